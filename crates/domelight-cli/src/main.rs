@@ -1,0 +1,2 @@
+//! The program `domelight`.
+fn main() {}

@@ -1,0 +1,1 @@
+//! The distant light: radiance over directions, its importance table and its look-up.

@@ -1,0 +1,58 @@
+//! Axis-aligned boxes.
+
+use crate::math::Vec3;
+
+/// An axis-aligned box; empty when a minimum exceeds its maximum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Least corner.
+    pub min: Vec3,
+    /// Greatest corner.
+    pub max: Vec3,
+}
+
+impl Aabb {
+    /// The box that holds nothing.
+    pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    /// The least box around some points; NaN coordinates are passed over.
+    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
+        points.into_iter().fold(Self::EMPTY, |b, p| b.including(p))
+    }
+
+    /// The least box around this one and `p`.
+    #[must_use]
+    pub fn including(self, p: Vec3) -> Self {
+        Self { min: self.min.min(p), max: self.max.max(p) }
+    }
+
+    /// The least box around both.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Holds no point.
+    pub fn is_empty(&self) -> bool {
+        !self.min.cmple(self.max).all()
+    }
+
+    /// The middle; NaN for an empty box.
+    pub fn center(&self) -> Vec3 {
+        0.5 * (self.min + self.max)
+    }
+
+    /// The lengths of the edges.
+    pub fn size(&self) -> Vec3 {
+        self.max - self.min
+    }
+
+    /// Half the surface area; 0 for an empty box.
+    pub fn half_area(&self) -> f32 {
+        if self.is_empty() {
+            return 0.0;
+        }
+        let s = self.size();
+        s.x * s.y + s.y * s.z + s.z * s.x
+    }
+}

@@ -1,0 +1,112 @@
+//! Rays, one and many, and where they hit.
+
+use crate::math::Vec3;
+
+/// A ray with the open interval (0, `t_max`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Origin.
+    pub origin: Vec3,
+    /// Direction; distances are in units of its length.
+    pub direction: Vec3,
+    /// The end of the interval, `f32::INFINITY` for a shadow ray to the environment.
+    pub t_max: f32,
+}
+
+impl Ray {
+    /// A ray to infinity.
+    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self { origin, direction, t_max: f32::INFINITY }
+    }
+
+    /// origin + t · direction.
+    pub fn at(&self, t: f32) -> Vec3 {
+        self.origin + t * self.direction
+    }
+}
+
+/// The nearest intersection of a ray with a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance in units of the direction's length.
+    pub t: f32,
+    /// Barycentric weight of the triangle's second vertex.
+    pub u: f32,
+    /// Barycentric weight of the triangle's third vertex.
+    pub v: f32,
+    /// Index of the triangle.
+    pub triangle: u32,
+}
+
+/// Shadow rays to infinity in structure-of-arrays form.
+#[derive(Clone, Debug, Default)]
+pub struct RayBatch {
+    /// Origins.
+    pub origins: Vec<Vec3>,
+    /// Unit directions, as many as origins.
+    pub directions: Vec<Vec3>,
+}
+
+impl RayBatch {
+    /// Appends a ray.
+    pub fn push(&mut self, origin: Vec3, direction: Vec3) {
+        self.origins.push(origin);
+        self.directions.push(direction);
+    }
+
+    /// How many rays.
+    pub fn len(&self) -> usize {
+        self.origins.len()
+    }
+
+    /// No rays.
+    pub fn is_empty(&self) -> bool {
+        self.origins.is_empty()
+    }
+
+    /// Forgets the rays and keeps the memory.
+    pub fn clear(&mut self) {
+        self.origins.clear();
+        self.directions.clear();
+    }
+}
+
+/// Moves a ray's origin off the surface, to the side that `normal` points to, by a few units in
+/// the last place: far enough not to hit the surface it starts on, near enough not to be seen.
+///
+/// Wächter & Binder 2019, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing
+/// Gems chapter 6.
+pub fn offset_origin(position: Vec3, normal: Vec3) -> Vec3 {
+    const ORIGIN: f32 = 1.0 / 32.0;
+    const FLOAT_SCALE: f32 = 1.0 / 65536.0;
+    const INT_SCALE: f32 = 256.0;
+    let offset = |p: f32, n: f32| {
+        if p.abs() < ORIGIN {
+            return p + FLOAT_SCALE * n;
+        }
+        let steps = (INT_SCALE * n) as i32;
+        f32::from_bits(p.to_bits().wrapping_add_signed(if p < 0.0 { -steps } else { steps }))
+    };
+    Vec3::new(
+        offset(position.x, normal.x),
+        offset(position.y, normal.y),
+        offset(position.z, normal.z),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::vec3;
+
+    #[test]
+    fn the_offset_goes_to_the_side_of_the_normal() {
+        for p in [vec3(0.0, 1e-3, 1e3), vec3(-5.0, -1e-9, 2.0)] {
+            for n in [vec3(0.6, -0.8, 0.0), vec3(0.0, 0.0, 1.0), vec3(-0.6, 0.0, -0.8)] {
+                let q = offset_origin(p, n);
+                assert!((q - p).dot(n) > 0.0);
+                assert!((q - p).length() < 1e-4 * p.length());
+            }
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Vectors and the local frame of a shading point.
+//!
+//! The world is right-handed with +Y up. Vectors are [`glam`]'s; directions are unit vectors.
+
+pub use glam::{Mat3, Mat4, Vec2, Vec3, Vec4, vec2, vec3};
+
+pub use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
+
+/// 1 / (4π), the density of the uniform distribution over the sphere \[sr⁻¹\].
+pub const FRAC_1_4PI: f32 = 0.25 * FRAC_1_PI;
+
+/// An orthonormal right-handed basis; `z` is the shading normal, `x` the tangent.
+///
+/// BRDF code works in the local frame, where the cosine to the normal is the z component.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Tangent, the direction of `alpha_x` of an anisotropic lobe.
+    pub x: Vec3,
+    /// Bitangent, `z × x`.
+    pub y: Vec3,
+    /// Normal.
+    pub z: Vec3,
+}
+
+impl Frame {
+    /// A frame around the unit vector `z`, continuous everywhere but at z = −Z.
+    ///
+    /// Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
+    pub fn from_z(z: Vec3) -> Self {
+        let sign = 1f32.copysign(z.z);
+        let a = -1.0 / (sign + z.z);
+        let b = z.x * z.y * a;
+        Self {
+            x: vec3(1.0 + sign * z.x * z.x * a, sign * b, -sign * z.x),
+            y: vec3(b, sign + z.y * z.y * a, -z.y),
+            z,
+        }
+    }
+
+    /// A frame around the unit vector `z` whose x axis lies as near to `tangent` as it can.
+    ///
+    /// Falls back to [`Frame::from_z`] where `tangent` is parallel to `z`, zero or not finite.
+    pub fn from_z_and_tangent(z: Vec3, tangent: Vec3) -> Self {
+        let x = tangent - z * z.dot(tangent);
+        match x.try_normalize() {
+            Some(x) if x.length_squared() > 0.5 => Self { x, y: z.cross(x), z },
+            _ => Self::from_z(z),
+        }
+    }
+
+    /// World to local.
+    pub fn to_local(&self, v: Vec3) -> Vec3 {
+        vec3(self.x.dot(v), self.y.dot(v), self.z.dot(v))
+    }
+
+    /// Local to world.
+    pub fn to_world(&self, v: Vec3) -> Vec3 {
+        self.x * v.x + self.y * v.y + self.z * v.z
+    }
+}
+
+/// The mirror direction of `w` about the unit vector `n`; both point away from the surface.
+pub fn reflect(w: Vec3, n: Vec3) -> Vec3 {
+    2.0 * w.dot(n) * n - w
+}
+
+/// A unit vector from spherical angles about +z: cos θ, and φ from +x \[rad\].
+pub fn from_spherical(cos_theta: f32, phi: f32) -> Vec3 {
+    let sin_theta = ((1.0 - cos_theta) * (1.0 + cos_theta)).max(0.0).sqrt();
+    let (sin_phi, cos_phi) = phi.sin_cos();
+    vec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
+}
+
+/// x².
+pub fn sqr(x: f32) -> f32 {
+    x * x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_orthonormal_and_right_handed() {
+        for i in 0..200 {
+            let t = i as f32 / 199.0;
+            let z = from_spherical(1.0 - 2.0 * t, 37.0 * t);
+            for f in [Frame::from_z(z), Frame::from_z_and_tangent(z, vec3(0.3, 1.0, -0.2))] {
+                assert!((f.x.cross(f.y) - f.z).length() < 1e-5);
+                assert!(f.x.dot(f.y).abs() < 1e-6 && (f.x.length() - 1.0).abs() < 1e-6);
+                let v = vec3(0.1, -0.7, 0.4);
+                assert!((f.to_world(f.to_local(v)) - v).length() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn a_useless_tangent_falls_back() {
+        for tangent in [Vec3::ZERO, Vec3::Z, Vec3::NAN, vec3(0.0, 0.0, 1e-30)] {
+            assert_eq!(Frame::from_z_and_tangent(Vec3::Z, tangent), Frame::from_z(Vec3::Z));
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Pictures on disk: readers, writers, tone curves, comparison.
