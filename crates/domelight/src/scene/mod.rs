@@ -1,1 +1,3 @@
-//! To be written.
+//! Scenes: the built-in ones.
+
+pub mod builtin;
