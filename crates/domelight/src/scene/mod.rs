@@ -4,6 +4,7 @@
 //! the ray-tracing hierarchy; after that nothing fails. [`Scene::surface_point`] turns a hit into
 //! all that shading needs.
 
+pub mod builtin;
 mod camera;
 mod description;
 mod shading;
