@@ -6,6 +6,8 @@
 //! single bright texel's light, for the table is zero where the interpolant is not.)
 
 mod compensation;
+#[cfg(feature = "io")]
+pub mod io;
 pub mod mapping;
 
 pub use compensation::CompensatedTable;
