@@ -1,1 +1,2 @@
 //! The distant light: radiance over directions, its importance table and its look-up.
+pub mod builtin;
