@@ -19,7 +19,7 @@ const BAY: f32 = 6.0;
 
 const LAMP_RADIUS: f32 = 0.13;
 const LAMP_COLOR: Rgb = Rgb::new(640.0, 430.0, 215.0);
-const STONE: Rgb = Rgb::new(0.105, 0.088, 0.070);
+const STONE: Rgb = Rgb::new(0.078, 0.064, 0.050);
 
 /// Radiance from the direction `d`.
 pub(super) fn radiance(d: Vec3) -> Rgb {
@@ -98,7 +98,7 @@ fn masonry(u: f32, v: f32, light: f32) -> Rgb {
     let joint = edge_distance(v / 0.45) * 0.45;
     let joint = joint.min(edge_distance(u / 0.9 + 0.5 * row.rem_euclid(2.0)) * 0.9);
     let shade = (0.82 + 0.36 * tint) * (0.62 + 0.38 * smoothstep(0.0, 0.035, joint));
-    STONE.lerp(Rgb::new(0.098, 0.092, 0.086), hash(row, column + 7.0)) * (shade * light)
+    STONE.lerp(Rgb::new(0.072, 0.067, 0.062), hash(row, column + 7.0)) * (shade * light)
 }
 
 /// Warm light of the lamps and coloured spill of the windows on a point of the stone.
@@ -113,7 +113,7 @@ fn floor(p: Vec3) -> Rgb {
     let (i, j) = ((p.x / 1.1).floor(), (p.z / 1.1).floor());
     let dark = (i + j).rem_euclid(2.0);
     let joint = edge_distance(p.x / 1.1).min(edge_distance(p.z / 1.1));
-    let tile = Rgb::new(0.125, 0.098, 0.074).lerp(Rgb::new(0.048, 0.040, 0.038), dark);
+    let tile = Rgb::new(0.080, 0.062, 0.047).lerp(Rgb::new(0.030, 0.025, 0.024), dark);
     let worn = 0.8 + 0.4 * hash(i, j);
     let spill = Rgb::new(0.05, 0.06, 0.14) * (-(sqr(p.x + 1.4) / 2.0 + sqr((p.z + 14.0) / 6.0))).exp()
         + Rgb::new(0.17, 0.055, 0.03) * (-(sqr(p.x - 1.0) / 2.5 + sqr((p.z + 9.0) / 4.0))).exp();
@@ -144,13 +144,13 @@ fn side(p: Vec3) -> Rgb {
         let shafts = 0.75 + 0.25 * (9.0 * round).cos();
         return masonry(3.0, p.y, 1.0).lerp(STONE, 0.6) * (glow(p) * shafts * (1.45 - 0.9 * round * round));
     }
-    let oculus = q - vec2(0.0, 7.75);
-    if oculus.length() < 0.62 {
-        let brightness = if sunny { 520.0 } else { 7.0 };
-        return roundel(oculus / 0.62, bay) * brightness;
+    let oculus = q - vec2(0.0, 8.1);
+    if oculus.length() < 0.52 {
+        let brightness = if sunny { 1000.0 } else { 7.0 };
+        return roundel(oculus / 0.52, bay) * brightness;
     }
-    if let Some(g) = lancet(q, 1.15, 4.1, 6.3) {
-        let brightness = if sunny { 6.5 } else { 2.6 };
+    if let Some(g) = lancet(q, 1.05, 4.1, 5.4) {
+        let brightness = if sunny { 4.5 } else { 2.2 };
         return glass(g, bay) * brightness;
     }
     let arch = arch_distance(q, 2.1, 1.1);
@@ -173,7 +173,7 @@ fn end(p: Vec3, sun: f32) -> Rgb {
     for (i, x) in [-2.6f32, 0.0, 2.6].into_iter().enumerate() {
         let top = if i == 1 { 5.4 } else { 4.6 };
         if let Some(g) = lancet(q - vec2(x, 0.0), 0.62, 1.4, top) {
-            return glass(g, 11.0 + i as f32) * (230.0 * sun);
+            return glass(g, 11.0 + i as f32) * (150.0 * sun);
         }
     }
     let frame = smoothstep(1.18, 1.04, rose.length());

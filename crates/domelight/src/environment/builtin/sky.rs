@@ -15,10 +15,10 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use super::{averaged, direction};
 use crate::color::Rgb;
 use crate::image::RgbImage;
-use crate::math::Vec3;
+use crate::math::{Vec3, vec3};
 
 /// Haziness: 2 is very clear, 3 clear, 6 warm and moist.
-const TURBIDITY: f64 = 2.6;
+const TURBIDITY: f64 = 2.3;
 /// Angle of the sun from the zenith \[rad\]: 36° above the horizon.
 const SUN_THETA: f64 = 54.0 * PI / 180.0;
 /// Angle of the sun from −Z toward +X \[rad\]: over the left shoulder of who looks along −Z.
@@ -30,13 +30,15 @@ const SOLAR_ILLUMINANCE: f64 = 133.0;
 /// Lambert reflectance of the ground: dry soil.
 const GROUND_ALBEDO: [f64; 3] = [0.27, 0.235, 0.19];
 /// Luminance of one unit of radiance \[kcd/m²\]: a white surface that faces the sun comes out at about 1.5.
-const UNIT: f64 = 19.0;
+const UNIT: f64 = 22.0;
+/// Height of the eye over the ground as a part of the visibility: how fast the ground fades into the horizon.
+const HAZE: f32 = 0.012;
 
 /// The lat-long map of sky, sun and ground.
 pub(super) fn image(height: usize) -> RgbImage {
     let sky = Sky::new(TURBIDITY, SUN_THETA, SUN_PHI);
     let ground = sky.ground();
-    let mut image = averaged(height, 512, |d| if d.y > 0.0 { sky.radiance(d) } else { ground });
+    let mut image = averaged(height, 512, |d| if d.y > 0.0 { sky.radiance(d) } else { sky.hazy(ground, d) });
     sky.add_sun(&mut image);
     image
 }
@@ -72,6 +74,12 @@ impl Sky {
         let gamma = (d.dot(self.sun) as f64).clamp(-1.0, 1.0).acos();
         let [luminance, x, y] = [0, 1, 2].map(|i| self.scale[i] * distribution(&self.perez[i], d.y as f64, gamma));
         rgb_of_chromaticity(luminance / UNIT, x, y)
+    }
+
+    /// The ground seen along `d` through the air, which takes the colour of the horizon above it.
+    fn hazy(&self, ground: Rgb, d: Vec3) -> Rgb {
+        let horizon = self.radiance(vec3(d.x, 0.02, d.z).normalize());
+        horizon.lerp(ground, (HAZE / d.y.min(-1e-6)).exp())
     }
 
     /// Radiance of the Lambertian ground: albedo · E / π with E the irradiance from sky and sun.
