@@ -45,8 +45,10 @@ enum Wall {
 
 /// What the ray from the origin along `d` meets, and where.
 fn hit(d: Vec3) -> (Wall, Vec3) {
-    let along = |component: f32, at: f32| if component * at > 0.0 { at / component } else { f32::INFINITY };
-    let (t_end, end) = if d.z < 0.0 { (along(d.z, EAST), Wall::East) } else { (along(d.z, WEST), Wall::West) };
+    let along =
+        |component: f32, at: f32| if component * at > 0.0 { at / component } else { f32::INFINITY };
+    let (t_end, end) =
+        if d.z < 0.0 { (along(d.z, EAST), Wall::East) } else { (along(d.z, WEST), Wall::West) };
     let t_side = along(d.x, HALF_WIDTH.copysign(d.x));
     let t_floor = along(d.y, FLOOR);
     let t_around = if d.y * t_side.min(1e6) > SPRING { vault_distance(d) } else { t_side };
@@ -115,7 +117,8 @@ fn floor(p: Vec3) -> Rgb {
     let joint = edge_distance(p.x / 1.1).min(edge_distance(p.z / 1.1));
     let tile = Rgb::new(0.080, 0.062, 0.047).lerp(Rgb::new(0.030, 0.025, 0.024), dark);
     let worn = 0.8 + 0.4 * hash(i, j);
-    let spill = Rgb::new(0.05, 0.06, 0.14) * (-(sqr(p.x + 1.4) / 2.0 + sqr((p.z + 14.0) / 6.0))).exp()
+    let spill = Rgb::new(0.05, 0.06, 0.14)
+        * (-(sqr(p.x + 1.4) / 2.0 + sqr((p.z + 14.0) / 6.0))).exp()
         + Rgb::new(0.17, 0.055, 0.03) * (-(sqr(p.x - 1.0) / 2.5 + sqr((p.z + 9.0) / 4.0))).exp();
     tile * (worn * glow(p) * (0.5 + 0.5 * smoothstep(0.0, 0.03, joint))) + spill
 }
@@ -142,11 +145,12 @@ fn side(p: Vec3) -> Rgb {
     if q.x.abs() > 0.5 * BAY - 0.42 {
         let round = (0.5 * BAY - q.x.abs()) / 0.42;
         let shafts = 0.75 + 0.25 * (9.0 * round).cos();
-        return masonry(3.0, p.y, 1.0).lerp(STONE, 0.6) * (glow(p) * shafts * (1.45 - 0.9 * round * round));
+        return masonry(3.0, p.y, 1.0).lerp(STONE, 0.6)
+            * (glow(p) * shafts * (1.45 - 0.9 * round * round));
     }
     let oculus = q - vec2(0.0, 8.1);
     if oculus.length() < 0.52 {
-        let brightness = if sunny { 1000.0 } else { 7.0 };
+        let brightness = if sunny { 830.0 } else { 7.0 };
         return roundel(oculus / 0.52, bay) * brightness;
     }
     if let Some(g) = lancet(q, 1.05, 4.1, 5.4) {
@@ -156,7 +160,8 @@ fn side(p: Vec3) -> Rgb {
     let arch = arch_distance(q, 2.1, 1.1);
     if arch < 0.0 {
         let deep = smoothstep(0.0, -1.6, arch);
-        return masonry(p.z, p.y, 0.75 * glow(p) * (1.0 - 0.85 * deep)) + Rgb::new(0.012, 0.007, 0.004) * (1.0 - deep);
+        return masonry(p.z, p.y, 0.75 * glow(p) * (1.0 - 0.85 * deep))
+            + Rgb::new(0.012, 0.007, 0.004) * (1.0 - deep);
     }
     let moulding = smoothstep(0.32, 0.0, arch) * (0.65 + 0.35 * (40.0 * arch).cos());
     let string = smoothstep(0.16, 0.1, (p.y - 3.7).abs());
@@ -224,10 +229,18 @@ fn roundel(q: Vec2, seed: f32) -> Rgb {
 fn rose_window(q: Vec2) -> Rgb {
     let r = q.length();
     let turn = q.y.atan2(q.x) / std::f32::consts::TAU;
-    let (count, ring) = if r > 0.62 { (24.0, 2.0) } else { (12.0, if r > 0.22 { 1.0 } else { 0.0 }) };
+    let (count, ring) =
+        if r > 0.62 { (24.0, 2.0) } else { (12.0, if r > 0.22 { 1.0 } else { 0.0 }) };
     let petal = turn * count;
-    let lead = (edge_distance(petal) * r * 6.0 / count).min((r - 0.62).abs()).min((r - 0.22).abs()).min(1.0 - r);
-    let hue = [0.95, 0.15 + 0.45 * petal.floor().rem_euclid(2.0), 0.02 + 0.3 * petal.floor().rem_euclid(3.0)];
+    let lead = (edge_distance(petal) * r * 6.0 / count)
+        .min((r - 0.62).abs())
+        .min((r - 0.22).abs())
+        .min(1.0 - r);
+    let hue = [
+        0.95,
+        0.15 + 0.45 * petal.floor().rem_euclid(2.0),
+        0.02 + 0.3 * petal.floor().rem_euclid(3.0),
+    ];
     pane(hue[ring as usize]) * (0.03 + 0.97 * smoothstep(0.012, 0.035, lead))
 }
 

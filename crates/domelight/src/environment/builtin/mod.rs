@@ -60,7 +60,9 @@ impl BuiltinProbe {
         match self {
             Self::Sky => "clear afternoon sky with a true-size sun, over a plain ground",
             Self::Studio => "dark room with soft boxes: warm key, cool fill and rims, overhead",
-            Self::Cathedral => "dim nave, small bright stained glass and lamps (2/3 of the energy in 0.1 % of the pixels)",
+            Self::Cathedral => {
+                "dim nave, small bright stained glass and lamps (2/3 of the energy in 0.1 % of the pixels)"
+            }
             Self::Constant => "radiance 1 everywhere, the white furnace",
         }
     }
@@ -93,7 +95,10 @@ impl FromStr for BuiltinProbe {
     type Err = UnknownProbe;
 
     fn from_str(name: &str) -> Result<Self, UnknownProbe> {
-        Self::ALL.into_iter().find(|p| p.name() == name).ok_or_else(|| UnknownProbe { name: name.to_owned() })
+        Self::ALL
+            .into_iter()
+            .find(|p| p.name() == name)
+            .ok_or_else(|| UnknownProbe { name: name.to_owned() })
     }
 }
 
@@ -189,7 +194,10 @@ mod tests {
                 assert_eq!((image.width, image.height), (2 * height, height));
                 assert!(image.pixels.iter().all(|p| p.is_finite() && p.min_component() >= 0.0));
                 for (a, b) in mean(&image).into_iter().zip(fine) {
-                    assert!((a / b - 1.0).abs() < 0.02, "{probe} at {height} rows: {a} against {b}");
+                    assert!(
+                        (a / b - 1.0).abs() < 0.02,
+                        "{probe} at {height} rows: {a} against {b}"
+                    );
                 }
             }
         }
@@ -205,10 +213,13 @@ mod tests {
         for height in [512, 1024] {
             let image = BuiltinProbe::Cathedral.image(height);
             let mut texels: Vec<(f32, f64)> = (0..height)
-                .flat_map(|y| image.row(y).iter().map(move |p| (p.luminance(), texel_solid_angle(y, height))))
+                .flat_map(|y| {
+                    image.row(y).iter().map(move |p| (p.luminance(), texel_solid_angle(y, height)))
+                })
                 .collect();
             texels.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let energy = |texels: &[(f32, f64)]| texels.iter().map(|t| t.0 as f64 * t.1).sum::<f64>();
+            let energy =
+                |texels: &[(f32, f64)]| texels.iter().map(|t| t.0 as f64 * t.1).sum::<f64>();
             let share = energy(&texels[..texels.len() / 1000]) / energy(&texels);
             let peak = texels[0].0 as f64 / (energy(&texels) / (4.0 * PI));
             println!("{height} rows: share {share:.3}, peak {peak:.0}, mean {:?}", mean(&image));

@@ -3,7 +3,9 @@
 //! Sky: Preetham, Shirley, Smits 1999, "A Practical Analytic Model for Daylight", SIGGRAPH: Perez's
 //! five-parameter distribution for luminance Y and chromaticity x, y, fitted over turbidity
 //! (appendix A.2). Sun: the same paper's attenuation by air, aerosol and ozone (appendix A.1) of a
-//! 5778 K black body outside the atmosphere.
+//! 5778 K black body outside the atmosphere. The paper's zenith luminance is about twice too high on
+//! clear days (Zotti, Wilkie, Purgathofer 2007, "A Critical Review of the Preetham Skylight Model"), so
+//! the sky as a whole is scaled to the measured illuminance of clear skies instead.
 //!
 //! Hošek and Wilkie 2012 is more accurate at high turbidity and low sun, but needs tables of some
 //! thousand coefficients; at the turbidity and sun height used here the two differ little. The CIE
@@ -30,7 +32,7 @@ const SOLAR_ILLUMINANCE: f64 = 133.0;
 /// Lambert reflectance of the ground: dry soil.
 const GROUND_ALBEDO: [f64; 3] = [0.27, 0.235, 0.19];
 /// Luminance of one unit of radiance \[kcd/m²\]: a white surface that faces the sun comes out at about 1.5.
-const UNIT: f64 = 22.0;
+const UNIT: f64 = 18.0;
 /// Height of the eye over the ground as a part of the visibility: how fast the ground fades into the horizon.
 const HAZE: f32 = 0.012;
 
@@ -38,7 +40,8 @@ const HAZE: f32 = 0.012;
 pub(super) fn image(height: usize) -> RgbImage {
     let sky = Sky::new(TURBIDITY, SUN_THETA, SUN_PHI);
     let ground = sky.ground();
-    let mut image = averaged(height, 512, |d| if d.y > 0.0 { sky.radiance(d) } else { sky.hazy(ground, d) });
+    let mut image =
+        averaged(height, 512, |d| if d.y > 0.0 { sky.radiance(d) } else { sky.hazy(ground, d) });
     sky.add_sun(&mut image);
     image
 }
@@ -51,7 +54,7 @@ struct Sky {
     sun_radiance: Rgb,
     /// A to E of Y, x, y.
     perez: [[f64; 5]; 3],
-    /// Zenith value of Y \[kcd/m²\], x, y over the distribution there.
+    /// Y \[kcd/m²\], x and y in units of their distributions.
     scale: [f64; 3],
 }
 
@@ -59,20 +62,44 @@ impl Sky {
     fn new(turbidity: f64, sun_theta: f64, sun_phi: f64) -> Self {
         let t = turbidity;
         let perez = [
-            [0.1787 * t - 1.4630, -0.3554 * t + 0.4275, -0.0227 * t + 5.3251, 0.1206 * t - 2.5771, -0.0670 * t + 0.3703],
-            [-0.0193 * t - 0.2592, -0.0665 * t + 0.0008, -0.0004 * t + 0.2125, -0.0641 * t - 0.8989, -0.0033 * t + 0.0452],
-            [-0.0167 * t - 0.2608, -0.0950 * t + 0.0092, -0.0079 * t + 0.2102, -0.0441 * t - 1.6537, -0.0109 * t + 0.0529],
+            [
+                0.1787 * t - 1.4630,
+                -0.3554 * t + 0.4275,
+                -0.0227 * t + 5.3251,
+                0.1206 * t - 2.5771,
+                -0.0670 * t + 0.3703,
+            ],
+            [
+                -0.0193 * t - 0.2592,
+                -0.0665 * t + 0.0008,
+                -0.0004 * t + 0.2125,
+                -0.0641 * t - 0.8989,
+                -0.0033 * t + 0.0452,
+            ],
+            [
+                -0.0167 * t - 0.2608,
+                -0.0950 * t + 0.0092,
+                -0.0079 * t + 0.2102,
+                -0.0441 * t - 1.6537,
+                -0.0109 * t + 0.0529,
+            ],
         ];
-        let zenith = zenith(t, sun_theta);
-        let scale = [0, 1, 2].map(|i| zenith[i] / distribution(&perez[i], 1.0, sun_theta));
+        let [x, y] = zenith_chromaticity(t, sun_theta);
+        let at_zenith = |i: usize| distribution(&perez[i], 1.0, sun_theta);
+        let scale = [1.0, x / at_zenith(1), y / at_zenith(2)];
         let sun_radiance = sun_radiance(t, sun_theta);
-        Self { sun: direction(sun_theta, sun_phi), sun_theta, sun_phi, sun_radiance, perez, scale }
+        let sun = direction(sun_theta, sun_phi);
+        let mut sky = Self { sun, sun_theta, sun_phi, sun_radiance, perez, scale };
+        sky.scale[0] =
+            clear_sky_illuminance(sun_theta) / UNIT / sky.irradiance().luminance() as f64;
+        sky
     }
 
     /// Radiance of the sky without the sun; `d` above the horizon.
     fn radiance(&self, d: Vec3) -> Rgb {
         let gamma = (d.dot(self.sun) as f64).clamp(-1.0, 1.0).acos();
-        let [luminance, x, y] = [0, 1, 2].map(|i| self.scale[i] * distribution(&self.perez[i], d.y as f64, gamma));
+        let [luminance, x, y] =
+            [0, 1, 2].map(|i| self.scale[i] * distribution(&self.perez[i], d.y as f64, gamma));
         rgb_of_chromaticity(luminance / UNIT, x, y)
     }
 
@@ -82,17 +109,28 @@ impl Sky {
         horizon.lerp(ground, (HAZE / d.y.min(-1e-6)).exp())
     }
 
-    /// Radiance of the Lambertian ground: albedo · E / π with E the irradiance from sky and sun.
+    /// Irradiance of the ground by the sky without the sun.
+    fn irradiance(&self) -> Rgb {
+        const N: usize = 64;
+        let d_theta = FRAC_PI_2 / N as f64;
+        let d_phi = TAU / (4 * N) as f64;
+        let ring = |theta: f64| -> Rgb {
+            let radiance = |j: usize| self.radiance(direction(theta, d_phi * j as f64));
+            (0..4 * N).map(radiance).sum::<Rgb>()
+                * (theta.sin() * theta.cos() * d_theta * d_phi) as f32
+        };
+        (0..N).map(|i| ring(d_theta * (i as f64 + 0.5))).sum()
+    }
+
+    /// Irradiance of the ground by the sun.
+    fn sun_irradiance(&self) -> Rgb {
+        self.sun_radiance * (sun_solid_angle() * self.sun_theta.cos()) as f32
+    }
+
+    /// Radiance of the Lambertian ground: albedo · E / π.
     fn ground(&self) -> Rgb {
-        let n = 64;
-        let d_omega_cos = |theta: f64| theta.sin() * theta.cos() * FRAC_PI_2 / n as f64 * TAU / (4 * n) as f64;
-        let mut irradiance = self.sun_radiance * (sun_solid_angle() * self.sun_theta.cos()) as f32;
-        for i in 0..n {
-            let theta = FRAC_PI_2 * (i as f64 + 0.5) / n as f64;
-            let ring: Rgb = (0..4 * n).map(|j| self.radiance(direction(theta, TAU * j as f64 / (4 * n) as f64))).sum();
-            irradiance += ring * d_omega_cos(theta) as f32;
-        }
-        irradiance * Rgb::from(GROUND_ALBEDO.map(|a| (a / PI) as f32))
+        (self.irradiance() + self.sun_irradiance())
+            * Rgb::from(GROUND_ALBEDO.map(|a| (a / PI) as f32))
     }
 
     /// Adds the disc of the sun, each texel by the part of it that the disc covers.
@@ -114,7 +152,8 @@ impl Sky {
             for column in span(self.sun_phi + PI, 1.1 * SUN_RADIUS / self.sun_theta.sin()) {
                 let phi = (column as f64 + 0.5) * cell - PI;
                 if angle_to(self.sun_theta, self.sun_phi, theta, phi) < SUN_RADIUS {
-                    let (x, y) = (column.rem_euclid(columns as isize) as usize / grid, row as usize / grid);
+                    let (x, y) =
+                        (column.rem_euclid(columns as isize) as usize / grid, row as usize / grid);
                     covered.push((y * image.width + x, solid_angle));
                 }
             }
@@ -131,13 +170,18 @@ impl Sky {
 /// Perez 1993 (Preetham et al., equation 3): (1 + A e^{B/cos θ})(1 + C e^{Dγ} + E cos² γ).
 fn distribution([a, b, c, d, e]: &[f64; 5], cos_theta: f64, gamma: f64) -> f64 {
     let cos_gamma = gamma.cos();
-    (1.0 + a * (b / cos_theta.max(1e-3)).exp()) * (1.0 + c * (d * gamma).exp() + e * cos_gamma * cos_gamma)
+    (1.0 + a * (b / cos_theta.max(1e-3)).exp())
+        * (1.0 + c * (d * gamma).exp() + e * cos_gamma * cos_gamma)
 }
 
-/// Y \[kcd/m²\], x and y at the zenith, of appendix A.2.
-fn zenith(t: f64, sun_theta: f64) -> [f64; 3] {
-    let chi = (4.0 / 9.0 - t / 120.0) * (PI - 2.0 * sun_theta);
-    let luminance = (4.0453 * t - 4.9710) * chi.tan() - 0.2155 * t + 2.4192;
+/// Illuminance of the ground by a clear sky without its sun \[klx\]: IESNA 2000, The IESNA Lighting
+/// Handbook, 9th edition, chapter 8.
+fn clear_sky_illuminance(sun_theta: f64) -> f64 {
+    0.8 + 15.5 * sun_theta.cos().sqrt()
+}
+
+/// x and y at the zenith, of appendix A.2.
+fn zenith_chromaticity(t: f64, sun_theta: f64) -> [f64; 2] {
     let cubic = |[a, b, c, d]: [f64; 4]| ((a * sun_theta + b) * sun_theta + c) * sun_theta + d;
     let fit = |m: [[f64; 4]; 3]| (cubic(m[0]) * t + cubic(m[1])) * t + cubic(m[2]);
     let x = fit([
@@ -150,7 +194,7 @@ fn zenith(t: f64, sun_theta: f64) -> [f64; 3] {
         [-0.04214, 0.08970, -0.04153, 0.00516],
         [0.15346, -0.26756, 0.06670, 0.26688],
     ]);
-    [luminance, x, y]
+    [x, y]
 }
 
 /// Radiance of the sun's disc through the atmosphere, of appendix A.1, at one wavelength a primary.
@@ -159,10 +203,12 @@ fn sun_radiance(turbidity: f64, theta: f64) -> Rgb {
     let air_mass = 1.0 / (theta.cos() + 0.15 * (93.885 - theta.to_degrees()).powf(-1.253));
     let aerosol = 0.04608 * turbidity - 0.04586;
     // Wavelength [µm] and ozone absorption [1/cm] of 0.35 cm of ozone.
-    let transmittance = [(0.61, 0.12), (0.55, 0.085), (0.465, 0.008)].map(|(wavelength, ozone): (f64, f64)| {
-        let depth = 0.008735 * wavelength.powf(-4.08) + aerosol * wavelength.powf(-1.3) + 0.35 * ozone;
-        (-depth * air_mass).exp() as f32
-    });
+    let transmittance =
+        [(0.61, 0.12), (0.55, 0.085), (0.465, 0.008)].map(|(wavelength, ozone): (f64, f64)| {
+            let depth =
+                0.008735 * wavelength.powf(-4.08) + aerosol * wavelength.powf(-1.3) + 0.35 * ozone;
+            (-depth * air_mass).exp() as f32
+        });
     outside * Rgb::from(transmittance)
 }
 
@@ -203,7 +249,10 @@ mod tests {
         let mut image = RgbImage::filled(2 * height, height, Rgb::BLACK);
         sky.add_sun(&mut image);
         (0..height)
-            .map(|y| image.row(y).iter().map(|p| p.luminance() as f64).sum::<f64>() * texel_solid_angle(y, height))
+            .map(|y| {
+                image.row(y).iter().map(|p| p.luminance() as f64).sum::<f64>()
+                    * texel_solid_angle(y, height)
+            })
             .sum()
     }
 
@@ -223,7 +272,8 @@ mod tests {
         sky.add_sun(&mut image);
         let peak = image.pixels.iter().map(|p| p.luminance()).fold(0.0, f32::max);
         assert!((peak / sky.sun_radiance.luminance() - 1.0).abs() < 0.01);
-        let rows: Vec<usize> = (0..height).filter(|&y| image.row(y).iter().any(|p| !p.is_black())).collect();
+        let rows: Vec<usize> =
+            (0..height).filter(|&y| image.row(y).iter().any(|p| !p.is_black())).collect();
         let degrees = rows.len() as f64 * 180.0 / height as f64;
         assert!((degrees - 0.53).abs() < 0.09, "{degrees}");
     }
@@ -231,13 +281,8 @@ mod tests {
     #[test]
     fn a_clear_day_has_a_strong_sun_and_a_blue_sky() {
         let sky = Sky::new(TURBIDITY, SUN_THETA, SUN_PHI);
-        let sun = sky.sun_radiance * (sun_solid_angle() * SUN_THETA.cos()) as f32;
-        let albedo = Rgb::from(GROUND_ALBEDO.map(|a| a as f32));
-        let ground = sky.ground();
-        let all = Rgb::new(ground.r / albedo.r, ground.g / albedo.g, ground.b / albedo.b) * PI as f32;
-        let diffuse = all - sun;
+        let (sun, diffuse) = (sky.sun_irradiance(), sky.irradiance());
         let ratio = sun.luminance() / diffuse.luminance();
-        println!("sun {sun:?} sky {diffuse:?} ratio {ratio} zenith {:?}", sky.radiance(Vec3::Y));
         assert!((3.0..7.0).contains(&ratio), "{ratio}");
         assert!(sky.radiance(Vec3::Y).b > 1.5 * sky.radiance(Vec3::Y).r);
         assert!(sun.r > sun.b);
