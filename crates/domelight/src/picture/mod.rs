@@ -7,8 +7,10 @@
 //! Writers make bytes ([`hdr::encode`], [`exr::ExrLayers::encode`], [`pfm::encode`], [`png::encode`]);
 //! [`write_atomically`] puts them into a file that is either the old one or the whole new one.
 
+pub mod compare;
 mod error;
 pub mod exr;
+pub mod flip;
 pub mod hdr;
 mod output;
 pub mod pfm;
