@@ -10,6 +10,7 @@ use domelight::strategy::{
     SampleNumbers, ShadingPoint,
 };
 use domelight::{Rgb, RgbImage};
+use rayon::prelude::*;
 use testkit::quadrature::{Adaptive, Rect};
 use testkit::{Suite, ZTest};
 
@@ -60,7 +61,7 @@ fn point(material: Material, theta: f32) -> ShadingPoint {
 
 /// The integral, texel by texel.
 fn quadrature(env: &Environment, at: &ShadingPoint, channel: usize) -> f64 {
-    let rule = Adaptive { tolerance: 1e-6, min_depth: 3, max_depth: 11 };
+    let rule = Adaptive { tolerance: 1e-5, min_depth: 2, max_depth: 8 };
     let mut sum = 0.0;
     for y in 0..HEIGHT {
         for x in 0..WIDTH {
@@ -113,7 +114,7 @@ fn batches<S: PointStrategy>(
     kind: SamplerKind,
 ) -> Vec<[f64; 3]> {
     assert!(S::UNBIASED);
-    (0..40).map(|b| estimate(strategy, env, at, Stream::new(kind, 5, b), 4096)).collect()
+    (0..40).map(|b| estimate(strategy, env, at, Stream::new(kind, 5, b), 1024)).collect()
 }
 
 #[test]
@@ -125,8 +126,8 @@ fn strategies_agree_with_quadrature() {
     let test = ZTest { suite, ..ZTest::default() };
     for env in &environments {
         let table = CompensatedTable::new(env);
-        for name in MATERIALS {
-            let material = name.parse::<MaterialSpec>().unwrap().material();
+        MATERIALS.par_iter().for_each(|name| {
+            let material = name.parse::<MaterialSpec>().unwrap().into();
             for theta in views {
                 let at = point(material, theta);
                 let reference = [0, 1, 2].map(|c| quadrature(env, &at, c));
@@ -154,7 +155,7 @@ fn strategies_agree_with_quadrature() {
                 let alone = mis(LightTable::Full, Heuristic::Balance, 2, 0);
                 check("mis 2:0", batches(&alone, env, &at, SamplerKind::Independent));
             }
-        }
+        });
     }
 }
 
@@ -168,7 +169,7 @@ fn white_environment() -> Environment {
 #[test]
 fn weights_that_sum_to_one_go_with_their_own_counts() {
     let env = environment(true, UpAxis::Y);
-    let material = "diffuse:0.8".parse::<MaterialSpec>().unwrap().material();
+    let material = "diffuse:0.8".parse::<MaterialSpec>().unwrap().into();
     let at = point(material, 0.5);
     let mis =
         MultipleImportanceSampling::new(&env, LightTable::Full, Heuristic::Balance, 1, 1).unwrap();
@@ -187,7 +188,7 @@ fn colours_are_not_lost_in_luminance() {
         _ => Rgb::new(0.0, 0.0, 1.0),
     });
     let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
-    let at = point("diffuse:0.8".parse::<MaterialSpec>().unwrap().material(), 0.4);
+    let at = point("diffuse:0.8".parse::<MaterialSpec>().unwrap().into(), 0.4);
     let light = EnvironmentSampling { environment: &env, n_samples: 1 };
     let reference = [0, 1, 2].map(|c| quadrature(&env, &at, c));
     let batches = batches(&light, &env, &at, SamplerKind::Independent);
