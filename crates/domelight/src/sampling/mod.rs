@@ -1,1 +1,3 @@
-//! To be written.
+//! Drawing from densities.
+
+pub mod warp;
