@@ -61,7 +61,7 @@ impl Scene {
         let wo = frame.to_local(viewer).normalize();
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
         let material = surface.material(&self.textures, uv, tint);
-        let albedo = albedo(&material, wo);
+        let albedo = material.albedo();
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
         SurfacePoint { position, ng, frame, wo, material, albedo }
     }
@@ -86,11 +86,6 @@ impl Scene {
         });
         (mapped.unwrap_or(normal), tangent)
     }
-}
-
-/// The material's albedo seen from `wo`.
-fn albedo(material: &Material, _wo: Vec3) -> Rgb {
-    material.albedo()
 }
 
 /// `normal` bent toward `viewer` until their cosine is [`MIN_COS_THETA_O`]; see the

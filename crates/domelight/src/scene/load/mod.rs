@@ -93,7 +93,7 @@ pub enum LoadError {
         /// Where in it.
         place: PlyPlace,
         /// What is wrong.
-        problem: PlyProblem,
+        problem: Box<PlyProblem>,
     },
     /// A broken OBJ or MTL file.
     #[error("{}, line {line}: {problem}", path.display())]
@@ -111,7 +111,7 @@ pub enum LoadError {
         /// The file.
         path: PathBuf,
         /// What is wrong, and where.
-        problem: GltfProblem,
+        problem: Box<GltfProblem>,
     },
     /// A broken scene file.
     #[error("{}{}: {problem}", path.display(), line.map(|l| format!(", line {l}")).unwrap_or_default())]
@@ -121,7 +121,7 @@ pub enum LoadError {
         /// Its line, from 1.
         line: Option<usize>,
         /// What is wrong.
-        problem: TomlProblem,
+        problem: Box<TomlProblem>,
     },
 }
 

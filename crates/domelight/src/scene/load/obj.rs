@@ -161,7 +161,9 @@ impl<'a> Reader<'a> {
                 let name = self.group_mut().name.clone();
                 self.start_group(name, Some(rest.to_owned()));
             }
-            "mtllib" if rest.is_empty() => return Err(at(ObjProblem::Name { keyword: keyword.into() })),
+            "mtllib" if rest.is_empty() => {
+                return Err(at(ObjProblem::Name { keyword: keyword.into() }));
+            }
             "mtllib" => self.library(number, rest)?,
             _ => {}
         }
@@ -230,7 +232,8 @@ impl<'a> Reader<'a> {
     }
 
     fn finish(mut self) -> Loaded {
-        self.colors.resize(if self.colors.is_empty() { 0 } else { self.positions.len() }, Rgb::WHITE);
+        self.colors
+            .resize(if self.colors.is_empty() { 0 } else { self.positions.len() }, Rgb::WHITE);
         let smooth = self.smooth_normals();
         let mut parts = Vec::new();
         for group in std::mem::take(&mut self.groups) {
@@ -291,7 +294,9 @@ impl<'a> Reader<'a> {
                     let position = corner.position as usize;
                     mesh.positions.push(self.positions[position]);
                     mesh.normals.push(
-                        corner.normal.map_or_else(|| smooth[position], |n| self.normals[n as usize]),
+                        corner
+                            .normal
+                            .map_or_else(|| smooth[position], |n| self.normals[n as usize]),
                     );
                     if has_uvs {
                         mesh.uvs.push(corner.uv.map_or(Vec2::ZERO, |t| self.uvs[t as usize]));

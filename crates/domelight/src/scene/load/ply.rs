@@ -59,7 +59,9 @@ pub enum PlyProblem {
         text: String,
     },
     /// A header without a usable format line.
-    #[error("the header names no format; it needs ascii, binary_little_endian or binary_big_endian")]
+    #[error(
+        "the header names no format; it needs ascii, binary_little_endian or binary_big_endian"
+    )]
     NoFormat,
     /// An element or a property that is needed is absent.
     #[error("the header declares no {what}")]
@@ -118,7 +120,7 @@ pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
     let mesh = parse(bytes).map_err(|(place, problem)| LoadError::Ply {
         path: path.into(),
         place,
-        problem,
+        problem: Box::new(problem),
     })?;
     let albedo = if mesh.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
     let description = SceneDescription {
@@ -136,8 +138,12 @@ fn parse(bytes: &[u8]) -> Located<Mesh> {
     let at = header.length;
     let mut mesh = match header.format {
         Format::Ascii => read_body(&header, &mut Ascii { data: body, position: 0, start: at })?,
-        Format::Little => read_body(&header, &mut Binary::<false> { data: body, start: at, position: 0 })?,
-        Format::Big => read_body(&header, &mut Binary::<true> { data: body, start: at, position: 0 })?,
+        Format::Little => {
+            read_body(&header, &mut Binary::<false> { data: body, start: at, position: 0 })?
+        }
+        Format::Big => {
+            read_body(&header, &mut Binary::<true> { data: body, start: at, position: 0 })?
+        }
     };
     if mesh.normals.is_empty() {
         mesh.compute_normals();
@@ -261,8 +267,7 @@ impl Header {
                     element.properties.push(Property { name: (*name).into(), list: None, scalar });
                 }
                 (["end_header"], _) => {
-                    let format =
-                        format.ok_or((PlyPlace::Line(index + 1), PlyProblem::NoFormat))?;
+                    let format = format.ok_or((PlyPlace::Line(index + 1), PlyProblem::NoFormat))?;
                     return Ok(Self { format, elements, length });
                 }
                 _ => return Err(wrong()),
@@ -395,7 +400,10 @@ fn read_body(header: &Header, numbers: &mut impl Numbers) -> Located<Mesh> {
         return Err((end, PlyProblem::Missing { what: "element vertex" }));
     }
     if !has_faces {
-        return Err((end, PlyProblem::Missing { what: "element face; points alone cannot be rendered" }));
+        return Err((
+            end,
+            PlyProblem::Missing { what: "element face; points alone cannot be rendered" },
+        ));
     }
     mesh.triangles = polygons.triangles(mesh.positions.len())?;
     Ok(mesh)
@@ -427,8 +435,12 @@ fn read_vertices(element: &Element, numbers: &mut impl Numbers, mesh: &mut Mesh)
         return Err((place, PlyProblem::Missing { what: "vertex properties x, y and z" }));
     }
     let (normals, uvs, colors) = (has(3..6), has(6..8), has(8..11));
-    let color_max =
-        element.properties.iter().zip(&slots).find(|(_, s)| **s == Some(8)).and_then(|(p, _)| p.scalar.max());
+    let color_max = element
+        .properties
+        .iter()
+        .zip(&slots)
+        .find(|(_, s)| **s == Some(8))
+        .and_then(|(p, _)| p.scalar.max());
 
     mesh.positions.reserve(element.count as usize);
     for row in 0..element.count as usize {
