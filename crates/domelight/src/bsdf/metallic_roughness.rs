@@ -5,6 +5,11 @@
 //! correlated masking and α = roughness². The diffuse part depends on the half vector, so the two
 //! parts are one lobe, not a sum of two; it is sampled as a mixture whose share follows Fresnel's
 //! reflectance at `wo`.
+//!
+//! This is the specification's formula, so that materials look as in other glTF viewers; it does not
+//! conserve energy. Light from everywhere meets half vectors that are less oblique than the view, so
+//! 1 − F takes too little from the diffuse part at grazing angles: a white dielectric of roughness
+//! 0.3 has the albedo 1.00 at 45°, 1.15 at 75° and 1.29 at 85°.
 
 use super::ggx::{Ggx, GgxNormals};
 use super::microfacet::{Masking, reflect_about};
@@ -25,7 +30,8 @@ impl MetallicRoughness {
     /// Of the base colour, metalness and perceptual roughness; all are clamped to [0, 1], as glTF
     /// has it for products of factors and textures.
     pub fn new(base_color: Rgb, metallic: f32, roughness: f32) -> Self {
-        let unit = |x: f32| x.max(0.0).min(1.0);
+        // NaN is zero.
+        let unit = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
         let (base, metallic) = (base_color.map(unit), unit(metallic));
         Self {
             diffuse: base * (1.0 - metallic),

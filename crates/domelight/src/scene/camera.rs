@@ -123,6 +123,14 @@ impl CameraSettings {
         }
     }
 
+    /// Checks that the settings make a picture.
+    ///
+    /// # Errors
+    /// The [`CameraError`] that says which one does not.
+    pub fn check(&self) -> Result<(), CameraError> {
+        basis(self).and(half_height(self.projection)).map(|_| ())
+    }
+
     /// Moves the camera by an affine matrix; an orthographic height grows with its scale.
     pub fn transform(&mut self, m: &Mat4) {
         self.origin = m.transform_point3(self.origin);

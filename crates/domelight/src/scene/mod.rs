@@ -7,12 +7,16 @@
 pub mod builtin;
 mod camera;
 mod description;
+#[cfg(feature = "io")]
+pub mod load;
 mod shading;
 mod surface;
 mod texture;
 
 pub use camera::{Camera, CameraError, CameraSettings, Projection};
 pub use description::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription, UpAxis};
+#[cfg(feature = "io")]
+pub use load::{LoadError, Loaded, load};
 pub use surface::{MetallicRoughnessSurface, NormalMap, PhongSurface, Surface, SurfaceModel};
 pub use texture::{Encoding, Texture, TextureError, TextureRef, UvTransform, Wrap};
 

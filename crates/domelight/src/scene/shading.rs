@@ -6,8 +6,8 @@
 //!
 //! An interpolated or mapped normal may face away from the viewer although the surface does not.
 //! Such a normal is **bent toward the viewer** until `wo` lies just above the shading horizon:
-//! n' ∝ n − (n·wo − ε) wo, the least change that gives n'·wo ≥ ε. Black or untouched pixels along
-//! silhouettes would be the alternatives.
+//! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Black pixels
+//! along silhouettes would be the alternative.
 
 use super::{Part, Scene, Surface};
 use crate::Rgb;
@@ -70,15 +70,19 @@ impl Scene {
     }
 }
 
-/// `normal` bent toward `viewer` until their cosine is positive; see the [module](self).
+/// `normal` bent toward `viewer` until their cosine is [`MIN_COS_THETA_O`]; see the
+/// [module](self).
 #[inline]
 fn bend(normal: Vec3, viewer: Vec3, ng: Vec3) -> Vec3 {
     let cos_theta_o = normal.dot(viewer);
     if cos_theta_o >= MIN_COS_THETA_O {
         return normal;
     }
-    let raise = |n: Vec3| (n - (n.dot(viewer) - MIN_COS_THETA_O) * viewer).try_normalize();
-    raise(normal).filter(|n| n.dot(viewer) > 0.0).or_else(|| raise(ng)).unwrap_or(viewer)
+    let grazing = |n: Vec3| (n - n.dot(viewer) * viewer).try_normalize();
+    let horizon = (1.0 - MIN_COS_THETA_O * MIN_COS_THETA_O).sqrt();
+    grazing(normal)
+        .or_else(|| grazing(ng))
+        .map_or(viewer, |n| (horizon * n + MIN_COS_THETA_O * viewer).normalize())
 }
 
 /// The corners of the triangle that was hit, and their barycentric weights.

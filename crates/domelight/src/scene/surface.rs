@@ -6,7 +6,7 @@
 
 use super::texture::{Texture, TextureRef};
 use crate::Rgb;
-use crate::bsdf::{Lambert, Lobe, Material, MetallicRoughness, Phong};
+use crate::bsdf::{Lambert, Material, MetallicRoughness, Phong};
 use crate::math::{Vec2, Vec3};
 
 /// What a part of a scene is made of.
@@ -161,9 +161,12 @@ fn unit(v: f32) -> f32 {
 }
 
 fn lambert_phong(diffuse: Rgb, specular: Rgb, exponent: f32) -> Material {
-    let lambert = Lobe::Lambert(Lambert::new(diffuse));
+    let lambert = Lambert::new(diffuse);
     let room = Rgb::WHITE - diffuse;
     let specular = Rgb::new(specular.r.min(room.r), specular.g.min(room.g), specular.b.min(room.b));
-    let phong = Lobe::Phong(Phong::new(specular, exponent));
-    Material::new(&[lambert, phong]).expect("two lobes fit")
+    if specular.is_black() {
+        return Material::single(lambert);
+    }
+    Material::new(&[lambert.into(), Phong::new(specular, exponent).into()])
+        .expect("a material holds two lobes")
 }
