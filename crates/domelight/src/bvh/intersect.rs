@@ -65,8 +65,11 @@ impl PreparedRay {
         prepared.axes = [x, y, z];
         prepared.shear = [direction[x] * scale, direction[y] * scale, scale];
 
-        let sum = prepared.inverse_direction.iter().sum::<f32>() + inflation;
-        (sum.is_finite() && ray.direction.is_finite()).then_some(prepared)
+        let finite = ray.origin.is_finite()
+            && ray.direction.is_finite()
+            && inflation.is_finite()
+            && prepared.inverse_direction.iter().all(|x| x.is_finite());
+        finite.then_some(prepared)
     }
 
     /// One bit an axis: set where the direction is negative.

@@ -176,9 +176,14 @@ fn closest_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &Ray, stack: &mut ClosestStack)
         } else {
             let node = &bvh.nodes[child.index()];
             let (crossed, enter) = Slabs::load(simd, node, &prepared).cross(simd, &prepared, limit);
+            let crossed = crossed.bits();
+            if crossed.is_power_of_two() {
+                child = node.children[crossed.trailing_zeros() as usize % WIDTH];
+                continue;
+            }
             let enter = enter.store();
             let base = stack.len;
-            for lane in lanes(crossed.bits()) {
+            for lane in lanes(crossed) {
                 let entry = ClosestEntry { enter: enter[lane], child: node.children[lane] };
                 stack.insert(base, entry);
             }
@@ -215,24 +220,33 @@ fn closest_in_block<S: Simd>(
 #[inline(always)]
 fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRay, limit: f32) -> bool {
     let mut stack = [Child::default(); STACK];
-    let mut len = 1; // the root
-    while len > 0 {
-        len -= 1;
-        let child = stack[len];
+    let mut len = 0;
+    let mut child = Child::node(0);
+    loop {
         if child.is_leaf() {
             if hit_block(simd, &bvh.blocks[child.index()], ray, limit).is_some() {
                 return true;
             }
-            continue;
+        } else {
+            let node = &bvh.nodes[child.index()];
+            let (crossed, _) = Slabs::load(simd, node, ray).cross(simd, ray, limit);
+            // On with the first and largest; the others wait.
+            let mut crossed = lanes(crossed.bits());
+            if let Some(first) = crossed.next() {
+                for lane in crossed {
+                    stack[len] = node.children[lane];
+                    len += 1;
+                }
+                child = node.children[first];
+                continue;
+            }
         }
-        let node = &bvh.nodes[child.index()];
-        let (crossed, _) = Slabs::load(simd, node, ray).cross(simd, ray, limit);
-        for lane in lanes_from_last(crossed.bits()) {
-            stack[len] = node.children[lane];
-            len += 1;
+        if len == 0 {
+            return false;
         }
+        len -= 1;
+        child = stack[len];
     }
-    false
 }
 
 /// A child yet to visit, and the rays of the stream that enter it.
