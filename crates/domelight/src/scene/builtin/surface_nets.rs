@@ -2,7 +2,7 @@
 //!
 //! One vertex stands in each grid cell that the surface crosses, at the mean of the crossings of
 //! the cell's edges (Gibson 1998, "Constrained Elastic Surface Nets"), and one quadrilateral across each
-//! grid edge that the surface crosses. Newton steps along the gradient then bring the vertices onto the
+//! grid edge that the surface crosses. A Newton step along the gradient then brings each vertex onto the
 //! surface, and the gradient there is the exact normal. Marching cubes was not chosen for its slivers
 //! and its table; dual contouring (Ju et al. 2002) would keep sharp edges, which our sculptures do
 //! not have.
@@ -14,9 +14,7 @@ use crate::geometry::{Aabb, Mesh};
 use crate::math::{Vec3, vec3};
 
 /// Cells along the edge of a block, the unit in which empty space is skipped.
-const BLOCK: usize = 8;
-/// Newton steps toward the surface.
-const PROJECTIONS: usize = 3;
+const BLOCK: usize = 4;
 /// A cell that the surface does not cross.
 const NO_VERTEX: u32 = u32::MAX;
 
@@ -55,11 +53,11 @@ impl Grid {
         let size = bounds.size().to_array().map(count);
         let values = vec![0.0; size.iter().product()];
         let mut grid = Self { origin: bounds.min, cell, size, values, active: Vec::new() };
-        // No surface within a block or one cell beyond it when its centre is farther than this.
-        let reach = lipschitz * cell * 3f32.sqrt() * (0.5 * BLOCK as f32 + 1.0);
+        // Samples of a block whose centre is farther from the surface have no crossed edge.
+        let reach = lipschitz * cell * (3f32.sqrt() * 0.5 * (BLOCK - 1) as f32 + 1.0);
         for block in points(size.map(|n| n / BLOCK)) {
             let first = block.map(|i| i * BLOCK);
-            let center = grid.position(first) + 0.5 * cell * (BLOCK - 1) as f32;
+            let center = grid.position(first) + Vec3::splat(0.5 * cell * (BLOCK - 1) as f32);
             let distance = field(center);
             let is_active = distance.abs() < reach;
             for offset in points([BLOCK; 3]) {
@@ -165,23 +163,26 @@ fn push_quad(mesh: &mut Mesh, [a, b, c, d]: [u32; 4]) {
     mesh.triangles.extend(halves);
 }
 
-/// Moves `p` onto the surface, by at most a cell, and returns the normal there.
+/// Moves `p` onto the surface by one Newton step, at most a cell long, and returns the normal there.
 fn project(field: &impl Fn(Vec3) -> f32, p: &mut Vec3, cell: f32) -> Vec3 {
-    let start = *p;
-    for _ in 0..PROJECTIONS {
-        let slope = gradient(field, *p, cell);
-        let newton = field(*p) / slope.length_squared().max(1e-6);
-        *p = start + (*p - newton * slope - start).clamp_length_max(cell);
-    }
-    gradient(field, *p, cell).normalize_or(Vec3::Y)
+    let (value, slope) = value_and_gradient(field, *p, cell);
+    *p -= (value / slope.length_squared().max(1e-6) * slope).clamp_length_max(cell);
+    value_and_gradient(field, *p, cell).1.normalize_or(Vec3::Y)
 }
 
-/// ∇field from four samples at the corners of a tetrahedron.
-fn gradient(field: &impl Fn(Vec3) -> f32, p: Vec3, cell: f32) -> Vec3 {
+/// The field and its gradient from four samples at the corners of a tetrahedron round `p`.
+fn value_and_gradient(field: &impl Fn(Vec3) -> f32, p: Vec3, cell: f32) -> (f32, Vec3) {
     let h = 0.2 * cell;
     let corners =
         [vec3(1.0, -1.0, -1.0), vec3(-1.0, -1.0, 1.0), vec3(-1.0, 1.0, -1.0), Vec3::ONE];
-    corners.into_iter().map(|k| k * field(p + h * k)).sum::<Vec3>() / (4.0 * h)
+    let mut value = 0.0;
+    let mut slope = Vec3::ZERO;
+    for k in corners {
+        let sample = field(p + h * k);
+        value += 0.25 * sample;
+        slope += sample / (4.0 * h) * k;
+    }
+    (value, slope)
 }
 
 /// All index triples below `size`, x fastest.
