@@ -1,0 +1,408 @@
+//! "This samples that density": Pearson's χ² test over the sphere, the unit square and the unit
+//! interval.
+//!
+//! Samples are counted in cells; the density is integrated over each by adaptive quadrature. Cells
+//! that expect few samples are pooled. Samples that the sampler declines (`None`) are a cell of
+//! their own, whose expectation is 1 − ∫ pdf, so a sampler that redraws them without renormalising
+//! its density fails. A sample where the density is zero fails at once. When samplers draw from a
+//! table, choose cells finer than its texels (and an odd number of them), or a sampler that returns
+//! texel centres passes.
+//!
+//! The layout of the test follows the one that Nori and Mitsuba ship (Wenzel Jakob).
+
+use crate::quadrature::{Adaptive, Rect, direction};
+use crate::table::{Table, dump};
+use crate::{Failure, Pcg, Suite};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+use std::f64::consts::{PI, TAU};
+
+/// A χ² test; change what differs from the default.
+#[derive(Clone, Copy, Debug)]
+pub struct Chi2 {
+    /// How many samples are drawn.
+    pub samples: usize,
+    /// Cells along θ and φ on the sphere, along x and y on the square.
+    pub cells: [usize; 2],
+    /// The polar axis θ = 0 of the sphere's cells: put it on a narrow lobe.
+    pub axis: [f32; 3],
+    /// How the density is integrated over a cell.
+    pub quadrature: Adaptive,
+    /// ∫ pdf may exceed 1 by this much: the error of the quadrature and of an f32 density.
+    pub mass_tolerance: f64,
+    /// Cells expecting fewer samples than this are pooled.
+    pub min_expected: f64,
+    /// Seed of the uniform numbers.
+    pub seed: u64,
+    /// The tests that share the probability of a false alarm.
+    pub suite: Suite,
+}
+
+impl Default for Chi2 {
+    fn default() -> Self {
+        Self {
+            samples: 100_000,
+            cells: [31, 61],
+            axis: [0.0, 0.0, 1.0],
+            quadrature: Adaptive { tolerance: 1e-7, min_depth: 0, max_depth: 9 },
+            mass_tolerance: 1e-4,
+            min_expected: 5.0,
+            seed: 1,
+            suite: Suite::default(),
+        }
+    }
+}
+
+/// A test that passed.
+#[derive(Clone, Copy, Debug)]
+pub struct Chi2Report {
+    /// Pearson's statistic.
+    pub statistic: f64,
+    /// Cells after pooling, less one.
+    pub degrees_of_freedom: usize,
+    /// Probability of a statistic at least as large if the density is right.
+    pub p_value: f64,
+    /// ∫ pdf.
+    pub mass: f64,
+    /// How many samples were declined.
+    pub lost: usize,
+}
+
+/// Samples counted in cells beside what the density expects there.
+struct Cells {
+    columns: usize,
+    observed: Vec<f64>,
+    expected: Vec<f64>,
+    lost: usize,
+    mass: f64,
+}
+
+impl Chi2 {
+    /// A test in a suite of `tests`.
+    pub fn in_suite_of(tests: usize) -> Self {
+        Self { suite: Suite::of(tests), ..Self::default() }
+    }
+
+    /// A sampler of directions, of (u, u_lobe), against its density \[sr⁻¹\].
+    ///
+    /// # Errors
+    /// The samples do not follow the density, or the density is negative, not finite, or
+    /// integrates to more than one.
+    pub fn sphere(
+        &self,
+        name: &str,
+        mut sampler: impl FnMut([f32; 2], f32) -> Option<[f32; 3]>,
+        pdf: impl Fn([f32; 3]) -> f64,
+    ) -> Result<Chi2Report, Failure> {
+        let frame = Frame::around(self.axis);
+        let place = |w: [f32; 3]| {
+            let [x, y, z] = frame.to_local(w);
+            [x.hypot(y).atan2(z) / PI, (y.atan2(x) / TAU).rem_euclid(1.0)]
+        };
+        let density = |[u, v]: [f64; 2]| {
+            let (theta, phi) = (PI * u, TAU * v);
+            pdf(frame.to_world(direction(theta, phi))) * theta.sin() * PI * TAU
+        };
+        let draw = |rng: &mut Pcg| {
+            let (u, u_lobe) = (rng.next_2d(), rng.next_f32());
+            sampler(u, u_lobe).map(|w| Drawn { place: place(w), pdf: pdf(w), at: w.to_vec() })
+        };
+        self.run(name, draw, density)
+    }
+
+    /// A sampler of points of [0, 1)² against its density.
+    ///
+    /// # Errors
+    /// As [`Chi2::sphere`].
+    pub fn square(
+        &self,
+        name: &str,
+        mut sampler: impl FnMut([f32; 2], f32) -> Option<[f32; 2]>,
+        pdf: impl Fn([f32; 2]) -> f64,
+    ) -> Result<Chi2Report, Failure> {
+        let draw = |rng: &mut Pcg| {
+            let (u, u_lobe) = (rng.next_2d(), rng.next_f32());
+            sampler(u, u_lobe).map(|p| Drawn {
+                place: p.map(f64::from),
+                pdf: pdf(p),
+                at: p.to_vec(),
+            })
+        };
+        self.run(name, draw, |p| pdf(p.map(|x| x as f32)))
+    }
+
+    /// A sampler of numbers in [0, 1) against its density, in `cells[0]` cells.
+    ///
+    /// # Errors
+    /// As [`Chi2::sphere`].
+    pub fn interval(
+        &self,
+        name: &str,
+        mut sampler: impl FnMut(f32) -> Option<f32>,
+        pdf: impl Fn(f32) -> f64,
+    ) -> Result<Chi2Report, Failure> {
+        let line = Self { cells: [self.cells[0], 1], ..*self };
+        line.square(name, |u, _| sampler(u[0]).map(|x| [x, 0.5]), |p| pdf(p[0]))
+    }
+
+    fn run(
+        &self,
+        name: &str,
+        draw: impl FnMut(&mut Pcg) -> Option<Drawn>,
+        density: impl Fn([f64; 2]) -> f64,
+    ) -> Result<Chi2Report, Failure> {
+        let (observed, lost) = self.observe(name, draw)?;
+        let expected = self.expect(density);
+        let mass = expected.iter().sum::<f64>() / self.samples as f64;
+        let cells = Cells { columns: self.cells[1], observed, expected, lost, mass };
+        self.judge(&cells).map_err(|why| {
+            let tables = dump(
+                name,
+                &Table { columns: cells.columns, cells: cells.observed.clone() },
+                &Table { columns: cells.columns, cells: cells.expected.clone() },
+            );
+            Failure::new(format!(
+                "{name}: {why}\n  {} samples, {} lost, ∫ pdf = {:.6}\n  {tables}",
+                self.samples, cells.lost, cells.mass
+            ))
+        })
+    }
+
+    fn cell(&self, place: [f64; 2]) -> usize {
+        let [i, j] =
+            [0, 1].map(|k| ((place[k] * self.cells[k] as f64) as usize).min(self.cells[k] - 1));
+        i * self.cells[1] + j
+    }
+
+    fn observe(
+        &self,
+        name: &str,
+        mut draw: impl FnMut(&mut Pcg) -> Option<Drawn>,
+    ) -> Result<(Vec<f64>, usize), Failure> {
+        let mut rng = Pcg::new(self.seed);
+        let mut observed = vec![0.0; self.cells[0] * self.cells[1]];
+        let mut lost = 0;
+        for i in 0..self.samples {
+            let Some(sample) = draw(&mut rng) else {
+                lost += 1;
+                continue;
+            };
+            if !(sample.pdf > 0.0 && sample.pdf.is_finite()) {
+                return Err(Failure::new(format!(
+                    "{name}: sample {i} is {:?}, where the density is {}",
+                    sample.at, sample.pdf
+                )));
+            }
+            observed[self.cell(sample.place)] += 1.0;
+        }
+        Ok((observed, lost))
+    }
+
+    fn expect(&self, density: impl Fn([f64; 2]) -> f64) -> Vec<f64> {
+        let size = self.cells.map(|n| 1.0 / n as f64);
+        let mut expected = Vec::with_capacity(self.cells[0] * self.cells[1]);
+        for i in 0..self.cells[0] {
+            for j in 0..self.cells[1] {
+                let span = |k: usize, n: usize| [n as f64 * size[k], (n + 1) as f64 * size[k]];
+                let cell = Rect { x: span(0, i), y: span(1, j) };
+                let mass = self.quadrature.rect(cell, &mut |x, y| density([x, y]));
+                expected.push(mass * self.samples as f64);
+            }
+        }
+        expected
+    }
+
+    fn judge(&self, cells: &Cells) -> Result<Chi2Report, String> {
+        if let Some(bad) = cells.expected.iter().find(|e| !(e.is_finite() && **e >= 0.0)) {
+            return Err(format!("the density integrates to {bad} over a cell"));
+        }
+        if cells.mass > 1.0 + self.mass_tolerance {
+            return Err(format!("the density integrates to {} > 1", cells.mass));
+        }
+        let expected_lost = (1.0 - cells.mass).max(0.0) * self.samples as f64;
+        let mut pairs: Vec<(f64, f64)> =
+            cells.expected.iter().copied().zip(cells.observed.iter().copied()).collect();
+        pairs.push((expected_lost, cells.lost as f64));
+        let (statistic, n) = self.pooled_statistic(pairs)?;
+        if n < 2 {
+            return Err("all cells were pooled: more samples or finer cells are needed".into());
+        }
+        let distribution = ChiSquared::new((n - 1) as f64).map_err(|e| e.to_string())?;
+        let p_value = distribution.sf(statistic);
+        let threshold = self.suite.threshold();
+        if p_value < threshold {
+            return Err(format!(
+                "χ² = {statistic:.2} with {} degrees of freedom: p = {p_value:.3e} < {threshold:.3e} (lost: {} of {expected_lost:.1} expected)",
+                n - 1,
+                cells.lost
+            ));
+        }
+        Ok(Chi2Report {
+            statistic,
+            degrees_of_freedom: n - 1,
+            p_value,
+            mass: cells.mass,
+            lost: cells.lost,
+        })
+    }
+
+    /// Σ (observed − expected)² / expected and the number of terms; from the least expectation up,
+    /// cells are added together until they expect enough.
+    fn pooled_statistic(&self, mut pairs: Vec<(f64, f64)>) -> Result<(f64, usize), String> {
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut statistic, mut n) = (0.0, 0);
+        let (mut expected, mut observed) = (0.0, 0.0);
+        for (e, o) in pairs {
+            expected += e;
+            observed += o;
+            if expected >= self.min_expected {
+                statistic += (observed - expected).powi(2) / expected;
+                n += 1;
+                (expected, observed) = (0.0, 0.0);
+            }
+        }
+        // What is left over can only be when everything together expects too little.
+        if n == 0 {
+            return Err(format!("{expected} samples are expected in all"));
+        }
+        Ok((statistic, n))
+    }
+}
+
+struct Drawn {
+    place: [f64; 2],
+    pdf: f64,
+    at: Vec<f32>,
+}
+
+/// An orthonormal basis with z along the polar axis.
+struct Frame([[f64; 3]; 3]);
+
+impl Frame {
+    /// Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
+    fn around(axis: [f32; 3]) -> Self {
+        let [x, y, z] = axis.map(f64::from);
+        let length = (x * x + y * y + z * z).sqrt();
+        let [x, y, z] = [x, y, z].map(|c| c / length);
+        let sign = 1f64.copysign(z);
+        let a = -1.0 / (sign + z);
+        let b = x * y * a;
+        Self([[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y], [x, y, z]])
+    }
+
+    fn to_local(&self, w: [f32; 3]) -> [f64; 3] {
+        self.0.map(|axis| axis.iter().zip(w).map(|(a, b)| a * f64::from(b)).sum())
+    }
+
+    fn to_world(&self, w: [f64; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|k| (0..3).map(|i| self.0[i][k] * w[i]).sum::<f64>() as f32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts as f32c;
+
+    fn spherical(cos_theta: f32, phi: f32) -> [f32; 3] {
+        let s = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
+        [s * phi.cos(), s * phi.sin(), cos_theta]
+    }
+
+    fn uniform_sphere(u: [f32; 2]) -> [f32; 3] {
+        spherical(1.0 - 2.0 * u[0], f32c::TAU * u[1])
+    }
+
+    fn cosine(u: [f32; 2]) -> [f32; 3] {
+        spherical((1.0 - u[0]).sqrt(), f32c::TAU * u[1])
+    }
+
+    fn cosine_pdf(w: [f32; 3]) -> f64 {
+        f64::from(w[2].max(0.0)) / PI
+    }
+
+    #[test]
+    fn right_samplers_pass() {
+        let test = Chi2::in_suite_of(4);
+        test.sphere("uniform", |u, _| Some(uniform_sphere(u)), |_| 0.25 / PI).unwrap();
+        let tilted = Chi2 { axis: [0.6, 0.0, 0.8], ..test };
+        tilted.sphere("cosine", |u, _| Some(cosine(u)), cosine_pdf).unwrap();
+        test.square("x", |u, _| Some([u[0].sqrt(), u[1]]), |p| 2.0 * f64::from(p[0])).unwrap();
+        test.interval("x", |u| Some(u.sqrt()), |x| 2.0 * f64::from(x)).unwrap();
+    }
+
+    #[test]
+    fn a_narrow_lobe_needs_no_more_than_its_axis() {
+        // exp(κ (cos − 1)) about an axis, κ = 1 / 0.02².
+        let kappa = 2500.0f64;
+        let axis = [0.0f32, 0.6, 0.8];
+        let frame = Frame::around(axis);
+        let draw = |u: [f32; 2], _: f32| {
+            let cos = 1.0 + f64::from(1.0 - u[0]).ln() / kappa;
+            let w = direction(cos.clamp(-1.0, 1.0).acos(), TAU * f64::from(u[1]));
+            Some(frame.to_world(w))
+        };
+        let pdf = |w: [f32; 3]| kappa / TAU * (kappa * (frame.to_local(w)[2] - 1.0)).exp();
+        let test = Chi2 { axis, cells: [301, 31], ..Chi2::default() };
+        let report = test.sphere("narrow", draw, pdf).unwrap();
+        assert!((report.mass - 1.0).abs() < 1e-5, "{report:?}");
+    }
+
+    #[test]
+    fn a_sampler_without_sin_theta_fails() {
+        let no_sine =
+            |u: [f32; 2], _: f32| Some(spherical((f32c::PI * u[0]).cos(), f32c::TAU * u[1]));
+        Chi2::default().sphere("no sine", no_sine, |_| 0.25 / PI).unwrap_err();
+    }
+
+    #[test]
+    fn texel_centres_fail_when_the_cells_are_finer() {
+        let centres = |u: [f32; 2], _: f32| Some(u.map(|x| ((x * 8.0).floor() + 0.5) / 8.0));
+        let test = Chi2 { cells: [31, 31], ..Chi2::default() };
+        let failure = test.square("texel centres", centres, |_| 1.0).unwrap_err();
+        assert!(failure.to_string().contains("texel_centres-observed.pfm"), "{failure}");
+    }
+
+    #[test]
+    fn redrawing_below_the_horizon_fails_and_counting_passes() {
+        // A cosine lobe tilted by 60°, part of which lies below the horizon.
+        let axis = [0.75f32.sqrt(), 0.0, 0.5];
+        let frame = Frame::around(axis);
+        let lobe = |u| frame.to_world(cosine(u).map(f64::from));
+        let pdf = |w: [f32; 3]| if w[2] > 0.0 { frame.to_local(w)[2].max(0.0) / PI } else { 0.0 };
+        let counted = |u, _: f32| Some(lobe(u)).filter(|w| w[2] > 0.0);
+        let report = Chi2::default().sphere("counted", counted, pdf).unwrap();
+        assert!(report.lost > 0);
+        let mut rng = Pcg::new(9);
+        let redrawn = |u, _: f32| {
+            let mut w = lobe(u);
+            while w[2] <= 0.0 {
+                w = lobe(rng.next_2d());
+            }
+            Some(w)
+        };
+        Chi2::default().sphere("redrawn", redrawn, pdf).unwrap_err();
+    }
+
+    #[test]
+    fn impossible_samples_and_densities_fail() {
+        let test = Chi2::default();
+        let below = |u: [f32; 2], _: f32| Some(cosine(u).map(|c| -c));
+        test.sphere("below", below, cosine_pdf).unwrap_err();
+        let twice = |w| 2.0 * cosine_pdf(w);
+        test.sphere("twice", |u, _| Some(cosine(u)), twice).unwrap_err();
+        let half = |w| 0.5 * cosine_pdf(w);
+        test.sphere("half", |u, _| Some(cosine(u)), half).unwrap_err();
+    }
+
+    #[test]
+    fn p_values_are_uniform() {
+        let below = (0..200u64).filter(|&seed| {
+            let test = Chi2 { samples: 2000, cells: [7, 9], seed, ..Chi2::default() };
+            let report = test.sphere("uniform", |u, _| Some(uniform_sphere(u)), |_| 0.25 / PI);
+            report.is_ok_and(|r| r.p_value < 0.25)
+        });
+        // Binomial(200, 0.25): within four standard deviations.
+        let below = below.count() as f64;
+        assert!((below - 50.0).abs() < 4.0 * 37.5f64.sqrt(), "{below}");
+    }
+}
