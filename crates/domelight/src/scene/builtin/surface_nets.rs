@@ -152,9 +152,8 @@ impl Grid {
 
 /// Splits a quadrilateral along its shorter diagonal.
 fn push_quad(mesh: &mut Mesh, [a, b, c, d]: [u32; 4]) {
-    let diagonal = |i: u32, j: u32| {
-        mesh.positions[i as usize].distance_squared(mesh.positions[j as usize])
-    };
+    let diagonal =
+        |i: u32, j: u32| mesh.positions[i as usize].distance_squared(mesh.positions[j as usize]);
     let halves = if diagonal(a, c) <= diagonal(b, d) {
         [[a, b, c], [a, c, d]]
     } else {
@@ -173,8 +172,7 @@ fn project(field: &impl Fn(Vec3) -> f32, p: &mut Vec3, cell: f32) -> Vec3 {
 /// The field and its gradient from four samples at the corners of a tetrahedron round `p`.
 fn value_and_gradient(field: &impl Fn(Vec3) -> f32, p: Vec3, cell: f32) -> (f32, Vec3) {
     let h = 0.2 * cell;
-    let corners =
-        [vec3(1.0, -1.0, -1.0), vec3(-1.0, -1.0, 1.0), vec3(-1.0, 1.0, -1.0), Vec3::ONE];
+    let corners = [vec3(1.0, -1.0, -1.0), vec3(-1.0, -1.0, 1.0), vec3(-1.0, 1.0, -1.0), Vec3::ONE];
     let mut value = 0.0;
     let mut slope = Vec3::ZERO;
     for k in corners {
