@@ -15,7 +15,7 @@ use crate::math::{FRAC_PI_2, PI, Vec2, Vec3, vec2, vec3};
 pub const PLINTH_HEIGHT: f32 = 0.8;
 
 /// Edge of a grid cell.
-const CELL: f32 = 0.0175;
+const CELL: f32 = 0.0178;
 /// Bound on the slope of [`figure_distance`].
 const LIPSCHITZ: f32 = 1.6;
 /// Turn of the space about the vertical axis \[rad per unit of height\].
@@ -42,7 +42,7 @@ fn figure_distance(p: Vec3) -> f32 {
     let outside = body + flutes(q, openings);
     let shell = smooth_max(outside, -(body + SHELL), 0.03);
     let shell = smooth_max(shell, -openings, 0.09);
-    let form = smooth_min(shell, inner_figure(q), 0.06);
+    let form = smooth_min(shell, inner_figure(q), 0.12);
     let form = smooth_min(form, foot(p), 0.12);
     smooth_max(form, -p.y - 0.05, 0.02)
 }
@@ -92,8 +92,11 @@ fn flutes(q: Vec3, openings: f32) -> f32 {
         return 0.0;
     }
     let phase = 0.5 * FLUTES * q.x.atan2(q.z) + 2.0 * q.y;
-    let ridge = 1.0 - (phase.sin().powi(2) + 0.02).sqrt();
-    fade * FLUTE_DEPTH * (1.0 - ridge)
+    // |sin| with its kink, the ridge, rounded to more than a cell.
+    let (rounding, whole) = (0.12, 0.12f32.sqrt());
+    let scoop =
+        ((phase.sin().powi(2) + rounding).sqrt() - whole) / ((1.0 + rounding).sqrt() - whole);
+    fade * FLUTE_DEPTH * scoop
 }
 
 /// A first-order distance to an ellipsoid of the given radii round the origin.
