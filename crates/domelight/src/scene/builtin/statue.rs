@@ -135,7 +135,7 @@ pub fn plinth() -> Mesh {
     // Torus.
     profile.extend(arc(vec2(0.62, 0.165), 0.045, -FRAC_PI_2, FRAC_PI_2, 16));
     // Hollow up to the drum, the drum, hollow out to the slab.
-    profile.extend(arc(vec2(0.62, 0.30), 0.09, -FRAC_PI_2, -PI, 12));
+    profile.extend(arc(vec2(0.62, 0.30), 0.09, -FRAC_PI_2, -PI, 12).into_iter().skip(1));
     profile.extend(arc(vec2(0.62, top - 0.20), 0.09, -PI, -1.5 * PI, 12));
     // Slab.
     profile.extend(arc(vec2(0.64, top - 0.095), 0.015, -FRAC_PI_2, 0.0, 6));
