@@ -88,7 +88,8 @@ pub enum ProbeError {
 pub fn load_probe(path: &Path, options: &ProbeOptions) -> Result<LoadedProbe, ProbeError> {
     let read = ReadOptions { layer: options.layer.clone() };
     let picture = picture::read(path, &read)?;
-    let file = if path == Path::new("-") { "standard input".into() } else { path.display().to_string() };
+    let file =
+        if path == Path::new("-") { "standard input".into() } else { path.display().to_string() };
     probe_from_picture(picture, &file, options)
 }
 
@@ -185,14 +186,13 @@ fn fill_channel(image: &mut RgbImage, channel: fn(&mut Rgb) -> &mut f32) {
     let (width, height) = (image.width, image.height);
     let mut values: Vec<f32> = image.pixels.iter_mut().map(|pixel| *channel(pixel)).collect();
     let mut queued: Vec<bool> = values.iter().map(|value| value.is_finite()).collect();
-    let unknown = |queued: &[bool]| (0..queued.len()).filter(|&i| !queued[i]).collect::<Vec<_>>();
-    let mut ring: Vec<usize> = unknown(&queued)
-        .into_iter()
-        .filter(|&i| neighbours(i, width, height).any(|j| values[j].is_finite()))
-        .collect();
+    let borders_known = |&i: &usize| neighbours(i, width, height).any(|j| values[j].is_finite());
+    let mut ring: Vec<usize> =
+        (0..values.len()).filter(|&i| !queued[i]).filter(borders_known).collect();
     while !ring.is_empty() {
         ring.iter().for_each(|&i| queued[i] = true);
-        let means: Vec<f32> = ring.iter().map(|&i| mean_around(&values, i, width, height)).collect();
+        let means: Vec<f32> =
+            ring.iter().map(|&i| mean_around(&values, i, width, height)).collect();
         ring.iter().zip(means).for_each(|(&i, mean)| values[i] = mean);
         let mut next = Vec::new();
         for j in ring.iter().flat_map(|&i| neighbours(i, width, height)) {
@@ -219,6 +219,8 @@ fn mean_around(values: &[f32], i: usize, width: usize, height: usize) -> f32 {
 fn neighbours(i: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
     let (x, y) = (i % width, i / width);
     let rows = y.saturating_sub(1)..(y + 2).min(height);
-    rows.flat_map(move |row| (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| row * width + x))
-        .filter(move |&j| j != i)
+    rows.flat_map(move |row| {
+        (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| row * width + x)
+    })
+    .filter(move |&j| j != i)
 }

@@ -21,7 +21,9 @@ pub enum Problem {
     #[error("{0}")]
     Io(io::Error),
     /// The first bytes belong to no known format.
-    #[error("not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG): it starts with {start:02x?}")]
+    #[error(
+        "not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG): it starts with {start:02x?}"
+    )]
     UnknownFormat {
         /// The first bytes, at most eight.
         start: Vec<u8>,
@@ -45,7 +47,10 @@ pub enum Problem {
         height: usize,
     },
     /// More texels than are ever read, or than there is memory for.
-    #[error("the picture is {width}x{height}: larger than can be read ({} texels at most, memory permitting)", super::MAX_TEXELS)]
+    #[error(
+        "the picture is {width}x{height}: larger than can be read ({} texels at most, memory permitting)",
+        super::MAX_TEXELS
+    )]
     TooLarge {
         /// Columns.
         width: usize,
@@ -53,7 +58,9 @@ pub enum Problem {
         height: usize,
     },
     /// The header promises more texels than the file can hold.
-    #[error("the header promises {width}x{height} texels, which take at least {needed} bytes; the file holds {held}: it is truncated or corrupt")]
+    #[error(
+        "the header promises {width}x{height} texels, which take at least {needed} bytes; the file holds {held}: it is truncated or corrupt"
+    )]
     Promises {
         /// Columns.
         width: usize,

@@ -252,8 +252,11 @@ fn skip_new(bytes: &[u8], mut at: usize, length: usize, scanline: usize) -> Resu
             let (count, taken) = if code > 128 { (code - 128, 1) } else { (code, code.into()) };
             filled += usize::from(count);
             if count == 0 || filled > length {
-                let what =
-                    if count == 0 { "a run of length zero" } else { "a run past the scanline's end" };
+                let what = if count == 0 {
+                    "a run of length zero"
+                } else {
+                    "a run past the scanline's end"
+                };
                 return Err(Problem::Scanline { scanline, offset: at, what });
             }
             at += 1 + taken;

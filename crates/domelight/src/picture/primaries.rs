@@ -18,7 +18,8 @@ impl Primaries {
     /// The matrix to linear Rec. 709; `None` where it is that already (to the three digits that files keep) or
     /// where the chromaticities span no colour space.
     pub(super) fn to_rec709(self) -> Option<Mat3> {
-        let same = |a: &[f32; 2], b: &[f32; 2]| (a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3;
+        let same =
+            |a: &[f32; 2], b: &[f32; 2]| (a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3;
         if self.0.iter().zip(&Self::REC709.0).all(|(a, b)| same(a, b)) {
             return None;
         }
@@ -74,7 +75,8 @@ mod tests {
     #[test]
     fn xyz_matrix_is_that_of_srgb() {
         // IEC 61966-2-1, to its four digits.
-        let expected = [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
+        let expected =
+            [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
         let matrix = xyz_to_rec709().transpose().to_cols_array_2d();
         for (row, expected) in matrix.iter().zip(&expected) {
             for (a, b) in row.iter().zip(expected) {
@@ -86,7 +88,8 @@ mod tests {
     #[test]
     fn white_stays_white() {
         assert_eq!(Primaries::REC709.to_rec709(), None);
-        let acescg = Primaries([[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]]);
+        let acescg =
+            Primaries([[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]]);
         let white = acescg.to_rec709().unwrap() * Vec3::ONE;
         assert!((white - Vec3::ONE).length() < 1e-4, "{white}");
         assert_eq!(Primaries([[0.3, 0.0]; 4]).to_rec709(), None);

@@ -108,8 +108,11 @@ fn rows(r: [f32; 3], g: [f32; 3], b: [f32; 3]) -> Mat3 {
 fn aces(c: Rgb) -> Rgb {
     let to_ap1_with_saturation =
         rows([0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]);
-    let to_rec709 =
-        rows([1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]);
+    let to_rec709 = rows(
+        [1.60475, -0.53108, -0.07367],
+        [-0.10208, 1.10813, -0.00605],
+        [-0.00327, -0.07276, 1.07602],
+    );
     // The fit is a quotient of squares: beyond this it is constant to f32.
     let v = to_ap1_with_saturation * Vec3::from(c.to_array()).min(Vec3::splat(1e9));
     let numerator = v * (v + 0.024_578_6) - 0.000_090_537;
@@ -131,7 +134,8 @@ fn agx(c: Rgb) -> Rgb {
     // 12.47 stops below and 4.03 above 1 are shown.
     let (least, greatest) = (-12.473_93, 4.026_069);
     let inside = inset * Vec3::from(c.to_array());
-    let encoded = inside.map(|v| (v.max(1e-10).log2().clamp(least, greatest) - least) / (greatest - least));
+    let encoded =
+        inside.map(|v| (v.max(1e-10).log2().clamp(least, greatest) - least) / (greatest - least));
     let shaped = encoded.map(agx_sigmoid);
     let shown = (outset * shaped).max(Vec3::ZERO);
     // The curve gives encoded values; back to linear light for the one encoding at the end.
@@ -170,7 +174,11 @@ mod tests {
             let mut last = 0.0;
             for stop in -80..=80 {
                 let shown = curve.apply(Rgb::splat(f32::exp2(stop as f32 * 0.25)));
-                assert!(shown.is_finite() && shown.min_component() >= 0.0 && shown.max_component() <= 1.0);
+                assert!(
+                    shown.is_finite()
+                        && shown.min_component() >= 0.0
+                        && shown.max_component() <= 1.0
+                );
                 // Rounding in the matrices may take a part in a million back.
                 assert!(shown.g >= last - 2e-6, "{curve} falls at {stop}: {last} {}", shown.g);
                 last = shown.g;

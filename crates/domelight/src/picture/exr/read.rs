@@ -9,20 +9,18 @@
 //! own for each file, in which a panic over a corrupt block would abort the process. What the crate asserts instead
 //! of returning an error is caught here and becomes [`Problem::ExrPanic`].
 
+use crate::environment::mapping::EnvmapKind;
 use crate::picture::primaries::{Primaries, transform};
 use crate::picture::{Format, MAX_TEXELS, Picture, Problem, allocate, checked_area};
-use crate::environment::mapping::EnvmapKind;
 use crate::{Rgb, RgbImage};
+use ::exr::block::UncompressedBlock;
 use ::exr::block::chunk::Chunk;
 use ::exr::block::lines::LineRef;
 use ::exr::block::reader::{ChunksReader, Reader};
-use ::exr::block::UncompressedBlock;
 use ::exr::meta::attribute::{Chromaticities, EnvironmentMap};
 use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, MetaData};
-use ::exr::prelude::{
-    Compression, SampleType, Text, f16,
-};
+use ::exr::prelude::{Compression, SampleType, Text, f16};
 use half::slice::HalfFloatSliceExt;
 use rayon::prelude::*;
 use std::io::Cursor;
@@ -84,7 +82,8 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Proble
 }
 
 fn decompress(batch: Vec<Chunk>, meta: &MetaData) -> Result<Vec<UncompressedBlock>, Problem> {
-    let blocks = batch.into_par_iter().map(|chunk| UncompressedBlock::decompress_chunk(chunk, meta, false));
+    let blocks =
+        batch.into_par_iter().map(|chunk| UncompressedBlock::decompress_chunk(chunk, meta, false));
     blocks.collect::<Result<_, _>>().map_err(Problem::Exr)
 }
 
@@ -110,10 +109,15 @@ fn check_promises(header: &Header, held: u64) -> Result<(), Problem> {
         _ => 65536,
     };
     // Subsampled channels take less than `bytes_per_pixel` says.
-    let texel_bytes: u64 = header.channels.list.iter().map(|c| match (c.sampling.0, c.sampling.1) {
-        (1, 1) => c.sample_type.bytes_per_sample() as u64,
-        _ => 0,
-    }).sum();
+    let texel_bytes: u64 = header
+        .channels
+        .list
+        .iter()
+        .map(|c| match (c.sampling.0, c.sampling.1) {
+            (1, 1) => c.sample_type.bytes_per_sample() as u64,
+            _ => 0,
+        })
+        .sum();
     let data = (width as u64 * height as u64).saturating_mul(texel_bytes) / ratio;
     let needed = (blocks * 16).saturating_add(data);
     let tile_area = match header.blocks {
@@ -327,4 +331,3 @@ fn to_floats(
         }
     }
 }
-

@@ -9,8 +9,8 @@ use crate::{Rgb, RgbImage};
 use ::exr::block;
 use ::exr::meta::attribute::EnvironmentMap;
 use ::exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, LayerAttributes, SmallVec,
-    Text, WritableImage,
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, LayerAttributes,
+    SmallVec, Text, WritableImage,
 };
 use std::io::Cursor;
 
@@ -87,7 +87,8 @@ impl ExrLayers {
         let mut names = std::collections::BTreeSet::new();
         let mut list = SmallVec::new();
         for (layer, channel, values) in self.planes() {
-            let name = if layer.is_empty() { channel.clone() } else { format!("{layer}.{channel}") };
+            let name =
+                if layer.is_empty() { channel.clone() } else { format!("{layer}.{channel}") };
             let refuse = |why| Err(Problem::Channel { channel: name.clone(), why });
             if !name.is_ascii() || name.is_empty() || name.len() > 255 {
                 return refuse("its name must be ASCII and 1 to 255 characters long");
