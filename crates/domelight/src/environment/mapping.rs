@@ -4,7 +4,7 @@
 //! Every mapping is a pair of inverse functions between picture coordinates (u, v) ∈ \[0, 1\]² (u right, v down)
 //! and directions in the world frame (right-handed, +Y up), with its Jacobian dω / (du dv). A texel's value is
 //! constant over the texel, so conversion is an area average: each target texel is the mean of the source over
-//! the texel's solid angle, by regular supersampling with nearest look-up. Bilinear look-up was rejected: it
+//! the texel's solid angle, by regular supersampling with nearest look-up, finer where a small light is. Bilinear look-up was rejected: it
 //! smears a one-texel sun over its neighbours and disagrees with the constant texels of the importance table.
 //!
 //! Sources: Debevec 1998, "Rendering Synthetic Objects into Real Scenes", and his light-probe gallery (angular
@@ -190,7 +190,10 @@ impl Mapping {
 
     /// dω / (du dv) \[sr\] at (u, v); zero where there is no direction. Its integral over the picture is 4π.
     pub fn solid_angle_density(self, uv: Vec2) -> f32 {
-        let Some(direction) = self.direction(uv) else { return 0.0 };
+        self.direction(uv).map_or(0.0, |direction| self.density_at(uv, direction))
+    }
+
+    fn density_at(self, uv: Vec2, direction: Vec3) -> f32 {
         match self {
             Self::LatLong | Self::LatLongExr => PI * TAU * (PI * uv.y).sin().max(0.0),
             Self::Angular => {
@@ -361,6 +364,7 @@ struct Face {
 struct Cube {
     columns: usize,
     rows: usize,
+    /// Those that look toward +X, −X, +Y, −Y, +Z, −Z.
     faces: [Face; 6],
 }
 
@@ -379,12 +383,12 @@ const CROSS_HORIZONTAL: Cube = Cube {
     columns: 4,
     rows: 3,
     faces: [
-        face(Y, Z, X, 1, 0),
-        face(NX, Y, NZ, 0, 1),
-        face(NZ, Y, X, 1, 1),
         face(X, Y, Z, 2, 1),
-        face(Z, Y, NX, 3, 1),
+        face(NX, Y, NZ, 0, 1),
+        face(Y, Z, X, 1, 0),
         face(NY, NZ, X, 1, 2),
+        face(Z, Y, NX, 3, 1),
+        face(NZ, Y, X, 1, 1),
     ],
 };
 
@@ -392,12 +396,12 @@ const CROSS_VERTICAL: Cube = Cube {
     columns: 3,
     rows: 4,
     faces: [
-        face(Y, Z, X, 1, 0),
-        face(NX, Y, NZ, 0, 1),
-        face(NZ, Y, X, 1, 1),
         face(X, Y, Z, 2, 1),
+        face(NX, Y, NZ, 0, 1),
+        face(Y, Z, X, 1, 0),
         face(NY, NZ, X, 1, 2),
         face(Z, NY, X, 1, 3),
+        face(NZ, Y, X, 1, 1),
     ],
 };
 
@@ -439,16 +443,12 @@ impl Cube {
     }
 
     fn uv(&self, d: Vec3) -> Vec2 {
-        let mut nearest = &self.faces[0];
-        for face in &self.faces[1..] {
-            if d.dot(face.forward) > d.dot(nearest.forward) {
-                nearest = face;
-            }
-        }
-        let depth = d.dot(nearest.forward);
-        let (s, t) = (d.dot(nearest.right) / depth, d.dot(nearest.up) / depth);
-        let x = nearest.column as f32 + (0.5 + 0.5 * s).clamp(0.0, 1.0);
-        let y = nearest.row as f32 + (0.5 - 0.5 * t).clamp(0.0, 1.0);
+        let axis = d.abs().max_position();
+        let depth = d[axis].abs();
+        let face = &self.faces[2 * axis + usize::from(d[axis] < 0.0)];
+        let (s, t) = (d.dot(face.right) / depth, d.dot(face.up) / depth);
+        let x = face.column as f32 + (0.5 + 0.5 * s).clamp(0.0, 1.0);
+        let y = face.row as f32 + (0.5 - 0.5 * t).clamp(0.0, 1.0);
         vec2(x / self.columns as f32, y / self.rows as f32)
     }
 }
@@ -469,21 +469,22 @@ pub fn to_lat_long(image: &RgbImage, mapping: Mapping, height: usize) -> RgbImag
     if mapping == Mapping::LatLongExr && image.height == height && image.width.is_multiple_of(2) {
         return turned_by_half(image);
     }
-    let (width, n) = (2 * height, subdivision(2 * height * height));
-    let columns: Vec<(f32, f32)> = (0..width * n)
-        .map(|i| (TAU * ((i as f32 + 0.5) / (width * n) as f32 - 0.5)).sin_cos())
-        .collect();
+    let width = 2 * height;
+    let longitudes = [COARSE, FINE].map(|n| sines_of_columns(width, n));
     by_rows(width, height, |y, row| {
-        let rings = rings_of_row(y, height, n);
+        let rings = [COARSE, FINE].map(|n| rings_of_row(y, height, n));
         for (x, texel) in row.iter_mut().enumerate() {
-            let mut sum = Rgb::BLACK;
-            for &(sin_theta, cos_theta) in &rings {
-                for &(sin_phi, cos_phi) in &columns[x * n..(x + 1) * n] {
+            let samples = |n: usize| {
+                let (rings, longitudes) =
+                    (&rings[usize::from(n == FINE)], &longitudes[usize::from(n == FINE)]);
+                (0..n * n).map(move |i| {
+                    let (sin_theta, cos_theta) = rings[i / n];
+                    let (sin_phi, cos_phi) = longitudes[x * n + i % n];
                     let d = vec3(sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta);
-                    sum += nearest(image, mapping.uv(d));
-                }
-            }
-            *texel = sum / (n * n) as f32;
+                    (nearest(image, mapping.uv(d)), 1.0)
+                })
+            };
+            *texel = Samples::adaptive(samples).mean();
         }
     })
 }
@@ -506,27 +507,63 @@ pub fn from_lat_long(image: &RgbImage, mapping: Mapping, size: (usize, usize)) -
     if turned && width.is_multiple_of(2) {
         return turned_by_half(image);
     }
-    let n = subdivision(width * height);
+    let samples = |x: usize, y: usize, n: usize| {
+        (0..n * n).filter_map(move |i| {
+            let u = (x as f32 + ((i % n) as f32 + 0.5) / n as f32) / width as f32;
+            let v = (y as f32 + ((i / n) as f32 + 0.5) / n as f32) / height as f32;
+            let d = mapping.direction(vec2(u, v))?;
+            Some((nearest(image, lat_long_uv(d)), mapping.density_at(vec2(u, v), d)))
+        })
+    };
     by_rows(width, height, |y, row| {
         for (x, texel) in row.iter_mut().enumerate() {
-            let (mut sum, mut solid_angle) = (Rgb::BLACK, 0.0);
-            for i in 0..n * n {
-                let u = (x as f32 + ((i % n) as f32 + 0.5) / n as f32) / width as f32;
-                let v = (y as f32 + ((i / n) as f32 + 0.5) / n as f32) / height as f32;
-                if let Some(d) = mapping.direction(vec2(u, v)) {
-                    let weight = mapping.solid_angle_density(vec2(u, v));
-                    sum += nearest(image, lat_long_uv(d)) * weight;
-                    solid_angle += weight;
-                }
-            }
-            *texel = if solid_angle > 0.0 { sum / solid_angle } else { Rgb::BLACK };
+            *texel = Samples::adaptive(|n| samples(x, y, n)).mean();
         }
     })
 }
 
-/// Subsamples along each side of a texel: fewer for large maps, whose lights cover more texels.
-fn subdivision(texels: usize) -> usize {
-    if texels <= 1 << 20 { 8 } else { 4 }
+/// Subsamples along each side of a texel, and of a texel in which they show the edge of a light.
+const COARSE: usize = 4;
+const FINE: usize = 32;
+
+/// A weighted mean, and the least and greatest value in it.
+struct Samples {
+    sum: Rgb,
+    weight: f32,
+    least: f32,
+    greatest: f32,
+}
+
+impl Samples {
+    fn collect(samples: impl Iterator<Item = (Rgb, f32)>) -> Self {
+        let mut all = Self { sum: Rgb::BLACK, weight: 0.0, least: f32::INFINITY, greatest: 0.0 };
+        for (value, weight) in samples {
+            all.sum += value * weight;
+            all.weight += weight;
+            all.least = all.least.min(value.max_component());
+            all.greatest = all.greatest.max(value.max_component());
+        }
+        all
+    }
+
+    /// From a coarse grid; from a fine one where the coarse one has found the edge of a light, so that a small sun
+    /// keeps its energy.
+    fn adaptive<I: Iterator<Item = (Rgb, f32)>>(grid: impl Fn(usize) -> I) -> Self {
+        let coarse = Self::collect(grid(COARSE));
+        let is_edge = coarse.greatest > 8.0 * coarse.least;
+        if is_edge { Self::collect(grid(FINE)) } else { coarse }
+    }
+
+    fn mean(&self) -> Rgb {
+        if self.weight > 0.0 { self.sum / self.weight } else { Rgb::BLACK }
+    }
+}
+
+/// (sin φ, cos φ) of `n` longitudes in each column.
+fn sines_of_columns(width: usize, n: usize) -> Vec<(f32, f32)> {
+    let columns = width * n;
+    let phi = |i: usize| TAU * ((i as f32 + 0.5) / columns as f32 - 0.5);
+    (0..columns).map(|i| phi(i).sin_cos()).collect()
 }
 
 /// (sin θ, cos θ) of `n` rings of equal solid angle in row `y`.
