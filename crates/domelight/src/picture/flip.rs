@@ -131,9 +131,9 @@ fn exposure_range(reference: &RgbImage) -> (f32, f32) {
     ((x / greatest).log2(), (x / median).log2())
 }
 
+/// The upper median, as the authors' program takes it.
 fn median_of_sorted(values: &[f32]) -> f32 {
-    let n = values.len();
-    0.5 * (values[(n - 1) / 2] + values[n / 2])
+    values[values.len() / 2]
 }
 
 /// What arrives of a picture behind the eye.
