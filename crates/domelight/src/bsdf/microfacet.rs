@@ -110,7 +110,8 @@ impl<D: NormalDistribution> Brdf for Microfacet<D> {
     }
 
     /// Bounded ring by ring of h: the greatest D of a ring, Fresnel's factor at its lowest h·wo, and
-    /// masking at its highest `wi` in the direction of the smoothest slope.
+    /// masking at its highest `wi` in the direction of the smoothest slope. Within a factor of 2.5
+    /// of the maximum.
     fn max_eval(&self, wo: Vec3) -> f32 {
         if wo.z <= HORIZON {
             return 0.0;

@@ -138,7 +138,9 @@ mod tests {
 
     #[test]
     fn the_narrowest_lobe_is_finite() {
-        FORMS.into_iter().for_each(|form| check_lobe(&ward([0.0, 1e-3], form)));
+        for form in FORMS {
+            check_lobe(&ward([0.0, 1e-3], form));
+        }
     }
 
     #[test]
