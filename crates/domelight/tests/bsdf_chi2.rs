@@ -6,6 +6,7 @@ use domelight::bsdf::{
     Phong, Ward, WardForm,
 };
 use domelight::math::{Vec2, Vec3, from_spherical};
+use testkit::quadrature::Adaptive;
 use testkit::{Chi2, Suite};
 
 const ANGLES: [f32; 5] = [0.0, 30.0, 60.0, 75.0, 85.0];
@@ -13,25 +14,33 @@ const ANGLES: [f32; 5] = [0.0, 30.0, 60.0, 75.0, 85.0];
 /// More than the tests of this file, which share one probability of a false alarm.
 const SUITE: usize = 150;
 
-/// Runs the χ² test of a lobe at all angles, with the cells' axis on the mirror direction, where
-/// narrow lobes have their peak.
+/// How closely the cells look: rings and sectors about the mirror direction, where narrow lobes have
+/// their peak.
+const WIDE: Chi2 = Chi2 {
+    samples: 100_000,
+    cells: [91, 31],
+    axis: [0.0, 0.0, 1.0],
+    quadrature: Adaptive { tolerance: 3e-7, min_depth: 0, max_depth: 7 },
+    mass_tolerance: 1e-4,
+    min_expected: 5.0,
+    seed: 100,
+    suite: Suite { tests: SUITE, significance: 0.01 },
+};
+
+/// Runs the χ² test of a lobe at all angles.
 fn check(name: &str, brdf: &impl Brdf) {
     for (i, degrees) in ANGLES.into_iter().enumerate() {
-        let phi = 0.3 + 0.9 * i as f32;
-        let wo = from_spherical(degrees.to_radians().cos(), phi);
-        let test = Chi2 {
-            cells: [91, 31],
-            axis: [-wo.x, -wo.y, wo.z],
-            seed: 100 + i as u64,
-            suite: Suite::of(SUITE),
-            ..Chi2::default()
-        };
-        let sampler = |u: [f32; 2], u_lobe: f32| {
-            brdf.sample(wo, u_lobe, Vec2::from(u)).map(|s| s.wi.to_array())
-        };
-        let pdf = |w: [f32; 3]| f64::from(brdf.pdf(wo, Vec3::from(w)));
-        test.sphere(&format!("{name} at {degrees}°"), sampler, pdf).unwrap();
+        check_at(name, brdf, degrees, Chi2 { seed: 100 + i as u64, ..WIDE });
     }
+}
+
+fn check_at(name: &str, brdf: &impl Brdf, degrees: f32, test: Chi2) {
+    let wo = from_spherical(degrees.to_radians().cos(), 0.3 + 0.02 * degrees);
+    let test = Chi2 { axis: [-wo.x, -wo.y, wo.z], ..test };
+    let sampler =
+        |u: [f32; 2], u_lobe: f32| brdf.sample(wo, u_lobe, Vec2::from(u)).map(|s| s.wi.to_array());
+    let pdf = |w: [f32; 3]| f64::from(brdf.pdf(wo, Vec3::from(w)));
+    test.sphere(&format!("{name} at {degrees}°"), sampler, pdf).unwrap();
 }
 
 #[test]
@@ -78,6 +87,24 @@ fn metallic_roughness() {
     for (metallic, roughness) in [(0.0, 0.25), (0.0, 0.8), (0.5, 0.4), (1.0, 0.25)] {
         let lobe = MetallicRoughness::new(base, metallic, roughness);
         check(&format!("metallic {metallic} rough {roughness}"), &lobe);
+    }
+}
+
+/// Rings of two thousandths of a radian resolve lobes a few of them wide.
+#[test]
+fn narrow_lobes() {
+    let narrow: [(&str, Lobe); 4] = [
+        ("ggx", Ggx::new([0.005; 2], Fresnel::One, Masking::Correlated).into()),
+        ("ward", Ward::new(Rgb::WHITE, [0.004, 0.008], WardForm::default()).into()),
+        ("beckmann", Beckmann::new([0.005; 2], Fresnel::One, Masking::Correlated).into()),
+        ("phong", Phong::new(Rgb::WHITE, 20_000.0).into()),
+    ];
+    let quadrature = Adaptive { min_depth: 1, ..WIDE.quadrature };
+    for (name, lobe) in narrow {
+        for degrees in [0.0, 60.0] {
+            let test = Chi2 { cells: [1501, 5], quadrature, ..WIDE };
+            check_at(&format!("narrow {name}"), &lobe, degrees, test);
+        }
     }
 }
 

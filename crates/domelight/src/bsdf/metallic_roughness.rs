@@ -90,7 +90,8 @@ impl Brdf for MetallicRoughness {
         Some(warp::cosine_hemisphere(u))
     }
 
-    /// The sum of the two parts' bounds: (1 − F) ≤ 1 − f0 in the diffuse one.
+    /// The sum of the two parts' bounds, with 1 − F ≤ 1 − f0 in the diffuse one; within a factor of
+    /// four of the maximum.
     fn max_eval(&self, wo: Vec3) -> f32 {
         if wo.z <= HORIZON {
             return 0.0;

@@ -110,7 +110,8 @@ impl<D: NormalDistribution> Brdf for Microfacet<D> {
     }
 
     /// Bounded ring by ring of h: the greatest D of a ring, Fresnel's factor at its lowest h·wo, and
-    /// masking at its highest `wi` in the direction of the smoothest slope.
+    /// masking at its highest `wi` in the direction of the smoothest slope. Within a factor of 2.5
+    /// of the maximum.
     fn max_eval(&self, wo: Vec3) -> f32 {
         if wo.z <= HORIZON {
             return 0.0;
@@ -195,4 +196,72 @@ pub(super) fn rings(wo: Vec3, alpha: f32) -> impl Iterator<Item = Ring> {
             max_cos_i: max_cos_i.min(1.0),
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bsdf::test_support::toward;
+    use crate::bsdf::{BeckmannNormals, GgxNormals};
+    use testkit::quadrature::Adaptive;
+
+    fn check_area(normals: &impl NormalDistribution, tolerance: f64) {
+        let quadrature = Adaptive { tolerance: 1e-7, ..Adaptive::default() };
+        for degrees in [0.0f32, 40.0, 70.0, 85.0, 90.0] {
+            let w = toward(degrees, 0.7);
+            let [area] = quadrature.hemisphere(|h| {
+                let h = Vec3::from(h.map(|c| c as f32));
+                [f64::from(normals.d(h) * h.dot(w).max(0.0))]
+            });
+            let sigma = f64::from(normals.sigma(w));
+            assert!((area - sigma).abs() < tolerance * area, "{degrees}°: {area} {sigma}");
+        }
+    }
+
+    /// Smith's normalisation: ∫ D(h) max(0, h·w) dω = σ(w).
+    #[test]
+    fn sigma_is_the_projected_area() {
+        for alpha in [[0.3, 0.6], [0.5, 0.5], [0.9, 0.2]] {
+            check_area(&GgxNormals::new(alpha), 1e-4);
+            // The accuracy of the rational fit of Λ.
+            check_area(&BeckmannNormals::new(alpha), 0.005);
+        }
+    }
+
+    /// G₂ by its definitions from Λ = (√(1 + α² tan² θ) − 1)/2.
+    #[test]
+    fn masking_is_smiths() {
+        let alpha = 0.4f32;
+        let normals = GgxNormals::new([alpha; 2]);
+        for (degrees_o, degrees_i) in [(0.0, 0.0), (20.0, 70.0), (60.0, 60.0), (85.0, 30.0)] {
+            let (wo, wi) = (toward(degrees_o, 0.3), toward(degrees_i, 2.0));
+            let lambda = |w: Vec3| 0.5 * ((1.0 + sqr(alpha) * (1.0 / sqr(w.z) - 1.0)).sqrt() - 1.0);
+            let (lambda_o, lambda_i) = (lambda(wo), lambda(wi));
+            let g2 = |masking| match masking {
+                Masking::Correlated => 1.0 / (1.0 + lambda_o + lambda_i),
+                Masking::Separable => 1.0 / ((1.0 + lambda_o) * (1.0 + lambda_i)),
+            };
+            for masking in [Masking::Correlated, Masking::Separable] {
+                let sigmas = [normals.sigma(wo), normals.sigma(wi)];
+                let found = masked(masking, [wo.z, wi.z], sigmas);
+                let expected = g2(masking) / (4.0 * wo.z);
+                assert!((found - expected).abs() < 1e-5 * expected, "{found} {expected}");
+            }
+        }
+    }
+
+    /// Every pair of directions lies in the ring of its half vector.
+    #[test]
+    fn rings_hold_their_directions() {
+        let mut rng = testkit::Pcg::new(3);
+        for _ in 0..20_000 {
+            let direction = |u| crate::sampling::warp::uniform_hemisphere(Vec2::from(u));
+            let (wo, wi) = (direction(rng.next_2d()), direction(rng.next_2d()));
+            let h = wo + wi;
+            let tan2 = (sqr(h.x) + sqr(h.y)) / sqr(h.z);
+            let ring = rings(wo, 0.3).find(|r| (r.tan2[0]..=r.tan2[1]).contains(&tan2));
+            let ring = ring.expect("the rings cover the hemisphere");
+            assert!(0.5 * h.length() >= ring.min_cos_d - 1e-5 && wi.z <= ring.max_cos_i + 1e-5);
+        }
+    }
 }

@@ -5,6 +5,19 @@
 //! are plain `Copy` data and evaluate value and density together, because multiple importance
 //! sampling always needs both.
 //!
+//! ```
+//! use domelight::bsdf::{Brdf, Material};
+//! use domelight::math::{vec2, vec3};
+//!
+//! let material: Material = "phong:50:0.5:0.3".parse()?;
+//! let wo = vec3(0.6, 0.0, 0.8);
+//! if let Some(sample) = material.for_view(wo).sample(wo, 0.2, vec2(0.3, 0.7)) {
+//!     let weight = sample.value / sample.pdf;
+//!     assert!(weight.is_finite() && sample.wi.z > 0.0);
+//! }
+//! # Ok::<(), domelight::bsdf::ParseMaterialError>(())
+//! ```
+//!
 //! All lobes here are reciprocal: f_r(wo, wi) = f_r(wi, wo).
 //!
 //! Rejected: trait objects (the set is closed, and the sample loop should inline); tabulated

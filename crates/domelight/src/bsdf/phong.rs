@@ -21,8 +21,7 @@ pub struct Phong {
 }
 
 impl Phong {
-    /// Of the reflectance k_s in [0, 1] and the exponent n, which is clamped to [0, 10⁵]: beyond
-    /// that, f32 cosines do not resolve the lobe.
+    /// Of the reflectance k_s in [0, 1] and the exponent n, which is clamped to [0, 10⁵].
     pub fn new(specular: Rgb, exponent: f32) -> Self {
         Self { specular, exponent: exponent.clamp(0.0, 1e5) }
     }
@@ -36,11 +35,13 @@ fn mirror(w: Vec3) -> Vec3 {
 impl Brdf for Phong {
     #[inline]
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        let cos_alpha = mirror(wo).dot(wi);
-        if !above(wo, wi) || cos_alpha <= 0.0 {
+        // cos α = 1 − |wi − mirror|²/2: a scalar product would carry the rounding of the vectors'
+        // lengths, which the power multiplies by n.
+        let versine = 0.5 * mirror(wo).distance_squared(wi);
+        if !above(wo, wi) || versine >= 1.0 {
             return (Rgb::BLACK, 0.0);
         }
-        let power = cos_alpha.min(1.0).powf(self.exponent) / TAU;
+        let power = (self.exponent * f32::ln_1p(-versine)).exp() / TAU;
         let value = self.specular * ((self.exponent + 2.0) * power * wi.z);
         (value, (self.exponent + 1.0) * power)
     }
@@ -62,11 +63,10 @@ impl Brdf for Phong {
         let sin_o = wo.truncate().length();
         let b = (n + 1.0) * cos_o;
         let tan_alpha = 2.0 * sin_o / (b + (b * b + 4.0 * n * sin_o * sin_o).sqrt());
-        let cos_alpha = 1.0 / (1.0 + tan_alpha * tan_alpha).sqrt();
-        let cos_i = cos_alpha * (cos_o + sin_o * tan_alpha);
-        let peak = (n + 2.0) / TAU * cos_alpha.powf(n) * cos_i;
-        // The power multiplies the rounding error of the cosine by n.
-        self.specular.max_component() * peak * (ROUNDING + 4.0 * n * f32::EPSILON)
+        let cos_alpha_n = (-0.5 * n * f32::ln_1p(tan_alpha * tan_alpha)).exp();
+        let cos_i = (cos_o + sin_o * tan_alpha) / (1.0 + tan_alpha * tan_alpha).sqrt();
+        let peak = (n + 2.0) / TAU * cos_alpha_n * cos_i;
+        self.specular.max_component() * peak * ROUNDING
     }
 
     #[inline]
@@ -87,6 +87,11 @@ mod tests {
             check_lobe(&lobe);
             check_bound(&lobe, 1.05);
         }
+    }
+
+    #[test]
+    fn the_narrowest_lobe_is_finite() {
+        check_lobe(&Phong::new(Rgb::WHITE, f32::INFINITY));
     }
 
     /// A lobe about the mirror direction passes under the surface: the fraction lost, found by
