@@ -1,0 +1,101 @@
+//! Where results go: pictures by their file's extension, reports to standard output.
+
+use crate::failure::UsageError;
+use domelight::RgbImage;
+use domelight::environment::mapping::{EnvmapKind, Mapping};
+use domelight::picture::exr::ExrLayers;
+use domelight::picture::png::Depth;
+use domelight::picture::tone::ToneMapping;
+use domelight::picture::{hdr, pfm, png, write_atomically};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// A picture file to write; `-` is standard output.
+#[derive(Clone, Debug)]
+pub(crate) struct PicturePath {
+    pub(crate) path: PathBuf,
+    /// `None` for `-`: the command's default.
+    format: Option<PictureFormat>,
+}
+
+/// The formats that can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PictureFormat {
+    Exr,
+    Hdr,
+    Pfm,
+    Png,
+}
+
+impl FromStr for PicturePath {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let path = PathBuf::from(text);
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        let format = match extension.as_deref() {
+            _ if text == "-" => None,
+            Some("exr") => Some(PictureFormat::Exr),
+            Some("hdr" | "pic" | "rgbe") => Some(PictureFormat::Hdr),
+            Some("pfm") => Some(PictureFormat::Pfm),
+            Some("png") => Some(PictureFormat::Png),
+            _ => return Err("its name must end in .exr, .hdr, .pfm or .png, or be -".into()),
+        };
+        Ok(Self { path, format })
+    }
+}
+
+impl PicturePath {
+    pub(crate) fn is_standard_output(&self) -> bool {
+        self.path == Path::new("-")
+    }
+
+    /// Writes the picture; the tone curve matters to PNG alone.
+    pub(crate) fn write(
+        &self,
+        image: &RgbImage,
+        tone: &ToneMapping,
+        for_standard_output: PictureFormat,
+        mapping: Option<Mapping>,
+    ) -> anyhow::Result<()> {
+        write_atomically(&self.path, |out| match self.format.unwrap_or(for_standard_output) {
+            PictureFormat::Exr => out.write_all(&exr_bytes(image, mapping)?),
+            PictureFormat::Hdr => hdr::encode(image, out),
+            PictureFormat::Pfm => pfm::encode(image, out),
+            PictureFormat::Png => png::encode(image, None, tone, Depth::Eight, out),
+        })?;
+        Ok(())
+    }
+}
+
+fn exr_bytes(image: &RgbImage, mapping: Option<Mapping>) -> io::Result<Vec<u8>> {
+    let mut layers = ExrLayers::from_image(image, None);
+    layers.envmap = match mapping {
+        Some(Mapping::LatLongExr) => Some(EnvmapKind::LatLong),
+        Some(Mapping::CubeStripVertical) => Some(EnvmapKind::Cube),
+        _ => None,
+    };
+    layers.encode().map_err(io::Error::other)
+}
+
+/// Refuses two results on standard output.
+pub(crate) fn require_one_on_standard_output(
+    pictures: &[Option<&PicturePath>],
+    json: bool,
+) -> Result<(), UsageError> {
+    let n = pictures.iter().flatten().filter(|p| p.is_standard_output()).count();
+    if n + usize::from(json) > 1 {
+        return Err(UsageError(
+            "only one result can go to standard output; give a file name".into(),
+        ));
+    }
+    Ok(())
+}
+
+/// Prints a report; an error of kind `BrokenPipe` if nobody reads.
+pub(crate) fn print(report: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{}", report.trim_end())?;
+    out.flush()
+}
