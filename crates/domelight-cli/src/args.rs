@@ -139,7 +139,7 @@ pub(crate) struct Tone {
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
     exposure: f32,
     /// Tone curve, for what is looked at [default: srgb, which cuts off at 1; of previews aces].
-    #[arg(long, value_name = "CURVE", value_parser = one_of(ToneCurve::ALL.map(ToneCurve::name)))]
+    #[arg(long, value_name = "CURVE", value_parser = tone_curve())]
     tone: Option<ToneCurve>,
 }
 
@@ -151,6 +151,10 @@ impl Tone {
 
 fn mapping() -> impl TypedValueParser<Value = Mapping> {
     one_of(Mapping::ALL.map(Mapping::name))
+}
+
+fn tone_curve() -> impl TypedValueParser<Value = ToneCurve> {
+    one_of(ToneCurve::ALL.map(ToneCurve::name))
 }
 
 /// Reads one of the `names`, which help and errors list.
