@@ -186,13 +186,13 @@ fn fill_channel(image: &mut RgbImage, channel: fn(&mut Rgb) -> &mut f32) {
     let (width, height) = (image.width, image.height);
     let mut values: Vec<f32> = image.pixels.iter_mut().map(|pixel| *channel(pixel)).collect();
     let mut queued: Vec<bool> = values.iter().map(|value| value.is_finite()).collect();
-    let unknown = |queued: &[bool]| (0..queued.len()).filter(|&i| !queued[i]).collect::<Vec<_>>();
-    let mut ring: Vec<usize> = unknown(&queued)
-        .into_iter()
-        .filter(|&i| neighbours(i, width, height).any(|j| values[j].is_finite()))
-        .collect();
+    let borders_known = |&i: &usize| neighbours(i, width, height).any(|j| values[j].is_finite());
+    let mut ring: Vec<usize> =
+        (0..values.len()).filter(|&i| !queued[i]).filter(borders_known).collect();
     while !ring.is_empty() {
-        ring.iter().for_each(|&i| queued[i] = true);
+        for &i in &ring {
+            queued[i] = true;
+        }
         let means: Vec<f32> =
             ring.iter().map(|&i| mean_around(&values, i, width, height)).collect();
         ring.iter().zip(means).for_each(|(&i, mean)| values[i] = mean);
