@@ -18,8 +18,9 @@ use crate::math::{PI, TAU, Vec2, Vec3, vec3};
 use crate::sampling::{Table2d, TableError};
 use crate::{Rgb, RgbImage};
 
-/// Which world axis the map's top row points to.
+/// A world axis that points up; the top row of a map faces it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "io", derive(serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum UpAxis {
     /// +Y up; the map's centre column looks toward −Z.
     #[default]

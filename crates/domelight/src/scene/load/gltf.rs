@@ -240,6 +240,7 @@ impl<'a> Reader<'a> {
             camera: self.camera,
             environment: None,
             up: Some(UpAxis::Y),
+            scenery: Vec::new(),
         };
         Loaded { description, warnings: self.warnings }
     }

@@ -458,7 +458,7 @@ fn camera_settings(table: &CameraTable, up: UpAxis) -> Result<CameraSettings, To
         projection,
         origin: table.origin.into(),
         target: table.target.into(),
-        up: table.up.map_or(up.direction(), Vec3::from),
+        up: table.up.map_or(up.vector(), Vec3::from),
     };
     settings.check()?;
     Ok(settings)
