@@ -204,6 +204,18 @@ mod tests {
     }
 
     #[test]
+    #[cfg(feature = "render")]
+    fn the_pixels_do_not_depend_on_threads() {
+        for probe in BuiltinProbe::ALL {
+            let with = |n_threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+                pool.install(|| probe.image(31))
+            };
+            assert_eq!(with(1), with(3), "{probe}");
+        }
+    }
+
+    #[test]
     fn constant_is_one() {
         assert!(BuiltinProbe::Constant.image(3).pixels.iter().all(|&p| p == Rgb::WHITE));
     }
