@@ -2,7 +2,7 @@
 
 use crate::args::{DiffArguments, Metric};
 use crate::failure::UsageError;
-use crate::output::{PictureFormat, print, require_one_on_standard_output};
+use crate::output::{PictureFormat, PicturePath, print, require_one_on_standard_output};
 use domelight::RgbImage;
 use domelight::picture::compare::{
     ColorScale, Comparison, absolute_error_map, compare, relative_error_map,
@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &DiffArguments, quiet: bool) -> anyhow::Result<()> 
     let white = difference.write_picture(arguments, &test.image, &reference.image)?;
     if arguments.json {
         print(&serde_json::to_string_pretty(&difference.json(arguments, white))?)?;
-    } else if !quiet && !arguments.output.as_ref().is_some_and(|o| o.is_standard_output()) {
+    } else if !quiet && !arguments.output.as_ref().is_some_and(PicturePath::is_standard_output) {
         print(&difference.table(white.map(|w| (w, arguments.metric))))?;
     }
     Ok(())
@@ -59,7 +59,7 @@ impl Difference {
     ) -> anyhow::Result<Self> {
         let comparison = compare(test, reference, mask)?;
         let tone = arguments.tone.mapping(ToneCurve::Srgb);
-        let flip = ldr_flip(&shown(reference, &tone), &shown(test, &tone), PIXELS_PER_DEGREE)?;
+        let flip = ldr_flip(&shown(reference, tone), &shown(test, tone), PIXELS_PER_DEGREE)?;
         let hdr = arguments.hdr_flip.then(|| hdr_flip(reference, test, PIXELS_PER_DEGREE));
         Ok(Self { comparison, flip, hdr_flip: hdr.transpose()?, mask: mask.map(<[bool]>::to_vec) })
     }
@@ -89,7 +89,7 @@ impl Difference {
             Metric::Rel | Metric::Abs => percentile(&errors, 0.999),
         });
         let picture = scale.picture(&errors, test.width, test.height, white);
-        output.write(&picture, &ToneMapping::default(), PictureFormat::Png, None)?;
+        output.write(&picture, ToneMapping::default(), PictureFormat::Png, None)?;
         Ok(Some(white))
     }
 
@@ -161,7 +161,7 @@ impl Difference {
     }
 }
 
-fn shown(picture: &RgbImage, tone: &ToneMapping) -> RgbImage {
+fn shown(picture: &RgbImage, tone: ToneMapping) -> RgbImage {
     RgbImage { pixels: picture.pixels.iter().map(|&p| tone.apply(p)).collect(), ..*picture }
 }
 

@@ -57,7 +57,7 @@ impl PicturePath {
     pub(crate) fn write(
         &self,
         image: &RgbImage,
-        tone: &ToneMapping,
+        tone: ToneMapping,
         for_standard_output: PictureFormat,
         mapping: Option<Mapping>,
     ) -> anyhow::Result<()> {
@@ -65,7 +65,7 @@ impl PicturePath {
             PictureFormat::Exr => out.write_all(&exr_bytes(image, mapping)?),
             PictureFormat::Hdr => hdr::encode(image, out),
             PictureFormat::Pfm => pfm::encode(image, out),
-            PictureFormat::Png => png::encode(image, None, tone, Depth::Eight, out),
+            PictureFormat::Png => png::encode(image, None, &tone, Depth::Eight, out),
         })?;
         Ok(())
     }

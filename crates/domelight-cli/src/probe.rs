@@ -1,7 +1,7 @@
 //! `domelight probe`: what a light probe is like, and its conversion.
 
 use crate::args::ProbeArguments;
-use crate::output::{PictureFormat, print, require_one_on_standard_output};
+use crate::output::{PictureFormat, PicturePath, print, require_one_on_standard_output};
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{LoadedProbe, ProbeOptions, SanitizeReport, load_probe};
 use domelight::environment::mapping::{Mapping, from_lat_long, to_lat_long};
@@ -19,7 +19,7 @@ pub(crate) fn run(arguments: &ProbeArguments, quiet: bool) -> anyhow::Result<()>
     let probe = load(arguments)?;
     write_pictures(arguments, &probe.image)?;
     let on_standard_output =
-        [preview, output].into_iter().flatten().any(|p| p.is_standard_output());
+        [preview, output].into_iter().flatten().any(PicturePath::is_standard_output);
     if arguments.json {
         print(&serde_json::to_string_pretty(&json(arguments, &probe))?)?;
     } else if !quiet && !on_standard_output {
@@ -53,7 +53,7 @@ fn write_pictures(arguments: &ProbeArguments, map: &RgbImage) -> anyhow::Result<
     let map = resized.as_ref().unwrap_or(map);
     let tone = arguments.tone.mapping(ToneCurve::Aces);
     if let Some(preview) = &arguments.preview {
-        preview.write(map, &tone, PictureFormat::Png, None)?;
+        preview.write(map, tone, PictureFormat::Png, None)?;
     }
     if let Some(output) = &arguments.output {
         let mapping = arguments.to;
@@ -62,7 +62,7 @@ fn write_pictures(arguments: &ProbeArguments, map: &RgbImage) -> anyhow::Result<
             _ => mapping.size_for(map.height),
         };
         let converted = from_lat_long(map, mapping, size);
-        output.write(&converted, &tone, PictureFormat::Exr, Some(mapping))?;
+        output.write(&converted, tone, PictureFormat::Exr, Some(mapping))?;
     }
     Ok(())
 }
