@@ -55,7 +55,7 @@ impl Settings {
     /// What OpenEXR files tell of their making.
     pub(crate) fn provenance(&self) -> Vec<(String, String)> {
         let mut attributes =
-            vec![("software".to_owned(), format!("domelight {}", env!("CARGO_PKG_VERSION")))];
+            vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
         let settings = [
             ("scene", self.scene.clone()),
             ("environment", self.environment.clone()),
