@@ -285,7 +285,7 @@ impl Reader<'_> {
         }
         for object in file.objects {
             let at = object.span().start;
-            self.object(object.into_inner(), at)?;
+            self.object(object.get_ref(), at)?;
         }
         Ok(())
     }
@@ -385,8 +385,8 @@ impl Reader<'_> {
         })
     }
 
-    fn object(&mut self, table: ObjectTable, at: usize) -> Result<(), LoadError> {
-        let matrix = matrix(&table).map_err(|problem| self.error(at, problem))?;
+    fn object(&mut self, table: &ObjectTable, at: usize) -> Result<(), LoadError> {
+        let matrix = matrix(table).map_err(|problem| self.error(at, problem))?;
         let mut loaded = match (&table.file, &table.builtin) {
             (Some(file), None) => {
                 let line = line_of(self.text, at);
@@ -406,14 +406,18 @@ impl Reader<'_> {
         // The scene file decides which axis points up.
         description.up = None;
         if let Some(name) = &table.name {
-            description.parts.iter_mut().for_each(|p| p.name.clone_from(name));
+            for part in &mut description.parts {
+                part.name.clone_from(name);
+            }
         }
         match &table.material {
             None => self.loaded.description.append(description),
             Some(text) => {
                 let surface = self.surface(text, at)?;
                 let mut parts = std::mem::take(&mut description.parts);
-                parts.iter_mut().for_each(|p| p.surface = surface);
+                for part in &mut parts {
+                    part.surface = surface;
+                }
                 self.loaded.description.parts.append(&mut parts);
                 let SceneDescription { camera, .. } = description;
                 self.loaded
