@@ -16,6 +16,7 @@ pub mod environment;
 mod image;
 pub mod math;
 pub mod sampling;
+pub mod strategy;
 
 #[cfg(feature = "render")]
 pub mod bvh;

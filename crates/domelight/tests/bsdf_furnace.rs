@@ -48,11 +48,9 @@ fn view(degrees: f32) -> Vec3 {
 /// abruptly, is then the edge of the domain.
 fn reflected(brdf: &impl Brdf, wo: Vec3) -> [f64; 3] {
     let quadrature = Adaptive { tolerance: 1e-8, min_depth: 3, max_depth: 10 };
-    [0, 1, 2].map(|channel| {
-        quadrature.hemisphere(|w| {
-            let wi = Vec3::from(w.map(|c| c as f32));
-            f64::from(brdf.eval(wo, wi).to_array()[channel])
-        })
+    quadrature.hemisphere(|w| {
+        let wi = Vec3::from(w.map(|c| c as f32));
+        brdf.eval(wo, wi).to_array().map(f64::from)
     })
 }
 

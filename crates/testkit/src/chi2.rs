@@ -204,7 +204,7 @@ impl Chi2 {
             for j in 0..self.cells[1] {
                 let span = |k: usize, n: usize| [n as f64 * size[k], (n + 1) as f64 * size[k]];
                 let cell = Rect { x: span(0, i), y: span(1, j) };
-                let mass = self.quadrature.rect(cell, &mut |x, y| density([x, y]));
+                let [mass] = self.quadrature.rect(cell, &mut |x, y| [density([x, y])]);
                 expected.push(mass * self.samples as f64);
             }
         }

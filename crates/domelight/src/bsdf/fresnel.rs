@@ -43,9 +43,14 @@ impl Fresnel {
 /// Schlick's approximation.
 #[inline]
 pub(super) fn schlick(f0: Rgb, cos_theta: f32) -> Rgb {
+    f0 + (Rgb::WHITE - f0) * schlick_weight(cos_theta)
+}
+
+/// (1 − cos θ)⁵, how far F is from f0 to 1.
+#[inline]
+pub(super) fn schlick_weight(cos_theta: f32) -> f32 {
     let x = (1.0 - cos_theta).clamp(0.0, 1.0);
-    let x5 = sqr(sqr(x)) * x;
-    f0 + (Rgb::WHITE - f0) * x5
+    sqr(sqr(x)) * x
 }
 
 /// A complex refractive index per colour channel.

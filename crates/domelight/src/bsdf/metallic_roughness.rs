@@ -24,6 +24,9 @@ pub struct MetallicRoughness {
     diffuse: Rgb,
     f0: Rgb,
     alpha: f32,
+    /// The channels' means, which choose between the parts.
+    diffuse_mean: f32,
+    f0_mean: f32,
 }
 
 impl MetallicRoughness {
@@ -33,10 +36,14 @@ impl MetallicRoughness {
         // NaN is zero.
         let unit = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
         let (base, metallic) = (base_color.map(unit), unit(metallic));
+        let diffuse = base * (1.0 - metallic);
+        let f0 = Rgb::splat(0.04).lerp(base, metallic);
         Self {
-            diffuse: base * (1.0 - metallic),
-            f0: Rgb::splat(0.04).lerp(base, metallic),
+            diffuse,
+            f0,
             alpha: sqr(unit(roughness)),
+            diffuse_mean: diffuse.mean(),
+            f0_mean: f0.mean(),
         }
     }
 
@@ -48,10 +55,11 @@ impl MetallicRoughness {
     /// The probability of drawing from the specular part.
     #[inline]
     fn specular_share(&self, wo: Vec3) -> f32 {
-        let f = fresnel::schlick(self.f0, wo.z);
-        let specular = f.mean();
-        let diffuse = ((Rgb::WHITE - f) * self.diffuse).mean();
-        if specular + diffuse > 0.0 { specular / (specular + diffuse) } else { 1.0 }
+        let grazing = fresnel::schlick_weight(wo.z);
+        let specular = self.f0_mean + (1.0 - self.f0_mean) * grazing;
+        let diffuse = (1.0 - specular) * self.diffuse_mean;
+        // Zero only for a black metal, which has no diffuse part either.
+        if specular > 0.0 { specular / (specular + diffuse) } else { 1.0 }
     }
 }
 

@@ -113,12 +113,11 @@ const FINE: Adaptive = Adaptive { tolerance: 1e-7, min_depth: 3, max_depth: 10 }
 
 /// ∫ f_r cos θ_i dω by quadrature.
 pub(crate) fn directional_albedo(lobe: &impl Brdf, wo: Vec3) -> [f64; 3] {
-    [0, 1, 2].map(|k| {
-        FINE.hemisphere(|w| f64::from(lobe.eval(wo, Vec3::from(w.map(|c| c as f32))).to_array()[k]))
-    })
+    FINE.hemisphere(|w| lobe.eval(wo, Vec3::from(w.map(|c| c as f32))).to_array().map(f64::from))
 }
 
 /// 1 − ∫ pdf dω by quadrature: the fraction of samples that are none.
 pub(crate) fn lost_fraction(lobe: &impl Brdf, wo: Vec3) -> f64 {
-    1.0 - FINE.hemisphere(|w| f64::from(lobe.pdf(wo, Vec3::from(w.map(|c| c as f32)))))
+    let [kept] = FINE.hemisphere(|w| [f64::from(lobe.pdf(wo, Vec3::from(w.map(|c| c as f32))))]);
+    1.0 - kept
 }

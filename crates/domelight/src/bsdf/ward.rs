@@ -112,7 +112,9 @@ impl Brdf for Ward {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bsdf::test_support::{check_bound, check_lobe, directional_albedo, toward};
+    use crate::bsdf::test_support::{
+        check_bound, check_lobe, directional_albedo, lost_fraction, toward,
+    };
     use crate::math::vec2;
     use testkit::quadrature::Adaptive;
 
@@ -149,10 +151,28 @@ mod tests {
             (-slope).exp() / (std::f64::consts::PI * ax * ay)
         };
         let quadrature = Adaptive { tolerance: 1e-9, ..Adaptive::default() };
-        let right = quadrature.hemisphere(|h| gauss(h) / h[2].powi(3));
-        let wrong = quadrature.hemisphere(gauss);
+        let [right] = quadrature.hemisphere(|h| [gauss(h) / h[2].powi(3)]);
+        let [wrong] = quadrature.hemisphere(|h| [gauss(h)]);
         assert!((right - 1.0).abs() < 1e-5, "{right}");
         assert!((wrong - 0.853).abs() < 5e-4, "{wrong}");
+    }
+
+    /// The density of `wi` is that of h times dω_h/dω_i = 1/(4 h·wi), and samples that end below the
+    /// surface are missing from it, not redrawn.
+    #[test]
+    fn the_density_is_of_the_light_direction() {
+        let (ax, ay) = (0.15f64, 0.5f64);
+        let lobe = ward([ax as f32, ay as f32], WardForm::default());
+        for (degrees, phi) in [(0.0, 0.0), (40.0, 1.0), (70.0, 4.0)] {
+            let (wo, wi) = (toward(30.0, 2.0), toward(degrees, phi));
+            let h = (wo + wi).normalize().as_dvec3();
+            let slope = (h.x / ax / h.z).powi(2) + (h.y / ay / h.z).powi(2);
+            let p_h = (-slope).exp() / (std::f64::consts::PI * ax * ay * h.z.powi(3));
+            let expected = p_h / (4.0 * h.dot(wi.as_dvec3()));
+            let found = f64::from(lobe.pdf(wo, wi));
+            assert!((found - expected).abs() < 1e-4 * expected, "{found} {expected}");
+        }
+        assert!(lost_fraction(&lobe, toward(85.0, 0.4)) > 0.1);
     }
 
     /// A plain arctangent of (α_y/α_x) tan 2πu would leave the half of the lobe with cos φ < 0 empty.

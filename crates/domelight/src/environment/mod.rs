@@ -1,1 +1,509 @@
 //! The distant light: radiance over directions, its importance table and its look-up.
+//!
+//! An [`Environment`] is a lat-long map of constant texels. Its table holds luminance times the
+//! texel's *exact* solid angle, so look-up, table and density agree everywhere: at the poles, at
+//! the seam and beside the sun. (A bilinear look-up over this table would lose up to 43.75 % of a
+//! single bright texel's light, for the table is zero where the interpolant is not.)
+
+pub mod builtin;
+mod compensation;
+#[cfg(feature = "io")]
+pub mod io;
+pub mod mapping;
+pub mod statistics;
+
+pub use compensation::CompensatedTable;
+
+use crate::math::{PI, TAU, Vec2, Vec3, vec3};
+use crate::sampling::{Table2d, TableError};
+use crate::{Rgb, RgbImage};
+
+/// Which world axis the map's top row points to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpAxis {
+    /// +Y up; the map's centre column looks toward −Z.
+    #[default]
+    Y,
+    /// +Z up; the map's centre column looks toward +Y.
+    Z,
+}
+
+impl UpAxis {
+    /// The axis as a unit vector.
+    pub fn vector(self) -> Vec3 {
+        match self {
+            Self::Y => Vec3::Y,
+            Self::Z => Vec3::Z,
+        }
+    }
+
+    /// World to the map's own frame, where +Y is up.
+    fn to_map(self, w: Vec3) -> Vec3 {
+        match self {
+            Self::Y => w,
+            Self::Z => vec3(w.x, w.z, -w.y),
+        }
+    }
+
+    /// The map's own frame to the world.
+    fn to_world(self, m: Vec3) -> Vec3 {
+        match self {
+            Self::Y => m,
+            Self::Z => vec3(m.x, -m.z, m.y),
+        }
+    }
+}
+
+/// How a map stands in the world.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Orientation {
+    /// The axis of the top row.
+    pub up: UpAxis,
+    /// Rotation about the up axis \[degrees\], counter-clockwise seen from above: at 90 what was in
+    /// front (−Z) is on the left (−X).
+    pub rotation: f32,
+}
+
+/// What makes a map unusable.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum EnvironmentError {
+    /// No texels.
+    #[error("the map is empty ({width}x{height})")]
+    Empty {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// A texel that is negative, NaN or infinite.
+    #[error(
+        "texel ({x}, {y}) is ({}, {}, {}); radiance must be finite and not negative",
+        value.r, value.g, value.b
+    )]
+    BadTexel {
+        /// Column.
+        x: usize,
+        /// Row.
+        y: usize,
+        /// Its value, scale included.
+        value: Rgb,
+    },
+    /// A rotation or scale that is not a number.
+    #[error("{what} is {value}; it must be finite and not negative")]
+    BadSetting {
+        /// The setting's name.
+        what: &'static str,
+        /// Its value.
+        value: f32,
+    },
+}
+
+/// A direction drawn from the environment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnvironmentSample {
+    /// Toward the light, world frame.
+    pub wi: Vec3,
+    /// Radiance from there \[W·m⁻²·sr⁻¹\], [`Environment::le`] of `wi`.
+    pub le: Rgb,
+    /// Density \[sr⁻¹\], [`Environment::pdf`] of `wi`, positive.
+    pub pdf: f32,
+}
+
+/// A texel of the map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Texel {
+    column: usize,
+    row: usize,
+}
+
+/// Radiance from every direction, and a way to draw directions in proportion to its luminance.
+///
+/// Resident memory is 20 bytes a texel: three floats of radiance and a running sum in double
+/// precision.
+#[derive(Clone, Debug)]
+pub struct Environment {
+    map: RgbImage,
+    orientation: Orientation,
+    grid: Grid,
+    /// Luminance · solid angle; none for a black map.
+    table: Option<Table2d>,
+}
+
+impl Environment {
+    /// From a lat-long map: row 0 up, texel centres at +½, every texel finite and not negative;
+    /// radiance is multiplied by `scale`.
+    ///
+    /// # Errors
+    /// The first bad texel in row order, an empty map, or a bad scale or rotation.
+    pub fn new(
+        mut map: RgbImage,
+        orientation: Orientation,
+        scale: f32,
+    ) -> Result<Self, EnvironmentError> {
+        let (width, height) = (map.width, map.height);
+        if width == 0 || height == 0 {
+            return Err(EnvironmentError::Empty { width, height });
+        }
+        if !scale.is_finite() || scale < 0.0 {
+            return Err(EnvironmentError::BadSetting { what: "scale", value: scale });
+        }
+        if !orientation.rotation.is_finite() {
+            let value = orientation.rotation;
+            return Err(EnvironmentError::BadSetting { what: "rotation", value });
+        }
+        if scale != 1.0 {
+            map.pixels.iter_mut().for_each(|p| *p *= scale);
+        }
+        let grid = Grid::new(width, height, orientation.rotation);
+        let table = grid.table(&map, |le| f64::from(le.luminance()));
+        let table = match table {
+            Ok(table) => Some(table),
+            Err(TableError::AllZero) => None,
+            Err(_) => return Err(Self::bad_texel(&map)),
+        };
+        // A luminance can be fine where a channel is not.
+        if !map.pixels.iter().all(|p| p.is_finite() && p.min_component() >= 0.0) {
+            return Err(Self::bad_texel(&map));
+        }
+        Ok(Self { map, orientation, grid, table })
+    }
+
+    /// The same radiance from everywhere.
+    ///
+    /// # Errors
+    /// If it is negative or not finite.
+    pub fn constant(radiance: Rgb) -> Result<Self, EnvironmentError> {
+        Self::new(RgbImage::filled(1, 1, radiance), Orientation::default(), 1.0)
+    }
+
+    fn bad_texel(map: &RgbImage) -> EnvironmentError {
+        let bad = |p: &Rgb| !p.is_finite() || p.min_component() < 0.0;
+        let i = map.pixels.iter().position(bad).unwrap_or(0);
+        let (x, y) = (i % map.width, i / map.width);
+        EnvironmentError::BadTexel { x, y, value: map.pixels[i] }
+    }
+
+    /// The map, scale included.
+    pub fn map(&self) -> &RgbImage {
+        &self.map
+    }
+
+    /// How the map stands in the world.
+    pub fn orientation(&self) -> Orientation {
+        self.orientation
+    }
+
+    /// The table of luminance times solid angle; none for a black map.
+    pub fn table(&self) -> Option<&Table2d> {
+        self.table.as_ref()
+    }
+
+    /// Solid angle of a texel of row `row` \[sr\], exactly the integral of sin θ over it.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn texel_solid_angle(&self, row: usize) -> f64 {
+        self.grid.solid_angle(row)
+    }
+
+    /// ∫ luminance dω over the sphere.
+    pub fn power(&self) -> f64 {
+        self.table.as_ref().map_or(0.0, Table2d::total)
+    }
+
+    /// Radiance from the unit direction `wi` \[W·m⁻²·sr⁻¹\], constant over each texel.
+    pub fn le(&self, wi: Vec3) -> Rgb {
+        let t = self.texel(wi);
+        self.map.get(t.column, t.row)
+    }
+
+    /// Density of [`Environment::sample`] at `wi` \[sr⁻¹\].
+    pub fn pdf(&self, wi: Vec3) -> f32 {
+        self.le_pdf(wi).1
+    }
+
+    /// [`Environment::le`] and [`Environment::pdf`] by one look-up.
+    pub fn le_pdf(&self, wi: Vec3) -> (Rgb, f32) {
+        let t = self.texel(wi);
+        (
+            self.map.get(t.column, t.row),
+            self.table.as_ref().map_or(0.0, |table| self.density(table, t)),
+        )
+    }
+
+    /// Draws a direction in proportion to luminance; none from a black map.
+    pub fn sample(&self, u: Vec2) -> Option<EnvironmentSample> {
+        self.table.as_ref().and_then(|table| self.sample_table(table, u))
+    }
+
+    /// Draws from any table over this map's texels.
+    fn sample_table(&self, table: &Table2d, u: Vec2) -> Option<EnvironmentSample> {
+        let drawn = table.sample(u);
+        let texel = Texel { column: drawn.column, row: drawn.row };
+        let wi = self.orientation.up.to_world(self.grid.direction_inside(texel, drawn.inside));
+        let pdf = (drawn.pmf / self.grid.solid_angle(texel.row)) as f32;
+        (pdf > 0.0).then(|| EnvironmentSample {
+            wi,
+            le: self.map.get(texel.column, texel.row),
+            pdf,
+        })
+    }
+
+    fn density(&self, table: &Table2d, t: Texel) -> f32 {
+        (table.pmf(t.column, t.row) / self.grid.solid_angle(t.row)) as f32
+    }
+
+    fn texel(&self, wi: Vec3) -> Texel {
+        self.grid.texel(self.orientation.up.to_map(wi))
+    }
+
+    /// The direction of a point of the map, `uv` in [0, 1]² with (0, 0) the corner of the first texel.
+    pub fn direction(&self, uv: Vec2) -> Vec3 {
+        let (x, y) = (f64::from(uv.x), f64::from(uv.y));
+        self.orientation.up.to_world(self.grid.direction(x, (f64::from(PI) * y).cos()))
+    }
+
+    /// The point of the map that `wi` looks at, in [0, 1]².
+    pub fn uv(&self, wi: Vec3) -> Vec2 {
+        self.grid.uv(self.orientation.up.to_map(wi))
+    }
+}
+
+/// The lat-long grid in the map's own frame, rotation included.
+#[derive(Clone, Debug)]
+struct Grid {
+    width: usize,
+    height: usize,
+    /// The rotation as a share of a turn.
+    turn: f32,
+    /// cos θ of the upper edge of each row, and of the lower edge of the last.
+    cos_edges: Vec<f64>,
+    /// A distance from a texel's edge, in texels, within which rounding may cross it.
+    margin: Vec2,
+}
+
+impl Grid {
+    fn new(width: usize, height: usize, rotation: f32) -> Self {
+        let edge = |y: usize| (std::f64::consts::PI * y as f64 / height as f64).cos();
+        // A direction in single precision is off by no more than a few units in the last place.
+        let error = 16.0 * f32::EPSILON;
+        let margin = Vec2::new(error * width as f32 / TAU, error * height as f32 / PI);
+        Self {
+            width,
+            height,
+            turn: (rotation / 360.0).rem_euclid(1.0),
+            cos_edges: (0..=height).map(edge).collect(),
+            margin: margin.min(Vec2::splat(0.25)),
+        }
+    }
+
+    fn solid_angle(&self, row: usize) -> f64 {
+        let band = self.cos_edges[row] - self.cos_edges[row + 1];
+        band * std::f64::consts::TAU / self.width as f64
+    }
+
+    /// A table of `importance(texel)` times solid angle.
+    fn table(
+        &self,
+        map: &RgbImage,
+        importance: impl Fn(Rgb) -> f64 + Sync,
+    ) -> Result<Table2d, TableError> {
+        Table2d::from_rows(self.width, self.height, |row, out| {
+            let solid_angle = self.solid_angle(row);
+            for (o, &le) in out.iter_mut().zip(map.row(row)) {
+                *o = importance(le) * solid_angle;
+            }
+        })
+    }
+
+    /// The direction at `u` in [0, 1] across the map and polar cosine `cos_theta`.
+    fn direction(&self, u: f64, cos_theta: f64) -> Vec3 {
+        let turn = u - 0.5 - f64::from(self.turn);
+        let phi = ((turn - turn.round()) * std::f64::consts::TAU) as f32;
+        let sin_theta = ((1.0 - cos_theta) * (1.0 + cos_theta)).max(0.0).sqrt() as f32;
+        let (sin_phi, cos_phi) = phi.sin_cos();
+        vec3(sin_phi * sin_theta, cos_theta as f32, -cos_phi * sin_theta)
+    }
+
+    /// The direction at `inside` a texel, uniform in solid angle: linear in φ and cos θ.
+    fn direction_in(&self, t: Texel, inside: Vec2) -> Vec3 {
+        let u = (t.column as f64 + f64::from(inside.x)) / self.width as f64;
+        let (top, bottom) = (self.cos_edges[t.row], self.cos_edges[t.row + 1]);
+        self.direction(u, top + f64::from(inside.y) * (bottom - top))
+    }
+
+    /// As [`Grid::direction_in`], but never rounded into a neighbour: the look-up of the direction
+    /// is the texel that was drawn.
+    fn direction_inside(&self, t: Texel, inside: Vec2) -> Vec3 {
+        let wi = self.direction_in(t, inside);
+        let (low, high) = (self.margin, Vec2::ONE - self.margin);
+        let safe = inside.cmpge(low).all() && inside.cmple(high).all();
+        if safe || self.texel(wi) == t { wi } else { self.direction_in(t, inside.clamp(low, high)) }
+    }
+
+    fn uv(&self, d: Vec3) -> Vec2 {
+        let u = d.x.atan2(-d.z) / TAU + 0.5 + self.turn;
+        // acos would lose the rows next to the poles.
+        let theta = d.x.hypot(d.z).atan2(d.y);
+        Vec2::new(u - u.floor(), theta / PI)
+    }
+
+    fn texel(&self, d: Vec3) -> Texel {
+        let uv = self.uv(d);
+        let column = ((uv.x * self.width as f32) as usize).min(self.width - 1);
+        let row = ((uv.y * self.height as f32) as usize).min(self.height - 1);
+        Texel { column, row }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::vec2;
+    use crate::sampling::{ONE_MINUS_EPSILON, Pcg32};
+
+    fn noise(width: usize, height: usize, seed: u64) -> RgbImage {
+        let mut pcg = Pcg32::new(seed, 0);
+        let mut number = move || (pcg.next_f32() * 12.0 - 6.0).exp();
+        RgbImage::from_fn(width, height, |_, _| Rgb::new(number(), number(), number()))
+    }
+
+    fn orientations() -> impl Iterator<Item = Orientation> {
+        [(UpAxis::Y, 0.0), (UpAxis::Y, 90.0), (UpAxis::Z, -33.3), (UpAxis::Y, 777.7)]
+            .into_iter()
+            .map(|(up, rotation)| Orientation { up, rotation })
+    }
+
+    #[test]
+    fn the_conventions() {
+        // One bright texel at a time on a 4x2 map, whose texels span quarters of a turn.
+        let looks_at = |column: usize, row: usize, orientation| {
+            let mut map = RgbImage::filled(4, 2, Rgb::BLACK);
+            map.pixels[row * 4 + column] = Rgb::WHITE;
+            let env = Environment::new(map, orientation, 1.0).unwrap();
+            env.sample(vec2(0.5, 0.5)).unwrap().wi
+        };
+        let o = Orientation::default();
+        // Right of the centre column lies +X, left −X; the first row is up.
+        let w = looks_at(2, 0, o);
+        assert!(w.x > 0.4 && w.y > 0.4 && w.z < -0.4, "{w}");
+        let w = looks_at(1, 1, o);
+        assert!(w.x < -0.4 && w.y < -0.4 && w.z < -0.4, "{w}");
+        let w = looks_at(0, 0, o);
+        assert!(w.x < -0.4 && w.z > 0.4, "{w}");
+        // Turned by 90 degrees what was right in front is left in front.
+        let w = looks_at(2, 0, Orientation { rotation: 90.0, ..o });
+        assert!(w.x < -0.4 && w.z < -0.4, "{w}");
+        // With +Z up the centre looks toward +Y.
+        let w = looks_at(2, 0, Orientation { up: UpAxis::Z, ..o });
+        assert!(w.x > 0.4 && w.z > 0.4 && w.y > 0.4, "{w}");
+    }
+
+    #[test]
+    fn samples_look_up_as_they_were_drawn() {
+        for orientation in orientations() {
+            for (w, h) in [(1, 1), (3, 5), (64, 32), (8192, 8), (8, 4096)] {
+                let env = Environment::new(noise(w, h, 5), orientation, 1.0).unwrap();
+                let mut pcg = Pcg32::new(w as u64, 1);
+                let ends = [0.0, ONE_MINUS_EPSILON, 0.5];
+                let corners = ends.iter().flat_map(|&x| ends.map(|y| vec2(x, y)));
+                let random = (0..20_000).map(|_| vec2(pcg.next_f32(), pcg.next_f32()));
+                for u in corners.chain(random) {
+                    let s = env.sample(u).unwrap();
+                    assert_eq!((s.le, s.pdf), env.le_pdf(s.wi), "{w}x{h} {u} {orientation:?}");
+                    assert!((s.wi.length() - 1.0).abs() < 1e-6);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn texels_partition_the_sphere() {
+        for (w, h) in [(1, 1), (7, 3), (64, 32), (1, 9)] {
+            let env = Environment::new(noise(w, h, 2), Orientation::default(), 1.0).unwrap();
+            let sphere: f64 = (0..h).map(|y| env.texel_solid_angle(y) * w as f64).sum();
+            assert!((sphere - 4.0 * std::f64::consts::PI).abs() < 1e-12);
+            let table = env.table().unwrap();
+            let total: f64 = (0..w * h).map(|i| table.pmf(i % w, i / w)).sum();
+            assert!((total - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn directions_round_trip_through_the_map() {
+        let map = noise(64, 32, 3);
+        for orientation in orientations() {
+            let env = Environment::new(map.clone(), orientation, 2.0).unwrap();
+            for y in 0..32 {
+                for x in 0..64 {
+                    // The centre of every texel, the poles' rows included.
+                    let uv = vec2((x as f32 + 0.5) / 64.0, (y as f32 + 0.5) / 32.0);
+                    let d = env.direction(uv);
+                    assert!((env.uv(d) - uv).length() < 1e-5, "{uv}");
+                    assert_eq!(env.le(d), 2.0 * map.get(x, y));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_poles_and_the_seam_are_inside() {
+        let env = Environment::new(noise(9, 7, 4), Orientation::default(), 1.0).unwrap();
+        for d in [Vec3::Y, -Vec3::Y, Vec3::Z, vec3(-0.0, 0.0, 1.0), vec3(-1e-8, 0.0, 1.0)] {
+            let (le, pdf) = env.le_pdf(d);
+            assert!(le.is_finite() && pdf.is_finite() && pdf > 0.0);
+        }
+    }
+
+    #[test]
+    fn a_rotation_turns_the_radiance() {
+        let map = noise(16, 8, 6);
+        let still = Environment::new(map.clone(), Orientation::default(), 1.0).unwrap();
+        let orientation = Orientation { rotation: 30.0, ..Default::default() };
+        let turned = Environment::new(map, orientation, 1.0).unwrap();
+        let turn = crate::math::Mat3::from_rotation_y(30f32.to_radians());
+        let mut pcg = Pcg32::new(1, 2);
+        for _ in 0..1000 {
+            let w = still.sample(vec2(pcg.next_f32(), pcg.next_f32())).unwrap();
+            // Away from texel edges, where rounding decides.
+            let uv = still.uv(w.wi) * vec2(16.0, 8.0);
+            if (uv.fract() - 0.5).abs().max_element() < 0.49 {
+                assert_eq!(turned.le_pdf(turn * w.wi), (w.le, w.pdf));
+            }
+        }
+    }
+
+    #[test]
+    fn black_constant_and_bad_maps() {
+        let black = Environment::constant(Rgb::BLACK).unwrap();
+        assert!(black.sample(vec2(0.5, 0.5)).is_none());
+        assert_eq!(black.le_pdf(Vec3::X), (Rgb::BLACK, 0.0));
+        let white = Environment::constant(Rgb::WHITE).unwrap();
+        assert_eq!(white.pdf(Vec3::X), crate::math::FRAC_1_4PI);
+        for value in [f32::NAN, f32::INFINITY, -1.0] {
+            let mut map = RgbImage::filled(4, 2, Rgb::WHITE);
+            map.pixels[6].g = value;
+            let error = Environment::new(map, Orientation::default(), 1.0).unwrap_err();
+            assert!(matches!(error, EnvironmentError::BadTexel { x: 2, y: 1, .. }), "{error}");
+        }
+        assert!(Environment::new(RgbImage::default(), Orientation::default(), 1.0).is_err());
+        assert!(Environment::new(noise(2, 2, 1), Orientation::default(), -1.0).is_err());
+    }
+
+    #[test]
+    fn compensation_leaves_dim_texels_to_the_brdf() {
+        let mut map = RgbImage::filled(8, 4, Rgb::splat(0.1));
+        map.pixels[10] = Rgb::splat(100.0);
+        let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
+        let table = CompensatedTable::new(&env);
+        let s = table.sample(&env, vec2(0.3, 0.7)).unwrap();
+        assert_eq!(s.le, Rgb::splat(100.0));
+        assert_eq!(table.le_pdf(&env, s.wi), (s.le, s.pdf));
+        assert_eq!(table.le_pdf(&env, -s.wi).1, 0.0);
+        for radiance in [Rgb::BLACK, Rgb::WHITE, Rgb::splat(0.3)] {
+            let map = RgbImage::filled(33, 17, radiance);
+            let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
+            assert!(CompensatedTable::new(&env).sample(&env, vec2(0.3, 0.7)).is_none());
+        }
+    }
+}

@@ -11,36 +11,19 @@
 
 use super::{Part, Scene, Surface};
 use crate::Rgb;
-use crate::bsdf::Material;
 use crate::geometry::{Hit, Mesh, Ray};
 use crate::math::{Frame, Vec2, Vec3, Vec4};
+use crate::strategy::ShadingPoint;
 
 /// The least cosine between the shading normal and the direction to the viewer.
 const MIN_COS_THETA_O: f32 = 1e-3;
-
-/// A point on a surface, ready for shading.
-#[derive(Clone, Copy, Debug)]
-pub struct SurfacePoint {
-    /// In world space.
-    pub position: Vec3,
-    /// Geometric normal, a unit vector on the viewer's side.
-    pub ng: Vec3,
-    /// Shading frame, its z axis the shading normal on the viewer's side.
-    pub frame: Frame,
-    /// Toward the viewer, a unit vector in the shading frame with z > 0.
-    pub wo: Vec3,
-    /// What the surface is made of here.
-    pub material: Material,
-    /// The material's albedo, for previews and denoisers.
-    pub albedo: Rgb,
-}
 
 impl Scene {
     /// All that shading needs of a hit that [`Scene::bvh`] reported for `ray`.
     ///
     /// # Panics
     /// If `hit.triangle` is not one of this scene's.
-    pub fn surface_point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+    pub fn shading_point(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
         let (part, triangle) = self.locate(hit.triangle);
         let surface = &self.surfaces[part.surface];
         let corner = Corners::new(&part.mesh, triangle, hit);
@@ -60,10 +43,9 @@ impl Scene {
         );
         let wo = frame.to_local(viewer).normalize();
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
-        let material = surface.material(&self.textures, uv, tint);
-        let albedo = material.albedo();
+        let material = surface.material(&self.textures, uv, tint).for_view(wo);
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
-        SurfacePoint { position, ng, frame, wo, material, albedo }
+        ShadingPoint { position, ng, frame, wo, material }
     }
 
     /// The shading normal on the front side, the normal map applied, and the tangent.
@@ -189,11 +171,11 @@ mod tests {
         Scene::new(description).unwrap()
     }
 
-    fn look(scene: &Scene, from: Vec3) -> SurfacePoint {
+    fn look(scene: &Scene, from: Vec3) -> ShadingPoint {
         let at = vec3(0.25, 0.25, 0.0);
         let ray = Ray::new(from, (at - from).normalize());
         let hit = scene.bvh().closest_hit(&ray).unwrap();
-        scene.surface_point(&ray, &hit)
+        scene.shading_point(&ray, &hit)
     }
 
     #[test]
@@ -208,7 +190,7 @@ mod tests {
             assert!(p.wo.z > 0.0);
             let toward = (vec3(0.5, 1.0, z) - p.position).normalize();
             assert!((p.frame.to_world(p.wo) - toward).length() < 1e-5);
-            assert_eq!(p.albedo, Rgb::splat(0.5));
+            assert_eq!(p.material.albedo(), Rgb::splat(0.5));
         }
     }
 
@@ -268,7 +250,7 @@ mod tests {
             p.diffuse_texture = Some(TextureRef::new(0));
         }
         let p = look(&Scene::new(description).unwrap(), vec3(0.25, 0.25, 3.0));
-        assert_eq!(p.albedo, Rgb::new(0.5, 0.25, 0.0));
+        assert_eq!(p.material.albedo(), Rgb::new(0.5, 0.25, 0.0));
     }
 
     #[test]

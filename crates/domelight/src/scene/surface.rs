@@ -121,8 +121,7 @@ impl Surface {
                 let base = m.base_color * look_up(&m.base_color_texture) * tint;
                 let factors = look_up(&m.metallic_roughness_texture);
                 let (metallic, roughness) = (m.metallic * factors.b, m.roughness * factors.g);
-                let base = base.map(unit);
-                Material::single(MetallicRoughness::new(base, unit(metallic), unit(roughness)))
+                Material::single(MetallicRoughness::new(base, metallic, roughness))
             }
         }
     }

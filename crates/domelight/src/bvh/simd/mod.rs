@@ -1,0 +1,119 @@
+//! Vectors of eight numbers on each instruction set: the only unsafe code of the library.
+//!
+//! A [`Kernel`] is written once over the vectors of a [`Simd`], whose operators are one IEEE
+//! operation a lane. Nothing fuses or reorders them, so a kernel gives the same bits on every
+//! instruction set. [`dispatch`] compiles it for each and picks at run time, so that a portable
+//! binary traces as fast as one built for the machine. Another instruction set is one more file like
+//! `avx2.rs` and one more line in [`InstructionSet`] and [`dispatch`]; two vectors of four, as of
+//! NEON, make one of eight.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod scalar;
+
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
+
+use super::Lanes;
+
+/// The instructions that trace rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InstructionSet {
+    /// One number at a time; the reference, on every processor.
+    Scalar,
+    /// x86-64 AVX2: eight numbers at a time.
+    Avx2,
+}
+
+impl InstructionSet {
+    /// All that this version knows, the fastest last.
+    pub const ALL: [Self; 2] = [Self::Scalar, Self::Avx2];
+
+    /// Whether this processor has the instructions.
+    pub fn is_available(self) -> bool {
+        match self {
+            Self::Scalar => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => avx2::Avx2::new().is_some(),
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx2 => false,
+        }
+    }
+
+    /// The fastest that this processor has.
+    pub fn best() -> Self {
+        Self::ALL.into_iter().rfind(|i| i.is_available()).unwrap_or(Self::Scalar)
+    }
+}
+
+/// Work to be compiled for each instruction set.
+///
+/// `run` and all that handles vectors below it must be `#[inline(always)]` functions: what is not
+/// inlined lacks the instructions and is slow, as is a closure over vectors.
+pub(super) trait Kernel {
+    type Output;
+    fn run<S: Simd>(self, simd: S) -> Self::Output;
+}
+
+/// Runs the kernel with the given instructions, or the scalar ones if the processor lacks them.
+#[inline]
+pub(super) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) -> K::Output {
+    match instruction_set {
+        InstructionSet::Scalar => kernel.run(scalar::Scalar),
+        InstructionSet::Avx2 => {
+            #[cfg(target_arch = "x86_64")]
+            if let Some(simd) = avx2::Avx2::new() {
+                return simd.run(kernel);
+            }
+            kernel.run(scalar::Scalar)
+        }
+    }
+}
+
+/// An instruction set. A value of it, and any vector made with one, proves that the processor has
+/// the instructions.
+pub(super) trait Simd: Copy {
+    type Floats: Floats;
+    type Sets: Sets<Mask = <Self::Floats as Floats>::Mask>;
+
+    fn splat(self, x: f32) -> Self::Floats;
+    fn load(self, x: &Lanes) -> Self::Floats;
+    /// Eight empty sets.
+    fn empty(self) -> Self::Sets;
+}
+
+/// Eight f32.
+pub(super) trait Floats:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    type Mask: Mask;
+
+    /// self < b ? self : b; so b if either is NaN.
+    fn min(self, b: Self) -> Self;
+    /// self > b ? self : b; so b if either is NaN.
+    fn max(self, b: Self) -> Self;
+    /// self ≤ b; false if either is NaN.
+    fn le(self, b: Self) -> Self::Mask;
+    /// self < b; false if either is NaN.
+    fn lt(self, b: Self) -> Self::Mask;
+    /// self = b; false if either is NaN.
+    fn eq(self, b: Self) -> Self::Mask;
+    fn store(self) -> Lanes;
+}
+
+/// Eight truth values.
+pub(super) trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
+    /// Bit i is lane i.
+    fn bits(self) -> u32;
+}
+
+/// Eight sets of the numbers 0 to 31.
+pub(super) trait Sets: Copy {
+    type Mask;
+
+    /// Adds `bit` to the sets of the lanes in `m`.
+    #[must_use]
+    fn insert(self, m: Self::Mask, bit: u32) -> Self;
+    /// Bit i: set i is not empty.
+    fn not_empty(self) -> u32;
+    fn store(self) -> [u32; 8];
+}

@@ -1,0 +1,225 @@
+//! The unit of work: a tile's camera rays, its shading points grouped by pixel, a strategy's rounds
+//! of shadow rays, and their sums.
+
+use super::film::{CameraSample, PixelSums, SurfaceSample};
+use super::{Background, Frame, Visibility};
+use crate::Rgb;
+use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
+use crate::math::Vec3;
+use crate::sampling::{Dimension, Stream};
+use crate::strategy::{Contributions, PixelPoints, Round, ShadingPoint, Strategy, TileShading};
+
+/// A rectangle of the picture and the sums of its pixels.
+#[derive(Clone, Debug)]
+pub(super) struct Tile {
+    pub(super) x: usize,
+    pub(super) y: usize,
+    pub(super) width: usize,
+    pub(super) pixels: Vec<PixelSums>,
+    pub(super) counts: Counts,
+}
+
+/// What was done, for the statistics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Camera rays.
+    pub camera_rays: u64,
+    /// Camera rays that hit the scene.
+    pub shading_points: u64,
+    /// Shadow rays traced.
+    pub shadow_rays: u64,
+    /// Camera samples whose value was NaN or infinite; they count as black.
+    pub non_finite: u64,
+}
+
+impl std::ops::AddAssign for Counts {
+    fn add_assign(&mut self, o: Self) {
+        self.camera_rays += o.camera_rays;
+        self.shading_points += o.shading_points;
+        self.shadow_rays += o.shadow_rays;
+        self.non_finite += o.non_finite;
+    }
+}
+
+/// Memory that a thread keeps from tile to tile.
+#[derive(Default)]
+pub(super) struct Scratch {
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
+    points: Vec<ShadingPoint>,
+    samples: Vec<u32>,
+    pixels: Vec<PixelPoints>,
+    contributions: Contributions,
+    shadow_rays: RayBatch,
+    occluded: Vec<bool>,
+    radiance: Vec<Rgb>,
+    unoccluded: Vec<Rgb>,
+}
+
+impl Tile {
+    /// Adds camera samples `samples` to each pixel.
+    pub(super) fn render<S: Strategy>(
+        &mut self,
+        frame: &Frame,
+        strategy: &S,
+        samples: std::ops::Range<u32>,
+        scratch: &mut Scratch,
+    ) -> Counts {
+        self.trace_camera_rays(frame, &samples, scratch);
+        scratch.gather_points(frame, samples.len());
+        let mut counts = Counts {
+            camera_rays: scratch.rays.len() as u64,
+            shading_points: scratch.points.len() as u64,
+            ..Counts::default()
+        };
+        counts.shadow_rays = scratch.trace_strategy(frame.scene.bvh(), strategy, self.width);
+        counts.non_finite = self.add_samples(frame, scratch);
+        self.counts += counts;
+        counts
+    }
+
+    fn trace_camera_rays(
+        &self,
+        frame: &Frame,
+        samples: &std::ops::Range<u32>,
+        scratch: &mut Scratch,
+    ) {
+        scratch.rays.clear();
+        scratch.pixels.clear();
+        for i in 0..self.pixels.len() {
+            let (x, y) = (self.x + i % self.width, self.y + i / self.width);
+            let pixel = (y * frame.settings.width + x) as u64;
+            let stream = Stream::new(frame.settings.sampler, frame.settings.seed, pixel);
+            for sample in samples.clone() {
+                let u = stream.numbers(Dimension::Film, sample).u();
+                let at = frame.filter.sample(u);
+                scratch.rays.push(frame.camera.ray(x as f32 + at.x, y as f32 + at.y));
+            }
+            let n_samples = samples.len() as u32;
+            scratch.pixels.push(PixelPoints { points: 0..0, n_samples, stream });
+        }
+        scratch.samples.clear();
+        scratch.samples.extend(samples.clone());
+        frame.scene.bvh().closest_hits(&scratch.rays, &mut scratch.hits);
+    }
+
+    /// Adds each camera sample to its pixel, in order.
+    fn add_samples(&mut self, frame: &Frame, scratch: &Scratch) -> u64 {
+        let mut non_finite = 0;
+        let mut point = 0;
+        let mut ray = 0;
+        for (sums, pixel) in self.pixels.iter_mut().zip(&scratch.pixels) {
+            for _ in 0..pixel.n_samples {
+                let sample = match scratch.hits[ray] {
+                    Some(hit) => {
+                        point += 1;
+                        scratch.surface_sample(frame, point - 1, &scratch.rays[ray], &hit)
+                    }
+                    None => background_sample(frame, scratch.rays[ray].direction),
+                };
+                non_finite += u64::from(!sums.add(&sample));
+                ray += 1;
+            }
+        }
+        non_finite
+    }
+}
+
+fn background_sample(frame: &Frame, direction: Vec3) -> CameraSample {
+    match frame.settings.background {
+        Background::Hidden => CameraSample::default(),
+        Background::Shown => {
+            let le = frame.environment.le(direction);
+            CameraSample { color: le, unoccluded: le, alpha: 1.0, surface: None }
+        }
+    }
+}
+
+impl Scratch {
+    /// Turns hits into shading points, grouped by pixel.
+    fn gather_points(&mut self, frame: &Frame, n_samples: usize) {
+        let first_sample = self.samples.first().copied().unwrap_or(0);
+        self.points.clear();
+        self.samples.clear();
+        for (i, pixel) in self.pixels.iter_mut().enumerate() {
+            let start = self.points.len();
+            for s in 0..n_samples {
+                let ray = i * n_samples + s;
+                if let Some(hit) = &self.hits[ray] {
+                    self.points.push(frame.scene.shading_point(&self.rays[ray], hit));
+                    self.samples.push(first_sample + s as u32);
+                }
+            }
+            pixel.points = start..self.points.len();
+        }
+    }
+
+    /// Runs the strategy's rounds; returns the number of shadow rays.
+    fn trace_strategy<S: Strategy>(
+        &mut self,
+        visibility: &impl Visibility,
+        strategy: &S,
+        width: usize,
+    ) -> u64 {
+        let n = self.points.len();
+        self.radiance.clear();
+        self.radiance.resize(n, Rgb::BLACK);
+        self.unoccluded.clear();
+        self.unoccluded.resize(n, Rgb::BLACK);
+        let mut learned = S::Learned::default();
+        let mut n_rays = 0;
+        for round in 0.. {
+            let tile = TileShading {
+                points: &self.points,
+                samples: &self.samples,
+                pixels: &self.pixels,
+                width,
+            };
+            self.contributions.reset(n);
+            let more = strategy.push(&tile, &learned, round, &mut self.contributions);
+            n_rays += self.contributions.len() as u64;
+
+            // Test the visibility of the whole round at once.
+            self.shadow_rays.clear();
+            for (&wi, &point) in self.contributions.wi.iter().zip(&self.contributions.point) {
+                let p = &self.points[point as usize];
+                let side = if p.ng.dot(wi) < 0.0 { -p.ng } else { p.ng };
+                self.shadow_rays.push(offset_origin(p.position, side), wi);
+            }
+            visibility.occluded(&self.shadow_rays, &mut self.occluded);
+
+            // base + Σ weight · V
+            for (i, &base) in self.contributions.base.iter().enumerate() {
+                self.radiance[i] += base;
+                self.unoccluded[i] += base;
+            }
+            let pairs = self.contributions.point.iter().zip(&self.contributions.weight);
+            for ((&point, &weight), &occluded) in pairs.zip(&self.occluded) {
+                self.unoccluded[point as usize] += weight;
+                if !occluded {
+                    self.radiance[point as usize] += weight;
+                }
+            }
+            if more == Round::Done {
+                break;
+            }
+            self.occluded.iter_mut().for_each(|o| *o = !*o);
+            strategy.learn(&tile, &self.contributions, &self.occluded, &mut learned);
+        }
+        n_rays
+    }
+
+    fn surface_sample(&self, frame: &Frame, point: usize, ray: &Ray, hit: &Hit) -> CameraSample {
+        let p = &self.points[point];
+        CameraSample {
+            color: self.radiance[point],
+            unoccluded: self.unoccluded[point],
+            alpha: 1.0,
+            surface: Some(SurfaceSample {
+                albedo: p.material.albedo(),
+                normal: p.frame.z,
+                depth: frame.camera.depth(ray.at(hit.t)),
+            }),
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Weights that combine sampling techniques: Veach & Guibas 1995, "Optimally Combining Sampling
+//! Techniques for Monte Carlo Rendering".
+//!
+//! The multi-sample estimator is Σᵢ (1/nᵢ) Σⱼ wᵢ(xᵢⱼ) f(xᵢⱼ) / pᵢ(xᵢⱼ) with Σᵢ wᵢ = 1. Weights that
+//! sum to one do not go with a common factor 1/(M + N): two techniques with M = N samples would
+//! then give exactly half the answer.
+
+/// How a sample's weight follows from the densities of the techniques.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Heuristic {
+    /// wᵢ = nᵢ pᵢ / Σₖ nₖ pₖ.
+    #[default]
+    Balance,
+    /// wᵢ = (nᵢ pᵢ)² / Σₖ (nₖ pₖ)².
+    Power,
+}
+
+impl Heuristic {
+    /// The weight in [0, 1] of a sample that one technique drew, `n_pdf` being its count times its
+    /// density and `other` the same of the other technique; both non-negative, in the same measure.
+    ///
+    /// A technique with an infinite density takes all, an impossible sample counts nothing.
+    pub fn weight(self, n_pdf: f32, other: f32) -> f32 {
+        if n_pdf <= 0.0 {
+            return 0.0;
+        }
+        // The ratio keeps the squares in range: neither ∞² nor ∞ / ∞ can come up.
+        let ratio = if other.is_infinite() && n_pdf.is_infinite() { 1.0 } else { other / n_pdf };
+        match self {
+            Self::Balance => 1.0 / (1.0 + ratio),
+            Self::Power => 1.0 / (1.0 + ratio * ratio),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_of_two_techniques_sum_to_one() {
+        for h in [Heuristic::Balance, Heuristic::Power] {
+            for (a, b) in [(1.0, 2.0), (1e-30, 1e30), (3e38, 3e38), (1e-20, 0.0), (5.0, 1e-38)] {
+                assert!((h.weight(a, b) + h.weight(b, a) - 1.0).abs() < 1e-6, "{h:?} {a} {b}");
+            }
+            assert_eq!(h.weight(0.0, 0.0), 0.0);
+            assert_eq!(h.weight(f32::INFINITY, 1.0), 1.0);
+            assert_eq!(h.weight(1.0, f32::INFINITY), 0.0);
+            assert_eq!(h.weight(f32::INFINITY, f32::INFINITY), 0.5);
+        }
+    }
+}

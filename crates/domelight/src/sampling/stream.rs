@@ -1,0 +1,113 @@
+//! Streams of uniform numbers: one a pixel, addressed by dimension and index.
+//!
+//! A stream is a pure function. Nothing depends on the order in which numbers are asked for, so
+//! pictures do not depend on threads, tiles or passes.
+
+use super::rng::{Pcg32, hash2};
+use super::{sobol, unit_f32};
+use crate::math::{Vec2, vec2};
+
+/// Which points a stream gives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SamplerKind {
+    /// Owen-scrambled Sobol' points.
+    #[default]
+    Sobol,
+    /// Independent pseudo-random points (PCG), for comparison.
+    Independent,
+}
+
+/// What a set of numbers is for. Each names a padded set of four dimensions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Dimension {
+    /// The position in the pixel.
+    Film = 0,
+    /// Directions from the environment.
+    Environment = 1,
+    /// Lobe and direction from the BRDF.
+    Brdf = 2,
+    /// Choices among candidates.
+    Resampling = 3,
+}
+
+/// Four uniform numbers of one index of one dimension.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Numbers(pub [f32; 4]);
+
+impl Numbers {
+    /// The first two, for a direction or a position.
+    pub fn u(&self) -> Vec2 {
+        vec2(self.0[0], self.0[1])
+    }
+
+    /// The third, for the choice of a lobe or a technique.
+    pub fn u_lobe(&self) -> f32 {
+        self.0[2]
+    }
+}
+
+/// All numbers of one pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Stream {
+    kind: SamplerKind,
+    key: u64,
+}
+
+impl Stream {
+    /// The stream of a pixel under a seed.
+    pub fn new(kind: SamplerKind, seed: u64, pixel: u64) -> Self {
+        Self { kind, key: hash2(seed, pixel) }
+    }
+
+    /// Point `index` of the set `dimension`, each number in [0, 1).
+    ///
+    /// Consecutive indices are well distributed together: number all samples of a pixel that serve
+    /// one purpose in one sequence.
+    pub fn numbers(&self, dimension: Dimension, index: u32) -> Numbers {
+        let set = hash2(self.key, dimension as u64);
+        Numbers(match self.kind {
+            SamplerKind::Sobol => sobol::point(index, set).map(unit_f32),
+            SamplerKind::Independent => {
+                let mut pcg = Pcg32::new(set, u64::from(index));
+                [(); 4].map(|()| pcg.next_f32())
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_lie_in_the_unit_interval_and_streams_differ() {
+        for kind in [SamplerKind::Sobol, SamplerKind::Independent] {
+            let (a, b) = (Stream::new(kind, 1, 0), Stream::new(kind, 1, 1));
+            for i in (0..4096).chain([u32::MAX]) {
+                let n = a.numbers(Dimension::Brdf, i);
+                assert!(n.0.iter().all(|x| (0.0..1.0).contains(x)));
+                assert_ne!(n, b.numbers(Dimension::Brdf, i));
+                assert_ne!(n, a.numbers(Dimension::Film, i));
+                assert_eq!(n, a.numbers(Dimension::Brdf, i));
+            }
+        }
+    }
+
+    #[test]
+    fn the_mean_of_each_number_is_one_half() {
+        for kind in [SamplerKind::Sobol, SamplerKind::Independent] {
+            let n = 1 << 14;
+            let mut mean = [0.0f64; 4];
+            for i in 0..n {
+                let p = Stream::new(kind, 3, 9).numbers(Dimension::Environment, i);
+                for d in 0..4 {
+                    mean[d] += f64::from(p.0[d]) / f64::from(n);
+                }
+            }
+            // Five standard deviations of independent numbers.
+            let bound = 5.0 / (12.0 * f64::from(n)).sqrt();
+            assert!(mean.iter().all(|m| (m - 0.5).abs() < bound), "{mean:?}");
+        }
+    }
+}

@@ -1,0 +1,318 @@
+//! Tabulated densities: one and two dimensions by inversion of the cumulative sum.
+//!
+//! Prefix sums are kept in double precision, un-normalised: the probability of a cell *is* the
+//! difference of its two neighbours over the total, so what [`Table2d::sample`] draws and what
+//! [`Table2d::pmf`] says agree exactly, on maps of any size. Inversion keeps the order of the
+//! uniform numbers, so stratified points stay stratified (an alias table would be faster and lose
+//! the strata).
+
+use super::ONE_MINUS_EPSILON;
+use crate::math::{Vec2, vec2};
+
+/// What makes weights unusable.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum TableError {
+    /// No weights at all.
+    #[error("a table needs at least one weight")]
+    Empty,
+    /// A weight that is negative, NaN or infinite.
+    #[error("weight {index} is {value}; weights must be finite and not negative")]
+    BadWeight {
+        /// Which weight.
+        index: usize,
+        /// Its value.
+        value: f32,
+    },
+    /// Nothing to draw.
+    #[error("all weights are zero")]
+    AllZero,
+}
+
+/// The sum of some weights after checking each.
+pub(super) fn check_weights(weights: &[f32]) -> Result<f64, TableError> {
+    if weights.is_empty() {
+        return Err(TableError::Empty);
+    }
+    match weights.iter().position(|w| !w.is_finite() || *w < 0.0) {
+        Some(index) => Err(TableError::BadWeight { index, value: weights[index] }),
+        None => Ok(weights.iter().map(|&w| f64::from(w)).sum()),
+    }
+}
+
+/// The cell of a running sum that `x` falls into, and where in it: [0, 1).
+///
+/// `sums[i]` is the sum up to and including cell i; 0 ≤ `x` < the last. A cell of no width is never
+/// found.
+fn invert(sums: &[f64], x: f64) -> (usize, f32) {
+    let i = sums.partition_point(|&s| s <= x).min(sums.len() - 1);
+    let start = if i == 0 { 0.0 } else { sums[i - 1] };
+    let rest = ((x - start) / (sums[i] - start)) as f32;
+    (i, rest.clamp(0.0, ONE_MINUS_EPSILON))
+}
+
+/// The width of cell `i` of a running sum.
+fn width(sums: &[f64], i: usize) -> f64 {
+    if i == 0 { sums[0] } else { sums[i] - sums[i - 1] }
+}
+
+/// A piecewise-constant density over n cells.
+#[derive(Clone, Debug)]
+pub struct Table1d {
+    sums: Vec<f64>,
+}
+
+impl Table1d {
+    /// From non-negative finite weights, not all zero.
+    ///
+    /// # Errors
+    /// See [`TableError`].
+    pub fn new(weights: &[f32]) -> Result<Self, TableError> {
+        check_weights(weights)?;
+        let mut sum = 0.0;
+        Self::from_sums(
+            weights
+                .iter()
+                .map(|&w| {
+                    sum += f64::from(w);
+                    sum
+                })
+                .collect(),
+        )
+    }
+
+    fn from_sums(sums: Vec<f64>) -> Result<Self, TableError> {
+        match sums.last() {
+            None => Err(TableError::Empty),
+            Some(&total) if total <= 0.0 => Err(TableError::AllZero),
+            Some(_) => Ok(Self { sums }),
+        }
+    }
+
+    /// How many cells.
+    pub fn len(&self) -> usize {
+        self.sums.len()
+    }
+
+    /// Never: a table has at least one cell.
+    pub fn is_empty(&self) -> bool {
+        self.sums.is_empty()
+    }
+
+    /// The sum of the weights.
+    pub fn total(&self) -> f64 {
+        self.sums[self.sums.len() - 1]
+    }
+
+    /// Probability of cell `i`.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn pmf(&self, i: usize) -> f64 {
+        width(&self.sums, i) / self.total()
+    }
+
+    /// A cell, and the rest of `u` in [0, 1): the position inside the cell.
+    pub fn sample(&self, u: f32) -> (usize, f32) {
+        invert(&self.sums, f64::from(u) * self.total())
+    }
+}
+
+/// A cell drawn from a [`Table2d`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TableSample {
+    /// Column of the cell.
+    pub column: usize,
+    /// Row of the cell.
+    pub row: usize,
+    /// Position inside the cell, in [0, 1)².
+    pub inside: Vec2,
+    /// Probability of the cell.
+    pub pmf: f64,
+}
+
+/// A piecewise-constant density over rows and columns: p(row) · p(column | row).
+#[derive(Clone, Debug)]
+pub struct Table2d {
+    width: usize,
+    rows: Table1d,
+    /// Running sums of each row, row by row.
+    columns: Vec<f64>,
+}
+
+impl Table2d {
+    /// From `width · height` weights, row by row: `weight(row, out)` writes those of one row.
+    ///
+    /// Rows are independent; they are filled in parallel with the feature `render`.
+    ///
+    /// # Errors
+    /// See [`TableError`]; the index of a bad weight is row · width + column.
+    pub fn from_rows(
+        width: usize,
+        height: usize,
+        weights: impl Fn(usize, &mut [f64]) + Sync,
+    ) -> Result<Self, TableError> {
+        if width == 0 || height == 0 {
+            return Err(TableError::Empty);
+        }
+        let mut columns = vec![0.0; width * height];
+        let fill = |(row, sums): (usize, &mut [f64])| -> Result<f64, TableError> {
+            weights(row, sums);
+            let mut sum = 0.0;
+            for (column, s) in sums.iter_mut().enumerate() {
+                if !s.is_finite() || *s < 0.0 {
+                    let index = row * width + column;
+                    return Err(TableError::BadWeight { index, value: *s as f32 });
+                }
+                sum += *s;
+                *s = sum;
+            }
+            Ok(sum)
+        };
+        #[cfg(feature = "render")]
+        let row_sums: Result<Vec<f64>, _> = {
+            use rayon::prelude::*;
+            columns.par_chunks_mut(width).enumerate().map(fill).collect()
+        };
+        #[cfg(not(feature = "render"))]
+        let row_sums: Result<Vec<f64>, _> =
+            columns.chunks_mut(width).enumerate().map(fill).collect();
+        let mut sums = row_sums?;
+        let mut total = 0.0;
+        for s in &mut sums {
+            total += *s;
+            *s = total;
+        }
+        Ok(Self { width, rows: Table1d::from_sums(sums)?, columns })
+    }
+
+    /// From weights row by row.
+    ///
+    /// # Errors
+    /// See [`TableError`].
+    ///
+    /// # Panics
+    /// If `weights` is not a whole number of rows.
+    pub fn new(width: usize, weights: &[f32]) -> Result<Self, TableError> {
+        check_weights(weights)?;
+        assert!(width > 0 && weights.len().is_multiple_of(width), "whole rows of {width}");
+        Self::from_rows(width, weights.len() / width, |row, out| {
+            for (o, &w) in out.iter_mut().zip(&weights[row * width..]) {
+                *o = f64::from(w);
+            }
+        })
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The sum of the weights.
+    pub fn total(&self) -> f64 {
+        self.rows.total()
+    }
+
+    /// The marginal over rows.
+    pub fn rows(&self) -> &Table1d {
+        &self.rows
+    }
+
+    /// Probability of a column given its row; zero in a row without weight.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn conditional_pmf(&self, column: usize, row: usize) -> f64 {
+        let sums = self.row_sums(row);
+        let total = sums[self.width - 1];
+        if total > 0.0 { width(sums, column) / total } else { 0.0 }
+    }
+
+    /// Probability of a cell.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn pmf(&self, column: usize, row: usize) -> f64 {
+        self.rows.pmf(row) * self.conditional_pmf(column, row)
+    }
+
+    /// Draws a row by `u.y`, then a column by `u.x`.
+    pub fn sample(&self, u: Vec2) -> TableSample {
+        let (row, y) = self.rows.sample(u.y);
+        let sums = self.row_sums(row);
+        let (column, x) = invert(sums, f64::from(u.x) * sums[self.width - 1]);
+        TableSample { column, row, inside: vec2(x, y), pmf: self.pmf(column, row) }
+    }
+
+    fn row_sums(&self, row: usize) -> &[f64] {
+        &self.columns[row * self.width..(row + 1) * self.width]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Pcg32;
+
+    #[test]
+    fn pmf_is_the_weight_over_the_sum() {
+        let table = Table1d::new(&[1.0, 0.0, 3.0, 4.0]).unwrap();
+        assert_eq!([0, 1, 2, 3].map(|i| table.pmf(i)), [0.125, 0.0, 0.375, 0.5]);
+        let table = Table2d::new(2, &[1.0, 3.0, 0.0, 4.0]).unwrap();
+        assert_eq!(table.pmf(0, 0), 0.125);
+        assert_eq!(table.pmf(1, 1), 0.5);
+        assert_eq!(table.conditional_pmf(1, 0), 0.75);
+    }
+
+    #[test]
+    fn the_ends_of_the_unit_interval_stay_inside() {
+        for weights in [vec![1.0], vec![0.0, 1.0, 0.0], vec![1e-30, 1.0, 1e-30], vec![0.1; 1000]] {
+            let table = Table1d::new(&weights).unwrap();
+            for u in [0.0, f32::MIN_POSITIVE, 0.5, ONE_MINUS_EPSILON] {
+                let (i, rest) = table.sample(u);
+                assert!(weights[i] > 0.0 && (0.0..1.0).contains(&rest), "{u} {i} {rest}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_weight_of_zero_is_never_drawn() {
+        let mut pcg = Pcg32::new(1, 0);
+        let weights: Vec<f32> =
+            (0..64).map(|i| if i % 3 == 0 { 0.0 } else { pcg.next_f32() * 1e-3 }).collect();
+        let table = Table2d::new(8, &weights).unwrap();
+        for _ in 0..100_000 {
+            let s = table.sample(vec2(pcg.next_f32(), pcg.next_f32()));
+            assert!(weights[s.row * 8 + s.column] > 0.0);
+            assert_eq!(s.pmf, table.pmf(s.column, s.row));
+        }
+    }
+
+    #[test]
+    fn one_bright_texel_among_millions_keeps_its_neighbours_right() {
+        // Sums in single precision would lose the dim cells behind the bright one.
+        let mut weights = vec![1e-6f32; 1 << 20];
+        weights[7] = 1e6;
+        let table = Table1d::new(&weights).unwrap();
+        let expected = f64::from(1e-6f32) / (1e6 + f64::from(1e-6f32) * ((1 << 20) as f64 - 1.0));
+        // The spacing of doubles near 10⁶ bounds the error of the difference.
+        assert!((table.pmf(1_000_000) - expected).abs() < 2e-16);
+    }
+
+    #[test]
+    fn one_row_one_column_and_bad_weights() {
+        assert_eq!(
+            Table2d::new(4, &[0.0, 0.0, 1.0, 0.0]).unwrap().sample(vec2(0.3, 0.9)).column,
+            2
+        );
+        assert_eq!(Table2d::new(1, &[0.0, 2.0, 0.0]).unwrap().sample(vec2(0.3, 0.9)).row, 1);
+        assert_eq!(Table1d::new(&[]).unwrap_err(), TableError::Empty);
+        assert_eq!(Table1d::new(&[0.0; 3]).unwrap_err(), TableError::AllZero);
+        assert!(matches!(Table1d::new(&[1.0, -1.0]), Err(TableError::BadWeight { index: 1, .. })));
+        assert!(Table2d::new(2, &[1.0, f32::NAN]).is_err());
+    }
+}

@@ -1,0 +1,34 @@
+//! Sampling the BRDF: directions where the surface reflects, whatever light there is.
+
+use super::{PointStrategy, SampleNumbers, ShadingPoint};
+use crate::Rgb;
+use crate::environment::Environment;
+use crate::math::Vec3;
+use crate::sampling::Dimension;
+
+/// (1/N) Σ f_r cos θ · L / p_brdf: best for narrow lobes under wide light.
+#[derive(Clone, Copy, Debug)]
+pub struct BrdfSampling<'a> {
+    /// The light.
+    pub environment: &'a Environment,
+    /// Shadow rays at each point.
+    pub n_samples: u32,
+}
+
+impl PointStrategy for BrdfSampling<'_> {
+    const UNBIASED: bool = true;
+
+    fn n_rays(&self) -> u32 {
+        self.n_samples
+    }
+
+    fn sample(&self, at: &ShadingPoint, numbers: SampleNumbers, mut push: impl FnMut(Vec3, Rgb)) {
+        let n = self.n_samples;
+        for j in 0..n {
+            let u = numbers.get(Dimension::Brdf, j, n);
+            if let Some(s) = at.sample(u.u_lobe(), u.u()) {
+                push(s.wi, s.value * self.environment.le(s.wi) / (s.pdf * n as f32));
+            }
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! Strategies: how shading points become shadow rays.
+//!
+//! Under a distant environment every ray that a strategy asks for is the same thing: a shadow ray
+//! to infinity. So a strategy turns shading points into pairs (wi, weight), and the estimate of
+//! ∫ f_r · cos θ · L · V dω at a point is
+//!
+//! ```text
+//! base + Σ weight · V(wi)
+//! ```
+//!
+//! 1/n, 1/pdf and combination weights are already in the weight; `base` is what a strategy knows
+//! without rays. Visibility, ray counts, the unoccluded picture (every V = 1, the lecture's L_ns)
+//! and the variance are then computed once, outside, and strategies compare at equal shadow rays
+//! by construction. Nothing here traces a ray.
+
+mod brdf;
+mod environment;
+mod mis;
+
+pub use brdf::BrdfSampling;
+pub use environment::EnvironmentSampling;
+pub use mis::{LightTable, MultipleImportanceSampling};
+
+use crate::Rgb;
+use crate::bsdf::{Brdf, Material};
+use crate::math::{Frame, Vec2, Vec3};
+use crate::sampling::stream::Numbers;
+use crate::sampling::{Dimension, Stream};
+
+/// Where a camera ray met an opaque surface.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadingPoint {
+    /// World position.
+    pub position: Vec3,
+    /// Geometric normal, toward the viewer's side.
+    pub ng: Vec3,
+    /// Shading frame; its z axis is the shading normal, toward the viewer's side.
+    pub frame: Frame,
+    /// Toward the viewer, in the shading frame.
+    pub wo: Vec3,
+    /// Reflectance, in the shading frame.
+    pub material: Material,
+}
+
+impl ShadingPoint {
+    /// f_r · max(0, cos θ_i) for the world direction `wi` \[sr⁻¹\].
+    ///
+    /// Black below the geometric surface as well: it is opaque, and no ray need be traced to know.
+    pub fn eval(&self, wi: Vec3) -> Rgb {
+        if self.ng.dot(wi) <= 0.0 {
+            return Rgb::BLACK;
+        }
+        self.material.eval(self.wo, self.frame.to_local(wi))
+    }
+
+    /// [`ShadingPoint::eval`] and the density of [`ShadingPoint::sample`] \[sr⁻¹\].
+    pub fn eval_pdf(&self, wi: Vec3) -> (Rgb, f32) {
+        if self.ng.dot(wi) <= 0.0 {
+            return (Rgb::BLACK, 0.0);
+        }
+        self.material.eval_pdf(self.wo, self.frame.to_local(wi))
+    }
+
+    /// Draws a world direction from the material; none is a sample of value zero.
+    pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<DirectionSample> {
+        let s = self.material.sample(self.wo, u_lobe, u)?;
+        let wi = self.frame.to_world(s.wi);
+        (self.ng.dot(wi) > 0.0).then_some(DirectionSample { wi, value: s.value, pdf: s.pdf })
+    }
+}
+
+/// A world direction drawn from the material of a point.
+#[derive(Clone, Copy, Debug)]
+pub struct DirectionSample {
+    /// Toward the light.
+    pub wi: Vec3,
+    /// f_r · cos θ_i \[sr⁻¹\].
+    pub value: Rgb,
+    /// Density \[sr⁻¹\].
+    pub pdf: f32,
+}
+
+/// The uniform numbers of one camera sample: a stream, and where in it.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleNumbers {
+    /// The pixel's stream.
+    pub stream: Stream,
+    /// Index of the camera sample in its pixel.
+    pub sample: u32,
+}
+
+impl SampleNumbers {
+    /// Numbers j of n for one purpose: those of all camera samples of a pixel form one sequence.
+    pub fn get(&self, dimension: Dimension, j: u32, n: u32) -> Numbers {
+        self.stream.numbers(dimension, self.sample.wrapping_mul(n).wrapping_add(j))
+    }
+}
+
+/// What a strategy asks for: pairs (wi, weight) by point, and what it knows without rays.
+#[derive(Clone, Debug, Default)]
+pub struct Contributions {
+    /// World directions of the shadow rays.
+    pub wi: Vec<Vec3>,
+    /// What each ray adds if it is free.
+    pub weight: Vec<Rgb>,
+    /// The shading point of each ray; rising.
+    pub point: Vec<u32>,
+    /// Added to each point without a ray; as many as there are points.
+    pub base: Vec<Rgb>,
+}
+
+impl Contributions {
+    /// Forgets the pairs, keeps the memory, and makes `base` black for `n_points`.
+    pub fn reset(&mut self, n_points: usize) {
+        self.wi.clear();
+        self.weight.clear();
+        self.point.clear();
+        self.base.clear();
+        self.base.resize(n_points, Rgb::BLACK);
+    }
+
+    /// How many shadow rays.
+    pub fn len(&self) -> usize {
+        self.wi.len()
+    }
+
+    /// No shadow rays.
+    pub fn is_empty(&self) -> bool {
+        self.wi.is_empty()
+    }
+
+    /// Asks for a ray; a black weight needs none.
+    pub fn push(&mut self, point: u32, wi: Vec3, weight: Rgb) {
+        if !weight.is_black() {
+            self.wi.push(wi);
+            self.weight.push(weight);
+            self.point.push(point);
+        }
+    }
+}
+
+/// A strategy that looks at one shading point at a time: the lecture's.
+pub trait PointStrategy: Sync {
+    /// The expected value of the estimate is the integral.
+    const UNBIASED: bool;
+
+    /// Shadow rays asked for at each point at the most.
+    fn n_rays(&self) -> u32;
+
+    /// Calls `push(wi, weight)` for each shadow ray at the point.
+    fn sample(&self, at: &ShadingPoint, numbers: SampleNumbers, push: impl FnMut(Vec3, Rgb));
+}
+
+/// The shading points of a tile, grouped by pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct TileShading<'a> {
+    /// All camera hits of the tile in this pass.
+    pub points: &'a [ShadingPoint],
+    /// Index of each point's camera sample in its pixel.
+    pub samples: &'a [u32],
+    /// The pixels in row order, those without a hit as well.
+    pub pixels: &'a [PixelPoints],
+    /// Pixels in a row of the tile.
+    pub width: usize,
+}
+
+/// The points of one pixel.
+#[derive(Clone, Debug)]
+pub struct PixelPoints {
+    /// Their range in [`TileShading::points`].
+    pub points: std::ops::Range<usize>,
+    /// Camera samples of the pixel in this pass, hits and misses.
+    pub n_samples: u32,
+    /// The pixel's uniform numbers.
+    pub stream: Stream,
+}
+
+/// Whether a strategy wants another round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Round {
+    /// Trace these, tell which were free, and ask again.
+    More,
+    /// Trace these; the tile is complete.
+    Done,
+}
+
+/// A strategy that looks at a tile at a time, in rounds. Every [`PointStrategy`] is one: it needs a
+/// single round and learns nothing.
+pub trait Strategy: Sync {
+    /// What the rounds of a tile teach.
+    type Learned: Default + Send;
+
+    /// Shadow rays asked for at each point at the most: for sizing batches.
+    fn n_rays(&self) -> u32;
+
+    /// Asks for the shadow rays of a round; `out` comes reset. A point's `base` and rays of all
+    /// rounds add up.
+    fn push(
+        &self,
+        tile: &TileShading,
+        learned: &Self::Learned,
+        round: u32,
+        out: &mut Contributions,
+    ) -> Round;
+
+    /// Is told which rays of the last round were free.
+    fn learn(
+        &self,
+        _tile: &TileShading,
+        _pushed: &Contributions,
+        _free: &[bool],
+        _learned: &mut Self::Learned,
+    ) {
+    }
+}
+
+impl<S: PointStrategy> Strategy for S {
+    type Learned = ();
+
+    fn n_rays(&self) -> u32 {
+        PointStrategy::n_rays(self)
+    }
+
+    fn push(&self, tile: &TileShading, (): &(), _round: u32, out: &mut Contributions) -> Round {
+        for pixel in tile.pixels {
+            for i in pixel.points.clone() {
+                let numbers = SampleNumbers { stream: pixel.stream, sample: tile.samples[i] };
+                self.sample(&tile.points[i], numbers, |wi, weight| out.push(i as u32, wi, weight));
+            }
+        }
+        Round::Done
+    }
+}
