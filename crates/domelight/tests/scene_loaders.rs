@@ -588,6 +588,15 @@ fn a_scene_file_combines_everything() {
 }
 
 #[test]
+fn built_in_scenes_are_objects_with_a_camera() {
+    let text = "[[objects]]\nbuiltin = \"sphere\"\nmaterial = \"ggx:0.3\"\ntranslate = [7, 0, 0]\n";
+    let d = one("scene.toml", text).description;
+    assert!(close(d.parts[0].mesh.bounds().center(), vec3(7.0, 0.0, 0.0)));
+    assert!(close(d.camera.unwrap().target, vec3(7.0, 0.0, 0.0)));
+    assert_eq!(d.surfaces.len(), 1);
+}
+
+#[test]
 fn broken_scene_files_name_the_line_and_the_reason() {
     let bad = |from: &str, to: &str, words: &[&str]| {
         assert!(TOML.contains(from), "{from}");
