@@ -475,6 +475,7 @@ fn broken_gltf_files_are_errors() {
     bad(r#""componentType":5123"#, r#""componentType":5126"#, &["accessor 3", "indices"]);
     bad(r#""TEXCOORD_0":2"#, r#""TEXCOORD_0":1"#, &["accessor 1", "VEC2"]);
     bad(r#""NORMAL":1"#, r#""NORMAL":9"#, &["not valid"]);
+    bad(r#""POSITION":0"#, r#""POSITION":9"#, &["accessor 9", "primitive 0"]);
     bad(r#""children":[1,2]"#, r#""children":[1,0]"#, &["node 0", "tree"]);
     bad(r#""children":[1,2]"#, r#""children":[1,1]"#, &["node 1", "tree"]);
     bad("my%20paint.png", "gone.png", &["gone.png", "paint"]);
@@ -649,4 +650,45 @@ fn sixteen_bit_and_grey_textures_load() {
     deep.save(folder.path("brass.png")).unwrap();
     let d = folder.load("scene.toml").description;
     assert_eq!(d.textures[0].texel(0, 0), Rgb::WHITE);
+}
+
+/// Whatever is loaded from a damaged file makes a scene or an error.
+#[test]
+fn damaged_files_never_panic() {
+    let folder = toml_folder().with_image("my paint.png", [1, 2, 3]).with("things.mtl", MTL);
+    let whole = [
+        ("a.ply", PLY_QUAD.as_bytes().to_vec()),
+        ("b.ply", binary_ply(true)),
+        ("c.obj", OBJ.as_bytes().to_vec()),
+        ("things.mtl", MTL.as_bytes().to_vec()),
+        ("d.glb", glb(&triangle_json(""), &triangle_bytes())),
+        ("e.gltf", embedded_json().into_bytes()),
+        ("f.toml", TOML.as_bytes().to_vec()),
+    ];
+    fs::write(folder.path("c.obj"), OBJ).unwrap();
+    let mut state = 1u64;
+    let mut random = |n: usize| {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((state >> 33) as usize) % n
+    };
+    for (name, bytes) in whole {
+        for _ in 0..200 {
+            let mut damaged = bytes.clone();
+            for _ in 0..=random(3) {
+                let at = random(damaged.len());
+                match random(4) {
+                    0 => damaged[at] = random(256) as u8,
+                    1 => damaged[at] = b"0123456789-.e,[]{}\" \n"[random(21)],
+                    2 => drop(damaged.remove(at)),
+                    _ => damaged.insert(at, b"09-"[random(3)]),
+                }
+            }
+            fs::write(folder.path(name), &damaged).unwrap();
+            let scene = if name == "things.mtl" { "c.obj" } else { name };
+            if let Ok(loaded) = load(folder.path(scene)) {
+                let _ = Scene::new(loaded.description);
+            }
+        }
+        fs::write(folder.path(name), &bytes).unwrap();
+    }
 }
