@@ -33,8 +33,7 @@ const MATERIALS: [&str; 9] = [
 fn environment(spots: bool, up: UpAxis) -> Environment {
     let mut pcg = Pcg32::new(17, 0);
     let mut number = move || (2.0 * pcg.next_f32()).exp();
-    let mut map =
-        RgbImage::from_fn(WIDTH, HEIGHT, |_, _| Rgb::new(number(), number(), number()));
+    let mut map = RgbImage::from_fn(WIDTH, HEIGHT, |_, _| Rgb::new(number(), number(), number()));
     if spots {
         map.pixels[2 * WIDTH + 5] = Rgb::new(300.0, 200.0, 100.0);
         map.pixels[3 * WIDTH + 1] = Rgb::BLACK;
