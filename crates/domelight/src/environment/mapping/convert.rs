@@ -71,7 +71,7 @@ const FINE: usize = 32;
 /// The weighted mean of the samples (value, weight) of each texel (x, y), on a grid of n × n.
 ///
 /// Texels are first sampled coarsely. Where that finds the edge of something bright, and in the eight texels around,
-/// a fine grid is used, so that a sun of a texel's size keeps its energy to within a few per mille.
+/// a fine grid is used, so that a sun of a texel's size keeps its energy to about one per cent.
 fn resample<I: Iterator<Item = (Rgb, f32)>>(
     source: &RgbImage,
     width: usize,
