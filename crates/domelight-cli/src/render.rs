@@ -106,7 +106,8 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let build = watch.lap();
 
     let settings = arguments.render_settings();
-    let job = Job { scene: &scene, camera: &camera, environment: &environment, settings: &settings };
+    let job =
+        Job { scene: &scene, camera: &camera, environment: &environment, settings: &settings };
     let n_pixels = (settings.width * settings.height) as u64;
     let progress =
         RenderProgress::new(n_pixels * u64::from(settings.n_samples), quiet, interrupted);
@@ -118,7 +119,12 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         Settings::new(&arguments.scene, &probe, &scene, &environment, plan.describe(), &settings);
     let tone = arguments.output.tone.mapping(ToneCurve::Agx);
     for path in &outputs {
-        path.write_layers(&rendering.layers, &tone, arguments.stage.hide_env, settings.provenance())?;
+        path.write_layers(
+            &rendering.layers,
+            &tone,
+            arguments.stage.hide_env,
+            settings.provenance(),
+        )?;
     }
     let stages = Stages { load, build, render, write: watch.lap() };
     let report = RenderReport::new(settings, &rendering, stages, &outputs);
@@ -336,7 +342,11 @@ impl CameraArguments {
 impl OutputArguments {
     fn paths(&self) -> Result<Vec<PicturePath>> {
         let paths: Vec<_> = if self.output.is_empty() {
-            ["domelight.exr", "domelight.png"].map(PicturePath::from_str).into_iter().flatten().collect()
+            ["domelight.exr", "domelight.png"]
+                .map(PicturePath::from_str)
+                .into_iter()
+                .flatten()
+                .collect()
         } else {
             self.output.clone()
         };

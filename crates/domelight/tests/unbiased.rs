@@ -75,7 +75,8 @@ fn quadrature(env: &Environment, at: &ShadingPoint) -> [f64; 3] {
             let integral = rule.rect(Rect { x: u, y: v }, &mut |u: f64, v: f64| {
                 let f = at.eval(env.direction(vec2(u as f32, v as f32))).to_array();
                 // dω = 2π² sin θ du dv
-                let solid_angle = (std::f64::consts::PI * v).sin() * 2.0 * std::f64::consts::PI.powi(2);
+                let solid_angle =
+                    (std::f64::consts::PI * v).sin() * 2.0 * std::f64::consts::PI.powi(2);
                 f.map(|f| f64::from(f) * solid_angle)
             });
             for c in 0..3 {

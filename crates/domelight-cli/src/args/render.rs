@@ -210,4 +210,3 @@ impl From<Up> for UpAxis {
         }
     }
 }
-

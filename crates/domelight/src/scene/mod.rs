@@ -14,8 +14,8 @@ mod stage;
 mod surface;
 mod texture;
 
-pub use camera::{Camera, CameraError, CameraSettings, Projection};
 pub use crate::environment::UpAxis;
+pub use camera::{Camera, CameraError, CameraSettings, Projection};
 pub use description::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription};
 #[cfg(feature = "io")]
 pub use load::{LoadError, Loaded, load};

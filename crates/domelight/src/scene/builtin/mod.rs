@@ -12,8 +12,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::camera::{CameraSettings, Projection};
-use super::{Part, SceneDescription, UpAxis};
 use super::surface::{MetallicRoughnessSurface, Surface, SurfaceModel};
+use super::{Part, SceneDescription, UpAxis};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Mat4, Vec3, vec3};
