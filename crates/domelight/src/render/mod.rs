@@ -6,6 +6,8 @@
 
 mod film;
 mod filter;
+#[cfg(feature = "io")]
+mod output;
 mod tile;
 mod visibility;
 

@@ -1,0 +1,141 @@
+//! What a render did: as JSON or as two lines for people.
+
+use anyhow::{Result, bail};
+use domelight::environment::Environment;
+use domelight::render::{RenderSettings, Rendering};
+use domelight::scene::Scene;
+use serde::Serialize;
+
+use crate::output::Destination;
+use crate::usage::{Seconds, peak_memory};
+
+/// What was rendered, and how.
+#[derive(Serialize)]
+pub(crate) struct Settings {
+    scene: String,
+    triangles: usize,
+    environment: String,
+    environment_size: [usize; 2],
+    strategy: String,
+    size: [usize; 2],
+    spp: u32,
+    sampler: String,
+    filter: &'static str,
+    seed: u64,
+    threads: usize,
+}
+
+impl Settings {
+    pub(crate) fn new(
+        scene_name: &str,
+        probe: &str,
+        scene: &Scene,
+        environment: &Environment,
+        strategy: String,
+        settings: &RenderSettings,
+    ) -> Self {
+        Self {
+            scene: scene_name.to_owned(),
+            triangles: scene.triangle_count(),
+            environment: probe.to_owned(),
+            environment_size: [environment.map().width, environment.map().height],
+            strategy,
+            size: [settings.width, settings.height],
+            spp: settings.n_samples,
+            sampler: format!("{:?}", settings.sampler).to_lowercase(),
+            filter: settings.filter.name(),
+            seed: settings.seed,
+            threads: rayon::current_num_threads(),
+        }
+    }
+}
+
+/// Where the time went.
+#[derive(Serialize)]
+pub(crate) struct Stages {
+    /// Reading or making scene and probe.
+    pub(crate) load: Seconds,
+    /// The BVH and the environment's table.
+    pub(crate) build: Seconds,
+    pub(crate) render: Seconds,
+    /// Encoding and writing pictures.
+    pub(crate) write: Seconds,
+}
+
+/// All that `--json` prints.
+#[derive(Serialize)]
+pub(crate) struct RenderReport {
+    version: &'static str,
+    settings: Settings,
+    seconds: Stages,
+    camera_rays: u64,
+    shading_points: u64,
+    shadow_rays: u64,
+    rays_per_second: f64,
+    peak_memory_bytes: Option<u64>,
+    non_finite_samples: u64,
+    complete: bool,
+    outputs: Vec<String>,
+}
+
+impl RenderReport {
+    pub(crate) fn new(
+        settings: Settings,
+        rendering: &Rendering,
+        seconds: Stages,
+        destinations: &[Destination],
+    ) -> Self {
+        let counts = rendering.counts;
+        let rays = (counts.camera_rays + counts.shadow_rays) as f64;
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            settings,
+            rays_per_second: rays / seconds.render.wall.max(1e-9),
+            seconds,
+            camera_rays: counts.camera_rays,
+            shading_points: counts.shading_points,
+            shadow_rays: counts.shadow_rays,
+            peak_memory_bytes: peak_memory(),
+            non_finite_samples: counts.non_finite,
+            complete: rendering.complete,
+            outputs: destinations.iter().map(ToString::to_string).collect(),
+        }
+    }
+
+    pub(crate) fn print_json(&self) -> Result<()> {
+        crate::print_line(&serde_json::to_string_pretty(self)?)
+    }
+
+    /// Two lines on standard error.
+    pub(crate) fn print_summary(&self) {
+        let Settings { scene, environment, strategy, size: [w, h], spp, .. } = &self.settings;
+        let Stages { load, build, render, .. } = &self.seconds;
+        let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
+        eprintln!(
+            "{scene} under {environment}: {w}x{h}, {spp} samples a pixel, {strategy}\n\
+             loaded in {:.2} s, built in {:.2} s, rendered in {:.2} s{cpu}, {:.1} Mrays/s -> {}",
+            load.wall,
+            build.wall,
+            render.wall,
+            self.rays_per_second * 1e-6,
+            self.outputs.join(", ")
+        );
+    }
+
+    /// Complains about what the picture does not show.
+    ///
+    /// # Errors
+    /// If the render was interrupted.
+    pub(crate) fn check(&self) -> Result<()> {
+        if self.non_finite_samples > 0 {
+            eprintln!(
+                "warning: {} camera samples were NaN or infinite and count as black",
+                self.non_finite_samples
+            );
+        }
+        if !self.complete {
+            bail!("interrupted; {} holds what was done so far", self.outputs.join(", "));
+        }
+        Ok(())
+    }
+}

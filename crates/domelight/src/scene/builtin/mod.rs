@@ -1,0 +1,5 @@
+//! Scenes made in code, for pictures and tests.
+
+pub mod shapes;
+pub mod statue;
+mod surface_nets;

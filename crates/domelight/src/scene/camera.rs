@@ -1,0 +1,332 @@
+//! The pinhole and the orthographic camera.
+//!
+//! The picture's basis is f = normalize(target − origin), r = normalize(f × up), u = r × f. The
+//! point (px, py) of a W × H picture, px to the right and py **down** from the top left corner in
+//! pixels, looks along
+//!
+//! normalize(f + tan(fov/2) · ((2 px/W − 1) · W/H · r + (1 − 2 py/H) · u)),
+//!
+//! so pixel centres lie at +½, pixels are square and `fov` is the vertical field of view. The
+//! orthographic camera moves the origin instead, with height/2 in the place of tan(fov/2).
+
+use crate::geometry::{Aabb, Ray};
+use crate::math::{Mat4, Vec3};
+
+/// A camera before the size of its picture is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraSettings {
+    /// Perspective or orthographic.
+    pub projection: Projection,
+    /// Where the camera is.
+    pub origin: Vec3,
+    /// What it looks at: any point on its axis but the origin.
+    pub target: Vec3,
+    /// A direction that points up in the picture, not parallel to the axis; of any length.
+    pub up: Vec3,
+}
+
+/// How the camera maps directions to the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// All rays start at the origin.
+    Perspective {
+        /// Vertical field of view in (0, 180) \[degrees\].
+        fov_y_degrees: f32,
+    },
+    /// All rays are parallel.
+    Orthographic {
+        /// Height of the picture in world units, > 0.
+        height: f32,
+    },
+}
+
+/// A camera that makes no picture.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CameraError {
+    /// A coordinate is NaN or infinite.
+    #[error("the camera's {name} is not finite: {value}; give three finite numbers")]
+    NotFinite {
+        /// Which vector.
+        name: &'static str,
+        /// Its value.
+        value: Vec3,
+    },
+    /// No direction to look in.
+    #[error("the camera's origin and target are the same point: {origin}; move one of them")]
+    NoDirection {
+        /// The origin.
+        origin: Vec3,
+    },
+    /// The picture could be rotated freely.
+    #[error(
+        "the camera's up vector {up} is zero or parallel to its viewing direction {forward}; choose another"
+    )]
+    Up {
+        /// The up vector.
+        up: Vec3,
+        /// The viewing direction.
+        forward: Vec3,
+    },
+    /// A field of view that does not fit a plane.
+    #[error("the field of view {fov_y_degrees}° is outside (0°, 180°)")]
+    FieldOfView {
+        /// The vertical field of view \[degrees\].
+        fov_y_degrees: f32,
+    },
+    /// An orthographic picture of no height.
+    #[error("the orthographic height {height} is not a positive finite number")]
+    Height {
+        /// The height.
+        height: f32,
+    },
+    /// A picture without pixels.
+    #[error("a picture of {width} x {height} has no pixels")]
+    Size {
+        /// Its width.
+        width: u32,
+        /// Its height.
+        height: u32,
+    },
+}
+
+impl CameraSettings {
+    /// The vertical field of view of [`CameraSettings::framing`] \[degrees\].
+    pub const DEFAULT_FOV_Y_DEGREES: f32 = 35.0;
+
+    /// A view from the +Z side (for `up` = +Y), 20° from above, that fits the bounding sphere of
+    /// `bounds` into a picture of `aspect` = width / height with a small margin.
+    ///
+    /// Empty or infinite bounds are taken as the cube from −1 to 1, an `up` of zero as +Y.
+    pub fn framing(bounds: &Aabb, aspect: f32, up: Vec3) -> Self {
+        const MARGIN: f32 = 1.05;
+        let usable = !bounds.is_empty() && bounds.min.is_finite() && bounds.max.is_finite();
+        let cube = Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE };
+        let bounds = if usable { *bounds } else { cube };
+        let center = bounds.center();
+        let radius = 0.5 * bounds.size().length();
+        let radius = if radius > 0.0 { radius } else { 1.0 };
+
+        let half_y = 0.5 * Self::DEFAULT_FOV_Y_DEGREES.to_radians();
+        let half_x = (half_y.tan() * aspect.max(1e-3)).atan();
+        let distance = MARGIN * radius / half_y.min(half_x).sin();
+
+        let up = up.try_normalize().unwrap_or(Vec3::Y);
+        let back = Vec3::Z - up * up.z;
+        let back = back.try_normalize().filter(|_| up.z.abs() < 0.9).unwrap_or(-Vec3::Y);
+        let back = (back - up * up.dot(back)).normalize();
+        let (sin, cos) = 20f32.to_radians().sin_cos();
+        Self {
+            projection: Projection::Perspective { fov_y_degrees: Self::DEFAULT_FOV_Y_DEGREES },
+            origin: center + distance * (cos * back + sin * up),
+            target: center,
+            up,
+        }
+    }
+
+    /// Moves the camera by an affine matrix; an orthographic height grows with its scale.
+    pub fn transform(&mut self, m: &Mat4) {
+        self.origin = m.transform_point3(self.origin);
+        self.target = m.transform_point3(self.target);
+        self.up = m.transform_vector3(self.up);
+        if let Projection::Orthographic { height } = &mut self.projection {
+            *height *= m.determinant().abs().cbrt();
+        }
+    }
+}
+
+/// A camera of one picture: camera rays from pixel positions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Of the perspective camera: all rays'; of the orthographic one: the top left corner.
+    origin: Vec3,
+    /// Of the perspective camera: toward the top left corner; of the orthographic one: all rays'.
+    direction: Vec3,
+    /// One pixel to the right, as a change of direction or of origin.
+    step_x: Vec3,
+    /// One pixel down.
+    step_y: Vec3,
+    orthographic: bool,
+}
+
+impl Camera {
+    /// The camera of a picture of `width` × `height` pixels.
+    ///
+    /// # Errors
+    /// The [`CameraError`] that says which setting makes no picture.
+    pub fn new(settings: &CameraSettings, width: u32, height: u32) -> Result<Self, CameraError> {
+        if width == 0 || height == 0 {
+            return Err(CameraError::Size { width, height });
+        }
+        let [forward, right, up] = basis(settings)?;
+        let half = half_height(settings.projection)?;
+        let half_right = half * (width as f32 / height as f32) * right;
+        let half_up = half * up;
+        let step_x = half_right * (2.0 / width as f32);
+        let step_y = half_up * (-2.0 / height as f32);
+        let corner = half_up - half_right;
+        Ok(match settings.projection {
+            Projection::Perspective { .. } => Self {
+                origin: settings.origin,
+                direction: forward + corner,
+                step_x,
+                step_y,
+                orthographic: false,
+            },
+            Projection::Orthographic { .. } => Self {
+                origin: settings.origin + corner,
+                direction: forward,
+                step_x,
+                step_y,
+                orthographic: true,
+            },
+        })
+    }
+
+    /// The ray through the point (`px`, `py`) of the picture in pixels, `px` in [0, width) to the
+    /// right and `py` in [0, height) down; its direction is a unit vector.
+    #[inline]
+    pub fn ray(&self, px: f32, py: f32) -> Ray {
+        let step = px * self.step_x + py * self.step_y;
+        if self.orthographic {
+            Ray::new(self.origin + step, self.direction)
+        } else {
+            Ray::new(self.origin, (self.direction + step).normalize())
+        }
+    }
+}
+
+/// Forward, right and up as an orthonormal basis.
+fn basis(settings: &CameraSettings) -> Result<[Vec3; 3], CameraError> {
+    let CameraSettings { origin, target, up, .. } = *settings;
+    for (name, value) in [("origin", origin), ("target", target), ("up vector", up)] {
+        if !value.is_finite() {
+            return Err(CameraError::NotFinite { name, value });
+        }
+    }
+    let forward = (target - origin).try_normalize().ok_or(CameraError::NoDirection { origin })?;
+    let unit_up = up.try_normalize().ok_or(CameraError::Up { up, forward })?;
+    let right = forward.cross(unit_up);
+    if right.length() < 1e-6 {
+        return Err(CameraError::Up { up, forward });
+    }
+    let right = right.normalize();
+    Ok([forward, right, right.cross(forward)])
+}
+
+/// Half the picture's height at unit distance.
+fn half_height(projection: Projection) -> Result<f32, CameraError> {
+    match projection {
+        Projection::Perspective { fov_y_degrees } => {
+            if !(fov_y_degrees > 0.0 && fov_y_degrees < 180.0) {
+                return Err(CameraError::FieldOfView { fov_y_degrees });
+            }
+            Ok((0.5 * fov_y_degrees.to_radians()).tan())
+        }
+        Projection::Orthographic { height } => {
+            if !(height > 0.0 && height.is_finite()) {
+                return Err(CameraError::Height { height });
+            }
+            Ok(0.5 * height)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::vec3;
+
+    fn settings() -> CameraSettings {
+        CameraSettings {
+            projection: Projection::Perspective { fov_y_degrees: 40.0 },
+            origin: vec3(1.0, 2.0, 5.0),
+            target: vec3(0.3, -0.2, 0.0),
+            up: vec3(0.1, 2.0, 0.0),
+        }
+    }
+
+    #[test]
+    fn rays_follow_the_definition() {
+        let s = settings();
+        let (w, h) = (64, 48);
+        let camera = Camera::new(&s, w, h).unwrap();
+        let f = (s.target - s.origin).normalize();
+        let r = f.cross(s.up).normalize();
+        let u = r.cross(f);
+        let t = 20f32.to_radians().tan();
+        let (w, h) = (w as f32, h as f32);
+        for (px, py) in [(0.0, 0.0), (0.5, 0.5), (32.0, 24.0), (63.5, 1.25), (10.0, 47.0)] {
+            let x = (2.0 * px / w - 1.0) * w / h;
+            let expected = (f + t * (x * r + (1.0 - 2.0 * py / h) * u)).normalize();
+            let ray = camera.ray(px, py);
+            assert!((ray.direction - expected).length() < 1e-6);
+            assert_eq!(ray.origin, s.origin);
+        }
+    }
+
+    #[test]
+    fn orthographic_rays_are_parallel_and_cover_the_height() {
+        let s =
+            CameraSettings { projection: Projection::Orthographic { height: 3.0 }, ..settings() };
+        let camera = Camera::new(&s, 20, 10).unwrap();
+        let (top, bottom) = (camera.ray(10.0, 0.0), camera.ray(10.0, 10.0));
+        assert_eq!(top.direction, bottom.direction);
+        assert!(((top.origin - bottom.origin).length() - 3.0).abs() < 1e-5);
+        assert!((camera.ray(10.0, 5.0).origin - s.origin).length() < 1e-6);
+        let width = (camera.ray(0.0, 5.0).origin - camera.ray(20.0, 5.0).origin).length();
+        assert!((width - 6.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn framing_fits_the_bounding_sphere() {
+        let bounds = Aabb { min: vec3(-3.0, 1.0, 2.0), max: vec3(4.0, 2.0, 9.0) };
+        for up in [Vec3::Y, Vec3::Z, vec3(0.0, 1.0, 1.0)] {
+            for (w, h) in [(300, 100), (100, 100), (100, 300)] {
+                let s = CameraSettings::framing(&bounds, w as f32 / h as f32, up);
+                Camera::new(&s, w, h).unwrap();
+                let [f, r, u] = basis(&s).unwrap();
+                let t = 17.5f32.to_radians().tan();
+                for i in 0..8 {
+                    let pick = |k: i32, lo: f32, hi: f32| if i >> k & 1 == 0 { lo } else { hi };
+                    let corner = vec3(
+                        pick(0, bounds.min.x, bounds.max.x),
+                        pick(1, bounds.min.y, bounds.max.y),
+                        pick(2, bounds.min.z, bounds.max.z),
+                    ) - s.origin;
+                    let z = f.dot(corner);
+                    assert!(z > 0.0);
+                    assert!(r.dot(corner).abs() < z * t * w as f32 / h as f32);
+                    assert!(u.dot(corner).abs() < z * t);
+                }
+            }
+        }
+        let s = CameraSettings::framing(&bounds, 1.0, Vec3::Y);
+        assert!(s.origin.z > bounds.max.z && s.origin.y > bounds.max.y);
+        for odd in [Aabb::EMPTY, Aabb { min: Vec3::ONE, max: Vec3::ONE }] {
+            Camera::new(&CameraSettings::framing(&odd, 1.0, Vec3::ZERO), 4, 4).unwrap();
+        }
+    }
+
+    #[test]
+    fn cameras_that_make_no_picture_are_refused() {
+        let s = settings();
+        let fov = |fov_y_degrees| CameraSettings {
+            projection: Projection::Perspective { fov_y_degrees },
+            ..s
+        };
+        let error = |s: CameraSettings| Camera::new(&s, 4, 4).unwrap_err();
+        for f in [0.0, 180.0, -3.0, f32::NAN] {
+            assert!(matches!(error(fov(f)), CameraError::FieldOfView { .. }));
+        }
+        let flat = CameraSettings { projection: Projection::Orthographic { height: 0.0 }, ..s };
+        assert!(matches!(error(flat), CameraError::Height { .. }));
+        let same = CameraSettings { target: s.origin, ..s };
+        assert!(matches!(error(same), CameraError::NoDirection { .. }));
+        for up in [Vec3::ZERO, s.target - s.origin, 2.0 * (s.origin - s.target)] {
+            assert!(matches!(error(CameraSettings { up, ..s }), CameraError::Up { .. }));
+        }
+        let nan = CameraSettings { origin: Vec3::NAN, ..s };
+        assert!(matches!(error(nan), CameraError::NotFinite { name: "origin", .. }));
+        assert!(matches!(Camera::new(&s, 0, 4), Err(CameraError::Size { .. })));
+    }
+}

@@ -1,0 +1,108 @@
+//! What a scene is made of, before anything is built: the common result of every loader.
+
+use std::path::PathBuf;
+
+use super::camera::CameraSettings;
+use super::surface::Surface;
+use super::texture::Texture;
+use crate::geometry::{Aabb, Mesh};
+use crate::math::Mat4;
+
+/// A scene as loaders and built-in scenes give it; [`Scene::new`](super::Scene::new) checks it.
+#[derive(Clone, Debug, Default)]
+pub struct SceneDescription {
+    /// The meshes.
+    pub parts: Vec<Part>,
+    /// What the parts are made of.
+    pub surfaces: Vec<Surface>,
+    /// The images that the surfaces refer to.
+    pub textures: Vec<Texture>,
+    /// The camera, if the scene brings one.
+    pub camera: Option<CameraSettings>,
+    /// The environment, if the scene names one.
+    pub environment: Option<EnvironmentSettings>,
+    /// Which axis of the file points up; `None` if the format does not say.
+    ///
+    /// The geometry is given as it is in the file: turning it is the caller's choice.
+    pub up: Option<UpAxis>,
+}
+
+/// A mesh and what it is made of.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Its name in the file, for messages.
+    pub name: String,
+    /// The mesh in world space.
+    pub mesh: Mesh,
+    /// Index into [`SceneDescription::surfaces`].
+    pub surface: usize,
+}
+
+/// The axis that points up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "io", derive(serde::Deserialize), serde(rename_all = "lowercase"))]
+pub enum UpAxis {
+    /// +Y, the program's own convention.
+    #[default]
+    Y,
+    /// +Z.
+    Z,
+}
+
+/// The light around a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvironmentSettings {
+    /// Where the map comes from.
+    pub source: EnvironmentSource,
+    /// Rotation about the up axis \[degrees\].
+    pub rotate_degrees: f32,
+    /// Factor on the radiance, ≥ 0.
+    pub scale: f32,
+    /// Exposure in stops: a further factor of 2^exposure.
+    pub exposure: f32,
+    /// The axis of the map that points up.
+    pub up: UpAxis,
+}
+
+/// Where a light probe comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum EnvironmentSource {
+    /// A file, its path already relative to the working directory.
+    File(PathBuf),
+    /// The name of a built-in probe.
+    Builtin(String),
+}
+
+impl SceneDescription {
+    /// The least box around all vertices.
+    pub fn bounds(&self) -> Aabb {
+        self.parts.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()))
+    }
+
+    /// Moves the parts and the camera by an affine matrix.
+    pub fn transform(&mut self, m: &Mat4) {
+        for part in &mut self.parts {
+            part.mesh.transform(m);
+        }
+        if let Some(camera) = &mut self.camera {
+            camera.transform(m);
+        }
+    }
+
+    /// Appends another scene's parts; its camera and environment are taken where this one has none.
+    pub fn append(&mut self, mut other: Self) {
+        let (surfaces, textures) = (self.surfaces.len(), self.textures.len());
+        for part in &mut other.parts {
+            part.surface += surfaces;
+        }
+        for surface in &mut other.surfaces {
+            surface.shift_textures(textures);
+        }
+        self.parts.append(&mut other.parts);
+        self.surfaces.append(&mut other.surfaces);
+        self.textures.append(&mut other.textures);
+        self.camera = self.camera.take().or(other.camera);
+        self.environment = self.environment.take().or(other.environment);
+        self.up = self.up.or(other.up);
+    }
+}

@@ -1,0 +1,316 @@
+//! From a hit to what shading needs: position, normals, frame and material.
+//!
+//! Surfaces are two-sided: both normals are turned to the viewer's side. The position comes from
+//! the barycentric coordinates, whose error is that of the vertices, rather than from
+//! origin + t · direction, whose error grows with the distance.
+//!
+//! An interpolated or mapped normal may face away from the viewer although the surface does not.
+//! Such a normal is **bent toward the viewer** until `wo` lies just above the shading horizon:
+//! n' ∝ n − (n·wo − ε) wo, the least change that gives n'·wo ≥ ε. Black or untouched pixels along
+//! silhouettes would be the alternatives.
+
+use super::{Part, Scene, Surface};
+use crate::Rgb;
+use crate::bsdf::Material;
+use crate::geometry::{Hit, Mesh, Ray};
+use crate::math::{Frame, Vec2, Vec3, Vec4};
+
+/// The least cosine between the shading normal and the direction to the viewer.
+const MIN_COS_THETA_O: f32 = 1e-3;
+
+/// A point on a surface, ready for shading.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// In world space.
+    pub position: Vec3,
+    /// Geometric normal, a unit vector on the viewer's side.
+    pub ng: Vec3,
+    /// Shading frame, its z axis the shading normal on the viewer's side.
+    pub frame: Frame,
+    /// Toward the viewer, a unit vector in the shading frame with z > 0.
+    pub wo: Vec3,
+    /// What the surface is made of here.
+    pub material: Material,
+    /// The material's albedo, for previews and denoisers.
+    pub albedo: Rgb,
+}
+
+impl Scene {
+    /// All that shading needs of a hit that [`Scene::bvh`] reported for `ray`.
+    ///
+    /// # Panics
+    /// If `hit.triangle` is not one of this scene's.
+    pub fn surface_point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let (part, triangle) = self.locate(hit.triangle);
+        let surface = &self.surfaces[part.surface];
+        let corner = Corners::new(&part.mesh, triangle, hit);
+        let viewer = -ray.direction.normalize();
+
+        let [p0, p1, p2] = corner.of(&part.mesh.positions);
+        let ng = (p1 - p0).cross(p2 - p0).try_normalize().unwrap_or(viewer);
+        let uv = corner.mix(&part.mesh.uvs).unwrap_or_default();
+        let (normal, tangent) = self.normal_and_tangent(part, surface, &corner, ng, uv);
+
+        let ng = if ng.dot(viewer) < 0.0 { -ng } else { ng };
+        let normal = if normal.dot(ng) < 0.0 { -normal } else { normal };
+        let normal = bend(normal, viewer, ng);
+        let frame = tangent.map_or_else(
+            || Frame::from_z(normal),
+            |t| Frame::from_z_and_tangent(normal, t.truncate()),
+        );
+        let wo = frame.to_local(viewer).normalize();
+        let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
+        let material = surface.material(&self.textures, uv, tint);
+        let albedo = albedo(&material, wo);
+        let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
+        SurfacePoint { position, ng, frame, wo, material, albedo }
+    }
+
+    /// The shading normal on the front side, the normal map applied, and the tangent.
+    fn normal_and_tangent(
+        &self,
+        part: &Part,
+        surface: &Surface,
+        corner: &Corners,
+        ng: Vec3,
+        uv: Vec2,
+    ) -> (Vec3, Option<Vec4>) {
+        let mesh = &part.mesh;
+        let normal = corner.mix(&mesh.normals).and_then(Vec3::try_normalize).unwrap_or(ng);
+        let tangent = corner.mix(&mesh.tangents).or_else(|| corner.uv_tangent(mesh, normal));
+        let mapped = surface.normal_map.zip(tangent).and_then(|(map, tangent)| {
+            let frame = Frame::from_z_and_tangent(normal, tangent.truncate());
+            let n = map.normal(&self.textures, uv);
+            let bitangent = frame.y * 1f32.copysign(tangent.w);
+            (frame.x * n.x + bitangent * n.y + frame.z * n.z).try_normalize()
+        });
+        (mapped.unwrap_or(normal), tangent)
+    }
+}
+
+/// The material's albedo seen from `wo`.
+fn albedo(material: &Material, _wo: Vec3) -> Rgb {
+    material.albedo()
+}
+
+/// `normal` bent toward `viewer` until their cosine is positive; see the [module](self).
+#[inline]
+fn bend(normal: Vec3, viewer: Vec3, ng: Vec3) -> Vec3 {
+    let cos_theta_o = normal.dot(viewer);
+    if cos_theta_o >= MIN_COS_THETA_O {
+        return normal;
+    }
+    let raise = |n: Vec3| (n - (n.dot(viewer) - MIN_COS_THETA_O) * viewer).try_normalize();
+    raise(normal).filter(|n| n.dot(viewer) > 0.0).or_else(|| raise(ng)).unwrap_or(viewer)
+}
+
+/// The corners of the triangle that was hit, and their barycentric weights.
+struct Corners {
+    indices: [usize; 3],
+    weights: [f32; 3],
+}
+
+impl Corners {
+    #[inline]
+    fn new(mesh: &Mesh, triangle: usize, hit: &Hit) -> Self {
+        Self {
+            indices: mesh.triangles[triangle].map(|i| i as usize),
+            weights: [1.0 - hit.u - hit.v, hit.u, hit.v],
+        }
+    }
+
+    /// An attribute at the corners.
+    #[inline]
+    fn of<T: Copy>(&self, attribute: &[T]) -> [T; 3] {
+        self.indices.map(|i| attribute[i])
+    }
+
+    /// An attribute interpolated; `None` if the mesh lacks it.
+    #[inline]
+    fn mix<T>(&self, attribute: &[T]) -> Option<T>
+    where
+        T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>,
+    {
+        if attribute.is_empty() {
+            return None;
+        }
+        let [a, b, c] = self.of(attribute);
+        let [wa, wb, wc] = self.weights;
+        Some(a * wa + b * wb + c * wc)
+    }
+
+    /// The tangent ∂p/∂u with the bitangent's sign as glTF defines it: the bitangent points toward
+    /// falling v, which is up in the image.
+    #[inline]
+    fn uv_tangent(&self, mesh: &Mesh, normal: Vec3) -> Option<Vec4> {
+        if mesh.uvs.is_empty() {
+            return None;
+        }
+        let [p0, p1, p2] = self.of(&mesh.positions);
+        let [t0, t1, t2] = self.of(&mesh.uvs);
+        let (e1, e2, d1, d2) = (p1 - p0, p2 - p0, t1 - t0, t2 - t0);
+        let sign = 1f32.copysign(d1.perp_dot(d2));
+        let along_u = (sign * (d2.y * e1 - d1.y * e2)).try_normalize()?;
+        let along_v = sign * (d1.x * e2 - d2.x * e1);
+        let handedness = -1f32.copysign(normal.cross(along_u).dot(along_v));
+        Some(along_u.extend(handedness))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{vec2, vec3};
+    use crate::scene::{Encoding, NormalMap, SceneDescription, SurfaceModel, Texture, TextureRef};
+
+    /// The triangle (0,0,0), (1,0,0), (0,1,0) with its image's v axis pointing down.
+    fn triangle() -> Mesh {
+        Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            uvs: vec![vec2(0.0, 1.0), vec2(1.0, 1.0), vec2(0.0, 0.0)],
+            triangles: vec![[0, 1, 2]],
+            ..Mesh::default()
+        }
+    }
+
+    fn scene(mesh: Mesh, normal_texel: Option<[u8; 3]>) -> Scene {
+        let mut surface = Surface::diffuse("grey", Rgb::splat(0.5));
+        let mut textures = Vec::new();
+        if let Some(texel) = normal_texel {
+            textures.push(Texture::from_rgb8("n", 1, 1, vec![texel], Encoding::Linear).unwrap());
+            surface.normal_map = Some(NormalMap { texture: TextureRef::new(0), scale: 1.0 });
+        }
+        let part = Part { name: "triangle".into(), mesh, surface: 0 };
+        let description = SceneDescription {
+            parts: vec![part],
+            surfaces: vec![surface],
+            textures,
+            ..SceneDescription::default()
+        };
+        Scene::new(description).unwrap()
+    }
+
+    fn look(scene: &Scene, from: Vec3) -> SurfacePoint {
+        let at = vec3(0.25, 0.25, 0.0);
+        let ray = Ray::new(from, (at - from).normalize());
+        let hit = scene.bvh().closest_hit(&ray).unwrap();
+        scene.surface_point(&ray, &hit)
+    }
+
+    #[test]
+    fn both_sides_face_their_viewer() {
+        let scene = scene(triangle(), None);
+        for z in [3.0, -3.0] {
+            let p = look(&scene, vec3(0.5, 1.0, z));
+            let side = Vec3::Z * f32::signum(z);
+            assert_eq!(p.ng, side);
+            assert!((p.frame.z - side).length() < 1e-6);
+            assert!((p.position - vec3(0.25, 0.25, 0.0)).length() < 1e-6);
+            assert!(p.wo.z > 0.0);
+            let toward = (vec3(0.5, 1.0, z) - p.position).normalize();
+            assert!((p.frame.to_world(p.wo) - toward).length() < 1e-5);
+            assert_eq!(p.albedo, Rgb::splat(0.5));
+        }
+    }
+
+    #[test]
+    fn normals_that_face_away_are_bent_toward_the_viewer() {
+        let mut mesh = triangle();
+        mesh.normals = vec![vec3(-0.995, 0.0, 0.1).normalize(); 3];
+        let p = look(&scene(mesh, None), vec3(3.0, 0.25, 0.5));
+        assert!(p.wo.z > 0.5 * MIN_COS_THETA_O && p.wo.z < 2.0 * MIN_COS_THETA_O);
+        assert!((p.frame.z.length() - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn degenerate_normals_fall_back_to_the_geometric_one() {
+        for n in [Vec3::ZERO, Vec3::NAN] {
+            let mut mesh = triangle();
+            mesh.normals = vec![n; 3];
+            assert_eq!(look(&scene(mesh, None), vec3(0.2, 0.2, 2.0)).frame.z, Vec3::Z);
+        }
+    }
+
+    #[test]
+    fn green_of_a_normal_map_points_up_in_the_image_on_either_side() {
+        let mut mirrored = triangle();
+        for uv in &mut mirrored.uvs {
+            uv.x = 1.0 - uv.x;
+        }
+        let mut with_tangents = triangle();
+        with_tangents.tangents = vec![Vec4::new(1.0, 0.0, 0.0, 1.0); 3];
+        for mesh in [triangle(), mirrored, with_tangents] {
+            let n = look(&scene(mesh.clone(), Some([128, 218, 218])), vec3(0.25, 0.25, 3.0));
+            assert!(n.frame.z.y > 0.6 && n.frame.z.z > 0.6, "{:?}", n.frame.z);
+            let back = look(&scene(mesh, Some([128, 218, 218])), vec3(0.25, 0.25, -3.0));
+            assert!((back.frame.z + n.frame.z).length() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn red_of_a_normal_map_points_along_u() {
+        let n = look(&scene(triangle(), Some([218, 128, 218])), vec3(0.25, 0.25, 3.0));
+        assert!(n.frame.z.x > 0.6 && n.frame.z.z > 0.6);
+    }
+
+    #[test]
+    fn vertex_colors_and_textures_multiply_the_base_color() {
+        let mut mesh = triangle();
+        mesh.colors = vec![Rgb::new(1.0, 0.5, 0.0); 3];
+        let mut description = SceneDescription {
+            parts: vec![Part { name: "t".into(), mesh, surface: 0 }],
+            surfaces: vec![Surface::diffuse("s", Rgb::splat(0.5))],
+            textures: vec![
+                Texture::from_rgb8("t", 1, 1, vec![[255, 255, 51]], Encoding::Linear).unwrap(),
+            ],
+            ..SceneDescription::default()
+        };
+        if let SurfaceModel::Phong(p) = &mut description.surfaces[0].model {
+            p.diffuse_texture = Some(TextureRef::new(0));
+        }
+        let p = look(&Scene::new(description).unwrap(), vec3(0.25, 0.25, 3.0));
+        assert_eq!(p.albedo, Rgb::new(0.5, 0.25, 0.0));
+    }
+
+    #[test]
+    fn triangles_find_their_part_past_empty_ones() {
+        let part = |name: &str, mesh| Part { name: name.into(), mesh, surface: 0 };
+        let mut moved = triangle();
+        moved.transform(&crate::math::Mat4::from_translation(vec3(5.0, 0.0, 0.0)));
+        let description = SceneDescription {
+            parts: vec![
+                part("empty", Mesh::default()),
+                part("a", triangle()),
+                part("empty", Mesh::default()),
+                part("b", moved),
+            ],
+            surfaces: vec![Surface::diffuse("s", Rgb::splat(0.5))],
+            ..SceneDescription::default()
+        };
+        let scene = Scene::new(description).unwrap();
+        assert_eq!((scene.locate(0).0.name.as_str(), scene.locate(0).1), ("a", 0));
+        assert_eq!((scene.locate(1).0.name.as_str(), scene.locate(1).1), ("b", 0));
+        assert_eq!(scene.triangle_count(), 2);
+        assert_eq!(scene.bounds().max.x, 6.0);
+    }
+
+    #[test]
+    fn broken_descriptions_are_refused_by_name() {
+        let broken = |edit: fn(&mut SceneDescription)| {
+            let mut d = SceneDescription {
+                parts: vec![Part { name: "vase".into(), mesh: triangle(), surface: 0 }],
+                surfaces: vec![Surface::diffuse("clay", Rgb::splat(0.5))],
+                ..SceneDescription::default()
+            };
+            edit(&mut d);
+            Scene::new(d).unwrap_err().to_string()
+        };
+        assert!(broken(|d| d.parts[0].mesh.triangles[0][1] = 7).contains("vase"));
+        assert!(broken(|d| d.parts[0].mesh.positions[2].y = f32::NAN).contains("vase"));
+        assert!(broken(|d| d.parts[0].surface = 3).contains("surface 3"));
+        let texture = |d: &mut SceneDescription| {
+            d.surfaces[0].normal_map = Some(NormalMap { texture: TextureRef::new(2), scale: 1.0 });
+        };
+        assert!(broken(texture).contains("clay"));
+    }
+}

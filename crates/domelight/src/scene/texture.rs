@@ -1,0 +1,288 @@
+//! Textures: images on surfaces, of reflectance, roughness or normals.
+//!
+//! Texels are kept as the file has them, 8 or 16 bits a channel, and decoded through a table of the
+//! 2⁸ or 2¹⁶ values; alpha is dropped, for all surfaces are opaque. Look-ups are bilinear between
+//! texel centres. There are no mip maps: a renderer that takes many samples a pixel averages the
+//! texture by itself, and without ray differentials a mip level would be a guess.
+
+use crate::Rgb;
+use crate::math::{Vec2, vec2};
+
+/// How texel values map to numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Encoding {
+    /// Colour with the transfer curve of IEC 61966-2-1.
+    Srgb,
+    /// Numbers in \[0, 1\]: roughness, metalness, normals.
+    Linear,
+}
+
+/// An image that surfaces refer to.
+#[derive(Clone, Debug)]
+pub struct Texture {
+    name: String,
+    width: u32,
+    height: u32,
+    texels: Texels,
+    /// The number for each texel value.
+    decode: Vec<f32>,
+}
+
+#[derive(Clone, Debug)]
+enum Texels {
+    Bits8(Vec<[u8; 3]>),
+    Bits16(Vec<[u16; 3]>),
+}
+
+/// What becomes of texture coordinates outside \[0, 1\].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "io", derive(serde::Deserialize), serde(rename_all = "lowercase"))]
+pub enum Wrap {
+    /// The image is tiled.
+    #[default]
+    Repeat,
+    /// The border texels go on for ever.
+    Clamp,
+    /// The image is tiled, every second tile a mirror image.
+    Mirror,
+}
+
+/// A texture as one use of it sees it: which one, and where on the mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureRef {
+    /// Index into the scene's textures.
+    pub texture: usize,
+    /// Wrapping in u and in v.
+    pub wrap: [Wrap; 2],
+    /// From the mesh's texture coordinates to the image's.
+    pub transform: UvTransform,
+}
+
+impl TextureRef {
+    /// The texture as it is, repeated.
+    pub fn new(texture: usize) -> Self {
+        Self { texture, wrap: [Wrap::Repeat; 2], transform: UvTransform::IDENTITY }
+    }
+}
+
+/// An affine map of texture coordinates: uv ↦ u · x + v · y + offset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UvTransform {
+    /// Where one step in u leads.
+    pub x: Vec2,
+    /// Where one step in v leads.
+    pub y: Vec2,
+    /// Where (0, 0) leads.
+    pub offset: Vec2,
+}
+
+impl UvTransform {
+    /// Changes nothing.
+    pub const IDENTITY: Self = Self { x: Vec2::X, y: Vec2::Y, offset: Vec2::ZERO };
+
+    /// Scale, then rotation \[rad\], then offset, as the glTF extension `KHR_texture_transform`
+    /// defines them.
+    pub fn new(offset: Vec2, rotation: f32, scale: Vec2) -> Self {
+        let (sin, cos) = rotation.sin_cos();
+        Self { x: scale.x * vec2(cos, -sin), y: scale.y * vec2(sin, cos), offset }
+    }
+
+    /// The image's coordinates of the mesh's `uv`.
+    #[inline]
+    pub fn apply(&self, uv: Vec2) -> Vec2 {
+        uv.x * self.x + uv.y * self.y + self.offset
+    }
+}
+
+/// A texture whose size and data disagree.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("texture {name} of {width} x {height} texels cannot hold {count}")]
+pub struct TextureError {
+    /// The texture's name.
+    pub name: String,
+    /// Its width.
+    pub width: u32,
+    /// Its height.
+    pub height: u32,
+    /// How many texels were given.
+    pub count: usize,
+}
+
+impl Texture {
+    /// From 8-bit texels, the first row on top.
+    ///
+    /// # Errors
+    /// The number of texels is not width · height, or there are none.
+    pub fn from_rgb8(
+        name: impl Into<String>,
+        width: u32,
+        height: u32,
+        texels: Vec<[u8; 3]>,
+        encoding: Encoding,
+    ) -> Result<Self, TextureError> {
+        Self::new(name.into(), width, height, Texels::Bits8(texels), encoding)
+    }
+
+    /// From 16-bit texels, the first row on top.
+    ///
+    /// # Errors
+    /// The number of texels is not width · height, or there are none.
+    pub fn from_rgb16(
+        name: impl Into<String>,
+        width: u32,
+        height: u32,
+        texels: Vec<[u16; 3]>,
+        encoding: Encoding,
+    ) -> Result<Self, TextureError> {
+        Self::new(name.into(), width, height, Texels::Bits16(texels), encoding)
+    }
+
+    fn new(
+        name: String,
+        width: u32,
+        height: u32,
+        texels: Texels,
+        encoding: Encoding,
+    ) -> Result<Self, TextureError> {
+        let (count, levels) = match &texels {
+            Texels::Bits8(t) => (t.len(), 1 << 8),
+            Texels::Bits16(t) => (t.len(), 1 << 16),
+        };
+        if count == 0 || count as u64 != u64::from(width) * u64::from(height) {
+            return Err(TextureError { name, width, height, count });
+        }
+        let decode =
+            (0..levels).map(|i| decode(i as f32 / (levels - 1) as f32, encoding)).collect();
+        Ok(Self { name, width, height, texels, decode })
+    }
+
+    /// Its name, for messages.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Width and height in texels.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    /// The texel in column `x` of row `y` from the top, decoded.
+    ///
+    /// # Panics
+    /// Outside the image.
+    #[inline]
+    pub fn texel(&self, x: u32, y: u32) -> Rgb {
+        let i = y as usize * self.width as usize + x as usize;
+        let [r, g, b] = match &self.texels {
+            Texels::Bits8(t) => t[i].map(usize::from),
+            Texels::Bits16(t) => t[i].map(usize::from),
+        };
+        Rgb::new(self.decode[r], self.decode[g], self.decode[b])
+    }
+
+    /// The bilinear look-up at `uv`, (0, 0) the top left corner of the image and (1, 1) the bottom
+    /// right one; coordinates that are not finite count as 0.
+    #[inline]
+    pub fn sample(&self, uv: Vec2, wrap: [Wrap; 2]) -> Rgb {
+        let (x0, x1, fx) = neighbours(uv.x, self.width, wrap[0]);
+        let (y0, y1, fy) = neighbours(uv.y, self.height, wrap[1]);
+        let top = self.texel(x0, y0).lerp(self.texel(x1, y0), fx);
+        let bottom = self.texel(x0, y1).lerp(self.texel(x1, y1), fx);
+        top.lerp(bottom, fy)
+    }
+}
+
+/// IEC 61966-2-1 decoding, or none.
+fn decode(v: f32, encoding: Encoding) -> f32 {
+    match encoding {
+        Encoding::Linear => v,
+        Encoding::Srgb if v <= 0.04045 => v / 12.92,
+        Encoding::Srgb => ((v + 0.055) / 1.055).powf(2.4),
+    }
+}
+
+/// The two texels nearest to the coordinate `t` along an axis of `n` texels, and the second's weight.
+#[inline]
+fn neighbours(t: f32, n: u32, wrap: Wrap) -> (u32, u32, f32) {
+    let t = if t.is_finite() { t } else { 0.0 };
+    let t = match wrap {
+        Wrap::Repeat => t - t.floor(),
+        Wrap::Clamp => t.clamp(0.0, 1.0),
+        Wrap::Mirror => 1.0 - (t - 2.0 * (0.5 * t).floor() - 1.0).abs(),
+    };
+    let x = t * n as f32 - 0.5;
+    let floor = x.floor();
+    let i = floor as i64;
+    (wrap_index(i, n, wrap), wrap_index(i + 1, n, wrap), x - floor)
+}
+
+/// The texel index `i` in [-1, n] brought into [0, n).
+#[inline]
+fn wrap_index(i: i64, n: u32, wrap: Wrap) -> u32 {
+    match wrap {
+        Wrap::Repeat => i.rem_euclid(i64::from(n)) as u32,
+        Wrap::Clamp | Wrap::Mirror => i.clamp(0, i64::from(n) - 1) as u32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_by_two() -> Texture {
+        let texels = vec![[0, 0, 0], [255, 0, 0], [0, 255, 0], [0, 0, 255]];
+        Texture::from_rgb8("t", 2, 2, texels, Encoding::Linear).unwrap()
+    }
+
+    #[test]
+    fn texel_centres_give_the_texels_under_every_wrap() {
+        let t = two_by_two();
+        for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+            for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                let uv = (vec2(x as f32, y as f32) + 0.5) / 2.0;
+                assert_eq!(t.sample(uv, [wrap; 2]), t.texel(x, y));
+            }
+        }
+    }
+
+    #[test]
+    fn wrapping_repeats_clamps_and_mirrors() {
+        let t = two_by_two();
+        let at = |u: f32, wrap| t.sample(vec2(u, 0.25), [wrap; 2]).r;
+        assert_eq!(at(1.25, Wrap::Repeat), 0.0);
+        assert_eq!(at(-0.25, Wrap::Repeat), 1.0);
+        assert_eq!(at(0.0, Wrap::Repeat), 0.5);
+        assert_eq!(at(1.25, Wrap::Clamp), 1.0);
+        assert_eq!(at(-7.0, Wrap::Clamp), 0.0);
+        assert_eq!(at(1.25, Wrap::Mirror), 1.0);
+        assert_eq!(at(-0.25, Wrap::Mirror), 0.0);
+        assert_eq!(at(-0.75, Wrap::Mirror), 1.0);
+        for odd in [f32::NAN, f32::INFINITY, 1e30, -1e30] {
+            assert!(t.sample(vec2(odd, odd), [Wrap::Repeat; 2]).is_finite());
+        }
+    }
+
+    #[test]
+    fn srgb_is_decoded_at_both_depths() {
+        let t8 = Texture::from_rgb8("t", 1, 1, vec![[0, 128, 255]], Encoding::Srgb).unwrap();
+        let t16 =
+            Texture::from_rgb16("t", 1, 1, vec![[0, 128 * 257, 65535]], Encoding::Srgb).unwrap();
+        let c = t8.texel(0, 0);
+        assert_eq!(c, t16.texel(0, 0));
+        assert_eq!((c.r, c.b), (0.0, 1.0));
+        assert!((c.g - 0.215_860_5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_uv_transform_scales_then_rotates_then_moves() {
+        let t = UvTransform::new(vec2(0.5, 0.0), std::f32::consts::FRAC_PI_2, vec2(2.0, 1.0));
+        assert!((t.apply(vec2(1.0, 0.0)) - vec2(0.5, -2.0)).length() < 1e-6);
+        assert!((t.apply(vec2(0.0, 1.0)) - vec2(1.5, 0.0)).length() < 1e-6);
+    }
+
+    #[test]
+    fn wrong_sizes_are_refused() {
+        assert!(Texture::from_rgb8("t", 2, 2, vec![[0; 3]; 3], Encoding::Linear).is_err());
+        assert!(Texture::from_rgb8("t", 0, 0, vec![], Encoding::Linear).is_err());
+    }
+}
