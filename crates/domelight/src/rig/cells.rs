@@ -12,16 +12,16 @@
 
 use std::ops::Range;
 
-use super::regions::{Blocks, Metric};
+use super::regions::{Blocks, Moments, SummedArea};
 use super::texels::{Texels, bands, in_order, unit};
-use crate::math::Vec3;
+use crate::math::{PI, Vec3};
 
 /// Rows of a band, which one thread does at a time, and columns of its first tiles.
 const TILE: usize = 64;
 /// Tiles of this size are not quartered again.
 const LEAF: usize = 4;
 /// What rounding may do to the length of a chord.
-const SLACK: f64 = 1e-6;
+const SLACK: f32 = 2e-6;
 
 /// Columns and rows of a grid of pieces.
 #[derive(Clone, Debug)]
@@ -46,11 +46,9 @@ impl Search<'_> {
     /// it: one, unless the tile is small.
     fn band(&self, band: usize, leaf: &mut impl FnMut(&Tile, &[u32])) {
         let rows = band * TILE..((band + 1) * TILE).min(self.blocks.rows);
-        // No wider than a quarter of a turn, or a tile is not inside the cone around its middle.
-        let width = TILE.min(self.blocks.columns.div_ceil(4));
         let mut candidates: Vec<u32> = (0..self.lights.len() as u32).collect();
-        for left in (0..self.blocks.columns).step_by(width) {
-            let columns = left..(left + width).min(self.blocks.columns);
+        for left in (0..self.blocks.columns).step_by(TILE) {
+            let columns = left..(left + TILE).min(self.blocks.columns);
             self.descend(&Tile { columns, rows: rows.clone() }, 0, &mut candidates, leaf);
         }
     }
@@ -84,30 +82,20 @@ impl Search<'_> {
 
     /// Pushes those of `stack[from..]` that can be nearest somewhere in the tile.
     fn narrow(&self, tile: &Tile, from: usize, stack: &mut Vec<u32>) {
-        let (middle, radius) = self.cone(tile);
-        let chord = |i: u32| f64::from(middle.distance(self.lights[i as usize]));
+        let b = &self.blocks;
+        let columns = b.x(tile.columns.start)..b.x(tile.columns.end);
+        let rows = b.y(tile.rows.start)..b.y(tile.rows.end);
+        let (middle, radius) = self.texels.cone(&columns, &rows);
+        let chord_squared = |i: u32| middle.distance_squared(self.lights[i as usize]);
         let to = stack.len();
-        let nearest = stack[from..].iter().map(|&i| chord(i)).fold(f64::INFINITY, f64::min);
-        let angle = 2.0 * (0.5 * nearest + SLACK).min(1.0).asin() + 2.0 * radius;
-        let reach = 2.0 * (0.5 * angle.min(std::f64::consts::PI)).sin() + SLACK;
+        let nearest = stack[from..].iter().map(|&i| chord_squared(i)).fold(4.0, f32::min);
+        let angle = 2.0 * (0.5 * nearest.sqrt() + SLACK).min(1.0).asin() + 2.0 * radius;
+        let reach = 2.0 * (0.5 * angle.min(PI)).sin() + SLACK;
         for k in from..to {
-            if chord(stack[k]) <= reach {
+            if chord_squared(stack[k]) <= reach * reach {
                 stack.push(stack[k]);
             }
         }
-    }
-
-    /// The middle of a tile and the angle from it to its farthest point: one of its corners.
-    fn cone(&self, tile: &Tile) -> (Vec3, f64) {
-        let b = &self.blocks;
-        let (x0, x1) = (b.x(tile.columns.start) as f64, b.x(tile.columns.end) as f64);
-        let (y0, y1) = (b.y(tile.rows.start) as f64, b.y(tile.rows.end) as f64);
-        let to_vec3 = |[x, y, z]: [f64; 3]| Vec3::new(x as f32, y as f32, z as f32);
-        let middle = to_vec3(self.texels.direction(0.5 * (x0 + x1), 0.5 * (y0 + y1)));
-        // Left and right are the same distance away.
-        let chord = [y0, y1].map(|y| to_vec3(self.texels.direction(x0, y)).distance(middle));
-        let chord = f64::from(chord[0].max(chord[1]));
-        (middle, 2.0 * (0.5 * chord + SLACK).min(1.0).asin())
     }
 
     /// The nearest of some lights; the first if several are.
@@ -152,88 +140,70 @@ pub(super) fn assign(texels: &Texels, lights: &[Vec3]) -> Vec<u32> {
     labels
 }
 
-/// The energy of a block as a vector.
+/// The energy of a block of the map, which goes to a light as a whole, as a vector.
 #[derive(Clone, Copy, Debug)]
-struct Piece {
-    /// The unit vector of ∫ L ω dω.
+pub(super) struct Piece {
+    /// The unit vector of R = ∫ L ω dω.
     direction: Vec3,
-    /// Its length.
+    /// |R|; zero for a black block.
     weight: f32,
 }
 
-/// Blocks of the map that go to a light as a whole.
-pub(super) struct Pieces<'a> {
-    texels: &'a Texels<'a>,
-    blocks: Blocks,
-    pieces: Vec<Piece>,
+impl Piece {
+    pub(super) fn new(m: &Moments) -> Self {
+        let length = m.first.map(|c| c * c).iter().sum::<f64>().sqrt();
+        Self { direction: unit(m.first).unwrap_or(Vec3::Y), weight: length as f32 }
+    }
+
+    fn moments(&self) -> Moments {
+        let r = (self.direction * self.weight).as_dvec3();
+        let lit = f64::from(u8::from(self.weight > 0.0));
+        Moments { first: [r.x, r.y, r.z], lit, ..Moments::default() }
+    }
 }
 
-impl<'a> Pieces<'a> {
-    /// Texels, or on maps of more than `max` as many blocks.
-    pub(super) fn new(texels: &'a Texels<'a>, max: usize) -> Self {
-        let blocks = Blocks::at_most(max, texels.width(), texels.height());
-        let piece = |first: [f64; 3]| {
-            let length = first.map(|c| c * c).iter().sum::<f64>().sqrt();
-            let direction = unit(first).unwrap_or(Vec3::Y);
-            Piece { direction, weight: length as f32 }
-        };
-        let moments = blocks.moments(texels, Metric::Sphere);
-        let pieces = moments.iter().map(|m| piece(m.first)).collect();
-        Self { texels, blocks, pieces }
-    }
-
-    /// Moves the lights by `steps` of Lloyd's at the most; a light without energy stays.
-    pub(super) fn refine(&self, lights: &mut [Vec3], steps: u32) {
-        for _ in 0..steps {
-            let centroids = self.centroids(lights);
-            let mut moved = false;
-            for (light, centroid) in lights.iter_mut().zip(centroids) {
-                let centroid = unit(centroid).unwrap_or(*light);
-                moved |= centroid != *light;
-                *light = centroid;
-            }
-            if !moved {
-                break;
-            }
+/// Moves the lights by `steps` of Lloyd's at the most; a light without energy stays.
+///
+/// `pieces` are the blocks of `table`, row by row.
+pub(super) fn refine(table: &SummedArea, pieces: &[Piece], lights: &mut [Vec3], steps: u32) {
+    for _ in 0..steps {
+        let cells = measure_cells(table, pieces, lights);
+        let mut moved = false;
+        for (light, cell) in lights.iter_mut().zip(cells) {
+            // Differences of a table's sums may leave a residue where all is black.
+            let centroid = if cell.lit > 0.0 { unit(cell.first) } else { None };
+            let centroid = centroid.unwrap_or(*light);
+            moved |= centroid != *light;
+            *light = centroid;
+        }
+        if !moved {
+            break;
         }
     }
+}
 
-    /// ∫ L ω dω over the cell of each light.
-    fn centroids(&self, lights: &[Vec3]) -> Vec<[f64; 3]> {
-        let search = Search { texels: self.texels, blocks: self.blocks, lights };
-        let parts = in_order(search.n_bands(), |band| {
-            let mut sums = vec![[0.0; 3]; lights.len()];
-            search.band(band, &mut |tile, candidates| {
-                for y in tile.rows.clone() {
-                    let row = &self.pieces[y * self.blocks.columns..][..self.blocks.columns];
-                    self.gather(&search, candidates, &row[tile.columns.clone()], &mut sums);
+/// R of the cell of each light: by the table where tiles are whole, by pieces along the borders.
+fn measure_cells(table: &SummedArea, pieces: &[Piece], lights: &[Vec3]) -> Vec<Moments> {
+    let blocks = table.blocks();
+    let search = Search { texels: table.texels(), blocks, lights };
+    let parts = in_order(search.n_bands(), |band| {
+        let mut sums = vec![Moments::default(); lights.len()];
+        search.band(band, &mut |tile, candidates| {
+            if let [only] = candidates {
+                sums[*only as usize] += table.block_sum(&tile.columns, &tile.rows);
+                return;
+            }
+            for y in tile.rows.clone() {
+                for p in &pieces[y * blocks.columns..][tile.columns.clone()] {
+                    sums[search.nearest(candidates, p.direction) as usize] += p.moments();
                 }
-            });
-            sums
-        });
-        let mut sums = vec![[0.0; 3]; lights.len()];
-        for part in parts {
-            for (s, p) in sums.iter_mut().zip(part) {
-                (0..3).for_each(|c| s[c] += p[c]);
             }
-        }
+        });
         sums
+    });
+    let mut sums = vec![Moments::default(); lights.len()];
+    for part in parts {
+        sums.iter_mut().zip(part).for_each(|(s, p)| *s += p);
     }
-
-    fn gather(
-        &self,
-        search: &Search,
-        candidates: &[u32],
-        pieces: &[Piece],
-        sums: &mut [[f64; 3]],
-    ) {
-        for p in pieces {
-            let light = search.nearest(candidates, p.direction) as usize;
-            let r = (p.direction * p.weight).as_dvec3();
-            let sum = &mut sums[light];
-            sum[0] += r.x;
-            sum[1] += r.y;
-            sum[2] += r.z;
-        }
-    }
+    sums
 }

@@ -84,6 +84,11 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
+    /// The blocks of a summed-area table: texels, but on large maps.
+    pub(super) fn of(texels: &Texels) -> Self {
+        Self::at_most(MAX_BLOCKS, texels.width(), texels.height())
+    }
+
     /// Blocks as small as `max` of them allow, a power of two wide.
     pub(super) fn at_most(max: usize, width: usize, height: usize) -> Self {
         let mut step = 1;
@@ -198,12 +203,17 @@ pub(super) struct SummedArea<'a> {
 
 impl<'a> SummedArea<'a> {
     pub(super) fn new(texels: &'a Texels<'a>, metric: Metric) -> Self {
-        Self::with_blocks(texels, metric, MAX_BLOCKS)
+        let blocks = Blocks::of(texels);
+        Self::from_moments(texels, metric, blocks, blocks.moments(texels, metric))
     }
 
-    pub(super) fn with_blocks(texels: &'a Texels<'a>, metric: Metric, max: usize) -> Self {
-        let blocks = Blocks::at_most(max, texels.width(), texels.height());
-        let mut sums = blocks.moments(texels, metric);
+    /// From the moments of each block.
+    pub(super) fn from_moments(
+        texels: &'a Texels<'a>,
+        metric: Metric,
+        blocks: Blocks,
+        mut sums: Vec<Moments>,
+    ) -> Self {
         bands(&mut sums, blocks.columns, |_, row| {
             let mut sum = Moments::default();
             for m in row {
@@ -227,6 +237,22 @@ impl<'a> SummedArea<'a> {
         self.metric
     }
 
+    pub(super) fn blocks(&self) -> Blocks {
+        self.blocks
+    }
+
+    /// The moments of a rectangle of blocks.
+    pub(super) fn block_sum(&self, columns: &Range<usize>, rows: &Range<usize>) -> Moments {
+        let strip = |c| self.corner(c, rows.end) - self.corner(c, rows.start);
+        strip(columns.end) - strip(columns.start)
+    }
+
+    /// The moments of any rectangle.
+    pub(super) fn measure(&self, r: &TexelRect) -> Moments {
+        let [_, rows] = self.profiles(r);
+        rows.last().map_or(Moments::default(), |(_, m)| *m)
+    }
+
     /// The whole map's.
     pub(super) fn total(&self) -> Moments {
         self.corner(self.blocks.columns, self.blocks.rows)
@@ -234,8 +260,8 @@ impl<'a> SummedArea<'a> {
 
     /// The block column that starts opposite the centre of light, as seen from above: a seam there
     /// turns with the map.
-    pub(super) fn darkest_column(&self, total: &Moments) -> usize {
-        let [x, _, z] = total.first;
+    pub(super) fn darkest_column(&self) -> usize {
+        let [x, _, z] = self.total().first;
         let share = (x.atan2(-z) / TAU).rem_euclid(1.0);
         // Light that is symmetric about a texel's middle or edge does not fall on a tie.
         let block = (share * self.blocks.columns as f64 + 0.25) as usize % self.blocks.columns;

@@ -2,6 +2,7 @@
 //! result does not depend on the number of threads.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 use crate::Rgb;
 use crate::environment::Environment;
@@ -16,8 +17,6 @@ pub(super) struct Row {
     pub(super) vertical: f64,
     /// ∫ sin² θ dθ: times the column's integrals, the horizontal part of ∫ ω dω.
     pub(super) horizontal: f64,
-    /// sin θ and cos θ at the row's middle.
-    centre: [f32; 2],
 }
 
 /// A map in its own frame: +Y up, the centre column toward −Z, whatever its orientation.
@@ -26,8 +25,10 @@ pub(super) struct Texels<'a> {
     /// ∫ sin φ dφ and −∫ cos φ dφ over each column.
     pub(super) columns: Vec<[f64; 2]>,
     pub(super) rows: Vec<Row>,
-    /// sin φ and −cos φ at each column's middle.
-    column_centres: Vec<[f32; 2]>,
+    /// sin φ and −cos φ at the edges and middles of columns, by half columns from the left.
+    half_columns: Vec<[f32; 2]>,
+    /// sin θ and cos θ at the edges and middles of rows, by half rows from the top.
+    half_rows: Vec<[f32; 2]>,
     /// The world directions of the map's axes.
     axes: [Vec3; 3],
 }
@@ -42,15 +43,20 @@ impl<'a> Texels<'a> {
             let chord = 2.0 * (PI / width as f64).sin();
             [sin * chord, -cos * chord]
         };
-        let column_centre = |x: usize| {
-            let (sin, cos) = phi(x as f64 + 0.5).sin_cos();
+        let half_column = |i: usize| {
+            let (sin, cos) = phi(0.5 * i as f64).sin_cos();
             [sin as f32, -cos as f32]
+        };
+        let half_row = |i: usize| {
+            let (sin, cos) = (PI * 0.5 * i as f64 / height as f64).sin_cos();
+            [sin as f32, cos as f32]
         };
         Self {
             environment,
             columns: (0..width).map(column).collect(),
             rows: (0..height).map(|y| Row::new(y, width, height)).collect(),
-            column_centres: (0..width).map(column_centre).collect(),
+            half_columns: (0..=2 * width).map(half_column).collect(),
+            half_rows: (0..=2 * height).map(half_row).collect(),
             axes: [vec2(0.75, 0.5), vec2(0.5, 0.0), vec2(0.5, 0.5)]
                 .map(|uv: Vec2| environment.direction(uv)),
         }
@@ -70,9 +76,26 @@ impl<'a> Texels<'a> {
 
     /// The middle of a texel, unit vector in the map's frame.
     pub(super) fn centre(&self, x: usize, y: usize) -> Vec3 {
+        self.half(2 * x + 1, 2 * y + 1)
+    }
+
+    /// The direction at `x` half columns and `y` half rows.
+    fn half(&self, x: usize, y: usize) -> Vec3 {
         let ([sin_phi, cos_phi], [sin_theta, cos_theta]) =
-            (self.column_centres[x], self.rows[y].centre);
+            (self.half_columns[x], self.half_rows[y]);
         vec3(sin_phi * sin_theta, cos_theta, cos_phi * sin_theta)
+    }
+
+    /// A direction in a rectangle without a seam, and a bound on the angle from it to any other.
+    ///
+    /// The straight line on the map from the middle, Δφ and Δθ away at the most, is no longer than
+    /// √(Δθ² + Δφ² sin² θ) on the sphere with the greatest sin θ, and a great circle is shorter.
+    pub(super) fn cone(&self, columns: &Range<usize>, rows: &Range<usize>) -> (Vec3, f32) {
+        let middle = self.half(columns.start + columns.end, rows.start + rows.end);
+        let delta_phi = PI as f32 * columns.len() as f32 / self.width() as f32;
+        let delta_theta = 0.5 * PI as f32 * rows.len() as f32 / self.height() as f32;
+        let equator = (self.height()).clamp(2 * rows.start, 2 * rows.end);
+        (middle, delta_theta.hypot(delta_phi * self.half_rows[equator][0]))
     }
 
     /// The direction at column `x` and row `y`, fractions allowed, in the map's frame.
@@ -97,12 +120,10 @@ impl Row {
         let middle = top + half;
         // Differences of cos θ, sin² θ / 2 and (2θ − sin 2θ) / 4 as products.
         let band = 2.0 * middle.sin() * half.sin();
-        let (sin, cos) = middle.sin_cos();
         Self {
             solid_angle: step * band,
             vertical: step * 0.5 * (2.0 * middle).sin() * (2.0 * half).sin(),
             horizontal: half - 0.5 * (2.0 * middle).cos() * (2.0 * half).sin(),
-            centre: [sin as f32, cos as f32],
         }
     }
 }

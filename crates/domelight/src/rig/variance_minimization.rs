@@ -9,16 +9,13 @@
 //! the worst region first, and then lets the lights move (Lloyd's refinement), which ends
 //! rectangles. Each of these steps lowers the error.
 
-use super::cells::{Pieces, assign};
-use super::regions::{Metric, SummedArea};
+use super::cells::{Piece, assign, refine};
+use super::regions::{Blocks, Metric, SummedArea};
 use super::split::{Criterion, split};
 use super::texels::{Texels, unit};
-use super::{Order, Region, RegionSums, Rig, RigError, TexelRect, fill};
+use super::{Order, Region, RegionSums, Rig, RigError, TexelRect};
 use crate::environment::Environment;
 use crate::math::Vec3;
-
-/// Pieces that move as a whole in the refinement, at the most.
-const MAX_PIECES: usize = 1 << 21;
 
 /// What a cut minimises.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,42 +66,47 @@ pub fn variance_minimization(
     settings: &VarianceMinimization,
 ) -> Result<Rig, RigError> {
     let texels = Texels::new(environment);
-    let regions = rectangles(&texels, n_lights, settings)?;
+    let blocks = Blocks::of(&texels);
+    let moments = blocks.moments(&texels, Metric::Sphere);
+    let pieces: Vec<Piece> = match settings.lloyd_steps {
+        0 => Vec::new(),
+        _ => moments.iter().map(Piece::new).collect(),
+    };
+    let table = SummedArea::from_moments(&texels, Metric::Sphere, blocks, moments);
+    RigError::check(n_lights, table.total().lit as usize)?;
+    let regions = match settings.rule {
+        Rule::Spherical => divide(&table, table.darkest_column(), n_lights, settings),
+        Rule::Poster => divide(&SummedArea::new(&texels, Metric::Plane), 0, n_lights, settings),
+    };
     if settings.lloyd_steps == 0 {
         return Ok(Rig::from_rectangles(&texels, &regions));
     }
-    let labels = fill(&regions, texels.width(), texels.height());
-    let sums = RegionSums::of(&texels, &labels, regions.len());
-    let mut lights: Vec<Vec3> =
-        regions.iter().zip(&sums).map(|(r, s)| position(&texels, r, s)).collect();
-    Pieces::new(&texels, MAX_PIECES).refine(&mut lights, settings.lloyd_steps);
+    let mut lights: Vec<Vec3> = regions.iter().map(|r| position(&table, r)).collect();
+    refine(&table, &pieces, &mut lights, settings.lloyd_steps);
     Ok(cells(&texels, lights))
 }
 
-fn rectangles(
-    texels: &Texels,
+/// Rectangles from the whole map, whose columns begin at `x0`.
+fn divide(
+    table: &SummedArea,
+    x0: usize,
     n_lights: usize,
     settings: &VarianceMinimization,
-) -> Result<Vec<TexelRect>, RigError> {
-    let (metric, criterion) = match settings.rule {
-        Rule::Poster => (Metric::Plane, Criterion::MinMaxVariance),
-        Rule::Spherical => (Metric::Sphere, Criterion::MinSumVariance),
+) -> Vec<TexelRect> {
+    let (width, height) = (table.texels().width(), table.texels().height());
+    let criterion = match settings.rule {
+        Rule::Poster => Criterion::MinMaxVariance,
+        Rule::Spherical => Criterion::MinSumVariance,
     };
-    let table = SummedArea::new(texels, metric);
-    let total = table.total();
-    RigError::check(n_lights, total.lit as usize)?;
-    let x0 = match settings.rule {
-        Rule::Poster => 0,
-        Rule::Spherical => table.darkest_column(&total),
-    };
-    let root = TexelRect { x0, x1: x0 + texels.width(), y0: 0, y1: texels.height() };
-    Ok(split(&table, root, criterion, settings.order, n_lights))
+    let root = TexelRect { x0, x1: x0 + width, y0: 0, y1: height };
+    split(table, root, criterion, settings.order, n_lights)
 }
 
 /// The energy centroid of a rectangle, or its middle if light comes from all around.
-fn position(texels: &Texels, r: &TexelRect, sums: &RegionSums) -> Vec3 {
-    let middle = || texels.direction(0.5 * (r.x0 + r.x1) as f64, 0.5 * (r.y0 + r.y1) as f64);
-    unit(sums.moment).or_else(|| unit(middle())).unwrap_or(Vec3::Y)
+fn position(table: &SummedArea, r: &TexelRect) -> Vec3 {
+    let (x, y) = (0.5 * (r.x0 + r.x1) as f64, 0.5 * (r.y0 + r.y1) as f64);
+    let middle = || unit(table.texels().direction(x, y));
+    unit(table.measure(r).first).or_else(middle).unwrap_or(Vec3::Y)
 }
 
 /// One light for each nearest-light cell that has energy.
