@@ -55,7 +55,7 @@ impl VarianceMinimization {
 
 /// `n_lights` lights with as little spread of energy around them as can be found.
 ///
-/// In rare cases refinement leaves a light without energy; it is dropped.
+/// Where all steps of the refinement would leave a light without energy, fewer are taken.
 ///
 /// # Errors
 /// [`RigError::NoLights`] for `n_lights` = 0, [`RigError::Black`] for a map without light, and
@@ -78,12 +78,20 @@ pub fn variance_minimization(
         Rule::Spherical => divide(&table, table.darkest_column(), n_lights, settings),
         Rule::Poster => divide(&SummedArea::new(&texels, Metric::Plane), 0, n_lights, settings),
     };
-    if settings.lloyd_steps == 0 {
-        return Ok(Rig::from_rectangles(&texels, &regions));
+    let start: Vec<Vec3> = regions.iter().map(|r| position(&table, r)).collect();
+    // A light that lost all its texels is rare; with fewer steps, or none, it keeps some.
+    let mut steps = settings.lloyd_steps;
+    while steps > 0 {
+        let mut lights = start.clone();
+        refine(&table, &pieces, &mut lights, steps);
+        let labels = assign(&texels, &lights);
+        let sums = RegionSums::of(&texels, &labels, n_lights);
+        if sums.iter().all(|s| s.energy > 0.0) {
+            return Ok(Rig::new(&texels, labels, &sums, &vec![Region::Cell; n_lights]));
+        }
+        steps /= 2;
     }
-    let mut lights: Vec<Vec3> = regions.iter().map(|r| position(&table, r)).collect();
-    refine(&table, &pieces, &mut lights, settings.lloyd_steps);
-    Ok(cells(&texels, lights))
+    Ok(Rig::from_rectangles(&texels, &regions))
 }
 
 /// Rectangles from the whole map, whose columns begin at `x0`.
@@ -107,18 +115,4 @@ fn position(table: &SummedArea, r: &TexelRect) -> Vec3 {
     let (x, y) = (0.5 * (r.x0 + r.x1) as f64, 0.5 * (r.y0 + r.y1) as f64);
     let middle = || unit(table.texels().direction(x, y));
     unit(table.measure(r).first).or_else(middle).unwrap_or(Vec3::Y)
-}
-
-/// One light for each nearest-light cell that has energy.
-fn cells(texels: &Texels, mut lights: Vec<Vec3>) -> Rig {
-    loop {
-        let labels = assign(texels, &lights);
-        let sums = RegionSums::of(texels, &labels, lights.len());
-        if sums.iter().all(|s| s.energy > 0.0) {
-            return Rig::new(texels, labels, &sums, &vec![Region::Cell; lights.len()]);
-        }
-        // The texels of a dark cell go to its neighbours.
-        let lit = lights.iter().zip(&sums).filter(|(_, s)| s.energy > 0.0);
-        lights = lit.map(|(l, _)| *l).collect();
-    }
 }
