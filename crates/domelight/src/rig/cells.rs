@@ -207,3 +207,70 @@ fn measure_cells(table: &SummedArea, pieces: &[Piece], lights: &[Vec3]) -> Vec<M
     }
     sums
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::{Environment, Orientation};
+    use crate::math::from_spherical;
+    use crate::rig::regions::Metric;
+    use crate::sampling::Pcg32;
+    use crate::{Rgb, RgbImage};
+
+    fn lights(n: usize, spread: f32) -> Vec<Vec3> {
+        let mut pcg = Pcg32::new(n as u64, 2);
+        let random = |pcg: &mut Pcg32| from_spherical(2.0 * pcg.next_f32() - 1.0, 7.0 * pcg.next_f32());
+        let centre = random(&mut pcg);
+        (0..n).map(|_| (centre + spread * random(&mut pcg)).normalize()).collect()
+    }
+
+    fn env(width: usize, height: usize) -> Environment {
+        let mut pcg = Pcg32::new(3, 3);
+        let map = RgbImage::from_fn(width, height, |_, _| Rgb::splat(pcg.next_f32()));
+        Environment::new(map, Orientation::default(), 1.0).unwrap()
+    }
+
+    /// The tiles leave out no light that wins: the same as trying all, ties included.
+    #[test]
+    fn the_nearest_of_all() {
+        for (width, height) in [(200, 100), (1, 1), (3, 70), (70, 2), (129, 64)] {
+            let env = env(width, height);
+            let texels = Texels::new(&env);
+            for (n, spread) in [(1, 1.0), (2, 1.0), (50, 3.0), (300, 0.05), (100, 1e-3)] {
+                let mut lights = lights(n, spread);
+                lights.push(lights[0]);
+                let blocks = Blocks::at_most(usize::MAX, width, height);
+                let search = Search { texels: &texels, blocks, lights: &lights };
+                let all: Vec<u32> = (0..lights.len() as u32).collect();
+                for (i, label) in assign(&texels, &lights).into_iter().enumerate() {
+                    let expected = search.nearest(&all, texels.centre(i % width, i / width));
+                    assert_eq!(label, expected, "{width}x{height}, {n} lights, texel {i}");
+                }
+            }
+        }
+    }
+
+    /// Σ (W − |R|) over the cells never grows from one step to the next.
+    #[test]
+    fn refinement_lowers_the_spread() {
+        let env = env(160, 80);
+        let texels = Texels::new(&env);
+        let blocks = Blocks::of(&texels);
+        let moments = blocks.moments(&texels, Metric::Sphere);
+        let pieces: Vec<Piece> = moments.iter().map(Piece::new).collect();
+        let table = SummedArea::from_moments(&texels, Metric::Sphere, blocks, moments);
+        let mut lights = lights(30, 5.0);
+        let mut last = f64::NEG_INFINITY;
+        for _ in 0..12 {
+            let cells = measure_cells(&table, &pieces, &lights);
+            let lit: f64 = cells.iter().map(|c| c.lit).sum();
+            assert_eq!(lit, table.total().lit);
+            let sum: f64 =
+                cells.iter().map(|c| c.first.map(|x| x * x).iter().sum::<f64>().sqrt()).sum();
+            // Pieces are in single precision.
+            assert!(sum >= last * (1.0 - 1e-6), "{sum} after {last}");
+            last = sum;
+            refine(&table, &pieces, &mut lights, 1);
+        }
+    }
+}

@@ -18,6 +18,7 @@
 mod cells;
 mod error;
 mod median_cut;
+mod merge;
 mod regions;
 mod split;
 mod texels;

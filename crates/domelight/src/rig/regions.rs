@@ -328,3 +328,85 @@ impl<'a> SummedArea<'a> {
         [columns.into_iter().enumerate().map(sum).collect(), rows]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::{Environment, Orientation};
+    use crate::sampling::Pcg32;
+    use crate::{Rgb, RgbImage};
+
+    fn noise(width: usize, height: usize) -> Environment {
+        let mut pcg = Pcg32::new(1, 9);
+        let map = RgbImage::from_fn(width, height, |_, _| {
+            let v = pcg.next_f32();
+            if v < 0.3 { Rgb::BLACK } else { Rgb::splat((8.0 * v).exp()) }
+        });
+        Environment::new(map, Orientation::default(), 1.0).unwrap()
+    }
+
+    fn assert_close(a: &Moments, b: &Moments, scale: f64) {
+        assert_eq!(a.lit, b.lit);
+        assert!((a.energy - b.energy).abs() <= 1e-12 * scale, "{a:?} {b:?}");
+        assert!((0..3).all(|i| (a.first[i] - b.first[i]).abs() <= 1e-12 * scale), "{a:?} {b:?}");
+    }
+
+    /// Profiles by the table, of texels or of blocks, are those by summing texels, across the seam
+    /// as well.
+    #[test]
+    fn profiles_agree_with_sums() {
+        let env = noise(150, 77);
+        let texels = Texels::new(&env);
+        for metric in [Metric::Sphere, Metric::Plane] {
+            for max in [usize::MAX, 4000, 300] {
+                let blocks = Blocks::at_most(max, 150, 77);
+                let moments = blocks.moments(&texels, metric);
+                let table = SummedArea::from_moments(&texels, metric, blocks, moments);
+                let total = table.total();
+                let scale = total.energy * if metric == Metric::Plane { 5000.0 } else { 1.0 };
+                // Planar moments of a rectangle that runs across the seam are not defined.
+                let x0 = if metric == Metric::Plane { 0 } else { blocks.x(blocks.columns / 2) };
+                let whole = TexelRect { x0, x1: x0 + 150, y0: 0, y1: 77 };
+                let part = TexelRect { y0: blocks.y(1), y1: 77, x1: blocks.x(blocks.column(x0) + 5), ..whole };
+                for r in [whole, part] {
+                    let direct = table.texel_profiles(&r);
+                    for (axis, by_blocks) in table.block_profiles(&r).into_iter().enumerate() {
+                        for (at, m) in by_blocks {
+                            let sum = direct[axis].iter().find(|(a, _)| *a == at).unwrap().1;
+                            assert_close(&m, &sum, scale);
+                        }
+                    }
+                }
+                assert_close(&table.measure(&whole), &total, scale);
+            }
+        }
+    }
+
+    #[test]
+    fn variance_is_the_mean_square_distance_to_the_centroid() {
+        let env = noise(31, 16);
+        let texels = Texels::new(&env);
+        let table = SummedArea::new(&texels, Metric::Plane);
+        let m = table.total();
+        let centroid = [m.first[0] / m.energy, m.first[1] / m.energy];
+        let sum = (0..31 * 16).map(|i| {
+            let (x, y) = ((i % 31) as f64 - 15.0, (i / 31) as f64 - 7.5);
+            let weight = texels.rows[i / 31].solid_angle
+                * f64::from(env.map().pixels[i].luminance());
+            weight * ((x - centroid[0]).powi(2) + (y - centroid[1]).powi(2))
+        });
+        let sum: f64 = sum.sum();
+        assert!((Metric::Plane.variance(&m) / sum - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_black_region_has_no_lit_texels_beside_a_sun() {
+        let mut map = RgbImage::filled(64, 32, Rgb::splat(1e-9));
+        map.pixels[70] = Rgb::splat(1e9);
+        map.pixels[1000..1020].fill(Rgb::BLACK);
+        let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
+        let texels = Texels::new(&env);
+        let table = SummedArea::new(&texels, Metric::Sphere);
+        assert_eq!(table.measure(&TexelRect { x0: 42, x1: 60, y0: 15, y1: 16 }).lit, 0.0);
+    }
+}

@@ -6,16 +6,20 @@
 //! The poster measures d on the map and takes the cut whose worse half is best. The default here
 //! measures chords on the sphere, where the variance is W − |R|²/W with W = ∫ L dω and
 //! R = ∫ L ω dω and no pole or seam matters; it takes the cut whose halves sum to the least, cuts
-//! the worst region first, and then lets the lights move (Lloyd's refinement), which ends
-//! rectangles. Each of these steps lowers the error.
+//! the worst region first. Then it gives up rectangles: of twice as many parts as there are lights
+//! it joins those that belong together, and lets the lights move (Lloyd's refinement).
 
 use super::cells::{Piece, assign, refine};
-use super::regions::{Blocks, Metric, SummedArea};
+use super::merge::merge;
+use super::regions::{Blocks, Metric, Moments, SummedArea};
 use super::split::{Criterion, split};
 use super::texels::{Texels, unit};
 use super::{Order, Region, RegionSums, Rig, RigError, TexelRect};
 use crate::environment::Environment;
 use crate::math::Vec3;
+
+/// Parts that the map is cut into for each light, to be joined again before the refinement.
+const PARTS_PER_LIGHT: usize = 2;
 
 /// What a cut minimises.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -73,12 +77,19 @@ pub fn variance_minimization(
         _ => moments.iter().map(Piece::new).collect(),
     };
     let table = SummedArea::from_moments(&texels, Metric::Sphere, blocks, moments);
-    RigError::check(n_lights, table.total().lit as usize)?;
-    let regions = match settings.rule {
-        Rule::Spherical => divide(&table, table.darkest_column(), n_lights, settings),
-        Rule::Poster => divide(&SummedArea::new(&texels, Metric::Plane), 0, n_lights, settings),
+    let lit = table.total().lit as usize;
+    RigError::check(n_lights, lit)?;
+    let rectangles = |n| match settings.rule {
+        Rule::Spherical => divide(&table, table.darkest_column(), n, settings),
+        Rule::Poster => divide(&SummedArea::new(&texels, Metric::Plane), 0, n, settings),
     };
-    let start: Vec<Vec3> = regions.iter().map(|r| position(&table, r)).collect();
+    if settings.lloyd_steps == 0 {
+        return Ok(Rig::from_rectangles(&texels, &rectangles(n_lights)));
+    }
+    let parts = rectangles(lit.min(PARTS_PER_LIGHT * n_lights));
+    let parts: Vec<Moments> = parts.iter().map(|r| table.measure(r)).collect();
+    let start = merge(&parts, n_lights);
+    let start: Vec<Vec3> = start.into_iter().map(|r| unit(r).unwrap_or(Vec3::Y)).collect();
     // A light that lost all its texels is rare; with fewer steps, or none, it keeps some.
     let mut steps = settings.lloyd_steps;
     while steps > 0 {
@@ -91,7 +102,7 @@ pub fn variance_minimization(
         }
         steps /= 2;
     }
-    Ok(Rig::from_rectangles(&texels, &regions))
+    Ok(Rig::from_rectangles(&texels, &rectangles(n_lights)))
 }
 
 /// Rectangles from the whole map, whose columns begin at `x0`.
@@ -108,11 +119,4 @@ fn divide(
     };
     let root = TexelRect { x0, x1: x0 + width, y0: 0, y1: height };
     split(table, root, criterion, settings.order, n_lights)
-}
-
-/// The energy centroid of a rectangle, or its middle if light comes from all around.
-fn position(table: &SummedArea, r: &TexelRect) -> Vec3 {
-    let (x, y) = (0.5 * (r.x0 + r.x1) as f64, 0.5 * (r.y0 + r.y1) as f64);
-    let middle = || unit(table.texels().direction(x, y));
-    unit(table.measure(r).first).or_else(middle).unwrap_or(Vec3::Y)
 }
