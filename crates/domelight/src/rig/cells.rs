@@ -219,7 +219,8 @@ mod tests {
 
     fn lights(n: usize, spread: f32) -> Vec<Vec3> {
         let mut pcg = Pcg32::new(n as u64, 2);
-        let random = |pcg: &mut Pcg32| from_spherical(2.0 * pcg.next_f32() - 1.0, 7.0 * pcg.next_f32());
+        let random =
+            |pcg: &mut Pcg32| from_spherical(2.0 * pcg.next_f32() - 1.0, 7.0 * pcg.next_f32());
         let centre = random(&mut pcg);
         (0..n).map(|_| (centre + spread * random(&mut pcg)).normalize()).collect()
     }

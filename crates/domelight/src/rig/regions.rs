@@ -367,7 +367,12 @@ mod tests {
                 // Planar moments of a rectangle that runs across the seam are not defined.
                 let x0 = if metric == Metric::Plane { 0 } else { blocks.x(blocks.columns / 2) };
                 let whole = TexelRect { x0, x1: x0 + 150, y0: 0, y1: 77 };
-                let part = TexelRect { y0: blocks.y(1), y1: 77, x1: blocks.x(blocks.column(x0) + 5), ..whole };
+                let part = TexelRect {
+                    y0: blocks.y(1),
+                    y1: 77,
+                    x1: blocks.x(blocks.column(x0) + 5),
+                    ..whole
+                };
                 for r in [whole, part] {
                     let direct = table.texel_profiles(&r);
                     for (axis, by_blocks) in table.block_profiles(&r).into_iter().enumerate() {
@@ -391,8 +396,8 @@ mod tests {
         let centroid = [m.first[0] / m.energy, m.first[1] / m.energy];
         let sum = (0..31 * 16).map(|i| {
             let (x, y) = ((i % 31) as f64 - 15.0, (i / 31) as f64 - 7.5);
-            let weight = texels.rows[i / 31].solid_angle
-                * f64::from(env.map().pixels[i].luminance());
+            let weight =
+                texels.rows[i / 31].solid_angle * f64::from(env.map().pixels[i].luminance());
             weight * ((x - centroid[0]).powi(2) + (y - centroid[1]).powi(2))
         });
         let sum: f64 = sum.sum();
