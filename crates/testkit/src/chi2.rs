@@ -104,7 +104,7 @@ impl Chi2 {
         };
         let draw = |rng: &mut Pcg| {
             let (u, u_lobe) = (rng.next_2d(), rng.next_f32());
-            sampler(u, u_lobe).map(|w| Drawn { place: place(w), pdf: pdf(w), at: w.to_vec() })
+            sampler(u, u_lobe).map(|w| Drawn { place: place(w), pdf: pdf(w), at: w })
         };
         self.run(name, draw, density)
     }
@@ -124,7 +124,7 @@ impl Chi2 {
             sampler(u, u_lobe).map(|p| Drawn {
                 place: p.map(f64::from),
                 pdf: pdf(p),
-                at: p.to_vec(),
+                at: [p[0], p[1], 0.0],
             })
         };
         self.run(name, draw, |p| pdf(p.map(|x| x as f32)))
@@ -204,7 +204,7 @@ impl Chi2 {
             for j in 0..self.cells[1] {
                 let span = |k: usize, n: usize| [n as f64 * size[k], (n + 1) as f64 * size[k]];
                 let cell = Rect { x: span(0, i), y: span(1, j) };
-                let mass = self.quadrature.rect(cell, &mut |x, y| density([x, y]));
+                let [mass] = self.quadrature.rect(cell, &mut |x, y| [density([x, y])]);
                 expected.push(mass * self.samples as f64);
             }
         }
@@ -271,7 +271,8 @@ impl Chi2 {
 struct Drawn {
     place: [f64; 2],
     pdf: f64,
-    at: Vec<f32>,
+    /// The sample, for a message; the third number means nothing on the square.
+    at: [f32; 3],
 }
 
 /// An orthonormal basis with z along the polar axis.

@@ -1,24 +1,96 @@
 //! Reflectance: lobes and the materials that they add up to.
+//!
+//! A [`Material`] is a small sum of [`Lobe`]s: [`Lambert`], [`Phong`], [`Ward`], [`Ggx`],
+//! [`Beckmann`] and glTF's [`MetallicRoughness`], one model a file. All work in the local frame,
+//! are plain `Copy` data and evaluate value and density together, because multiple importance
+//! sampling always needs both.
+//!
+//! ```
+//! use domelight::bsdf::{Brdf, Material};
+//! use domelight::math::{vec2, vec3};
+//!
+//! let material: Material = "phong:50:0.5:0.3".parse()?;
+//! let wo = vec3(0.6, 0.0, 0.8);
+//! if let Some(sample) = material.for_view(wo).sample(wo, 0.2, vec2(0.3, 0.7)) {
+//!     let weight = sample.value / sample.pdf;
+//!     assert!(weight.is_finite() && sample.wi.z > 0.0);
+//! }
+//! # Ok::<(), domelight::bsdf::ParseMaterialError>(())
+//! ```
+//!
+//! All lobes here are reciprocal: f_r(wo, wi) = f_r(wi, wo).
+//!
+//! Rejected: trait objects (the set is closed, and the sample loop should inline); tabulated
+//! energy compensation (its tables would have to enter the bounds of [`Brdf::max_eval`]).
+
+mod beckmann;
+mod fresnel;
+mod ggx;
+mod lambert;
+mod material;
+mod metallic_roughness;
+mod microfacet;
+mod parse;
+mod phong;
+#[cfg(test)]
+mod test_support;
+mod ward;
+
+pub use beckmann::{Beckmann, BeckmannNormals};
+pub use fresnel::{Conductor, Fresnel};
+pub use ggx::{Ggx, GgxNormals};
+pub use lambert::Lambert;
+pub use material::{Lobe, MAX_LOBES, Material, TooManyLobes};
+pub use metallic_roughness::MetallicRoughness;
+pub use microfacet::{MIN_ALPHA, Masking, Microfacet, NormalDistribution};
+pub use parse::{MaterialSpec, ParseMaterialError};
+pub use phong::Phong;
+pub use ward::{Ward, WardForm};
 
 use crate::Rgb;
 use crate::math::{Vec2, Vec3};
 
 /// A reflectance lobe in the local frame (z the shading normal).
 pub trait Brdf: Copy + Send + Sync {
-    /// f_r(wo, wi) · max(0, cos θ_i) \[sr⁻¹\], the cosine inside; black when either direction lies
-    /// at or below the surface.
-    fn eval(&self, wo: Vec3, wi: Vec3) -> Rgb;
+    /// [`Brdf::eval`] and [`Brdf::pdf`] at once.
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32);
 
-    /// Density of [`Brdf::sample`] per solid angle of `wi` \[sr⁻¹\]; zero below the surface.
-    /// It may integrate to less than one: the rest is the probability of no sample.
-    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32;
-
-    /// Draws `wi` from the uniform numbers `u` and `u_lobe` in [0, 1). `None` is a sample of value
-    /// zero, to be counted and never redrawn.
-    fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<BrdfSample>;
+    /// The direction of [`Brdf::sample`] alone. It may lie below the surface, be NaN, or be `None`:
+    /// all of them are the sample of value zero.
+    fn sample_direction(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Vec3>;
 
     /// An upper bound over all `wi` of the greatest channel of [`Brdf::eval`] \[sr⁻¹\].
     fn max_eval(&self, wo: Vec3) -> f32;
+
+    /// The fraction of light toward `wo` = (·, ·, `cos_theta_o`) under uniform light, roughly: what
+    /// chooses between lobes and colours previews. Never negative.
+    fn directional_albedo(&self, cos_theta_o: f32) -> Rgb;
+
+    /// f_r(wo, wi) · max(0, cos θ_i) \[sr⁻¹\], the cosine inside; black when either direction lies
+    /// at or below the surface.
+    #[inline]
+    fn eval(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        self.eval_pdf(wo, wi).0
+    }
+
+    /// Density of [`Brdf::sample`] per solid angle of `wi` \[sr⁻¹\]; zero below the surface.
+    /// It may integrate to less than one: the rest is the probability of no sample.
+    #[inline]
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.eval_pdf(wo, wi).1
+    }
+
+    /// Draws `wi` from the uniform numbers `u` and `u_lobe` in [0, 1). `None` is a sample of value
+    /// zero, to be counted and never redrawn.
+    ///
+    /// Value and density are those of [`Brdf::eval_pdf`] at the direction as rounded, so both agree
+    /// with any later evaluation to the last bit, however narrow the lobe.
+    #[inline]
+    fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<BrdfSample> {
+        let wi = self.sample_direction(wo, u_lobe, u)?;
+        let (value, pdf) = self.eval_pdf(wo, wi);
+        (pdf > 0.0 && pdf.is_finite()).then_some(BrdfSample { wi, value, pdf })
+    }
 }
 
 /// A direction drawn from a lobe.
@@ -31,3 +103,16 @@ pub struct BrdfSample {
     /// [`Brdf::pdf`] at `wi` \[sr⁻¹\], positive and finite.
     pub pdf: f32,
 }
+
+/// The cosine below which a direction counts as at the surface: f32 directions resolve no lower,
+/// and its fourth power is still a normal number.
+const HORIZON: f32 = 1e-7;
+
+/// Both directions lie above the surface; false for NaN.
+#[inline]
+fn above(wo: Vec3, wi: Vec3) -> bool {
+    wo.z > HORIZON && wi.z > HORIZON
+}
+
+/// What [`Brdf::max_eval`] adds for the rounding of an evaluation in f32.
+const ROUNDING: f32 = 1.0 + 1e-5;

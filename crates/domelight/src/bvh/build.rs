@@ -155,7 +155,7 @@ struct Binning {
 
 impl Binning {
     fn new(range: &Range<'_>) -> Self {
-        let count = (4 + range.primitives.len() / 16).min(MAX_BINS);
+        let count = (16 + range.primitives.len() / 16).min(MAX_BINS);
         Self {
             origin: range.centroids.min,
             scale: Vec3::splat(count as f32) / range.centroids.size(),

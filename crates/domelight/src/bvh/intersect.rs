@@ -12,9 +12,10 @@
 //! accept, planes move outward by 16·2⁻²⁴·m: the shear's 7, the box test's own 3, and room to spare
 //! (the paper's section on traversal does it axis by axis).
 
-use super::simd::Simd;
+use super::simd::{Floats, Mask, Simd};
 use super::{Block, Lanes, Node, WIDTH};
 use crate::geometry::{Aabb, Ray};
+use crate::math::Vec3;
 
 /// A ray with what both tests need of it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -64,13 +65,16 @@ impl PreparedRay {
         prepared.axes = [x, y, z];
         prepared.shear = [direction[x] * scale, direction[y] * scale, scale];
 
-        let sum = prepared.inverse_direction.iter().sum::<f32>() + inflation;
-        (sum.is_finite() && ray.direction.is_finite()).then_some(prepared)
+        let finite = ray.origin.is_finite()
+            && ray.direction.is_finite()
+            && inflation.is_finite()
+            && prepared.inverse_direction.iter().all(|x| x.is_finite());
+        finite.then_some(prepared)
     }
 
     /// One bit an axis: set where the direction is negative.
     #[inline(always)]
-    pub(super) fn octant(direction: crate::math::Vec3) -> usize {
+    pub(super) fn octant(direction: Vec3) -> usize {
         let sign = |x: f32| usize::from(x.is_sign_negative());
         sign(direction.x) | sign(direction.y) << 1 | sign(direction.z) << 2
     }
@@ -91,33 +95,87 @@ fn longest_axis(d: [f32; 3]) -> usize {
 /// A node's planes in the order in which rays of one octant cross them.
 #[derive(Clone, Copy)]
 pub(super) struct Slabs<S: Simd> {
-    near: [S::F; 3],
-    far: [S::F; 3],
+    near: [S::Floats; 3],
+    far: [S::Floats; 3],
 }
 
 impl<S: Simd> Slabs<S> {
     /// Takes the octant from any ray of it.
     #[inline(always)]
     pub(super) fn load(simd: S, node: &Node, ray: &PreparedRay) -> Self {
-        let plane = |axis: usize, side: usize| simd.load(&node.planes[axis][side & 1]);
-        let [x, y, z] = ray.near_side;
+        let [[x_near, x_far], [y_near, y_far], [z_near, z_far]] = [
+            ordered(&node.planes[0], ray.near_side[0]),
+            ordered(&node.planes[1], ray.near_side[1]),
+            ordered(&node.planes[2], ray.near_side[2]),
+        ];
         Self {
-            near: [plane(0, x), plane(1, y), plane(2, z)],
-            far: [plane(0, x ^ 1), plane(1, y ^ 1), plane(2, z ^ 1)],
+            near: [simd.load(x_near), simd.load(y_near), simd.load(z_near)],
+            far: [simd.load(x_far), simd.load(y_far), simd.load(z_far)],
         }
     }
 
     /// Which boxes the ray crosses within [0, `limit`], and the distances where it enters them.
     #[inline(always)]
-    pub(super) fn cross(&self, simd: S, ray: &PreparedRay, limit: f32) -> (S::M, S::F) {
-        let distance = |plane: S::F, origin: f32, inverse_direction: f32| {
-            simd.mul(simd.sub(plane, simd.splat(origin)), simd.splat(inverse_direction))
-        };
-        let near = |k: usize| distance(self.near[k], ray.near_origin[k], ray.inverse_direction[k]);
-        let far = |k: usize| distance(self.far[k], ray.far_origin[k], ray.inverse_direction[k]);
-        let enter = simd.max(simd.max(near(0), near(1)), simd.max(near(2), simd.splat(0.0)));
-        let leave = simd.min(simd.min(far(0), far(1)), simd.min(far(2), simd.splat(limit)));
-        (simd.le(enter, leave), enter)
+    pub(super) fn cross(
+        &self,
+        simd: S,
+        ray: &PreparedRay,
+        limit: f32,
+    ) -> (<S::Floats as Floats>::Mask, S::Floats) {
+        let (mut enter, mut leave) = (simd.splat(0.0), simd.splat(limit));
+        for k in 0..3 {
+            let inverse_direction = simd.splat(ray.inverse_direction[k]);
+            let near = (self.near[k] - simd.splat(ray.near_origin[k])) * inverse_direction;
+            let far = (self.far[k] - simd.splat(ray.far_origin[k])) * inverse_direction;
+            enter = near.max(enter);
+            leave = far.min(leave);
+        }
+        (enter.le(leave), enter)
+    }
+}
+
+/// The planes of an axis, the one on the ray's near side first.
+#[inline(always)]
+fn ordered(planes: &[Lanes; 2], near_side: usize) -> [&Lanes; 2] {
+    [&planes[near_side & 1], &planes[near_side & 1 ^ 1]]
+}
+
+/// Eight points.
+#[derive(Clone, Copy)]
+struct Points<F> {
+    x: F,
+    y: F,
+    z: F,
+}
+
+impl<F: Floats> Points<F> {
+    #[inline(always)]
+    fn load<S: Simd<Floats = F>>(simd: S, lanes: &[Lanes; 3]) -> Self {
+        Self { x: simd.load(&lanes[0]), y: simd.load(&lanes[1]), z: simd.load(&lanes[2]) }
+    }
+
+    #[inline(always)]
+    fn splat<S: Simd<Floats = F>>(simd: S, [x, y, z]: [f32; 3]) -> Self {
+        Self { x: simd.splat(x), y: simd.splat(y), z: simd.splat(z) }
+    }
+
+    #[inline(always)]
+    fn sub(self, q: Self) -> Self {
+        Self { x: self.x - q.x, y: self.y - q.y, z: self.z - q.z }
+    }
+
+    #[inline(always)]
+    fn dot(self, q: Self) -> F {
+        self.x * q.x + self.y * q.y + self.z * q.z
+    }
+
+    #[inline(always)]
+    fn cross(self, q: Self) -> Self {
+        Self {
+            x: self.y * q.z - self.z * q.y,
+            y: self.z * q.x - self.x * q.z,
+            z: self.x * q.y - self.y * q.x,
+        }
     }
 }
 
@@ -125,16 +183,19 @@ impl<S: Simd> Slabs<S> {
 pub(super) struct BlockHits<S: Simd> {
     /// Bit i: triangle i is hit; the rest of its lane means nothing otherwise.
     pub(super) mask: u32,
-    pub(super) t: S::F,
-    edges: [S::F; 3],
-    determinant: S::F,
+    /// Distances in units of the direction's length.
+    pub(super) t: S::Floats,
+    /// Barycentric weights of the second and third vertices, times `determinant`.
+    weights: [S::Floats; 2],
+    determinant: S::Floats,
 }
 
 impl<S: Simd> BlockHits<S> {
     /// Barycentric weights of the second and third vertices.
     #[inline(always)]
-    pub(super) fn barycentric(&self, simd: S) -> [Lanes; 2] {
-        [1, 2].map(|i| simd.store(simd.div(self.edges[i], self.determinant)))
+    pub(super) fn barycentric(&self) -> [Lanes; 2] {
+        let [v, w] = self.weights;
+        [(v / self.determinant).store(), (w / self.determinant).store()]
     }
 }
 
@@ -146,71 +207,80 @@ pub(super) fn hit_block<S: Simd>(
     ray: &PreparedRay,
     limit: f32,
 ) -> Option<BlockHits<S>> {
-    let [kx, ky, kz] = ray.axes.map(|k| k.min(2));
-    let origin = |k: usize| simd.splat(ray.origin[k]);
-    let [ox, oy, oz] = [origin(kx), origin(ky), origin(kz)];
-    let [sx, sy, sz] = ray.shear.map(|s| simd.splat(s));
-
-    // Shear the corners: the ray becomes the z axis.
-    let shear = |vertex: &[Lanes; 3]| {
-        let [x, y, z] = [kx, ky, kz].map(|k| simd.load(&vertex[k]));
-        let z = simd.sub(z, oz);
-        let x = simd.sub(simd.sub(x, ox), simd.mul(sx, z));
-        let y = simd.sub(simd.sub(y, oy), simd.mul(sy, z));
-        [x, y, z]
-    };
-    let [a, b, c] =
-        [shear(&block.vertices[0]), shear(&block.vertices[1]), shear(&block.vertices[2])];
-
-    // Scaled barycentric weights of the three corners.
-    let edge = |p: [S::F; 3], q: [S::F; 3]| simd.sub(simd.mul(p[0], q[1]), simd.mul(p[1], q[0]));
-    let mut edges = [edge(c, b), edge(a, c), edge(b, a)];
     let zero = simd.splat(0.0);
-    let on_edge = edges.map(|e| simd.eq(e, zero)).into_iter().reduce(|m, n| simd.or(m, n));
-    if on_edge.is_some_and(|m| simd.bits(m) != 0) {
-        let xy = |p: [S::F; 3]| [simd.store(p[0]), simd.store(p[1])];
-        let rounded = edges.map(|e| simd.store(e));
-        edges = exact_edges([xy(a), xy(b), xy(c)], rounded).map(|e| simd.load(&e));
+    let frame = ShearedFrame::new(simd, ray);
+    let a = frame.shear(simd, &block.vertices[0]);
+    let b = frame.shear(simd, &block.vertices[1]);
+    let c = frame.shear(simd, &block.vertices[2]);
+
+    // Scaled barycentric weights.
+    let (mut u, mut v, mut w) = (edge(c, b), edge(a, c), edge(b, a));
+    if (u.eq(zero) | v.eq(zero) | w.eq(zero)).bits() != 0 {
+        let corners =
+            [[a.x.store(), a.y.store()], [b.x.store(), b.y.store()], [c.x.store(), c.y.store()]];
+        let exact = exact_edges(corners, [u.store(), v.store(), w.store()]);
+        (u, v, w) = (simd.load(&exact[0]), simd.load(&exact[1]), simd.load(&exact[2]));
     }
-    let [u, v, w] = edges;
-    let least = simd.min(simd.min(u, v), w);
-    let greatest = simd.max(simd.max(u, v), w);
-    let inside = simd.or(simd.le(zero, least), simd.le(greatest, zero));
-    if simd.bits(inside) == 0 {
+    let inside = zero.le(u.min(v).min(w)) | u.max(v).max(w).le(zero);
+    if inside.bits() == 0 {
         return None;
     }
 
     // The distance to the plane, but within that of the corners even where the plane is edge-on.
-    let depths = [a[2], b[2], c[2]].map(|z| simd.mul(z, sz));
-    let nearest = simd.min(simd.min(depths[0], depths[1]), depths[2]);
-    let farthest = simd.max(simd.max(depths[0], depths[1]), depths[2]);
-    let t = simd.min(simd.max(plane_distance(simd, block, ray), nearest), farthest);
+    let nearest = a.z.min(b.z).min(c.z);
+    let farthest = a.z.max(b.z).max(c.z);
+    let t = plane_distance(simd, block, ray).max(nearest).min(farthest);
 
     // A determinant that is zero or NaN is no hit.
-    let determinant = simd.add(simd.add(u, v), w);
-    let has_area = simd.or(simd.lt(determinant, zero), simd.lt(zero, determinant));
-    let in_interval = simd.and(simd.lt(zero, t), simd.le(t, simd.splat(limit)));
-    let mask = simd.bits(simd.and(simd.and(inside, has_area), in_interval));
-    (mask != 0).then_some(BlockHits { mask, t, edges, determinant })
+    let determinant = u + v + w;
+    let has_area = determinant.lt(zero) | zero.lt(determinant);
+    let mask = (inside & has_area & zero.lt(t) & t.le(simd.splat(limit))).bits();
+    (mask != 0).then_some(BlockHits { mask, t, weights: [v, w], determinant })
+}
+
+/// Where the ray is the z axis and z is the distance.
+struct ShearedFrame<F> {
+    axes: [usize; 3],
+    origin: Points<F>,
+    /// Direction x/z, y/z and 1/z.
+    shear: Points<F>,
+}
+
+impl<F: Floats> ShearedFrame<F> {
+    #[inline(always)]
+    fn new<S: Simd<Floats = F>>(simd: S, ray: &PreparedRay) -> Self {
+        let [x, y, z] = ray.axes;
+        let axes = [x.min(2), y.min(2), z.min(2)]; // in bounds, for the compiler
+        let origin = [ray.origin[axes[0]], ray.origin[axes[1]], ray.origin[axes[2]]];
+        Self { axes, origin: Points::splat(simd, origin), shear: Points::splat(simd, ray.shear) }
+    }
+
+    #[inline(always)]
+    fn shear<S: Simd<Floats = F>>(&self, simd: S, vertex: &[Lanes; 3]) -> Points<F> {
+        let z = simd.load(&vertex[self.axes[2]]) - self.origin.z;
+        let x = simd.load(&vertex[self.axes[0]]) - self.origin.x - self.shear.x * z;
+        let y = simd.load(&vertex[self.axes[1]]) - self.origin.y - self.shear.y * z;
+        Points { x, y, z: self.shear.z * z }
+    }
+}
+
+/// Twice the signed area of 0, p, q in the sheared plane; exactly opposite for q, p.
+#[inline(always)]
+fn edge<F: Floats>(p: Points<F>, q: Points<F>) -> F {
+    p.x * q.y - p.y * q.x
 }
 
 /// n · (a − o) / (n · d) with n = (b − a) × (c − a).
 ///
-/// More accurate than to interpolate the corners' depths where the triangle is large and near.
+/// More accurate than to interpolate the corners' distances where the triangle is large and near.
 #[inline(always)]
-fn plane_distance<S: Simd>(simd: S, block: &Block, ray: &PreparedRay) -> S::F {
-    let [a, b, c] = block.vertices.each_ref().map(|v| v.each_ref().map(|x| simd.load(x)));
-    let sub = |p: [S::F; 3], q: [S::F; 3]| [0, 1, 2].map(|k| simd.sub(p[k], q[k]));
-    let dot = |p: [S::F; 3], q: [S::F; 3]| {
-        let [x, y, z] = [0, 1, 2].map(|k| simd.mul(p[k], q[k]));
-        simd.add(simd.add(x, y), z)
-    };
-    let (e, f) = (sub(b, a), sub(c, a));
-    let n =
-        [(1, 2), (2, 0), (0, 1)].map(|(i, j)| simd.sub(simd.mul(e[i], f[j]), simd.mul(e[j], f[i])));
-    let origin = ray.origin.map(|x| simd.splat(x));
-    let direction = ray.direction.map(|x| simd.splat(x));
-    simd.div(dot(n, sub(a, origin)), dot(n, direction))
+fn plane_distance<S: Simd>(simd: S, block: &Block, ray: &PreparedRay) -> S::Floats {
+    let a = Points::load(simd, &block.vertices[0]);
+    let b = Points::load(simd, &block.vertices[1]);
+    let c = Points::load(simd, &block.vertices[2]);
+    let n = b.sub(a).cross(c.sub(a));
+    let to_plane = a.sub(Points::splat(simd, ray.origin));
+    n.dot(to_plane) / n.dot(Points::splat(simd, ray.direction))
 }
 
 /// Where an edge function is zero, all three in f64, in which the products of f32 are exact.

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::build::MAX_DEPTH;
 use super::intersect::{PreparedRay, Slabs, hit_block};
-use super::simd::{Kernel, Simd};
+use super::simd::{Floats, Kernel, Mask, Sets, Simd};
 use super::{Bvh, Child, WIDTH};
 use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
@@ -176,9 +176,14 @@ fn closest_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &Ray, stack: &mut ClosestStack)
         } else {
             let node = &bvh.nodes[child.index()];
             let (crossed, enter) = Slabs::load(simd, node, &prepared).cross(simd, &prepared, limit);
-            let enter = simd.store(enter);
+            let crossed = crossed.bits();
+            if crossed.is_power_of_two() {
+                child = node.children[crossed.trailing_zeros() as usize % WIDTH];
+                continue;
+            }
+            let enter = enter.store();
             let base = stack.len;
-            for lane in lanes(simd.bits(crossed)) {
+            for lane in lanes(crossed) {
                 let entry = ClosestEntry { enter: enter[lane], child: node.children[lane] };
                 stack.insert(base, entry);
             }
@@ -202,37 +207,46 @@ fn closest_in_block<S: Simd>(
 ) -> Option<Hit> {
     let block = &bvh.blocks[leaf.index()];
     let hits = hit_block(simd, block, ray, limit)?;
-    let t = simd.store(hits.t);
+    let t = hits.t.store();
     let lane = lanes(hits.mask)
         .reduce(|a, b| if (t[b], block.ids[b]) < (t[a], block.ids[a]) { b } else { a })?;
     if closest.is_some_and(|c| (c.t, c.triangle) < (t[lane], block.ids[lane])) {
         return None;
     }
-    let [u, v] = hits.barycentric(simd);
+    let [u, v] = hits.barycentric();
     Some(Hit { t: t[lane], u: u[lane], v: v[lane], triangle: block.ids[lane] })
 }
 
 #[inline(always)]
 fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRay, limit: f32) -> bool {
     let mut stack = [Child::default(); STACK];
-    let mut len = 1; // the root
-    while len > 0 {
-        len -= 1;
-        let child = stack[len];
+    let mut len = 0;
+    let mut child = Child::node(0);
+    loop {
         if child.is_leaf() {
             if hit_block(simd, &bvh.blocks[child.index()], ray, limit).is_some() {
                 return true;
             }
-            continue;
+        } else {
+            let node = &bvh.nodes[child.index()];
+            let (crossed, _) = Slabs::load(simd, node, ray).cross(simd, ray, limit);
+            // On with the first and largest; the others wait.
+            let mut crossed = lanes(crossed.bits());
+            if let Some(first) = crossed.next() {
+                for lane in crossed {
+                    stack[len] = node.children[lane];
+                    len += 1;
+                }
+                child = node.children[first];
+                continue;
+            }
         }
-        let node = &bvh.nodes[child.index()];
-        let (crossed, _) = Slabs::load(simd, node, ray).cross(simd, ray, limit);
-        for lane in lanes_from_last(simd.bits(crossed)) {
-            stack[len] = node.children[lane];
-            len += 1;
+        if len == 0 {
+            return false;
         }
+        len -= 1;
+        child = stack[len];
     }
-    false
 }
 
 /// A child yet to visit, and the rays of the stream that enter it.
@@ -278,13 +292,13 @@ fn occluded_stream<S: Simd>(
         }
         let node = &bvh.nodes[child.index()];
         let slabs = Slabs::load(simd, node, &stream[0]);
-        let mut crossing = simd.no_bits();
+        let mut crossing = simd.empty();
         for i in lanes(rays) {
             let (crossed, _) = slabs.cross(simd, &stream[i], f32::MAX);
-            crossing = simd.insert(crossing, crossed, 1 << i);
+            crossing = crossing.insert(crossed, 1 << i);
         }
-        let sets = simd.store_bits(crossing);
-        for lane in lanes_from_last(simd.not_empty(crossing)) {
+        let sets = crossing.store();
+        for lane in lanes_from_last(crossing.not_empty()) {
             stack[len] = StreamEntry { child: node.children[lane], rays: sets[lane] };
             len += 1;
         }

@@ -32,15 +32,21 @@ pub enum BvhDefect {
         /// The node.
         node: usize,
     },
-    /// Nodes, blocks or triangles that are not reached exactly once.
-    #[error("the tree reaches {reached} {what} of {count}, or some twice")]
+    /// Nodes, blocks or triangles that no path reaches, or more than one.
+    #[error("the tree reaches {reached} of {count} {what}")]
     Coverage {
-        /// What is missing.
+        /// What is missing or repeated.
         what: &'static str,
         /// How many are reached, with repetition.
         reached: usize,
         /// How many there are.
         count: usize,
+    },
+    /// A triangle that is in two blocks.
+    #[error("triangle {triangle} is in the tree twice")]
+    Repeated {
+        /// The triangle.
+        triangle: u32,
     },
 }
 
@@ -50,13 +56,13 @@ pub(super) fn validate(bvh: &Bvh) -> Result<(), BvhDefect> {
     if root != bvh.bounds {
         return Err(BvhDefect::Bounds { node: 0, child: 0, bounds: bvh.bounds });
     }
-    let ids = seen.ids.len();
     seen.ids.sort_unstable();
-    seen.ids.dedup();
-    let reached = if seen.ids.len() == ids { ids } else { usize::MAX };
+    if let Some(pair) = seen.ids.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(BvhDefect::Repeated { triangle: pair[0] });
+    }
     covers("nodes", seen.nodes, bvh.nodes.len())?;
     covers("blocks", seen.blocks, bvh.blocks.len())?;
-    covers("triangles", reached, bvh.triangle_count)
+    covers("triangles", seen.ids.len(), bvh.triangle_count)
 }
 
 fn covers(what: &'static str, reached: usize, count: usize) -> Result<(), BvhDefect> {

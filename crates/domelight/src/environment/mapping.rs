@@ -1,1 +1,603 @@
-//! stub
+//! How a picture covers the sphere of directions: the mappings in which light probes are kept, and conversion
+//! to and from the lat-long working map.
+//!
+//! Every mapping is a pair of inverse functions between picture coordinates (u, v) ∈ \[0, 1\]² (u right, v down)
+//! and directions in the world frame (right-handed, +Y up), with its Jacobian dω / (du dv). A texel's value is
+//! constant over the texel, so conversion is an area average: each target texel is the mean of the source over
+//! the texel's solid angle, by regular supersampling with nearest look-up, finer where a small light is. Bilinear look-up was rejected: it
+//! smears a one-texel sun over its neighbours and disagrees with the constant texels of the importance table.
+//!
+//! Sources: Debevec 1998, "Rendering Synthetic Objects into Real Scenes", and his light-probe gallery (angular
+//! map); Reinhard et al. 2010, "High Dynamic Range Imaging", ch. 11 (angular map, mirrored sphere, vertical
+//! cross); OpenEXR's environment map conventions (`ImfEnvmap.h`); Clarberg 2008, "Fast Equal-Area Mapping of the
+//! (Hemi)Sphere using SIMD" (octahedral).
+
+use crate::color::Rgb;
+use crate::image::RgbImage;
+use crate::math::{PI, TAU, Vec2, Vec3, sqr, vec2, vec3};
+use std::str::FromStr;
+
+/// What the `envmap` attribute of an OpenEXR file says about its picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EnvmapKind {
+    /// Latitude and longitude, the centre toward +Z.
+    LatLong,
+    /// Six faces of a cube, one above the other.
+    Cube,
+}
+
+/// A mapping between picture coordinates and directions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Mapping {
+    /// Latitude and longitude, the working map: row 0 is +Y, the centre column looks toward −Z and u grows to
+    /// the right as seen from inside.
+    LatLong,
+    /// Latitude and longitude as OpenEXR's `envmap` attribute defines it: as [`Mapping::LatLong`], but the centre
+    /// column looks toward +Z. OpenEXR puts the centres of the border texels on the border (texel 0 at longitude
+    /// π exactly); here, as in all other mappings, texels are areas, which moves a texel by less than its half.
+    LatLongExr,
+    /// Debevec's light probe: a disc whose radius is the angle to −Z over π; the centre looks toward −Z, the
+    /// circumference is +Z, right is +X, up is +Y.
+    Angular,
+    /// An orthographic photograph of a mirror ball that touches the picture's borders. The camera stands at −Z of
+    /// the ball, so the centre, which reflects the camera, looks toward −Z like that of the angular map, and the
+    /// circumference grazes +Z. It is a reflection: u grows to the *left* as seen from inside, and a plain
+    /// photograph gives an environment in which text reads the right way round. (pfstools and the book of Reinhard
+    /// et al. take ball pictures that were mirrored beforehand.)
+    MirrorBall,
+    /// Unfolded cube of 4 × 3 faces: +Y above −Z; then −X, −Z, +X, +Z from left to right; −Y below −Z.
+    CubeCrossHorizontal,
+    /// Unfolded cube of 3 × 4 faces: +Y; −X, −Z, +X; −Y; then +Z upside down, as in Debevec's gallery.
+    CubeCrossVertical,
+    /// The faces of [`Mapping::CubeStripVertical`] from left to right.
+    CubeStripHorizontal,
+    /// Faces +X, −X, +Y, −Y, +Z, −Z from top to bottom, each seen from inside: OpenEXR's cube map.
+    CubeStripVertical,
+    /// Equal-area octahedral square with +Y at its centre and −Y at its corners, as in pbrt-v4. Rotated such that
+    /// what pbrt's `imgtool makeequiarea` makes of a lat-long map comes back as that map.
+    Octahedral,
+}
+
+/// The picture has a shape in which the mapping cannot be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("a {mapping} map has width : height = {}:{}, this picture is {width}x{height}", .mapping.aspect().0, .mapping.aspect().1)]
+pub struct ShapeError {
+    /// The mapping that was asked for.
+    pub mapping: Mapping,
+    /// Columns of the picture.
+    pub width: usize,
+    /// Rows of the picture.
+    pub height: usize,
+}
+
+/// No mapping has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown mapping {name:?}; known are {}", Mapping::ALL.map(Mapping::name).join(", "))]
+pub struct UnknownMapping {
+    /// What was asked for.
+    pub name: String,
+}
+
+impl Mapping {
+    /// All mappings.
+    pub const ALL: [Self; 9] = [
+        Self::LatLong,
+        Self::LatLongExr,
+        Self::Angular,
+        Self::MirrorBall,
+        Self::CubeCrossHorizontal,
+        Self::CubeCrossVertical,
+        Self::CubeStripHorizontal,
+        Self::CubeStripVertical,
+        Self::Octahedral,
+    ];
+
+    /// The name that [`FromStr`] understands.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::LatLong => "lat-long",
+            Self::LatLongExr => "lat-long-exr",
+            Self::Angular => "angular",
+            Self::MirrorBall => "mirror-ball",
+            Self::CubeCrossHorizontal => "cross-horizontal",
+            Self::CubeCrossVertical => "cross-vertical",
+            Self::CubeStripHorizontal => "strip-horizontal",
+            Self::CubeStripVertical => "strip-vertical",
+            Self::Octahedral => "octahedral",
+        }
+    }
+
+    /// Width to height in least whole numbers. Lat-long maps of any other shape are accepted too.
+    pub const fn aspect(self) -> (usize, usize) {
+        match self {
+            Self::LatLong | Self::LatLongExr => (2, 1),
+            Self::Angular | Self::MirrorBall | Self::Octahedral => (1, 1),
+            Self::CubeCrossHorizontal => (4, 3),
+            Self::CubeCrossVertical => (3, 4),
+            Self::CubeStripHorizontal => (6, 1),
+            Self::CubeStripVertical => (1, 6),
+        }
+    }
+
+    /// Whether a picture of `width` × `height` texels can be in this mapping.
+    ///
+    /// # Errors
+    /// If it has not the exact shape [`Mapping::aspect`]; lat-long maps may have any.
+    pub fn check_shape(self, width: usize, height: usize) -> Result<(), ShapeError> {
+        let (columns, rows) = self.aspect();
+        let any_shape = matches!(self, Self::LatLong | Self::LatLongExr);
+        if any_shape || width as u128 * rows as u128 == height as u128 * columns as u128 {
+            Ok(())
+        } else {
+            Err(ShapeError { mapping: self, width, height })
+        }
+    }
+
+    /// The likely mapping of a picture from its size and its OpenEXR attribute.
+    ///
+    /// The attribute decides where its shape can be true. Then 1:1 is an angular map, 4:3 and 3:4 a cross, 6:1 and
+    /// 1:6 a strip of faces, and everything else, a single texel included, lat-long. A square can as well be a
+    /// mirror ball or octahedral: nothing in the size tells.
+    pub fn guess(width: usize, height: usize, envmap: Option<EnvmapKind>) -> Self {
+        let has_shape = |mapping: &Self| mapping.check_shape(width, height).is_ok();
+        match envmap {
+            Some(EnvmapKind::LatLong) => return Self::LatLongExr,
+            Some(EnvmapKind::Cube) if has_shape(&Self::CubeStripVertical) => {
+                return Self::CubeStripVertical;
+            }
+            _ => {}
+        }
+        if width == 1 && height == 1 {
+            return Self::LatLong;
+        }
+        let by_shape = [
+            Self::Angular,
+            Self::CubeCrossHorizontal,
+            Self::CubeCrossVertical,
+            Self::CubeStripHorizontal,
+            Self::CubeStripVertical,
+        ];
+        by_shape.into_iter().find(has_shape).unwrap_or(Self::LatLong)
+    }
+
+    /// The unit direction at (u, v); `None` outside \[0, 1\]², the disc or the faces of the cross.
+    pub fn direction(self, uv: Vec2) -> Option<Vec3> {
+        if !(0.0..=1.0).contains(&uv.x) || !(0.0..=1.0).contains(&uv.y) {
+            return None;
+        }
+        match self {
+            Self::LatLong => Some(lat_long_direction(uv)),
+            Self::LatLongExr => Some(half_turn(lat_long_direction(uv))),
+            Self::Angular => angular_direction(uv),
+            Self::MirrorBall => mirror_ball_direction(uv),
+            Self::Octahedral => Some(octahedral_direction(uv)),
+            _ => self.cube().direction(uv),
+        }
+    }
+
+    /// The coordinates of a unit direction, in \[0, 1\]².
+    pub fn uv(self, direction: Vec3) -> Vec2 {
+        let uv = match self {
+            Self::LatLong => lat_long_uv(direction),
+            Self::LatLongExr => lat_long_uv(half_turn(direction)),
+            Self::Angular => angular_uv(direction),
+            Self::MirrorBall => mirror_ball_uv(direction),
+            Self::Octahedral => octahedral_uv(direction),
+            _ => self.cube().uv(direction),
+        };
+        uv.clamp(Vec2::ZERO, Vec2::ONE)
+    }
+
+    /// dω / (du dv) \[sr\] at (u, v); zero where there is no direction. Its integral over the picture is 4π.
+    pub fn solid_angle_density(self, uv: Vec2) -> f32 {
+        self.direction(uv).map_or(0.0, |direction| self.density_at(uv, direction))
+    }
+
+    fn density_at(self, uv: Vec2, direction: Vec3) -> f32 {
+        match self {
+            Self::LatLong | Self::LatLongExr => PI * TAU * (PI * uv.y).sin().max(0.0),
+            Self::Angular => {
+                let r = disc(uv).length();
+                let sinc = if r < 1e-4 { PI } else { (PI * r).sin().max(0.0) / r };
+                4.0 * PI * sinc
+            }
+            // sin θ dθ = 4 r dr for θ = 2 asin r: the reflection in a ball preserves area.
+            Self::MirrorBall => 16.0,
+            Self::Octahedral => 4.0 * PI,
+            // dω = ds dt / (1 + s² + t²)^{3/2}, and 1/√(1 + s² + t²) is the greatest component.
+            _ => {
+                let (columns, rows) = self.aspect();
+                4.0 * (columns * rows) as f32 * direction.abs().max_element().powi(3)
+            }
+        }
+    }
+
+    /// The height of a lat-long map that keeps the finest detail of a picture of this mapping.
+    ///
+    /// The lat-long texel π / height is as wide as the source's texel where that is widest in the picture's centre.
+    pub fn lat_long_height(self, width: usize, height: usize) -> usize {
+        let edge = height as f32 / self.aspect().1 as f32;
+        let keeps = match self {
+            Self::LatLong | Self::LatLongExr => return height,
+            Self::Angular => 0.5 * height as f32,
+            Self::MirrorBall => 0.25 * PI * height as f32,
+            Self::Octahedral => 0.5 * PI.sqrt() * width as f32,
+            _ => 0.5 * PI * edge,
+        };
+        (keeps.ceil() as usize).max(1)
+    }
+
+    /// The size (width, height) of a picture of this mapping that keeps the detail of a lat-long map of
+    /// `lat_long_height` rows: the inverse of [`Mapping::lat_long_height`].
+    pub fn size_for(self, lat_long_height: usize) -> (usize, usize) {
+        let h = lat_long_height as f32;
+        let unit = match self {
+            Self::LatLong | Self::LatLongExr => return (2 * lat_long_height, lat_long_height),
+            Self::Angular => 2.0 * h,
+            Self::MirrorBall => 4.0 / PI * h,
+            Self::Octahedral => 2.0 / PI.sqrt() * h,
+            _ => 2.0 / PI * h,
+        };
+        let unit = (unit.ceil() as usize).max(1);
+        let (columns, rows) = self.aspect();
+        (columns * unit, rows * unit)
+    }
+
+    fn cube(self) -> &'static Cube {
+        match self {
+            Self::CubeCrossHorizontal => &CROSS_HORIZONTAL,
+            Self::CubeCrossVertical => &CROSS_VERTICAL,
+            Self::CubeStripHorizontal => &STRIP_HORIZONTAL,
+            _ => &STRIP_VERTICAL,
+        }
+    }
+}
+
+impl std::fmt::Display for Mapping {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Mapping {
+    type Err = UnknownMapping;
+
+    fn from_str(name: &str) -> Result<Self, UnknownMapping> {
+        let found = Self::ALL.into_iter().find(|mapping| mapping.name() == name);
+        found.ok_or_else(|| UnknownMapping { name: name.to_owned() })
+    }
+}
+
+/// d = (sin φ sin θ, cos θ, −cos φ sin θ), φ = 2π(u − ½), θ = π v.
+fn lat_long_direction(uv: Vec2) -> Vec3 {
+    let (sin_phi, cos_phi) = (TAU * (uv.x - 0.5)).sin_cos();
+    let (sin_theta, cos_theta) = (PI * uv.y).sin_cos();
+    vec3(sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta)
+}
+
+fn lat_long_uv(d: Vec3) -> Vec2 {
+    let phi = d.x.atan2(-d.z);
+    let theta = d.x.hypot(d.z).atan2(d.y);
+    vec2(phi / TAU + 0.5, theta / PI)
+}
+
+/// Half a turn about +Y.
+fn half_turn(d: Vec3) -> Vec3 {
+    vec3(-d.x, d.y, -d.z)
+}
+
+/// The point of the disc of radius 1, x right and y up.
+fn disc(uv: Vec2) -> Vec2 {
+    vec2(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y)
+}
+
+fn disc_uv(p: Vec2) -> Vec2 {
+    vec2(0.5 + 0.5 * p.x, 0.5 - 0.5 * p.y)
+}
+
+/// θ = π r is the angle to −Z.
+fn angular_direction(uv: Vec2) -> Option<Vec3> {
+    let p = disc(uv);
+    let r = p.length();
+    let (sin_theta, cos_theta) = (PI * r).sin_cos();
+    let xy = p.normalize_or_zero() * sin_theta;
+    (r <= 1.0).then(|| vec3(xy.x, xy.y, -cos_theta))
+}
+
+fn angular_uv(d: Vec3) -> Vec2 {
+    let xy = vec2(d.x, d.y);
+    let r = xy.length().atan2(-d.z) / PI;
+    // Straight backward every azimuth is right; take the rightmost point.
+    let azimuth = xy.try_normalize().unwrap_or(Vec2::X);
+    disc_uv(azimuth * r)
+}
+
+/// The direction to the viewer, −Z, mirrored about the normal (−x, y, −√(1−r²)) of the ball.
+fn mirror_ball_direction(uv: Vec2) -> Option<Vec3> {
+    let p = disc(uv);
+    let r2 = p.length_squared();
+    let towards = 2.0 * (1.0 - r2).max(0.0).sqrt();
+    (r2 <= 1.0).then(|| vec3(-p.x * towards, p.y * towards, 2.0 * r2 - 1.0))
+}
+
+/// r = sin(θ/2) with θ the angle to −Z.
+fn mirror_ball_uv(d: Vec3) -> Vec2 {
+    let xy = vec2(-d.x, d.y);
+    let r = (0.5 * xy.length().atan2(-d.z)).sin();
+    disc_uv(xy.try_normalize().unwrap_or(Vec2::X) * r)
+}
+
+/// Clarberg 2008; pbrt-v4 `EqualAreaSquareToSphere`, whose (x, y, z) is our (z, −x, y).
+fn octahedral_direction(uv: Vec2) -> Vec3 {
+    let p = 2.0 * uv - Vec2::ONE;
+    let q = p.abs();
+    // Radius r as the distance from the square's outline, folded at the inner diamond.
+    let signed_distance = 1.0 - (q.x + q.y);
+    let r = 1.0 - signed_distance.abs();
+    let phi = if r == 0.0 { 0.25 * PI } else { ((q.y - q.x) / r + 1.0) * 0.25 * PI };
+    let up = (1.0 - sqr(r)).copysign(signed_distance);
+    let across = r * (2.0 - sqr(r)).max(0.0).sqrt();
+    let (sin_phi, cos_phi) = phi.sin_cos();
+    vec3(-(sin_phi * across).copysign(p.y), up, (cos_phi * across).copysign(p.x))
+}
+
+fn octahedral_uv(d: Vec3) -> Vec2 {
+    let (x, y, z) = (d.z, -d.x, d.y);
+    let across = sqr(x) + sqr(y);
+    // r = √(1 − |z|), written so that it does not cancel near the poles.
+    let r = (across / (1.0 + z.abs())).sqrt();
+    let phi = if across == 0.0 { 0.5 } else { y.abs().atan2(x.abs()) * (2.0 / PI) };
+    let folded = vec2(r - phi * r, phi * r);
+    let unfolded = if z < 0.0 { vec2(1.0 - folded.y, 1.0 - folded.x) } else { folded };
+    0.5 * vec2(unfolded.x.copysign(x), unfolded.y.copysign(y)) + Vec2::splat(0.5)
+}
+
+/// One face as seen from inside: where it looks, what is up in its picture, and its cell.
+struct Face {
+    forward: Vec3,
+    up: Vec3,
+    right: Vec3,
+    column: usize,
+    row: usize,
+}
+
+struct Cube {
+    columns: usize,
+    rows: usize,
+    /// Those that look toward +X, −X, +Y, −Y, +Z, −Z.
+    faces: [Face; 6],
+}
+
+const fn face(forward: Vec3, up: Vec3, right: Vec3, column: usize, row: usize) -> Face {
+    Face { forward, up, right, column, row }
+}
+
+const X: Vec3 = Vec3::X;
+const Y: Vec3 = Vec3::Y;
+const Z: Vec3 = Vec3::Z;
+const NX: Vec3 = Vec3::NEG_X;
+const NY: Vec3 = Vec3::NEG_Y;
+const NZ: Vec3 = Vec3::NEG_Z;
+
+const CROSS_HORIZONTAL: Cube = Cube {
+    columns: 4,
+    rows: 3,
+    faces: [
+        face(X, Y, Z, 2, 1),
+        face(NX, Y, NZ, 0, 1),
+        face(Y, Z, X, 1, 0),
+        face(NY, NZ, X, 1, 2),
+        face(Z, Y, NX, 3, 1),
+        face(NZ, Y, X, 1, 1),
+    ],
+};
+
+const CROSS_VERTICAL: Cube = Cube {
+    columns: 3,
+    rows: 4,
+    faces: [
+        face(X, Y, Z, 2, 1),
+        face(NX, Y, NZ, 0, 1),
+        face(Y, Z, X, 1, 0),
+        face(NY, NZ, X, 1, 2),
+        face(Z, NY, X, 1, 3),
+        face(NZ, Y, X, 1, 1),
+    ],
+};
+
+const STRIP_HORIZONTAL: Cube = Cube {
+    columns: 6,
+    rows: 1,
+    faces: [
+        face(X, Y, Z, 0, 0),
+        face(NX, Y, NZ, 1, 0),
+        face(Y, Z, X, 2, 0),
+        face(NY, NZ, X, 3, 0),
+        face(Z, Y, NX, 4, 0),
+        face(NZ, Y, X, 5, 0),
+    ],
+};
+
+const STRIP_VERTICAL: Cube = Cube {
+    columns: 1,
+    rows: 6,
+    faces: [
+        face(X, Y, Z, 0, 0),
+        face(NX, Y, NZ, 0, 1),
+        face(Y, Z, X, 0, 2),
+        face(NY, NZ, X, 0, 3),
+        face(Z, Y, NX, 0, 4),
+        face(NZ, Y, X, 0, 5),
+    ],
+};
+
+impl Cube {
+    fn direction(&self, uv: Vec2) -> Option<Vec3> {
+        let cell = uv * vec2(self.columns as f32, self.rows as f32);
+        let column = (cell.x as usize).min(self.columns - 1);
+        let row = (cell.y as usize).min(self.rows - 1);
+        let face = self.faces.iter().find(|face| (face.column, face.row) == (column, row))?;
+        let s = 2.0 * (cell.x - column as f32) - 1.0;
+        let t = 1.0 - 2.0 * (cell.y - row as f32);
+        Some((face.forward + s * face.right + t * face.up).normalize())
+    }
+
+    fn uv(&self, d: Vec3) -> Vec2 {
+        let axis = d.abs().max_position();
+        let depth = d[axis].abs();
+        let face = &self.faces[2 * axis + usize::from(d[axis] < 0.0)];
+        let (s, t) = (d.dot(face.right) / depth, d.dot(face.up) / depth);
+        let x = face.column as f32 + (0.5 + 0.5 * s).clamp(0.0, 1.0);
+        let y = face.row as f32 + (0.5 - 0.5 * t).clamp(0.0, 1.0);
+        vec2(x / self.columns as f32, y / self.rows as f32)
+    }
+}
+
+/// The lat-long map of `2 · height` × `height` texels of what `image` shows in `mapping`.
+///
+/// Each texel is the mean of the source over its solid angle. A lat-long map that has `height` rows already is
+/// returned bit for bit, and so is OpenEXR's, turned by half its (even) width. [`Mapping::lat_long_height`] gives
+/// the height that keeps all detail. The same bits for any number of threads.
+///
+/// # Panics
+/// If the picture has no texels or `height` is zero.
+pub fn to_lat_long(image: &RgbImage, mapping: Mapping, height: usize) -> RgbImage {
+    assert!(image.width > 0 && image.height > 0 && height > 0, "an empty map");
+    if mapping == Mapping::LatLong && image.height == height {
+        return image.clone();
+    }
+    if mapping == Mapping::LatLongExr && image.height == height && image.width.is_multiple_of(2) {
+        return turned_by_half(image);
+    }
+    let width = 2 * height;
+    let longitudes = [COARSE, FINE].map(|n| sines_of_columns(width, n));
+    by_rows(width, height, |y, row| {
+        let rings = [COARSE, FINE].map(|n| rings_of_row(y, height, n));
+        for (x, texel) in row.iter_mut().enumerate() {
+            let samples = |n: usize| {
+                let (rings, longitudes) =
+                    (&rings[usize::from(n == FINE)], &longitudes[usize::from(n == FINE)]);
+                (0..n * n).map(move |i| {
+                    let (sin_theta, cos_theta) = rings[i / n];
+                    let (sin_phi, cos_phi) = longitudes[x * n + i % n];
+                    let d = vec3(sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta);
+                    (nearest(image, mapping.uv(d)), 1.0)
+                })
+            };
+            *texel = Samples::adaptive(samples).mean();
+        }
+    })
+}
+
+/// What a lat-long map shows, as a picture of `size` (width, height) in `mapping`; black where the picture shows
+/// no direction.
+///
+/// Each texel is the mean of the map over the texel's solid angle. [`Mapping::size_for`] gives the size that keeps
+/// all detail. The same bits for any number of threads.
+///
+/// # Panics
+/// If the map or the size is empty.
+pub fn from_lat_long(image: &RgbImage, mapping: Mapping, size: (usize, usize)) -> RgbImage {
+    let (width, height) = size;
+    assert!(image.width > 0 && image.height > 0 && width > 0 && height > 0, "an empty map");
+    if mapping == Mapping::LatLong && (image.width, image.height) == size {
+        return image.clone();
+    }
+    let turned = mapping == Mapping::LatLongExr && (image.width, image.height) == size;
+    if turned && width.is_multiple_of(2) {
+        return turned_by_half(image);
+    }
+    let samples = |x: usize, y: usize, n: usize| {
+        (0..n * n).filter_map(move |i| {
+            let u = (x as f32 + ((i % n) as f32 + 0.5) / n as f32) / width as f32;
+            let v = (y as f32 + ((i / n) as f32 + 0.5) / n as f32) / height as f32;
+            let d = mapping.direction(vec2(u, v))?;
+            Some((nearest(image, lat_long_uv(d)), mapping.density_at(vec2(u, v), d)))
+        })
+    };
+    by_rows(width, height, |y, row| {
+        for (x, texel) in row.iter_mut().enumerate() {
+            *texel = Samples::adaptive(|n| samples(x, y, n)).mean();
+        }
+    })
+}
+
+/// Subsamples along each side of a texel, and of a texel in which they show the edge of a light.
+const COARSE: usize = 4;
+const FINE: usize = 32;
+
+/// A weighted mean, and the least and greatest value in it.
+struct Samples {
+    sum: Rgb,
+    weight: f32,
+    least: f32,
+    greatest: f32,
+}
+
+impl Samples {
+    fn collect(samples: impl Iterator<Item = (Rgb, f32)>) -> Self {
+        let mut all = Self { sum: Rgb::BLACK, weight: 0.0, least: f32::INFINITY, greatest: 0.0 };
+        for (value, weight) in samples {
+            all.sum += value * weight;
+            all.weight += weight;
+            all.least = all.least.min(value.max_component());
+            all.greatest = all.greatest.max(value.max_component());
+        }
+        all
+    }
+
+    /// From a coarse grid; from a fine one where the coarse one has found the edge of a light, so that a small sun
+    /// keeps its energy.
+    fn adaptive<I: Iterator<Item = (Rgb, f32)>>(grid: impl Fn(usize) -> I) -> Self {
+        let coarse = Self::collect(grid(COARSE));
+        let is_edge = coarse.greatest > 8.0 * coarse.least;
+        if is_edge { Self::collect(grid(FINE)) } else { coarse }
+    }
+
+    fn mean(&self) -> Rgb {
+        if self.weight > 0.0 { self.sum / self.weight } else { Rgb::BLACK }
+    }
+}
+
+/// (sin φ, cos φ) of `n` longitudes in each column.
+fn sines_of_columns(width: usize, n: usize) -> Vec<(f32, f32)> {
+    let columns = width * n;
+    let phi = |i: usize| TAU * ((i as f32 + 0.5) / columns as f32 - 0.5);
+    (0..columns).map(|i| phi(i).sin_cos()).collect()
+}
+
+/// (sin θ, cos θ) of `n` rings of equal solid angle in row `y`.
+fn rings_of_row(y: usize, height: usize, n: usize) -> Vec<(f32, f32)> {
+    let cos_at = |row: usize| (std::f64::consts::PI * row as f64 / height as f64).cos();
+    let (top, bottom) = (cos_at(y), cos_at(y + 1));
+    let ring = |i: usize| {
+        let cos_theta = top + (bottom - top) * ((i as f64 + 0.5) / n as f64);
+        ((1.0 - cos_theta * cos_theta).max(0.0).sqrt() as f32, cos_theta as f32)
+    };
+    (0..n).map(ring).collect()
+}
+
+fn nearest(image: &RgbImage, uv: Vec2) -> Rgb {
+    let x = ((uv.x * image.width as f32) as usize).min(image.width - 1);
+    let y = ((uv.y * image.height as f32) as usize).min(image.height - 1);
+    image.pixels[y * image.width + x]
+}
+
+fn turned_by_half(image: &RgbImage) -> RgbImage {
+    let mut turned = image.clone();
+    turned.pixels.chunks_exact_mut(image.width).for_each(|row| row.rotate_left(image.width / 2));
+    turned
+}
+
+/// A picture whose rows are filled independently of each other, in parallel where threads are compiled in.
+fn by_rows(width: usize, height: usize, fill: impl Fn(usize, &mut [Rgb]) + Sync) -> RgbImage {
+    let mut pixels = vec![Rgb::BLACK; width * height];
+    #[cfg(feature = "render")]
+    {
+        use rayon::prelude::*;
+        pixels.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| fill(y, row));
+    }
+    #[cfg(not(feature = "render"))]
+    pixels.chunks_exact_mut(width).enumerate().for_each(|(y, row)| fill(y, row));
+    RgbImage::new(width, height, pixels)
+}

@@ -5,8 +5,12 @@
 //! the seam and beside the sun. (A bilinear look-up over this table would lose up to 43.75 % of a
 //! single bright texel's light, for the table is zero where the interpolant is not.)
 
+pub mod builtin;
 mod compensation;
+#[cfg(feature = "io")]
+pub mod io;
 pub mod mapping;
+pub mod statistics;
 
 pub use compensation::CompensatedTable;
 

@@ -1,1 +1,140 @@
-//! Pictures on disk: readers, writers, tone curves, comparison.
+//! Pictures in files: Radiance `.hdr`, OpenEXR, `.pfm`, PNG; and what a tone curve makes of them.
+//!
+//! The format is told from the first bytes, never from the name. What comes out is linear Rec. 709, top row first.
+//! A header that promises more texels than its file can hold is refused before memory is taken for them; truncated
+//! and corrupt files give a [`PictureError`] that names file, place and value.
+//!
+//! Writers make bytes ([`hdr::encode`], [`exr::ExrLayers::encode`], [`pfm::encode`], [`png::encode`]);
+//! [`write_atomically`] puts them into a file that is either the old one or the whole new one.
+
+pub mod compare;
+mod error;
+pub mod exr;
+pub mod flip;
+pub mod hdr;
+mod output;
+pub mod pfm;
+pub mod png;
+mod primaries;
+pub mod tone;
+
+pub use error::{PictureError, Problem};
+pub use output::write_atomically;
+
+use crate::RgbImage;
+use crate::environment::mapping::EnvmapKind;
+use std::io::Read;
+use std::path::Path;
+
+/// No picture with more texels than this is read (2²⁹: 32768 × 16384).
+pub const MAX_TEXELS: usize = 1 << 29;
+
+/// The file formats that [`read`] understands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Radiance RGBE or XYZE.
+    Hdr,
+    /// OpenEXR.
+    Exr,
+    /// Portable float map.
+    Pfm,
+    /// PNG, taken as sRGB.
+    Png,
+}
+
+/// A picture as read from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Linear Rec. 709. Where there is alpha, premultiplied by it.
+    pub image: RgbImage,
+    /// Coverage in \[0, 1\], a value a texel, if the file has it.
+    pub alpha: Option<Vec<f32>>,
+    /// What OpenEXR's `envmap` attribute says.
+    pub envmap: Option<EnvmapKind>,
+    /// The format it was read from.
+    pub format: Format,
+}
+
+impl Picture {
+    fn opaque(image: RgbImage, format: Format) -> Self {
+        Self { image, alpha: None, envmap: None, format }
+    }
+}
+
+/// What to take from a file that holds several pictures.
+#[derive(Clone, Debug, Default)]
+pub struct ReadOptions {
+    /// The OpenEXR layer; by default the unnamed R, G, B channels, else the first layer that has them.
+    pub layer: Option<String>,
+}
+
+/// The picture in a file, or on standard input if `path` is `-`.
+///
+/// # Errors
+/// If the file cannot be read or is not a whole, valid picture in one of the known formats.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Picture, PictureError> {
+    let name = display_name(path);
+    let bytes = read_all(path).map_err(|error| Problem::Io(error).in_file(&name))?;
+    read_bytes(&bytes, &name, options)
+}
+
+/// The picture in `bytes`; `name` is for messages.
+///
+/// # Errors
+/// If the bytes are not a whole, valid picture in one of the known formats.
+pub fn read_bytes(
+    bytes: &[u8],
+    name: &str,
+    options: &ReadOptions,
+) -> Result<Picture, PictureError> {
+    let decoded = match format_of(bytes) {
+        Some(Format::Hdr) => hdr::decode(bytes).map(|image| Picture::opaque(image, Format::Hdr)),
+        Some(Format::Exr) => exr::decode(bytes, options.layer.as_deref()),
+        Some(Format::Pfm) => pfm::decode(bytes).map(|image| Picture::opaque(image, Format::Pfm)),
+        Some(Format::Png) => png::decode(bytes),
+        None => Err(Problem::UnknownFormat { start: bytes[..bytes.len().min(8)].to_vec() }),
+    };
+    decoded.map_err(|problem| problem.in_file(name))
+}
+
+/// The format that the first bytes promise.
+pub fn format_of(bytes: &[u8]) -> Option<Format> {
+    match bytes {
+        [b'#', b'?', ..] => Some(Format::Hdr),
+        [0x76, 0x2f, 0x31, 0x01, ..] => Some(Format::Exr),
+        [b'P', b'F' | b'f', b' ' | b'\t' | b'\r' | b'\n', ..] => Some(Format::Pfm),
+        [0x89, b'P', b'N', b'G', ..] => Some(Format::Png),
+        _ => None,
+    }
+}
+
+fn display_name(path: &Path) -> String {
+    if path == Path::new("-") { "standard input".into() } else { path.display().to_string() }
+}
+
+fn read_all(path: &Path) -> std::io::Result<Vec<u8>> {
+    if path != Path::new("-") {
+        return std::fs::read(path);
+    }
+    let mut bytes = Vec::new();
+    std::io::stdin().lock().read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The number of texels of a size that is neither empty nor beyond [`MAX_TEXELS`].
+fn checked_area(width: usize, height: usize) -> Result<usize, Problem> {
+    match width.checked_mul(height) {
+        Some(0) => Err(Problem::Empty { width, height }),
+        Some(area) if area <= MAX_TEXELS => Ok(area),
+        _ => Err(Problem::TooLarge { width, height }),
+    }
+}
+
+/// `n` copies of `value`, or an error where the memory is not there.
+fn allocate<T: Clone>(value: T, width: usize, height: usize) -> Result<Vec<T>, Problem> {
+    let n = width * height;
+    let mut values = Vec::new();
+    values.try_reserve_exact(n).map_err(|_| Problem::TooLarge { width, height })?;
+    values.resize(n, value);
+    Ok(values)
+}

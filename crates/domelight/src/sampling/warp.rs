@@ -1,1 +1,119 @@
-//! stub
+//! Warps of the unit square onto the disk, the sphere and the hemisphere, each beside its density.
+//!
+//! All take `u` in [0, 1)²; the hemisphere is z > 0. Cosine-weighted directions go through the
+//! concentric map of Shirley & Chiu 1997 ("A Low Distortion Map Between Disk and Square"), which
+//! keeps the stratification of `u` and needs one sine and cosine; the polar map √u has the same
+//! density and distorts more.
+
+use crate::math::{FRAC_1_4PI, FRAC_1_PI, PI, TAU, Vec2, Vec3, from_spherical, vec2};
+
+/// Uniform over the unit disk: density 1/π.
+pub fn concentric_disk(u: Vec2) -> Vec2 {
+    let p = 2.0 * u - Vec2::ONE;
+    if p == Vec2::ZERO {
+        return p;
+    }
+    let (radius, phi) = if p.x.abs() > p.y.abs() {
+        (p.x, 0.25 * PI * (p.y / p.x))
+    } else {
+        (p.y, 0.5 * PI - 0.25 * PI * (p.x / p.y))
+    };
+    let (sin, cos) = phi.sin_cos();
+    radius * vec2(cos, sin)
+}
+
+/// Cosine-weighted over the hemisphere: density [`cosine_hemisphere_pdf`] (Malley's method).
+pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
+    let d = concentric_disk(u);
+    d.extend((1.0 - d.length_squared()).max(0.0).sqrt())
+}
+
+/// cos θ / π \[sr⁻¹\], zero below the horizon.
+pub fn cosine_hemisphere_pdf(cos_theta: f32) -> f32 {
+    cos_theta.max(0.0) * FRAC_1_PI
+}
+
+/// Uniform over the hemisphere: density 1/(2π) \[sr⁻¹\].
+pub fn uniform_hemisphere(u: Vec2) -> Vec3 {
+    from_spherical(1.0 - u.x, TAU * u.y)
+}
+
+/// 1/(2π) \[sr⁻¹\] above the horizon, zero below.
+pub fn uniform_hemisphere_pdf(cos_theta: f32) -> f32 {
+    if cos_theta > 0.0 { 0.5 * FRAC_1_PI } else { 0.0 }
+}
+
+/// Uniform over the sphere: density 1/(4π) \[sr⁻¹\].
+pub fn uniform_sphere(u: Vec2) -> Vec3 {
+    from_spherical(1.0 - 2.0 * u.x, TAU * u.y)
+}
+
+/// 1/(4π) \[sr⁻¹\].
+pub fn uniform_sphere_pdf() -> f32 {
+    FRAC_1_4PI
+}
+
+/// A power-of-cosine lobe about +z: density [`phong_lobe_pdf`]; `exponent` ≥ 0.
+///
+/// 1 − cos θ is computed by itself, so that a narrow lobe keeps its shape in f32.
+pub fn phong_lobe(u: Vec2, exponent: f32) -> Vec3 {
+    // cos θ = (1 − u)^(1/(n + 1))
+    let versine = -f32::exp_m1(f32::ln_1p(-u.x) / (exponent + 1.0));
+    let sin_theta = (versine * (2.0 - versine)).max(0.0).sqrt();
+    let (sin_phi, cos_phi) = (TAU * u.y).sin_cos();
+    Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, 1.0 - versine)
+}
+
+/// (n + 1)/(2π) cosⁿ θ \[sr⁻¹\], zero below the horizon.
+pub fn phong_lobe_pdf(cos_theta: f32, exponent: f32) -> f32 {
+    if cos_theta > 0.0 { (exponent + 1.0) / TAU * cos_theta.powf(exponent) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use testkit::Chi2;
+
+    /// Runs the χ² test of a warp onto the sphere.
+    fn check(name: &str, cells: [usize; 2], warp: impl Fn(Vec2) -> Vec3, pdf: impl Fn(f32) -> f32) {
+        let test = Chi2 { cells, ..Chi2::in_suite_of(7) };
+        let sampler = |u: [f32; 2], _| Some(warp(Vec2::from(u)).to_array());
+        test.sphere(name, sampler, |w| f64::from(pdf(w[2]))).unwrap();
+    }
+
+    #[test]
+    fn warps_follow_their_densities() {
+        check("cosine hemisphere", [31, 61], cosine_hemisphere, cosine_hemisphere_pdf);
+        check("uniform hemisphere", [31, 61], uniform_hemisphere, uniform_hemisphere_pdf);
+        check("uniform sphere", [31, 61], uniform_sphere, |_| uniform_sphere_pdf());
+        for n in [0.0, 1.0, 20.0] {
+            let name = format!("phong lobe {n}");
+            check(&name, [101, 31], |u| phong_lobe(u, n), |z| phong_lobe_pdf(z, n));
+        }
+    }
+
+    #[test]
+    fn the_disk_is_uniform() {
+        let unit = |p: Vec2| (0.5 * p + Vec2::splat(0.5)).to_array();
+        let sampler = |u: [f32; 2], _| Some(unit(concentric_disk(Vec2::from(u))));
+        let inside = |p: [f32; 2]| {
+            let p = 2.0 * Vec2::from(p) - Vec2::ONE;
+            // A hair wider than the disk, for points rounded onto its edge.
+            if p.length_squared() <= 1.000_001 { f64::from(4.0 * FRAC_1_PI) } else { 0.0 }
+        };
+        Chi2::in_suite_of(7).square("disk", sampler, inside).unwrap();
+    }
+
+    #[test]
+    fn corners_of_the_square_are_harmless() {
+        let last = 1.0 - f32::EPSILON / 2.0;
+        for u in
+            [vec2(0.0, 0.0), vec2(last, 0.0), vec2(0.0, last), vec2(last, last), vec2(0.5, 0.5)]
+        {
+            let phong = phong_lobe(u, 1e5);
+            for w in [cosine_hemisphere(u), uniform_hemisphere(u), uniform_sphere(u), phong] {
+                assert!((w.length() - 1.0).abs() < 1e-6, "{u} {w}");
+            }
+        }
+    }
+}

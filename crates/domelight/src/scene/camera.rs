@@ -83,9 +83,9 @@ pub enum CameraError {
     #[error("a picture of {width} x {height} has no pixels")]
     Size {
         /// Its width.
-        width: u32,
+        width: usize,
         /// Its height.
-        height: u32,
+        height: usize,
     },
 }
 
@@ -123,6 +123,14 @@ impl CameraSettings {
         }
     }
 
+    /// Checks that the settings make a picture.
+    ///
+    /// # Errors
+    /// The [`CameraError`] that says which one does not.
+    pub fn check(&self) -> Result<(), CameraError> {
+        basis(self).and(half_height(self.projection)).map(|_| ())
+    }
+
     /// Moves the camera by an affine matrix; an orthographic height grows with its scale.
     pub fn transform(&mut self, m: &Mat4) {
         self.origin = m.transform_point3(self.origin);
@@ -145,6 +153,8 @@ pub struct Camera {
     step_x: Vec3,
     /// One pixel down.
     step_y: Vec3,
+    /// The camera's axis through its place, to measure depth along.
+    axis: Ray,
     orthographic: bool,
 }
 
@@ -153,7 +163,7 @@ impl Camera {
     ///
     /// # Errors
     /// The [`CameraError`] that says which setting makes no picture.
-    pub fn new(settings: &CameraSettings, width: u32, height: u32) -> Result<Self, CameraError> {
+    pub fn new(settings: &CameraSettings, width: usize, height: usize) -> Result<Self, CameraError> {
         if width == 0 || height == 0 {
             return Err(CameraError::Size { width, height });
         }
@@ -164,12 +174,14 @@ impl Camera {
         let step_x = half_right * (2.0 / width as f32);
         let step_y = half_up * (-2.0 / height as f32);
         let corner = half_up - half_right;
+        let axis = Ray::new(settings.origin, forward);
         Ok(match settings.projection {
             Projection::Perspective { .. } => Self {
                 origin: settings.origin,
                 direction: forward + corner,
                 step_x,
                 step_y,
+                axis,
                 orthographic: false,
             },
             Projection::Orthographic { .. } => Self {
@@ -177,6 +189,7 @@ impl Camera {
                 direction: forward,
                 step_x,
                 step_y,
+                axis,
                 orthographic: true,
             },
         })
@@ -192,6 +205,11 @@ impl Camera {
         } else {
             Ray::new(self.origin, (self.direction + step).normalize())
         }
+    }
+
+    /// The distance of a point from the plane through the camera's place, across its axis.
+    pub fn depth(&self, point: Vec3) -> f32 {
+        (point - self.axis.origin).dot(self.axis.direction)
     }
 }
 

@@ -6,7 +6,7 @@ use super::camera::CameraSettings;
 use super::surface::Surface;
 use super::texture::Texture;
 use crate::geometry::{Aabb, Mesh};
-use crate::math::Mat4;
+use crate::math::{Mat4, Vec3};
 
 /// A scene as loaders and built-in scenes give it; [`Scene::new`](super::Scene::new) checks it.
 #[derive(Clone, Debug, Default)]
@@ -47,6 +47,16 @@ pub enum UpAxis {
     Y,
     /// +Z.
     Z,
+}
+
+impl UpAxis {
+    /// The axis as a unit vector.
+    pub const fn direction(self) -> Vec3 {
+        match self {
+            Self::Y => Vec3::Y,
+            Self::Z => Vec3::Z,
+        }
+    }
 }
 
 /// The light around a scene.

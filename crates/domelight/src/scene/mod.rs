@@ -1,19 +1,22 @@
 //! Scenes: meshes, what they are made of, and the camera; built in code or loaded from files.
 //!
 //! A loader or a built-in scene gives a [`SceneDescription`]; [`Scene::new`] checks it and builds
-//! the ray-tracing hierarchy; after that nothing fails. [`Scene::surface_point`] turns a hit into
+//! the ray-tracing hierarchy; after that nothing fails. [`Scene::shading_point`] turns a hit into
 //! all that shading needs.
 
 pub mod builtin;
 mod camera;
 mod description;
+#[cfg(feature = "io")]
+pub mod load;
 mod shading;
 mod surface;
 mod texture;
 
 pub use camera::{Camera, CameraError, CameraSettings, Projection};
 pub use description::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription, UpAxis};
-pub use shading::SurfacePoint;
+#[cfg(feature = "io")]
+pub use load::{LoadError, Loaded, load};
 pub use surface::{MetallicRoughnessSurface, NormalMap, PhongSurface, Surface, SurfaceModel};
 pub use texture::{Encoding, Texture, TextureError, TextureRef, UvTransform, Wrap};
 

@@ -6,41 +6,24 @@
 //!
 //! An interpolated or mapped normal may face away from the viewer although the surface does not.
 //! Such a normal is **bent toward the viewer** until `wo` lies just above the shading horizon:
-//! n' ∝ n − (n·wo − ε) wo, the least change that gives n'·wo ≥ ε. Black or untouched pixels along
-//! silhouettes would be the alternatives.
+//! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Black pixels
+//! along silhouettes would be the alternative.
 
 use super::{Part, Scene, Surface};
 use crate::Rgb;
-use crate::bsdf::Material;
 use crate::geometry::{Hit, Mesh, Ray};
 use crate::math::{Frame, Vec2, Vec3, Vec4};
+use crate::strategy::ShadingPoint;
 
 /// The least cosine between the shading normal and the direction to the viewer.
 const MIN_COS_THETA_O: f32 = 1e-3;
-
-/// A point on a surface, ready for shading.
-#[derive(Clone, Copy, Debug)]
-pub struct SurfacePoint {
-    /// In world space.
-    pub position: Vec3,
-    /// Geometric normal, a unit vector on the viewer's side.
-    pub ng: Vec3,
-    /// Shading frame, its z axis the shading normal on the viewer's side.
-    pub frame: Frame,
-    /// Toward the viewer, a unit vector in the shading frame with z > 0.
-    pub wo: Vec3,
-    /// What the surface is made of here.
-    pub material: Material,
-    /// The material's albedo, for previews and denoisers.
-    pub albedo: Rgb,
-}
 
 impl Scene {
     /// All that shading needs of a hit that [`Scene::bvh`] reported for `ray`.
     ///
     /// # Panics
     /// If `hit.triangle` is not one of this scene's.
-    pub fn surface_point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+    pub fn shading_point(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
         let (part, triangle) = self.locate(hit.triangle);
         let surface = &self.surfaces[part.surface];
         let corner = Corners::new(&part.mesh, triangle, hit);
@@ -60,10 +43,9 @@ impl Scene {
         );
         let wo = frame.to_local(viewer).normalize();
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
-        let material = surface.material(&self.textures, uv, tint);
-        let albedo = albedo(&material, wo);
+        let material = surface.material(&self.textures, uv, tint).for_view(wo);
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
-        SurfacePoint { position, ng, frame, wo, material, albedo }
+        ShadingPoint { position, ng, frame, wo, material }
     }
 
     /// The shading normal on the front side, the normal map applied, and the tangent.
@@ -88,20 +70,19 @@ impl Scene {
     }
 }
 
-/// The material's albedo seen from `wo`.
-fn albedo(material: &Material, _wo: Vec3) -> Rgb {
-    material.albedo()
-}
-
-/// `normal` bent toward `viewer` until their cosine is positive; see the [module](self).
+/// `normal` bent toward `viewer` until their cosine is [`MIN_COS_THETA_O`]; see the
+/// [module](self).
 #[inline]
 fn bend(normal: Vec3, viewer: Vec3, ng: Vec3) -> Vec3 {
     let cos_theta_o = normal.dot(viewer);
     if cos_theta_o >= MIN_COS_THETA_O {
         return normal;
     }
-    let raise = |n: Vec3| (n - (n.dot(viewer) - MIN_COS_THETA_O) * viewer).try_normalize();
-    raise(normal).filter(|n| n.dot(viewer) > 0.0).or_else(|| raise(ng)).unwrap_or(viewer)
+    let grazing = |n: Vec3| (n - n.dot(viewer) * viewer).try_normalize();
+    let horizon = (1.0 - MIN_COS_THETA_O * MIN_COS_THETA_O).sqrt();
+    grazing(normal)
+        .or_else(|| grazing(ng))
+        .map_or(viewer, |n| (horizon * n + MIN_COS_THETA_O * viewer).normalize())
 }
 
 /// The corners of the triangle that was hit, and their barycentric weights.
@@ -190,11 +171,11 @@ mod tests {
         Scene::new(description).unwrap()
     }
 
-    fn look(scene: &Scene, from: Vec3) -> SurfacePoint {
+    fn look(scene: &Scene, from: Vec3) -> ShadingPoint {
         let at = vec3(0.25, 0.25, 0.0);
         let ray = Ray::new(from, (at - from).normalize());
         let hit = scene.bvh().closest_hit(&ray).unwrap();
-        scene.surface_point(&ray, &hit)
+        scene.shading_point(&ray, &hit)
     }
 
     #[test]
@@ -209,7 +190,7 @@ mod tests {
             assert!(p.wo.z > 0.0);
             let toward = (vec3(0.5, 1.0, z) - p.position).normalize();
             assert!((p.frame.to_world(p.wo) - toward).length() < 1e-5);
-            assert_eq!(p.albedo, Rgb::splat(0.5));
+            assert_eq!(p.material.albedo(), Rgb::splat(0.5));
         }
     }
 
@@ -269,7 +250,7 @@ mod tests {
             p.diffuse_texture = Some(TextureRef::new(0));
         }
         let p = look(&Scene::new(description).unwrap(), vec3(0.25, 0.25, 3.0));
-        assert_eq!(p.albedo, Rgb::new(0.5, 0.25, 0.0));
+        assert_eq!(p.material.albedo(), Rgb::new(0.5, 0.25, 0.0));
     }
 
     #[test]

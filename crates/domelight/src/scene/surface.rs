@@ -6,7 +6,7 @@
 
 use super::texture::{Texture, TextureRef};
 use crate::Rgb;
-use crate::bsdf::{Lambert, Lobe, Material, Phong};
+use crate::bsdf::{Lambert, Material, MetallicRoughness, Phong};
 use crate::math::{Vec2, Vec3};
 
 /// What a part of a scene is made of.
@@ -121,7 +121,7 @@ impl Surface {
                 let base = m.base_color * look_up(&m.base_color_texture) * tint;
                 let factors = look_up(&m.metallic_roughness_texture);
                 let (metallic, roughness) = (m.metallic * factors.b, m.roughness * factors.g);
-                Material::metallic_roughness(base.map(unit), unit(metallic), unit(roughness))
+                Material::single(MetallicRoughness::new(base, metallic, roughness))
             }
         }
     }
@@ -161,11 +161,12 @@ fn unit(v: f32) -> f32 {
 }
 
 fn lambert_phong(diffuse: Rgb, specular: Rgb, exponent: f32) -> Material {
-    let lambert = Lobe::Lambert(Lambert::new(diffuse));
+    let lambert = Lambert::new(diffuse);
     let room = Rgb::WHITE - diffuse;
     let specular = Rgb::new(specular.r.min(room.r), specular.g.min(room.g), specular.b.min(room.b));
     if specular.is_black() {
-        return Material::new(&[lambert]);
+        return Material::single(lambert);
     }
-    Material::new(&[lambert, Lobe::Phong(Phong::new(specular, exponent))])
+    Material::new(&[lambert.into(), Phong::new(specular, exponent).into()])
+        .expect("a material holds two lobes")
 }

@@ -193,7 +193,7 @@ impl Texture {
 }
 
 /// IEC 61966-2-1 decoding, or none.
-fn decode(v: f32, encoding: Encoding) -> f32 {
+pub(crate) fn decode(v: f32, encoding: Encoding) -> f32 {
     match encoding {
         Encoding::Linear => v,
         Encoding::Srgb if v <= 0.04045 => v / 12.92,

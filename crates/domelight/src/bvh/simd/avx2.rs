@@ -3,12 +3,25 @@
 #![allow(clippy::wildcard_imports)] // The intrinsics' names are distinctive enough.
 
 use std::arch::x86_64::*;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-use super::{Kernel, Lanes, Simd};
+use super::{Floats, Kernel, Lanes, Mask, Sets, Simd};
 
 /// Exists only where the processor has AVX2 and the bit instructions that came with it.
 #[derive(Clone, Copy)]
 pub(super) struct Avx2(());
+
+/// Made only by an [`Avx2`], so it proves the same.
+#[derive(Clone, Copy)]
+pub(super) struct F32x8(__m256);
+
+/// Made only from a vector, so it proves the same; a lane has all bits set or none.
+#[derive(Clone, Copy)]
+pub(super) struct Mask8(__m256);
+
+/// Made only by an [`Avx2`], so it proves the same.
+#[derive(Clone, Copy)]
+pub(super) struct Sets8(__m256i);
 
 impl Avx2 {
     #[inline]
@@ -32,115 +45,116 @@ impl Avx2 {
     }
 }
 
-// Each block below calls intrinsics that need AVX or AVX2, which `self` proves.
 impl Simd for Avx2 {
-    type F = __m256;
-    type M = __m256;
-    type B = __m256i;
+    type Floats = F32x8;
+    type Sets = Sets8;
 
     #[inline(always)]
-    fn splat(self, x: f32) -> __m256 {
+    fn splat(self, x: f32) -> F32x8 {
         // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_set1_ps(x) }
+        F32x8(unsafe { _mm256_set1_ps(x) })
     }
     #[inline(always)]
-    fn load(self, x: &Lanes) -> __m256 {
+    fn load(self, x: &Lanes) -> F32x8 {
         // SAFETY: `self` proves AVX2; `x` is 8 readable f32, and the load needs no alignment.
-        unsafe { _mm256_loadu_ps(x.as_ptr()) }
+        F32x8(unsafe { _mm256_loadu_ps(x.as_ptr()) })
     }
     #[inline(always)]
-    fn store(self, x: __m256) -> Lanes {
+    fn empty(self) -> Sets8 {
+        // SAFETY: `self` proves AVX2.
+        Sets8(unsafe { _mm256_setzero_si256() })
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $method:ident, $type:ident, $intrinsic:ident) => {
+        impl $trait for $type {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, b: Self) -> Self {
+                // SAFETY: `self` proves AVX2.
+                Self(unsafe { $intrinsic(self.0, b.0) })
+            }
+        }
+    };
+}
+operator!(Add, add, F32x8, _mm256_add_ps);
+operator!(Sub, sub, F32x8, _mm256_sub_ps);
+operator!(Mul, mul, F32x8, _mm256_mul_ps);
+operator!(Div, div, F32x8, _mm256_div_ps);
+operator!(BitAnd, bitand, Mask8, _mm256_and_ps);
+operator!(BitOr, bitor, Mask8, _mm256_or_ps);
+
+impl Floats for F32x8 {
+    type Mask = Mask8;
+
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        // SAFETY: `self` proves AVX2.
+        Self(unsafe { _mm256_min_ps(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn max(self, b: Self) -> Self {
+        // SAFETY: `self` proves AVX2.
+        Self(unsafe { _mm256_max_ps(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn le(self, b: Self) -> Mask8 {
+        // SAFETY: `self` proves AVX2.
+        Mask8(unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn lt(self, b: Self) -> Mask8 {
+        // SAFETY: `self` proves AVX2.
+        Mask8(unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn eq(self, b: Self) -> Mask8 {
+        // SAFETY: `self` proves AVX2.
+        Mask8(unsafe { _mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn store(self) -> Lanes {
         let mut lanes = [0.0; 8];
         // SAFETY: `self` proves AVX2; `lanes` is 8 writable f32, and the store needs no alignment.
-        unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), x) };
+        unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), self.0) };
         lanes
     }
+}
+
+impl Mask for Mask8 {
     #[inline(always)]
-    fn add(self, a: __m256, b: __m256) -> __m256 {
+    fn bits(self) -> u32 {
         // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_add_ps(a, b) }
+        unsafe { _mm256_movemask_ps(self.0) as u32 }
     }
+}
+
+impl Sets for Sets8 {
+    type Mask = Mask8;
+
     #[inline(always)]
-    fn sub(self, a: __m256, b: __m256) -> __m256 {
+    fn insert(self, m: Mask8, bit: u32) -> Self {
         // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_sub_ps(a, b) }
-    }
-    #[inline(always)]
-    fn mul(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_mul_ps(a, b) }
-    }
-    #[inline(always)]
-    fn div(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_div_ps(a, b) }
-    }
-    #[inline(always)]
-    fn min(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_min_ps(a, b) }
-    }
-    #[inline(always)]
-    fn max(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_max_ps(a, b) }
-    }
-    #[inline(always)]
-    fn le(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(a, b) }
-    }
-    #[inline(always)]
-    fn lt(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(a, b) }
-    }
-    #[inline(always)]
-    fn eq(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_cmp_ps::<_CMP_EQ_OQ>(a, b) }
-    }
-    #[inline(always)]
-    fn and(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_and_ps(a, b) }
-    }
-    #[inline(always)]
-    fn or(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_or_ps(a, b) }
-    }
-    #[inline(always)]
-    fn bits(self, m: __m256) -> u32 {
-        // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_movemask_ps(m) as u32 }
-    }
-    #[inline(always)]
-    fn no_bits(self) -> __m256i {
-        // SAFETY: `self` proves AVX2.
-        unsafe { _mm256_setzero_si256() }
-    }
-    #[inline(always)]
-    fn insert(self, sets: __m256i, m: __m256, bit: u32) -> __m256i {
-        // SAFETY: `self` proves AVX2.
-        unsafe {
+        Self(unsafe {
             let bit = _mm256_set1_epi32(bit as i32);
-            _mm256_or_si256(sets, _mm256_and_si256(_mm256_castps_si256(m), bit))
-        }
+            _mm256_or_si256(self.0, _mm256_and_si256(_mm256_castps_si256(m.0), bit))
+        })
     }
     #[inline(always)]
-    fn store_bits(self, sets: __m256i) -> [u32; 8] {
-        let mut lanes = [0u32; 8];
-        // SAFETY: `self` proves AVX2; `lanes` is 32 writable bytes, the store needs no alignment.
-        unsafe { _mm256_storeu_si256(lanes.as_mut_ptr().cast(), sets) };
-        lanes
-    }
-    #[inline(always)]
-    fn not_empty(self, sets: __m256i) -> u32 {
+    fn not_empty(self) -> u32 {
         // SAFETY: `self` proves AVX2.
         unsafe {
-            let empty = _mm256_cmpeq_epi32(sets, _mm256_setzero_si256());
+            let empty = _mm256_cmpeq_epi32(self.0, _mm256_setzero_si256());
             !_mm256_movemask_ps(_mm256_castsi256_ps(empty)) as u32 & 0xff
         }
+    }
+    #[inline(always)]
+    fn store(self) -> [u32; 8] {
+        let mut lanes = [0; 8];
+        // SAFETY: `self` proves AVX2; `lanes` is 32 writable bytes, the store needs no alignment.
+        unsafe { _mm256_storeu_si256(lanes.as_mut_ptr().cast(), self.0) };
+        lanes
     }
 }

@@ -1,14 +1,17 @@
 //! Vectors of eight numbers on each instruction set: the only unsafe code of the library.
 //!
-//! A [`Kernel`] is written once over the operations of [`Simd`], each of which is one IEEE operation
-//! a lane. Nothing fuses or reorders them, so a kernel gives the same bits on every instruction set.
-//! [`dispatch`] compiles it for each and picks at run time, so that a portable binary traces as fast
-//! as one built for the machine. Another instruction set is one more file like `avx2.rs` and one more
-//! line in each function of [`InstructionSet`] and [`dispatch`]; two vectors of four make one of eight.
+//! A [`Kernel`] is written once over the vectors of a [`Simd`], whose operators are one IEEE
+//! operation a lane. Nothing fuses or reorders them, so a kernel gives the same bits on every
+//! instruction set. [`dispatch`] compiles it for each and picks at run time, so that a portable
+//! binary traces as fast as one built for the machine. Another instruction set is one more file like
+//! `avx2.rs` and one more line in [`InstructionSet`] and [`dispatch`]; two vectors of four, as of
+//! NEON, make one of eight.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod scalar;
+
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 use super::Lanes;
 
@@ -42,8 +45,10 @@ impl InstructionSet {
     }
 }
 
-/// Work to be compiled for each instruction set. `run` and all that it calls must be
-/// `#[inline(always)]`, or the compiler may leave them without the instructions.
+/// Work to be compiled for each instruction set.
+///
+/// `run` and all that handles vectors below it must be `#[inline(always)]` functions: what is not
+/// inlined lacks the instructions and is slow, as is a closure over vectors.
 pub(super) trait Kernel {
     type Output;
     fn run<S: Simd>(self, simd: S) -> Self::Output;
@@ -52,51 +57,63 @@ pub(super) trait Kernel {
 /// Runs the kernel with the given instructions, or the scalar ones if the processor lacks them.
 #[inline]
 pub(super) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) -> K::Output {
-    #[cfg(target_arch = "x86_64")]
-    if instruction_set == InstructionSet::Avx2
-        && let Some(simd) = avx2::Avx2::new()
-    {
-        return simd.run(kernel);
+    match instruction_set {
+        InstructionSet::Scalar => kernel.run(scalar::Scalar),
+        InstructionSet::Avx2 => {
+            #[cfg(target_arch = "x86_64")]
+            if let Some(simd) = avx2::Avx2::new() {
+                return simd.run(kernel);
+            }
+            kernel.run(scalar::Scalar)
+        }
     }
-    let _ = instruction_set;
-    kernel.run(scalar::Scalar)
 }
 
-/// Operations on eight lanes. A value of the type proves that the processor has the instructions.
+/// An instruction set. A value of it, and any vector made with one, proves that the processor has
+/// the instructions.
 pub(super) trait Simd: Copy {
-    /// Eight f32.
-    type F: Copy;
-    /// Eight truth values.
-    type M: Copy;
-    /// Eight sets of 32 bits.
-    type B: Copy;
+    type Floats: Floats;
+    type Sets: Sets<Mask = <Self::Floats as Floats>::Mask>;
 
-    fn splat(self, x: f32) -> Self::F;
-    fn load(self, x: &Lanes) -> Self::F;
-    fn store(self, x: Self::F) -> Lanes;
-    fn add(self, a: Self::F, b: Self::F) -> Self::F;
-    fn sub(self, a: Self::F, b: Self::F) -> Self::F;
-    fn mul(self, a: Self::F, b: Self::F) -> Self::F;
-    fn div(self, a: Self::F, b: Self::F) -> Self::F;
-    /// a < b ? a : b; so b if either is NaN.
-    fn min(self, a: Self::F, b: Self::F) -> Self::F;
-    /// a > b ? a : b; so b if either is NaN.
-    fn max(self, a: Self::F, b: Self::F) -> Self::F;
-    /// a ≤ b; false if either is NaN.
-    fn le(self, a: Self::F, b: Self::F) -> Self::M;
-    /// a < b; false if either is NaN.
-    fn lt(self, a: Self::F, b: Self::F) -> Self::M;
-    /// a = b; false if either is NaN.
-    fn eq(self, a: Self::F, b: Self::F) -> Self::M;
-    fn and(self, a: Self::M, b: Self::M) -> Self::M;
-    fn or(self, a: Self::M, b: Self::M) -> Self::M;
+    fn splat(self, x: f32) -> Self::Floats;
+    fn load(self, x: &Lanes) -> Self::Floats;
+    /// Eight empty sets.
+    fn empty(self) -> Self::Sets;
+}
+
+/// Eight f32.
+pub(super) trait Floats:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    type Mask: Mask;
+
+    /// self < b ? self : b; so b if either is NaN.
+    fn min(self, b: Self) -> Self;
+    /// self > b ? self : b; so b if either is NaN.
+    fn max(self, b: Self) -> Self;
+    /// self ≤ b; false if either is NaN.
+    fn le(self, b: Self) -> Self::Mask;
+    /// self < b; false if either is NaN.
+    fn lt(self, b: Self) -> Self::Mask;
+    /// self = b; false if either is NaN.
+    fn eq(self, b: Self) -> Self::Mask;
+    fn store(self) -> Lanes;
+}
+
+/// Eight truth values.
+pub(super) trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
     /// Bit i is lane i.
-    fn bits(self, m: Self::M) -> u32;
+    fn bits(self) -> u32;
+}
 
-    fn no_bits(self) -> Self::B;
-    /// Adds `bit` to the sets where `m` is true.
-    fn insert(self, sets: Self::B, m: Self::M, bit: u32) -> Self::B;
-    fn store_bits(self, sets: Self::B) -> [u32; 8];
+/// Eight sets of the numbers 0 to 31.
+pub(super) trait Sets: Copy {
+    type Mask;
+
+    /// Adds `bit` to the sets of the lanes in `m`.
+    #[must_use]
+    fn insert(self, m: Self::Mask, bit: u32) -> Self;
     /// Bit i: set i is not empty.
-    fn not_empty(self, sets: Self::B) -> u32;
+    fn not_empty(self) -> u32;
+    fn store(self) -> [u32; 8];
 }

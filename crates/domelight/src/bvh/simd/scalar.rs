@@ -1,91 +1,108 @@
 //! The reference: plain Rust, one lane after the other.
 
 use std::array::from_fn;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-use super::{Lanes, Simd};
+use super::{Floats, Lanes, Mask, Sets, Simd};
 
 #[derive(Clone, Copy)]
 pub(super) struct Scalar;
 
+#[derive(Clone, Copy)]
+pub(super) struct F32x8(Lanes);
+
+#[derive(Clone, Copy)]
+pub(super) struct Mask8([bool; 8]);
+
+#[derive(Clone, Copy)]
+pub(super) struct Sets8([u32; 8]);
+
 impl Simd for Scalar {
-    type F = Lanes;
-    type M = [bool; 8];
-    type B = [u32; 8];
+    type Floats = F32x8;
+    type Sets = Sets8;
 
     #[inline(always)]
-    fn splat(self, x: f32) -> Lanes {
-        [x; 8]
+    fn splat(self, x: f32) -> F32x8 {
+        F32x8([x; 8])
     }
     #[inline(always)]
-    fn load(self, x: &Lanes) -> Lanes {
-        *x
+    fn load(self, x: &Lanes) -> F32x8 {
+        F32x8(*x)
     }
     #[inline(always)]
-    fn store(self, x: Lanes) -> Lanes {
-        x
+    fn empty(self) -> Sets8 {
+        Sets8([0; 8])
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $method:ident, $type:ident, $op:tt) => {
+        impl $trait for $type {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, b: Self) -> Self {
+                Self(from_fn(|i| self.0[i] $op b.0[i]))
+            }
+        }
+    };
+}
+operator!(Add, add, F32x8, +);
+operator!(Sub, sub, F32x8, -);
+operator!(Mul, mul, F32x8, *);
+operator!(Div, div, F32x8, /);
+operator!(BitAnd, bitand, Mask8, &);
+operator!(BitOr, bitor, Mask8, |);
+
+impl Floats for F32x8 {
+    type Mask = Mask8;
+
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        Self(from_fn(|i| if self.0[i] < b.0[i] { self.0[i] } else { b.0[i] }))
     }
     #[inline(always)]
-    fn add(self, a: Lanes, b: Lanes) -> Lanes {
-        from_fn(|i| a[i] + b[i])
+    fn max(self, b: Self) -> Self {
+        Self(from_fn(|i| if self.0[i] > b.0[i] { self.0[i] } else { b.0[i] }))
     }
     #[inline(always)]
-    fn sub(self, a: Lanes, b: Lanes) -> Lanes {
-        from_fn(|i| a[i] - b[i])
+    fn le(self, b: Self) -> Mask8 {
+        Mask8(from_fn(|i| self.0[i] <= b.0[i]))
     }
     #[inline(always)]
-    fn mul(self, a: Lanes, b: Lanes) -> Lanes {
-        from_fn(|i| a[i] * b[i])
+    fn lt(self, b: Self) -> Mask8 {
+        Mask8(from_fn(|i| self.0[i] < b.0[i]))
     }
     #[inline(always)]
-    fn div(self, a: Lanes, b: Lanes) -> Lanes {
-        from_fn(|i| a[i] / b[i])
+    fn eq(self, b: Self) -> Mask8 {
+        Mask8(from_fn(|i| self.0[i] == b.0[i]))
     }
     #[inline(always)]
-    fn min(self, a: Lanes, b: Lanes) -> Lanes {
-        from_fn(|i| if a[i] < b[i] { a[i] } else { b[i] })
+    fn store(self) -> Lanes {
+        self.0
+    }
+}
+
+impl Mask for Mask8 {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        (0..8).fold(0, |bits, i| bits | u32::from(self.0[i]) << i)
+    }
+}
+
+impl Sets for Sets8 {
+    type Mask = Mask8;
+
+    #[inline(always)]
+    fn insert(self, m: Mask8, bit: u32) -> Self {
+        Self(from_fn(|i| if m.0[i] { self.0[i] | bit } else { self.0[i] }))
     }
     #[inline(always)]
-    fn max(self, a: Lanes, b: Lanes) -> Lanes {
-        from_fn(|i| if a[i] > b[i] { a[i] } else { b[i] })
+    fn not_empty(self) -> u32 {
+        (0..8).fold(0, |bits, i| bits | u32::from(self.0[i] != 0) << i)
     }
     #[inline(always)]
-    fn le(self, a: Lanes, b: Lanes) -> [bool; 8] {
-        from_fn(|i| a[i] <= b[i])
-    }
-    #[inline(always)]
-    fn lt(self, a: Lanes, b: Lanes) -> [bool; 8] {
-        from_fn(|i| a[i] < b[i])
-    }
-    #[inline(always)]
-    fn eq(self, a: Lanes, b: Lanes) -> [bool; 8] {
-        from_fn(|i| a[i] == b[i])
-    }
-    #[inline(always)]
-    fn and(self, a: [bool; 8], b: [bool; 8]) -> [bool; 8] {
-        from_fn(|i| a[i] & b[i])
-    }
-    #[inline(always)]
-    fn or(self, a: [bool; 8], b: [bool; 8]) -> [bool; 8] {
-        from_fn(|i| a[i] | b[i])
-    }
-    #[inline(always)]
-    fn bits(self, m: [bool; 8]) -> u32 {
-        (0..8).fold(0, |bits, i| bits | u32::from(m[i]) << i)
-    }
-    #[inline(always)]
-    fn no_bits(self) -> [u32; 8] {
-        [0; 8]
-    }
-    #[inline(always)]
-    fn insert(self, sets: [u32; 8], m: [bool; 8], bit: u32) -> [u32; 8] {
-        from_fn(|i| if m[i] { sets[i] | bit } else { sets[i] })
-    }
-    #[inline(always)]
-    fn store_bits(self, sets: [u32; 8]) -> [u32; 8] {
-        sets
-    }
-    #[inline(always)]
-    fn not_empty(self, sets: [u32; 8]) -> u32 {
-        (0..8).fold(0, |bits, i| bits | u32::from(sets[i] != 0) << i)
+    fn store(self) -> [u32; 8] {
+        self.0
     }
 }

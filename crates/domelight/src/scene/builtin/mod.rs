@@ -1,5 +1,215 @@
 //! Scenes made in code, for pictures and tests.
+//!
+//! Each shows what one question needs: self-shadowing, roughness, a material, or a plain sphere whose
+//! every normal is seen. They name no environment; [`BuiltinScene::probe`] says which built-in one suits.
 
+pub mod material_ball;
 pub mod shapes;
 pub mod statue;
 mod surface_nets;
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::camera::{CameraSettings, Projection};
+use super::description::{Part, SceneDescription, UpAxis};
+use super::surface::{MetallicRoughnessSurface, Surface, SurfaceModel};
+use crate::Rgb;
+use crate::geometry::Mesh;
+use crate::math::{Mat4, Vec3, vec3};
+
+/// Spheres in the row.
+const SPHERES: usize = 7;
+/// Radius of each.
+const SPHERE_RADIUS: f32 = 0.5;
+/// Distance between their centres.
+const SPHERE_SPACING: f32 = 1.12;
+/// Roughness of the first; the last has 1.
+const LEAST_ROUGHNESS: f32 = 0.1;
+/// Radius of the floors.
+const FLOOR_RADIUS: f32 = 12.0;
+
+/// A scene made in code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BuiltinScene {
+    /// A pierced, fluted sculpture on a plinth: strong shadows of itself.
+    Statue,
+    /// Seven metal spheres of rising roughness on a floor.
+    Spheres,
+    /// A grooved ball in a cradle: curvature, edges and contact shadows.
+    MaterialBall,
+    /// The unit sphere at the origin in perspective.
+    Sphere,
+    /// The unit sphere at the origin, filling an orthographic picture.
+    SphereOrthographic,
+}
+
+/// A name that is no built-in scene.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "no built-in scene is called {name:?}; there are statue, spheres, material-ball, sphere and \
+     sphere-orthographic"
+)]
+pub struct UnknownScene {
+    /// The name that was given.
+    pub name: String,
+}
+
+impl BuiltinScene {
+    /// All of them, in the order of their documentation.
+    pub const ALL: [Self; 5] =
+        [Self::Statue, Self::Spheres, Self::MaterialBall, Self::Sphere, Self::SphereOrthographic];
+
+    /// The name that [`FromStr`] reads.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Statue => "statue",
+            Self::Spheres => "spheres",
+            Self::MaterialBall => "material-ball",
+            Self::Sphere => "sphere",
+            Self::SphereOrthographic => "sphere-orthographic",
+        }
+    }
+
+    /// One line for a list of scenes.
+    pub const fn summary(self) -> &'static str {
+        match self {
+            Self::Statue => "pierced, fluted marble on a plinth, with strong shadows of itself",
+            Self::Spheres => "seven metal spheres of rising roughness on a floor",
+            Self::MaterialBall => "grooved ball in a cradle: curvature, edges, contact shadows",
+            Self::Sphere => "a single diffuse sphere in perspective",
+            Self::SphereOrthographic => "a single diffuse sphere that fills the picture",
+        }
+    }
+
+    /// The name of the built-in probe that suits it best.
+    pub const fn probe(self) -> &'static str {
+        match self {
+            Self::Statue => "sky",
+            Self::Spheres | Self::MaterialBall => "studio",
+            Self::Sphere | Self::SphereOrthographic => "cathedral",
+        }
+    }
+
+    /// The scene, with a camera for a square picture.
+    pub fn description(self) -> SceneDescription {
+        match self {
+            Self::Statue => statue_scene(),
+            Self::Spheres => spheres_scene(),
+            Self::MaterialBall => material_ball_scene(),
+            Self::Sphere => sphere_scene(camera(30.0, vec3(0.0, 0.0, 4.4), Vec3::ZERO)),
+            Self::SphereOrthographic => sphere_scene(CameraSettings {
+                projection: Projection::Orthographic { height: 2.0 },
+                origin: vec3(0.0, 0.0, 4.0),
+                target: Vec3::ZERO,
+                up: Vec3::Y,
+            }),
+        }
+    }
+}
+
+impl fmt::Display for BuiltinScene {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for BuiltinScene {
+    type Err = UnknownScene;
+
+    fn from_str(name: &str) -> Result<Self, UnknownScene> {
+        let found = Self::ALL.into_iter().find(|s| s.name() == name);
+        found.ok_or_else(|| UnknownScene { name: name.to_owned() })
+    }
+}
+
+fn statue_scene() -> SceneDescription {
+    let mut figure = statue::figure();
+    figure.transform(&Mat4::from_translation(statue::PLINTH_HEIGHT * Vec3::Y));
+    let marble = glossy("marble", Rgb::new(0.76, 0.71, 0.64), 0.0, 0.42);
+    let stone = Surface::diffuse("stone", Rgb::new(0.33, 0.31, 0.29));
+    scene(
+        camera(26.0, vec3(7.2, 2.35, -2.6), vec3(0.0, 1.56, 0.0)),
+        [("figure", figure, marble), ("plinth", statue::plinth(), stone), floor()],
+    )
+}
+
+fn spheres_scene() -> SceneDescription {
+    let sphere = shapes::icosphere(5);
+    let balls = (0..SPHERES).map(|i| {
+        let t = i as f32 / (SPHERES - 1) as f32;
+        let x = SPHERE_SPACING * (i as f32 - 0.5 * (SPHERES - 1) as f32);
+        let mut mesh = sphere.clone();
+        mesh.transform(
+            &(Mat4::from_translation(vec3(x, SPHERE_RADIUS, 0.0))
+                * Mat4::from_scale(Vec3::splat(SPHERE_RADIUS))),
+        );
+        let roughness = LEAST_ROUGHNESS + (1.0 - LEAST_ROUGHNESS) * t;
+        ("sphere", mesh, glossy("metal", Rgb::new(0.93, 0.88, 0.80), 1.0, roughness))
+    });
+    let eye = camera(24.0, vec3(0.0, 5.2, 19.5), vec3(0.0, 0.45, 0.0));
+    scene(eye, balls.chain([floor()]))
+}
+
+fn material_ball_scene() -> SceneDescription {
+    let glaze = glossy("glaze", Rgb::new(0.62, 0.15, 0.07), 0.0, 0.25);
+    let steel = glossy("steel", Rgb::new(0.60, 0.58, 0.55), 1.0, 0.35);
+    let stone = Surface::diffuse("stone", Rgb::new(0.30, 0.30, 0.30));
+    scene(
+        camera(28.0, vec3(0.0, 3.0, 5.6), vec3(0.0, 1.02, 0.0)),
+        [
+            ("ball", material_ball::ball(), glaze),
+            ("core", material_ball::core(), steel),
+            ("cradle", material_ball::cradle(), stone),
+            floor(),
+        ],
+    )
+}
+
+fn sphere_scene(camera: CameraSettings) -> SceneDescription {
+    let white = Surface::diffuse("white", Rgb::splat(0.8));
+    scene(camera, [("sphere", shapes::icosphere(5), white)])
+}
+
+/// A wide grey disc at y = 0.
+fn floor() -> (&'static str, Mesh, Surface) {
+    let grey = Surface::diffuse("floor", Rgb::new(0.42, 0.41, 0.40));
+    ("floor", shapes::disc(FLOOR_RADIUS, 96), grey)
+}
+
+fn scene(
+    camera: CameraSettings,
+    things: impl IntoIterator<Item = (&'static str, Mesh, Surface)>,
+) -> SceneDescription {
+    let mut description = SceneDescription {
+        camera: Some(camera),
+        up: Some(UpAxis::Y),
+        ..SceneDescription::default()
+    };
+    for (name, mesh, surface) in things {
+        let part = Part { name: name.to_owned(), mesh, surface: description.surfaces.len() };
+        description.parts.push(part);
+        description.surfaces.push(surface);
+    }
+    description
+}
+
+fn camera(fov_y_degrees: f32, origin: Vec3, target: Vec3) -> CameraSettings {
+    let projection = Projection::Perspective { fov_y_degrees };
+    CameraSettings { projection, origin, target, up: Vec3::Y }
+}
+
+fn glossy(name: &str, base_color: Rgb, metallic: f32, roughness: f32) -> Surface {
+    let model = MetallicRoughnessSurface {
+        base_color,
+        base_color_texture: None,
+        metallic,
+        roughness,
+        metallic_roughness_texture: None,
+    };
+    let model = SurfaceModel::MetallicRoughness(model);
+    Surface { name: name.to_owned(), model, normal_map: None }
+}
+
+#[cfg(test)]
+mod tests;

@@ -86,7 +86,7 @@ pub fn disc(radius: f32, segments: u32) -> Mesh {
 /// `segments` (≥ 3) sectors.
 ///
 /// The profile rises from the lower end of the axis to the upper one, or is a loop that ends where
-/// it began, counter-clockwise in the (r, y) plane. Gentle turns are shaded smooth, sharp ones as creases.
+/// it began, counter-clockwise in the (r, y) plane; no point follows itself. Gentle turns are shaded smooth, sharp ones as creases.
 pub fn lathe(profile: &[Vec2], segments: u32) -> Mesh {
     let directions: Vec<Vec2> =
         profile.windows(2).map(|w| (w[1] - w[0]).normalize_or_zero()).collect();

@@ -12,18 +12,18 @@ use crate::geometry::{Aabb, Mesh};
 use crate::math::{FRAC_PI_2, PI, Vec2, Vec3, vec2, vec3};
 
 /// Height of the plinth's top above the floor.
-pub const PLINTH_HEIGHT: f32 = 0.9;
+pub const PLINTH_HEIGHT: f32 = 0.8;
 
 /// Edge of a grid cell.
-const CELL: f32 = 0.0135;
+const CELL: f32 = 0.0178;
 /// Bound on the slope of [`figure_distance`].
-const LIPSCHITZ: f32 = 1.9;
+const LIPSCHITZ: f32 = 1.6;
 /// Turn of the space about the vertical axis \[rad per unit of height\].
 const TWIST: f32 = 1.15;
 /// Thickness of the shell.
 const SHELL: f32 = 0.11;
 /// Flutes round the shell.
-const FLUTES: f32 = 26.0;
+const FLUTES: f32 = 24.0;
 /// Depth of the flutes.
 const FLUTE_DEPTH: f32 = 0.034;
 
@@ -42,14 +42,14 @@ fn figure_distance(p: Vec3) -> f32 {
     let outside = body + flutes(q, openings);
     let shell = smooth_max(outside, -(body + SHELL), 0.03);
     let shell = smooth_max(shell, -openings, 0.09);
-    let form = smooth_min(shell, inner_figure(q), 0.06);
+    let form = smooth_min(shell, inner_figure(q), 0.12);
     let form = smooth_min(form, foot(p), 0.12);
     smooth_max(form, -p.y - 0.05, 0.02)
 }
 
 /// Straightens the form's bend and twist.
 fn untwist(p: Vec3) -> Vec3 {
-    let bend = vec2(0.09 * (1.6 * p.y - 0.3).sin(), 0.05 * (2.1 * p.y).sin());
+    let bend = vec2(0.13 * (1.7 * p.y - 0.3).sin(), 0.07 * (2.1 * p.y).sin());
     let (sin, cos) = (TWIST * p.y).sin_cos();
     let (x, z) = (p.x - bend.x, p.z - bend.y);
     vec3(cos * x - sin * z, p.y, sin * x + cos * z)
@@ -63,8 +63,8 @@ fn body(q: Vec3) -> f32 {
 
 /// What is cut out of the shell: a tall opening before and a smaller one behind.
 fn openings(q: Vec3) -> f32 {
-    let front = ellipsoid(q - vec3(0.06, 1.16, 0.52), vec3(0.31, 0.80, 0.50));
-    let back = ellipsoid(q - vec3(-0.10, 1.42, -0.50), vec3(0.24, 0.52, 0.42));
+    let front = ellipsoid(q - vec3(0.05, 1.18, 0.52), vec3(0.36, 0.84, 0.50));
+    let back = ellipsoid(q - vec3(-0.08, 1.36, -0.50), vec3(0.27, 0.62, 0.42));
     front.min(back)
 }
 
@@ -80,7 +80,7 @@ fn inner_figure(q: Vec3) -> f32 {
 
 /// The low mound that binds shell and figure to the plinth.
 fn foot(p: Vec3) -> f32 {
-    ellipsoid(p, vec3(0.42, 0.13, 0.36))
+    ellipsoid(p, vec3(0.34, 0.09, 0.31))
 }
 
 /// How deep the flutes lie at `q`: scoops with rounded ridges, which fade out toward the lips of
@@ -92,14 +92,19 @@ fn flutes(q: Vec3, openings: f32) -> f32 {
         return 0.0;
     }
     let phase = 0.5 * FLUTES * q.x.atan2(q.z) + 2.0 * q.y;
-    let ridge = 1.0 - (phase.sin().powi(2) + 0.02).sqrt();
-    fade * FLUTE_DEPTH * (1.0 - ridge)
+    // |sin| with its kink, the ridge, rounded to more than a cell.
+    let (rounding, whole) = (0.12, 0.12f32.sqrt());
+    let scoop =
+        ((phase.sin().powi(2) + rounding).sqrt() - whole) / ((1.0 + rounding).sqrt() - whole);
+    fade * FLUTE_DEPTH * scoop
 }
 
 /// A first-order distance to an ellipsoid of the given radii round the origin.
 fn ellipsoid(p: Vec3, radii: Vec3) -> f32 {
-    let k0 = (p / radii).length();
-    let k1 = (p / (radii * radii)).length();
+    let inverse = radii.recip();
+    let scaled = p * inverse;
+    let k0 = scaled.length();
+    let k1 = (scaled * inverse).length();
     if k1 == 0.0 { -radii.min_element() } else { k0 * (k0 - 1.0) / k1 }
 }
 
@@ -120,21 +125,21 @@ fn smooth_step(from: f32, to: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// A round plinth on y = 0: a bevelled foot, a torus, a drum drawn in by an apophyge and a bevelled top.
+/// A round plinth on y = 0: a foot, a torus, a drum between two hollows and a slab, all bevelled.
 pub fn plinth() -> Mesh {
-    let mut profile = vec![Vec2::ZERO];
     let top = PLINTH_HEIGHT;
+    let mut profile = vec![Vec2::ZERO];
     // Foot.
-    profile.extend(arc(vec2(0.86, 0.02), 0.02, -FRAC_PI_2, 0.0, 6));
-    profile.extend(arc(vec2(0.86, 0.12), 0.02, 0.0, FRAC_PI_2, 6));
+    profile.extend(arc(vec2(0.68, 0.015), 0.015, -FRAC_PI_2, 0.0, 6));
+    profile.extend(arc(vec2(0.68, 0.105), 0.015, 0.0, FRAC_PI_2, 6));
     // Torus.
-    profile.extend(arc(vec2(0.78, 0.19), 0.05, -FRAC_PI_2, FRAC_PI_2, 16));
-    // Hollow up to the drum, the drum, hollow out to the top.
-    profile.extend(arc(vec2(0.78, 0.32), 0.08, -FRAC_PI_2, -PI, 12));
-    profile.extend(arc(vec2(0.78, top - 0.22), 0.08, -PI, -1.5 * PI, 12));
-    // Top slab.
-    profile.extend(arc(vec2(0.81, top - 0.115), 0.025, -FRAC_PI_2, 0.0, 6));
-    profile.extend(arc(vec2(0.81, top - 0.025), 0.025, 0.0, FRAC_PI_2, 6));
+    profile.extend(arc(vec2(0.62, 0.165), 0.045, -FRAC_PI_2, FRAC_PI_2, 16));
+    // Hollow up to the drum, the drum, hollow out to the slab.
+    profile.extend(arc(vec2(0.62, 0.30), 0.09, -FRAC_PI_2, -PI, 12).into_iter().skip(1));
+    profile.extend(arc(vec2(0.62, top - 0.20), 0.09, -PI, -1.5 * PI, 12));
+    // Slab.
+    profile.extend(arc(vec2(0.64, top - 0.095), 0.015, -FRAC_PI_2, 0.0, 6));
+    profile.extend(arc(vec2(0.64, top - 0.015), 0.015, 0.0, FRAC_PI_2, 6));
     profile.push(vec2(0.0, top));
     lathe(&profile, 128)
 }

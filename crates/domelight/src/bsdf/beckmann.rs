@@ -1,0 +1,106 @@
+//! The Beckmann lobe: Gaussian slopes.
+//!
+//! Beckmann & Spizzichino 1963; Walter et al. 2007, whose rational fit of Λ (relative error below
+//! 0.35 %) stands in for the error function.
+//!
+//! Normals are drawn from D(h) cos θ_h. Visible Beckmann normals (Heitz & d'Eon 2014) need a numerical
+//! inversion of an error function and would make this lobe the slowest one; it is here for
+//! comparison with published pictures, where the simple sampler is what was used. Its weights grow
+//! without bound at grazing angles: [`super::Ggx`] is the lobe to render with.
+
+use super::Fresnel;
+use super::microfacet::{Masking, Microfacet, NormalDistribution, clamp_alpha, gaussian_slopes};
+use crate::math::{FRAC_1_PI, Vec2, Vec3, sqr};
+
+/// A Beckmann lobe.
+pub type Beckmann = Microfacet<BeckmannNormals>;
+
+impl Beckmann {
+    /// Of the roughness α along x and y (equal for an isotropic lobe), raised to at least
+    /// [`super::MIN_ALPHA`].
+    pub fn new(alpha: [f32; 2], fresnel: Fresnel, masking: Masking) -> Self {
+        Self::with_normals(BeckmannNormals::new(alpha), fresnel, masking)
+    }
+}
+
+/// D(h) = exp(−tan² θ_h (cos² φ_h/α_x² + sin² φ_h/α_y²)) / (π α_x α_y cos⁴ θ_h).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BeckmannNormals {
+    alpha: [f32; 2],
+}
+
+impl BeckmannNormals {
+    /// Of the roughness along x and y.
+    pub fn new(alpha: [f32; 2]) -> Self {
+        Self { alpha: clamp_alpha(alpha) }
+    }
+}
+
+impl NormalDistribution for BeckmannNormals {
+    fn alpha(&self) -> [f32; 2] {
+        self.alpha
+    }
+
+    #[inline]
+    fn d(&self, h: Vec3) -> f32 {
+        let [ax, ay] = self.alpha;
+        let z2 = sqr(h.z);
+        let gauss = (-(sqr(h.x / ax) + sqr(h.y / ay)) / z2).exp();
+        FRAC_1_PI / (ax * ay) * gauss * sqr(h.length_squared() / z2)
+    }
+
+    /// exp(−t/α²)(1 + t)² has its one maximum at t = 2α² − 1.
+    fn max_d(&self, tan2: [f32; 2]) -> f32 {
+        let [ax, ay] = self.alpha;
+        let alpha2 = sqr(ax.max(ay));
+        let t = (2.0 * alpha2 - 1.0).clamp(tan2[0], tan2[1]);
+        FRAC_1_PI / (ax * ay) * (-t / alpha2).exp() * sqr(1.0 + t)
+    }
+
+    /// cos θ (1 + Λ), with the fit Λ(a) = (1 − 1.259 a + 0.396 a²)/(3.535 a + 2.181 a²) below
+    /// a = cos θ/√(α_x² w_x² + α_y² w_y²) = 1.6 and zero above (Walter et al. 2007, eq. 27).
+    #[inline]
+    fn sigma(&self, w: Vec3) -> f32 {
+        let [ax, ay] = self.alpha;
+        let spread = (sqr(ax * w.x) + sqr(ay * w.y)).sqrt();
+        if w.z >= 1.6 * spread {
+            return w.z;
+        }
+        let a = w.z / spread;
+        w.z + spread * (1.0 + a * (0.396 * a - 1.259)) / (3.535 + 2.181 * a)
+    }
+
+    #[inline]
+    fn sample_normal(&self, _wo: Vec3, u: Vec2) -> Vec3 {
+        gaussian_slopes(u, self.alpha)
+    }
+
+    /// D cos θ_h/(4 h·wo) = D H_z/(2|H|²).
+    #[inline]
+    fn reflected_pdf(&self, h: Vec3, d: f32, _sigma_o: f32) -> f32 {
+        0.5 * d * h.z / h.length_squared()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Rgb;
+    use crate::bsdf::test_support::{check_bound, check_lobe};
+
+    #[test]
+    fn obeys_the_laws() {
+        let fresnels = [Fresnel::One, Fresnel::Schlick { f0: Rgb::new(0.04, 0.3, 0.9) }];
+        for alpha in [[1e-4, 1e-4], [0.05, 0.05], [0.3, 0.3], [0.1, 0.5], [1.0, 1.0]] {
+            for masking in [Masking::Correlated, Masking::Separable] {
+                for fresnel in fresnels {
+                    let lobe = Beckmann::new(alpha, fresnel, masking);
+                    check_lobe(&lobe);
+                    if alpha[0] > 1e-3 {
+                        check_bound(&lobe, 2.5);
+                    }
+                }
+            }
+        }
+    }
+}

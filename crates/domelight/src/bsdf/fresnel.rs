@@ -1,0 +1,185 @@
+//! Fresnel reflectance as a function of the angle of incidence on a microfacet.
+//!
+//! - Schlick 1994, "An Inexpensive BRDF Model for Physically-based Rendering", eq. 15.
+//! - The exact unpolarised reflectance of a conductor of complex refractive index η + ik, per
+//!   colour channel; for its arithmetic see Lagarde 2013, "Memo on Fresnel equations".
+
+use crate::Rgb;
+use crate::math::sqr;
+
+/// What a microfacet reflects.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Fresnel {
+    /// Everything: F = 1.
+    #[default]
+    One,
+    /// f0 + (1 − f0)(1 − cos θ)⁵.
+    Schlick {
+        /// Reflectance at normal incidence, in [0, 1].
+        f0: Rgb,
+    },
+    /// The exact unpolarised reflectance of a conductor.
+    Conductor(Conductor),
+}
+
+impl Fresnel {
+    /// F at the cosine between direction and microfacet normal, in [0, 1].
+    #[inline]
+    pub fn eval(&self, cos_theta: f32) -> Rgb {
+        match self {
+            Self::One => Rgb::WHITE,
+            Self::Schlick { f0 } => schlick(*f0, cos_theta),
+            Self::Conductor(c) => c.reflectance(cos_theta),
+        }
+    }
+
+    /// The greatest channel of F over all cosines from `cos_theta` to 1.
+    pub fn max_from(&self, cos_theta: f32) -> f32 {
+        // All three fall, or fall and rise once, from grazing to normal incidence.
+        self.eval(cos_theta).max_component().max(self.eval(1.0).max_component())
+    }
+}
+
+/// Schlick's approximation.
+#[inline]
+pub(super) fn schlick(f0: Rgb, cos_theta: f32) -> Rgb {
+    f0 + (Rgb::WHITE - f0) * schlick_weight(cos_theta)
+}
+
+/// (1 − cos θ)⁵, how far F is from f0 to 1.
+#[inline]
+pub(super) fn schlick_weight(cos_theta: f32) -> f32 {
+    let x = (1.0 - cos_theta).clamp(0.0, 1.0);
+    sqr(sqr(x)) * x
+}
+
+/// A complex refractive index per colour channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conductor {
+    /// Real part.
+    pub eta: Rgb,
+    /// Imaginary part, the extinction coefficient.
+    pub k: Rgb,
+}
+
+impl Conductor {
+    /// Silver. These indices are measured spectra brought to linear Rec. 709.
+    pub const SILVER: Self = Self {
+        eta: Rgb::new(0.155265, 0.116723, 0.138381),
+        k: Rgb::new(4.828343, 3.122246, 2.147050),
+    };
+    /// Aluminium.
+    pub const ALUMINIUM: Self = Self {
+        eta: Rgb::new(1.657460, 0.880369, 0.521229),
+        k: Rgb::new(9.223869, 6.269523, 4.837001),
+    };
+    /// Gold.
+    pub const GOLD: Self = Self {
+        eta: Rgb::new(0.143119, 0.374957, 1.442479),
+        k: Rgb::new(3.983160, 2.385721, 1.603215),
+    };
+    /// Chromium.
+    pub const CHROMIUM: Self = Self {
+        eta: Rgb::new(4.369683, 2.916702, 1.654701),
+        k: Rgb::new(5.206434, 4.231365, 3.754947),
+    };
+    /// Copper.
+    pub const COPPER: Self = Self {
+        eta: Rgb::new(0.200438, 0.924033, 1.102212),
+        k: Rgb::new(3.912949, 2.452848, 2.142188),
+    };
+    /// Tungsten.
+    pub const TUNGSTEN: Self = Self {
+        eta: Rgb::new(4.370703, 3.300297, 2.998267),
+        k: Rgb::new(3.500678, 2.604865, 2.273193),
+    };
+
+    /// The metals by name.
+    pub const NAMED: [(&'static str, Self); 7] = [
+        ("aluminium", Self::ALUMINIUM),
+        ("aluminum", Self::ALUMINIUM),
+        ("chromium", Self::CHROMIUM),
+        ("copper", Self::COPPER),
+        ("gold", Self::GOLD),
+        ("silver", Self::SILVER),
+        ("tungsten", Self::TUNGSTEN),
+    ];
+
+    /// Unpolarised reflectance per channel at the cosine of incidence in [0, 1].
+    #[inline]
+    pub fn reflectance(&self, cos_theta: f32) -> Rgb {
+        let c = cos_theta.clamp(0.0, 1.0);
+        Rgb::new(
+            conductor(c, self.eta.r, self.k.r),
+            conductor(c, self.eta.g, self.k.g),
+            conductor(c, self.eta.b, self.k.b),
+        )
+    }
+}
+
+/// (R_s + R_p)/2, with a² + b² = |√((η + ik)² − sin² θ)|².
+#[inline]
+fn conductor(cos: f32, eta: f32, k: f32) -> f32 {
+    let (cos2, eta2, k2) = (cos * cos, eta * eta, k * k);
+    let sin2 = 1.0 - cos2;
+    let t = eta2 - k2 - sin2;
+    let a2_b2 = (t * t + 4.0 * eta2 * k2).sqrt();
+    let a = (0.5 * (a2_b2 + t)).max(0.0).sqrt();
+    let (sum, cross) = (a2_b2 + cos2, 2.0 * cos * a);
+    let r_s = (sum - cross) / (sum + cross);
+    let (sum, cross) = (cos2 * a2_b2 + sin2 * sin2, cross * sin2);
+    let r_p = r_s * (sum - cross) / (sum + cross);
+    0.5 * (r_s + r_p)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normal_and_grazing_incidence() {
+        for (name, metal) in Conductor::NAMED {
+            // ((η − 1)² + k²) / ((η + 1)² + k²)
+            let at_normal = |eta: f32, k: f32| (sqr(eta - 1.0) + k * k) / (sqr(eta + 1.0) + k * k);
+            let f = metal.reflectance(1.0);
+            assert!((f.r - at_normal(metal.eta.r, metal.k.r)).abs() < 1e-5, "{name}");
+            assert!((metal.reflectance(0.0).g - 1.0).abs() < 1e-5, "{name}");
+        }
+        assert_eq!(schlick(Rgb::splat(0.04), 1.0), Rgb::splat(0.04));
+        assert_eq!(schlick(Rgb::splat(0.04), 0.0), Rgb::WHITE);
+    }
+
+    #[test]
+    fn without_absorption_it_is_the_dielectric() {
+        // Fresnel's equations at 60° for n = 1.5.
+        let (cos_i, cos_t) = (0.5f32, (1.0 - 0.75 / 2.25f32).sqrt());
+        let r_s = sqr((cos_i - 1.5 * cos_t) / (cos_i + 1.5 * cos_t));
+        let r_p = sqr((1.5 * cos_i - cos_t) / (1.5 * cos_i + cos_t));
+        assert!((conductor(cos_i, 1.5, 0.0) - 0.5 * (r_s + r_p)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn metals_have_their_colours() {
+        let gold = Conductor::GOLD.reflectance(1.0);
+        assert!(gold.r > 0.9 && gold.r > gold.g && gold.g > gold.b, "{gold:?}");
+        let copper = Conductor::COPPER.reflectance(1.0);
+        assert!(copper.r > 0.9 && copper.g < 0.75 && copper.b < 0.6, "{copper:?}");
+        assert!(Conductor::SILVER.reflectance(1.0).min_component() > 0.9);
+    }
+
+    #[test]
+    fn the_maximum_is_one() {
+        let others = [Fresnel::One, Fresnel::Schlick { f0: Rgb::new(0.04, 0.5, 1.0) }];
+        let metals = Conductor::NAMED.map(|(_, metal)| Fresnel::Conductor(metal));
+        for fresnel in others.into_iter().chain(metals) {
+            for i in 0..=100u8 {
+                let from = f32::from(i) / 100.0;
+                let bound = fresnel.max_from(from);
+                for j in i..=100 {
+                    let f = fresnel.eval(f32::from(j) / 100.0);
+                    assert!(f.max_component() <= bound + 1e-6 && f.min_component() >= 0.0);
+                }
+            }
+        }
+    }
+}

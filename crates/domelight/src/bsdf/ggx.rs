@@ -1,0 +1,144 @@
+//! The GGX (Trowbridge–Reitz) lobe.
+//!
+//! Trowbridge & Reitz 1975; Walter et al. 2007; anisotropic form and σ from Heitz 2014. Visible
+//! normals are drawn by spherical caps (Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with
+//! Spherical Caps"), which has the density of Heitz 2018 with less arithmetic; drawing from D cos θ
+//! instead has weights without bound at grazing angles.
+
+use super::Fresnel;
+use super::microfacet::{Masking, Microfacet, NormalDistribution, clamp_alpha};
+use crate::math::{FRAC_1_PI, TAU, Vec2, Vec3, sqr, vec3};
+
+/// A GGX lobe.
+pub type Ggx = Microfacet<GgxNormals>;
+
+impl Ggx {
+    /// Of the roughness α along x and y (equal for an isotropic lobe), raised to at least
+    /// [`super::MIN_ALPHA`].
+    pub fn new(alpha: [f32; 2], fresnel: Fresnel, masking: Masking) -> Self {
+        Self::with_normals(GgxNormals::new(alpha), fresnel, masking)
+    }
+}
+
+/// D(h) = 1 / (π α_x α_y (h_x²/α_x² + h_y²/α_y² + h_z²)²).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GgxNormals {
+    alpha: [f32; 2],
+}
+
+impl GgxNormals {
+    /// Of the roughness along x and y.
+    pub fn new(alpha: [f32; 2]) -> Self {
+        Self { alpha: clamp_alpha(alpha) }
+    }
+}
+
+impl NormalDistribution for GgxNormals {
+    fn alpha(&self) -> [f32; 2] {
+        self.alpha
+    }
+
+    #[inline]
+    fn d(&self, h: Vec3) -> f32 {
+        let [ax, ay] = self.alpha;
+        let stretched = sqr(h.x / ax) + sqr(h.y / ay) + sqr(h.z);
+        FRAC_1_PI / (ax * ay) * sqr(h.length_squared() / stretched)
+    }
+
+    /// D is monotone in tan² θ_h, falling for α < 1.
+    fn max_d(&self, tan2: [f32; 2]) -> f32 {
+        let [ax, ay] = self.alpha;
+        let alpha2 = sqr(ax.max(ay));
+        let ratio = |t: f32| if t < f32::MAX { (1.0 + t) / (1.0 + t / alpha2) } else { alpha2 };
+        FRAC_1_PI / (ax * ay) * sqr(ratio(tan2[0]).max(ratio(tan2[1])))
+    }
+
+    /// (cos θ + √(cos² θ + α_x² w_x² + α_y² w_y²))/2.
+    #[inline]
+    fn sigma(&self, w: Vec3) -> f32 {
+        let [ax, ay] = self.alpha;
+        0.5 * (w.z + (sqr(w.z) + sqr(ax * w.x) + sqr(ay * w.y)).sqrt())
+    }
+
+    /// Dupuy & Benyoub 2023, listing 3.
+    #[inline]
+    fn sample_normal(&self, wo: Vec3, u: Vec2) -> Vec3 {
+        let [ax, ay] = self.alpha;
+        // Stretch to the configuration of unit roughness.
+        let w = vec3(ax * wo.x, ay * wo.y, wo.z).normalize();
+        // A uniform direction of the cap z > −w_z.
+        let z = (1.0 - u.x) * (1.0 + w.z) - w.z;
+        let sin_theta = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
+        let (sin_phi, cos_phi) = (TAU * u.y).sin_cos();
+        // The half vector, and back.
+        let h = vec3(sin_theta * cos_phi, sin_theta * sin_phi, z) + w;
+        vec3(ax * h.x, ay * h.y, h.z)
+    }
+
+    /// D G₁(wo)/(4 cos θ_o) = D/(4 σ_o).
+    #[inline]
+    fn reflected_pdf(&self, _h: Vec3, d: f32, sigma_o: f32) -> f32 {
+        0.25 * d / sigma_o
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Rgb;
+    use crate::bsdf::test_support::{check_bound, check_lobe, directional_albedo, toward};
+    use crate::bsdf::{Brdf, Conductor};
+    use crate::math::vec2;
+
+    const FRESNELS: [Fresnel; 3] = [
+        Fresnel::One,
+        Fresnel::Schlick { f0: Rgb::new(0.04, 0.3, 0.9) },
+        Fresnel::Conductor(Conductor::COPPER),
+    ];
+
+    #[test]
+    fn obeys_the_laws() {
+        for alpha in [[0.05, 0.05], [0.3, 0.3], [0.1, 0.5], [1.0, 1.0]] {
+            for masking in [Masking::Correlated, Masking::Separable] {
+                for fresnel in FRESNELS {
+                    let lobe = Ggx::new(alpha, fresnel, masking);
+                    check_lobe(&lobe);
+                    check_bound(&lobe, 2.5);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_narrowest_lobe_is_finite() {
+        for alpha in [0.0, crate::bsdf::MIN_ALPHA, 1e-3] {
+            check_lobe(&Ggx::new([alpha; 2], Fresnel::One, Masking::Correlated));
+        }
+    }
+
+    /// With visible normals the weight is F G₂/G₁ ≤ 1.
+    #[test]
+    fn weights_never_exceed_one() {
+        for alpha in [[0.05, 0.05], [0.2, 0.6]] {
+            for masking in [Masking::Correlated, Masking::Separable] {
+                let lobe = Ggx::new(alpha, Fresnel::One, masking);
+                for i in 0..2000u32 {
+                    let u = vec2((0.618 * i as f32).fract(), (0.755 * i as f32).fract());
+                    let wo = toward(89.9 * (0.413 * i as f32).fract(), i as f32);
+                    if let Some(s) = lobe.sample(wo, 0.0, u) {
+                        assert!(s.value.g <= s.pdf * 1.00001, "{wo} {s:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn correlated_masking_is_brighter_and_both_lose_energy() {
+        let albedo = |masking| {
+            directional_albedo(&Ggx::new([0.6; 2], Fresnel::One, masking), toward(60.0, 0.3))[0]
+        };
+        let (correlated, separable) = (albedo(Masking::Correlated), albedo(Masking::Separable));
+        assert!(separable < correlated && correlated < 1.0, "{separable} {correlated}");
+    }
+}

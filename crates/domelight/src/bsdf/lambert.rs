@@ -1,0 +1,59 @@
+//! Lambert's law: f_r = ρ/π.
+
+use super::{Brdf, above};
+use crate::Rgb;
+use crate::math::{FRAC_1_PI, Vec2, Vec3};
+use crate::sampling::warp;
+
+/// Ideal diffuse reflection, sampled by the cosine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lambert {
+    /// Albedo ρ in [0, 1].
+    pub albedo: Rgb,
+}
+
+impl Lambert {
+    /// Of an albedo in [0, 1].
+    pub const fn new(albedo: Rgb) -> Self {
+        Self { albedo }
+    }
+}
+
+impl Brdf for Lambert {
+    #[inline]
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        if !above(wo, wi) {
+            return (Rgb::BLACK, 0.0);
+        }
+        let pdf = warp::cosine_hemisphere_pdf(wi.z);
+        (self.albedo * pdf, pdf)
+    }
+
+    #[inline]
+    fn sample_direction(&self, _wo: Vec3, _u_lobe: f32, u: Vec2) -> Option<Vec3> {
+        Some(warp::cosine_hemisphere(u))
+    }
+
+    /// ρ/π, reached at the normal.
+    fn max_eval(&self, _wo: Vec3) -> f32 {
+        self.albedo.max_component() * FRAC_1_PI
+    }
+
+    #[inline]
+    fn directional_albedo(&self, _cos_theta_o: f32) -> Rgb {
+        self.albedo
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bsdf::test_support::{check_bound, check_lobe};
+
+    #[test]
+    fn obeys_the_laws() {
+        let lobe = Lambert::new(Rgb::new(0.2, 0.5, 0.9));
+        check_lobe(&lobe);
+        check_bound(&lobe, 1.01);
+    }
+}

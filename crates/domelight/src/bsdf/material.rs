@@ -1,0 +1,341 @@
+//! Materials: weighted sums of a few lobes.
+//!
+//! A material is sampled by choosing one lobe and drawing from it; its density is that of the
+//! mixture, so no sample is worse than the chosen lobes' own by more than the choice.
+
+use super::{Beckmann, Brdf, Ggx, Lambert, MetallicRoughness, Phong, Ward};
+use crate::Rgb;
+use crate::math::{Vec2, Vec3};
+
+/// One reflectance lobe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lobe {
+    /// Ideal diffuse.
+    Lambert(Lambert),
+    /// About the mirror direction.
+    Phong(Phong),
+    /// Anisotropic Gaussian.
+    Ward(Ward),
+    /// Microfacets, Trowbridge–Reitz.
+    Ggx(Ggx),
+    /// Microfacets, Gaussian slopes.
+    Beckmann(Beckmann),
+    /// glTF's coupled diffuse and GGX.
+    MetallicRoughness(MetallicRoughness),
+}
+
+/// The same expression for the lobe inside, whatever it is.
+macro_rules! each {
+    ($lobe:expr, $l:ident => $body:expr) => {
+        match $lobe {
+            Lobe::Lambert($l) => $body,
+            Lobe::Phong($l) => $body,
+            Lobe::Ward($l) => $body,
+            Lobe::Ggx($l) => $body,
+            Lobe::Beckmann($l) => $body,
+            Lobe::MetallicRoughness($l) => $body,
+        }
+    };
+}
+
+impl Brdf for Lobe {
+    #[inline]
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        each!(self, l => l.eval_pdf(wo, wi))
+    }
+
+    #[inline]
+    fn sample_direction(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Vec3> {
+        each!(self, l => l.sample_direction(wo, u_lobe, u))
+    }
+
+    fn max_eval(&self, wo: Vec3) -> f32 {
+        each!(self, l => l.max_eval(wo))
+    }
+
+    #[inline]
+    fn directional_albedo(&self, cos_theta_o: f32) -> Rgb {
+        each!(self, l => l.directional_albedo(cos_theta_o))
+    }
+}
+
+macro_rules! lobe_from {
+    ($($model:ident),*) => {$(
+        impl From<$model> for Lobe {
+            fn from(lobe: $model) -> Self {
+                Self::$model(lobe)
+            }
+        }
+    )*};
+}
+lobe_from!(Lambert, Phong, Ward, Ggx, Beckmann, MetallicRoughness);
+
+/// The most lobes of a [`Material`].
+pub const MAX_LOBES: usize = 3;
+
+/// A sum of at most [`MAX_LOBES`] weighted lobes: plain data of 160 bytes, no heap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    terms: [Term; MAX_LOBES],
+    n_terms: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Term {
+    lobe: Lobe,
+    weight: f32,
+    /// Of choosing this lobe; positive, and 1 in sum.
+    probability: f32,
+}
+
+/// More lobes than a material holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("a material is a sum of at most {MAX_LOBES} lobes that are not black, not {count}")]
+pub struct TooManyLobes {
+    /// How many were given.
+    pub count: usize,
+}
+
+/// The cosine at which lobes are weighed while the view is unknown: the mean of cos θ over
+/// directions that a diffuse surface receives light from.
+const TYPICAL_COSINE: f32 = 2.0 / 3.0;
+
+/// The least share of a lobe, relative to the sum of all: its albedo is only an estimate.
+const LEAST_SHARE: f32 = 0.05;
+
+impl Material {
+    /// Reflects nothing.
+    pub const BLACK: Self = {
+        let lobe = Lobe::Lambert(Lambert::new(Rgb::BLACK));
+        let term = Term { lobe, weight: 0.0, probability: 0.0 };
+        Self { terms: [term; MAX_LOBES], n_terms: 0 }
+    };
+
+    /// One lobe.
+    pub fn single(lobe: impl Into<Lobe>) -> Self {
+        Self::of_terms([(1.0, lobe.into())])
+    }
+
+    /// The sum of lobes.
+    ///
+    /// # Errors
+    /// [`TooManyLobes`] when more than [`MAX_LOBES`] are not black.
+    pub fn new(lobes: &[Lobe]) -> Result<Self, TooManyLobes> {
+        Self::checked(lobes.iter().map(|&lobe| (1.0, lobe)))
+    }
+
+    /// The sum of lobes times weights ≥ 0; a weight that is not positive drops its lobe.
+    ///
+    /// # Errors
+    /// [`TooManyLobes`] when more than [`MAX_LOBES`] are not black.
+    pub fn weighted(lobes: &[(f32, Lobe)]) -> Result<Self, TooManyLobes> {
+        Self::checked(lobes.iter().copied())
+    }
+
+    fn checked(lobes: impl Iterator<Item = (f32, Lobe)> + Clone) -> Result<Self, TooManyLobes> {
+        let count = lobes.clone().filter(reflects).count();
+        if count > MAX_LOBES { Err(TooManyLobes { count }) } else { Ok(Self::of_terms(lobes)) }
+    }
+
+    fn of_terms(lobes: impl IntoIterator<Item = (f32, Lobe)>) -> Self {
+        let mut material = Self::BLACK;
+        for (slot, (weight, lobe)) in
+            material.terms.iter_mut().zip(lobes.into_iter().filter(reflects))
+        {
+            *slot = Term { lobe, weight, probability: 0.0 };
+            material.n_terms += 1;
+        }
+        material.choose_by_albedo(TYPICAL_COSINE);
+        material
+    }
+
+    /// The same material with its lobes chosen in proportion to their albedos toward `wo`: Fresnel's
+    /// reflectance then has the right share at every angle. Worth its cost from a few samples up.
+    #[must_use]
+    pub fn for_view(mut self, wo: Vec3) -> Self {
+        if self.n_terms > 1 {
+            self.choose_by_albedo(wo.z.clamp(0.0, 1.0));
+        }
+        self
+    }
+
+    fn choose_by_albedo(&mut self, cos_theta_o: f32) {
+        let terms = &mut self.terms[..self.n_terms as usize];
+        let mut sum = 0.0;
+        for term in terms.iter_mut() {
+            term.probability = term.weight * term.lobe.directional_albedo(cos_theta_o).mean();
+            sum += term.probability;
+        }
+        let floor = if sum > 0.0 { LEAST_SHARE * sum } else { 1.0 };
+        let total = sum + floor * terms.len() as f32;
+        for term in terms {
+            term.probability = (term.probability + floor) / total;
+        }
+    }
+
+    /// The colour of the surface, roughly: its albedo seen from above.
+    pub fn albedo(&self) -> Rgb {
+        self.directional_albedo(1.0)
+    }
+
+    /// The lobes with their weights.
+    pub fn lobes(&self) -> impl Iterator<Item = (f32, &Lobe)> {
+        self.terms().iter().map(|t| (t.weight, &t.lobe))
+    }
+
+    #[inline]
+    fn terms(&self) -> &[Term] {
+        &self.terms[..self.n_terms as usize]
+    }
+}
+
+/// Not black from every direction.
+fn reflects(&(weight, lobe): &(f32, Lobe)) -> bool {
+    let albedo = lobe.directional_albedo(0.0) + lobe.directional_albedo(1.0);
+    weight > 0.0 && !albedo.is_black()
+}
+
+impl Default for Material {
+    /// Black.
+    fn default() -> Self {
+        Self::BLACK
+    }
+}
+
+impl From<Lobe> for Material {
+    fn from(lobe: Lobe) -> Self {
+        Self::single(lobe)
+    }
+}
+
+impl Brdf for Material {
+    #[inline]
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        let (mut value, mut pdf) = (Rgb::BLACK, 0.0);
+        for term in self.terms() {
+            let (v, p) = term.lobe.eval_pdf(wo, wi);
+            value += v * term.weight;
+            pdf += p * term.probability;
+        }
+        (value, pdf)
+    }
+
+    #[inline]
+    fn sample_direction(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Vec3> {
+        let (last, others) = self.terms().split_last()?;
+        let mut rest = u_lobe;
+        for term in others {
+            if rest < term.probability {
+                return term.sample_direction(wo, rest, u);
+            }
+            rest -= term.probability;
+        }
+        last.sample_direction(wo, rest, u)
+    }
+
+    /// The sum of the lobes' bounds.
+    fn max_eval(&self, wo: Vec3) -> f32 {
+        self.terms().iter().map(|t| t.weight * t.lobe.max_eval(wo)).sum()
+    }
+
+    fn directional_albedo(&self, cos_theta_o: f32) -> Rgb {
+        self.terms().iter().map(|t| t.weight * t.lobe.directional_albedo(cos_theta_o)).sum()
+    }
+}
+
+impl Term {
+    /// What is left of `u_lobe` after the choice is uniform again, and chooses within the lobe.
+    #[inline]
+    fn sample_direction(&self, wo: Vec3, rest: f32, u: Vec2) -> Option<Vec3> {
+        const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+        self.lobe.sample_direction(wo, (rest / self.probability).min(BELOW_ONE), u)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bsdf::test_support::{check_bound, check_lobe, toward};
+    use crate::bsdf::{Fresnel, Masking, WardForm};
+    use crate::math::vec2;
+
+    fn glossy(f0: f32) -> Lobe {
+        Ggx::new([0.1; 2], Fresnel::Schlick { f0: Rgb::splat(f0) }, Masking::Correlated).into()
+    }
+
+    fn three() -> Material {
+        let ward = Ward::new(Rgb::splat(0.2), [0.15, 0.5], WardForm::default());
+        let phong = Phong::new(Rgb::new(0.1, 0.2, 0.3), 50.0);
+        Material::new(&[Lambert::new(Rgb::splat(0.3)).into(), ward.into(), phong.into()]).unwrap()
+    }
+
+    #[test]
+    fn is_small() {
+        assert_eq!(size_of::<Lobe>(), 44);
+        assert_eq!(size_of::<Material>(), 160);
+    }
+
+    #[test]
+    fn obeys_the_laws() {
+        check_lobe(&three());
+        check_bound(&three(), 3.0);
+    }
+
+    #[test]
+    fn is_the_weighted_sum_of_its_lobes() {
+        let (a, b) = (Lobe::from(Lambert::new(Rgb::splat(0.5))), glossy(0.5));
+        let mix = Material::weighted(&[(0.5, a), (0.25, b)]).unwrap();
+        let (wo, wi) = (toward(40.0, 0.0), toward(35.0, 3.0));
+        let expected = a.eval(wo, wi) * 0.5 + b.eval(wo, wi) * 0.25;
+        assert!((mix.eval(wo, wi) - expected).max_component().abs() < 1e-6);
+    }
+
+    #[test]
+    fn one_lobe_is_that_lobe() {
+        let material = Material::single(Lambert::new(Rgb::splat(0.5)));
+        let (wo, u) = (toward(50.0, 1.0), vec2(0.3, 0.8));
+        let lobe = Lambert::new(Rgb::splat(0.5));
+        assert_eq!(material.sample(wo, 0.7, u), lobe.sample(wo, 0.7, u));
+    }
+
+    #[test]
+    fn black_lobes_are_dropped_and_black_materials_have_no_samples() {
+        let black = Lobe::from(Lambert::new(Rgb::BLACK));
+        let material = Material::new(&[black, black, glossy(0.0), black, black]).unwrap();
+        assert_eq!(material.lobes().count(), 1);
+        let nothing = Material::new(&[black]).unwrap();
+        assert_eq!(nothing, Material::BLACK);
+        let (wo, wi) = (toward(50.0, 1.0), toward(10.0, 0.0));
+        assert!(nothing.sample(wo, 0.7, vec2(0.3, 0.8)).is_none());
+        assert_eq!((nothing.eval(wo, wi), nothing.max_eval(wo)), (Rgb::BLACK, 0.0));
+    }
+
+    #[test]
+    fn a_fourth_lobe_is_refused() {
+        let error = Material::new(&[glossy(0.5); 4]).unwrap_err();
+        assert_eq!(error, TooManyLobes { count: 4 });
+    }
+
+    /// The share of samples drawn from the glossy lobe follows Fresnel's reflectance.
+    #[test]
+    fn a_view_refines_the_choice() {
+        let material =
+            Material::new(&[Lambert::new(Rgb::splat(0.5)).into(), glossy(0.04)]).unwrap();
+        let share = |degrees: f32| {
+            let refined = material.for_view(toward(degrees, 0.0));
+            let shares: Vec<f32> = refined.terms().iter().map(|t| t.probability).collect();
+            assert!((shares.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+            shares[1]
+        };
+        assert!(share(0.0) < 0.15 && share(88.0) > 0.5, "{} {}", share(0.0), share(88.0));
+        check_lobe(&material.for_view(toward(80.0, 0.0)));
+    }
+
+    /// Every value is covered by the density: no lobe has a probability of zero.
+    #[test]
+    fn lobes_that_look_black_head_on_are_still_sampled() {
+        let material = Material::new(&[Lambert::new(Rgb::splat(0.5)).into(), glossy(0.0)]).unwrap();
+        let refined = material.for_view(Vec3::Z);
+        assert!(refined.terms().iter().all(|t| t.probability > 0.0));
+    }
+}

@@ -1,0 +1,267 @@
+//! What the microfacet lobes share: f_r = F D G₂ / (4 cos θ_i cos θ_o).
+//!
+//! Torrance & Sparrow 1967; Cook & Torrance 1982; Walter et al. 2007, "Microfacet Models for
+//! Refraction through Rough Surfaces"; Heitz 2014, "Understanding the Masking-Shadowing Function in
+//! Microfacet-Based BRDFs".
+//!
+//! Masking is written through σ(w) = cos θ (1 + Λ(w)), the projected area of the microfacets that
+//! face w (Heitz 2014, eq. 22 with G₁ = cos θ/σ). Unlike Λ and G₁ it stays finite and away from 0/0
+//! at grazing angles:
+//!
+//! - separable: G₂ cos θ_i/(4 cos θ_i cos θ_o) = cos θ_i / (4 σ_o σ_i);
+//! - height-correlated: = cos θ_i / (4 (σ_o cos θ_i + σ_i cos θ_o − cos θ_i cos θ_o)).
+//!
+//! The half vector stays unnormalised, H = wo + wi with |H| = 2 h·wi, so that neither a square root
+//! nor 1 − cos² appears where a lobe is narrow.
+//!
+//! Single scattering only: rough lobes lose the light that bounces twice.
+
+use super::{Brdf, Fresnel, HORIZON, ROUNDING, above};
+use crate::Rgb;
+use crate::math::{TAU, Vec2, Vec3, sqr, vec3};
+
+/// The least roughness of a lobe; f32 directions resolve no narrower one.
+pub const MIN_ALPHA: f32 = 1e-4;
+
+/// Raises both to [`MIN_ALPHA`] (and NaN too).
+pub(super) fn clamp_alpha(alpha: [f32; 2]) -> [f32; 2] {
+    alpha.map(|a| a.max(MIN_ALPHA))
+}
+
+/// How masking toward the viewer and shadowing from the light are combined.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Masking {
+    /// Smith's height-correlated G₂ = 1/(1 + Λ_o + Λ_i).
+    #[default]
+    Correlated,
+    /// G₁(wo) G₁(wi), which is darker.
+    Separable,
+}
+
+/// A distribution of microfacet normals and how to draw from it.
+pub trait NormalDistribution: Copy + Send + Sync {
+    /// The roughness along x and y.
+    fn alpha(&self) -> [f32; 2];
+
+    /// D(h/|h|) \[sr⁻¹\] for an `h` of any length.
+    fn d(&self, h: Vec3) -> f32;
+
+    /// The greatest D where tan² θ_h lies in a closed range, which may end at infinity.
+    fn max_d(&self, tan2: [f32; 2]) -> f32;
+
+    /// σ(w) = cos θ (1 + Λ(w)), the projected area of the microfacets facing `w`.
+    fn sigma(&self, w: Vec3) -> f32;
+
+    /// Draws a normal, of any length, for the viewer `wo`.
+    fn sample_normal(&self, wo: Vec3, u: Vec2) -> Vec3;
+
+    /// Density \[sr⁻¹\] of `wo` reflected about the drawn normal, where `h` = wo + wi, `d` = D(h) and
+    /// `sigma_o` = σ(wo).
+    fn reflected_pdf(&self, h: Vec3, d: f32, sigma_o: f32) -> f32;
+}
+
+/// A microfacet lobe over a distribution of normals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Microfacet<D> {
+    normals: D,
+    fresnel: Fresnel,
+    masking: Masking,
+}
+
+impl<D: NormalDistribution> Microfacet<D> {
+    /// Of a distribution of normals.
+    pub fn with_normals(normals: D, fresnel: Fresnel, masking: Masking) -> Self {
+        Self { normals, fresnel, masking }
+    }
+
+    /// D G₂/(4 cos θ_o), the lobe without Fresnel's factor, and the density.
+    #[inline]
+    pub(super) fn geometry_pdf(&self, wo: Vec3, wi: Vec3, h: Vec3) -> (f32, f32) {
+        let d = self.normals.d(h);
+        let (sigma_o, sigma_i) = (self.normals.sigma(wo), self.normals.sigma(wi));
+        let geometry = d * masked(self.masking, [wo.z, wi.z], [sigma_o, sigma_i]);
+        (geometry, self.normals.reflected_pdf(h, d, sigma_o))
+    }
+}
+
+/// G₂ cos θ_i / (4 cos θ_i cos θ_o) of the cosines and projected areas of (wo, wi).
+#[inline]
+fn masked(masking: Masking, [cos_o, cos_i]: [f32; 2], [sigma_o, sigma_i]: [f32; 2]) -> f32 {
+    match masking {
+        Masking::Separable => 0.25 * cos_i / (sigma_o * sigma_i),
+        Masking::Correlated => 0.25 * cos_i / (sigma_o * cos_i + sigma_i * cos_o - cos_i * cos_o),
+    }
+}
+
+impl<D: NormalDistribution> Brdf for Microfacet<D> {
+    #[inline]
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        if !above(wo, wi) {
+            return (Rgb::BLACK, 0.0);
+        }
+        let h = wo + wi;
+        let (geometry, pdf) = self.geometry_pdf(wo, wi, h);
+        (self.fresnel.eval(0.5 * h.length()) * geometry, pdf)
+    }
+
+    #[inline]
+    fn sample_direction(&self, wo: Vec3, _u_lobe: f32, u: Vec2) -> Option<Vec3> {
+        (wo.z > HORIZON).then(|| reflect_about(wo, self.normals.sample_normal(wo, u)))
+    }
+
+    /// Bounded ring by ring of h: the greatest D of a ring, Fresnel's factor at its lowest h·wo, and
+    /// masking at its highest `wi` in the direction of the smoothest slope. Within a factor of 2.5
+    /// of the maximum.
+    fn max_eval(&self, wo: Vec3) -> f32 {
+        if wo.z <= HORIZON {
+            return 0.0;
+        }
+        let [ax, ay] = self.normals.alpha();
+        let sigma_o = self.normals.sigma(wo);
+        let bound = |ring: Ring| {
+            let (z, x) = (ring.max_cos_i, (1.0 - sqr(ring.max_cos_i)).max(0.0).sqrt());
+            let smoothest = if ax < ay { vec3(x, 0.0, z) } else { vec3(0.0, x, z) };
+            let sigma_i = self.normals.sigma(smoothest);
+            self.normals.max_d(ring.tan2)
+                * self.fresnel.max_from(ring.min_cos_d)
+                * masked(self.masking, [wo.z, z], [sigma_o, sigma_i])
+        };
+        rings(wo, ax.max(ay)).map(bound).fold(0.0, f32::max) * ROUNDING
+    }
+
+    /// Fresnel's reflectance at `cos_theta_o`.
+    #[inline]
+    fn directional_albedo(&self, cos_theta_o: f32) -> Rgb {
+        self.fresnel.eval(cos_theta_o)
+    }
+}
+
+/// The mirror direction of `wo` about an `h` of any length but zero.
+#[inline]
+pub(super) fn reflect_about(wo: Vec3, h: Vec3) -> Vec3 {
+    (2.0 * wo.dot(h) / h.length_squared()) * h - wo
+}
+
+/// A normal, z = 1, whose slopes are Gaussian of variance α²/2: density per solid angle
+/// exp(−tan² θ_h (cos² φ_h/α_x² + sin² φ_h/α_y²)) / (π α_x α_y cos³ θ_h).
+#[inline]
+pub(super) fn gaussian_slopes(u: Vec2, [ax, ay]: [f32; 2]) -> Vec3 {
+    let radius = (-f32::ln_1p(-u.x)).sqrt();
+    let (sin, cos) = (TAU * u.y).sin_cos();
+    vec3(ax * radius * cos, ay * radius * sin, 1.0)
+}
+
+/// A ring of half vectors θ₀ ≤ θ_h ≤ θ₁ about the normal, and what follows for the directions.
+pub(super) struct Ring {
+    /// tan² θ₀ and tan² θ₁.
+    pub(super) tan2: [f32; 2],
+    /// The least h·wo ≥ 0: the angle between h and wo is at most θ_o + θ₁.
+    pub(super) min_cos_d: f32,
+    /// The greatest cos θ_i: reflection about h is that about the normal turned by at most 2θ₁.
+    pub(super) max_cos_i: f32,
+}
+
+/// Rings that cover the hemisphere of half vectors, for bounds on a lobe of roughness `alpha`.
+pub(super) fn rings(wo: Vec3, alpha: f32) -> impl Iterator<Item = Ring> {
+    const EDGES: [f32; 17] = [
+        0.0,
+        0.1,
+        0.2,
+        0.3,
+        0.4,
+        0.5,
+        0.65,
+        0.8,
+        1.0,
+        1.25,
+        1.6,
+        2.0,
+        2.5,
+        3.5,
+        6.0,
+        12.0,
+        f32::INFINITY,
+    ];
+    let (cos_o, sin_o) = (wo.z, wo.truncate().length());
+    EDGES.windows(2).map(move |edge| {
+        let tan2 = [sqr(edge[0] * alpha), sqr(edge[1] * alpha)];
+        let cos2 = 1.0 / (1.0 + tan2[1]);
+        let (cos, sin) = (cos2.sqrt(), (1.0 - cos2).sqrt());
+        let (cos_double, sin_double) = (2.0 * cos2 - 1.0, 2.0 * sin * cos);
+        let reaches_normal = cos_double <= cos_o;
+        let max_cos_i = if reaches_normal { 1.0 } else { cos_o * cos_double + sin_o * sin_double };
+        Ring {
+            tan2,
+            min_cos_d: (cos_o * cos - sin_o * sin).max(0.0),
+            max_cos_i: max_cos_i.min(1.0),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bsdf::test_support::toward;
+    use crate::bsdf::{BeckmannNormals, GgxNormals};
+    use testkit::quadrature::Adaptive;
+
+    fn check_area(normals: &impl NormalDistribution, tolerance: f64) {
+        let quadrature = Adaptive { tolerance: 1e-7, ..Adaptive::default() };
+        for degrees in [0.0f32, 40.0, 70.0, 85.0, 90.0] {
+            let w = toward(degrees, 0.7);
+            let [area] = quadrature.hemisphere(|h| {
+                let h = Vec3::from(h.map(|c| c as f32));
+                [f64::from(normals.d(h) * h.dot(w).max(0.0))]
+            });
+            let sigma = f64::from(normals.sigma(w));
+            assert!((area - sigma).abs() < tolerance * area, "{degrees}°: {area} {sigma}");
+        }
+    }
+
+    /// Smith's normalisation: ∫ D(h) max(0, h·w) dω = σ(w).
+    #[test]
+    fn sigma_is_the_projected_area() {
+        for alpha in [[0.3, 0.6], [0.5, 0.5], [0.9, 0.2]] {
+            check_area(&GgxNormals::new(alpha), 1e-4);
+            // The accuracy of the rational fit of Λ.
+            check_area(&BeckmannNormals::new(alpha), 0.005);
+        }
+    }
+
+    /// G₂ by its definitions from Λ = (√(1 + α² tan² θ) − 1)/2.
+    #[test]
+    fn masking_is_smiths() {
+        let alpha = 0.4f32;
+        let normals = GgxNormals::new([alpha; 2]);
+        for (degrees_o, degrees_i) in [(0.0, 0.0), (20.0, 70.0), (60.0, 60.0), (85.0, 30.0)] {
+            let (wo, wi) = (toward(degrees_o, 0.3), toward(degrees_i, 2.0));
+            let lambda = |w: Vec3| 0.5 * ((1.0 + sqr(alpha) * (1.0 / sqr(w.z) - 1.0)).sqrt() - 1.0);
+            let (lambda_o, lambda_i) = (lambda(wo), lambda(wi));
+            let g2 = |masking| match masking {
+                Masking::Correlated => 1.0 / (1.0 + lambda_o + lambda_i),
+                Masking::Separable => 1.0 / ((1.0 + lambda_o) * (1.0 + lambda_i)),
+            };
+            for masking in [Masking::Correlated, Masking::Separable] {
+                let sigmas = [normals.sigma(wo), normals.sigma(wi)];
+                let found = masked(masking, [wo.z, wi.z], sigmas);
+                let expected = g2(masking) / (4.0 * wo.z);
+                assert!((found - expected).abs() < 1e-5 * expected, "{found} {expected}");
+            }
+        }
+    }
+
+    /// Every pair of directions lies in the ring of its half vector.
+    #[test]
+    fn rings_hold_their_directions() {
+        let mut rng = testkit::Pcg::new(3);
+        for _ in 0..20_000 {
+            let direction = |u| crate::sampling::warp::uniform_hemisphere(Vec2::from(u));
+            let (wo, wi) = (direction(rng.next_2d()), direction(rng.next_2d()));
+            let h = wo + wi;
+            let tan2 = (sqr(h.x) + sqr(h.y)) / sqr(h.z);
+            let ring = rings(wo, 0.3).find(|r| (r.tan2[0]..=r.tan2[1]).contains(&tan2));
+            let ring = ring.expect("the rings cover the hemisphere");
+            assert!(0.5 * h.length() >= ring.min_cos_d - 1e-5 && wi.z <= ring.max_cos_i + 1e-5);
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! Light probes from files: any picture format, any mapping, brought to the lat-long working map.
+//!
+//! Radiance must be finite and not negative before any sampling table is made from it. A probe that breaks this is an
+//! error that shows the first bad texel; repairing it is the user's decision ([`ProbeOptions::sanitize`]), because a
+//! NaN is often where the sun was.
+
+use super::mapping::{Mapping, ShapeError, to_lat_long};
+use crate::math::{Vec2, vec2};
+use crate::picture::{self, PictureError, ReadOptions};
+use crate::{Rgb, RgbImage};
+use std::path::Path;
+
+/// How to understand a probe's file.
+#[derive(Clone, Debug, Default)]
+pub struct ProbeOptions {
+    /// The mapping; by default guessed from attribute, shape and, of a square, its corners.
+    pub mapping: Option<Mapping>,
+    /// The OpenEXR layer, see [`ReadOptions::layer`].
+    pub layer: Option<String>,
+    /// Repair negative and non-finite values instead of refusing them.
+    pub sanitize: bool,
+}
+
+/// A probe in the working map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadedProbe {
+    /// Lat-long, every value finite and ≥ 0.
+    pub image: RgbImage,
+    /// The mapping of the file.
+    pub mapping: Mapping,
+    /// Width and height of the file's picture.
+    pub file_size: (usize, usize),
+    /// What was repaired.
+    pub sanitized: SanitizeReport,
+}
+
+/// Numbers of repaired values (channels of texels).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SanitizeReport {
+    /// Negative values, now 0.
+    pub negative: usize,
+    /// NaN and infinities, now the mean of their neighbours.
+    pub non_finite: usize,
+}
+
+/// A probe could not be loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum ProbeError {
+    /// The picture could not be read.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// The picture has not the shape of the mapping that was asked for.
+    #[error("{file}: {shape}")]
+    Shape {
+        /// The file.
+        file: String,
+        /// What does not fit.
+        shape: ShapeError,
+    },
+    /// Some values are no radiance.
+    #[error(
+        "{file}: texel ({x}, {y}) has {channel} = {value}, and {count} value(s) in all are negative, NaN or infinite; \
+         --sanitize repairs them"
+    )]
+    BadTexel {
+        /// The file.
+        file: String,
+        /// Column of the first bad texel.
+        x: usize,
+        /// Row of the first bad texel.
+        y: usize,
+        /// `R`, `G` or `B`.
+        channel: char,
+        /// Its value there.
+        value: f32,
+        /// Number of bad values in the whole picture.
+        count: usize,
+    },
+}
+
+/// The light probe in a file, or on standard input if `path` is `-`.
+///
+/// Lat-long maps keep their texels bit for bit; other mappings are converted at the height that keeps their detail.
+///
+/// # Errors
+/// If the picture cannot be read, has not the mapping's shape, or has values that are no radiance and `sanitize` is
+/// not set.
+pub fn load_probe(path: &Path, options: &ProbeOptions) -> Result<LoadedProbe, ProbeError> {
+    let read = ReadOptions { layer: options.layer.clone() };
+    let picture = picture::read(path, &read)?;
+    let file =
+        if path == Path::new("-") { "standard input".into() } else { path.display().to_string() };
+    probe_from_picture(picture, &file, options)
+}
+
+/// The light probe in a picture; `file` is for messages.
+///
+/// # Errors
+/// As [`load_probe`], but for reading.
+pub fn probe_from_picture(
+    picture: picture::Picture,
+    file: &str,
+    options: &ProbeOptions,
+) -> Result<LoadedProbe, ProbeError> {
+    let mut image = picture.image;
+    let mapping = options.mapping.unwrap_or_else(|| {
+        match Mapping::guess(image.width, image.height, picture.envmap) {
+            Mapping::Angular => guess_of_square(&image),
+            mapping => mapping,
+        }
+    });
+    mapping
+        .check_shape(image.width, image.height)
+        .map_err(|shape| ProbeError::Shape { file: file.to_owned(), shape })?;
+    let sanitized = if options.sanitize {
+        sanitize(&mut image)
+    } else {
+        require_radiance(&image, file)?;
+        SanitizeReport::default()
+    };
+    let file_size = (image.width, image.height);
+    let height = mapping.lat_long_height(image.width, image.height);
+    let image = match mapping {
+        Mapping::LatLong => image,
+        _ => to_lat_long(&image, mapping, height),
+    };
+    Ok(LoadedProbe { image, mapping, file_size, sanitized })
+}
+
+/// An angular map is black outside its disc; a square that is not is taken as octahedral.
+fn guess_of_square(image: &RgbImage) -> Mapping {
+    let n = image.width as f32;
+    let is_outside = |x: usize, y: usize| {
+        let from_center = vec2(x as f32 + 0.5, y as f32 + 0.5) / n * 2.0 - Vec2::ONE;
+        // A texel's half diagonal beyond the circle.
+        from_center.length() > 1.0 + 1.5 / n
+    };
+    let lit = |(i, pixel): (usize, &Rgb)| {
+        is_outside(i % image.width, i / image.width) && pixel.max_component() > 0.0
+    };
+    if image.pixels.iter().enumerate().any(lit) { Mapping::Octahedral } else { Mapping::Angular }
+}
+
+fn is_radiance(value: f32) -> bool {
+    value.is_finite() && value >= 0.0
+}
+
+fn require_radiance(image: &RgbImage, file: &str) -> Result<(), ProbeError> {
+    let bad = |pixel: &Rgb| pixel.to_array().into_iter().filter(|&c| !is_radiance(c)).count();
+    let count = image.pixels.iter().map(bad).sum();
+    let Some(first) = image.pixels.iter().position(|pixel| bad(pixel) > 0) else { return Ok(()) };
+    let values = image.pixels[first].to_array();
+    let channel = values.iter().position(|&c| !is_radiance(c)).unwrap_or(0);
+    Err(ProbeError::BadTexel {
+        file: file.to_owned(),
+        x: first % image.width,
+        y: first / image.width,
+        channel: ['R', 'G', 'B'][channel],
+        value: values[channel],
+        count,
+    })
+}
+
+/// Makes every value finite and ≥ 0: negative ones become 0, NaN and infinities the mean of their finite neighbours
+/// among the eight around, from the border of a bad region inward. A channel without any finite value becomes 0.
+pub fn sanitize(image: &mut RgbImage) -> SanitizeReport {
+    let mut report = SanitizeReport::default();
+    for pixel in &mut image.pixels {
+        *pixel = pixel.map(|c| {
+            let negative = c < 0.0 && c.is_finite();
+            report.negative += usize::from(negative);
+            report.non_finite += usize::from(!c.is_finite());
+            if negative { 0.0 } else { c }
+        });
+    }
+    if report.non_finite > 0 {
+        fill_channel(image, |pixel| &mut pixel.r);
+        fill_channel(image, |pixel| &mut pixel.g);
+        fill_channel(image, |pixel| &mut pixel.b);
+    }
+    report
+}
+
+/// Replaces the non-finite values of one channel ring by ring, each from the values around it that are known then.
+fn fill_channel(image: &mut RgbImage, channel: fn(&mut Rgb) -> &mut f32) {
+    let (width, height) = (image.width, image.height);
+    let mut values: Vec<f32> = image.pixels.iter_mut().map(|pixel| *channel(pixel)).collect();
+    let mut queued: Vec<bool> = values.iter().map(|value| value.is_finite()).collect();
+    let borders_known = |&i: &usize| neighbours(i, width, height).any(|j| values[j].is_finite());
+    let mut ring: Vec<usize> =
+        (0..values.len()).filter(|&i| !queued[i]).filter(borders_known).collect();
+    while !ring.is_empty() {
+        ring.iter().for_each(|&i| queued[i] = true);
+        let means: Vec<f32> =
+            ring.iter().map(|&i| mean_around(&values, i, width, height)).collect();
+        ring.iter().zip(means).for_each(|(&i, mean)| values[i] = mean);
+        let mut next = Vec::new();
+        for j in ring.iter().flat_map(|&i| neighbours(i, width, height)) {
+            if !std::mem::replace(&mut queued[j], true) {
+                next.push(j);
+            }
+        }
+        ring = next;
+    }
+    for (pixel, value) in image.pixels.iter_mut().zip(values) {
+        *channel(pixel) = if value.is_finite() { value } else { 0.0 };
+    }
+}
+
+fn mean_around(values: &[f32], i: usize, width: usize, height: usize) -> f32 {
+    let (mut sum, mut count) = (0.0, 0);
+    for value in neighbours(i, width, height).map(|j| values[j]).filter(|value| value.is_finite()) {
+        sum += f64::from(value);
+        count += 1;
+    }
+    (sum / f64::from(count)) as f32
+}
+
+fn neighbours(i: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
+    let (x, y) = (i % width, i / width);
+    let rows = y.saturating_sub(1)..(y + 2).min(height);
+    rows.flat_map(move |row| {
+        (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| row * width + x)
+    })
+    .filter(move |&j| j != i)
+}

@@ -1,0 +1,282 @@
+//! What a light probe is like: how bright, how concentrated, where its sun stands.
+//!
+//! Everything is weighed by the exact solid angle of the texels, in f64. Means over pixels, which
+//! overrate the poles, are given beside it only because other programs print them.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use super::mapping::Mapping;
+use crate::color::Rgb;
+use crate::image::RgbImage;
+use crate::math::{Vec3, vec2};
+
+/// A part of this size counts as the brightest texels.
+const BRIGHTEST: f64 = 0.001;
+/// Texels of at least this part of the greatest luminance can belong to the sun.
+const SUN_THRESHOLD: f32 = 0.1;
+/// A region larger than this is no sun \[sr\]: a cap of 7° radius.
+const SUN_MAX_SOLID_ANGLE: f64 = 0.047;
+
+/// Measures of a lat-long map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProbeStatistics {
+    /// Least luminance above zero; 0 if the map is black.
+    pub min_luminance: f32,
+    /// Greatest luminance.
+    pub max_luminance: f32,
+    /// Mean over pixels.
+    pub pixel_mean: Rgb,
+    /// Mean radiance over the sphere, ∫ L dω / 4π.
+    pub mean_radiance: Rgb,
+    /// Irradiance of a surface that faces up, ∫ L max(0, ω·Y) dω \[W·m⁻²\].
+    pub irradiance_up: Rgb,
+    /// Part of ∫ L dω (in luminance) that the brightest 0.1 % of the texels hold, in \[0, 1\].
+    pub brightest_share: f64,
+    /// The brightest compact region, if there is one.
+    pub sun: Option<Sun>,
+}
+
+/// The compact region that sends the most light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sun {
+    /// Its centre of energy, a unit vector.
+    pub direction: Vec3,
+    /// Solid angle of its texels \[sr\].
+    pub solid_angle: f64,
+    /// Irradiance at normal incidence \[W·m⁻²\].
+    pub irradiance: Rgb,
+    /// Its part of ∫ L dω (in luminance), in \[0, 1\].
+    pub share: f64,
+}
+
+impl ProbeStatistics {
+    /// Measures a lat-long map of finite radiance ≥ 0, of any shape.
+    ///
+    /// # Panics
+    /// If the map has no texels.
+    pub fn new(map: &RgbImage) -> Self {
+        assert!(!map.pixels.is_empty(), "an empty map");
+        let luminance: Vec<f32> = map.pixels.iter().map(|p| p.luminance()).collect();
+        let positive = luminance.iter().copied().filter(|&l| l > 0.0);
+        let min = positive.fold(f32::INFINITY, f32::min);
+        let weights = Weights::new(map);
+        Self {
+            min_luminance: if min.is_finite() { min } else { 0.0 },
+            max_luminance: luminance.iter().copied().fold(0.0, f32::max),
+            pixel_mean: weighted_sum(map, |_| 1.0 / map.pixels.len() as f64),
+            mean_radiance: weighted_sum(map, |y| weights.solid_angle(y) / (4.0 * PI)),
+            irradiance_up: weighted_sum(map, |y| weights.projected_up(y)),
+            brightest_share: brightest_share(map, &luminance, &weights),
+            sun: sun(map, &luminance, &weights),
+        }
+    }
+
+    /// Greatest over least positive luminance; 1 for a black map.
+    pub fn dynamic_range(&self) -> f64 {
+        if self.max_luminance > 0.0 {
+            self.max_luminance as f64 / self.min_luminance as f64
+        } else {
+            1.0
+        }
+    }
+
+    /// Greatest luminance over that of the mean radiance; 1 for a black map.
+    pub fn peak_to_mean(&self) -> f64 {
+        let mean = self.mean_radiance.luminance();
+        if mean > 0.0 { self.max_luminance as f64 / mean as f64 } else { 1.0 }
+    }
+}
+
+impl Sun {
+    /// Height above the horizon \[°\].
+    pub fn elevation(&self) -> f64 {
+        (self.direction.y as f64).clamp(-1.0, 1.0).asin().to_degrees()
+    }
+
+    /// Angle around +Y from −Z toward +X \[°\], in (−180, 180]; 0 is the centre column of the map.
+    pub fn azimuth(&self) -> f64 {
+        (self.direction.x as f64).atan2(-self.direction.z as f64).to_degrees()
+    }
+}
+
+/// Integrals over a texel of each row.
+struct Weights {
+    width: usize,
+    height: usize,
+}
+
+impl Weights {
+    fn new(map: &RgbImage) -> Self {
+        Self { width: map.width, height: map.height }
+    }
+
+    fn theta(&self, row: usize) -> f64 {
+        PI * row as f64 / self.height as f64
+    }
+
+    /// ∫ dω over a texel \[sr\].
+    fn solid_angle(&self, y: usize) -> f64 {
+        TAU / self.width as f64 * (self.theta(y).cos() - self.theta(y + 1).cos())
+    }
+
+    /// ∫ max(0, cos θ) dω over a texel, with ∫ sin θ cos θ dθ = ½ sin² θ.
+    fn projected_up(&self, y: usize) -> f64 {
+        let [a, b] = [y, y + 1].map(|row| self.theta(row).min(FRAC_PI_2).sin().powi(2));
+        TAU / self.width as f64 * 0.5 * (b - a)
+    }
+}
+
+/// Σ weight(row) · texel.
+fn weighted_sum(map: &RgbImage, weight: impl Fn(usize) -> f64) -> Rgb {
+    let mut sum = [0.0f64; 3];
+    for y in 0..map.height {
+        let w = weight(y);
+        for texel in map.row(y) {
+            sum.iter_mut().zip(texel.to_array()).for_each(|(s, c)| *s += w * c as f64);
+        }
+    }
+    Rgb::from(sum.map(|s| s as f32))
+}
+
+fn brightest_share(map: &RgbImage, luminance: &[f32], weights: &Weights) -> f64 {
+    let energy =
+        |i: &u32| luminance[*i as usize] as f64 * weights.solid_angle(*i as usize / map.width);
+    let mut order: Vec<u32> = (0..luminance.len() as u32).collect();
+    let total: f64 = order.iter().map(energy).sum();
+    if total <= 0.0 {
+        return 0.0;
+    }
+    let n = ((luminance.len() as f64 * BRIGHTEST).round() as usize).clamp(1, luminance.len());
+    let brighter =
+        |a: &u32, b: &u32| luminance[*b as usize].total_cmp(&luminance[*a as usize]).then(a.cmp(b));
+    order.select_nth_unstable_by(n - 1, brighter);
+    order[..n].sort_unstable();
+    order[..n].iter().map(energy).sum::<f64>() / total
+}
+
+/// Of the connected regions of bright texels the one with the most energy, if it is small.
+fn sun(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Sun> {
+    let threshold = SUN_THRESHOLD * luminance.iter().copied().fold(0.0, f32::max);
+    let mut open: Vec<bool> = luminance.iter().map(|&l| l > 0.0 && l >= threshold).collect();
+    let energy = |i: usize| luminance[i] as f64 * weights.solid_angle(i / map.width);
+    let mut best: (f64, Vec<usize>) = (0.0, Vec::new());
+    for seed in 0..luminance.len() {
+        if open[seed] {
+            let region = flood(seed, map, &mut open);
+            let total = region.iter().map(|&i| energy(i)).sum();
+            if total > best.0 {
+                best = (total, region);
+            }
+        }
+    }
+    let (total, region) = best;
+    let solid_angle: f64 = region.iter().map(|&i| weights.solid_angle(i / map.width)).sum();
+    if total <= 0.0 || solid_angle > SUN_MAX_SOLID_ANGLE {
+        return None;
+    }
+    let mut moment = [0.0f64; 3];
+    let mut irradiance = [0.0f64; 3];
+    for &i in &region {
+        let (x, y) = (i % map.width, i / map.width);
+        let d = texel_direction(map, x, y).to_array();
+        moment.iter_mut().zip(d).for_each(|(m, d)| *m += energy(i) * d as f64);
+        let le = map.pixels[i].to_array();
+        irradiance.iter_mut().zip(le).for_each(|(e, l)| *e += l as f64 * weights.solid_angle(y));
+    }
+    let direction = Vec3::from_array(moment.map(|m| (m / total) as f32)).try_normalize()?;
+    let all: f64 = (0..luminance.len()).map(energy).sum();
+    let irradiance = Rgb::from(irradiance.map(|e| e as f32));
+    Some(Sun { direction, solid_angle, irradiance, share: total / all })
+}
+
+/// The open texels connected to `seed`, sides and corners, around the seam; they are closed.
+fn flood(seed: usize, map: &RgbImage, open: &mut [bool]) -> Vec<usize> {
+    let mut region = vec![seed];
+    open[seed] = false;
+    let mut next = 0;
+    while let Some(&i) = region.get(next) {
+        next += 1;
+        let (x, y) = (i % map.width, i / map.width);
+        for ny in y.saturating_sub(1)..=(y + 1).min(map.height - 1) {
+            for nx in [x + map.width - 1, x, x + 1] {
+                let j = ny * map.width + nx % map.width;
+                if std::mem::take(&mut open[j]) {
+                    region.push(j);
+                }
+            }
+        }
+    }
+    region
+}
+
+fn texel_direction(map: &RgbImage, x: usize, y: usize) -> Vec3 {
+    let uv = vec2((x as f32 + 0.5) / map.width as f32, (y as f32 + 0.5) / map.height as f32);
+    Mapping::LatLong.direction(uv).expect("a lat-long map shows every direction")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::builtin::BuiltinProbe;
+
+    fn near(a: f32, b: f64, relative: f64) -> bool {
+        (a as f64 / b - 1.0).abs() < relative
+    }
+
+    #[test]
+    fn a_constant_map_gives_pi_and_no_sun() {
+        for (width, height) in [(1, 1), (2, 1), (7, 3), (64, 32)] {
+            let s = ProbeStatistics::new(&RgbImage::filled(width, height, Rgb::splat(2.0)));
+            assert!(near(s.mean_radiance.g, 2.0, 1e-6) && near(s.irradiance_up.g, 2.0 * PI, 1e-6));
+            assert_eq!((s.dynamic_range(), s.sun), (1.0, None));
+            assert!((s.peak_to_mean() - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_black_map_is_defined() {
+        let s = ProbeStatistics::new(&RgbImage::filled(4, 2, Rgb::BLACK));
+        assert_eq!(
+            (s.brightest_share, s.sun, s.dynamic_range(), s.peak_to_mean()),
+            (0.0, None, 1.0, 1.0)
+        );
+    }
+
+    #[test]
+    fn the_brightest_texel_of_a_thousand_is_weighed_by_its_solid_angle() {
+        let mut map = RgbImage::filled(50, 20, Rgb::WHITE);
+        map.pixels[10 * 50 + 7] = Rgb::splat(100.0);
+        let omega = Weights::new(&map).solid_angle(10);
+        let expected = 100.0 * omega / (4.0 * PI + 99.0 * omega);
+        assert!((ProbeStatistics::new(&map).brightest_share - expected).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_sun_of_the_sky_is_found_at_every_size() {
+        for height in [64, 255, 512] {
+            let s = ProbeStatistics::new(&BuiltinProbe::Sky.image(height));
+            let sun = s.sun.expect("a sky has a sun");
+            let step = 180.0 / height as f64;
+            assert!((sun.elevation() - 36.0).abs() < 0.5 * step, "{} at {height}", sun.elevation());
+            assert!((sun.azimuth() + 122.0).abs() < 0.5 * step, "{} at {height}", sun.azimuth());
+        }
+    }
+
+    #[test]
+    fn a_sun_on_the_seam_is_one() {
+        let mut map = RgbImage::filled(64, 32, Rgb::splat(0.01));
+        for x in [0, 63] {
+            map.pixels[12 * 64 + x] = Rgb::splat(50.0);
+        }
+        let sun = ProbeStatistics::new(&map).sun.expect("two bright texels");
+        assert!(sun.direction.z > 0.0 && sun.direction.x.abs() < 1e-5, "{:?}", sun.direction);
+        assert!((sun.azimuth().abs() - 180.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn irradiance_from_above_of_a_half_lit_odd_map() {
+        // Rows 0 to 3 of 7 are white; row 3 straddles the horizon, below which nothing counts.
+        let map = RgbImage::from_fn(4, 7, |_, y| if y <= 3 { Rgb::WHITE } else { Rgb::BLACK });
+        assert!(near(ProbeStatistics::new(&map).irradiance_up.r, PI, 1e-6));
+    }
+}

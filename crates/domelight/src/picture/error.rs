@@ -1,0 +1,140 @@
+//! What can be wrong with a picture file.
+
+use std::io;
+
+/// A picture file could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}: {problem}")]
+pub struct PictureError {
+    /// The file's name as the user gave it.
+    pub file: String,
+    /// What is wrong with it.
+    #[source]
+    pub problem: Problem,
+}
+
+/// What is wrong with a picture file. Offsets are in bytes from the file's start.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Problem {
+    /// The system says so.
+    #[error("{0}")]
+    Io(io::Error),
+    /// The first bytes belong to no known format.
+    #[error(
+        "not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG): it starts with {start:02x?}"
+    )]
+    UnknownFormat {
+        /// The first bytes, at most eight.
+        start: Vec<u8>,
+    },
+    /// A line of the header makes no sense.
+    #[error("header line {line}: {found:?} is not {expected}")]
+    Header {
+        /// Counted from 1.
+        line: usize,
+        /// What stands there.
+        found: String,
+        /// What should.
+        expected: &'static str,
+    },
+    /// No texels.
+    #[error("the picture is {width}x{height}: it has no texels")]
+    Empty {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// More texels than are ever read, or than there is memory for.
+    #[error(
+        "the picture is {width}x{height}: larger than can be read ({} texels at most, memory permitting)",
+        super::MAX_TEXELS
+    )]
+    TooLarge {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// The header promises more texels than the file can hold.
+    #[error(
+        "the header promises {width}x{height} texels, which take at least {needed} bytes; the file holds {held}: it is truncated or corrupt"
+    )]
+    Promises {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Least number of bytes of such a picture.
+        needed: u64,
+        /// Bytes there.
+        held: u64,
+    },
+    /// The file ends too early.
+    #[error("the file ends at byte {offset} in {place}: it is truncated")]
+    Truncated {
+        /// What was being read, with its number.
+        place: String,
+        /// Where the file ends.
+        offset: usize,
+    },
+    /// A Radiance run that cannot be.
+    #[error("scanline {scanline}, byte {offset}: {what}")]
+    Scanline {
+        /// Counted from 0 in the file's order.
+        scanline: usize,
+        /// Where in the file.
+        offset: usize,
+        /// What is wrong there.
+        what: &'static str,
+    },
+    /// The OpenEXR decoder refused the file.
+    #[error("OpenEXR: {0}")]
+    Exr(::exr::error::Error),
+    /// The OpenEXR decoder hit an inconsistency that it does not report as an error.
+    #[error("OpenEXR: the file is corrupt ({message})")]
+    ExrPanic {
+        /// Its own words.
+        message: String,
+    },
+    /// Something of OpenEXR that is not read.
+    #[error("OpenEXR: {0} are not supported")]
+    ExrUnsupported(&'static str),
+    /// The layer that was asked for is not there.
+    #[error("there is no layer {asked:?} with colour channels; the file has {}", list(.present))]
+    NoSuchLayer {
+        /// Its name.
+        asked: String,
+        /// The layers there are.
+        present: Vec<String>,
+    },
+    /// No layer has R, G and B, or Y.
+    #[error("there are no colour channels (R, G, B or Y); the file has {}", list(.present))]
+    NoColor {
+        /// The channels there are.
+        present: Vec<String>,
+    },
+    /// A decoder of the `image` crate refused the file.
+    #[error("{0}")]
+    Image(image::ImageError),
+    /// The layers cannot be written as one OpenEXR part.
+    #[error("channel {channel:?} cannot be written: {why}")]
+    Channel {
+        /// Its full name.
+        channel: String,
+        /// The reason.
+        why: &'static str,
+    },
+}
+
+impl Problem {
+    /// Names the file.
+    pub fn in_file(self, file: &str) -> PictureError {
+        PictureError { file: file.to_owned(), problem: self }
+    }
+}
+
+fn list(names: &[String]) -> String {
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}

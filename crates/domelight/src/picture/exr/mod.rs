@@ -1,0 +1,7 @@
+//! OpenEXR: reads one layer of any flat file, writes several layers into one part.
+
+mod read;
+mod write;
+
+pub use read::decode;
+pub use write::{ExrLayers, Layer, text_attributes};

@@ -1,0 +1,333 @@
+//! Reading OpenEXR.
+//!
+//! The `exr` crate parses and decompresses: scanlines and tiles, half, float and uint, every compression
+//! it knows (none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB). Of mip- and rip-mapped files the largest
+//! level is read. The picture is the data window, wherever it lies; the display window is ignored. A
+//! `chromaticities` attribute other than Rec. 709's is converted, white point included.
+//!
+//! Blocks are decompressed in batches on the program's own threads: the crate's parallel reader starts a pool of its
+//! own for each file, in which a panic over a corrupt block would abort the process. What the crate asserts instead
+//! of returning an error is caught here and becomes [`Problem::ExrPanic`].
+
+use crate::environment::mapping::EnvmapKind;
+use crate::picture::primaries::{Primaries, transform};
+use crate::picture::{Format, MAX_TEXELS, Picture, Problem, allocate, checked_area};
+use crate::{Rgb, RgbImage};
+use ::exr::block::UncompressedBlock;
+use ::exr::block::chunk::Chunk;
+use ::exr::block::lines::LineRef;
+use ::exr::block::reader::{ChunksReader, Reader};
+use ::exr::meta::attribute::{Chromaticities, EnvironmentMap};
+use ::exr::meta::header::Header;
+use ::exr::meta::{BlockDescription, MetaData};
+use ::exr::prelude::{Compression, SampleType, Text, f16};
+use half::slice::HalfFloatSliceExt;
+use rayon::prelude::*;
+use std::io::Cursor;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Decodes one layer of a whole file.
+///
+/// By default that is the unnamed R, G, B channels, else the first layer with R, G, B, else one with Y alone. `layer`
+/// names another: a part, the part of the channel names before the last dot, or both joined by a dot, in any case
+/// of letters; X, Y, Z or a single channel of any name then count as colour too.
+///
+/// # Errors
+/// If the file is damaged, incomplete or deep, or has no such layer.
+pub fn decode(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Problem> {
+    // The crate asserts in places where only a corrupt file can lead; nothing of what it touched is used afterwards.
+    let decoded = catch_unwind(AssertUnwindSafe(|| decode_unguarded(bytes, layer)));
+    decoded.unwrap_or_else(|panic| {
+        let words = panic.downcast_ref::<String>().map(String::as_str);
+        let message = words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("unknown");
+        Err(Problem::ExrPanic { message: message.to_owned() })
+    })
+}
+
+/// Blocks decompressed together: enough for all cores, few enough to need little memory.
+const BATCH: usize = 32;
+
+fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Problem> {
+    let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(Problem::Exr)?;
+    for header in reader.headers() {
+        check_promises(header, bytes.len() as u64)?;
+    }
+    let selected = select(reader.headers(), layer)?;
+    let header = &reader.headers()[selected.header];
+    let mut planes = Planes::new(header, selected.channels)?;
+    let envmap = header.own_attributes.environment_map.map(|kind| match kind {
+        EnvironmentMap::LatitudeLongitude => EnvmapKind::LatLong,
+        EnvironmentMap::Cube => EnvmapKind::Cube,
+    });
+    let matrix = header.shared_attributes.chromaticities.as_ref().and_then(to_rec709);
+
+    let mut chunks = reader
+        .filter_chunks(false, |_, tile, block| {
+            block.layer == selected.header && tile.is_largest_resolution_level()
+        })
+        .map_err(Problem::Exr)?;
+    let meta = chunks.meta_data().clone();
+    loop {
+        let batch: Vec<Chunk> =
+            chunks.by_ref().take(BATCH).collect::<Result<_, _>>().map_err(Problem::Exr)?;
+        if batch.is_empty() {
+            break;
+        }
+        for block in decompress(batch, &meta)? {
+            planes.insert(&meta.headers[selected.header], &block)?;
+        }
+    }
+    let image = planes.into_image(matrix.filter(|_| selected.is_color));
+    Ok(Picture { image: image.0, alpha: image.1, envmap, format: Format::Exr })
+}
+
+fn decompress(batch: Vec<Chunk>, meta: &MetaData) -> Result<Vec<UncompressedBlock>, Problem> {
+    let blocks =
+        batch.into_par_iter().map(|chunk| UncompressedBlock::decompress_chunk(chunk, meta, false));
+    blocks.collect::<Result<_, _>>().map_err(Problem::Exr)
+}
+
+fn to_rec709(c: &Chromaticities) -> Option<crate::math::Mat3> {
+    Primaries([c.red, c.green, c.blue, c.white].map(|xy| [xy.0, xy.1])).to_rec709()
+}
+
+/// Refuses a header whose blocks cannot all be in a file of `held` bytes.
+///
+/// Each block of the largest level has its offset (8 bytes), its place and size (8 at least) and its data in the file.
+/// A byte of data makes at most 1 byte without compression, 64 of RLE and 1032 of deflate (1376 of PXR24). PIZ, B44A
+/// and DWA have no useful bound on what a block can be made from; 65536 lets a black map of any size through.
+fn check_promises(header: &Header, held: u64) -> Result<(), Problem> {
+    let (width, height) = (header.layer_size.0, header.layer_size.1);
+    checked_area(width, height)?;
+    let block = header.max_block_pixel_size();
+    let blocks = width.div_ceil(block.0.max(1)) as u64 * height.div_ceil(block.1.max(1)) as u64;
+    let ratio = match header.compression {
+        Compression::Uncompressed => 1,
+        Compression::RLE => 64,
+        Compression::ZIP1 | Compression::ZIP16 => 1032,
+        Compression::PXR24 => 1376,
+        _ => 65536,
+    };
+    // Subsampled channels take less than `bytes_per_pixel` says.
+    let texel_bytes: u64 = header
+        .channels
+        .list
+        .iter()
+        .map(|c| match (c.sampling.0, c.sampling.1) {
+            (1, 1) => c.sample_type.bytes_per_sample() as u64,
+            _ => 0,
+        })
+        .sum();
+    let data = (width as u64 * height as u64).saturating_mul(texel_bytes) / ratio;
+    let needed = (blocks * 16).saturating_add(data);
+    let tile_area = match header.blocks {
+        BlockDescription::Tiles(tiles) => tiles.tile_size.0 as u64 * tiles.tile_size.1 as u64,
+        BlockDescription::ScanLines => 0,
+    };
+    if held < needed || tile_area > MAX_TEXELS as u64 {
+        return Err(Problem::Promises { width, height, needed, held });
+    }
+    Ok(())
+}
+
+/// Which channels of which part make the picture.
+struct Selected {
+    header: usize,
+    /// Indices into the part's channels of red, green, blue and, if there is one, alpha.
+    channels: [Option<usize>; 4],
+    /// Red, green and blue, not a grey or something else by its own name.
+    is_color: bool,
+}
+
+/// The channels of one part that share what stands before the last dot of their names.
+struct Candidate {
+    header: usize,
+    part: String,
+    prefix: String,
+    /// (name after the dot, index).
+    channels: Vec<(String, usize)>,
+}
+
+fn candidates(headers: &[Header]) -> Vec<Candidate> {
+    let mut found: Vec<Candidate> = Vec::new();
+    for (index, header) in headers.iter().enumerate().filter(|(_, header)| !header.deep) {
+        let part = header.own_attributes.layer_name.as_ref().map(Text::to_string);
+        let part = part.filter(|_| headers.len() > 1).unwrap_or_default();
+        for (channel, description) in header.channels.list.iter().enumerate() {
+            let full = description.name.to_string();
+            let (prefix, name) = full.rsplit_once('.').unwrap_or(("", &full));
+            let known = found.iter().position(|c| c.header == index && c.prefix == prefix);
+            let at = known.unwrap_or_else(|| {
+                let (part, prefix) = (part.clone(), prefix.to_owned());
+                found.push(Candidate { header: index, part, prefix, channels: Vec::new() });
+                found.len() - 1
+            });
+            found[at].channels.push((name.to_owned(), channel));
+        }
+    }
+    found
+}
+
+impl Candidate {
+    fn full_name(&self) -> String {
+        match (self.part.as_str(), self.prefix.as_str()) {
+            ("", name) | (name, "") => name.to_owned(),
+            (part, prefix) => format!("{part}.{prefix}"),
+        }
+    }
+
+    fn is_called(&self, asked: &str) -> bool {
+        [&self.full_name(), &self.part, &self.prefix]
+            .into_iter()
+            .any(|name| !name.is_empty() && name.eq_ignore_ascii_case(asked))
+    }
+
+    fn channel(&self, name: &str) -> Option<usize> {
+        self.channels.iter().find(|(n, _)| n == name).map(|&(_, index)| index)
+    }
+
+    fn three(&self, names: [&str; 3]) -> Option<[usize; 3]> {
+        Some([self.channel(names[0])?, self.channel(names[1])?, self.channel(names[2])?])
+    }
+
+    fn rgb(&self) -> Option<Selected> {
+        let rgb = self.three(["R", "G", "B"]).or_else(|| self.three(["r", "g", "b"]))?;
+        Some(self.selected(rgb, true))
+    }
+
+    /// Luminance without the subsampled chroma that sometimes goes with it.
+    fn luminance(&self) -> Option<Selected> {
+        let y = self.channel("Y").filter(|_| self.channel("RY").is_none())?;
+        Some(self.selected([y; 3], false))
+    }
+
+    fn anything(&self) -> Option<Selected> {
+        let vector = self.three(["X", "Y", "Z"]);
+        let single = (self.channels.len() == 1).then(|| [self.channels[0].1; 3]);
+        vector.or(single).map(|channels| self.selected(channels, false))
+    }
+
+    fn selected(&self, [r, g, b]: [usize; 3], is_color: bool) -> Selected {
+        let alpha = self.channel("A").or_else(|| self.channel("a"));
+        Selected { header: self.header, channels: [Some(r), Some(g), Some(b), alpha], is_color }
+    }
+}
+
+fn select(headers: &[Header], layer: Option<&str>) -> Result<Selected, Problem> {
+    if headers.iter().all(|header| header.deep) {
+        return Err(Problem::ExrUnsupported("deep pictures"));
+    }
+    let all = candidates(headers);
+    let selected = if let Some(asked) = layer {
+        let mut called = all.iter().filter(|candidate| candidate.is_called(asked));
+        let found = called.find_map(|c| c.rgb().or_else(|| c.anything()).or_else(|| c.luminance()));
+        found.ok_or_else(|| Problem::NoSuchLayer {
+            asked: asked.to_owned(),
+            present: all.iter().map(Candidate::full_name).filter(|name| !name.is_empty()).collect(),
+        })?
+    } else {
+        let unnamed = || all.iter().filter(|candidate| candidate.prefix.is_empty());
+        let found = unnamed()
+            .find_map(Candidate::rgb)
+            .or_else(|| all.iter().find_map(Candidate::rgb))
+            .or_else(|| unnamed().find_map(Candidate::luminance))
+            .or_else(|| all.iter().find_map(Candidate::luminance));
+        found.ok_or_else(|| no_color(headers, &all))?
+    };
+    let list = &headers[selected.header].channels.list;
+    let full = |index: usize| (list[index].sampling.0, list[index].sampling.1) == (1, 1);
+    if list.iter().enumerate().any(|(index, _)| !full(index)) {
+        return Err(Problem::ExrUnsupported("subsampled channels"));
+    }
+    Ok(selected)
+}
+
+fn no_color(headers: &[Header], all: &[Candidate]) -> Problem {
+    if all.iter().any(|c| c.channel("RY").is_some()) {
+        return Problem::ExrUnsupported("luminance-chroma pictures (Y, RY, BY)");
+    }
+    let channels = headers.iter().flat_map(|header| &header.channels.list);
+    Problem::NoColor { present: channels.map(|channel| channel.name.to_string()).collect() }
+}
+
+/// The picture while its blocks arrive.
+struct Planes {
+    width: usize,
+    height: usize,
+    pixels: Vec<Rgb>,
+    alpha: Option<Vec<f32>>,
+    channels: [Option<usize>; 4],
+}
+
+impl Planes {
+    fn new(header: &Header, channels: [Option<usize>; 4]) -> Result<Self, Problem> {
+        let (width, height) = (header.layer_size.0, header.layer_size.1);
+        let pixels = allocate(Rgb::BLACK, width, height)?;
+        let alpha = channels[3].map(|_| allocate(0.0, width, height)).transpose()?;
+        Ok(Self { width, height, pixels, alpha, channels })
+    }
+
+    fn insert(&mut self, header: &Header, block: &UncompressedBlock) -> Result<(), Problem> {
+        let (mut halves, mut values) = (Vec::new(), Vec::new());
+        for line in block.lines(&header.channels) {
+            let place = line.location;
+            let wanted = self.channels.contains(&Some(place.channel));
+            let inside = place.position.0 + place.sample_count <= self.width
+                && place.position.1 < self.height;
+            if !wanted || !inside {
+                continue;
+            }
+            values.resize(place.sample_count, 0.0);
+            let sample_type = header.channels.list[place.channel].sample_type;
+            to_floats(line, sample_type, &mut halves, &mut values).map_err(Problem::Exr)?;
+            let start = place.position.1 * self.width + place.position.0;
+            self.put(place.channel, start, &values);
+        }
+        Ok(())
+    }
+
+    fn put(&mut self, channel: usize, start: usize, values: &[f32]) {
+        let is = |i: usize| self.channels[i] == Some(channel);
+        let pixels = &mut self.pixels[start..start + values.len()];
+        let (r, g, b) = (is(0), is(1), is(2));
+        for (pixel, &value) in pixels.iter_mut().zip(values) {
+            pixel.r = if r { value } else { pixel.r };
+            pixel.g = if g { value } else { pixel.g };
+            pixel.b = if b { value } else { pixel.b };
+        }
+        if let Some(alpha) = self.alpha.as_mut().filter(|_| self.channels[3] == Some(channel)) {
+            alpha[start..start + values.len()].copy_from_slice(values);
+        }
+    }
+
+    fn into_image(self, matrix: Option<crate::math::Mat3>) -> (RgbImage, Option<Vec<f32>>) {
+        let mut pixels = self.pixels;
+        if let Some(matrix) = matrix {
+            pixels.iter_mut().for_each(|pixel| *pixel = transform(&matrix, *pixel));
+        }
+        (RgbImage::new(self.width, self.height, pixels), self.alpha)
+    }
+}
+
+fn to_floats(
+    line: LineRef<'_>,
+    sample_type: SampleType,
+    halves: &mut Vec<f16>,
+    values: &mut [f32],
+) -> ::exr::error::UnitResult {
+    match sample_type {
+        SampleType::F32 => line.read_samples_into_slice(values),
+        SampleType::F16 => {
+            halves.resize(values.len(), f16::ZERO);
+            line.read_samples_into_slice(halves)?;
+            halves.convert_to_f32_slice(values);
+            Ok(())
+        }
+        SampleType::U32 => {
+            for (value, sample) in values.iter_mut().zip(line.read_samples::<u32>()) {
+                *value = sample? as f32;
+            }
+            Ok(())
+        }
+    }
+}

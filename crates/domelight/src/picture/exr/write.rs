@@ -1,0 +1,155 @@
+//! Writing OpenEXR: layers in one part.
+//!
+//! One part with dotted channel names is what Blender, Nuke and OpenImageIO show as layers; several parts were
+//! rejected because Blender and older viewers see only the first.
+
+use crate::environment::mapping::EnvmapKind;
+use crate::picture::{Problem, checked_area};
+use crate::{Rgb, RgbImage};
+use ::exr::block;
+use ::exr::meta::attribute::EnvironmentMap;
+use ::exr::prelude::{
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, LayerAttributes,
+    SmallVec, Text, WritableImage,
+};
+use std::io::Cursor;
+
+/// Channels that belong together, such as `albedo` with R, G and B.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// What stands before the dot in the file; empty for the picture itself.
+    pub name: String,
+    /// Name (R, G, B, A, X, Y, Z …) and a value a texel, row by row.
+    pub channels: Vec<(String, Vec<f32>)>,
+}
+
+/// Layers of one size, to be written as one part: `R`, `G`, `B`, `A` for the picture itself and `layer.R` … for
+/// others, the naming that Blender, Nuke and OpenImageIO show as layers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ExrLayers {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// In any order; the file sorts channels by name.
+    pub layers: Vec<Layer>,
+    /// String attributes (name, value), for provenance.
+    pub attributes: Vec<(String, String)>,
+    /// The `envmap` attribute.
+    pub envmap: Option<EnvmapKind>,
+}
+
+impl ExrLayers {
+    /// No layers yet.
+    pub fn new(width: usize, height: usize) -> Self {
+        Self { width, height, ..Self::default() }
+    }
+
+    /// One picture, with alpha if given.
+    pub fn from_image(image: &RgbImage, alpha: Option<&[f32]>) -> Self {
+        let mut layers = Self::new(image.width, image.height);
+        layers.push_rgb("", image, alpha);
+        layers
+    }
+
+    /// Adds a layer with R, G, B and perhaps A.
+    pub fn push_rgb(&mut self, name: &str, image: &RgbImage, alpha: Option<&[f32]>) {
+        let plane = |f: fn(&Rgb) -> f32| image.pixels.iter().map(f).collect();
+        let mut channels = vec![
+            ("R".to_owned(), plane(|c| c.r)),
+            ("G".to_owned(), plane(|c| c.g)),
+            ("B".to_owned(), plane(|c| c.b)),
+        ];
+        channels.extend(alpha.map(|alpha| ("A".to_owned(), alpha.to_vec())));
+        self.layers.push(Layer { name: name.to_owned(), channels });
+    }
+
+    /// Adds a layer with X, Y and Z, such as normals.
+    pub fn push_xyz(&mut self, name: &str, vectors: &[crate::math::Vec3]) {
+        let plane = |axis: usize| vectors.iter().map(|v| v[axis]).collect();
+        let channels = ["X", "Y", "Z"].iter().enumerate().map(|(i, n)| ((*n).to_owned(), plane(i)));
+        self.layers.push(Layer { name: name.to_owned(), channels: channels.collect() });
+    }
+
+    /// Adds a layer of one channel, such as `depth.Z`.
+    pub fn push_channel(&mut self, name: &str, channel: &str, values: Vec<f32>) {
+        let channels = vec![(channel.to_owned(), values)];
+        self.layers.push(Layer { name: name.to_owned(), channels });
+    }
+
+    /// The file's bytes: f32, ZIP, scanlines.
+    ///
+    /// # Errors
+    /// If there are no texels or no channels, two channels have one name, a name is not ASCII or too long, or a
+    /// channel has not `width · height` values.
+    pub fn encode(&self) -> Result<Vec<u8>, Problem> {
+        let area = checked_area(self.width, self.height)?;
+        let mut names = std::collections::BTreeSet::new();
+        let mut list = SmallVec::new();
+        for (layer, channel, values) in self.planes() {
+            let name =
+                if layer.is_empty() { channel.clone() } else { format!("{layer}.{channel}") };
+            let refuse = |why| Err(Problem::Channel { channel: name.clone(), why });
+            if !name.is_ascii() || name.is_empty() || name.len() > 255 {
+                return refuse("its name must be ASCII and 1 to 255 characters long");
+            } else if values.len() != area {
+                return refuse("it has not one value for each texel");
+            } else if !names.insert(name.clone()) {
+                return refuse("another channel has the same name");
+            }
+            list.push(AnyChannel::new(Text::from(name.as_str()), FlatSamples::F32(values.clone())));
+        }
+        if list.is_empty() {
+            return Err(Problem::NoColor { present: Vec::new() });
+        }
+        let size = (self.width, self.height);
+        let layer = ::exr::prelude::Layer::new(
+            size,
+            self.layer_attributes(),
+            Encoding::SMALL_LOSSLESS,
+            AnyChannels::sort(list),
+        );
+        let mut bytes = Cursor::new(Vec::new());
+        Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(Problem::Exr)?;
+        Ok(bytes.into_inner())
+    }
+
+    fn planes(&self) -> impl Iterator<Item = (&str, &String, &Vec<f32>)> {
+        self.layers.iter().flat_map(|Layer { name, channels }| {
+            channels.iter().map(move |(channel, values)| (name.as_str(), channel, values))
+        })
+    }
+
+    fn layer_attributes(&self) -> LayerAttributes {
+        let text = |text: &str| Text::from_slice_unchecked(text.as_bytes());
+        let mut attributes = LayerAttributes {
+            software_name: Some(text("domelight")),
+            environment_map: self.envmap.map(|kind| match kind {
+                EnvmapKind::LatLong => EnvironmentMap::LatitudeLongitude,
+                EnvmapKind::Cube => EnvironmentMap::Cube,
+            }),
+            ..LayerAttributes::default()
+        };
+        for (name, value) in self.attributes.iter().filter(|(name, _)| !name.is_empty()) {
+            attributes.other.insert(text(name), AttributeValue::Text(text(value)));
+        }
+        attributes
+    }
+}
+
+/// The string attributes of the first part: what [`ExrLayers::attributes`] wrote.
+///
+/// # Errors
+/// If the file's headers are damaged.
+pub fn text_attributes(bytes: &[u8]) -> Result<Vec<(String, String)>, Problem> {
+    let reader = block::read(Cursor::new(bytes), false).map_err(Problem::Exr)?;
+    let mut texts: Vec<(String, String)> = Vec::new();
+    for (name, value) in reader.headers().iter().take(1).flat_map(|h| &h.own_attributes.other) {
+        if let AttributeValue::Text(value) = value {
+            let utf8 = |text: &Text| String::from_utf8_lossy(text.as_slice()).into_owned();
+            texts.push((utf8(name), utf8(value)));
+        }
+    }
+    texts.sort();
+    Ok(texts)
+}

@@ -1,0 +1,54 @@
+//! Files that are whole or not there.
+
+use super::{PictureError, Problem};
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Runs `write` on a new file beside `path` and renames it to `path` when all of it is on its way to the disk, so
+/// that a crash never leaves half a file; `-` is standard output. What is not a plain file (a device, a pipe) is
+/// written to directly, and a symbolic link keeps pointing where it points.
+///
+/// # Errors
+/// If the file cannot be created, written or renamed; the old file is then untouched.
+pub fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), PictureError> {
+    if path == Path::new("-") {
+        let mut out = io::stdout().lock();
+        return write(&mut out)
+            .and_then(|()| out.flush())
+            .map_err(|error| Problem::Io(error).in_file("standard output"));
+    }
+    replace(path, write).map_err(|error| Problem::Io(error).in_file(&path.display().to_string()))
+}
+
+fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    if fs::metadata(&path).is_ok_and(|there| !there.is_file()) {
+        return finish(File::options().write(true).open(&path)?, write);
+    }
+    let temporary = beside(&path)?;
+    finish(File::create_new(&temporary)?, write)
+        .and_then(|()| fs::rename(&temporary, &path))
+        .inspect_err(|_| drop(fs::remove_file(&temporary)))
+}
+
+fn finish(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut out = BufWriter::new(file);
+    write(&mut out)?;
+    out.flush()
+}
+
+/// A name in the same folder that nothing else has.
+fn beside(path: &Path) -> io::Result<PathBuf> {
+    let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
+    let free = (0..u32::MAX).map(|i| {
+        let mut hidden = std::ffi::OsString::from(".");
+        hidden.push(name);
+        hidden.push(format!(".{}-{i}.part", std::process::id()));
+        path.with_file_name(hidden)
+    });
+    free.into_iter().find(|name| !name.exists()).ok_or_else(|| io::ErrorKind::AlreadyExists.into())
+}

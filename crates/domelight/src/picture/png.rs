@@ -1,0 +1,97 @@
+//! PNG: writes sRGB in 8 or 16 bits a channel, reads it back as linear colour.
+//!
+//! PNG keeps colour and alpha apart (straight, unassociated); pictures here are premultiplied. The writer divides by
+//! alpha before the tone curve, so that what a viewer composes over black is the tone-mapped object; light that does
+//! not cover (alpha 0) cannot be kept. No dithering: the same colour is the same byte everywhere.
+
+use super::tone::{ToneMapping, linear_from_srgb, srgb_from_linear};
+use super::{Format, Picture, Problem, checked_area};
+use crate::{Rgb, RgbImage};
+use image::{ImageDecoder, ImageFormat, ImageReader};
+use std::io::{self, Cursor, Write};
+
+/// Bits a channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Depth {
+    /// 8 bits.
+    #[default]
+    Eight,
+    /// 16 bits.
+    Sixteen,
+}
+
+/// Writes an sRGB picture with an `sRGB` chunk; with alpha if given, by which `image` is premultiplied.
+///
+/// # Errors
+/// If `out` does not take it, or the picture is empty or `alpha` has another size.
+pub fn encode(
+    image: &RgbImage,
+    alpha: Option<&[f32]>,
+    tone: &ToneMapping,
+    depth: Depth,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    if alpha.is_some_and(|alpha| alpha.len() != image.pixels.len()) {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "alpha of another size"));
+    }
+    let (width, height) = (image.width as u32, image.height as u32);
+    let mut encoder = ::png::Encoder::new(out, width, height);
+    encoder.set_color(alpha.map_or(::png::ColorType::Rgb, |_| ::png::ColorType::Rgba));
+    encoder.set_depth(match depth {
+        Depth::Eight => ::png::BitDepth::Eight,
+        Depth::Sixteen => ::png::BitDepth::Sixteen,
+    });
+    encoder.set_source_srgb(::png::SrgbRenderingIntent::Perceptual);
+    let mut bytes = Vec::with_capacity(image.pixels.len() * 4);
+    for (i, &pixel) in image.pixels.iter().enumerate() {
+        let coverage = alpha.map(|alpha| alpha[i].clamp(0.0, 1.0));
+        let color = tone.apply(straight(pixel, coverage)).map(srgb_from_linear);
+        color.to_array().into_iter().chain(coverage).for_each(|v| quantize(v, depth, &mut bytes));
+    }
+    let mut writer = encoder.write_header().map_err(io::Error::other)?;
+    writer.write_image_data(&bytes).map_err(io::Error::other)?;
+    writer.finish().map_err(io::Error::other)
+}
+
+fn straight(color: Rgb, coverage: Option<f32>) -> Rgb {
+    match coverage {
+        None => color,
+        Some(alpha) if alpha > 0.0 => color / alpha,
+        Some(_) => Rgb::BLACK,
+    }
+}
+
+fn quantize(value: f32, depth: Depth, bytes: &mut Vec<u8>) {
+    match depth {
+        Depth::Eight => bytes.push((value * 255.0).round() as u8),
+        Depth::Sixteen => bytes.extend(((value * 65535.0).round() as u16).to_be_bytes()),
+    }
+}
+
+/// Decodes a PNG as sRGB (whatever it says of its colours) into linear, premultiplied colour.
+///
+/// # Errors
+/// If the file is damaged or incomplete.
+pub fn decode(bytes: &[u8]) -> Result<Picture, Problem> {
+    let reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
+    let decoder = reader.into_decoder().map_err(Problem::Image)?;
+    let (width, height) = decoder.dimensions();
+    checked_area(width as usize, height as usize)?;
+    // Deflate makes at most 1032 bytes of one; a texel may be a single bit.
+    let (needed, held) = (u64::from(width) * u64::from(height) / (8 * 1032), bytes.len() as u64);
+    if held < needed {
+        let (width, height) = (width as usize, height as usize);
+        return Err(Problem::Promises { width, height, needed, held });
+    }
+    let has_alpha = decoder.color_type().has_alpha();
+    let decoded = image::DynamicImage::from_decoder(decoder).map_err(Problem::Image)?;
+    let texels = decoded.into_rgba32f();
+    let mut alpha = Vec::with_capacity(if has_alpha { texels.len() / 4 } else { 0 });
+    let pixels = texels.pixels().map(|texel| {
+        let [r, g, b, a] = texel.0;
+        alpha.extend(has_alpha.then_some(a));
+        Rgb::new(r, g, b).map(linear_from_srgb) * if has_alpha { a } else { 1.0 }
+    });
+    let image = RgbImage::new(width as usize, height as usize, pixels.collect());
+    Ok(Picture { image, alpha: has_alpha.then_some(alpha), envmap: None, format: Format::Png })
+}

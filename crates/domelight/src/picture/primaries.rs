@@ -1,0 +1,97 @@
+//! Colour spaces of RGB primaries, brought to Rec. 709.
+//!
+//! Matrices from chromaticities: SMPTE RP 177-1993. White points are adapted by Bradford's cone responses.
+
+use crate::Rgb;
+use crate::math::Mat3;
+use glam::{Vec3, vec3};
+
+/// CIE 1931 (x, y) of red, green, blue and white.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Primaries(pub(super) [[f32; 2]; 4]);
+
+impl Primaries {
+    /// ITU-R BT.709 with D65.
+    pub(super) const REC709: Self =
+        Self([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]]);
+
+    /// The matrix to linear Rec. 709; `None` where it is that already (to the three digits that files keep) or
+    /// where the chromaticities span no colour space.
+    pub(super) fn to_rec709(self) -> Option<Mat3> {
+        let same =
+            |a: &[f32; 2], b: &[f32; 2]| (a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3;
+        if self.0.iter().zip(&Self::REC709.0).all(|(a, b)| same(a, b)) {
+            return None;
+        }
+        let matrix = xyz_to_rec709() * adaptation(self.white()) * self.to_xyz()?;
+        matrix.is_finite().then_some(matrix)
+    }
+
+    /// RGB = (1, 1, 1) has the white's chromaticity and Y = 1.
+    fn to_xyz(self) -> Option<Mat3> {
+        let [r, g, b] = [0, 1, 2].map(|i| xyz_of(self.0[i]));
+        let columns = Mat3::from_cols(r, g, b);
+        if !columns.is_finite() || columns.determinant().abs() < 1e-6 {
+            return None;
+        }
+        let scale = columns.inverse() * self.white();
+        Some(columns * Mat3::from_diagonal(scale))
+    }
+
+    fn white(self) -> Vec3 {
+        xyz_of(self.0[3])
+    }
+}
+
+/// XYZ (relative to Y = 1 of D65 white, no adaptation) to linear Rec. 709.
+pub(super) fn xyz_to_rec709() -> Mat3 {
+    Primaries::REC709.to_xyz().expect("Rec. 709 spans a colour space").inverse()
+}
+
+/// `matrix` on a colour.
+pub(super) fn transform(matrix: &Mat3, c: Rgb) -> Rgb {
+    Rgb::from((*matrix * vec3(c.r, c.g, c.b)).to_array())
+}
+
+fn xyz_of([x, y]: [f32; 2]) -> Vec3 {
+    vec3(x / y, 1.0, (1.0 - x - y) / y)
+}
+
+/// From `white` to D65 (Lam 1985, the Bradford transform).
+fn adaptation(white: Vec3) -> Mat3 {
+    let cones = Mat3::from_cols(
+        vec3(0.8951, -0.7502, 0.0389),
+        vec3(0.2664, 1.7135, -0.0685),
+        vec3(-0.1614, 0.0367, 1.0296),
+    );
+    let gain = (cones * Primaries::REC709.white()) / (cones * white);
+    cones.inverse() * Mat3::from_diagonal(gain) * cones
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn xyz_matrix_is_that_of_srgb() {
+        // IEC 61966-2-1, to its four digits.
+        let expected =
+            [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
+        let matrix = xyz_to_rec709().transpose().to_cols_array_2d();
+        for (row, expected) in matrix.iter().zip(&expected) {
+            for (a, b) in row.iter().zip(expected) {
+                assert!((a - b).abs() < 1e-3, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn white_stays_white() {
+        assert_eq!(Primaries::REC709.to_rec709(), None);
+        let acescg =
+            Primaries([[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]]);
+        let white = acescg.to_rec709().unwrap() * Vec3::ONE;
+        assert!((white - Vec3::ONE).length() < 1e-4, "{white}");
+        assert_eq!(Primaries([[0.3, 0.0]; 4]).to_rec709(), None);
+    }
+}

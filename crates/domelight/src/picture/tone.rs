@@ -1,0 +1,215 @@
+//! From scene-linear radiance to what a screen shows: exposure, tone curve, sRGB encoding.
+
+use crate::Rgb;
+use crate::math::{Mat3, Vec3};
+use std::str::FromStr;
+
+/// How radiance beyond the screen's range is brought into it. All curves take and give linear Rec. 709.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ToneCurve {
+    /// None: values beyond \[0, 1\] are cut off. Comparable, as values in range are shown as they are.
+    #[default]
+    Srgb,
+    /// c / (1 + Y), Y the luminance: Reinhard et al. 2002, "Photographic Tone Reproduction for Digital Images",
+    /// equation 3, without the key (that is the exposure's task).
+    Reinhard,
+    /// The ACES 1.0 reference and sRGB output transforms as fitted by Stephen Hill (2016, in "BakingLab" of Pettineo
+    /// and Neubelt).
+    Aces,
+    /// AgX (Sobotka 2022), the base look, with the sigmoid as the polynomial of Wrensch 2023, "Minimal AgX
+    /// Implementation".
+    Agx,
+    /// Khronos PBR Neutral (2024): colours up to 0.8 as they are, for true-to-life base colours.
+    Neutral,
+}
+
+/// No tone curve has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown tone curve {name:?}; known are {}", ToneCurve::ALL.map(ToneCurve::name).join(", "))]
+pub struct UnknownToneCurve {
+    /// What was asked for.
+    pub name: String,
+}
+
+impl ToneCurve {
+    /// All curves.
+    pub const ALL: [Self; 5] = [Self::Srgb, Self::Reinhard, Self::Aces, Self::Agx, Self::Neutral];
+
+    /// The name that [`FromStr`] understands.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Srgb => "srgb",
+            Self::Reinhard => "reinhard",
+            Self::Aces => "aces",
+            Self::Agx => "agx",
+            Self::Neutral => "neutral",
+        }
+    }
+
+    /// Linear light on the screen, in \[0, 1\], of exposed radiance; negative and NaN count as 0.
+    pub fn apply(self, radiance: Rgb) -> Rgb {
+        let c = radiance.map(|c| c.max(0.0).min(1e30));
+        let shown = match self {
+            Self::Srgb => c,
+            Self::Reinhard => c / (1.0 + c.luminance()),
+            Self::Aces => aces(c),
+            Self::Agx => agx(c),
+            Self::Neutral => neutral(c),
+        };
+        shown.map(|c| c.clamp(0.0, 1.0))
+    }
+}
+
+impl FromStr for ToneCurve {
+    type Err = UnknownToneCurve;
+
+    fn from_str(name: &str) -> Result<Self, UnknownToneCurve> {
+        let found = Self::ALL.into_iter().find(|curve| curve.name() == name);
+        found.ok_or_else(|| UnknownToneCurve { name: name.to_owned() })
+    }
+}
+
+impl std::fmt::Display for ToneCurve {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// Exposure, then a curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ToneMapping {
+    /// In stops: radiance times 2^exposure.
+    pub exposure: f32,
+    /// Applied after it.
+    pub curve: ToneCurve,
+}
+
+impl ToneMapping {
+    /// Linear light on the screen, in \[0, 1\].
+    pub fn apply(&self, radiance: Rgb) -> Rgb {
+        self.curve.apply(radiance * self.exposure.exp2())
+    }
+}
+
+/// The sRGB encoding of linear light in \[0, 1\] (IEC 61966-2-1).
+pub fn srgb_from_linear(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// The linear light of an sRGB value in \[0, 1\].
+pub fn linear_from_srgb(encoded: f32) -> f32 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+fn rows(r: [f32; 3], g: [f32; 3], b: [f32; 3]) -> Mat3 {
+    Mat3::from_cols(r.into(), g.into(), b.into()).transpose()
+}
+
+fn aces(c: Rgb) -> Rgb {
+    let to_ap1_with_saturation =
+        rows([0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]);
+    let to_rec709 = rows(
+        [1.60475, -0.53108, -0.07367],
+        [-0.10208, 1.10813, -0.00605],
+        [-0.00327, -0.07276, 1.07602],
+    );
+    // The fit is a quotient of squares: beyond this it is constant to f32.
+    let v = to_ap1_with_saturation * Vec3::from(c.to_array()).min(Vec3::splat(1e9));
+    let numerator = v * (v + 0.024_578_6) - 0.000_090_537;
+    let denominator = v * (0.983_729 * v + 0.432_951) + 0.238_081;
+    Rgb::from((to_rec709 * (numerator / denominator)).to_array())
+}
+
+fn agx(c: Rgb) -> Rgb {
+    let inset = rows(
+        [0.842_479_06, 0.078_433_6, 0.079_223_745],
+        [0.042_328_24, 0.878_468_64, 0.079_166_13],
+        [0.042_375_654, 0.078_433_6, 0.879_142_97],
+    );
+    let outset = rows(
+        [1.196_879, -0.098_020_88, -0.099_029_74],
+        [-0.052_896_85, 1.151_903_1, -0.098_961_18],
+        [-0.052_971_635, -0.098_043_45, 1.151_073_7],
+    );
+    // 12.47 stops below and 4.03 above 1 are shown.
+    let (least, greatest) = (-12.473_93, 4.026_069);
+    let inside = inset * Vec3::from(c.to_array());
+    let encoded =
+        inside.map(|v| (v.max(1e-10).log2().clamp(least, greatest) - least) / (greatest - least));
+    let shaped = encoded.map(agx_sigmoid);
+    let shown = (outset * shaped).max(Vec3::ZERO);
+    // The curve gives encoded values; back to linear light for the one encoding at the end.
+    Rgb::from(shown.map(|v| v.powf(2.2)).to_array())
+}
+
+fn agx_sigmoid(x: f32) -> f32 {
+    let coefficients = [15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232];
+    coefficients.iter().fold(0.0, |sum, c| sum * x + c)
+}
+
+fn neutral(c: Rgb) -> Rgb {
+    let (start, desaturation) = (0.8 - 0.04, 0.15);
+    // Fresnel reflection of 4 % off dielectrics is taken out.
+    let least = c.min_component();
+    let offset = if least < 0.08 { least - 6.25 * least * least } else { 0.04 };
+    let c = c - Rgb::splat(offset);
+    let peak = c.max_component();
+    if peak < start {
+        return c;
+    }
+    let room = 1.0 - start;
+    let new_peak = 1.0 - room * room / (peak + room - start);
+    let toward_white = 1.0 - 1.0 / (desaturation * (peak - new_peak) + 1.0);
+    (c * (new_peak / peak)).lerp(Rgb::splat(new_peak), toward_white)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_stay_on_the_screen_and_rise() {
+        for curve in ToneCurve::ALL {
+            assert_eq!(curve.name().parse(), Ok(curve));
+            let mut last = 0.0;
+            for stop in -80..=80 {
+                let shown = curve.apply(Rgb::splat(f32::exp2(stop as f32 * 0.25)));
+                assert!(
+                    shown.is_finite()
+                        && shown.min_component() >= 0.0
+                        && shown.max_component() <= 1.0
+                );
+                // Rounding in the matrices may take a part in a million back.
+                assert!(shown.g >= last - 2e-6, "{curve} falls at {stop}: {last} {}", shown.g);
+                last = shown.g;
+            }
+            assert!(last > 0.95, "{curve} ends at {last}");
+            for odd in [f32::NAN, -1.0, f32::INFINITY, f32::MAX] {
+                assert!(curve.apply(Rgb::new(odd, 0.5, 0.0)).is_finite(), "{curve} of {odd}");
+            }
+        }
+        assert!("Filmic".parse::<ToneCurve>().is_err());
+    }
+
+    #[test]
+    fn published_values() {
+        // PBR Neutral: base colours pass through with the reflection of 4 % added.
+        let neutral = ToneCurve::Neutral.apply(Rgb::new(0.54, 0.34, 0.14));
+        assert!((neutral - Rgb::new(0.5, 0.3, 0.1)).map(f32::abs).max_component() < 1e-6);
+        // Middle grey of AgX stays near middle grey.
+        let grey = ToneCurve::Agx.apply(Rgb::splat(0.18)).g;
+        assert!((0.16..0.24).contains(&grey), "{grey}");
+        assert_eq!(ToneCurve::Reinhard.apply(Rgb::splat(1.0)).g, 0.5);
+    }
+
+    #[test]
+    fn srgb_encoding_is_the_inverse_of_decoding() {
+        for byte in 0..=255u8 {
+            let encoded = f32::from(byte) / 255.0;
+            let again = srgb_from_linear(linear_from_srgb(encoded));
+            assert_eq!((again * 255.0).round() as u8, byte);
+        }
+        let two_stops = ToneMapping { exposure: 2.0, curve: ToneCurve::Srgb };
+        assert_eq!(two_stops.apply(Rgb::splat(0.125)).r, 0.5);
+    }
+}

@@ -1,0 +1,350 @@
+//! Wavefront OBJ.
+//!
+//! Read are `v` (with colours), `vt` (v upward), `vn`, `f` (polygons cut into fans, relative
+//! indices), `o`, `g`, `usemtl` and `mtllib` ([`super::mtl`]); lines, points, curves and smoothing
+//! groups are passed over. Every object or group and material makes a part of its own. A corner
+//! without normal gets the smooth one of its position, computed over the whole file, so that seams
+//! of texture coordinates and materials do not show.
+//!
+//! Written for this program: the crate tobj tells no line numbers, and its arithmetic overflows on
+//! relative indices out of range.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use super::ply::DEFAULT_ALBEDO;
+use super::textures::Textures;
+use super::{LoadError, Loaded, mtl, stem};
+use crate::Rgb;
+use crate::geometry::Mesh;
+use crate::math::{Vec2, Vec3};
+use crate::scene::{Part, SceneDescription, Surface};
+
+/// What is wrong with a line of an OBJ or MTL file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ObjProblem {
+    /// Not enough numbers.
+    #[error("{keyword} needs {needed} numbers, but there are only {found}")]
+    TooFew {
+        /// The line's keyword.
+        keyword: String,
+        /// How many it needs.
+        needed: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// A word that is not a number.
+    #[error("'{text}' is not a finite number")]
+    NotANumber {
+        /// The word.
+        text: String,
+    },
+    /// A face with a corner that cannot be read.
+    #[error("'{text}' is no corner of a face; write v, v/vt, v//vn or v/vt/vn")]
+    Corner {
+        /// The corner.
+        text: String,
+    },
+    /// An index that names nothing yet.
+    #[error("index {index} names no {what}; {count} are defined so far")]
+    Index {
+        /// The index as written.
+        index: i64,
+        /// What it should name.
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+    },
+    /// A face with less than three corners.
+    #[error("a face needs three corners or more, but there are {corners}")]
+    Face {
+        /// How many it has.
+        corners: usize,
+    },
+    /// A keyword without its name.
+    #[error("{keyword} needs a name")]
+    Name {
+        /// The keyword.
+        keyword: String,
+    },
+    /// A material's property before any material.
+    #[error("{keyword} stands before the first newmtl")]
+    NoMaterial {
+        /// The keyword.
+        keyword: String,
+    },
+}
+
+pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
+    let mut reader = Reader::new(path);
+    for (index, line) in bytes.split(|&b| b == b'\n').enumerate() {
+        let text = String::from_utf8_lossy(line);
+        reader.line(index + 1, &text)?;
+    }
+    Ok(reader.finish())
+}
+
+/// Indices of a corner's position, texture coordinate and normal.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+struct Corner {
+    position: u32,
+    uv: Option<u32>,
+    normal: Option<u32>,
+}
+
+/// The faces of one object and one material.
+#[derive(Default)]
+struct Group {
+    name: String,
+    material: Option<String>,
+    triangles: Vec<[Corner; 3]>,
+}
+
+struct Reader<'a> {
+    path: &'a Path,
+    positions: Vec<Vec3>,
+    /// One a position, white where the file gives none; empty if it never does.
+    colors: Vec<Rgb>,
+    uvs: Vec<Vec2>,
+    normals: Vec<Vec3>,
+    groups: Vec<Group>,
+    surfaces: Vec<Surface>,
+    textures: Textures,
+    warnings: Vec<String>,
+}
+
+impl<'a> Reader<'a> {
+    fn new(path: &'a Path) -> Self {
+        Self {
+            path,
+            positions: Vec::new(),
+            colors: Vec::new(),
+            uvs: Vec::new(),
+            normals: Vec::new(),
+            groups: vec![Group { name: stem(path), ..Group::default() }],
+            surfaces: Vec::new(),
+            textures: Textures::default(),
+            warnings: Vec::new(),
+        }
+    }
+
+    fn line(&mut self, number: usize, text: &str) -> Result<(), LoadError> {
+        let text = text.trim();
+        let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+        let rest = rest.trim();
+        let at = |problem| LoadError::Obj { path: self.path.into(), line: number, problem };
+        match keyword {
+            "v" => {
+                let numbers = numbers(keyword, rest, 3).map_err(at)?;
+                self.vertex(&numbers);
+            }
+            "vt" => {
+                let n = numbers(keyword, rest, 1).map_err(at)?;
+                self.uvs.push(Vec2::new(n[0], 1.0 - n.get(1).unwrap_or(&0.0)));
+            }
+            "vn" => {
+                let n = numbers(keyword, rest, 3).map_err(at)?;
+                self.normals.push(Vec3::new(n[0], n[1], n[2]).normalize_or_zero());
+            }
+            "f" => {
+                let corners: Result<Vec<Corner>, _> =
+                    rest.split_whitespace().map(|word| self.corner(word)).collect();
+                let triangles = corners.and_then(|c| fan(&c)).map_err(at)?;
+                self.group_mut().triangles.extend(triangles);
+            }
+            "o" | "g" => {
+                let name = if rest.is_empty() { stem(self.path) } else { rest.into() };
+                let material = self.group_mut().material.clone();
+                self.start_group(name, material);
+            }
+            "usemtl" => {
+                let name = self.group_mut().name.clone();
+                self.start_group(name, Some(rest.to_owned()));
+            }
+            "mtllib" if rest.is_empty() => {
+                return Err(at(ObjProblem::Name { keyword: keyword.into() }));
+            }
+            "mtllib" => self.library(number, rest)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A position, perhaps with a weight (which rendering ignores) or a colour after it.
+    fn vertex(&mut self, n: &[f32]) {
+        if n.len() >= 6 {
+            self.colors.resize(self.positions.len(), Rgb::WHITE);
+            self.colors.push(Rgb::new(n[n.len() - 3], n[n.len() - 2], n[n.len() - 1]));
+        }
+        self.positions.push(Vec3::new(n[0], n[1], n[2]));
+    }
+
+    fn corner(&self, text: &str) -> Result<Corner, ObjProblem> {
+        let mut words = text.split('/');
+        let mut index = |what, count| match words.next() {
+            None | Some("") => Ok(None),
+            Some(word) => {
+                let malformed = |_| ObjProblem::Corner { text: text.into() };
+                resolve(word.parse().map_err(malformed)?, what, count).map(Some)
+            }
+        };
+        let position = index("vertex (v)", self.positions.len())?;
+        let uv = index("texture coordinate (vt)", self.uvs.len())?;
+        let normal = index("normal (vn)", self.normals.len())?;
+        let position = position.ok_or_else(|| ObjProblem::Corner { text: text.into() })?;
+        Ok(Corner { position, uv, normal })
+    }
+
+    /// The group that faces go to.
+    fn group_mut(&mut self) -> &mut Group {
+        if self.groups.is_empty() {
+            self.groups.push(Group::default());
+        }
+        let last = self.groups.len() - 1;
+        &mut self.groups[last]
+    }
+
+    fn start_group(&mut self, name: String, material: Option<String>) {
+        let group = self.group_mut();
+        if group.triangles.is_empty() {
+            (group.name, group.material) = (name, material);
+        } else {
+            self.groups.push(Group { name, material, triangles: Vec::new() });
+        }
+    }
+
+    /// Reads a material library; one that is missing is a warning.
+    fn library(&mut self, line: usize, name: &str) -> Result<(), LoadError> {
+        let path = super::relative(self.path, name);
+        match std::fs::read(&path) {
+            Ok(bytes) => {
+                let mut surfaces =
+                    mtl::parse(&path, &bytes, &mut self.textures, &mut self.warnings)?;
+                self.surfaces.append(&mut surfaces);
+            }
+            Err(error) => self.warnings.push(format!(
+                "{}, line {line}: cannot read the material library {}: {error}; its materials are grey",
+                self.path.display(),
+                path.display()
+            )),
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Loaded {
+        self.colors
+            .resize(if self.colors.is_empty() { 0 } else { self.positions.len() }, Rgb::WHITE);
+        let smooth = self.smooth_normals();
+        let mut parts = Vec::new();
+        for group in std::mem::take(&mut self.groups) {
+            if !group.triangles.is_empty() {
+                let surface = self.surface(group.material.as_deref());
+                let mesh = self.mesh(&group.triangles, &smooth);
+                parts.push(Part { name: group.name, mesh, surface });
+            }
+        }
+        let description = SceneDescription {
+            parts,
+            surfaces: self.surfaces,
+            textures: self.textures.textures,
+            ..SceneDescription::default()
+        };
+        Loaded { description, warnings: self.warnings }
+    }
+
+    /// The surface of a name; an unknown one becomes a new grey one.
+    fn surface(&mut self, name: Option<&str>) -> usize {
+        let wanted = name.unwrap_or("default");
+        if let Some(index) = self.surfaces.iter().position(|s| s.name == wanted) {
+            return index;
+        }
+        if let Some(name) = name {
+            let path = self.path.display();
+            self.warnings.push(format!("{path}: material '{name}' is not defined; it is grey"));
+        }
+        let albedo = if self.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
+        self.surfaces.push(Surface::diffuse(wanted, albedo));
+        self.surfaces.len() - 1
+    }
+
+    /// Smooth normals of all positions; empty if every corner brings its own.
+    fn smooth_normals(&self) -> Vec<Vec3> {
+        let all = || self.groups.iter().flat_map(|g| &g.triangles);
+        if all().flatten().all(|c| c.normal.is_some()) {
+            return Vec::new();
+        }
+        let mut mesh = Mesh {
+            positions: self.positions.clone(),
+            triangles: all().map(|t| t.map(|c| c.position)).collect(),
+            ..Mesh::default()
+        };
+        mesh.compute_normals();
+        mesh.normals
+    }
+
+    /// One vertex for each different corner.
+    fn mesh(&self, triangles: &[[Corner; 3]], smooth: &[Vec3]) -> Mesh {
+        let mut mesh = Mesh::default();
+        let mut known = HashMap::new();
+        let has_uvs = triangles.iter().flatten().any(|c| c.uv.is_some());
+        mesh.triangles.reserve(triangles.len());
+        for triangle in triangles {
+            let indices = triangle.map(|corner| {
+                *known.entry(corner).or_insert_with(|| {
+                    let position = corner.position as usize;
+                    mesh.positions.push(self.positions[position]);
+                    mesh.normals.push(
+                        corner
+                            .normal
+                            .map_or_else(|| smooth[position], |n| self.normals[n as usize]),
+                    );
+                    if has_uvs {
+                        mesh.uvs.push(corner.uv.map_or(Vec2::ZERO, |t| self.uvs[t as usize]));
+                    }
+                    if !self.colors.is_empty() {
+                        mesh.colors.push(self.colors[position]);
+                    }
+                    (mesh.positions.len() - 1) as u32
+                })
+            });
+            mesh.triangles.push(indices);
+        }
+        mesh
+    }
+}
+
+/// All numbers after a keyword, at least `needed`.
+pub(super) fn numbers(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjProblem> {
+    let numbers: Vec<f32> = rest
+        .split_whitespace()
+        .take_while(|word| !word.starts_with('#'))
+        .map(number)
+        .collect::<Result<_, _>>()?;
+    if numbers.len() < needed {
+        let found = numbers.len();
+        return Err(ObjProblem::TooFew { keyword: keyword.into(), needed, found });
+    }
+    Ok(numbers)
+}
+
+pub(super) fn number(word: &str) -> Result<f32, ObjProblem> {
+    let not_a_number = || ObjProblem::NotANumber { text: word.chars().take(40).collect() };
+    word.parse().ok().filter(|v: &f32| v.is_finite()).ok_or_else(not_a_number)
+}
+
+/// An index of a file, from 1 or relative to the end, as one from 0.
+fn resolve(index: i64, what: &'static str, count: usize) -> Result<u32, ObjProblem> {
+    let resolved = if index < 0 { index.checked_add(count as i64) } else { index.checked_sub(1) };
+    resolved
+        .filter(|i| (0..count as i64).contains(i))
+        .and_then(|i| u32::try_from(i).ok())
+        .ok_or(ObjProblem::Index { index, what, count })
+}
+
+/// A polygon as triangles round its first corner.
+fn fan(corners: &[Corner]) -> Result<Vec<[Corner; 3]>, ObjProblem> {
+    if corners.len() < 3 {
+        return Err(ObjProblem::Face { corners: corners.len() });
+    }
+    Ok(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]).collect())
+}

@@ -1,0 +1,556 @@
+//! Stanford PLY: ASCII and both binary byte orders.
+//!
+//! Read are, of the element `vertex`, the properties `x y z`, `nx ny nz`, texture coordinates
+//! (`s t`, `u v` or `texture_u texture_v`, v upward) and `red green blue` (integers: sRGB, floats:
+//! linear); of the element `face` the list `vertex_indices` or `vertex_index`, polygons cut into
+//! fans. All else is passed over. A file without normals gets smooth ones.
+//!
+//! Written for this program: the crates that read PLY build a map of properties for every row.
+
+use std::fmt;
+use std::path::Path;
+
+use super::{LoadError, Loaded, stem};
+use crate::Rgb;
+use crate::geometry::Mesh;
+use crate::math::{Vec2, Vec3};
+use crate::scene::texture::{Encoding, decode};
+use crate::scene::{Part, SceneDescription, Surface};
+
+/// The albedo of meshes that come without a material.
+pub(super) const DEFAULT_ALBEDO: Rgb = Rgb::splat(0.6);
+
+/// A place in a PLY file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PlyPlace {
+    /// A line of the header, from 1.
+    Line(usize),
+    /// A byte offset into the file.
+    Byte(usize),
+    /// A row of an element, from 0.
+    Row {
+        /// The element's name.
+        element: String,
+        /// The row.
+        row: usize,
+    },
+}
+
+impl fmt::Display for PlyPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+            Self::Row { element, row } => write!(f, "{element} {row}"),
+        }
+    }
+}
+
+/// What is wrong with a PLY file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlyProblem {
+    /// The header does not end.
+    #[error("the header has no end_header line; the file is cut short or not PLY")]
+    NoEndOfHeader,
+    /// A header line that is not PLY.
+    #[error("'{text}' is no valid header line")]
+    HeaderLine {
+        /// The line.
+        text: String,
+    },
+    /// A header without a usable format line.
+    #[error(
+        "the header names no format; it needs ascii, binary_little_endian or binary_big_endian"
+    )]
+    NoFormat,
+    /// An element or a property that is needed is absent.
+    #[error("the header declares no {what}")]
+    Missing {
+        /// What is absent.
+        what: &'static str,
+    },
+    /// More rows than the file can hold.
+    #[error(
+        "the header promises {count} rows of {element}, at least {needed} bytes, but only {left} bytes follow; the file is cut short or its header wrong"
+    )]
+    TooManyRows {
+        /// The element.
+        element: String,
+        /// Its count in the header.
+        count: u64,
+        /// The bytes that these take at least.
+        needed: u128,
+        /// The bytes there are.
+        left: usize,
+    },
+    /// The data end too early.
+    #[error("the file ends in the middle of the data")]
+    EndOfFile,
+    /// A token that is not a number.
+    #[error("'{text}' is not a number")]
+    NotANumber {
+        /// The token.
+        text: String,
+    },
+    /// A list length that is negative or fractional.
+    #[error("a list cannot have {value} entries")]
+    ListLength {
+        /// The length.
+        value: f64,
+    },
+    /// An index that names no vertex.
+    #[error("index {value} names no vertex; there are {vertices}")]
+    Index {
+        /// The index.
+        value: f64,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+    /// A vertex at no place.
+    #[error("the position is not finite: {position}")]
+    NotFinite {
+        /// The position.
+        position: Vec3,
+    },
+}
+
+type Located<T> = Result<T, (PlyPlace, PlyProblem)>;
+
+pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
+    let mesh = parse(bytes).map_err(|(place, problem)| LoadError::Ply {
+        path: path.into(),
+        place,
+        problem: Box::new(problem),
+    })?;
+    let albedo = if mesh.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
+    let description = SceneDescription {
+        parts: vec![Part { name: stem(path), mesh, surface: 0 }],
+        surfaces: vec![Surface::diffuse("default", albedo)],
+        ..SceneDescription::default()
+    };
+    Ok(Loaded { description, warnings: Vec::new() })
+}
+
+fn parse(bytes: &[u8]) -> Located<Mesh> {
+    let header = Header::parse(bytes)?;
+    let body = &bytes[header.length..];
+    header.check_size(body.len())?;
+    let at = header.length;
+    let mut mesh = match header.format {
+        Format::Ascii => read_body(&header, &mut Ascii { data: body, position: 0, start: at })?,
+        Format::Little => {
+            read_body(&header, &mut Binary::<false> { data: body, start: at, position: 0 })?
+        }
+        Format::Big => {
+            read_body(&header, &mut Binary::<true> { data: body, start: at, position: 0 })?
+        }
+    };
+    if mesh.normals.is_empty() {
+        mesh.compute_normals();
+    }
+    Ok(mesh)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Ascii,
+    Little,
+    Big,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    fn from_name(name: &str) -> Option<Self> {
+        Some(match name {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// The greatest value of an integer type.
+    fn max(self) -> Option<f32> {
+        match self {
+            Self::U8 => Some(255.0),
+            Self::U16 => Some(65535.0),
+            _ => None,
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Property {
+    name: String,
+    /// The type of a list's length; `None` for a single value.
+    list: Option<Scalar>,
+    scalar: Scalar,
+}
+
+#[derive(Debug)]
+struct Element {
+    name: String,
+    count: u64,
+    properties: Vec<Property>,
+    line: usize,
+}
+
+#[derive(Debug)]
+struct Header {
+    format: Format,
+    elements: Vec<Element>,
+    /// In bytes, with the end of its last line.
+    length: usize,
+}
+
+impl Header {
+    fn parse(bytes: &[u8]) -> Located<Self> {
+        let (mut format, mut elements, mut length) = (None, Vec::<Element>::new(), 0);
+        for (index, line) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
+            length += line.len();
+            let text = String::from_utf8_lossy(line);
+            let words: Vec<&str> = text.split_whitespace().collect();
+            let wrong = || {
+                let text = text.trim().chars().take(80).collect();
+                (PlyPlace::Line(index + 1), PlyProblem::HeaderLine { text })
+            };
+            match (words.as_slice(), elements.last_mut()) {
+                (["ply"], _) if index == 0 => {}
+                _ if index == 0 => return Err(wrong()),
+                ([] | ["comment" | "obj_info", ..], _) => {}
+                (["format", name, ..], _) => {
+                    format = Some(match *name {
+                        "ascii" => Format::Ascii,
+                        "binary_little_endian" => Format::Little,
+                        "binary_big_endian" => Format::Big,
+                        _ => return Err(wrong()),
+                    });
+                }
+                (["element", name, count], _) => elements.push(Element {
+                    name: (*name).into(),
+                    count: count.parse().map_err(|_| wrong())?,
+                    properties: Vec::new(),
+                    line: index + 1,
+                }),
+                (["property", "list", length, scalar, name], Some(element)) => {
+                    let list = Some(Scalar::from_name(length).ok_or_else(wrong)?);
+                    let scalar = Scalar::from_name(scalar).ok_or_else(wrong)?;
+                    element.properties.push(Property { name: (*name).into(), list, scalar });
+                }
+                (["property", scalar, name], Some(element)) => {
+                    let scalar = Scalar::from_name(scalar).ok_or_else(wrong)?;
+                    element.properties.push(Property { name: (*name).into(), list: None, scalar });
+                }
+                (["end_header"], _) => {
+                    let format = format.ok_or((PlyPlace::Line(index + 1), PlyProblem::NoFormat))?;
+                    return Ok(Self { format, elements, length });
+                }
+                _ => return Err(wrong()),
+            }
+        }
+        Err((PlyPlace::Byte(bytes.len()), PlyProblem::NoEndOfHeader))
+    }
+
+    /// Refuses a header that promises more rows than `left` bytes can hold.
+    fn check_size(&self, left: usize) -> Located<()> {
+        let mut total = 0;
+        for element in &self.elements {
+            let row: usize = element
+                .properties
+                .iter()
+                .map(|p| match self.format {
+                    Format::Ascii => 2,
+                    _ => p.list.unwrap_or(p.scalar).size(),
+                })
+                .sum();
+            // The last value of an ASCII file needs no separator.
+            let slack = u128::from(self.format == Format::Ascii);
+            let needed = u128::from(element.count) * row as u128;
+            total += needed;
+            // Rows without properties take no bytes; one byte a row bounds the loop over them.
+            let rows = u128::from(element.count);
+            if total > left as u128 + slack || rows > (left as u128 + slack) {
+                let problem = PlyProblem::TooManyRows {
+                    element: element.name.clone(),
+                    count: element.count,
+                    needed,
+                    left,
+                };
+                return Err((PlyPlace::Line(element.line), problem));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The numbers of the body in order.
+trait Numbers {
+    fn next(&mut self, scalar: Scalar) -> Located<f64>;
+}
+
+struct Ascii<'a> {
+    data: &'a [u8],
+    position: usize,
+    start: usize,
+}
+
+impl Numbers for Ascii<'_> {
+    #[inline]
+    fn next(&mut self, _: Scalar) -> Located<f64> {
+        let rest = &self.data[self.position..];
+        let begin = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
+        let length =
+            rest[begin..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - begin);
+        let token = &rest[begin..begin + length];
+        let place = || PlyPlace::Byte(self.start + self.position + begin);
+        if token.is_empty() {
+            return Err((place(), PlyProblem::EndOfFile));
+        }
+        let text = std::str::from_utf8(token).unwrap_or("");
+        let value = text.parse().map_err(|_| {
+            let text = String::from_utf8_lossy(token).chars().take(40).collect();
+            (place(), PlyProblem::NotANumber { text })
+        })?;
+        self.position += begin + length;
+        Ok(value)
+    }
+}
+
+struct Binary<'a, const BIG: bool> {
+    data: &'a [u8],
+    position: usize,
+    start: usize,
+}
+
+impl<const BIG: bool> Binary<'_, BIG> {
+    #[inline]
+    fn bytes<const N: usize>(&mut self) -> Located<[u8; N]> {
+        let Some(bytes) = self.data[self.position..].first_chunk::<N>() else {
+            return Err((PlyPlace::Byte(self.start + self.position), PlyProblem::EndOfFile));
+        };
+        self.position += N;
+        let mut bytes = *bytes;
+        if BIG {
+            bytes.reverse();
+        }
+        Ok(bytes)
+    }
+}
+
+impl<const BIG: bool> Numbers for Binary<'_, BIG> {
+    #[inline]
+    fn next(&mut self, scalar: Scalar) -> Located<f64> {
+        Ok(match scalar {
+            Scalar::I8 => i8::from_le_bytes(self.bytes()?).into(),
+            Scalar::U8 => u8::from_le_bytes(self.bytes()?).into(),
+            Scalar::I16 => i16::from_le_bytes(self.bytes()?).into(),
+            Scalar::U16 => u16::from_le_bytes(self.bytes()?).into(),
+            Scalar::I32 => i32::from_le_bytes(self.bytes()?).into(),
+            Scalar::U32 => u32::from_le_bytes(self.bytes()?).into(),
+            Scalar::F32 => f32::from_le_bytes(self.bytes()?).into(),
+            Scalar::F64 => f64::from_le_bytes(self.bytes()?),
+        })
+    }
+}
+
+fn read_body(header: &Header, numbers: &mut impl Numbers) -> Located<Mesh> {
+    let mut mesh = Mesh::default();
+    let mut polygons = Polygons::default();
+    let (mut has_vertices, mut has_faces) = (false, false);
+    for element in &header.elements {
+        match element.name.as_str() {
+            "vertex" => {
+                has_vertices = true;
+                read_vertices(element, numbers, &mut mesh)?;
+            }
+            "face" => {
+                has_faces = true;
+                read_faces(element, numbers, &mut polygons)?;
+            }
+            _ => skip(element, numbers)?,
+        }
+    }
+    let end = PlyPlace::Line(header.elements.last().map_or(1, |e| e.line));
+    if !has_vertices {
+        return Err((end, PlyProblem::Missing { what: "element vertex" }));
+    }
+    if !has_faces {
+        return Err((
+            end,
+            PlyProblem::Missing { what: "element face; points alone cannot be rendered" },
+        ));
+    }
+    mesh.triangles = polygons.triangles(mesh.positions.len())?;
+    Ok(mesh)
+}
+
+/// What is read of a vertex, each with its names; the number is the slot in a row of values.
+const SLOTS: [&[&str]; 11] = [
+    &["x"],
+    &["y"],
+    &["z"],
+    &["nx"],
+    &["ny"],
+    &["nz"],
+    &["u", "s", "texture_u"],
+    &["v", "t", "texture_v"],
+    &["red", "r", "diffuse_red"],
+    &["green", "g", "diffuse_green"],
+    &["blue", "b", "diffuse_blue"],
+];
+
+fn read_vertices(element: &Element, numbers: &mut impl Numbers, mesh: &mut Mesh) -> Located<()> {
+    let slot_of = |p: &Property| {
+        SLOTS.iter().position(|names| p.list.is_none() && names.contains(&p.name.as_str()))
+    };
+    let slots: Vec<Option<usize>> = element.properties.iter().map(slot_of).collect();
+    let has = |wanted: std::ops::Range<usize>| wanted.into_iter().all(|s| slots.contains(&Some(s)));
+    let place = PlyPlace::Line(element.line);
+    if !has(0..3) {
+        return Err((place, PlyProblem::Missing { what: "vertex properties x, y and z" }));
+    }
+    let (normals, uvs, colors) = (has(3..6), has(6..8), has(8..11));
+    let color_max = element
+        .properties
+        .iter()
+        .zip(&slots)
+        .find(|(_, s)| **s == Some(8))
+        .and_then(|(p, _)| p.scalar.max());
+
+    mesh.positions.reserve(element.count as usize);
+    for row in 0..element.count as usize {
+        let mut values = [0f32; SLOTS.len()];
+        for (property, slot) in element.properties.iter().zip(&slots) {
+            match (property.list, slot) {
+                (None, Some(slot)) => values[*slot] = numbers.next(property.scalar)? as f32,
+                _ => skip_property(property, numbers)?,
+            }
+        }
+        let [x, y, z, nx, ny, nz, u, v, r, g, b] = values;
+        let position = Vec3::new(x, y, z);
+        if !position.is_finite() {
+            let place = PlyPlace::Row { element: element.name.clone(), row };
+            return Err((place, PlyProblem::NotFinite { position }));
+        }
+        mesh.positions.push(position);
+        if normals {
+            mesh.normals.push(Vec3::new(nx, ny, nz).normalize_or_zero());
+        }
+        if uvs {
+            mesh.uvs.push(Vec2::new(u, 1.0 - v));
+        }
+        if colors {
+            let linear = |c: f32| color_max.map_or(c, |max| decode(c / max, Encoding::Srgb));
+            mesh.colors.push(Rgb::new(r, g, b).map(linear));
+        }
+    }
+    Ok(())
+}
+
+/// Faces as the file has them.
+#[derive(Default)]
+struct Polygons {
+    indices: Vec<f64>,
+    /// Where each face's indices end.
+    ends: Vec<usize>,
+}
+
+impl Polygons {
+    /// Each polygon as a fan round its first vertex.
+    fn triangles(&self, vertices: usize) -> Located<Vec<[u32; 3]>> {
+        let mut triangles = Vec::with_capacity(self.ends.len());
+        let mut begin = 0;
+        for (row, &end) in self.ends.iter().enumerate() {
+            let polygon = &self.indices[begin..end];
+            begin = end;
+            let usable = |i: f64| i >= 0.0 && i < vertices as f64 && i.fract() == 0.0;
+            if let Some(&value) = polygon.iter().find(|&&i| !usable(i)) {
+                let place = PlyPlace::Row { element: "face".into(), row };
+                return Err((place, PlyProblem::Index { value, vertices }));
+            }
+            for pair in polygon.get(1..).unwrap_or_default().windows(2) {
+                triangles.push([polygon[0] as u32, pair[0] as u32, pair[1] as u32]);
+            }
+        }
+        Ok(triangles)
+    }
+}
+
+fn read_faces(element: &Element, numbers: &mut impl Numbers, out: &mut Polygons) -> Located<()> {
+    let is_indices = |p: &Property| {
+        p.list.is_some() && matches!(p.name.as_str(), "vertex_indices" | "vertex_index")
+    };
+    if !element.properties.iter().any(is_indices) {
+        let what = "face property list vertex_indices";
+        return Err((PlyPlace::Line(element.line), PlyProblem::Missing { what }));
+    }
+    for row in 0..element.count as usize {
+        for property in &element.properties {
+            if is_indices(property) {
+                let length = list_length(property, numbers, &element.name, row)?;
+                for _ in 0..length {
+                    out.indices.push(numbers.next(property.scalar)?);
+                }
+                out.ends.push(out.indices.len());
+            } else {
+                skip_property(property, numbers)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn list_length(
+    property: &Property,
+    numbers: &mut impl Numbers,
+    element: &str,
+    row: usize,
+) -> Located<u64> {
+    let value = property.list.map_or(Ok(1.0), |length| numbers.next(length))?;
+    if value < 0.0 || value.fract() != 0.0 || value > f64::from(u32::MAX) {
+        let place = PlyPlace::Row { element: element.into(), row };
+        return Err((place, PlyProblem::ListLength { value }));
+    }
+    Ok(value as u64)
+}
+
+fn skip_property(property: &Property, numbers: &mut impl Numbers) -> Located<()> {
+    for _ in 0..list_length(property, numbers, &property.name, 0)? {
+        numbers.next(property.scalar)?;
+    }
+    Ok(())
+}
+
+fn skip(element: &Element, numbers: &mut impl Numbers) -> Located<()> {
+    for _ in 0..element.count {
+        for property in &element.properties {
+            skip_property(property, numbers)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,493 @@
+//! Scene files: a TOML text that combines meshes, materials, a camera and an environment.
+//!
+//! ```toml
+//! up = "y"                            # or "z": which way the whole scene points up
+//!
+//! [camera]
+//! origin = [0.0, 1.0, 5.0]
+//! target = [0.0, 0.5, 0.0]            # required, as is origin
+//! up = [0.0, 1.0, 0.0]                # default: the scene's up axis
+//! fov = 35.0                          # vertical, degrees (the default); or
+//! # orthographic = 3.0                # the height of the picture in world units
+//!
+//! [environment]
+//! file = "probes/courtyard.exr"       # or builtin = "studio"
+//! rotate = 90.0                       # degrees about the up axis, default 0
+//! scale = 1.0                         # factor on the radiance, default 1
+//! exposure = 0.0                      # stops, default 0
+//! up = "y"                            # the map's up axis, default "y"
+//!
+//! [materials]
+//! clay = "diffuse:0.8"                # the command line's notation, see `bsdf::MaterialSpec`
+//!
+//! [materials.brass]                   # metallic-roughness as in glTF; every key is optional
+//! base_color = [0.9, 0.7, 0.3]        # linear, default white
+//! base_color_texture = "brass.png"    # sRGB
+//! metallic = 1.0                      # default 0
+//! roughness = 0.3                     # default 0.5; α = roughness²
+//! metallic_roughness_texture = "mr.png"   # linear: green × roughness, blue × metallic
+//! normal_map = "normal.png"           # linear, +Y up as in glTF
+//! normal_scale = 1.0
+//! wrap = "repeat"                     # or "clamp", "mirror"; of all the material's textures
+//! uv_scale = 1.0                      # how often the textures repeat, default 1
+//!
+//! [[objects]]
+//! file = "teapot.ply"                 # PLY, OBJ, glTF or GLB; or builtin = "sphere"
+//! name = "teapot"                     # for messages; default: the file's own names
+//! material = "brass"                  # a name from [materials] or the command line's notation;
+//!                                     # default: the file's own materials
+//! scale = 2.0                         # or [x, y, z]
+//! rotate = [0.0, 90.0, 0.0]           # degrees about x, then y, then z
+//! translate = [0.0, 1.0, 0.0]         # scale first, then rotate, then translate
+//! # matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]   # rows, instead of the three
+//! ```
+//!
+//! Paths are relative to the scene file. Unknown keys are errors, as are files that are missing.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::textures::Textures;
+use super::{LoadError, Loaded, load_mesh, relative};
+use crate::Rgb;
+use crate::bsdf::{Material, ParseMaterialError};
+use crate::math::{Mat4, Vec2, Vec3, Vec4};
+use crate::scene::camera::{CameraError, CameraSettings, Projection};
+use crate::scene::{
+    Encoding, EnvironmentSettings, EnvironmentSource, MetallicRoughnessSurface, NormalMap,
+    SceneDescription, Surface, SurfaceModel, TextureRef, UpAxis, UvTransform, Wrap,
+};
+
+/// What is wrong with a scene file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TomlProblem {
+    /// Not UTF-8.
+    #[error("not a text in UTF-8; the first bad byte is byte {byte}")]
+    Encoding {
+        /// The first bad byte.
+        byte: usize,
+    },
+    /// Not TOML, or not a scene.
+    #[error("{0}")]
+    Syntax(String),
+    /// A thing that needs exactly one of two keys.
+    #[error("{what} needs either '{first}' or '{second}', and not both")]
+    OneOf {
+        /// The table.
+        what: String,
+        /// One key.
+        first: &'static str,
+        /// The other.
+        second: &'static str,
+    },
+    /// A built-in object that does not exist.
+    #[error("there is no built-in object '{name}'")]
+    Builtin {
+        /// The name.
+        name: String,
+    },
+    /// A material that is neither defined nor notation.
+    #[error("material '{text}' is neither defined in [materials] nor valid notation: {source}")]
+    Material {
+        /// The text.
+        text: String,
+        /// Why it is no notation.
+        source: ParseMaterialError,
+    },
+    /// A number out of its range.
+    #[error("{what} is {value}, which is outside {range}")]
+    Range {
+        /// Which key.
+        what: &'static str,
+        /// Its value.
+        value: f32,
+        /// Its range.
+        range: &'static str,
+    },
+    /// A transform that flattens or loses the object.
+    #[error("the transform of this object is singular or not finite; no scale may be 0")]
+    Singular,
+    /// A matrix beside other transforms.
+    #[error("'matrix' stands instead of 'scale', 'rotate' and 'translate', not beside them")]
+    MatrixAndOthers,
+    /// A matrix that is not affine.
+    #[error("the last row of 'matrix' must be [0, 0, 0, 1]; give the matrix by rows")]
+    NotAffine,
+    /// A camera that makes no picture.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SceneFile {
+    #[serde(default)]
+    up: UpAxis,
+    camera: Option<Spanned<CameraTable>>,
+    environment: Option<Spanned<EnvironmentTable>>,
+    #[serde(default)]
+    materials: BTreeMap<String, Spanned<MaterialEntry>>,
+    #[serde(default)]
+    objects: Vec<Spanned<ObjectTable>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraTable {
+    origin: [f32; 3],
+    target: [f32; 3],
+    up: Option<[f32; 3]>,
+    fov: Option<f32>,
+    orthographic: Option<f32>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EnvironmentTable {
+    file: Option<String>,
+    builtin: Option<String>,
+    #[serde(default)]
+    rotate: f32,
+    #[serde(default = "one")]
+    scale: f32,
+    #[serde(default)]
+    exposure: f32,
+    #[serde(default)]
+    up: UpAxis,
+}
+
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "a material is notation such as \"ggx:0.2\" or a table of base_color, base_color_texture, metallic, roughness, metallic_roughness_texture, normal_map, normal_scale, wrap and uv_scale"
+)]
+enum MaterialEntry {
+    Notation(String),
+    Table(Box<MaterialTable>),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MaterialTable {
+    #[serde(default = "white")]
+    base_color: [f32; 3],
+    base_color_texture: Option<String>,
+    #[serde(default)]
+    metallic: f32,
+    #[serde(default = "half")]
+    roughness: f32,
+    metallic_roughness_texture: Option<String>,
+    normal_map: Option<String>,
+    #[serde(default = "one")]
+    normal_scale: f32,
+    #[serde(default)]
+    wrap: Wrap,
+    #[serde(default = "one")]
+    uv_scale: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ObjectTable {
+    file: Option<String>,
+    builtin: Option<String>,
+    name: Option<String>,
+    material: Option<String>,
+    scale: Option<Scale>,
+    rotate: Option<[f32; 3]>,
+    translate: Option<[f32; 3]>,
+    matrix: Option<[[f32; 4]; 4]>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged, expecting = "a scale is a number or [x, y, z]")]
+enum Scale {
+    Uniform(f32),
+    Axes([f32; 3]),
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn half() -> f32 {
+    0.5
+}
+
+fn white() -> [f32; 3] {
+    [1.0; 3]
+}
+
+pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
+    let failed =
+        |line, problem| LoadError::Toml { path: path.into(), line, problem: Box::new(problem) };
+    let text = std::str::from_utf8(bytes)
+        .map_err(|e| failed(None, TomlProblem::Encoding { byte: e.valid_up_to() }))?;
+    let file: SceneFile = toml::from_str(text).map_err(|e| {
+        let line = e.span().map(|span| line_of(text, span.start));
+        failed(line, TomlProblem::Syntax(e.message().into()))
+    })?;
+    let mut reader = Reader {
+        path,
+        text,
+        named: BTreeMap::new(),
+        textures: Textures::default(),
+        loaded: Loaded::default(),
+    };
+    reader.scene(file)?;
+    Ok(reader.finish())
+}
+
+fn line_of(text: &str, byte: usize) -> usize {
+    1 + text.as_bytes().iter().take(byte).filter(|&&b| b == b'\n').count()
+}
+
+struct Reader<'a> {
+    path: &'a Path,
+    text: &'a str,
+    /// Surfaces by the name or notation of their material.
+    named: BTreeMap<String, usize>,
+    textures: Textures,
+    loaded: Loaded,
+}
+
+impl Reader<'_> {
+    /// An error in the table that begins at a byte of the text.
+    fn error(&self, byte: usize, problem: TomlProblem) -> LoadError {
+        let line = Some(line_of(self.text, byte));
+        LoadError::Toml { path: self.path.into(), line, problem: Box::new(problem) }
+    }
+
+    fn scene(&mut self, file: SceneFile) -> Result<(), LoadError> {
+        self.loaded.description.up = Some(file.up);
+        for (name, entry) in file.materials {
+            let at = entry.span().start;
+            let surface = self.material(&name, entry.into_inner(), at)?;
+            self.add_surface(name, surface);
+        }
+        // The surfaces of [materials] come first, and with them the only textures so far.
+        self.loaded.description.textures = std::mem::take(&mut self.textures.textures);
+        if let Some(camera) = file.camera {
+            let at = camera.span().start;
+            let settings = camera_settings(&camera.into_inner(), file.up)
+                .map_err(|problem| self.error(at, problem))?;
+            self.loaded.description.camera = Some(settings);
+        }
+        if let Some(environment) = file.environment {
+            let at = environment.span().start;
+            let settings = self
+                .environment(environment.into_inner())
+                .map_err(|problem| self.error(at, problem))?;
+            self.loaded.description.environment = Some(settings);
+        }
+        for object in file.objects {
+            let at = object.span().start;
+            self.object(object.into_inner(), at)?;
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Loaded {
+        self.loaded
+    }
+
+    fn add_surface(&mut self, name: String, surface: Surface) -> usize {
+        let surfaces = &mut self.loaded.description.surfaces;
+        surfaces.push(surface);
+        self.named.insert(name, surfaces.len() - 1);
+        surfaces.len() - 1
+    }
+
+    fn material(
+        &mut self,
+        name: &str,
+        entry: MaterialEntry,
+        at: usize,
+    ) -> Result<Surface, LoadError> {
+        let table = match entry {
+            MaterialEntry::Notation(text) => return self.notation(name, &text, at),
+            MaterialEntry::Table(table) => table,
+        };
+        let ranges = [
+            ("base_color", table.base_color[0]),
+            ("base_color", table.base_color[1]),
+            ("base_color", table.base_color[2]),
+            ("metallic", table.metallic),
+            ("roughness", table.roughness),
+        ];
+        for (what, value) in ranges {
+            if !(0.0..=1.0).contains(&value) {
+                return Err(self.error(at, TomlProblem::Range { what, value, range: "[0, 1]" }));
+            }
+        }
+        for (what, value) in [("normal_scale", table.normal_scale), ("uv_scale", table.uv_scale)] {
+            if !value.is_finite() {
+                let range = "the finite numbers";
+                return Err(self.error(at, TomlProblem::Range { what, value, range }));
+            }
+        }
+        let referrer =
+            format!("{}, line {}, material '{name}',", self.path.display(), line_of(self.text, at));
+        let transform = UvTransform::new(Vec2::ZERO, 0.0, Vec2::splat(table.uv_scale));
+        let mut texture = |file: &Option<String>, encoding| {
+            let Some(file) = file else { return Ok(None) };
+            let texture = self.textures.file(&relative(self.path, file), encoding, &referrer)?;
+            Ok(Some(TextureRef { texture, wrap: [table.wrap; 2], transform }))
+        };
+        let base_color_texture = texture(&table.base_color_texture, Encoding::Srgb)?;
+        let metallic_roughness_texture =
+            texture(&table.metallic_roughness_texture, Encoding::Linear)?;
+        let normal_map = texture(&table.normal_map, Encoding::Linear)?
+            .map(|texture| NormalMap { texture, scale: table.normal_scale });
+        let model = SurfaceModel::MetallicRoughness(MetallicRoughnessSurface {
+            base_color: Rgb::from(table.base_color),
+            base_color_texture,
+            metallic: table.metallic,
+            roughness: table.roughness,
+            metallic_roughness_texture,
+        });
+        Ok(Surface { name: name.into(), model, normal_map })
+    }
+
+    fn notation(&self, name: &str, text: &str, at: usize) -> Result<Surface, LoadError> {
+        let material = text.parse::<Material>().map_err(|source| {
+            self.error(at, TomlProblem::Material { text: text.into(), source })
+        })?;
+        Ok(Surface::fixed(name, material))
+    }
+
+    fn environment(&self, table: EnvironmentTable) -> Result<EnvironmentSettings, TomlProblem> {
+        let source = match (table.file, table.builtin) {
+            (Some(file), None) => EnvironmentSource::File(relative(self.path, &file)),
+            (None, Some(name)) => EnvironmentSource::Builtin(name),
+            _ => return Err(one_of("[environment]")),
+        };
+        let finite = "the finite numbers";
+        let ranges = [
+            ("rotate", table.rotate, finite, f32::MIN),
+            ("scale", table.scale, "[0, ∞)", 0.0),
+            ("exposure", table.exposure, finite, f32::MIN),
+        ];
+        for (what, value, range, least) in ranges {
+            if !(value.is_finite() && value >= least) {
+                return Err(TomlProblem::Range { what, value, range });
+            }
+        }
+        Ok(EnvironmentSettings {
+            source,
+            rotate_degrees: table.rotate,
+            scale: table.scale,
+            exposure: table.exposure,
+            up: table.up,
+        })
+    }
+
+    fn object(&mut self, table: ObjectTable, at: usize) -> Result<(), LoadError> {
+        let matrix = matrix(&table).map_err(|problem| self.error(at, problem))?;
+        let mut loaded = match (&table.file, &table.builtin) {
+            (Some(file), None) => {
+                let line = line_of(self.text, at);
+                let referrer = format!("{}, line {line}, an object,", self.path.display());
+                load_mesh(&relative(self.path, file), &referrer)?
+            }
+            (None, Some(name)) => {
+                let description = builtin_object(name)
+                    .ok_or_else(|| self.error(at, TomlProblem::Builtin { name: name.clone() }))?;
+                Loaded { description, warnings: Vec::new() }
+            }
+            _ => return Err(self.error(at, one_of("an object"))),
+        };
+        self.loaded.warnings.append(&mut loaded.warnings);
+        let mut description = loaded.description;
+        description.transform(&matrix);
+        // The scene file decides which axis points up.
+        description.up = None;
+        if let Some(name) = &table.name {
+            description.parts.iter_mut().for_each(|p| p.name.clone_from(name));
+        }
+        match &table.material {
+            None => self.loaded.description.append(description),
+            Some(text) => {
+                let surface = self.surface(text, at)?;
+                let mut parts = std::mem::take(&mut description.parts);
+                parts.iter_mut().for_each(|p| p.surface = surface);
+                self.loaded.description.parts.append(&mut parts);
+                let SceneDescription { camera, .. } = description;
+                self.loaded
+                    .description
+                    .append(SceneDescription { camera, ..SceneDescription::default() });
+            }
+        }
+        Ok(())
+    }
+
+    /// The surface of a material's name, or of notation.
+    fn surface(&mut self, text: &str, at: usize) -> Result<usize, LoadError> {
+        if let Some(&surface) = self.named.get(text) {
+            return Ok(surface);
+        }
+        let surface = self.notation(text, text, at)?;
+        Ok(self.add_surface(text.into(), surface))
+    }
+}
+
+/// The built-in scene of a name.
+fn builtin_object(_name: &str) -> Option<SceneDescription> {
+    None
+}
+
+fn one_of(what: &str) -> TomlProblem {
+    TomlProblem::OneOf { what: what.into(), first: "file", second: "builtin" }
+}
+
+fn camera_settings(table: &CameraTable, up: UpAxis) -> Result<CameraSettings, TomlProblem> {
+    let projection = match (table.fov, table.orthographic) {
+        (Some(_), Some(_)) => {
+            let (first, second) = ("fov", "orthographic");
+            return Err(TomlProblem::OneOf { what: "[camera]".into(), first, second });
+        }
+        (None, Some(height)) => Projection::Orthographic { height },
+        (fov, None) => Projection::Perspective {
+            fov_y_degrees: fov.unwrap_or(CameraSettings::DEFAULT_FOV_Y_DEGREES),
+        },
+    };
+    let settings = CameraSettings {
+        projection,
+        origin: table.origin.into(),
+        target: table.target.into(),
+        up: table.up.map_or(up.direction(), Vec3::from),
+    };
+    settings.check()?;
+    Ok(settings)
+}
+
+/// Scale, then rotation about x, y and z, then translation; or the matrix.
+fn matrix(table: &ObjectTable) -> Result<Mat4, TomlProblem> {
+    let others = table.scale.is_some() || table.rotate.is_some() || table.translate.is_some();
+    let m = match table.matrix {
+        Some(_) if others => return Err(TomlProblem::MatrixAndOthers),
+        Some(rows) if rows[3] != [0.0, 0.0, 0.0, 1.0] => return Err(TomlProblem::NotAffine),
+        Some(rows) => Mat4::from_cols_array_2d(&rows).transpose(),
+        None => {
+            let scale = match table.scale {
+                None => Vec3::ONE,
+                Some(Scale::Uniform(s)) => Vec3::splat(s),
+                Some(Scale::Axes(s)) => s.into(),
+            };
+            let [x, y, z] = table.rotate.unwrap_or_default().map(f32::to_radians);
+            Mat4::from_translation(table.translate.unwrap_or_default().into())
+                * Mat4::from_rotation_z(z)
+                * Mat4::from_rotation_y(y)
+                * Mat4::from_rotation_x(x)
+                * Mat4::from_scale(scale)
+        }
+    };
+    let columns: [Vec4; 4] = [m.x_axis, m.y_axis, m.z_axis, m.w_axis];
+    let usable = columns.iter().all(|c| c.is_finite())
+        && m.determinant() != 0.0
+        && m.determinant().is_finite();
+    if usable { Ok(m) } else { Err(TomlProblem::Singular) }
+}

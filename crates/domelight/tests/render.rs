@@ -1,0 +1,278 @@
+//! The renderer: the same bits however the work is divided, strategies that agree pixel by pixel,
+//! and layers that mean what they say.
+
+use domelight::bsdf::{Material, MaterialSpec};
+use domelight::environment::{CompensatedTable, Environment, Orientation};
+use domelight::geometry::Mesh;
+use domelight::math::{Mat4, Vec3, vec3};
+use domelight::render::{Background, Filter, Layers, Observer, RenderSettings, Rendering, render};
+use domelight::sampling::{Heuristic, Pcg32, SamplerKind};
+use domelight::scene::builtin::shapes;
+use domelight::scene::{
+    Camera, CameraSettings, Part, Projection, Scene, SceneDescription, Surface, SurfaceModel,
+};
+use domelight::strategy::{
+    BrdfSampling, EnvironmentSampling, LightTable, MultipleImportanceSampling, Strategy,
+};
+use domelight::{Rgb, RgbImage};
+use testkit::{Suite, ZTest};
+
+fn material(text: &str) -> Material {
+    text.parse::<MaterialSpec>().unwrap().into()
+}
+
+/// Two spheres on a floor, which shade each other.
+fn scene(ball: &str) -> Scene {
+    let place = |mut mesh: Mesh, m: Mat4| {
+        mesh.transform(&m);
+        mesh
+    };
+    let sphere = |x: f32, r: f32| {
+        let m = Mat4::from_translation(vec3(x, r, 0.0)) * Mat4::from_scale(Vec3::splat(r));
+        place(shapes::icosphere(3), m)
+    };
+    let part = |name: &str, mesh, surface| Part { name: name.into(), mesh, surface };
+    let surface = |name: &str, text| Surface {
+        name: name.into(),
+        model: SurfaceModel::Fixed(material(text)),
+        normal_map: None,
+    };
+    Scene::new(SceneDescription {
+        parts: vec![
+            part("left", sphere(-0.8, 0.8), 0),
+            part("right", sphere(0.7, 0.5), 0),
+            part("floor", shapes::disc(4.0, 48), 1),
+        ],
+        surfaces: vec![surface("ball", ball), surface("grey", "diffuse:0.5")],
+        ..SceneDescription::default()
+    })
+    .unwrap()
+}
+
+fn camera(settings: &RenderSettings) -> Camera {
+    let view = CameraSettings {
+        projection: Projection::Perspective { fov_y_degrees: 35.0 },
+        origin: vec3(0.0, 1.6, 5.0),
+        target: vec3(0.0, 0.6, 0.0),
+        up: Vec3::Y,
+    };
+    Camera::new(&view, settings.width, settings.height).unwrap()
+}
+
+/// A bright patch on a noisy sky, wide enough that BRDF samples find it in every batch: the t-test
+/// needs batch means that are nearly normal.
+fn environment() -> Environment {
+    let mut pcg = Pcg32::new(2, 0);
+    let mut map = RgbImage::from_fn(32, 16, |_, y| {
+        let level = if y < 8 { 0.3 } else { 0.1 };
+        Rgb::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32()) * level
+    });
+    for y in 3..6 {
+        map.pixels[y * 32 + 3..y * 32 + 8].fill(Rgb::new(4.0, 3.5, 3.0));
+    }
+    Environment::new(map, Orientation::default(), 1.0).unwrap()
+}
+
+fn mis(environment: &Environment) -> MultipleImportanceSampling<'_> {
+    MultipleImportanceSampling::new(environment, LightTable::Full, Heuristic::Balance, 1, 1).unwrap()
+}
+
+fn draw<S: Strategy>(
+    scene: &Scene,
+    environment: &Environment,
+    strategy: &S,
+    settings: &RenderSettings,
+) -> Rendering {
+    render(scene, &camera(settings), environment, strategy, settings, &())
+}
+
+fn small() -> RenderSettings {
+    RenderSettings { width: 45, height: 37, n_samples: 9, seed: 3, ..RenderSettings::default() }
+}
+
+fn bits(layers: &Layers) -> Vec<u32> {
+    let images = [&layers.color, &layers.unoccluded, &layers.albedo, &layers.variance];
+    let colors = images.into_iter().flat_map(|i| &i.pixels).flat_map(|p| p.to_array());
+    let normals = layers.normal.iter().flat_map(|n| n.to_array());
+    let others = layers.alpha.iter().chain(&layers.depth).copied();
+    colors.chain(normals).chain(others).map(f32::to_bits).collect()
+}
+
+#[test]
+fn the_same_bits_for_any_threads_and_tiles() {
+    let (scene, environment) = (scene("ggx:0.2"), environment());
+    let strategy = mis(&environment);
+    let picture = |threads: usize, tile_size: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let settings = RenderSettings { tile_size, ..small() };
+        bits(&pool.install(|| draw(&scene, &environment, &strategy, &settings)).layers)
+    };
+    let expected = picture(1, 16);
+    for (threads, tile_size) in [(2, 16), (5, 16), (2, 7), (1, 64), (3, 1)] {
+        assert!(picture(threads, tile_size) == expected, "{threads} threads, tiles of {tile_size}");
+    }
+}
+
+#[test]
+fn seeds_and_samplers_differ() {
+    let (scene, environment) = (scene("diffuse:0.8"), environment());
+    let strategy = mis(&environment);
+    let picture = |settings| bits(&draw(&scene, &environment, &strategy, &settings).layers);
+    let first = picture(small());
+    assert!(first != picture(RenderSettings { seed: 4, ..small() }));
+    assert!(first != picture(RenderSettings { sampler: SamplerKind::Independent, ..small() }));
+}
+
+/// Every pixel and channel of pictures under many seeds, strategy against strategy.
+#[test]
+fn strategies_agree_pixel_by_pixel() {
+    let environment = environment();
+    let settings =
+        RenderSettings { width: 12, height: 9, n_samples: 64, ..RenderSettings::default() };
+    let n_values = settings.width * settings.height;
+    let compensated = CompensatedTable::new(&environment);
+    let compensated = MultipleImportanceSampling::new(
+        &environment,
+        LightTable::Compensated(&compensated),
+        Heuristic::Power,
+        2,
+        1,
+    )
+    .unwrap();
+    let balls = ["diffuse:0.8", "phong:20:0.6:0.3"];
+    for ball in balls {
+        let scene = scene(ball);
+        let brdf = BrdfSampling { environment: &environment, n_samples: 2 };
+        let light = EnvironmentSampling { environment: &environment, n_samples: 2 };
+        let balance = pictures(&scene, &environment, &mis(&environment), &settings);
+        let others = [
+            ("brdf", pictures(&scene, &environment, &brdf, &settings)),
+            ("environment", pictures(&scene, &environment, &light, &settings)),
+            ("compensated", pictures(&scene, &environment, &compensated, &settings)),
+        ];
+        let suite = Suite::of(others.len() * balls.len() * n_values);
+        let test = ZTest { suite, ..ZTest::default() };
+        for (name, other) in &others {
+            for i in 0..n_values {
+                let pixel = |pictures: &[RgbImage]| -> Vec<[f64; 3]> {
+                    pictures.iter().map(|p| p.pixels[i].to_array().map(f64::from)).collect()
+                };
+                let name = format!("{name} against mis, {ball}, pixel {i}");
+                let result = test.two_sample(&name, &pixel(other), &pixel(&balance));
+                result.unwrap_or_else(|f| panic!("{f}"));
+            }
+        }
+    }
+}
+
+fn pictures<S: Strategy>(
+    scene: &Scene,
+    environment: &Environment,
+    strategy: &S,
+    settings: &RenderSettings,
+) -> Vec<RgbImage> {
+    let picture = |seed| {
+        let settings = RenderSettings { seed, ..*settings };
+        draw(scene, environment, strategy, &settings).layers.color
+    };
+    (0..40).map(picture).collect()
+}
+
+#[test]
+fn a_white_sphere_in_a_white_furnace_vanishes() {
+    let environment = Environment::constant(Rgb::WHITE).unwrap();
+    let sphere = Part { name: "sphere".into(), mesh: shapes::icosphere(4), surface: 0 };
+    let scene = Scene::new(SceneDescription {
+        parts: vec![sphere],
+        surfaces: vec![Surface {
+            name: "white".into(),
+            model: SurfaceModel::Fixed(material("diffuse:1")),
+            normal_map: None,
+        }],
+        ..SceneDescription::default()
+    })
+    .unwrap();
+    let settings = RenderSettings { width: 24, height: 24, ..small() };
+    // Cosine sampling has no variance here; a shading normal that is not the facet's loses what
+    // lies below the facet, which is less than one part in a hundred for these facets.
+    let strategy = BrdfSampling { environment: &environment, n_samples: 4 };
+    let picture = draw(&scene, &environment, &strategy, &settings);
+    for (i, p) in picture.layers.color.pixels.iter().enumerate() {
+        assert!((0.96..=1.0001).contains(&p.g), "pixel {i}: {p:?}");
+    }
+    assert_eq!(picture.counts.non_finite, 0);
+}
+
+#[test]
+fn layers_mean_what_they_say() {
+    let (scene, environment) = (scene("diffuse:0.8"), environment());
+    let settings = RenderSettings {
+        background: Background::Hidden,
+        filter: Filter::Box,
+        n_samples: 16,
+        ..small()
+    };
+    let Rendering { layers, counts, complete } =
+        draw(&scene, &environment, &mis(&environment), &settings);
+    assert!(complete);
+    assert_eq!(counts.camera_rays, 45 * 37 * 16);
+    let covered: f32 = layers.alpha.iter().sum();
+    assert_eq!((covered * 16.0).round() as u64, counts.shading_points);
+    for i in 0..layers.alpha.len() {
+        let (color, open) = (layers.color.pixels[i], layers.unoccluded.pixels[i]);
+        assert!(open.g >= color.g * 0.999_99, "free rays only add light");
+        assert!(layers.normal[i].length() <= layers.alpha[i] + 1e-4);
+        assert!((0.0..=1.0).contains(&layers.alpha[i]));
+        assert_eq!(layers.n_samples[i], 16);
+        if layers.alpha[i] == 0.0 {
+            assert!(color.is_black() && layers.depth[i] == 0.0);
+        } else {
+            assert!((2.0..9.0).contains(&layers.depth[i]), "{}", layers.depth[i]);
+        }
+    }
+    // The upper corners look past the scene, the middle of the lower edge at the grey floor.
+    assert_eq!(layers.alpha[0], 0.0);
+    let floor = 36 * 45 + 22;
+    assert_eq!(layers.alpha[floor], 1.0);
+    assert!((layers.albedo.pixels[floor].g - 0.5).abs() < 1e-5);
+    assert!((layers.normal[floor] - Vec3::Y).length() < 1e-4);
+
+    let shown = RenderSettings { background: Background::Shown, ..settings };
+    let shown = draw(&scene, &environment, &mis(&environment), &shown).layers;
+    assert!(shown.alpha.iter().all(|&a| a == 1.0));
+    assert!(shown.color.pixels[0].g > 0.0);
+}
+
+#[test]
+fn a_cancelled_render_keeps_what_is_done() {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    struct After(AtomicUsize);
+    impl Observer for After {
+        fn tile_finished(&self, _: &domelight::render::Counts) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+        fn cancelled(&self) -> bool {
+            self.0.load(Ordering::Relaxed) >= 20
+        }
+    }
+    let (scene, environment) = (scene("diffuse:0.8"), environment());
+    let settings = RenderSettings { n_samples: 64, ..small() };
+    let observer = After(AtomicUsize::new(0));
+    let camera = camera(&settings);
+    let rendering =
+        render(&scene, &camera, &environment, &mis(&environment), &settings, &observer);
+    assert!(!rendering.complete);
+    assert!(rendering.layers.n_samples.iter().all(|&n| (1..64).contains(&n)));
+    assert!(rendering.layers.color.pixels.iter().all(|p| p.is_finite()));
+}
+
+#[test]
+fn an_empty_scene_and_a_black_probe_render() {
+    let environment = Environment::constant(Rgb::BLACK).unwrap();
+    let nothing = Scene::new(SceneDescription::default()).unwrap();
+    let settings = RenderSettings { width: 1, height: 3, ..small() };
+    for scene in [nothing, scene("ggx:0.1")] {
+        let picture = draw(&scene, &environment, &mis(&environment), &settings);
+        assert!(picture.layers.color.pixels.iter().all(|p| p.is_black()));
+    }
+}
