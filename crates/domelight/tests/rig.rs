@@ -1,12 +1,14 @@
 //! Light rigs: regions partition the sphere, light is conserved, and the error falls.
 
+use domelight::bsdf::MaterialSpec;
 use domelight::environment::{Environment, Orientation, UpAxis};
-use domelight::math::{Mat3, PI, Vec3};
+use domelight::math::{Frame, Mat3, PI, Vec3};
 use domelight::rig::{
     LightPosition, MedianCut, Order, Region, Rig, RigError, Rule, ShadingReference,
     VarianceMinimization, median_cut, variance_minimization,
 };
-use domelight::sampling::Pcg32;
+use domelight::sampling::{Pcg32, SamplerKind, Stream};
+use domelight::strategy::{LightSet, PointStrategy, SampleNumbers, ShadingPoint};
 use domelight::{Rgb, RgbImage};
 
 /// A way to make a rig.
@@ -152,6 +154,35 @@ fn check_lights(name: &str, env: &Environment, rig: &Rig) {
     assert!((shares - 1.0).abs() < 1e-5);
 }
 
+/// Large maps are cut between blocks of texels, and small regions of them between texels: a
+/// dark map with a few lit texels needs both.
+#[test]
+fn large_maps_conserve_light_as_well() {
+    let (width, height) = (3001, 1500);
+    let mut sparse = RgbImage::filled(width, height, Rgb::BLACK);
+    for i in 0..40 {
+        sparse.pixels[(i * i * 7_919 + i % 3) % (width * height)] = Rgb::new(1.0, 0.5, i as f32);
+    }
+    sparse.pixels[5_000..5_006].fill(Rgb::WHITE);
+    for (name, map) in [("interior", interior(width, height)), ("sparse", sparse)] {
+        let env = environment(map);
+        for method in Method::all() {
+            let rig = method.rig(&env, 40).unwrap();
+            assert_eq!(rig.lights.len(), 40, "{name} {method:?}");
+            let mut sums = vec![[0.0; 3]; 40];
+            for (i, le) in env.map().pixels.iter().enumerate() {
+                let solid_angle = env.texel_solid_angle(i / width);
+                let sum = &mut sums[rig.labels[i] as usize];
+                let le = le.to_array();
+                (0..3).for_each(|c| sum[c] += f64::from(le[c]) * solid_angle);
+            }
+            for (light, sum) in rig.lights.iter().zip(sums) {
+                assert_close(&format!("{name} {method:?}"), light.irradiance, sum);
+            }
+        }
+    }
+}
+
 #[test]
 fn any_number_of_lights_to_the_last_texel() {
     for (name, map) in [("sparse", maps().remove(2).1), ("interior", interior(12, 6))] {
@@ -287,6 +318,33 @@ fn better_methods_have_smaller_errors() {
             assert!(pair[1].glossy < pair[0].glossy, "{n}: {methods:?} {pair:?}");
         }
     }
+}
+
+/// Σ f_r cos θ · E over the lights: one light in each texel is a sum over the map.
+#[test]
+fn a_light_set_asks_for_one_ray_a_light() {
+    let env = environment(interior(32, 16));
+    let lit = env.map().pixels.iter().filter(|p| !p.is_black()).count();
+    let rig = median_cut(&env, lit, &MedianCut::default()).unwrap();
+    let lights = LightSet { rig: &rig };
+    assert_eq!(PointStrategy::n_rays(&lights), lit as u32);
+    let normal = Vec3::new(0.6, 0.64, 0.48);
+    let at = ShadingPoint {
+        position: Vec3::ZERO,
+        ng: normal,
+        frame: Frame::from_z(normal),
+        wo: Vec3::Z,
+        material: "diffuse:0.8,0.5,0.2".parse::<MaterialSpec>().unwrap().into(),
+    };
+    let mut shaded = Rgb::BLACK;
+    let numbers = SampleNumbers { stream: Stream::new(SamplerKind::Sobol, 0, 0), sample: 0 };
+    lights.sample(&at, numbers, |_, weight| shaded += weight);
+    let exact = rig.lights.iter().map(|l| {
+        let cos_theta = l.direction.dot(normal).max(0.0);
+        Rgb::new(0.8, 0.5, 0.2) * l.irradiance * (cos_theta / PI)
+    });
+    let exact: Rgb = exact.sum();
+    assert_close("light set", shaded, exact.to_array().map(f64::from));
 }
 
 /// One light in every lit texel is the map, up to the extent of a texel.
