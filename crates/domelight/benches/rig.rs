@@ -21,32 +21,32 @@ type Method = fn(&Environment, usize) -> Result<Rig, RigError>;
 const METHODS: [(&str, Method); 8] = [
     ("median cut, geometric centre", |env, n| {
         let position = LightPosition::GeometricCentre;
-        median_cut(env, n, &MedianCut { position, ..MedianCut::default() })
+        median_cut(env, n, MedianCut { position, ..MedianCut::default() })
     }),
-    ("median cut", |env, n| median_cut(env, n, &MedianCut::default())),
+    ("median cut", |env, n| median_cut(env, n, MedianCut::default())),
     ("median cut, widths as on the map", |env, n| {
-        median_cut(env, n, &MedianCut { scale_width: false, ..MedianCut::default() })
+        median_cut(env, n, MedianCut { scale_width: false, ..MedianCut::default() })
     }),
-    ("variance, poster", |env, n| variance_minimization(env, n, &VarianceMinimization::poster())),
+    ("variance, poster", |env, n| variance_minimization(env, n, VarianceMinimization::poster())),
     ("variance, poster, worst first", |env, n| {
         let order = Order::WorstFirst;
         variance_minimization(
             env,
             n,
-            &VarianceMinimization { order, ..VarianceMinimization::poster() },
+            VarianceMinimization { order, ..VarianceMinimization::poster() },
         )
     }),
     ("variance, sphere, levels", |env, n| {
         let settings = VarianceMinimization::default();
         let order = Order::Levels;
-        variance_minimization(env, n, &VarianceMinimization { order, lloyd_steps: 0, ..settings })
+        variance_minimization(env, n, VarianceMinimization { order, lloyd_steps: 0, ..settings })
     }),
     ("variance, sphere, worst first", |env, n| {
         let settings = VarianceMinimization::default();
-        variance_minimization(env, n, &VarianceMinimization { lloyd_steps: 0, ..settings })
+        variance_minimization(env, n, VarianceMinimization { lloyd_steps: 0, ..settings })
     }),
     ("variance, sphere, refined", |env, n| {
-        variance_minimization(env, n, &VarianceMinimization::default())
+        variance_minimization(env, n, VarianceMinimization::default())
     }),
 ];
 

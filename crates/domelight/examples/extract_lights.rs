@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let n_lights = std::env::args().nth(1).map_or(Ok(8), |n| n.parse())?;
     let map = BuiltinProbe::Sky.image(256);
     let environment = Environment::new(map, Orientation::default(), 1.0)?;
-    let rig = variance_minimization(&environment, n_lights, &VarianceMinimization::default())?;
+    let rig = variance_minimization(&environment, n_lights, VarianceMinimization::default())?;
 
     println!("toward the light (x y z)      irradiance (r g b)            radius   share");
     for light in &rig.lights {

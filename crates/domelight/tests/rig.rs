@@ -21,8 +21,8 @@ enum Method {
 impl Method {
     fn rig(self, env: &Environment, n: usize) -> Result<Rig, RigError> {
         match self {
-            Self::MedianCut(settings) => median_cut(env, n, &settings),
-            Self::Variance(settings) => variance_minimization(env, n, &settings),
+            Self::MedianCut(settings) => median_cut(env, n, settings),
+            Self::Variance(settings) => variance_minimization(env, n, settings),
         }
     }
 
@@ -219,7 +219,7 @@ fn a_light_that_is_alone_has_its_own_size_and_place() {
     for centre in centres {
         let (width, height) = (512, 256);
         let env = environment(sun(width, height, centre, 0.2, 0.0));
-        let rig = variance_minimization(&env, 1, &VarianceMinimization::default()).unwrap();
+        let rig = variance_minimization(&env, 1, VarianceMinimization::default()).unwrap();
         let light = rig.lights[0];
         let texel = PI / height as f32;
         assert!(light.direction.distance(centre) < texel, "{centre}: {light:?}");
@@ -234,7 +234,7 @@ fn a_sun_across_the_seam_or_a_pole_is_one_light() {
     for centre in seam.into_iter().chain([Vec3::Y, -Vec3::Y]) {
         let env = environment(sun(512, 256, centre, 0.03, 2.0));
         for n in [4, 16, 32] {
-            let rig = variance_minimization(&env, n, &VarianceMinimization::default()).unwrap();
+            let rig = variance_minimization(&env, n, VarianceMinimization::default()).unwrap();
             let sun = env.map().pixels.iter().zip(&rig.labels).filter(|(p, _)| p.r > 1e3);
             let labels: std::collections::BTreeSet<u32> = sun.map(|(_, &l)| l).collect();
             assert_eq!(labels.len(), 1, "{centre}, {n} lights");
@@ -271,10 +271,10 @@ fn rolling_the_map_turns_the_rig() {
     let map = interior(96, 48);
     for lloyd_steps in [0, 15] {
         let settings = VarianceMinimization { lloyd_steps, ..Default::default() };
-        let expected = variance_minimization(&environment(map.clone()), 40, &settings).unwrap();
+        let expected = variance_minimization(&environment(map.clone()), 40, settings).unwrap();
         for shift in [1, 17, 48, 95] {
             let rolled = RgbImage::from_fn(96, 48, |x, y| map.get((x + 96 - shift) % 96, y));
-            let rig = variance_minimization(&environment(rolled), 40, &settings).unwrap();
+            let rig = variance_minimization(&environment(rolled), 40, settings).unwrap();
             // Columns grow to the right as seen from inside: clockwise from above.
             let turn = Mat3::from_rotation_y(-(shift as f32) / 96.0 * 2.0 * PI);
             for (a, b) in rig.lights.iter().zip(&expected.lights) {
@@ -325,7 +325,7 @@ fn better_methods_have_smaller_errors() {
 fn a_light_set_asks_for_one_ray_a_light() {
     let env = environment(interior(32, 16));
     let lit = env.map().pixels.iter().filter(|p| !p.is_black()).count();
-    let rig = median_cut(&env, lit, &MedianCut::default()).unwrap();
+    let rig = median_cut(&env, lit, MedianCut::default()).unwrap();
     let lights = LightSet { rig: &rig };
     assert_eq!(PointStrategy::n_rays(&lights), lit as u32);
     let normal = Vec3::new(0.6, 0.64, 0.48);
@@ -352,7 +352,7 @@ fn a_light_set_asks_for_one_ray_a_light() {
 fn a_light_in_every_texel_shades_as_the_map() {
     let env = environment(interior(32, 16));
     let lit = env.map().pixels.iter().filter(|p| !p.is_black()).count();
-    let rig = variance_minimization(&env, lit, &VarianceMinimization::default()).unwrap();
+    let rig = variance_minimization(&env, lit, VarianceMinimization::default()).unwrap();
     let error = ShadingReference::new(&env).error(&rig);
     assert!(error.diffuse < 1e-6 && error.glossy < 1e-6, "{error:?}");
 }
@@ -362,7 +362,7 @@ fn the_poster_cuts_two_to_the_n_regions_level_by_level() {
     let settings = VarianceMinimization::poster();
     assert_eq!(settings.rule, Rule::Poster);
     let env = environment(interior(96, 48));
-    let rigs = [4, 5, 6, 7, 8].map(|n| variance_minimization(&env, n, &settings).unwrap());
+    let rigs = [4, 5, 6, 7, 8].map(|n| variance_minimization(&env, n, settings).unwrap());
     // Each further light divides one of the four regions, and none twice.
     for (i, rig) in rigs.iter().enumerate().skip(1) {
         let kept =

@@ -47,7 +47,7 @@ impl Default for MedianCut {
 pub fn median_cut(
     environment: &Environment,
     n_lights: usize,
-    settings: &MedianCut,
+    settings: MedianCut,
 ) -> Result<Rig, RigError> {
     let texels = Texels::new(environment);
     let (width, height) = (texels.width(), texels.height());

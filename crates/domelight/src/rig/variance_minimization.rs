@@ -67,7 +67,7 @@ impl VarianceMinimization {
 pub fn variance_minimization(
     environment: &Environment,
     n_lights: usize,
-    settings: &VarianceMinimization,
+    settings: VarianceMinimization,
 ) -> Result<Rig, RigError> {
     let texels = Texels::new(environment);
     let blocks = Blocks::of(&texels);
@@ -110,7 +110,7 @@ fn divide(
     table: &SummedArea,
     x0: usize,
     n_lights: usize,
-    settings: &VarianceMinimization,
+    settings: VarianceMinimization,
 ) -> Vec<TexelRect> {
     let (width, height) = (table.texels().width(), table.texels().height());
     let criterion = match settings.rule {
