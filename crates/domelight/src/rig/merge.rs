@@ -39,8 +39,10 @@ impl Part {
 pub(super) fn merge(parts: &[Moments], n: usize) -> Vec<[f64; 3]> {
     let part = |m: &Moments| Part::new(m.first.into(), m.energy);
     let mut parts: Vec<Part> = parts.iter().map(part).collect();
-    for i in 0..parts.len() {
-        find_partner(&mut parts, i);
+    if parts.len() > n {
+        for i in 0..parts.len() {
+            find_partner(&mut parts, i);
+        }
     }
     while parts.len() > n.max(1) {
         join_cheapest(&mut parts);

@@ -62,6 +62,10 @@ impl<'a> Texels<'a> {
         }
     }
 
+    pub(super) fn environment(&self) -> &'a Environment {
+        self.environment
+    }
+
     pub(super) fn width(&self) -> usize {
         self.columns.len()
     }

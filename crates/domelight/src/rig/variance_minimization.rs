@@ -20,6 +20,8 @@ use crate::math::Vec3;
 
 /// Parts that the map is cut into for each light, to be joined again before the refinement.
 const PARTS_PER_LIGHT: usize = 2;
+/// Lights above which no parts are joined: joining takes time in proportion to their square.
+const MAX_JOINED: usize = 4096;
 
 /// What a cut minimises.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,6 +33,15 @@ pub enum Rule {
     /// opposite the map's centre of light, so turning the map turns the rig.
     #[default]
     Spherical,
+}
+
+impl Rule {
+    fn metric(self) -> Metric {
+        match self {
+            Self::Poster => Metric::Plane,
+            Self::Spherical => Metric::Sphere,
+        }
+    }
 }
 
 /// Settings of [`variance_minimization`].
@@ -59,7 +70,8 @@ impl VarianceMinimization {
 
 /// `n_lights` lights with as little spread of energy around them as can be found.
 ///
-/// Where all steps of the refinement would leave a light without energy, fewer are taken.
+/// Where all steps of the refinement would leave a light without energy, fewer are taken; where
+/// even none would, regions stay rectangles.
 ///
 /// # Errors
 /// [`RigError::NoLights`] for `n_lights` = 0, [`RigError::Black`] for a map without light, and
@@ -70,53 +82,71 @@ pub fn variance_minimization(
     settings: VarianceMinimization,
 ) -> Result<Rig, RigError> {
     let texels = Texels::new(environment);
-    let blocks = Blocks::of(&texels);
-    let moments = blocks.moments(&texels, Metric::Sphere);
-    let pieces: Vec<Piece> = match settings.lloyd_steps {
-        0 => Vec::new(),
-        _ => moments.iter().map(Piece::new).collect(),
-    };
-    let table = SummedArea::from_moments(&texels, Metric::Sphere, blocks, moments);
-    let lit = table.total().lit as usize;
-    RigError::check(n_lights, lit)?;
-    let rectangles = |n| match settings.rule {
-        Rule::Spherical => divide(&table, table.darkest_column(), n, settings),
-        Rule::Poster => divide(&SummedArea::new(&texels, Metric::Plane), 0, n, settings),
-    };
-    if settings.lloyd_steps == 0 {
-        return Ok(Rig::from_rectangles(&texels, &rectangles(n_lights)));
+    if settings.lloyd_steps > 0 {
+        return refined(&texels, n_lights, settings);
     }
-    let parts = rectangles(lit.min(PARTS_PER_LIGHT * n_lights));
-    let parts: Vec<Moments> = parts.iter().map(|r| table.measure(r)).collect();
-    let start = merge(&parts, n_lights);
-    let start: Vec<Vec3> = start.into_iter().map(|r| unit(r).unwrap_or(Vec3::Y)).collect();
-    // A light that lost all its texels is rare; with fewer steps, or none, it keeps some.
-    let mut steps = settings.lloyd_steps;
-    while steps > 0 {
-        let mut lights = start.clone();
-        refine(&table, &pieces, &mut lights, steps);
-        let labels = assign(&texels, &lights);
-        let sums = RegionSums::of(&texels, &labels, n_lights);
-        if sums.iter().all(|s| s.energy > 0.0) {
-            return Ok(Rig::new(&texels, labels, &sums, &vec![Region::Cell; n_lights]));
-        }
-        steps /= 2;
-    }
-    Ok(Rig::from_rectangles(&texels, &rectangles(n_lights)))
+    let table = SummedArea::new(&texels, settings.rule.metric());
+    RigError::check(n_lights, table.total().lit as usize)?;
+    let regions = divide(&table, n_lights, settings);
+    drop(table);
+    Ok(Rig::from_rectangles(&texels, &regions))
 }
 
-/// Rectangles from the whole map, whose columns begin at `x0`.
-fn divide(
-    table: &SummedArea,
-    x0: usize,
-    n_lights: usize,
-    settings: VarianceMinimization,
-) -> Vec<TexelRect> {
+/// Rectangles of the whole map.
+fn divide(table: &SummedArea, n: usize, settings: VarianceMinimization) -> Vec<TexelRect> {
     let (width, height) = (table.texels().width(), table.texels().height());
-    let criterion = match settings.rule {
-        Rule::Poster => Criterion::MinMaxVariance,
-        Rule::Spherical => Criterion::MinSumVariance,
+    let (x0, criterion) = match settings.rule {
+        Rule::Poster => (0, Criterion::MinMaxVariance),
+        Rule::Spherical => (table.darkest_column(), Criterion::MinSumVariance),
     };
     let root = TexelRect { x0, x1: x0 + width, y0: 0, y1: height };
-    split(table, root, criterion, settings.order, n_lights)
+    split(table, root, criterion, settings.order, n)
+}
+
+/// Nearest-light cells after Lloyd's refinement.
+fn refined(
+    texels: &Texels,
+    n_lights: usize,
+    settings: VarianceMinimization,
+) -> Result<Rig, RigError> {
+    let blocks = Blocks::of(texels);
+    let moments = blocks.moments(texels, Metric::Sphere);
+    let pieces: Vec<Piece> = moments.iter().map(Piece::new).collect();
+    let table = SummedArea::from_moments(texels, Metric::Sphere, blocks, moments);
+    let lit = table.total().lit as usize;
+    RigError::check(n_lights, lit)?;
+    let n_parts = if n_lights > MAX_JOINED { n_lights } else { PARTS_PER_LIGHT * n_lights };
+    let start = start(&table, n_parts.min(lit), n_lights, settings);
+    let mut steps = settings.lloyd_steps;
+    loop {
+        let mut lights = start.clone();
+        refine(&table, &pieces, &mut lights, steps);
+        let labels = assign(texels, &lights);
+        let sums = RegionSums::of(texels, &labels, n_lights);
+        if sums.iter().all(|s| s.energy > 0.0) {
+            return Ok(Rig::new(texels, labels, &sums, &vec![Region::Cell; n_lights]));
+        }
+        if steps == 0 {
+            let rectangles = VarianceMinimization { lloyd_steps: 0, ..settings };
+            return variance_minimization(texels.environment(), n_lights, rectangles);
+        }
+        // A light that lost all its texels is rare; with fewer steps it may keep some.
+        steps /= 2;
+    }
+}
+
+/// Directions of `n_lights` lights: the map in `n_parts` rectangles, joined.
+fn start(
+    table: &SummedArea,
+    n_parts: usize,
+    n_lights: usize,
+    settings: VarianceMinimization,
+) -> Vec<Vec3> {
+    let parts = match settings.rule {
+        Rule::Spherical => divide(table, n_parts, settings),
+        Rule::Poster => divide(&SummedArea::new(table.texels(), Metric::Plane), n_parts, settings),
+    };
+    let parts: Vec<Moments> = parts.iter().map(|r| table.measure(r)).collect();
+    let joined = merge(&parts, n_lights);
+    joined.into_iter().map(|r| unit(r).unwrap_or(Vec3::Y)).collect()
 }
