@@ -16,7 +16,7 @@ pub enum LightPosition {
     /// The direction of ∫ L ω dω: what the method asks for.
     #[default]
     EnergyCentroid,
-    /// The middle of the rectangle on the map: a common mistake, three to ten times worse.
+    /// The middle of the rectangle on the map: a common mistake, several times worse.
     GeometricCentre,
 }
 
