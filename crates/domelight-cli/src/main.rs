@@ -1,2 +1,32 @@
-//! The program `domelight`.
-fn main() {}
+//! The program `domelight`: one module a subcommand, their arguments in [`args`].
+//!
+//! Exit codes: 0 done (also when the reader of our output went away), 1 failed, 2 bad usage.
+
+mod args;
+mod diff;
+mod failure;
+mod interrupt;
+mod output;
+mod probe;
+mod progress;
+mod render;
+mod report;
+mod usage;
+mod values;
+
+use args::{Arguments, Command};
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let Arguments { command, quiet } = Arguments::parse();
+    let done = match command {
+        Command::Render(arguments) => render::run(&arguments, quiet),
+        Command::Diff(arguments) => diff::run(&arguments, quiet),
+        Command::Probe(arguments) => probe::run(&arguments, quiet),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => failure::report(&error),
+    }
+}

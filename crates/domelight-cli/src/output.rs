@@ -1,120 +1,137 @@
-//! Where pictures go: the format by the name's extension, every file whole or not there.
+//! Where results go: pictures by their file's extension, reports to standard output.
 
-use std::fmt;
-use std::path::{Path, PathBuf};
-
-use anyhow::Result;
+use crate::failure::UsageError;
 use domelight::RgbImage;
+use domelight::environment::mapping::{EnvmapKind, Mapping};
+use domelight::picture::exr::ExrLayers;
 use domelight::picture::png::Depth;
-use domelight::picture::tone::{ToneCurve, ToneMapping};
-use domelight::picture::{Problem, hdr, pfm, png, write_atomically};
+use domelight::picture::tone::ToneMapping;
+use domelight::picture::{hdr, pfm, png, write_atomically};
 use domelight::render::Layers;
+use std::fmt;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
-use crate::usage_error;
+/// A picture file to write; `-` is standard output.
+#[derive(Clone, Debug)]
+pub(crate) struct PicturePath {
+    pub(crate) path: PathBuf,
+    /// `None` for `-`: the command's default.
+    format: Option<PictureFormat>,
+}
 
-/// A file format that pictures are written in.
+/// The formats that can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Format {
+pub(crate) enum PictureFormat {
     Exr,
     Hdr,
     Pfm,
     Png,
 }
 
-/// A file to write, or standard output.
-#[derive(Clone, Debug)]
-pub(crate) struct Destination {
-    path: PathBuf,
-    format: Format,
-}
+impl FromStr for PicturePath {
+    type Err = String;
 
-impl Destination {
-    /// The format follows from the extension; standard output gets OpenEXR.
-    ///
-    /// # Errors
-    /// An extension that no format has.
-    pub(crate) fn new(path: &Path) -> Result<Self> {
-        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    fn from_str(text: &str) -> Result<Self, String> {
+        let path = PathBuf::from(text);
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         let format = match extension.as_deref() {
-            Some("exr") => Format::Exr,
-            Some("hdr" | "pic" | "rgbe") => Format::Hdr,
-            Some("pfm") => Format::Pfm,
-            Some("png") => Format::Png,
-            None if path == Path::new("-") => Format::Exr,
-            _ => {
-                return usage_error(format!(
-                    "{}: cannot tell the format; end the name in .exr, .hdr, .pfm or .png",
-                    path.display()
-                ));
-            }
+            _ if text == "-" => None,
+            Some("exr") => Some(PictureFormat::Exr),
+            Some("hdr" | "pic" | "rgbe") => Some(PictureFormat::Hdr),
+            Some("pfm") => Some(PictureFormat::Pfm),
+            Some("png") => Some(PictureFormat::Png),
+            _ => return Err("its name must end in .exr, .hdr, .pfm or .png, or be -".into()),
         };
-        Ok(Self { path: path.to_owned(), format })
-    }
-
-    /// Writes a picture without layers; `alpha` goes where the format has it.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub(crate) fn write_image(
-        &self,
-        image: &RgbImage,
-        alpha: Option<&[f32]>,
-        tone: &ToneMapping,
-    ) -> Result<()> {
-        let exr = || domelight::picture::exr::ExrLayers::from_image(image, alpha).encode();
-        self.write(image, alpha, tone, exr)
-    }
-
-    fn write(
-        &self,
-        image: &RgbImage,
-        alpha: Option<&[f32]>,
-        tone: &ToneMapping,
-        exr: impl FnOnce() -> Result<Vec<u8>, Problem>,
-    ) -> Result<()> {
-        let bytes = match self.format {
-            Format::Exr => exr().map_err(|problem| problem.in_file(&self.to_string()))?,
-            Format::Hdr => hdr::encode(image),
-            Format::Pfm => pfm::encode(image),
-            Format::Png => {
-                let mut bytes = Vec::new();
-                png::encode(image, alpha, tone, Depth::Eight, &mut bytes)?;
-                bytes
-            }
-        };
-        Ok(write_atomically(&self.path, |out| out.write_all(&bytes))?)
+        Ok(Self { path, format })
     }
 }
 
-impl fmt::Display for Destination {
+impl PicturePath {
+    pub(crate) fn is_standard_output(&self) -> bool {
+        self.path == Path::new("-")
+    }
+
+    /// Writes the picture; the tone curve matters to PNG alone.
+    pub(crate) fn write(
+        &self,
+        image: &RgbImage,
+        tone: ToneMapping,
+        for_standard_output: PictureFormat,
+        mapping: Option<Mapping>,
+    ) -> anyhow::Result<()> {
+        write_atomically(&self.path, |out| match self.format.unwrap_or(for_standard_output) {
+            PictureFormat::Exr => out.write_all(&exr_bytes(image, mapping)?),
+            PictureFormat::Hdr => hdr::encode(image, out),
+            PictureFormat::Pfm => pfm::encode(image, out),
+            PictureFormat::Png => png::encode(image, None, &tone, Depth::Eight, out),
+        })?;
+        Ok(())
+    }
+
+    /// Writes a rendering: OpenEXR, also to standard output, gets all its layers and `attributes`.
+    /// PNG gets alpha if the background is `hidden`.
+    pub(crate) fn write_layers(
+        &self,
+        layers: &Layers,
+        tone: &ToneMapping,
+        hidden: bool,
+        attributes: Vec<(String, String)>,
+    ) -> anyhow::Result<()> {
+        let color = &layers.color;
+        write_atomically(&self.path, |out| match self.format.unwrap_or(PictureFormat::Exr) {
+            PictureFormat::Exr => {
+                let bytes = layers.to_exr(attributes).encode().map_err(io::Error::other)?;
+                out.write_all(&bytes)
+            }
+            PictureFormat::Hdr => hdr::encode(color, out),
+            PictureFormat::Pfm => pfm::encode(color, out),
+            PictureFormat::Png => {
+                let alpha = hidden.then_some(&layers.alpha[..]);
+                png::encode(color, alpha, tone, Depth::Eight, out)
+            }
+        })?;
+        Ok(())
+    }
+}
+
+impl fmt::Display for PicturePath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_standard_output() {
+            return f.write_str("standard output");
+        }
         self.path.display().fmt(f)
     }
 }
 
-/// How PNG pictures are tone-mapped.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PngSettings {
-    pub(crate) exposure: f32,
-    pub(crate) tone: ToneCurve,
+fn exr_bytes(image: &RgbImage, mapping: Option<Mapping>) -> io::Result<Vec<u8>> {
+    let mut layers = ExrLayers::from_image(image, None);
+    layers.envmap = match mapping {
+        Some(Mapping::LatLongExr) => Some(EnvmapKind::LatLong),
+        Some(Mapping::CubeStripVertical) => Some(EnvmapKind::Cube),
+        _ => None,
+    };
+    layers.encode().map_err(io::Error::other)
 }
 
-/// Writes a rendering to every destination.
-///
-/// # Errors
-/// The first file that cannot be written.
-pub(crate) fn write_all(
-    destinations: &[Destination],
-    layers: &Layers,
-    png: &PngSettings,
-    opaque: bool,
-    attributes: &[(String, String)],
-) -> Result<()> {
-    let tone = ToneMapping { exposure: png.exposure, curve: png.tone };
-    let alpha = (!opaque).then_some(&layers.alpha[..]);
-    for destination in destinations {
-        let exr = || layers.to_exr(attributes.to_vec()).encode();
-        destination.write(&layers.color, alpha, &tone, exr)?;
+/// Refuses two results on standard output.
+pub(crate) fn require_one_on_standard_output(
+    pictures: &[Option<&PicturePath>],
+    json: bool,
+) -> Result<(), UsageError> {
+    let n = pictures.iter().flatten().filter(|p| p.is_standard_output()).count();
+    if n + usize::from(json) > 1 {
+        return Err(UsageError(
+            "only one result can go to standard output; give a file name".into(),
+        ));
     }
     Ok(())
+}
+
+/// Prints a report; an error of kind `BrokenPipe` if nobody reads.
+pub(crate) fn print(report: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{}", report.trim_end())?;
+    out.flush()
 }

@@ -6,7 +6,8 @@ use domelight::render::{RenderSettings, Rendering};
 use domelight::scene::Scene;
 use serde::Serialize;
 
-use crate::output::Destination;
+use crate::failure::warn;
+use crate::output::{self, PicturePath};
 use crate::usage::{Seconds, peak_memory};
 
 /// What was rendered, and how.
@@ -50,6 +51,26 @@ impl Settings {
     }
 }
 
+impl Settings {
+    /// What OpenEXR files tell of their making.
+    pub(crate) fn provenance(&self) -> Vec<(String, String)> {
+        let mut attributes =
+            vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
+        let settings = [
+            ("scene", self.scene.clone()),
+            ("environment", self.environment.clone()),
+            ("strategy", self.strategy.clone()),
+            ("samples", self.spp.to_string()),
+            ("sampler", self.sampler.clone()),
+            ("filter", self.filter.to_owned()),
+            ("seed", self.seed.to_string()),
+        ];
+        let named = settings.map(|(name, value)| (format!("domelight.{name}"), value));
+        attributes.extend(named);
+        attributes
+    }
+}
+
 /// Where the time went.
 #[derive(Serialize)]
 pub(crate) struct Stages {
@@ -83,7 +104,7 @@ impl RenderReport {
         settings: Settings,
         rendering: &Rendering,
         seconds: Stages,
-        destinations: &[Destination],
+        outputs: &[PicturePath],
     ) -> Self {
         let counts = rendering.counts;
         let rays = (counts.camera_rays + counts.shadow_rays) as f64;
@@ -98,12 +119,12 @@ impl RenderReport {
             peak_memory_bytes: peak_memory(),
             non_finite_samples: counts.non_finite,
             complete: rendering.complete,
-            outputs: destinations.iter().map(ToString::to_string).collect(),
+            outputs: outputs.iter().map(ToString::to_string).collect(),
         }
     }
 
     pub(crate) fn print_json(&self) -> Result<()> {
-        crate::print_line(&serde_json::to_string_pretty(self)?)
+        Ok(output::print(&serde_json::to_string_pretty(self)?)?)
     }
 
     /// Two lines on standard error.
@@ -126,12 +147,10 @@ impl RenderReport {
     ///
     /// # Errors
     /// If the render was interrupted.
-    pub(crate) fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self, quiet: bool) -> Result<()> {
         if self.non_finite_samples > 0 {
-            eprintln!(
-                "warning: {} camera samples were NaN or infinite and count as black",
-                self.non_finite_samples
-            );
+            let n = self.non_finite_samples;
+            warn(quiet, &format!("{n} camera samples were NaN or infinite and count as black"));
         }
         if !self.complete {
             bail!("interrupted; {} holds what was done so far", self.outputs.join(", "));

@@ -86,14 +86,6 @@ impl FromStr for Split {
     }
 }
 
-/// A finite number.
-pub(crate) fn finite(s: &str) -> Result<f32, BadValue> {
-    match s.parse::<f32>() {
-        Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(bad(s, "a number")),
-    }
-}
-
 /// A finite number that is not negative.
 pub(crate) fn not_negative(s: &str) -> Result<f32, BadValue> {
     match s.parse::<f32>() {

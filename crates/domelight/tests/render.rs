@@ -74,7 +74,8 @@ fn environment() -> Environment {
 }
 
 fn mis(environment: &Environment) -> MultipleImportanceSampling<'_> {
-    MultipleImportanceSampling::new(environment, LightTable::Full, Heuristic::Balance, 1, 1).unwrap()
+    MultipleImportanceSampling::new(environment, LightTable::Full, Heuristic::Balance, 1, 1)
+        .unwrap()
 }
 
 fn draw<S: Strategy>(
@@ -259,8 +260,7 @@ fn a_cancelled_render_keeps_what_is_done() {
     let settings = RenderSettings { n_samples: 64, ..small() };
     let observer = After(AtomicUsize::new(0));
     let camera = camera(&settings);
-    let rendering =
-        render(&scene, &camera, &environment, &mis(&environment), &settings, &observer);
+    let rendering = render(&scene, &camera, &environment, &mis(&environment), &settings, &observer);
     assert!(!rendering.complete);
     assert!(rendering.layers.n_samples.iter().all(|&n| (1..64).contains(&n)));
     assert!(rendering.layers.color.pixels.iter().all(|p| p.is_finite()));

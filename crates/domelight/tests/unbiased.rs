@@ -33,8 +33,7 @@ const MATERIALS: [&str; 9] = [
 fn environment(spots: bool, up: UpAxis) -> Environment {
     let mut pcg = Pcg32::new(17, 0);
     let mut number = move || (2.0 * pcg.next_f32()).exp();
-    let mut map =
-        RgbImage::from_fn(WIDTH, HEIGHT, |_, _| Rgb::new(number(), number(), number()));
+    let mut map = RgbImage::from_fn(WIDTH, HEIGHT, |_, _| Rgb::new(number(), number(), number()));
     if spots {
         map.pixels[2 * WIDTH + 5] = Rgb::new(300.0, 200.0, 100.0);
         map.pixels[3 * WIDTH + 1] = Rgb::BLACK;
@@ -76,7 +75,8 @@ fn quadrature(env: &Environment, at: &ShadingPoint) -> [f64; 3] {
             let integral = rule.rect(Rect { x: u, y: v }, &mut |u: f64, v: f64| {
                 let f = at.eval(env.direction(vec2(u as f32, v as f32))).to_array();
                 // dω = 2π² sin θ du dv
-                let solid_angle = (std::f64::consts::PI * v).sin() * 2.0 * std::f64::consts::PI.powi(2);
+                let solid_angle =
+                    (std::f64::consts::PI * v).sin() * 2.0 * std::f64::consts::PI.powi(2);
                 f.map(|f| f64::from(f) * solid_angle)
             });
             for c in 0..3 {

@@ -328,3 +328,44 @@ impl Layout<'_> {
         Child::block(self.blocks.len() - 1)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn depth(tree: &Tree<'_>) -> u32 {
+        match tree {
+            Tree::Leaf(primitives) => {
+                assert!((1..=WIDTH).contains(&primitives.len()));
+                0
+            }
+            Tree::Inner(children) => {
+                assert!(children.len() <= WIDTH);
+                1 + children.iter().map(|(_, tree)| depth(tree)).max().unwrap_or(0)
+            }
+        }
+    }
+
+    #[test]
+    fn halving_makes_trees_of_least_depth() {
+        let mut primitives: Vec<_> = (0..8 * 8 * 8 * 8)
+            .map(|i| {
+                let corner = Vec3::new((i * i % 97) as f32, (i % 31) as f32, 1.5f32.powi(i % 50));
+                Primitive { bounds: Aabb { min: corner, max: corner + 1.0 }, id: i as u32 }
+            })
+            .collect();
+        assert_eq!(depth(&subtree(Range::new(&mut primitives), MAX_HEURISTIC_DEPTH)), 3);
+    }
+
+    #[test]
+    fn boxes_too_large_for_arithmetic_in_f32_are_split() {
+        let mut primitives: Vec<_> = (0..100)
+            .map(|id| {
+                let x = f32::MAX * (id as f32 / 50.0 - 1.0);
+                let bounds = Aabb { min: Vec3::splat(x), max: Vec3::splat(x) };
+                Primitive { bounds, id }
+            })
+            .collect();
+        assert!(depth(&subtree(Range::new(&mut primitives), 0)) <= 3);
+    }
+}

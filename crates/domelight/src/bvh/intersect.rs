@@ -16,12 +16,13 @@ use super::simd::{Floats, Mask, Simd};
 use super::{Block, Lanes, Node, WIDTH};
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
+use glam::Vec3A;
 
 /// A ray with what both tests need of it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PreparedRay {
-    /// 0 where the ray enters through the lower plane, 1 where through the upper.
-    near_side: [usize; 3],
+    /// One bit an axis: set where the ray enters through the upper plane.
+    octant: u32,
     /// The origin moved forward along each axis, for near planes.
     near_origin: [f32; 3],
     /// The origin moved backward along each axis, for far planes.
@@ -30,7 +31,7 @@ pub(super) struct PreparedRay {
     origin: [f32; 3],
     direction: [f32; 3],
     /// The axes x, y, z of the sheared space; z is the longest of the direction.
-    axes: [usize; 3],
+    axes: [u8; 3],
     /// Direction x/z, y/z and 1/z.
     shear: [f32; 3],
 }
@@ -45,38 +46,39 @@ impl PreparedRay {
         // A component so small moves the ray by less than the inflation while it crosses the scene.
         const NEGLIGIBLE: f32 = 1.0 / (1u64 << 40) as f32;
 
-        let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
-        let length = ray.direction.abs().max_element();
-        let extent = (scene.max - ray.origin).abs().max((scene.min - ray.origin).abs());
-        let inflation = INFLATION * extent.max_element();
+        let [origin, direction] = [ray.origin, ray.direction].map(Vec3A::from);
+        let [lower, upper] = [scene.min, scene.max].map(|p| (Vec3A::from(p) - origin).abs());
+        let inflation = INFLATION * lower.max(upper).max_element();
+        let margin = Vec3A::splat(inflation) + ORIGIN_ROUNDING * origin.abs();
+        let forward = margin.copysign(direction);
 
-        let mut prepared = Self { origin, direction, ..Self::default() };
-        for k in 0..3 {
-            let d = direction[k].abs().max(NEGLIGIBLE * length).copysign(direction[k]);
-            let margin = (inflation + ORIGIN_ROUNDING * origin[k].abs()).copysign(d);
-            prepared.near_side[k] = usize::from(d.is_sign_negative());
-            prepared.near_origin[k] = origin[k] + margin;
-            prepared.far_origin[k] = origin[k] - margin;
-            prepared.inverse_direction[k] = 1.0 / d;
-        }
-        let z = longest_axis(direction);
+        let negligible = NEGLIGIBLE * direction.abs().max_element();
+        let nonzero = direction.abs().max(Vec3A::splat(negligible)).copysign(direction);
+        let inverse_direction = nonzero.recip().to_array();
+
+        let d = direction.to_array();
+        let z = longest_axis(d);
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let scale = prepared.inverse_direction[z];
-        prepared.axes = [x, y, z];
-        prepared.shear = [direction[x] * scale, direction[y] * scale, scale];
-
-        let finite = ray.origin.is_finite()
-            && ray.direction.is_finite()
-            && inflation.is_finite()
-            && prepared.inverse_direction.iter().all(|x| x.is_finite());
-        finite.then_some(prepared)
+        let scale = inverse_direction[z];
+        let prepared = Self {
+            octant: ray.direction.is_negative_bitmask(),
+            near_origin: (origin + forward).to_array(),
+            far_origin: (origin - forward).to_array(),
+            inverse_direction,
+            origin: ray.origin.to_array(),
+            direction: d,
+            axes: [x as u8, y as u8, z as u8],
+            shear: [d[x] * scale, d[y] * scale, scale],
+        };
+        // Not finite if any of the numbers is not.
+        let sum = origin + direction + Vec3A::from(inverse_direction) + Vec3A::splat(inflation);
+        sum.is_finite().then_some(prepared)
     }
 
     /// One bit an axis: set where the direction is negative.
     #[inline(always)]
     pub(super) fn octant(direction: Vec3) -> usize {
-        let sign = |x: f32| usize::from(x.is_sign_negative());
-        sign(direction.x) | sign(direction.y) << 1 | sign(direction.z) << 2
+        direction.is_negative_bitmask() as usize
     }
 }
 
@@ -104,9 +106,9 @@ impl<S: Simd> Slabs<S> {
     #[inline(always)]
     pub(super) fn load(simd: S, node: &Node, ray: &PreparedRay) -> Self {
         let [[x_near, x_far], [y_near, y_far], [z_near, z_far]] = [
-            ordered(&node.planes[0], ray.near_side[0]),
-            ordered(&node.planes[1], ray.near_side[1]),
-            ordered(&node.planes[2], ray.near_side[2]),
+            ordered(&node.planes[0], ray.octant),
+            ordered(&node.planes[1], ray.octant >> 1),
+            ordered(&node.planes[2], ray.octant >> 2),
         ];
         Self {
             near: [simd.load(x_near), simd.load(y_near), simd.load(z_near)],
@@ -134,10 +136,11 @@ impl<S: Simd> Slabs<S> {
     }
 }
 
-/// The planes of an axis, the one on the ray's near side first.
+/// The planes of an axis, the near one first; the lowest bit says whether that is the upper.
 #[inline(always)]
-fn ordered(planes: &[Lanes; 2], near_side: usize) -> [&Lanes; 2] {
-    [&planes[near_side & 1], &planes[near_side & 1 ^ 1]]
+fn ordered(planes: &[Lanes; 2], is_negative: u32) -> [&Lanes; 2] {
+    let near = is_negative as usize & 1;
+    [&planes[near], &planes[near ^ 1]]
 }
 
 /// Eight points.
@@ -249,7 +252,7 @@ struct ShearedFrame<F> {
 impl<F: Floats> ShearedFrame<F> {
     #[inline(always)]
     fn new<S: Simd<Floats = F>>(simd: S, ray: &PreparedRay) -> Self {
-        let [x, y, z] = ray.axes;
+        let [x, y, z] = ray.axes.map(usize::from);
         let axes = [x.min(2), y.min(2), z.min(2)]; // in bounds, for the compiler
         let origin = [ray.origin[axes[0]], ray.origin[axes[1]], ray.origin[axes[2]]];
         Self { axes, origin: Points::splat(simd, origin), shear: Points::splat(simd, ray.shear) }

@@ -26,7 +26,7 @@
 //! rays become slow.
 //!
 //! # Alternatives
-//! Möller–Trumbore makes rays 4 to 7 % quicker and leaks along shared edges. Fused multiply-adds
+//! Möller–Trumbore makes rays 3 to 7 % quicker and leaks along shared edges. Fused multiply-adds
 //! would make the edge functions of two neighbours differ, and be slow on processors without them.
 //! Sorting shadow rays more finely than by octant loses more coherence of the origins than it wins.
 //! Clustering from below (PLOC) with reinsertion gives trees of similar quality, but of no bounded

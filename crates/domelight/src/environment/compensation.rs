@@ -14,6 +14,10 @@ use crate::sampling::Table2d;
 pub struct CompensatedTable {
     /// None where nothing exceeds the mean, on a constant or black map: all is left to the BRDF.
     table: Option<Table2d>,
+    /// What is taken off the luminance.
+    floor: f32,
+    /// One over the table's total; 0 without a table.
+    inverse_total: f32,
 }
 
 impl CompensatedTable {
@@ -21,20 +25,25 @@ impl CompensatedTable {
     pub fn new(environment: &Environment) -> Self {
         let mean = environment.power() / (4.0 * std::f64::consts::PI);
         // The mean of a constant map may round to just below it.
-        let floor = mean * (1.0 + 1e-6);
-        let importance = |le: Rgb| (f64::from(le.luminance()) - floor).max(0.0);
-        Self { table: environment.grid.table(&environment.map, importance).ok() }
+        let floor = (mean * (1.0 + 1e-6)) as f32;
+        let importance = |le: Rgb| f64::from((le.luminance() - floor).max(0.0));
+        let table = environment.grid.table(&environment.map, importance).ok();
+        let inverse_total = table.as_ref().map_or(0.0, |t| (1.0 / t.total()) as f32);
+        Self { table, floor, inverse_total }
     }
 
     /// Draws a direction; none where nothing exceeds the mean.
     pub fn sample(&self, environment: &Environment, u: Vec2) -> Option<EnvironmentSample> {
-        self.table.as_ref().and_then(|table| environment.sample_table(table, u))
+        environment.sample_table(self.table.as_ref()?, u, |le| self.density(le))
     }
 
     /// Radiance, and the density of [`CompensatedTable::sample`] at `wi` \[sr⁻¹\].
     pub fn le_pdf(&self, environment: &Environment, wi: Vec3) -> (Rgb, f32) {
-        let t = environment.texel(wi);
-        let pdf = self.table.as_ref().map_or(0.0, |table| environment.density(table, t));
-        (environment.map.get(t.column, t.row), pdf)
+        let le = environment.le(wi);
+        (le, self.density(le))
+    }
+
+    fn density(&self, le: Rgb) -> f32 {
+        (le.luminance() - self.floor).max(0.0) * self.inverse_total
     }
 }

@@ -190,7 +190,9 @@ fn fill_channel(image: &mut RgbImage, channel: fn(&mut Rgb) -> &mut f32) {
     let mut ring: Vec<usize> =
         (0..values.len()).filter(|&i| !queued[i]).filter(borders_known).collect();
     while !ring.is_empty() {
-        ring.iter().for_each(|&i| queued[i] = true);
+        for &i in &ring {
+            queued[i] = true;
+        }
         let means: Vec<f32> =
             ring.iter().map(|&i| mean_around(&values, i, width, height)).collect();
         ring.iter().zip(means).for_each(|(&i, mean)| values[i] = mean);

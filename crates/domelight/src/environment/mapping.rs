@@ -12,8 +12,11 @@
 //! cross); OpenEXR's environment map conventions (`ImfEnvmap.h`); Clarberg 2008, "Fast Equal-Area Mapping of the
 //! (Hemi)Sphere using SIMD" (octahedral).
 
-use crate::color::Rgb;
-use crate::image::RgbImage;
+mod convert;
+mod cube;
+
+pub use convert::{from_lat_long, to_lat_long};
+
 use crate::math::{PI, TAU, Vec2, Vec3, sqr, vec2, vec3};
 use std::str::FromStr;
 
@@ -243,12 +246,12 @@ impl Mapping {
         (columns * unit, rows * unit)
     }
 
-    fn cube(self) -> &'static Cube {
+    fn cube(self) -> &'static cube::Cube {
         match self {
-            Self::CubeCrossHorizontal => &CROSS_HORIZONTAL,
-            Self::CubeCrossVertical => &CROSS_VERTICAL,
-            Self::CubeStripHorizontal => &STRIP_HORIZONTAL,
-            _ => &STRIP_VERTICAL,
+            Self::CubeCrossHorizontal => &cube::CROSS_HORIZONTAL,
+            Self::CubeCrossVertical => &cube::CROSS_VERTICAL,
+            Self::CubeStripHorizontal => &cube::STRIP_HORIZONTAL,
+            _ => &cube::STRIP_VERTICAL,
         }
     }
 }
@@ -350,254 +353,4 @@ fn octahedral_uv(d: Vec3) -> Vec2 {
     let folded = vec2(r - phi * r, phi * r);
     let unfolded = if z < 0.0 { vec2(1.0 - folded.y, 1.0 - folded.x) } else { folded };
     0.5 * vec2(unfolded.x.copysign(x), unfolded.y.copysign(y)) + Vec2::splat(0.5)
-}
-
-/// One face as seen from inside: where it looks, what is up in its picture, and its cell.
-struct Face {
-    forward: Vec3,
-    up: Vec3,
-    right: Vec3,
-    column: usize,
-    row: usize,
-}
-
-struct Cube {
-    columns: usize,
-    rows: usize,
-    /// Those that look toward +X, −X, +Y, −Y, +Z, −Z.
-    faces: [Face; 6],
-}
-
-const fn face(forward: Vec3, up: Vec3, right: Vec3, column: usize, row: usize) -> Face {
-    Face { forward, up, right, column, row }
-}
-
-const X: Vec3 = Vec3::X;
-const Y: Vec3 = Vec3::Y;
-const Z: Vec3 = Vec3::Z;
-const NX: Vec3 = Vec3::NEG_X;
-const NY: Vec3 = Vec3::NEG_Y;
-const NZ: Vec3 = Vec3::NEG_Z;
-
-const CROSS_HORIZONTAL: Cube = Cube {
-    columns: 4,
-    rows: 3,
-    faces: [
-        face(X, Y, Z, 2, 1),
-        face(NX, Y, NZ, 0, 1),
-        face(Y, Z, X, 1, 0),
-        face(NY, NZ, X, 1, 2),
-        face(Z, Y, NX, 3, 1),
-        face(NZ, Y, X, 1, 1),
-    ],
-};
-
-const CROSS_VERTICAL: Cube = Cube {
-    columns: 3,
-    rows: 4,
-    faces: [
-        face(X, Y, Z, 2, 1),
-        face(NX, Y, NZ, 0, 1),
-        face(Y, Z, X, 1, 0),
-        face(NY, NZ, X, 1, 2),
-        face(Z, NY, X, 1, 3),
-        face(NZ, Y, X, 1, 1),
-    ],
-};
-
-const STRIP_HORIZONTAL: Cube = Cube {
-    columns: 6,
-    rows: 1,
-    faces: [
-        face(X, Y, Z, 0, 0),
-        face(NX, Y, NZ, 1, 0),
-        face(Y, Z, X, 2, 0),
-        face(NY, NZ, X, 3, 0),
-        face(Z, Y, NX, 4, 0),
-        face(NZ, Y, X, 5, 0),
-    ],
-};
-
-const STRIP_VERTICAL: Cube = Cube {
-    columns: 1,
-    rows: 6,
-    faces: [
-        face(X, Y, Z, 0, 0),
-        face(NX, Y, NZ, 0, 1),
-        face(Y, Z, X, 0, 2),
-        face(NY, NZ, X, 0, 3),
-        face(Z, Y, NX, 0, 4),
-        face(NZ, Y, X, 0, 5),
-    ],
-};
-
-impl Cube {
-    fn direction(&self, uv: Vec2) -> Option<Vec3> {
-        let cell = uv * vec2(self.columns as f32, self.rows as f32);
-        let column = (cell.x as usize).min(self.columns - 1);
-        let row = (cell.y as usize).min(self.rows - 1);
-        let face = self.faces.iter().find(|face| (face.column, face.row) == (column, row))?;
-        let s = 2.0 * (cell.x - column as f32) - 1.0;
-        let t = 1.0 - 2.0 * (cell.y - row as f32);
-        Some((face.forward + s * face.right + t * face.up).normalize())
-    }
-
-    fn uv(&self, d: Vec3) -> Vec2 {
-        let axis = d.abs().max_position();
-        let depth = d[axis].abs();
-        let face = &self.faces[2 * axis + usize::from(d[axis] < 0.0)];
-        let (s, t) = (d.dot(face.right) / depth, d.dot(face.up) / depth);
-        let x = face.column as f32 + (0.5 + 0.5 * s).clamp(0.0, 1.0);
-        let y = face.row as f32 + (0.5 - 0.5 * t).clamp(0.0, 1.0);
-        vec2(x / self.columns as f32, y / self.rows as f32)
-    }
-}
-
-/// The lat-long map of `2 · height` × `height` texels of what `image` shows in `mapping`.
-///
-/// Each texel is the mean of the source over its solid angle. A lat-long map that has `height` rows already is
-/// returned bit for bit, and so is OpenEXR's, turned by half its (even) width. [`Mapping::lat_long_height`] gives
-/// the height that keeps all detail. The same bits for any number of threads.
-///
-/// # Panics
-/// If the picture has no texels or `height` is zero.
-pub fn to_lat_long(image: &RgbImage, mapping: Mapping, height: usize) -> RgbImage {
-    assert!(image.width > 0 && image.height > 0 && height > 0, "an empty map");
-    if mapping == Mapping::LatLong && image.height == height {
-        return image.clone();
-    }
-    if mapping == Mapping::LatLongExr && image.height == height && image.width.is_multiple_of(2) {
-        return turned_by_half(image);
-    }
-    let width = 2 * height;
-    let longitudes = [COARSE, FINE].map(|n| sines_of_columns(width, n));
-    by_rows(width, height, |y, row| {
-        let rings = [COARSE, FINE].map(|n| rings_of_row(y, height, n));
-        for (x, texel) in row.iter_mut().enumerate() {
-            let samples = |n: usize| {
-                let (rings, longitudes) =
-                    (&rings[usize::from(n == FINE)], &longitudes[usize::from(n == FINE)]);
-                (0..n * n).map(move |i| {
-                    let (sin_theta, cos_theta) = rings[i / n];
-                    let (sin_phi, cos_phi) = longitudes[x * n + i % n];
-                    let d = vec3(sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta);
-                    (nearest(image, mapping.uv(d)), 1.0)
-                })
-            };
-            *texel = Samples::adaptive(samples).mean();
-        }
-    })
-}
-
-/// What a lat-long map shows, as a picture of `size` (width, height) in `mapping`; black where the picture shows
-/// no direction.
-///
-/// Each texel is the mean of the map over the texel's solid angle. [`Mapping::size_for`] gives the size that keeps
-/// all detail. The same bits for any number of threads.
-///
-/// # Panics
-/// If the map or the size is empty.
-pub fn from_lat_long(image: &RgbImage, mapping: Mapping, size: (usize, usize)) -> RgbImage {
-    let (width, height) = size;
-    assert!(image.width > 0 && image.height > 0 && width > 0 && height > 0, "an empty map");
-    if mapping == Mapping::LatLong && (image.width, image.height) == size {
-        return image.clone();
-    }
-    let turned = mapping == Mapping::LatLongExr && (image.width, image.height) == size;
-    if turned && width.is_multiple_of(2) {
-        return turned_by_half(image);
-    }
-    let samples = |x: usize, y: usize, n: usize| {
-        (0..n * n).filter_map(move |i| {
-            let u = (x as f32 + ((i % n) as f32 + 0.5) / n as f32) / width as f32;
-            let v = (y as f32 + ((i / n) as f32 + 0.5) / n as f32) / height as f32;
-            let d = mapping.direction(vec2(u, v))?;
-            Some((nearest(image, lat_long_uv(d)), mapping.density_at(vec2(u, v), d)))
-        })
-    };
-    by_rows(width, height, |y, row| {
-        for (x, texel) in row.iter_mut().enumerate() {
-            *texel = Samples::adaptive(|n| samples(x, y, n)).mean();
-        }
-    })
-}
-
-/// Subsamples along each side of a texel, and of a texel in which they show the edge of a light.
-const COARSE: usize = 4;
-const FINE: usize = 32;
-
-/// A weighted mean, and the least and greatest value in it.
-struct Samples {
-    sum: Rgb,
-    weight: f32,
-    least: f32,
-    greatest: f32,
-}
-
-impl Samples {
-    fn collect(samples: impl Iterator<Item = (Rgb, f32)>) -> Self {
-        let mut all = Self { sum: Rgb::BLACK, weight: 0.0, least: f32::INFINITY, greatest: 0.0 };
-        for (value, weight) in samples {
-            all.sum += value * weight;
-            all.weight += weight;
-            all.least = all.least.min(value.max_component());
-            all.greatest = all.greatest.max(value.max_component());
-        }
-        all
-    }
-
-    /// From a coarse grid; from a fine one where the coarse one has found the edge of a light, so that a small sun
-    /// keeps its energy.
-    fn adaptive<I: Iterator<Item = (Rgb, f32)>>(grid: impl Fn(usize) -> I) -> Self {
-        let coarse = Self::collect(grid(COARSE));
-        let is_edge = coarse.greatest > 8.0 * coarse.least;
-        if is_edge { Self::collect(grid(FINE)) } else { coarse }
-    }
-
-    fn mean(&self) -> Rgb {
-        if self.weight > 0.0 { self.sum / self.weight } else { Rgb::BLACK }
-    }
-}
-
-/// (sin φ, cos φ) of `n` longitudes in each column.
-fn sines_of_columns(width: usize, n: usize) -> Vec<(f32, f32)> {
-    let columns = width * n;
-    let phi = |i: usize| TAU * ((i as f32 + 0.5) / columns as f32 - 0.5);
-    (0..columns).map(|i| phi(i).sin_cos()).collect()
-}
-
-/// (sin θ, cos θ) of `n` rings of equal solid angle in row `y`.
-fn rings_of_row(y: usize, height: usize, n: usize) -> Vec<(f32, f32)> {
-    let cos_at = |row: usize| (std::f64::consts::PI * row as f64 / height as f64).cos();
-    let (top, bottom) = (cos_at(y), cos_at(y + 1));
-    let ring = |i: usize| {
-        let cos_theta = top + (bottom - top) * ((i as f64 + 0.5) / n as f64);
-        ((1.0 - cos_theta * cos_theta).max(0.0).sqrt() as f32, cos_theta as f32)
-    };
-    (0..n).map(ring).collect()
-}
-
-fn nearest(image: &RgbImage, uv: Vec2) -> Rgb {
-    let x = ((uv.x * image.width as f32) as usize).min(image.width - 1);
-    let y = ((uv.y * image.height as f32) as usize).min(image.height - 1);
-    image.pixels[y * image.width + x]
-}
-
-fn turned_by_half(image: &RgbImage) -> RgbImage {
-    let mut turned = image.clone();
-    turned.pixels.chunks_exact_mut(image.width).for_each(|row| row.rotate_left(image.width / 2));
-    turned
-}
-
-/// A picture whose rows are filled independently of each other, in parallel where threads are compiled in.
-fn by_rows(width: usize, height: usize, fill: impl Fn(usize, &mut [Rgb]) + Sync) -> RgbImage {
-    let mut pixels = vec![Rgb::BLACK; width * height];
-    #[cfg(feature = "render")]
-    {
-        use rayon::prelude::*;
-        pixels.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| fill(y, row));
-    }
-    #[cfg(not(feature = "render"))]
-    pixels.chunks_exact_mut(width).enumerate().for_each(|(y, row)| fill(y, row));
-    RgbImage::new(width, height, pixels)
 }

@@ -18,8 +18,9 @@ use crate::math::{PI, TAU, Vec2, Vec3, vec3};
 use crate::sampling::{Table2d, TableError};
 use crate::{Rgb, RgbImage};
 
-/// Which world axis the map's top row points to.
+/// A world axis that points up; the top row of a map faces it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "io", derive(serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum UpAxis {
     /// +Y up; the map's centre column looks toward −Z.
     #[default]
@@ -118,8 +119,8 @@ struct Texel {
 
 /// Radiance from every direction, and a way to draw directions in proportion to its luminance.
 ///
-/// Resident memory is 20 bytes a texel: three floats of radiance and a running sum in double
-/// precision.
+/// Resident memory is 21 bytes a texel: three floats of radiance, a running sum in double precision
+/// and its guide.
 #[derive(Clone, Debug)]
 pub struct Environment {
     map: RgbImage,
@@ -127,6 +128,8 @@ pub struct Environment {
     grid: Grid,
     /// Luminance · solid angle; none for a black map.
     table: Option<Table2d>,
+    /// One over the table's total; 0 for a black map.
+    inverse_power: f32,
 }
 
 impl Environment {
@@ -165,7 +168,8 @@ impl Environment {
         if !map.pixels.iter().all(|p| p.is_finite() && p.min_component() >= 0.0) {
             return Err(Self::bad_texel(&map));
         }
-        Ok(Self { map, orientation, grid, table })
+        let inverse_power = table.as_ref().map_or(0.0, |t| (1.0 / t.total()) as f32);
+        Ok(Self { map, orientation, grid, table, inverse_power })
     }
 
     /// The same radiance from everywhere.
@@ -225,32 +229,33 @@ impl Environment {
     /// [`Environment::le`] and [`Environment::pdf`] by one look-up.
     pub fn le_pdf(&self, wi: Vec3) -> (Rgb, f32) {
         let t = self.texel(wi);
-        (
-            self.map.get(t.column, t.row),
-            self.table.as_ref().map_or(0.0, |table| self.density(table, t)),
-        )
+        let le = self.map.get(t.column, t.row);
+        (le, self.density(le))
     }
 
     /// Draws a direction in proportion to luminance; none from a black map.
     pub fn sample(&self, u: Vec2) -> Option<EnvironmentSample> {
-        self.table.as_ref().and_then(|table| self.sample_table(table, u))
+        self.sample_table(self.table.as_ref()?, u, |le| self.density(le))
     }
 
-    /// Draws from any table over this map's texels.
-    fn sample_table(&self, table: &Table2d, u: Vec2) -> Option<EnvironmentSample> {
+    /// Draws from any table over this map's texels; `density` is that of a texel by its radiance.
+    fn sample_table(
+        &self,
+        table: &Table2d,
+        u: Vec2,
+        density: impl FnOnce(Rgb) -> f32,
+    ) -> Option<EnvironmentSample> {
         let drawn = table.sample(u);
         let texel = Texel { column: drawn.column, row: drawn.row };
         let wi = self.orientation.up.to_world(self.grid.direction_inside(texel, drawn.inside));
-        let pdf = (drawn.pmf / self.grid.solid_angle(texel.row)) as f32;
-        (pdf > 0.0).then(|| EnvironmentSample {
-            wi,
-            le: self.map.get(texel.column, texel.row),
-            pdf,
-        })
+        let le = self.map.get(texel.column, texel.row);
+        let pdf = density(le);
+        (pdf > 0.0).then_some(EnvironmentSample { wi, le, pdf })
     }
 
-    fn density(&self, table: &Table2d, t: Texel) -> f32 {
-        (table.pmf(t.column, t.row) / self.grid.solid_angle(t.row)) as f32
+    /// A texel's probability over its solid angle: the solid angle of the weight cancels.
+    fn density(&self, le: Rgb) -> f32 {
+        le.luminance() * self.inverse_power
     }
 
     fn texel(&self, wi: Vec3) -> Texel {

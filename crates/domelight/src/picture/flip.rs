@@ -120,8 +120,9 @@ fn exposure_range(reference: &RgbImage) -> (f32, f32) {
     let [k0, k1, k3, k4, k5] = ACES;
     let (a, b, c) = (k0 - SHOWN * k3, k1 - SHOWN * k4, -SHOWN * k5);
     let x = (-b + (b * b - 4.0 * a * c).sqrt()) / (2.0 * a);
-    let mut luminance: Vec<f32> = reference.pixels.iter().map(|p| p.luminance()).collect();
-    luminance.iter_mut().for_each(|l| *l = if l.is_finite() { l.max(0.0) } else { 0.0 });
+    let positive = |l: f32| if l.is_finite() { l.max(0.0) } else { 0.0 };
+    let mut luminance: Vec<f32> =
+        reference.pixels.iter().map(|p| positive(p.luminance())).collect();
     luminance.sort_unstable_by(f32::total_cmp);
     let Some(&greatest) = luminance.last().filter(|&&l| l > 0.0) else { return (0.0, 0.0) };
     let median = match median_of_sorted(&luminance) {

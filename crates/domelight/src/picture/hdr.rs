@@ -311,7 +311,9 @@ fn decode_new(bytes: &[u8], out: &mut [[u8; 4]]) {
             let count = usize::from(if code > 128 { code - 128 } else { code });
             let run = &mut out[filled..filled + count];
             if code > 128 {
-                run.iter_mut().for_each(|pixel| pixel[component] = bytes[at + 1]);
+                for pixel in run {
+                    pixel[component] = bytes[at + 1];
+                }
                 at += 2;
             } else {
                 let literal = &bytes[at + 1..=at + count];
@@ -402,7 +404,8 @@ pub fn encode(image: &RgbImage, out: &mut dyn Write) -> io::Result<()> {
 
 /// The nearest (mantissas, exponent): the greatest mantissa is in 128 ..= 255.
 pub fn rgbe(color: Rgb) -> [u8; 4] {
-    let color = color.map(|c| c.max(0.0).min(f32::MAX));
+    // max before min: NaN becomes 0.
+    let color = color.map(|c| f32::min(c.max(0.0), f32::MAX));
     let greatest = f64::from(color.max_component());
     // 2^(e−136) · 127.5 ≤ greatest < 2^(e−136) · 255.5, so that the greatest mantissa rounds to 128 ..= 255.
     let exponent = |value: f64| ((value / 255.5).log2().floor() as i32 + 137).clamp(0, 255);

@@ -48,7 +48,7 @@ impl ToneCurve {
 
     /// Linear light on the screen, in \[0, 1\], of exposed radiance; negative and NaN count as 0.
     pub fn apply(self, radiance: Rgb) -> Rgb {
-        let c = radiance.map(|c| c.max(0.0).min(1e30));
+        let c = radiance.map(|c| f32::min(c.max(0.0), 1e30));
         let shown = match self {
             Self::Srgb => c,
             Self::Reinhard => c / (1.0 + c.luminance()),

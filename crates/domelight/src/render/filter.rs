@@ -92,8 +92,7 @@ impl FilterSampler {
     pub fn new(filter: Filter) -> Self {
         let radius = filter.radius();
         let center = |i: usize| (2.0 * (i as f32 + 0.5) / Self::CELLS as f32 - 1.0) * radius;
-        let weights: Vec<f32> =
-            (0..Self::CELLS).map(|i| filter.eval(center(i)).max(0.0)).collect();
+        let weights: Vec<f32> = (0..Self::CELLS).map(|i| filter.eval(center(i)).max(0.0)).collect();
         let table = if filter == Filter::Box { None } else { Table1d::new(&weights).ok() };
         Self { radius, table }
     }
@@ -131,7 +130,8 @@ mod tests {
             }
             let (mut norm, mut moment) = (0.0f64, 0.0f64);
             for i in 0..n {
-                let x = (2.0 * (f64::from(i) + 0.5) / f64::from(n) - 1.0) * f64::from(filter.radius());
+                let x =
+                    (2.0 * (f64::from(i) + 0.5) / f64::from(n) - 1.0) * f64::from(filter.radius());
                 let f = f64::from(filter.eval(x as f32));
                 norm += f;
                 moment += f * x * x;

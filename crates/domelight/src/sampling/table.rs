@@ -4,7 +4,7 @@
 //! difference of its two neighbours over the total, so what [`Table2d::sample`] draws and what
 //! [`Table2d::pmf`] says agree exactly, on maps of any size. Inversion keeps the order of the
 //! uniform numbers, so stratified points stay stratified (an alias table would be faster and lose
-//! the strata).
+//! the strata). A guide (Chen & Asau 1974's cutpoints) tells where to begin the search.
 
 use super::ONE_MINUS_EPSILON;
 use crate::math::{Vec2, vec2};
@@ -39,12 +39,41 @@ pub(super) fn check_weights(weights: &[f32]) -> Result<f64, TableError> {
     }
 }
 
-/// The cell of a running sum that `x` falls into, and where in it: [0, 1).
+/// Cells of a running sum that share an entry of its guide.
+const CELLS_PER_CUT: usize = 4;
+
+/// Entries of the guide of a running sum of `n` cells: one more than there are cuts.
+const fn guide_len(n: usize) -> usize {
+    n.div_ceil(CELLS_PER_CUT) + 1
+}
+
+/// Fills the guide: entry k is the cell that the k-th of equally spaced cuts through the sum falls
+/// into. Two or three cells lie between cuts on average, so a search ends in a cache line or two.
+fn fill_guide(sums: &[f64], guide: &mut [u32]) {
+    let n_cuts = guide.len() - 1;
+    let total = sums[sums.len() - 1];
+    let mut cell = 0;
+    for (k, g) in guide.iter_mut().enumerate() {
+        let cut = total * (k as f64 / n_cuts as f64);
+        while cell + 1 < sums.len() && sums[cell] <= cut {
+            cell += 1;
+        }
+        *g = cell as u32;
+    }
+}
+
+/// The cell of a running sum that `u` of its total falls into, and where in it: both `u` and the
+/// rest are in [0, 1).
 ///
-/// `sums[i]` is the sum up to and including cell i; 0 ≤ `x` < the last. A cell of no width is never
-/// found.
-fn invert(sums: &[f64], x: f64) -> (usize, f32) {
-    let i = sums.partition_point(|&s| s <= x).min(sums.len() - 1);
+/// `sums[i]` is the sum up to and including cell i. A cell of no width is never found.
+fn invert(sums: &[f64], guide: &[u32], u: f32) -> (usize, f32) {
+    let x = f64::from(u) * sums[sums.len() - 1];
+    let k = (f64::from(u) * (guide.len() - 1) as f64) as usize;
+    // Rounding may put x a step across the cut: look one cell further on both sides.
+    let low = (guide[k] as usize).saturating_sub(1);
+    let high = (guide[k + 1] as usize + 2).min(sums.len());
+    let i = low + sums[low..high].partition_point(|&s| s <= x);
+    let i = i.min(sums.len() - 1);
     let start = if i == 0 { 0.0 } else { sums[i - 1] };
     let rest = ((x - start) / (sums[i] - start)) as f32;
     (i, rest.clamp(0.0, ONE_MINUS_EPSILON))
@@ -59,6 +88,7 @@ fn width(sums: &[f64], i: usize) -> f64 {
 #[derive(Clone, Debug)]
 pub struct Table1d {
     sums: Vec<f64>,
+    guide: Vec<u32>,
 }
 
 impl Table1d {
@@ -84,7 +114,11 @@ impl Table1d {
         match sums.last() {
             None => Err(TableError::Empty),
             Some(&total) if total <= 0.0 => Err(TableError::AllZero),
-            Some(_) => Ok(Self { sums }),
+            Some(_) => {
+                let mut guide = vec![0; guide_len(sums.len())];
+                fill_guide(&sums, &mut guide);
+                Ok(Self { sums, guide })
+            }
         }
     }
 
@@ -113,7 +147,7 @@ impl Table1d {
 
     /// A cell, and the rest of `u` in [0, 1): the position inside the cell.
     pub fn sample(&self, u: f32) -> (usize, f32) {
-        invert(&self.sums, f64::from(u) * self.total())
+        invert(&self.sums, &self.guide, u)
     }
 }
 
@@ -137,6 +171,8 @@ pub struct Table2d {
     rows: Table1d,
     /// Running sums of each row, row by row.
     columns: Vec<f64>,
+    /// Their guides.
+    guides: Vec<u32>,
 }
 
 impl Table2d {
@@ -155,9 +191,10 @@ impl Table2d {
             return Err(TableError::Empty);
         }
         let mut columns = vec![0.0; width * height];
-        let fill = |(row, sums): (usize, &mut [f64])| -> Result<f64, TableError> {
+        let mut guides = vec![0; guide_len(width) * height];
+        let fill = |(row, (sums, guide)): (usize, (&mut [f64], &mut [u32]))| {
             weights(row, sums);
-            let mut sum = 0.0;
+            let mut sum = 0.0f64;
             for (column, s) in sums.iter_mut().enumerate() {
                 if !s.is_finite() || *s < 0.0 {
                     let index = row * width + column;
@@ -166,23 +203,27 @@ impl Table2d {
                 sum += *s;
                 *s = sum;
             }
+            fill_guide(sums, guide);
             Ok(sum)
         };
         #[cfg(feature = "render")]
         let row_sums: Result<Vec<f64>, _> = {
             use rayon::prelude::*;
-            columns.par_chunks_mut(width).enumerate().map(fill).collect()
+            let guides = guides.par_chunks_mut(guide_len(width));
+            columns.par_chunks_mut(width).zip(guides).enumerate().map(fill).collect()
         };
         #[cfg(not(feature = "render"))]
-        let row_sums: Result<Vec<f64>, _> =
-            columns.chunks_mut(width).enumerate().map(fill).collect();
+        let row_sums: Result<Vec<f64>, _> = {
+            let guides = guides.chunks_mut(guide_len(width));
+            columns.chunks_mut(width).zip(guides).enumerate().map(fill).collect()
+        };
         let mut sums = row_sums?;
         let mut total = 0.0;
         for s in &mut sums {
             total += *s;
             *s = total;
         }
-        Ok(Self { width, rows: Table1d::from_sums(sums)?, columns })
+        Ok(Self { width, rows: Table1d::from_sums(sums)?, columns, guides })
     }
 
     /// From weights row by row.
@@ -243,8 +284,9 @@ impl Table2d {
     /// Draws a row by `u.y`, then a column by `u.x`.
     pub fn sample(&self, u: Vec2) -> TableSample {
         let (row, y) = self.rows.sample(u.y);
-        let sums = self.row_sums(row);
-        let (column, x) = invert(sums, f64::from(u.x) * sums[self.width - 1]);
+        let n = guide_len(self.width);
+        let guide = &self.guides[row * n..(row + 1) * n];
+        let (column, x) = invert(self.row_sums(row), guide, u.x);
         TableSample { column, row, inside: vec2(x, y), pmf: self.pmf(column, row) }
     }
 
@@ -275,6 +317,24 @@ mod tests {
             for u in [0.0, f32::MIN_POSITIVE, 0.5, ONE_MINUS_EPSILON] {
                 let (i, rest) = table.sample(u);
                 assert!(weights[i] > 0.0 && (0.0..1.0).contains(&rest), "{u} {i} {rest}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_guide_finds_what_a_search_of_all_finds() {
+        let mut pcg = Pcg32::new(9, 0);
+        for n in [1, 2, 3, 7, 64, 1000] {
+            let mut weight =
+                || (pcg.next_f32() * 40.0 - 38.0).exp() * f32::from(pcg.next_f32() > 0.3);
+            let mut weights: Vec<f32> = (0..n).map(|_| weight()).collect();
+            weights[n / 2] = 1.0;
+            let table = Table1d::new(&weights).unwrap();
+            for k in 0..20_000 {
+                let u = k as f32 / 20_000.0;
+                let x = f64::from(u) * table.total();
+                let expected = table.sums.partition_point(|&s| s <= x);
+                assert_eq!(table.sample(u).0, expected.min(n - 1), "{n} cells, {u}");
             }
         }
     }

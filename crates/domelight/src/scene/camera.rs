@@ -163,7 +163,11 @@ impl Camera {
     ///
     /// # Errors
     /// The [`CameraError`] that says which setting makes no picture.
-    pub fn new(settings: &CameraSettings, width: usize, height: usize) -> Result<Self, CameraError> {
+    pub fn new(
+        settings: &CameraSettings,
+        width: usize,
+        height: usize,
+    ) -> Result<Self, CameraError> {
         if width == 0 || height == 0 {
             return Err(CameraError::Size { width, height });
         }

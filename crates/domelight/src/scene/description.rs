@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use super::camera::CameraSettings;
 use super::surface::Surface;
 use super::texture::Texture;
+use crate::environment::UpAxis;
 use crate::geometry::{Aabb, Mesh};
-use crate::math::{Mat4, Vec3};
+use crate::math::Mat4;
 
 /// A scene as loaders and built-in scenes give it; [`Scene::new`](super::Scene::new) checks it.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +22,9 @@ pub struct SceneDescription {
     pub camera: Option<CameraSettings>,
     /// The environment, if the scene names one.
     pub environment: Option<EnvironmentSettings>,
+    /// Parts that are scenery, such as floors and plinths, by index: the camera is not framed to
+    /// them and a material for the subject does not reach them.
+    pub scenery: Vec<usize>,
     /// Which axis of the file points up; `None` if the format does not say.
     ///
     /// The geometry is given as it is in the file: turning it is the caller's choice.
@@ -36,27 +40,6 @@ pub struct Part {
     pub mesh: Mesh,
     /// Index into [`SceneDescription::surfaces`].
     pub surface: usize,
-}
-
-/// The axis that points up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "io", derive(serde::Deserialize), serde(rename_all = "lowercase"))]
-pub enum UpAxis {
-    /// +Y, the program's own convention.
-    #[default]
-    Y,
-    /// +Z.
-    Z,
-}
-
-impl UpAxis {
-    /// The axis as a unit vector.
-    pub const fn direction(self) -> Vec3 {
-        match self {
-            Self::Y => Vec3::Y,
-            Self::Z => Vec3::Z,
-        }
-    }
 }
 
 /// The light around a scene.
@@ -102,6 +85,7 @@ impl SceneDescription {
     /// Appends another scene's parts; its camera and environment are taken where this one has none.
     pub fn append(&mut self, mut other: Self) {
         let (surfaces, textures) = (self.surfaces.len(), self.textures.len());
+        self.scenery.extend(other.scenery.iter().map(|part| part + self.parts.len()));
         for part in &mut other.parts {
             part.surface += surfaces;
         }

@@ -10,11 +10,13 @@ mod description;
 #[cfg(feature = "io")]
 pub mod load;
 mod shading;
+mod stage;
 mod surface;
 mod texture;
 
+pub use crate::environment::UpAxis;
 pub use camera::{Camera, CameraError, CameraSettings, Projection};
-pub use description::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription, UpAxis};
+pub use description::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription};
 #[cfg(feature = "io")]
 pub use load::{LoadError, Loaded, load};
 pub use surface::{MetallicRoughnessSurface, NormalMap, PhongSurface, Surface, SurfaceModel};

@@ -27,7 +27,8 @@ pub enum BuiltinProbe {
     Sky,
     /// A dark room with soft boxes.
     Studio,
-    /// A dim nave with small bright windows and lamps: two thirds of the energy in 0.1 % of the pixels.
+    /// A dim nave with small bright windows and lamps: two thirds of the energy in 0.1 % of the pixels
+    /// (62 % at 256 rows, 67 % at 512, 72 % at 1024; finer texels tell glass from lead).
     Cathedral,
     /// Radiance 1 from everywhere, the white furnace.
     Constant,
@@ -200,6 +201,18 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    #[cfg(feature = "render")]
+    fn the_pixels_do_not_depend_on_threads() {
+        for probe in BuiltinProbe::ALL {
+            let with = |n_threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+                pool.install(|| probe.image(31))
+            };
+            assert_eq!(with(1), with(3), "{probe}");
         }
     }
 

@@ -14,7 +14,7 @@ use crate::picture::primaries::{Primaries, transform};
 use crate::picture::{Format, MAX_TEXELS, Picture, Problem, allocate, checked_area};
 use crate::{Rgb, RgbImage};
 use ::exr::block::UncompressedBlock;
-use ::exr::block::chunk::Chunk;
+use ::exr::block::chunk::{Chunk, CompressedBlock};
 use ::exr::block::lines::LineRef;
 use ::exr::block::reader::{ChunksReader, Reader};
 use ::exr::meta::attribute::{Chromaticities, EnvironmentMap};
@@ -54,7 +54,6 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Proble
     }
     let selected = select(reader.headers(), layer)?;
     let header = &reader.headers()[selected.header];
-    let mut planes = Planes::new(header, selected.channels)?;
     let envmap = header.own_attributes.environment_map.map(|kind| match kind {
         EnvironmentMap::LatitudeLongitude => EnvmapKind::LatLong,
         EnvironmentMap::Cube => EnvmapKind::Cube,
@@ -67,24 +66,69 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Proble
         })
         .map_err(Problem::Exr)?;
     let meta = chunks.meta_data().clone();
+    let header = &meta.headers[selected.header];
+    // Memory for the picture is taken when its first blocks have turned out to be whole.
+    let mut planes = None;
     loop {
         let batch: Vec<Chunk> =
             chunks.by_ref().take(BATCH).collect::<Result<_, _>>().map_err(Problem::Exr)?;
         if batch.is_empty() {
             break;
         }
-        for block in decompress(batch, &meta)? {
-            planes.insert(&meta.headers[selected.header], &block)?;
+        let blocks = decompress(batch, &meta)?;
+        let planes = match &mut planes {
+            Some(planes) => planes,
+            none => none.insert(Planes::new(header, selected.channels)?),
+        };
+        for block in &blocks {
+            planes.insert(header, block)?;
         }
     }
+    let planes = planes.map_or_else(|| Planes::new(header, selected.channels), Ok)?;
     let image = planes.into_image(matrix.filter(|_| selected.is_color));
     Ok(Picture { image: image.0, alpha: image.1, envmap, format: Format::Exr })
 }
 
 fn decompress(batch: Vec<Chunk>, meta: &MetaData) -> Result<Vec<UncompressedBlock>, Problem> {
-    let blocks =
-        batch.into_par_iter().map(|chunk| UncompressedBlock::decompress_chunk(chunk, meta, false));
-    blocks.collect::<Result<_, _>>().map_err(Problem::Exr)
+    let blocks = batch.into_par_iter().map(|chunk| {
+        check_dwa_sizes(&chunk, meta)?;
+        UncompressedBlock::decompress_chunk(chunk, meta, false).map_err(Problem::Exr)
+    });
+    blocks.collect()
+}
+
+/// Refuses a DWA block whose own header promises more than the block can make.
+///
+/// The crate takes memory for the promised sizes, and the process dies where there is not so much. The header is 11
+/// little-endian numbers of 8 bytes; those at 1, 6, 7, 8 and 9 are sizes after decompression, none of which is more
+/// than 8 bytes for each sample, padded to whole 8 × 8 blocks.
+fn check_dwa_sizes(chunk: &Chunk, meta: &MetaData) -> Result<(), Problem> {
+    let Some(header) = meta.headers.get(chunk.layer_index) else { return Ok(()) };
+    let data = match &chunk.compressed_block {
+        CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
+        CompressedBlock::Tile(block) => &block.compressed_pixels_le,
+        _ => return Ok(()),
+    };
+    if !matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
+        return Ok(());
+    }
+    let place = header
+        .get_block_data_indices(&chunk.compressed_block)
+        .and_then(|tile| header.get_absolute_block_pixel_coordinates(tile))
+        .map_err(Problem::Exr)?;
+    let (width, height) = (place.size.0, place.size.1);
+    // A block that would not shrink is stored as it is.
+    if data.len() == width * height * header.channels.bytes_per_pixel {
+        return Ok(());
+    }
+    let most = 8 * (width + 8) as u64 * (height + 8) as u64 * header.channels.list.len() as u64;
+    let promise = |i: usize| data.get(8 * i..8 * i + 8)?.try_into().map(u64::from_le_bytes).ok();
+    let greatest = [1, 6, 7, 8, 9].into_iter().filter_map(promise).max().unwrap_or(0);
+    if greatest > most {
+        let held = data.len() as u64;
+        return Err(Problem::Promises { width, height, needed: greatest, held });
+    }
+    Ok(())
 }
 
 fn to_rec709(c: &Chromaticities) -> Option<crate::math::Mat3> {
@@ -303,7 +347,9 @@ impl Planes {
     fn into_image(self, matrix: Option<crate::math::Mat3>) -> (RgbImage, Option<Vec<f32>>) {
         let mut pixels = self.pixels;
         if let Some(matrix) = matrix {
-            pixels.iter_mut().for_each(|pixel| *pixel = transform(&matrix, *pixel));
+            for pixel in &mut pixels {
+                *pixel = transform(&matrix, *pixel);
+            }
         }
         (RgbImage::new(self.width, self.height, pixels), self.alpha)
     }

@@ -12,8 +12,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::camera::{CameraSettings, Projection};
-use super::description::{Part, SceneDescription, UpAxis};
 use super::surface::{MetallicRoughnessSurface, Surface, SurfaceModel};
+use super::{Part, SceneDescription, UpAxis};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Mat4, Vec3, vec3};
@@ -28,6 +28,9 @@ const SPHERE_SPACING: f32 = 1.12;
 const LEAST_ROUGHNESS: f32 = 0.1;
 /// Radius of the floors.
 const FLOOR_RADIUS: f32 = 12.0;
+
+/// The parts that only set off the subject.
+const SCENERY: [&str; 3] = ["floor", "plinth", "cradle"];
 
 /// A scene made in code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -187,6 +190,9 @@ fn scene(
         ..SceneDescription::default()
     };
     for (name, mesh, surface) in things {
+        if SCENERY.contains(&name) {
+            description.scenery.push(description.parts.len());
+        }
         let part = Part { name: name.to_owned(), mesh, surface: description.surfaces.len() };
         description.parts.push(part);
         description.surfaces.push(surface);

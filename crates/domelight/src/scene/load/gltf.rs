@@ -143,6 +143,20 @@ pub enum GltfProblem {
         /// How many vertices there are.
         vertices: usize,
     },
+    /// Positions in an accessor that does not exist.
+    #[error(
+        "mesh {mesh}, primitive {primitive}: its positions are in accessor {accessor}, but there are only {accessors}"
+    )]
+    NoAccessor {
+        /// The mesh.
+        mesh: usize,
+        /// The primitive.
+        primitive: usize,
+        /// The accessor.
+        accessor: usize,
+        /// How many there are.
+        accessors: usize,
+    },
     /// A primitive without positions.
     #[error("mesh {mesh}, primitive {primitive} has no positions")]
     NoPositions {
@@ -156,10 +170,8 @@ pub enum GltfProblem {
 const MAX_DEPTH: usize = 200;
 
 pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
-    check_glb_header(bytes)
+    let (document, blob) = parse(bytes)
         .map_err(|problem| LoadError::Gltf { path: path.into(), problem: Box::new(problem) })?;
-    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(bytes)
-        .map_err(|e| LoadError::Gltf { path: path.into(), problem: Box::new(e.into()) })?;
     let mut reader = Reader {
         path,
         document: &document,
@@ -188,6 +200,28 @@ pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
         }
     }
     Ok(reader.finish())
+}
+
+/// The document, checked, and the binary chunk of a GLB file.
+///
+/// The crate's own checks look up the accessor of the positions before they have checked its index.
+fn parse(bytes: &[u8]) -> Result<(gltf::Document, Option<Vec<u8>>), GltfProblem> {
+    check_glb_header(bytes)?;
+    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice_without_validation(bytes)?;
+    let json = document.into_json();
+    let positions = json::validation::Checked::Valid(Semantic::Positions);
+    for (mesh, primitives) in json.meshes.iter().map(|m| &m.primitives).enumerate() {
+        for (primitive, attributes) in primitives.iter().map(|p| &p.attributes).enumerate() {
+            let Some(accessor) = attributes.get(&positions).map(json::Index::value) else {
+                return Err(GltfProblem::NoPositions { mesh, primitive });
+            };
+            let accessors = json.accessors.len();
+            if accessor >= accessors {
+                return Err(GltfProblem::NoAccessor { mesh, primitive, accessor, accessors });
+            }
+        }
+    }
+    Ok((gltf::Document::from_json(json)?, blob))
 }
 
 /// The crate subtracts the header's size from the length without a check.
@@ -240,6 +274,7 @@ impl<'a> Reader<'a> {
             camera: self.camera,
             environment: None,
             up: Some(UpAxis::Y),
+            scenery: Vec::new(),
         };
         Loaded { description, warnings: self.warnings }
     }

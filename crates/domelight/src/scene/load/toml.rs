@@ -1,4 +1,5 @@
-//! Scene files: a TOML text that combines meshes, materials, a camera and an environment.
+//! Scene files: a TOML text that combines meshes, materials, a camera and an environment;
+//! `docs/scene-format.md` is its manual.
 //!
 //! ```toml
 //! up = "y"                            # or "z": which way the whole scene points up
@@ -32,7 +33,7 @@
 //! uv_scale = 1.0                      # how often the textures repeat, default 1
 //!
 //! [[objects]]
-//! file = "teapot.ply"                 # PLY, OBJ, glTF or GLB; or builtin = "sphere"
+//! file = "teapot.ply"                 # PLY, OBJ, glTF or GLB; or builtin = "statue", a built-in scene
 //! name = "teapot"                     # for messages; default: the file's own names
 //! material = "brass"                  # a name from [materials] or the command line's notation;
 //!                                     # default: the file's own materials
@@ -55,6 +56,7 @@ use super::{LoadError, Loaded, load_mesh, relative};
 use crate::Rgb;
 use crate::bsdf::{Material, ParseMaterialError};
 use crate::math::{Mat4, Vec2, Vec3, Vec4};
+use crate::scene::builtin::{BuiltinScene, UnknownScene};
 use crate::scene::camera::{CameraError, CameraSettings, Projection};
 use crate::scene::{
     Encoding, EnvironmentSettings, EnvironmentSource, MetallicRoughnessSurface, NormalMap,
@@ -83,12 +85,9 @@ pub enum TomlProblem {
         /// The other.
         second: &'static str,
     },
-    /// A built-in object that does not exist.
-    #[error("there is no built-in object '{name}'")]
-    Builtin {
-        /// The name.
-        name: String,
-    },
+    /// A built-in scene that does not exist.
+    #[error(transparent)]
+    Builtin(#[from] UnknownScene),
     /// A material that is neither defined nor notation.
     #[error("material '{text}' is neither defined in [materials] nor valid notation: {source}")]
     Material {
@@ -285,7 +284,7 @@ impl Reader<'_> {
         }
         for object in file.objects {
             let at = object.span().start;
-            self.object(object.into_inner(), at)?;
+            self.object(object.get_ref(), at)?;
         }
         Ok(())
     }
@@ -385,8 +384,8 @@ impl Reader<'_> {
         })
     }
 
-    fn object(&mut self, table: ObjectTable, at: usize) -> Result<(), LoadError> {
-        let matrix = matrix(&table).map_err(|problem| self.error(at, problem))?;
+    fn object(&mut self, table: &ObjectTable, at: usize) -> Result<(), LoadError> {
+        let matrix = matrix(table).map_err(|problem| self.error(at, problem))?;
         let mut loaded = match (&table.file, &table.builtin) {
             (Some(file), None) => {
                 let line = line_of(self.text, at);
@@ -394,8 +393,9 @@ impl Reader<'_> {
                 load_mesh(&relative(self.path, file), &referrer)?
             }
             (None, Some(name)) => {
-                let description = builtin_object(name)
-                    .ok_or_else(|| self.error(at, TomlProblem::Builtin { name: name.clone() }))?;
+                let scene = name.parse::<BuiltinScene>();
+                let scene = scene.map_err(|unknown| self.error(at, unknown.into()))?;
+                let description = scene.description();
                 Loaded { description, warnings: Vec::new() }
             }
             _ => return Err(self.error(at, one_of("an object"))),
@@ -406,14 +406,18 @@ impl Reader<'_> {
         // The scene file decides which axis points up.
         description.up = None;
         if let Some(name) = &table.name {
-            description.parts.iter_mut().for_each(|p| p.name.clone_from(name));
+            for part in &mut description.parts {
+                part.name.clone_from(name);
+            }
         }
         match &table.material {
             None => self.loaded.description.append(description),
             Some(text) => {
                 let surface = self.surface(text, at)?;
                 let mut parts = std::mem::take(&mut description.parts);
-                parts.iter_mut().for_each(|p| p.surface = surface);
+                for part in &mut parts {
+                    part.surface = surface;
+                }
                 self.loaded.description.parts.append(&mut parts);
                 let SceneDescription { camera, .. } = description;
                 self.loaded
@@ -432,11 +436,6 @@ impl Reader<'_> {
         let surface = self.notation(text, text, at)?;
         Ok(self.add_surface(text.into(), surface))
     }
-}
-
-/// The built-in scene of a name.
-fn builtin_object(_name: &str) -> Option<SceneDescription> {
-    None
 }
 
 fn one_of(what: &str) -> TomlProblem {
@@ -458,7 +457,7 @@ fn camera_settings(table: &CameraTable, up: UpAxis) -> Result<CameraSettings, To
         projection,
         origin: table.origin.into(),
         target: table.target.into(),
-        up: table.up.map_or(up.direction(), Vec3::from),
+        up: table.up.map_or(up.vector(), Vec3::from),
     };
     settings.check()?;
     Ok(settings)

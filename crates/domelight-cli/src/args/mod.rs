@@ -1,0 +1,196 @@
+//! The command line, typed.
+
+pub(crate) mod render;
+
+use crate::output::PicturePath;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use domelight::environment::mapping::Mapping;
+use domelight::picture::tone::{ToneCurve, ToneMapping};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Direct illumination under measured light.
+#[derive(Debug, Parser)]
+#[command(
+    name = "domelight",
+    version,
+    about,
+    propagate_version = true,
+    arg_required_else_help = true
+)]
+pub(crate) struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Print nothing but errors and what --json asks for.
+    #[arg(short, long, global = true)]
+    pub(crate) quiet: bool,
+}
+
+/// One variant a subcommand.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Render a scene lit by an HDR environment.
+    #[command(after_help = render::EXAMPLES)]
+    Render(Box<render::RenderArguments>),
+    /// Compare a picture with its reference: MSE, relMSE, PSNR, ꟻLIP.
+    #[command(after_help = DIFF_EXAMPLES)]
+    Diff(DiffArguments),
+    /// Measure, look at and convert a light probe.
+    #[command(after_help = PROBE_EXAMPLES)]
+    Probe(ProbeArguments),
+}
+
+const DIFF_EXAMPLES: &str = "\
+Examples:
+  domelight diff render.exr reference.exr
+  domelight diff render.exr reference.exr --covered --json
+  domelight diff render.exr reference.exr -o error.png --metric flip";
+
+const PROBE_EXAMPLES: &str = "\
+Examples:
+  domelight probe sky --preview sky.png
+  domelight probe studio.hdr --json
+  domelight probe ball.hdr --mapping mirror-ball -o studio.exr
+  domelight probe grace.hdr --to cross-vertical -o cross.hdr
+  domelight probe cathedral --size 256 -o - | domelight probe -";
+
+/// Compare a picture with its reference.
+#[derive(Args, Debug)]
+pub(crate) struct DiffArguments {
+    /// The picture (.exr, .hdr, .pfm, .png; - reads standard input).
+    #[arg(value_name = "A")]
+    pub(crate) test: PathBuf,
+    /// Its reference.
+    #[arg(value_name = "B")]
+    pub(crate) reference: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write a false-colour picture of the error.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PicturePath>,
+    /// What the error picture shows.
+    #[arg(long, value_enum, default_value_t = Metric::Rel, requires = "output")]
+    pub(crate) metric: Metric,
+    /// Error at the upper end of the error picture's colours [default: 99.9th percentile; flip: 1].
+    #[arg(long, value_name = "ERROR", value_parser = positive, requires = "output")]
+    pub(crate) scale: Option<f32>,
+    /// Compare only pixels that the reference covers (alpha > 0.999).
+    #[arg(long)]
+    pub(crate) covered: bool,
+    /// Compute HDR-ꟻLIP, over all exposures that the reference needs, too.
+    #[arg(long)]
+    pub(crate) hdr_flip: bool,
+    /// The OpenEXR layer to compare.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) layer: Option<String>,
+    /// Exposure at which ꟻLIP sees the pictures.
+    #[command(flatten)]
+    pub(crate) tone: Tone,
+}
+
+/// What an error picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Metric {
+    /// Relative error √((I−R)² / (R² + 0.01))
+    Rel,
+    /// Absolute error |I−R|, in radiance
+    Abs,
+    /// ꟻLIP, what the eye sees when it flips between the two
+    Flip,
+}
+
+/// Measure, look at and convert a light probe.
+#[derive(Args, Debug)]
+pub(crate) struct ProbeArguments {
+    /// A file (.hdr, .exr, .pfm; - reads standard input) or sky, studio, cathedral, constant.
+    #[arg(value_name = "FILE|NAME")]
+    pub(crate) probe: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write a picture to look at, with --exposure and --tone applied.
+    #[arg(long, value_name = "OUT.png")]
+    pub(crate) preview: Option<PicturePath>,
+    /// The mapping of the file that is written.
+    #[arg(long, value_name = "MAPPING", requires = "output", default_value_t = Mapping::LatLong, value_parser = mapping())]
+    pub(crate) to: Mapping,
+    /// Write the probe (.exr, .hdr, .pfm, .png; - writes OpenEXR to standard output).
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PicturePath>,
+    /// Rows of the lat-long map: of a built-in probe [default: 512], and of what is written.
+    #[arg(long, value_name = "H", value_parser = clap::value_parser!(u32).range(1..=16384))]
+    pub(crate) size: Option<u32>,
+    /// The mapping of the file [default: guessed from its shape].
+    #[arg(long, value_parser = mapping())]
+    pub(crate) mapping: Option<Mapping>,
+    /// Repair negative, infinite and NaN values instead of refusing them.
+    #[arg(long)]
+    pub(crate) sanitize: bool,
+    /// The OpenEXR layer.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) layer: Option<String>,
+    /// How the preview is shown.
+    #[command(flatten)]
+    pub(crate) tone: Tone,
+}
+
+/// Exposure and tone curve of what is looked at.
+#[derive(Args, Debug)]
+pub(crate) struct Tone {
+    /// Exposure in stops, for what is looked at.
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
+    exposure: f32,
+    /// Tone curve, for what is looked at [default: srgb, which cuts off at 1; of previews aces].
+    #[arg(long, value_name = "CURVE", value_parser = tone_curve())]
+    tone: Option<ToneCurve>,
+}
+
+impl Tone {
+    pub(crate) fn mapping(&self, default: ToneCurve) -> ToneMapping {
+        ToneMapping { exposure: self.exposure, curve: self.tone.unwrap_or(default) }
+    }
+}
+
+fn mapping() -> impl TypedValueParser<Value = Mapping> {
+    one_of(Mapping::ALL.map(Mapping::name))
+}
+
+fn tone_curve() -> impl TypedValueParser<Value = ToneCurve> {
+    one_of(ToneCurve::ALL.map(ToneCurve::name))
+}
+
+/// Reads one of the `names`, which help and errors list.
+fn one_of<T>(names: impl IntoIterator<Item = &'static str>) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err: std::error::Error + Send + Sync> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<T>())
+}
+
+fn finite(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("not a finite number".into()),
+    }
+}
+
+fn positive(text: &str) -> Result<f32, String> {
+    match finite(text) {
+        Ok(value) if value > 0.0 => Ok(value),
+        _ => Err("not a number above 0".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+}

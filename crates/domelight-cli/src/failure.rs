@@ -1,0 +1,88 @@
+//! What the user is told when something fails, and the exit code.
+
+use domelight::environment::builtin::BuiltinProbe;
+use domelight::environment::io::ProbeError;
+use domelight::picture::Problem;
+use domelight::picture::compare::SizeMismatch;
+use std::fmt::Write;
+use std::io::{self, IsTerminal};
+use std::process::ExitCode;
+
+/// Arguments that each are right but do not go together; exit code 2.
+#[derive(Debug)]
+pub(crate) struct UsageError(pub(crate) String);
+
+impl std::fmt::Display for UsageError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for UsageError {}
+
+/// Prints a warning unless asked for quiet.
+pub(crate) fn warn(quiet: bool, text: &str) {
+    if !quiet {
+        let label = if colored() { "\x1b[1;33mwarning:\x1b[0m" } else { "warning:" };
+        eprintln!("{label} {text}");
+    }
+}
+
+/// Prints `error` with its causes on one line and a hint where there is one; the exit code.
+pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
+    if is_broken_pipe(error) {
+        return ExitCode::SUCCESS;
+    }
+    let (error_label, hint_label) = if colored() {
+        ("\x1b[1;31merror:\x1b[0m", "\x1b[1;36mhint:\x1b[0m")
+    } else {
+        ("error:", "hint:")
+    };
+    eprintln!("{error_label} {}", chain(error));
+    if let Some(hint) = hint(error) {
+        eprintln!("{hint_label} {hint}");
+    }
+    ExitCode::from(if error.is::<UsageError>() { 2 } else { 1 })
+}
+
+/// The error and its causes, but for causes that the message above them already contains.
+fn chain(error: &anyhow::Error) -> String {
+    let mut text = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !text.contains(&cause) {
+            let _ = write!(text, ": {cause}");
+        }
+    }
+    text
+}
+
+fn hint(error: &anyhow::Error) -> Option<String> {
+    if error.is::<SizeMismatch>() {
+        return Some("render both with the same --size".into());
+    }
+    match error.downcast_ref()? {
+        ProbeError::Picture(_) if io_kind(error) == Some(io::ErrorKind::NotFound) => {
+            let names = BuiltinProbe::ALL.map(BuiltinProbe::name).join(", ");
+            Some(format!("a probe is a file or one of {names}"))
+        }
+        ProbeError::Shape { .. } => Some("--mapping tells how the file is mapped".into()),
+        _ => None,
+    }
+}
+
+/// Whoever read our output has seen enough.
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    io_kind(error) == Some(io::ErrorKind::BrokenPipe)
+}
+
+fn io_kind(error: &anyhow::Error) -> Option<io::ErrorKind> {
+    error.chain().find_map(|cause| match cause.downcast_ref() {
+        Some(Problem::Io(error)) => Some(error.kind()),
+        _ => cause.downcast_ref().map(io::Error::kind),
+    })
+}
+
+/// <https://no-color.org>: colour on a terminal unless NO_COLOR is set to something.
+fn colored() -> bool {
+    io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}

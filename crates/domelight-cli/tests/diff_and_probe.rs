@@ -1,0 +1,243 @@
+//! The real program in a temporary folder: exit codes, messages, JSON, files.
+
+use domelight::picture::{ReadOptions, exr::ExrLayers, read};
+use domelight::{Rgb, RgbImage};
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use tempfile::TempDir;
+
+fn domelight(folder: &TempDir, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_domelight"))
+        .args(arguments)
+        .current_dir(folder)
+        .env_remove("NO_COLOR")
+        .stdin(Stdio::null())
+        .output()
+        .expect("the program starts")
+}
+
+fn stdout(output: &Output) -> &str {
+    std::str::from_utf8(&output.stdout).expect("UTF-8")
+}
+
+fn stderr(output: &Output) -> &str {
+    std::str::from_utf8(&output.stderr).expect("UTF-8")
+}
+
+#[track_caller]
+fn done(output: &Output) -> &str {
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
+    assert_eq!(stderr(output), "");
+    stdout(output)
+}
+
+#[track_caller]
+fn json(output: &Output) -> Value {
+    serde_json::from_str(done(output)).expect("JSON")
+}
+
+fn write_exr(path: &Path, image: &RgbImage, alpha: Option<&[f32]>) {
+    let bytes = ExrLayers::from_image(image, alpha).encode().expect("a picture");
+    std::fs::write(path, bytes).expect("a writable folder");
+}
+
+fn load(folder: &TempDir, name: &str) -> RgbImage {
+    read(&folder.path().join(name), &ReadOptions::default()).expect(name).image
+}
+
+/// `grey.exr`, `brighter.exr` (by a tenth), `half.exr` (covered left half, wrong right half), `small.exr`.
+fn pictures() -> TempDir {
+    let folder = TempDir::new().expect("a temporary folder");
+    let at = |name: &str| folder.path().join(name);
+    write_exr(&at("grey.exr"), &RgbImage::filled(20, 10, Rgb::splat(0.5)), None);
+    write_exr(&at("brighter.exr"), &RgbImage::filled(20, 10, Rgb::splat(0.55)), None);
+    let half = |x: usize| if x < 10 { Rgb::splat(0.5) } else { Rgb::BLACK };
+    let alpha: Vec<f32> = (0..200).map(|i| if i % 20 < 10 { 1.0 } else { 0.0 }).collect();
+    write_exr(&at("half.exr"), &RgbImage::from_fn(20, 10, |x, _| half(x)), Some(&alpha));
+    write_exr(&at("small.exr"), &RgbImage::filled(10, 10, Rgb::WHITE), None);
+    folder
+}
+
+#[test]
+fn equal_pictures_have_no_difference() {
+    let folder = pictures();
+    let report =
+        json(&domelight(&folder, &["diff", "grey.exr", "grey.exr", "--json", "--hdr-flip"]));
+    for zero in ["mse", "rel_mse", "rel_mse_trimmed", "flip"] {
+        assert_eq!(report[zero], 0.0, "{zero}");
+    }
+    assert_eq!(report["psnr"], Value::Null);
+    assert_eq!((&report["pixels"], &report["hdr_flip"]["mean"]), (&200.into(), &0.0.into()));
+}
+
+#[test]
+fn a_known_difference_is_reported_as_json_and_as_a_table() {
+    let folder = pictures();
+    let report = json(&domelight(&folder, &["diff", "brighter.exr", "grey.exr", "--json"]));
+    let value = |name: &str| report[name].as_f64().expect("a number");
+    assert!((value("mse") - 0.0025).abs() < 1e-8);
+    assert!((value("rel_mse") - 0.0025 / 0.26).abs() < 1e-7);
+    assert!((report["mean_ratio"][1].as_f64().expect("a ratio") - 1.1).abs() < 1e-6);
+    let table = domelight(&folder, &["diff", "brighter.exr", "grey.exr"]);
+    for name in ["MSE", "relMSE trimmed", "PSNR", "mean ratio", "ꟻLIP"] {
+        assert!(done(&table).contains(name), "{name}");
+    }
+    assert_eq!(done(&domelight(&folder, &["diff", "brighter.exr", "grey.exr", "-q"])), "");
+}
+
+#[test]
+fn covered_compares_what_the_reference_covers() {
+    let folder = pictures();
+    let arguments = ["diff", "grey.exr", "half.exr", "--covered", "--json"];
+    let report = json(&domelight(&folder, &arguments));
+    assert_eq!((&report["pixels"], &report["mse"]), (&100.into(), &0.0.into()));
+    let refused = domelight(&folder, &["diff", "half.exr", "grey.exr", "--covered"]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(stderr(&refused).contains("grey.exr") && stderr(&refused).contains("alpha"));
+}
+
+#[test]
+fn every_metric_draws_a_picture() {
+    let folder = pictures();
+    for metric in ["rel", "abs", "flip"] {
+        let name = format!("{metric}.png");
+        let arguments = ["diff", "grey.exr", "half.exr", "--metric", metric, "-o", &name];
+        assert!(done(&domelight(&folder, &arguments)).contains(metric));
+        let picture = load(&folder, &name);
+        assert_eq!((picture.width, picture.height), (20, 10));
+        assert!(picture.get(19, 5).luminance() > picture.get(0, 5).luminance(), "{metric}");
+    }
+}
+
+#[test]
+fn sizes_that_differ_are_an_error_with_a_hint() {
+    let folder = pictures();
+    let output = domelight(&folder, &["diff", "grey.exr", "small.exr", "-o", "error.png"]);
+    assert_eq!((output.status.code(), stdout(&output)), (Some(1), ""));
+    let expected = "error: the pictures differ in size: 20x10 against 10x10 of the reference\n\
+                    hint: render both with the same --size\n";
+    assert_eq!(stderr(&output), expected);
+    assert!(!folder.path().join("error.png").exists());
+}
+
+#[test]
+fn bad_usage_is_exit_code_2() {
+    let folder = pictures();
+    for arguments in [
+        &["diff", "grey.exr"][..],
+        &["diff", "-", "-"],
+        &["diff", "grey.exr", "grey.exr", "-o", "error.tiff"],
+        &["diff", "grey.exr", "grey.exr", "-o", "-", "--json"],
+        &["diff", "grey.exr", "grey.exr", "--exposure", "nan"],
+        &["probe", "sky", "--to", "octahedral"],
+        &["probe", "sky", "--to", "sphere", "-o", "sky.exr"],
+        &["probe", "sky", "--size", "0"],
+        &["probe", "sky", "--preview", "-", "-o", "-"],
+        &["paint"],
+        &[],
+    ] {
+        let output = domelight(&folder, arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert_eq!(stdout(&output), "", "{arguments:?}");
+    }
+}
+
+#[test]
+fn help_shows_examples() {
+    let folder = pictures();
+    for command in ["diff", "probe"] {
+        let text = domelight(&folder, &[command, "--help"]);
+        assert!(done(&text).contains("Examples:\n  domelight"), "{command}");
+    }
+}
+
+#[test]
+fn a_missing_probe_is_named_with_a_hint() {
+    let folder = pictures();
+    let output = domelight(&folder, &["probe", "skye"]);
+    assert_eq!(output.status.code(), Some(1));
+    let lines: Vec<&str> = stderr(&output).lines().collect();
+    assert!(lines[0].starts_with("error: skye: "), "{lines:?}");
+    assert_eq!(lines[1], "hint: a probe is a file or one of sky, studio, cathedral, constant");
+}
+
+#[test]
+fn a_built_in_probe_is_measured() {
+    let folder = pictures();
+    let report = json(&domelight(&folder, &["probe", "sky", "--size", "64", "--json"]));
+    assert_eq!((&report["width"], &report["mapping"]), (&128.into(), &"lat-long".into()));
+    assert!((report["sun"]["elevation"].as_f64().expect("a sun") - 36.0).abs() < 1.5);
+    let table = domelight(&folder, &["probe", "constant", "--size", "8"]);
+    assert!(done(&table).contains("irradiance from above   3.14159 3.14159 3.14159"));
+}
+
+#[test]
+fn a_probe_goes_to_another_mapping_and_back() {
+    let folder = pictures();
+    let to = ["probe", "studio", "--size", "64", "--to", "cross-vertical", "-o", "cross.exr", "-q"];
+    assert_eq!(done(&domelight(&folder, &to)), "");
+    let cross = load(&folder, "cross.exr");
+    assert_eq!(cross.width * 4, cross.height * 3);
+    let mean = |output: &Output| json(output)["mean_radiance"][1].as_f64().expect("a number");
+    let original = mean(&domelight(&folder, &["probe", "studio", "--size", "64", "--json"]));
+    let back = mean(&domelight(&folder, &["probe", "cross.exr", "--json"]));
+    assert!((back / original - 1.0).abs() < 0.02, "{back} {original}");
+}
+
+#[test]
+fn a_preview_is_resized_and_exposed() {
+    let folder = pictures();
+    for (exposure, name) in [("0", "dark.png"), ("3", "bright.png")] {
+        let size =
+            ["probe", "cathedral", "--size", "40", "--preview", name, "--exposure", exposure];
+        done(&domelight(&folder, &size));
+    }
+    let [dark, bright] = ["dark.png", "bright.png"].map(|name| load(&folder, name));
+    assert_eq!((dark.width, dark.height), (80, 40));
+    assert!(bright.get(40, 30).luminance() > 2.0 * dark.get(40, 30).luminance());
+}
+
+#[test]
+fn bad_texels_are_refused_or_repaired_and_counted() {
+    let folder = pictures();
+    let mut map = RgbImage::filled(8, 4, Rgb::WHITE);
+    map.pixels[13] = Rgb::new(1.0, f32::NAN, -2.0);
+    write_exr(&folder.path().join("bad.exr"), &map, None);
+    let refused = domelight(&folder, &["probe", "bad.exr"]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(stderr(&refused).contains("(5, 1)") && stderr(&refused).contains("--sanitize"));
+    let report = json(&domelight(&folder, &["probe", "bad.exr", "--sanitize", "--json"]));
+    assert_eq!(report["sanitized"], serde_json::json!({"negative": 1, "non_finite": 1}));
+}
+
+#[test]
+fn probes_pass_through_pipes() {
+    let folder = pictures();
+    let made = domelight(&folder, &["probe", "studio", "--size", "16", "-o", "-"]);
+    assert_eq!(made.status.code(), Some(0));
+    std::fs::write(folder.path().join("piped"), &made.stdout).expect("a writable folder");
+    let file = std::fs::File::open(folder.path().join("piped")).expect("just written");
+    let mut read = Command::new(env!("CARGO_BIN_EXE_domelight"));
+    let output = read.args(["probe", "-", "--json"]).stdin(file).output().expect("starts");
+    assert_eq!(json(&output)["height"], 16);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_reader_that_leaves_is_no_failure() {
+    let folder = pictures();
+    for arguments in [&["probe", "sky", "-o", "-"][..], &["probe", "sky", "--size", "32", "--json"]]
+    {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_domelight"))
+            .args(arguments)
+            .current_dir(&folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!((output.status.code(), stderr(&output)), (Some(0), ""));
+    }
+}
