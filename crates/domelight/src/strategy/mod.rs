@@ -15,10 +15,12 @@
 
 mod brdf;
 mod environment;
+mod light_set;
 mod mis;
 
 pub use brdf::BrdfSampling;
 pub use environment::EnvironmentSampling;
+pub use light_set::LightSet;
 pub use mis::{LightTable, MultipleImportanceSampling};
 
 use crate::Rgb;
