@@ -1,6 +1,7 @@
 //! Drawing from densities: uniform numbers, warps, tables, and the weights that combine them.
 
 pub mod alias;
+pub mod hierarchy;
 pub mod mis;
 pub mod rng;
 pub mod sobol;
@@ -9,6 +10,7 @@ pub mod table;
 pub mod warp;
 
 pub use alias::AliasTable;
+pub use hierarchy::HierarchicalTable;
 pub use mis::Heuristic;
 pub use rng::Pcg32;
 pub use stream::{Dimension, SamplerKind, Stream};
