@@ -13,8 +13,8 @@
 //! for only ratios of neighbours matter; the probability of a cell differs from its weight over the
 //! total by some 10⁻⁶ of itself.
 
-use super::table::{TableError, TableSample};
 use super::ONE_MINUS_EPSILON;
+use super::table::{TableError, TableSample};
 use crate::math::{Vec2, vec2};
 
 /// Four cells: upper left, upper right, lower left, lower right.
@@ -135,7 +135,10 @@ impl Level {
                 weights(row, &mut line);
                 for (column, &w) in line.iter().enumerate() {
                     if !w.is_finite() || w < 0.0 {
-                        return Err(TableError::BadWeight { index: row * width + column, value: w });
+                        return Err(TableError::BadWeight {
+                            index: row * width + column,
+                            value: w,
+                        });
                     }
                     quads[column / 2][2 * half + column % 2] = w;
                     sum += f64::from(w);
@@ -149,7 +152,8 @@ impl Level {
             quads.par_chunks_mut(quads_wide).enumerate().map(fill).collect()
         };
         #[cfg(not(feature = "render"))]
-        let sums: Result<Vec<f64>, _> = quads.chunks_mut(quads_wide).enumerate().map(fill).collect();
+        let sums: Result<Vec<f64>, _> =
+            quads.chunks_mut(quads_wide).enumerate().map(fill).collect();
         Ok((Self { width: quads_wide, quads }, sums?.iter().sum()))
     }
 
