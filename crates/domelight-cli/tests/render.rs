@@ -58,7 +58,9 @@ fn without_arguments_it_makes_an_exr_and_a_png() {
 #[test]
 fn every_strategy_renders_and_json_tells_all() {
     let folder = folder();
-    let strategies: [&[&str]; 6] = [
+    let strategies: [&[&str]; 8] = [
+        &["--strategy", "median-cut", "--lights", "5"],
+        &["--strategy", "variance-minimization"],
         &["--strategy", "brdf", "--rays", "3"],
         &["--strategy", "environment"],
         &["--strategy", "mis", "--rays", "5"],
@@ -132,6 +134,9 @@ fn flags_that_contradict_are_usage_errors() {
     let folder = folder();
     refused(&render(&folder, &["--strategy", "mis", "--rays", "1"]), 2, &["--split 1:0"]);
     refused(&render(&folder, &["--strategy", "brdf", "--split", "1:1"]), 2, &["--split", "mis"]);
+    refused(&render(&folder, &["--lights", "4"]), 2, &["--lights", "median-cut"]);
+    let rays = ["--strategy", "median-cut", "--rays", "4"];
+    refused(&render(&folder, &rays), 2, &["--rays", "--lights"]);
     let other = ["--no-compensation", "--strategy", "environment"];
     refused(&render(&folder, &other), 2, &["--no-compensation", "mis"]);
     refused(&render(&folder, &["--size", "0x4"]), 2, &["0x4", "800x600"]);

@@ -3,6 +3,7 @@
 use domelight::environment::mapping::{EnvmapKind, Mapping, from_lat_long, to_lat_long};
 use domelight::math::{PI, Vec3, vec2, vec3};
 use domelight::{Rgb, RgbImage};
+use testkit::Chi2;
 
 /// Directions spread evenly over the sphere (a Fibonacci lattice).
 fn directions(n: usize) -> impl Iterator<Item = Vec3> {
@@ -286,5 +287,25 @@ fn constant_maps_stay_constant() {
         assert!(map.pixels.iter().all(|&pixel| pixel == color), "{mapping}");
         let one = to_lat_long(&RgbImage::filled(1, 1, color), mapping, 1);
         assert!(one.pixels.iter().all(|&pixel| pixel == color), "{mapping}");
+    }
+}
+
+/// Uniform points of the picture, as directions, have the density 1 / (dω/dA): χ² for every
+/// mapping. What falls outside the disc or the cross is lost and counted.
+#[test]
+fn uniform_points_follow_the_jacobian() {
+    for mapping in Mapping::ALL {
+        // Octants of the cells divide the faces of the cubes and the octahedron evenly.
+        let test = Chi2 { cells: [24, 48], ..Chi2::in_suite_of(Mapping::ALL.len()) };
+        let sampler = |u: [f32; 2], _| mapping.direction(vec2(u[0], u[1])).map(|d| d.to_array());
+        let pdf = |w: [f32; 3]| {
+            1.0 / f64::from(mapping.solid_angle_density(mapping.uv(Vec3::from(w))))
+        };
+        let report = test.sphere(mapping.name(), sampler, pdf);
+        let report = report.unwrap_or_else(|failure| panic!("{failure}"));
+        let covered = 1.0 - report.lost as f64 / test.samples as f64;
+        // Five standard deviations of a count of independent points.
+        let bound = 5.0 * (0.25 / test.samples as f64).sqrt();
+        assert!((covered - report.mass).abs() < bound, "{mapping}: {covered} {}", report.mass);
     }
 }

@@ -79,8 +79,7 @@ fn aliases() {
         let (i, rest) = table.sample(u);
         Some((i as f32 + rest) / n as f32)
     };
-    let pdf =
-        |x: f32| f64::from(table.pmf(((x * n as f32) as usize).min(n - 1))) * n as f64;
+    let pdf = |x: f32| f64::from(table.pmf(((x * n as f32) as usize).min(n - 1))) * n as f64;
     test.interval("AliasTable", sample, pdf).unwrap_or_else(|f| panic!("{f}"));
 }
 

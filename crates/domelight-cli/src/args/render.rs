@@ -92,6 +92,9 @@ pub(crate) struct SamplingArguments {
     /// Environment and BRDF samples of each camera sample, with mis [default: half of --rays each]
     #[arg(long, value_name = "M:N")]
     pub(crate) split: Option<Split>,
+    /// Lights that stand for the probe, with median-cut and variance-minimization [default: 64]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub(crate) lights: Option<u32>,
     /// How mis weighs its samples
     #[arg(long, value_enum, default_value_t = HeuristicName::Power)]
     pub(crate) heuristic: HeuristicName,
@@ -177,6 +180,10 @@ pub(crate) enum StrategyName {
     Environment,
     /// Both, by multiple importance sampling
     Mis,
+    /// The probe as --lights directional lights by median cut: no noise, but bias
+    MedianCut,
+    /// The probe as --lights directional lights by variance minimization: no noise, but bias
+    VarianceMinimization,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
