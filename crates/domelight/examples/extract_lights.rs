@@ -8,7 +8,7 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::{Environment, Orientation};
 use domelight::rig::{ShadingReference, VarianceMinimization, variance_minimization};
 
-pub fn main() -> Result<(), Box<dyn Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let n_lights = 8;
     let map = BuiltinProbe::Sky.image(256);
     let environment = Environment::new(map, Orientation::default(), 1.0)?;

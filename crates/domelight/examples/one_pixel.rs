@@ -29,7 +29,7 @@ fn estimate(strategy: &impl PointStrategy, at: &ShadingPoint, n: u32) -> Rgb {
     sum / n as f32
 }
 
-pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let map: RgbImage = BuiltinProbe::Sky.image(256);
     let environment = &Environment::new(map, Orientation::default(), 1.0)?;
 

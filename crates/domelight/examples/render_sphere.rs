@@ -10,7 +10,7 @@ use domelight::scene::builtin::shapes;
 use domelight::scene::{Camera, CameraSettings, Part, Scene, SceneDescription, Surface};
 use domelight::strategy::{LightTable, MultipleImportanceSampling};
 
-pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sphere = Part { name: "sphere".into(), mesh: shapes::icosphere(4), surface: 0 };
     let scene = Scene::new(SceneDescription {
         parts: vec![sphere],

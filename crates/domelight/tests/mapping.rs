@@ -298,9 +298,8 @@ fn uniform_points_follow_the_jacobian() {
         // Octants of the cells divide the faces of the cubes and the octahedron evenly.
         let test = Chi2 { cells: [24, 48], ..Chi2::in_suite_of(Mapping::ALL.len()) };
         let sampler = |u: [f32; 2], _| mapping.direction(vec2(u[0], u[1])).map(|d| d.to_array());
-        let pdf = |w: [f32; 3]| {
-            1.0 / f64::from(mapping.solid_angle_density(mapping.uv(Vec3::from(w))))
-        };
+        let pdf =
+            |w: [f32; 3]| 1.0 / f64::from(mapping.solid_angle_density(mapping.uv(Vec3::from(w))));
         let report = test.sphere(mapping.name(), sampler, pdf);
         let report = report.unwrap_or_else(|failure| panic!("{failure}"));
         let covered = 1.0 - report.lost as f64 / test.samples as f64;

@@ -129,7 +129,7 @@ fn seeds_and_samplers_differ() {
 fn strategies_agree_pixel_by_pixel() {
     let environment = environment();
     let settings =
-        RenderSettings { width: 12, height: 9, n_samples: 64, ..RenderSettings::default() };
+        RenderSettings { width: 12, height: 9, n_samples: 128, ..RenderSettings::default() };
     let n_values = settings.width * settings.height;
     let compensated = CompensatedTable::new(&environment);
     let compensated = MultipleImportanceSampling::new(
@@ -140,7 +140,9 @@ fn strategies_agree_pixel_by_pixel() {
         1,
     )
     .unwrap();
-    let balls = ["diffuse:0.8", "phong:20:0.6:0.3"];
+    // A narrower lobe would give environment samples rare large values, and the t-test batch means
+    // that are far from normal; tests/unbiased.rs has narrow lobes with larger batches.
+    let balls = ["diffuse:0.8", "phong:8:0.6:0.3"];
     for ball in balls {
         let scene = scene(ball);
         let brdf = BrdfSampling { environment: &environment, n_samples: 2 };
