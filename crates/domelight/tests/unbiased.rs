@@ -97,7 +97,7 @@ fn estimate<S: PointStrategy>(
 ) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for sample in 0..n {
-        strategy.sample(at, SampleNumbers { stream, sample }, |wi, weight| {
+        strategy.sample(at, SampleNumbers { stream, sample }, &mut scratch, |wi, weight| {
             if !hidden(env, wi) {
                 for (s, w) in sum.iter_mut().zip(weight.to_array()) {
                     *s += f64::from(w);

@@ -1,7 +1,9 @@
 //! Drawing from densities: uniform numbers, warps, tables, and the weights that combine them.
 
 pub mod alias;
+pub mod hilbert;
 pub mod mis;
+pub mod reservoir;
 pub mod rng;
 pub mod sobol;
 pub mod stream;
@@ -10,6 +12,7 @@ pub mod warp;
 
 pub use alias::AliasTable;
 pub use mis::Heuristic;
+pub use reservoir::WeightedReservoirs;
 pub use rng::Pcg32;
 pub use stream::{Dimension, SamplerKind, Stream};
 pub use table::{Table1d, Table2d, TableError, TableSample};
