@@ -319,7 +319,7 @@ impl CameraArguments {
         of_scene: Option<&CameraSettings>,
         framed: impl FnOnce() -> CameraSettings,
     ) -> CameraSettings {
-        let mut camera = of_scene.cloned().unwrap_or_else(framed);
+        let mut camera = of_scene.copied().unwrap_or_else(framed);
         if let Some(Triple(origin)) = self.origin {
             camera.origin = origin;
         }

@@ -1,50 +1,12 @@
 //! The real program in a temporary folder: exit codes, messages, JSON, files.
 
-use domelight::picture::{ReadOptions, exr::ExrLayers, read};
+mod common;
+
+use common::{domelight, done, json, load, stderr, stdout, write_exr};
 use domelight::{Rgb, RgbImage};
 use serde_json::Value;
-use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
-
-fn domelight(folder: &TempDir, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_domelight"))
-        .args(arguments)
-        .current_dir(folder)
-        .env_remove("NO_COLOR")
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts")
-}
-
-fn stdout(output: &Output) -> &str {
-    std::str::from_utf8(&output.stdout).expect("UTF-8")
-}
-
-fn stderr(output: &Output) -> &str {
-    std::str::from_utf8(&output.stderr).expect("UTF-8")
-}
-
-#[track_caller]
-fn done(output: &Output) -> &str {
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
-    assert_eq!(stderr(output), "");
-    stdout(output)
-}
-
-#[track_caller]
-fn json(output: &Output) -> Value {
-    serde_json::from_str(done(output)).expect("JSON")
-}
-
-fn write_exr(path: &Path, image: &RgbImage, alpha: Option<&[f32]>) {
-    let bytes = ExrLayers::from_image(image, alpha).encode().expect("a picture");
-    std::fs::write(path, bytes).expect("a writable folder");
-}
-
-fn load(folder: &TempDir, name: &str) -> RgbImage {
-    read(&folder.path().join(name), &ReadOptions::default()).expect(name).image
-}
 
 /// `grey.exr`, `brighter.exr` (by a tenth), `half.exr` (covered left half, wrong right half), `small.exr`.
 fn pictures() -> TempDir {

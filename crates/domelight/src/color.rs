@@ -67,11 +67,13 @@ impl Rgb {
     }
 
     /// Applies `f` to each channel.
+    #[must_use]
     pub fn map(self, mut f: impl FnMut(f32) -> f32) -> Self {
         Self::new(f(self.r), f(self.g), f(self.b))
     }
 
     /// self at t = 0, `other` at t = 1.
+    #[must_use]
     pub fn lerp(self, other: Self, t: f32) -> Self {
         self * (1.0 - t) + other * t
     }

@@ -15,6 +15,7 @@ mod color;
 pub mod environment;
 mod image;
 pub mod math;
+pub mod rig;
 pub mod sampling;
 pub mod strategy;
 

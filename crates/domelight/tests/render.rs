@@ -94,7 +94,7 @@ fn small() -> RenderSettings {
 fn bits(layers: &Layers) -> Vec<u32> {
     let images = [&layers.color, &layers.unoccluded, &layers.albedo, &layers.variance];
     let colors = images.into_iter().flat_map(|i| &i.pixels).flat_map(|p| p.to_array());
-    let normals = layers.normal.iter().flat_map(|n| n.to_array());
+    let normals = layers.normal.iter().flat_map(Vec3::to_array);
     let others = layers.alpha.iter().chain(&layers.depth).copied();
     colors.chain(normals).chain(others).map(f32::to_bits).collect()
 }

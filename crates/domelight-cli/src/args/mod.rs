@@ -17,6 +17,7 @@ use std::str::FromStr;
     version,
     about,
     propagate_version = true,
+    args_override_self = true,
     arg_required_else_help = true
 )]
 pub(crate) struct Arguments {

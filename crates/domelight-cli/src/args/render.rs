@@ -116,7 +116,7 @@ pub(crate) struct SamplingArguments {
 #[command(next_help_heading = "Camera")]
 pub(crate) struct CameraArguments {
     /// Size of the picture
-    #[arg(long, value_name = "WxH", default_value = "720x720")]
+    #[arg(long, value_name = "WxH", default_value = "640x640")]
     pub(crate) size: Size,
     /// Where the camera is [default: framed to the scene]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]

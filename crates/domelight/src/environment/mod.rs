@@ -233,6 +233,20 @@ impl Environment {
         self.map.get(t.column, t.row)
     }
 
+    /// Radiance from `wi` interpolated between texel centres: for what the camera sees behind the
+    /// scene, where texels would show. It lights nothing, for the table does not match it.
+    pub fn backdrop(&self, wi: Vec3) -> Rgb {
+        let (w, h) = (self.map.width, self.map.height);
+        let uv = self.uv(wi);
+        let (x, y) = (uv.x * w as f32 - 0.5, (uv.y * h as f32 - 0.5).clamp(0.0, (h - 1) as f32));
+        let (fx, fy) = (x - x.floor(), y - y.floor());
+        let column = |i: f32| (i as isize).rem_euclid(w as isize) as usize;
+        let (x0, x1) = (column(x.floor()), column(x.floor() + 1.0));
+        let (y0, y1) = (y as usize, (y as usize + 1).min(h - 1));
+        let row = |y| self.map.get(x0, y).lerp(self.map.get(x1, y), fx);
+        row(y0).lerp(row(y1), fy)
+    }
+
     /// Density of [`Environment::sample`] at `wi` \[sr⁻¹\].
     pub fn pdf(&self, wi: Vec3) -> f32 {
         self.le_pdf(wi).1
@@ -461,6 +475,24 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_backdrop_passes_through_texel_centres_and_is_continuous() {
+        let value = |x: usize, y: usize| ((3 * x + 5 * y) % 7) as f32;
+        let map = RgbImage::from_fn(16, 9, |x, y| Rgb::splat(value(x, y)));
+        let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
+        for (x, y) in [(0, 0), (15, 8), (7, 4), (0, 5)] {
+            let center = env.direction(vec2((x as f32 + 0.5) / 16.0, (y as f32 + 0.5) / 9.0));
+            assert!((env.backdrop(center).g - value(x, y)).abs() < 1e-3);
+        }
+        // Across the seam and a texel's edge: the slope is at most 6 a texel.
+        for u in [0.0, 0.25] {
+            let at = |du: f32| env.backdrop(env.direction(vec2(u + du, 0.4))).g;
+            assert!((at(1e-5) - at(-1e-5)).abs() < 6.0 * 16.0 * 2e-5 + 1e-3);
+        }
+        let single = Environment::constant(Rgb::WHITE).unwrap();
+        assert_eq!(single.backdrop(Vec3::Y), Rgb::WHITE);
     }
 
     #[test]

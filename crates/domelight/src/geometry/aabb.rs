@@ -17,7 +17,7 @@ impl Aabb {
 
     /// The least box around some points; NaN coordinates are passed over.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |b, p| b.including(p))
+        points.into_iter().fold(Self::EMPTY, Self::including)
     }
 
     /// The least box around this one and `p`.

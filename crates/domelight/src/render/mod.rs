@@ -30,7 +30,7 @@ use tile::{Scratch, Tile};
 /// What camera rays see that leave the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Background {
-    /// The environment; alpha is 1.
+    /// The environment, interpolated between texels; alpha is 1.
     #[default]
     Shown,
     /// Nothing; alpha is the coverage.

@@ -129,7 +129,7 @@ fn background_sample(frame: &Frame, direction: Vec3) -> CameraSample {
     match frame.settings.background {
         Background::Hidden => CameraSample::default(),
         Background::Shown => {
-            let le = frame.environment.le(direction);
+            let le = frame.environment.backdrop(direction);
             CameraSample { color: le, unoccluded: le, alpha: 1.0, surface: None }
         }
     }

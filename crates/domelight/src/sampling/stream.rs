@@ -76,7 +76,7 @@ impl Stream {
         Numbers(match self.kind {
             SamplerKind::Sobol => sobol::point(index, set).map(unit_f32),
             SamplerKind::Independent => {
-                let mut pcg = Pcg32::new(set, u64::from(index));
+                let mut pcg = generator(set, index);
                 [(); 4].map(|()| pcg.next_f32())
             }
         })
@@ -85,8 +85,15 @@ impl Stream {
     /// Independent numbers without end, sequence `index` of this stream: for procedures that stop at
     /// a random time, whose laws hold for independent numbers alone.
     pub fn generator(&self, index: u32) -> Pcg32 {
-        Pcg32::new(hash2(self.key, Dimension::Sequence as u64), u64::from(index))
+        generator(hash2(self.key, Dimension::Sequence as u64), index)
     }
+}
+
+/// Sequence `index` of a set. The index has to enter the seed through a hash: streams of PCG that
+/// differ in the increment alone begin with correlated numbers.
+fn generator(set: u64, index: u32) -> Pcg32 {
+    let index = u64::from(index);
+    Pcg32::new(hash2(set, index), index)
 }
 
 #[cfg(test)]

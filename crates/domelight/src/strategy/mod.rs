@@ -15,15 +15,21 @@
 
 mod brdf;
 mod environment;
+mod light_set;
 mod mis;
 mod rejection;
 mod sir;
 
 pub use brdf::BrdfSampling;
 pub use environment::EnvironmentSampling;
+pub use light_set::LightSet;
 pub use mis::{CompensationNeedsBrdf, LightTable, MultipleImportanceSampling};
-pub use rejection::{Proposal, RejectionError, RejectionSampling, RejectionStatistics, Stop};
-pub use sir::{Candidates, Resampling, SamplingImportanceResampling, optimal_candidates};
+pub use rejection::{
+    Proposal, RejectionError, RejectionSampling, RejectionScratch, RejectionStatistics, Stop,
+};
+pub use sir::{
+    Candidates, Resampling, SamplingImportanceResampling, SirScratch, optimal_candidates,
+};
 
 use crate::Rgb;
 use crate::bsdf::{Brdf, Material};

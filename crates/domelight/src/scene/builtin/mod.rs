@@ -13,7 +13,7 @@ use std::str::FromStr;
 
 use super::camera::{CameraSettings, Projection};
 use super::surface::{MetallicRoughnessSurface, Surface, SurfaceModel};
-use super::{Part, SceneDescription, UpAxis};
+use super::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription, UpAxis};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Mat4, Vec3, vec3};
@@ -27,7 +27,7 @@ const SPHERE_SPACING: f32 = 1.12;
 /// Roughness of the first; the last has 1.
 const LEAST_ROUGHNESS: f32 = 0.1;
 /// Radius of the floors.
-const FLOOR_RADIUS: f32 = 12.0;
+const FLOOR_RADIUS: f32 = 100.0;
 
 /// The parts that only set off the subject.
 const SCENERY: [&str; 3] = ["floor", "plinth", "cradle"];
@@ -94,8 +94,28 @@ impl BuiltinScene {
         }
     }
 
-    /// The scene, with a camera for a square picture.
+    /// How far that probe is turned \[degrees\]: its key light comes over the camera's shoulder.
+    const fn probe_rotation(self) -> f32 {
+        match self {
+            Self::Statue => 125.0,
+            _ => 0.0,
+        }
+    }
+
+    /// The scene, with a camera for a square picture and the probe that suits it.
     pub fn description(self) -> SceneDescription {
+        let source = EnvironmentSource::Builtin(self.probe().to_owned());
+        let environment = EnvironmentSettings {
+            source,
+            rotate_degrees: self.probe_rotation(),
+            scale: 1.0,
+            exposure: 0.0,
+            up: UpAxis::Y,
+        };
+        SceneDescription { environment: Some(environment), ..self.geometry() }
+    }
+
+    fn geometry(self) -> SceneDescription {
         match self {
             Self::Statue => statue_scene(),
             Self::Spheres => spheres_scene(),

@@ -2,10 +2,10 @@
 //!
 //! | format | geometry | materials | camera |
 //! |---|---|---|---|
-//! | PLY ([`ply`]) | yes | vertex colours | no |
-//! | OBJ + MTL ([`obj`]) | yes | `Kd Ks Ns Pr Pm map_Kd norm` | no |
-//! | glTF, GLB ([`gltf`]) | triangles | metallic-roughness, normal maps | perspective, orthographic |
-//! | TOML ([`toml`]) | the above and built-in meshes | by text or table | yes |
+//! | PLY | yes | vertex colours | no |
+//! | OBJ + MTL | yes | `Kd Ks Ns Pr Pm map_Kd norm` | no |
+//! | glTF, GLB | triangles | metallic-roughness, normal maps | perspective, orthographic |
+//! | TOML | the above and built-in meshes | by text or table | yes |
 //!
 //! The format is told by the first bytes where they are telling (PLY, GLB), else by the extension.
 //! Every loader checks what it reads before it takes memory for it; bad input is a [`LoadError`]

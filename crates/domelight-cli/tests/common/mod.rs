@@ -1,0 +1,49 @@
+//! Running the real program in a temporary folder.
+#![allow(dead_code, unreachable_pub)]
+
+use domelight::RgbImage;
+use domelight::picture::exr::ExrLayers;
+use domelight::picture::{ReadOptions, read};
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use tempfile::TempDir;
+
+pub fn domelight(folder: &TempDir, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_domelight"))
+        .args(arguments)
+        .current_dir(folder)
+        .env_remove("NO_COLOR")
+        .stdin(Stdio::null())
+        .output()
+        .expect("the program starts")
+}
+
+pub fn stdout(output: &Output) -> &str {
+    std::str::from_utf8(&output.stdout).expect("UTF-8")
+}
+
+pub fn stderr(output: &Output) -> &str {
+    std::str::from_utf8(&output.stderr).expect("UTF-8")
+}
+
+#[track_caller]
+pub fn done(output: &Output) -> &str {
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
+    assert_eq!(stderr(output), "");
+    stdout(output)
+}
+
+#[track_caller]
+pub fn json(output: &Output) -> Value {
+    serde_json::from_str(done(output)).expect("JSON")
+}
+
+pub fn write_exr(path: &Path, image: &RgbImage, alpha: Option<&[f32]>) {
+    let bytes = ExrLayers::from_image(image, alpha).encode().expect("a picture");
+    std::fs::write(path, bytes).expect("a writable folder");
+}
+
+pub fn load(folder: &TempDir, name: &str) -> RgbImage {
+    read(&folder.path().join(name), &ReadOptions::default()).expect(name).image
+}

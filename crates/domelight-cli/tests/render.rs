@@ -1,0 +1,223 @@
+//! `domelight render` as a user runs it: files in, pictures out, messages and exit codes.
+
+mod common;
+
+use common::{domelight, json, load, stderr, stdout, write_exr};
+use domelight::picture::exr::text_attributes;
+use domelight::{Rgb, RgbImage};
+use std::fs;
+use std::process::Output;
+use tempfile::TempDir;
+
+/// A small render of `scene` with more arguments.
+fn render(folder: &TempDir, arguments: &[&str]) -> Output {
+    let quick = ["render", "--size", "24x18", "--spp", "4", "--env-rows", "32"];
+    domelight(folder, &[&quick[..], arguments].concat())
+}
+
+fn folder() -> TempDir {
+    TempDir::new().expect("a temporary folder")
+}
+
+#[track_caller]
+fn succeeded(output: &Output) {
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
+}
+
+#[track_caller]
+fn refused(output: &Output, code: i32, words: &[&str]) {
+    let text = stderr(output);
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    for word in words {
+        assert!(text.contains(word), "'{word}' is not in: {text}");
+    }
+    assert!(!text.contains("panicked"), "{text}");
+}
+
+const TRIANGLE: &str = "v -1 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n";
+
+#[test]
+fn without_arguments_it_makes_an_exr_and_a_png() {
+    let folder = folder();
+    let output = render(&folder, &[]);
+    succeeded(&output);
+    assert!(stderr(&output).contains("statue under sky: 24x18"), "{}", stderr(&output));
+    for name in ["domelight.exr", "domelight.png"] {
+        let picture = load(&folder, name);
+        assert_eq!((picture.width, picture.height), (24, 18));
+        assert!(picture.pixels.iter().any(|p| p.g > 0.1));
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "nothing else is left behind");
+    let bytes = fs::read(folder.path().join("domelight.exr")).unwrap();
+    let attributes = text_attributes(&bytes).unwrap();
+    let of = |name: &str| attributes.iter().find(|(n, _)| n == name).map(|(_, v)| v.as_str());
+    assert_eq!(of("domelight.scene"), Some("statue"));
+    assert_eq!(of("domelight.seed"), Some("0"));
+}
+
+#[test]
+fn every_strategy_renders_and_json_tells_all() {
+    let folder = folder();
+    let strategies: [&[&str]; 6] = [
+        &["--strategy", "brdf", "--rays", "3"],
+        &["--strategy", "environment"],
+        &["--strategy", "mis", "--rays", "5"],
+        &["--strategy", "mis", "--split", "3:1", "--heuristic", "power"],
+        &["--strategy", "mis", "--compensation"],
+        &["--strategy", "mis", "--split", "0:2", "--sampler", "independent"],
+    ];
+    for strategy in strategies {
+        let scene = ["spheres", "--json", "-q", "-o", "x.exr", "-o", "x.pfm"];
+        let report = json(&render(&folder, &[&scene[..], strategy].concat()));
+        assert_eq!(report["camera_rays"], 24 * 18 * 4);
+        assert_eq!(report["non_finite_samples"], 0);
+        assert_eq!(report["complete"], true);
+        assert_eq!(report["settings"]["size"], serde_json::json!([24, 18]));
+        for stage in ["load", "build", "render", "write"] {
+            assert!(report["seconds"][stage]["wall"].as_f64().unwrap() >= 0.0);
+        }
+        assert!(report["rays_per_second"].as_f64().unwrap() > 0.0);
+        assert!(report["shadow_rays"].as_u64().unwrap() > 0, "{strategy:?}");
+        assert_eq!(report["outputs"], serde_json::json!(["x.exr", "x.pfm"]));
+        #[cfg(target_os = "linux")]
+        assert!(report["peak_memory_bytes"].as_u64().unwrap() > 1 << 20);
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_file() {
+    let folder = folder();
+    let picture = |name: &str, seed: &str, threads: &str| {
+        let output = render(&folder, &["--seed", seed, "--threads", threads, "-o", name]);
+        succeeded(&output);
+        fs::read(folder.path().join(name)).unwrap()
+    };
+    assert_eq!(picture("a.pfm", "7", "1"), picture("b.pfm", "7", "2"));
+    assert_ne!(picture("a.pfm", "7", "1"), picture("c.pfm", "8", "1"));
+}
+
+#[test]
+fn own_meshes_render_under_own_probes() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("triangle.obj"), TRIANGLE).unwrap();
+    let sky = RgbImage::from_fn(8, 4, |x, y| Rgb::splat((x + y) as f32));
+    write_exr(&at("sky.exr"), &sky, None);
+    let scene = "[environment]\nfile = \"sky.exr\"\nrotate = 20.0\n\n\
+                 [[objects]]\nfile = \"triangle.obj\"\nmaterial = \"shiny\"\n\n\
+                 [materials]\nshiny = \"ggx:0.2\"\n";
+    fs::write(at("scene.toml"), scene).unwrap();
+    let output = render(&folder, &["scene.toml", "-o", "a.exr"]);
+    succeeded(&output);
+    let mesh = ["triangle.obj", "--env", "sky.exr", "--material", "phong:50:1:0", "--normalize"];
+    let more = ["--ground", "--hide-env", "--up", "0,1,0", "--origin", "-1,0.5,4", "--fov", "40"];
+    let output = render(&folder, &[&mesh[..], &more[..], &["-o", "b.png", "-o", "b.hdr"]].concat());
+    succeeded(&output);
+    let ortho =
+        ["triangle.obj", "--env", "constant", "--ortho", "3", "--env-up", "z", "-o", "c.exr"];
+    succeeded(&render(&folder, &ortho));
+}
+
+#[test]
+fn standard_output_takes_a_picture() {
+    let folder = folder();
+    let output = render(&folder, &["-q", "-o", "-"]);
+    succeeded(&output);
+    assert!(output.stdout.starts_with(&[0x76, 0x2f, 0x31, 0x01]), "OpenEXR");
+    refused(&render(&folder, &["--json", "-o", "-"]), 2, &["standard output"]);
+}
+
+#[test]
+fn flags_that_contradict_are_usage_errors() {
+    let folder = folder();
+    refused(&render(&folder, &["--strategy", "mis", "--rays", "1"]), 2, &["--split 1:0"]);
+    refused(&render(&folder, &["--strategy", "brdf", "--split", "1:1"]), 2, &["--split", "mis"]);
+    let alone = ["--compensation", "--split", "2:0"];
+    refused(&render(&folder, &alone), 2, &["--compensation", "BRDF"]);
+    refused(&render(&folder, &["--size", "0x4"]), 2, &["0x4", "800x600"]);
+    refused(&render(&folder, &["--material", "velvet"]), 2, &["velvet", "ggx:"]);
+    refused(&render(&folder, &["-o", "picture.bmp"]), 2, &["picture.bmp", ".exr"]);
+    refused(&render(&folder, &["--filter", "lanczos"]), 2, &["lanczos", "gaussian"]);
+    refused(&render(&folder, &["--tone", "filmic"]), 2, &["filmic", "agx"]);
+    refused(&render(&folder, &["--up", "0,0,0"]), 1, &["up"]);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn missing_and_bad_files_are_named() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    refused(&render(&folder, &["bunny.ply"]), 1, &["bunny.ply", "No such file"]);
+    refused(&render(&folder, &["statuette"]), 1, &["statuette"]);
+    refused(&render(&folder, &["--env", "grace.hdr"]), 1, &["grace.hdr", "No such file", "sky"]);
+    fs::write(at("broken.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
+    refused(&render(&folder, &["broken.obj"]), 1, &["broken.obj", "2"]);
+    fs::write(at("broken.hdr"), "#?RADIANCE\n\n-Y 4000 +X 9000\n").unwrap();
+    refused(&render(&folder, &["--env", "broken.hdr"]), 1, &["broken.hdr"]);
+    let scene = "[[objects]]\nfile = \"gone.ply\"\n";
+    fs::write(at("scene.toml"), scene).unwrap();
+    refused(&render(&folder, &["scene.toml"]), 1, &["gone.ply", "scene.toml"]);
+    assert!(!at("domelight.exr").exists());
+}
+
+#[test]
+fn bad_texels_are_refused_or_repaired() {
+    let folder = folder();
+    let mut map = RgbImage::filled(8, 4, Rgb::splat(1.0));
+    map.pixels[8 + 3].g = -2.0;
+    map.pixels[16].r = f32::NAN;
+    write_exr(&folder.path().join("bad.exr"), &map, None);
+    let arguments = ["sphere", "--env", "bad.exr", "-o", "x.pfm"];
+    refused(&render(&folder, &arguments), 1, &["bad.exr", "(3, 1)", "-2", "--sanitize"]);
+    let output = render(&folder, &[&arguments[..], &["--sanitize"]].concat());
+    succeeded(&output);
+    assert!(stderr(&output).contains("1 negative"), "{}", stderr(&output));
+    let picture = load(&folder, "x.pfm");
+    assert!(picture.pixels.iter().all(|p| p.is_finite()));
+}
+
+#[test]
+fn an_unwritable_place_is_an_error_that_names_it() {
+    let folder = folder();
+    let output = render(&folder, &["-o", "no/such/folder/x.png"]);
+    refused(&output, 1, &["no/such/folder/x.png"]);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+/// Ctrl-C ends a long render with what is there.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_what_is_done() {
+    use nix::sys::signal::{Signal, kill};
+    use nix::unistd::Pid;
+    use std::process::{Command, Stdio};
+    use std::time::Duration;
+
+    let folder = folder();
+    let arguments = [
+        "render",
+        "sphere",
+        "--size",
+        "64x64",
+        "--spp",
+        "1000000",
+        "--env-rows",
+        "32",
+        "-o",
+        "x.exr",
+    ];
+    let child = Command::new(env!("CARGO_BIN_EXE_domelight"))
+        .args(arguments)
+        .current_dir(&folder)
+        .stdin(Stdio::null())
+        .stderr(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(1500));
+    kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();
+    let output = child.wait_with_output().unwrap();
+    refused(&output, 1, &["interrupted", "x.exr"]);
+    assert_eq!(stdout(&output), "");
+    assert!(load(&folder, "x.exr").pixels.iter().all(|p| p.is_finite()));
+}

@@ -1,0 +1,94 @@
+//! How well a rig shades.
+//!
+//! Without occluders, over normals spread evenly on the sphere: the irradiance of a matt surface,
+//! ∫ L max(0, n·ω) dω, and a glossy lobe, ∫ L max(0, n·ω)²⁰ dω, both of luminance. Shadows are not
+//! part of it: there point lights stay hard, and the error falls slowly with any method.
+
+use super::Rig;
+use super::regions::{Blocks, Metric};
+use super::texels::{Texels, in_order, unit};
+use crate::environment::Environment;
+use crate::math::{TAU, Vec3, vec3};
+
+/// Normals that errors are measured over.
+const N_NORMALS: usize = 600;
+/// Parts of the map that the reference sums over, at the most.
+const MAX_BLOCKS: usize = 1 << 17;
+
+/// The root mean square error of a rig's shading, relative to the root mean square of the map's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShadingError {
+    /// Of a matt surface; 0.01 is one per cent.
+    pub diffuse: f64,
+    /// Of the lobe cos²⁰.
+    pub glossy: f64,
+}
+
+/// What a map shades, to be compared with many rigs.
+#[derive(Clone, Debug)]
+pub struct ShadingReference {
+    exact: Vec<Shading>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Shading {
+    diffuse: f64,
+    glossy: f64,
+}
+
+impl Shading {
+    /// Adds light of luminance `energy` \[times sr\] from a direction whose cosine to the normal is
+    /// `cos_theta`.
+    fn add(&mut self, cos_theta: f64, energy: f64) {
+        if cos_theta > 0.0 {
+            self.diffuse += energy * cos_theta;
+            self.glossy += energy * cos_theta.powi(20);
+        }
+    }
+}
+
+impl ShadingReference {
+    /// Sums over all texels; on maps of more than 2¹⁷ over the energy centroids of blocks.
+    pub fn new(environment: &Environment) -> Self {
+        let texels = Texels::new(environment);
+        let blocks = Blocks::at_most(MAX_BLOCKS, texels.width(), texels.height());
+        let lights: Vec<(Vec3, f64)> = blocks
+            .moments(&texels, Metric::Sphere)
+            .iter()
+            .filter(|m| m.energy > 0.0)
+            .filter_map(|m| unit(m.first).map(|_| (texels.to_world(m.first), m.energy)))
+            .collect();
+        Self { exact: in_order(N_NORMALS, |i| shade(normal(i), &lights)) }
+    }
+
+    /// The error of a rig.
+    pub fn error(&self, rig: &Rig) -> ShadingError {
+        let light = |l: &super::RigLight| (l.direction, f64::from(l.irradiance.luminance()));
+        let lights: Vec<_> = rig.lights.iter().map(light).collect();
+        let shaded = in_order(N_NORMALS, |i| shade(normal(i), &lights));
+        let relative = |channel: fn(&Shading) -> f64| {
+            let pairs = self.exact.iter().zip(&shaded).map(|(e, s)| (channel(e), channel(s)));
+            let error: f64 = pairs.clone().map(|(e, s)| (e - s).powi(2)).sum();
+            let exact: f64 = pairs.map(|(e, _)| e * e).sum();
+            if exact > 0.0 { (error / exact).sqrt() } else { 0.0 }
+        };
+        ShadingError { diffuse: relative(|s| s.diffuse), glossy: relative(|s| s.glossy) }
+    }
+}
+
+fn shade(normal: Vec3, lights: &[(Vec3, f64)]) -> Shading {
+    let mut sum = Shading::default();
+    for &(direction, energy) in lights {
+        sum.add(f64::from(normal.dot(direction)), energy);
+    }
+    sum
+}
+
+/// Normal `i` of [`N_NORMALS`] on the golden spiral.
+fn normal(i: usize) -> Vec3 {
+    const GOLDEN: f32 = 0.618_034;
+    let y = 1.0 - (2 * i + 1) as f32 / N_NORMALS as f32;
+    let (sin_phi, cos_phi) = (TAU * (GOLDEN * i as f32).fract()).sin_cos();
+    let sin_theta = (1.0 - y * y).sqrt();
+    vec3(sin_phi * sin_theta, y, cos_phi * sin_theta)
+}

@@ -1,0 +1,271 @@
+//! Light rigs: a lat-long map turned into a handful of directional lights.
+//!
+//! A method divides the map into regions and puts one light into each:
+//! - [`median_cut`] halves the energy of rectangles: Debevec 2005, "A Median Cut Algorithm for
+//!   Light Probe Sampling".
+//! - [`variance_minimization`] halves their spread instead: Viriyothai & Debevec 2009, "Variance
+//!   Minimization Light Probe Sampling", and a form of it on the sphere that is better throughout.
+//!
+//! # What is exact
+//! Every texel of the map belongs to one region, and a light's irradiance is the sum over its
+//! region's texels of radiance times *exact* solid angle, in double precision: the lights add up to
+//! the integral of the map in each channel. Directions and sizes come from the exact integrals of
+//! the direction over each texel. Where regions are cut is a choice, not an integral: on maps of
+//! more than two million texels large regions are cut between blocks of texels.
+//!
+//! Everything here has the same bits for any number of threads.
+
+mod cells;
+mod error;
+mod median_cut;
+mod merge;
+mod regions;
+mod split;
+mod texels;
+mod variance_minimization;
+
+pub use error::{ShadingError, ShadingReference};
+pub use median_cut::{LightPosition, MedianCut, median_cut};
+pub use split::Order;
+pub use variance_minimization::{Rule, VarianceMinimization, variance_minimization};
+
+use crate::Rgb;
+use crate::math::Vec3;
+use texels::{Texels, bands, in_order};
+
+/// Why there is no rig.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RigError {
+    /// A rig of no lights.
+    #[error("a rig has at least one light; 0 were asked for")]
+    NoLights,
+    /// A map without light.
+    #[error("the map is black; there is no light to extract")]
+    Black,
+    /// More lights than texels that could be one.
+    #[error("{n_lights} lights were asked for, but only {lit} texels of the map are not black")]
+    TooFewTexels {
+        /// Lights asked for.
+        n_lights: usize,
+        /// Texels with luminance.
+        lit: usize,
+    },
+}
+
+impl RigError {
+    /// Whether `lit` texels make `n_lights` lights.
+    fn check(n_lights: usize, lit: usize) -> Result<(), Self> {
+        match lit {
+            _ if n_lights == 0 => Err(Self::NoLights),
+            0 => Err(Self::Black),
+            _ if n_lights > lit => Err(Self::TooFewTexels { n_lights, lit }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Directional lights that stand for an environment, and the region of the map behind each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig {
+    /// The lights, those of the greatest luminance first.
+    pub lights: Vec<RigLight>,
+    /// Columns of the map.
+    pub width: usize,
+    /// Rows of the map.
+    pub height: usize,
+    /// The index in [`Rig::lights`] of the light of each texel, row by row.
+    pub labels: Vec<u32>,
+}
+
+/// A distant light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigLight {
+    /// Toward the light, unit vector in the world.
+    pub direction: Vec3,
+    /// ∫ L dω over the region \[W·m⁻²\]: what a surface that faces the light receives. All lights
+    /// together have the integral of the map, channel by channel.
+    pub irradiance: Rgb,
+    /// Angular radius of the uniformly bright disc of the same spread \[rad\], in [0, π].
+    ///
+    /// A disc of radius α has the mean direction |R|/W = (1 + cos α)/2, where W = ∫ L dω and
+    /// R = ∫ L ω dω of luminance. So a sun that fills its region alone gets its own radius.
+    pub angular_radius: f32,
+    /// Share of the map's luminance, in [0, 1].
+    pub share: f32,
+    /// Solid angle of the region \[sr\].
+    pub solid_angle: f32,
+    /// The shape of the region.
+    pub region: Region,
+}
+
+/// The shape of a light's region; its texels are those of its label in [`Rig::labels`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Region {
+    /// A rectangle of the map.
+    Rectangle(TexelRect),
+    /// The texels that are nearer to this light than to any other, on the sphere.
+    Cell,
+}
+
+/// Columns [x0, x1) and rows [y0, y1) of the map.
+///
+/// Columns run on across the seam: 0 ≤ x0 < width, x1 ≤ x0 + width, and column x is column
+/// x − width where x ≥ width.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TexelRect {
+    /// First column.
+    pub x0: usize,
+    /// Column after the last.
+    pub x1: usize,
+    /// First row.
+    pub y0: usize,
+    /// Row after the last.
+    pub y1: usize,
+}
+
+impl TexelRect {
+    /// How many texels.
+    pub fn area(&self) -> usize {
+        (self.x1 - self.x0) * (self.y1 - self.y0)
+    }
+
+    /// The columns as one or two ranges within a map of `width` columns.
+    pub fn columns(&self, width: usize) -> [std::ops::Range<usize>; 2] {
+        [self.x0..self.x1.min(width), 0..self.x1.saturating_sub(width)]
+    }
+}
+
+impl Rig {
+    /// Σ irradiance \[W·m⁻²\].
+    pub fn irradiance(&self) -> Rgb {
+        let sum = |channel: fn(&RigLight) -> f32| {
+            self.lights.iter().map(|l| f64::from(channel(l))).sum::<f64>() as f32
+        };
+        Rgb::new(sum(|l| l.irradiance.r), sum(|l| l.irradiance.g), sum(|l| l.irradiance.b))
+    }
+
+    /// A light at the energy centroid of each region, from its label, sums and shape.
+    fn new(texels: &Texels, mut labels: Vec<u32>, sums: &[RegionSums], shapes: &[Region]) -> Self {
+        let (width, height) = (texels.width(), texels.height());
+        let total: f64 = sums.iter().map(|s| s.energy).sum();
+        let mut order: Vec<usize> = (0..sums.len()).collect();
+        order.sort_by(|&a, &b| sums[b].energy.total_cmp(&sums[a].energy));
+        let mut rank = vec![0; sums.len()];
+        for (new, &old) in order.iter().enumerate() {
+            rank[old] = new as u32;
+        }
+        bands(&mut labels, width, |_, row| row.iter_mut().for_each(|l| *l = rank[*l as usize]));
+        let lights = order.iter().map(|&i| sums[i].light(texels, total, shapes[i])).collect();
+        Self { lights, width, height, labels }
+    }
+
+    /// A light at the energy centroid of each of the rectangles, which partition the map.
+    fn from_rectangles(texels: &Texels, rectangles: &[TexelRect]) -> Self {
+        let labels = fill(rectangles, texels.width(), texels.height());
+        let sums = RegionSums::of(texels, &labels, rectangles.len());
+        let shapes: Vec<_> = rectangles.iter().map(|&r| Region::Rectangle(r)).collect();
+        Self::new(texels, labels, &sums, &shapes)
+    }
+}
+
+/// The label map of rectangles.
+fn fill(rectangles: &[TexelRect], width: usize, height: usize) -> Vec<u32> {
+    const ROWS: usize = 32;
+    let mut labels = vec![0; width * height];
+    bands(&mut labels, width * ROWS, |band, labels| {
+        let top = band * ROWS;
+        let bottom = top + labels.len() / width;
+        for (i, r) in rectangles.iter().enumerate() {
+            for y in r.y0.max(top)..r.y1.min(bottom) {
+                for columns in r.columns(width) {
+                    labels[(y - top) * width..][columns].fill(i as u32);
+                }
+            }
+        }
+    });
+    labels
+}
+
+/// Integrals over a region, in the map's frame.
+#[derive(Clone, Copy, Debug, Default)]
+struct RegionSums {
+    /// ∫ luminance dω.
+    energy: f64,
+    /// ∫ luminance · ω dω.
+    moment: [f64; 3],
+    /// ∫ L dω.
+    irradiance: [f64; 3],
+    /// ∫ dω.
+    solid_angle: f64,
+}
+
+impl RegionSums {
+    /// Those of each label.
+    fn of(texels: &Texels, labels: &[u32], n: usize) -> Vec<Self> {
+        const BANDS: usize = 16;
+        let (width, height) = (texels.width(), texels.height());
+        let parts = in_order(BANDS, |band| {
+            let mut sums = vec![Self::default(); n];
+            for y in band * height / BANDS..(band + 1) * height / BANDS {
+                let row = &labels[y * width..(y + 1) * width];
+                let mut x = 0;
+                for run in row.chunk_by(|a, b| a == b) {
+                    sums[run[0] as usize].add_run(texels, x..x + run.len(), y);
+                    x += run.len();
+                }
+            }
+            sums
+        });
+        let mut sums = vec![Self::default(); n];
+        for part in parts {
+            sums.iter_mut().zip(part).for_each(|(s, p)| s.add(&p));
+        }
+        sums
+    }
+
+    /// Adds texels of one row.
+    fn add_run(&mut self, texels: &Texels, columns: std::ops::Range<usize>, y: usize) {
+        let mut rgb = [0.0; 3];
+        let [mut energy, mut sin, mut cos] = [0.0; 3];
+        for (le, c) in texels.row(y)[columns.clone()].iter().zip(&texels.columns[columns.clone()]) {
+            let luminance = f64::from(le.luminance());
+            energy += luminance;
+            sin += luminance * c[0];
+            cos += luminance * c[1];
+            rgb[0] += f64::from(le.r);
+            rgb[1] += f64::from(le.g);
+            rgb[2] += f64::from(le.b);
+        }
+        let row = &texels.rows[y];
+        let moment = [sin * row.horizontal, energy * row.vertical, cos * row.horizontal];
+        self.add(&Self {
+            energy: energy * row.solid_angle,
+            moment,
+            irradiance: rgb.map(|c| c * row.solid_angle),
+            solid_angle: columns.len() as f64 * row.solid_angle,
+        });
+    }
+
+    fn add(&mut self, o: &Self) {
+        self.energy += o.energy;
+        self.solid_angle += o.solid_angle;
+        for c in 0..3 {
+            self.moment[c] += o.moment[c];
+            self.irradiance[c] += o.irradiance[c];
+        }
+    }
+
+    fn light(&self, texels: &Texels, total: f64, region: Region) -> RigLight {
+        let [r, g, b] = self.irradiance.map(|c| c as f32);
+        let length = self.moment.map(|m| m * m).iter().sum::<f64>().sqrt();
+        let concentration = (length / self.energy).min(1.0);
+        RigLight {
+            direction: texels.to_world(self.moment),
+            irradiance: Rgb::new(r, g, b),
+            angular_radius: (2.0 * concentration - 1.0).acos() as f32,
+            share: (self.energy / total) as f32,
+            solid_angle: self.solid_angle as f32,
+            region,
+        }
+    }
+}

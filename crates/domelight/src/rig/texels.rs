@@ -1,0 +1,214 @@
+//! The texels of a lat-long map with the exact integrals over each, and loops over them whose
+//! result does not depend on the number of threads.
+
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+use crate::Rgb;
+use crate::environment::Environment;
+use crate::math::{Vec2, Vec3, vec2, vec3};
+
+/// Integrals over one texel of a row; those over φ are in [`Texels::columns`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    /// ∫∫ sin θ dθ dφ \[sr\].
+    pub(super) solid_angle: f64,
+    /// ∫∫ cos θ sin θ dθ dφ: the vertical part of ∫ ω dω.
+    pub(super) vertical: f64,
+    /// ∫ sin² θ dθ: times the column's integrals, the horizontal part of ∫ ω dω.
+    pub(super) horizontal: f64,
+}
+
+/// A map in its own frame: +Y up, the centre column toward −Z, whatever its orientation.
+pub(super) struct Texels<'a> {
+    environment: &'a Environment,
+    /// ∫ sin φ dφ and −∫ cos φ dφ over each column.
+    pub(super) columns: Vec<[f64; 2]>,
+    pub(super) rows: Vec<Row>,
+    /// sin φ and −cos φ at the edges and middles of columns, by half columns from the left.
+    half_columns: Vec<[f32; 2]>,
+    /// sin θ and cos θ at the edges and middles of rows, by half rows from the top.
+    half_rows: Vec<[f32; 2]>,
+    /// The world directions of the map's axes.
+    axes: [Vec3; 3],
+}
+
+impl<'a> Texels<'a> {
+    pub(super) fn new(environment: &'a Environment) -> Self {
+        let (width, height) = (environment.map().width, environment.map().height);
+        let phi = |x: f64| TAU * (x / width as f64 - 0.5);
+        let column = |x: usize| {
+            // ∫ sin φ = 2 sin φ_c sin(Δ/2) without the cancellation of cos φ0 − cos φ1.
+            let (sin, cos) = phi(x as f64 + 0.5).sin_cos();
+            let chord = 2.0 * (PI / width as f64).sin();
+            [sin * chord, -cos * chord]
+        };
+        let half_column = |i: usize| {
+            let (sin, cos) = phi(0.5 * i as f64).sin_cos();
+            [sin as f32, -cos as f32]
+        };
+        let half_row = |i: usize| {
+            let (sin, cos) = (PI * 0.5 * i as f64 / height as f64).sin_cos();
+            [sin as f32, cos as f32]
+        };
+        Self {
+            environment,
+            columns: (0..width).map(column).collect(),
+            rows: (0..height).map(|y| Row::new(y, width, height)).collect(),
+            half_columns: (0..=2 * width).map(half_column).collect(),
+            half_rows: (0..=2 * height).map(half_row).collect(),
+            axes: [vec2(0.75, 0.5), vec2(0.5, 0.0), vec2(0.5, 0.5)]
+                .map(|uv: Vec2| environment.direction(uv)),
+        }
+    }
+
+    pub(super) fn environment(&self) -> &'a Environment {
+        self.environment
+    }
+
+    pub(super) fn width(&self) -> usize {
+        self.columns.len()
+    }
+
+    pub(super) fn height(&self) -> usize {
+        self.rows.len()
+    }
+
+    pub(super) fn row(&self, y: usize) -> &'a [Rgb] {
+        self.environment.map().row(y)
+    }
+
+    /// The middle of a texel, unit vector in the map's frame.
+    pub(super) fn centre(&self, x: usize, y: usize) -> Vec3 {
+        self.half(2 * x + 1, 2 * y + 1)
+    }
+
+    /// The direction at `x` half columns and `y` half rows.
+    fn half(&self, x: usize, y: usize) -> Vec3 {
+        let ([sin_phi, cos_phi], [sin_theta, cos_theta]) =
+            (self.half_columns[x], self.half_rows[y]);
+        vec3(sin_phi * sin_theta, cos_theta, cos_phi * sin_theta)
+    }
+
+    /// A direction in a rectangle without a seam, and a bound on the angle from it to any other.
+    ///
+    /// The straight line on the map from the middle, Δφ and Δθ away at the most, is no longer than
+    /// √(Δθ² + Δφ² sin² θ) on the sphere with the greatest sin θ, and a great circle is shorter.
+    pub(super) fn cone(&self, columns: &Range<usize>, rows: &Range<usize>) -> (Vec3, f32) {
+        let middle = self.half(columns.start + columns.end, rows.start + rows.end);
+        let delta_phi = PI as f32 * columns.len() as f32 / self.width() as f32;
+        let delta_theta = 0.5 * PI as f32 * rows.len() as f32 / self.height() as f32;
+        let equator = (self.height()).clamp(2 * rows.start, 2 * rows.end);
+        (middle, delta_theta.hypot(delta_phi * self.half_rows[equator][0]))
+    }
+
+    /// The direction at column `x` and row `y`, fractions allowed, in the map's frame.
+    pub(super) fn direction(&self, x: f64, y: f64) -> [f64; 3] {
+        let (sin_phi, cos_phi) = (TAU * (x / self.width() as f64 - 0.5)).sin_cos();
+        let (sin_theta, cos_theta) = (PI * y / self.height() as f64).sin_cos();
+        [sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta]
+    }
+
+    /// The unit vector along `m` of the map's frame, in the world; up where `m` has no direction.
+    pub(super) fn to_world(&self, m: [f64; 3]) -> Vec3 {
+        let v = unit(m).unwrap_or(Vec3::Y);
+        (self.axes[0] * v.x + self.axes[1] * v.y - self.axes[2] * v.z).normalize()
+    }
+}
+
+impl Row {
+    fn new(y: usize, width: usize, height: usize) -> Self {
+        let (top, bottom) = (PI * y as f64 / height as f64, PI * (y + 1) as f64 / height as f64);
+        let step = TAU / width as f64;
+        let half = 0.5 * (bottom - top);
+        let middle = top + half;
+        // Differences of cos θ, sin² θ / 2 and (2θ − sin 2θ) / 4 as products.
+        let band = 2.0 * middle.sin() * half.sin();
+        Self {
+            solid_angle: step * band,
+            vertical: step * 0.5 * (2.0 * middle).sin() * (2.0 * half).sin(),
+            horizontal: half - 0.5 * (2.0 * middle).cos() * (2.0 * half).sin(),
+        }
+    }
+}
+
+/// `m` as a unit vector; none if its length is zero or lost in rounding.
+pub(super) fn unit(m: [f64; 3]) -> Option<Vec3> {
+    let length = m.map(|c| c * c).iter().sum::<f64>().sqrt();
+    let [x, y, z] = m.map(|c| (c / length) as f32);
+    (length > 0.0 && length.is_finite()).then(|| vec3(x, y, z))
+}
+
+/// `f(0)`, …, `f(n − 1)`, in parallel with the feature `render`.
+pub(super) fn in_order<R: Send>(n: usize, f: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    #[cfg(feature = "render")]
+    {
+        use rayon::prelude::*;
+        (0..n).into_par_iter().map(&f).collect()
+    }
+    #[cfg(not(feature = "render"))]
+    (0..n).map(f).collect()
+}
+
+/// `f(i, chunk i)` of chunks of `len`, in parallel with the feature `render`.
+pub(super) fn bands<T: Send>(slice: &mut [T], len: usize, f: impl Fn(usize, &mut [T]) + Sync) {
+    #[cfg(feature = "render")]
+    {
+        use rayon::prelude::*;
+        slice.par_chunks_mut(len).enumerate().for_each(|(i, chunk)| f(i, chunk));
+    }
+    #[cfg(not(feature = "render"))]
+    slice.chunks_mut(len).enumerate().for_each(|(i, chunk)| f(i, chunk));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::RgbImage;
+    use crate::environment::{Orientation, UpAxis};
+
+    /// Midpoint sums over a fine grid inside each texel, against the closed forms.
+    #[test]
+    fn integrals_over_a_texel() {
+        let (width, height, n) = (7, 5, 400);
+        let map = RgbImage::filled(width, height, Rgb::WHITE);
+        let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
+        let texels = Texels::new(&env);
+        for (x, y) in [(0, 0), (3, 2), (6, 4), (2, 1)] {
+            let mut sum = [0.0; 4];
+            for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
+                let v = y as f64 + (j as f64 + 0.5) / n as f64;
+                let d = texels.direction(x as f64 + (i as f64 + 0.5) / n as f64, v);
+                let cell = TAU * PI / (n * n * width * height) as f64;
+                let weight = cell * (PI * v / height as f64).sin();
+                sum[0] += weight;
+                (0..3).for_each(|c| sum[c + 1] += weight * d[c]);
+            }
+            let (row, column) = (texels.rows[y], texels.columns[x]);
+            let exact = [
+                row.solid_angle,
+                row.horizontal * column[0],
+                row.vertical,
+                row.horizontal * column[1],
+            ];
+            for (a, b) in sum.iter().zip(exact) {
+                assert!((a - b).abs() < 1e-5, "({x}, {y}): {sum:?} {exact:?}");
+            }
+            assert!((row.solid_angle - env.texel_solid_angle(y)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_world_is_the_environments() {
+        for (up, rotation) in [(UpAxis::Y, 0.0), (UpAxis::Y, 70.0), (UpAxis::Z, -123.0)] {
+            let map = RgbImage::filled(12, 6, Rgb::WHITE);
+            let env = Environment::new(map, Orientation { up, rotation }, 1.0).unwrap();
+            let texels = Texels::new(&env);
+            for (x, y) in [(0.5, 0.5), (3.0, 2.2), (11.9, 5.0), (6.0, 3.0)] {
+                let world = texels.to_world(texels.direction(x, y));
+                let expected = env.direction(vec2(x as f32 / 12.0, y as f32 / 6.0));
+                assert!((world - expected).length() < 1e-5, "{world} {expected}");
+            }
+        }
+    }
+}

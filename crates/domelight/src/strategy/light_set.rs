@@ -1,0 +1,37 @@
+//! A fixed set of lights: no noise, but the light of each region comes from a single direction.
+
+use super::{PointStrategy, SampleNumbers, ShadingPoint};
+use crate::Rgb;
+use crate::math::Vec3;
+use crate::rig::Rig;
+
+/// Σ f_r cos θ · E over the lights of a rig, E their irradiance: the same rays at every point.
+///
+/// Biased: shadows are sums of hard ones and narrow lobes see separate lights.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSet<'a> {
+    /// The lights.
+    pub rig: &'a Rig,
+}
+
+impl PointStrategy for LightSet<'_> {
+    type Scratch = ();
+
+    const UNBIASED: bool = false;
+
+    fn n_rays(&self) -> u32 {
+        self.rig.lights.len() as u32
+    }
+
+    fn sample(
+        &self,
+        at: &ShadingPoint,
+        _: SampleNumbers,
+        (): &mut (),
+        mut push: impl FnMut(Vec3, Rgb),
+    ) {
+        for light in &self.rig.lights {
+            push(light.direction, at.eval(light.direction) * light.irradiance);
+        }
+    }
+}
