@@ -85,7 +85,7 @@ pub(crate) fn integral<const N: usize>(
 
 /// ∫ f_r · cos θ · L · V dω.
 pub(crate) fn quadrature(env: &Environment, at: &ShadingPoint) -> [f64; 3] {
-    let rule = Adaptive { tolerance: 1e-4, min_depth: 2, max_depth: 8 };
+    let rule = Adaptive { tolerance: 1e-5, min_depth: 2, max_depth: 8 };
     integral(env, rule, |wi, le, hidden| {
         if hidden { [0.0; 3] } else { (at.eval(wi) * le).to_array().map(f64::from) }
     })
