@@ -6,17 +6,17 @@ mod common;
 use std::cell::RefCell;
 
 use common::{
-    HEIGHT, MATERIALS, WIDTH, batches, environment, estimate, hidden, integral, point, quadrature,
+    HEIGHT, MATERIALS, WIDTH, batches, environment, hidden, integral, point, quadrature,
     texel_integrals, white_environment,
 };
 use domelight::bsdf::{Brdf, Material, MaterialSpec};
 use domelight::environment::{Environment, Orientation, UpAxis};
-use domelight::math::Vec3;
+use domelight::math::{Vec2, Vec3};
 use domelight::sampling::{Heuristic, SamplerKind, Stream};
 use domelight::strategy::{
-    BrdfSampling, Candidates, LightTable, MultipleImportanceSampling, PointStrategy, Proposal,
-    RejectionSampling, RejectionScratch, Resampling, SampleNumbers, SamplingImportanceResampling,
-    ShadingPoint, Stop,
+    Candidates, LightTable, MultipleImportanceSampling, PointStrategy, Proposal, RejectionSampling,
+    RejectionScratch, Resampling, SampleNumbers, SamplingImportanceResampling, ShadingPoint,
+    SirScratch, Stop,
 };
 use domelight::{Rgb, RgbImage};
 use rayon::prelude::*;
@@ -232,7 +232,7 @@ fn picks_approach_the_product() {
     let total: f64 = product.iter().map(|p| p[0]).sum();
     let statistic = |resampling, n_candidates| {
         let strategy = sir(&env, (n_candidates, 1), Candidates::Mixture, resampling);
-        let mut scratch = Default::default();
+        let mut scratch = SirScratch::default();
         let mut counts = [0.0; WIDTH * HEIGHT];
         let stream = Stream::new(SamplerKind::Independent, 6, u64::from(n_candidates));
         for sample in 0..20_000 {
@@ -417,14 +417,15 @@ fn darkness_is_dark() {
     assert!(unoccluded(&env, &black_surface).iter().all(|sum| sum.is_black()));
 }
 
-/// One lit texel of a fine map: a tenth of the directions of a diffuse BRDF in a hundred thousand.
+/// One lit texel of a fine map, two thirds of a degree across: the integrand varies by less than a
+/// percent over it, and the BRDF practically never finds it.
 #[test]
 fn one_lit_texel() {
     let mut map = RgbImage::filled(512, 256, Rgb::BLACK);
     map.pixels[40 * 512 + 300] = Rgb::new(3e5, 2e5, 1e5);
     let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
     let at = point(material("diffuse:0.8,0.5,0.2"), 0.7);
-    let le = env.sample(Default::default()).unwrap();
+    let le = env.sample(Vec2::splat(0.5)).unwrap();
     // The texel is so small that its centre stands for all of it.
     let expected = at.eval(env.direction([300.5 / 512.0, 40.5 / 256.0].into())) * le.le / le.pdf;
     let close = |strategy: &str, sum: Rgb, samples: f32, tolerance: f32| {
@@ -452,7 +453,7 @@ fn the_sum_of_the_weights_is_the_unshadowed_estimate() {
             .flat_map(|r| [1, 3, 40].map(|n| sir(&env, (9, n), candidates, r)))
             .map(|strategy| {
                 let (mut sum, mut rays) = (0.0, Vec::new());
-                strategy.sample(&at, numbers, &mut Default::default(), |wi, w| {
+                strategy.sample(&at, numbers, &mut SirScratch::default(), |wi, w| {
                     sum += w.luminance();
                     assert!(!rays.contains(&wi));
                     rays.push(wi);
@@ -477,8 +478,4 @@ fn the_pilot_tells_smooth_from_spotted() {
     assert!(spread(&spotted, Candidates::Mixture) < spread(&spotted, Candidates::Brdf));
     let black = Environment::constant(Rgb::BLACK).unwrap();
     assert_eq!(spread(&black, Candidates::Mixture), 0.0);
-    // A pilot is not the estimate: it must not look at the numbers that will be used.
-    let strategy = BrdfSampling { environment: &even, n_samples: 1 };
-    let stream = Stream::new(SamplerKind::Sobol, 1, 0);
-    assert!(estimate(&strategy, &even, &at, stream, 16)[0] > 0.0);
 }

@@ -170,7 +170,9 @@ impl<'a> RejectionSampling<'a> {
         let tries = self.draw(at, envelope, numbers, kept);
         let accepted = kept.len() as u32;
         let weight = envelope.mass * self.stop.share(tries, accepted);
-        kept.iter().for_each(|k| push(k.wi, k.value * weight));
+        for k in &*kept {
+            push(k.wi, k.value * weight);
+        }
         let ran_out = matches!(self.stop, Stop::Accepted { n, .. } if accepted < n);
         RejectionStatistics { proposal: envelope.proposal, tries, accepted, ran_out }
     }
@@ -207,10 +209,8 @@ impl<'a> RejectionSampling<'a> {
         }
         match self.stop {
             Stop::Tries(n) => {
-                let dimension = match envelope.proposal {
-                    Proposal::Brdf => Dimension::Brdf,
-                    _ => Dimension::Environment,
-                };
+                let from_brdf = envelope.proposal == Proposal::Brdf;
+                let dimension = if from_brdf { Dimension::Brdf } else { Dimension::Environment };
                 kept.extend(
                     (0..n).filter_map(|j| self.attempt(at, envelope, numbers.get(dimension, j, n))),
                 );
@@ -229,21 +229,18 @@ impl<'a> RejectionSampling<'a> {
     }
 
     fn attempt(&self, at: &ShadingPoint, envelope: Envelope, u: Numbers) -> Option<Kept> {
-        match envelope.proposal {
-            Proposal::Brdf => {
-                let s = at.sample(u.u_lobe(), u.u())?;
-                let le = self.environment.le(s.wi);
-                let y = le.luminance();
-                let keep = u.u_accept() * envelope.bound < y;
-                keep.then(|| Kept { wi: s.wi, value: s.value / s.pdf * (le / y) })
-            }
-            _ => {
-                let s = self.environment.sample(u.u())?;
-                let product = at.eval(s.wi) * s.le;
-                let y = product.luminance();
-                let keep = u.u_accept() * envelope.bound * s.le.luminance() < y;
-                keep.then(|| Kept { wi: s.wi, value: product / y })
-            }
+        if envelope.proposal == Proposal::Brdf {
+            let s = at.sample(u.u_lobe(), u.u())?;
+            let le = self.environment.le(s.wi);
+            let y = le.luminance();
+            let keep = u.u_accept() * envelope.bound < y;
+            keep.then(|| Kept { wi: s.wi, value: s.value / s.pdf * (le / y) })
+        } else {
+            let s = self.environment.sample(u.u())?;
+            let product = at.eval(s.wi) * s.le;
+            let y = product.luminance();
+            let keep = u.u_accept() * envelope.bound * s.le.luminance() < y;
+            keep.then(|| Kept { wi: s.wi, value: product / y })
         }
     }
 }

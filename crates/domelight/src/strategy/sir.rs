@@ -270,7 +270,7 @@ impl Candidates {
         seed: u64,
     ) -> f64 {
         const N_CANDIDATES: u32 = 64;
-        const PILOT: u64 = 0x7069_6c6f_74;
+        const PILOT: u64 = 0x0070_696c_6f74;
         let sir = SamplingImportanceResampling {
             environment,
             n_candidates: N_CANDIDATES,
