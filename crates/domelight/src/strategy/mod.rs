@@ -28,7 +28,7 @@ pub use rejection::{
     Proposal, RejectionError, RejectionSampling, RejectionScratch, RejectionStatistics, Stop,
 };
 pub use sir::{
-    Candidates, Resampling, SamplingImportanceResampling, SirScratch, optimal_candidates,
+    Candidates, RAY_COST, Resampling, SamplingImportanceResampling, SirScratch, optimal_candidates,
 };
 
 use crate::Rgb;

@@ -301,8 +301,10 @@ mod tests {
                     walk[0] = 1.0;
                     let mut mean = 0.0;
                     for t in 1..=max_tries {
-                        let full = walk[n as usize - 1] * a;
-                        mean += full * f64::from(n) * f64::from(stop.share(t, n));
+                        if t >= n {
+                            let full = walk[n as usize - 1] * a;
+                            mean += full * f64::from(n) * f64::from(stop.share(t, n));
+                        }
                         for k in (0..n as usize).rev() {
                             walk[k] =
                                 walk[k] * (1.0 - a) + if k > 0 { walk[k - 1] * a } else { 0.0 };

@@ -295,16 +295,25 @@ impl Candidates {
     }
 }
 
+/// The cost of a shadow ray over that of a candidate, as measured with this library on scenes of a
+/// hundred thousand triangles under a map of 1024 × 512 texels: 0.05 to 0.08 µs against 0.2 µs, of
+/// which the look-up in the map and its table is the most. Rays cost more in larger scenes.
+pub const RAY_COST: f64 = 0.3;
+
 /// The number of candidates M with the least error for the cost of `n_samples` = N shadow rays and M
 /// candidates, a power of two not below N.
 ///
-/// The variance is A/M + B/N and the cost M c + N r, so M/N = √(A/B · r/c), where `ray_cost` is r/c.
-/// If the share v of a point's light is visible, whatever its direction, then with CV² =
-/// `relative_variance` of the weights A = v (CV² + 1 − v) L_ns² and B = v (1 − v) L_ns², so A/B =
-/// 1 + CV²/(1 − v). No ray is traced to know v: a half is assumed. The optimum is flat, so the power
-/// of two, of which Sobol' points are best distributed, costs little: at √2 times the optimal ratio
-/// the product of cost and variance is at most 3 % above its minimum. Stratified candidates need
-/// fewer than this.
+/// The variance is A/M + B/N and the cost M c + N r, so M/N = √(A/B · r/c), where `ray_cost` is r/c,
+/// such as [`RAY_COST`]. If the share v of a point's light is visible, whatever its direction, then
+/// with CV² = `relative_variance` of the weights ([`Candidates::relative_variance`])
+///
+/// ```text
+/// A = v (CV² + 1 − v) L_ns²    B = v (1 − v) L_ns²    A/B = 1 + CV²/(1 − v)
+/// ```
+///
+/// No ray is traced to know v: a half is assumed. The optimum is flat, so the power of two, of which
+/// Sobol' points are best distributed, costs little: at √2 times the optimal ratio the product of
+/// cost and variance is at most 3 % above its minimum.
 pub fn optimal_candidates(n_samples: u32, relative_variance: f64, ray_cost: f64) -> u32 {
     let ratio = ((1.0 + 2.0 * relative_variance) * ray_cost).sqrt();
     let m = (f64::from(n_samples.max(1)) * ratio).clamp(1.0, f64::from(1u32 << 20));
