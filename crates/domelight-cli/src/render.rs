@@ -49,7 +49,8 @@ impl SamplingArguments {
             HeuristicName::Balance => Heuristic::Balance,
             HeuristicName::Power => Heuristic::Power,
         };
-        let only_mis = [(self.split.is_some(), "--split"), (self.compensation, "--compensation")];
+        let only_mis =
+            [(self.split.is_some(), "--split"), (self.no_compensation, "--no-compensation")];
         let n = self.rays.unwrap_or(1);
         match self.strategy {
             StrategyName::Mis => {
@@ -63,10 +64,9 @@ impl SamplingArguments {
                     }
                     (None, n) => Split { environment: n.div_ceil(2), brdf: n / 2 },
                 };
-                if self.compensation && split.brdf == 0 {
-                    return usage("--compensation needs BRDF samples: --split M:N with N > 0");
-                }
-                Ok(Plan::Mis { split, heuristic, compensation: self.compensation })
+                // Without BRDF samples nothing would catch the dim light.
+                let compensation = !self.no_compensation && split.brdf > 0;
+                Ok(Plan::Mis { split, heuristic, compensation })
             }
             _ if only_mis.iter().any(|(given, _)| *given) => {
                 let names: Vec<_> =

@@ -62,8 +62,8 @@ fn every_strategy_renders_and_json_tells_all() {
         &["--strategy", "brdf", "--rays", "3"],
         &["--strategy", "environment"],
         &["--strategy", "mis", "--rays", "5"],
-        &["--strategy", "mis", "--split", "3:1", "--heuristic", "power"],
-        &["--strategy", "mis", "--compensation"],
+        &["--strategy", "mis", "--split", "3:1", "--heuristic", "balance"],
+        &["--strategy", "mis", "--no-compensation"],
         &["--strategy", "mis", "--split", "0:2", "--sampler", "independent"],
     ];
     for strategy in strategies {
@@ -132,8 +132,8 @@ fn flags_that_contradict_are_usage_errors() {
     let folder = folder();
     refused(&render(&folder, &["--strategy", "mis", "--rays", "1"]), 2, &["--split 1:0"]);
     refused(&render(&folder, &["--strategy", "brdf", "--split", "1:1"]), 2, &["--split", "mis"]);
-    let alone = ["--compensation", "--split", "2:0"];
-    refused(&render(&folder, &alone), 2, &["--compensation", "BRDF"]);
+    let other = ["--no-compensation", "--strategy", "environment"];
+    refused(&render(&folder, &other), 2, &["--no-compensation", "mis"]);
     refused(&render(&folder, &["--size", "0x4"]), 2, &["0x4", "800x600"]);
     refused(&render(&folder, &["--material", "velvet"]), 2, &["velvet", "ggx:"]);
     refused(&render(&folder, &["-o", "picture.bmp"]), 2, &["picture.bmp", ".exr"]);

@@ -1,4 +1,4 @@
-//! Turns a probe into a few lights: `cargo run --release --example extract_lights [N]`.
+//! Turns a probe into a few lights: `cargo run --release --example extract_lights`.
 //!
 //! The probe is the built-in afternoon sky; a map of your own becomes an `Environment` the same way.
 
@@ -8,8 +8,8 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::{Environment, Orientation};
 use domelight::rig::{ShadingReference, VarianceMinimization, variance_minimization};
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let n_lights = std::env::args().nth(1).map_or(Ok(8), |n| n.parse())?;
+pub fn main() -> Result<(), Box<dyn Error>> {
+    let n_lights = 8;
     let map = BuiltinProbe::Sky.image(256);
     let environment = Environment::new(map, Orientation::default(), 1.0)?;
     let rig = variance_minimization(&environment, n_lights, VarianceMinimization::default())?;

@@ -9,6 +9,37 @@
 //! - The world is right-handed, +Y up. On a lat-long map row 0 is +Y, the centre column looks toward
 //!   −Z and u grows to the right as seen from inside.
 //! - Uniform numbers lie in [0, 1), never 1. A sampler is a pure function of them.
+//!
+//! # Example
+//! A strategy turns a shading point into pairs (wi, weight); the estimate is Σ weight · V(wi).
+//!
+//! ```
+//! use domelight::bsdf::{Lambert, Material};
+//! use domelight::environment::{Environment, Orientation, builtin::BuiltinProbe};
+//! use domelight::math::{Frame, Vec3};
+//! use domelight::sampling::{SamplerKind, Stream};
+//! use domelight::strategy::{EnvironmentSampling, PointStrategy, SampleNumbers, ShadingPoint};
+//! use domelight::Rgb;
+//!
+//! let map = BuiltinProbe::Sky.image(64);
+//! let environment = &Environment::new(map, Orientation::default(), 1.0)?;
+//! let material = Material::single(Lambert::new(Rgb::splat(0.5)));
+//! let (ng, frame) = (Vec3::Y, Frame::from_z(Vec3::Y));
+//! let at = ShadingPoint { position: Vec3::ZERO, ng, frame, wo: Vec3::Z, material };
+//!
+//! let strategy = EnvironmentSampling { environment, n_samples: 16 };
+//! let stream = Stream::new(SamplerKind::Sobol, 0, 0);
+//! let mut unoccluded = Rgb::BLACK;
+//! let numbers = SampleNumbers { stream, sample: 0 };
+//! strategy.sample(&at, numbers, &mut (), |_wi, weight| unoccluded += weight);
+//! assert!(unoccluded.luminance() > 0.0);
+//! # Ok::<(), domelight::environment::EnvironmentError>(())
+//! ```
+//!
+//! # Features
+//! `render` (default): scenes, ray tracing, the renderer. `io` (default): readers and writers of
+//! pictures, probes and scenes. Without either the library is the sampling core alone: [`math`],
+//! [`sampling`], [`bsdf`], [`environment`], [`strategy`], [`rig`].
 
 pub mod bsdf;
 mod color;

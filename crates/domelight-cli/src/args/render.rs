@@ -93,11 +93,12 @@ pub(crate) struct SamplingArguments {
     #[arg(long, value_name = "M:N")]
     pub(crate) split: Option<Split>,
     /// How mis weighs its samples
-    #[arg(long, value_enum, default_value_t = HeuristicName::Balance)]
+    #[arg(long, value_enum, default_value_t = HeuristicName::Power)]
     pub(crate) heuristic: HeuristicName,
-    /// Leave what is dimmer than the mean to the BRDF samples, with mis
+    /// With mis, draw from the environment's whole table; by default what is dimmer than the mean
+    /// is left to the BRDF samples
     #[arg(long)]
-    pub(crate) compensation: bool,
+    pub(crate) no_compensation: bool,
     /// Which points: Owen-scrambled Sobol' or independent random numbers
     #[arg(long, value_enum, default_value_t = SamplerName::Sobol)]
     pub(crate) sampler: SamplerName,

@@ -4,7 +4,7 @@
 use super::{Environment, EnvironmentSample};
 use crate::Rgb;
 use crate::math::{Vec2, Vec3};
-use crate::sampling::Table2d;
+use crate::sampling::HierarchicalTable;
 
 /// A table over max(L − mean L, 0): it leaves the dim parts of the map to another technique.
 ///
@@ -13,7 +13,7 @@ use crate::sampling::Table2d;
 #[derive(Clone, Debug)]
 pub struct CompensatedTable {
     /// None where nothing exceeds the mean, on a constant or black map: all is left to the BRDF.
-    table: Option<Table2d>,
+    table: Option<HierarchicalTable>,
     /// What is taken off the luminance.
     floor: f32,
     /// One over the table's total; 0 without a table.
@@ -26,7 +26,7 @@ impl CompensatedTable {
         let mean = environment.power() / (4.0 * std::f64::consts::PI);
         // The mean of a constant map may round to just below it.
         let floor = (mean * (1.0 + 1e-6)) as f32;
-        let importance = |le: Rgb| f64::from((le.luminance() - floor).max(0.0));
+        let importance = |le: Rgb| (le.luminance() - floor).max(0.0);
         let table = environment.grid.table(&environment.map, importance).ok();
         let inverse_total = table.as_ref().map_or(0.0, |t| (1.0 / t.total()) as f32);
         Self { table, floor, inverse_total }

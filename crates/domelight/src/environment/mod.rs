@@ -15,7 +15,7 @@ pub mod statistics;
 pub use compensation::CompensatedTable;
 
 use crate::math::{PI, TAU, Vec2, Vec3, vec3};
-use crate::sampling::{Table2d, TableError};
+use crate::sampling::{HierarchicalTable, TableError};
 use crate::{Rgb, RgbImage};
 
 /// A world axis that points up; the top row of a map faces it.
@@ -119,15 +119,14 @@ struct Texel {
 
 /// Radiance from every direction, and a way to draw directions in proportion to its luminance.
 ///
-/// Resident memory is 21 bytes a texel: three floats of radiance, a running sum in double precision
-/// and its guide.
+/// Resident memory is 17⅓ bytes a texel: three floats of radiance and a pyramid of weights.
 #[derive(Clone, Debug)]
 pub struct Environment {
     map: RgbImage,
     orientation: Orientation,
     grid: Grid,
     /// Luminance · solid angle; none for a black map.
-    table: Option<Table2d>,
+    table: Option<HierarchicalTable>,
     /// One over the table's total; 0 for a black map.
     inverse_power: f32,
     /// The greatest luminance of a texel.
@@ -160,7 +159,7 @@ impl Environment {
             map.pixels.iter_mut().for_each(|p| *p *= scale);
         }
         let grid = Grid::new(width, height, orientation.rotation);
-        let table = grid.table(&map, |le| f64::from(le.luminance()));
+        let table = grid.table(&map, Rgb::luminance);
         let table = match table {
             Ok(table) => Some(table),
             Err(TableError::AllZero) => None,
@@ -204,7 +203,7 @@ impl Environment {
     }
 
     /// The table of luminance times solid angle; none for a black map.
-    pub fn table(&self) -> Option<&Table2d> {
+    pub fn table(&self) -> Option<&HierarchicalTable> {
         self.table.as_ref()
     }
 
@@ -218,7 +217,7 @@ impl Environment {
 
     /// ∫ luminance dω over the sphere.
     pub fn power(&self) -> f64 {
-        self.table.as_ref().map_or(0.0, Table2d::total)
+        self.table.as_ref().map_or(0.0, HierarchicalTable::total)
     }
 
     /// The greatest luminance of [`Environment::le`] over all directions \[W·m⁻²·sr⁻¹\]; 0 for a
@@ -267,7 +266,7 @@ impl Environment {
     /// Draws from any table over this map's texels; `density` is that of a texel by its radiance.
     fn sample_table(
         &self,
-        table: &Table2d,
+        table: &HierarchicalTable,
         u: Vec2,
         density: impl FnOnce(Rgb) -> f32,
     ) -> Option<EnvironmentSample> {
@@ -337,10 +336,10 @@ impl Grid {
     fn table(
         &self,
         map: &RgbImage,
-        importance: impl Fn(Rgb) -> f64 + Sync,
-    ) -> Result<Table2d, TableError> {
-        Table2d::from_rows(self.width, self.height, |row, out| {
-            let solid_angle = self.solid_angle(row);
+        importance: impl Fn(Rgb) -> f32 + Sync,
+    ) -> Result<HierarchicalTable, TableError> {
+        HierarchicalTable::from_rows(self.width, self.height, |row, out| {
+            let solid_angle = self.solid_angle(row) as f32;
             for (o, &le) in out.iter_mut().zip(map.row(row)) {
                 *o = importance(le) * solid_angle;
             }

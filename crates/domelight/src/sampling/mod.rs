@@ -1,6 +1,7 @@
 //! Drawing from densities: uniform numbers, warps, tables, and the weights that combine them.
 
 pub mod alias;
+pub mod hierarchy;
 pub mod hilbert;
 pub mod mis;
 pub mod reservoir;
@@ -11,6 +12,7 @@ pub mod table;
 pub mod warp;
 
 pub use alias::AliasTable;
+pub use hierarchy::HierarchicalTable;
 pub use mis::Heuristic;
 pub use reservoir::WeightedReservoirs;
 pub use rng::Pcg32;
