@@ -16,11 +16,11 @@ fn visible(wi: Vec3) -> bool {
 }
 
 /// The mean of (Σ weight · V) over `n` camera samples.
-fn estimate(strategy: &impl PointStrategy, at: &ShadingPoint, n: u32) -> Rgb {
+fn estimate<S: PointStrategy>(strategy: &S, at: &ShadingPoint, n: u32) -> Rgb {
     let stream = Stream::new(SamplerKind::Sobol, 0, 0);
-    let mut sum = Rgb::BLACK;
+    let (mut sum, mut scratch) = (Rgb::BLACK, S::Scratch::default());
     for sample in 0..n {
-        strategy.sample(at, SampleNumbers { stream, sample }, |wi, weight| {
+        strategy.sample(at, SampleNumbers { stream, sample }, &mut scratch, |wi, weight| {
             if visible(wi) {
                 sum += weight;
             }

@@ -30,7 +30,8 @@
 //! let strategy = EnvironmentSampling { environment, n_samples: 16 };
 //! let stream = Stream::new(SamplerKind::Sobol, 0, 0);
 //! let mut unoccluded = Rgb::BLACK;
-//! strategy.sample(&at, SampleNumbers { stream, sample: 0 }, |_wi, weight| unoccluded += weight);
+//! let numbers = SampleNumbers { stream, sample: 0 };
+//! strategy.sample(&at, numbers, &mut (), |_wi, weight| unoccluded += weight);
 //! assert!(unoccluded.luminance() > 0.0);
 //! # Ok::<(), domelight::environment::EnvironmentError>(())
 //! ```

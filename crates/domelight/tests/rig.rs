@@ -338,7 +338,7 @@ fn a_light_set_asks_for_one_ray_a_light() {
     };
     let mut shaded = Rgb::BLACK;
     let numbers = SampleNumbers { stream: Stream::new(SamplerKind::Sobol, 0, 0), sample: 0 };
-    lights.sample(&at, numbers, |_, weight| shaded += weight);
+    lights.sample(&at, numbers, &mut (), |_, weight| shaded += weight);
     let exact = rig.lights.iter().map(|l| {
         let cos_theta = l.direction.dot(normal).max(0.0);
         Rgb::new(0.8, 0.5, 0.2) * l.irradiance * (cos_theta / PI)

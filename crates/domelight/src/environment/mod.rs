@@ -129,6 +129,8 @@ pub struct Environment {
     table: Option<HierarchicalTable>,
     /// One over the table's total; 0 for a black map.
     inverse_power: f32,
+    /// The greatest luminance of a texel.
+    max_luminance: f32,
 }
 
 impl Environment {
@@ -164,11 +166,15 @@ impl Environment {
             Err(_) => return Err(Self::bad_texel(&map)),
         };
         // A luminance can be fine where a channel is not.
-        if !map.pixels.iter().all(|p| p.is_finite() && p.min_component() >= 0.0) {
-            return Err(Self::bad_texel(&map));
+        let mut max_luminance = 0f32;
+        for p in &map.pixels {
+            if !p.is_finite() || p.min_component() < 0.0 {
+                return Err(Self::bad_texel(&map));
+            }
+            max_luminance = max_luminance.max(p.luminance());
         }
         let inverse_power = table.as_ref().map_or(0.0, |t| (1.0 / t.total()) as f32);
-        Ok(Self { map, orientation, grid, table, inverse_power })
+        Ok(Self { map, orientation, grid, table, inverse_power, max_luminance })
     }
 
     /// The same radiance from everywhere.
@@ -212,6 +218,12 @@ impl Environment {
     /// ∫ luminance dω over the sphere.
     pub fn power(&self) -> f64 {
         self.table.as_ref().map_or(0.0, HierarchicalTable::total)
+    }
+
+    /// The greatest luminance of [`Environment::le`] over all directions \[W·m⁻²·sr⁻¹\]; 0 for a
+    /// black map.
+    pub fn max_luminance(&self) -> f32 {
+        self.max_luminance
     }
 
     /// Radiance from the unit direction `wi` \[W·m⁻²·sr⁻¹\], constant over each texel.
@@ -516,6 +528,10 @@ mod tests {
         assert_eq!(black.le_pdf(Vec3::X), (Rgb::BLACK, 0.0));
         let white = Environment::constant(Rgb::WHITE).unwrap();
         assert_eq!(white.pdf(Vec3::X), crate::math::FRAC_1_4PI);
+        assert_eq!((black.max_luminance(), white.max_luminance()), (0.0, Rgb::WHITE.luminance()));
+        let dim = Environment::new(noise(9, 5, 3), Orientation::default(), 0.5).unwrap();
+        let brightest = dim.map().pixels.iter().map(|p| p.luminance()).fold(0.0, f32::max);
+        assert_eq!(dim.max_luminance(), brightest);
         for value in [f32::NAN, f32::INFINITY, -1.0] {
             let mut map = RgbImage::filled(4, 2, Rgb::WHITE);
             map.pixels[6].g = value;

@@ -2,7 +2,9 @@
 
 pub mod alias;
 pub mod hierarchy;
+pub mod hilbert;
 pub mod mis;
+pub mod reservoir;
 pub mod rng;
 pub mod sobol;
 pub mod stream;
@@ -12,6 +14,7 @@ pub mod warp;
 pub use alias::AliasTable;
 pub use hierarchy::HierarchicalTable;
 pub use mis::Heuristic;
+pub use reservoir::WeightedReservoirs;
 pub use rng::Pcg32;
 pub use stream::{Dimension, SamplerKind, Stream};
 pub use table::{Table1d, Table2d, TableError, TableSample};

@@ -29,6 +29,8 @@ pub enum Dimension {
     Brdf = 2,
     /// Choices among candidates.
     Resampling = 3,
+    /// Sequences without a fixed length, see [`Stream::generator`].
+    Sequence = 4,
 }
 
 /// Four uniform numbers of one index of one dimension.
@@ -44,6 +46,11 @@ impl Numbers {
     /// The third, for the choice of a lobe or a technique.
     pub fn u_lobe(&self) -> f32 {
         self.0[2]
+    }
+
+    /// The fourth, for whether to keep what the others gave.
+    pub fn u_accept(&self) -> f32 {
+        self.0[3]
     }
 }
 
@@ -69,11 +76,24 @@ impl Stream {
         Numbers(match self.kind {
             SamplerKind::Sobol => sobol::point(index, set).map(unit_f32),
             SamplerKind::Independent => {
-                let mut pcg = Pcg32::new(set, u64::from(index));
+                let mut pcg = generator(set, index);
                 [(); 4].map(|()| pcg.next_f32())
             }
         })
     }
+
+    /// Independent numbers without end, sequence `index` of this stream: for procedures that stop at
+    /// a random time, whose laws hold for independent numbers alone.
+    pub fn generator(&self, index: u32) -> Pcg32 {
+        generator(hash2(self.key, Dimension::Sequence as u64), index)
+    }
+}
+
+/// Sequence `index` of a set. The index has to enter the seed through a hash: streams of PCG that
+/// differ in the increment alone begin with correlated numbers.
+fn generator(set: u64, index: u32) -> Pcg32 {
+    let index = u64::from(index);
+    Pcg32::new(hash2(set, index), index)
 }
 
 #[cfg(test)]

@@ -16,13 +16,21 @@ pub struct BrdfSampling<'a> {
 }
 
 impl PointStrategy for BrdfSampling<'_> {
+    type Scratch = ();
+
     const UNBIASED: bool = true;
 
     fn n_rays(&self) -> u32 {
         self.n_samples
     }
 
-    fn sample(&self, at: &ShadingPoint, numbers: SampleNumbers, mut push: impl FnMut(Vec3, Rgb)) {
+    fn sample(
+        &self,
+        at: &ShadingPoint,
+        numbers: SampleNumbers,
+        (): &mut (),
+        mut push: impl FnMut(Vec3, Rgb),
+    ) {
         let n = self.n_samples;
         for j in 0..n {
             let u = numbers.get(Dimension::Brdf, j, n);

@@ -15,13 +15,21 @@ pub struct LightSet<'a> {
 }
 
 impl PointStrategy for LightSet<'_> {
+    type Scratch = ();
+
     const UNBIASED: bool = false;
 
     fn n_rays(&self) -> u32 {
         self.rig.lights.len() as u32
     }
 
-    fn sample(&self, at: &ShadingPoint, _: SampleNumbers, mut push: impl FnMut(Vec3, Rgb)) {
+    fn sample(
+        &self,
+        at: &ShadingPoint,
+        _: SampleNumbers,
+        (): &mut (),
+        mut push: impl FnMut(Vec3, Rgb),
+    ) {
         for light in &self.rig.lights {
             push(light.direction, at.eval(light.direction) * light.irradiance);
         }

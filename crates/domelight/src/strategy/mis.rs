@@ -65,13 +65,21 @@ impl<'a> MultipleImportanceSampling<'a> {
 }
 
 impl PointStrategy for MultipleImportanceSampling<'_> {
+    type Scratch = ();
+
     const UNBIASED: bool = true;
 
     fn n_rays(&self) -> u32 {
         self.n_environment + self.n_brdf
     }
 
-    fn sample(&self, at: &ShadingPoint, numbers: SampleNumbers, mut push: impl FnMut(Vec3, Rgb)) {
+    fn sample(
+        &self,
+        at: &ShadingPoint,
+        numbers: SampleNumbers,
+        (): &mut (),
+        mut push: impl FnMut(Vec3, Rgb),
+    ) {
         let (m, n) = (self.n_environment, self.n_brdf);
         for j in 0..m {
             let u = numbers.get(Dimension::Environment, j, m);

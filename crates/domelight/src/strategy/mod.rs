@@ -17,17 +17,25 @@ mod brdf;
 mod environment;
 mod light_set;
 mod mis;
+mod rejection;
+mod sir;
 
 pub use brdf::BrdfSampling;
 pub use environment::EnvironmentSampling;
 pub use light_set::LightSet;
-pub use mis::{LightTable, MultipleImportanceSampling};
+pub use mis::{CompensationNeedsBrdf, LightTable, MultipleImportanceSampling};
+pub use rejection::{
+    Proposal, RejectionError, RejectionSampling, RejectionScratch, RejectionStatistics, Stop,
+};
+pub use sir::{
+    Candidates, RAY_COST, Resampling, SamplingImportanceResampling, SirScratch, optimal_candidates,
+};
 
 use crate::Rgb;
 use crate::bsdf::{Brdf, Material};
 use crate::math::{Frame, Vec2, Vec3};
 use crate::sampling::stream::Numbers;
-use crate::sampling::{Dimension, Stream};
+use crate::sampling::{Dimension, Pcg32, Stream};
 
 /// Where a camera ray met an opaque surface.
 #[derive(Clone, Copy, Debug)]
@@ -96,6 +104,11 @@ impl SampleNumbers {
     pub fn get(&self, dimension: Dimension, j: u32, n: u32) -> Numbers {
         self.stream.numbers(dimension, self.sample.wrapping_mul(n).wrapping_add(j))
     }
+
+    /// Independent numbers without end.
+    pub fn generator(&self) -> Pcg32 {
+        self.stream.generator(self.sample)
+    }
 }
 
 /// What a strategy asks for: pairs (wi, weight) by point, and what it knows without rays.
@@ -143,6 +156,9 @@ impl Contributions {
 
 /// A strategy that looks at one shading point at a time: the lecture's.
 pub trait PointStrategy: Sync {
+    /// Memory that is kept from point to point; it carries no state.
+    type Scratch: Default;
+
     /// The expected value of the estimate is the integral.
     const UNBIASED: bool;
 
@@ -150,7 +166,13 @@ pub trait PointStrategy: Sync {
     fn n_rays(&self) -> u32;
 
     /// Calls `push(wi, weight)` for each shadow ray at the point.
-    fn sample(&self, at: &ShadingPoint, numbers: SampleNumbers, push: impl FnMut(Vec3, Rgb));
+    fn sample(
+        &self,
+        at: &ShadingPoint,
+        numbers: SampleNumbers,
+        scratch: &mut Self::Scratch,
+        push: impl FnMut(Vec3, Rgb),
+    );
 }
 
 /// The shading points of a tile, grouped by pixel.
@@ -224,10 +246,12 @@ impl<S: PointStrategy> Strategy for S {
     }
 
     fn push(&self, tile: &TileShading, (): &(), _round: u32, out: &mut Contributions) -> Round {
+        let mut scratch = S::Scratch::default();
         for pixel in tile.pixels {
             for i in pixel.points.clone() {
                 let numbers = SampleNumbers { stream: pixel.stream, sample: tile.samples[i] };
-                self.sample(&tile.points[i], numbers, |wi, weight| out.push(i as u32, wi, weight));
+                let push = |wi, weight| out.push(i as u32, wi, weight);
+                self.sample(&tile.points[i], numbers, &mut scratch, push);
             }
         }
         Round::Done

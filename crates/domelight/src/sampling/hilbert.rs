@@ -1,0 +1,95 @@
+//! Hilbert's curve over the hemisphere: neighbours along it are neighbours in space, so a stratified
+//! choice from what is sorted along it is stratified in space.
+//!
+//! Rejected: Morton's curve, which jumps across the square at every power of two and so groups
+//! directions that have nothing in common.
+
+use crate::math::Vec3;
+
+/// Cells along each side of the square are 2 to this: four minutes of arc.
+const BITS: u32 = 12;
+
+/// The curve within a cell is one of four turns of itself: its axes exchanged, both reversed, or
+/// both of these. One step descends two levels: from a turn and two bits of x and of y to the next
+/// turn (two bits) and four bits of the index.
+const STEPS: [u8; 64] = steps();
+
+const fn steps() -> [u8; 64] {
+    let mut steps = [0; 64];
+    let mut i = 0;
+    while i < 64 {
+        let (mut swap, mut reverse) = ((i >> 5) & 1, (i >> 4) & 1);
+        let mut index = 0;
+        let mut level = 2;
+        while level > 0 {
+            level -= 1;
+            let (x, y) = ((i >> (2 + level)) & 1 ^ reverse, (i >> level) & 1 ^ reverse);
+            let (x, y) = if swap == 1 { (y, x) } else { (x, y) };
+            index = index << 2 | (3 * x) ^ y;
+            if y == 0 {
+                swap ^= 1;
+                reverse ^= x;
+            }
+        }
+        steps[i] = (swap << 5 | reverse << 4 | index) as u8;
+        i += 1;
+    }
+    steps
+}
+
+/// Where along the curve the cell (`x`, `y`) of a square of 4096² cells lies, from 0 to 4096² − 1.
+pub fn index(x: u32, y: u32) -> u32 {
+    let (mut turn, mut index) = (0, 0);
+    let mut shift = BITS;
+    while shift > 0 {
+        shift -= 2;
+        let cell = (x >> shift & 3) << 2 | (y >> shift & 3);
+        let step = STEPS[(turn | cell) as usize];
+        index = index << 4 | u32::from(step & 15);
+        turn = u32::from(step & 0x30);
+    }
+    index
+}
+
+/// Where along the curve the unit direction `w` of the upper hemisphere lies: [`index`] of its cell
+/// in the octahedral map of the hemisphere (Cigolle et al. 2014, "A Survey of Efficient
+/// Representations for Independent Unit Vectors").
+pub fn hemisphere_index(w: Vec3) -> u32 {
+    let scale = 1.0 / (w.x.abs() + w.y.abs() + w.z.max(0.0));
+    let (x, y) = ((w.x + w.y) * scale, (w.x - w.y) * scale);
+    let cell = |t: f32| (((0.5 * t + 0.5) * (1 << BITS) as f32) as u32).min((1 << BITS) - 1);
+    index(cell(x), cell(y))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::from_spherical;
+
+    /// The curve visits every cell once, and consecutive cells share an edge.
+    #[test]
+    fn the_curve_is_continuous() {
+        let side = 1u32 << BITS;
+        let mut cells = vec![u32::MAX; (side * side) as usize];
+        for y in 0..side {
+            for x in 0..side {
+                let i = index(x, y) as usize;
+                assert_eq!(cells[i], u32::MAX);
+                cells[i] = y << 16 | x;
+            }
+        }
+        for pair in cells.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(|c| ((c & 0xffff) as i32, (c >> 16) as i32));
+            assert_eq!((a.0 - b.0).abs() + (a.1 - b.1).abs(), 1, "{a:?} {b:?}");
+        }
+    }
+
+    #[test]
+    fn the_whole_hemisphere_has_a_place() {
+        for (cos_theta, phi) in [(1.0, 0.0), (0.0, 0.0), (0.0, 2.0), (-0.1, 4.0), (0.5, 6.0)] {
+            assert!(hemisphere_index(from_spherical(cos_theta, phi)) < 1 << (2 * BITS));
+        }
+        let [a, b] = [0.3f32, 0.3001].map(|phi| hemisphere_index(from_spherical(0.5, phi)));
+        assert!(a.abs_diff(b) < 1 << 8);
+    }
+}

@@ -1,0 +1,332 @@
+//! Rejection sampling of the product of light and reflectance: Burke, Ghosh & Heidrich 2005,
+//! "Bidirectional Importance Sampling for Direct Illumination".
+//!
+//! Directions are drawn from one factor and kept with a probability in proportion to the other. An
+//! envelope of mass C lies over the product p̂; a try is kept with probability a = ∫ p̂ / C, and what
+//! is kept follows p̂ exactly. Two envelopes:
+//!
+//! ```text
+//! from the environment   q = L_y / Q    keep with (f_r cos θ · L)_y / (L_y · g_max)   C = Q · g_max
+//! from the BRDF          q = p_brdf     keep with L_y / L_max                         C = L_max
+//! ```
+//!
+//! Here y is luminance, Q = ∫ L_y dω and g_max bounds the greatest channel of f_r cos θ
+//! ([`Brdf::max_eval`]), hence (g · L)_y ≤ g_max · L_y for any colours. The first keeps directions in
+//! proportion to the luminance of the product; the second, since f_r cos θ / p_brdf has no bound in
+//! general, in proportion to p_brdf · L_y, and that quotient stays in the weight. So does colour.
+//!
+//! To divide by the probability of keeping, one has to know a, and an estimate of 1 / a or of a from
+//! the same tries is a trap: N kept over T tries is biased upward when one stops at the N-th. Two
+//! stopping rules with an unbiased estimate, each with its limit on tries *inside* the estimate:
+//!
+//! * [`Stop::Tries`]: always M tries, C/M · Σ kept: plain importance sampling by the envelope, in which
+//!   most values are known to be zero without a ray. The points may be stratified.
+//! * [`Stop::Accepted`]: stop at the N-th kept or the M-th try. The unbiased estimate of a is the
+//!   probability that the *first* try was kept given how it ended (Girshick, Mosteller & Savage
+//!   1946, "Unbiased Estimates for Certain Binomial Sampling Problems with Applications"): the share
+//!   of the paths to the end that begin so. That is (N − 1)/(T − 1) at the N-th (Haldane 1945, "On a
+//!   Method of Estimating Frequencies") and k/M when the tries ran out with k < N kept. What was kept
+//!   is exchangeable and independent of T, so a's estimate times C times the mean is unbiased for
+//!   any limit, however low. It needs independent tries: a stratified sequence knows how many are
+//!   still to come.
+//!
+//! At equal tries both have the variance I (C − I) / M, to first order. Rejected: the number of tries
+//! without a limit (a point that sees no light would never end), and redrawing at the limit from
+//! something else (a bias, if a small one).
+
+use super::{PointStrategy, SampleNumbers, ShadingPoint};
+use crate::Rgb;
+use crate::bsdf::Brdf;
+use crate::environment::Environment;
+use crate::math::Vec3;
+use crate::sampling::stream::Numbers;
+use crate::sampling::{Dimension, Pcg32};
+
+/// Which factor of the product directions are drawn from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Proposal {
+    /// The environment, kept by the BRDF.
+    Environment,
+    /// The BRDF, kept by the environment.
+    Brdf,
+    /// At each point the one that keeps more.
+    ///
+    /// With ρ = ∫ f_r cos θ dω, the BRDF's envelope as one of the product has the mass ρ · L_max
+    /// (exact where the density follows f_r cos θ), so the environment is better where
+    /// Q · g_max ≤ ρ · L_max. ρ is an approximation; an error in it costs tries, not bias.
+    #[default]
+    Tighter,
+}
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// After this many tries, at least 1. As many shadow rays as are kept.
+    Tries(u32),
+    /// When enough are kept, or after a number of tries. Tries are independent numbers.
+    Accepted {
+        /// Directions to keep, at least 2.
+        n: u32,
+        /// The most tries, at least 1.
+        max_tries: u32,
+    },
+}
+
+/// A stopping rule that has no unbiased estimate of use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RejectionError {
+    /// No tries.
+    #[error("rejection sampling needs at least one try")]
+    NoTries,
+    /// One kept direction says nothing about how rare it is.
+    #[error(
+        "stopping after {n} accepted directions: at least 2 are needed to estimate without bias how rare they are"
+    )]
+    TooFewAccepted {
+        /// The number asked for.
+        n: u32,
+    },
+}
+
+/// What happened at a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RejectionStatistics {
+    /// The factor that was drawn from, never [`Proposal::Tighter`].
+    pub proposal: Proposal,
+    /// Directions drawn; 0 where the product is known to be zero without any.
+    pub tries: u32,
+    /// Directions kept: shadow rays.
+    pub accepted: u32,
+    /// The tries ran out before enough were kept.
+    pub ran_out: bool,
+}
+
+impl RejectionStatistics {
+    /// Accepted per try; 0 of none.
+    pub fn acceptance(&self) -> f32 {
+        self.accepted as f32 / self.tries.max(1) as f32
+    }
+}
+
+/// A shadow ray to be weighed when the number of tries is known.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    wi: Vec3,
+    /// Its value over that of the envelope.
+    value: Rgb,
+}
+
+/// Memory of [`RejectionSampling`].
+#[derive(Clone, Debug, Default)]
+pub struct RejectionScratch(Vec<Kept>);
+
+/// Directions from the product of light and reflectance by rejection.
+#[derive(Clone, Copy, Debug)]
+pub struct RejectionSampling<'a> {
+    environment: &'a Environment,
+    proposal: Proposal,
+    stop: Stop,
+}
+
+/// What tries at a point are made under.
+#[derive(Clone, Copy, Debug)]
+struct Envelope {
+    /// Never [`Proposal::Tighter`].
+    proposal: Proposal,
+    /// Of the factor that is not drawn from.
+    bound: f32,
+    /// C.
+    mass: f32,
+}
+
+impl<'a> RejectionSampling<'a> {
+    /// Rejection sampling with a stopping rule.
+    ///
+    /// # Errors
+    /// No tries, or fewer than two accepted directions.
+    pub fn new(
+        environment: &'a Environment,
+        proposal: Proposal,
+        stop: Stop,
+    ) -> Result<Self, RejectionError> {
+        match stop {
+            Stop::Tries(0) | Stop::Accepted { max_tries: 0, .. } => Err(RejectionError::NoTries),
+            Stop::Accepted { n: n @ (0 | 1), .. } => Err(RejectionError::TooFewAccepted { n }),
+            _ => Ok(Self { environment, proposal, stop }),
+        }
+    }
+
+    /// [`PointStrategy::sample`], and how many tries it took.
+    pub fn sample_counted(
+        &self,
+        at: &ShadingPoint,
+        numbers: SampleNumbers,
+        scratch: &mut RejectionScratch,
+        mut push: impl FnMut(Vec3, Rgb),
+    ) -> RejectionStatistics {
+        let envelope = self.envelope(at);
+        let kept = &mut scratch.0;
+        kept.clear();
+        let tries = self.draw(at, envelope, numbers, kept);
+        let accepted = kept.len() as u32;
+        let weight = envelope.mass * self.stop.share(tries, accepted);
+        for k in &*kept {
+            push(k.wi, k.value * weight);
+        }
+        let ran_out = matches!(self.stop, Stop::Accepted { n, .. } if accepted < n);
+        RejectionStatistics { proposal: envelope.proposal, tries, accepted, ran_out }
+    }
+
+    fn envelope(&self, at: &ShadingPoint) -> Envelope {
+        let g_max = at.material.max_eval(at.wo);
+        let l_max = self.environment.max_luminance();
+        let light = Envelope {
+            proposal: Proposal::Environment,
+            bound: g_max,
+            mass: self.environment.power() as f32 * g_max,
+        };
+        let brdf = Envelope { proposal: Proposal::Brdf, bound: l_max, mass: l_max };
+        match self.proposal {
+            Proposal::Environment => light,
+            Proposal::Brdf => brdf,
+            Proposal::Tighter => {
+                let albedo = at.material.directional_albedo(at.wo.z.clamp(0.0, 1.0)).luminance();
+                if light.mass <= albedo * brdf.mass { light } else { brdf }
+            }
+        }
+    }
+
+    /// Fills `kept` and returns the number of tries.
+    fn draw(
+        &self,
+        at: &ShadingPoint,
+        envelope: Envelope,
+        numbers: SampleNumbers,
+        kept: &mut Vec<Kept>,
+    ) -> u32 {
+        if envelope.mass == 0.0 {
+            return 0;
+        }
+        match self.stop {
+            Stop::Tries(n) => {
+                let from_brdf = envelope.proposal == Proposal::Brdf;
+                let dimension = if from_brdf { Dimension::Brdf } else { Dimension::Environment };
+                kept.extend(
+                    (0..n).filter_map(|j| self.attempt(at, envelope, numbers.get(dimension, j, n))),
+                );
+                n
+            }
+            Stop::Accepted { n, max_tries } => {
+                let mut generator = numbers.generator();
+                let mut tries = 0;
+                while tries < max_tries && kept.len() < n as usize {
+                    kept.extend(self.attempt(at, envelope, four(&mut generator)));
+                    tries += 1;
+                }
+                tries
+            }
+        }
+    }
+
+    fn attempt(&self, at: &ShadingPoint, envelope: Envelope, u: Numbers) -> Option<Kept> {
+        if envelope.proposal == Proposal::Brdf {
+            let s = at.sample(u.u_lobe(), u.u())?;
+            let le = self.environment.le(s.wi);
+            let y = le.luminance();
+            let keep = u.u_accept() * envelope.bound < y;
+            keep.then(|| Kept { wi: s.wi, value: s.value / s.pdf * (le / y) })
+        } else {
+            let s = self.environment.sample(u.u())?;
+            let product = at.eval(s.wi) * s.le;
+            let y = product.luminance();
+            let keep = u.u_accept() * envelope.bound * s.le.luminance() < y;
+            keep.then(|| Kept { wi: s.wi, value: product / y })
+        }
+    }
+}
+
+impl Stop {
+    /// What each of the `accepted` directions weighs: the estimate of the probability to be kept,
+    /// over their number.
+    fn share(self, tries: u32, accepted: u32) -> f32 {
+        match self {
+            Self::Accepted { n, .. } if accepted == n => {
+                (n - 1) as f32 / ((tries - 1) as f32 * n as f32)
+            }
+            _ => 1.0 / tries.max(1) as f32,
+        }
+    }
+}
+
+fn four(generator: &mut Pcg32) -> Numbers {
+    Numbers([(); 4].map(|()| generator.next_f32()))
+}
+
+impl PointStrategy for RejectionSampling<'_> {
+    type Scratch = RejectionScratch;
+
+    const UNBIASED: bool = true;
+
+    fn n_rays(&self) -> u32 {
+        match self.stop {
+            Stop::Tries(n) | Stop::Accepted { n, .. } => n,
+        }
+    }
+
+    fn sample(
+        &self,
+        at: &ShadingPoint,
+        numbers: SampleNumbers,
+        scratch: &mut RejectionScratch,
+        push: impl FnMut(Vec3, Rgb),
+    ) {
+        self.sample_counted(at, numbers, scratch, push);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The estimate of the probability to be kept is unbiased for every limit: the sum over all ends
+    /// of the walk of probability times estimate, exactly.
+    #[test]
+    fn the_limit_on_tries_does_not_bias() {
+        for a in [0.01, 0.2, 0.5, 0.9, 1.0] {
+            for n in [2, 3, 5] {
+                for max_tries in [1, 2, 3, 4, 7, 40] {
+                    let stop = Stop::Accepted { n, max_tries };
+                    // Probability of k kept after t tries, not yet stopped.
+                    let mut walk = vec![0.0; n as usize];
+                    walk[0] = 1.0;
+                    let mut mean = 0.0;
+                    for t in 1..=max_tries {
+                        if t >= n {
+                            let full = walk[n as usize - 1] * a;
+                            mean += full * f64::from(n) * f64::from(stop.share(t, n));
+                        }
+                        for k in (0..n as usize).rev() {
+                            walk[k] =
+                                walk[k] * (1.0 - a) + if k > 0 { walk[k - 1] * a } else { 0.0 };
+                        }
+                    }
+                    for k in 0..n {
+                        let share = f64::from(stop.share(max_tries, k));
+                        mean += walk[k as usize] * f64::from(k) * share;
+                    }
+                    assert!((mean - a).abs() < 1e-6, "{a} {n} of {max_tries}: {mean}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn stops_without_an_estimate_are_refused() {
+        let env = Environment::constant(Rgb::WHITE).unwrap();
+        let new = |stop| RejectionSampling::new(&env, Proposal::Tighter, stop);
+        assert_eq!(new(Stop::Tries(0)).unwrap_err(), RejectionError::NoTries);
+        let one = new(Stop::Accepted { n: 1, max_tries: 10 }).unwrap_err();
+        assert_eq!(one, RejectionError::TooFewAccepted { n: 1 });
+        assert!(new(Stop::Accepted { n: 2, max_tries: 1 }).is_ok());
+    }
+}
