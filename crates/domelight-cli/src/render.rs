@@ -7,91 +7,30 @@ use anyhow::{Context as _, Result};
 use domelight::bsdf::Material;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{ProbeOptions, load_probe};
-use domelight::environment::{CompensatedTable, Environment, Orientation, UpAxis};
+use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::geometry::Aabb;
 use domelight::math::Vec3;
 use domelight::picture::tone::ToneCurve;
-use domelight::render::{Background, RenderSettings, Rendering, render};
-use domelight::rig::{MedianCut, Rig, VarianceMinimization, median_cut, variance_minimization};
-use domelight::sampling::{Heuristic, SamplerKind};
+use domelight::render::{Background, RenderSettings, survey};
+use domelight::sampling::SamplerKind;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
     Camera, CameraSettings, EnvironmentSettings, EnvironmentSource, Projection, Scene,
     SceneDescription, load,
 };
-use domelight::strategy::{
-    BrdfSampling, EnvironmentSampling, LightSet, LightTable, MultipleImportanceSampling, Strategy,
-};
 
 use crate::args::render::{
-    CameraArguments, EnvironmentArguments, HeuristicName, OutputArguments, RenderArguments,
-    SamplerName, SamplingArguments, StageArguments, StrategyName,
+    CameraArguments, EnvironmentArguments, OutputArguments, RenderArguments, SamplerName,
+    StageArguments,
 };
-use crate::failure::{UsageError, warn};
+use crate::failure::warn;
 use crate::interrupt;
 use crate::output::{PicturePath, require_one_on_standard_output};
 use crate::progress::RenderProgress;
 use crate::report::{RenderReport, Settings, Stages};
+use crate::strategy::{Job, Prepared};
 use crate::usage::Stopwatch;
-use crate::values::{Size, Split, Triple};
-
-/// What the sampling flags say together.
-#[derive(Clone, Copy, Debug)]
-enum Plan {
-    Brdf { n: u32 },
-    Environment { n: u32 },
-    Mis { split: Split, heuristic: Heuristic, compensation: bool },
-    MedianCut { n_lights: usize },
-    VarianceMinimization { n_lights: usize },
-}
-
-impl SamplingArguments {
-    /// Checks what the flags say together.
-    fn plan(&self) -> Result<Plan> {
-        let is_mis = matches!(self.strategy, StrategyName::Mis);
-        let is_rig =
-            matches!(self.strategy, StrategyName::MedianCut | StrategyName::VarianceMinimization);
-        refuse("--split", self.split.is_some() && !is_mis, "--strategy mis")?;
-        refuse("--no-compensation", self.no_compensation && !is_mis, "--strategy mis")?;
-        let rigs = "--strategy median-cut or variance-minimization";
-        refuse("--lights", self.lights.is_some() && !is_rig, rigs)?;
-        refuse("--rays", self.rays.is_some() && is_rig, "other strategies; use --lights")?;
-        let n = self.rays.unwrap_or(1);
-        let n_lights = self.lights.unwrap_or(64) as usize;
-        Ok(match self.strategy {
-            StrategyName::Brdf => Plan::Brdf { n },
-            StrategyName::Environment => Plan::Environment { n },
-            StrategyName::Mis => self.mis()?,
-            StrategyName::MedianCut => Plan::MedianCut { n_lights },
-            StrategyName::VarianceMinimization => Plan::VarianceMinimization { n_lights },
-        })
-    }
-
-    fn mis(&self) -> Result<Plan> {
-        let split = match (self.split, self.rays.unwrap_or(2)) {
-            (Some(split), _) => split,
-            (None, 1) => {
-                return usage(
-                    "--strategy mis takes one sample of each kind at least: use --rays 2, or \
-                     --split 1:0 or 0:1 for one kind alone",
-                );
-            }
-            (None, n) => Split { environment: n.div_ceil(2), brdf: n / 2 },
-        };
-        let heuristic = match self.heuristic {
-            HeuristicName::Balance => Heuristic::Balance,
-            HeuristicName::Power => Heuristic::Power,
-        };
-        // Without BRDF samples nothing would catch the dim light.
-        let compensation = !self.no_compensation && split.brdf > 0;
-        Ok(Plan::Mis { split, heuristic, compensation })
-    }
-}
-
-/// A usage error if a flag is given that does not apply.
-fn refuse(flag: &str, misplaced: bool, goes_with: &str) -> Result<()> {
-    if misplaced { usage(format!("{flag} goes with {goes_with}")) } else { Ok(()) }
-}
+use crate::values::{Size, Triple};
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
@@ -115,10 +54,11 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let scale = light.scale * light.exposure.exp2();
     let probe = probe_name(&light.source);
     let environment = Environment::new(map, orientation, scale).with_context(|| probe.clone())?;
+    let settings = arguments.render_settings();
+    let plan = plan.for_scene(|| survey(&scene, &camera, &settings), &environment, settings.seed);
     let prepared = Prepared::new(plan, &environment).with_context(|| probe.clone())?;
     let build = watch.lap();
 
-    let settings = arguments.render_settings();
     let job =
         Job { scene: &scene, camera: &camera, environment: &environment, settings: &settings };
     let n_pixels = (settings.width * settings.height) as u64;
@@ -147,92 +87,6 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         report.print_summary();
     }
     report.check(quiet)
-}
-
-fn usage<T>(text: impl Into<String>) -> Result<T> {
-    Err(UsageError(text.into()).into())
-}
-
-impl Plan {
-    /// The name and the samples, for the report.
-    fn describe(self) -> String {
-        match self {
-            Self::Brdf { n } => format!("brdf, {n} a camera sample"),
-            Self::Environment { n } => format!("environment, {n} a camera sample"),
-            Self::Mis { split, heuristic, compensation } => format!(
-                "mis {}:{}, {} heuristic{}",
-                split.environment,
-                split.brdf,
-                if heuristic == Heuristic::Power { "power" } else { "balance" },
-                if compensation { ", compensated" } else { "" }
-            ),
-            Self::MedianCut { n_lights } => format!("median-cut, {n_lights} lights"),
-            Self::VarianceMinimization { n_lights } => {
-                format!("variance-minimization, {n_lights} lights")
-            }
-        }
-    }
-}
-
-/// A plan with what it needs of the environment.
-enum Prepared {
-    Brdf { n: u32 },
-    Environment { n: u32 },
-    Mis { split: Split, heuristic: Heuristic, table: Option<CompensatedTable> },
-    Lights(Rig),
-}
-
-impl Prepared {
-    fn new(plan: Plan, environment: &Environment) -> Result<Self> {
-        Ok(match plan {
-            Plan::Brdf { n } => Self::Brdf { n },
-            Plan::Environment { n } => Self::Environment { n },
-            Plan::Mis { split, heuristic, compensation } => {
-                let table = compensation.then(|| CompensatedTable::new(environment));
-                Self::Mis { split, heuristic, table }
-            }
-            Plan::MedianCut { n_lights } => {
-                Self::Lights(median_cut(environment, n_lights, MedianCut::default())?)
-            }
-            Plan::VarianceMinimization { n_lights } => {
-                let settings = VarianceMinimization::default();
-                Self::Lights(variance_minimization(environment, n_lights, settings)?)
-            }
-        })
-    }
-}
-
-/// A scene ready to be rendered.
-struct Job<'a> {
-    scene: &'a Scene,
-    camera: &'a Camera,
-    environment: &'a Environment,
-    settings: &'a RenderSettings,
-}
-
-impl Job<'_> {
-    fn run(&self, prepared: &Prepared, progress: &RenderProgress) -> Result<Rendering> {
-        let environment = self.environment;
-        Ok(match prepared {
-            &Prepared::Brdf { n } => {
-                self.with(&BrdfSampling { environment, n_samples: n }, progress)
-            }
-            &Prepared::Environment { n } => {
-                self.with(&EnvironmentSampling { environment, n_samples: n }, progress)
-            }
-            Prepared::Mis { split, heuristic, table } => {
-                let &Split { environment: m, brdf: n } = split;
-                let table = table.as_ref().map_or(LightTable::Full, LightTable::Compensated);
-                let mis = MultipleImportanceSampling::new(environment, table, *heuristic, m, n)?;
-                self.with(&mis, progress)
-            }
-            Prepared::Lights(rig) => self.with(&LightSet { rig }, progress),
-        })
-    }
-
-    fn with<S: Strategy>(&self, strategy: &S, progress: &RenderProgress) -> Rendering {
-        render(self.scene, self.camera, self.environment, strategy, self.settings, progress)
-    }
 }
 
 impl RenderArguments {

@@ -58,7 +58,11 @@ fn without_arguments_it_makes_an_exr_and_a_png() {
 #[test]
 fn every_strategy_renders_and_json_tells_all() {
     let folder = folder();
-    let strategies: [&[&str]; 8] = [
+    let strategies: [&[&str]; 12] = [
+        &["--strategy", "sir"],
+        &["--strategy", "sir", "--rays", "3", "--candidates", "20", "--resampling", "reservoir"],
+        &["--strategy", "rejection", "--tries", "9"],
+        &["--strategy", "rejection", "--rays", "2", "--proposal", "environment"],
         &["--strategy", "median-cut", "--lights", "5"],
         &["--strategy", "variance-minimization"],
         &["--strategy", "brdf", "--rays", "3"],
@@ -135,6 +139,11 @@ fn flags_that_contradict_are_usage_errors() {
     refused(&render(&folder, &["--strategy", "mis", "--rays", "1"]), 2, &["--split 1:0"]);
     refused(&render(&folder, &["--strategy", "brdf", "--split", "1:1"]), 2, &["--split", "mis"]);
     refused(&render(&folder, &["--lights", "4"]), 2, &["--lights", "median-cut"]);
+    refused(&render(&folder, &["--candidates", "9"]), 2, &["--candidates", "sir"]);
+    let few = ["--strategy", "sir", "--rays", "9", "--candidates", "8"];
+    refused(&render(&folder, &few), 2, &["--candidates", "--rays"]);
+    let one = ["--strategy", "rejection", "--rays", "1"];
+    refused(&render(&folder, &one), 2, &["--tries", "2"]);
     let rays = ["--strategy", "median-cut", "--rays", "4"];
     refused(&render(&folder, &rays), 2, &["--rays", "--lights"]);
     let other = ["--no-compensation", "--strategy", "environment"];

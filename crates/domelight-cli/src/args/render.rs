@@ -85,7 +85,7 @@ pub(crate) struct SamplingArguments {
     #[arg(long, value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub(crate) spp: u32,
-    /// Shadow rays of each camera sample [default: 1, with mis 2]
+    /// Shadow rays of each camera sample; with rejection, samples to accept [default: 1, with mis 2]
     #[arg(long, value_name = "N", conflicts_with = "split",
           value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub(crate) rays: Option<u32>,
@@ -95,6 +95,22 @@ pub(crate) struct SamplingArguments {
     /// Lights that stand for the probe, with median-cut and variance-minimization [default: 64]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub(crate) lights: Option<u32>,
+    /// Candidates of each camera sample, with sir [default: by a pilot, for the least error in time]
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub(crate) candidates: Option<u32>,
+    /// Where sir draws its candidates from [default: mixture]
+    #[arg(long, value_enum, value_name = "SOURCE")]
+    pub(crate) from: Option<SourceName>,
+    /// How sir picks rays from candidates [default: sorted]
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub(crate) resampling: Option<ResamplingName>,
+    /// Tries of each camera sample, with rejection; with --rays the most tries [default: 16; with
+    /// --rays N 64 N]
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub(crate) tries: Option<u32>,
+    /// What rejection draws its tries from [default: tighter]
+    #[arg(long, value_enum, value_name = "SOURCE")]
+    pub(crate) proposal: Option<ProposalName>,
     /// How mis weighs its samples
     #[arg(long, value_enum, default_value_t = HeuristicName::Power)]
     pub(crate) heuristic: HeuristicName,
@@ -171,7 +187,7 @@ pub(crate) struct OutputArguments {
     pub(crate) json: bool,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum StrategyName {
     /// From the reflectance alone
     Brdf,
@@ -180,10 +196,46 @@ pub(crate) enum StrategyName {
     Environment,
     /// Both, by multiple importance sampling
     Mis,
+    /// The product of both, by rejection from one with a bound on the other
+    Rejection,
+    /// The product of both, by resampling --candidates to --rays
+    Sir,
     /// The probe as --lights directional lights by median cut: no noise, but bias
     MedianCut,
     /// The probe as --lights directional lights by variance minimization: no noise, but bias
     VarianceMinimization,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum SourceName {
+    /// The environment
+    Environment,
+    /// The reflectance
+    Brdf,
+    /// Half from each
+    Mixture,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ResamplingName {
+    /// Each ray by a number of its own
+    Multinomial,
+    /// Equally spaced picks
+    Systematic,
+    /// Equally spaced picks from candidates sorted in space
+    Sorted,
+    /// Streaming reservoirs: no memory for candidates
+    Reservoir,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ProposalName {
+    /// The environment, with a bound on the reflectance
+    Environment,
+    /// The reflectance, with a bound on the light
+    Brdf,
+    /// Whichever bound is tighter at the point
+    Tighter,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

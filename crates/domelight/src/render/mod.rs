@@ -23,7 +23,7 @@ pub use visibility::Visibility;
 use crate::environment::Environment;
 use crate::sampling::SamplerKind;
 use crate::scene::{Camera, Scene};
-use crate::strategy::Strategy;
+use crate::strategy::{ShadingPoint, Strategy};
 use film::PixelSums;
 use tile::{Scratch, Tile};
 
@@ -154,6 +154,16 @@ pub fn render<S: Strategy>(
             .reduce(|| true, |a, b| a & b);
     }
     assemble(settings, &tiles, complete)
+}
+
+/// The shading points of up to 256 pixels' centres, spread over the picture: for pilots.
+pub fn survey(scene: &Scene, camera: &Camera, settings: &RenderSettings) -> Vec<ShadingPoint> {
+    const ACROSS: usize = 16;
+    let at = |i: usize, n: usize| ((2 * i + 1) * n) as f32 / (2 * ACROSS) as f32;
+    let rays = (0..ACROSS * ACROSS)
+        .map(|i| camera.ray(at(i % ACROSS, settings.width), at(i / ACROSS, settings.height)));
+    let hit = |ray| scene.bvh().closest_hit(&ray).map(|hit| scene.shading_point(&ray, &hit));
+    rays.filter_map(hit).collect()
 }
 
 /// The tiles of the picture in row order; those at the right and lower border may be smaller.
