@@ -6,7 +6,7 @@ use domelight::render::{RenderSettings, Rendering};
 use domelight::scene::Scene;
 use serde::Serialize;
 
-use crate::failure::warn;
+use crate::failure::{tell, warn};
 use crate::output::{self, PicturePath};
 use crate::usage::{Seconds, peak_memory};
 
@@ -132,7 +132,7 @@ impl RenderReport {
         let Settings { scene, environment, strategy, size: [w, h], spp, .. } = &self.settings;
         let Stages { load, build, render, .. } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
-        eprintln!(
+        tell(&format!(
             "{scene} under {environment}: {w}x{h}, {spp} samples a pixel, {strategy}\n\
              loaded in {:.2} s, built in {:.2} s, rendered in {:.2} s{cpu}, {:.1} Mrays/s -> {}",
             load.wall,
@@ -140,7 +140,7 @@ impl RenderReport {
             render.wall,
             self.rays_per_second * 1e-6,
             self.outputs.join(", ")
-        );
+        ));
     }
 
     /// Complains about what the picture does not show.

@@ -198,6 +198,23 @@ fn an_unwritable_place_is_an_error_that_names_it() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
+/// Who throws the messages away gets the picture all the same.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_standard_error_does_no_harm() {
+    let folder = folder();
+    fs::write(folder.path().join("grey.obj"), format!("usemtl gone\n{TRIANGLE}")).unwrap();
+    let full = fs::File::options().write(true).open("/dev/full").unwrap();
+    let status = std::process::Command::new(env!("CARGO_BIN_EXE_domelight"))
+        .args(["render", "grey.obj", "--size", "8x8", "--spp", "1", "--env-rows", "8"])
+        .current_dir(&folder)
+        .stderr(full)
+        .status()
+        .unwrap();
+    assert_eq!(status.code(), Some(0));
+    assert_eq!(load(&folder, "domelight.png").width, 8);
+}
+
 /// Ctrl-C ends a long render with what is there.
 #[cfg(unix)]
 #[test]
