@@ -193,8 +193,13 @@ fn bad_texels_are_refused_or_repaired() {
 #[test]
 fn an_unwritable_place_is_an_error_that_names_it() {
     let folder = folder();
-    let output = render(&folder, &["-o", "no/such/folder/x.png"]);
-    refused(&output, 1, &["no/such/folder/x.png"]);
+    // Before the render: sixteen million samples would take hours.
+    for place in ["no/such/folder/x.png", "folder.png"] {
+        fs::create_dir_all(folder.path().join("folder.png")).unwrap();
+        let long = ["render", "-o", "x.exr", "-o", place, "--spp", "16777216"];
+        refused(&domelight(&folder, &long), 1, &[place]);
+        fs::remove_dir(folder.path().join("folder.png")).unwrap();
+    }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
