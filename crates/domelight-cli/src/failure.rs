@@ -70,7 +70,9 @@ fn hint(error: &anyhow::Error) -> Option<String> {
             let names = BuiltinProbe::ALL.map(BuiltinProbe::name).join(", ");
             Some(format!("a probe is a file or one of {names}"))
         }
-        ProbeError::Shape { .. } => Some("--mapping tells how the file is mapped".into()),
+        ProbeError::Shape { .. } => {
+            Some("--mapping (of render: --env-mapping) tells how the file is mapped".into())
+        }
         _ => None,
     }
 }

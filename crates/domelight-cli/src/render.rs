@@ -74,7 +74,7 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let tone = arguments.output.tone.mapping(ToneCurve::Agx);
     // A full disk under one file must not cost the others.
     let write = |path: &PicturePath| {
-        let attributes = settings.provenance();
+        let attributes = settings.provenance(rendering.complete);
         path.write_layers(&rendering.layers, &tone, arguments.stage.hide_env, attributes)
     };
     outputs.iter().map(write).fold(Ok(()), Result::and)?;
@@ -181,7 +181,7 @@ impl EnvironmentArguments {
             warn(
                 quiet,
                 &format!(
-                    "{}: repaired {} negative and {} non-finite texels",
+                    "{}: repaired {} negative and {} non-finite values",
                     path.display(),
                     repaired.negative,
                     repaired.non_finite

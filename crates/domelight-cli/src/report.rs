@@ -53,7 +53,7 @@ impl Settings {
 
 impl Settings {
     /// What OpenEXR files tell of their making.
-    pub(crate) fn provenance(&self) -> Vec<(String, String)> {
+    pub(crate) fn provenance(&self, complete: bool) -> Vec<(String, String)> {
         let mut attributes =
             vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
         let settings = [
@@ -61,6 +61,8 @@ impl Settings {
             ("environment", self.environment.clone()),
             ("strategy", self.strategy.clone()),
             ("samples", self.spp.to_string()),
+            // If not, the layer of sample counts tells how many there are.
+            ("complete", complete.to_string()),
             ("sampler", self.sampler.clone()),
             ("filter", self.filter.to_owned()),
             ("seed", self.seed.to_string()),
@@ -153,7 +155,7 @@ impl RenderReport {
             warn(quiet, &format!("{n} camera samples were NaN or infinite and count as black"));
         }
         if !self.complete {
-            bail!("interrupted; {} holds what was done so far", self.outputs.join(", "));
+            bail!("interrupted; what was done so far is in {}", self.outputs.join(", "));
         }
         Ok(())
     }

@@ -154,6 +154,7 @@ fn flags_that_contradict_are_usage_errors() {
     refused(&render(&folder, &["--filter", "lanczos"]), 2, &["lanczos", "gaussian"]);
     refused(&render(&folder, &["--tone", "filmic"]), 2, &["filmic", "agx"]);
     refused(&render(&folder, &["--up", "0,0,0"]), 1, &["up"]);
+    refused(&render(&folder, &["--ortho", "-1"]), 2, &["-1", "not negative"]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
@@ -256,4 +257,7 @@ fn an_interrupt_keeps_what_is_done() {
     refused(&output, 1, &["interrupted", "x.exr"]);
     assert_eq!(stdout(&output), "");
     assert!(load(&folder, "x.exr").pixels.iter().all(|p| p.is_finite()));
+    let bytes = fs::read(folder.path().join("x.exr")).unwrap();
+    let complete = ("domelight.complete".to_owned(), "false".to_owned());
+    assert!(text_attributes(&bytes).unwrap().contains(&complete));
 }
