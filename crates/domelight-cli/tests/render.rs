@@ -99,6 +99,7 @@ fn the_same_seed_gives_the_same_file() {
         fs::read(folder.path().join(name)).unwrap()
     };
     assert_eq!(picture("a.pfm", "7", "1"), picture("b.pfm", "7", "2"));
+    assert!(picture("a.exr", "7", "1") == picture("b.exr", "7", "2"), "attributes and all");
     assert_ne!(picture("a.pfm", "7", "1"), picture("c.pfm", "8", "1"));
 }
 
