@@ -4,8 +4,8 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::ProbeError;
 use domelight::picture::Problem;
 use domelight::picture::compare::SizeMismatch;
-use std::fmt::Write;
-use std::io::{self, IsTerminal};
+use std::fmt::Write as _;
+use std::io::{self, IsTerminal, Write as _};
 use std::process::ExitCode;
 
 /// Arguments that each are right but do not go together; exit code 2.
@@ -20,11 +20,16 @@ impl std::fmt::Display for UsageError {
 
 impl std::error::Error for UsageError {}
 
+/// Prints a line to standard error. If that is closed or full, nobody can be told, and the work goes on.
+pub(crate) fn tell(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
+}
+
 /// Prints a warning unless asked for quiet.
 pub(crate) fn warn(quiet: bool, text: &str) {
     if !quiet {
         let label = if colored() { "\x1b[1;33mwarning:\x1b[0m" } else { "warning:" };
-        eprintln!("{label} {text}");
+        tell(&format!("{label} {text}"));
     }
 }
 
@@ -38,9 +43,9 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
     } else {
         ("error:", "hint:")
     };
-    eprintln!("{error_label} {}", chain(error));
+    tell(&format!("{error_label} {}", chain(error)));
     if let Some(hint) = hint(error) {
-        eprintln!("{hint_label} {hint}");
+        tell(&format!("{hint_label} {hint}"));
     }
     ExitCode::from(if error.is::<UsageError>() { 2 } else { 1 })
 }
@@ -65,7 +70,9 @@ fn hint(error: &anyhow::Error) -> Option<String> {
             let names = BuiltinProbe::ALL.map(BuiltinProbe::name).join(", ");
             Some(format!("a probe is a file or one of {names}"))
         }
-        ProbeError::Shape { .. } => Some("--mapping tells how the file is mapped".into()),
+        ProbeError::Shape { .. } => {
+            Some("--mapping (of render: --env-mapping) tells how the file is mapped".into())
+        }
         _ => None,
     }
 }

@@ -6,7 +6,7 @@ use domelight::environment::mapping::{EnvmapKind, Mapping};
 use domelight::picture::exr::ExrLayers;
 use domelight::picture::png::Depth;
 use domelight::picture::tone::ToneMapping;
-use domelight::picture::{hdr, pfm, png, write_atomically};
+use domelight::picture::{hdr, pfm, png, require_writable, write_atomically};
 use domelight::render::Layers;
 use std::fmt;
 use std::io::{self, Write};
@@ -51,6 +51,11 @@ impl FromStr for PicturePath {
 impl PicturePath {
     pub(crate) fn is_standard_output(&self) -> bool {
         self.path == Path::new("-")
+    }
+
+    /// Asks before the work whether its result can be written.
+    pub(crate) fn require_writable(&self) -> anyhow::Result<()> {
+        Ok(require_writable(&self.path)?)
     }
 
     /// Writes the picture; the tone curve matters to PNG alone.

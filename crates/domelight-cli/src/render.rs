@@ -36,6 +36,7 @@ use crate::values::{Size, Triple};
 pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let plan = arguments.sampling.plan()?;
     let outputs = arguments.output.paths()?;
+    outputs.iter().try_for_each(PicturePath::require_writable)?;
     if let Some(threads) = arguments.sampling.threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
         pool.build_global().context("cannot start the threads")?;
@@ -71,14 +72,12 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let settings =
         Settings::new(&arguments.scene, &probe, &scene, &environment, plan.describe(), &settings);
     let tone = arguments.output.tone.mapping(ToneCurve::Agx);
-    for path in &outputs {
-        path.write_layers(
-            &rendering.layers,
-            &tone,
-            arguments.stage.hide_env,
-            settings.provenance(),
-        )?;
-    }
+    // A full disk under one file must not cost the others.
+    let write = |path: &PicturePath| {
+        let attributes = settings.provenance(rendering.complete);
+        path.write_layers(&rendering.layers, &tone, arguments.stage.hide_env, attributes)
+    };
+    outputs.iter().map(write).fold(Ok(()), Result::and)?;
     let stages = Stages { load, build, render, write: watch.lap() };
     let report = RenderReport::new(settings, &rendering, stages, &outputs);
     if arguments.output.json {
@@ -182,7 +181,7 @@ impl EnvironmentArguments {
             warn(
                 quiet,
                 &format!(
-                    "{}: repaired {} negative and {} non-finite texels",
+                    "{}: repaired {} negative and {} non-finite values",
                     path.display(),
                     repaired.negative,
                     repaired.non_finite

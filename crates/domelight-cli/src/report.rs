@@ -6,7 +6,7 @@ use domelight::render::{RenderSettings, Rendering};
 use domelight::scene::Scene;
 use serde::Serialize;
 
-use crate::failure::warn;
+use crate::failure::{tell, warn};
 use crate::output::{self, PicturePath};
 use crate::usage::{Seconds, peak_memory};
 
@@ -53,7 +53,7 @@ impl Settings {
 
 impl Settings {
     /// What OpenEXR files tell of their making.
-    pub(crate) fn provenance(&self) -> Vec<(String, String)> {
+    pub(crate) fn provenance(&self, complete: bool) -> Vec<(String, String)> {
         let mut attributes =
             vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
         let settings = [
@@ -61,6 +61,8 @@ impl Settings {
             ("environment", self.environment.clone()),
             ("strategy", self.strategy.clone()),
             ("samples", self.spp.to_string()),
+            // If not, the layer of sample counts tells how many there are.
+            ("complete", complete.to_string()),
             ("sampler", self.sampler.clone()),
             ("filter", self.filter.to_owned()),
             ("seed", self.seed.to_string()),
@@ -132,7 +134,7 @@ impl RenderReport {
         let Settings { scene, environment, strategy, size: [w, h], spp, .. } = &self.settings;
         let Stages { load, build, render, .. } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
-        eprintln!(
+        tell(&format!(
             "{scene} under {environment}: {w}x{h}, {spp} samples a pixel, {strategy}\n\
              loaded in {:.2} s, built in {:.2} s, rendered in {:.2} s{cpu}, {:.1} Mrays/s -> {}",
             load.wall,
@@ -140,7 +142,7 @@ impl RenderReport {
             render.wall,
             self.rays_per_second * 1e-6,
             self.outputs.join(", ")
-        );
+        ));
     }
 
     /// Complains about what the picture does not show.
@@ -153,7 +155,7 @@ impl RenderReport {
             warn(quiet, &format!("{n} camera samples were NaN or infinite and count as black"));
         }
         if !self.complete {
-            bail!("interrupted; {} holds what was done so far", self.outputs.join(", "));
+            bail!("interrupted; what was done so far is in {}", self.outputs.join(", "));
         }
         Ok(())
     }

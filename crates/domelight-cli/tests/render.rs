@@ -99,6 +99,7 @@ fn the_same_seed_gives_the_same_file() {
         fs::read(folder.path().join(name)).unwrap()
     };
     assert_eq!(picture("a.pfm", "7", "1"), picture("b.pfm", "7", "2"));
+    assert!(picture("a.exr", "7", "1") == picture("b.exr", "7", "2"), "attributes and all");
     assert_ne!(picture("a.pfm", "7", "1"), picture("c.pfm", "8", "1"));
 }
 
@@ -154,6 +155,7 @@ fn flags_that_contradict_are_usage_errors() {
     refused(&render(&folder, &["--filter", "lanczos"]), 2, &["lanczos", "gaussian"]);
     refused(&render(&folder, &["--tone", "filmic"]), 2, &["filmic", "agx"]);
     refused(&render(&folder, &["--up", "0,0,0"]), 1, &["up"]);
+    refused(&render(&folder, &["--ortho", "-1"]), 2, &["-1", "not negative"]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
@@ -193,9 +195,31 @@ fn bad_texels_are_refused_or_repaired() {
 #[test]
 fn an_unwritable_place_is_an_error_that_names_it() {
     let folder = folder();
-    let output = render(&folder, &["-o", "no/such/folder/x.png"]);
-    refused(&output, 1, &["no/such/folder/x.png"]);
+    // Before the render: sixteen million samples would take hours.
+    for place in ["no/such/folder/x.png", "folder.png"] {
+        fs::create_dir_all(folder.path().join("folder.png")).unwrap();
+        let long = ["render", "-o", "x.exr", "-o", place, "--spp", "16777216"];
+        refused(&domelight(&folder, &long), 1, &[place]);
+        fs::remove_dir(folder.path().join("folder.png")).unwrap();
+    }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+/// Who throws the messages away gets the picture all the same.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_standard_error_does_no_harm() {
+    let folder = folder();
+    fs::write(folder.path().join("grey.obj"), format!("usemtl gone\n{TRIANGLE}")).unwrap();
+    let full = fs::File::options().write(true).open("/dev/full").unwrap();
+    let status = std::process::Command::new(env!("CARGO_BIN_EXE_domelight"))
+        .args(["render", "grey.obj", "--size", "8x8", "--spp", "1", "--env-rows", "8"])
+        .current_dir(&folder)
+        .stderr(full)
+        .status()
+        .unwrap();
+    assert_eq!(status.code(), Some(0));
+    assert_eq!(load(&folder, "domelight.png").width, 8);
 }
 
 /// Ctrl-C ends a long render with what is there.
@@ -234,4 +258,7 @@ fn an_interrupt_keeps_what_is_done() {
     refused(&output, 1, &["interrupted", "x.exr"]);
     assert_eq!(stdout(&output), "");
     assert!(load(&folder, "x.exr").pixels.iter().all(|p| p.is_finite()));
+    let bytes = fs::read(folder.path().join("x.exr")).unwrap();
+    let complete = ("domelight.complete".to_owned(), "false".to_owned());
+    assert!(text_attributes(&bytes).unwrap().contains(&complete));
 }

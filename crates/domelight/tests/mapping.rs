@@ -190,7 +190,7 @@ fn mappings_are_guessed_from_shape_and_attribute() {
     assert!(Mapping::Angular.check_shape(10, 11).is_err());
     assert_eq!(
         Mapping::CubeStripVertical.check_shape(7, 41).unwrap_err().to_string(),
-        "a strip-vertical map has width : height = 1:6, this picture is 7x41"
+        "strip-vertical maps have width : height = 1:6, this picture is 7x41"
     );
     for mapping in Mapping::ALL {
         assert_eq!(mapping.name().parse(), Ok(mapping));

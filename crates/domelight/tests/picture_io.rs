@@ -640,7 +640,7 @@ fn probes_of_any_shape_load() {
     assert_eq!(
         load_probe(&cross, &ball).unwrap_err().to_string(),
         format!(
-            "{}: a mirror-ball map has width : height = 1:1, this picture is 48x64",
+            "{}: mirror-ball maps have width : height = 1:1, this picture is 48x64",
             cross.display()
         )
     );

@@ -52,7 +52,7 @@ pub(crate) struct EnvironmentArguments {
     #[arg(long, value_name = "DEG", value_parser = finite, allow_negative_numbers = true)]
     pub(crate) env_rotate: Option<f32>,
     /// Multiply the environment's radiance
-    #[arg(long, value_name = "X", value_parser = not_negative)]
+    #[arg(long, value_name = "X", value_parser = not_negative, allow_negative_numbers = true)]
     pub(crate) env_scale: Option<f32>,
     /// Multiply the environment's radiance by 2^EV
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true)]
@@ -148,10 +148,10 @@ pub(crate) struct CameraArguments {
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) up: Option<Triple>,
     /// Vertical field of view [degrees]
-    #[arg(long, value_name = "DEG", value_parser = not_negative, conflicts_with = "ortho")]
+    #[arg(long, value_name = "DEG", value_parser = not_negative, allow_negative_numbers = true, conflicts_with = "ortho")]
     pub(crate) fov: Option<f32>,
     /// Orthographic, with this height of the picture in the world
-    #[arg(long, value_name = "HEIGHT", value_parser = not_negative)]
+    #[arg(long, value_name = "HEIGHT", value_parser = not_negative, allow_negative_numbers = true)]
     pub(crate) ortho: Option<f32>,
 }
 

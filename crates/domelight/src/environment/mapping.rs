@@ -63,7 +63,7 @@ pub enum Mapping {
 
 /// The picture has a shape in which the mapping cannot be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a {mapping} map has width : height = {}:{}, this picture is {width}x{height}", .mapping.aspect().0, .mapping.aspect().1)]
+#[error("{mapping} maps have width : height = {}:{}, this picture is {width}x{height}", .mapping.aspect().0, .mapping.aspect().1)]
 pub struct ShapeError {
     /// The mapping that was asked for.
     pub mapping: Mapping,

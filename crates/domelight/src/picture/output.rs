@@ -24,6 +24,31 @@ pub fn write_atomically(
     replace(path, write).map_err(|error| Problem::Io(error).in_file(&path.display().to_string()))
 }
 
+/// Whether [`write_atomically`] can make a file at `path` now: to be asked before hours of work. Leaves nothing behind
+/// and does not open devices and pipes.
+///
+/// # Errors
+/// If a file cannot be created there.
+pub fn require_writable(path: &Path) -> Result<(), PictureError> {
+    if path == Path::new("-") {
+        return Ok(());
+    }
+    try_place(path).map_err(|error| Problem::Io(error).in_file(&path.display().to_string()))
+}
+
+fn try_place(path: &Path) -> io::Result<()> {
+    let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    match fs::metadata(&path) {
+        Ok(there) if there.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
+        Ok(there) if !there.is_file() => Ok(()),
+        _ => {
+            let temporary = beside(&path)?;
+            File::create_new(&temporary)?;
+            fs::remove_file(&temporary)
+        }
+    }
+}
+
 fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
     if fs::metadata(&path).is_ok_and(|there| !there.is_file()) {

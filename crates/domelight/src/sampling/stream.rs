@@ -130,4 +130,23 @@ mod tests {
             assert!(mean.iter().all(|m| (m - 0.5).abs() < bound), "{mean:?}");
         }
     }
+
+    /// Of numbers that are independent, the mean of n has the variance 1/12n over all streams.
+    #[test]
+    fn independent_numbers_average_like_independent_numbers() {
+        let (n_streams, n) = (1000u32, 1024u32);
+        let mut chi2 = [0.0f64; 4];
+        for pixel in 0..n_streams {
+            let stream = Stream::new(SamplerKind::Independent, 5, u64::from(pixel));
+            let mut sum = [0.0f64; 4];
+            for i in 0..n {
+                let numbers = stream.numbers(Dimension::Brdf, i);
+                (0..4).for_each(|d| sum[d] += f64::from(numbers.0[d]) - 0.5);
+            }
+            (0..4).for_each(|d| chi2[d] += sum[d] * sum[d] * 12.0 / f64::from(n));
+        }
+        // χ² of as many degrees of freedom as streams; five of its standard deviations.
+        let bound = 5.0 * (2.0 * f64::from(n_streams)).sqrt();
+        assert!(chi2.iter().all(|x| (x - f64::from(n_streams)).abs() < bound), "{chi2:?}");
+    }
 }

@@ -111,7 +111,9 @@ impl ExrLayers {
         );
         let mut bytes = Cursor::new(Vec::new());
         Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(Problem::Exr)?;
-        Ok(bytes.into_inner())
+        let mut bytes = bytes.into_inner();
+        sort_attributes(&mut bytes);
+        Ok(bytes)
     }
 
     fn planes(&self) -> impl Iterator<Item = (&str, &String, &Vec<f32>)> {
@@ -135,6 +137,31 @@ impl ExrLayers {
         }
         attributes
     }
+}
+
+/// Puts the header's attributes in the order of their names, as OpenEXR itself does: the encoder keeps some in a hash
+/// map, whose order changes from run to run, and the same picture should give the same bytes.
+fn sort_attributes(bytes: &mut [u8]) {
+    const MAGIC_AND_VERSION: usize = 8;
+    let mut attributes = Vec::new();
+    let mut rest = bytes.get(MAGIC_AND_VERSION..).unwrap_or_default();
+    while let Some((attribute, after)) = split_attribute(rest) {
+        attributes.push(attribute);
+        rest = after;
+    }
+    attributes.sort_unstable();
+    let sorted = attributes.concat();
+    bytes[MAGIC_AND_VERSION..][..sorted.len()].copy_from_slice(&sorted);
+}
+
+/// The first attribute (name, 0, type, 0, size, value) and what follows; none at the 0 that ends the header.
+fn split_attribute(header: &[u8]) -> Option<(&[u8], &[u8])> {
+    let end = |text: &[u8]| text.iter().position(|&byte| byte == 0);
+    let name = end(header).filter(|&length| length > 0)?;
+    let size = name + 1 + end(&header[name + 1..])? + 1;
+    let value = size + 4;
+    let length = u32::from_le_bytes(header.get(size..value)?.try_into().ok()?);
+    header.split_at_checked(value + length as usize)
 }
 
 /// The string attributes of the first part: what [`ExrLayers::attributes`] wrote.
