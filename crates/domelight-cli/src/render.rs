@@ -2,8 +2,9 @@
 
 use std::path::Path;
 use std::str::FromStr as _;
+use std::sync::atomic::Ordering;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use domelight::bsdf::Material;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{ProbeOptions, load_probe};
@@ -27,7 +28,7 @@ use crate::failure::warn;
 use crate::interrupt;
 use crate::output::{PicturePath, require_one_on_standard_output};
 use crate::progress::RenderProgress;
-use crate::report::{RenderReport, Settings, Stages};
+use crate::report::{CameraReport, EnvironmentReport, RenderReport, Settings, Stages};
 use crate::strategy::{Job, Prepared};
 use crate::usage::Stopwatch;
 use crate::values::{Size, Triple};
@@ -49,7 +50,9 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let map = arguments.environment.load(&light, quiet)?;
     let load = watch.lap();
 
-    let camera = arguments.stage(&mut description, light.up.vector())?;
+    let view = arguments.stage(&mut description, light.up.vector());
+    let Size { width, height } = arguments.camera.size;
+    let camera = Camera::new(&view, width, height)?;
     let scene = Scene::new(description).with_context(|| arguments.scene.clone())?;
     let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
     let scale = light.scale * light.exposure.exp2();
@@ -59,6 +62,9 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let plan = plan.for_scene(|| survey(&scene, &camera, &settings), &environment, settings.seed);
     let prepared = Prepared::new(plan, &environment).with_context(|| probe.clone())?;
     let build = watch.lap();
+    if interrupted.load(Ordering::Relaxed) {
+        bail!("interrupted before the first sample; nothing was written");
+    }
 
     let job =
         Job { scene: &scene, camera: &camera, environment: &environment, settings: &settings };
@@ -67,15 +73,34 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         RenderProgress::new(n_pixels * u64::from(settings.n_samples), quiet, interrupted);
     let rendering = job.run(&prepared, &progress)?;
     progress.finish();
+    if rendering.counts.camera_rays == 0 {
+        bail!("interrupted before the first sample; nothing was written");
+    }
     let render = watch.lap();
 
-    let settings =
-        Settings::new(&arguments.scene, &probe, &scene, &environment, plan.describe(), &settings);
+    let stage = &arguments.stage;
+    let settings = Settings {
+        scene: arguments.scene.clone(),
+        triangles: scene.triangle_count(),
+        material: stage.material.as_ref().map(|m| m.text.clone()),
+        normalize: stage.normalize,
+        ground: stage.ground,
+        hide_env: stage.hide_env,
+        environment: EnvironmentReport::new(probe, &light, &environment),
+        camera: CameraReport::new(&view),
+        strategy: plan.describe(),
+        size: [width, height],
+        spp: settings.n_samples,
+        sampler: format!("{:?}", settings.sampler).to_lowercase(),
+        filter: settings.filter.name(),
+        seed: settings.seed,
+        threads: rayon::current_num_threads(),
+    };
     let tone = arguments.output.tone.mapping(ToneCurve::Agx);
     // A full disk under one file must not cost the others.
     let write = |path: &PicturePath| {
         let attributes = settings.provenance(rendering.complete);
-        path.write_layers(&rendering.layers, &tone, arguments.stage.hide_env, attributes)
+        path.write_layers(&rendering.layers, &tone, stage.hide_env, attributes)
     };
     outputs.iter().map(write).fold(Ok(()), Result::and)?;
     let stages = Stages { load, build, render, write: watch.lap() };
@@ -90,13 +115,12 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
 
 impl RenderArguments {
     /// Changes the scene as the flags say; the camera frames what is not scenery.
-    fn stage(&self, scene: &mut SceneDescription, up: Vec3) -> Result<Camera> {
+    fn stage(&self, scene: &mut SceneDescription, up: Vec3) -> CameraSettings {
         let Size { width, height } = self.camera.size;
         let bounds = self.stage.apply(scene, up);
-        let settings = self.camera.settings(scene.camera.as_ref(), || {
+        self.camera.settings(scene.camera.as_ref(), || {
             CameraSettings::framing(&bounds, width as f32 / height as f32, up)
-        });
-        Ok(Camera::new(&settings, width, height)?)
+        })
     }
 
     fn render_settings(&self) -> RenderSettings {
@@ -199,7 +223,7 @@ impl StageArguments {
             scene.normalize();
         }
         if let Some(material) = &self.material {
-            scene.set_subject_material(Material::from(*material));
+            scene.set_subject_material(Material::from(material.spec));
         }
         let bounds = scene.subject_bounds();
         if self.ground {

@@ -1,53 +1,84 @@
 //! What a render did: as JSON or as two lines for people.
 
 use anyhow::{Result, bail};
-use domelight::environment::Environment;
-use domelight::render::{RenderSettings, Rendering};
-use domelight::scene::Scene;
+use domelight::environment::{Environment, UpAxis};
+use domelight::render::Rendering;
+use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
 use serde::Serialize;
 
 use crate::failure::{tell, warn};
 use crate::output::{self, PicturePath};
 use crate::usage::{Seconds, peak_memory};
 
-/// What was rendered, and how.
+/// What was rendered, and how: enough to make the same picture again.
 #[derive(Serialize)]
 pub(crate) struct Settings {
-    scene: String,
-    triangles: usize,
-    environment: String,
-    environment_size: [usize; 2],
-    strategy: String,
-    size: [usize; 2],
-    spp: u32,
-    sampler: String,
-    filter: &'static str,
-    seed: u64,
-    threads: usize,
+    pub(crate) scene: String,
+    pub(crate) triangles: usize,
+    pub(crate) material: Option<String>,
+    pub(crate) normalize: bool,
+    pub(crate) ground: bool,
+    pub(crate) hide_env: bool,
+    pub(crate) environment: EnvironmentReport,
+    pub(crate) camera: CameraReport,
+    pub(crate) strategy: String,
+    pub(crate) size: [usize; 2],
+    pub(crate) spp: u32,
+    pub(crate) sampler: String,
+    pub(crate) filter: &'static str,
+    pub(crate) seed: u64,
+    pub(crate) threads: usize,
 }
 
-impl Settings {
+/// The light of a render.
+#[derive(Serialize)]
+pub(crate) struct EnvironmentReport {
+    probe: String,
+    size: [usize; 2],
+    rotate: f32,
+    scale: f32,
+    exposure: f32,
+    up: &'static str,
+}
+
+impl EnvironmentReport {
     pub(crate) fn new(
-        scene_name: &str,
-        probe: &str,
-        scene: &Scene,
+        probe: String,
+        light: &EnvironmentSettings,
         environment: &Environment,
-        strategy: String,
-        settings: &RenderSettings,
     ) -> Self {
         Self {
-            scene: scene_name.to_owned(),
-            triangles: scene.triangle_count(),
-            environment: probe.to_owned(),
-            environment_size: [environment.map().width, environment.map().height],
-            strategy,
-            size: [settings.width, settings.height],
-            spp: settings.n_samples,
-            sampler: format!("{:?}", settings.sampler).to_lowercase(),
-            filter: settings.filter.name(),
-            seed: settings.seed,
-            threads: rayon::current_num_threads(),
+            probe,
+            size: [environment.map().width, environment.map().height],
+            rotate: light.rotate_degrees,
+            scale: light.scale,
+            exposure: light.exposure,
+            up: match light.up {
+                UpAxis::Y => "y",
+                UpAxis::Z => "z",
+            },
         }
+    }
+}
+
+/// The view of a render; one of `fov` and `ortho` is null.
+#[derive(Serialize)]
+pub(crate) struct CameraReport {
+    origin: [f32; 3],
+    target: [f32; 3],
+    up: [f32; 3],
+    fov: Option<f32>,
+    ortho: Option<f32>,
+}
+
+impl CameraReport {
+    pub(crate) fn new(view: &CameraSettings) -> Self {
+        let (fov, ortho) = match view.projection {
+            Projection::Perspective { fov_y_degrees } => (Some(fov_y_degrees), None),
+            Projection::Orthographic { height } => (None, Some(height)),
+        };
+        let [origin, target, up] = [view.origin, view.target, view.up].map(|v| v.to_array());
+        Self { origin, target, up, fov, ortho }
     }
 }
 
@@ -58,7 +89,7 @@ impl Settings {
             vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
         let settings = [
             ("scene", self.scene.clone()),
-            ("environment", self.environment.clone()),
+            ("environment", self.environment.probe.clone()),
             ("strategy", self.strategy.clone()),
             ("samples", self.spp.to_string()),
             // If not, the layer of sample counts tells how many there are.
@@ -132,6 +163,7 @@ impl RenderReport {
     /// Two lines on standard error.
     pub(crate) fn print_summary(&self) {
         let Settings { scene, environment, strategy, size: [w, h], spp, .. } = &self.settings;
+        let environment = &environment.probe;
         let Stages { load, build, render, .. } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
         tell(&format!(

@@ -38,6 +38,7 @@ impl SamplingArguments {
         let is = |names: &[StrategyName]| names.contains(&self.strategy);
         let is_rig = is(&[S::MedianCut, S::VarianceMinimization]);
         let (mis, sir, rejection) = (is(&[S::Mis]), is(&[S::Sir]), is(&[S::Rejection]));
+        refuse("--heuristic", self.heuristic.is_some() && !mis, "--strategy mis")?;
         refuse("--split", self.split.is_some() && !mis, "--strategy mis")?;
         refuse("--no-compensation", self.no_compensation && !mis, "--strategy mis")?;
         refuse("--candidates", self.candidates.is_some() && !sir, "--strategy sir")?;
@@ -110,7 +111,7 @@ impl SamplingArguments {
             }
             (None, n) => Split { environment: n.div_ceil(2), brdf: n / 2 },
         };
-        let heuristic = match self.heuristic {
+        let heuristic = match self.heuristic.unwrap_or(HeuristicName::Power) {
             HeuristicName::Balance => Heuristic::Balance,
             HeuristicName::Power => Heuristic::Power,
         };

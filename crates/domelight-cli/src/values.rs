@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use domelight::bsdf::{MaterialSpec, ParseMaterialError};
 use domelight::math::{Vec3, vec3};
 
 /// A value that could not be read, and what it should look like.
@@ -26,17 +27,22 @@ pub(crate) struct Size {
 impl Size {
     /// The longest edge of a picture.
     const MOST: usize = 65_536;
+
+    /// The most pixels of a picture, whose sums take some 120 bytes each.
+    const MOST_PIXELS: usize = 1 << 28;
 }
 
 impl FromStr for Size {
     type Err = BadValue;
 
     fn from_str(s: &str) -> Result<Self, BadValue> {
-        let expected = "a size such as 800x600, each from 1 to 65536";
+        let expected = "a size such as 800x600, each from 1 to 65536, of 2^28 pixels at the most";
         let (w, h) = s.split_once(['x', 'X']).ok_or_else(|| bad(s, expected))?;
         match (w.parse(), h.parse()) {
             (Ok(width), Ok(height))
-                if (1..=Self::MOST).contains(&width) && (1..=Self::MOST).contains(&height) =>
+                if (1..=Self::MOST).contains(&width)
+                    && (1..=Self::MOST).contains(&height)
+                    && width * height <= Self::MOST_PIXELS =>
             {
                 Ok(Self { width, height })
             }
@@ -61,6 +67,21 @@ impl FromStr for Triple {
             }
             _ => Err(bad(s, expected)),
         }
+    }
+}
+
+/// A material in the notation of `--material`, and the text that it was given as.
+#[derive(Clone, Debug)]
+pub(crate) struct NamedMaterial {
+    pub(crate) text: String,
+    pub(crate) spec: MaterialSpec,
+}
+
+impl FromStr for NamedMaterial {
+    type Err = ParseMaterialError;
+
+    fn from_str(s: &str) -> Result<Self, ParseMaterialError> {
+        Ok(Self { text: s.to_owned(), spec: s.parse()? })
     }
 }
 
@@ -101,7 +122,11 @@ mod tests {
     #[test]
     fn good_and_bad_values() {
         assert_eq!("640x480".parse(), Ok(Size { width: 640, height: 480 }));
-        assert!(["", "640", "0x1", "1x65537", "ax3"].iter().all(|s| s.parse::<Size>().is_err()));
+        assert!(
+            ["", "640", "0x1", "1x65537", "ax3", "65536x65536"]
+                .iter()
+                .all(|s| s.parse::<Size>().is_err())
+        );
         assert_eq!("1, -2,3e1".parse(), Ok(Triple(vec3(1.0, -2.0, 30.0))));
         assert!(["1,2", "1,2,nan", "a,b,c"].iter().all(|s| s.parse::<Triple>().is_err()));
         assert_eq!("3:1".parse(), Ok(Split { environment: 3, brdf: 1 }));

@@ -79,6 +79,8 @@ fn every_strategy_renders_and_json_tells_all() {
         assert_eq!(report["non_finite_samples"], 0);
         assert_eq!(report["complete"], true);
         assert_eq!(report["settings"]["size"], serde_json::json!([24, 18]));
+        assert_eq!(report["settings"]["environment"]["probe"], "studio");
+        assert!(report["settings"]["camera"]["fov"].as_f64().unwrap() > 0.0);
         for stage in ["load", "build", "render", "write"] {
             assert!(report["seconds"][stage]["wall"].as_f64().unwrap() >= 0.0);
         }

@@ -6,13 +6,16 @@ use domelight::environment::{CompensatedTable, Environment, Orientation};
 use domelight::geometry::Mesh;
 use domelight::math::{Mat4, Vec3, vec3};
 use domelight::render::{Background, Filter, Layers, Observer, RenderSettings, Rendering, render};
+use domelight::rig::{VarianceMinimization, variance_minimization};
 use domelight::sampling::{Heuristic, Pcg32, SamplerKind};
 use domelight::scene::builtin::shapes;
 use domelight::scene::{
     Camera, CameraSettings, Part, Projection, Scene, SceneDescription, Surface, SurfaceModel,
 };
 use domelight::strategy::{
-    BrdfSampling, EnvironmentSampling, LightTable, MultipleImportanceSampling, Strategy,
+    BrdfSampling, Candidates, EnvironmentSampling, LightSet, LightTable,
+    MultipleImportanceSampling, Proposal, RejectionSampling, Resampling,
+    SamplingImportanceResampling, Stop, Strategy,
 };
 use domelight::{Rgb, RgbImage};
 use testkit::{Suite, ZTest};
@@ -101,16 +104,35 @@ fn bits(layers: &Layers) -> Vec<u32> {
 
 #[test]
 fn the_same_bits_for_any_threads_and_tiles() {
-    let (scene, environment) = (scene("ggx:0.2"), environment());
-    let strategy = mis(&environment);
+    let environment = environment();
+    same_bits("mis", &environment, &mis(&environment));
+    let sir = SamplingImportanceResampling {
+        environment: &environment,
+        n_candidates: 16,
+        n_samples: 3,
+        candidates: Candidates::default(),
+        resampling: Resampling::default(),
+    };
+    same_bits("sir", &environment, &sir);
+    let stop = Stop::Accepted { n: 2, max_tries: 20 };
+    let rejection = RejectionSampling::new(&environment, Proposal::Tighter, stop).unwrap();
+    same_bits("rejection", &environment, &rejection);
+    let rig = variance_minimization(&environment, 8, VarianceMinimization::default()).unwrap();
+    same_bits("lights", &environment, &LightSet { rig: &rig });
+}
+
+fn same_bits<S: Strategy>(name: &str, environment: &Environment, strategy: &S) {
+    let scene = scene("ggx:0.2");
     let picture = |threads: usize, tile_size: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let settings = RenderSettings { tile_size, ..small() };
-        bits(&pool.install(|| draw(&scene, &environment, &strategy, &settings)).layers)
+        let picture = pool.install(|| draw(&scene, environment, strategy, &settings));
+        (bits(&picture.layers), picture.layers.n_samples, picture.counts)
     };
     let expected = picture(1, 16);
     for (threads, tile_size) in [(2, 16), (5, 16), (2, 7), (1, 64), (3, 1)] {
-        assert!(picture(threads, tile_size) == expected, "{threads} threads, tiles of {tile_size}");
+        let same = picture(threads, tile_size) == expected;
+        assert!(same, "{name}: {threads} threads, tiles of {tile_size}");
     }
 }
 

@@ -594,7 +594,19 @@ fn built_in_scenes_are_objects_with_a_camera() {
     let d = one("scene.toml", text).description;
     assert!(close(d.parts[0].mesh.bounds().center(), vec3(7.0, 0.0, 0.0)));
     assert!(close(d.camera.unwrap().target, vec3(7.0, 0.0, 0.0)));
-    assert_eq!(d.surfaces.len(), 1);
+    assert!(matches!(d.surfaces[d.parts[0].surface].model, SurfaceModel::Fixed(_)));
+}
+
+/// A material is the subject's; floor, probe and camera of the scene stay as they are.
+#[test]
+fn a_material_changes_nothing_but_the_subject() {
+    let text = "[[objects]]\nbuiltin = \"material-ball\"\nmaterial = \"ggx:0.3\"\n";
+    let d = one("scene.toml", text).description;
+    assert!(d.environment.is_some() && d.camera.is_some() && !d.scenery.is_empty());
+    for (i, part) in d.parts.iter().enumerate() {
+        let fixed = matches!(d.surfaces[part.surface].model, SurfaceModel::Fixed(_));
+        assert_eq!(fixed, !d.scenery.contains(&i), "{}", part.name);
+    }
 }
 
 #[test]

@@ -21,7 +21,7 @@ fn strategies_agree_with_quadrature() {
     let views = [0.2, 1.1, 1.48];
     let environments =
         [environment(false, UpAxis::Y), environment(true, UpAxis::Z), white_environment()];
-    let suite = Suite::of(MATERIALS.len() * views.len() * environments.len() * 8);
+    let suite = Suite::of(MATERIALS.len() * views.len() * environments.len() * 10);
     let test = ZTest { suite, ..ZTest::default() };
     for env in &environments {
         let table = CompensatedTable::new(env);
@@ -43,6 +43,11 @@ fn strategies_agree_with_quadrature() {
                 let mis = |table, heuristic, m, n| {
                     MultipleImportanceSampling::new(env, table, heuristic, m, n).unwrap()
                 };
+                for kind in [SamplerKind::Independent, SamplerKind::Sobol] {
+                    let table = LightTable::Compensated(&table);
+                    let default = mis(table, Heuristic::Power, 1, 1);
+                    check("mis power compensated", batches(&default, env, &at, kind, 1024));
+                }
                 let kind = SamplerKind::Sobol;
                 let balance = mis(LightTable::Full, Heuristic::Balance, 1, 1);
                 check("mis balance", batches(&balance, env, &at, kind, 1024));

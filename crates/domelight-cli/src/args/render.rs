@@ -1,14 +1,13 @@
 //! The arguments of `domelight render`.
 
 use clap::{Args, ValueEnum};
-use domelight::bsdf::MaterialSpec;
 use domelight::environment::UpAxis;
 use domelight::environment::mapping::Mapping;
 use domelight::render::Filter;
 
 use super::{Tone, finite, mapping, one_of};
 use crate::output::PicturePath;
-use crate::values::{Size, Split, Triple, not_negative};
+use crate::values::{NamedMaterial, Size, Split, Triple, not_negative};
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -111,9 +110,9 @@ pub(crate) struct SamplingArguments {
     /// What rejection draws its tries from [default: tighter]
     #[arg(long, value_enum, value_name = "SOURCE")]
     pub(crate) proposal: Option<ProposalName>,
-    /// How mis weighs its samples
-    #[arg(long, value_enum, default_value_t = HeuristicName::Power)]
-    pub(crate) heuristic: HeuristicName,
+    /// How mis weighs its samples [default: power]
+    #[arg(long, value_enum)]
+    pub(crate) heuristic: Option<HeuristicName>,
     /// With mis, draw from the environment's whole table; by default what is dimmer than the mean
     /// is left to the BRDF samples
     #[arg(long)]
@@ -160,7 +159,7 @@ pub(crate) struct CameraArguments {
 pub(crate) struct StageArguments {
     /// Material of the subject: diffuse:0.8, phong:50:1:0.5, ward:0.15:0.5, ggx:0.2, mix, …
     #[arg(long, value_name = "M")]
-    pub(crate) material: Option<MaterialSpec>,
+    pub(crate) material: Option<NamedMaterial>,
     /// Move and scale the scene: centre of the bounds to 0, longest half-extent to 1
     #[arg(long)]
     pub(crate) normalize: bool,

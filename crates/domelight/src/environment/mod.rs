@@ -89,13 +89,17 @@ pub enum EnvironmentError {
         /// Its value, scale included.
         value: Rgb,
     },
-    /// A rotation or scale that is not a number.
-    #[error("{what} is {value}; it must be finite and not negative")]
-    BadSetting {
-        /// The setting's name.
-        what: &'static str,
-        /// Its value.
-        value: f32,
+    /// A scale that is negative, NaN or infinite.
+    #[error("the scale is {0}; it must be finite and not negative")]
+    BadScale(f32),
+    /// A rotation that is NaN or infinite.
+    #[error("the rotation is {0} degrees; it must be finite")]
+    BadRotation(f32),
+    /// More light than single precision holds.
+    #[error("the map's total is {power:e}, beyond single precision; scale it down")]
+    TooBright {
+        /// ∫ luminance dω.
+        power: f64,
     },
 }
 
@@ -149,11 +153,10 @@ impl Environment {
             return Err(EnvironmentError::Empty { width, height });
         }
         if !scale.is_finite() || scale < 0.0 {
-            return Err(EnvironmentError::BadSetting { what: "scale", value: scale });
+            return Err(EnvironmentError::BadScale(scale));
         }
         if !orientation.rotation.is_finite() {
-            let value = orientation.rotation;
-            return Err(EnvironmentError::BadSetting { what: "rotation", value });
+            return Err(EnvironmentError::BadRotation(orientation.rotation));
         }
         if scale != 1.0 {
             map.pixels.iter_mut().for_each(|p| *p *= scale);
@@ -173,7 +176,14 @@ impl Environment {
             }
             max_luminance = max_luminance.max(p.luminance());
         }
-        let inverse_power = table.as_ref().map_or(0.0, |t| (1.0 / t.total()) as f32);
+        let power = table.as_ref().map_or(0.0, HierarchicalTable::total);
+        if power > f64::from(f32::MAX) {
+            return Err(EnvironmentError::TooBright { power });
+        }
+        // Less light than single precision can invert is none.
+        let inverse_power = (1.0 / power) as f32;
+        let table = table.filter(|_| inverse_power.is_finite());
+        let inverse_power = if table.is_some() { inverse_power } else { 0.0 };
         Ok(Self { map, orientation, grid, table, inverse_power, max_luminance })
     }
 

@@ -27,10 +27,10 @@ pub(super) struct SurfaceSample {
 pub(super) struct PixelSums {
     color: [f64; 3],
     color_squared: [f64; 3],
-    unoccluded: Rgb,
+    unoccluded: [f64; 3],
     albedo: Rgb,
     normal: Vec3,
-    depth: f32,
+    depth: f64,
     alpha: f32,
     n_hits: u32,
     n_samples: u32,
@@ -45,14 +45,16 @@ impl PixelSums {
                 self.color[c] += f64::from(x);
                 self.color_squared[c] += f64::from(x) * f64::from(x);
             }
-            self.unoccluded += sample.unoccluded;
+            for (c, x) in sample.unoccluded.to_array().into_iter().enumerate() {
+                self.unoccluded[c] += f64::from(x);
+            }
         }
         self.alpha += sample.alpha;
         self.n_samples += 1;
         if let Some(surface) = sample.surface {
             self.albedo += surface.albedo;
             self.normal += surface.normal;
-            self.depth += surface.depth;
+            self.depth += f64::from(surface.depth);
             self.n_hits += 1;
         }
         finite
@@ -62,9 +64,13 @@ impl PixelSums {
         1.0 / self.n_samples.max(1) as f32
     }
 
-    fn color(&self) -> Rgb {
+    fn mean(&self, sum: [f64; 3]) -> Rgb {
         let n = f64::from(self.n_samples.max(1));
-        Rgb::from(self.color.map(|c| (c / n) as f32))
+        Rgb::from(sum.map(|c| (c / n) as f32))
+    }
+
+    fn depth(&self) -> f32 {
+        (self.depth / f64::from(self.n_hits.max(1))) as f32
     }
 
     /// Of the mean, by the spread of the samples; stratified samples err less than it says.
@@ -113,20 +119,25 @@ impl Layers {
         self.color.height
     }
 
-    /// From the sums of all pixels in row order.
-    pub(super) fn new(width: usize, height: usize, pixels: &[PixelSums]) -> Self {
-        let image = |f: &dyn Fn(&PixelSums) -> Rgb| {
-            RgbImage::new(width, height, pixels.iter().map(f).collect())
-        };
+    /// From the sums `at(x, y)` of all pixels.
+    pub(super) fn new<'a>(
+        width: usize,
+        height: usize,
+        at: impl Fn(usize, usize) -> &'a PixelSums,
+    ) -> Self {
+        let places = || (0..height).flat_map(move |y| (0..width).map(move |x| (x, y)));
+        let pixels = || places().map(|(x, y)| at(x, y));
+        let image =
+            |f: &dyn Fn(&PixelSums) -> Rgb| RgbImage::new(width, height, pixels().map(f).collect());
         Self {
-            color: image(&PixelSums::color),
-            alpha: pixels.iter().map(|p| p.alpha * p.scale()).collect(),
-            unoccluded: image(&|p| p.unoccluded * p.scale()),
+            color: image(&|p| p.mean(p.color)),
+            alpha: pixels().map(|p| p.alpha * p.scale()).collect(),
+            unoccluded: image(&|p| p.mean(p.unoccluded)),
             albedo: image(&|p| p.albedo * p.scale()),
-            normal: pixels.iter().map(|p| p.normal * p.scale()).collect(),
-            depth: pixels.iter().map(|p| p.depth / p.n_hits.max(1) as f32).collect(),
+            normal: pixels().map(|p| p.normal * p.scale()).collect(),
+            depth: pixels().map(PixelSums::depth).collect(),
             variance: image(&PixelSums::variance),
-            n_samples: pixels.iter().map(|p| p.n_samples).collect(),
+            n_samples: pixels().map(|p| p.n_samples).collect(),
         }
     }
 }

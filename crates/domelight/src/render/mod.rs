@@ -2,7 +2,7 @@
 //!
 //! A tile depends on nothing but the scene, the settings, the seed and its own place; a pixel's
 //! sums are added in the order of its samples. So the picture has the same bits for any number of
-//! threads, any tile size and any division into passes.
+//! threads; with strategies that learn nothing, also for any tile size and division into passes.
 
 mod film;
 mod filter;
@@ -54,7 +54,8 @@ pub struct RenderSettings {
     pub sampler: SamplerKind,
     /// What camera rays see that leave the scene.
     pub background: Background,
-    /// Pixels along a tile's edge, at least 1; the picture does not depend on it.
+    /// Pixels along a tile's edge, at least 1. Strategies that learn nothing give the same picture
+    /// with any.
     pub tile_size: usize,
 }
 
@@ -134,9 +135,12 @@ pub fn render<S: Strategy>(
 ) -> Rendering {
     let filter = FilterSampler::new(settings.filter);
     let frame = Frame { scene, camera, environment, settings, filter };
-    let mut tiles = tiles(settings);
+    let n_rays = strategy.n_rays();
+    let size = tile_size(settings, n_rays);
+    let mut tiles: Vec<(Tile, S::Learned)> =
+        tiles(settings, size).map(|tile| (tile, S::Learned::default())).collect();
     let mut complete = true;
-    for samples in passes(settings, strategy.n_rays()) {
+    for samples in passes(settings, size, n_rays) {
         if observer.cancelled() {
             complete = false;
             break;
@@ -144,16 +148,17 @@ pub fn render<S: Strategy>(
         observer.pass_started(samples.clone());
         complete &= tiles
             .par_iter_mut()
-            .map_init(Scratch::default, |scratch, tile| {
+            .map_init(Scratch::default, |scratch, (tile, learned)| {
                 if observer.cancelled() {
                     return false;
                 }
-                observer.tile_finished(&tile.render(&frame, strategy, samples.clone(), scratch));
+                let counts = tile.render(&frame, strategy, learned, samples.clone(), scratch);
+                observer.tile_finished(&counts);
                 true
             })
             .reduce(|| true, |a, b| a & b);
     }
-    assemble(settings, &tiles, complete)
+    assemble(settings, size, &tiles, complete)
 }
 
 /// The shading points of up to 256 pixels' centres, spread over the picture: for pilots.
@@ -167,31 +172,34 @@ pub fn survey(scene: &Scene, camera: &Camera, settings: &RenderSettings) -> Vec<
 }
 
 /// The tiles of the picture in row order; those at the right and lower border may be smaller.
-fn tiles(settings: &RenderSettings) -> Vec<Tile> {
-    let size = settings.tile_size;
+fn tiles(settings: &RenderSettings, size: usize) -> impl Iterator<Item = Tile> + use<'_> {
     let rows = (0..settings.height).step_by(size);
-    rows.flat_map(|y| (0..settings.width).step_by(size).map(move |x| (x, y)))
-        .map(|(x, y)| {
+    rows.flat_map(move |y| (0..settings.width).step_by(size).map(move |x| (x, y))).map(
+        move |(x, y)| {
             let width = size.min(settings.width - x);
             let height = size.min(settings.height - y);
             let pixels = vec![PixelSums::default(); width * height];
             Tile { x, y, width, pixels, counts: Counts::default() }
-        })
-        .collect()
+        },
+    )
 }
 
-/// How many passes a render takes.
-pub fn n_passes(settings: &RenderSettings, n_rays: u32) -> usize {
-    passes(settings, n_rays).count()
+/// Shadow rays of a tile in one pass that the caches hold.
+const RAYS_PER_TILE: usize = 1 << 15;
+
+/// The edge of the tiles: smaller than set where one sample of each pixel asks for too many rays.
+fn tile_size(settings: &RenderSettings, n_rays: u32) -> usize {
+    let most = (RAYS_PER_TILE / n_rays.max(1) as usize).isqrt().max(1);
+    settings.tile_size.min(most)
 }
 
 /// Camera samples of each pass: 1, 1, 2, 4, … up to as many as keep a tile's rays in the caches.
 fn passes(
     settings: &RenderSettings,
+    tile_size: usize,
     n_rays: u32,
 ) -> impl Iterator<Item = std::ops::Range<u32>> + use<> {
-    const RAYS_PER_TILE: usize = 1 << 15;
-    let pixels = settings.tile_size * settings.tile_size;
+    let pixels = tile_size * tile_size;
     let most = (RAYS_PER_TILE / (pixels * n_rays.max(1) as usize)).clamp(1, 64) as u32;
     let n_samples = settings.n_samples;
     let mut start = 0;
@@ -203,17 +211,19 @@ fn passes(
     })
 }
 
-fn assemble(settings: &RenderSettings, tiles: &[Tile], complete: bool) -> Rendering {
-    let mut pixels = vec![PixelSums::default(); settings.width * settings.height];
+fn assemble<L>(
+    settings: &RenderSettings,
+    size: usize,
+    tiles: &[(Tile, L)],
+    complete: bool,
+) -> Rendering {
     let mut counts = Counts::default();
-    for tile in tiles {
-        counts += tile.counts;
-        for (row, sums) in tile.pixels.chunks(tile.width).enumerate() {
-            let start = (tile.y + row) * settings.width + tile.x;
-            pixels[start..start + tile.width].copy_from_slice(sums);
-        }
-    }
-    let layers = Layers::new(settings.width, settings.height, &pixels);
+    tiles.iter().for_each(|(tile, _)| counts += tile.counts);
+    let across = settings.width.div_ceil(size);
+    let layers = Layers::new(settings.width, settings.height, |x, y| {
+        let (tile, _) = &tiles[y / size * across + x / size];
+        &tile.pixels[(y - tile.y) * tile.width + x - tile.x]
+    });
     Rendering { layers, counts, complete }
 }
 
@@ -227,7 +237,7 @@ mod tests {
             for n_rays in [0, 1, 2, 15, 1000] {
                 let settings = RenderSettings { n_samples, ..Default::default() };
                 let mut next = 0;
-                for pass in passes(&settings, n_rays) {
+                for pass in passes(&settings, 16, n_rays) {
                     assert_eq!(pass.start, next);
                     assert!(pass.end > pass.start);
                     next = pass.end;
@@ -240,7 +250,7 @@ mod tests {
     #[test]
     fn tiles_cover_every_pixel_once() {
         let settings = RenderSettings { width: 37, height: 5, tile_size: 16, ..Default::default() };
-        let n: usize = tiles(&settings).iter().map(|t| t.pixels.len()).sum();
+        let n: usize = tiles(&settings, 16).map(|t| t.pixels.len()).sum();
         assert_eq!(n, 37 * 5);
     }
 }

@@ -62,6 +62,7 @@ impl Tile {
         &mut self,
         frame: &Frame,
         strategy: &S,
+        learned: &mut S::Learned,
         samples: std::ops::Range<u32>,
         scratch: &mut Scratch,
     ) -> Counts {
@@ -72,7 +73,8 @@ impl Tile {
             shading_points: scratch.points.len() as u64,
             ..Counts::default()
         };
-        counts.shadow_rays = scratch.trace_strategy(frame.scene.bvh(), strategy, self.width);
+        counts.shadow_rays =
+            scratch.trace_strategy(frame.scene.bvh(), strategy, learned, self.width);
         counts.non_finite = self.add_samples(frame, scratch);
         self.counts += counts;
         counts
@@ -159,6 +161,7 @@ impl Scratch {
         &mut self,
         visibility: &impl Visibility,
         strategy: &S,
+        learned: &mut S::Learned,
         width: usize,
     ) -> u64 {
         let n = self.points.len();
@@ -166,7 +169,6 @@ impl Scratch {
         self.radiance.resize(n, Rgb::BLACK);
         self.unoccluded.clear();
         self.unoccluded.resize(n, Rgb::BLACK);
-        let mut learned = S::Learned::default();
         let mut n_rays = 0;
         for round in 0.. {
             let tile = TileShading {
@@ -176,7 +178,7 @@ impl Scratch {
                 width,
             };
             self.contributions.reset(n);
-            let more = strategy.push(&tile, &learned, round, &mut self.contributions);
+            let more = strategy.push(&tile, learned, round, &mut self.contributions);
             n_rays += self.contributions.len() as u64;
 
             // Test the visibility of the whole round at once.
@@ -204,7 +206,7 @@ impl Scratch {
                 break;
             }
             self.occluded.iter_mut().for_each(|o| *o = !*o);
-            strategy.learn(&tile, &self.contributions, &self.occluded, &mut learned);
+            strategy.learn(&tile, &self.contributions, &self.occluded, learned);
         }
         n_rays
     }

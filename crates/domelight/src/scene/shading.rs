@@ -32,10 +32,10 @@ impl Scene {
         let [p0, p1, p2] = corner.of(&part.mesh.positions);
         let ng = (p1 - p0).cross(p2 - p0).try_normalize().unwrap_or(viewer);
         let uv = corner.mix(&part.mesh.uvs).unwrap_or_default();
-        let (normal, tangent) = self.normal_and_tangent(part, surface, &corner, ng, uv);
+        let (smooth, normal, tangent) = self.normals_and_tangent(part, surface, &corner, ng, uv);
 
         let ng = if ng.dot(viewer) < 0.0 { -ng } else { ng };
-        let normal = if normal.dot(ng) < 0.0 { -normal } else { normal };
+        let normal = if smooth.dot(ng) < 0.0 { -normal } else { normal };
         let normal = bend(normal, viewer, ng);
         let frame = tangent.map_or_else(
             || Frame::from_z(normal),
@@ -48,15 +48,16 @@ impl Scene {
         ShadingPoint { position, ng, frame, wo, material }
     }
 
-    /// The shading normal on the front side, the normal map applied, and the tangent.
-    fn normal_and_tangent(
+    /// On the front side: the interpolated normal, the same with the normal map applied, and the
+    /// tangent. Which side the viewer is on follows from the first, for relief may tip the second over.
+    fn normals_and_tangent(
         &self,
         part: &Part,
         surface: &Surface,
         corner: &Corners,
         ng: Vec3,
         uv: Vec2,
-    ) -> (Vec3, Option<Vec4>) {
+    ) -> (Vec3, Vec3, Option<Vec4>) {
         let mesh = &part.mesh;
         let normal = corner.mix(&mesh.normals).and_then(Vec3::try_normalize).unwrap_or(ng);
         let tangent = corner.mix(&mesh.tangents).or_else(|| corner.uv_tangent(mesh, normal));
@@ -66,7 +67,7 @@ impl Scene {
             let bitangent = frame.y * 1f32.copysign(tangent.w);
             (frame.x * n.x + bitangent * n.y + frame.z * n.z).try_normalize()
         });
-        (mapped.unwrap_or(normal), tangent)
+        (normal, mapped.unwrap_or(normal), tangent)
     }
 }
 

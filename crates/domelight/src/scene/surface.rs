@@ -156,8 +156,9 @@ impl TextureRef {
     }
 }
 
+/// Clamps to [0, 1]; NaN becomes 0.
 fn unit(v: f32) -> f32 {
-    v.clamp(0.0, 1.0)
+    v.max(0.0).min(1.0)
 }
 
 fn lambert_phong(diffuse: Rgb, specular: Rgb, exponent: f32) -> Material {

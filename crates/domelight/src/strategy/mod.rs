@@ -211,7 +211,7 @@ pub enum Round {
 /// A strategy that looks at a tile at a time, in rounds. Every [`PointStrategy`] is one: it needs a
 /// single round and learns nothing.
 pub trait Strategy: Sync {
-    /// What the rounds of a tile teach.
+    /// What the rounds of a tile teach, kept from pass to pass.
     type Learned: Default + Send;
 
     /// Shadow rays asked for at each point at the most: for sizing batches.

@@ -38,7 +38,7 @@ use crate::environment::Environment;
 use crate::math::Vec3;
 use crate::sampling::hilbert::hemisphere_index;
 use crate::sampling::rng::hash2;
-use crate::sampling::{Dimension, SamplerKind, Stream, WeightedReservoirs};
+use crate::sampling::{Dimension, ONE_MINUS_EPSILON, SamplerKind, Stream, WeightedReservoirs};
 
 /// Where candidates come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -151,7 +151,8 @@ impl SamplingImportanceResampling<'_> {
             ticks.sort_unstable_by(f32::total_cmp);
         } else {
             let offset = number(0, 1);
-            ticks.extend((0..n).map(|j| (j as f32 + offset) / n as f32));
+            let tick = |j: u32| ((j as f32 + offset) / n as f32).min(ONE_MINUS_EPSILON);
+            ticks.extend((0..n).map(tick));
         }
     }
 
@@ -160,12 +161,17 @@ impl SamplingImportanceResampling<'_> {
         at: &ShadingPoint,
         numbers: SampleNumbers,
         scratch: &mut SirScratch,
-        push: impl FnMut(Vec3, Rgb),
+        mut push: impl FnMut(Vec3, Rgb),
     ) {
         let SirScratch { candidates, order, ticks, .. } = scratch;
         candidates.clear();
         self.draw(at, numbers, |c| candidates.push(c));
         let total = candidates.iter().map(|c| f64::from(c.weight)).sum();
+        if !f64::is_finite(total) {
+            // Overflow is handed on, for the film to count.
+            candidates.iter().take(1).for_each(|c| push(c.wi, c.value * f32::INFINITY));
+            return;
+        }
         self.fill_ticks(numbers, ticks);
         if self.resampling == Resampling::SystematicSorted {
             order.clear();
@@ -231,7 +237,7 @@ fn pick<'a>(
         }
     }
     // A tick is below 1 by more than sums in double precision are off.
-    debug_assert!(ticks.is_empty() || total == 0.0 || !total.is_finite());
+    debug_assert!(ticks.is_empty() || total == 0.0);
 }
 
 impl PointStrategy for SamplingImportanceResampling<'_> {

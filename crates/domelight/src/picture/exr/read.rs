@@ -348,7 +348,12 @@ impl Planes {
         let mut pixels = self.pixels;
         if let Some(matrix) = matrix {
             for pixel in &mut pixels {
+                // A colour outside Rec. 709 is clipped; a negative value of the file is kept to be seen.
+                let valid = pixel.min_component() >= 0.0;
                 *pixel = transform(&matrix, *pixel);
+                if valid {
+                    *pixel = pixel.map(|c| c.max(0.0));
+                }
             }
         }
         (RgbImage::new(self.width, self.height, pixels), self.alpha)

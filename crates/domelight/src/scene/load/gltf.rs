@@ -169,6 +169,9 @@ pub enum GltfProblem {
 
 const MAX_DEPTH: usize = 200;
 
+/// Extensions that change nothing unseen: read, or warned of where they matter.
+const HANDLED_EXTENSIONS: [&str; 2] = ["KHR_texture_transform", "KHR_materials_emissive_strength"];
+
 pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
     let (document, blob) = parse(bytes)
         .map_err(|problem| LoadError::Gltf { path: path.into(), problem: Box::new(problem) })?;
@@ -185,6 +188,9 @@ pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
         camera: None,
         warnings: Vec::new(),
     };
+    for extension in document.extensions_used().filter(|e| !HANDLED_EXTENSIONS.contains(e)) {
+        reader.warn(&format!("the extension {extension} is ignored"));
+    }
     reader.read_buffers(blob.as_deref())?;
     let scene = document.default_scene().or_else(|| document.scenes().next());
     match scene {

@@ -161,11 +161,19 @@ fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
 }
 
 fn read_referenced(path: &Path, referrer: &str) -> Result<Vec<u8>, LoadError> {
-    fs::read(path).map_err(|source| LoadError::ReadReferenced {
+    read_plain(path).map_err(|source| LoadError::ReadReferenced {
         path: path.into(),
         referrer: referrer.into(),
         source,
     })
+}
+
+/// The bytes of a plain file: a device or a pipe that a scene names might never end.
+fn read_plain(path: &Path) -> io::Result<Vec<u8>> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a plain file"));
+    }
+    fs::read(path)
 }
 
 /// The name of a file without folder and extension.

@@ -216,7 +216,7 @@ impl<'a> Reader<'a> {
     /// Reads a material library; one that is missing is a warning.
     fn library(&mut self, line: usize, name: &str) -> Result<(), LoadError> {
         let path = super::relative(self.path, name);
-        match std::fs::read(&path) {
+        match super::read_plain(&path) {
             Ok(bytes) => {
                 let mut surfaces =
                     mtl::parse(&path, &bytes, &mut self.textures, &mut self.warnings)?;

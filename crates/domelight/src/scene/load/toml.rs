@@ -410,19 +410,14 @@ impl Reader<'_> {
                 part.name.clone_from(name);
             }
         }
-        match &table.material {
-            None => self.loaded.description.append(description),
-            Some(text) => {
-                let surface = self.surface(text, at)?;
-                let mut parts = std::mem::take(&mut description.parts);
-                for part in &mut parts {
-                    part.surface = surface;
-                }
-                self.loaded.description.parts.append(&mut parts);
-                let SceneDescription { camera, .. } = description;
-                self.loaded
-                    .description
-                    .append(SceneDescription { camera, ..SceneDescription::default() });
+        let surface = table.material.as_ref().map(|text| self.surface(text, at)).transpose()?;
+        let first = self.loaded.description.parts.len();
+        self.loaded.description.append(description);
+        // A material is the subject's; floors and plinths keep theirs.
+        let SceneDescription { parts, scenery, .. } = &mut self.loaded.description;
+        for (i, part) in parts.iter_mut().enumerate().skip(first) {
+            if let (Some(surface), false) = (surface, scenery.contains(&i)) {
+                part.surface = surface;
             }
         }
         Ok(())
