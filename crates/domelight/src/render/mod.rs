@@ -218,7 +218,9 @@ fn assemble<L>(
     complete: bool,
 ) -> Rendering {
     let mut counts = Counts::default();
-    tiles.iter().for_each(|(tile, _)| counts += tile.counts);
+    for (tile, _) in tiles {
+        counts += tile.counts;
+    }
     let across = settings.width.div_ceil(size);
     let layers = Layers::new(settings.width, settings.height, |x, y| {
         let (tile, _) = &tiles[y / size * across + x / size];

@@ -158,7 +158,7 @@ impl TextureRef {
 
 /// Clamps to [0, 1]; NaN becomes 0.
 fn unit(v: f32) -> f32 {
-    v.max(0.0).min(1.0)
+    if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) }
 }
 
 fn lambert_phong(diffuse: Rgb, specular: Rgb, exponent: f32) -> Material {
