@@ -51,6 +51,7 @@ impl SamplingArguments {
         refuse("--rays", self.rays.is_some() && is_rig, "other strategies; use --lights")?;
         let n = self.rays.unwrap_or(1);
         let n_lights = self.lights.unwrap_or(64) as usize;
+        self.refuse_repeating_points()?;
         Ok(match self.strategy {
             S::Brdf => Plan::Brdf { n },
             S::Environment => Plan::Environment { n },
@@ -60,6 +61,21 @@ impl SamplingArguments {
             S::MedianCut => Plan::MedianCut { n_lights },
             S::VarianceMinimization => Plan::VarianceMinimization { n_lights },
         })
+    }
+
+    /// The points of a pixel are numbered by 32 bits; beyond that they would repeat.
+    fn refuse_repeating_points(&self) -> Result<()> {
+        let split = self.split.map_or(0, |s| s.environment.max(s.brdf));
+        let counts = [self.rays, self.candidates, self.tries, Some(split)];
+        let most = counts.into_iter().flatten().max().unwrap_or(1).max(1);
+        if u64::from(self.spp) * u64::from(most) > 1 << 32 {
+            return usage(format!(
+                "{} camera samples of {most} directions are more points than a pixel has (2^32): \
+                 lower --spp, or render several seeds and average them",
+                self.spp
+            ));
+        }
+        Ok(())
     }
 
     fn rejection(&self) -> Result<Plan> {

@@ -145,6 +145,8 @@ fn flags_that_contradict_are_usage_errors() {
     refused(&render(&folder, &["--candidates", "9"]), 2, &["--candidates", "sir"]);
     let few = ["--strategy", "sir", "--rays", "9", "--candidates", "8"];
     refused(&render(&folder, &few), 2, &["--candidates", "--rays"]);
+    let many = ["--strategy", "sir", "--candidates", "1048576", "--spp", "16384"];
+    refused(&render(&folder, &many), 2, &["2^32", "--spp"]);
     let one = ["--strategy", "rejection", "--rays", "1"];
     refused(&render(&folder, &one), 2, &["--tries", "2"]);
     let rays = ["--strategy", "median-cut", "--rays", "4"];
