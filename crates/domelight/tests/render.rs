@@ -26,6 +26,10 @@ fn material(text: &str) -> Material {
 
 /// Two spheres on a floor, which shade each other.
 fn scene(ball: &str) -> Scene {
+    Scene::new(description(ball)).unwrap()
+}
+
+fn description(ball: &str) -> SceneDescription {
     let place = |mut mesh: Mesh, m: Mat4| {
         mesh.transform(&m);
         mesh
@@ -40,7 +44,7 @@ fn scene(ball: &str) -> Scene {
         model: SurfaceModel::Fixed(material(text)),
         normal_map: None,
     };
-    Scene::new(SceneDescription {
+    SceneDescription {
         parts: vec![
             part("left", sphere(-0.8, 0.8), 0),
             part("right", sphere(0.7, 0.5), 0),
@@ -48,18 +52,20 @@ fn scene(ball: &str) -> Scene {
         ],
         surfaces: vec![surface("ball", ball), surface("grey", "diffuse:0.5")],
         ..SceneDescription::default()
-    })
-    .unwrap()
+    }
 }
 
-fn camera(settings: &RenderSettings) -> Camera {
-    let view = CameraSettings {
+fn view() -> CameraSettings {
+    CameraSettings {
         projection: Projection::Perspective { fov_y_degrees: 35.0 },
         origin: vec3(0.0, 1.6, 5.0),
         target: vec3(0.0, 0.6, 0.0),
         up: Vec3::Y,
-    };
-    Camera::new(&view, settings.width, settings.height).unwrap()
+    }
+}
+
+fn camera(settings: &RenderSettings) -> Camera {
+    Camera::new(&view(), settings.width, settings.height).unwrap()
 }
 
 /// A bright patch on a noisy sky, wide enough that BRDF samples find it in every batch: the t-test
@@ -266,6 +272,31 @@ fn layers_mean_what_they_say() {
     let shown = draw(&scene, &environment, &mis(&environment), &shown).layers;
     assert!(shown.alpha.iter().all(|&a| a == 1.0));
     assert!(shown.color.pixels[0].g > 0.0);
+}
+
+/// The picture of a scene does not depend on its unit of length.
+#[test]
+fn tiny_and_huge_scenes_are_shadowed_alike() {
+    let environment = environment();
+    let picture = |scale: f32| {
+        let mut description = description("diffuse:0.8");
+        description.transform(&Mat4::from_scale(Vec3::splat(scale)));
+        let scene = Scene::new(description).unwrap();
+        let settings = RenderSettings { width: 24, height: 20, n_samples: 64, ..small() };
+        let mut view = view();
+        view.origin *= scale;
+        view.target *= scale;
+        let camera = Camera::new(&view, settings.width, settings.height).unwrap();
+        let mis = mis(&environment);
+        render(&scene, &camera, &environment, &mis, &settings, &()).layers.color
+    };
+    let expected = picture(1.0);
+    let mean = |image: &RgbImage| image.pixels.iter().map(|p| f64::from(p.g)).sum::<f64>();
+    for scale in [1e-4, 1e-2, 1e4] {
+        // The same random numbers: only rays that graze an edge may fall on its other side.
+        let ratio = mean(&picture(scale)) / mean(&expected);
+        assert!((ratio - 1.0).abs() < 2e-3, "scale {scale}: {ratio}");
+    }
 }
 
 #[test]

@@ -74,15 +74,18 @@ impl RayBatch {
 /// Moves a ray's origin off the surface, to the side that `normal` points to, by a few units in
 /// the last place: far enough not to hit the surface it starts on, near enough not to be seen.
 ///
+/// Near the origin, where units in the last place vanish, the step is 2⁻¹⁶ of `extent`, the size of
+/// the scene, or of 1 if that is less.
+///
 /// Wächter & Binder 2019, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing
 /// Gems chapter 6.
-pub fn offset_origin(position: Vec3, normal: Vec3) -> Vec3 {
-    const ORIGIN: f32 = 1.0 / 32.0;
-    const FLOAT_SCALE: f32 = 1.0 / 65536.0;
+pub fn offset_origin(position: Vec3, normal: Vec3, extent: f32) -> Vec3 {
     const INT_SCALE: f32 = 256.0;
+    let unit = extent.min(1.0);
+    let (origin, float_scale) = (unit / 32.0, unit / 65536.0);
     let offset = |p: f32, n: f32| {
-        if p.abs() < ORIGIN {
-            return p + FLOAT_SCALE * n;
+        if p.abs() < origin {
+            return p + float_scale * n;
         }
         let steps = (INT_SCALE * n) as i32;
         f32::from_bits(p.to_bits().wrapping_add_signed(if p < 0.0 { -steps } else { steps }))
@@ -103,9 +106,11 @@ mod tests {
     fn the_offset_goes_to_the_side_of_the_normal() {
         for p in [vec3(0.0, 1e-3, 1e3), vec3(-5.0, -1e-9, 2.0)] {
             for n in [vec3(0.6, -0.8, 0.0), vec3(0.0, 0.0, 1.0), vec3(-0.6, 0.0, -0.8)] {
-                let q = offset_origin(p, n);
-                assert!((q - p).dot(n) > 0.0);
-                assert!((q - p).length() < 1e-4 * p.length());
+                for extent in [1e-3, 1.0, 1e4] {
+                    let q = offset_origin(p, n, extent);
+                    assert!((q - p).dot(n) > 0.0);
+                    assert!((q - p).length() < 1e-4 * p.length());
+                }
             }
         }
     }

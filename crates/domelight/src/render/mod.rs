@@ -116,6 +116,8 @@ struct Frame<'a> {
     environment: &'a Environment,
     settings: &'a RenderSettings,
     filter: FilterSampler,
+    /// The longest extent of the scene.
+    extent: f32,
 }
 
 /// Renders a scene under an environment with one strategy, on rayon's current pool of threads.
@@ -134,7 +136,8 @@ pub fn render<S: Strategy>(
     observer: &impl Observer,
 ) -> Rendering {
     let filter = FilterSampler::new(settings.filter);
-    let frame = Frame { scene, camera, environment, settings, filter };
+    let extent = scene.bounds().size().max_element();
+    let frame = Frame { scene, camera, environment, settings, filter, extent };
     let n_rays = strategy.n_rays();
     let size = tile_size(settings, n_rays);
     let mut tiles: Vec<(Tile, S::Learned)> =

@@ -73,8 +73,7 @@ impl Tile {
             shading_points: scratch.points.len() as u64,
             ..Counts::default()
         };
-        counts.shadow_rays =
-            scratch.trace_strategy(frame.scene.bvh(), strategy, learned, self.width);
+        counts.shadow_rays = scratch.trace_strategy(frame, strategy, learned, self.width);
         counts.non_finite = self.add_samples(frame, scratch);
         self.counts += counts;
         counts
@@ -159,7 +158,7 @@ impl Scratch {
     /// Runs the strategy's rounds; returns the number of shadow rays.
     fn trace_strategy<S: Strategy>(
         &mut self,
-        visibility: &impl Visibility,
+        frame: &Frame,
         strategy: &S,
         learned: &mut S::Learned,
         width: usize,
@@ -186,9 +185,9 @@ impl Scratch {
             for (&wi, &point) in self.contributions.wi.iter().zip(&self.contributions.point) {
                 let p = &self.points[point as usize];
                 let side = if p.ng.dot(wi) < 0.0 { -p.ng } else { p.ng };
-                self.shadow_rays.push(offset_origin(p.position, side), wi);
+                self.shadow_rays.push(offset_origin(p.position, side, frame.extent), wi);
             }
-            visibility.occluded(&self.shadow_rays, &mut self.occluded);
+            Visibility::occluded(frame.scene.bvh(), &self.shadow_rays, &mut self.occluded);
 
             // base + Σ weight · V
             for (i, &base) in self.contributions.base.iter().enumerate() {
