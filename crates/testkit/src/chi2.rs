@@ -260,7 +260,7 @@ impl Chi2 {
                 (expected, observed) = (0.0, 0.0);
             }
         }
-        // What is left over can only be when everything together expects too little.
+        // A last pool that expects too little is left out; without any pool there is no test.
         if n == 0 {
             return Err(format!("{expected} samples are expected in all"));
         }
