@@ -29,7 +29,7 @@ use crate::interrupt;
 use crate::output::{PicturePath, require_one_on_standard_output};
 use crate::progress::RenderProgress;
 use crate::report::{CameraReport, EnvironmentReport, RenderReport, Settings, Stages};
-use crate::strategy::{Job, Prepared};
+use crate::strategy::Job;
 use crate::usage::Stopwatch;
 use crate::values::{Size, Triple};
 
@@ -60,18 +60,17 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let environment = Environment::new(map, orientation, scale).with_context(|| probe.clone())?;
     let settings = arguments.render_settings();
     let plan = plan.for_scene(|| survey(&scene, &camera, &settings), &environment, settings.seed);
-    let prepared = Prepared::new(plan, &environment).with_context(|| probe.clone())?;
+    let renderer = plan.prepare(&environment).with_context(|| probe.clone())?;
     let build = watch.lap();
     if interrupted.load(Ordering::Relaxed) {
         bail!("interrupted before the first sample; nothing was written");
     }
 
-    let job =
-        Job { scene: &scene, camera: &camera, environment: &environment, settings: &settings };
     let n_pixels = (settings.width * settings.height) as u64;
     let progress =
-        RenderProgress::new(n_pixels * u64::from(settings.n_samples), quiet, interrupted);
-    let rendering = job.run(&prepared, &progress)?;
+        &RenderProgress::new(n_pixels * u64::from(settings.n_samples), quiet, interrupted);
+    let (scene, camera, environment) = (&scene, &camera, &environment);
+    let rendering = renderer(&Job { scene, camera, environment, settings: &settings, progress })?;
     progress.finish();
     if rendering.counts.camera_rays == 0 {
         bail!("interrupted before the first sample; nothing was written");
@@ -86,7 +85,7 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         normalize: stage.normalize,
         ground: stage.ground,
         hide_env: stage.hide_env,
-        environment: EnvironmentReport::new(probe, &light, &environment),
+        environment: EnvironmentReport::new(probe, &light, environment),
         camera: CameraReport::new(&view),
         strategy: plan.describe(),
         size: [width, height],
