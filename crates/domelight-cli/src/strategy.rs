@@ -12,8 +12,8 @@ use domelight::strategy::{
     SamplingImportanceResampling, ShadingPoint, Stop, Strategy, optimal_candidates,
 };
 
-use crate::args::render::{
-    HeuristicName, ProposalName, ResamplingName, SamplingArguments, SourceName, StrategyName,
+use crate::args::sampling::{
+    HeuristicName, ProposalName, ResamplingName, SourceName, StrategyArguments, StrategyName,
 };
 use crate::failure::UsageError;
 use crate::progress::RenderProgress;
@@ -31,7 +31,7 @@ pub(crate) enum Plan {
     VarianceMinimization { n_lights: usize },
 }
 
-impl SamplingArguments {
+impl StrategyArguments {
     /// Checks what the flags say together.
     pub(crate) fn plan(&self) -> Result<Plan> {
         use StrategyName as S;
@@ -51,7 +51,6 @@ impl SamplingArguments {
         refuse("--rays", self.rays.is_some() && is_rig, "other strategies; use --lights")?;
         let n = self.rays.unwrap_or(1);
         let n_lights = self.lights.unwrap_or(64) as usize;
-        self.refuse_repeating_points()?;
         Ok(match self.strategy {
             S::Brdf => Plan::Brdf { n },
             S::Environment => Plan::Environment { n },
@@ -61,21 +60,6 @@ impl SamplingArguments {
             S::MedianCut => Plan::MedianCut { n_lights },
             S::VarianceMinimization => Plan::VarianceMinimization { n_lights },
         })
-    }
-
-    /// The points of a pixel are numbered by 32 bits; beyond that they would repeat.
-    fn refuse_repeating_points(&self) -> Result<()> {
-        let split = self.split.map_or(0, |s| s.environment.max(s.brdf));
-        let counts = [self.rays, self.candidates, self.tries, Some(split)];
-        let most = counts.into_iter().flatten().max().unwrap_or(1).max(1);
-        if u64::from(self.spp) * u64::from(most) > 1 << 32 {
-            return usage(format!(
-                "{} camera samples of {most} directions are more points than a pixel has (2^32): \
-                 lower --spp, or render several seeds and average them",
-                self.spp
-            ));
-        }
-        Ok(())
     }
 
     fn rejection(&self) -> Result<Plan> {
@@ -168,6 +152,28 @@ impl Plan {
             }
             plan => plan,
         }
+    }
+
+    /// The points of a pixel are numbered by 32 bits; beyond that they would repeat.
+    pub(crate) fn refuse_repeating_points(self, spp: u32) -> Result<()> {
+        let n_points = match self {
+            Self::Brdf { n }
+            | Self::Environment { n }
+            | Self::Rejection { stop: Stop::Tries(n), .. } => n,
+            Self::Mis { split, .. } => split.environment.max(split.brdf),
+            Self::Sir { n_candidates, n, .. } => n_candidates.unwrap_or(n),
+            // Independent numbers, and none at all.
+            Self::Rejection { stop: Stop::Accepted { .. }, .. }
+            | Self::MedianCut { .. }
+            | Self::VarianceMinimization { .. } => 1,
+        };
+        if u64::from(spp) * u64::from(n_points) > 1 << 32 {
+            return usage(format!(
+                "{spp} camera samples of {n_points} directions are more points than a pixel has \
+                 (2^32): lower --spp, or render several seeds and average them"
+            ));
+        }
+        Ok(())
     }
 
     /// The name and the samples, for the report.
