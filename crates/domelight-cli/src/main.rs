@@ -13,6 +13,8 @@ mod render;
 mod report;
 mod scene;
 mod strategy;
+#[allow(dead_code)] // Commands that draw are to come.
+mod svg;
 mod usage;
 mod values;
 
