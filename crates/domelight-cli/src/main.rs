@@ -3,9 +3,11 @@
 //! Exit codes: 0 done (also when the reader of our output went away), 1 failed, 2 bad usage.
 
 mod args;
+mod compare;
 mod diff;
 mod failure;
 mod interrupt;
+mod notation;
 mod output;
 mod probe;
 mod progress;
@@ -26,6 +28,7 @@ fn main() -> ExitCode {
     let Arguments { command, quiet } = Arguments::parse();
     let done = match command {
         Command::Render(arguments) => render::run(&arguments, quiet),
+        Command::Compare(arguments) => compare::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
     };

@@ -11,6 +11,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// a terminal and nobody asked for quiet; passes the interrupt flag on to the renderer.
 pub(crate) struct RenderProgress {
     bar: ProgressBar,
+    /// What is rendered; empty where that is plain.
+    label: String,
     interrupted: &'static AtomicBool,
     rays: AtomicU64,
     started: Instant,
@@ -18,7 +20,12 @@ pub(crate) struct RenderProgress {
 
 impl RenderProgress {
     /// A bar over `n_camera_rays`.
-    pub(crate) fn new(n_camera_rays: u64, quiet: bool, interrupted: &'static AtomicBool) -> Self {
+    pub(crate) fn new(
+        label: &str,
+        n_camera_rays: u64,
+        quiet: bool,
+        interrupted: &'static AtomicBool,
+    ) -> Self {
         let target =
             if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let bar = ProgressBar::with_draw_target(Some(n_camera_rays), target);
@@ -27,7 +34,8 @@ impl RenderProgress {
             bar.set_style(style.progress_chars("━━╌"));
         }
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self { bar, interrupted, rays: AtomicU64::new(0), started: Instant::now() }
+        let label = if label.is_empty() { String::new() } else { format!("{label}  ") };
+        Self { bar, label, interrupted, rays: AtomicU64::new(0), started: Instant::now() }
     }
 
     /// Takes the bar away.
@@ -45,7 +53,12 @@ impl Observer for RenderProgress {
         let rays = counts.camera_rays + counts.shadow_rays;
         let rays = self.rays.fetch_add(rays, Ordering::Relaxed) + rays;
         let rate = rays as f64 / self.started.elapsed().as_secs_f64().max(1e-3);
-        self.bar.set_message(format!("{}  {:.1} Mrays/s", self.bar.prefix(), rate * 1e-6));
+        self.bar.set_message(format!(
+            "{}{}  {:.1} Mrays/s",
+            self.label,
+            self.bar.prefix(),
+            rate * 1e-6
+        ));
         self.bar.inc(counts.camera_rays);
     }
 

@@ -40,7 +40,7 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
 
     let n_pixels = (settings.width * settings.height) as u64;
     let progress =
-        &RenderProgress::new(n_pixels * u64::from(settings.n_samples), quiet, interrupted);
+        &RenderProgress::new("", n_pixels * u64::from(settings.n_samples), quiet, interrupted);
     let rendering = renderer(&Job { scene, camera, environment, settings, progress })?;
     progress.finish();
     if rendering.counts.camera_rays == 0 {

@@ -1,5 +1,6 @@
 //! The command line, typed.
 
+pub(crate) mod compare;
 pub(crate) mod render;
 pub(crate) mod sampling;
 pub(crate) mod scene;
@@ -37,6 +38,9 @@ pub(crate) enum Command {
     /// Render a scene lit by an HDR environment.
     #[command(after_help = render::EXAMPLES)]
     Render(Box<render::RenderArguments>),
+    /// Compare strategies on one scene at equal samples, rays or time, in a report to look at.
+    #[command(after_help = compare::EXAMPLES)]
+    Compare(Box<compare::CompareArguments>),
     /// Compare a picture with its reference: MSE, relMSE, PSNR, ꟻLIP.
     #[command(after_help = DIFF_EXAMPLES)]
     Diff(DiffArguments),
