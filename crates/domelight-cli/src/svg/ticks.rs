@@ -21,7 +21,7 @@ pub(super) fn linear(min: f64, max: f64, n: usize) -> Vec<Tick> {
     let (first, last) = ((min / step - 1e-3).ceil() as i64, (max / step + 1e-3).floor() as i64);
     let tick = |i: i64| {
         let value = i as f64 * step;
-        Tick { value, label: Some(minus(format!("{value:.digits$}"))) }
+        Tick { value, label: Some(minus(&format!("{value:.digits$}"))) }
     };
     (first..=last).map(tick).collect()
 }
@@ -76,7 +76,7 @@ fn superscript(c: char) -> char {
 }
 
 /// With a true minus sign.
-fn minus(number: String) -> String {
+fn minus(number: &str) -> String {
     number.replace('-', "−")
 }
 
