@@ -47,10 +47,13 @@ impl Studio<'_> {
             bail!("interrupted; no report was written");
         }
         let counts = rendering.counts;
+        if counts.shading_points == 0 {
+            bail!("the camera sees nothing of the scene: there is nothing to compare");
+        }
         let points_of_a_sample = counts.shading_points as f64 / f64::from(n_samples);
         Ok(Shot {
             image: rendering.layers.color,
-            rays: counts.shadow_rays as f64 / points_of_a_sample.max(1.0),
+            rays: counts.shadow_rays as f64 / points_of_a_sample,
             seconds: time.cpu.unwrap_or(time.wall),
             non_finite: counts.non_finite,
         })
