@@ -47,6 +47,7 @@ after(async () => {
 async function open(options = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, ...options });
   const page = await context.newPage();
+  await page.addInitScript(`window.bytesOf = ${bytesOf}`);
   const complaints = [];
   page.on("console", (message) => ["error", "warning"].includes(message.type()) && complaints.push(message.text()));
   page.on("pageerror", (error) => complaints.push(String(error)));
@@ -59,27 +60,32 @@ async function open(options = {}) {
 /** A frame of animation later, all is painted. */
 const painted = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 
-/** The bytes of every canvas that is seen, by way of a copy that is made to be read. */
+/** In the page: the bytes of a canvas, by way of a copy that is made to be read. */
+function bytesOf(canvas) {
+  const { width, height } = canvas;
+  const copy = Object.assign(document.createElement("canvas"), { width, height });
+  const context = copy.getContext("2d", { willReadFrequently: true });
+  context.drawImage(canvas, 0, 0);
+  return context.getImageData(0, 0, width, height).data;
+}
+
+/** A hash (FNV-1a) of every picture that is seen, the stage's first. */
 async function canvases(page) {
   await painted(page);
-  return page.$$eval(".viewer canvas", (all) => all.map((seen) => {
-    const { width, height } = seen;
-    const copy = Object.assign(document.createElement("canvas"), { width, height });
-    const context = copy.getContext("2d", { willReadFrequently: true });
-    context.drawImage(seen, 0, 0);
-    return context.getImageData(0, 0, width, height).data.join();
-  }));
+  return page.$$eval(".viewer canvas", (all) => all.map((canvas) =>
+    window.bytesOf(canvas).reduce((hash, byte) => Math.imul(hash ^ byte, 16777619), 2166136261)));
 }
 
 /** The mean of the stage's bytes between the fractions `from` and `to` of its width. */
 async function brightness(page, from = 0, to = 1) {
-  const bytes = (await canvases(page))[0].split(",").map(Number);
-  const width = await page.$eval("#stage canvas", (canvas) => canvas.width);
-  const inside = bytes.filter((_, i) => {
-    const x = ((i >> 2) % width + 0.5) / width;
-    return from <= x && x < to;
-  });
-  return inside.reduce((sum, byte) => sum + byte, 0) / inside.length;
+  await painted(page);
+  return page.$eval("#stage canvas", (canvas, [from, to]) => {
+    const inside = window.bytesOf(canvas).filter((_, i) => {
+      const x = ((i >> 2) % canvas.width + 0.5) / canvas.width;
+      return from <= x && x < to;
+    });
+    return inside.reduce((sum, byte) => sum + byte, 0) / inside.length;
+  }, [from, to]);
 }
 
 const changed = (before, after) => before.map((bytes, i) => bytes !== after[i]);
@@ -94,7 +100,7 @@ test("the page shows every strategy, the table and the plots", async () => {
   const rows = await page.$$eval("#table tbody tr", (all) => all.map((e) => e.textContent));
   assert.equal(rows.length, 4);
   assert.match(rows[3], /left out: one camera sample a pixel traces/);
-  assert.equal(await page.$$eval(".plots svg", (all) => all.length), 2);
+  assert.equal(await page.$$eval(".plots figure > svg", (all) => all.length), 2);
   assert.match(await text(page, "pre"), /^domelight -q compare sphere/);
   await done();
 });

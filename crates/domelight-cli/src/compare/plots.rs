@@ -39,7 +39,7 @@ pub(super) fn convergence(report: &CompareReport, cost: Cost) -> String {
         series: series.collect(),
         legend: Legend::Above,
     };
-    let (width, height) = (640.0, 520.0);
+    let (width, height) = (500.0, 450.0);
     let mut sheet = Document::new(width, height);
     plot.draw(&mut sheet, Rect::new(0.0, 0.0, width, height));
     sheet.to_svg()
