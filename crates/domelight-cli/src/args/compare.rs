@@ -37,6 +37,7 @@ Examples:
 
 /// Compare strategies on one scene at equal samples, rays or time.
 #[derive(Args, Debug)]
+#[command(mut_arg("size", |size| size.default_value("400x400")))]
 pub(crate) struct CompareArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
@@ -62,7 +63,7 @@ pub(crate) struct CompareArguments {
     pub(crate) reference: Option<PathBuf>,
     /// Camera samples of each pixel of a rendered reference, each of 4 environment and 4 BRDF
     /// samples
-    #[arg(long, value_name = "N", default_value_t = 512, help_heading = "Reference",
+    #[arg(long, value_name = "N", default_value_t = 256, help_heading = "Reference",
           conflicts_with = "reference", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
     pub(crate) reference_spp: u32,
     /// Where references are kept [default: domelight in the user's cache folder]

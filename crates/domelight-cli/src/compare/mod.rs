@@ -38,6 +38,9 @@ use shot::Studio;
 /// The relMSE of the reference should be this far below the least that is measured against it.
 const CONVERGED: f64 = 0.2;
 
+/// How far beside its budget a strategy may be without a word.
+const TOLERANCE: f64 = 0.1;
+
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     check(arguments)?;
@@ -134,7 +137,7 @@ impl Competition<'_> {
         let report = CompareReport {
             version: env!("CARGO_PKG_VERSION"),
             command: command(std::env::args().skip(1)),
-            budget: arguments.budget.to_string(),
+            budget: arguments.budget,
             scene: self.view.report.clone(),
             sampler: format!("{:?}", settings.sampler).to_lowercase(),
             filter: settings.filter.name(),
@@ -244,6 +247,9 @@ impl CompareReport {
                 warn(quiet, &format!("{name} is left out: {why}"));
             }
             let Some(result) = result else { continue };
+            if let Some((what, off)) = self.miss(result) {
+                warn(quiet, &format!("{name} misses the budget by {off:+.0} %: {what}"));
+            }
             if result.non_finite_samples > 0 {
                 let n = result.non_finite_samples;
                 warn(quiet, &format!("{name}: {n} samples were NaN or infinite, taken as black"));
@@ -273,16 +279,29 @@ impl CompareReport {
         }
     }
 
+    /// By how many percent a result is beside the budget, if that is much.
+    fn miss(&self, result: &ResultReport) -> Option<(String, f64)> {
+        let (spent, budget, unit) = match self.budget {
+            Budget::Samples(_) => return None,
+            Budget::Rays(rays) => (result.rays, rays, "shadow rays"),
+            Budget::Time(seconds) => (result.cpu_seconds.mean, seconds, "CPU seconds"),
+        };
+        let off = spent / budget - 1.0;
+        let what = format!("{spent:.3} {unit} with {} camera samples a pixel", result.spp);
+        (off.abs() > TOLERANCE).then_some((what, 100.0 * off))
+    }
+
     /// A line a strategy on standard error.
     fn summarise(&self, output: &Path) {
         let width = self.strategies.iter().map(|s| s.name.chars().count()).max().unwrap_or(0);
-        for StrategyReport { name, result, .. } in &self.strategies {
+        for StrategyReport { name, result, unbiased, .. } in &self.strategies {
             let Some(r) = result else { continue };
             let sd = r.rel_mse.sd.map_or(String::new(), |sd| format!(" ± {sd:.0e}"));
+            let bias = if *unbiased { "" } else { ", biased" };
             let ratio = r.efficiency_ratio_to_mis;
             let ratio = ratio.map_or(String::new(), |x| format!(", efficiency {x:.2} of mis"));
             tell(&format!(
-                "{name:width$}  {:>6} spp  {:>7.1} rays  {:>7.3} CPU-s  relMSE {:.2e}{sd}{ratio}",
+                "{name:width$}  {:>6} spp  {:>7.1} rays  {:>7.3} CPU-s  relMSE {:.2e}{sd}{ratio}{bias}",
                 r.spp, r.rays, r.cpu_seconds.mean, r.rel_mse.mean
             ));
         }

@@ -405,7 +405,7 @@
   }
 
   function tableRows() {
-    const columns = ["Strategy", "spp", "Rays", "CPU s", "relMSE", "Bias in it", "ꟻLIP", "Efficiency", "relMSE, mis = 1", "Efficiency, mis = 1"];
+    const columns = ["Strategy", "relMSE", "relMSE / mis", "Bias", "ꟻLIP", "Rays", "CPU s", "Efficiency", "Eff. / mis", "spp"];
     const head = element("thead"), row = element("tr");
     for (const name of columns) {
       const cell = element("th", "", name);
@@ -442,17 +442,17 @@
       const off = kind === "rays" ? r.rays / Number(value) - 1 : 0;
       const late = kind === "time" ? r.cpu_seconds.mean / parseFloat(value) - 1 : 0;
       const deviation = (part) => Math.abs(part) < 0.02 ? "" : `${part > 0 ? "+" : "−"}${Math.round(100 * Math.abs(part))} %`;
-      cell(r.spp);
-      cell(r.rays.toFixed(1), false, deviation(off));
-      cell(number(r.cpu_seconds.mean).toString(), false, deviation(late));
+      const ratio = (x) => x === null ? "–" : number(x).toString();
       const sd = r.rel_mse.sd;
       cell(error(r.rel_mse.mean), best === strategy, sd === null ? "" : `± ${number(100 * sd / r.rel_mse.mean, 2)} %`);
+      cell(r.error_ratio_to_mis === null ? "–" : ratio(1 / r.error_ratio_to_mis));
       cell(biasText(strategy));
       cell(r.flip.toFixed(3), clearest === strategy);
+      cell(r.rays.toFixed(1), false, deviation(off));
+      cell(number(r.cpu_seconds.mean).toString(), false, deviation(late));
       cell(number(r.efficiency).toLocaleString("en"), fastest === strategy);
-      const ratio = (x) => x === null ? "–" : number(x, 3).toString();
-      cell(r.error_ratio_to_mis === null ? "–" : ratio(1 / r.error_ratio_to_mis));
       cell(ratio(r.efficiency_ratio_to_mis));
+      cell(r.spp);
       body.append(row);
     }
     $("table").append(head, body);
@@ -462,7 +462,7 @@
     if (strategy.unbiased) return "none";
     const { bias, rel_mse } = strategy.result;
     if (bias === null) return "yes";
-    return `${Math.round(100 * Math.min(Math.max(bias / rel_mse.mean, 0), 1))} %`;
+    return `${Math.round(100 * Math.min(Math.max(bias / rel_mse.mean, 0), 1))} % of it`;
   }
 
   function notes() {

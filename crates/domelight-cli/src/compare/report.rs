@@ -1,7 +1,8 @@
 //! The numbers of a comparison, as `--json` gives them and the page shows them.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
+use super::budget::Budget;
 use super::entrant::{Spread, Step};
 use super::reference::ReferenceReport;
 use crate::report::SceneReport;
@@ -12,7 +13,9 @@ pub(super) struct CompareReport {
     pub(super) version: &'static str,
     /// As it was typed.
     pub(super) command: String,
-    pub(super) budget: String,
+    /// As it may be typed.
+    #[serde(serialize_with = "as_text")]
+    pub(super) budget: Budget,
     pub(super) scene: SceneReport,
     pub(super) sampler: String,
     pub(super) filter: &'static str,
@@ -62,4 +65,8 @@ pub(super) struct ResultReport {
     /// Camera samples that were NaN or infinite, over all seeds.
     pub(super) non_finite_samples: u64,
     pub(super) convergence: Vec<Step>,
+}
+
+fn as_text<S: Serializer>(budget: &Budget, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(budget)
 }
