@@ -37,7 +37,8 @@ fn decode_unguarded(bytes: &[u8]) -> Result<ExrLayers, Problem> {
     let mut planes: Vec<Plane> = Vec::new();
     for_each_block(reader, 0, |block| {
         if planes.is_empty() {
-            let plane = |c: &::exr::prelude::ChannelDescription| empty(c.sample_type, width, height);
+            let plane =
+                |c: &::exr::prelude::ChannelDescription| empty(c.sample_type, width, height);
             planes = list.iter().map(plane).collect::<Result<_, _>>()?;
         }
         for line in block.lines(&header.channels) {

@@ -10,8 +10,8 @@ use ::exr::block;
 use ::exr::meta::attribute::EnvironmentMap;
 use ::exr::meta::header::Header;
 use ::exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, LayerAttributes,
-    IntegerBounds, SmallVec, Text, Vec2, WritableImage,
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, IntegerBounds,
+    LayerAttributes, SmallVec, Text, Vec2, WritableImage,
 };
 use std::io::Cursor;
 
