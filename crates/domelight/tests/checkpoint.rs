@@ -235,7 +235,7 @@ fn sums_of_another_render_are_refused() {
 #[test]
 fn tiles_decide_for_themselves_when_the_error_is_reached() {
     let stage = stage();
-    let settings = RenderSettings { n_samples: 256, target_error: Some(2e-3), ..settings() };
+    let settings = RenderSettings { n_samples: 256, target_error: Some(8e-3), ..settings() };
     let mis = mis(&stage);
     let mut whole = session(&stage, &mis, &settings);
     assert!(whole.run(&()));
