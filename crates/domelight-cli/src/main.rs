@@ -11,6 +11,7 @@ mod probe;
 mod progress;
 mod render;
 mod report;
+mod scene;
 mod strategy;
 mod usage;
 mod values;

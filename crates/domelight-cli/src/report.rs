@@ -10,9 +10,9 @@ use crate::failure::{tell, warn};
 use crate::output::{self, PicturePath};
 use crate::usage::{Seconds, peak_memory};
 
-/// What was rendered, and how: enough to make the same picture again.
-#[derive(Serialize)]
-pub(crate) struct Settings {
+/// A scene under its light, seen by a camera.
+#[derive(Clone, Serialize)]
+pub(crate) struct SceneReport {
     pub(crate) scene: String,
     pub(crate) triangles: usize,
     pub(crate) material: Option<String>,
@@ -21,8 +21,15 @@ pub(crate) struct Settings {
     pub(crate) hide_env: bool,
     pub(crate) environment: EnvironmentReport,
     pub(crate) camera: CameraReport,
-    pub(crate) strategy: String,
     pub(crate) size: [usize; 2],
+}
+
+/// What was rendered, and how: enough to make the same picture again.
+#[derive(Serialize)]
+pub(crate) struct Settings {
+    #[serde(flatten)]
+    pub(crate) scene: SceneReport,
+    pub(crate) strategy: String,
     pub(crate) spp: u32,
     pub(crate) sampler: String,
     pub(crate) filter: &'static str,
@@ -31,7 +38,7 @@ pub(crate) struct Settings {
 }
 
 /// The light of a render.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(crate) struct EnvironmentReport {
     probe: String,
     size: [usize; 2],
@@ -62,7 +69,7 @@ impl EnvironmentReport {
 }
 
 /// The view of a render; one of `fov` and `ortho` is null.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(crate) struct CameraReport {
     origin: [f32; 3],
     target: [f32; 3],
@@ -88,8 +95,8 @@ impl Settings {
         let mut attributes =
             vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
         let settings = [
-            ("scene", self.scene.clone()),
-            ("environment", self.environment.probe.clone()),
+            ("scene", self.scene.scene.clone()),
+            ("environment", self.scene.environment.probe.clone()),
             ("strategy", self.strategy.clone()),
             ("samples", self.spp.to_string()),
             // If not, the layer of sample counts tells how many there are.
@@ -162,7 +169,8 @@ impl RenderReport {
 
     /// Two lines on standard error.
     pub(crate) fn print_summary(&self) {
-        let Settings { scene, environment, strategy, size: [w, h], spp, .. } = &self.settings;
+        let Settings { scene, strategy, spp, .. } = &self.settings;
+        let SceneReport { scene, environment, size: [w, h], .. } = scene;
         let environment = &environment.probe;
         let Stages { load, build, render, .. } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));

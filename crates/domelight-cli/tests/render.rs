@@ -239,6 +239,8 @@ fn an_interrupt_keeps_what_is_done() {
     let arguments = [
         "render",
         "sphere",
+        "--env",
+        "constant",
         "--size",
         "64x64",
         "--spp",

@@ -1,6 +1,8 @@
 //! The command line, typed.
 
 pub(crate) mod render;
+pub(crate) mod sampling;
+pub(crate) mod scene;
 
 use crate::output::PicturePath;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
