@@ -1,11 +1,14 @@
 //! The program `domelight`: one module a subcommand, their arguments in [`args`].
 //!
-//! Exit codes: 0 done (also when the reader of our output went away), 1 failed, 2 bad usage.
+//! Exit codes: 0 done (also when the reader of our output went away), 1 failed, 2 bad usage or input, 75
+//! interrupted and saved; `merge` has three of its own.
 
 mod args;
+mod course;
 mod diff;
 mod failure;
 mod interrupt;
+mod merge;
 mod output;
 mod probe;
 mod progress;
@@ -24,6 +27,7 @@ fn main() -> ExitCode {
     let Arguments { command, quiet } = Arguments::parse();
     let done = match command {
         Command::Render(arguments) => render::run(&arguments, quiet),
+        Command::Merge(arguments) => merge::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
     };

@@ -7,38 +7,75 @@ use std::time::{Duration, Instant};
 use domelight::render::{Counts, Observer};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::args::render::ProgressKind;
+use crate::output::print;
+
 /// Shows camera samples done, passes, rays a second and the time left on standard error, if that is
-/// a terminal and nobody asked for quiet; passes the interrupt flag on to the renderer.
+/// a terminal and nobody asked for quiet, or tells a farm on standard output; passes the interrupt flag
+/// on to the renderer.
 pub(crate) struct RenderProgress {
     bar: ProgressBar,
+    openjd: bool,
     interrupted: &'static AtomicBool,
     rays: AtomicU64,
+    /// Whole per cent told last.
+    told: AtomicU64,
     started: Instant,
 }
 
 impl RenderProgress {
     /// A bar over `n_camera_rays`.
-    pub(crate) fn new(n_camera_rays: u64, quiet: bool, interrupted: &'static AtomicBool) -> Self {
+    pub(crate) fn new(
+        n_camera_rays: u64,
+        kind: ProgressKind,
+        quiet: bool,
+        interrupted: &'static AtomicBool,
+    ) -> Self {
+        let openjd = kind == ProgressKind::Openjd;
+        let hidden = quiet || openjd;
         let target =
-            if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+            if hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let bar = ProgressBar::with_draw_target(Some(n_camera_rays), target);
         let template = "{bar:30.cyan/blue} {percent:>3} %  {msg}  {elapsed} elapsed, {eta} left";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("━━╌"));
         }
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self { bar, interrupted, rays: AtomicU64::new(0), started: Instant::now() }
+        let (rays, told) = (AtomicU64::new(0), AtomicU64::new(0));
+        Self { bar, openjd, interrupted, rays, told, started: Instant::now() }
+    }
+
+    /// Sets the bar to `done` of `total` camera rays.
+    pub(crate) fn begin(&self, total: u64, done: u64) {
+        self.bar.set_length(total);
+        self.bar.set_position(done);
+        self.bar.reset_eta();
+        self.tell_farm();
     }
 
     /// Takes the bar away.
     pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
     }
+
+    /// Says on standard output, at each whole per cent, how much is done; nobody may be listening.
+    fn tell_farm(&self) {
+        let percent = 100 * self.bar.position() / self.bar.length().unwrap_or(1).max(1);
+        if self.openjd
+            && (percent == 0 || self.told.fetch_max(percent, Ordering::Relaxed) < percent)
+        {
+            let _ = print(&format!("openjd_progress: {percent}"));
+        }
+    }
 }
 
 impl Observer for RenderProgress {
     fn pass_started(&self, samples: Range<u32>) {
-        self.bar.set_prefix(format!("samples {}–{}", samples.start + 1, samples.end));
+        let samples = format!("samples {}–{}", samples.start + 1, samples.end);
+        if self.openjd {
+            let _ = print(&format!("openjd_status: {samples}"));
+        }
+        self.bar.set_prefix(samples);
     }
 
     fn tile_finished(&self, counts: &Counts) {
@@ -47,6 +84,7 @@ impl Observer for RenderProgress {
         let rate = rays as f64 / self.started.elapsed().as_secs_f64().max(1e-3);
         self.bar.set_message(format!("{}  {:.1} Mrays/s", self.bar.prefix(), rate * 1e-6));
         self.bar.inc(counts.camera_rays);
+        self.tell_farm();
     }
 
     fn cancelled(&self) -> bool {
