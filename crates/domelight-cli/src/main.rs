@@ -7,6 +7,7 @@ mod args;
 mod course;
 mod diff;
 mod failure;
+mod farm;
 mod interrupt;
 mod merge;
 mod output;
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
     let done = match command {
         Command::Render(arguments) => render::run(&arguments, quiet),
         Command::Merge(arguments) => merge::run(&arguments, quiet),
+        Command::Farm(arguments) => farm::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
     };

@@ -1,6 +1,7 @@
 //! The command line, typed.
 
 pub(crate) mod course;
+pub(crate) mod farm;
 pub(crate) mod render;
 pub(crate) mod sampling;
 pub(crate) mod scene;
@@ -41,6 +42,9 @@ pub(crate) enum Command {
     /// Put the parts of a picture together that `render --shard` or `--tiles` made.
     #[command(after_help = MERGE_EXAMPLES)]
     Merge(MergeArguments),
+    /// Render a picture in parts on a farm: files for Slurm, Open Job Description, Kubernetes, parallel.
+    #[command(after_help = farm::EXAMPLES)]
+    Farm(Box<farm::FarmArguments>),
     /// Compare a picture with its reference: MSE, relMSE, PSNR, ꟻLIP.
     #[command(after_help = DIFF_EXAMPLES)]
     Diff(DiffArguments),
