@@ -86,17 +86,14 @@ impl CourseArguments {
         let existing = part.clone().filter(|path| path.exists());
         let save = part.or_else(|| self.checkpoint.clone()).or_else(|| self.resume.clone());
         let identity = identity(view, settings, report);
-        let from = match self.resume.clone().or(existing) {
-            Some(path) => {
-                let checkpoint = read(&path)?;
-                require_same(&path, &checkpoint, &identity)?;
-                require_more(&path, &checkpoint, settings.n_samples)?;
-                Some((path, checkpoint))
-            }
-            None => {
-                self.checkpoint.as_deref().map(refuse_to_replace).transpose()?;
-                None
-            }
+        let from = if let Some(path) = self.resume.clone().or(existing) {
+            let checkpoint = read(&path)?;
+            require_same(&path, &checkpoint, &identity)?;
+            require_more(&path, &checkpoint, settings.n_samples)?;
+            Some((path, checkpoint))
+        } else {
+            self.checkpoint.as_deref().map(refuse_to_replace).transpose()?;
+            None
         };
         let Self { checkpoint_every: every, time, .. } = *self;
         let provenance = report.provenance();
@@ -183,7 +180,7 @@ impl Course {
         let range = self.range(session.tiling())?;
         let mut session = session.only(range.clone());
         if let Some((path, checkpoint)) = &self.from {
-            self.restore(&mut session, path, checkpoint)?;
+            restore(&mut session, path, checkpoint)?;
         }
         let pixels: usize = range.map(|t| session.tiling().tile(t).area()).sum();
         let total = pixels as u64 * u64::from(settings.n_samples);
@@ -194,26 +191,6 @@ impl Course {
             self.save(&session, settings)?;
         }
         Ok(session.rendering())
-    }
-
-    fn restore<S: Strategy>(
-        &self,
-        session: &mut Session<S>,
-        path: &Path,
-        checkpoint: &Checkpoint,
-    ) -> Result<()> {
-        if checkpoint.tiles != session.tiles() {
-            let name = |t: &Range<usize>| format!("{}-{}", t.start, t.end.saturating_sub(1));
-            let text = format!(
-                "{} holds tiles {} of the picture, not {}",
-                path.display(),
-                name(&checkpoint.tiles),
-                name(&session.tiles())
-            );
-            return Err(UsageError(text).into());
-        }
-        let restored = session.restore(&checkpoint.film, checkpoint.counts);
-        restored.with_context(|| path.display().to_string())
     }
 
     /// Renders, and saves from time to time.
@@ -273,6 +250,26 @@ impl Course {
     pub(crate) fn saved(&self) -> Option<&Path> {
         self.save.as_deref()
     }
+}
+
+/// Gives a session the state of a checkpoint that is of the same tiles.
+fn restore<S: Strategy>(
+    session: &mut Session<S>,
+    path: &Path,
+    checkpoint: &Checkpoint,
+) -> Result<()> {
+    if checkpoint.tiles != session.tiles() {
+        let name = |t: &Range<usize>| format!("{}-{}", t.start, t.end.saturating_sub(1));
+        let text = format!(
+            "{} holds tiles {} of the picture, not {}",
+            path.display(),
+            name(&checkpoint.tiles),
+            name(&session.tiles())
+        );
+        return Err(UsageError(text).into());
+    }
+    let restored = session.restore(&checkpoint.film, checkpoint.counts);
+    restored.with_context(|| path.display().to_string())
 }
 
 /// Ends a run at a moment.

@@ -33,7 +33,9 @@ fn the_tasks_of_an_array_and_their_merge_make_the_single_run() {
         command.arg(files.join(script)).env("SLURM_ARRAY_TASK_ID", task).current_dir("/");
         succeeded(&command.output().expect("bash"));
     };
-    ["1", "0", "2", "1"].iter().for_each(|task| run("render.sbatch", task));
+    for task in ["1", "0", "2", "1"] {
+        run("render.sbatch", task);
+    }
     run("merge.sbatch", "");
     let merged = fs::read(files.join("picture.exr")).unwrap();
     assert!(merged == fs::read(folder.path().join("whole.exr")).unwrap());
@@ -54,7 +56,7 @@ fn every_engine_gets_its_files() {
         assert!(stdout(&output).contains(command), "{}", stdout(&output));
         for name in names {
             let text = fs::read_to_string(folder.path().join(engine).join(name)).unwrap();
-            assert!(text.contains("domelight"), "{text}");
+            assert!(name == "submit.sh" || text.contains("domelight"), "{text}");
             if !name.starts_with("merge") && name != "submit.sh" {
                 assert!(text.contains("spheres --env sky"), "{text}");
                 assert!(text.contains("--threads 2"), "{text}");

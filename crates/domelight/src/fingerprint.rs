@@ -67,7 +67,9 @@ mod tests {
 
     fn of(parts: &[&[u8]]) -> Fingerprint {
         let mut fingerprinter = Fingerprinter::default();
-        parts.iter().for_each(|part| fingerprinter.bytes(part.iter().copied()));
+        for part in parts {
+            fingerprinter.bytes(part.iter().copied());
+        }
         fingerprinter.finish()
     }
 

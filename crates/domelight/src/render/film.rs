@@ -245,7 +245,7 @@ impl Film {
     /// The bits of the sums: for each of [`PixelSums::WORDS`] one word a pixel.
     #[cfg(feature = "io")]
     pub(super) fn words(&self) -> impl Iterator<Item = (&'static str, Vec<u32>)> {
-        let words: Vec<_> = self.pixels.iter().map(PixelSums::to_words).collect();
+        let words: Vec<_> = self.pixels.iter().copied().map(PixelSums::to_words).collect();
         let plane = move |i: usize| words.iter().map(|w| w[i]).collect();
         PixelSums::WORDS.into_iter().enumerate().map(move |(i, name)| (name, plane(i)))
     }
@@ -302,7 +302,7 @@ impl PixelSums {
         "samples.Y",
     ];
 
-    fn to_words(&self) -> [u32; 29] {
+    fn to_words(self) -> [u32; 29] {
         let mut words = [0; 29];
         let doubles = [self.color, self.color_squared, self.unoccluded];
         let doubles = doubles.as_flattened().iter().chain([&self.depth]);

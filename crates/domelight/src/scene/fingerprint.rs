@@ -2,6 +2,7 @@
 
 use super::Scene;
 use crate::fingerprint::{Fingerprint, Fingerprinter};
+use crate::math::{Vec2, Vec3, Vec4};
 
 impl Scene {
     /// The fingerprint of all that rays can meet.
@@ -11,10 +12,10 @@ impl Scene {
             let mesh = &part.mesh;
             f.words([part.surface as u32]);
             f.words(mesh.triangles.as_flattened().iter().copied());
-            f.numbers(mesh.positions.iter().flat_map(|p| p.to_array()));
-            f.numbers(mesh.normals.iter().flat_map(|n| n.to_array()));
-            f.numbers(mesh.uvs.iter().flat_map(|uv| uv.to_array()));
-            f.numbers(mesh.tangents.iter().flat_map(|t| t.to_array()));
+            f.numbers(mesh.positions.iter().flat_map(Vec3::to_array));
+            f.numbers(mesh.normals.iter().flat_map(Vec3::to_array));
+            f.numbers(mesh.uvs.iter().flat_map(Vec2::to_array));
+            f.numbers(mesh.tangents.iter().flat_map(Vec4::to_array));
             f.numbers(mesh.colors.iter().flat_map(|c| c.to_array()));
         }
         for surface in &self.surfaces {
