@@ -4,12 +4,14 @@
 //! interrupted and saved; `merge` has three of its own.
 
 mod args;
+mod compare;
 mod course;
 mod diff;
 mod failure;
 mod farm;
 mod interrupt;
 mod merge;
+mod notation;
 mod output;
 mod probe;
 mod progress;
@@ -17,6 +19,8 @@ mod render;
 mod report;
 mod scene;
 mod strategy;
+#[allow(dead_code)] // Commands that draw are to come.
+mod svg;
 mod usage;
 mod values;
 
@@ -30,6 +34,7 @@ fn main() -> ExitCode {
         Command::Render(arguments) => render::run(&arguments, quiet),
         Command::Merge(arguments) => merge::run(&arguments, quiet),
         Command::Farm(arguments) => farm::run(&arguments, quiet),
+        Command::Compare(arguments) => compare::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
     };

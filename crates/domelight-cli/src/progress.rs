@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 use domelight::render::{Counts, Observer};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::args::render::ProgressKind;
 use crate::output::print;
 
 /// Shows camera samples done, passes, rays a second and the time left on standard error, if that is
@@ -16,6 +15,8 @@ use crate::output::print;
 pub(crate) struct RenderProgress {
     bar: ProgressBar,
     openjd: bool,
+    /// What is rendered; empty where that is plain.
+    label: String,
     interrupted: &'static AtomicBool,
     rays: AtomicU64,
     /// Whole per cent told last.
@@ -26,23 +27,31 @@ pub(crate) struct RenderProgress {
 impl RenderProgress {
     /// A bar over `n_camera_rays`.
     pub(crate) fn new(
+        label: &str,
         n_camera_rays: u64,
-        kind: ProgressKind,
         quiet: bool,
         interrupted: &'static AtomicBool,
     ) -> Self {
-        let openjd = kind == ProgressKind::Openjd;
-        let hidden = quiet || openjd;
         let target =
-            if hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+            if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let bar = ProgressBar::with_draw_target(Some(n_camera_rays), target);
         let template = "{bar:30.cyan/blue} {percent:>3} %  {msg}  {elapsed} elapsed, {eta} left";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("━━╌"));
         }
         bar.enable_steady_tick(Duration::from_millis(200));
+        let label = if label.is_empty() { String::new() } else { format!("{label}  ") };
         let (rays, told) = (AtomicU64::new(0), AtomicU64::new(0));
-        Self { bar, openjd, interrupted, rays, told, started: Instant::now() }
+        Self { bar, label, openjd: false, interrupted, rays, told, started: Instant::now() }
+    }
+
+    /// The lines of Open Job Description on standard output instead of the bar, if `on`.
+    pub(crate) fn openjd(mut self, on: bool) -> Self {
+        if on {
+            self.bar.set_draw_target(ProgressDrawTarget::hidden());
+        }
+        self.openjd = on;
+        self
     }
 
     /// Sets the bar to `done` of `total` camera rays.
@@ -82,7 +91,12 @@ impl Observer for RenderProgress {
         let rays = counts.camera_rays + counts.shadow_rays;
         let rays = self.rays.fetch_add(rays, Ordering::Relaxed) + rays;
         let rate = rays as f64 / self.started.elapsed().as_secs_f64().max(1e-3);
-        self.bar.set_message(format!("{}  {:.1} Mrays/s", self.bar.prefix(), rate * 1e-6));
+        self.bar.set_message(format!(
+            "{}{}  {:.1} Mrays/s",
+            self.label,
+            self.bar.prefix(),
+            rate * 1e-6
+        ));
         self.bar.inc(counts.camera_rays);
         self.tell_farm();
     }

@@ -67,8 +67,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
 
     let n_pixels = (settings.width * settings.height) as u64;
     let total = n_pixels * u64::from(settings.n_samples);
-    let kind = arguments.output.progress;
-    let progress = &RenderProgress::new(total, kind, quiet, interrupted);
+    let openjd = arguments.output.progress == ProgressKind::Openjd;
+    let progress = &RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
     let course = Some(&course);
     let rendering = renderer(&Job { scene, camera, environment, settings, progress, course })?;
     progress.finish();

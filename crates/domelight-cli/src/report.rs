@@ -50,6 +50,11 @@ pub(crate) struct EnvironmentReport {
 }
 
 impl EnvironmentReport {
+    /// What a user would call the probe.
+    pub(crate) fn probe(&self) -> &str {
+        &self.probe
+    }
+
     pub(crate) fn new(
         probe: String,
         light: &EnvironmentSettings,

@@ -177,6 +177,11 @@ impl Plan {
         Ok(())
     }
 
+    /// The expected value of the picture is the truth.
+    pub(crate) fn is_unbiased(self) -> bool {
+        !matches!(self, Self::MedianCut { .. } | Self::VarianceMinimization { .. })
+    }
+
     /// The name and the samples, for the report.
     pub(crate) fn describe(self) -> String {
         match self {

@@ -1,5 +1,6 @@
 //! The command line, typed.
 
+pub(crate) mod compare;
 pub(crate) mod course;
 pub(crate) mod farm;
 pub(crate) mod render;
@@ -45,6 +46,9 @@ pub(crate) enum Command {
     /// Render a picture in parts on a farm: files for Slurm, Open Job Description, Kubernetes, parallel.
     #[command(after_help = farm::EXAMPLES)]
     Farm(Box<farm::FarmArguments>),
+    /// Compare strategies on one scene at equal samples, rays or time, in a report to look at.
+    #[command(after_help = compare::EXAMPLES)]
+    Compare(Box<compare::CompareArguments>),
     /// Compare a picture with its reference: MSE, relMSE, PSNR, ꟻLIP.
     #[command(after_help = DIFF_EXAMPLES)]
     Diff(DiffArguments),
