@@ -1,12 +1,16 @@
 //! The program `domelight`: one module a subcommand, their arguments in [`args`].
 //!
-//! Exit codes: 0 done (also when the reader of our output went away), 1 failed, 2 bad usage.
+//! Exit codes: 0 done (also when the reader of our output went away), 1 failed, 2 bad usage or input, 75
+//! interrupted and saved; `merge` has three of its own.
 
 mod args;
 mod compare;
+mod course;
 mod diff;
 mod failure;
+mod farm;
 mod interrupt;
+mod merge;
 mod notation;
 mod output;
 mod probe;
@@ -28,6 +32,8 @@ fn main() -> ExitCode {
     let Arguments { command, quiet } = Arguments::parse();
     let done = match command {
         Command::Render(arguments) => render::run(&arguments, quiet),
+        Command::Merge(arguments) => merge::run(&arguments, quiet),
+        Command::Farm(arguments) => farm::run(&arguments, quiet),
         Command::Compare(arguments) => compare::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),

@@ -5,22 +5,34 @@ use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, bail};
 use domelight::picture::tone::ToneCurve;
-use domelight::render::survey;
+use domelight::render::{RenderSettings, survey};
 
-use crate::args::render::{OutputArguments, RenderArguments};
+use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
+use crate::course::Course;
+use crate::failure::UsageError;
 use crate::interrupt;
-use crate::output::{PicturePath, require_one_on_standard_output};
+use crate::output::{PicturePath, print, require_one_on_standard_output};
 use crate::progress::RenderProgress;
-use crate::report::{RenderReport, Settings, Stages};
+use crate::report::{RenderReport, Settings, Stages, Stop};
 use crate::scene::View;
 use crate::strategy::Job;
 use crate::usage::Stopwatch;
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
+    let openjd = arguments.output.progress == ProgressKind::Openjd;
+    render(arguments, quiet).inspect_err(|error| {
+        if openjd {
+            let _ = print(&format!("openjd_fail: {error:#}"));
+        }
+    })
+}
+
+fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let plan = arguments.strategy.plan()?;
     plan.refuse_repeating_points(arguments.spp)?;
     let outputs = arguments.output.paths()?;
+    arguments.course.check(&outputs)?;
     outputs.iter().try_for_each(PicturePath::require_writable)?;
     arguments.pixel.start_threads()?;
     let interrupted = interrupt::flag();
@@ -29,27 +41,15 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let loaded = arguments.scene.load(quiet)?;
     let load = watch.lap();
 
-    let View { scene, camera, environment, probe, report } = &arguments.scene.build(loaded)?;
-    let settings = &arguments.scene.render_settings(&arguments.pixel, arguments.spp);
+    let view = &arguments.scene.build(loaded)?;
+    let View { scene, camera, environment, probe, report } = view;
+    let settings = &RenderSettings {
+        target_error: arguments.course.target_error,
+        ..arguments.scene.render_settings(&arguments.pixel, arguments.spp)
+    };
     let plan = plan.for_scene(|| survey(scene, camera, settings), environment, settings.seed);
     let renderer = plan.prepare(environment).with_context(|| probe.clone())?;
-    let build = watch.lap();
-    if interrupted.load(Ordering::Relaxed) {
-        bail!("interrupted before the first sample; nothing was written");
-    }
-
-    let n_pixels = (settings.width * settings.height) as u64;
-    let progress =
-        &RenderProgress::new("", n_pixels * u64::from(settings.n_samples), quiet, interrupted);
-    let rendering = renderer(&Job { scene, camera, environment, settings, progress })?;
-    progress.finish();
-    if rendering.counts.camera_rays == 0 {
-        bail!("interrupted before the first sample; nothing was written");
-    }
-    let render = watch.lap();
-
-    let hide_env = report.hide_env;
-    let settings = Settings {
+    let described = Settings {
         scene: report.clone(),
         strategy: plan.describe(),
         spp: settings.n_samples,
@@ -58,21 +58,51 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         seed: settings.seed,
         threads: rayon::current_num_threads(),
     };
+    let course = &arguments.course;
+    let course = course.course(view, settings, &described, &outputs, interrupted, quiet)?;
+    let build = watch.lap();
+    if interrupted.load(Ordering::Relaxed) {
+        bail!("interrupted before the first sample; nothing was written");
+    }
+
+    let n_pixels = (settings.width * settings.height) as u64;
+    let total = n_pixels * u64::from(settings.n_samples);
+    let openjd = arguments.output.progress == ProgressKind::Openjd;
+    let progress = &RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
+    let course = Some(&course);
+    let rendering = renderer(&Job { scene, camera, environment, settings, progress, course })?;
+    progress.finish();
+    let stopped = match () {
+        () if rendering.complete => None,
+        () if interrupted.load(Ordering::Relaxed) => Some(Stop::Interrupted),
+        () => Some(Stop::Time),
+    };
+    let saved = course.and_then(Course::saved);
+    if rendering.counts.camera_rays == 0 && saved.is_none() {
+        bail!("ended before the first sample; nothing was written");
+    }
+    let render = watch.lap();
+
     let tone = arguments.output.tone.mapping(ToneCurve::Agx);
     // A full disk under one file must not cost the others.
     let write = |path: &PicturePath| {
-        let attributes = settings.provenance(rendering.complete);
-        path.write_layers(&rendering.layers, &tone, hide_env, attributes)
+        let mut attributes = described.provenance();
+        // If not, the layer of sample counts tells how many there are.
+        attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
+        path.write_layers(&rendering.layers, &tone, report.hide_env, attributes)
     };
-    outputs.iter().map(write).fold(Ok(()), Result::and)?;
+    // A part is its own checkpoint, and written.
+    if !arguments.course.is_part() {
+        outputs.iter().map(write).fold(Ok(()), Result::and)?;
+    }
     let stages = Stages { load, build, render, write: watch.lap() };
-    let report = RenderReport::new(settings, &rendering, stages, &outputs);
+    let report = RenderReport::new(described, &rendering, stages, &outputs, stopped);
     if arguments.output.json {
         report.print_json()?;
     } else if !quiet {
         report.print_summary();
     }
-    report.check(quiet)
+    report.check(saved, quiet)
 }
 
 impl OutputArguments {
@@ -87,7 +117,12 @@ impl OutputArguments {
             self.output.clone()
         };
         let all: Vec<_> = paths.iter().map(Some).collect();
-        require_one_on_standard_output(&all, self.json)?;
+        let lines = self.json || self.progress == ProgressKind::Openjd;
+        require_one_on_standard_output(&all, lines)?;
+        if self.json && self.progress == ProgressKind::Openjd {
+            let text = "--json and --progress openjd both write to standard output";
+            return Err(UsageError(text.into()).into());
+        }
         Ok(paths)
     }
 }

@@ -5,8 +5,9 @@ use domelight::environment::{Environment, UpAxis};
 use domelight::render::Rendering;
 use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
 use serde::Serialize;
+use std::path::Path;
 
-use crate::failure::{tell, warn};
+use crate::failure::{InterruptedAndSaved, tell, warn};
 use crate::output::{self, PicturePath};
 use crate::usage::{Seconds, peak_memory};
 
@@ -96,7 +97,7 @@ impl CameraReport {
 
 impl Settings {
     /// What OpenEXR files tell of their making.
-    pub(crate) fn provenance(&self, complete: bool) -> Vec<(String, String)> {
+    pub(crate) fn provenance(&self) -> Vec<(String, String)> {
         let mut attributes =
             vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
         let settings = [
@@ -104,8 +105,6 @@ impl Settings {
             ("environment", self.scene.environment.probe.clone()),
             ("strategy", self.strategy.clone()),
             ("samples", self.spp.to_string()),
-            // If not, the layer of sample counts tells how many there are.
-            ("complete", complete.to_string()),
             ("sampler", self.sampler.clone()),
             ("filter", self.filter.to_owned()),
             ("seed", self.seed.to_string()),
@@ -128,6 +127,14 @@ pub(crate) struct Stages {
     pub(crate) write: Seconds,
 }
 
+/// What ended a render before all samples were there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Stop {
+    Interrupted,
+    Time,
+}
+
 /// All that `--json` prints.
 #[derive(Serialize)]
 pub(crate) struct RenderReport {
@@ -141,6 +148,7 @@ pub(crate) struct RenderReport {
     peak_memory_bytes: Option<u64>,
     non_finite_samples: u64,
     complete: bool,
+    stopped: Option<Stop>,
     outputs: Vec<String>,
 }
 
@@ -150,6 +158,7 @@ impl RenderReport {
         rendering: &Rendering,
         seconds: Stages,
         outputs: &[PicturePath],
+        stopped: Option<Stop>,
     ) -> Self {
         let counts = rendering.counts;
         let rays = (counts.camera_rays + counts.shadow_rays) as f64;
@@ -164,6 +173,7 @@ impl RenderReport {
             peak_memory_bytes: peak_memory(),
             non_finite_samples: counts.non_finite,
             complete: rendering.complete,
+            stopped,
             outputs: outputs.iter().map(ToString::to_string).collect(),
         }
     }
@@ -194,14 +204,21 @@ impl RenderReport {
     ///
     /// # Errors
     /// If the render was interrupted.
-    pub(crate) fn check(&self, quiet: bool) -> Result<()> {
+    pub(crate) fn check(&self, saved: Option<&Path>, quiet: bool) -> Result<()> {
         if self.non_finite_samples > 0 {
             let n = self.non_finite_samples;
             warn(quiet, &format!("{n} camera samples were NaN or infinite and count as black"));
         }
-        if !self.complete {
-            bail!("interrupted; what was done so far is in {}", self.outputs.join(", "));
+        match (self.stopped, saved) {
+            (Some(Stop::Interrupted), None) => {
+                bail!("interrupted; what was done so far is in {}", self.outputs.join(", "))
+            }
+            (Some(Stop::Interrupted), Some(saved)) => Err(InterruptedAndSaved(format!(
+                "interrupted; {} holds the state to go on from",
+                saved.display()
+            ))
+            .into()),
+            (Some(Stop::Time) | None, _) => Ok(()),
         }
-        Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use domelight::environment::{CompensatedTable, Environment};
-use domelight::render::{RenderSettings, Rendering, render};
+use domelight::render::{RenderSettings, Rendering, Session, render};
 use domelight::rig::{MedianCut, Rig, VarianceMinimization, median_cut, variance_minimization};
 use domelight::sampling::Heuristic;
 use domelight::scene::{Camera, Scene};
@@ -15,6 +15,7 @@ use domelight::strategy::{
 use crate::args::sampling::{
     HeuristicName, ProposalName, ResamplingName, SourceName, StrategyArguments, StrategyName,
 };
+use crate::course::Course;
 use crate::failure::UsageError;
 use crate::progress::RenderProgress;
 use crate::values::Split;
@@ -224,12 +225,20 @@ pub(crate) struct Job<'a> {
     pub(crate) environment: &'a Environment,
     pub(crate) settings: &'a RenderSettings,
     pub(crate) progress: &'a RenderProgress,
+    /// From the first sample to the last, unless it says otherwise.
+    pub(crate) course: Option<&'a Course>,
 }
 
 impl Job<'_> {
-    fn render<S: Strategy>(&self, strategy: &S) -> Rendering {
-        let Self { scene, camera, environment, settings, progress } = *self;
-        render(scene, camera, environment, strategy, settings, progress)
+    fn render<S: Strategy>(&self, strategy: &S) -> Result<Rendering> {
+        let Self { scene, camera, environment, settings, progress, course } = *self;
+        match course {
+            Some(course) => {
+                let session = Session::new(scene, camera, environment, strategy, settings);
+                course.run(session, settings, progress)
+            }
+            None => Ok(render(scene, camera, environment, strategy, settings, progress)),
+        }
     }
 }
 
@@ -242,23 +251,23 @@ impl Plan {
         Ok(match self {
             Self::Brdf { n } => {
                 let brdf = BrdfSampling { environment, n_samples: n };
-                Box::new(move |job| Ok(job.render(&brdf)))
+                Box::new(move |job| job.render(&brdf))
             }
             Self::Environment { n } => {
                 let light = EnvironmentSampling { environment, n_samples: n };
-                Box::new(move |job| Ok(job.render(&light)))
+                Box::new(move |job| job.render(&light))
             }
             Self::Mis { split: Split { environment: m, brdf: n }, heuristic, compensation } => {
                 let table = compensation.then(|| CompensatedTable::new(environment));
                 Box::new(move |job| {
                     let table = table.as_ref().map_or(LightTable::Full, LightTable::Compensated);
                     let mis = MultipleImportanceSampling::new(environment, table, heuristic, m, n)?;
-                    Ok(job.render(&mis))
+                    job.render(&mis)
                 })
             }
             Self::Rejection { proposal, stop } => {
                 let rejection = RejectionSampling::new(environment, proposal, stop)?;
-                Box::new(move |job| Ok(job.render(&rejection)))
+                Box::new(move |job| job.render(&rejection))
             }
             Self::Sir { n_candidates, n, candidates, resampling } => {
                 let sir = SamplingImportanceResampling {
@@ -268,7 +277,7 @@ impl Plan {
                     candidates,
                     resampling,
                 };
-                Box::new(move |job| Ok(job.render(&sir)))
+                Box::new(move |job| job.render(&sir))
             }
             Self::MedianCut { n_lights } => {
                 lights(median_cut(environment, n_lights, MedianCut::default())?)
@@ -282,5 +291,5 @@ impl Plan {
 }
 
 fn lights<'e>(rig: Rig) -> Renderer<'e> {
-    Box::new(move |job| Ok(job.render(&LightSet { rig: &rig })))
+    Box::new(move |job| job.render(&LightSet { rig: &rig }))
 }

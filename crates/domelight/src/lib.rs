@@ -60,6 +60,8 @@ pub mod render;
 pub mod scene;
 
 #[cfg(feature = "io")]
+pub mod fingerprint;
+#[cfg(feature = "io")]
 pub mod picture;
 
 pub use color::Rgb;

@@ -1,6 +1,8 @@
 //! The command line, typed.
 
 pub(crate) mod compare;
+pub(crate) mod course;
+pub(crate) mod farm;
 pub(crate) mod render;
 pub(crate) mod sampling;
 pub(crate) mod scene;
@@ -38,6 +40,12 @@ pub(crate) enum Command {
     /// Render a scene lit by an HDR environment.
     #[command(after_help = render::EXAMPLES)]
     Render(Box<render::RenderArguments>),
+    /// Put the parts of a picture together that `render --shard` or `--tiles` made.
+    #[command(after_help = MERGE_EXAMPLES)]
+    Merge(MergeArguments),
+    /// Render a picture in parts on a farm: files for Slurm, Open Job Description, Kubernetes, parallel.
+    #[command(after_help = farm::EXAMPLES)]
+    Farm(Box<farm::FarmArguments>),
     /// Compare strategies on one scene at equal samples, rays or time, in a report to look at.
     #[command(after_help = compare::EXAMPLES)]
     Compare(Box<compare::CompareArguments>),
@@ -55,6 +63,14 @@ Examples:
   domelight diff render.exr reference.exr --covered --json
   domelight diff render.exr reference.exr -o error.png --metric flip";
 
+const MERGE_EXAMPLES: &str = "\
+Examples:
+  domelight merge part-*.exr -o whole.exr -o whole.png
+  domelight merge parts/ -o whole.exr
+
+Exit codes: 3 if parts are missing or unfinished, 4 if two hold the same tile, 5 if one is damaged or
+of another render.";
+
 const PROBE_EXAMPLES: &str = "\
 Examples:
   domelight probe sky --preview sky.png
@@ -62,6 +78,24 @@ Examples:
   domelight probe ball.hdr --mapping mirror-ball -o studio.exr
   domelight probe grace.hdr --to cross-vertical -o cross.hdr
   domelight probe cathedral --size 256 -o - | domelight probe -";
+
+/// Put the parts of a picture together.
+#[derive(Args, Debug)]
+pub(crate) struct MergeArguments {
+    /// Parts (.exr), or folders of them
+    #[arg(value_name = "PART", required = true)]
+    pub(crate) parts: Vec<PathBuf>,
+    /// Where to: .exr (all layers), .png, .hdr or .pfm; several times for several files; - writes
+    /// OpenEXR to standard output
+    #[arg(short, long, value_name = "FILE", required = true)]
+    pub(crate) output: Vec<PicturePath>,
+    /// Print what was merged as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// How PNG output is shown.
+    #[command(flatten)]
+    pub(crate) tone: Tone,
+}
 
 /// Compare a picture with its reference.
 #[derive(Args, Debug)]

@@ -1,8 +1,9 @@
 //! The arguments of `domelight render`.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::Tone;
+use super::course::CourseArguments;
 use super::sampling::{PixelArguments, StrategyArguments};
 use super::scene::SceneArguments;
 use crate::output::PicturePath;
@@ -16,7 +17,12 @@ Examples:
   domelight render scene.toml --strategy mis --split 3:1 --spp 256 -o out.exr -o out.png
       a scene file, three environment samples for each BRDF sample
   domelight render spheres --env cathedral --strategy brdf --rays 4 --json > stats.json
-      another built-in scene, its statistics as JSON";
+      another built-in scene, its statistics as JSON
+  domelight render --spp 4096 --checkpoint long.exr
+  domelight render --spp 4096 --resume long.exr
+      a long render that survives whatever ends it
+  domelight render --shard 0/8 -o part-0.exr
+      one of eight parts; `domelight merge part-*.exr -o whole.exr` puts them together";
 
 /// Render a scene lit by an HDR environment.
 #[derive(Args, Debug)]
@@ -31,6 +37,8 @@ pub(crate) struct RenderArguments {
     pub(crate) spp: u32,
     #[command(flatten)]
     pub(crate) pixel: PixelArguments,
+    #[command(flatten)]
+    pub(crate) course: CourseArguments,
     #[command(flatten)]
     pub(crate) output: OutputArguments,
 }
@@ -48,4 +56,15 @@ pub(crate) struct OutputArguments {
     /// Print settings, times and counts as JSON on standard output
     #[arg(long)]
     pub(crate) json: bool,
+    /// How progress is shown
+    #[arg(long, value_enum, value_name = "HOW", default_value_t = ProgressKind::Bar)]
+    pub(crate) progress: ProgressKind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ProgressKind {
+    /// A bar on standard error, if that is a terminal
+    Bar,
+    /// The lines of Open Job Description on standard output
+    Openjd,
 }

@@ -62,7 +62,7 @@ pub(crate) struct PixelArguments {
     /// Names the random numbers; the same seed gives the same picture
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Threads [default: all cores]
+    /// Threads [default: SLURM_CPUS_PER_TASK, else the cores that the process may use]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub(crate) threads: Option<u32>,
 }

@@ -52,14 +52,10 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     let size = arguments.scene.camera.size;
     let given = arguments.reference.as_deref();
     let given = given.map(|path| Reference::read(path, [size.width, size.height])).transpose()?;
-    let loaded = arguments.scene.load(quiet)?;
-    let (reference, view) = if let Some(reference) = given {
-        (reference, arguments.scene.build(loaded)?)
-    } else {
-        // The cache's key is of the scene as it was read, which building takes apart.
-        let wanted = Wanted::new(arguments, &loaded)?;
-        let view = arguments.scene.build(loaded)?;
-        (wanted.get(&view, quiet)?, view)
+    let view = arguments.scene.build(arguments.scene.load(quiet)?)?;
+    let reference = match given {
+        Some(reference) => reference,
+        None => Wanted::new(arguments, &view)?.get(&view, quiet)?,
     };
     let competition = Competition { arguments, view: &view, reference: &reference, quiet };
     let (report, pictures) = competition.run()?;

@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::cache::{Cache, Key};
 use super::shot::Studio;
 use crate::args::compare::CompareArguments;
-use crate::scene::{LoadedScene, View};
+use crate::scene::View;
 use crate::strategy::Plan;
 use crate::values::Split;
 
@@ -92,8 +92,8 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// Of the scene as it was read.
-    pub(super) fn new(arguments: &CompareArguments, loaded: &LoadedScene) -> Result<Self> {
+    /// Of the scene and the flags.
+    pub(super) fn new(arguments: &CompareArguments, view: &View) -> Result<Self> {
         let cache = (!arguments.no_cache).then(|| Cache::new(arguments.cache.as_deref()));
         // Two halves.
         let n_samples = arguments.reference_spp.div_ceil(2);
@@ -101,7 +101,7 @@ impl Wanted {
             seed: SEEDS[0],
             ..arguments.scene.render_settings(&arguments.pixel, n_samples)
         };
-        Ok(Self { cache: cache.transpose()?, key: Key::new(loaded, &settings, PLAN), settings })
+        Ok(Self { cache: cache.transpose()?, key: Key::new(view, &settings, PLAN), settings })
     }
 
     /// From the cache, else rendered and kept.

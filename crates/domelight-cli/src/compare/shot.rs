@@ -40,7 +40,9 @@ impl Studio<'_> {
         let interrupted = interrupt::flag();
         let progress = &RenderProgress::new(label, n_camera_rays, self.quiet, interrupted);
         let mut watch = Stopwatch::start();
-        let rendering = (self.renderer)(&Job { scene, camera, environment, settings, progress })?;
+        let course = None;
+        let job = Job { scene, camera, environment, settings, progress, course };
+        let rendering = (self.renderer)(&job)?;
         let time = watch.lap();
         progress.finish();
         if !rendering.complete {

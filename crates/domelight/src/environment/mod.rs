@@ -138,6 +138,16 @@ pub struct Environment {
 }
 
 impl Environment {
+    /// The fingerprint of the light: the map's texels times the scale, and how it is turned.
+    #[cfg(feature = "io")]
+    pub fn fingerprint(&self) -> crate::fingerprint::Fingerprint {
+        let mut fingerprinter = crate::fingerprint::Fingerprinter::default();
+        let RgbImage { width, height, pixels } = &self.map;
+        fingerprinter.text(format_args!("{width}x{height} {:?}", self.orientation));
+        fingerprinter.numbers(pixels.iter().flat_map(|texel| texel.to_array()));
+        fingerprinter.finish()
+    }
+
     /// From a lat-long map: row 0 up, texel centres at +½, every texel finite and not negative;
     /// radiance is multiplied by `scale`.
     ///
