@@ -231,7 +231,7 @@ fn bad_usage_is_named() {
     refused(&compare(&["--seeds", "0"]), 2, &["--seeds"]);
     refused(&compare(&["--json", "-o", "-"]), 2, &["standard output"]);
     refused(&compare(&["--no-cache"]), 2, &["--no-cache", "--cache"]);
-    refused(&compare(&["gone.ply"]), 1, &["gone.ply"]);
+    refused(&compare(&["gone.ply"]), 2, &["gone.ply"]);
     refused(&compare(&["-o", "no/such/folder/x.html"]), 1, &["no/such/folder"]);
     let away = ["sphere", "--origin", "0,0,9", "--target", "0,0,99", "--strategies", "brdf"];
     refused(&compare(&away), 1, &["camera", "sees nothing"]);
