@@ -473,7 +473,7 @@
     if (kind === "time") add("Equal time: the number of camera samples was found by measuring CPU seconds; what the pictures then took is in the table.");
     if (kind === "spp") add("Equal camera samples: rays and time differ.");
     const biased = report.strategies.filter((s) => !s.unbiased).map((s) => s.name);
-    if (biased.length) add(`Biased: ${biased.join(", ")}. Fixed lights have no noise, but an error that more samples do not take away; their efficiency says little.`);
+    if (biased.length) add(`Biased: ${biased.join(", ")}. Fixed lights leave an error that more samples do not take away (what does fall is that of edges within pixels); their efficiency says little.`);
     if (entrants().every((s) => s.result.error_ratio_to_mis === null)) add("Without mis in the list there is nothing to take ratios to.");
   }
 
