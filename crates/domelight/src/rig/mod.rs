@@ -17,19 +17,24 @@
 
 mod cells;
 mod error;
+#[cfg(feature = "io")]
+pub mod export;
 mod median_cut;
 mod merge;
 mod regions;
+mod spherical_harmonics;
 mod split;
 mod texels;
 mod variance_minimization;
 
 pub use error::{ShadingError, ShadingReference};
 pub use median_cut::{LightPosition, MedianCut, median_cut};
+pub use spherical_harmonics::SphericalHarmonics;
 pub use split::Order;
 pub use variance_minimization::{Rule, VarianceMinimization, variance_minimization};
 
 use crate::Rgb;
+use crate::environment::Environment;
 use crate::math::Vec3;
 use texels::{Texels, bands, in_order};
 
@@ -67,14 +72,25 @@ impl RigError {
 /// Directional lights that stand for an environment, and the region of the map behind each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
-    /// The lights, those of the greatest luminance first.
+    /// The lights: compact ones first, then those of regions, of each kind those of the greatest
+    /// luminance first.
     pub lights: Vec<RigLight>,
     /// Columns of the map.
     pub width: usize,
     /// Rows of the map.
     pub height: usize,
-    /// The index in [`Rig::lights`] of the light of each texel, row by row.
+    /// The index in [`Rig::lights`] of the light of each texel, row by row; [`Rig::NO_LIGHT`] of
+    /// texels that no light was taken from. Compact lights lie over the regions.
     pub labels: Vec<u32>,
+}
+
+/// A rig and what it leaves on the map: together they are the environment, channel by channel.
+#[derive(Clone, Debug)]
+pub struct Extraction {
+    /// The lights.
+    pub rig: Rig,
+    /// The environment without the light that they took, nowhere negative; none if they took all.
+    pub residual: Option<Environment>,
 }
 
 /// A distant light.
@@ -105,6 +121,10 @@ pub enum Region {
     Rectangle(TexelRect),
     /// The texels that are nearer to this light than to any other, on the sphere.
     Cell,
+    /// The compact source that is taken for the sun.
+    Sun,
+    /// Another compact source.
+    Lamp,
 }
 
 /// Columns [x0, x1) and rows [y0, y1) of the map.
@@ -136,6 +156,9 @@ impl TexelRect {
 }
 
 impl Rig {
+    /// The label of a texel that no light was taken from.
+    pub const NO_LIGHT: u32 = u32::MAX;
+
     /// Σ irradiance \[W·m⁻²\].
     pub fn irradiance(&self) -> Rgb {
         let sum = |channel: fn(&RigLight) -> f32| {

@@ -109,6 +109,12 @@ impl<'a> Texels<'a> {
         [sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta]
     }
 
+    /// The world directions of the map frame's x, y and z.
+    pub(super) fn axes(&self) -> [[f64; 3]; 3] {
+        let [x, y, minus_z] = self.axes.map(|a| a.as_dvec3().to_array());
+        [x, y, minus_z.map(|c| -c)]
+    }
+
     /// The unit vector along `m` of the map's frame, in the world; up where `m` has no direction.
     pub(super) fn to_world(&self, m: [f64; 3]) -> Vec3 {
         let v = unit(m).unwrap_or(Vec3::Y);
