@@ -12,6 +12,8 @@ mod progress;
 mod render;
 mod report;
 mod strategy;
+#[allow(dead_code)] // Commands that draw are to come.
+mod svg;
 mod usage;
 mod values;
 
