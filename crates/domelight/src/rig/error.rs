@@ -6,9 +6,10 @@
 
 use super::Rig;
 use super::regions::{Blocks, Metric};
-use super::texels::{Texels, in_order, unit};
+use super::texels::{Texels, unit};
 use crate::environment::Environment;
 use crate::math::{TAU, Vec3, vec3};
+use crate::parallel::in_order;
 
 /// Normals that errors are measured over.
 const N_NORMALS: usize = 600;

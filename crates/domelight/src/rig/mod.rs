@@ -36,7 +36,8 @@ pub use variance_minimization::{Rule, VarianceMinimization, variance_minimizatio
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::Vec3;
-use texels::{Texels, bands, in_order};
+use crate::parallel::{bands, in_order};
+use texels::Texels;
 
 /// Why there is no rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
