@@ -140,6 +140,12 @@ impl<'a> CompactExtraction<'a> {
         self.lights.len()
     }
 
+    /// How many texels are lit beside them.
+    pub(super) fn n_lit(&self) -> usize {
+        let rest = self.residual.as_ref().unwrap_or(self.environment);
+        rest.map().pixels.iter().filter(|le| le.luminance() > 0.0).count()
+    }
+
     /// A rig of `n_lights` lights, compact ones included, which take all light; or of the compact
     /// ones alone.
     ///

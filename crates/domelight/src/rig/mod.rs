@@ -22,7 +22,9 @@ pub mod export;
 mod extraction;
 mod median_cut;
 mod merge;
+mod quadrature;
 mod regions;
+mod smallest;
 mod spherical_harmonics;
 mod split;
 mod texels;
@@ -31,6 +33,8 @@ mod variance_minimization;
 pub use error::{ShadingError, ShadingReference};
 pub use extraction::{CompactExtraction, Extraction, ExtractionSettings, Method, extract};
 pub use median_cut::{LightPosition, MedianCut, median_cut};
+pub use quadrature::quadrature;
+pub use smallest::{SmallestRig, smallest_rig};
 pub use spherical_harmonics::SphericalHarmonics;
 pub use split::Order;
 pub use variance_minimization::{Rule, VarianceMinimization, variance_minimization};
@@ -41,7 +45,7 @@ use crate::parallel::{bands, in_order};
 use texels::Texels;
 
 /// Why there is no rig.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RigError {
     /// A rig of no lights.
     #[error("a rig has at least one light; 0 were asked for")]
@@ -72,6 +76,14 @@ pub enum RigError {
     /// Lights too dim to be kept.
     #[error("no light holds the least share of the map's light that was asked for")]
     TooDim,
+    /// No rig is good enough.
+    #[error("even {n_lights} lights have a shading error of {percent:.2} %")]
+    ErrorNotReached {
+        /// The most lights that were tried.
+        n_lights: usize,
+        /// Their error \[%\].
+        percent: f32,
+    },
 }
 
 impl RigError {

@@ -31,6 +31,8 @@ pub(super) struct Peak {
     pub(super) solid_angle: f64,
     /// ∫ (L − level) dω over them, without the peaks that were found within.
     pub(super) excess: f64,
+    /// The index of the one peak within, if there is exactly one.
+    pub(super) core: Option<u32>,
 }
 
 /// A component of the level set, as the level falls.
@@ -44,6 +46,9 @@ struct Component {
     /// The least t·A since then, and the peak that would end there.
     least: f64,
     end: Peak,
+    /// The sources that ended within: how many, and the last.
+    n_within: u32,
+    within: u32,
 }
 
 impl Component {
@@ -57,13 +62,23 @@ impl Component {
         if flux < self.least {
             let excess = self.energy - f64::from(level) * self.area;
             self.least = flux;
-            self.end = Peak { seed: self.seed, level, solid_angle: self.area, excess };
+            let core = (self.n_within == 1).then_some(self.within);
+            self.end = Peak { seed: self.seed, level, solid_angle: self.area, excess, core };
         }
     }
 
     /// Whether it is a source, should it end here.
     fn stands_out(&self, min_energy: f64) -> bool {
         self.most >= CONTRAST * self.least && self.end.excess >= min_energy
+    }
+
+    fn join(&mut self, o: &Self) {
+        self.area += o.area;
+        self.energy += o.energy;
+        if o.n_within > 0 {
+            self.n_within += o.n_within;
+            self.within = o.within;
+        }
     }
 
     /// Forgets the source that was found.
@@ -170,9 +185,10 @@ impl Search<'_> {
 
     fn start(&mut self, cell: usize, level: f32, area: f64, energy: f64) {
         let id = self.components.len() as u32;
-        let end = Peak { seed: cell as u32, level, solid_angle: 0.0, excess: 0.0 };
-        let mut component =
-            Component { seed: cell as u32, area, energy, most: 0.0, least: 0.0, end };
+        let seed = cell as u32;
+        let end = Peak { seed, level, solid_angle: 0.0, excess: 0.0, core: None };
+        let (most, least, n_within, within) = (0.0, 0.0, 0, NONE);
+        let mut component = Component { seed, area, energy, most, least, end, n_within, within };
         component.start_again(level, self.blur);
         self.components.push(component);
         self.parent.push(id);
@@ -196,9 +212,8 @@ impl Search<'_> {
             _ => brightest.unwrap_or(ids[0]),
         };
         for &id in ids.iter().filter(|&&id| id != into) {
-            let Component { area, energy, .. } = self.components[id as usize];
-            self.components[into as usize].area += area;
-            self.components[into as usize].energy += energy;
+            let joined = self.components[id as usize];
+            self.components[into as usize].join(&joined);
             self.parent[id as usize] = into;
         }
         if sources.len() > 1 {
@@ -211,6 +226,7 @@ impl Search<'_> {
     fn end(&mut self, id: u32) {
         let component = &mut self.components[id as usize];
         component.energy -= component.end.excess;
+        (component.n_within, component.within) = (1, self.peaks.len() as u32);
         self.peaks.push(component.end);
     }
 

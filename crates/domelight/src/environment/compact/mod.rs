@@ -22,6 +22,10 @@ const WIDEST_SUN: f64 = 0.047;
 /// Solid angle of the widest lamp or window \[sr\], a cap of 28°.
 const WIDEST_LAMP: f64 = 0.75;
 
+/// How many times the solid angle of a source what belongs to it around it has at the most: four
+/// times the radius.
+const SHELL: f64 = 16.0;
+
 /// Which compact sources are taken out of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Wanted {
@@ -60,19 +64,56 @@ pub(crate) fn compact_sources(map: &RgbImage, wanted: Wanted) -> Vec<CompactSour
         return Vec::new();
     }
     let grid = Grid::new(map);
-    let mut peaks = find_peaks(&grid, wanted.min_share * grid.total());
-    peaks.retain(|p| p.solid_angle <= WIDEST_LAMP);
-    peaks.sort_by(|a, b| b.excess.total_cmp(&a.excess).then(a.seed.cmp(&b.seed)));
-    let sun = peaks.iter().position(|p| wanted.sun && p.solid_angle <= WIDEST_SUN);
-    if let Some(sun) = sun {
-        peaks[..=sun].rotate_right(1);
+    let mut peaks: Vec<Option<Peak>> = Vec::new();
+    peaks.extend(find_peaks(&grid, wanted.min_share * grid.total()).into_iter().map(Some));
+    let mut chosen = Vec::new();
+    if wanted.sun {
+        let suns = whole_sources(&peaks, WIDEST_SUN);
+        if let Some(sun) = brightest(&suns, 1).pop() {
+            remove(&mut peaks, sun);
+            chosen.extend(suns[sun]);
+        }
     }
-    peaks.truncate(usize::from(sun.is_some()) + wanted.n_lamps);
-    let mut sources = take_out(map, &grid, &peaks);
-    if let (Some(_), Some(first)) = (sun, sources.first_mut()) {
-        first.is_sun = true;
-    }
+    let has_sun = !chosen.is_empty();
+    let lamps = whole_sources(&peaks, WIDEST_LAMP);
+    chosen.extend(brightest(&lamps, wanted.n_lamps).into_iter().filter_map(|i| lamps[i]));
+    let mut sources = take_out(map, &grid, &chosen);
+    sources.iter_mut().take(1).for_each(|first| first.is_sun = has_sun);
     sources
+}
+
+/// The peaks that are no wider than `widest` \[sr\], whole: what surrounds a single one and is no
+/// wider than [`SHELL`] times its solid angle belongs to it, as the dish does to the bulb.
+fn whole_sources(peaks: &[Option<Peak>], widest: f64) -> Vec<Option<Peak>> {
+    let mut whole = vec![None; peaks.len()];
+    // What lies within another comes before it.
+    for (i, peak) in peaks.iter().enumerate() {
+        let Some(mut peak) = peak.filter(|p| p.solid_angle <= widest) else { continue };
+        if let Some(core) = peak.core.map(|c| c as usize)
+            && whole[core].is_some_and(|c: Peak| peak.solid_angle <= SHELL * c.solid_angle)
+        {
+            peak.excess += whole[core].take().map_or(0.0, |c| c.excess);
+        }
+        whole[i] = Some(peak);
+    }
+    whole
+}
+
+/// The indices of up to `n` of the most light, in this order.
+fn brightest(peaks: &[Option<Peak>], n: usize) -> Vec<usize> {
+    let excess = |i: usize| peaks[i].map_or(0.0, |p| p.excess);
+    let mut order: Vec<usize> = (0..peaks.len()).filter(|&i| peaks[i].is_some()).collect();
+    order.sort_by(|&a, &b| excess(b).total_cmp(&excess(a)));
+    order.truncate(n);
+    order
+}
+
+/// Removes a peak and those within it.
+fn remove(peaks: &mut [Option<Peak>], i: usize) {
+    let mut next = Some(i);
+    while let Some(i) = next {
+        next = peaks[i].take().and_then(|p| p.core).map(|core| core as usize);
+    }
 }
 
 /// Separates the peaks from what is behind them.
