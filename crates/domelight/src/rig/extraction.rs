@@ -84,7 +84,11 @@ pub fn extract(
     environment: &Environment,
     settings: ExtractionSettings,
 ) -> Result<Extraction, RigError> {
-    CompactExtraction::new(environment, settings)?.with_lights(settings.n_lights)
+    let compact = CompactExtraction::new(environment, settings)?;
+    if compact.n_regions(settings.n_lights) == 0 {
+        return Ok(Extraction { rig: compact.compact_rig(), residual: compact.residual });
+    }
+    compact.with_lights(settings.n_lights)
 }
 
 /// A rig and what it leaves on the map: together they are the environment, channel by channel.
@@ -142,8 +146,7 @@ impl<'a> CompactExtraction<'a> {
 
     /// How many texels are lit beside them.
     pub(super) fn n_lit(&self) -> usize {
-        let rest = self.residual.as_ref().unwrap_or(self.environment);
-        rest.map().pixels.iter().filter(|le| le.luminance() > 0.0).count()
+        self.rest().map().pixels.iter().filter(|le| le.luminance() > 0.0).count()
     }
 
     /// A rig of `n_lights` lights, compact ones included, which take all light; or of the compact
@@ -152,18 +155,28 @@ impl<'a> CompactExtraction<'a> {
     /// # Errors
     /// As [`extract`].
     pub fn with_lights(&self, n_lights: Option<usize>) -> Result<Extraction, RigError> {
-        let n_regions = n_lights.map_or(0, |n| n.saturating_sub(self.lights.len()));
-        let rest = self.residual.as_ref().unwrap_or(self.environment);
-        // Compact sources may have been all the light there was.
-        if n_regions == 0 || (rest.power() == 0.0 && !self.lights.is_empty()) {
-            return Ok(self.alone());
+        let n_regions = self.n_regions(n_lights);
+        if n_regions == 0 {
+            return Ok(Extraction { rig: self.compact_rig(), residual: self.residual.clone() });
         }
-        let regions = self.settings.method.rig(rest, n_regions)?;
-        self.combine(regions, rest)
+        let regions = self.settings.method.rig(self.rest(), n_regions)?;
+        self.combine(regions)
     }
 
-    /// The compact lights, and all else as residual.
-    fn alone(&self) -> Extraction {
+    /// What compact sources leave.
+    fn rest(&self) -> &Environment {
+        self.residual.as_ref().unwrap_or(self.environment)
+    }
+
+    /// How many lights of regions a rig of `n_lights` has.
+    fn n_regions(&self, n_lights: Option<usize>) -> usize {
+        // Compact sources may have been all the light there was.
+        let dark = self.rest().power() == 0.0 && !self.lights.is_empty();
+        n_lights.filter(|_| !dark).map_or(0, |n| n.saturating_sub(self.lights.len()))
+    }
+
+    /// The compact lights alone.
+    fn compact_rig(&self) -> Rig {
         let map = self.environment.map();
         let mut rig = Rig {
             lights: self.lights.clone(),
@@ -172,7 +185,7 @@ impl<'a> CompactExtraction<'a> {
             labels: vec![Rig::NO_LIGHT; map.pixels.len()],
         };
         self.overlay(&mut rig.labels);
-        Extraction { rig, residual: self.residual.clone() }
+        rig
     }
 
     /// Writes the compact lights into labels.
@@ -183,7 +196,8 @@ impl<'a> CompactExtraction<'a> {
     }
 
     /// Compact lights and the lights of regions of the rest, without those that are too dim.
-    fn combine(&self, mut regions: Rig, rest: &Environment) -> Result<Extraction, RigError> {
+    fn combine(&self, mut regions: Rig) -> Result<Extraction, RigError> {
+        let rest = self.rest();
         let scale = (rest.power() / self.environment.power()) as f32;
         regions.lights.iter_mut().for_each(|l| l.share *= scale);
         // Lights are in order, the dim ones last.
