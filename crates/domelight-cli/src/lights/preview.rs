@@ -1,5 +1,7 @@
 //! A picture of a rig: the probe with regions and lights, a sphere under both, and the error.
 
+use std::path::Path;
+
 use anyhow::Result;
 use domelight::environment::Environment;
 use domelight::math::{Frame, Vec2, Vec3, vec2, vec3};
@@ -18,10 +20,15 @@ const WIDTH: f64 = 1320.0;
 const MARGIN: f64 = 20.0;
 /// Of the picture of the probe.
 const MAP: (usize, usize) = (1280, 640);
-/// Edge of the picture of a sphere.
-const SPHERE: usize = 280;
+/// Pixels along the edge of the picture of a sphere.
+const SPHERE: usize = 300;
+/// Its edge on the sheet, and beside a plot of errors.
+const LARGE: f64 = 416.0;
+const SMALL: f64 = 280.0;
+/// Room between pictures.
+const GAP: f64 = 16.0;
 /// Lights that stand for the probe when it lights the sphere.
-const QUADRATURE: usize = 1 << 14;
+const QUADRATURE: usize = 1 << 13;
 /// Lights above which they have no numbers.
 const MAX_NUMBERS: usize = 128;
 
@@ -36,15 +43,16 @@ impl Preview<'_> {
     pub(super) fn png(&self) -> Result<Vec<u8>> {
         let has_plot = self.found.errors.len() > 1;
         let map = Rect::new(MARGIN, 64.0, MAP.0 as f64, MAP.1 as f64);
-        let below = map.y + map.height + 16.0;
-        let mut sheet = Document::new(WIDTH, below + SPHERE as f64 + 84.0);
+        let below = map.y + map.height + GAP;
+        let edge = if has_plot { SMALL } else { LARGE };
+        let mut sheet = Document::new(WIDTH, below + edge + 76.0);
         self.draw_title(&mut sheet);
         sheet.image(map, &png_bytes(&self.map())?, Pixels::Smooth);
         sheet.clipped(map, |sheet| self.draw_lights(sheet, map));
-        self.draw_spheres(&mut sheet, below)?;
+        self.draw_spheres(&mut sheet, below, edge)?;
         if has_plot {
-            let left = MARGIN + 3.0 * (SPHERE as f64 + 16.0);
-            self.draw_errors(&mut sheet, Rect::new(left, below, WIDTH - left - MARGIN, 356.0));
+            let left = MARGIN + 3.0 * (edge + GAP);
+            self.draw_errors(&mut sheet, Rect::new(left, below, WIDTH - left - MARGIN, 340.0));
         }
         rasterise(&sheet.to_svg(), 1.0)
     }
@@ -57,7 +65,9 @@ impl Preview<'_> {
         let n = self.rig().lights.len();
         let beside = if self.found.extraction.residual.is_some() { " beside a dome" } else { "" };
         let lights = if n == 1 { "light" } else { "lights" };
-        let title = format!("{}: {n} {lights}{beside}", self.probe);
+        let probe =
+            Path::new(self.probe).file_name().map_or(self.probe.into(), |n| n.to_string_lossy());
+        let title = format!("{probe}: {n} {lights}{beside}");
         sheet.text((MARGIN, 32.0), &title, TextStyle::new(24.0).bold());
         if let Some(error) = self.found.error() {
             let style = TextStyle::new(17.0).color(Color::GREY);
@@ -147,8 +157,9 @@ impl Preview<'_> {
     }
 
     /// A white matt sphere under the probe and under the rig, and how much they differ.
-    fn draw_spheres(&self, sheet: &mut Document, top: f64) -> Result<()> {
-        let probe = sphere(self.environment, &quadrature(self.environment, QUADRATURE).lights);
+    fn draw_spheres(&self, sheet: &mut Document, top: f64, edge: f64) -> Result<()> {
+        let lights = quadrature(self.environment, QUADRATURE).lights;
+        let probe = sphere(self.environment, &lights);
         let mut lights = self.rig().lights.clone();
         if let Some(dome) = &self.found.extraction.residual {
             lights.extend(quadrature(dome, QUADRATURE).lights);
@@ -171,11 +182,10 @@ impl Preview<'_> {
             (exposed(&difference, gain), format!("difference × {gain}")),
         ];
         for (i, (image, title)) in titles.iter().enumerate() {
-            let size = SPHERE as f64;
-            let r = Rect::new(MARGIN + i as f64 * (size + 16.0), top, size, size);
+            let r = Rect::new(MARGIN + i as f64 * (edge + GAP), top, edge, edge);
             sheet.image(r, &png_bytes(image)?, Pixels::Smooth);
             let style = TextStyle::new(17.0).anchor(Anchor::Middle);
-            sheet.text((r.x + 0.5 * size, top + size + 24.0), title, style);
+            sheet.text((r.x + 0.5 * edge, top + edge + 24.0), title, style);
         }
         let note = format!(
             "a white matt sphere without shadows; the greatest difference is {:.2} % of its \
@@ -183,7 +193,7 @@ impl Preview<'_> {
             100.0 * worst
         );
         let style = TextStyle::new(15.0).color(Color::GREY);
-        sheet.text((MARGIN, top + SPHERE as f64 + 52.0), &note, style);
+        sheet.text((MARGIN, top + edge + 52.0), &note, style);
         Ok(())
     }
 

@@ -222,7 +222,9 @@ impl<'a> Behind<'a> {
             for (i, &cell) in group.iter().enumerate() {
                 index[cell as usize] = (radiance.len() + i) as u32;
             }
-            radiance.extend(continue_rim(grid, &group, &rim));
+            let is_outside =
+                |cell: usize| owner[cell] == NOBODY && rim.binary_search(&(cell as u32)).is_err();
+            radiance.extend(continue_rim(grid, &group, &rim, is_outside));
         }
         Self { grid, index, radiance }
     }
