@@ -69,11 +69,7 @@ fn thin_plate(at: Vec3, rim: &[RimCell]) -> Rgb {
     let membrane = radiance / weights;
     let bulge = slope * (PI / (weights * weights));
     // A glow of 1/r², the steepest that is not the source's, doubles at the middle.
-    let bounded = |bulge: f32, most: f32| bulge.clamp(0.0, most);
-    membrane
-        + Rgb::new(
-            bounded(bulge.r, membrane.r),
-            bounded(bulge.g, membrane.g),
-            bounded(bulge.b, membrane.b),
-        )
+    let share = membrane.luminance() / bulge.luminance();
+    let bounded = if share > 0.0 { bulge * share.min(1.0) } else { Rgb::BLACK };
+    (membrane + bounded).map(|c| c.max(0.0))
 }
