@@ -10,6 +10,7 @@ mod diff;
 mod failure;
 mod farm;
 mod interrupt;
+mod lights;
 mod merge;
 mod notation;
 mod output;
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
         Command::Farm(arguments) => farm::run(&arguments, quiet),
         Command::Compare(arguments) => compare::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
+        Command::Lights(arguments) => lights::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
     };
     match done {

@@ -3,6 +3,7 @@
 pub(crate) mod compare;
 pub(crate) mod course;
 pub(crate) mod farm;
+pub(crate) mod lights;
 pub(crate) mod render;
 pub(crate) mod sampling;
 pub(crate) mod scene;
@@ -49,6 +50,9 @@ pub(crate) enum Command {
     /// Compare strategies on one scene at equal samples, rays or time, in a report to look at.
     #[command(after_help = compare::EXAMPLES)]
     Compare(Box<compare::CompareArguments>),
+    /// Turn a light probe into a rig of lights, and the probe without them.
+    #[command(after_help = lights::EXAMPLES, mut_arg("env", lights::positional))]
+    Lights(Box<lights::LightsArguments>),
     /// Compare a picture with its reference: MSE, relMSE, PSNR, ꟻLIP.
     #[command(after_help = DIFF_EXAMPLES)]
     Diff(DiffArguments),
@@ -222,6 +226,13 @@ fn positive(text: &str) -> Result<f32, String> {
     match finite(text) {
         Ok(value) if value > 0.0 => Ok(value),
         _ => Err("not a number above 0".into()),
+    }
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 100.0 => Ok(value),
+        _ => Err("not a percentage above 0, up to 100".into()),
     }
 }
 
