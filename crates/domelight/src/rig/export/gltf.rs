@@ -1,0 +1,185 @@
+//! glTF 2.0, as text with its data within (`.gltf`) and binary (`.glb`).
+//!
+//! A light is a node with a directional light of `KHR_lights_punctual`: it shines along the node's
+//! −Z, colour times intensity is the irradiance of a surface that faces it. glTF's unit is lux; the
+//! number is the probe's own, in W·m⁻² where its radiance is in W·m⁻²·sr⁻¹. It has no size. +Y is
+//! up.
+//!
+//! The dome is the scene's light of `EXT_lights_image_based`: its irradiance as nine harmonics, and,
+//! because the schema wants them, images for reflections. Those are drawn from the same harmonics,
+//! as smooth as they are. Neither the extension's text nor its schema says how the harmonics are
+//! scaled and signed, nor which way up a face is; both are as Babylon.js, whose authors wrote the
+//! extension, reads them.
+
+use base64::Engine as _;
+use serde_json::{Map, Value, json};
+
+use super::RigExport;
+use super::axes::Axes;
+use super::disc::color_and_strength;
+use crate::Rgb;
+use crate::environment::UpAxis;
+use crate::math::{PI, Quat, Vec3, vec3};
+use crate::rig::SphericalHarmonics;
+
+/// Texels along the edge of a face of the reflections.
+const FACE_SIZE: u32 = 16;
+
+/// glTF as text; its buffer is a data URI.
+pub(super) fn encode_text(rig: &RigExport) -> String {
+    let (mut root, buffer) = document(rig);
+    if !buffer.is_empty() {
+        let data = base64::engine::general_purpose::STANDARD.encode(&buffer);
+        let uri = format!("data:application/octet-stream;base64,{data}");
+        root["buffers"] = json!([{ "byteLength": buffer.len(), "uri": uri }]);
+    }
+    let mut text = serde_json::to_string_pretty(&root).expect("text and finite numbers");
+    text.push('\n');
+    text
+}
+
+/// Binary glTF: a header, then a chunk of JSON and one of the buffer, each padded to 4 bytes.
+pub(super) fn encode_binary(rig: &RigExport) -> Vec<u8> {
+    const HEADER: usize = 12;
+    let (mut root, buffer) = document(rig);
+    if !buffer.is_empty() {
+        root["buffers"] = json!([{ "byteLength": buffer.len() }]);
+    }
+    let json = serde_json::to_vec(&root).expect("text and finite numbers");
+    let mut chunks = chunk(*b"JSON", json, b' ');
+    if !buffer.is_empty() {
+        chunks.extend(chunk(*b"BIN\0", buffer, 0));
+    }
+    let mut file = b"glTF".to_vec();
+    file.extend(2u32.to_le_bytes());
+    file.extend(((HEADER + chunks.len()) as u32).to_le_bytes());
+    file.extend(chunks);
+    file
+}
+
+fn chunk(kind: [u8; 4], mut data: Vec<u8>, padding: u8) -> Vec<u8> {
+    data.resize(data.len().next_multiple_of(4), padding);
+    let mut chunk = (data.len() as u32).to_le_bytes().to_vec();
+    chunk.extend(kind);
+    chunk.extend(data);
+    chunk
+}
+
+/// The document but for its buffers, and the buffer.
+fn document(rig: &RigExport) -> (Value, Vec<u8>) {
+    let axes = Axes::with_up(rig, UpAxis::Y);
+    let mut root = json!({
+        "asset": { "version": "2.0", "generator": concat!("domelight ", env!("CARGO_PKG_VERSION")) },
+        "scene": 0,
+        "scenes": [{ "name": rig.probe }],
+    });
+    let (mut used, mut extensions) = (Vec::new(), Map::new());
+    if !rig.lights.is_empty() {
+        const PUNCTUAL: &str = "KHR_lights_punctual";
+        let (mut lights, mut nodes) = (Vec::new(), Vec::new());
+        for (light, name) in rig.lights.iter().zip(rig.names()) {
+            let (color, intensity) = color_and_strength(light.irradiance);
+            let toward = (axes.world * light.direction).normalize();
+            nodes.push(json!({
+                "name": name,
+                "rotation": Quat::from_rotation_arc(Vec3::Z, toward).to_array(),
+                "extensions": { PUNCTUAL: { "light": lights.len() } },
+            }));
+            lights.push(json!({
+                "type": "directional",
+                "name": name,
+                "color": color.to_array(),
+                "intensity": intensity,
+            }));
+        }
+        root["scenes"][0]["nodes"] = (0..nodes.len()).collect();
+        root["nodes"] = nodes.into();
+        extensions.insert(PUNCTUAL.into(), json!({ "lights": lights }));
+        used.push(PUNCTUAL);
+    }
+    let mut buffer = Vec::new();
+    if let Some(dome) = rig.dome {
+        const IMAGE_BASED: &str = "EXT_lights_image_based";
+        let light = image_based_light(&dome.harmonics.turned(axes.world), &mut root, &mut buffer);
+        extensions.insert(IMAGE_BASED.into(), json!({ "lights": [light] }));
+        root["scenes"][0]["extensions"] = json!({ IMAGE_BASED: { "light": 0 } });
+        used.push(IMAGE_BASED);
+    }
+    if !used.is_empty() {
+        root["extensionsUsed"] = json!(used);
+        root["extensions"] = extensions.into();
+    }
+    (root, buffer)
+}
+
+/// The light; its images go into the document and the buffer.
+///
+/// `intensity` scales both harmonics and images, so it is the greatest radiance and images are in
+/// [0, 1].
+fn image_based_light(dome: &SphericalHarmonics, root: &mut Value, buffer: &mut Vec<u8>) -> Value {
+    let faces: Vec<Vec<Rgb>> = (0..6).map(|face| face_radiance(dome, face)).collect();
+    let peak = faces.iter().flatten().map(|le| le.max_component()).fold(0.0, f32::max);
+    let intensity = if peak > 0.0 { peak } else { 1.0 };
+    let (mut images, mut views) = (Vec::new(), Vec::new());
+    for face in &faces {
+        let image = png(face.iter().map(|&le| le / intensity));
+        images.push(json!({ "bufferView": views.len(), "mimeType": "image/png" }));
+        views.push(json!({ "buffer": 0, "byteOffset": buffer.len(), "byteLength": image.len() }));
+        buffer.extend(image);
+        buffer.resize(buffer.len().next_multiple_of(4), 0);
+    }
+    root["images"] = images.into();
+    root["bufferViews"] = views.into();
+    json!({
+        "name": "dome",
+        "intensity": intensity,
+        "irradianceCoefficients": irradiance_coefficients(dome, intensity),
+        "specularImageSize": FACE_SIZE,
+        "specularImages": [[0, 1, 2, 3, 4, 5]],
+    })
+}
+
+/// π times the harmonics of radiance, with the Condon-Shortley phase: the reader blurs them by the
+/// cosine (Â_l/π) and divides by π.
+fn irradiance_coefficients(dome: &SphericalHarmonics, intensity: f32) -> Vec<[f32; 3]> {
+    const PHASE: [f32; 9] = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
+    let scaled = |(&l, sign): (&Rgb, f32)| (l * (sign * PI / intensity)).to_array();
+    dome.coefficients.iter().zip(PHASE).map(scaled).collect()
+}
+
+/// Radiance at the texels of a face (+X, −X, +Y, −Y, +Z, −Z), row by row, none negative.
+fn face_radiance(dome: &SphericalHarmonics, face: usize) -> Vec<Rgb> {
+    let place = |i: u32| (2 * i + 1) as f32 / FACE_SIZE as f32 - 1.0;
+    let texels = (0..FACE_SIZE * FACE_SIZE).map(|i| (place(i % FACE_SIZE), place(i / FACE_SIZE)));
+    texels
+        .map(|(right, down)| {
+            let direction = face_direction(face, right, down).normalize();
+            dome.radiance(direction).map(|le| le.max(0.0))
+        })
+        .collect()
+}
+
+/// The direction of a place on a face of the cube, `right` and `down` in [−1, 1].
+fn face_direction(face: usize, right: f32, down: f32) -> Vec3 {
+    match face {
+        0 => vec3(1.0, -down, -right),
+        1 => vec3(-1.0, -down, right),
+        2 => vec3(right, 1.0, down),
+        3 => vec3(right, -1.0, -down),
+        4 => vec3(right, -down, 1.0),
+        _ => vec3(-right, -down, -1.0),
+    }
+}
+
+/// A face in RGBD, the square root of colours' … with the divisor 1, for its colours are in [0, 1].
+fn png(texels: impl Iterator<Item = Rgb>) -> Vec<u8> {
+    let byte = |c: f32| (255.0 * c.powf(1.0 / 2.2)).round() as u8;
+    let bytes: Vec<u8> = texels.flat_map(|c| [byte(c.r), byte(c.g), byte(c.b), 255]).collect();
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, FACE_SIZE, FACE_SIZE);
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_depth(png::BitDepth::Eight);
+    let written = encoder.write_header().and_then(|mut image| image.write_image_data(&bytes));
+    written.expect("a vector takes all bytes");
+    file
+}
