@@ -7,7 +7,7 @@ and from -Z ("back"), +Y up, so that every normal is seen. Pictures are radiance
 import numpy as np
 import probe
 
-SIZE = 96
+SIZE = 64
 VIEWS = {"front": 1.0, "back": -1.0}
 # Pixels nearer to the silhouette than this are left out: consumers tessellate the sphere.
 RIM = 0.96
