@@ -7,9 +7,10 @@
 //!
 //! The dome is the scene's light of `EXT_lights_image_based`: its irradiance as nine harmonics, and,
 //! because the schema wants them, images for reflections. Those are drawn from the same harmonics,
-//! as smooth as they are. Neither the extension's text nor its schema says how the harmonics are
-//! scaled and signed, nor which way up a face is; both are as Babylon.js, whose authors wrote the
-//! extension, reads them.
+//! as smooth as they are. The extension's text leaves open how the harmonics are signed and how
+//! directions are over its axes; both are as Babylon.js, whose authors wrote the extension, reads
+//! them in its usual, left-handed scenes. (In a right-handed one it sees the dome half a turn about
+//! +Y away.)
 
 use base64::Engine as _;
 use serde_json::{Map, Value, json};
@@ -19,11 +20,20 @@ use super::axes::Axes;
 use super::disc::color_and_strength;
 use crate::Rgb;
 use crate::environment::UpAxis;
-use crate::math::{PI, Quat, Vec3, vec3};
+use crate::math::{Mat3, Quat, Vec3, vec3};
 use crate::rig::SphericalHarmonics;
 
 /// Texels along the edge of a face of the reflections.
 const FACE_SIZE: u32 = 16;
+
+/// The greatest radiance that RGBD holds.
+const RGBD_RANGE: f32 = 255.0;
+
+/// The space of the image-based light, left-handed as that of cube maps, is the world in a mirror.
+const WORLD_TO_CUBE: Mat3 = Mat3::from_diagonal(vec3(-1.0, 1.0, 1.0));
+
+/// The sign (−1)^m of each harmonic.
+const CONDON_SHORTLEY: [f32; 9] = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
 
 /// glTF as text; its buffer is a data URI.
 pub(super) fn encode_text(rig: &RigExport) -> String {
@@ -113,16 +123,15 @@ fn document(rig: &RigExport) -> (Value, Vec<u8>) {
 }
 
 /// The light; its images go into the document and the buffer.
-///
-/// `intensity` scales both harmonics and images, so it is the greatest radiance and images are in
-/// [0, 1].
 fn image_based_light(dome: &SphericalHarmonics, root: &mut Value, buffer: &mut Vec<u8>) -> Value {
-    let faces: Vec<Vec<Rgb>> = (0..6).map(|face| face_radiance(dome, face)).collect();
+    let dome = dome.turned(WORLD_TO_CUBE);
+    let faces: Vec<Vec<Rgb>> = (0..6).map(|face| face_radiance(&dome, face)).collect();
     let peak = faces.iter().flatten().map(|le| le.max_component()).fold(0.0, f32::max);
-    let intensity = if peak > 0.0 { peak } else { 1.0 };
+    // 1 wherever it can be: Babylon.js multiplies the harmonics by it twice.
+    let intensity = (peak / RGBD_RANGE).max(1.0);
     let (mut images, mut views) = (Vec::new(), Vec::new());
     for face in &faces {
-        let image = png(face.iter().map(|&le| le / intensity));
+        let image = png(face.iter().map(|&le| rgbd(le / intensity)));
         images.push(json!({ "bufferView": views.len(), "mimeType": "image/png" }));
         views.push(json!({ "buffer": 0, "byteOffset": buffer.len(), "byteLength": image.len() }));
         buffer.extend(image);
@@ -130,21 +139,15 @@ fn image_based_light(dome: &SphericalHarmonics, root: &mut Value, buffer: &mut V
     }
     root["images"] = images.into();
     root["bufferViews"] = views.into();
+    let signed = |(e, sign): (Rgb, f32)| (e * (sign / intensity)).to_array();
+    let coefficients = dome.irradiance_coefficients().into_iter().zip(CONDON_SHORTLEY).map(signed);
     json!({
         "name": "dome",
         "intensity": intensity,
-        "irradianceCoefficients": irradiance_coefficients(dome, intensity),
+        "irradianceCoefficients": coefficients.collect::<Vec<_>>(),
         "specularImageSize": FACE_SIZE,
         "specularImages": [[0, 1, 2, 3, 4, 5]],
     })
-}
-
-/// π times the harmonics of radiance, with the Condon-Shortley phase: the reader blurs them by the
-/// cosine (Â_l/π) and divides by π.
-fn irradiance_coefficients(dome: &SphericalHarmonics, intensity: f32) -> Vec<[f32; 3]> {
-    const PHASE: [f32; 9] = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
-    let scaled = |(&l, sign): (&Rgb, f32)| (l * (sign * PI / intensity)).to_array();
-    dome.coefficients.iter().zip(PHASE).map(scaled).collect()
 }
 
 /// Radiance at the texels of a face (+X, −X, +Y, −Y, +Z, −Z), row by row, none negative.
@@ -171,10 +174,16 @@ fn face_direction(face: usize, right: f32, down: f32) -> Vec3 {
     }
 }
 
-/// A face in RGBD, the square root of colours' … with the divisor 1, for its colours are in [0, 1].
-fn png(texels: impl Iterator<Item = Rgb>) -> Vec<u8> {
-    let byte = |c: f32| (255.0 * c.powf(1.0 / 2.2)).round() as u8;
-    let bytes: Vec<u8> = texels.flat_map(|c| [byte(c.r), byte(c.g), byte(c.b), 255]).collect();
+/// Red, green, blue and divisor: radiance is (rgb/255)^2.2 over d/255.
+fn rgbd(le: Rgb) -> [u8; 4] {
+    let divisor = (RGBD_RANGE / le.max_component().max(1.0)).floor().max(1.0);
+    let byte = |c: f32| (255.0 * (c * divisor / 255.0).powf(1.0 / 2.2)).round() as u8;
+    [byte(le.r), byte(le.g), byte(le.b), divisor as u8]
+}
+
+/// A face as a picture.
+fn png(texels: impl Iterator<Item = [u8; 4]>) -> Vec<u8> {
+    let bytes: Vec<u8> = texels.flatten().collect();
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, FACE_SIZE, FACE_SIZE);
     encoder.set_color(png::ColorType::Rgba);
