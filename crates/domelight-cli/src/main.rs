@@ -6,12 +6,15 @@ mod args;
 mod diff;
 mod failure;
 mod interrupt;
+mod lights;
 mod output;
 mod probe;
 mod progress;
 mod render;
 mod report;
 mod strategy;
+#[allow(dead_code)] // Commands that draw are to come.
+mod svg;
 mod usage;
 mod values;
 
@@ -24,6 +27,7 @@ fn main() -> ExitCode {
     let done = match command {
         Command::Render(arguments) => render::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
+        Command::Lights(arguments) => lights::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
     };
     match done {

@@ -46,6 +46,7 @@ mod color;
 pub mod environment;
 mod image;
 pub mod math;
+mod parallel;
 pub mod rig;
 pub mod sampling;
 pub mod strategy;

@@ -1,5 +1,6 @@
 //! The command line, typed.
 
+pub(crate) mod lights;
 pub(crate) mod render;
 
 use crate::output::PicturePath;
@@ -35,6 +36,9 @@ pub(crate) enum Command {
     /// Render a scene lit by an HDR environment.
     #[command(after_help = render::EXAMPLES)]
     Render(Box<render::RenderArguments>),
+    /// Turn a light probe into a rig of lights, and the probe without them.
+    #[command(after_help = lights::EXAMPLES, mut_arg("env", lights::positional))]
+    Lights(Box<lights::LightsArguments>),
     /// Compare a picture with its reference: MSE, relMSE, PSNR, ꟻLIP.
     #[command(after_help = DIFF_EXAMPLES)]
     Diff(DiffArguments),
@@ -182,6 +186,13 @@ fn positive(text: &str) -> Result<f32, String> {
     match finite(text) {
         Ok(value) if value > 0.0 => Ok(value),
         _ => Err("not a number above 0".into()),
+    }
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 100.0 => Ok(value),
+        _ => Err("not a percentage above 0, up to 100".into()),
     }
 }
 

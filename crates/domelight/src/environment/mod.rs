@@ -6,6 +6,7 @@
 //! single bright texel's light, for the table is zero where the interpolant is not.)
 
 pub mod builtin;
+pub(crate) mod compact;
 mod compensation;
 #[cfg(feature = "io")]
 pub mod io;

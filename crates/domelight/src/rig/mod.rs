@@ -19,27 +19,33 @@ mod cells;
 mod error;
 #[cfg(feature = "io")]
 pub mod export;
+mod extraction;
 mod median_cut;
 mod merge;
+mod quadrature;
 mod regions;
+mod smallest;
 mod spherical_harmonics;
 mod split;
 mod texels;
 mod variance_minimization;
 
 pub use error::{ShadingError, ShadingReference};
+pub use extraction::{CompactExtraction, Extraction, ExtractionSettings, Method, extract};
 pub use median_cut::{LightPosition, MedianCut, median_cut};
+pub use quadrature::quadrature;
+pub use smallest::{SmallestRig, smallest_rig};
 pub use spherical_harmonics::SphericalHarmonics;
 pub use split::Order;
 pub use variance_minimization::{Rule, VarianceMinimization, variance_minimization};
 
 use crate::Rgb;
-use crate::environment::Environment;
 use crate::math::Vec3;
-use texels::{Texels, bands, in_order};
+use crate::parallel::{bands, in_order};
+use texels::Texels;
 
 /// Why there is no rig.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RigError {
     /// A rig of no lights.
     #[error("a rig has at least one light; 0 were asked for")]
@@ -54,6 +60,29 @@ pub enum RigError {
         n_lights: usize,
         /// Texels with luminance.
         lit: usize,
+    },
+    /// No sun.
+    #[error(
+        "there is no sun: no compact source of 0.1 % of the map's light or more stands out of its \
+         surroundings by a factor of 4"
+    )]
+    NoSun,
+    /// No lamp.
+    #[error(
+        "there is no lamp: no compact source of 0.1 % of the map's light or more stands out of its \
+         surroundings by a factor of 4"
+    )]
+    NoLamp,
+    /// Lights too dim to be kept.
+    #[error("no light holds the least share of the map's light that was asked for")]
+    TooDim,
+    /// No rig is good enough.
+    #[error("even {n_lights} lights have a shading error of {percent:.2} %")]
+    ErrorNotReached {
+        /// The most lights that were tried.
+        n_lights: usize,
+        /// Their error \[%\].
+        percent: f32,
     },
 }
 
@@ -82,15 +111,6 @@ pub struct Rig {
     /// The index in [`Rig::lights`] of the light of each texel, row by row; [`Rig::NO_LIGHT`] of
     /// texels that no light was taken from. Compact lights lie over the regions.
     pub labels: Vec<u32>,
-}
-
-/// A rig and what it leaves on the map: together they are the environment, channel by channel.
-#[derive(Clone, Debug)]
-pub struct Extraction {
-    /// The lights.
-    pub rig: Rig,
-    /// The environment without the light that they took, nowhere negative; none if they took all.
-    pub residual: Option<Environment>,
 }
 
 /// A distant light.
@@ -266,6 +286,19 @@ impl RegionSums {
             moment,
             irradiance: rgb.map(|c| c * row.solid_angle),
             solid_angle: columns.len() as f64 * row.solid_angle,
+        });
+    }
+
+    /// Adds radiance of one texel.
+    fn add_texel(&mut self, texels: &Texels, x: usize, y: usize, le: [f64; 3]) {
+        let (row, column) = (&texels.rows[y], texels.columns[x]);
+        let luminance = 0.2126 * le[0] + 0.7152 * le[1] + 0.0722 * le[2];
+        let across = luminance * row.horizontal;
+        self.add(&Self {
+            energy: luminance * row.solid_angle,
+            moment: [across * column[0], luminance * row.vertical, across * column[1]],
+            irradiance: le.map(|c| c * row.solid_angle),
+            solid_angle: row.solid_angle,
         });
     }
 

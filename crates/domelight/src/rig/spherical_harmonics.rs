@@ -6,10 +6,11 @@
 
 use std::f64::consts::PI;
 
-use super::texels::{Texels, in_order};
+use super::texels::Texels;
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::{Mat3, Vec3, vec3};
+use crate::parallel::in_order;
 
 /// Radiance as Σ L_i Y_i with the real harmonics up to degree 2, over the world's axes.
 ///

@@ -97,3 +97,54 @@ pub(super) fn encode(rig: &RigExport) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests_support::{with_dome_file, with_example};
+    use super::*;
+
+    #[test]
+    fn suns_face_surfaces_with_their_discs() {
+        with_example(|rig| {
+            let text = encode(rig);
+            let line = text.lines().find(|line| line.contains("\"sun\"")).unwrap();
+            // Y-up (0, 0.6, −0.8) is Z-up (0, 0.8, 0.6).
+            assert!(line.contains("(0, 0.8, 0.6)"), "{line}");
+            let numbers: Vec<f32> = line
+                .trim_end_matches("),")
+                .rsplit(", ")
+                .take(2)
+                .map(|number| number.parse().unwrap())
+                .collect();
+            assert_eq!(numbers[0], 2.0 * rig.lights[0].angular_radius);
+            let facing = 3.0 * 0.5 * (1.0 + rig.lights[0].angular_radius.cos());
+            assert!((numbers[1] - facing).abs() < 1e-6);
+        });
+    }
+
+    /// In the console an empty line ends a block, and a block needs one to end.
+    #[test]
+    fn blocks_can_be_pasted_into_the_console() {
+        with_example(|rig| {
+            let text = encode(rig);
+            let lines: Vec<&str> = text.lines().collect();
+            for pair in lines.windows(2) {
+                let indented = |line: &str| line.starts_with("    ");
+                if indented(pair[0]) && !pair[0].starts_with("    (") {
+                    assert!(indented(pair[1]) || pair[1].is_empty(), "{pair:?}");
+                }
+                assert!(!(pair[0].is_empty() && indented(pair[1])), "{pair:?}");
+            }
+        });
+    }
+
+    #[test]
+    fn names_are_escaped() {
+        with_dome_file("C:\\maps\\\"r\".exr", |rig| {
+            let text = encode(&RigExport { probe: "a\nimport os", ..*rig });
+            assert!(text.contains(r#"DOME = "C:\\maps\\\"r\".exr""#), "{text}");
+            assert!(text.starts_with("# The lights of a import os, by domelight"));
+            assert!(!encode(&RigExport { dome: None, ..*rig }).contains("set_world"));
+        });
+    }
+}

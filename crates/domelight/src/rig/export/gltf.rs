@@ -192,3 +192,88 @@ fn png(texels: impl Iterator<Item = [u8; 4]>) -> Vec<u8> {
     written.expect("a vector takes all bytes");
     file
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests_support::with_example;
+    use super::*;
+    use crate::picture;
+
+    fn parse(text: &str) -> Value {
+        serde_json::from_str(text).unwrap()
+    }
+
+    /// The JSON and the buffer of a binary file.
+    fn split(file: &[u8]) -> (Value, Vec<u8>) {
+        let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize;
+        assert_eq!((&file[..4], word(4), word(8)), (&b"glTF"[..], 2, file.len()));
+        assert_eq!(&file[16..20], b"JSON");
+        let end = 20 + word(12);
+        let json = serde_json::from_slice(&file[20..end]).unwrap();
+        if end == file.len() {
+            return (json, Vec::new());
+        }
+        assert_eq!((&file[end + 4..end + 8], word(end) % 4), (&b"BIN\0"[..], 0));
+        (json, file[end + 8..].to_vec())
+    }
+
+    #[test]
+    fn nodes_shine_away_from_their_direction() {
+        with_example(|rig| {
+            let json = parse(&encode_text(rig));
+            let lights = &json["extensions"]["KHR_lights_punctual"]["lights"];
+            for (i, light) in rig.lights.iter().enumerate() {
+                let number = |v: &Value| v.as_f64().unwrap() as f32;
+                let q = &json["nodes"][i]["rotation"];
+                let q = Quat::from_xyzw(number(&q[0]), number(&q[1]), number(&q[2]), number(&q[3]));
+                assert!((q * Vec3::NEG_Z + light.direction).length() < 1e-6);
+                let intensity = number(&lights[i]["intensity"]);
+                for (c, e) in light.irradiance.to_array().iter().enumerate() {
+                    assert!((number(&lights[i]["color"][c]) * intensity - e).abs() < 1e-6);
+                }
+            }
+            assert_eq!(json["scenes"][0]["nodes"], json!([0, 1, 2]));
+        });
+    }
+
+    #[test]
+    fn the_dome_has_harmonics_and_images() {
+        with_example(|rig| {
+            let (json, buffer) = split(&encode_binary(rig));
+            let light = &json["extensions"]["EXT_lights_image_based"]["lights"][0];
+            let e = rig.dome.unwrap().harmonics.irradiance_coefficients();
+            let sign = |i: usize| light["irradianceCoefficients"][i][1].as_f64().unwrap() as f32;
+            assert!((sign(0) - e[0].g).abs() < 1e-4 && (sign(1) + e[1].g).abs() < 1e-4);
+            assert_eq!(json["images"].as_array().unwrap().len(), 6);
+            for view in json["bufferViews"].as_array().unwrap() {
+                let at = view["byteOffset"].as_u64().unwrap() as usize;
+                let image = &buffer[at..][..view["byteLength"].as_u64().unwrap() as usize];
+                assert_eq!(picture::format_of(image), Some(picture::Format::Png));
+            }
+            let text = parse(&encode_text(rig));
+            assert_eq!(text["extensions"], json["extensions"]);
+            assert_eq!(text["buffers"][0]["byteLength"], json["buffers"][0]["byteLength"]);
+        });
+    }
+
+    #[test]
+    fn nothing_is_empty_where_there_is_nothing() {
+        with_example(|rig| {
+            let (json, buffer) =
+                split(&encode_binary(&RigExport { lights: &[], dome: None, ..*rig }));
+            assert!(buffer.is_empty());
+            for key in ["nodes", "buffers", "images", "extensions", "extensionsUsed"] {
+                assert!(json.get(key).is_none(), "{key}");
+            }
+        });
+    }
+
+    #[test]
+    fn rgbd_holds_up_to_its_range() {
+        for le in [0.0, 0.3, 1.0, 7.5, 120.0, 255.0] {
+            let [r, _, _, d] = rgbd(Rgb::splat(le));
+            let read = (f32::from(r) / 255.0).powf(2.2) / (f32::from(d) / 255.0);
+            assert!((read - le).abs() <= 0.02 * le.max(0.1), "{le} {read}");
+        }
+    }
+}

@@ -88,3 +88,49 @@ pub(super) fn encode(rig: &RigExport) -> String {
     );
     text + FUNCTIONS
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests_support::with_example;
+    use super::*;
+    use crate::environment::Orientation;
+    use crate::rig::SphericalHarmonics;
+
+    #[test]
+    fn lights_have_colour_times_intensity() {
+        with_example(|rig| {
+            let text = encode(rig);
+            let sun = r#"{ name: "sun", direction: [0, 0.6, -0.8], color: [1, 0.033333335, 0], intensity: 3 },"#;
+            assert!(text.contains(sun), "{text}");
+            assert_eq!(text.matches("{ name: ").count(), 1 + rig.lights.len());
+        });
+    }
+
+    #[test]
+    fn a_z_up_world_is_turned_with_its_harmonics() {
+        with_example(|rig| {
+            let orientation = Orientation { up: UpAxis::Z, rotation: 0.0 };
+            let mut dome = rig.dome.unwrap();
+            // Light from above is first order in z of the Z-up world, in y of three.js.
+            dome.harmonics = SphericalHarmonics { coefficients: [crate::Rgb::BLACK; 9] };
+            dome.harmonics.coefficients[2] = crate::Rgb::WHITE;
+            let text = encode(&RigExport { orientation, dome: Some(dome), ..*rig });
+            assert!(text.contains("direction: [0, -0.8, -0.6]"), "{text}");
+            let start = text.find("harmonics = [\n").unwrap();
+            let rows: Vec<&str> = text[start..].lines().skip(1).take(9).collect();
+            let first = |row: &str| -> f32 {
+                row.trim_start_matches("  [").split(',').next().unwrap().parse().unwrap()
+            };
+            assert!((first(rows[1]) - 1.0).abs() < 1e-6 && first(rows[2]).abs() < 1e-6, "{rows:?}");
+        });
+    }
+
+    #[test]
+    fn names_are_escaped() {
+        with_example(|rig| {
+            let text = encode(&RigExport { probe: "a\n}*/b", dome: None, ..*rig });
+            assert!(text.starts_with("// The lights of a }*/b, by domelight.\n"));
+            assert!(text.contains("export const harmonics = null;"));
+        });
+    }
+}
