@@ -6,10 +6,12 @@ mod report;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
+use domelight::RgbImage;
+use domelight::environment::mapping::{Mapping, from_lat_long};
 use domelight::environment::{Environment, Orientation};
 use domelight::picture::tone::ToneCurve;
 use domelight::picture::{require_writable, write_atomically};
-use domelight::rig::export::{Dome, Format, RigExport};
+use domelight::rig::export::{Dome, DomePicture, Format, RigExport};
 use domelight::rig::{
     Extraction, ExtractionSettings, ShadingError, ShadingReference, SphericalHarmonics, extract,
     smallest_rig,
@@ -38,11 +40,12 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
     let extract = watch.lap();
 
     let dome_file = arguments.dome_file(&outputs, &found.extraction)?;
-    if let (Some(path), Some(dome)) = (&dome_file, &found.extraction.residual) {
-        path.write(dome.map(), arguments.tone.mapping(ToneCurve::Srgb), PictureFormat::Exr, None)?;
-    }
+    let dome_files = match (&dome_file, &found.extraction.residual) {
+        (Some(path), Some(dome)) => arguments.write_dome(path, dome.map(), &outputs)?,
+        _ => vec![None; outputs.len()],
+    };
     let harmonics = found.extraction.residual.as_ref().map(SphericalHarmonics::project);
-    for output in &outputs {
+    for (output, dome_file) in outputs.iter().zip(&dome_files) {
         let file = dome_file.as_ref().map(|dome| refer(output.path, &dome.path));
         let rig = RigExport {
             probe: &probe,
@@ -52,7 +55,7 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
                 |(harmonics, environment)| Dome { environment, harmonics, file: file.as_deref() },
             ),
         };
-        let bytes = output.format.encode(&rig);
+        let bytes = output.format.encode(&rig).with_context(|| probe.clone())?;
         write_atomically(output.path, |out| out.write_all(&bytes))?;
     }
     if let Some(path) = &arguments.preview {
@@ -183,7 +186,8 @@ impl LightsArguments {
         if let Some(path) = &self.keep_residual {
             return Ok(Some(path.clone()));
         }
-        let needs = outputs.iter().find(|o| o.format.needs_dome_file() && o.path != Path::new("-"));
+        let needs =
+            outputs.iter().find(|o| o.format.dome_picture().is_some() && o.path != Path::new("-"));
         let Some(output) = needs else { return Ok(None) };
         let stem = output.path.file_stem().unwrap_or_default().to_string_lossy();
         let path = output.path.with_file_name(format!("{stem}_dome.exr"));
@@ -191,6 +195,49 @@ impl LightsArguments {
         path.require_writable()?;
         Ok(Some(path))
     }
+}
+
+impl LightsArguments {
+    /// Writes the dome's map and what else outputs need of it; the picture of each output.
+    fn write_dome(
+        &self,
+        path: &PicturePath,
+        map: &RgbImage,
+        outputs: &[Output],
+    ) -> Result<Vec<Option<PicturePath>>> {
+        let tone = self.tone.mapping(ToneCurve::Srgb);
+        path.write(map, tone, PictureFormat::Exr, None)?;
+        let mut pictures = Vec::new();
+        for output in outputs {
+            let picture = output.format.dome_picture().unwrap_or(DomePicture::LatLong);
+            let file = picture_path(path, picture)?;
+            if file.path != path.path {
+                let mapping = picture.mapping();
+                let size = match mapping {
+                    Mapping::LatLong => (map.width, map.height),
+                    _ => mapping.size_for(map.height),
+                };
+                let converted = from_lat_long(map, mapping, size);
+                file.write(&converted, tone, PictureFormat::Exr, Some(mapping))?;
+            }
+            pictures.push(Some(file));
+        }
+        Ok(pictures)
+    }
+}
+
+/// The name of a picture of the dome beside its map: `dome.exr`, `dome.hdr`, `dome_octahedral.exr`.
+fn picture_path(map: &PicturePath, picture: DomePicture) -> Result<PicturePath> {
+    let path = match picture {
+        DomePicture::LatLong => map.path.clone(),
+        DomePicture::LatLongHdr => map.path.with_extension("hdr"),
+        DomePicture::Octahedral => {
+            let [stem, extension] = [map.path.file_stem(), map.path.extension()]
+                .map(|part| part.unwrap_or_default().to_string_lossy());
+            map.path.with_file_name(format!("{stem}_octahedral.{extension}"))
+        }
+    };
+    Ok(path.to_string_lossy().parse::<PicturePath>().map_err(UsageError)?)
 }
 
 fn measure(environment: &Environment, found: &Extraction) -> ShadingError {

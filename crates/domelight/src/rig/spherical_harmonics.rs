@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use super::texels::Texels;
 use crate::Rgb;
 use crate::environment::Environment;
-use crate::math::Vec3;
+use crate::math::{Mat3, Vec3, vec3};
 use crate::parallel::in_order;
 
 /// Radiance as Σ L_i Y_i with the real harmonics up to degree 2, over the world's axes.
@@ -47,6 +47,24 @@ impl SphericalHarmonics {
     /// Radiance from the unit direction `wi`; may be negative where the environment is not smooth.
     pub fn radiance(&self, wi: Vec3) -> Rgb {
         basis(wi).into_iter().zip(self.coefficients).map(|(y, l)| l * y).sum()
+    }
+
+    /// Those of the radiance that `rotation` turns.
+    ///
+    /// By the rule of 14 points, the corners and the faces' centres of a cube, which integrates
+    /// polynomials of degree 5 over the sphere exactly.
+    #[must_use]
+    pub fn turned(&self, rotation: Mat3) -> Self {
+        let (inverse, centres) = (rotation.transpose(), [Vec3::X, Vec3::Y, Vec3::Z]);
+        let sign = |bit: usize| if bit == 0 { 1.0 } else { -1.0 };
+        let corner = |i: usize| vec3(sign(i & 1), sign(i & 2), sign(i & 4)).normalize();
+        let faces = centres.into_iter().flat_map(|w| [w, -w]).map(|w| (w, 1.0 / 15.0));
+        let mut coefficients = [Rgb::BLACK; 9];
+        for (w, weight) in faces.chain((0..8).map(|i| (corner(i), 3.0 / 40.0))) {
+            let le = self.radiance(inverse * w) * (weight * 4.0 * PI as f32);
+            coefficients.iter_mut().zip(basis(w)).for_each(|(c, y)| *c += le * y);
+        }
+        Self { coefficients }
     }
 
     /// Irradiance of a surface whose normal is the unit vector `normal` \[W·m⁻²\]: Σ Â_l L_lm Y_lm
@@ -235,6 +253,19 @@ mod tests {
                 let off = (*f - e).map(f32::abs).max_component();
                 assert!(off < 2e-4, "{f:?} is not {e:?}, {orientation:?}");
             }
+        }
+    }
+
+    #[test]
+    fn turned_harmonics_are_those_of_the_turned_world() {
+        let mut pcg = Pcg32::new(4, 1);
+        let coefficients = [0; 9].map(|_| Rgb::from([0; 3].map(|_| pcg.next_f32() - 0.5)));
+        let still = SphericalHarmonics { coefficients };
+        let rotation = Mat3::from_rotation_y(0.7) * Mat3::from_rotation_x(-2.0);
+        let turned = still.turned(rotation);
+        for w in directions() {
+            let off = (turned.radiance(rotation * w) - still.radiance(w)).map(f32::abs);
+            assert!(off.max_component() < 1e-5, "{w}");
         }
     }
 

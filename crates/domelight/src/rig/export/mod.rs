@@ -3,14 +3,26 @@
 //! Functions here make bytes and do no I/O. What a format needs of the outside, the name of the
 //! file that holds the residual map, is given as text.
 
+mod axes;
+mod blender;
 mod csv;
+mod disc;
+mod gltf;
 mod json;
+mod mitsuba;
+mod pbrt;
+mod radiance;
+mod sibl;
+mod text;
+mod three;
+mod usd;
 
 pub use json::VERSION as JSON_VERSION;
 
 use std::str::FromStr;
 
 use super::{Region, RigLight, SphericalHarmonics};
+use crate::environment::mapping::Mapping;
 use crate::environment::{Environment, Orientation};
 
 /// What all formats write.
@@ -38,6 +50,11 @@ pub struct Dome<'a> {
 }
 
 impl RigExport<'_> {
+    /// The file of the dome's picture, if there are both.
+    fn dome_file(&self) -> Option<&str> {
+        self.dome.and_then(|dome| dome.file)
+    }
+
     /// A name for each light, all different: `sun`, `lamp_1`, …, `light_1`, ….
     pub fn names(&self) -> Vec<String> {
         let (mut lamps, mut regions) = (0, 0);
@@ -61,6 +78,72 @@ pub enum Format {
     Json,
     /// A table with a light a row.
     Csv,
+    /// glTF 2.0 as text.
+    Gltf,
+    /// Binary glTF 2.0.
+    Glb,
+    /// OpenUSD as text.
+    Usd,
+    /// A Python script for Blender.
+    Blender,
+    /// A Mitsuba 3 scene.
+    Mitsuba,
+    /// Lights of a pbrt-v4 scene.
+    Pbrt,
+    /// A three.js module.
+    Three,
+    /// Lights of a Radiance scene.
+    Radiance,
+    /// A smart IBL set.
+    Sibl,
+}
+
+/// A picture of the dome beside a rig's file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DomePicture {
+    /// The map itself in any file of high dynamic range.
+    LatLong,
+    /// The map itself as Radiance `.hdr`.
+    LatLongHdr,
+    /// The map in [`Mapping::Octahedral`], in any file of high dynamic range.
+    Octahedral,
+}
+
+impl DomePicture {
+    /// The mapping of the picture, in the map's own frame.
+    pub fn mapping(self) -> Mapping {
+        match self {
+            Self::LatLong | Self::LatLongHdr => Mapping::LatLong,
+            Self::Octahedral => Mapping::Octahedral,
+        }
+    }
+}
+
+/// Why a rig cannot be written.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ExportError {
+    /// A light whose direction is no unit vector, or whose numbers are not finite or negative.
+    #[error(
+        "light {name} has direction {}, irradiance {:?} and angular radius {}; \
+         lights have a unit vector, finite irradiance that is not negative, and a finite radius",
+        light.direction, light.irradiance.to_array(), light.angular_radius
+    )]
+    BadLight {
+        /// The name that it would have.
+        name: String,
+        /// The light.
+        light: RigLight,
+    },
+    /// A file name that the format has no way to write.
+    #[error(
+        "{format} files cannot name the file {file:?}: choose a name without '\"' and control characters"
+    )]
+    BadFileName {
+        /// The format.
+        format: Format,
+        /// The name.
+        file: String,
+    },
 }
 
 /// No format has this name.
@@ -72,13 +155,34 @@ pub struct UnknownFormat {
 
 impl Format {
     /// All formats.
-    pub const ALL: [Self; 2] = [Self::Json, Self::Csv];
+    pub const ALL: [Self; 11] = [
+        Self::Json,
+        Self::Csv,
+        Self::Gltf,
+        Self::Glb,
+        Self::Usd,
+        Self::Blender,
+        Self::Mitsuba,
+        Self::Pbrt,
+        Self::Three,
+        Self::Radiance,
+        Self::Sibl,
+    ];
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Json => "json",
             Self::Csv => "csv",
+            Self::Gltf => "gltf",
+            Self::Glb => "glb",
+            Self::Usd => "usd",
+            Self::Blender => "blender",
+            Self::Mitsuba => "mitsuba",
+            Self::Pbrt => "pbrt",
+            Self::Three => "three",
+            Self::Radiance => "radiance",
+            Self::Sibl => "sibl",
         }
     }
 
@@ -87,6 +191,15 @@ impl Format {
         match self {
             Self::Json => &["json"],
             Self::Csv => &["csv", "txt"],
+            Self::Gltf => &["gltf"],
+            Self::Glb => &["glb"],
+            Self::Usd => &["usda"],
+            Self::Blender => &["py"],
+            Self::Mitsuba => &["xml"],
+            Self::Pbrt => &["pbrt"],
+            Self::Three => &["js", "mjs"],
+            Self::Radiance => &["rad"],
+            Self::Sibl => &["ibl"],
         }
     }
 
@@ -96,19 +209,54 @@ impl Format {
         Self::ALL.into_iter().find(|f| f.extensions().contains(&extension.as_str()))
     }
 
-    /// Whether files of this format light a scene with the dome by naming its picture's file, so
-    /// that it must be written beside them.
-    pub fn needs_dome_file(self) -> bool {
+    /// The picture of the dome that files of this format name and light a scene with, so that it
+    /// must be written beside them.
+    pub fn dome_picture(self) -> Option<DomePicture> {
         match self {
-            Self::Json | Self::Csv => false,
+            Self::Json | Self::Csv | Self::Gltf | Self::Glb | Self::Three => None,
+            Self::Usd | Self::Blender | Self::Mitsuba | Self::Sibl => Some(DomePicture::LatLong),
+            Self::Pbrt => Some(DomePicture::Octahedral),
+            Self::Radiance => Some(DomePicture::LatLongHdr),
         }
     }
 
     /// The rig as a file of this format.
-    pub fn encode(self, rig: &RigExport) -> Vec<u8> {
-        match self {
+    ///
+    /// # Errors
+    /// A light that is not a direction with light of finite amount, or a name of the dome's file
+    /// that the format cannot hold.
+    pub fn encode(self, rig: &RigExport) -> Result<Vec<u8>, ExportError> {
+        self.check(rig)?;
+        Ok(match self {
             Self::Json => json::encode(rig).into_bytes(),
             Self::Csv => csv::encode(rig).into_bytes(),
+            Self::Gltf => gltf::encode_text(rig).into_bytes(),
+            Self::Glb => gltf::encode_binary(rig),
+            Self::Usd => usd::encode(rig).into_bytes(),
+            Self::Blender => blender::encode(rig).into_bytes(),
+            Self::Mitsuba => mitsuba::encode(rig).into_bytes(),
+            Self::Pbrt => pbrt::encode(rig).into_bytes(),
+            Self::Three => three::encode(rig).into_bytes(),
+            Self::Radiance => radiance::encode(rig).into_bytes(),
+            Self::Sibl => sibl::encode(rig).into_bytes(),
+        })
+    }
+
+    fn check(self, rig: &RigExport) -> Result<(), ExportError> {
+        for (light, name) in rig.lights.iter().zip(rig.names()) {
+            let e = light.irradiance;
+            let directed = light.direction.is_normalized() && light.angular_radius.is_finite();
+            if !directed || !e.is_finite() || e.min_component() < 0.0 {
+                return Err(ExportError::BadLight { name, light: *light });
+            }
+        }
+        let unquotable = matches!(self, Self::Sibl | Self::Radiance);
+        let bad = |c: char| c.is_control() || unquotable && c == '"';
+        match rig.dome_file() {
+            Some(file) if self.dome_picture().is_some() && file.contains(bad) => {
+                Err(ExportError::BadFileName { format: self, file: file.to_owned() })
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -135,16 +283,25 @@ mod tests_support {
     use crate::math::{Vec3, vec3};
     use crate::{Rgb, RgbImage};
 
-    /// Passes on a sun, a lamp and a region, red, green and blue, over a dome.
-    pub(super) fn with_example(f: impl FnOnce(&RigExport)) {
-        let light = |direction: Vec3, irradiance, region| RigLight {
+    /// A light that is small.
+    pub(super) fn light(direction: Vec3, irradiance: Rgb, region: Region) -> RigLight {
+        RigLight {
             direction,
             irradiance,
             angular_radius: 0.01,
             share: 0.25,
             solid_angle: 3e-4,
             region,
-        };
+        }
+    }
+
+    /// Passes on a sun, a lamp and a region, red, green and blue, over a dome.
+    pub(super) fn with_example(f: impl FnOnce(&RigExport)) {
+        with_dome_file("residual.exr", f);
+    }
+
+    /// The same with a file of this name.
+    pub(super) fn with_dome_file(file: &str, f: impl FnOnce(&RigExport)) {
         let lights = [
             light(vec3(0.0, 0.6, -0.8), Rgb::new(3.0, 0.1, 0.0), Region::Sun),
             light(vec3(1.0, 0.0, 0.0), Rgb::new(0.0, 2.0, 0.0), Region::Lamp),
@@ -154,8 +311,7 @@ mod tests_support {
         let map = RgbImage::from_fn(16, 8, |x, y| Rgb::new(0.1 * x as f32, 0.5, 0.2 * y as f32));
         let environment = Environment::new(map, orientation, 1.0).unwrap();
         let harmonics = SphericalHarmonics::project(&environment);
-        let file = Some("residual.exr");
-        let dome = Some(Dome { environment: &environment, harmonics, file });
+        let dome = Some(Dome { environment: &environment, harmonics, file: Some(file) });
         f(&RigExport { probe: "probe.hdr", orientation, lights: &lights, dome });
     }
 }
