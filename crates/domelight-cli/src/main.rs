@@ -5,6 +5,7 @@
 mod args;
 mod diff;
 mod failure;
+mod figures;
 mod interrupt;
 mod output;
 mod probe;
@@ -12,7 +13,6 @@ mod progress;
 mod render;
 mod report;
 mod strategy;
-#[allow(dead_code)] // Commands that draw are to come.
 mod svg;
 mod usage;
 mod values;
@@ -27,6 +27,7 @@ fn main() -> ExitCode {
         Command::Render(arguments) => render::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
+        Command::Figures(arguments) => figures::run(&arguments, quiet),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

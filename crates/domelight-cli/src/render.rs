@@ -141,7 +141,7 @@ impl RenderArguments {
 }
 
 /// A built-in scene by its name, else a file.
-fn load_scene(name: &str, quiet: bool) -> Result<SceneDescription> {
+pub(crate) fn load_scene(name: &str, quiet: bool) -> Result<SceneDescription> {
     if let Ok(builtin) = BuiltinScene::from_str(name) {
         return Ok(builtin.description());
     }
@@ -153,7 +153,7 @@ fn load_scene(name: &str, quiet: bool) -> Result<SceneDescription> {
 }
 
 /// What a user would call the probe.
-fn probe_name(source: &EnvironmentSource) -> String {
+pub(crate) fn probe_name(source: &EnvironmentSource) -> String {
     match source {
         EnvironmentSource::File(path) => path.display().to_string(),
         EnvironmentSource::Builtin(name) => name.clone(),
@@ -162,7 +162,7 @@ fn probe_name(source: &EnvironmentSource) -> String {
 
 impl EnvironmentArguments {
     /// The scene's own settings with the flags over them.
-    fn settings(&self, scene: &SceneDescription) -> EnvironmentSettings {
+    pub(crate) fn settings(&self, scene: &SceneDescription) -> EnvironmentSettings {
         let source = |name: &str| match BuiltinProbe::from_str(name) {
             Ok(probe) => EnvironmentSource::Builtin(probe.name().to_owned()),
             Err(_) => EnvironmentSource::File(name.into()),
@@ -187,7 +187,11 @@ impl EnvironmentArguments {
         settings
     }
 
-    fn load(&self, light: &EnvironmentSettings, quiet: bool) -> Result<domelight::RgbImage> {
+    pub(crate) fn load(
+        &self,
+        light: &EnvironmentSettings,
+        quiet: bool,
+    ) -> Result<domelight::RgbImage> {
         let path = match &light.source {
             EnvironmentSource::Builtin(name) => {
                 return Ok(BuiltinProbe::from_str(name)?.image(self.env_rows as usize));

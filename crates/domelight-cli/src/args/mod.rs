@@ -1,5 +1,6 @@
 //! The command line, typed.
 
+pub(crate) mod figures;
 pub(crate) mod render;
 
 use crate::output::PicturePath;
@@ -41,6 +42,9 @@ pub(crate) enum Command {
     /// Measure, look at and convert a light probe.
     #[command(after_help = PROBE_EXAMPLES)]
     Probe(ProbeArguments),
+    /// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
+    #[command(after_help = figures::EXAMPLES)]
+    Figures(Box<figures::FiguresArguments>),
 }
 
 const DIFF_EXAMPLES: &str = "\
