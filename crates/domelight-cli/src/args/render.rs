@@ -20,6 +20,9 @@ Examples:
   domelight render spheres --env cathedral --strategy brdf --rays 4 --json > stats.json
       another built-in scene, its statistics as JSON";
 
+/// Rows of a built-in probe unless told otherwise.
+pub(crate) const BUILTIN_ROWS: u32 = 1024;
+
 /// Render a scene lit by an HDR environment.
 #[derive(Args, Debug)]
 pub(crate) struct RenderArguments {
@@ -66,7 +69,7 @@ pub(crate) struct EnvironmentArguments {
     #[arg(long, value_name = "NAME")]
     pub(crate) env_layer: Option<String>,
     /// Rows of a built-in probe
-    #[arg(long, value_name = "ROWS", default_value_t = 1024,
+    #[arg(long, value_name = "ROWS", default_value_t = BUILTIN_ROWS,
           value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(crate) env_rows: u32,
     /// Repair negative, NaN and infinite texels instead of refusing them

@@ -14,9 +14,6 @@ use serde_json::{Map, Value};
 use crate::svg::plot::Plot;
 use crate::svg::{Anchor, Color, Document, Pixels, Rect, Style, TextStyle, rasterise, superscript};
 
-/// Pixels of a figure's PNG for each of its own.
-const SCALE: f32 = 1.5;
-
 /// One of the lecture's figures.
 pub(crate) struct Figure {
     pub(crate) number: u8,
@@ -107,11 +104,11 @@ impl Figure {
         names
     }
 
-    /// Writes all files of the figure.
-    pub(crate) fn write(&self, folder: &Path) -> Result<()> {
+    /// Writes all files of the figure; the PNG has `scale` pixels for each of the sheet's.
+    pub(crate) fn write(&self, folder: &Path, scale: f32) -> Result<()> {
         let n = self.number;
         let sheet = self.sheet();
-        write(&folder.join(format!("figure-{n}.png")), &rasterise(&sheet.to_svg(), SCALE)?)?;
+        write(&folder.join(format!("figure-{n}.png")), &rasterise(&sheet.to_svg(), scale)?)?;
         if let (true, Some(table)) = (self.has_data, self.tables.first()) {
             write(&folder.join(format!("figure-{n}.csv")), table.csv().as_bytes())?;
             write(&folder.join(format!("figure-{n}.json")), table.json()?.as_bytes())?;

@@ -25,12 +25,12 @@ const SIR: (u32, u32) = (15, 800);
 
 /// The lecture's materials.
 const MATERIALS: [(&str, &str); 2] = [
-    ("Phong, s = 50, k_s = 1", "phong:50:1"),
-    ("Phong, s = 50, k_s = 1, k_d = 0.5", "phong:50:1:0.5"),
+    ("Phong, s = 50, ks = 1", "phong:50:1"),
+    ("Phong, s = 50, ks = 1, kd = 0.5", "phong:50:1:0.5"),
 ];
 /// Two more, for the environment against the product.
 const MORE: [(&str, &str); 2] =
-    [("Ward, α = 0.15, 0.5", "ward:0.15:0.5"), ("Gold, GGX, α = 0.2", "ggx:0.2:gold")];
+    [("Ward, α = 0.15 × 0.5", "ward:0.15:0.5"), ("Gold, GGX, α = 0.2", "ggx:0.2:gold")];
 
 /// The product by resampling, from candidates of both factors.
 pub(super) fn sir(n: u32, n_candidates: Option<u32>) -> Plan {
@@ -158,10 +158,10 @@ impl Budget<'_> {
                 Shown::new("SIR", shot, sir(SIR.0, Some(SIR.1)))?,
             ]),
             Self::Equal { seconds, lecture } => {
+                // A quarter of the time tells what a sample costs.
                 let scaled = |i: usize, n: u32, plan: &dyn Fn(u32) -> Plan| {
-                    let ratio = seconds / lecture[i].measured.taken.seconds.max(1e-6);
-                    // From there it is a small step to the right count.
-                    let n = (f64::from(n) * ratio).clamp(1.0, 20_000.0) as u32;
+                    let ratio = 0.25 * seconds / lecture[i].measured.taken.seconds.max(1e-6);
+                    let n = (f64::from(n) * ratio).clamp(2.0, 5_000.0) as u32;
                     equal_time(shot, *seconds, n, plan)
                 };
                 let full = |n: u32| sir(n, Some(scaled_candidates(n).max(n)));
@@ -173,7 +173,7 @@ impl Budget<'_> {
                     Shown::new(
                         "SIR",
                         shot,
-                        equal_time(shot, *seconds, 8 * SIR.0, |n| sir(n, None))?,
+                        equal_time(shot, *seconds, 2 * SIR.0, |n| sir(n, None))?,
                     )?,
                 ])
             }

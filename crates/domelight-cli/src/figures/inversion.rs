@@ -12,7 +12,7 @@ use crate::svg::plot::{Axis, Datum, Join, Legend, Plot, Scale, Series};
 use crate::svg::{Color, Document, PALETTE, Rect, Style};
 
 /// Cells of the one-dimensional example.
-const CELLS: usize = 16;
+const CELLS: usize = 24;
 /// Numbers that it inverts.
 const NUMBERS: usize = 12;
 /// The course's numbers of samples.
@@ -72,8 +72,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
             lower.into(),
         ],
     ];
-    let rows: Vec<f64> = (0..table.height()).map(|y| table.rows().pmf(y)).collect();
-    let example = grouped(&rows, CELLS);
+    let example: Vec<f64> = (0..CELLS).map(|i| example((i as f64 + 0.5) / CELLS as f64)).collect();
     Ok(Figure {
         number: 2,
         title: "Inverting a distribution function; sampling the environment",
@@ -128,10 +127,10 @@ fn draw(studio: &Studio, table: &Table2d, n: usize) -> Vec<Sample> {
     (0..n).map(sample).collect()
 }
 
-/// The sums of `n` groups of neighbours.
-fn grouped(values: &[f64], n: usize) -> Vec<f64> {
-    let end = |i: usize| i * values.len() / n;
-    (0..n).map(|i| values[end(i)..end(i + 1)].iter().sum()).collect()
+/// Two bumps on a little everywhere.
+fn example(x: f64) -> f64 {
+    let bump = |center: f64, width: f64| (-((x - center) / width).powi(2)).exp();
+    0.08 + bump(0.3, 0.12) + 0.7 * bump(0.74, 0.06)
 }
 
 /// Polar angle of a row's middle.

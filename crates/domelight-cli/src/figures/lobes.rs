@@ -16,7 +16,7 @@ use crate::svg::{Anchor, Color, Document, PALETTE, Style, TextStyle};
 const LOBES: [(&str, &str); 4] = [
     ("Phong, n = 50", "phong:50"),
     ("Ward, α = 0.2", "ward:0.2"),
-    ("Ward, α = 0.15, 0.5", "ward:0.15:0.5"),
+    ("Ward, α = 0.15 × 0.5", "ward:0.15:0.5"),
     ("GGX, α = 0.3", "ggx:0.3"),
 ];
 const THETA_BINS: usize = 45;
@@ -199,20 +199,19 @@ impl Lobe {
         const SIZE: f64 = 300.0;
         let (center, radius) = (0.5 * SIZE, 0.5 * SIZE - 12.0);
         let mut panel = Document::new(SIZE, SIZE);
-        for degrees in [30.0, 60.0, 90.0] {
-            let r = radius * degrees / 90.0;
+        let rings = [30.0, 60.0, 90.0].map(|degrees| (degrees, radius * degrees / 90.0));
+        for (_, r) in rings {
             panel.circle((center, center), r, Style::stroke(Color::FAINT, 1.4));
-            let style = TextStyle::new(14.0).color(Color::GREY).anchor(Anchor::End);
-            panel.text(
-                (center + 0.707 * r - 2.0, center + 0.707 * r - 2.0),
-                &format!("{degrees}°"),
-                style,
-            );
         }
         for (theta, phi) in self.drawn.iter().take(DOTS) {
             let (r, phi) = (radius * theta / 90.0, phi.to_radians());
             let at = (center + r * phi.cos(), center - r * phi.sin());
             panel.circle(at, 1.7, Style::fill(PALETTE[0]).opacity(0.7));
+        }
+        for (degrees, r) in rings {
+            let at = (center + 0.707 * r, center + 0.707 * r + 5.0);
+            let style = TextStyle::new(14.0).color(Color::GREY).anchor(Anchor::Middle).halo();
+            panel.text(at, &format!("{degrees}°"), style);
         }
         panel
     }

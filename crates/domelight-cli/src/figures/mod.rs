@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &FiguresArguments, quiet: bool) -> Result<()> {
     {
         let start = Instant::now();
         let made = make(&studio, number).and_then(|figure| {
-            figure.write(folder)?;
+            figure.write(folder, studio.choose(1.5, 0.75))?;
             Ok(figure)
         });
         match made {

@@ -8,7 +8,10 @@ use serde_json::Value;
 
 use super::figure::{Figure, Row, Table, count, number};
 use super::studio::Studio;
-use crate::svg::{escape, font_face_css};
+use crate::svg::{Document, data_uri, escape, font_face_css};
+
+/// For formulas: signs that grow, which fonts for text have not.
+const MATH_FONT: &[u8] = include_bytes!("../../assets/math-subset.otf");
 
 /// The page's file.
 pub(crate) const NAME: &str = "index.html";
@@ -33,18 +36,24 @@ fn page(studio: &Studio, figures: &[Figure]) -> String {
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <title>Sampling direct illumination</title>\n<style>{}{STYLE}</style>\n</head>\n<body>\n\
+         <title>Sampling direct illumination</title>\n<style>{}{}{STYLE}</style>\n</head>\n<body>\n\
          <header><h1>Sampling direct illumination</h1>\
          <p>The figures of the lecture, computed: <b>{scene}</b> in the light of <b>{probe}</b> ({}×{} texels), \
          by domelight {}.{quick}</p>\
          <p class=\"command\"><code>domelight figures{}</code></p></header>\n\
          <nav aria-label=\"Figures\"><h2>Figures</h2><ol>{contents}</ol></nav>\n<main>\n{sections}</main>\n</body>\n</html>\n",
         font_face_css(),
+        math_font_css(),
         map.width,
         map.height,
         env!("CARGO_PKG_VERSION"),
         escape(&studio.arguments),
     )
+}
+
+fn math_font_css() -> String {
+    let source = data_uri("font/otf", MATH_FONT);
+    format!("@font-face{{font-family:'Domelight Math';src:url({source})}}")
 }
 
 fn section(studio: &Studio, figure: &Figure) -> String {
@@ -80,15 +89,18 @@ fn panels(row: &Row) -> String {
     if !row.heading.is_empty() {
         let _ = write!(html, "<h3>{}</h3>", escape(&row.heading));
     }
-    html += "<div class=\"row\">";
+    let widths = || row.panels.iter().map(Document::width);
+    let columns: Vec<String> = widths().map(|w| format!("{w:.0}fr")).collect();
+    // On a phone two small panels stand side by side.
+    let least = widths().fold(0.0, f64::max).min(480.0) * 0.68;
+    let _ = write!(
+        html,
+        "<div class=\"row\" style=\"--columns:{};--width:{:.0}px;--least:{least:.0}px\">",
+        columns.join(" "),
+        1.25 * widths().sum::<f64>()
+    );
     for panel in &row.panels {
-        let _ = write!(
-            html,
-            "<figure style=\"--w:{:.0}px;--grow:{:.0}\">{}</figure>",
-            panel.width(),
-            panel.width(),
-            panel.to_svg()
-        );
+        let _ = write!(html, "<figure>{}</figure>", panel.to_svg());
     }
     html + "</div>"
 }
@@ -138,9 +150,9 @@ nav ol{columns:2 22rem;margin:.4rem 0 0;padding-left:1.5rem}
 section{border-top:1px solid var(--line);margin-top:3rem;padding-top:2rem}
 .slides,.files{color:var(--soft);font-size:.95rem;margin:.1rem 0 .8rem}
 .formula{overflow-x:auto;overflow-y:hidden;padding:.5rem .2rem;font-size:1.15rem}
-math{font-family:'STIX Two Math','Latin Modern Math','Cambria Math','Noto Sans Math',math,serif}
-.row{display:flex;flex-wrap:wrap;gap:.9rem;align-items:flex-start}
-figure{margin:0;flex:0 1 var(--w);min-width:min(100%,calc(var(--w)*.62));background:#fff;border-radius:.5rem;padding:.7rem;box-shadow:0 0 0 1px var(--line)}
+math{font-family:'Domelight Math',math,serif}
+.row{display:grid;grid-template-columns:var(--columns);max-width:var(--width);gap:.9rem;align-items:start}
+figure{margin:0;min-width:0;background:#fff;border-radius:.5rem;padding:.7rem;box-shadow:0 0 0 1px var(--line)}
 figure svg{display:block;width:100%;height:auto}
 .table{overflow-x:auto;margin:1.2rem 0}
 table{border-collapse:collapse;font-size:.97rem}
@@ -149,6 +161,6 @@ th{color:var(--soft);font-weight:400}
 .n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 summary{cursor:pointer;color:var(--link);margin:1rem 0}
 .command code{display:inline-block;max-width:100%;overflow-x:auto;background:var(--card);border-radius:.4rem;padding:.45rem .8rem;font:.95rem/1.4 ui-monospace,Menlo,Consolas,monospace;white-space:nowrap}
-@media(max-width:600px){figure{min-width:100%;padding:.45rem}}
+@media(max-width:800px){.row{grid-template-columns:repeat(auto-fill,minmax(min(100%,var(--least)),1fr));max-width:none}figure{padding:.45rem}}
 @media print{figure{break-inside:avoid}}
 ";

@@ -31,7 +31,8 @@ const TILT: f32 = 35.0;
 pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     let point = shading_point(studio)?;
     let environment = &studio.environment;
-    let view = SphereView { environment, n: studio.choose(SIZE as usize, 64) };
+    let ahead = environment.uv(point.frame.to_world(reflect(point.wo, Vec3::Z)));
+    let view = SphereView { environment, turn: ahead.x - 0.5, n: studio.choose(SIZE as usize, 64) };
     let light = view.picture(|wi| environment.le(wi));
     let product = view.picture(|wi| point.eval(wi) * environment.le(wi));
     let product_peak = peak(&product);
@@ -66,7 +67,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         title: "Importance of light, of reflectance, and of both",
         slides: "slides 17–18",
         caption: format!(
-            "<p>The sphere of directions as a light probe: its centre looks ahead, the rim is behind. A Phong lobe of \
+            "<p>The sphere of directions as a light probe: its centre looks toward where the lobe points, the rim is behind. A Phong lobe of \
              exponent 50 leans {OFF_AXIS:.0}° past the brightest light. Samples of the environment find lights \
              that the surface does not reflect, samples of the BRDF find directions from where little light comes; \
              samples of the product do neither. They are drawn by rejection, which follows the product exactly. \
@@ -119,9 +120,11 @@ fn peak(picture: &RgbImage) -> f32 {
     values[(values.len() - 1) * 1999 / 2000].max(f32::MIN_POSITIVE)
 }
 
-/// The sphere of directions as an angular map of n × n pixels, as the environment stands in the world.
+/// The sphere of directions as an angular map of n × n pixels.
 struct SphereView<'a> {
     environment: &'a Environment,
+    /// Where across the map the centre looks, from the middle on.
+    turn: f32,
     n: usize,
 }
 
@@ -148,12 +151,14 @@ impl SphereView<'_> {
     /// The mapping knows the map's own frame: the map tells where that is in the world.
     fn direction(&self, uv: Vec2) -> Option<Vec3> {
         let in_map = Mapping::Angular.direction(uv)?;
-        Some(self.environment.direction(Mapping::LatLong.uv(in_map)))
+        let uv = Mapping::LatLong.uv(in_map);
+        Some(self.environment.direction(vec2((uv.x + self.turn).rem_euclid(1.0), uv.y)))
     }
 
     fn uv(&self, wi: Vec3) -> Vec2 {
-        let in_map = Mapping::LatLong.direction(self.environment.uv(wi)).unwrap_or(Vec3::Y);
-        Mapping::Angular.uv(in_map)
+        let uv = self.environment.uv(wi);
+        let uv = vec2((uv.x - self.turn).rem_euclid(1.0), uv.y);
+        Mapping::LatLong.direction(uv).map_or(uv, |in_map| Mapping::Angular.uv(in_map))
     }
 
     fn panel(&self, png: &[u8], title: &str, directions: &[Vec3], notes: &[String]) -> Document {

@@ -24,6 +24,7 @@ use domelight::scene::{
 };
 
 use crate::args::figures::FiguresArguments;
+use crate::args::render::BUILTIN_ROWS;
 use crate::interrupt;
 use crate::progress::RenderProgress;
 use crate::render::{load_scene, probe_name};
@@ -117,10 +118,12 @@ impl Studio {
         Ok(())
     }
 
-    /// How the map is shown: its mean a little below middle grey.
+    /// How the map is shown: the mean of its logarithms, which lamps and suns hardly move, a little
+    /// below middle grey.
     pub(crate) fn map_tone(&self) -> ToneMapping {
-        let solid_angle = f64::from(4.0 * domelight::math::PI);
-        exposed((self.environment.power() / solid_angle) as f32, 0.14)
+        let lit = self.map.pixels.iter().map(|p| p.luminance()).filter(|&y| y > 0.0);
+        let (sum, n) = lit.fold((0.0, 0.0f32), |(sum, n), y| (sum + y.ln(), n + 1.0));
+        exposed((sum / n.max(1.0)).exp(), 0.09)
     }
 
     /// The direction of the map's brightest texel.
@@ -167,8 +170,8 @@ impl Studio {
             name: format!("{subject:?} {width}x{height}"),
             // Noise is told from far fewer samples than it takes to be rid of it; bias is large.
             reference_rays: match subject {
-                Subject::Alone(_) => self.choose(4096, 128),
-                Subject::Scene | Subject::Sphere => self.choose(512, 64),
+                Subject::Alone(_) => self.choose(1024, 64),
+                Subject::Scene | Subject::Sphere => self.choose(256, 32),
             },
             camera: Camera::new(&view, width, height)?,
             scene: Scene::new(description).with_context(|| self.scene.clone())?,
@@ -232,11 +235,23 @@ fn common_arguments(arguments: &FiguresArguments) -> String {
             add(flag, value.to_string());
         }
     }
+    if let Some(up) = environment.env_up {
+        add("--env-up", format!("{up:?}").to_lowercase());
+    }
+    if let Some(mapping) = environment.env_mapping {
+        add("--env-mapping", mapping.name().to_owned());
+    }
+    if let Some(layer) = &environment.env_layer {
+        add("--env-layer", layer.clone());
+    }
+    if environment.env_rows != BUILTIN_ROWS {
+        add("--env-rows", environment.env_rows.to_string());
+    }
     if arguments.seed != 0 {
         add("--seed", arguments.seed.to_string());
     }
-    if arguments.quick {
-        text += " --quick";
+    for (flag, given) in [(" --sanitize", environment.sanitize), (" --quick", arguments.quick)] {
+        text += if given { flag } else { "" };
     }
     text
 }
