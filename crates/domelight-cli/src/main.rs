@@ -2,6 +2,7 @@
 //!
 //! Exit codes: 0 done (also when the reader of our output went away), 1 failed, 2 bad usage.
 
+mod acceptance;
 mod args;
 mod diff;
 mod failure;

@@ -58,19 +58,25 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let scale = light.scale * light.exposure.exp2();
     let probe = probe_name(&light.source);
     let environment = Environment::new(map, orientation, scale).with_context(|| probe.clone())?;
-    let settings = arguments.render_settings();
-    let plan = plan.for_scene(|| survey(&scene, &camera, &settings), &environment, settings.seed);
+    let render_settings = arguments.render_settings();
+    let seed = render_settings.seed;
+    let points = || survey(&scene, &camera, &render_settings);
+    let plan = plan.for_scene(points, &environment, seed);
     let prepared = Prepared::new(plan, &environment).with_context(|| probe.clone())?;
     let build = watch.lap();
     if interrupted.load(Ordering::Relaxed) {
         bail!("interrupted before the first sample; nothing was written");
     }
 
-    let job =
-        Job { scene: &scene, camera: &camera, environment: &environment, settings: &settings };
-    let n_pixels = (settings.width * settings.height) as u64;
+    let job = Job {
+        scene: &scene,
+        camera: &camera,
+        environment: &environment,
+        settings: &render_settings,
+    };
+    let n_pixels = (render_settings.width * render_settings.height) as u64;
     let progress =
-        RenderProgress::new(n_pixels * u64::from(settings.n_samples), quiet, interrupted);
+        RenderProgress::new(n_pixels * u64::from(render_settings.n_samples), quiet, interrupted);
     let rendering = job.run(&prepared, &progress)?;
     progress.finish();
     if rendering.counts.camera_rays == 0 {
@@ -90,10 +96,10 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         camera: CameraReport::new(&view),
         strategy: plan.describe(),
         size: [width, height],
-        spp: settings.n_samples,
-        sampler: format!("{:?}", settings.sampler).to_lowercase(),
-        filter: settings.filter.name(),
-        seed: settings.seed,
+        spp: render_settings.n_samples,
+        sampler: format!("{:?}", render_settings.sampler).to_lowercase(),
+        filter: render_settings.filter.name(),
+        seed,
         threads: rayon::current_num_threads(),
     };
     let tone = arguments.output.tone.mapping(ToneCurve::Agx);
@@ -104,7 +110,8 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     };
     outputs.iter().map(write).fold(Ok(()), Result::and)?;
     let stages = Stages { load, build, render, write: watch.lap() };
-    let report = RenderReport::new(settings, &rendering, stages, &outputs);
+    let rejection = plan.acceptance(points, &environment, seed)?;
+    let report = RenderReport::new(settings, &rendering, stages, rejection, &outputs);
     if arguments.output.json {
         report.print_json()?;
     } else if !quiet {

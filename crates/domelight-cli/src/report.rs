@@ -6,6 +6,7 @@ use domelight::render::Rendering;
 use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
 use serde::Serialize;
 
+use crate::acceptance::Acceptance;
 use crate::failure::{tell, warn};
 use crate::output::{self, PicturePath};
 use crate::usage::{Seconds, peak_memory};
@@ -128,6 +129,8 @@ pub(crate) struct RenderReport {
     rays_per_second: f64,
     peak_memory_bytes: Option<u64>,
     non_finite_samples: u64,
+    /// Of the strategy rejection, at the centres of pixels spread over the picture.
+    rejection: Option<Acceptance>,
     complete: bool,
     outputs: Vec<String>,
 }
@@ -137,6 +140,7 @@ impl RenderReport {
         settings: Settings,
         rendering: &Rendering,
         seconds: Stages,
+        rejection: Option<Acceptance>,
         outputs: &[PicturePath],
     ) -> Self {
         let counts = rendering.counts;
@@ -151,6 +155,7 @@ impl RenderReport {
             shadow_rays: counts.shadow_rays,
             peak_memory_bytes: peak_memory(),
             non_finite_samples: counts.non_finite,
+            rejection,
             complete: rendering.complete,
             outputs: outputs.iter().map(ToString::to_string).collect(),
         }

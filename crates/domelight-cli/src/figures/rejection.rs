@@ -3,18 +3,16 @@
 use anyhow::Result;
 use domelight::picture::compare::ColorScale;
 use domelight::picture::tone::{ToneCurve, ToneMapping};
-use domelight::sampling::{Pcg32, SamplerKind, Stream};
-use domelight::strategy::{
-    Proposal, RejectionSampling, RejectionStatistics, SampleNumbers, ShadingPoint, Stop,
-};
+use domelight::sampling::Pcg32;
+use domelight::strategy::{Proposal, RejectionSampling, RejectionStatistics, ShadingPoint, Stop};
 use domelight::{Rgb, RgbImage};
-use rayon::prelude::*;
 
 use super::figure::{
     Figure, Picture, Row, Table, number, picture_panel, plot_panel, png_bytes, scale_panel,
 };
 use super::formulas;
 use super::studio::{Shot, Studio, Subject};
+use crate::acceptance::{Acceptance, count_tries};
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE, Pixels, superscript};
 
@@ -35,6 +33,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     let (width, height) = studio.choose((176, 248), (22, 31));
     let shot = studio.shot(Subject::Alone(MATERIAL), width, height)?;
     let points = points(&shot);
+    let seen: Vec<ShadingPoint> = points.iter().flatten().copied().collect();
     let mut table =
         Table::new(&["proposal", "mean acceptance", "median tries", "gave up [% of points]"]);
     let (mut acceptance, mut tries) = (Vec::new(), Vec::new());
@@ -42,8 +41,8 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         studio.check_interrupted()?;
         let stop = Stop::Accepted { n: ACCEPT, max_tries: MAX_TRIES };
         let rejection = RejectionSampling::new(&studio.environment, proposal, stop)?;
-        let statistics = count_tries(&rejection, &points, studio.seed);
-        let summary = Summary::new(&statistics);
+        let statistics = count_tries(&rejection, &seen, studio.seed);
+        let summary = Acceptance::of(&statistics);
         table.rows.push(vec![
             name.into(),
             summary.acceptance.into(),
@@ -53,6 +52,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         let notes = [format!("mean acceptance {}", number(summary.acceptance))];
         let shown = |s: &RejectionStatistics| 1.0 + s.acceptance().log10() / DECADES;
         acceptance.push(map(
+            &points,
             &statistics,
             ColorScale::Viridis,
             shown,
@@ -61,12 +61,20 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
             &notes,
         )?);
         let notes = [
-            format!("median {} tries", number(summary.median_tries)),
+            format!("median {} tries", summary.median_tries),
             format!("{} % of the points gave up", number(100.0 * summary.gave_up)),
         ];
         let most = (MAX_TRIES as f32 / ACCEPT as f32).log10();
         let shown = |s: &RejectionStatistics| (s.tries as f32 / ACCEPT as f32).log10() / most;
-        tries.push(map(&statistics, ColorScale::Magma, shown, (width, height), name, &notes)?);
+        tries.push(map(
+            &points,
+            &statistics,
+            ColorScale::Magma,
+            shown,
+            (width, height),
+            name,
+            &notes,
+        )?);
     }
     let power = |k: f32| format!("10{}", superscript(k as i32));
     let labels = [power(-DECADES), power(-DECADES / 2.0), "1".to_owned()];
@@ -114,57 +122,24 @@ fn points(shot: &Shot) -> Vec<Option<ShadingPoint>> {
     (0..width * height).map(point).collect()
 }
 
-fn count_tries(
-    rejection: &RejectionSampling,
-    points: &[Option<ShadingPoint>],
-    seed: u64,
-) -> Vec<Option<RejectionStatistics>> {
-    let count = |(i, point): (usize, &Option<ShadingPoint>)| {
-        let stream = Stream::new(SamplerKind::Independent, seed, i as u64);
-        let numbers = SampleNumbers { stream, sample: 0 };
-        let at = point.as_ref()?;
-        Some(rejection.sample_counted(at, numbers, &mut Default::default(), |_, _| {}))
-    };
-    points.par_iter().enumerate().map(count).collect()
-}
-
-/// Numbers over all points.
-struct Summary {
-    acceptance: f64,
-    median_tries: f64,
-    gave_up: f64,
-}
-
-impl Summary {
-    fn new(statistics: &[Option<RejectionStatistics>]) -> Self {
-        let seen: Vec<&RejectionStatistics> = statistics.iter().flatten().collect();
-        let n = seen.len().max(1) as f64;
-        let mut tries: Vec<u32> = seen.iter().map(|s| s.tries).collect();
-        tries.sort_unstable();
-        Self {
-            acceptance: seen.iter().map(|s| f64::from(s.acceptance())).sum::<f64>() / n,
-            median_tries: tries.get(tries.len() / 2).copied().unwrap_or(0).into(),
-            gave_up: seen.iter().filter(|s| s.ran_out).count() as f64 / n,
-        }
-    }
-}
-
 /// Colours are already what is to be seen.
 const AS_IT_IS: ToneMapping = ToneMapping { exposure: 0.0, curve: ToneCurve::Srgb };
 
 fn map(
-    statistics: &[Option<RejectionStatistics>],
+    points: &[Option<ShadingPoint>],
+    statistics: &[RejectionStatistics],
     scale: ColorScale,
     value: impl Fn(&RejectionStatistics) -> f32,
     (width, height): (usize, usize),
     title: &str,
     notes: &[String],
 ) -> Result<Document> {
-    let color = |s: &Option<RejectionStatistics>| match s {
+    let mut next = statistics.iter();
+    let color = |point: &Option<ShadingPoint>| match point.and_then(|_| next.next()) {
         Some(s) => scale.color(value(s).clamp(0.0, 1.0)),
         None => Rgb::splat(0.86),
     };
-    let image = RgbImage::new(width, height, statistics.iter().map(color).collect());
+    let image = RgbImage::new(width, height, points.iter().map(color).collect());
     let picture = Picture {
         png: png_bytes(&image, AS_IT_IS)?,
         width: 352.0 * 0.75,
