@@ -82,7 +82,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         let shot = studio.shot(Subject::Alone(material), width, height)?;
         let em = Shown::new("EM", &shot, Plan::Environment { n: EM })?;
         let seconds = em.measured.taken.seconds;
-        let resampled = equal_time(&shot, seconds, 8, |n| sir(n, None))?;
+        let resampled = equal_time(&shot, seconds, SIR.0, tuned_sir(&shot))?;
         let heading =
             format!("{name}: environment against product, {} CPU s each", number(seconds));
         let resampled = Shown::new("Bidirectional: SIR", &shot, resampled)?;
@@ -138,6 +138,16 @@ fn scaled_candidates(n: u32) -> u32 {
     (u64::from(n) * u64::from(SIR.1) / u64::from(SIR.0)) as u32
 }
 
+/// Resampling by the ratio of candidates to rays that a pilot finds best here.
+fn tuned_sir(shot: &Shot) -> impl Fn(u32) -> Plan + use<> {
+    const PILOT: u32 = 64;
+    let ratio = match shot.complete(sir(PILOT, None)) {
+        Plan::Sir { n_candidates: Some(m), .. } => m / PILOT,
+        _ => 1,
+    };
+    move |n| sir(n, Some(n * ratio.max(1)))
+}
+
 /// What the pictures may cost.
 enum Budget<'a> {
     /// The lecture's counts.
@@ -173,7 +183,7 @@ impl Budget<'_> {
                     Shown::new(
                         "SIR",
                         shot,
-                        equal_time(shot, *seconds, 2 * SIR.0, |n| sir(n, None))?,
+                        equal_time(shot, *seconds, 2 * SIR.0, tuned_sir(shot))?,
                     )?,
                 ])
             }

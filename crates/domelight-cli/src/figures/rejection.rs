@@ -17,7 +17,7 @@ use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE, Pixels, superscript};
 
 /// Directions to accept at each point, and the most tries.
-const ACCEPT: u32 = 15;
+const ACCEPT: u32 = 8;
 const MAX_TRIES: u32 = 4096;
 const MATERIAL: &str = "phong:50:1:0.5";
 /// The proposals and their names.
@@ -168,7 +168,6 @@ fn bound(looseness: f64, seed: u64) -> Document {
     let (accepted, rejected): (Vec<Datum>, Vec<Datum>) =
         tried.iter().partition(|d| d.y < lobe(d.x));
     let name = if looseness > 1.0 { "Loose bound" } else { "Tight bound" };
-    let line = |points: Vec<Datum>| points;
     let curve = (-90..=90).map(|i| 0.5 * f64::from(i)).map(|x| Datum::new(x, lobe(x))).collect();
     let series = |name: &str, color: usize, join, marker, points| Series {
         name: name.to_owned(),
@@ -185,7 +184,7 @@ fn bound(looseness: f64, seed: u64) -> Document {
         series: vec![
             series("rejected", 1, Join::Apart, Some(Marker::Diamond), rejected),
             series("accepted", 2, Join::Apart, Some(Marker::Disc), accepted),
-            series("cos⁵⁰ θ", 0, Join::Curve, None, line(curve)),
+            series("cos⁵⁰ θ", 0, Join::Curve, None, curve),
             series(
                 "bound",
                 6,

@@ -374,7 +374,7 @@ impl Shot<'_> {
             sum += color.luminance().min(1e6);
             n += 1.0;
         }
-        Ok(exposed(sum / n.max(1.0), 0.32))
+        Ok(exposed(sum / n.max(1.0), 0.4))
     }
 }
 
