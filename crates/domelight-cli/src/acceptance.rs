@@ -26,7 +26,7 @@ pub(crate) struct Acceptance {
     /// Points that were looked at.
     pub(crate) points: usize,
     /// Accepted per try, averaged over the points.
-    pub(crate) acceptance: f64,
+    pub(crate) mean: f64,
     /// Tries at the point in the middle.
     pub(crate) median_tries: u32,
     /// Share of the points whose tries ran out before enough were accepted.
@@ -40,7 +40,7 @@ impl Acceptance {
         tries.sort_unstable();
         Self {
             points: statistics.len(),
-            acceptance: statistics.iter().map(|s| f64::from(s.acceptance())).sum::<f64>() / n,
+            mean: statistics.iter().map(|s| f64::from(s.acceptance())).sum::<f64>() / n,
             median_tries: tries.get(tries.len() / 2).copied().unwrap_or(0),
             gave_up: statistics.iter().filter(|s| s.ran_out).count() as f64 / n,
         }

@@ -17,8 +17,11 @@ const MATERIAL: &str = "phong:50:1:0.5";
 const CANDIDATES: u32 = 16;
 const TRIES: u32 = 16;
 
-/// What is compared, by name; a plan for `n` rays or lights.
-const METHODS: [(&str, fn(u32) -> Plan); 7] = [
+/// A plan for a number of rays or lights.
+type PlanFor = fn(u32) -> Plan;
+
+/// What is compared, by name.
+const METHODS: [(&str, PlanFor); 7] = [
     ("EM", |n| Plan::Environment { n }),
     ("BRDF", |n| Plan::Brdf { n }),
     ("MIS", |n| mis(n.div_ceil(2))),

@@ -213,7 +213,7 @@ pub(crate) fn plot_panel(plot: &Plot, width: f64, height: f64) -> Document {
 }
 
 /// A colour scale as a strip, with numbers at its ends and middle.
-pub(crate) fn scale_panel(height: f64, png: &[u8], labels: [String; 3], title: &str) -> Document {
+pub(crate) fn scale_panel(height: f64, png: &[u8], labels: &[String; 3], title: &str) -> Document {
     let mut panel = Document::new(120.0, height);
     let place = Rect::new(6.0, 44.0, 22.0, height - 60.0);
     panel.text((0.0, 19.0), title, TextStyle::new(16.0));
@@ -251,7 +251,7 @@ pub(crate) fn count(n: u64) -> String {
     let digits = n.to_string();
     let mut text = String::new();
     for (i, c) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i) % 3 == 0 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
             text.push('\u{a0}');
         }
         text.push(c);

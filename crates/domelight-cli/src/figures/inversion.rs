@@ -39,7 +39,9 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         let shown = &samples[..n];
         let title = format!("{n} samples");
         with_marks.push(map_panel(studio, &title, &[], |sheet, r| {
-            shown.iter().for_each(|s| mark(sheet, s.place(r)));
+            for s in shown {
+                mark(sheet, s.place(r));
+            }
         })?);
         let radius = if n > 500 { 1.5 } else { 2.4 };
         with_dots.push(map_panel(studio, &title, &[], |sheet, r| {

@@ -1,5 +1,8 @@
 //! The environment as a map, and what is drawn on it.
 
+use std::fmt::Write as _;
+
+use anyhow::Result;
 use domelight::math::Vec3;
 use domelight::picture::tone::srgb_from_linear;
 use domelight::rig::Rig;
@@ -8,7 +11,6 @@ use domelight::{Rgb, RgbImage};
 use super::figure::{Picture, picture_panel, png_bytes};
 use super::studio::Studio;
 use crate::svg::{Color, Document, Pixels, Rect, Style};
-use anyhow::Result;
 
 /// Width of a map on the sheet.
 pub(crate) const MAP_WIDTH: f64 = 480.0;
@@ -86,7 +88,7 @@ pub(crate) fn borders(sheet: &mut Document, r: Rect, rig: &Rig, part: Rect) {
     let (x1, y1) = (x1.min(w), y1.min(h));
     let mut path = String::new();
     let mut line = |a: (f64, f64), b: (f64, f64)| {
-        path += &format!("M{:.1} {:.1}L{:.1} {:.1}", a.0, a.1, b.0, b.1);
+        let _ = write!(path, "M{:.1} {:.1}L{:.1} {:.1}", a.0, a.1, b.0, b.1);
     };
     for y in (y0..y1).step_by(step).skip(1) {
         runs(x0, x1, step, |x| label(x, y) != label(x, y - step), |a, b| line(at(a, y), at(b, y)));

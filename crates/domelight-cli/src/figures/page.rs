@@ -77,9 +77,10 @@ fn section(studio: &Studio, figure: &Figure) -> String {
         format!("; radiance in <a href=\"figure-{n}/\">figure-{n}/</a> (OpenEXR, PNG)")
     };
     let arguments = escape(&studio.arguments);
-    let _ = write!(
+    let _ = writeln!(
         html,
-        "<p class=\"command\"><code>domelight figures --only {n}{arguments}</code></p><p class=\"files\">{files}{more}</p></section>\n"
+        "<p class=\"command\"><code>domelight figures --only {n}{arguments}</code></p>\
+         <p class=\"files\">{files}{more}</p></section>"
     );
     html
 }
@@ -105,22 +106,31 @@ fn panels(row: &Row) -> String {
     html + "</div>"
 }
 
-fn numbers(table: &Table) -> String {
-    let head: String = table.columns.iter().map(|c| format!("<th>{}</th>", escape(c))).collect();
-    let cell = |value: &Value| match value {
-        Value::Number(n) if n.is_u64() => {
-            format!("<td class=\"n\">{}</td>", count(n.as_u64().unwrap_or(0)))
-        }
+fn cell(value: &Value) -> String {
+    match value {
         Value::Number(n) => {
-            format!("<td class=\"n\">{}</td>", number(n.as_f64().unwrap_or(f64::NAN)))
+            let text = n.as_u64().map_or_else(|| number(n.as_f64().unwrap_or(f64::NAN)), count);
+            format!("<td class=\"n\">{text}</td>")
         }
         Value::String(text) => format!("<td>{}</td>", escape(text)),
         _ => "<td>–</td>".to_owned(),
-    };
-    let row =
-        |cells: &Vec<Value>| format!("<tr>{}</tr>", cells.iter().map(cell).collect::<String>());
-    let rows: String = table.rows.iter().map(row).collect();
-    let body = format!("<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>");
+    }
+}
+
+fn numbers(table: &Table) -> String {
+    let mut body = "<table><thead><tr>".to_owned();
+    for column in &table.columns {
+        let _ = write!(body, "<th>{}</th>", escape(column));
+    }
+    body += "</tr></thead><tbody>";
+    for row in &table.rows {
+        body += "<tr>";
+        for value in row {
+            body += &cell(value);
+        }
+        body += "</tr>";
+    }
+    body += "</tbody></table>";
     // A long table would hide the next figure.
     if table.rows.len() > 14 {
         format!(

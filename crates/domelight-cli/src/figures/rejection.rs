@@ -45,11 +45,11 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         let summary = Acceptance::of(&statistics);
         table.rows.push(vec![
             name.into(),
-            summary.acceptance.into(),
+            summary.mean.into(),
             summary.median_tries.into(),
             (100.0 * summary.gave_up).into(),
         ]);
-        let notes = [format!("mean acceptance {}", number(summary.acceptance))];
+        let notes = [format!("mean acceptance {}", number(summary.mean))];
         let shown = |s: &RejectionStatistics| 1.0 + s.acceptance().log10() / DECADES;
         acceptance.push(map(
             &points,
@@ -78,10 +78,10 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     }
     let power = |k: f32| format!("10{}", superscript(k as i32));
     let labels = [power(-DECADES), power(-DECADES / 2.0), "1".to_owned()];
-    acceptance.push(scale_panel(360.0, &strip(ColorScale::Viridis)?, labels, "acceptance"));
+    acceptance.push(scale_panel(360.0, &strip(ColorScale::Viridis)?, &labels, "acceptance"));
     let middle = (f64::from(ACCEPT) * f64::from(MAX_TRIES)).sqrt().round();
     let labels = [ACCEPT.to_string(), middle.to_string(), MAX_TRIES.to_string()];
-    tries.push(scale_panel(360.0, &strip(ColorScale::Magma)?, labels, "tries"));
+    tries.push(scale_panel(360.0, &strip(ColorScale::Magma)?, &labels, "tries"));
     Ok(Figure {
         number: 5,
         title: "Rejection sampling",

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::fmt::Write as _;
 use std::rc::Rc;
 use std::str::FromStr as _;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -144,26 +145,11 @@ impl Studio {
             _ => self.description.clone(),
         };
         let aspect = width as f32 / height as f32;
-        let own = description.camera;
-        let view = match subject {
-            Subject::Alone(material) => {
-                let material: Material =
-                    material.parse().with_context(|| format!("material {material}"))?;
-                description.set_subject_material(material);
-                let scenery = std::mem::take(&mut description.scenery);
-                if scenery.len() < description.parts.len() {
-                    let mut i = 0;
-                    description.parts.retain(|_| {
-                        i += 1;
-                        !scenery.contains(&(i - 1))
-                    });
-                }
-                close_up(&description, own, aspect, self.up)
-            }
-            _ => {
-                let bounds = description.subject_bounds();
-                own.unwrap_or_else(|| CameraSettings::framing(&bounds, aspect, self.up))
-            }
+        let view = if let Subject::Alone(material) = subject {
+            leave_alone(&mut description, material)?;
+            close_up(&description, aspect, self.up)
+        } else {
+            view_of(&description, aspect, self.up)
         };
         Ok(Shot {
             studio: self,
@@ -186,16 +172,29 @@ impl Studio {
     }
 }
 
-/// The view of the scene's own camera, or of one framed to it, moved until the scene just fits.
-fn close_up(
-    description: &SceneDescription,
-    own: Option<CameraSettings>,
-    aspect: f32,
-    up: Vec3,
-) -> CameraSettings {
+/// Removes the scenery, unless there is nothing else, and gives the rest one material.
+fn leave_alone(description: &mut SceneDescription, material: &str) -> Result<()> {
+    let material: Material = material.parse().with_context(|| format!("material {material}"))?;
+    description.set_subject_material(material);
+    let scenery = std::mem::take(&mut description.scenery);
+    if scenery.len() < description.parts.len() {
+        let parts = std::mem::take(&mut description.parts).into_iter().enumerate();
+        description.parts = parts.filter(|(i, _)| !scenery.contains(i)).map(|(_, p)| p).collect();
+    }
+    Ok(())
+}
+
+/// The scene's own camera, or one framed to it.
+fn view_of(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
+    let framed = || CameraSettings::framing(&description.subject_bounds(), aspect, up);
+    description.camera.unwrap_or_else(framed)
+}
+
+/// That view, moved until the scene just fits.
+fn close_up(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
     const FOV: f32 = 26.0;
+    let view = view_of(description, aspect, up);
     let bounds = description.bounds();
-    let view = own.unwrap_or_else(|| CameraSettings::framing(&bounds, aspect, up));
     let (center, size) = (bounds.center(), bounds.size());
     let toward = (view.origin - view.target).normalize_or(Vec3::Z);
     let height = size.abs().dot(up.abs());
@@ -216,7 +215,8 @@ fn common_arguments(arguments: &FiguresArguments) -> String {
     let mut text = String::new();
     let mut add = |flag: &str, value: String| {
         let quoted = value.chars().any(|c| !(c.is_alphanumeric() || "-_./:".contains(c)));
-        text += &if quoted { format!(" {flag} '{value}'") } else { format!(" {flag} {value}") };
+        let quote = if quoted { "'" } else { "" };
+        let _ = write!(text, " {flag} {quote}{value}{quote}");
     };
     let environment = &arguments.environment;
     if arguments.scene != BuiltinScene::Statue.name() {

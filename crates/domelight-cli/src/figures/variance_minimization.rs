@@ -3,7 +3,7 @@
 use anyhow::Result;
 use domelight::RgbImage;
 use domelight::rig::{
-    LightPosition, MedianCut, Rig, ShadingReference, VarianceMinimization, median_cut,
+    LightPosition, MedianCut, Rig, RigError, ShadingReference, VarianceMinimization, median_cut,
     variance_minimization,
 };
 
@@ -83,6 +83,9 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     })
 }
 
+/// A rig of some lights.
+type Method<'a> = Box<dyn Fn(usize) -> Result<Rig, RigError> + 'a>;
+
 /// RMS shading errors of every method.
 fn errors(studio: &Studio) -> Result<Table> {
     let environment = &studio.environment;
@@ -99,7 +102,6 @@ fn errors(studio: &Studio) -> Result<Table> {
     let centre = MedianCut { position: LightPosition::GeometricCentre, ..MedianCut::default() };
     let flat = MedianCut { scale_width: false, ..MedianCut::default() };
     let sphere = VarianceMinimization { lloyd_steps: 0, ..VarianceMinimization::default() };
-    type Method<'a> = Box<dyn Fn(usize) -> Result<Rig, domelight::rig::RigError> + 'a>;
     let methods: [(&str, Method); 6] = [
         ("median cut, geometric centre", Box::new(move |n| median_cut(environment, n, centre))),
         ("median cut", Box::new(|n| median_cut(environment, n, MedianCut::default()))),
