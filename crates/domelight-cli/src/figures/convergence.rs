@@ -14,8 +14,8 @@ use crate::svg::{Document, PALETTE};
 
 const MATERIAL: &str = "phong:50:1:0.5";
 /// Candidates of each ray that is resampled, and tries of each that rejection should accept.
-const CANDIDATES: u32 = 16;
-const TRIES: u32 = 16;
+const CANDIDATES: u32 = 4;
+const TRIES: u32 = 8;
 
 /// A plan for a number of rays or lights.
 type PlanFor = fn(u32) -> Plan;
@@ -25,7 +25,7 @@ const METHODS: [(&str, PlanFor); 7] = [
     ("EM", |n| Plan::Environment { n }),
     ("BRDF", |n| Plan::Brdf { n }),
     ("MIS", |n| mis(n.div_ceil(2))),
-    ("SIR, M = 16 N", |n| sir(n, Some(CANDIDATES * n))),
+    ("SIR, M = 4 N", |n| sir(n, Some(CANDIDATES * n))),
     ("rejection", |n| Plan::Rejection {
         proposal: Proposal::Tighter,
         stop: Stop::Tries(TRIES * n),
@@ -85,7 +85,7 @@ impl Curve {
 
 pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     let counts: &[u32] = studio.choose(&[1, 4, 16, 64, 256], &[1, 4, 16]);
-    let n_seeds = studio.choose(4, 2);
+    let n_seeds = studio.choose(3, 2);
     let mut table = Table::new(&[
         "numbers",
         "method",

@@ -68,16 +68,16 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     let mut plots = Vec::new();
     for (name, material) in MATERIALS {
         let shot = studio.shot(Subject::Alone(material), width, height)?;
-        let lecture = Budget::Lecture.pictures(&shot)?;
-        let seconds = lecture.iter().map(|p| p.measured.taken.seconds).fold(0.0, f64::max);
-        let equal = Budget::Equal { seconds, lecture: &lecture }.pictures(&shot)?;
+        let lecture = at_lectures_counts(&shot)?;
+        let seconds = lecture[0].measured.taken.seconds;
+        let equal = in_equal_time(&shot, seconds)?;
         plots.push(plot(name, &lecture, &equal));
-        let heading = format!("{name}: the lecture's counts");
+        let heading = format!("{name}: the lecture's counts, and MIS in the time of SIR");
         add(&mut figure, &shot, name, "lecture", &heading, lecture)?;
         let heading = format!("{name}: equal time, {} CPU s each", number(seconds));
         add(&mut figure, &shot, name, "equal time", &heading, equal)?;
     }
-    figure.rows.push(Row::new("Error over time, from the lecture's counts to equal time", plots));
+    figure.rows.push(Row::new("Error over time, at the lecture's counts and at equal time", plots));
     for (name, material) in MORE {
         let shot = studio.shot(Subject::Alone(material), width, height)?;
         let em = Shown::new("EM", &shot, Plan::Environment { n: EM })?;
@@ -93,13 +93,15 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
 
 const CAPTION: &str = "<p>One camera ray a pixel, the same in all pictures; what differs is the estimate of the \
     light alone. First at the lecture's counts: 100 samples of the environment (EM), 75 of the BRDF, 37 of each by \
-    multiple importance sampling, and 15 shadow rays resampled from 800 candidates (SIR), which took the same time in \
-    2005. They no longer do: a shadow ray is now cheaper than a candidate. So the second row gives all \
-    of them the time of the slowest, their counts calibrated by measurement, and adds SIR with the ratio of \
-    candidates to rays that suits these costs. Under each picture stand its error against the converged \
-    one (relMSE: mean of (I − R)² / (R² + 0.01) over the pixels that show the scene), its shadow rays and its \
-    CPU seconds.</p><p>The weights of multiple importance sampling add up to 1 for each direction, and each \
-    kind of sample is divided by its own count: divided by M + N, as it is sometimes written, the same weights \
+    multiple importance sampling (power heuristic, compensated), and 15 shadow rays resampled from 800 candidates \
+    (SIR), which took the same time in 2005. They no longer do: a shadow ray is now cheaper than a candidate. So MIS \
+    stands there once more, with as many samples as it gets in the time of SIR; and the second row gives \
+    all the time of the environment’s 100 samples, their counts calibrated by measurement: SIR with the \
+    lecture’s ratio of candidates to rays, and with the ratio that suits what they cost here. Under each picture \
+    stand its error against the converged one (relMSE: mean of (I − R)² / (R² + 0.01) over the pixels that show the \
+    scene), its shadow rays and its CPU seconds.</p><p>The weights of multiple importance sampling add up to 1 for \
+    each direction, and each kind of sample is divided by its own count: divided by M + N, as it is sometimes \
+    written, the same weights \
     give half the answer.</p>";
 
 /// A picture with its name.
@@ -148,47 +150,29 @@ fn tuned_sir(shot: &Shot) -> impl Fn(u32) -> Plan + use<> {
     move |n| sir(n, Some(n * ratio.max(1)))
 }
 
-/// What the pictures may cost.
-enum Budget<'a> {
-    /// The lecture's counts.
-    Lecture,
-    /// The same CPU time for each.
-    Equal { seconds: f64, lecture: &'a [Shown] },
+/// The lecture's four, and how far both factors come in the time of the last.
+fn at_lectures_counts(shot: &Shot) -> Result<Vec<Shown>> {
+    let mut shown = vec![
+        Shown::new("EM", shot, Plan::Environment { n: EM })?,
+        Shown::new("BRDF", shot, Plan::Brdf { n: BRDF })?,
+        Shown::new("MIS", shot, mis(MIS))?,
+        Shown::new("SIR", shot, sir(SIR.0, Some(SIR.1)))?,
+    ];
+    let seconds = shown[3].measured.taken.seconds;
+    shown.push(Shown::new("MIS", shot, equal_time(shot, seconds, MIS, mis)?)?);
+    Ok(shown)
 }
 
-impl Budget<'_> {
-    fn pictures(&self, shot: &Shot) -> Result<Vec<Shown>> {
-        let em = |n| Plan::Environment { n };
-        let brdf = |n| Plan::Brdf { n };
-        match self {
-            Self::Lecture => Ok(vec![
-                Shown::new("EM", shot, em(EM))?,
-                Shown::new("BRDF", shot, brdf(BRDF))?,
-                Shown::new("MIS", shot, mis(MIS))?,
-                Shown::new("SIR", shot, sir(SIR.0, Some(SIR.1)))?,
-            ]),
-            Self::Equal { seconds, lecture } => {
-                // A quarter of the time tells what a sample costs.
-                let scaled = |i: usize, n: u32, plan: &dyn Fn(u32) -> Plan| {
-                    let ratio = 0.25 * seconds / lecture[i].measured.taken.seconds.max(1e-6);
-                    let n = (f64::from(n) * ratio).clamp(2.0, 5_000.0) as u32;
-                    equal_time(shot, *seconds, n, plan)
-                };
-                let full = |n: u32| sir(n, Some(scaled_candidates(n).max(n)));
-                Ok(vec![
-                    Shown::new("EM", shot, scaled(0, EM, &em)?)?,
-                    Shown::new("BRDF", shot, scaled(1, BRDF, &brdf)?)?,
-                    Shown::new("MIS", shot, scaled(2, MIS, &mis)?)?,
-                    Shown::new("SIR", shot, scaled(3, SIR.0, &full)?)?,
-                    Shown::new(
-                        "SIR",
-                        shot,
-                        equal_time(shot, *seconds, 2 * SIR.0, tuned_sir(shot))?,
-                    )?,
-                ])
-            }
-        }
-    }
+/// The four again with `seconds` for each, and resampling with the ratio that suits.
+fn in_equal_time(shot: &Shot, seconds: f64) -> Result<Vec<Shown>> {
+    let lectures_ratio = |n: u32| sir(n, Some(scaled_candidates(n)));
+    Ok(vec![
+        Shown::new("EM", shot, equal_time(shot, seconds, EM, |n| Plan::Environment { n })?)?,
+        Shown::new("BRDF", shot, equal_time(shot, seconds, BRDF, |n| Plan::Brdf { n })?)?,
+        Shown::new("MIS", shot, equal_time(shot, seconds, MIS, mis)?)?,
+        Shown::new("SIR", shot, equal_time(shot, seconds, 2, lectures_ratio)?)?,
+        Shown::new("SIR", shot, equal_time(shot, seconds, SIR.0, tuned_sir(shot))?)?,
+    ])
 }
 
 /// The plan with the count that takes `seconds`, by measurement from `start` on.
@@ -268,7 +252,7 @@ pub(super) fn file_name(text: &str) -> String {
     plain.split_whitespace().collect::<Vec<_>>().join("-")
 }
 
-/// Error over CPU seconds, from the lecture's counts to equal time.
+/// Error over CPU seconds, at the lecture's counts and at equal time.
 fn plot(name: &str, lecture: &[Shown], equal: &[Shown]) -> Document {
     const KINDS: [&str; 5] =
         ["EM", "BRDF", "MIS", "SIR, the lecture's ratio", "SIR, measured ratio"];

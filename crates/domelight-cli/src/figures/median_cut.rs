@@ -99,14 +99,14 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
 
 /// The scene as it is, in a picture that both figures of fixed lights share.
 pub(super) fn scene_shot(studio: &Studio) -> Result<Shot<'_>> {
-    let size = studio.choose(330, 24);
-    Ok(studio.shot(Subject::Scene, size, size)?.samples(studio.choose(4, 1)))
+    let size = studio.choose(264, 24);
+    Ok(studio.shot(Subject::Scene, size, size)?.samples(studio.choose(2, 1)))
 }
 
 /// A matt sphere.
 pub(super) fn sphere_shot(studio: &Studio) -> Result<Shot<'_>> {
-    let size = studio.choose(330, 24);
-    Ok(studio.shot(Subject::Sphere, size, size)?.samples(studio.choose(4, 1)))
+    let size = studio.choose(264, 24);
+    Ok(studio.shot(Subject::Sphere, size, size)?.samples(studio.choose(2, 1)))
 }
 
 /// The map, the borders of regions in white and their lights in blue.
