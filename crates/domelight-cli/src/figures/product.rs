@@ -166,11 +166,13 @@ impl SphereView<'_> {
         let png = png.to_vec();
         let picture = Picture { png, width: SIZE, height: SIZE, pixels, title, notes };
         picture_panel(&picture, |sheet, r| {
+            let center = (r.x + 0.5 * r.width, r.y + 0.5 * r.height);
+            sheet.circle(center, 0.5 * r.width - 0.5, Style::stroke(Color::GREY, 1.0));
             for &wi in directions {
                 let uv = self.uv(wi);
                 let at = (r.x + f64::from(uv.x) * r.width, r.y + f64::from(uv.y) * r.height);
                 let style = Style::fill(Color(0x2e, 0xd1, 0xff)).outlined(Color::INK, 0.8);
-                sheet.circle(at, 4.0, style);
+                sheet.circle(at, 3.2, style);
             }
         })
     }
