@@ -3,12 +3,14 @@
 //! Exit codes: 0 done (also when the reader of our output went away), 1 failed, 2 bad usage or input, 75
 //! interrupted and saved; `merge` has three of its own.
 
+mod acceptance;
 mod args;
 mod compare;
 mod course;
 mod diff;
 mod failure;
 mod farm;
+mod figures;
 mod interrupt;
 mod lights;
 mod merge;
@@ -20,7 +22,6 @@ mod render;
 mod report;
 mod scene;
 mod strategy;
-#[allow(dead_code)] // Commands that draw are to come.
 mod svg;
 mod usage;
 mod values;
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Lights(arguments) => lights::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
+        Command::Figures(arguments) => figures::run(&arguments, quiet),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

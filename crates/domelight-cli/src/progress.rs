@@ -39,7 +39,9 @@ impl RenderProgress {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("━━╌"));
         }
-        bar.enable_steady_tick(Duration::from_millis(200));
+        if !bar.is_hidden() {
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
         let label = if label.is_empty() { String::new() } else { format!("{label}  ") };
         let (rays, told) = (AtomicU64::new(0), AtomicU64::new(0));
         Self { bar, label, openjd: false, interrupted, rays, told, started: Instant::now() }

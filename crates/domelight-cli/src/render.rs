@@ -47,7 +47,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         target_error: arguments.course.target_error,
         ..arguments.scene.render_settings(&arguments.pixel, arguments.spp)
     };
-    let plan = plan.for_scene(|| survey(scene, camera, settings), environment, settings.seed);
+    let points = || survey(scene, camera, settings);
+    let plan = plan.for_scene(points, environment, settings.seed);
     let renderer = plan.prepare(environment).with_context(|| probe.clone())?;
     let described = Settings {
         scene: report.clone(),
@@ -96,7 +97,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         outputs.iter().map(write).fold(Ok(()), Result::and)?;
     }
     let stages = Stages { load, build, render, write: watch.lap() };
-    let report = RenderReport::new(described, &rendering, stages, &outputs, stopped);
+    let rejection = plan.acceptance(points, environment, settings.seed)?;
+    let report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
     if arguments.output.json {
         report.print_json()?;
     } else if !quiet {

@@ -7,6 +7,7 @@ use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
 use serde::Serialize;
 use std::path::Path;
 
+use crate::acceptance::Acceptance;
 use crate::failure::{InterruptedAndSaved, tell, warn};
 use crate::output::{self, PicturePath};
 use crate::usage::{Seconds, peak_memory};
@@ -147,6 +148,8 @@ pub(crate) struct RenderReport {
     rays_per_second: f64,
     peak_memory_bytes: Option<u64>,
     non_finite_samples: u64,
+    /// Of the strategy rejection, at the centres of pixels spread over the picture.
+    rejection: Option<Acceptance>,
     complete: bool,
     stopped: Option<Stop>,
     outputs: Vec<String>,
@@ -157,6 +160,7 @@ impl RenderReport {
         settings: Settings,
         rendering: &Rendering,
         seconds: Stages,
+        rejection: Option<Acceptance>,
         outputs: &[PicturePath],
         stopped: Option<Stop>,
     ) -> Self {
@@ -172,6 +176,7 @@ impl RenderReport {
             shadow_rays: counts.shadow_rays,
             peak_memory_bytes: peak_memory(),
             non_finite_samples: counts.non_finite,
+            rejection,
             complete: rendering.complete,
             stopped,
             outputs: outputs.iter().map(ToString::to_string).collect(),

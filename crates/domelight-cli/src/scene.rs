@@ -116,7 +116,7 @@ impl PixelArguments {
 }
 
 /// A built-in scene by its name, else a file.
-fn load_scene(name: &str, quiet: bool) -> Result<SceneDescription> {
+pub(crate) fn load_scene(name: &str, quiet: bool) -> Result<SceneDescription> {
     if let Ok(builtin) = BuiltinScene::from_str(name) {
         return Ok(builtin.description());
     }
@@ -128,7 +128,7 @@ fn load_scene(name: &str, quiet: bool) -> Result<SceneDescription> {
 }
 
 /// What a user would call the probe.
-fn probe_name(source: &EnvironmentSource) -> String {
+pub(crate) fn probe_name(source: &EnvironmentSource) -> String {
     match source {
         EnvironmentSource::File(path) => path.display().to_string(),
         EnvironmentSource::Builtin(name) => name.clone(),

@@ -12,6 +12,7 @@ use domelight::strategy::{
     SamplingImportanceResampling, ShadingPoint, Stop, Strategy, optimal_candidates,
 };
 
+use crate::acceptance::{Acceptance, count_tries};
 use crate::args::sampling::{
     HeuristicName, ProposalName, ResamplingName, SourceName, StrategyArguments, StrategyName,
 };
@@ -153,6 +154,21 @@ impl Plan {
             }
             plan => plan,
         }
+    }
+
+    /// What rejection would accept at those points; none of other strategies.
+    ///
+    /// # Errors
+    /// If the plan has a stopping rule without an estimate.
+    pub(crate) fn acceptance(
+        self,
+        points: impl FnOnce() -> Vec<ShadingPoint>,
+        environment: &Environment,
+        seed: u64,
+    ) -> Result<Option<Acceptance>> {
+        let Self::Rejection { proposal, stop } = self else { return Ok(None) };
+        let rejection = RejectionSampling::new(environment, proposal, stop)?;
+        Ok(Some(Acceptance::of(&count_tries(&rejection, &points(), seed))))
     }
 
     /// The points of a pixel are numbered by 32 bits; beyond that they would repeat.

@@ -3,6 +3,7 @@
 pub(crate) mod compare;
 pub(crate) mod course;
 pub(crate) mod farm;
+pub(crate) mod figures;
 pub(crate) mod lights;
 pub(crate) mod render;
 pub(crate) mod sampling;
@@ -59,6 +60,9 @@ pub(crate) enum Command {
     /// Measure, look at and convert a light probe.
     #[command(after_help = PROBE_EXAMPLES)]
     Probe(ProbeArguments),
+    /// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
+    #[command(after_help = figures::EXAMPLES)]
+    Figures(Box<figures::FiguresArguments>),
 }
 
 const DIFF_EXAMPLES: &str = "\

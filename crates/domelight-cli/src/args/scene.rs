@@ -7,6 +7,9 @@ use domelight::environment::mapping::Mapping;
 use super::{finite, mapping};
 use crate::values::{NamedMaterial, Size, Triple, not_negative};
 
+/// Rows of a built-in probe unless told otherwise.
+pub(crate) const BUILTIN_ROWS: u32 = 1024;
+
 /// A scene under its light, seen by a camera: for every command that renders.
 #[derive(Args, Debug)]
 pub(crate) struct SceneArguments {
@@ -49,7 +52,7 @@ pub(crate) struct EnvironmentArguments {
     #[arg(long, value_name = "NAME")]
     pub(crate) env_layer: Option<String>,
     /// Rows of a built-in probe
-    #[arg(long, value_name = "ROWS", default_value_t = 1024,
+    #[arg(long, value_name = "ROWS", default_value_t = BUILTIN_ROWS,
           value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(crate) env_rows: u32,
     /// Repair negative, NaN and infinite texels instead of refusing them

@@ -7,8 +7,8 @@ pub(crate) mod plot;
 mod raster;
 mod ticks;
 
-#[allow(unused_imports)] // Commands that draw are to come.
 pub(crate) use raster::{font_face_css, rasterise};
+pub(crate) use ticks::superscript;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;

@@ -61,7 +61,7 @@ impl Axis {
 
     fn ticks(&self, length: f64) -> Vec<Tick> {
         match self.scale {
-            Scale::Linear => ticks::linear(self.min, self.max, (length / 75.0) as usize + 1),
+            Scale::Linear => ticks::linear(self.min, self.max, (length / 60.0) as usize + 1),
             Scale::Log => ticks::logarithmic(self.min, self.max),
         }
     }

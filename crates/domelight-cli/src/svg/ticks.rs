@@ -61,18 +61,20 @@ fn power(digit: i32, k: i32, plain: bool) -> String {
         let digits = (-k).max(0) as usize;
         return format!("{:.digits$}", f64::from(digit) * 10f64.powi(k));
     }
-    let exponent = k.to_string().chars().map(superscript).collect::<String>();
+    let exponent = superscript(k);
     if digit == 1 { format!("10{exponent}") } else { format!("{digit}·10{exponent}") }
 }
 
-fn superscript(c: char) -> char {
-    match c {
+/// A whole number in raised digits.
+pub(crate) fn superscript(k: i32) -> String {
+    let raised = |c: char| match c {
         '-' => '⁻',
         '1' => '¹',
         '2' => '²',
         '3' => '³',
         c => c.to_digit(10).and_then(|d| char::from_u32(0x2070 + d)).unwrap_or(c),
-    }
+    };
+    k.to_string().chars().map(raised).collect()
 }
 
 /// With a true minus sign.
