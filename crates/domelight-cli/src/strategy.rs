@@ -8,7 +8,7 @@ use domelight::sampling::Heuristic;
 use domelight::scene::{Camera, Scene};
 use domelight::strategy::{
     BrdfSampling, Candidates, EnvironmentSampling, LightSet, LightTable,
-    MultipleImportanceSampling, Proposal, RAY_COST, RejectionSampling, Resampling,
+    MultipleImportanceSampling, ProductSampling, Proposal, RAY_COST, RejectionSampling, Resampling,
     SamplingImportanceResampling, ShadingPoint, Stop, Strategy, optimal_candidates,
 };
 
@@ -25,6 +25,7 @@ pub(crate) enum Plan {
     Brdf { n: u32 },
     Environment { n: u32 },
     Mis { split: Split, heuristic: Heuristic, compensation: bool },
+    Product { n: u32 },
     Rejection { proposal: Proposal, stop: Stop },
     Sir { n_candidates: Option<u32>, n: u32, candidates: Candidates, resampling: Resampling },
     MedianCut { n_lights: usize },
@@ -56,6 +57,7 @@ impl SamplingArguments {
             S::Brdf => Plan::Brdf { n },
             S::Environment => Plan::Environment { n },
             S::Mis => self.mis()?,
+            S::Product => Plan::Product { n: self.rays.unwrap_or(8) },
             S::Rejection => self.rejection()?,
             S::Sir => self.sir(n)?,
             S::MedianCut => Plan::MedianCut { n_lights },
@@ -182,6 +184,7 @@ impl Plan {
                 if heuristic == Heuristic::Power { "power" } else { "balance" },
                 if compensation { ", compensated" } else { "" }
             ),
+            Self::Product { n } => format!("product, up to {n} a camera sample"),
             Self::Rejection { proposal, stop } => {
                 let stop = match stop {
                     Stop::Tries(m) => format!("{m} tries"),
@@ -206,17 +209,18 @@ impl Plan {
 }
 
 /// A plan with what it needs of the environment.
-pub(crate) enum Prepared {
+pub(crate) enum Prepared<'a> {
     Brdf { n: u32 },
     Environment { n: u32 },
     Mis { split: Split, heuristic: Heuristic, table: Option<CompensatedTable> },
+    Product(Box<ProductSampling<'a>>),
     Rejection { proposal: Proposal, stop: Stop },
     Sir { n_candidates: u32, n: u32, candidates: Candidates, resampling: Resampling },
     Lights(Rig),
 }
 
-impl Prepared {
-    pub(crate) fn new(plan: Plan, environment: &Environment) -> Result<Self> {
+impl<'a> Prepared<'a> {
+    pub(crate) fn new(plan: Plan, environment: &'a Environment) -> Result<Self> {
         Ok(match plan {
             Plan::Brdf { n } => Self::Brdf { n },
             Plan::Environment { n } => Self::Environment { n },
@@ -224,6 +228,7 @@ impl Prepared {
                 let table = compensation.then(|| CompensatedTable::new(environment));
                 Self::Mis { split, heuristic, table }
             }
+            Plan::Product { n } => Self::Product(Box::new(ProductSampling::new(environment, n))),
             Plan::Rejection { proposal, stop } => Self::Rejection { proposal, stop },
             Plan::Sir { n_candidates, n, candidates, resampling } => {
                 Self::Sir { n_candidates: n_candidates.unwrap_or(n), n, candidates, resampling }
@@ -264,6 +269,7 @@ impl Job<'_> {
                 let mis = MultipleImportanceSampling::new(environment, table, *heuristic, m, n)?;
                 self.with(&mis, progress)
             }
+            Prepared::Product(product) => self.with(&**product, progress),
             &Prepared::Rejection { proposal, stop } => {
                 self.with(&RejectionSampling::new(environment, proposal, stop)?, progress)
             }

@@ -84,7 +84,8 @@ pub(crate) struct SamplingArguments {
     #[arg(long, value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub(crate) spp: u32,
-    /// Shadow rays of each camera sample; with rejection, samples to accept [default: 1, with mis 2]
+    /// Shadow rays of each camera sample; with rejection, samples to accept [default: 1,
+    /// with mis 2, with product 8]
     #[arg(long, value_name = "N", conflicts_with = "split",
           value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub(crate) rays: Option<u32>,
@@ -195,6 +196,9 @@ pub(crate) enum StrategyName {
     Environment,
     /// Both, by multiple importance sampling
     Mis,
+    /// The product of both, by a table a pixel, with the visibility that is learned on the way; traces
+    /// up to --rays where they matter
+    Product,
     /// The product of both, by rejection from one with a bound on the other
     Rejection,
     /// The product of both, by resampling --candidates to --rays

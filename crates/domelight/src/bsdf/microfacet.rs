@@ -74,6 +74,10 @@ impl<D: NormalDistribution> Microfacet<D> {
         Self { normals, fresnel, masking }
     }
 
+    pub(super) fn alpha(&self) -> [f32; 2] {
+        self.normals.alpha()
+    }
+
     /// D G₂/(4 cos θ_o), the lobe without Fresnel's factor, and the density.
     #[inline]
     pub(super) fn geometry_pdf(&self, wo: Vec3, wi: Vec3, h: Vec3) -> (f32, f32) {

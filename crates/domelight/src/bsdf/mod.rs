@@ -30,6 +30,7 @@ mod lambert;
 mod material;
 mod metallic_roughness;
 mod microfacet;
+mod outline;
 mod parse;
 mod phong;
 #[cfg(test)]
@@ -43,6 +44,7 @@ pub use lambert::Lambert;
 pub use material::{Lobe, MAX_LOBES, Material, TooManyLobes};
 pub use metallic_roughness::MetallicRoughness;
 pub use microfacet::{MIN_ALPHA, Masking, Microfacet, NormalDistribution};
+pub use outline::{Gloss, Outline};
 pub use parse::{MaterialSpec, ParseMaterialError};
 pub use phong::Phong;
 pub use ward::{Ward, WardForm};

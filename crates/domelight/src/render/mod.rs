@@ -21,11 +21,11 @@ pub use tile::Counts;
 pub use visibility::Visibility;
 
 use crate::environment::Environment;
-use crate::sampling::SamplerKind;
+use crate::sampling::{SamplerKind, Stream};
 use crate::scene::{Camera, Scene};
 use crate::strategy::{ShadingPoint, Strategy};
 use film::PixelSums;
-use tile::{Scratch, Tile};
+use tile::{Pass, Scratch, Tile};
 
 /// What camera rays see that leave the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -143,19 +143,21 @@ pub fn render<S: Strategy>(
     let mut tiles: Vec<(Tile, S::Learned)> =
         tiles(settings, size).map(|tile| (tile, S::Learned::default())).collect();
     let mut complete = true;
-    for samples in passes(settings, size, n_rays) {
+    for samples in passes(settings, size, n_rays, strategy.samples_per_pass()) {
         if observer.cancelled() {
             complete = false;
             break;
         }
         observer.pass_started(samples.clone());
+        let stream = Stream::of_pass(settings.sampler, settings.seed, samples.start);
+        let pass = Pass { samples, shared: strategy.begin_pass(stream) };
         complete &= tiles
             .par_iter_mut()
-            .map_init(Scratch::default, |scratch, (tile, learned)| {
+            .map_init(Scratch::<S>::default, |scratch, (tile, learned)| {
                 if observer.cancelled() {
                     return false;
                 }
-                let counts = tile.render(&frame, strategy, learned, samples.clone(), scratch);
+                let counts = tile.render(&frame, strategy, &pass, learned, scratch);
                 observer.tile_finished(&counts);
                 true
             })
@@ -196,18 +198,20 @@ fn tile_size(settings: &RenderSettings, n_rays: u32) -> usize {
     settings.tile_size.min(most)
 }
 
-/// Camera samples of each pass: 1, 1, 2, 4, … up to as many as keep a tile's rays in the caches.
+/// Camera samples of each pass: as many as the strategy says, or 1, 1, 2, 4, … up to as many as keep
+/// a tile's rays in the caches.
 fn passes(
     settings: &RenderSettings,
     tile_size: usize,
     n_rays: u32,
+    samples_per_pass: Option<u32>,
 ) -> impl Iterator<Item = std::ops::Range<u32>> + use<> {
     let pixels = tile_size * tile_size;
     let most = (RAYS_PER_TILE / (pixels * n_rays.max(1) as usize)).clamp(1, 64) as u32;
     let n_samples = settings.n_samples;
     let mut start = 0;
     std::iter::from_fn(move || {
-        let count = start.clamp(1, most).min(n_samples - start);
+        let count = samples_per_pass.unwrap_or(start.clamp(1, most)).min(n_samples - start);
         let pass = start..start + count;
         start += count;
         (count > 0).then_some(pass)
@@ -239,10 +243,12 @@ mod tests {
     #[test]
     fn passes_cover_every_sample_once() {
         for n_samples in [1, 2, 3, 7, 64, 1000] {
-            for n_rays in [0, 1, 2, 15, 1000] {
+            for (n_rays, each) in
+                [(0, None), (1, None), (2, Some(16)), (15, None), (1000, None), (1000, Some(3))]
+            {
                 let settings = RenderSettings { n_samples, ..Default::default() };
                 let mut next = 0;
-                for pass in passes(&settings, 16, n_rays) {
+                for pass in passes(&settings, 16, n_rays, each) {
                     assert_eq!(pass.start, next);
                     assert!(pass.end > pass.start);
                     next = pass.end;

@@ -41,9 +41,36 @@ impl std::ops::AddAssign for Counts {
     }
 }
 
-/// Memory that a thread keeps from tile to tile.
+/// Memory that a thread keeps from tile to tile, and the strategy's.
+pub(super) struct Scratch<S: Strategy> {
+    batch: Batch,
+    of_strategy: S::Scratch,
+}
+
+impl<S: Strategy> Default for Scratch<S> {
+    fn default() -> Self {
+        Self { batch: Batch::default(), of_strategy: S::Scratch::default() }
+    }
+}
+
+/// A pass over the picture.
+pub(super) struct Pass<S: Strategy> {
+    /// Its camera samples of each pixel.
+    pub(super) samples: std::ops::Range<u32>,
+    pub(super) shared: S::Pass,
+}
+
+/// A strategy and all that it is given at a tile.
+struct Lesson<'a, S: Strategy> {
+    strategy: &'a S,
+    pass: &'a S::Pass,
+    learned: &'a mut S::Learned,
+    scratch: &'a mut S::Scratch,
+}
+
+/// One pass over a tile.
 #[derive(Default)]
-pub(super) struct Scratch {
+struct Batch {
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
     points: Vec<ShadingPoint>,
@@ -62,19 +89,21 @@ impl Tile {
         &mut self,
         frame: &Frame,
         strategy: &S,
+        pass: &Pass<S>,
         learned: &mut S::Learned,
-        samples: std::ops::Range<u32>,
-        scratch: &mut Scratch,
+        scratch: &mut Scratch<S>,
     ) -> Counts {
-        self.trace_camera_rays(frame, &samples, scratch);
-        scratch.gather_points(frame, samples.len());
+        let Scratch { batch, of_strategy } = scratch;
+        self.trace_camera_rays(frame, &pass.samples, batch);
+        batch.gather_points(frame, pass.samples.len());
         let mut counts = Counts {
-            camera_rays: scratch.rays.len() as u64,
-            shading_points: scratch.points.len() as u64,
+            camera_rays: batch.rays.len() as u64,
+            shading_points: batch.points.len() as u64,
             ..Counts::default()
         };
-        counts.shadow_rays = scratch.trace_strategy(frame, strategy, learned, self.width);
-        counts.non_finite = self.add_samples(frame, scratch);
+        let lesson = Lesson { strategy, pass: &pass.shared, learned, scratch: of_strategy };
+        counts.shadow_rays = batch.trace_strategy(frame, lesson, self.width);
+        counts.non_finite = self.add_samples(frame, batch);
         self.counts += counts;
         counts
     }
@@ -83,7 +112,7 @@ impl Tile {
         &self,
         frame: &Frame,
         samples: &std::ops::Range<u32>,
-        scratch: &mut Scratch,
+        scratch: &mut Batch,
     ) {
         scratch.rays.clear();
         scratch.pixels.clear();
@@ -105,7 +134,7 @@ impl Tile {
     }
 
     /// Adds each camera sample to its pixel, in order.
-    fn add_samples(&mut self, frame: &Frame, scratch: &Scratch) -> u64 {
+    fn add_samples(&mut self, frame: &Frame, scratch: &Batch) -> u64 {
         let mut non_finite = 0;
         let mut point = 0;
         let mut ray = 0;
@@ -136,7 +165,7 @@ fn background_sample(frame: &Frame, direction: Vec3) -> CameraSample {
     }
 }
 
-impl Scratch {
+impl Batch {
     /// Turns hits into shading points, grouped by pixel.
     fn gather_points(&mut self, frame: &Frame, n_samples: usize) {
         let first_sample = self.samples.first().copied().unwrap_or(0);
@@ -159,10 +188,10 @@ impl Scratch {
     fn trace_strategy<S: Strategy>(
         &mut self,
         frame: &Frame,
-        strategy: &S,
-        learned: &mut S::Learned,
+        lesson: Lesson<S>,
         width: usize,
     ) -> u64 {
+        let Lesson { strategy, pass, learned, scratch } = lesson;
         let n = self.points.len();
         self.radiance.clear();
         self.radiance.resize(n, Rgb::BLACK);
@@ -177,7 +206,7 @@ impl Scratch {
                 width,
             };
             self.contributions.reset(n);
-            let more = strategy.push(&tile, learned, round, &mut self.contributions);
+            let more = strategy.push(pass, &tile, round, learned, scratch, &mut self.contributions);
             n_rays += self.contributions.len() as u64;
 
             // Test the visibility of the whole round at once.
@@ -201,11 +230,11 @@ impl Scratch {
                     self.radiance[point as usize] += weight;
                 }
             }
+            self.occluded.iter_mut().for_each(|o| *o = !*o);
+            strategy.learn(&tile, &self.contributions, &self.occluded, scratch, learned);
             if more == Round::Done {
                 break;
             }
-            self.occluded.iter_mut().for_each(|o| *o = !*o);
-            strategy.learn(&tile, &self.contributions, &self.occluded, learned);
         }
         n_rays
     }
