@@ -48,6 +48,7 @@ mod image;
 pub mod math;
 pub mod rig;
 pub mod sampling;
+mod simd;
 pub mod strategy;
 
 #[cfg(feature = "render")]

@@ -68,7 +68,7 @@ impl MetallicRoughness {
 }
 
 impl Brdf for MetallicRoughness {
-    #[inline]
+    #[inline(always)]
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         if !above(wo, wi) {
             return (Rgb::BLACK, 0.0);

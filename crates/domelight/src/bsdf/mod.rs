@@ -24,6 +24,7 @@
 //! energy compensation (its tables would have to enter the bounds of [`Brdf::max_eval`]).
 
 mod beckmann;
+mod block;
 mod fresnel;
 mod ggx;
 mod lambert;
@@ -38,6 +39,7 @@ mod test_support;
 mod ward;
 
 pub use beckmann::{Beckmann, BeckmannNormals};
+pub use block::{LANES, Lanes, ValueBlock, VecBlock};
 pub use fresnel::{Conductor, Fresnel};
 pub use ggx::{Ggx, GgxNormals};
 pub use lambert::Lambert;
@@ -67,6 +69,17 @@ pub trait Brdf: Copy + Send + Sync {
     /// The fraction of light toward `wo` = (·, ·, `cos_theta_o`) under uniform light, roughly: what
     /// chooses between lobes and colours previews. Never negative.
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb;
+
+    /// [`Brdf::eval_pdf`] of a block of directions, to the same bits.
+    #[inline(always)]
+    fn eval_pdf_block(&self, wo: Vec3, wi: &VecBlock) -> ValueBlock {
+        let mut block = ValueBlock::default();
+        for lane in 0..LANES {
+            let (value, pdf) = self.eval_pdf(wo, wi.get(lane));
+            block.set(lane, value, pdf);
+        }
+        block
+    }
 
     /// f_r(wo, wi) · max(0, cos θ_i) \[sr⁻¹\], the cosine inside; black when either direction lies
     /// at or below the surface.
@@ -111,7 +124,7 @@ pub struct BrdfSample {
 const HORIZON: f32 = 1e-7;
 
 /// Both directions lie above the surface; false for NaN.
-#[inline]
+#[inline(always)]
 fn above(wo: Vec3, wi: Vec3) -> bool {
     wo.z > HORIZON && wi.z > HORIZON
 }

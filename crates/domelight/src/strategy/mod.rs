@@ -34,7 +34,7 @@ pub use sir::{
 };
 
 use crate::Rgb;
-use crate::bsdf::{Brdf, Material};
+use crate::bsdf::{Brdf, LANES, Material, ValueBlock, VecBlock};
 use crate::math::{Frame, Vec2, Vec3};
 use crate::sampling::stream::Numbers;
 use crate::sampling::{Dimension, Pcg32, Stream};
@@ -71,6 +71,23 @@ impl ShadingPoint {
             return (Rgb::BLACK, 0.0);
         }
         self.material.eval_pdf(self.wo, self.frame.to_local(wi))
+    }
+
+    /// [`ShadingPoint::eval_pdf`] of a block of world directions.
+    #[inline(always)]
+    pub fn eval_pdf_block(&self, wi: &VecBlock) -> ValueBlock {
+        let Frame { x, y, z } = self.frame;
+        let local = VecBlock { x: wi.dot(x), y: wi.dot(y), z: wi.dot(z) };
+        let mut block = self.material.eval_pdf_block(self.wo, &local);
+        let above = wi.dot(self.ng);
+        for lane in 0..LANES {
+            let keep = above[lane] > 0.0;
+            for channel in &mut block.value {
+                channel[lane] = if keep { channel[lane] } else { 0.0 };
+            }
+            block.pdf[lane] = if keep { block.pdf[lane] } else { 0.0 };
+        }
+        block
     }
 
     /// Draws a world direction from the material; none is a sample of value zero.

@@ -40,6 +40,7 @@ use super::{Contributions, PixelPoints, Round, Strategy, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::sampling::Stream;
+use crate::simd::{Work, vectorized};
 use candidates::{Candidate, Counts, PixelNumbers, Sources};
 use cells::Cells;
 use choose::Choice;
@@ -167,42 +168,7 @@ impl Strategy for ProductSampling<'_> {
             (0, _) => Which::Others,
             _ => Which::All,
         };
-        let blocks = tile.blocks();
-        if which != Which::Pilots {
-            scratch.visibility.estimate(learned, blocks);
-        }
-        scratch.targets.clear();
-        scratch.pixels.clear();
-        scratch.last = which != Which::Pilots;
-        for (i, pixel) in tile.pixels.iter().enumerate() {
-            let (x, y) = (i % tile.width, i / tile.width);
-            let points = &tile.points[pixel.points.clone()];
-            if !which.includes(x, y) || points.is_empty() {
-                continue;
-            }
-            scratch.pixels.push(i);
-            scratch.groups.gather(points);
-            scratch.table.fill(cells, &scratch.groups.groups);
-            let counts = self.counts(&scratch.groups, points.len());
-            // The first camera sample that hits tells passes apart.
-            let stream = pixel.stream.part(tile.samples[pixel.points.start]);
-            let numbers = PixelNumbers::new(stream);
-            let sources =
-                Sources { environment: self.environment, cells, pool, table: &scratch.table };
-            let ProductScratch { strata, candidates, .. } = scratch;
-            sources.draw(points, counts, &numbers, strata, candidates);
-            let mut rays =
-                Rays { pixel, block: blocks.of(x, y), out, targets: &mut scratch.targets };
-            if which == Which::Pilots {
-                rays.push_all(candidates);
-            } else {
-                let brightness = self.expected_brightness(tile.width, learned, i);
-                let n = (counts.light + counts.brdf) as f32;
-                let tolerance = TOLERANCE[usize::from(counts.brdf > 0)];
-                let choice = Choice::new(numbers.choice, tolerance * brightness / n);
-                rays.push_chosen(candidates, &scratch.visibility, choice);
-            }
-        }
+        vectorized(Asking { strategy: self, cells, pool, tile, which, learned, scratch, out });
         if which == Which::Pilots { Round::More } else { Round::Done }
     }
 
@@ -233,6 +199,71 @@ impl Strategy for ProductSampling<'_> {
             learned.add_luminance(i, sum.luminance(), *n_samples);
         }
         learned.n_passes += u32::from(scratch.last);
+    }
+}
+
+/// A round over a tile.
+struct Asking<'a, 'e> {
+    strategy: &'a ProductSampling<'e>,
+    cells: &'a Cells,
+    pool: &'a Pool,
+    tile: &'a TileShading<'a>,
+    which: Which,
+    learned: &'a Learned,
+    scratch: &'a mut ProductScratch,
+    out: &'a mut Contributions,
+}
+
+impl Work for Asking<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        let Self { tile, which, .. } = self;
+        let blocks = tile.blocks();
+        if which != Which::Pilots {
+            self.scratch.visibility.estimate(self.learned, blocks);
+        }
+        self.scratch.targets.clear();
+        self.scratch.pixels.clear();
+        self.scratch.last = which != Which::Pilots;
+        for (i, pixel) in tile.pixels.iter().enumerate() {
+            let (x, y) = (i % tile.width, i / tile.width);
+            if which.includes(x, y) && !pixel.points.is_empty() {
+                self.scratch.pixels.push(i);
+                self.ask(i, pixel, blocks.of(x, y));
+            }
+        }
+    }
+}
+
+impl Asking<'_, '_> {
+    /// Asks for the rays of a pixel.
+    #[inline(always)]
+    fn ask(&mut self, i: usize, pixel: &PixelPoints, block: usize) {
+        let Self { strategy, tile, learned, .. } = *self;
+        let ProductScratch { groups, table, strata, candidates, visibility, targets, .. } =
+            &mut *self.scratch;
+        let points = &tile.points[pixel.points.clone()];
+        groups.gather(points);
+        table.fill(self.cells, &groups.groups);
+        let counts = strategy.counts(groups, points.len());
+        // The first camera sample that hits tells passes apart.
+        let stream = pixel.stream.part(tile.samples[pixel.points.start]);
+        let numbers = PixelNumbers::new(stream);
+        let (environment, cells, pool) = (strategy.environment, self.cells, self.pool);
+        let sources = Sources { environment, cells, pool, table };
+        sources.draw(points, counts, &numbers, strata, candidates);
+        let mut rays = Rays { pixel, block, out: self.out, targets };
+        if self.which == Which::Pilots {
+            rays.push_all(candidates);
+        } else {
+            let brightness = strategy.expected_brightness(tile.width, learned, i);
+            let n = (counts.light + counts.brdf) as f32;
+            let tolerance = TOLERANCE[usize::from(counts.brdf > 0)];
+            let choice = Choice::new(numbers.choice, tolerance * brightness / n);
+            rays.push_chosen(candidates, visibility, choice);
+        }
     }
 }
 
@@ -279,6 +310,7 @@ impl Rays<'_> {
         self.pixel.points.len() as f32
     }
 
+    #[inline(always)]
     fn push(&mut self, c: &Candidate, weight: Rgb) {
         let point = self.pixel.points.start as u32 + c.hit;
         self.out.push(point, c.wi, weight);
@@ -286,14 +318,16 @@ impl Rays<'_> {
     }
 
     /// Σ W V: traces every candidate.
+    #[inline(always)]
     fn push_all(&mut self, candidates: &[Candidate]) {
         let scale = self.scale();
-        for c in candidates {
+        for c in candidates.iter().filter(|c| c.luminance > 0.0) {
             self.push(c, c.value * scale);
         }
     }
 
     /// Σ W V̂ + Σ W (V − V̂)/π: traces the chosen ones.
+    #[inline(always)]
     fn push_chosen(
         &mut self,
         candidates: &[Candidate],

@@ -77,7 +77,6 @@ mod tests {
                 let light = pool.at(cell, (j as f32 + 0.5) / PER_CELL as f32);
                 let mass = light.le.luminance() / light.density;
                 assert!((mass / cells.mass_of(cell) - 1.0).abs() < 1e-5);
-                assert_eq!(cells.find(&environment, light.wi), Some((cell, light.le)));
             }
         }
         let other = Pool::draw(&cells, &environment, Stream::of_pass(SamplerKind::Sobol, 1, 8));

@@ -40,6 +40,7 @@ impl Default for Table {
 
 impl Table {
     /// Fills the table for groups of hits.
+    #[inline(always)]
     pub(super) fn fill(&mut self, cells: &Cells, groups: &[Group]) {
         self.weight.fill(0.0);
         for group in groups {
@@ -52,6 +53,7 @@ impl Table {
     }
 
     /// Adds what a group reflects from each cell per light.
+    #[inline(always)]
     fn add(&mut self, cells: &Cells, group: &Group) {
         let spread2 = sqr(group.spread);
         self.face(cells, group.frame.z, group.spread);
@@ -76,6 +78,7 @@ impl Table {
     }
 
     /// The ramp of the cosine.
+    #[inline(always)]
     fn face(&mut self, cells: &Cells, normal: Vec3, spread: f32) {
         let [cx, cy, cz] = &cells.center;
         for i in 0..MAX_CELLS {
@@ -89,6 +92,7 @@ impl Table {
     }
 
     /// D(h) cos θ_i/(4 σ_o σ_i), of GGX or with tails (1 + t/3)⁻⁴ that are near to a Gaussian's.
+    #[inline(always)]
     fn add_slopes<const GAUSSIAN: bool>(
         &mut self,
         cells: &Cells,
@@ -124,6 +128,7 @@ impl Table {
 
     /// (1 + v/3σ²)⁻⁴/(2πσ²) of the versine v to the mirror direction, with σ² = 1/n: near to a
     /// Gaussian of the power's variance.
+    #[inline(always)]
     fn add_mirror(
         &mut self,
         cells: &Cells,
@@ -144,6 +149,7 @@ impl Table {
     }
 
     /// The running sum: down the rows in all lanes at once, then over the lanes.
+    #[inline(always)]
     fn accumulate(&mut self) {
         let mut sum = [0.0; LANES];
         for row in 0..ROWS {
@@ -185,6 +191,7 @@ impl Table {
     ///
     /// A cell begins with the first stratum that does not lie before it. Every cell marks that stratum,
     /// a later one over an earlier one without strata, and marks spread to the right.
+    #[inline(always)]
     pub(super) fn strata(&self, n: usize, xi: f32, cells: &mut Vec<u32>) {
         cells.clear();
         cells.resize(n + 1, 0);

@@ -113,6 +113,7 @@ pub(super) struct Visibility {
 
 impl Visibility {
     /// Estimates all.
+    #[inline(always)]
     pub(super) fn estimate(&mut self, learned: &Learned, blocks: Blocks) {
         let [mut n_tile, mut k_tile] = [[0.0; MAX_CELLS]; 2];
         let counts = learned.rays.chunks(MAX_CELLS).zip(learned.free.chunks(MAX_CELLS));
