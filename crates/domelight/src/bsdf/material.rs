@@ -307,7 +307,7 @@ mod tests {
     #[test]
     fn blocks_are_directions_side_by_side() {
         let lambert = Lobe::from(Lambert::new(Rgb::new(0.5, 0.3, 0.1)));
-        let gltf = crate::bsdf::MetallicRoughness::new(Rgb::new(0.5, 0.3, 0.1), 0.3, 0.4);
+        let gltf = MetallicRoughness::new(Rgb::new(0.5, 0.3, 0.1), 0.3, 0.4);
         let silver = Fresnel::Conductor(crate::bsdf::Conductor::SILVER);
         let metal = Ggx::new([0.1, 0.3], silver, Masking::Separable);
         let materials =

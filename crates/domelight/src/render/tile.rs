@@ -76,11 +76,23 @@ struct Batch {
     points: Vec<ShadingPoint>,
     samples: Vec<u32>,
     pixels: Vec<PixelPoints>,
-    contributions: Contributions,
-    shadow_rays: RayBatch,
-    occluded: Vec<bool>,
+    /// Of each point, moved off the surface to the viewer's side.
+    origins: Vec<Vec3>,
+    round: ShadowRays,
     radiance: Vec<Rgb>,
     unoccluded: Vec<Rgb>,
+}
+
+/// The shadow rays of a round.
+#[derive(Default)]
+struct ShadowRays {
+    asked: Contributions,
+    /// Which of them is traced as which.
+    order: Vec<u32>,
+    traced: RayBatch,
+    occluded: Vec<bool>,
+    /// Of each ray as asked for.
+    free: Vec<bool>,
 }
 
 impl Tile {
@@ -170,13 +182,16 @@ impl Batch {
     fn gather_points(&mut self, frame: &Frame, n_samples: usize) {
         let first_sample = self.samples.first().copied().unwrap_or(0);
         self.points.clear();
+        self.origins.clear();
         self.samples.clear();
         for (i, pixel) in self.pixels.iter_mut().enumerate() {
             let start = self.points.len();
             for s in 0..n_samples {
                 let ray = i * n_samples + s;
                 if let Some(hit) = &self.hits[ray] {
-                    self.points.push(frame.scene.shading_point(&self.rays[ray], hit));
+                    let point = frame.scene.shading_point(&self.rays[ray], hit);
+                    self.origins.push(offset_origin(point.position, point.ng, frame.extent));
+                    self.points.push(point);
                     self.samples.push(first_sample + s as u32);
                 }
             }
@@ -205,33 +220,25 @@ impl Batch {
                 pixels: &self.pixels,
                 width,
             };
-            self.contributions.reset(n);
-            let more = strategy.push(pass, &tile, round, learned, scratch, &mut self.contributions);
-            n_rays += self.contributions.len() as u64;
+            self.round.asked.reset(n);
+            let more = strategy.push(pass, &tile, round, learned, scratch, &mut self.round.asked);
+            n_rays += self.round.asked.len() as u64;
 
-            // Test the visibility of the whole round at once.
-            self.shadow_rays.clear();
-            for (&wi, &point) in self.contributions.wi.iter().zip(&self.contributions.point) {
-                let p = &self.points[point as usize];
-                let side = if p.ng.dot(wi) < 0.0 { -p.ng } else { p.ng };
-                self.shadow_rays.push(offset_origin(p.position, side, frame.extent), wi);
-            }
-            Visibility::occluded(frame.scene.bvh(), &self.shadow_rays, &mut self.occluded);
+            self.round.trace(frame, &self.points, &self.origins);
 
             // base + Σ weight · V
-            for (i, &base) in self.contributions.base.iter().enumerate() {
+            for (i, &base) in self.round.asked.base.iter().enumerate() {
                 self.radiance[i] += base;
                 self.unoccluded[i] += base;
             }
-            let pairs = self.contributions.point.iter().zip(&self.contributions.weight);
-            for ((&point, &weight), &occluded) in pairs.zip(&self.occluded) {
+            let pairs = self.round.asked.point.iter().zip(&self.round.asked.weight);
+            for ((&point, &weight), &free) in pairs.zip(&self.round.free) {
                 self.unoccluded[point as usize] += weight;
-                if !occluded {
+                if free {
                     self.radiance[point as usize] += weight;
                 }
             }
-            self.occluded.iter_mut().for_each(|o| *o = !*o);
-            strategy.learn(&tile, &self.contributions, &self.occluded, scratch, learned);
+            strategy.learn(&tile, &self.round.asked, &self.round.free, scratch, learned);
             if more == Round::Done {
                 break;
             }
@@ -251,5 +258,70 @@ impl Batch {
                 depth: frame.camera.depth(ray.at(hit.t)),
             }),
         }
+    }
+}
+
+impl ShadowRays {
+    /// Tests the visibility of all rays asked for at once, nearly parallel ones together.
+    fn trace(&mut self, frame: &Frame, points: &[ShadingPoint], origins: &[Vec3]) {
+        let asked = &self.asked;
+        sort_by_key(&asked.toward, asked.len(), &mut self.order);
+        self.traced.clear();
+        for i in self.order.iter().map(|&i| i as usize) {
+            let (wi, point) = (asked.wi[i], asked.point[i] as usize);
+            let p = &points[point];
+            let behind = p.ng.dot(wi) < 0.0;
+            let origin = if behind {
+                offset_origin(p.position, -p.ng, frame.extent)
+            } else {
+                origins[point]
+            };
+            self.traced.push(origin, wi);
+        }
+        Visibility::occluded(frame.scene.bvh(), &self.traced, &mut self.occluded);
+        self.free.resize(asked.len(), false);
+        for (&i, &occluded) in self.order.iter().zip(&self.occluded) {
+            self.free[i as usize] = !occluded;
+        }
+    }
+}
+
+/// The indices 0 to `n` − 1 in rising order of their keys, equal ones as they come; without keys as
+/// they come.
+fn sort_by_key(keys: &[u16], n: usize, order: &mut Vec<u32>) {
+    order.clear();
+    if keys.is_empty() {
+        order.extend(0..n as u32);
+        return;
+    }
+    let n_keys = usize::from(keys.iter().copied().max().unwrap_or(0)) + 1;
+    let mut next = vec![0u32; n_keys + 1];
+    for &key in keys {
+        next[usize::from(key) + 1] += 1;
+    }
+    for key in 1..n_keys {
+        next[key] += next[key - 1];
+    }
+    order.resize(n, 0);
+    for (i, &key) in (0u32..).zip(keys) {
+        let place = &mut next[usize::from(key)];
+        order[*place as usize] = i;
+        *place += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_are_sorted_by_key() {
+        let mut order = Vec::new();
+        sort_by_key(&[3, 0, 3, 1, 0], 5, &mut order);
+        assert_eq!(order, [1, 4, 3, 0, 2]);
+        sort_by_key(&[], 3, &mut order);
+        assert_eq!(order, [0, 1, 2]);
+        sort_by_key(&[], 0, &mut order);
+        assert!(order.is_empty());
     }
 }

@@ -108,8 +108,6 @@ pub struct ProductScratch {
     strata: Vec<u32>,
     candidates: Vec<Candidate>,
     visibility: Visibility,
-    /// Of each ray of the round the block that it starts from and the cell that it goes to.
-    targets: Vec<(u32, u32)>,
     /// The pixels of the round.
     pixels: Vec<usize>,
     /// This round ends the pass.
@@ -183,18 +181,17 @@ impl Strategy for ProductSampling<'_> {
         if self.cells.is_none() {
             return;
         }
-        learned.prepare(tile.blocks(), tile.pixels.len());
-        for (&(block, cell), &free) in scratch.targets.iter().zip(free) {
-            learned.count(block as usize, cell as usize, free);
-        }
-        let mut rays = pushed.point.iter().zip(&pushed.weight).zip(free).peekable();
+        let blocks = tile.blocks();
+        learned.prepare(blocks, tile.pixels.len());
+        let mut ray = 0;
         for &i in &scratch.pixels {
             let PixelPoints { points, n_samples, .. } = &tile.pixels[i];
+            let block = blocks.of(i % tile.width, i / tile.width);
             let mut sum: Rgb = pushed.base[points.clone()].iter().copied().sum();
-            while let Some(((_, &weight), &free)) =
-                rays.next_if(|((point, _), _)| points.contains(&(**point as usize)))
-            {
-                sum += if free { weight } else { Rgb::BLACK };
+            while pushed.point.get(ray).is_some_and(|&point| (point as usize) < points.end) {
+                learned.count(block, usize::from(pushed.toward[ray]), free[ray]);
+                sum += if free[ray] { pushed.weight[ray] } else { Rgb::BLACK };
+                ray += 1;
             }
             learned.add_luminance(i, sum.luminance(), *n_samples);
         }
@@ -224,7 +221,6 @@ impl Work for Asking<'_, '_> {
         if which != Which::Pilots {
             self.scratch.visibility.estimate(self.learned, blocks);
         }
-        self.scratch.targets.clear();
         self.scratch.pixels.clear();
         self.scratch.last = which != Which::Pilots;
         for (i, pixel) in tile.pixels.iter().enumerate() {
@@ -242,7 +238,7 @@ impl Asking<'_, '_> {
     #[inline(always)]
     fn ask(&mut self, i: usize, pixel: &PixelPoints, block: usize) {
         let Self { strategy, tile, learned, .. } = *self;
-        let ProductScratch { groups, table, strata, candidates, visibility, targets, .. } =
+        let ProductScratch { groups, table, strata, candidates, visibility, .. } =
             &mut *self.scratch;
         let points = &tile.points[pixel.points.clone()];
         groups.gather(points);
@@ -254,7 +250,7 @@ impl Asking<'_, '_> {
         let (environment, cells, pool) = (strategy.environment, self.cells, self.pool);
         let sources = Sources { environment, cells, pool, table };
         sources.draw(points, counts, &numbers, strata, candidates);
-        let mut rays = Rays { pixel, block, out: self.out, targets };
+        let mut rays = Rays { pixel, block, out: self.out };
         if self.which == Which::Pilots {
             rays.push_all(candidates);
         } else {
@@ -301,7 +297,6 @@ struct Rays<'a> {
     pixel: &'a PixelPoints,
     block: usize,
     out: &'a mut Contributions,
-    targets: &'a mut Vec<(u32, u32)>,
 }
 
 impl Rays<'_> {
@@ -313,8 +308,10 @@ impl Rays<'_> {
     #[inline(always)]
     fn push(&mut self, c: &Candidate, weight: Rgb) {
         let point = self.pixel.points.start as u32 + c.hit;
-        self.out.push(point, c.wi, weight);
-        self.targets.push((self.block as u32, c.cell));
+        self.out.wi.push(c.wi);
+        self.out.weight.push(weight);
+        self.out.point.push(point);
+        self.out.toward.push(c.cell as u16);
     }
 
     /// Σ W V: traces every candidate.

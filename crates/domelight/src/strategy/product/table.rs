@@ -7,7 +7,9 @@
 //! f is the outline of the material, widened by the angular radius r of the cell and the spread of
 //! the normals in the pixel: s² = r² + spread² is added to the variance of a lobe, and the cosine x
 //! becomes a ramp (x + s)²/4s where |x| < s. No cell that may hold a direction above the surface has
-//! a weight of zero, so the table is a density for all that the pixel reflects.
+//! a diffuse weight of zero, so the table is a density for all that the pixel reflects; the tails of
+//! narrow lobes may fall below what single precision adds up, and are left to samples of the
+//! material.
 //!
 //! The running sum of the table is a distribution along the curve. Its M strata share one random
 //! offset: stratum k falls at u = (k + ξ)/M.
@@ -196,12 +198,16 @@ impl Table {
         cells.clear();
         cells.resize(n + 1, 0);
         let scale = n as f32 / self.total();
-        let mut start = 0.0;
-        for cell in 0..MAX_CELLS {
-            let at = slot(cell);
-            let first = ((start * scale - xi).ceil().max(0.0) as usize).min(n);
-            cells[if self.weight[at] > 0.0 { first } else { n }] = cell as u32;
-            start = self.end[at];
+        let mut first = [0; MAX_CELLS];
+        for i in 0..MAX_CELLS {
+            let start = self.end[i] - self.weight[i];
+            let stratum = (start * scale - xi).ceil().clamp(0.0, n as f32);
+            first[i] = if self.weight[i] > 0.0 { stratum as i32 } else { n as i32 };
+        }
+        for lane in 0..LANES {
+            for row in 0..ROWS {
+                cells[first[row * LANES + lane] as usize] = (lane * ROWS + row) as u32;
+            }
         }
         cells.truncate(n);
         let mut last = 0;
@@ -219,5 +225,115 @@ impl Table {
         let width = self.weight[at];
         let start = self.end[at] - width;
         ((u - start) / width).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::hits::Groups;
+    use super::*;
+    use crate::bsdf::{Material, MaterialSpec};
+    use crate::environment::builtin::BuiltinProbe;
+    use crate::environment::{Environment, Orientation};
+    use crate::math::{Frame, vec3};
+    use crate::strategy::ShadingPoint;
+    use testkit::Chi2;
+    use testkit::quadrature::Adaptive;
+
+    const MATERIALS: [&str; 5] =
+        ["diffuse:0.8", "phong:50:0.5:0.5", "ward:0.15:0.5", "ggx:0.2", "gltf:0.9,0.6,0.3:0.5:0.5"];
+
+    fn hit(material: &str, normal: Vec3) -> ShadingPoint {
+        let material = Material::from(material.parse::<MaterialSpec>().unwrap());
+        let frame = Frame::from_z_and_tangent(normal.normalize(), Vec3::X);
+        let wo = vec3(0.5, 0.1, 0.8).normalize();
+        ShadingPoint { position: Vec3::ZERO, ng: frame.z, frame, wo, material }
+    }
+
+    fn sky() -> Environment {
+        Environment::new(BuiltinProbe::Sky.image(32), Orientation::default(), 1.0).unwrap()
+    }
+
+    fn table(cells: &Cells, hits: &[ShadingPoint]) -> Table {
+        let (mut groups, mut table) = (Groups::default(), Table::default());
+        groups.gather(hits);
+        table.fill(cells, &groups.groups);
+        table
+    }
+
+    /// A stratum at random falls into a cell with the probability of its width, and directions drawn
+    /// there have the density that candidates are weighed by.
+    #[test]
+    fn strata_follow_the_table() {
+        const M: usize = 7;
+        let environment = sky();
+        let cells = Cells::new(&environment).unwrap();
+        // The density has jumps at every texel's edge.
+        let quadrature = Adaptive { tolerance: 1e-5, min_depth: 1, max_depth: 7 };
+        let test = Chi2 {
+            samples: 20_000,
+            cells: [13, 27],
+            quadrature,
+            mass_tolerance: 1e-3,
+            ..Chi2::in_suite_of(MATERIALS.len())
+        };
+        for name in MATERIALS {
+            let table = table(&cells, &[hit(name, vec3(0.3, 0.9, -0.2))]);
+            let mut strata = Vec::new();
+            let sample = |[xi, which]: [f32; 2], u: f32| {
+                let k = (which * M as f32) as usize;
+                table.strata(M, xi, &mut strata);
+                let cell = strata[k] as usize;
+                let inside = table.inside(cell, k, M, xi);
+                assert!((-1e-3..1.001).contains(&inside), "{inside}");
+                let jitter = [u, (which * M as f32).fract()];
+                Some(cells.draw(&environment, cell, f64::from(inside), jitter).0.to_array())
+            };
+            let pdf = |wi: [f32; 3]| {
+                let Some((cell, le)) = cells.find(&environment, Vec3::from(wi)) else { return 0.0 };
+                let within = f64::from(le.luminance() / cells.mass_of(cell));
+                f64::from(table.width(cell) / table.total()) * within
+            };
+            test.sphere(name, sample, pdf).unwrap();
+        }
+    }
+
+    /// Wherever any hit of the pixel reflects light there is a chance to look.
+    #[test]
+    fn the_table_leaves_nothing_out() {
+        let environment = sky();
+        let cells = Cells::new(&environment).unwrap();
+        let normals = [vec3(0.0, 1.0, 0.1), vec3(0.2, 1.0, 0.0), vec3(-1.0, 0.2, 0.3)];
+        for name in MATERIALS {
+            let hits = normals.map(|normal| hit(name, normal));
+            let table = table(&cells, &hits);
+            for i in 0..20_000 {
+                let u = crate::math::vec2((0.618 * i as f32).fract(), i as f32 / 20_000.0);
+                let wi = crate::sampling::warp::uniform_sphere(u);
+                let Some((cell, le)) = cells.find(&environment, wi) else { continue };
+                // A glossy pixel has samples of its materials as well.
+                let left_to_table = |at: &ShadingPoint| {
+                    let (f, pdf) = at.eval_pdf(wi);
+                    !(f * le).is_black() && (name.starts_with("diffuse") || pdf == 0.0)
+                };
+                let needed = hits.iter().any(left_to_table);
+                assert!(!needed || table.width(cell) > 0.0, "{name} {cell} {wi}");
+            }
+        }
+    }
+
+    #[test]
+    fn running_sums_go_along_the_curve() {
+        let environment = sky();
+        let cells = Cells::new(&environment).unwrap();
+        let table = table(&cells, &[hit("diffuse:0.8", Vec3::Y)]);
+        let mut sum = 0.0;
+        for cell in 0..MAX_CELLS {
+            let end = table.end[slot(cell)];
+            assert!((end - table.width(cell) - sum).abs() <= 1e-6 * table.total());
+            sum = table.end[slot(cell)];
+        }
+        assert_eq!(table.total(), sum);
+        assert!(table.width(cells.len() - 1) >= 0.0);
     }
 }
