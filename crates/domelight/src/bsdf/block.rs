@@ -57,22 +57,13 @@ impl ValueBlock {
         Rgb::new(r[lane], g[lane], b[lane])
     }
 
-    /// Sets a lane.
+    /// Adds to a lane.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, value: Rgb, pdf: f32) {
+    pub(super) fn add(&mut self, lane: usize, value: Rgb, pdf: f32) {
         let [r, g, b] = &mut self.value;
-        (r[lane], g[lane], b[lane]) = (value.r, value.g, value.b);
-        self.pdf[lane] = pdf;
-    }
-
-    /// Adds a lobe's values times its weight and its densities times its probability.
-    #[inline(always)]
-    pub(super) fn add(&mut self, lobe: &Self, weight: f32, probability: f32) {
-        for i in 0..LANES {
-            for c in 0..3 {
-                self.value[c][i] += lobe.value[c][i] * weight;
-            }
-            self.pdf[i] += lobe.pdf[i] * probability;
-        }
+        r[lane] += value.r;
+        g[lane] += value.g;
+        b[lane] += value.b;
+        self.pdf[lane] += pdf;
     }
 }

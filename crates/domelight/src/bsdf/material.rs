@@ -45,8 +45,8 @@ impl Brdf for Lobe {
     }
 
     #[inline(always)]
-    fn eval_pdf_block(&self, wo: Vec3, wi: &VecBlock) -> ValueBlock {
-        each!(self, l => l.eval_pdf_block(wo, wi))
+    fn add_block(&self, wo: Vec3, wi: &VecBlock, factors: [f32; 2], sum: &mut ValueBlock) {
+        each!(self, l => l.add_block(wo, wi, factors, sum));
     }
 
     #[inline]
@@ -178,6 +178,16 @@ impl Material {
         }
     }
 
+    /// [`Brdf::eval_pdf`] of a block of directions, to the same bits.
+    #[inline(always)]
+    pub fn eval_pdf_block(&self, wo: Vec3, wi: &VecBlock) -> ValueBlock {
+        let mut sum = ValueBlock::default();
+        for term in self.terms() {
+            term.lobe.add_block(wo, wi, [term.weight, term.probability], &mut sum);
+        }
+        sum
+    }
+
     /// The colour of the surface, roughly: its albedo seen from above.
     pub fn albedo(&self) -> Rgb {
         self.directional_albedo(1.0)
@@ -223,15 +233,6 @@ impl Brdf for Material {
             pdf += p * term.probability;
         }
         (value, pdf)
-    }
-
-    #[inline(always)]
-    fn eval_pdf_block(&self, wo: Vec3, wi: &VecBlock) -> ValueBlock {
-        let mut sum = ValueBlock::default();
-        for term in self.terms() {
-            sum.add(&term.lobe.eval_pdf_block(wo, wi), term.weight, term.probability);
-        }
-        sum
     }
 
     #[inline]

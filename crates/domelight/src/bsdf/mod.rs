@@ -70,15 +70,20 @@ pub trait Brdf: Copy + Send + Sync {
     /// chooses between lobes and colours previews. Never negative.
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb;
 
-    /// [`Brdf::eval_pdf`] of a block of directions, to the same bits.
+    /// Adds [`Brdf::eval_pdf`] of a block of directions, values times `weight` and densities times
+    /// `probability`.
     #[inline(always)]
-    fn eval_pdf_block(&self, wo: Vec3, wi: &VecBlock) -> ValueBlock {
-        let mut block = ValueBlock::default();
+    fn add_block(
+        &self,
+        wo: Vec3,
+        wi: &VecBlock,
+        [weight, probability]: [f32; 2],
+        sum: &mut ValueBlock,
+    ) {
         for lane in 0..LANES {
             let (value, pdf) = self.eval_pdf(wo, wi.get(lane));
-            block.set(lane, value, pdf);
+            sum.add(lane, value * weight, pdf * probability);
         }
-        block
     }
 
     /// f_r(wo, wi) · max(0, cos θ_i) \[sr⁻¹\], the cosine inside; black when either direction lies

@@ -87,11 +87,7 @@ struct Batch {
 #[derive(Default)]
 struct ShadowRays {
     asked: Contributions,
-    /// Which of them is traced as which.
-    order: Vec<u32>,
     traced: RayBatch,
-    occluded: Vec<bool>,
-    /// Of each ray as asked for.
     free: Vec<bool>,
 }
 
@@ -262,66 +258,20 @@ impl Batch {
 }
 
 impl ShadowRays {
-    /// Tests the visibility of all rays asked for at once, nearly parallel ones together.
+    /// Tests the visibility of all rays asked for at once.
     fn trace(&mut self, frame: &Frame, points: &[ShadingPoint], origins: &[Vec3]) {
-        let asked = &self.asked;
-        sort_by_key(&asked.toward, asked.len(), &mut self.order);
         self.traced.clear();
-        for i in self.order.iter().map(|&i| i as usize) {
-            let (wi, point) = (asked.wi[i], asked.point[i] as usize);
-            let p = &points[point];
+        for (&wi, &point) in self.asked.wi.iter().zip(&self.asked.point) {
+            let p = &points[point as usize];
             let behind = p.ng.dot(wi) < 0.0;
             let origin = if behind {
                 offset_origin(p.position, -p.ng, frame.extent)
             } else {
-                origins[point]
+                origins[point as usize]
             };
             self.traced.push(origin, wi);
         }
-        Visibility::occluded(frame.scene.bvh(), &self.traced, &mut self.occluded);
-        self.free.resize(asked.len(), false);
-        for (&i, &occluded) in self.order.iter().zip(&self.occluded) {
-            self.free[i as usize] = !occluded;
-        }
-    }
-}
-
-/// The indices 0 to `n` − 1 in rising order of their keys, equal ones as they come; without keys as
-/// they come.
-fn sort_by_key(keys: &[u16], n: usize, order: &mut Vec<u32>) {
-    order.clear();
-    if keys.is_empty() {
-        order.extend(0..n as u32);
-        return;
-    }
-    let n_keys = usize::from(keys.iter().copied().max().unwrap_or(0)) + 1;
-    let mut next = vec![0u32; n_keys + 1];
-    for &key in keys {
-        next[usize::from(key) + 1] += 1;
-    }
-    for key in 1..n_keys {
-        next[key] += next[key - 1];
-    }
-    order.resize(n, 0);
-    for (i, &key) in (0u32..).zip(keys) {
-        let place = &mut next[usize::from(key)];
-        order[*place as usize] = i;
-        *place += 1;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rays_are_sorted_by_key() {
-        let mut order = Vec::new();
-        sort_by_key(&[3, 0, 3, 1, 0], 5, &mut order);
-        assert_eq!(order, [1, 4, 3, 0, 2]);
-        sort_by_key(&[], 3, &mut order);
-        assert_eq!(order, [0, 1, 2]);
-        sort_by_key(&[], 0, &mut order);
-        assert!(order.is_empty());
+        Visibility::occluded(frame.scene.bvh(), &self.traced, &mut self.free);
+        self.free.iter_mut().for_each(|answer| *answer = !*answer);
     }
 }

@@ -139,9 +139,6 @@ pub struct Contributions {
     pub weight: Vec<Rgb>,
     /// The shading point of each ray; rising.
     pub point: Vec<u32>,
-    /// A number for each ray that nearly parallel rays share, by which they are traced together; left
-    /// empty by strategies that do not know.
-    pub toward: Vec<u16>,
     /// Added to each point without a ray; as many as there are points.
     pub base: Vec<Rgb>,
 }
@@ -152,7 +149,6 @@ impl Contributions {
         self.wi.clear();
         self.weight.clear();
         self.point.clear();
-        self.toward.clear();
         self.base.clear();
         self.base.resize(n_points, Rgb::BLACK);
     }

@@ -96,7 +96,6 @@ impl Sources<'_> {
         strata: &mut Vec<u32>,
         candidates: &mut Vec<Candidate>,
     ) {
-        candidates.clear();
         let total = self.table.total();
         let scale = if total > 0.0 { counts.light as f32 / total } else { 0.0 };
         if scale > 0.0 {
@@ -110,6 +109,8 @@ impl Sources<'_> {
                     self.draw_lights(&of_hit, first, step, numbers.strata, strata, candidates);
                 }
             }
+        } else {
+            candidates.clear();
         }
         self.draw_brdf(points, counts, scale, numbers, candidates);
     }

@@ -47,8 +47,11 @@ impl Groups {
     pub(super) fn gather(&mut self, points: &[ShadingPoint]) {
         self.gatherings.clear();
         self.member.clear();
+        let mut outline = Outline::default();
         for (i, p) in points.iter().enumerate() {
-            let outline = p.material.outline(p.wo);
+            if i == 0 || p.material != points[i - 1].material {
+                outline = p.material.outline(p.wo);
+            }
             let like = |g: &Gathering| {
                 points[g.first].frame.z.dot(p.frame.z) > LIKE_NORMALS && alike(&g.outline, &outline)
             };

@@ -108,6 +108,8 @@ pub struct ProductScratch {
     strata: Vec<u32>,
     candidates: Vec<Candidate>,
     visibility: Visibility,
+    /// Of each ray of the round the cell that it goes to.
+    targets: Vec<u16>,
     /// The pixels of the round.
     pixels: Vec<usize>,
     /// This round ends the pass.
@@ -189,7 +191,7 @@ impl Strategy for ProductSampling<'_> {
             let block = blocks.of(i % tile.width, i / tile.width);
             let mut sum: Rgb = pushed.base[points.clone()].iter().copied().sum();
             while pushed.point.get(ray).is_some_and(|&point| (point as usize) < points.end) {
-                learned.count(block, usize::from(pushed.toward[ray]), free[ray]);
+                learned.count(block, usize::from(scratch.targets[ray]), free[ray]);
                 sum += if free[ray] { pushed.weight[ray] } else { Rgb::BLACK };
                 ray += 1;
             }
@@ -221,6 +223,7 @@ impl Work for Asking<'_, '_> {
         if which != Which::Pilots {
             self.scratch.visibility.estimate(self.learned, blocks);
         }
+        self.scratch.targets.clear();
         self.scratch.pixels.clear();
         self.scratch.last = which != Which::Pilots;
         for (i, pixel) in tile.pixels.iter().enumerate() {
@@ -238,7 +241,7 @@ impl Asking<'_, '_> {
     #[inline(always)]
     fn ask(&mut self, i: usize, pixel: &PixelPoints, block: usize) {
         let Self { strategy, tile, learned, .. } = *self;
-        let ProductScratch { groups, table, strata, candidates, visibility, .. } =
+        let ProductScratch { groups, table, strata, candidates, visibility, targets, .. } =
             &mut *self.scratch;
         let points = &tile.points[pixel.points.clone()];
         groups.gather(points);
@@ -250,7 +253,7 @@ impl Asking<'_, '_> {
         let (environment, cells, pool) = (strategy.environment, self.cells, self.pool);
         let sources = Sources { environment, cells, pool, table };
         sources.draw(points, counts, &numbers, strata, candidates);
-        let mut rays = Rays { pixel, block, out: self.out };
+        let mut rays = Rays { pixel, block, out: self.out, targets };
         if self.which == Which::Pilots {
             rays.push_all(candidates);
         } else {
@@ -297,6 +300,7 @@ struct Rays<'a> {
     pixel: &'a PixelPoints,
     block: usize,
     out: &'a mut Contributions,
+    targets: &'a mut Vec<u16>,
 }
 
 impl Rays<'_> {
@@ -311,7 +315,7 @@ impl Rays<'_> {
         self.out.wi.push(c.wi);
         self.out.weight.push(weight);
         self.out.point.push(point);
-        self.out.toward.push(c.cell as u16);
+        self.targets.push(c.cell as u16);
     }
 
     /// Σ W V: traces every candidate.

@@ -1,7 +1,7 @@
 //! A pool of directions toward the light, drawn anew for each pass and shared by its pixels.
 //!
 //! Drawing from the map costs a walk through its pyramid and a direction; a pixel takes some hundred.
-//! Instead each cell has 64 directions ready, stratified along the curve within the cell, and a
+//! Instead each cell has 32 directions ready, stratified along the curve within the cell, and a
 //! stratum that falls into the cell takes the one where it falls. The estimate of a pixel is unbiased
 //! over the pools; what the pool of one pass has in error, all its pixels share.
 
@@ -12,7 +12,7 @@ use crate::math::Vec3;
 use crate::sampling::Stream;
 
 /// Directions of each cell.
-pub(super) const PER_CELL: usize = 64;
+pub(super) const PER_CELL: usize = 32;
 
 /// A direction toward the light: half a line of the cache.
 #[derive(Clone, Copy, Debug)]
