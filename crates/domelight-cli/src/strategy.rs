@@ -8,7 +8,7 @@ use domelight::sampling::Heuristic;
 use domelight::scene::{Camera, Scene};
 use domelight::strategy::{
     BrdfSampling, Candidates, EnvironmentSampling, LightSet, LightTable,
-    MultipleImportanceSampling, Proposal, RAY_COST, RejectionSampling, Resampling,
+    MultipleImportanceSampling, ProductSampling, Proposal, RAY_COST, RejectionSampling, Resampling,
     SamplingImportanceResampling, ShadingPoint, Stop, Strategy, optimal_candidates,
 };
 
@@ -27,6 +27,7 @@ pub(crate) enum Plan {
     Brdf { n: u32 },
     Environment { n: u32 },
     Mis { split: Split, heuristic: Heuristic, compensation: bool },
+    Product { n: u32 },
     Rejection { proposal: Proposal, stop: Stop },
     Sir { n_candidates: Option<u32>, n: u32, candidates: Candidates, resampling: Resampling },
     MedianCut { n_lights: usize },
@@ -57,6 +58,7 @@ impl StrategyArguments {
             S::Brdf => Plan::Brdf { n },
             S::Environment => Plan::Environment { n },
             S::Mis => self.mis()?,
+            S::Product => Plan::Product { n: self.rays.unwrap_or(8) },
             S::Rejection => self.rejection()?,
             S::Sir => self.sir(n)?,
             S::MedianCut => Plan::MedianCut { n_lights },
@@ -176,6 +178,7 @@ impl Plan {
         let n_points = match self {
             Self::Brdf { n }
             | Self::Environment { n }
+            | Self::Product { n }
             | Self::Rejection { stop: Stop::Tries(n), .. } => n,
             Self::Mis { split, .. } => split.environment.max(split.brdf),
             Self::Sir { n_candidates, n, .. } => n_candidates.unwrap_or(n),
@@ -210,6 +213,7 @@ impl Plan {
                 if heuristic == Heuristic::Power { "power" } else { "balance" },
                 if compensation { ", compensated" } else { "" }
             ),
+            Self::Product { n } => format!("product, up to {n} a camera sample"),
             Self::Rejection { proposal, stop } => {
                 let stop = match stop {
                     Stop::Tries(m) => format!("{m} tries"),
@@ -280,6 +284,10 @@ impl Plan {
                     let mis = MultipleImportanceSampling::new(environment, table, heuristic, m, n)?;
                     job.render(&mis)
                 })
+            }
+            Self::Product { n } => {
+                let product = ProductSampling::new(environment, n);
+                Box::new(move |job| job.render(&product))
             }
             Self::Rejection { proposal, stop } => {
                 let rejection = RejectionSampling::new(environment, proposal, stop)?;

@@ -49,6 +49,7 @@ pub mod math;
 mod parallel;
 pub mod rig;
 pub mod sampling;
+mod simd;
 pub mod strategy;
 
 #[cfg(feature = "render")]

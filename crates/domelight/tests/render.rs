@@ -14,7 +14,7 @@ use domelight::scene::{
 };
 use domelight::strategy::{
     BrdfSampling, Candidates, EnvironmentSampling, LightSet, LightTable,
-    MultipleImportanceSampling, Proposal, RejectionSampling, Resampling,
+    MultipleImportanceSampling, ProductSampling, Proposal, RejectionSampling, Resampling,
     SamplingImportanceResampling, Stop, Strategy,
 };
 use domelight::{Rgb, RgbImage};
@@ -127,6 +127,21 @@ fn the_same_bits_for_any_threads_and_tiles() {
     same_bits("lights", &environment, &LightSet { rig: &rig });
 }
 
+/// A strategy that learns from a tile's other pixels depends on the tiles, but not on who renders them.
+#[test]
+fn what_is_learned_does_not_depend_on_threads() {
+    let (scene, environment) = (scene("ggx:0.2"), environment());
+    let strategy = ProductSampling::new(&environment, 3);
+    let picture = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let settings = RenderSettings { n_samples: 20, ..small() };
+        let picture = pool.install(|| draw(&scene, &environment, &strategy, &settings));
+        (bits(&picture.layers), picture.counts)
+    };
+    let expected = picture(1);
+    assert!(picture(2) == expected && picture(5) == expected);
+}
+
 fn same_bits<S: Strategy>(name: &str, environment: &Environment, strategy: &S) {
     let scene = scene("ggx:0.2");
     let picture = |threads: usize, tile_size: usize| {
@@ -170,6 +185,7 @@ fn strategies_agree_pixel_by_pixel() {
     .unwrap();
     // A narrower lobe would give environment samples rare large values, and the t-test batch means
     // that are far from normal; tests/unbiased.rs has narrow lobes with larger batches.
+    let product = ProductSampling::new(&environment, 2);
     let balls = ["diffuse:0.8", "phong:8:0.6:0.3"];
     for ball in balls {
         let scene = scene(ball);
@@ -180,6 +196,7 @@ fn strategies_agree_pixel_by_pixel() {
             ("brdf", pictures(&scene, &environment, &brdf, &settings)),
             ("environment", pictures(&scene, &environment, &light, &settings)),
             ("compensated", pictures(&scene, &environment, &compensated, &settings)),
+            ("product", pictures(&scene, &environment, &product, &settings)),
         ];
         let suite = Suite::of(others.len() * balls.len() * n_values);
         let test = ZTest { suite, ..ZTest::default() };
@@ -328,6 +345,9 @@ fn an_empty_scene_and_a_black_probe_render() {
     let settings = RenderSettings { width: 1, height: 3, ..small() };
     for scene in [nothing, scene("ggx:0.1")] {
         let picture = draw(&scene, &environment, &mis(&environment), &settings);
+        assert!(picture.layers.color.pixels.iter().all(|p| p.is_black()));
+        let product = ProductSampling::new(&environment, 4);
+        let picture = draw(&scene, &environment, &product, &settings);
         assert!(picture.layers.color.pixels.iter().all(|p| p.is_black()));
     }
 }

@@ -14,7 +14,8 @@ pub(crate) struct StrategyArguments {
     /// How directions are chosen
     #[arg(long, value_enum, default_value_t = StrategyName::Mis)]
     pub(crate) strategy: StrategyName,
-    /// Shadow rays of each camera sample; with rejection, samples to accept [default: 1, with mis 2]
+    /// Shadow rays of each camera sample; with rejection, samples to accept [default: 1,
+    /// with mis 2, with product 8]
     #[arg(long, value_name = "N", conflicts_with = "split",
           value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub(crate) rays: Option<u32>,
@@ -76,6 +77,9 @@ pub(crate) enum StrategyName {
     Environment,
     /// Both, by multiple importance sampling
     Mis,
+    /// The product of both, by a table a pixel, with the visibility that is learned on the way; traces
+    /// up to --rays where they matter
+    Product,
     /// The product of both, by rejection from one with a bound on the other
     Rejection,
     /// The product of both, by resampling --candidates to --rays

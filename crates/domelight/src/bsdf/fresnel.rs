@@ -24,7 +24,7 @@ pub enum Fresnel {
 
 impl Fresnel {
     /// F at the cosine between direction and microfacet normal, in [0, 1].
-    #[inline]
+    #[inline(always)]
     pub fn eval(&self, cos_theta: f32) -> Rgb {
         match self {
             Self::One => Rgb::WHITE,
@@ -41,13 +41,13 @@ impl Fresnel {
 }
 
 /// Schlick's approximation.
-#[inline]
+#[inline(always)]
 pub(super) fn schlick(f0: Rgb, cos_theta: f32) -> Rgb {
     f0 + (Rgb::WHITE - f0) * schlick_weight(cos_theta)
 }
 
 /// (1 − cos θ)⁵, how far F is from f0 to 1.
-#[inline]
+#[inline(always)]
 pub(super) fn schlick_weight(cos_theta: f32) -> f32 {
     let x = (1.0 - cos_theta).clamp(0.0, 1.0);
     sqr(sqr(x)) * x

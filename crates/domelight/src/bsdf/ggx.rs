@@ -38,7 +38,7 @@ impl NormalDistribution for GgxNormals {
         self.alpha
     }
 
-    #[inline]
+    #[inline(always)]
     fn d(&self, h: Vec3) -> f32 {
         let [ax, ay] = self.alpha;
         let stretched = sqr(h.x / ax) + sqr(h.y / ay) + sqr(h.z);
@@ -54,7 +54,7 @@ impl NormalDistribution for GgxNormals {
     }
 
     /// (cos θ + √(cos² θ + α_x² w_x² + α_y² w_y²))/2.
-    #[inline]
+    #[inline(always)]
     fn sigma(&self, w: Vec3) -> f32 {
         let [ax, ay] = self.alpha;
         0.5 * (w.z + (sqr(w.z) + sqr(ax * w.x) + sqr(ay * w.y)).sqrt())
@@ -76,7 +76,7 @@ impl NormalDistribution for GgxNormals {
     }
 
     /// D G₁(wo)/(4 cos θ_o) = D/(4 σ_o).
-    #[inline]
+    #[inline(always)]
     fn reflected_pdf(&self, _h: Vec3, d: f32, sigma_o: f32) -> f32 {
         0.25 * d / sigma_o
     }

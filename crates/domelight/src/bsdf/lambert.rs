@@ -20,7 +20,7 @@ impl Lambert {
 }
 
 impl Brdf for Lambert {
-    #[inline]
+    #[inline(always)]
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         if !above(wo, wi) {
             return (Rgb::BLACK, 0.0);

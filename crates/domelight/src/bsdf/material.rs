@@ -3,7 +3,7 @@
 //! A material is sampled by choosing one lobe and drawing from it; its density is that of the
 //! mixture, so no sample is worse than the chosen lobes' own by more than the choice.
 
-use super::{Beckmann, Brdf, Ggx, Lambert, MetallicRoughness, Phong, Ward};
+use super::{Beckmann, Brdf, Ggx, Lambert, MetallicRoughness, Phong, ValueBlock, VecBlock, Ward};
 use crate::Rgb;
 use crate::math::{Vec2, Vec3};
 
@@ -42,6 +42,11 @@ impl Brdf for Lobe {
     #[inline]
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         each!(self, l => l.eval_pdf(wo, wi))
+    }
+
+    #[inline(always)]
+    fn add_block(&self, wo: Vec3, wi: &VecBlock, factors: [f32; 2], sum: &mut ValueBlock) {
+        each!(self, l => l.add_block(wo, wi, factors, sum));
     }
 
     #[inline]
@@ -173,6 +178,16 @@ impl Material {
         }
     }
 
+    /// [`Brdf::eval_pdf`] of a block of directions, to the same bits.
+    #[inline(always)]
+    pub fn eval_pdf_block(&self, wo: Vec3, wi: &VecBlock) -> ValueBlock {
+        let mut sum = ValueBlock::default();
+        for term in self.terms() {
+            term.lobe.add_block(wo, wi, [term.weight, term.probability], &mut sum);
+        }
+        sum
+    }
+
     /// The colour of the surface, roughly: its albedo seen from above.
     pub fn albedo(&self) -> Rgb {
         self.directional_albedo(1.0)
@@ -256,7 +271,7 @@ impl Term {
 mod tests {
     use super::*;
     use crate::bsdf::test_support::{check_bound, check_lobe, toward};
-    use crate::bsdf::{Fresnel, Masking, WardForm};
+    use crate::bsdf::{Fresnel, LANES, Masking, WardForm};
     use crate::math::vec2;
 
     fn glossy(f0: f32) -> Lobe {
@@ -288,6 +303,29 @@ mod tests {
         let (wo, wi) = (toward(40.0, 0.0), toward(35.0, 3.0));
         let expected = a.eval(wo, wi) * 0.5 + b.eval(wo, wi) * 0.25;
         assert!((mix.eval(wo, wi) - expected).max_component().abs() < 1e-6);
+    }
+
+    #[test]
+    fn blocks_are_directions_side_by_side() {
+        let lambert = Lobe::from(Lambert::new(Rgb::new(0.5, 0.3, 0.1)));
+        let gltf = MetallicRoughness::new(Rgb::new(0.5, 0.3, 0.1), 0.3, 0.4);
+        let silver = Fresnel::Conductor(crate::bsdf::Conductor::SILVER);
+        let metal = Ggx::new([0.1, 0.3], silver, Masking::Separable);
+        let materials =
+            [three(), Material::single(gltf), Material::new(&[lambert, metal.into()]).unwrap()];
+        for material in materials {
+            for view in [0.0, 50.0, 89.0] {
+                let (wo, mut block) = (toward(view, 0.3), VecBlock::default());
+                for lane in 0..LANES {
+                    block.set(lane, toward(18.0 * lane as f32, 0.5 * lane as f32));
+                }
+                let values = material.eval_pdf_block(wo, &block);
+                for lane in 0..LANES {
+                    let expected = material.eval_pdf(wo, block.get(lane));
+                    assert_eq!((values.value(lane), values.pdf[lane]), expected);
+                }
+            }
+        }
     }
 
     #[test]

@@ -47,6 +47,10 @@ impl MetallicRoughness {
         }
     }
 
+    pub(super) fn alpha(&self) -> [f32; 2] {
+        [self.alpha; 2]
+    }
+
     fn specular(&self) -> Ggx {
         let fresnel = Fresnel::Schlick { f0: self.f0 };
         Ggx::new([self.alpha; 2], fresnel, Masking::Correlated)
@@ -54,7 +58,7 @@ impl MetallicRoughness {
 
     /// The probability of drawing from the specular part.
     #[inline]
-    fn specular_share(&self, wo: Vec3) -> f32 {
+    pub(super) fn specular_share(&self, wo: Vec3) -> f32 {
         let grazing = fresnel::schlick_weight(wo.z);
         let specular = self.f0_mean + (1.0 - self.f0_mean) * grazing;
         let diffuse = (1.0 - specular) * self.diffuse_mean;
@@ -64,7 +68,7 @@ impl MetallicRoughness {
 }
 
 impl Brdf for MetallicRoughness {
-    #[inline]
+    #[inline(always)]
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         if !above(wo, wi) {
             return (Rgb::BLACK, 0.0);

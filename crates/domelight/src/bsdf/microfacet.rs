@@ -74,8 +74,12 @@ impl<D: NormalDistribution> Microfacet<D> {
         Self { normals, fresnel, masking }
     }
 
+    pub(super) fn alpha(&self) -> [f32; 2] {
+        self.normals.alpha()
+    }
+
     /// D G₂/(4 cos θ_o), the lobe without Fresnel's factor, and the density.
-    #[inline]
+    #[inline(always)]
     pub(super) fn geometry_pdf(&self, wo: Vec3, wi: Vec3, h: Vec3) -> (f32, f32) {
         let d = self.normals.d(h);
         let (sigma_o, sigma_i) = (self.normals.sigma(wo), self.normals.sigma(wi));
@@ -85,7 +89,7 @@ impl<D: NormalDistribution> Microfacet<D> {
 }
 
 /// G₂ cos θ_i / (4 cos θ_i cos θ_o) of the cosines and projected areas of (wo, wi).
-#[inline]
+#[inline(always)]
 fn masked(masking: Masking, [cos_o, cos_i]: [f32; 2], [sigma_o, sigma_i]: [f32; 2]) -> f32 {
     match masking {
         Masking::Separable => 0.25 * cos_i / (sigma_o * sigma_i),
@@ -94,7 +98,7 @@ fn masked(masking: Masking, [cos_o, cos_i]: [f32; 2], [sigma_o, sigma_i]: [f32; 
 }
 
 impl<D: NormalDistribution> Brdf for Microfacet<D> {
-    #[inline]
+    #[inline(always)]
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         if !above(wo, wi) {
             return (Rgb::BLACK, 0.0);

@@ -24,12 +24,14 @@
 //! energy compensation (its tables would have to enter the bounds of [`Brdf::max_eval`]).
 
 mod beckmann;
+mod block;
 mod fresnel;
 mod ggx;
 mod lambert;
 mod material;
 mod metallic_roughness;
 mod microfacet;
+mod outline;
 mod parse;
 mod phong;
 #[cfg(test)]
@@ -37,12 +39,14 @@ mod test_support;
 mod ward;
 
 pub use beckmann::{Beckmann, BeckmannNormals};
+pub use block::{LANES, Lanes, ValueBlock, VecBlock};
 pub use fresnel::{Conductor, Fresnel};
 pub use ggx::{Ggx, GgxNormals};
 pub use lambert::Lambert;
 pub use material::{Lobe, MAX_LOBES, Material, TooManyLobes};
 pub use metallic_roughness::MetallicRoughness;
 pub use microfacet::{MIN_ALPHA, Masking, Microfacet, NormalDistribution};
+pub use outline::{Gloss, Outline};
 pub use parse::{MaterialSpec, ParseMaterialError};
 pub use phong::Phong;
 pub use ward::{Ward, WardForm};
@@ -65,6 +69,22 @@ pub trait Brdf: Copy + Send + Sync {
     /// The fraction of light toward `wo` = (·, ·, `cos_theta_o`) under uniform light, roughly: what
     /// chooses between lobes and colours previews. Never negative.
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb;
+
+    /// Adds [`Brdf::eval_pdf`] of a block of directions, values times `weight` and densities times
+    /// `probability`.
+    #[inline(always)]
+    fn add_block(
+        &self,
+        wo: Vec3,
+        wi: &VecBlock,
+        [weight, probability]: [f32; 2],
+        sum: &mut ValueBlock,
+    ) {
+        for lane in 0..LANES {
+            let (value, pdf) = self.eval_pdf(wo, wi.get(lane));
+            sum.add(lane, value * weight, pdf * probability);
+        }
+    }
 
     /// f_r(wo, wi) · max(0, cos θ_i) \[sr⁻¹\], the cosine inside; black when either direction lies
     /// at or below the surface.
@@ -109,7 +129,7 @@ pub struct BrdfSample {
 const HORIZON: f32 = 1e-7;
 
 /// Both directions lie above the surface; false for NaN.
-#[inline]
+#[inline(always)]
 fn above(wo: Vec3, wi: Vec3) -> bool {
     wo.z > HORIZON && wi.z > HORIZON
 }

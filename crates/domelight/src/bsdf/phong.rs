@@ -25,6 +25,10 @@ impl Phong {
     pub fn new(specular: Rgb, exponent: f32) -> Self {
         Self { specular, exponent: exponent.clamp(0.0, 1e5) }
     }
+
+    pub(super) fn exponent(&self) -> f32 {
+        self.exponent
+    }
 }
 
 /// The mirror direction of `w` about the normal.

@@ -50,6 +50,10 @@ impl Ward {
     pub fn new(rho: Rgb, alpha: [f32; 2], form: WardForm) -> Self {
         Self { rho, alpha: clamp_alpha(alpha), form }
     }
+
+    pub(super) fn alpha(&self) -> [f32; 2] {
+        self.alpha
+    }
 }
 
 impl Brdf for Ward {

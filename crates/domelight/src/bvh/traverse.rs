@@ -47,9 +47,14 @@ impl Kernel for ClosestHits<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let mut stack = ClosestStack::new();
-        for ray in self.rays {
-            self.hits.push(closest_hit(simd, self.bvh, ray, &mut stack));
+        let mut stack = [StreamEntry::default(); STACK];
+        let mut stream = ClosestStream::default();
+        let octant = |ray: &Ray| PreparedRay::octant(ray.direction);
+        for run in self.rays.chunk_by(|a, b| octant(a) == octant(b)) {
+            for rays in run.chunks(STREAM) {
+                closest_hits(simd, self.bvh, rays, &mut stream, &mut stack);
+                self.hits.extend_from_slice(&stream.hits[..rays.len()]);
+            }
         }
     }
 }
@@ -191,6 +196,82 @@ fn closest_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &Ray, stack: &mut ClosestStack)
         match stack.pop(limit) {
             Some(next) => child = next,
             None => return closest,
+        }
+    }
+}
+
+/// Rays of one octant on their way to their closest hits.
+struct ClosestStream {
+    rays: [PreparedRay; STREAM],
+    limits: [f32; STREAM],
+    hits: [Option<Hit>; STREAM],
+}
+
+impl Default for ClosestStream {
+    fn default() -> Self {
+        Self { rays: [PreparedRay::default(); STREAM], limits: [0.0; STREAM], hits: [None; STREAM] }
+    }
+}
+
+/// [`closest_hit`] of up to [`STREAM`] rays of one octant, together: a node's planes are loaded once for
+/// all rays that reach it. Children are visited in the order in which one of them enters; the answer
+/// does not depend on the order.
+#[inline(always)]
+fn closest_hits<S: Simd>(
+    simd: S,
+    bvh: &Bvh,
+    rays: &[Ray],
+    stream: &mut ClosestStream,
+    stack: &mut [StreamEntry; STACK],
+) {
+    let ClosestStream { rays: prepared, limits, hits } = stream;
+    hits[..rays.len()].fill(None);
+    let (mut all, mut first) = (0, 0);
+    for (i, ray) in rays.iter().enumerate() {
+        if let Some(ray) = PreparedRay::new(ray, &bvh.bounds) {
+            (prepared[i], first) = (ray, i);
+            all |= 1 << i;
+        }
+        limits[i] = last_below(ray.t_max);
+    }
+    stack[0] = StreamEntry { child: Child::node(0), rays: all };
+    let mut len = usize::from(all != 0);
+    while len > 0 {
+        len -= 1;
+        let StreamEntry { child, rays } = stack[len];
+        if child.is_leaf() {
+            for i in lanes(rays) {
+                let hit = closest_in_block(simd, bvh, child, &prepared[i], limits[i], hits[i]);
+                if let Some(hit) = hit {
+                    limits[i] = hit.t;
+                    hits[i] = Some(hit);
+                }
+            }
+            continue;
+        }
+        let node = &bvh.nodes[child.index()];
+        let slabs = Slabs::load(simd, node, &prepared[first]);
+        let mut crossing = simd.empty();
+        let mut enter = simd.splat(0.0);
+        for i in lanes(rays) {
+            let (crossed, entered) = slabs.cross(simd, &prepared[i], limits[i]);
+            crossing = crossing.insert(crossed, 1 << i);
+            enter = entered;
+        }
+        let (sets, enter) = (crossing.store(), enter.store());
+        // The nearest child of the last ray on top.
+        let base = len;
+        let mut keys = [0.0; WIDTH];
+        for lane in lanes(crossing.not_empty()) {
+            let mut at = len;
+            while at > base && keys[at - 1 - base] < enter[lane] {
+                stack[at] = stack[at - 1];
+                keys[at - base] = keys[at - 1 - base];
+                at -= 1;
+            }
+            stack[at] = StreamEntry { child: node.children[lane], rays: sets[lane] };
+            keys[at - base] = enter[lane];
+            len += 1;
         }
     }
 }

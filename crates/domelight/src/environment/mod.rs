@@ -16,7 +16,7 @@ pub mod statistics;
 pub use compensation::CompensatedTable;
 
 use crate::math::{Mat3, PI, TAU, Vec2, Vec3, vec3};
-use crate::sampling::{HierarchicalTable, TableError};
+use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
 use crate::{Rgb, RgbImage};
 
 /// A world axis that points up; the top row of a map faces it.
@@ -46,7 +46,7 @@ impl UpAxis {
     }
 
     /// World to the map's own frame, where +Y is up.
-    fn to_map(self, w: Vec3) -> Vec3 {
+    pub(crate) fn to_map(self, w: Vec3) -> Vec3 {
         match self {
             Self::Y => w,
             Self::Z => vec3(w.x, w.z, -w.y),
@@ -54,7 +54,7 @@ impl UpAxis {
     }
 
     /// The map's own frame to the world.
-    fn to_world(self, m: Vec3) -> Vec3 {
+    pub(crate) fn to_world(self, m: Vec3) -> Vec3 {
         match self {
             Self::Y => m,
             Self::Z => vec3(m.x, -m.z, m.y),
@@ -321,6 +321,35 @@ impl Environment {
         self.grid.texel(self.orientation.up.to_map(wi))
     }
 
+    /// The direction of a place on the map, in texels from its upper left corner, in the map's own
+    /// frame: +Y up. Within a texel rows are equally spaced in cos θ, as solid angle is.
+    pub(crate) fn map_direction(&self, column: f64, row: f64) -> Vec3 {
+        self.grid.direction(column / self.grid.width as f64, self.cos_theta(row))
+    }
+
+    /// The polar cosine of a row of the map, in texels from the upper edge.
+    pub(crate) fn cos_theta(&self, row: f64) -> f64 {
+        let edges = &self.grid.cos_edges;
+        let texel = (row as usize).min(self.grid.height - 1);
+        edges[texel] + (row - texel as f64) * (edges[texel + 1] - edges[texel])
+    }
+
+    /// The column and the row that `wi` looks at, and the radiance there.
+    pub(crate) fn look_up(&self, wi: Vec3) -> (usize, usize, Rgb) {
+        let Texel { column, row } = self.texel(wi);
+        (column, row, self.map.get(column, row))
+    }
+
+    /// Where in its texel `wi` looks, in [0, 1)²: linear in φ and cos θ.
+    pub(crate) fn inside(&self, wi: Vec3) -> Vec2 {
+        let wi = self.orientation.up.to_map(wi);
+        let Texel { column, row } = self.grid.texel(wi);
+        let x = self.grid.uv(wi).x * self.grid.width as f32 - column as f32;
+        let (top, bottom) = (self.grid.cos_edges[row], self.grid.cos_edges[row + 1]);
+        let y = ((top - f64::from(wi.y)) / (top - bottom)) as f32;
+        Vec2::new(x, y).clamp(Vec2::ZERO, Vec2::splat(ONE_MINUS_EPSILON))
+    }
+
     /// The direction of a point of the map, `uv` in [0, 1]² with (0, 0) the corner of the first texel.
     pub fn direction(&self, uv: Vec2) -> Vec3 {
         let (x, y) = (f64::from(uv.x), f64::from(uv.y));
@@ -424,7 +453,7 @@ impl Grid {
 mod tests {
     use super::*;
     use crate::math::vec2;
-    use crate::sampling::{ONE_MINUS_EPSILON, Pcg32};
+    use crate::sampling::Pcg32;
 
     fn noise(width: usize, height: usize, seed: u64) -> RgbImage {
         let mut pcg = Pcg32::new(seed, 0);

@@ -6,10 +6,11 @@ use rayon::prelude::*;
 
 use super::film::{Film, Misfit, PixelSums};
 use super::filter::FilterSampler;
-use super::tile::{Counts, Scratch, Tile};
+use super::tile::{Counts, Pass, Scratch, Tile};
 use super::tiling::{Tiling, Window};
 use super::{Frame, Observer, RenderSettings, Rendering};
 use crate::environment::Environment;
+use crate::sampling::Stream;
 use crate::scene::{Camera, Scene};
 use crate::strategy::Strategy;
 
@@ -89,18 +90,20 @@ impl<'a, S: Strategy> Session<'a, S> {
             }
             let Self { frame, strategy, tiling, tiles, .. } = self;
             let n_samples = frame.settings.n_samples;
-            let samples = tiling.pass(start, n_samples - start, strategy.n_rays());
+            let samples = tiling.pass(*strategy, start, n_samples - start);
             observer.pass_started(samples.clone());
+            let stream = Stream::of_pass(frame.settings.sampler, frame.settings.seed, start);
+            let pass = Pass { samples, shared: strategy.begin_pass(stream) };
             let behind =
                 |tile: &Tile| tile.n_samples() == start && !tile.is_finished(frame.settings);
             let complete = tiles
                 .par_iter_mut()
                 .filter(|(tile, _)| behind(tile))
-                .map_init(Scratch::default, |scratch, (tile, learned)| {
+                .map_init(Scratch::<S>::default, |scratch, (tile, learned)| {
                     if observer.cancelled() {
                         return false;
                     }
-                    let counts = tile.render(frame, *strategy, learned, samples.clone(), scratch);
+                    let counts = tile.render(frame, *strategy, &pass, learned, scratch);
                     observer.tile_finished(&counts);
                     true
                 })

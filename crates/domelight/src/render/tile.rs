@@ -52,19 +52,54 @@ impl std::ops::AddAssign for Counts {
     }
 }
 
-/// Memory that a thread keeps from tile to tile.
+/// Memory that a thread keeps from tile to tile, and the strategy's.
+pub(super) struct Scratch<S: Strategy> {
+    batch: Batch,
+    of_strategy: S::Scratch,
+}
+
+impl<S: Strategy> Default for Scratch<S> {
+    fn default() -> Self {
+        Self { batch: Batch::default(), of_strategy: S::Scratch::default() }
+    }
+}
+
+/// A pass over the picture.
+pub(super) struct Pass<S: Strategy> {
+    /// Its camera samples of each pixel.
+    pub(super) samples: std::ops::Range<u32>,
+    pub(super) shared: S::Pass,
+}
+
+/// A strategy and all that it is given at a tile.
+struct Lesson<'a, S: Strategy> {
+    strategy: &'a S,
+    pass: &'a S::Pass,
+    learned: &'a mut S::Learned,
+    scratch: &'a mut S::Scratch,
+}
+
+/// One pass over a tile.
 #[derive(Default)]
-pub(super) struct Scratch {
+struct Batch {
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
     points: Vec<ShadingPoint>,
     samples: Vec<u32>,
     pixels: Vec<PixelPoints>,
-    contributions: Contributions,
-    shadow_rays: RayBatch,
-    occluded: Vec<bool>,
+    /// Of each point, moved off the surface to the viewer's side.
+    origins: Vec<Vec3>,
+    round: ShadowRays,
     radiance: Vec<Rgb>,
     unoccluded: Vec<Rgb>,
+}
+
+/// The shadow rays of a round.
+#[derive(Default)]
+struct ShadowRays {
+    asked: Contributions,
+    traced: RayBatch,
+    free: Vec<bool>,
 }
 
 impl Tile {
@@ -97,19 +132,21 @@ impl Tile {
         &mut self,
         frame: &Frame,
         strategy: &S,
+        pass: &Pass<S>,
         learned: &mut S::Learned,
-        samples: std::ops::Range<u32>,
-        scratch: &mut Scratch,
+        scratch: &mut Scratch<S>,
     ) -> Counts {
-        self.trace_camera_rays(frame, &samples, scratch);
-        scratch.gather_points(frame, samples.len());
+        let Scratch { batch, of_strategy } = scratch;
+        self.trace_camera_rays(frame, &pass.samples, batch);
+        batch.gather_points(frame, pass.samples.len());
         let mut counts = Counts {
-            camera_rays: scratch.rays.len() as u64,
-            shading_points: scratch.points.len() as u64,
+            camera_rays: batch.rays.len() as u64,
+            shading_points: batch.points.len() as u64,
             ..Counts::default()
         };
-        counts.shadow_rays = scratch.trace_strategy(frame, strategy, learned, self.window.width);
-        counts.non_finite = self.add_samples(frame, scratch);
+        let lesson = Lesson { strategy, pass: &pass.shared, learned, scratch: of_strategy };
+        counts.shadow_rays = batch.trace_strategy(frame, lesson, self.window.width);
+        counts.non_finite = self.add_samples(frame, batch);
         self.counts += counts;
         counts
     }
@@ -118,7 +155,7 @@ impl Tile {
         &self,
         frame: &Frame,
         samples: &std::ops::Range<u32>,
-        scratch: &mut Scratch,
+        scratch: &mut Batch,
     ) {
         scratch.rays.clear();
         scratch.pixels.clear();
@@ -141,7 +178,7 @@ impl Tile {
     }
 
     /// Adds each camera sample to its pixel, in order.
-    fn add_samples(&mut self, frame: &Frame, scratch: &Scratch) -> u64 {
+    fn add_samples(&mut self, frame: &Frame, scratch: &Batch) -> u64 {
         let mut non_finite = 0;
         let mut point = 0;
         let mut ray = 0;
@@ -172,18 +209,21 @@ fn background_sample(frame: &Frame, direction: Vec3) -> CameraSample {
     }
 }
 
-impl Scratch {
+impl Batch {
     /// Turns hits into shading points, grouped by pixel.
     fn gather_points(&mut self, frame: &Frame, n_samples: usize) {
         let first_sample = self.samples.first().copied().unwrap_or(0);
         self.points.clear();
+        self.origins.clear();
         self.samples.clear();
         for (i, pixel) in self.pixels.iter_mut().enumerate() {
             let start = self.points.len();
             for s in 0..n_samples {
                 let ray = i * n_samples + s;
                 if let Some(hit) = &self.hits[ray] {
-                    self.points.push(frame.scene.shading_point(&self.rays[ray], hit));
+                    let point = frame.scene.shading_point(&self.rays[ray], hit);
+                    self.origins.push(offset_origin(point.position, point.ng, frame.extent));
+                    self.points.push(point);
                     self.samples.push(first_sample + s as u32);
                 }
             }
@@ -195,10 +235,10 @@ impl Scratch {
     fn trace_strategy<S: Strategy>(
         &mut self,
         frame: &Frame,
-        strategy: &S,
-        learned: &mut S::Learned,
+        lesson: Lesson<S>,
         width: usize,
     ) -> u64 {
+        let Lesson { strategy, pass, learned, scratch } = lesson;
         let n = self.points.len();
         self.radiance.clear();
         self.radiance.resize(n, Rgb::BLACK);
@@ -212,36 +252,28 @@ impl Scratch {
                 pixels: &self.pixels,
                 width,
             };
-            self.contributions.reset(n);
-            let more = strategy.push(&tile, learned, round, &mut self.contributions);
-            n_rays += self.contributions.len() as u64;
+            self.round.asked.reset(n);
+            let more = strategy.push(pass, &tile, round, learned, scratch, &mut self.round.asked);
+            n_rays += self.round.asked.len() as u64;
 
-            // Test the visibility of the whole round at once.
-            self.shadow_rays.clear();
-            for (&wi, &point) in self.contributions.wi.iter().zip(&self.contributions.point) {
-                let p = &self.points[point as usize];
-                let side = if p.ng.dot(wi) < 0.0 { -p.ng } else { p.ng };
-                self.shadow_rays.push(offset_origin(p.position, side, frame.extent), wi);
-            }
-            Visibility::occluded(frame.scene.bvh(), &self.shadow_rays, &mut self.occluded);
+            self.round.trace(frame, &self.points, &self.origins);
 
             // base + Σ weight · V
-            for (i, &base) in self.contributions.base.iter().enumerate() {
+            for (i, &base) in self.round.asked.base.iter().enumerate() {
                 self.radiance[i] += base;
                 self.unoccluded[i] += base;
             }
-            let pairs = self.contributions.point.iter().zip(&self.contributions.weight);
-            for ((&point, &weight), &occluded) in pairs.zip(&self.occluded) {
+            let pairs = self.round.asked.point.iter().zip(&self.round.asked.weight);
+            for ((&point, &weight), &free) in pairs.zip(&self.round.free) {
                 self.unoccluded[point as usize] += weight;
-                if !occluded {
+                if free {
                     self.radiance[point as usize] += weight;
                 }
             }
+            strategy.learn(&tile, &self.round.asked, &self.round.free, scratch, learned);
             if more == Round::Done {
                 break;
             }
-            self.occluded.iter_mut().for_each(|o| *o = !*o);
-            strategy.learn(&tile, &self.contributions, &self.occluded, learned);
         }
         n_rays
     }
@@ -258,5 +290,24 @@ impl Scratch {
                 depth: frame.camera.depth(ray.at(hit.t)),
             }),
         }
+    }
+}
+
+impl ShadowRays {
+    /// Tests the visibility of all rays asked for at once.
+    fn trace(&mut self, frame: &Frame, points: &[ShadingPoint], origins: &[Vec3]) {
+        self.traced.clear();
+        for (&wi, &point) in self.asked.wi.iter().zip(&self.asked.point) {
+            let p = &points[point as usize];
+            let behind = p.ng.dot(wi) < 0.0;
+            let origin = if behind {
+                offset_origin(p.position, -p.ng, frame.extent)
+            } else {
+                origins[point as usize]
+            };
+            self.traced.push(origin, wi);
+        }
+        Visibility::occluded(frame.scene.bvh(), &self.traced, &mut self.free);
+        self.free.iter_mut().for_each(|answer| *answer = !*answer);
     }
 }

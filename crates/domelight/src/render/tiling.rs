@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::Range;
 
 use super::RenderSettings;
+use crate::strategy::Strategy;
 
 /// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,12 +110,14 @@ impl Tiling {
         }
     }
 
-    /// Camera samples of the pass that begins at sample `start`: as many as went before, up to as many
-    /// as keep a tile's rays in the caches, and no more than `left`.
-    pub(super) fn pass(&self, start: u32, left: u32, n_rays: u32) -> Range<u32> {
-        let pixels = self.size * self.size;
-        let most = (RAYS_PER_TILE / (pixels * n_rays.max(1) as usize)).clamp(1, 64) as u32;
-        start..start + start.clamp(1, most).min(left)
+    /// Camera samples of the pass that begins at sample `start`: as many as the strategy says, or as went
+    /// before, up to as many as keep a tile's rays in the caches; no more than `left`.
+    pub(super) fn pass(&self, strategy: &impl Strategy, start: u32, left: u32) -> Range<u32> {
+        let count = strategy.samples_per_pass().unwrap_or_else(|| {
+            let rays = self.size * self.size * strategy.n_rays().max(1) as usize;
+            start.clamp(1, (RAYS_PER_TILE / rays).clamp(1, 64) as u32)
+        });
+        start..start + count.clamp(1, left.max(1))
     }
 
     fn across(&self) -> usize {
@@ -125,6 +128,9 @@ impl Tiling {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Rgb;
+    use crate::environment::Environment;
+    use crate::strategy::{BrdfSampling, ProductSampling};
 
     fn tiling(width: usize, height: usize, tile_size: usize) -> Tiling {
         Tiling::new(&RenderSettings { width, height, tile_size, ..Default::default() }, 1)
@@ -164,18 +170,25 @@ mod tests {
 
     #[test]
     fn passes_cover_every_sample_once() {
+        let environment = Environment::constant(Rgb::WHITE).expect("a light");
+        let environment = &environment;
+        let tiling = tiling(64, 64, 16);
         for n_samples in [1, 2, 3, 7, 64, 1000] {
-            for n_rays in [0, 1, 2, 15, 1000] {
-                let tiling = tiling(64, 64, 16);
-                let mut next = 0;
-                while next < n_samples {
-                    let pass = tiling.pass(next, n_samples - next, n_rays);
-                    assert_eq!(pass.start, next);
-                    assert!(pass.end > pass.start);
-                    next = pass.end;
-                }
-                assert_eq!(next, n_samples);
+            for n in [1, 2, 15, 1000] {
+                cover(&tiling, &BrdfSampling { environment, n_samples: n }, n_samples);
+                cover(&tiling, &ProductSampling::new(environment, n), n_samples);
             }
         }
+    }
+
+    fn cover(tiling: &Tiling, strategy: &impl Strategy, n_samples: u32) {
+        let mut next = 0;
+        while next < n_samples {
+            let pass = tiling.pass(strategy, next, n_samples - next);
+            assert_eq!(pass.start, next);
+            assert!(pass.end > pass.start);
+            next = pass.end;
+        }
+        assert_eq!(next, n_samples);
     }
 }

@@ -78,6 +78,22 @@ impl HierarchicalTable {
         self.total
     }
 
+    /// How many levels of halving lead from the whole to a cell: the square of 2^`depth` cells at the
+    /// upper left holds all.
+    pub fn depth(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// The weights of the quarters of a square of 2^`size` cells, by row: upper left, upper right,
+    /// lower left, lower right. `column` and `row` count such squares.
+    ///
+    /// # Panics
+    /// If `size` is not in 1..=[`HierarchicalTable::depth`], or the square lies beyond the table.
+    pub fn quarters(&self, size: usize, column: usize, row: usize) -> [f32; 4] {
+        let level = &self.levels[size - 1];
+        level.quads[row * level.width + column]
+    }
+
     /// Probability of a cell.
     ///
     /// # Panics

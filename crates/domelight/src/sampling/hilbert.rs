@@ -37,6 +37,30 @@ const fn steps() -> [u8; 64] {
     steps
 }
 
+/// Which of its four turns the curve takes through a square.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Turn {
+    swap: bool,
+    reverse: bool,
+}
+
+impl Turn {
+    /// The turn that visits the quadrants (0, 0), (1, 0), (1, 1), (0, 1); the default one visits
+    /// (0, 0), (0, 1), (1, 1), (1, 0).
+    pub const SWAPPED: Self = Self { swap: true, reverse: false };
+
+    /// The quadrant (x, y) that is visited as number `i` of four, and the curve's turn there.
+    ///
+    /// # Panics
+    /// If `i` exceeds 3.
+    pub fn quadrant(self, i: usize) -> (usize, usize, Self) {
+        let (x, y) = [(false, false), (false, true), (true, true), (true, false)][i];
+        let inner = Self { swap: self.swap ^ !y, reverse: self.reverse ^ (!y & x) };
+        let (x, y) = if self.swap { (y, x) } else { (x, y) };
+        (usize::from(x ^ self.reverse), usize::from(y ^ self.reverse), inner)
+    }
+}
+
 /// Where along the curve the cell (`x`, `y`) of a square of 4096² cells lies, from 0 to 4096² − 1.
 pub fn index(x: u32, y: u32) -> u32 {
     let (mut turn, mut index) = (0, 0);
@@ -81,6 +105,19 @@ mod tests {
         for pair in cells.windows(2) {
             let [a, b] = [pair[0], pair[1]].map(|c| ((c & 0xffff) as i32, (c >> 16) as i32));
             assert_eq!((a.0 - b.0).abs() + (a.1 - b.1).abs(), 1, "{a:?} {b:?}");
+        }
+    }
+
+    /// Descending by quadrants follows the same curve.
+    #[test]
+    fn quadrants_follow_the_curve() {
+        for expected in [0, 1, 77, 0x00ab_cdef, (1 << 24) - 1] {
+            let (mut x, mut y, mut turn) = (0, 0, Turn::default());
+            for level in (0..BITS).rev() {
+                let (dx, dy, inner) = turn.quadrant((expected >> (2 * level) & 3) as usize);
+                (x, y, turn) = (2 * x + dx as u32, 2 * y + dy as u32, inner);
+            }
+            assert_eq!(index(x, y), expected);
         }
     }
 

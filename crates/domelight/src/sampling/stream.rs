@@ -31,6 +31,8 @@ pub enum Dimension {
     Resampling = 3,
     /// Sequences without a fixed length, see [`Stream::generator`].
     Sequence = 4,
+    /// Streams within a stream, see [`Stream::part`].
+    Part = 5,
 }
 
 /// Four uniform numbers of one index of one dimension.
@@ -65,6 +67,19 @@ impl Stream {
     /// The stream of a pixel under a seed.
     pub fn new(kind: SamplerKind, seed: u64, pixel: u64) -> Self {
         Self { kind, key: hash2(seed, pixel) }
+    }
+
+    /// The stream of what all pixels share in the pass that begins with camera sample `first`.
+    pub fn of_pass(kind: SamplerKind, seed: u64, first: u32) -> Self {
+        // No pixel has this number.
+        Self::new(kind, seed, u64::MAX).part(first)
+    }
+
+    /// Stream `index` within this one, independent of it and of the others.
+    #[must_use]
+    pub fn part(&self, index: u32) -> Self {
+        let key = hash2(hash2(self.key, Dimension::Part as u64), u64::from(index));
+        Self { kind: self.kind, key }
     }
 
     /// Point `index` of the set `dimension`, each number in [0, 1).

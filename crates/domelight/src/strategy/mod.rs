@@ -17,6 +17,7 @@ mod brdf;
 mod environment;
 mod light_set;
 mod mis;
+pub mod product;
 mod rejection;
 mod sir;
 
@@ -24,6 +25,7 @@ pub use brdf::BrdfSampling;
 pub use environment::EnvironmentSampling;
 pub use light_set::LightSet;
 pub use mis::{CompensationNeedsBrdf, LightTable, MultipleImportanceSampling};
+pub use product::ProductSampling;
 pub use rejection::{
     Proposal, RejectionError, RejectionSampling, RejectionScratch, RejectionStatistics, Stop,
 };
@@ -32,7 +34,7 @@ pub use sir::{
 };
 
 use crate::Rgb;
-use crate::bsdf::{Brdf, Material};
+use crate::bsdf::{Brdf, LANES, Material, ValueBlock, VecBlock};
 use crate::math::{Frame, Vec2, Vec3};
 use crate::sampling::stream::Numbers;
 use crate::sampling::{Dimension, Pcg32, Stream};
@@ -69,6 +71,23 @@ impl ShadingPoint {
             return (Rgb::BLACK, 0.0);
         }
         self.material.eval_pdf(self.wo, self.frame.to_local(wi))
+    }
+
+    /// [`ShadingPoint::eval_pdf`] of a block of world directions.
+    #[inline(always)]
+    pub fn eval_pdf_block(&self, wi: &VecBlock) -> ValueBlock {
+        let Frame { x, y, z } = self.frame;
+        let local = VecBlock { x: wi.dot(x), y: wi.dot(y), z: wi.dot(z) };
+        let mut block = self.material.eval_pdf_block(self.wo, &local);
+        let above = wi.dot(self.ng);
+        for lane in 0..LANES {
+            let keep = above[lane] > 0.0;
+            for channel in &mut block.value {
+                channel[lane] = if keep { channel[lane] } else { 0.0 };
+            }
+            block.pdf[lane] = if keep { block.pdf[lane] } else { 0.0 };
+        }
+        block
     }
 
     /// Draws a world direction from the material; none is a sample of value zero.
@@ -211,19 +230,35 @@ pub enum Round {
 /// A strategy that looks at a tile at a time, in rounds. Every [`PointStrategy`] is one: it needs a
 /// single round and learns nothing.
 pub trait Strategy: Sync {
+    /// What all tiles of a pass share.
+    type Pass: Sync;
     /// What the rounds of a tile teach, kept from pass to pass.
     type Learned: Default + Send;
+    /// Memory that a thread keeps from tile to tile; from one round to its lesson it may carry what
+    /// was asked for.
+    type Scratch: Default;
 
     /// Shadow rays asked for at each point at the most: for sizing batches.
     fn n_rays(&self) -> u32;
+
+    /// Camera samples of each pixel that a pass should have, for strategies that place the rays of
+    /// all of them together; `None` where it does not matter.
+    fn samples_per_pass(&self) -> Option<u32> {
+        None
+    }
+
+    /// Prepares a pass; `stream` is its own, independent of those of pixels and other passes.
+    fn begin_pass(&self, stream: Stream) -> Self::Pass;
 
     /// Asks for the shadow rays of a round; `out` comes reset. A point's `base` and rays of all
     /// rounds add up.
     fn push(
         &self,
+        pass: &Self::Pass,
         tile: &TileShading,
-        learned: &Self::Learned,
         round: u32,
+        learned: &Self::Learned,
+        scratch: &mut Self::Scratch,
         out: &mut Contributions,
     ) -> Round;
 
@@ -233,25 +268,37 @@ pub trait Strategy: Sync {
         _tile: &TileShading,
         _pushed: &Contributions,
         _free: &[bool],
+        _scratch: &mut Self::Scratch,
         _learned: &mut Self::Learned,
     ) {
     }
 }
 
 impl<S: PointStrategy> Strategy for S {
+    type Pass = ();
     type Learned = ();
+    type Scratch = S::Scratch;
 
     fn n_rays(&self) -> u32 {
         PointStrategy::n_rays(self)
     }
 
-    fn push(&self, tile: &TileShading, (): &(), _round: u32, out: &mut Contributions) -> Round {
-        let mut scratch = S::Scratch::default();
+    fn begin_pass(&self, _: Stream) {}
+
+    fn push(
+        &self,
+        (): &(),
+        tile: &TileShading,
+        _round: u32,
+        (): &(),
+        scratch: &mut S::Scratch,
+        out: &mut Contributions,
+    ) -> Round {
         for pixel in tile.pixels {
             for i in pixel.points.clone() {
                 let numbers = SampleNumbers { stream: pixel.stream, sample: tile.samples[i] };
                 let push = |wi, weight| out.push(i as u32, wi, weight);
-                self.sample(&tile.points[i], numbers, &mut scratch, push);
+                self.sample(&tile.points[i], numbers, scratch, push);
             }
         }
         Round::Done

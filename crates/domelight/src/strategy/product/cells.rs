@@ -1,0 +1,499 @@
+//! Light cells: the map cut into some hundred squares, in the order of a space-filling curve.
+//!
+//! A cell is a node of the environment's own pyramid of weights, or a part of a texel, which is
+//! constant. Cells follow each other along Hilbert's curve, so that a running sum over them is a
+//! one-dimensional distribution whose strata are compact regions of the sky, and a choice that is
+//! spread evenly over it is spread evenly over the sky.
+//!
+//! Cells are split where their light spreads most: the cell of the greatest
+//!
+//! ```text
+//! (W − |R|²/W)/W₀ + 0.02 (W/W₀) s + 10⁻⁴ a s        + 10³ s if s > 0.08
+//! ```
+//!
+//! first, with W = ∫ L dω and R = ∫ L ω dω over the cell, W₀ = W of the whole map, a its solid angle
+//! and s = 1 − |∫ ω dω|/a, half the square of its angular radius. The first term is the variance of
+//! directions of Viriyothai & Debevec 2009 on the sphere; the others keep dim cells small enough for
+//! a cosine and a lobe to be looked up at their centres.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+use std::f64::consts::{PI, TAU};
+
+use crate::Rgb;
+use crate::environment::Environment;
+use crate::math::Vec3;
+use crate::sampling::hilbert::Turn;
+
+/// Cells side by side in a vector: the lanes of a running sum.
+pub(super) const LANES: usize = 8;
+/// Cells of each lane: an eighth of the curve.
+pub(super) const ROWS: usize = 48;
+/// The most cells.
+pub(super) const MAX_CELLS: usize = LANES * ROWS;
+
+/// One number a cell, at [`slot`].
+pub(super) type Slots = [f32; MAX_CELLS];
+
+/// Where a cell's number is: lane l has the l-th eighth of the curve, row by row, so that one running
+/// sum a lane and one over the lanes make the sum along the curve.
+pub(super) fn slot(cell: usize) -> usize {
+    cell % ROWS * LANES + cell / ROWS
+}
+
+/// Texels are cut no finer than into squares of 2⁻⁸ of their side.
+const FINEST: i32 = -8;
+
+/// A square of the map.
+#[derive(Clone, Copy, Debug)]
+struct Square {
+    /// Its side is 2^`size` texels.
+    size: i32,
+    /// Counted in such squares.
+    column: u32,
+    row: u32,
+    turn: Turn,
+    /// ∫ luminance dω.
+    mass: f32,
+}
+
+/// What a link of the tree leads to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Link {
+    /// Nothing: no light.
+    Dark,
+    Cell(u16),
+    Split(u16),
+}
+
+/// The cells of an environment.
+#[derive(Clone, Debug)]
+pub(super) struct Cells {
+    /// Along the curve.
+    squares: Vec<Square>,
+    /// The four quarters of each square that was split, by row; the first is the whole.
+    links: Vec<[Link; 4]>,
+    /// Unit direction of the light's mean, in the world.
+    pub(super) center: [Box<Slots>; 3],
+    /// Square of the angular radius.
+    pub(super) radius2: Box<Slots>,
+    /// No direction of the cell is further from its centre than this \[rad\].
+    pub(super) reach: Box<Slots>,
+    /// ∫ luminance dω; 0 where there is no cell.
+    pub(super) mass: Box<Slots>,
+}
+
+impl Cells {
+    /// Cuts an environment; none of a black one.
+    pub(super) fn new(environment: &Environment) -> Option<Self> {
+        let map = Map { environment };
+        let tree = Tree::grow(&map, map.root()?);
+        let zeros = || Box::new([0.0; MAX_CELLS]);
+        let mut cells = Self {
+            squares: Vec::new(),
+            links: vec![[Link::Dark; 4]; tree.links.len()],
+            center: [zeros(), zeros(), zeros()],
+            radius2: zeros(),
+            reach: zeros(),
+            mass: zeros(),
+        };
+        cells.number(&tree, 0, &tree.nodes[0]);
+        for cell in 0..cells.squares.len() {
+            let square = cells.squares[cell];
+            let (center, radius, reach) = map.extent(&square);
+            let at = slot(cell);
+            for (c, x) in cells.center.iter_mut().zip(center.to_array()) {
+                c[at] = x;
+            }
+            cells.radius2[at] = radius * radius;
+            cells.reach[at] = reach;
+            cells.mass[at] = square.mass;
+        }
+        Some(cells)
+    }
+
+    /// Numbers the leaves below split `split` along the curve.
+    fn number(&mut self, tree: &Tree, split: usize, node: &Node) {
+        let children = tree.links[split];
+        for i in 0..4 {
+            let (x, y, _) = node.square.turn.quadrant(i);
+            let Some(child) = children[2 * y + x] else { continue };
+            let child = &tree.nodes[child];
+            self.links[split][2 * y + x] = match child.split {
+                Some(below) => {
+                    self.number(tree, below, child);
+                    Link::Split(below as u16)
+                }
+                None => {
+                    self.squares.push(child.square);
+                    Link::Cell(self.squares.len() as u16 - 1)
+                }
+            };
+        }
+    }
+
+    /// How many.
+    pub(super) fn len(&self) -> usize {
+        self.squares.len()
+    }
+
+    /// ∫ luminance dω over a cell.
+    pub(super) fn mass_of(&self, cell: usize) -> f32 {
+        self.mass[slot(cell)]
+    }
+
+    /// The cell that `wi` looks at and the radiance from there; none where there is no light.
+    pub(super) fn find(&self, environment: &Environment, wi: Vec3) -> Option<(usize, Rgb)> {
+        let (column, row, le) = environment.look_up(wi);
+        let mut bit = environment.table()?.depth();
+        let mut links = &self.links[0];
+        while bit > 0 {
+            bit -= 1;
+            match links[(row >> bit & 1) << 1 | column >> bit & 1] {
+                Link::Dark => return None,
+                Link::Cell(cell) => return Some((usize::from(cell), le)),
+                Link::Split(below) => links = &self.links[usize::from(below)],
+            }
+        }
+        // Within the texel.
+        let mut at = environment.inside(wi);
+        loop {
+            at *= 2.0;
+            let (x, y) = (at.x as usize, at.y as usize);
+            at = at.fract();
+            match links[2 * y + x] {
+                Link::Dark => return None,
+                Link::Cell(cell) => return Some((usize::from(cell), le)),
+                Link::Split(below) => links = &self.links[usize::from(below)],
+            }
+        }
+    }
+
+    /// Draws a direction in a cell in proportion to luminance; neighbouring `u` in [0, 1) give
+    /// neighbours along the curve. `jitter` in [0, 1)² places it within what `u` resolves.
+    ///
+    /// Its density within the cell is the luminance of the radiance over the cell's mass \[sr⁻¹\].
+    pub(super) fn draw(
+        &self,
+        environment: &Environment,
+        cell: usize,
+        mut u: f64,
+        jitter: [f32; 2],
+    ) -> (Vec3, Rgb) {
+        /// Levels below a texel, or below a cell within one.
+        const BELOW: i32 = 3;
+        let map = Map { environment };
+        let mut square = self.squares[cell];
+        let last = square.size.min(0) - BELOW;
+        while square.size > last {
+            let quarters = map.quarters(&square);
+            let total: f64 = quarters.iter().map(|q| f64::from(q.mass)).sum();
+            let mut at = u * total;
+            // The last that has any mass ends the search whatever the rounding.
+            for quarter in quarters.into_iter().filter(|q| q.mass > 0.0) {
+                square = quarter;
+                let mass = f64::from(quarter.mass);
+                u = (at / mass).min(1.0 - f64::EPSILON);
+                if at < mass {
+                    break;
+                }
+                at -= mass;
+            }
+        }
+        let side = f64::from(square.size).exp2();
+        let column = (f64::from(square.column) + f64::from(jitter[0])) * side;
+        let row = (f64::from(square.row) + f64::from(jitter[1])) * side;
+        let wi = environment.orientation().up.to_world(environment.map_direction(column, row));
+        (wi, environment.map().get(column as usize, row as usize))
+    }
+}
+
+/// The squares of a map.
+struct Map<'a> {
+    environment: &'a Environment,
+}
+
+impl Map<'_> {
+    /// All of the map; none of a black one.
+    fn root(&self) -> Option<Square> {
+        let table = self.environment.table()?;
+        // A map of two to one is visited from its left to its right half.
+        let turn = Turn::SWAPPED;
+        let (size, mass) = (table.depth() as i32, table.total() as f32);
+        Some(Square { size, column: 0, row: 0, turn, mass })
+    }
+
+    /// Along the curve.
+    fn quarters(&self, square: &Square) -> [Square; 4] {
+        let &Square { size, column, row, turn, mass } = square;
+        let masses = match self.environment.table() {
+            Some(table) if size > 0 => table.quarters(size as usize, column as usize, row as usize),
+            _ => [0.25 * mass; 4],
+        };
+        std::array::from_fn(|i| {
+            let (x, y, turn) = turn.quadrant(i);
+            Square {
+                size: size - 1,
+                column: 2 * column + x as u32,
+                row: 2 * row + y as u32,
+                turn,
+                mass: masses[2 * y + x],
+            }
+        })
+    }
+
+    /// Its rectangle of the map, in texels: columns and rows, from and to.
+    fn rectangle(&self, square: &Square) -> [[f64; 2]; 2] {
+        let side = f64::from(square.size).exp2();
+        let span =
+            |i: u32, n: usize| [f64::from(i) * side, (f64::from(i + 1) * side).min(n as f64)];
+        let map = self.environment.map();
+        [span(square.column, map.width), span(square.row, map.height)]
+    }
+
+    /// The mean direction of its light in the map's frame, times the square's mass.
+    fn moment(&self, square: &Square, depth: u32) -> Vec3 {
+        if square.mass == 0.0 {
+            return Vec3::ZERO;
+        }
+        if depth == 0 {
+            let [[x0, x1], [y0, y1]] = self.rectangle(square);
+            return self.environment.map_direction(0.5 * (x0 + x1), 0.5 * (y0 + y1)) * square.mass;
+        }
+        self.quarters(square).iter().map(|q| self.moment(q, depth - 1)).sum()
+    }
+
+    /// Its solid angle, and 1 − |∫ ω dω| over it.
+    fn area(&self, square: &Square) -> (f64, f64) {
+        let [columns, rows] = self.rectangle(square);
+        let width = (columns[1] - columns[0]) * TAU / self.environment.map().width as f64;
+        let cos = rows.map(|row| self.environment.cos_theta(row).clamp(-1.0, 1.0));
+        let area = width * (cos[0] - cos[1]);
+        // ∫ sin² θ dθ and ∫ sin θ cos θ dθ
+        let across = |c: f64| 0.5 * (c.acos() - c * (1.0 - c * c).sqrt());
+        let along = |c: f64| -0.5 * c * c;
+        let horizontal = (across(cos[1]) - across(cos[0])) * 2.0 * (0.5 * width).sin();
+        let vertical = (along(cos[1]) - along(cos[0])) * width;
+        (area, 1.0 - (horizontal.hypot(vertical) / area).min(1.0))
+    }
+
+    fn priority(&self, square: &Square) -> f64 {
+        let mass = f64::from(square.mass);
+        let moment = f64::from(self.moment(square, 3).length());
+        let (area, spread) = self.area(square);
+        let total = self.environment.power();
+        let scatter = (mass - moment * moment / mass).max(0.0) / total;
+        let wide = if spread > 0.08 { 1e3 * spread } else { 0.0 };
+        scatter + (0.02 * mass / total + 1e-4 * area) * spread + wide
+    }
+
+    /// Centre, angular radius and reach of a cell.
+    fn extent(&self, square: &Square) -> (Vec3, f32, f32) {
+        let moment = self.moment(square, 3);
+        let [[x0, x1], [y0, y1]] = self.rectangle(square);
+        let middle = self.environment.map_direction(0.5 * (x0 + x1), 0.5 * (y0 + y1));
+        let center = moment.try_normalize().unwrap_or(middle);
+        let reach = self.farthest(square, center);
+        // The light's variance along one axis, and the half side of a square that has it.
+        let variance = 0.5 * (1.0 - (moment.length() / square.mass).min(1.0).powi(2));
+        let radius = (3.0 * variance).sqrt().max(0.5 * reach);
+        let up = self.environment.orientation().up;
+        // Directions are in single precision.
+        (up.to_world(center), radius, 1.001 * reach + 1e-4)
+    }
+
+    /// The angle from `center` to the farthest point of a square.
+    ///
+    /// Along a parallel it is at the column farthest from the centre's. Along that meridian the cosine
+    /// is A sin θ + B cos θ, which is least at an end, or where it has its one minimum.
+    fn farthest(&self, square: &Square, center: Vec3) -> f32 {
+        let [columns, rows] = self.rectangle(square);
+        let azimuth = |v: Vec3| f64::from(v.x).atan2(f64::from(-v.z));
+        let edge = self.environment.map_direction(columns[0], 0.5 * (rows[0] + rows[1]));
+        let first = wrapped(azimuth(edge) - azimuth(center));
+        let last = first + (columns[1] - columns[0]) * TAU / self.environment.map().width as f64;
+        let away = if last >= PI { PI } else { first.abs().max(last.abs()) };
+
+        let a = f64::from(center.x.hypot(center.z)) * away.cos();
+        let b = f64::from(center.y);
+        let thetas = rows.map(|row| self.environment.cos_theta(row).clamp(-1.0, 1.0).acos());
+        let cosine = |theta: f64| a * theta.sin() + b * theta.cos();
+        let lowest = a.atan2(b) + PI;
+        let inside = thetas[0] < lowest && lowest < thetas[1];
+        let least = cosine(thetas[0]).min(cosine(thetas[1]));
+        let least = if inside { -a.hypot(b) } else { least };
+        least.clamp(-1.0, 1.0).acos() as f32
+    }
+}
+
+/// An angle brought to [−π, π].
+fn wrapped(angle: f64) -> f64 {
+    angle - (angle / TAU).round() * TAU
+}
+
+/// The squares in the course of splitting.
+struct Tree {
+    nodes: Vec<Node>,
+    /// The children of each square that was split, by row; those without light are left out.
+    links: Vec<[Option<usize>; 4]>,
+}
+
+struct Node {
+    square: Square,
+    split: Option<usize>,
+}
+
+impl Tree {
+    fn grow(map: &Map, root: Square) -> Self {
+        let nodes = vec![Node { square: root, split: None }];
+        let mut tree = Self { nodes, links: Vec::new() };
+        let mut queue = BinaryHeap::from([Next { priority: f64::INFINITY, node: 0 }]);
+        let mut n_cells = 1;
+        while n_cells + 3 <= MAX_CELLS {
+            let Some(next) = queue.pop() else { break };
+            let square = tree.nodes[next.node].square;
+            tree.nodes[next.node].split = Some(tree.links.len());
+            let mut children = [None; 4];
+            for quarter in map.quarters(&square).into_iter().filter(|q| q.mass > 0.0) {
+                let node = tree.nodes.len();
+                children[(quarter.row % 2 * 2 + quarter.column % 2) as usize] = Some(node);
+                tree.nodes.push(Node { square: quarter, split: None });
+                if quarter.size > FINEST {
+                    queue.push(Next { priority: map.priority(&quarter), node });
+                }
+                n_cells += 1;
+            }
+            n_cells -= 1;
+            tree.links.push(children);
+        }
+        tree
+    }
+}
+
+/// A square waiting to be split; the earlier node first among equals.
+struct Next {
+    priority: f64,
+    node: usize,
+}
+
+impl Ord for Next {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.priority.total_cmp(&other.priority).then(other.node.cmp(&self.node))
+    }
+}
+
+impl PartialOrd for Next {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Next {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Next {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::RgbImage;
+    use crate::environment::builtin::BuiltinProbe;
+    use crate::environment::{Orientation, UpAxis};
+    use crate::sampling::Pcg32;
+
+    fn environments() -> Vec<(&'static str, Environment)> {
+        let orientation = Orientation { up: UpAxis::Z, rotation: 77.0 };
+        let make = |map| Environment::new(map, orientation, 1.0).unwrap();
+        let mut pcg = Pcg32::new(1, 2);
+        let noise =
+            RgbImage::from_fn(37, 13, |_, _| Rgb::splat((9.0 * pcg.next_f32()).exp() - 1.0));
+        let mut lit = RgbImage::filled(100, 50, Rgb::BLACK);
+        lit.pixels[1234] = Rgb::WHITE;
+        vec![
+            ("constant", Environment::constant(Rgb::WHITE).unwrap()),
+            ("sky", make(BuiltinProbe::Sky.image(64))),
+            ("noise", make(noise)),
+            ("one lit texel", make(lit)),
+        ]
+    }
+
+    #[test]
+    fn black_has_no_cells() {
+        assert!(Cells::new(&Environment::constant(Rgb::BLACK).unwrap()).is_none());
+    }
+
+    /// The masses add up to the whole, and each is the light that a direction finds in it.
+    #[test]
+    fn cells_partition_the_light() {
+        for (name, environment) in environments() {
+            let cells = Cells::new(&environment).unwrap();
+            assert!((100..=MAX_CELLS).contains(&cells.len()), "{name}: {}", cells.len());
+            let total: f64 = cells.mass.iter().map(|&m| f64::from(m)).sum();
+            assert!((total / environment.power() - 1.0).abs() < 1e-5, "{name}");
+
+            // Sum over a grid of equal steps in φ and cos θ that is finer than any cell.
+            let map = environment.map();
+            let finest = cells.squares.iter().map(|s| s.size).min().unwrap();
+            let n = 2 << (-finest).max(0);
+            let mut found = vec![0.0; cells.len()];
+            for (i, texel) in map.pixels.iter().enumerate().filter(|(_, t)| !t.is_black()) {
+                let (row, column) = (i / map.width, i % map.width);
+                let solid_angle = environment.texel_solid_angle(row) / f64::from(n * n);
+                for (x, y) in (0..n).flat_map(|x| (0..n).map(move |y| (x, y))) {
+                    let at = |i: usize, x: i32| i as f64 + (f64::from(x) + 0.5) / f64::from(n);
+                    let wi = environment.map_direction(at(column, x), at(row, y));
+                    let wi = environment.orientation().up.to_world(wi);
+                    let (cell, le) = cells.find(&environment, wi).unwrap();
+                    assert_eq!(le, *texel, "{name}");
+                    found[cell] += f64::from(le.luminance()) * solid_angle;
+                    // No direction lies further from the centre than the reach.
+                    let center = Vec3::from(cells.center.each_ref().map(|c| c[slot(cell)]));
+                    assert!(center.angle_between(wi) <= cells.reach[slot(cell)], "{name} {cell}");
+                }
+            }
+            for (cell, found) in found.into_iter().enumerate() {
+                let mass = f64::from(cells.mass_of(cell));
+                assert!((found / mass - 1.0).abs() < 1e-4, "{name} {cell}: {found} {mass}");
+            }
+        }
+    }
+
+    /// What is drawn lies in its cell, follows the light, and keeps the order of the numbers.
+    #[test]
+    fn directions_are_drawn_by_luminance_along_the_curve() {
+        let mut pcg = Pcg32::new(5, 6);
+        for (name, environment) in environments() {
+            let cells = Cells::new(&environment).unwrap();
+            for cell in (0..cells.len()).step_by(17) {
+                let n = 256;
+                let mut steps = 0.0;
+                let mut last: Option<Vec3> = None;
+                for i in 0..n {
+                    let u = (f64::from(i) + f64::from(pcg.next_f32())) / f64::from(n);
+                    let jitter = [pcg.next_f32(), pcg.next_f32()];
+                    let (wi, le) = cells.draw(&environment, cell, u, jitter);
+                    assert!(le.luminance() > 0.0);
+                    // A direction that rounding took over an edge is in the cell a little further in.
+                    let map = Map { environment: &environment };
+                    let [[x0, x1], [y0, y1]] = map.rectangle(&cells.squares[cell]);
+                    let middle = environment.map_direction(0.5 * (x0 + x1), 0.5 * (y0 + y1));
+                    let middle = environment.orientation().up.to_world(middle);
+                    let is_here = |wi| cells.find(&environment, wi) == Some((cell, le));
+                    let inward = wi.lerp(middle, 1e-3).normalize();
+                    assert!(is_here(wi) || is_here(inward), "{name} {cell}");
+                    steps += last.map_or(0.0, |l| l.angle_between(wi));
+                    last = Some(wi);
+                }
+                // A curve through n points of a square is some √n sides long.
+                let reach = cells.reach[slot(cell)];
+                assert!(
+                    steps < 6.0 * f32::sqrt(n as f32) * reach,
+                    "{name} {cell}: {steps} {reach}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! The camera hits of a pixel in groups that look alike: one table serves a group.
+
+use super::super::ShadingPoint;
+use crate::bsdf::{Gloss, Outline};
+use crate::math::{Frame, Vec3};
+
+/// Hits of like normals and materials.
+#[derive(Clone, Debug)]
+pub(super) struct Group {
+    /// About the mean normal, with the tangent of the first hit.
+    pub(super) frame: Frame,
+    /// The mean direction to the viewer, in that frame.
+    pub(super) wo: Vec3,
+    /// No normal of the group is further from the mean than this \[rad\].
+    pub(super) spread: f32,
+    /// The material of the first hit.
+    pub(super) outline: Outline,
+    /// The share of the pixel's hits.
+    pub(super) share: f32,
+}
+
+/// Hits of a group have normals within 18° of the first one's.
+const LIKE_NORMALS: f32 = 0.95;
+/// The roughnesses of a group are within this factor of the first one's.
+const LIKE_ROUGHNESS: f32 = 1.5;
+
+/// A group in the making.
+#[derive(Clone, Debug)]
+struct Gathering {
+    first: usize,
+    outline: Outline,
+    normals: Vec3,
+    viewers: Vec3,
+    n: usize,
+}
+
+/// Memory for grouping.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Groups {
+    gatherings: Vec<Gathering>,
+    member: Vec<usize>,
+    pub(super) groups: Vec<Group>,
+}
+
+impl Groups {
+    /// Groups the hits of a pixel.
+    pub(super) fn gather(&mut self, points: &[ShadingPoint]) {
+        self.gatherings.clear();
+        self.member.clear();
+        let mut outline = Outline::default();
+        for (i, p) in points.iter().enumerate() {
+            if i == 0 || p.material != points[i - 1].material {
+                outline = p.material.outline(p.wo);
+            }
+            let like = |g: &Gathering| {
+                points[g.first].frame.z.dot(p.frame.z) > LIKE_NORMALS && alike(&g.outline, &outline)
+            };
+            let group = self.gatherings.iter().position(like).unwrap_or_else(|| {
+                let (normals, viewers) = (Vec3::ZERO, Vec3::ZERO);
+                self.gatherings.push(Gathering { first: i, outline, normals, viewers, n: 0 });
+                self.gatherings.len() - 1
+            });
+            let gathering = &mut self.gatherings[group];
+            gathering.normals += p.frame.z;
+            gathering.viewers += p.frame.to_world(p.wo);
+            gathering.n += 1;
+            self.member.push(group);
+        }
+        self.groups.clear();
+        for g in &self.gatherings {
+            let first = &points[g.first].frame;
+            let normal = g.normals.try_normalize().unwrap_or(first.z);
+            let frame = Frame::from_z_and_tangent(normal, first.x);
+            let wo = frame.to_local(g.viewers).try_normalize().unwrap_or(Vec3::Z);
+            self.groups.push(Group {
+                frame,
+                wo: Vec3::new(wo.x, wo.y, wo.z.max(1e-3)),
+                spread: 0.0,
+                outline: g.outline,
+                share: g.n as f32 / points.len() as f32,
+            });
+        }
+        for (p, &member) in points.iter().zip(&self.member) {
+            let group = &mut self.groups[member];
+            // The chord is off the angle by less than a twentieth here.
+            let angle = 1.05 * p.frame.z.distance(group.frame.z);
+            group.spread = group.spread.max(angle);
+        }
+    }
+}
+
+/// Of the same kinds of lobes, about as rough.
+fn alike(a: &Outline, b: &Outline) -> bool {
+    let near = |a: f32, b: f32| a < LIKE_ROUGHNESS * b && b < LIKE_ROUGHNESS * a;
+    let gloss = |a: Gloss, b: Gloss| match (a, b) {
+        (Gloss::Slopes { alpha: a, gaussian: c }, Gloss::Slopes { alpha: b, gaussian: d }) => {
+            c == d && near(a[0], b[0]) && near(a[1], b[1])
+        }
+        (Gloss::Mirror { exponent: a }, Gloss::Mirror { exponent: b }) => {
+            near(a.sqrt() + 1.0, b.sqrt() + 1.0)
+        }
+        _ => false,
+    };
+    (a.diffuse > 0.0) == (b.diffuse > 0.0)
+        && a.glossy.iter().zip(&b.glossy).all(|pair| match pair {
+            (Some((_, a)), Some((_, b))) => gloss(*a, *b),
+            (None, None) => true,
+            _ => false,
+        })
+}

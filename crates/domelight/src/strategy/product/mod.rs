@@ -1,0 +1,353 @@
+//! Product sampling: rays follow light times reflectance, and visibility is learned on the way.
+//!
+//! Once for an environment its map is cut into some 384 [`cells`] along Hilbert's curve. Each pass draws
+//! a [`pool`] of directions in every cell. Then, pixel by pixel, all its camera hits together:
+//!
+//! 1. A [`table`] gives each cell its light times what the pixel reflects of it.
+//! 2. [`candidates`]: strata along the curve, each with one direction of the pool, and samples of the
+//!    material, weighed by the balance heuristic.
+//! 3. One pixel of each 2 × 2, a *pilot*, traces all its candidates. From them the tile learns the
+//!    [`visibility`] V̂ of each cell and the brightness of its pixels.
+//! 4. The others take Σ W V̂ without a ray, and [`choose`] those candidates whose visibility matters:
+//!
+//! ```text
+//! base = Σ_j W_j V̂_j − Σ_chosen (W_j/π_j) V̂_j        rays: weight W_j/π_j
+//! ```
+//!
+//! Later passes have no pilots: what earlier passes learned serves all pixels.
+//!
+//! The expectation is ∫ f L V dω for every V̂, brightness and pool, given that they do not depend on
+//! the numbers that strata, samples and choice are drawn with: V̂ and brightness come from other pixels
+//! or earlier passes, and each pixel and pass has a stream of numbers of its own. The density of the
+//! candidates depends on the pixel's hits alone, so what the pool and V̂ have in common does no harm.
+//!
+//! Related: Clarberg & Akenine-Möller 2008, "Practical Product Importance Sampling for Direct
+//! Illumination", multiplies trees of BRDF and map; Atanasov et al. 2018, "Adaptive Environment
+//! Sampling on CPU and GPU", learns visibility for the density.
+
+mod candidates;
+mod cells;
+mod choose;
+mod hits;
+mod pool;
+mod table;
+mod visibility;
+
+pub use pool::Pool;
+pub use visibility::Learned;
+
+use super::{Contributions, PixelPoints, Round, Strategy, TileShading};
+use crate::Rgb;
+use crate::environment::Environment;
+use crate::sampling::Stream;
+use crate::simd::{Work, vectorized};
+use candidates::{Candidate, Counts, PixelNumbers, Sources};
+use cells::Cells;
+use choose::Choice;
+use hits::Groups;
+use table::Table;
+use visibility::{Blocks, Visibility};
+
+/// Camera samples of a pass: strata that one random offset spreads over all of them are worth more
+/// than the same number in two sets, and a tile's rays still fit the caches.
+const SAMPLES_PER_PASS: u32 = 16;
+
+/// Of the candidates for a glossy material one in this many comes from the material.
+const BRDF_SHARE: usize = 8;
+
+/// The error of a candidate that does not matter, as a share of the pixel's brightness over the
+/// number of candidates: of diffuse and of glossy pixels.
+const TOLERANCE: [f32; 2] = [0.64, 1.28];
+
+/// Pixels darker than this share of the environment's mean are not held to their own brightness.
+const DARK: f32 = 0.15;
+
+/// Up to N rays a camera sample, where light, reflectance and visibility say.
+#[derive(Clone, Debug)]
+pub struct ProductSampling<'a> {
+    environment: &'a Environment,
+    /// None under a black sky.
+    cells: Option<Cells>,
+    /// Luminance below which brightness does not count.
+    dark: f32,
+    n_rays: u32,
+}
+
+impl<'a> ProductSampling<'a> {
+    /// With at most `n_rays` ≥ 1 shadow rays for each camera sample that hits. It is the number of
+    /// candidates: those that cannot change the pixel visibly are not traced.
+    pub fn new(environment: &'a Environment, n_rays: u32) -> Self {
+        let mean = environment.power() / (4.0 * std::f64::consts::PI);
+        Self {
+            environment,
+            cells: Cells::new(environment),
+            dark: (f64::from(DARK) * mean) as f32,
+            n_rays: n_rays.max(1),
+        }
+    }
+
+    /// How many candidates the hits of a pixel have together.
+    fn counts(&self, groups: &Groups, n_hits: usize) -> Counts {
+        let all = self.n_rays as usize * n_hits;
+        let diffuse = groups.groups.iter().all(|g| g.outline.is_diffuse());
+        let brdf = if diffuse { 0 } else { all.div_ceil(BRDF_SHARE) };
+        Counts { light: all - brdf, brdf }
+    }
+
+    /// The brightness of a pixel that its error is measured by.
+    fn brightness(&self, luminance: f32) -> f32 {
+        luminance.hypot(self.dark)
+    }
+}
+
+/// Memory of [`ProductSampling`].
+#[derive(Clone, Debug, Default)]
+pub struct ProductScratch {
+    groups: Groups,
+    table: Table,
+    strata: Vec<u32>,
+    candidates: Vec<Candidate>,
+    visibility: Visibility,
+    /// Of each ray of the round the cell that it goes to.
+    targets: Vec<u16>,
+    /// The pixels of the round.
+    pixels: Vec<usize>,
+    /// This round ends the pass.
+    last: bool,
+}
+
+/// Which pixels of a tile a round is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Which {
+    Pilots,
+    Others,
+    All,
+}
+
+impl Which {
+    fn includes(self, x: usize, y: usize) -> bool {
+        let pilot = x.is_multiple_of(2) && y.is_multiple_of(2);
+        match self {
+            Self::Pilots => pilot,
+            Self::Others => !pilot,
+            Self::All => true,
+        }
+    }
+}
+
+impl Strategy for ProductSampling<'_> {
+    type Pass = Pool;
+    type Learned = Learned;
+    type Scratch = ProductScratch;
+
+    fn n_rays(&self) -> u32 {
+        self.n_rays
+    }
+
+    fn samples_per_pass(&self) -> Option<u32> {
+        Some(SAMPLES_PER_PASS)
+    }
+
+    fn begin_pass(&self, stream: Stream) -> Pool {
+        let draw = |cells| Pool::draw(cells, self.environment, stream);
+        self.cells.as_ref().map_or_else(Pool::default, draw)
+    }
+
+    fn push(
+        &self,
+        pool: &Pool,
+        tile: &TileShading,
+        round: u32,
+        learned: &Learned,
+        scratch: &mut ProductScratch,
+        out: &mut Contributions,
+    ) -> Round {
+        let Some(cells) = &self.cells else { return Round::Done };
+        let which = match (learned.n_passes, round) {
+            (0, 0) => Which::Pilots,
+            (0, _) => Which::Others,
+            _ => Which::All,
+        };
+        vectorized(Asking { strategy: self, cells, pool, tile, which, learned, scratch, out });
+        if which == Which::Pilots { Round::More } else { Round::Done }
+    }
+
+    fn learn(
+        &self,
+        tile: &TileShading,
+        pushed: &Contributions,
+        free: &[bool],
+        scratch: &mut ProductScratch,
+        learned: &mut Learned,
+    ) {
+        if self.cells.is_none() {
+            return;
+        }
+        let blocks = tile.blocks();
+        learned.prepare(blocks, tile.pixels.len());
+        let mut ray = 0;
+        for &i in &scratch.pixels {
+            let PixelPoints { points, n_samples, .. } = &tile.pixels[i];
+            let block = blocks.of(i % tile.width, i / tile.width);
+            let mut sum: Rgb = pushed.base[points.clone()].iter().copied().sum();
+            while pushed.point.get(ray).is_some_and(|&point| (point as usize) < points.end) {
+                learned.count(block, usize::from(scratch.targets[ray]), free[ray]);
+                sum += if free[ray] { pushed.weight[ray] } else { Rgb::BLACK };
+                ray += 1;
+            }
+            learned.add_luminance(i, sum.luminance(), *n_samples);
+        }
+        learned.n_passes += u32::from(scratch.last);
+    }
+}
+
+/// A round over a tile.
+struct Asking<'a, 'e> {
+    strategy: &'a ProductSampling<'e>,
+    cells: &'a Cells,
+    pool: &'a Pool,
+    tile: &'a TileShading<'a>,
+    which: Which,
+    learned: &'a Learned,
+    scratch: &'a mut ProductScratch,
+    out: &'a mut Contributions,
+}
+
+impl Work for Asking<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        let Self { tile, which, .. } = self;
+        let blocks = tile.blocks();
+        if which != Which::Pilots {
+            self.scratch.visibility.estimate(self.learned, blocks);
+        }
+        self.scratch.targets.clear();
+        self.scratch.pixels.clear();
+        self.scratch.last = which != Which::Pilots;
+        for (i, pixel) in tile.pixels.iter().enumerate() {
+            let (x, y) = (i % tile.width, i / tile.width);
+            if which.includes(x, y) && !pixel.points.is_empty() {
+                self.scratch.pixels.push(i);
+                self.ask(i, pixel, blocks.of(x, y));
+            }
+        }
+    }
+}
+
+impl Asking<'_, '_> {
+    /// Asks for the rays of a pixel.
+    #[inline(always)]
+    fn ask(&mut self, i: usize, pixel: &PixelPoints, block: usize) {
+        let Self { strategy, tile, learned, .. } = *self;
+        let ProductScratch { groups, table, strata, candidates, visibility, targets, .. } =
+            &mut *self.scratch;
+        let points = &tile.points[pixel.points.clone()];
+        groups.gather(points);
+        table.fill(self.cells, &groups.groups);
+        let counts = strategy.counts(groups, points.len());
+        // The first camera sample that hits tells passes apart.
+        let stream = pixel.stream.part(tile.samples[pixel.points.start]);
+        let numbers = PixelNumbers::new(stream);
+        let (environment, cells, pool) = (strategy.environment, self.cells, self.pool);
+        let sources = Sources { environment, cells, pool, table };
+        sources.draw(points, counts, &numbers, strata, candidates);
+        let mut rays = Rays { pixel, block, out: self.out, targets };
+        if self.which == Which::Pilots {
+            rays.push_all(candidates);
+        } else {
+            let brightness = strategy.expected_brightness(tile.width, learned, i);
+            let n = (counts.light + counts.brdf) as f32;
+            let tolerance = TOLERANCE[usize::from(counts.brdf > 0)];
+            let choice = Choice::new(numbers.choice, tolerance * brightness / n);
+            rays.push_chosen(candidates, visibility, choice);
+        }
+    }
+}
+
+impl TileShading<'_> {
+    fn blocks(&self) -> Blocks {
+        Blocks::new(self.width, self.pixels.len() / self.width.max(1))
+    }
+}
+
+impl ProductSampling<'_> {
+    /// How bright a pixel will be: of what earlier passes found for it, or the harmonic mean over the
+    /// pilots about it, for a dark one among them tells of a shadow's edge.
+    fn expected_brightness(&self, width: usize, learned: &Learned, pixel: usize) -> f32 {
+        if learned.n_passes > 0 {
+            return self.brightness(learned.luminance(pixel).unwrap_or(0.0));
+        }
+        let (x, y) = (pixel % width, pixel / width);
+        let (mut n, mut sum) = (0.0, 0.0);
+        for y in [y & !1, (y + 1) & !1] {
+            for x in [x & !1, (x + 1) & !1] {
+                if x < width
+                    && let Some(luminance) = learned.luminance(y * width + x)
+                {
+                    n += 1.0;
+                    sum += 1.0 / self.brightness(luminance);
+                }
+            }
+        }
+        if n > 0.0 { n / sum } else { self.dark }
+    }
+}
+
+/// Where the rays of a pixel go.
+struct Rays<'a> {
+    pixel: &'a PixelPoints,
+    block: usize,
+    out: &'a mut Contributions,
+    targets: &'a mut Vec<u16>,
+}
+
+impl Rays<'_> {
+    /// The mean over the pixel's hits becomes a sum over its points.
+    fn scale(&self) -> f32 {
+        self.pixel.points.len() as f32
+    }
+
+    #[inline(always)]
+    fn push(&mut self, c: &Candidate, weight: Rgb) {
+        let point = self.pixel.points.start as u32 + c.hit;
+        self.out.wi.push(c.wi);
+        self.out.weight.push(weight);
+        self.out.point.push(point);
+        self.targets.push(c.cell as u16);
+    }
+
+    /// Σ W V: traces every candidate.
+    #[inline(always)]
+    fn push_all(&mut self, candidates: &[Candidate]) {
+        let scale = self.scale();
+        for c in candidates.iter().filter(|c| c.luminance > 0.0) {
+            self.push(c, c.value * scale);
+        }
+    }
+
+    /// Σ W V̂ + Σ W (V − V̂)/π: traces the chosen ones.
+    #[inline(always)]
+    fn push_chosen(
+        &mut self,
+        candidates: &[Candidate],
+        visibility: &Visibility,
+        mut choice: Choice,
+    ) {
+        let scale = self.scale();
+        let covered = scale / self.pixel.n_samples as f32;
+        let (visible, doubt) = visibility.of(self.block);
+        for c in candidates {
+            let cell = c.cell as usize;
+            let value = c.value * scale;
+            let base = &mut self.out.base[self.pixel.points.start + c.hit as usize];
+            *base += value * visible[cell];
+            if let Some(weight) = choice.offer(c.luminance * covered * doubt[cell]) {
+                let value = value * weight;
+                *base += value * -visible[cell];
+                self.push(c, value);
+            }
+        }
+    }
+}

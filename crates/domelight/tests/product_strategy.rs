@@ -1,0 +1,206 @@
+//! The strategy of product tables and learned visibility: every round of every pass is unbiased, on
+//! every material, with some texels hidden.
+
+mod common;
+
+use common::{
+    HEIGHT, MATERIALS, WIDTH, environment, hidden, integral, point, quadrature, white_environment,
+};
+use domelight::bsdf::{Material, MaterialSpec};
+use domelight::environment::{Environment, Orientation, UpAxis};
+use domelight::math::{Frame, Vec3};
+use domelight::sampling::{SamplerKind, Stream};
+use domelight::strategy::{
+    Contributions, PixelPoints, ProductSampling, Round, ShadingPoint, Strategy, TileShading,
+};
+use domelight::{Rgb, RgbImage};
+use rayon::prelude::*;
+use testkit::quadrature::Adaptive;
+use testkit::{Suite, ZTest};
+
+fn material(name: &str) -> Material {
+    name.parse::<MaterialSpec>().unwrap().into()
+}
+
+/// A tile of 5 × 5 pixels, all with the same hits.
+const SIDE: usize = 5;
+const N_PASSES: usize = 2;
+/// Pilots of the first pass, its other pixels, and all of the second pass.
+const KINDS: [&str; 3] = ["pilots", "others", "second pass"];
+
+/// The mean estimate of each kind of pixel under one seed.
+fn estimates(
+    strategy: &ProductSampling,
+    env: &Environment,
+    hits: &[ShadingPoint],
+    sampler: SamplerKind,
+    seed: u64,
+) -> [[f64; 3]; 3] {
+    let n = hits.len();
+    let points = hits.repeat(SIDE * SIDE);
+    let mut learned = Default::default();
+    let mut scratch = Default::default();
+    let (mut sums, mut counts) = ([[0.0; 3]; 3], [0.0; 3]);
+    for pass in 0..N_PASSES {
+        let samples: Vec<u32> = (0..points.len()).map(|i| (pass * n + i % n) as u32).collect();
+        let pixels: Vec<PixelPoints> = (0..SIDE * SIDE)
+            .map(|i| PixelPoints {
+                points: i * n..(i + 1) * n,
+                n_samples: n as u32,
+                stream: Stream::new(sampler, seed, i as u64),
+            })
+            .collect();
+        let tile = TileShading { points: &points, samples: &samples, pixels: &pixels, width: SIDE };
+        let shared = strategy.begin_pass(Stream::of_pass(sampler, seed, (pass * n) as u32));
+        let mut sum = vec![[0.0; 3]; SIDE * SIDE];
+        let mut out = Contributions::default();
+        for round in 0.. {
+            out.reset(points.len());
+            let more = strategy.push(&shared, &tile, round, &learned, &mut scratch, &mut out);
+            let free: Vec<bool> = out.wi.iter().map(|&wi| !hidden(env, wi)).collect();
+            let mut add = |point: usize, value: Rgb| {
+                for (s, v) in sum[point / n].iter_mut().zip(value.to_array()) {
+                    *s += f64::from(v) / n as f64;
+                }
+            };
+            for (i, &base) in out.base.iter().enumerate() {
+                add(i, base);
+            }
+            for (i, _) in free.iter().enumerate().filter(|(_, free)| **free) {
+                add(out.point[i] as usize, out.weight[i]);
+            }
+            strategy.learn(&tile, &out, &free, &mut scratch, &mut learned);
+            if more == Round::Done {
+                break;
+            }
+        }
+        for (i, s) in sum.iter().enumerate() {
+            let pilot = i % SIDE % 2 == 0 && i / SIDE % 2 == 0;
+            let kind = if pass > 0 { 2 } else { usize::from(!pilot) };
+            counts[kind] += 1.0;
+            (0..3).for_each(|c| sums[kind][c] += s[c]);
+        }
+    }
+    std::array::from_fn(|kind| sums[kind].map(|s| s / counts[kind]))
+}
+
+/// Checks the mean over many seeds of every kind of pixel.
+fn check(
+    test: ZTest,
+    label: &str,
+    strategy: &ProductSampling,
+    env: &Environment,
+    hits: &[ShadingPoint],
+    expected: [f64; 3],
+) {
+    let sampler =
+        if hits.len().is_multiple_of(2) { SamplerKind::Sobol } else { SamplerKind::Independent };
+    let batches: Vec<_> =
+        (0..48).map(|seed| estimates(strategy, env, hits, sampler, seed)).collect();
+    for (kind, name) in KINDS.iter().enumerate() {
+        let batches: Vec<[f64; 3]> = batches.iter().map(|b| b[kind]).collect();
+        let label = format!("{label}, {name}");
+        test.against(&label, &batches, expected).unwrap_or_else(|f| panic!("{f}"));
+    }
+}
+
+#[test]
+fn every_round_is_unbiased_on_every_material() {
+    let environments = [environment(true, UpAxis::Z), white_environment()];
+    // Views, rays of each camera sample, and camera samples.
+    let cases = [(0.2, 8, 3), (1.3, 3, 4)];
+    let suite = Suite::of(MATERIALS.len() * environments.len() * cases.len() * KINDS.len());
+    let test = ZTest { suite, ..ZTest::default() };
+    for env in &environments {
+        MATERIALS.par_iter().for_each(|name| {
+            for (theta, n_rays, n_hits) in cases {
+                let at = point(material(name), theta);
+                let expected = quadrature(env, &at);
+                let strategy = ProductSampling::new(env, n_rays);
+                let label = format!("{name}, view {theta}, {n_rays} rays, {n_hits} hits");
+                check(test, &label, &strategy, env, &vec![at; n_hits], expected);
+            }
+        });
+    }
+}
+
+/// Hits of every normal and material in one pixel, and single candidates.
+#[test]
+fn pixels_of_many_surfaces_are_unbiased() {
+    let env = environment(false, UpAxis::Y);
+    let turned = |i: usize| {
+        let mut at = point(material(MATERIALS[i]), 0.3 + 0.1 * i as f32);
+        let normal = (at.frame.z + 0.4 * i as f32 * Vec3::X).normalize();
+        at.frame = Frame::from_z(normal);
+        at
+    };
+    // The narrowest lobe would need larger batches for single candidates.
+    let hits: Vec<ShadingPoint> =
+        (0..9).filter(|&i| MATERIALS[i] != "ggx:0.05").map(turned).collect();
+    let each: Vec<_> = hits.iter().map(|at| quadrature(&env, at)).collect();
+    let mean = |n: usize| {
+        let sum = |c: usize| each[..n].iter().map(|e| e[c]).sum::<f64>();
+        [0, 1, 2].map(|c| sum(c) / n as f64)
+    };
+    let cases = [(1, 1), (1, 2), (1, 8), (2, 5), (7, 8)];
+    let test = ZTest::in_suite_of(cases.len() * KINDS.len());
+    cases.into_par_iter().for_each(|(n_rays, n_hits)| {
+        let strategy = ProductSampling::new(&env, n_rays);
+        let label = format!("{n_rays} rays, {n_hits} hits");
+        check(test, &label, &strategy, &env, &hits[..n_hits], mean(n_hits));
+    });
+}
+
+/// Maps with nothing to follow: constant, black, a single lit texel, a single row or column.
+#[test]
+fn odd_maps_are_unbiased() {
+    let spot = |width, height, i: usize| {
+        let mut map = RgbImage::filled(width, height, Rgb::BLACK);
+        map.pixels[i] = Rgb::new(3.0, 2.0, 1.0);
+        map
+    };
+    // `quadrature` goes by texels of this size.
+    let maps = [
+        RgbImage::filled(WIDTH, HEIGHT, Rgb::new(1.0, 2.0, 3.0)),
+        spot(WIDTH, HEIGHT, WIDTH + 3),
+        RgbImage::filled(WIDTH, HEIGHT, Rgb::BLACK),
+    ];
+    let test = ZTest::in_suite_of(maps.len() * 2 * KINDS.len());
+    for (i, map) in maps.into_iter().enumerate() {
+        let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
+        for name in ["diffuse:0.8", "ggx:0.4"] {
+            let at = point(material(name), 0.7);
+            let strategy = ProductSampling::new(&env, 6);
+            let label = format!("map {i}, {name}");
+            check(test, &label, &strategy, &env, &[at; 2], quadrature(&env, &at));
+        }
+    }
+    for (width, height) in [(1, 1), (1, 7), (300, 1), (5, 1000)] {
+        let map = RgbImage::filled(width, height, Rgb::WHITE);
+        let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
+        let at = point(material("diffuse:1"), 0.7);
+        let strategy = ProductSampling::new(&env, 6);
+        let batches: Vec<[f64; 3]> = (0..40)
+            .map(|seed| {
+                let stream = Stream::new(SamplerKind::Sobol, seed, 0);
+                let tile = TileShading {
+                    points: &[at],
+                    samples: &[0],
+                    pixels: &[PixelPoints { points: 0..1, n_samples: 1, stream }],
+                    width: 1,
+                };
+                let pass = strategy.begin_pass(Stream::of_pass(SamplerKind::Sobol, seed, 0));
+                let mut out = Contributions::default();
+                out.reset(1);
+                let (learned, mut scratch) = Default::default();
+                strategy.push(&pass, &tile, 0, &learned, &mut scratch, &mut out);
+                out.weight.iter().copied().sum::<Rgb>().to_array().map(f64::from)
+            })
+            .collect();
+        let rule = Adaptive { tolerance: 1e-5, min_depth: 2, max_depth: 8 };
+        let open = |wi, le: Rgb, _| (at.eval(wi) * le).to_array().map(f64::from);
+        let whole = integral(&white_environment(), rule, open);
+        let label = format!("{width}x{height}");
+        ZTest::in_suite_of(4).against(&label, &batches, whole).unwrap();
+    }
+}
