@@ -14,9 +14,14 @@ fn mo(operator: &str) -> String {
     format!("<mo>{operator}</mo>")
 }
 
+/// A thin space.
+fn thin() -> String {
+    "<mspace width=\"0.17em\"/>".to_owned()
+}
+
 /// A function's name.
 fn function(name: &str) -> String {
-    format!("<mi>{name}</mi><mo>&#x2061;</mo>")
+    mi(name) + &thin()
 }
 
 fn row<T: Display>(parts: impl IntoIterator<Item = T>) -> String {
@@ -75,7 +80,7 @@ fn f_cos() -> String {
 
 /// tan² θ (cos² φ / αx² + sin² φ / αy²), without the tangent.
 fn ellipse() -> String {
-    let square = |f: &str| row([sup(&mi(f), &mn("2")), mo("&#x2061;"), sub(&mi("φ"), &mi("h"))]);
+    let square = |f: &str| row([sup(&mi(f), &mn("2")), thin(), sub(&mi("φ"), &mi("h"))]);
     let term = |f: &str, axis: &str| {
         frac(&square(f), &format!("<msubsup>{}{}{}</msubsup>", mi("α"), mi(axis), mn("2")))
     };
@@ -90,8 +95,8 @@ pub(crate) fn lobes() -> Vec<String> {
     let two_pi_u = row([mn("2"), mi("π"), u2]);
     let rest = row([mn("1"), mo("−"), u1]);
     let minus_log = row([mo("−"), function("ln"), paren(&rest)]);
-    let tan2 = row([sup(&mi("tan"), &mn("2")), mo("&#x2061;"), theta_h.clone()]);
-    let cos = |power: &str| row([sup(&mi("cos"), &mn(power)), mo("&#x2061;"), theta_h.clone()]);
+    let tan2 = row([sup(&mi("tan"), &mn("2")), thin(), theta_h.clone()]);
+    let cos = |power: &str| row([sup(&mi("cos"), &mn(power)), thin(), theta_h.clone()]);
     let pi_alphas = row([mi("π"), alpha("x"), alpha("y")]);
     vec![
         math([
@@ -99,7 +104,7 @@ pub(crate) fn lobes() -> Vec<String> {
             paren(&row([mi("θ"), mo(","), mi("φ")])),
             mo("="),
             frac(
-                &row([paren(&n1), sup(&mi("cos"), &mi("n")), mo("&#x2061;"), mi("θ")]),
+                &row([paren(&n1), sup(&mi("cos"), &mi("n")), thin(), mi("θ")]),
                 &row([mn("2"), mi("π")]),
             ),
             and(),
@@ -202,7 +207,8 @@ pub(crate) fn inversion() -> Vec<String> {
 
 /// Figure 3: the three densities.
 pub(crate) fn product() -> Vec<String> {
-    let over = |f: &str| frac(f, &row([integral(&mi("Ω")), f.to_owned(), mi("d"), omega("i")]));
+    let over =
+        |f: &str| frac(f, &row([integral(&mi("Ω")), f.to_owned(), thin(), mi("d"), omega("i")]));
     let light = row([mi("L"), paren(&omega("i"))]);
     let density = |index: &str| row([sub(&mi("q"), &mi(index)), paren(&omega("i"))]);
     let product = row([f_cos(), light.clone()]);
@@ -296,7 +302,7 @@ pub(crate) fn rejection() -> Vec<String> {
 /// Figures 6 and 7: a region's light, and its variance on the map and on the sphere.
 pub(crate) fn region_light() -> String {
     let over_r = integral(&mi("r"));
-    let d_omega = row([mi("d"), mi("ω")]);
+    let d_omega = row([thin(), mi("d"), mi("ω")]);
     let moment = row([over_r.clone(), mi("L"), mi("ω"), d_omega.clone()]);
     math([
         sub(&mi("E"), &mi("r")),
@@ -318,8 +324,8 @@ pub(crate) fn region_variance() -> String {
         row([mi("p"), mo("∈"), mi("r")])
     );
     let d_p = format!("<msubsup>{}{}{}</msubsup>", mi("d"), mi("p"), mn("2"));
-    let w = row([integral(&mi("r")), mi("L"), mi("d"), mi("ω")]);
-    let r = row([integral(&mi("r")), mi("L"), mi("ω"), mi("d"), mi("ω")]);
+    let w = row([integral(&mi("r")), mi("L"), thin(), mi("d"), mi("ω")]);
+    let r = row([integral(&mi("r")), mi("L"), mi("ω"), thin(), mi("d"), mi("ω")]);
     math([
         function("Var"),
         paren(&mi("r")),

@@ -257,15 +257,17 @@ fn plot(name: &str, lecture: &[Shown], equal: &[Shown]) -> Document {
     const KINDS: [&str; 5] =
         ["EM", "BRDF", "MIS", "SIR, the lecture's ratio", "SIR, measured ratio"];
     let all = || lecture.iter().chain(equal);
-    let series = KINDS.iter().enumerate().map(|(kind, name)| Series {
-        name: (*name).to_owned(),
-        color: PALETTE[kind],
-        join: Join::Curve,
-        marker: Some(Marker::ALL[kind % Marker::ALL.len()]),
-        points: all()
-            .filter(|s| s.kind() == kind)
-            .map(|s| Datum::new(s.measured.taken.seconds, s.measured.rel_mse))
-            .collect(),
+    let series = KINDS.iter().enumerate().map(|(kind, name)| {
+        let datum = |s: &Shown| Datum::new(s.measured.taken.seconds, s.measured.rel_mse);
+        let mut points: Vec<Datum> = all().filter(|s| s.kind() == kind).map(datum).collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x));
+        Series {
+            name: (*name).to_owned(),
+            color: PALETTE[kind],
+            join: Join::Curve,
+            marker: Some(Marker::ALL[kind % Marker::ALL.len()]),
+            points,
+        }
     });
     let plot = Plot {
         title: name.to_owned(),

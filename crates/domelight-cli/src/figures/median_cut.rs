@@ -99,13 +99,13 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
 
 /// The scene as it is, in a picture that both figures of fixed lights share.
 pub(super) fn scene_shot(studio: &Studio) -> Result<Shot<'_>> {
-    let size = studio.choose(264, 24);
+    let size = studio.choose(220, 24);
     Ok(studio.shot(Subject::Scene, size, size)?.samples(studio.choose(2, 1)))
 }
 
 /// A matt sphere.
 pub(super) fn sphere_shot(studio: &Studio) -> Result<Shot<'_>> {
-    let size = studio.choose(264, 24);
+    let size = studio.choose(220, 24);
     Ok(studio.shot(Subject::Sphere, size, size)?.samples(studio.choose(2, 1)))
 }
 

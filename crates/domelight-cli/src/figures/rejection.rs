@@ -18,7 +18,7 @@ use crate::svg::{Document, PALETTE, Pixels, superscript};
 
 /// Directions to accept at each point, and the most tries.
 const ACCEPT: u32 = 8;
-const MAX_TRIES: u32 = 4096;
+const MAX_TRIES: u32 = 2048;
 const MATERIAL: &str = "phong:50:1:0.5";
 /// The proposals and their names.
 const PROPOSALS: [(Proposal, &str); 3] = [

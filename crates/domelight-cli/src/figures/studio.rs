@@ -154,10 +154,10 @@ impl Studio {
         Ok(Shot {
             studio: self,
             name: format!("{subject:?} {width}x{height}"),
-            // Noise is told from far fewer samples than it takes to be rid of it; bias is large.
-            reference_rays: match subject {
-                Subject::Alone(_) => self.choose(1024, 64),
-                Subject::Scene | Subject::Sphere => self.choose(256, 32),
+            reference: match subject {
+                Subject::Alone(_) => self.choose(split(1024, 1024), split(64, 64)),
+                // Matt for the most part.
+                Subject::Scene | Subject::Sphere => self.choose(split(1536, 128), split(64, 16)),
             },
             camera: Camera::new(&view, width, height)?,
             scene: Scene::new(description).with_context(|| self.scene.clone())?,
@@ -263,7 +263,7 @@ pub(crate) struct Shot<'a> {
     /// Names what is seen, not how it is sampled.
     name: String,
     /// Samples of each kind in a pixel of the converged picture.
-    reference_rays: u32,
+    reference: Split,
     pub(crate) scene: Scene,
     pub(crate) camera: Camera,
     pub(crate) settings: RenderSettings,
@@ -356,8 +356,8 @@ impl Shot<'_> {
         if let Some(made) = self.studio.references.borrow().get(&key) {
             return Ok(made.clone());
         }
-        let rays = self.reference_rays.div_ceil(n_samples);
-        let split = Split { environment: rays, brdf: rays };
+        let Split { environment, brdf } = self.reference;
+        let split = split(environment.div_ceil(n_samples), brdf.div_ceil(n_samples));
         let plan = Plan::Mis { split, heuristic: Heuristic::Power, compensation: true };
         let made = Rc::new(self.take_with(plan, seed, sampler)?.layers);
         self.studio.references.borrow_mut().insert(key, made.clone());
@@ -376,6 +376,10 @@ impl Shot<'_> {
         }
         Ok(exposed(sum / n.max(1.0), 0.4))
     }
+}
+
+fn split(environment: u32, brdf: u32) -> Split {
+    Split { environment, brdf }
 }
 
 /// Exposure that takes `mean` to `grey`, before the curve.
