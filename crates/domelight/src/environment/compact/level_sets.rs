@@ -9,7 +9,7 @@
 //! where radiance begins to fall slower than 1/r², so that further rings would add ever more light.
 //! How far t·A falls is the source's contrast.
 //!
-//! No radius, threshold or background enters; scaling the map or its resolution changes nothing.
+//! No radius, brightness or background is assumed; scaling the map's radiance changes nothing.
 
 use super::grid::Grid;
 use crate::parallel::sort;
