@@ -74,7 +74,7 @@ pub(crate) struct LightsArguments {
     #[arg(long, help_heading = "Output")]
     pub(crate) json: bool,
     /// How the preview is shown.
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Output")]
     pub(crate) tone: Tone,
 }
 
@@ -82,7 +82,8 @@ pub(crate) struct LightsArguments {
 pub(super) fn positional(env: clap::Arg) -> clap::Arg {
     let help = "A built-in probe (sky, studio, cathedral, constant) or a file (.hdr, .exr, .pfm; - \
                 reads standard input)";
-    env.long(None::<&'static str>).index(1).required(true).help(help).help_heading("Arguments")
+    let env = env.long(None::<&'static str>).index(1).required(true);
+    env.help(help).help_heading(None::<&'static str>)
 }
 
 fn format() -> impl TypedValueParser<Value = Format> {

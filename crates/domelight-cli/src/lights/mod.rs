@@ -18,7 +18,7 @@ use domelight::rig::{
 };
 use domelight::scene::SceneDescription;
 
-use crate::args::lights::{LightsArguments, RigPath};
+use crate::args::lights::{LightsArguments, PngPath, RigPath};
 use crate::failure::UsageError;
 use crate::output::{PictureFormat, PicturePath, print};
 use crate::usage::Stopwatch;
@@ -142,7 +142,7 @@ impl LightsArguments {
     fn n_on_standard_output(&self) -> usize {
         let rigs = self.output.iter().filter(|o| o.is_standard_output()).count();
         let residual = self.keep_residual.as_ref().is_some_and(PicturePath::is_standard_output);
-        let preview = self.preview.as_ref().is_some_and(|p| p.is_standard_output());
+        let preview = self.preview.as_ref().is_some_and(PngPath::is_standard_output);
         rigs + [residual, preview, self.json].map(usize::from).iter().sum::<usize>()
     }
 

@@ -100,7 +100,7 @@ impl LightsReport<'_> {
             "irradiance": rig.irradiance().to_array(),
             "error": self.found.error().map(error),
             "tried": tried.collect::<Vec<_>>(),
-            "dome": self.dome.map(|h| h.coefficients.map(|c| c.to_array())),
+            "dome": self.dome.map(|h| h.coefficients.map(domelight::Rgb::to_array)),
             "seconds": self.stages,
             "peak_memory": peak_memory(),
         })

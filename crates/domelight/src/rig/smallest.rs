@@ -36,10 +36,13 @@ pub fn smallest_rig(
     let settings = ExtractionSettings { n_lights: Some(usize::MAX), ..settings };
     let compact = CompactExtraction::new(environment, settings)?;
     let reference = ShadingReference::new(environment);
-    let mut search = Search { compact, reference, tried: Vec::new(), best: None };
+    let mut search = Search { compact, reference, target, tried: Vec::new() };
     let mut too_few = search.compact.n_compact();
     let mut enough = too_few + 1;
-    while !search.reaches(enough, target)? {
+    let mut best = loop {
+        if let Some(found) = search.good_enough(enough)? {
+            break found;
+        }
         if enough >= search.most() {
             let (n_lights, error) = search.tried[search.tried.len() - 1];
             let percent = (100.0 * error.worst()) as f32;
@@ -47,25 +50,24 @@ pub fn smallest_rig(
         }
         too_few = enough;
         enough = (2 * enough).min(search.most());
-    }
+    };
     while enough - too_few > 1 {
         let middle = too_few.midpoint(enough);
-        if search.reaches(middle, target)? {
-            enough = middle;
-        } else {
-            too_few = middle;
+        match search.good_enough(middle)? {
+            Some(found) => (best, enough) = (found, middle),
+            None => too_few = middle,
         }
     }
     search.tried.sort_by_key(|(n, _)| *n);
-    let (extraction, error) = search.best.expect("the last that was good enough");
+    let (extraction, error) = best;
     Ok(SmallestRig { extraction, error, tried: search.tried })
 }
 
 struct Search<'a> {
     compact: CompactExtraction<'a>,
     reference: ShadingReference,
+    target: f64,
     tried: Vec<(usize, ShadingError)>,
-    best: Option<(Extraction, ShadingError)>,
 }
 
 impl Search<'_> {
@@ -73,7 +75,11 @@ impl Search<'_> {
         MAX_LIGHTS.min(self.compact.n_compact() + self.compact.n_lit()).max(1)
     }
 
-    fn reaches(&mut self, n_lights: usize, target: f64) -> Result<bool, RigError> {
+    /// The rig of so many lights, if its error is small enough.
+    fn good_enough(
+        &mut self,
+        n_lights: usize,
+    ) -> Result<Option<(Extraction, ShadingError)>, RigError> {
         let extraction = self.compact.with_lights(Some(n_lights))?;
         let error = match &extraction.residual {
             Some(dome) => {
@@ -82,10 +88,6 @@ impl Search<'_> {
             None => self.reference.error(&extraction.rig),
         };
         self.tried.push((n_lights, error));
-        let reached = error.worst() <= target;
-        if reached {
-            self.best = Some((extraction, error));
-        }
-        Ok(reached)
+        Ok((error.worst() <= self.target).then_some((extraction, error)))
     }
 }

@@ -24,8 +24,8 @@ struct RimCell {
     /// The length of the rim in the cell.
     length: f32,
     radiance: Rgb,
-    /// By how much radiance rises toward the source \[per radian\].
-    slope: Rgb,
+    /// By how much luminance rises toward the source \[per radian\].
+    slope: f32,
 }
 
 /// Radiance of each of `cells`, continued from the cells of their `rim`; black if there is none.
@@ -44,19 +44,19 @@ pub(super) fn continue_rim(
 impl RimCell {
     fn new(grid: &Grid, cell: usize, is_outside: impl Fn(usize) -> bool) -> Self {
         let (direction, radiance) = (grid.direction(cell), grid.mean(cell));
-        let (mut rise, mut distance) = (Rgb::BLACK, 0.0);
+        let (mut rise, mut distance) = (0.0, 0.0);
         for n in grid.neighbours(cell).into_iter().filter(|&n| is_outside(n)) {
-            rise += radiance - grid.mean(n);
+            rise += grid.luminance[cell] - grid.luminance[n];
             distance += direction.distance(grid.direction(n));
         }
-        let slope = if distance > 0.0 { rise / distance } else { Rgb::BLACK };
+        let slope = if distance > 0.0 { rise / distance } else { 0.0 };
         Self { direction, length: grid.solid_angle(cell).sqrt() as f32, radiance, slope }
     }
 }
 
 /// Σ s L / d² over Σ s / d², s the length of the rim in a cell, and the like of slopes.
 fn thin_plate(at: Vec3, rim: &[RimCell]) -> Rgb {
-    let (mut radiance, mut slope, mut weights) = (Rgb::BLACK, Rgb::BLACK, 0.0);
+    let (mut radiance, mut slope, mut weights) = (Rgb::BLACK, 0.0, 0.0);
     for cell in rim {
         let weight = cell.length / at.distance_squared(cell.direction);
         radiance += cell.radiance * weight;
@@ -68,8 +68,8 @@ fn thin_plate(at: Vec3, rim: &[RimCell]) -> Rgb {
     }
     let membrane = radiance / weights;
     let bulge = slope * (PI / (weights * weights));
-    // A glow of 1/r², the steepest that is not the source's, doubles at the middle.
-    let share = membrane.luminance() / bulge.luminance();
-    let bounded = if share > 0.0 { bulge * share.min(1.0) } else { Rgb::BLACK };
-    (membrane + bounded).map(|c| c.max(0.0))
+    // The glow has the membrane's colour. At 1/r², the steepest that is not the source's, it doubles
+    // in the middle. Where nothing rises, or all is black, there is none.
+    let share = bulge / membrane.luminance();
+    if share > 0.0 { membrane * (1.0 + share.min(1.0)) } else { membrane }
 }

@@ -9,7 +9,7 @@
 //! where radiance begins to fall slower than 1/r², so that further rings would add ever more light.
 //! How far t·A falls is the source's contrast.
 //!
-//! No radius, threshold or background enters; scaling the map or its resolution changes nothing.
+//! No radius, brightness or background is assumed; scaling the map's radiance changes nothing.
 
 use super::grid::Grid;
 use crate::parallel::sort;
@@ -166,7 +166,9 @@ impl Search<'_> {
             self.start(cell, level, area, energy);
             return;
         }
-        touching.iter().for_each(|&c| self.components[c as usize].descend(level, blur));
+        for &c in touching {
+            self.components[c as usize].descend(level, blur);
+        }
         let into = self.merge(touching, level);
         let merged = &mut self.components[into as usize];
         merged.area += area;
@@ -203,7 +205,9 @@ impl Search<'_> {
         let stands_out = |c: &u32| self.components[*c as usize].stands_out(self.min_energy);
         let sources: Vec<u32> = ids.iter().copied().filter(stands_out).collect();
         if sources.len() > 1 {
-            sources.iter().for_each(|&c| self.end(c));
+            for &c in &sources {
+                self.end(c);
+            }
         }
         let most = |c: u32| self.components[c as usize].most;
         let brightest = ids.iter().copied().max_by(|&a, &b| most(a).total_cmp(&most(b)));
