@@ -16,7 +16,8 @@ def to_world(prim, vectors):
 def lights(path):
     """Name → direction, ∫ L dω and angular radius of each distant light."""
     found = {}
-    for prim in Usd.Stage.Open(str(path)).Traverse():
+    stage = Usd.Stage.Open(str(path))
+    for prim in stage.Traverse():
         if not prim.IsA(UsdLux.DistantLight):
             continue
         light = UsdLux.DistantLight(prim)
@@ -34,12 +35,13 @@ def lights(path):
 
 def dome(path):
     """The texture's resolved path and the world directions of u, v in it (u right, v down)."""
-    for prim in Usd.Stage.Open(str(path)).Traverse():
+    stage = Usd.Stage.Open(str(path))
+    for prim in stage.Traverse():
         if prim.IsA(UsdLux.DomeLight):
             light = UsdLux.DomeLight(prim)
             texture = light.GetTextureFileAttr().Get().resolvedPath
 
-            def direction(u, v, prim=prim):
+            def direction(u, v, prim=prim, stage=stage):  # a stage that nobody holds expires
                 # Left longitude +π, right −π; longitude 0 is +Z, π/2 is +X; the top is +Y.
                 longitude, latitude = np.pi * (1 - 2 * u), np.pi * (0.5 - v)
                 across = np.cos(latitude)

@@ -124,7 +124,16 @@ impl LightsArguments {
                            or keep dim lights on the map by --min-energy";
             return Err(UsageError(message.into()).into());
         }
-        self.output.iter().map(|o| self.output(o)).collect()
+        let outputs: Vec<_> = self.output.iter().map(|o| self.output(o)).collect::<Result<_>>()?;
+        let unnamed = self.keep_residual.as_ref().is_some_and(PicturePath::is_standard_output);
+        if let Some(o) = outputs.iter().find(|o| unnamed && o.format.dome_picture().is_some()) {
+            let message = format!(
+                "a {} file names the residual map: give --keep-residual a file name instead of -",
+                o.format
+            );
+            return Err(UsageError(message).into());
+        }
+        Ok(outputs)
     }
 
     fn output<'a>(&self, output: &'a RigPath) -> Result<Output<'a>> {

@@ -1,0 +1,37 @@
+//! `domelight lights` into the formats of other programs: the pictures of the dome beside them.
+
+mod common;
+
+use common::{domelight, done, load, stderr};
+use tempfile::TempDir;
+
+const RIGS: [&str; 5] = ["rig.xml", "rig.rad", "rig.pbrt", "rig.js", "rig.glb"];
+
+#[test]
+fn each_rig_names_the_picture_that_its_program_reads() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let mut arguments = vec!["lights", "sky", "--env-rows", "64", "--sun", "-q"];
+    RIGS.iter().for_each(|rig| arguments.extend(["-o", rig]));
+    done(&domelight(&folder, &arguments));
+    for (rig, picture) in [
+        ("rig.xml", "rig_dome.exr"),
+        ("rig.rad", "rig_dome.hdr"),
+        ("rig.pbrt", "rig_dome_octahedral.exr"),
+    ] {
+        let text = std::fs::read_to_string(folder.path().join(rig)).expect(rig);
+        assert!(text.contains(&format!("\"{picture}\"")), "{rig}: {text}");
+        assert!(folder.path().join(picture).is_file(), "{picture}");
+    }
+    let square = load(&folder, "rig_dome_octahedral.exr");
+    assert_eq!(square.width, square.height);
+}
+
+#[test]
+fn a_picture_on_standard_output_has_no_name_to_refer_to() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let arguments = ["lights", "sky", "--sun", "--keep-residual", "-", "-o", "rig.xml"];
+    let output = domelight(&folder, &arguments);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("mitsuba"), "{}", stderr(&output));
+    assert!(!folder.path().join("rig.xml").exists());
+}
