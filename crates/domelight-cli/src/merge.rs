@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 use domelight::picture::tone::ToneCurve;
-use domelight::render::{Checkpoint, CheckpointError, Counts, Film, Window};
+use domelight::render::{Checkpoint, CheckpointError, Counts, Film, Layers};
 use serde::Serialize;
 
 use crate::args::MergeArguments;
@@ -48,7 +48,7 @@ struct Merged {
     n_tiles: usize,
     n_samples: u32,
     counts: Counts,
-    film: Film,
+    layers: Layers,
     /// Which tiles are there, and whose.
     taken: Vec<(Range<usize>, String)>,
 }
@@ -86,9 +86,8 @@ pub(crate) fn run(arguments: &MergeArguments, quiet: bool) -> Result<()> {
     attributes.push(("domelight.complete".into(), "true".into()));
     let background = |(name, value): &(String, String)| name == "background" && value == "hidden";
     let hidden = merged.identity.iter().any(background);
-    let layers = merged.film.layers();
     for output in &arguments.output {
-        output.write_layers(&layers, &tone, hidden, attributes.clone())?;
+        output.write_layers(&merged.layers, &tone, hidden, attributes.clone())?;
     }
     merged.report(files.len(), arguments, quiet)
 }
@@ -133,7 +132,7 @@ impl Merged {
             n_tiles: part.n_tiles,
             n_samples: part.n_samples,
             counts: Counts::default(),
-            film: Film::new(width, height, Window { x: 0, y: 0, width, height }),
+            layers: Layers::new(width, height),
             taken: Vec::new(),
         }
     }
@@ -153,9 +152,9 @@ impl Merged {
         if here != there {
             return foreign("number of samples", &here, &there);
         }
-        let size = |film: &Film| format!("{}x{}", film.width, film.height);
-        let here = (size(&part.film), part.n_tiles);
-        let there = (size(&self.film), self.n_tiles);
+        let size = |width: usize, height: usize| format!("{width}x{height}");
+        let here = (size(part.film.width, part.film.height), part.n_tiles);
+        let there = (size(self.layers.width(), self.layers.height()), self.n_tiles);
         if here != there {
             return foreign("division into tiles", &format!("{here:?}"), &format!("{there:?}"));
         }
@@ -171,7 +170,7 @@ impl Merged {
         if let Some((tile, first)) = self.taken.iter().find_map(overlap) {
             return Err(MergeError::Doubled { first, second: name, tile });
         }
-        self.film.merge(&part.film);
+        self.layers.merge(&part.film);
         self.counts += part.counts;
         self.taken.push((tiles, name));
         Ok(())
@@ -214,7 +213,7 @@ impl Merged {
         let report = Report {
             parts: n_parts,
             tiles: self.n_tiles,
-            size: [self.film.width, self.film.height],
+            size: [self.layers.width(), self.layers.height()],
             spp: self.n_samples,
             camera_rays: self.counts.camera_rays,
             shadow_rays: self.counts.shadow_rays,

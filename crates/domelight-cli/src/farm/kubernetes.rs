@@ -41,6 +41,8 @@ spec:
     rules:
       - action: FailIndex # 2: the arguments or the scene are wrong, trying again cannot help
         onExitCodes: {{ containerName: domelight, operator: In, values: [2] }}
+      - action: Ignore # 75: interrupted and saved, no failure
+        onExitCodes: {{ containerName: domelight, operator: In, values: [75] }}
       - action: Ignore # evicted or drained: no failure
         onPodConditions: [{{ type: DisruptionTarget }}]"
     );

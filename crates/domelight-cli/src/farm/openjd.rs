@@ -3,18 +3,18 @@
 use super::shell::quote;
 use super::{Farm, File, Submission, text};
 
-/// `job.yaml`.
+/// `job.yaml`. A default of a path must be relative to the template's folder, so that what lies elsewhere is given
+/// on the command line.
 pub(super) fn submission(farm: &Farm) -> Submission {
     let Farm { program, cwd, render, n_shards, threads, name, .. } = farm;
-    let string = |text: &str| serde_json::Value::from(text).to_string();
     let template = format!(
         r#"specificationVersion: jobtemplate-2023-09
 name: {name}
 parameterDefinitions:
   - {{ name: Program, type: STRING, default: {program}, description: The domelight program on the workers }}
-  - {{ name: WorkDir, type: PATH, objectType: DIRECTORY, dataFlow: IN, default: {cwd}, description: Where relative names start }}
-  - {{ name: PartsDir, type: PATH, objectType: DIRECTORY, dataFlow: INOUT, default: {parts} }}
-  - {{ name: Picture, type: PATH, objectType: FILE, dataFlow: OUT, default: {picture} }}
+  - {{ name: WorkDir, type: PATH, objectType: DIRECTORY, dataFlow: IN, description: Where relative names start }}
+  - {{ name: PartsDir, type: PATH, objectType: DIRECTORY, dataFlow: INOUT, default: parts }}
+  - {{ name: Picture, type: PATH, objectType: FILE, dataFlow: OUT, default: picture.exr }}
   - {{ name: Shards, type: INT, default: {n_shards}, minValue: 1, maxValue: 100000 }}
 steps:
   - name: Render
@@ -51,11 +51,13 @@ steps:
             set -eu
             exec '{{{{Param.Program}}}}' merge '{{{{Param.PartsDir}}}}' -o '{{{{Param.Picture}}}}'
 "#,
-        program = string(program),
-        cwd = string(cwd),
-        parts = string(&text(&farm.parts())),
-        picture = string(&text(&farm.picture)),
+        program = serde_json::Value::from(program.as_str()),
     );
-    let command = format!("openjd run {}", quote(&text(&farm.folder.join("job.yaml"))));
+    let job = quote(&text(&farm.folder.join("job.yaml")));
+    let mut command = format!("openjd run {job} -p {}", quote(&format!("WorkDir={cwd}")));
+    if farm.picture != farm.folder.join("picture.exr") {
+        let picture = format!("Picture={}", text(&farm.picture));
+        command = format!("{command} -p {}", quote(&picture));
+    }
     Submission { files: vec![File { name: "job.yaml", text: template }], command }
 }

@@ -14,13 +14,14 @@ pub(super) fn submission(farm: &Farm) -> Submission {
          # Arguments go to parallel, as in: render.sh --jobs 4 --sshlogin a,b\n\
          set -eu\n\
          cd {cwd}\n\
-         shard() {{\n    {program} {shard} --quiet\n}}\n\
-         if [ \"${{1-}}\" = shard ]; then shift; shard \"$1\"; exit; fi\n\
-         parallel --joblog {log} --resume-failed --retries 3 --halt soon,fail=1 \"$@\" \\\n    \
+         if [ \"${{1-}}\" = shard ]; then\n    \
+         exec {program} {shard} --quiet\n\
+         fi\n\
+         parallel --quote --joblog {log} --resume-failed --retries 3 --halt soon,fail=1 \"$@\" \\\n    \
          sh {itself} shard {{}} ::: $(seq 0 {last})\n\
          exec {program} {merge}\n",
         cwd = quote(cwd),
-        shard = farm.shard("$1"),
+        shard = farm.shard("$2"),
         log = quote(&format!("{folder}/joblog")),
         itself = quote(&format!("{folder}/render.sh")),
         last = n_shards - 1,

@@ -16,6 +16,7 @@ pub(super) fn submission(farm: &Farm) -> Submission {
          #SBATCH --ntasks=1\n\
          #SBATCH --cpus-per-task={threads}\n\
          #SBATCH --requeue\n\
+         #SBATCH --output=render.%A_%a.log\n\
          #SBATCH --open-mode=append\n\
          #SBATCH --signal=B:TERM@60\n\
          # Exit code 75 says: interrupted and saved, run me again (RequeueExit=75 in slurm.conf does so);\n\
@@ -29,6 +30,7 @@ pub(super) fn submission(farm: &Farm) -> Submission {
         "#!/bin/bash\n\
          #SBATCH --job-name={name}-merge\n\
          #SBATCH --ntasks=1\n\
+         #SBATCH --output=merge.%j.log\n\
          #SBATCH --open-mode=append\n\
          # After any end of the array: merge itself refuses missing and unfinished parts.\n\
          set -eu\n\
@@ -41,8 +43,10 @@ pub(super) fn submission(farm: &Farm) -> Submission {
          # Submits the array and the merge that waits for it; arguments go to both sbatch commands.\n\
          set -eu\n\
          cd {folder}\n\
-         job=$(sbatch --parsable --output=render.%A_%a.log \"$@\" render.sbatch)\n\
-         exec sbatch --parsable --output=merge.%j.log --dependency=afterany:\"${{job%%;*}}\" \"$@\" merge.sbatch\n",
+         array=$(sbatch --parsable \"$@\" render.sbatch)\n\
+         array=${{array%%;*}}\n\
+         merge=$(sbatch --parsable --dependency=afterany:\"$array\" \"$@\" merge.sbatch)\n\
+         echo \"array $array, merge ${{merge%%;*}}\"\n",
         folder = quote(&folder)
     );
     let files = vec![

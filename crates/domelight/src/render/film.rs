@@ -81,6 +81,10 @@ impl PixelSums {
         Rgb::from(sum.map(|c| (c / n) as f32))
     }
 
+    fn alpha(&self) -> f32 {
+        self.alpha * self.scale()
+    }
+
     fn depth(&self) -> f32 {
         (self.depth / f64::from(self.n_hits.max(1))) as f32
     }
@@ -131,20 +135,46 @@ impl Layers {
         self.color.height
     }
 
-    /// From the sums of all pixels, row by row.
-    fn new(width: usize, height: usize, sums: &[PixelSums]) -> Self {
-        let image = |f: &dyn Fn(&PixelSums) -> Rgb| {
-            RgbImage::new(width, height, sums.iter().map(f).collect())
-        };
+    /// Of pixels without samples.
+    pub fn new(width: usize, height: usize) -> Self {
+        let image = || RgbImage::filled(width, height, Rgb::BLACK);
+        let n = width * height;
         Self {
-            color: image(&|p| p.mean(p.color)),
-            alpha: sums.iter().map(|p| p.alpha * p.scale()).collect(),
-            unoccluded: image(&|p| p.mean(p.unoccluded)),
-            albedo: image(&|p| p.albedo * p.scale()),
-            normal: sums.iter().map(|p| p.normal * p.scale()).collect(),
-            depth: sums.iter().map(PixelSums::depth).collect(),
-            variance: image(&PixelSums::variance),
-            n_samples: sums.iter().map(|p| p.n_samples).collect(),
+            color: image(),
+            alpha: vec![0.0; n],
+            unoccluded: image(),
+            albedo: image(),
+            normal: vec![Vec3::ZERO; n],
+            depth: vec![0.0; n],
+            variance: image(),
+            n_samples: vec![0; n],
+        }
+    }
+
+    /// Takes the pixels that have samples in a part of the picture over.
+    ///
+    /// # Panics
+    /// If one lies outside the picture.
+    pub fn merge(&mut self, part: &Film) {
+        let (width, height) = (self.width(), self.height());
+        self.put(part, Window { x: 0, y: 0, width, height });
+    }
+
+    /// Takes the pixels of `film` over that have samples; `self` is of the pixels of `window`.
+    fn put(&mut self, film: &Film, window: Window) {
+        let from = film.window;
+        for (i, p) in film.pixels.iter().enumerate().filter(|(_, p)| p.n_samples > 0) {
+            let (x, y) = (from.x + i % from.width, from.y + i / from.width);
+            assert!(window.contains(x, y), "pixel ({x}, {y}) outside {window}");
+            let i = window.index(x, y);
+            self.color.pixels[i] = p.mean(p.color);
+            self.alpha[i] = p.alpha();
+            self.unoccluded.pixels[i] = p.mean(p.unoccluded);
+            self.albedo.pixels[i] = p.albedo * p.scale();
+            self.normal[i] = p.normal * p.scale();
+            self.depth[i] = p.depth();
+            self.variance.pixels[i] = p.variance();
+            self.n_samples[i] = p.n_samples;
         }
     }
 }
@@ -193,28 +223,17 @@ impl Film {
 
     /// The picture of the window.
     pub fn layers(&self) -> Layers {
-        Layers::new(self.window.width, self.window.height, &self.pixels)
+        let mut layers = Layers::new(self.window.width, self.window.height);
+        layers.put(self, self.window);
+        layers
     }
 
-    /// Takes the pixels that have samples in `part` over, wherever they lie in the window.
-    ///
-    /// # Panics
-    /// If one lies outside the window.
-    pub fn merge(&mut self, part: &Self) {
-        let from = part.window;
-        for (i, sums) in part.pixels.iter().enumerate().filter(|(_, sums)| sums.n_samples > 0) {
-            let (x, y) = (from.x + i % from.width, from.y + i / from.width);
-            assert!(self.window.contains(x, y), "pixel ({x}, {y}) outside {}", self.window);
-            self.pixels[self.window.index(x, y)] = *sums;
-        }
-    }
-
-    /// Camera samples of the pixel (x, y) of the picture.
-    ///
-    /// # Panics
-    /// If it lies outside the window.
-    pub fn n_samples(&self, x: usize, y: usize) -> u32 {
-        self.pixels[self.window.index(x, y)].n_samples
+    /// Colour and alpha of the window.
+    #[cfg(feature = "io")]
+    pub(super) fn picture(&self) -> (RgbImage, Vec<f32>) {
+        let color = self.pixels.iter().map(|p| p.mean(p.color)).collect();
+        let alpha = self.pixels.iter().map(PixelSums::alpha).collect();
+        (RgbImage::new(self.window.width, self.window.height, color), alpha)
     }
 
     pub(super) fn put(&mut self, window: Window, pixels: &[PixelSums]) {
@@ -248,9 +267,13 @@ impl Film {
     /// The bits of the sums: for each of [`PixelSums::WORDS`] one word a pixel.
     #[cfg(feature = "io")]
     pub(super) fn words(&self) -> impl Iterator<Item = (&'static str, Vec<u32>)> {
-        let words: Vec<_> = self.pixels.iter().copied().map(PixelSums::to_words).collect();
-        let plane = move |i: usize| words.iter().map(|w| w[i]).collect();
-        PixelSums::WORDS.into_iter().enumerate().map(move |(i, name)| (name, plane(i)))
+        let plane = || Vec::with_capacity(self.pixels.len());
+        let mut planes = PixelSums::WORDS.map(|name| (name, plane()));
+        for sums in &self.pixels {
+            let words = sums.to_words();
+            planes.iter_mut().zip(words).for_each(|((_, plane), word)| plane.push(word));
+        }
+        planes.into_iter()
     }
 
     /// From the words of [`Film::words`], found by name; none if one is missing or too short.
@@ -364,12 +387,11 @@ mod tests {
         let without = |name: &str| find(name).filter(|_| name != "hits.Y");
         assert_eq!(Film::from_words(9, 9, window, without), None);
 
-        let mut whole = Film::new(9, 9, Window { x: 0, y: 0, width: 9, height: 9 });
+        let mut whole = Layers::new(9, 9);
         whole.merge(&film);
-        assert_eq!(whole.get(window), film.pixels);
-        assert_eq!(
-            (whole.n_samples(2, 1), whole.n_samples(3, 1), whole.n_samples(4, 1)),
-            (1, 2, 0)
-        );
+        let part = film.layers();
+        assert_eq!(whole.n_samples[10..14], [0, 1, 2, 0]);
+        assert_eq!(whole.color.pixels[11..13], part.color.pixels);
+        assert_eq!((whole.depth[12], whole.alpha[12]), (part.depth[1], part.alpha[1]));
     }
 }

@@ -5,4 +5,4 @@ mod read_layers;
 mod write;
 
 pub use read::decode;
-pub use write::{ExrLayers, Layer, Plane, text_attributes};
+pub use write::{Compression, ExrLayers, Layer, Plane, text_attributes};

@@ -2,7 +2,7 @@
 
 use super::read::{for_each_block, guarded, open};
 use super::write::string_attributes;
-use super::{ExrLayers, Layer, Plane};
+use super::{Compression, ExrLayers, Layer, Plane};
 use crate::picture::{Problem, allocate};
 use ::exr::block::lines::LineRef;
 use ::exr::meta::attribute::EnvironmentMap;
@@ -59,6 +59,7 @@ fn decode_unguarded(bytes: &[u8]) -> Result<ExrLayers, Problem> {
             EnvironmentMap::LatitudeLongitude => EnvmapKind::LatLong,
             EnvironmentMap::Cube => EnvmapKind::Cube,
         }),
+        compression: Compression::default(),
     };
     for (channel, plane) in list.iter().zip(planes) {
         let name = channel.name.to_string();
