@@ -227,7 +227,6 @@ impl Course {
             complete: session.is_complete(),
             counts: session.counts(),
             film: session.film(),
-            guides: session.guides(),
         };
         let bytes = checkpoint.encode()?;
         Ok(write_atomically(path, |out| out.write_all(&bytes))?)
@@ -269,7 +268,7 @@ fn restore<S: Strategy>(
         );
         return Err(UsageError(text).into());
     }
-    let restored = session.restore(&checkpoint.film, &checkpoint.guides, checkpoint.counts);
+    let restored = session.restore(&checkpoint.film, checkpoint.counts);
     restored.with_context(|| path.display().to_string())
 }
 

@@ -13,7 +13,7 @@ use domelight::render::{
 use domelight::sampling::{Heuristic, Pcg32};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{Camera, CameraSettings, Scene};
-use domelight::strategy::{LightTable, MultipleImportanceSampling, ProductSampling, Strategy};
+use domelight::strategy::{LightTable, MultipleImportanceSampling};
 
 type Mis<'a> = MultipleImportanceSampling<'a>;
 
@@ -46,19 +46,19 @@ fn mis(stage: &Stage) -> Mis<'_> {
     Mis::new(&stage.environment, LightTable::Full, Heuristic::Balance, 1, 1).unwrap()
 }
 
-fn session<'a, S: Strategy>(
+fn session<'a>(
     stage: &'a Stage,
-    strategy: &'a S,
+    mis: &'a Mis<'a>,
     settings: &'a RenderSettings,
-) -> Session<'a, S> {
-    Session::new(&stage.scene, &stage.camera, &stage.environment, strategy, settings)
+) -> Session<'a, Mis<'a>> {
+    Session::new(&stage.scene, &stage.camera, &stage.environment, mis, settings)
 }
 
-fn uninterrupted(stage: &Stage, strategy: &impl Strategy, settings: &RenderSettings) -> Rendering {
-    render(&stage.scene, &stage.camera, &stage.environment, strategy, settings, &())
+fn uninterrupted(stage: &Stage, settings: &RenderSettings) -> Rendering {
+    render(&stage.scene, &stage.camera, &stage.environment, &mis(stage), settings, &())
 }
 
-fn checkpoint<S: Strategy>(session: &Session<S>, n_samples: u32) -> Checkpoint {
+fn checkpoint(session: &Session<Mis>, n_samples: u32) -> Checkpoint {
     Checkpoint {
         identity: vec![("scene".into(), "spheres".into()), ("seed".into(), "0".into())],
         provenance: vec![("domelight.version".into(), "test".into())],
@@ -68,7 +68,6 @@ fn checkpoint<S: Strategy>(session: &Session<S>, n_samples: u32) -> Checkpoint {
         complete: session.is_complete(),
         counts: session.counts(),
         film: session.film(),
-        guides: session.guides(),
     }
 }
 
@@ -98,31 +97,19 @@ fn pool(n_threads: usize) -> rayon::ThreadPool {
 #[test]
 fn a_resumed_render_has_the_bits_of_the_uninterrupted_one() {
     let (stage, settings) = (stage(), settings());
-    interrupt_and_resume(&stage, &mis(&stage), &settings);
-}
-
-#[test]
-fn what_was_learned_is_gone_on_with() {
-    let stage = stage();
-    let settings = RenderSettings { n_samples: 40, tile_size: 16, ..settings() };
-    interrupt_and_resume(&stage, &ProductSampling::new(&stage.environment, 2), &settings);
-}
-
-fn interrupt_and_resume<S: Strategy>(stage: &Stage, strategy: &S, settings: &RenderSettings) {
-    let expected = uninterrupted(stage, strategy, settings);
+    let (mis, expected) = (mis(&stage), uninterrupted(&stage, &settings));
     let mut random = Pcg32::new(1, 1);
     for n_threads in [1, 2] {
         pool(n_threads).install(|| {
             let mut saved: Option<Vec<u8>> = None;
             let mut interruptions = 0;
             let rendering = loop {
-                let mut session = session(stage, strategy, settings);
+                let mut session = session(&stage, &mis, &settings);
                 if let Some(bytes) = &saved {
-                    let Checkpoint { film, guides, counts, .. } =
-                        Checkpoint::decode(bytes).unwrap();
-                    session.restore(&film, &guides, counts).unwrap();
+                    let checkpoint = Checkpoint::decode(bytes).unwrap();
+                    session.restore(&checkpoint.film, checkpoint.counts).unwrap();
                 }
-                if session.run(&After::tiles(1 + random.next_u32() as usize % 10)) {
+                if session.run(&After::tiles(1 + random.next_u32() as usize % 40)) {
                     break session.rendering();
                 }
                 interruptions += 1;
@@ -150,17 +137,16 @@ fn more_samples_than_before_go_on_from_what_is_there() {
     let mut first = session(&stage, &mis, &few);
     assert!(first.run(&()));
     let mut second = session(&stage, &mis, &many);
-    second.restore(&first.film(), &first.guides(), first.counts()).unwrap();
+    second.restore(&first.film(), first.counts()).unwrap();
     assert!(!second.is_complete());
     assert!(second.run(&()));
-    assert_same(&second.rendering(), &uninterrupted(&stage, &mis, &many));
+    assert_same(&second.rendering(), &uninterrupted(&stage, &many));
 }
 
 #[test]
 fn merged_shards_are_the_single_run() {
     let (stage, settings) = (stage(), settings());
-    let mis = mis(&stage);
-    let expected = uninterrupted(&stage, &mis, &settings);
+    let (mis, expected) = (mis(&stage), uninterrupted(&stage, &settings));
     let RenderSettings { width, height, .. } = settings;
     for n in [1, 2, 3, 8, 64] {
         let mut layers = Layers::new(width, height);
@@ -239,12 +225,10 @@ fn sums_of_another_render_are_refused() {
     let mis = mis(&stage);
     let mut whole = session(&stage, &mis, &settings);
     let shard = session(&stage, &mis, &settings).only(0..3);
-    let refused = whole.restore(&shard.film(), &[], Counts::default());
+    let refused = whole.restore(&shard.film(), Counts::default());
     assert!(matches!(refused, Err(Misfit::Window { .. })), "{refused:?}");
     let other_size = Film::new(99, 38, whole.film().window);
-    assert!(whole.restore(&other_size, &[], Counts::default()).is_err());
-    let (film, more) = (whole.film(), [0]);
-    assert_eq!(whole.restore(&film, &more, Counts::default()), Err(Misfit::Guides));
+    assert!(whole.restore(&other_size, Counts::default()).is_err());
 }
 
 /// A tile stops by its own samples: the same with its neighbours or without.

@@ -6,9 +6,6 @@
 
 use std::ops::Range;
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD as BASE64;
-
 use super::{Counts, Film, Window};
 use crate::fingerprint::Fingerprinter;
 use crate::picture::Problem;
@@ -34,8 +31,6 @@ pub struct Checkpoint {
     pub counts: Counts,
     /// The sums.
     pub film: Film,
-    /// What the strategy has learned.
-    pub guides: Vec<u8>,
 }
 
 /// Why a file is no checkpoint to go on from.
@@ -137,13 +132,11 @@ impl Checkpoint {
             shadow_rays: count("domelight.state.shadow-rays")?,
             non_finite: count("domelight.state.non-finite")?,
         };
-        let guides = take("domelight.state.guides").ok_or_else(missing)?;
-        let guides = BASE64.decode(guides).map_err(|_| CheckpointError::Damaged("its guides"))?;
         let (identity, provenance) =
             attributes.into_iter().partition::<Vec<_>, _>(|(name, _)| name.starts_with(IDENTITY));
         let strip = |(name, value): (String, String)| (name[IDENTITY.len()..].to_owned(), value);
         let identity = identity.into_iter().map(strip).collect();
-        Ok(Self { identity, provenance, tiles, n_tiles, n_samples, complete, counts, film, guides })
+        Ok(Self { identity, provenance, tiles, n_tiles, n_samples, complete, counts, film })
     }
 
     /// The first entry of the identity that is not the same here and there: its name, here, there.
@@ -177,9 +170,7 @@ impl Checkpoint {
         let numbers = numbers.map(|(name, n)| (format!("domelight.state.{name}"), n.to_string()));
         let identity = self.identity.iter().map(|(n, v)| (format!("{IDENTITY}{n}"), v.clone()));
         let format = ("domelight.checkpoint".to_owned(), FORMAT.to_owned());
-        let guides = ("domelight.state.guides".to_owned(), BASE64.encode(&self.guides));
-        let own = [format, guides].into_iter().chain(numbers).chain(identity);
-        let all = self.provenance.iter().cloned().chain(own);
+        let all = self.provenance.iter().cloned().chain([format]).chain(numbers).chain(identity);
         let mut all: Vec<_> = all.collect();
         all.sort();
         all

@@ -202,9 +202,6 @@ pub enum Misfit {
         /// Of the render.
         expected: Window,
     },
-    /// What was learned is not of these tiles.
-    #[error("what the strategy had learned is of other tiles")]
-    Guides,
     /// Some pixels of a tile have more samples than others.
     #[error("the tile at ({x}, {y}) is torn: its pixels have different numbers of samples")]
     Samples {

@@ -12,7 +12,7 @@ use super::{Frame, Observer, RenderSettings, Rendering};
 use crate::environment::Environment;
 use crate::sampling::Stream;
 use crate::scene::{Camera, Scene};
-use crate::strategy::{Guide as _, Strategy};
+use crate::strategy::Strategy;
 
 /// The tiles of a picture, or some of them, on their way to all their samples.
 ///
@@ -141,26 +141,13 @@ impl<'a, S: Strategy> Session<'a, S> {
         film
     }
 
-    /// What the strategy has learned of each tile so far, as bytes.
-    pub fn guides(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        for (_, learned) in &self.tiles {
-            learned.write(&mut bytes);
-        }
-        bytes
-    }
-
-    /// Takes the sums over that another session of the same render had, what was learned, and what was
-    /// done.
+    /// Takes the sums over that another session of the same render had.
     ///
     /// # Errors
     /// If they are of another part or size of picture, or of no whole number of passes.
-    pub fn restore(&mut self, film: &Film, guides: &[u8], counts: Counts) -> Result<(), Misfit> {
+    pub fn restore(&mut self, film: &Film, counts: Counts) -> Result<(), Misfit> {
         film.require_window(self.frame.settings, self.tiling.window(&self.range))?;
-        let mut guides = guides;
-        for (tile, learned) in &mut self.tiles {
-            let Window { width, height, .. } = tile.window;
-            *learned = S::Learned::read(&mut guides, width, height).ok_or(Misfit::Guides)?;
+        for (tile, _) in &mut self.tiles {
             let pixels: Vec<PixelSums> = film.get(tile.window);
             let n_samples = pixels[0].n_samples();
             if pixels.iter().any(|p| p.n_samples() != n_samples) {
@@ -170,7 +157,7 @@ impl<'a, S: Strategy> Session<'a, S> {
             (tile.pixels, tile.counts) = (pixels, Counts::default());
         }
         self.before = counts;
-        if guides.is_empty() { Ok(()) } else { Err(Misfit::Guides) }
+        Ok(())
     }
 
     /// The picture of all tiles so far.

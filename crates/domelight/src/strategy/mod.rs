@@ -15,7 +15,6 @@
 
 mod brdf;
 mod environment;
-pub(crate) mod guide;
 mod light_set;
 mod mis;
 pub mod product;
@@ -24,7 +23,6 @@ mod sir;
 
 pub use brdf::BrdfSampling;
 pub use environment::EnvironmentSampling;
-pub use guide::Guide;
 pub use light_set::LightSet;
 pub use mis::{CompensationNeedsBrdf, LightTable, MultipleImportanceSampling};
 pub use product::ProductSampling;
@@ -235,7 +233,7 @@ pub trait Strategy: Sync {
     /// What all tiles of a pass share.
     type Pass: Sync;
     /// What the rounds of a tile teach, kept from pass to pass.
-    type Learned: Guide;
+    type Learned: Default + Send;
     /// Memory that a thread keeps from tile to tile; from one round to its lesson it may carry what
     /// was asked for.
     type Scratch: Default;

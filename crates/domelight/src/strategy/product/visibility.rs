@@ -14,7 +14,6 @@
 //! with. So V̂ comes from other pixels or from earlier passes alone.
 
 use super::cells::MAX_CELLS;
-use crate::strategy::guide::{Guide, read_number, read_sparse, write_number, write_sparse};
 
 /// Pixels along the side of a block.
 pub(super) const BLOCK: usize = 4;
@@ -22,7 +21,7 @@ pub(super) const BLOCK: usize = 4;
 const NEIGHBOR: f32 = 0.35;
 
 /// What is known of a tile.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct Learned {
     /// Rays traced from each block to each cell.
     rays: Vec<u16>,
@@ -100,37 +99,6 @@ impl Learned {
     pub(super) fn luminance(&self, pixel: usize) -> Option<f32> {
         let n = *self.n_samples.get(pixel)?;
         (n > 0).then(|| self.luminance[pixel] / n as f32)
-    }
-}
-
-impl Guide for Learned {
-    fn write(&self, out: &mut Vec<u8>) {
-        let Self { rays, free, luminance, n_samples, n_passes } = self;
-        let words = |counts: &[u16]| counts.iter().map(|&n| u32::from(n)).collect::<Vec<_>>();
-        let luminance: Vec<_> = luminance.iter().map(|l| l.to_bits()).collect();
-        for numbers in [&words(rays), &words(free), &luminance, n_samples] {
-            write_sparse(numbers, out);
-        }
-        write_number(*n_passes, out);
-    }
-
-    fn read(bytes: &mut &[u8], width: usize, height: usize) -> Option<Self> {
-        let n_counts = Blocks::new(width, height).len() * MAX_CELLS;
-        // A tile on which nothing was hit has learned nothing.
-        let list = |bytes: &mut &[u8], n: usize| {
-            read_sparse(bytes, n).filter(|list| [0, n].contains(&list.len()))
-        };
-        let counts = |bytes: &mut &[u8]| {
-            let narrow = |&n: &u32| u16::try_from(n).ok();
-            list(bytes, n_counts)?.iter().map(narrow).collect::<Option<Vec<_>>>()
-        };
-        let (rays, free) = (counts(bytes)?, counts(bytes)?);
-        let luminance = list(bytes, width * height)?.into_iter().map(f32::from_bits).collect();
-        let n_samples = list(bytes, width * height)?;
-        let learned = Self { rays, free, luminance, n_samples, n_passes: read_number(bytes)? };
-        let pairs = learned.rays.len() == learned.free.len()
-            && learned.luminance.len() == learned.n_samples.len();
-        pairs.then_some(learned)
     }
 }
 
