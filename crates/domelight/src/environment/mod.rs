@@ -584,7 +584,7 @@ mod tests {
         let still = Environment::new(map.clone(), Orientation::default(), 1.0).unwrap();
         let orientation = Orientation { rotation: 30.0, ..Default::default() };
         let turned = Environment::new(map, orientation, 1.0).unwrap();
-        let turn = crate::math::Mat3::from_rotation_y(30f32.to_radians());
+        let turn = Mat3::from_rotation_y(30f32.to_radians());
         let mut pcg = Pcg32::new(1, 2);
         for _ in 0..1000 {
             let w = still.sample(vec2(pcg.next_f32(), pcg.next_f32())).unwrap();

@@ -52,7 +52,7 @@ mod tests {
         for degrees in [0.01, 0.25, 10.0, 45.0, 90.0] {
             let radius = f32::to_radians(degrees);
             let light = light(Vec3::Y, Rgb::WHITE, Region::Sun);
-            let disc = Disc::of(&crate::rig::RigLight { angular_radius: radius, ..light });
+            let disc = Disc::of(&RigLight { angular_radius: radius, ..light });
             let radiance = 1.0 / solid_angle(radius);
             let projected = PI * radius.sin().powi(2);
             assert!((disc.facing.r - radiance * projected).abs() < 1e-5, "{degrees}");
@@ -62,7 +62,7 @@ mod tests {
     #[test]
     fn wider_discs_become_hemispheres() {
         let light = light(Vec3::Y, Rgb::WHITE, Region::Cell);
-        let disc = Disc::of(&crate::rig::RigLight { angular_radius: 3.0, ..light });
+        let disc = Disc::of(&RigLight { angular_radius: 3.0, ..light });
         assert_eq!(disc.radius, FRAC_PI_2);
         assert!((disc.facing.g - 0.5).abs() < 1e-6);
     }
