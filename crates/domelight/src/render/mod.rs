@@ -140,8 +140,7 @@ pub fn render<S: Strategy>(
     let frame = Frame { scene, camera, environment, settings, filter, extent };
     let n_rays = strategy.n_rays();
     let size = tile_size(settings, n_rays);
-    let mut tiles: Vec<(Tile, S::Learned)> =
-        tiles(settings, size).map(|tile| (tile, S::Learned::default())).collect();
+    let mut tiles: Vec<Tile> = tiles(settings, size).collect();
     let mut complete = true;
     for samples in passes(settings, size, n_rays, strategy.samples_per_pass()) {
         if observer.cancelled() {
@@ -153,11 +152,11 @@ pub fn render<S: Strategy>(
         let pass = Pass { samples, shared: strategy.begin_pass(stream) };
         complete &= tiles
             .par_iter_mut()
-            .map_init(Scratch::<S>::default, |scratch, (tile, learned)| {
+            .map_init(Scratch::<S>::default, |scratch, tile| {
                 if observer.cancelled() {
                     return false;
                 }
-                let counts = tile.render(&frame, strategy, &pass, learned, scratch);
+                let counts = tile.render(&frame, strategy, &pass, scratch);
                 observer.tile_finished(&counts);
                 true
             })
@@ -218,19 +217,14 @@ fn passes(
     })
 }
 
-fn assemble<L>(
-    settings: &RenderSettings,
-    size: usize,
-    tiles: &[(Tile, L)],
-    complete: bool,
-) -> Rendering {
+fn assemble(settings: &RenderSettings, size: usize, tiles: &[Tile], complete: bool) -> Rendering {
     let mut counts = Counts::default();
-    for (tile, _) in tiles {
+    for tile in tiles {
         counts += tile.counts;
     }
     let across = settings.width.div_ceil(size);
     let layers = Layers::new(settings.width, settings.height, |x, y| {
-        let (tile, _) = &tiles[y / size * across + x / size];
+        let tile = &tiles[y / size * across + x / size];
         &tile.pixels[(y - tile.y) * tile.width + x - tile.x]
     });
     Rendering { layers, counts, complete }
