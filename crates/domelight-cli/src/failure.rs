@@ -1,9 +1,13 @@
 //! What the user is told when something fails, and the exit code.
 
+use crate::merge::MergeError;
+use domelight::environment::EnvironmentError;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::ProbeError;
 use domelight::picture::Problem;
 use domelight::picture::compare::SizeMismatch;
+use domelight::render::CheckpointError;
+use domelight::scene::{CameraError, LoadError, SceneError};
 use std::fmt::Write as _;
 use std::io::{self, IsTerminal, Write as _};
 use std::process::ExitCode;
@@ -19,6 +23,18 @@ impl std::fmt::Display for UsageError {
 }
 
 impl std::error::Error for UsageError {}
+
+/// The work was interrupted and its state saved: run it again; exit code 75, the EX_TEMPFAIL of sysexits.h.
+#[derive(Debug)]
+pub(crate) struct InterruptedAndSaved(pub(crate) String);
+
+impl std::fmt::Display for InterruptedAndSaved {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for InterruptedAndSaved {}
 
 /// Prints a line to standard error. If that is closed or full, nobody can be told, and the work goes on.
 pub(crate) fn tell(text: &str) {
@@ -47,7 +63,28 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
     if let Some(hint) = hint(error) {
         tell(&format!("{hint_label} {hint}"));
     }
-    ExitCode::from(if error.is::<UsageError>() { 2 } else { 1 })
+    ExitCode::from(code(error))
+}
+
+/// 2 if trying again cannot help: the arguments, the scene or the probe are wrong. 75 if it goes on where it was.
+fn code(error: &anyhow::Error) -> u8 {
+    let hopeless = error.is::<UsageError>()
+        || error.is::<LoadError>()
+        || error.is::<ProbeError>()
+        || error.is::<SceneError>()
+        || error.is::<CameraError>()
+        || error.is::<EnvironmentError>()
+        || error.is::<CheckpointError>();
+    // A file that is not there was asked for wrongly; other troubles of the system may pass.
+    let passing = io_kind(error).is_some_and(|kind| kind != io::ErrorKind::NotFound);
+    if let Some(error) = error.downcast_ref::<MergeError>() {
+        return error.code();
+    }
+    match () {
+        () if error.is::<InterruptedAndSaved>() => 75,
+        () if hopeless && !passing => 2,
+        () => 1,
+    }
 }
 
 /// The error and its causes, but for causes that the message above them already contains.

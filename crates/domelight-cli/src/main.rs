@@ -1,17 +1,28 @@
 //! The program `domelight`: one module a subcommand, their arguments in [`args`].
 //!
-//! Exit codes: 0 done (also when the reader of our output went away), 1 failed, 2 bad usage.
+//! Exit codes: 0 done (also when the reader of our output went away), 1 failed, 2 bad usage or input, 75
+//! interrupted and saved; `merge` has three of its own.
 
+mod acceptance;
 mod args;
+mod compare;
+mod course;
 mod diff;
 mod failure;
+mod farm;
+mod figures;
 mod interrupt;
+mod lights;
+mod merge;
+mod notation;
 mod output;
 mod probe;
 mod progress;
 mod render;
 mod report;
+mod scene;
 mod strategy;
+mod svg;
 mod usage;
 mod values;
 
@@ -23,8 +34,13 @@ fn main() -> ExitCode {
     let Arguments { command, quiet } = Arguments::parse();
     let done = match command {
         Command::Render(arguments) => render::run(&arguments, quiet),
+        Command::Merge(arguments) => merge::run(&arguments, quiet),
+        Command::Farm(arguments) => farm::run(&arguments, quiet),
+        Command::Compare(arguments) => compare::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
+        Command::Lights(arguments) => lights::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
+        Command::Figures(arguments) => figures::run(&arguments, quiet),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -53,6 +53,11 @@ impl PicturePath {
         self.path == Path::new("-")
     }
 
+    /// What its name says; none for standard output.
+    pub(crate) fn format(&self) -> Option<PictureFormat> {
+        self.format
+    }
+
     /// Asks before the work whether its result can be written.
     pub(crate) fn require_writable(&self) -> anyhow::Result<()> {
         Ok(require_writable(&self.path)?)

@@ -7,18 +7,31 @@ use std::time::{Duration, Instant};
 use domelight::render::{Counts, Observer};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::output::print;
+
 /// Shows camera samples done, passes, rays a second and the time left on standard error, if that is
-/// a terminal and nobody asked for quiet; passes the interrupt flag on to the renderer.
+/// a terminal and nobody asked for quiet, or tells a farm on standard output; passes the interrupt flag
+/// on to the renderer.
 pub(crate) struct RenderProgress {
     bar: ProgressBar,
+    openjd: bool,
+    /// What is rendered; empty where that is plain.
+    label: String,
     interrupted: &'static AtomicBool,
     rays: AtomicU64,
+    /// Whole per cent told last.
+    told: AtomicU64,
     started: Instant,
 }
 
 impl RenderProgress {
     /// A bar over `n_camera_rays`.
-    pub(crate) fn new(n_camera_rays: u64, quiet: bool, interrupted: &'static AtomicBool) -> Self {
+    pub(crate) fn new(
+        label: &str,
+        n_camera_rays: u64,
+        quiet: bool,
+        interrupted: &'static AtomicBool,
+    ) -> Self {
         let target =
             if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let bar = ProgressBar::with_draw_target(Some(n_camera_rays), target);
@@ -26,27 +39,68 @@ impl RenderProgress {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("━━╌"));
         }
-        bar.enable_steady_tick(Duration::from_millis(200));
-        Self { bar, interrupted, rays: AtomicU64::new(0), started: Instant::now() }
+        if !bar.is_hidden() {
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
+        let label = if label.is_empty() { String::new() } else { format!("{label}  ") };
+        let (rays, told) = (AtomicU64::new(0), AtomicU64::new(0));
+        Self { bar, label, openjd: false, interrupted, rays, told, started: Instant::now() }
+    }
+
+    /// The lines of Open Job Description on standard output instead of the bar, if `on`.
+    pub(crate) fn openjd(mut self, on: bool) -> Self {
+        if on {
+            self.bar.set_draw_target(ProgressDrawTarget::hidden());
+        }
+        self.openjd = on;
+        self
+    }
+
+    /// Sets the bar to `done` of `total` camera rays.
+    pub(crate) fn begin(&self, total: u64, done: u64) {
+        self.bar.set_length(total);
+        self.bar.set_position(done);
+        self.bar.reset_eta();
+        self.tell_farm();
     }
 
     /// Takes the bar away.
     pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
     }
+
+    /// Says on standard output, at each whole per cent, how much is done; nobody may be listening.
+    fn tell_farm(&self) {
+        let percent = 100 * self.bar.position() / self.bar.length().unwrap_or(1).max(1);
+        if self.openjd
+            && (percent == 0 || self.told.fetch_max(percent, Ordering::Relaxed) < percent)
+        {
+            let _ = print(&format!("openjd_progress: {percent}"));
+        }
+    }
 }
 
 impl Observer for RenderProgress {
     fn pass_started(&self, samples: Range<u32>) {
-        self.bar.set_prefix(format!("samples {}–{}", samples.start + 1, samples.end));
+        let samples = format!("samples {}–{}", samples.start + 1, samples.end);
+        if self.openjd {
+            let _ = print(&format!("openjd_status: {samples}"));
+        }
+        self.bar.set_prefix(samples);
     }
 
     fn tile_finished(&self, counts: &Counts) {
         let rays = counts.camera_rays + counts.shadow_rays;
         let rays = self.rays.fetch_add(rays, Ordering::Relaxed) + rays;
         let rate = rays as f64 / self.started.elapsed().as_secs_f64().max(1e-3);
-        self.bar.set_message(format!("{}  {:.1} Mrays/s", self.bar.prefix(), rate * 1e-6));
+        self.bar.set_message(format!(
+            "{}{}  {:.1} Mrays/s",
+            self.label,
+            self.bar.prefix(),
+            rate * 1e-6
+        ));
         self.bar.inc(counts.camera_rays);
+        self.tell_farm();
     }
 
     fn cancelled(&self) -> bool {

@@ -5,14 +5,16 @@ use domelight::environment::{Environment, UpAxis};
 use domelight::render::Rendering;
 use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
 use serde::Serialize;
+use std::path::Path;
 
-use crate::failure::{tell, warn};
+use crate::acceptance::Acceptance;
+use crate::failure::{InterruptedAndSaved, tell, warn};
 use crate::output::{self, PicturePath};
 use crate::usage::{Seconds, peak_memory};
 
-/// What was rendered, and how: enough to make the same picture again.
-#[derive(Serialize)]
-pub(crate) struct Settings {
+/// A scene under its light, seen by a camera.
+#[derive(Clone, Serialize)]
+pub(crate) struct SceneReport {
     pub(crate) scene: String,
     pub(crate) triangles: usize,
     pub(crate) material: Option<String>,
@@ -21,8 +23,15 @@ pub(crate) struct Settings {
     pub(crate) hide_env: bool,
     pub(crate) environment: EnvironmentReport,
     pub(crate) camera: CameraReport,
-    pub(crate) strategy: String,
     pub(crate) size: [usize; 2],
+}
+
+/// What was rendered, and how: enough to make the same picture again.
+#[derive(Serialize)]
+pub(crate) struct Settings {
+    #[serde(flatten)]
+    pub(crate) scene: SceneReport,
+    pub(crate) strategy: String,
     pub(crate) spp: u32,
     pub(crate) sampler: String,
     pub(crate) filter: &'static str,
@@ -31,7 +40,7 @@ pub(crate) struct Settings {
 }
 
 /// The light of a render.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(crate) struct EnvironmentReport {
     probe: String,
     size: [usize; 2],
@@ -42,6 +51,11 @@ pub(crate) struct EnvironmentReport {
 }
 
 impl EnvironmentReport {
+    /// What a user would call the probe.
+    pub(crate) fn probe(&self) -> &str {
+        &self.probe
+    }
+
     pub(crate) fn new(
         probe: String,
         light: &EnvironmentSettings,
@@ -62,7 +76,7 @@ impl EnvironmentReport {
 }
 
 /// The view of a render; one of `fov` and `ortho` is null.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(crate) struct CameraReport {
     origin: [f32; 3],
     target: [f32; 3],
@@ -84,16 +98,14 @@ impl CameraReport {
 
 impl Settings {
     /// What OpenEXR files tell of their making.
-    pub(crate) fn provenance(&self, complete: bool) -> Vec<(String, String)> {
+    pub(crate) fn provenance(&self) -> Vec<(String, String)> {
         let mut attributes =
             vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
         let settings = [
-            ("scene", self.scene.clone()),
-            ("environment", self.environment.probe.clone()),
+            ("scene", self.scene.scene.clone()),
+            ("environment", self.scene.environment.probe.clone()),
             ("strategy", self.strategy.clone()),
             ("samples", self.spp.to_string()),
-            // If not, the layer of sample counts tells how many there are.
-            ("complete", complete.to_string()),
             ("sampler", self.sampler.clone()),
             ("filter", self.filter.to_owned()),
             ("seed", self.seed.to_string()),
@@ -116,6 +128,14 @@ pub(crate) struct Stages {
     pub(crate) write: Seconds,
 }
 
+/// What ended a render before all samples were there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Stop {
+    Interrupted,
+    Time,
+}
+
 /// All that `--json` prints.
 #[derive(Serialize)]
 pub(crate) struct RenderReport {
@@ -128,7 +148,10 @@ pub(crate) struct RenderReport {
     rays_per_second: f64,
     peak_memory_bytes: Option<u64>,
     non_finite_samples: u64,
+    /// Of the strategy rejection, at the centres of pixels spread over the picture.
+    rejection: Option<Acceptance>,
     complete: bool,
+    stopped: Option<Stop>,
     outputs: Vec<String>,
 }
 
@@ -137,7 +160,9 @@ impl RenderReport {
         settings: Settings,
         rendering: &Rendering,
         seconds: Stages,
+        rejection: Option<Acceptance>,
         outputs: &[PicturePath],
+        stopped: Option<Stop>,
     ) -> Self {
         let counts = rendering.counts;
         let rays = (counts.camera_rays + counts.shadow_rays) as f64;
@@ -151,7 +176,9 @@ impl RenderReport {
             shadow_rays: counts.shadow_rays,
             peak_memory_bytes: peak_memory(),
             non_finite_samples: counts.non_finite,
+            rejection,
             complete: rendering.complete,
+            stopped,
             outputs: outputs.iter().map(ToString::to_string).collect(),
         }
     }
@@ -162,7 +189,8 @@ impl RenderReport {
 
     /// Two lines on standard error.
     pub(crate) fn print_summary(&self) {
-        let Settings { scene, environment, strategy, size: [w, h], spp, .. } = &self.settings;
+        let Settings { scene, strategy, spp, .. } = &self.settings;
+        let SceneReport { scene, environment, size: [w, h], .. } = scene;
         let environment = &environment.probe;
         let Stages { load, build, render, .. } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
@@ -181,14 +209,21 @@ impl RenderReport {
     ///
     /// # Errors
     /// If the render was interrupted.
-    pub(crate) fn check(&self, quiet: bool) -> Result<()> {
+    pub(crate) fn check(&self, saved: Option<&Path>, quiet: bool) -> Result<()> {
         if self.non_finite_samples > 0 {
             let n = self.non_finite_samples;
             warn(quiet, &format!("{n} camera samples were NaN or infinite and count as black"));
         }
-        if !self.complete {
-            bail!("interrupted; what was done so far is in {}", self.outputs.join(", "));
+        match (self.stopped, saved) {
+            (Some(Stop::Interrupted), None) => {
+                bail!("interrupted; what was done so far is in {}", self.outputs.join(", "))
+            }
+            (Some(Stop::Interrupted), Some(saved)) => Err(InterruptedAndSaved(format!(
+                "interrupted; {} holds the state to go on from",
+                saved.display()
+            ))
+            .into()),
+            (Some(Stop::Time) | None, _) => Ok(()),
         }
-        Ok(())
     }
 }

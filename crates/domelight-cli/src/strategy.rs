@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use domelight::environment::{CompensatedTable, Environment};
-use domelight::render::{RenderSettings, Rendering, render};
+use domelight::render::{RenderSettings, Rendering, Session, render};
 use domelight::rig::{MedianCut, Rig, VarianceMinimization, median_cut, variance_minimization};
 use domelight::sampling::Heuristic;
 use domelight::scene::{Camera, Scene};
@@ -12,9 +12,11 @@ use domelight::strategy::{
     SamplingImportanceResampling, ShadingPoint, Stop, Strategy, optimal_candidates,
 };
 
-use crate::args::render::{
-    HeuristicName, ProposalName, ResamplingName, SamplingArguments, SourceName, StrategyName,
+use crate::acceptance::{Acceptance, count_tries};
+use crate::args::sampling::{
+    HeuristicName, ProposalName, ResamplingName, SourceName, StrategyArguments, StrategyName,
 };
+use crate::course::Course;
 use crate::failure::UsageError;
 use crate::progress::RenderProgress;
 use crate::values::Split;
@@ -32,7 +34,7 @@ pub(crate) enum Plan {
     VarianceMinimization { n_lights: usize },
 }
 
-impl SamplingArguments {
+impl StrategyArguments {
     /// Checks what the flags say together.
     pub(crate) fn plan(&self) -> Result<Plan> {
         use StrategyName as S;
@@ -52,7 +54,6 @@ impl SamplingArguments {
         refuse("--rays", self.rays.is_some() && is_rig, "other strategies; use --lights")?;
         let n = self.rays.unwrap_or(1);
         let n_lights = self.lights.unwrap_or(64) as usize;
-        self.refuse_repeating_points()?;
         Ok(match self.strategy {
             S::Brdf => Plan::Brdf { n },
             S::Environment => Plan::Environment { n },
@@ -63,21 +64,6 @@ impl SamplingArguments {
             S::MedianCut => Plan::MedianCut { n_lights },
             S::VarianceMinimization => Plan::VarianceMinimization { n_lights },
         })
-    }
-
-    /// The points of a pixel are numbered by 32 bits; beyond that they would repeat.
-    fn refuse_repeating_points(&self) -> Result<()> {
-        let split = self.split.map_or(0, |s| s.environment.max(s.brdf));
-        let counts = [self.rays, self.candidates, self.tries, Some(split)];
-        let most = counts.into_iter().flatten().max().unwrap_or(1).max(1);
-        if u64::from(self.spp) * u64::from(most) > 1 << 32 {
-            return usage(format!(
-                "{} camera samples of {most} directions are more points than a pixel has (2^32): \
-                 lower --spp, or render several seeds and average them",
-                self.spp
-            ));
-        }
-        Ok(())
     }
 
     fn rejection(&self) -> Result<Plan> {
@@ -172,6 +158,49 @@ impl Plan {
         }
     }
 
+    /// What rejection would accept at those points; none of other strategies.
+    ///
+    /// # Errors
+    /// If the plan has a stopping rule without an estimate.
+    pub(crate) fn acceptance(
+        self,
+        points: impl FnOnce() -> Vec<ShadingPoint>,
+        environment: &Environment,
+        seed: u64,
+    ) -> Result<Option<Acceptance>> {
+        let Self::Rejection { proposal, stop } = self else { return Ok(None) };
+        let rejection = RejectionSampling::new(environment, proposal, stop)?;
+        Ok(Some(Acceptance::of(&count_tries(&rejection, &points(), seed))))
+    }
+
+    /// The points of a pixel are numbered by 32 bits; beyond that they would repeat.
+    pub(crate) fn refuse_repeating_points(self, spp: u32) -> Result<()> {
+        let n_points = match self {
+            Self::Brdf { n }
+            | Self::Environment { n }
+            | Self::Product { n }
+            | Self::Rejection { stop: Stop::Tries(n), .. } => n,
+            Self::Mis { split, .. } => split.environment.max(split.brdf),
+            Self::Sir { n_candidates, n, .. } => n_candidates.unwrap_or(n),
+            // Independent numbers, and none at all.
+            Self::Rejection { stop: Stop::Accepted { .. }, .. }
+            | Self::MedianCut { .. }
+            | Self::VarianceMinimization { .. } => 1,
+        };
+        if u64::from(spp) * u64::from(n_points) > 1 << 32 {
+            return usage(format!(
+                "{spp} camera samples of {n_points} directions are more points than a pixel has \
+                 (2^32): lower --spp, or render several seeds and average them"
+            ));
+        }
+        Ok(())
+    }
+
+    /// The expected value of the picture is the truth.
+    pub(crate) fn is_unbiased(self) -> bool {
+        !matches!(self, Self::MedianCut { .. } | Self::VarianceMinimization { .. })
+    }
+
     /// The name and the samples, for the report.
     pub(crate) fn describe(self) -> String {
         match self {
@@ -208,86 +237,83 @@ impl Plan {
     }
 }
 
-/// A plan with what it needs of the environment.
-pub(crate) enum Prepared<'a> {
-    Brdf { n: u32 },
-    Environment { n: u32 },
-    Mis { split: Split, heuristic: Heuristic, table: Option<CompensatedTable> },
-    Product(Box<ProductSampling<'a>>),
-    Rejection { proposal: Proposal, stop: Stop },
-    Sir { n_candidates: u32, n: u32, candidates: Candidates, resampling: Resampling },
-    Lights(Rig),
-}
-
-impl<'a> Prepared<'a> {
-    pub(crate) fn new(plan: Plan, environment: &'a Environment) -> Result<Self> {
-        Ok(match plan {
-            Plan::Brdf { n } => Self::Brdf { n },
-            Plan::Environment { n } => Self::Environment { n },
-            Plan::Mis { split, heuristic, compensation } => {
-                let table = compensation.then(|| CompensatedTable::new(environment));
-                Self::Mis { split, heuristic, table }
-            }
-            Plan::Product { n } => Self::Product(Box::new(ProductSampling::new(environment, n))),
-            Plan::Rejection { proposal, stop } => Self::Rejection { proposal, stop },
-            Plan::Sir { n_candidates, n, candidates, resampling } => {
-                Self::Sir { n_candidates: n_candidates.unwrap_or(n), n, candidates, resampling }
-            }
-            Plan::MedianCut { n_lights } => {
-                Self::Lights(median_cut(environment, n_lights, MedianCut::default())?)
-            }
-            Plan::VarianceMinimization { n_lights } => {
-                let settings = VarianceMinimization::default();
-                Self::Lights(variance_minimization(environment, n_lights, settings)?)
-            }
-        })
-    }
-}
-
 /// A scene ready to be rendered.
+#[derive(Clone, Copy)]
 pub(crate) struct Job<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) camera: &'a Camera,
     pub(crate) environment: &'a Environment,
     pub(crate) settings: &'a RenderSettings,
+    pub(crate) progress: &'a RenderProgress,
+    /// From the first sample to the last, unless it says otherwise.
+    pub(crate) course: Option<&'a Course>,
 }
 
 impl Job<'_> {
-    /// Renders with the strategy that was planned.
-    pub(crate) fn run(&self, prepared: &Prepared, progress: &RenderProgress) -> Result<Rendering> {
-        let environment = self.environment;
-        Ok(match prepared {
-            &Prepared::Brdf { n } => {
-                self.with(&BrdfSampling { environment, n_samples: n }, progress)
+    fn render<S: Strategy>(&self, strategy: &S) -> Result<Rendering> {
+        let Self { scene, camera, environment, settings, progress, course } = *self;
+        match course {
+            Some(course) => {
+                let session = Session::new(scene, camera, environment, strategy, settings);
+                course.run(session, settings, progress)
             }
-            &Prepared::Environment { n } => {
-                self.with(&EnvironmentSampling { environment, n_samples: n }, progress)
+            None => Ok(render(scene, camera, environment, strategy, settings, progress)),
+        }
+    }
+}
+
+/// Renders jobs with a plan, whose tables and lights are made.
+pub(crate) type Renderer<'e> = Box<dyn Fn(&Job) -> Result<Rendering> + 'e>;
+
+impl Plan {
+    /// Makes of the environment what serves all pictures.
+    pub(crate) fn prepare(self, environment: &Environment) -> Result<Renderer<'_>> {
+        Ok(match self {
+            Self::Brdf { n } => {
+                let brdf = BrdfSampling { environment, n_samples: n };
+                Box::new(move |job| job.render(&brdf))
             }
-            Prepared::Mis { split, heuristic, table } => {
-                let &Split { environment: m, brdf: n } = split;
-                let table = table.as_ref().map_or(LightTable::Full, LightTable::Compensated);
-                let mis = MultipleImportanceSampling::new(environment, table, *heuristic, m, n)?;
-                self.with(&mis, progress)
+            Self::Environment { n } => {
+                let light = EnvironmentSampling { environment, n_samples: n };
+                Box::new(move |job| job.render(&light))
             }
-            Prepared::Product(product) => self.with(&**product, progress),
-            &Prepared::Rejection { proposal, stop } => {
-                self.with(&RejectionSampling::new(environment, proposal, stop)?, progress)
+            Self::Mis { split: Split { environment: m, brdf: n }, heuristic, compensation } => {
+                let table = compensation.then(|| CompensatedTable::new(environment));
+                Box::new(move |job| {
+                    let table = table.as_ref().map_or(LightTable::Full, LightTable::Compensated);
+                    let mis = MultipleImportanceSampling::new(environment, table, heuristic, m, n)?;
+                    job.render(&mis)
+                })
             }
-            &Prepared::Sir { n_candidates, n, candidates, resampling } => {
+            Self::Product { n } => {
+                let product = ProductSampling::new(environment, n);
+                Box::new(move |job| job.render(&product))
+            }
+            Self::Rejection { proposal, stop } => {
+                let rejection = RejectionSampling::new(environment, proposal, stop)?;
+                Box::new(move |job| job.render(&rejection))
+            }
+            Self::Sir { n_candidates, n, candidates, resampling } => {
                 let sir = SamplingImportanceResampling {
                     environment,
-                    n_candidates,
+                    n_candidates: n_candidates.unwrap_or(n),
                     n_samples: n,
                     candidates,
                     resampling,
                 };
-                self.with(&sir, progress)
+                Box::new(move |job| job.render(&sir))
             }
-            Prepared::Lights(rig) => self.with(&LightSet { rig }, progress),
+            Self::MedianCut { n_lights } => {
+                lights(median_cut(environment, n_lights, MedianCut::default())?)
+            }
+            Self::VarianceMinimization { n_lights } => {
+                let settings = VarianceMinimization::default();
+                lights(variance_minimization(environment, n_lights, settings)?)
+            }
         })
     }
+}
 
-    fn with<S: Strategy>(&self, strategy: &S, progress: &RenderProgress) -> Rendering {
-        render(self.scene, self.camera, self.environment, strategy, self.settings, progress)
-    }
+fn lights<'e>(rig: Rig) -> Renderer<'e> {
+    Box::new(move |job| job.render(&LightSet { rig: &rig }))
 }

@@ -118,7 +118,7 @@ fn help_shows_examples() {
 fn a_missing_probe_is_named_with_a_hint() {
     let folder = pictures();
     let output = domelight(&folder, &["probe", "skye"]);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(2));
     let lines: Vec<&str> = stderr(&output).lines().collect();
     assert!(lines[0].starts_with("error: skye: "), "{lines:?}");
     assert_eq!(lines[1], "hint: a probe is a file or one of sky, studio, cathedral, constant");
@@ -167,7 +167,7 @@ fn bad_texels_are_refused_or_repaired_and_counted() {
     map.pixels[13] = Rgb::new(1.0, f32::NAN, -2.0);
     write_exr(&folder.path().join("bad.exr"), &map, None);
     let refused = domelight(&folder, &["probe", "bad.exr"]);
-    assert_eq!(refused.status.code(), Some(1));
+    assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains("(5, 1)") && stderr(&refused).contains("--sanitize"));
     let report = json(&domelight(&folder, &["probe", "bad.exr", "--sanitize", "--json"]));
     assert_eq!(report["sanitized"], serde_json::json!({"negative": 1, "non_finite": 1}));

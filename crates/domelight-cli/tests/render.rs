@@ -158,7 +158,7 @@ fn flags_that_contradict_are_usage_errors() {
     refused(&render(&folder, &["-o", "picture.bmp"]), 2, &["picture.bmp", ".exr"]);
     refused(&render(&folder, &["--filter", "lanczos"]), 2, &["lanczos", "gaussian"]);
     refused(&render(&folder, &["--tone", "filmic"]), 2, &["filmic", "agx"]);
-    refused(&render(&folder, &["--up", "0,0,0"]), 1, &["up"]);
+    refused(&render(&folder, &["--up", "0,0,0"]), 2, &["up"]);
     refused(&render(&folder, &["--ortho", "-1"]), 2, &["-1", "not negative"]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
@@ -167,16 +167,16 @@ fn flags_that_contradict_are_usage_errors() {
 fn missing_and_bad_files_are_named() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
-    refused(&render(&folder, &["bunny.ply"]), 1, &["bunny.ply", "No such file"]);
-    refused(&render(&folder, &["statuette"]), 1, &["statuette"]);
-    refused(&render(&folder, &["--env", "grace.hdr"]), 1, &["grace.hdr", "No such file", "sky"]);
+    refused(&render(&folder, &["bunny.ply"]), 2, &["bunny.ply", "No such file"]);
+    refused(&render(&folder, &["statuette"]), 2, &["statuette"]);
+    refused(&render(&folder, &["--env", "grace.hdr"]), 2, &["grace.hdr", "No such file", "sky"]);
     fs::write(at("broken.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
-    refused(&render(&folder, &["broken.obj"]), 1, &["broken.obj", "2"]);
+    refused(&render(&folder, &["broken.obj"]), 2, &["broken.obj", "2"]);
     fs::write(at("broken.hdr"), "#?RADIANCE\n\n-Y 4000 +X 9000\n").unwrap();
-    refused(&render(&folder, &["--env", "broken.hdr"]), 1, &["broken.hdr"]);
+    refused(&render(&folder, &["--env", "broken.hdr"]), 2, &["broken.hdr"]);
     let scene = "[[objects]]\nfile = \"gone.ply\"\n";
     fs::write(at("scene.toml"), scene).unwrap();
-    refused(&render(&folder, &["scene.toml"]), 1, &["gone.ply", "scene.toml"]);
+    refused(&render(&folder, &["scene.toml"]), 2, &["gone.ply", "scene.toml"]);
     assert!(!at("domelight.exr").exists());
 }
 
@@ -188,7 +188,7 @@ fn bad_texels_are_refused_or_repaired() {
     map.pixels[16].r = f32::NAN;
     write_exr(&folder.path().join("bad.exr"), &map, None);
     let arguments = ["sphere", "--env", "bad.exr", "-o", "x.pfm"];
-    refused(&render(&folder, &arguments), 1, &["bad.exr", "(3, 1)", "-2", "--sanitize"]);
+    refused(&render(&folder, &arguments), 2, &["bad.exr", "(3, 1)", "-2", "--sanitize"]);
     let output = render(&folder, &[&arguments[..], &["--sanitize"]].concat());
     succeeded(&output);
     assert!(stderr(&output).contains("1 negative"), "{}", stderr(&output));
@@ -239,6 +239,8 @@ fn an_interrupt_keeps_what_is_done() {
     let arguments = [
         "render",
         "sphere",
+        "--env",
+        "constant",
         "--size",
         "64x64",
         "--spp",

@@ -46,6 +46,7 @@ mod color;
 pub mod environment;
 mod image;
 pub mod math;
+mod parallel;
 pub mod rig;
 pub mod sampling;
 mod simd;
@@ -60,6 +61,8 @@ pub mod render;
 #[cfg(feature = "render")]
 pub mod scene;
 
+#[cfg(feature = "io")]
+pub mod fingerprint;
 #[cfg(feature = "io")]
 pub mod picture;
 

@@ -2,7 +2,7 @@
 //!
 //! The world is right-handed with +Y up. Vectors are [`glam`]'s; directions are unit vectors.
 
-pub use glam::{Mat3, Mat4, Vec2, Vec3, Vec4, vec2, vec3};
+pub use glam::{Mat3, Mat4, Quat, Vec2, Vec3, Vec4, vec2, vec3};
 
 pub use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 

@@ -1,6 +1,13 @@
 //! The command line, typed.
 
+pub(crate) mod compare;
+pub(crate) mod course;
+pub(crate) mod farm;
+pub(crate) mod figures;
+pub(crate) mod lights;
 pub(crate) mod render;
+pub(crate) mod sampling;
+pub(crate) mod scene;
 
 use crate::output::PicturePath;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -35,12 +42,27 @@ pub(crate) enum Command {
     /// Render a scene lit by an HDR environment.
     #[command(after_help = render::EXAMPLES)]
     Render(Box<render::RenderArguments>),
+    /// Put the parts of a picture together that `render --shard` or `--tiles` made.
+    #[command(after_help = MERGE_EXAMPLES)]
+    Merge(MergeArguments),
+    /// Render a picture in parts on a farm: files for Slurm, Open Job Description, Kubernetes, parallel.
+    #[command(after_help = farm::EXAMPLES)]
+    Farm(Box<farm::FarmArguments>),
+    /// Compare strategies on one scene at equal samples, rays or time, in a report to look at.
+    #[command(after_help = compare::EXAMPLES)]
+    Compare(Box<compare::CompareArguments>),
+    /// Turn a light probe into a rig of lights, and the probe without them.
+    #[command(after_help = lights::EXAMPLES, mut_arg("env", lights::positional))]
+    Lights(Box<lights::LightsArguments>),
     /// Compare a picture with its reference: MSE, relMSE, PSNR, ꟻLIP.
     #[command(after_help = DIFF_EXAMPLES)]
     Diff(DiffArguments),
     /// Measure, look at and convert a light probe.
     #[command(after_help = PROBE_EXAMPLES)]
     Probe(ProbeArguments),
+    /// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
+    #[command(after_help = figures::EXAMPLES)]
+    Figures(Box<figures::FiguresArguments>),
 }
 
 const DIFF_EXAMPLES: &str = "\
@@ -49,6 +71,14 @@ Examples:
   domelight diff render.exr reference.exr --covered --json
   domelight diff render.exr reference.exr -o error.png --metric flip";
 
+const MERGE_EXAMPLES: &str = "\
+Examples:
+  domelight merge part-*.exr -o whole.exr -o whole.png
+  domelight merge parts/ -o whole.exr
+
+Exit codes: 3 if parts are missing or unfinished, 4 if two hold the same tile, 5 if one is damaged or
+of another render.";
+
 const PROBE_EXAMPLES: &str = "\
 Examples:
   domelight probe sky --preview sky.png
@@ -56,6 +86,24 @@ Examples:
   domelight probe ball.hdr --mapping mirror-ball -o studio.exr
   domelight probe grace.hdr --to cross-vertical -o cross.hdr
   domelight probe cathedral --size 256 -o - | domelight probe -";
+
+/// Put the parts of a picture together.
+#[derive(Args, Debug)]
+pub(crate) struct MergeArguments {
+    /// Parts (.exr), or folders of them
+    #[arg(value_name = "PART", required = true)]
+    pub(crate) parts: Vec<PathBuf>,
+    /// Where to: .exr (all layers), .png, .hdr or .pfm; several times for several files; - writes
+    /// OpenEXR to standard output
+    #[arg(short, long, value_name = "FILE", required = true)]
+    pub(crate) output: Vec<PicturePath>,
+    /// Print what was merged as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// How PNG output is shown.
+    #[command(flatten)]
+    pub(crate) tone: Tone,
+}
 
 /// Compare a picture with its reference.
 #[derive(Args, Debug)]
@@ -182,6 +230,13 @@ fn positive(text: &str) -> Result<f32, String> {
     match finite(text) {
         Ok(value) if value > 0.0 => Ok(value),
         _ => Err("not a number above 0".into()),
+    }
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 100.0 => Ok(value),
+        _ => Err("not a percentage above 0, up to 100".into()),
     }
 }
 

@@ -6,6 +6,7 @@
 //! single bright texel's light, for the table is zero where the interpolant is not.)
 
 pub mod builtin;
+pub(crate) mod compact;
 mod compensation;
 #[cfg(feature = "io")]
 pub mod io;
@@ -14,7 +15,7 @@ pub mod statistics;
 
 pub use compensation::CompensatedTable;
 
-use crate::math::{PI, TAU, Vec2, Vec3, vec3};
+use crate::math::{Mat3, PI, TAU, Vec2, Vec3, vec3};
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
 use crate::{Rgb, RgbImage};
 
@@ -36,6 +37,12 @@ impl UpAxis {
             Self::Y => Vec3::Y,
             Self::Z => Vec3::Z,
         }
+    }
+
+    /// The rotation from a world in which +Y is up to one in which this axis is; what the centre of
+    /// a map looks toward stays in front.
+    pub fn from_y_up(self) -> Mat3 {
+        Mat3::from_cols(self.to_world(Vec3::X), self.to_world(Vec3::Y), self.to_world(Vec3::Z))
     }
 
     /// World to the map's own frame, where +Y is up.
@@ -63,6 +70,13 @@ pub struct Orientation {
     /// Rotation about the up axis \[degrees\], counter-clockwise seen from above: at 90 what was in
     /// front (−Z) is on the left (−X).
     pub rotation: f32,
+}
+
+impl Orientation {
+    /// The rotation from the map's own frame, +Y up and the centre column toward −Z, to the world.
+    pub fn map_to_world(self) -> Mat3 {
+        self.up.from_y_up() * Mat3::from_rotation_y(self.rotation.to_radians())
+    }
 }
 
 /// What makes a map unusable.
@@ -138,6 +152,16 @@ pub struct Environment {
 }
 
 impl Environment {
+    /// The fingerprint of the light: the map's texels times the scale, and how it is turned.
+    #[cfg(feature = "io")]
+    pub fn fingerprint(&self) -> crate::fingerprint::Fingerprint {
+        let mut fingerprinter = crate::fingerprint::Fingerprinter::default();
+        let RgbImage { width, height, pixels } = &self.map;
+        fingerprinter.text(format_args!("{width}x{height} {:?}", self.orientation));
+        fingerprinter.numbers(pixels.iter().flat_map(|texel| texel.to_array()));
+        fingerprinter.finish()
+    }
+
     /// From a lat-long map: row 0 up, texel centres at +½, every texel finite and not negative;
     /// radiance is multiplied by `scale`.
     ///
@@ -495,6 +519,18 @@ mod tests {
             let table = env.table().unwrap();
             let total: f64 = (0..w * h).map(|i| table.pmf(i % w, i / w)).sum();
             assert!((total - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_rotation_of_an_orientation_turns_the_map() {
+        let still = Environment::new(noise(8, 4, 1), Orientation::default(), 1.0).unwrap();
+        for orientation in orientations() {
+            let turned = Environment::new(noise(8, 4, 1), orientation, 1.0).unwrap();
+            for uv in [vec2(0.5, 0.5), vec2(0.1, 0.2), vec2(0.7, 0.8)] {
+                let expected = orientation.map_to_world() * still.direction(uv);
+                assert!((turned.direction(uv) - expected).length() < 1e-5, "{orientation:?}");
+            }
         }
     }
 

@@ -5,6 +5,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use super::compact::{Wanted, compact_sources};
 use super::mapping::Mapping;
 use crate::color::Rgb;
 use crate::image::RgbImage;
@@ -12,10 +13,6 @@ use crate::math::{Vec3, vec2};
 
 /// A part of this size counts as the brightest texels.
 const BRIGHTEST: f64 = 0.001;
-/// Texels of at least this part of the greatest luminance can belong to the sun.
-const SUN_THRESHOLD: f32 = 0.1;
-/// A region larger than this is no sun \[sr\]: a cap of 7° radius.
-const SUN_MAX_SOLID_ANGLE: f64 = 0.047;
 
 /// Measures of a lat-long map.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,11 +29,11 @@ pub struct ProbeStatistics {
     pub irradiance_up: Rgb,
     /// Part of ∫ L dω (in luminance) that the brightest 0.1 % of the texels hold, in \[0, 1\].
     pub brightest_share: f64,
-    /// The brightest compact region, if there is one.
+    /// The sun, if there is one.
     pub sun: Option<Sun>,
 }
 
-/// The compact region that sends the most light.
+/// The compact source that is taken for the sun: what exceeds the radiance around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sun {
     /// Its centre of energy, a unit vector.
@@ -154,59 +151,27 @@ fn brightest_share(map: &RgbImage, luminance: &[f32], weights: &Weights) -> f64 
     order[..n].iter().map(energy).sum::<f64>() / total
 }
 
-/// Of the connected regions of bright texels the one with the most energy, if it is small.
+/// What is taken out of the map as its sun.
 fn sun(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Sun> {
-    let threshold = SUN_THRESHOLD * luminance.iter().copied().fold(0.0, f32::max);
-    let mut open: Vec<bool> = luminance.iter().map(|&l| l > 0.0 && l >= threshold).collect();
-    let energy = |i: usize| luminance[i] as f64 * weights.solid_angle(i / map.width);
-    let mut best: (f64, Vec<usize>) = (0.0, Vec::new());
-    for seed in 0..luminance.len() {
-        if open[seed] {
-            let region = flood(seed, map, &mut open);
-            let total = region.iter().map(|&i| energy(i)).sum();
-            if total > best.0 {
-                best = (total, region);
-            }
-        }
-    }
-    let (total, region) = best;
-    let solid_angle: f64 = region.iter().map(|&i| weights.solid_angle(i / map.width)).sum();
-    if total <= 0.0 || solid_angle > SUN_MAX_SOLID_ANGLE {
-        return None;
-    }
-    let mut moment = [0.0f64; 3];
-    let mut irradiance = [0.0f64; 3];
-    for &i in &region {
-        let (x, y) = (i % map.width, i / map.width);
+    let source = compact_sources(map, Wanted::SUN).pop()?;
+    let [mut moment, mut irradiance] = [[0.0f64; 3]; 2];
+    let [mut energy, mut solid_angle] = [0.0; 2];
+    for (&i, rest) in source.texels.iter().zip(&source.residual) {
+        let (x, y) = (i as usize % map.width, i as usize / map.width);
+        let omega = weights.solid_angle(y);
+        let taken = map.pixels[i as usize] - *rest;
+        let weight = taken.luminance() as f64 * omega;
         let d = texel_direction(map, x, y).to_array();
-        moment.iter_mut().zip(d).for_each(|(m, d)| *m += energy(i) * d as f64);
-        let le = map.pixels[i].to_array();
-        irradiance.iter_mut().zip(le).for_each(|(e, l)| *e += l as f64 * weights.solid_angle(y));
+        moment.iter_mut().zip(d).for_each(|(m, d)| *m += weight * d as f64);
+        irradiance.iter_mut().zip(taken.to_array()).for_each(|(e, l)| *e += l as f64 * omega);
+        energy += weight;
+        solid_angle += omega;
     }
-    let direction = Vec3::from_array(moment.map(|m| (m / total) as f32)).try_normalize()?;
-    let all: f64 = (0..luminance.len()).map(energy).sum();
+    let direction = Vec3::from_array(moment.map(|m| (m / energy) as f32)).try_normalize()?;
+    let power = |(i, &l): (usize, &f32)| l as f64 * weights.solid_angle(i / map.width);
+    let all: f64 = luminance.iter().enumerate().map(power).sum();
     let irradiance = Rgb::from(irradiance.map(|e| e as f32));
-    Some(Sun { direction, solid_angle, irradiance, share: total / all })
-}
-
-/// The open texels connected to `seed`, sides and corners, around the seam; they are closed.
-fn flood(seed: usize, map: &RgbImage, open: &mut [bool]) -> Vec<usize> {
-    let mut region = vec![seed];
-    open[seed] = false;
-    let mut next = 0;
-    while let Some(&i) = region.get(next) {
-        next += 1;
-        let (x, y) = (i % map.width, i / map.width);
-        for ny in y.saturating_sub(1)..=(y + 1).min(map.height - 1) {
-            for nx in [x + map.width - 1, x, x + 1] {
-                let j = ny * map.width + nx % map.width;
-                if std::mem::take(&mut open[j]) {
-                    region.push(j);
-                }
-            }
-        }
-    }
-    region
+    Some(Sun { direction, solid_angle, irradiance, share: energy / all })
 }
 
 fn texel_direction(map: &RgbImage, x: usize, y: usize) -> Vec3 {

@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Runs `write` on a new file beside `path` and renames it to `path` when all of it is on its way to the disk, so
+/// Runs `write` on a new file beside `path` and renames it to `path` when all of it is on the disk, so
 /// that a crash never leaves half a file; `-` is standard output. What is not a plain file (a device, a pipe) is
 /// written to directly, and a symbolic link keeps pointing where it points.
 ///
@@ -52,18 +52,19 @@ fn try_place(path: &Path) -> io::Result<()> {
 fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
     if fs::metadata(&path).is_ok_and(|there| !there.is_file()) {
-        return finish(File::options().write(true).open(&path)?, write);
+        return finish(File::options().write(true).open(&path)?, write).map(drop);
     }
     let temporary = beside(&path)?;
     finish(File::create_new(&temporary)?, write)
+        .and_then(|file| file.sync_all())
         .and_then(|()| fs::rename(&temporary, &path))
         .inspect_err(|_| drop(fs::remove_file(&temporary)))
 }
 
-fn finish(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+fn finish(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<File> {
     let mut out = BufWriter::new(file);
     write(&mut out)?;
-    out.flush()
+    Ok(out.into_inner()?)
 }
 
 /// A name in the same folder that nothing else has.

@@ -1,5 +1,7 @@
 //! Sums of camera samples, pixel by pixel, and the layers that they become.
 
+use super::RenderSettings;
+use super::tiling::Window;
 use crate::math::Vec3;
 use crate::{Rgb, RgbImage};
 
@@ -23,7 +25,7 @@ pub(super) struct SurfaceSample {
 
 /// The sums of one pixel. Samples are added one by one in their order, whatever the passes: the
 /// same samples give the same bits.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PixelSums {
     color: [f64; 3],
     color_squared: [f64; 3],
@@ -58,6 +60,16 @@ impl PixelSums {
             self.n_hits += 1;
         }
         finite
+    }
+
+    pub(super) fn n_samples(&self) -> u32 {
+        self.n_samples
+    }
+
+    /// Error² of the mean's luminance over its own square, by the spread of the samples.
+    pub(super) fn relative_variance(&self) -> f32 {
+        let mean = self.mean(self.color).luminance();
+        self.variance().luminance() / (mean * mean + 0.01)
     }
 
     fn scale(&self) -> f32 {
@@ -119,25 +131,242 @@ impl Layers {
         self.color.height
     }
 
-    /// From the sums `at(x, y)` of all pixels.
-    pub(super) fn new<'a>(
-        width: usize,
-        height: usize,
-        at: impl Fn(usize, usize) -> &'a PixelSums,
-    ) -> Self {
-        let places = || (0..height).flat_map(move |y| (0..width).map(move |x| (x, y)));
-        let pixels = || places().map(|(x, y)| at(x, y));
-        let image =
-            |f: &dyn Fn(&PixelSums) -> Rgb| RgbImage::new(width, height, pixels().map(f).collect());
+    /// From the sums of all pixels, row by row.
+    fn new(width: usize, height: usize, sums: &[PixelSums]) -> Self {
+        let image = |f: &dyn Fn(&PixelSums) -> Rgb| {
+            RgbImage::new(width, height, sums.iter().map(f).collect())
+        };
         Self {
             color: image(&|p| p.mean(p.color)),
-            alpha: pixels().map(|p| p.alpha * p.scale()).collect(),
+            alpha: sums.iter().map(|p| p.alpha * p.scale()).collect(),
             unoccluded: image(&|p| p.mean(p.unoccluded)),
             albedo: image(&|p| p.albedo * p.scale()),
-            normal: pixels().map(|p| p.normal * p.scale()).collect(),
-            depth: pixels().map(PixelSums::depth).collect(),
+            normal: sums.iter().map(|p| p.normal * p.scale()).collect(),
+            depth: sums.iter().map(PixelSums::depth).collect(),
             variance: image(&PixelSums::variance),
-            n_samples: pixels().map(|p| p.n_samples).collect(),
+            n_samples: sums.iter().map(|p| p.n_samples).collect(),
         }
+    }
+}
+
+/// The sums of all pixels of a picture or of a window of it, from which a render can go on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    /// Columns of the whole picture.
+    pub width: usize,
+    /// Rows of the whole picture.
+    pub height: usize,
+    /// Which pixels these are; those that nobody rendered have no samples.
+    pub window: Window,
+    pixels: Vec<PixelSums>,
+}
+
+/// Sums that do not belong to a render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Misfit {
+    /// Another picture or part of it.
+    #[error("it is window {found} of the picture, not {expected}")]
+    Window {
+        /// Of the sums.
+        found: Window,
+        /// Of the render.
+        expected: Window,
+    },
+    /// Some pixels of a tile have more samples than others.
+    #[error("the tile at ({x}, {y}) is torn: its pixels have different numbers of samples")]
+    Samples {
+        /// Column of the tile's corner.
+        x: usize,
+        /// Row of the tile's corner.
+        y: usize,
+    },
+}
+
+impl Film {
+    /// No samples yet.
+    pub fn new(width: usize, height: usize, window: Window) -> Self {
+        Self { width, height, window, pixels: vec![PixelSums::default(); window.area()] }
+    }
+
+    /// The picture of the window.
+    pub fn layers(&self) -> Layers {
+        Layers::new(self.window.width, self.window.height, &self.pixels)
+    }
+
+    /// Takes the pixels that have samples in `part` over, wherever they lie in the window.
+    ///
+    /// # Panics
+    /// If one lies outside the window.
+    pub fn merge(&mut self, part: &Self) {
+        let from = part.window;
+        for (i, sums) in part.pixels.iter().enumerate().filter(|(_, sums)| sums.n_samples > 0) {
+            let (x, y) = (from.x + i % from.width, from.y + i / from.width);
+            assert!(self.window.contains(x, y), "pixel ({x}, {y}) outside {}", self.window);
+            self.pixels[self.window.index(x, y)] = *sums;
+        }
+    }
+
+    /// Camera samples of the pixel (x, y) of the picture.
+    ///
+    /// # Panics
+    /// If it lies outside the window.
+    pub fn n_samples(&self, x: usize, y: usize) -> u32 {
+        self.pixels[self.window.index(x, y)].n_samples
+    }
+
+    pub(super) fn put(&mut self, window: Window, pixels: &[PixelSums]) {
+        for (row, y) in pixels.chunks_exact(window.width).zip(window.y..) {
+            let start = self.window.index(window.x, y);
+            self.pixels[start..start + window.width].copy_from_slice(row);
+        }
+    }
+
+    pub(super) fn get(&self, window: Window) -> Vec<PixelSums> {
+        let row = |y| {
+            let start = self.window.index(window.x, y);
+            &self.pixels[start..start + window.width]
+        };
+        (window.y..window.y + window.height).flat_map(row).copied().collect()
+    }
+
+    pub(super) fn require_window(
+        &self,
+        settings: &RenderSettings,
+        expected: Window,
+    ) -> Result<(), Misfit> {
+        let same_size = (self.width, self.height) == (settings.width, settings.height);
+        let found = self.window;
+        if same_size && found == expected {
+            return Ok(());
+        }
+        Err(Misfit::Window { found, expected })
+    }
+
+    /// The bits of the sums: for each of [`PixelSums::WORDS`] one word a pixel.
+    #[cfg(feature = "io")]
+    pub(super) fn words(&self) -> impl Iterator<Item = (&'static str, Vec<u32>)> {
+        let words: Vec<_> = self.pixels.iter().copied().map(PixelSums::to_words).collect();
+        let plane = move |i: usize| words.iter().map(|w| w[i]).collect();
+        PixelSums::WORDS.into_iter().enumerate().map(move |(i, name)| (name, plane(i)))
+    }
+
+    /// From the words of [`Film::words`], found by name; none if one is missing or too short.
+    #[cfg(feature = "io")]
+    pub(super) fn from_words<'w>(
+        width: usize,
+        height: usize,
+        window: Window,
+        find: impl Fn(&str) -> Option<&'w [u32]>,
+    ) -> Option<Self> {
+        let planes: Vec<&[u32]> = PixelSums::WORDS.into_iter().map(find).collect::<Option<_>>()?;
+        if planes.iter().any(|plane| plane.len() != window.area()) {
+            return None;
+        }
+        let pixel = |i| PixelSums::from_words(std::array::from_fn(|word| planes[word][i]));
+        Some(Self { width, height, window, pixels: (0..window.area()).map(pixel).collect() })
+    }
+}
+
+#[cfg(feature = "io")]
+impl PixelSums {
+    /// What the words of [`PixelSums::to_words`] are; doubles are the upper and the lower half of their bits.
+    pub(super) const WORDS: [&'static str; 29] = [
+        "color.R.high",
+        "color.R.low",
+        "color.G.high",
+        "color.G.low",
+        "color.B.high",
+        "color.B.low",
+        "color2.R.high",
+        "color2.R.low",
+        "color2.G.high",
+        "color2.G.low",
+        "color2.B.high",
+        "color2.B.low",
+        "unoccluded.R.high",
+        "unoccluded.R.low",
+        "unoccluded.G.high",
+        "unoccluded.G.low",
+        "unoccluded.B.high",
+        "unoccluded.B.low",
+        "depth.Z.high",
+        "depth.Z.low",
+        "albedo.R",
+        "albedo.G",
+        "albedo.B",
+        "normal.X",
+        "normal.Y",
+        "normal.Z",
+        "alpha.A",
+        "hits.Y",
+        "samples.Y",
+    ];
+
+    fn to_words(self) -> [u32; 29] {
+        let mut words = [0; 29];
+        let doubles = [self.color, self.color_squared, self.unoccluded];
+        let doubles = doubles.as_flattened().iter().chain([&self.depth]);
+        for (pair, double) in words.chunks_exact_mut(2).zip(doubles) {
+            let bits = double.to_bits();
+            pair.copy_from_slice(&[(bits >> 32) as u32, bits as u32]);
+        }
+        let floats = self.albedo.to_array().into_iter().chain(self.normal.to_array());
+        for (word, float) in words[20..27].iter_mut().zip(floats.chain([self.alpha])) {
+            *word = float.to_bits();
+        }
+        words[27..].copy_from_slice(&[self.n_hits, self.n_samples]);
+        words
+    }
+
+    fn from_words(words: [u32; 29]) -> Self {
+        let double =
+            |i: usize| f64::from_bits(u64::from(words[2 * i]) << 32 | u64::from(words[2 * i + 1]));
+        let three = |i: usize| [double(i), double(i + 1), double(i + 2)];
+        let float = |i: usize| f32::from_bits(words[i]);
+        Self {
+            color: three(0),
+            color_squared: three(3),
+            unoccluded: three(6),
+            depth: double(9),
+            albedo: Rgb::new(float(20), float(21), float(22)),
+            normal: Vec3::new(float(23), float(24), float(25)),
+            alpha: float(26),
+            n_hits: words[27],
+            n_samples: words[28],
+        }
+    }
+}
+
+#[cfg(all(test, feature = "io"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_keep_every_bit() {
+        let window = Window { x: 2, y: 1, width: 2, height: 1 };
+        let mut film = Film::new(9, 9, window);
+        for (i, pixel) in film.pixels.iter_mut().enumerate() {
+            for j in 0..=i {
+                let x = 0.1 + i as f32 / 3.0 + j as f32;
+                let color = Rgb::new(x, 1e-30 * x, 1e30 * x);
+                let surface = SurfaceSample { albedo: color, normal: Vec3::splat(x), depth: -x };
+                let sample =
+                    CameraSample { color, unoccluded: -color, alpha: x, surface: Some(surface) };
+                pixel.add(&sample);
+            }
+        }
+        let words: Vec<_> = film.words().collect();
+        let find = |name: &str| words.iter().find(|w| w.0 == name).map(|w| &w.1[..]);
+        assert_eq!(Film::from_words(9, 9, window, find), Some(film.clone()));
+        let without = |name: &str| find(name).filter(|_| name != "hits.Y");
+        assert_eq!(Film::from_words(9, 9, window, without), None);
+
+        let mut whole = Film::new(9, 9, Window { x: 0, y: 0, width: 9, height: 9 });
+        whole.merge(&film);
+        assert_eq!(whole.get(window), film.pixels);
+        assert_eq!(
+            (whole.n_samples(2, 1), whole.n_samples(3, 1), whole.n_samples(4, 1)),
+            (1, 2, 0)
+        );
     }
 }

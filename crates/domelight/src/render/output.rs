@@ -15,7 +15,8 @@ impl Layers {
         exr.push_xyz("normal", &self.normal);
         exr.push_channel("depth", "Z", self.depth.clone());
         exr.push_rgb("variance", &self.variance, None);
-        exr.push_channel("samples", "Y", self.n_samples.iter().map(|&n| n as f32).collect());
+        let n_samples = self.n_samples.iter().map(|&n| n as f32);
+        exr.push_channel("samples", "Y", n_samples.collect::<Vec<_>>());
         exr.attributes = attributes;
         exr
     }

@@ -2,19 +2,21 @@
 //! of shadow rays, and their sums.
 
 use super::film::{CameraSample, PixelSums, SurfaceSample};
-use super::{Background, Frame, Visibility};
+use super::tiling::Window;
+use super::{Background, Frame, RenderSettings, Visibility};
 use crate::Rgb;
 use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
 use crate::math::Vec3;
 use crate::sampling::{Dimension, Stream};
 use crate::strategy::{Contributions, PixelPoints, Round, ShadingPoint, Strategy, TileShading};
 
+/// Camera samples below which a spread says nothing.
+const FEWEST_SAMPLES: u32 = 16;
+
 /// A rectangle of the picture and the sums of its pixels.
 #[derive(Clone, Debug)]
 pub(super) struct Tile {
-    pub(super) x: usize,
-    pub(super) y: usize,
-    pub(super) width: usize,
+    pub(super) window: Window,
     pub(super) pixels: Vec<PixelSums>,
     pub(super) counts: Counts,
 }
@@ -30,6 +32,15 @@ pub struct Counts {
     pub shadow_rays: u64,
     /// Camera samples whose value was NaN or infinite; they count as black.
     pub non_finite: u64,
+}
+
+impl std::ops::Add for Counts {
+    type Output = Self;
+
+    fn add(mut self, o: Self) -> Self {
+        self += o;
+        self
+    }
 }
 
 impl std::ops::AddAssign for Counts {
@@ -84,6 +95,30 @@ struct ShadowRays {
 }
 
 impl Tile {
+    /// Without samples.
+    pub(super) fn new(window: Window) -> Self {
+        let pixels = vec![PixelSums::default(); window.area()];
+        Self { window, pixels, counts: Counts::default() }
+    }
+
+    /// Camera samples of each pixel.
+    pub(super) fn n_samples(&self) -> u32 {
+        self.pixels[0].n_samples()
+    }
+
+    /// Has all samples, or as few as the error allows: a decision that no other tile has a part in.
+    pub(super) fn is_finished(&self, settings: &RenderSettings) -> bool {
+        let n_samples = self.n_samples();
+        let precise = |error| n_samples >= FEWEST_SAMPLES && self.error() <= error;
+        n_samples >= settings.n_samples || settings.target_error.is_some_and(precise)
+    }
+
+    /// The relMSE that the spread of the samples suggests.
+    fn error(&self) -> f32 {
+        let sum: f32 = self.pixels.iter().map(PixelSums::relative_variance).sum();
+        sum / self.pixels.len() as f32
+    }
+
     /// Adds camera samples `samples` to each pixel.
     pub(super) fn render<S: Strategy>(
         &mut self,
@@ -100,7 +135,7 @@ impl Tile {
             shading_points: batch.points.len() as u64,
             ..Counts::default()
         };
-        let (shared, width) = (&pass.shared, self.width);
+        let (shared, width) = (&pass.shared, self.window.width);
         counts.shadow_rays = batch.trace_strategy(frame, strategy, shared, of_strategy, width);
         counts.non_finite = self.add_samples(frame, batch);
         self.counts += counts;
@@ -116,7 +151,8 @@ impl Tile {
         scratch.rays.clear();
         scratch.pixels.clear();
         for i in 0..self.pixels.len() {
-            let (x, y) = (self.x + i % self.width, self.y + i / self.width);
+            let Window { x, y, width, .. } = self.window;
+            let (x, y) = (x + i % width, y + i / width);
             let pixel = (y * frame.settings.width + x) as u64;
             let stream = Stream::new(frame.settings.sampler, frame.settings.seed, pixel);
             for sample in samples.clone() {

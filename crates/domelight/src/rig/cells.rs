@@ -13,8 +13,9 @@
 use std::ops::Range;
 
 use super::regions::{Blocks, Moments, SummedArea};
-use super::texels::{Texels, bands, in_order, unit};
+use super::texels::{Texels, unit};
 use crate::math::{PI, Vec3};
+use crate::parallel::{bands, in_order};
 
 /// Rows of a band, which one thread does at a time, and columns of its first tiles.
 const TILE: usize = 64;

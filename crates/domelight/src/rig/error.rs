@@ -6,9 +6,10 @@
 
 use super::Rig;
 use super::regions::{Blocks, Metric};
-use super::texels::{Texels, in_order, unit};
+use super::texels::{Texels, unit};
 use crate::environment::Environment;
 use crate::math::{TAU, Vec3, vec3};
+use crate::parallel::in_order;
 
 /// Normals that errors are measured over.
 const N_NORMALS: usize = 600;
@@ -22,6 +23,13 @@ pub struct ShadingError {
     pub diffuse: f64,
     /// Of the lobe cos²⁰.
     pub glossy: f64,
+}
+
+impl ShadingError {
+    /// The greater of the two.
+    pub fn worst(self) -> f64 {
+        self.diffuse.max(self.glossy)
+    }
 }
 
 /// What a map shades, to be compared with many rigs.
@@ -61,13 +69,30 @@ impl ShadingReference {
         Self { exact: in_order(N_NORMALS, |i| shade(normal(i), &lights)) }
     }
 
-    /// The error of a rig.
+    /// The error of a rig that stands for the whole map.
     pub fn error(&self, rig: &Rig) -> ShadingError {
+        self.error_of(&self.shade(rig))
+    }
+
+    /// The error of a rig that shines beside a dome.
+    pub fn error_beside(&self, rig: &Rig, dome: &Self) -> ShadingError {
+        let mut shaded = self.shade(rig);
+        shaded.iter_mut().zip(&dome.exact).for_each(|(s, d)| {
+            s.diffuse += d.diffuse;
+            s.glossy += d.glossy;
+        });
+        self.error_of(&shaded)
+    }
+
+    fn shade(&self, rig: &Rig) -> Vec<Shading> {
         let light = |l: &super::RigLight| (l.direction, f64::from(l.irradiance.luminance()));
         let lights: Vec<_> = rig.lights.iter().map(light).collect();
-        let shaded = in_order(N_NORMALS, |i| shade(normal(i), &lights));
+        in_order(self.exact.len(), |i| shade(normal(i), &lights))
+    }
+
+    fn error_of(&self, shaded: &[Shading]) -> ShadingError {
         let relative = |channel: fn(&Shading) -> f64| {
-            let pairs = self.exact.iter().zip(&shaded).map(|(e, s)| (channel(e), channel(s)));
+            let pairs = self.exact.iter().zip(shaded).map(|(e, s)| (channel(e), channel(s)));
             let error: f64 = pairs.clone().map(|(e, s)| (e - s).powi(2)).sum();
             let exact: f64 = pairs.map(|(e, _)| e * e).sum();
             if exact > 0.0 { (error / exact).sqrt() } else { 0.0 }

@@ -17,24 +17,35 @@
 
 mod cells;
 mod error;
+#[cfg(feature = "io")]
+pub mod export;
+mod extraction;
 mod median_cut;
 mod merge;
+mod quadrature;
 mod regions;
+mod smallest;
+mod spherical_harmonics;
 mod split;
 mod texels;
 mod variance_minimization;
 
 pub use error::{ShadingError, ShadingReference};
+pub use extraction::{CompactExtraction, Extraction, ExtractionSettings, Method, extract};
 pub use median_cut::{LightPosition, MedianCut, median_cut};
+pub use quadrature::quadrature;
+pub use smallest::{SmallestRig, smallest_rig};
+pub use spherical_harmonics::SphericalHarmonics;
 pub use split::Order;
 pub use variance_minimization::{Rule, VarianceMinimization, variance_minimization};
 
 use crate::Rgb;
 use crate::math::Vec3;
-use texels::{Texels, bands, in_order};
+use crate::parallel::{bands, in_order};
+use texels::Texels;
 
 /// Why there is no rig.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RigError {
     /// A rig of no lights.
     #[error("a rig has at least one light; 0 were asked for")]
@@ -49,6 +60,29 @@ pub enum RigError {
         n_lights: usize,
         /// Texels with luminance.
         lit: usize,
+    },
+    /// No sun.
+    #[error(
+        "there is no sun: no compact source of 0.1 % of the map's light or more stands out of its \
+         surroundings by a factor of 4"
+    )]
+    NoSun,
+    /// No lamp.
+    #[error(
+        "there is no lamp: no compact source of 0.1 % of the map's light or more stands out of its \
+         surroundings by a factor of 4"
+    )]
+    NoLamp,
+    /// Lights too dim to be kept.
+    #[error("no light holds the least share of the map's light that was asked for")]
+    TooDim,
+    /// No rig is good enough.
+    #[error("even {n_lights} lights have a shading error of {percent:.2} %")]
+    ErrorNotReached {
+        /// The most lights that were tried.
+        n_lights: usize,
+        /// Their error \[%\].
+        percent: f32,
     },
 }
 
@@ -67,13 +101,15 @@ impl RigError {
 /// Directional lights that stand for an environment, and the region of the map behind each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
-    /// The lights, those of the greatest luminance first.
+    /// The lights: compact ones first, then those of regions, of each kind those of the greatest
+    /// luminance first.
     pub lights: Vec<RigLight>,
     /// Columns of the map.
     pub width: usize,
     /// Rows of the map.
     pub height: usize,
-    /// The index in [`Rig::lights`] of the light of each texel, row by row.
+    /// The index in [`Rig::lights`] of the light of each texel, row by row; [`Rig::NO_LIGHT`] of
+    /// texels that no light was taken from. Compact lights lie over the regions.
     pub labels: Vec<u32>,
 }
 
@@ -105,6 +141,10 @@ pub enum Region {
     Rectangle(TexelRect),
     /// The texels that are nearer to this light than to any other, on the sphere.
     Cell,
+    /// The compact source that is taken for the sun.
+    Sun,
+    /// Another compact source.
+    Lamp,
 }
 
 /// Columns [x0, x1) and rows [y0, y1) of the map.
@@ -136,6 +176,9 @@ impl TexelRect {
 }
 
 impl Rig {
+    /// The label of a texel that no light was taken from.
+    pub const NO_LIGHT: u32 = u32::MAX;
+
     /// Σ irradiance \[W·m⁻²\].
     pub fn irradiance(&self) -> Rgb {
         let sum = |channel: fn(&RigLight) -> f32| {
@@ -243,6 +286,19 @@ impl RegionSums {
             moment,
             irradiance: rgb.map(|c| c * row.solid_angle),
             solid_angle: columns.len() as f64 * row.solid_angle,
+        });
+    }
+
+    /// Adds radiance of one texel.
+    fn add_texel(&mut self, texels: &Texels, x: usize, y: usize, le: [f64; 3]) {
+        let (row, column) = (&texels.rows[y], texels.columns[x]);
+        let luminance = 0.2126 * le[0] + 0.7152 * le[1] + 0.0722 * le[2];
+        let across = luminance * row.horizontal;
+        self.add(&Self {
+            energy: luminance * row.solid_angle,
+            moment: [across * column[0], luminance * row.vertical, across * column[1]],
+            irradiance: le.map(|c| c * row.solid_angle),
+            solid_angle: row.solid_angle,
         });
     }
 

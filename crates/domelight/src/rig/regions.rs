@@ -9,7 +9,8 @@ use std::f64::consts::TAU;
 use std::ops::{Add, AddAssign, Range, Sub};
 
 use super::TexelRect;
-use super::texels::{Texels, bands};
+use super::texels::Texels;
+use crate::parallel::bands;
 
 /// Entries of a table at the most.
 const MAX_BLOCKS: usize = 1 << 21;

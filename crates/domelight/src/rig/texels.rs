@@ -1,5 +1,4 @@
-//! The texels of a lat-long map with the exact integrals over each, and loops over them whose
-//! result does not depend on the number of threads.
+//! The texels of a lat-long map with the exact integrals over each.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -109,6 +108,12 @@ impl<'a> Texels<'a> {
         [sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta]
     }
 
+    /// The world directions of the map frame's x, y and z.
+    pub(super) fn axes(&self) -> [[f64; 3]; 3] {
+        let [x, y, minus_z] = self.axes.map(|a| a.as_dvec3().to_array());
+        [x, y, minus_z.map(|c| -c)]
+    }
+
     /// The unit vector along `m` of the map's frame, in the world; up where `m` has no direction.
     pub(super) fn to_world(&self, m: [f64; 3]) -> Vec3 {
         let v = unit(m).unwrap_or(Vec3::Y);
@@ -137,28 +142,6 @@ pub(super) fn unit(m: [f64; 3]) -> Option<Vec3> {
     let length = m.map(|c| c * c).iter().sum::<f64>().sqrt();
     let [x, y, z] = m.map(|c| (c / length) as f32);
     (length > 0.0 && length.is_finite()).then(|| vec3(x, y, z))
-}
-
-/// `f(0)`, …, `f(n − 1)`, in parallel with the feature `render`.
-pub(super) fn in_order<R: Send>(n: usize, f: impl Fn(usize) -> R + Sync) -> Vec<R> {
-    #[cfg(feature = "render")]
-    {
-        use rayon::prelude::*;
-        (0..n).into_par_iter().map(&f).collect()
-    }
-    #[cfg(not(feature = "render"))]
-    (0..n).map(f).collect()
-}
-
-/// `f(i, chunk i)` of chunks of `len`, in parallel with the feature `render`.
-pub(super) fn bands<T: Send>(slice: &mut [T], len: usize, f: impl Fn(usize, &mut [T]) + Sync) {
-    #[cfg(feature = "render")]
-    {
-        use rayon::prelude::*;
-        slice.par_chunks_mut(len).enumerate().for_each(|(i, chunk)| f(i, chunk));
-    }
-    #[cfg(not(feature = "render"))]
-    slice.chunks_mut(len).enumerate().for_each(|(i, chunk)| f(i, chunk));
 }
 
 #[cfg(test)]

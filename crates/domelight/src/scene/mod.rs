@@ -8,6 +8,8 @@ pub mod builtin;
 mod camera;
 mod description;
 #[cfg(feature = "io")]
+mod fingerprint;
+#[cfg(feature = "io")]
 pub mod load;
 mod shading;
 mod stage;

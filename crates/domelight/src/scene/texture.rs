@@ -137,6 +137,21 @@ impl Texture {
         Self::new(name.into(), width, height, Texels::Bits16(texels), encoding)
     }
 
+    /// The texels as they are kept, byte by byte, and everything else in words.
+    #[cfg(feature = "io")]
+    pub(crate) fn add_to(&self, fingerprinter: &mut crate::fingerprint::Fingerprinter) {
+        let Self { width, height, texels, decode, .. } = self;
+        fingerprinter.text(format_args!("{width}x{height}"));
+        fingerprinter.numbers(decode.iter().copied());
+        match texels {
+            Texels::Bits8(texels) => fingerprinter.bytes(texels.as_flattened().iter().copied()),
+            Texels::Bits16(texels) => {
+                let values = texels.as_flattened().iter();
+                fingerprinter.bytes(values.flat_map(|value| value.to_le_bytes()));
+            }
+        }
+    }
+
     fn new(
         name: String,
         width: u32,

@@ -1,7 +1,8 @@
 //! OpenEXR: reads one layer of any flat file, writes several layers into one part.
 
 mod read;
+mod read_layers;
 mod write;
 
 pub use read::decode;
-pub use write::{ExrLayers, Layer, text_attributes};
+pub use write::{ExrLayers, Layer, Plane, text_attributes};

@@ -35,8 +35,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// # Errors
 /// If the file is damaged, incomplete or deep, or has no such layer.
 pub fn decode(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Problem> {
-    // The crate asserts in places where only a corrupt file can lead; nothing of what it touched is used afterwards.
-    let decoded = catch_unwind(AssertUnwindSafe(|| decode_unguarded(bytes, layer)));
+    guarded(|| decode_unguarded(bytes, layer))
+}
+
+/// Turns the crate's panics into errors: it asserts in places where only a corrupt file can lead. Nothing of what
+/// it touched is used afterwards.
+pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, Problem>) -> Result<T, Problem> {
+    let decoded = catch_unwind(AssertUnwindSafe(read));
     decoded.unwrap_or_else(|panic| {
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let message = words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("unknown");
@@ -48,10 +53,7 @@ pub fn decode(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Problem> {
 const BATCH: usize = 32;
 
 fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Problem> {
-    let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(Problem::Exr)?;
-    for header in reader.headers() {
-        check_promises(header, bytes.len() as u64)?;
-    }
+    let reader = open(bytes)?;
     let selected = select(reader.headers(), layer)?;
     let header = &reader.headers()[selected.header];
     let envmap = header.own_attributes.environment_map.map(|kind| match kind {
@@ -60,33 +62,52 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Proble
     });
     let matrix = header.shared_attributes.chromaticities.as_ref().and_then(to_rec709);
 
+    // Memory for the picture is taken when its first blocks have turned out to be whole.
+    let mut planes = None;
+    let (channels, is_color) = (selected.channels, selected.is_color);
+    let header = header.clone();
+    for_each_block(reader, selected.header, |block| {
+        let planes = match &mut planes {
+            Some(planes) => planes,
+            none => none.insert(Planes::new(&header, channels)?),
+        };
+        planes.insert(&header, block)
+    })?;
+    let planes = planes.map_or_else(|| Planes::new(&header, channels), Ok)?;
+    let image = planes.into_image(matrix.filter(|_| is_color));
+    Ok(Picture { image: image.0, alpha: image.1, envmap, format: Format::Exr })
+}
+
+pub(super) fn open(bytes: &[u8]) -> Result<Reader<Cursor<&[u8]>>, Problem> {
+    let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(Problem::Exr)?;
+    for header in reader.headers() {
+        check_promises(header, bytes.len() as u64)?;
+    }
+    Ok(reader)
+}
+
+/// Decompresses the blocks of a part's largest level, in the order of the file.
+pub(super) fn for_each_block(
+    reader: Reader<Cursor<&[u8]>>,
+    part: usize,
+    mut each: impl FnMut(&UncompressedBlock) -> Result<(), Problem>,
+) -> Result<(), Problem> {
     let mut chunks = reader
         .filter_chunks(false, |_, tile, block| {
-            block.layer == selected.header && tile.is_largest_resolution_level()
+            block.layer == part && tile.is_largest_resolution_level()
         })
         .map_err(Problem::Exr)?;
     let meta = chunks.meta_data().clone();
-    let header = &meta.headers[selected.header];
-    // Memory for the picture is taken when its first blocks have turned out to be whole.
-    let mut planes = None;
     loop {
         let batch: Vec<Chunk> =
             chunks.by_ref().take(BATCH).collect::<Result<_, _>>().map_err(Problem::Exr)?;
         if batch.is_empty() {
-            break;
+            return Ok(());
         }
-        let blocks = decompress(batch, &meta)?;
-        let planes = match &mut planes {
-            Some(planes) => planes,
-            none => none.insert(Planes::new(header, selected.channels)?),
-        };
-        for block in &blocks {
-            planes.insert(header, block)?;
+        for block in &decompress(batch, &meta)? {
+            each(block)?;
         }
     }
-    let planes = planes.map_or_else(|| Planes::new(header, selected.channels), Ok)?;
-    let image = planes.into_image(matrix.filter(|_| selected.is_color));
-    Ok(Picture { image: image.0, alpha: image.1, envmap, format: Format::Exr })
 }
 
 fn decompress(batch: Vec<Chunk>, meta: &MetaData) -> Result<Vec<UncompressedBlock>, Problem> {

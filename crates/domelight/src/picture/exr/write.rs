@@ -8,9 +8,10 @@ use crate::picture::{Problem, checked_area};
 use crate::{Rgb, RgbImage};
 use ::exr::block;
 use ::exr::meta::attribute::EnvironmentMap;
+use ::exr::meta::header::Header;
 use ::exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, LayerAttributes,
-    SmallVec, Text, WritableImage,
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, IntegerBounds,
+    LayerAttributes, SmallVec, Text, Vec2, WritableImage,
 };
 use std::io::Cursor;
 
@@ -20,7 +21,50 @@ pub struct Layer {
     /// What stands before the dot in the file; empty for the picture itself.
     pub name: String,
     /// Name (R, G, B, A, X, Y, Z …) and a value a texel, row by row.
-    pub channels: Vec<(String, Vec<f32>)>,
+    pub channels: Vec<(String, Plane)>,
+}
+
+/// The values of a channel, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Plane {
+    /// Numbers of 32 bits.
+    Float(Vec<f32>),
+    /// Counts, or bits that mean something to their writer alone.
+    Uint(Vec<u32>),
+}
+
+impl Plane {
+    /// How many values.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Float(values) => values.len(),
+            Self::Uint(values) => values.len(),
+        }
+    }
+
+    /// No values.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    fn samples(&self) -> FlatSamples {
+        match self {
+            Self::Float(values) => FlatSamples::F32(values.clone()),
+            Self::Uint(values) => FlatSamples::U32(values.clone()),
+        }
+    }
+}
+
+impl From<Vec<f32>> for Plane {
+    fn from(values: Vec<f32>) -> Self {
+        Self::Float(values)
+    }
+}
+
+impl From<Vec<u32>> for Plane {
+    fn from(values: Vec<u32>) -> Self {
+        Self::Uint(values)
+    }
 }
 
 /// Layers of one size, to be written as one part: `R`, `G`, `B`, `A` for the picture itself and `layer.R` … for
@@ -31,6 +75,10 @@ pub struct ExrLayers {
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// Where the first column and row lie in the whole picture: the data window's corner.
+    pub origin: (usize, usize),
+    /// Columns and rows of the whole picture, the display window; by default the data window.
+    pub whole: Option<(usize, usize)>,
     /// In any order; the file sorts channels by name.
     pub layers: Vec<Layer>,
     /// String attributes (name, value), for provenance.
@@ -54,30 +102,30 @@ impl ExrLayers {
 
     /// Adds a layer with R, G, B and perhaps A.
     pub fn push_rgb(&mut self, name: &str, image: &RgbImage, alpha: Option<&[f32]>) {
-        let plane = |f: fn(&Rgb) -> f32| image.pixels.iter().map(f).collect();
+        let plane = |f: fn(&Rgb) -> f32| Plane::Float(image.pixels.iter().map(f).collect());
         let mut channels = vec![
             ("R".to_owned(), plane(|c| c.r)),
             ("G".to_owned(), plane(|c| c.g)),
             ("B".to_owned(), plane(|c| c.b)),
         ];
-        channels.extend(alpha.map(|alpha| ("A".to_owned(), alpha.to_vec())));
+        channels.extend(alpha.map(|alpha| ("A".to_owned(), alpha.to_vec().into())));
         self.layers.push(Layer { name: name.to_owned(), channels });
     }
 
     /// Adds a layer with X, Y and Z, such as normals.
     pub fn push_xyz(&mut self, name: &str, vectors: &[crate::math::Vec3]) {
-        let plane = |axis: usize| vectors.iter().map(|v| v[axis]).collect();
+        let plane = |axis: usize| Plane::Float(vectors.iter().map(|v| v[axis]).collect());
         let channels = ["X", "Y", "Z"].iter().enumerate().map(|(i, n)| ((*n).to_owned(), plane(i)));
         self.layers.push(Layer { name: name.to_owned(), channels: channels.collect() });
     }
 
     /// Adds a layer of one channel, such as `depth.Z`.
-    pub fn push_channel(&mut self, name: &str, channel: &str, values: Vec<f32>) {
-        let channels = vec![(channel.to_owned(), values)];
+    pub fn push_channel(&mut self, name: &str, channel: &str, values: impl Into<Plane>) {
+        let channels = vec![(channel.to_owned(), values.into())];
         self.layers.push(Layer { name: name.to_owned(), channels });
     }
 
-    /// The file's bytes: f32, ZIP, scanlines.
+    /// The file's bytes: 32 bits a sample, ZIP, scanlines.
     ///
     /// # Errors
     /// If there are no texels or no channels, two channels have one name, a name is not ASCII or too long, or a
@@ -97,7 +145,7 @@ impl ExrLayers {
             } else if !names.insert(name.clone()) {
                 return refuse("another channel has the same name");
             }
-            list.push(AnyChannel::new(Text::from(name.as_str()), FlatSamples::F32(values.clone())));
+            list.push(AnyChannel::new(Text::from(name.as_str()), values.samples()));
         }
         if list.is_empty() {
             return Err(Problem::NoColor { present: Vec::new() });
@@ -109,14 +157,18 @@ impl ExrLayers {
             Encoding::SMALL_LOSSLESS,
             AnyChannels::sort(list),
         );
+        let mut image = Image::from_layer(layer);
+        if let Some((width, height)) = self.whole {
+            image.attributes.display_window = IntegerBounds::from_dimensions((width, height));
+        }
         let mut bytes = Cursor::new(Vec::new());
-        Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(Problem::Exr)?;
+        image.write().to_buffered(&mut bytes).map_err(Problem::Exr)?;
         let mut bytes = bytes.into_inner();
         sort_attributes(&mut bytes);
         Ok(bytes)
     }
 
-    fn planes(&self) -> impl Iterator<Item = (&str, &String, &Vec<f32>)> {
+    fn planes(&self) -> impl Iterator<Item = (&str, &String, &Plane)> {
         self.layers.iter().flat_map(|Layer { name, channels }| {
             channels.iter().map(move |(channel, values)| (name.as_str(), channel, values))
         })
@@ -126,6 +178,7 @@ impl ExrLayers {
         let text = |text: &str| Text::from_slice_unchecked(text.as_bytes());
         let mut attributes = LayerAttributes {
             software_name: Some(text("domelight")),
+            layer_position: Vec2(self.origin.0 as i32, self.origin.1 as i32),
             environment_map: self.envmap.map(|kind| match kind {
                 EnvmapKind::LatLong => EnvironmentMap::LatitudeLongitude,
                 EnvmapKind::Cube => EnvironmentMap::Cube,
@@ -170,13 +223,17 @@ fn split_attribute(header: &[u8]) -> Option<(&[u8], &[u8])> {
 /// If the file's headers are damaged.
 pub fn text_attributes(bytes: &[u8]) -> Result<Vec<(String, String)>, Problem> {
     let reader = block::read(Cursor::new(bytes), false).map_err(Problem::Exr)?;
-    let mut texts: Vec<(String, String)> = Vec::new();
-    for (name, value) in reader.headers().iter().take(1).flat_map(|h| &h.own_attributes.other) {
-        if let AttributeValue::Text(value) = value {
-            let utf8 = |text: &Text| String::from_utf8_lossy(text.as_slice()).into_owned();
-            texts.push((utf8(name), utf8(value)));
-        }
-    }
+    Ok(reader.headers().first().map(string_attributes).unwrap_or_default())
+}
+
+/// The string attributes of a part, by name.
+pub(super) fn string_attributes(header: &Header) -> Vec<(String, String)> {
+    let utf8 = |text: &Text| String::from_utf8_lossy(text.as_slice()).into_owned();
+    let text = |(name, value): (&Text, &AttributeValue)| match value {
+        AttributeValue::Text(value) => Some((utf8(name), utf8(value))),
+        _ => None,
+    };
+    let mut texts: Vec<_> = header.own_attributes.other.iter().filter_map(text).collect();
     texts.sort();
-    Ok(texts)
+    texts
 }

@@ -49,6 +49,9 @@ use visibility::{Blocks, Learned, Visibility};
 /// than the same number in two sets, and a tile's rays still fit the caches.
 const SAMPLES_PER_PASS: u32 = 32;
 
+/// Candidates of a pixel in a pass, for the sake of memory.
+const MAX_CANDIDATES: u32 = 1 << 14;
+
 /// Of the candidates for a glossy material one in this many comes from the material: of lobes as wide
 /// as cells, and of narrower ones, which the table hardly sees.
 const BRDF_SHARE: [usize; 2] = [8, 4];
@@ -58,7 +61,7 @@ const NARROW: f32 = 0.1;
 
 /// The error of a candidate that does not matter, as a share of the pixel's brightness over the
 /// number of candidates: of diffuse and of glossy pixels.
-const TOLERANCE: [f32; 2] = [0.3, 0.5];
+const TOLERANCE: [f32; 2] = [0.4, 0.6];
 
 /// Pixels darker than this share of the environment's mean are not held to their own brightness.
 const DARK: f32 = 0.15;
@@ -132,7 +135,7 @@ impl Strategy for ProductSampling<'_> {
     }
 
     fn samples_per_pass(&self) -> Option<u32> {
-        Some(SAMPLES_PER_PASS)
+        Some((MAX_CANDIDATES / self.n_rays).clamp(1, SAMPLES_PER_PASS))
     }
 
     fn begin_pass(&self, stream: Stream) -> Pool {

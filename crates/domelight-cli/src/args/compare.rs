@@ -1,0 +1,96 @@
+//! The arguments of `domelight compare`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::finite;
+use super::sampling::PixelArguments;
+use super::scene::SceneArguments;
+use crate::compare::Budget;
+use crate::notation::NamedStrategy;
+
+pub(super) const EXAMPLES: &str = "\
+Strategies are NAME[:OPTION]…, separated by commas; an option is a flag of render without its
+dashes, KEY=VALUE or a bare word. A first number, or two, stand for the usual options:
+  brdf:4  environment:4  rejection:rays=2     so many --rays
+  mis:3/1                                     --split 3:1
+  sir:15/800                                  --rays 15 --candidates 800
+  rejection:32                                --tries 32
+  median-cut:64  variance-minimization:64     --lights 64
+  mis:heuristic=balance:no-compensation  sir:4/64:from=brdf:resampling=reservoir
+
+Budgets are of each picture: spp:N camera samples a pixel; rays:N shadow rays traced for a pixel
+that the scene covers; time:T CPU seconds of rendering, by measurement. Camera samples are whole: a
+strategy that cannot meet the budget with a whole number of them is reported, and left out if even
+one sample is far beyond it.
+
+Examples:
+  domelight compare
+      the built-in statue under the sky, four strategies at 64 shadow rays, into compare.html
+  domelight compare statue --env cathedral --strategies mis,sir:15/800,variance-minimization:64
+      your choice of strategies
+  domelight compare bunny.ply --env studio.hdr --budget time:2s --seeds 8 -o bunny.html
+      your mesh under your HDRI at equal time
+  domelight compare scene.toml --reference converged.exr --json=result.json -o report.html
+      against your own reference, the numbers as JSON too";
+
+/// Compare strategies on one scene at equal samples, rays or time.
+#[derive(Args, Debug)]
+#[command(mut_arg("size", |size| size.default_value("400x400")))]
+pub(crate) struct CompareArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
+
+    /// The strategies, as described below
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        help_heading = "Comparison",
+        default_value = "brdf,environment,mis,sir"
+    )]
+    pub(crate) strategies: Vec<NamedStrategy>,
+    /// What all have in common: rays:N, time:T (2s, 500ms, 1m) or spp:N
+    #[arg(long, value_name = "BUDGET", default_value = "rays:64", help_heading = "Comparison")]
+    pub(crate) budget: Budget,
+    /// Pictures of each strategy, from --seed on: the spread of the error is that over them
+    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Comparison",
+          value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) seeds: u32,
+    /// The converged picture [default: rendered once, then kept in the cache]
+    #[arg(long, value_name = "FILE", help_heading = "Reference")]
+    pub(crate) reference: Option<PathBuf>,
+    /// Camera samples of each pixel of a rendered reference, each of 4 environment and 4 BRDF
+    /// samples
+    #[arg(long, value_name = "N", default_value_t = 256, help_heading = "Reference",
+          conflicts_with = "reference", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
+    pub(crate) reference_spp: u32,
+    /// Where references are kept [default: domelight in the user's cache folder]
+    #[arg(long, value_name = "FOLDER", help_heading = "Reference")]
+    pub(crate) cache: Option<PathBuf>,
+    /// Neither look for the reference in the cache nor keep it
+    #[arg(long, help_heading = "Reference", conflicts_with = "cache")]
+    pub(crate) no_cache: bool,
+
+    #[command(flatten)]
+    pub(crate) pixel: PixelArguments,
+
+    /// The report; - writes it to standard output
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        default_value = "compare.html",
+        help_heading = "Output"
+    )]
+    pub(crate) output: PathBuf,
+    /// Print the numbers as JSON, or write them to a file
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true,
+          default_missing_value = "-", help_heading = "Output")]
+    pub(crate) json: Option<PathBuf>,
+    /// Exposure in stops at which the page opens and ꟻLIP sees the pictures
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite,
+          allow_negative_numbers = true, help_heading = "Output")]
+    pub(crate) exposure: f32,
+}

@@ -1,0 +1,37 @@
+//! The arguments that say how a render proceeds: what is saved, gone on with, left to others, and when it ends.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+
+use super::positive;
+use crate::values::{Shard, Tiles, duration};
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Checkpoints, parts and limits")]
+pub(crate) struct CourseArguments {
+    /// Save the state of the render here (.exr) from time to time, when it is interrupted and when it is done
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["shard", "tiles"])]
+    pub(crate) checkpoint: Option<PathBuf>,
+    /// Time between checkpoints
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = duration)]
+    pub(crate) checkpoint_every: Duration,
+    /// Go on from a checkpoint of the same render, with the same or more --spp; saves into the same file
+    /// unless --checkpoint names another
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["shard", "tiles"])]
+    pub(crate) resume: Option<PathBuf>,
+    /// Render shard K of N (K from 0) into one part, -o PART.exr, which `domelight merge` puts together with the
+    /// others; goes on with a part that was interrupted, and leaves a finished one as it is
+    #[arg(long, value_name = "K/N", conflicts_with = "tiles", requires = "output")]
+    pub(crate) shard: Option<Shard>,
+    /// As --shard, for tiles A to B of the picture
+    #[arg(long, value_name = "A-B", requires = "output")]
+    pub(crate) tiles: Option<Tiles>,
+    /// End the render after this time with what is there
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub(crate) time: Option<Duration>,
+    /// End each tile when the spread of its samples suggests this relMSE, such as 1e-3, but not before 16 samples
+    #[arg(long, value_name = "E", value_parser = positive)]
+    pub(crate) target_error: Option<f32>,
+}

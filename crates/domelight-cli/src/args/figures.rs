@@ -1,0 +1,38 @@
+//! The arguments of `domelight figures`.
+
+use clap::Args;
+use std::path::PathBuf;
+
+use super::scene::EnvironmentArguments;
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  domelight figures
+      all figures of the built-in statue in the built-in cathedral, into the folder figures
+  domelight figures --env studio.hdr --only 4,8 -o comparison
+      two of them under your HDRI
+  domelight figures --scene bunny.ply --env sky --quick
+      your mesh; small pictures and few samples, to see what is there";
+
+/// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
+#[derive(Args, Debug)]
+pub(crate) struct FiguresArguments {
+    /// The folder to write into, made if it is not there
+    #[arg(short, long = "output", value_name = "DIR", default_value = "figures")]
+    pub(crate) output: PathBuf,
+    /// A built-in scene (statue, spheres, material-ball, sphere, …), a mesh or a scene file
+    #[arg(long, value_name = "SCENE", default_value = "statue")]
+    pub(crate) scene: String,
+    /// The figures to make [default: all, 1 to 8]
+    #[arg(long, value_name = "LIST", value_delimiter = ',',
+          value_parser = clap::value_parser!(u8).range(1..=8))]
+    pub(crate) only: Vec<u8>,
+    /// Small pictures, few samples, poor references: seconds instead of a minute
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Names the random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) environment: EnvironmentArguments,
+}

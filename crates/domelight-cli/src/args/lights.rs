@@ -1,0 +1,154 @@
+//! The arguments of `domelight lights`.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use clap::builder::TypedValueParser;
+use clap::{Args, ValueEnum};
+use domelight::rig::export::Format;
+use domelight::rig::{MedianCut, Method, VarianceMinimization};
+
+use super::scene::EnvironmentArguments;
+use super::{Tone, one_of, percent};
+use crate::output::PicturePath;
+
+pub(super) const EXAMPLES: &str = "\
+The rig is the sun (--sun) and lamps (--lamps) first, then regions of what they leave (-n,
+--error). Without -n and --error all else stays on the map: a dome beside the lights, which
+--keep-residual writes. Lights and dome together are the probe.
+
+Examples:
+  domelight lights venice.hdr
+      64 lights, as a table
+  domelight lights road.hdr --sun --keep-residual dome.exr -o sun.json
+      the sun, and the probe without it
+  domelight lights studio.hdr --lamps 4 --preview lamps.png
+      up to four lamps, and a picture of what was found
+  domelight lights chapel.hdr --error 5 -o rig.json -o rig.csv
+      as many lights as shade with an error of 5 %
+  domelight lights sky --sun -n 16 -o - --format csv
+      the sun and 15 regions, to standard output";
+
+/// Turn a light probe into a rig of lights.
+#[derive(Args, Debug)]
+pub(crate) struct LightsArguments {
+    #[command(flatten)]
+    pub(crate) environment: EnvironmentArguments,
+
+    /// Lights of the rig, sun and lamps included [default: 64, with --sun or --lamps those alone]
+    #[arg(short = 'n', long = "lights", value_name = "N", help_heading = "Lights",
+          conflicts_with = "error", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub(crate) n_lights: Option<u32>,
+    /// The fewest lights whose shading, matt and glossy, is off by this much at the most [%]
+    #[arg(long, value_name = "PERCENT", help_heading = "Lights", value_parser = percent)]
+    pub(crate) error: Option<f64>,
+    /// Take the sun out first: the brightest compact source no wider than 14°
+    #[arg(long, help_heading = "Lights")]
+    pub(crate) sun: bool,
+    /// Take up to K lamps and windows out first: compact bright sources no wider than 56°
+    #[arg(long, value_name = "K", help_heading = "Lights", default_value_t = 0,
+          hide_default_value = true, value_parser = clap::value_parser!(u32).range(0..=4096))]
+    pub(crate) lamps: u32,
+    /// How the rest is divided
+    #[arg(long, value_enum, help_heading = "Lights",
+          default_value_t = MethodName::VarianceMinimization)]
+    pub(crate) method: MethodName,
+    /// Leave lights with less of the probe's light on the map [%; default: 0.1 of sun and lamps]
+    #[arg(long, value_name = "PERCENT", help_heading = "Lights", value_parser = percent)]
+    pub(crate) min_energy: Option<f64>,
+
+    /// The rig, its format by its extension; several times for several files; - is standard output
+    #[arg(short, long = "output", value_name = "RIG", help_heading = "Output")]
+    pub(crate) output: Vec<RigPath>,
+    /// The format where no extension tells it [of standard output: json]
+    #[arg(long, value_name = "FORMAT", help_heading = "Output", value_parser = format(),
+          requires = "output")]
+    pub(crate) format: Option<Format>,
+    /// Write the probe without the light that the rig took (.exr, .hdr, .pfm)
+    #[arg(long, value_name = "FILE.exr", help_heading = "Output")]
+    pub(crate) keep_residual: Option<PicturePath>,
+    /// Write a picture of the rig: regions, lights, and a sphere under probe and rig
+    #[arg(long, value_name = "FILE.png", help_heading = "Output")]
+    pub(crate) preview: Option<PngPath>,
+    /// Print lights, error and times as JSON
+    #[arg(long, help_heading = "Output")]
+    pub(crate) json: bool,
+    /// How the preview is shown.
+    #[command(flatten)]
+    pub(crate) tone: Tone,
+}
+
+/// `--env` as the first argument.
+pub(super) fn positional(env: clap::Arg) -> clap::Arg {
+    let help = "A built-in probe (sky, studio, cathedral, constant) or a file (.hdr, .exr, .pfm; - \
+                reads standard input)";
+    env.long(None::<&'static str>).index(1).required(true).help(help).help_heading("Arguments")
+}
+
+fn format() -> impl TypedValueParser<Value = Format> {
+    one_of(Format::ALL.map(Format::name))
+}
+
+/// How a map is divided into regions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MethodName {
+    /// Regions of little spread (Viriyothai & Debevec 2009, on the sphere)
+    VarianceMinimization,
+    /// Regions of even energy (Debevec 2005)
+    MedianCut,
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::VarianceMinimization => {
+                Self::VarianceMinimization(VarianceMinimization::default())
+            }
+            MethodName::MedianCut => Self::MedianCut(MedianCut::default()),
+        }
+    }
+}
+
+/// A rig's file to write; `-` is standard output.
+#[derive(Clone, Debug)]
+pub(crate) struct RigPath {
+    pub(crate) path: PathBuf,
+    /// What its extension says.
+    pub(crate) format: Option<Format>,
+}
+
+impl FromStr for RigPath {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let path = PathBuf::from(text);
+        let format = path.extension().and_then(|e| Format::of_extension(&e.to_string_lossy()));
+        Ok(Self { path, format })
+    }
+}
+
+impl RigPath {
+    pub(crate) fn is_standard_output(&self) -> bool {
+        self.path == Path::new("-")
+    }
+}
+
+/// A PNG to write; `-` is standard output.
+#[derive(Clone, Debug)]
+pub(crate) struct PngPath(pub(crate) PathBuf);
+
+impl FromStr for PngPath {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let path = PathBuf::from(text);
+        let is_png = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
+        if is_png || text == "-" { Ok(Self(path)) } else { Err("its name must end in .png".into()) }
+    }
+}
+
+impl PngPath {
+    pub(crate) fn is_standard_output(&self) -> bool {
+        self.0 == Path::new("-")
+    }
+}

@@ -1,0 +1,148 @@
+//! How directions and points are chosen.
+
+use clap::{Args, ValueEnum};
+use domelight::render::Filter;
+use domelight::sampling::SamplerKind;
+
+use super::one_of;
+use crate::values::Split;
+
+/// A strategy, and what it may be told.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Sampling")]
+pub(crate) struct StrategyArguments {
+    /// How directions are chosen
+    #[arg(long, value_enum, default_value_t = StrategyName::Mis)]
+    pub(crate) strategy: StrategyName,
+    /// Shadow rays of each camera sample; with rejection, samples to accept [default: 1,
+    /// with mis 2, with product 8]
+    #[arg(long, value_name = "N", conflicts_with = "split",
+          value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub(crate) rays: Option<u32>,
+    /// Environment and BRDF samples of each camera sample, with mis [default: half of --rays each]
+    #[arg(long, value_name = "M:N")]
+    pub(crate) split: Option<Split>,
+    /// Lights that stand for the probe, with median-cut and variance-minimization [default: 64]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub(crate) lights: Option<u32>,
+    /// Candidates of each camera sample, with sir [default: by a pilot, for the least error in time]
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub(crate) candidates: Option<u32>,
+    /// Where sir draws its candidates from [default: mixture]
+    #[arg(long, value_enum, value_name = "SOURCE")]
+    pub(crate) from: Option<SourceName>,
+    /// How sir picks rays from candidates [default: sorted]
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub(crate) resampling: Option<ResamplingName>,
+    /// Tries of each camera sample, with rejection; with --rays the most tries [default: 16; with
+    /// --rays N 64 N]
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub(crate) tries: Option<u32>,
+    /// What rejection draws its tries from [default: tighter]
+    #[arg(long, value_enum, value_name = "SOURCE")]
+    pub(crate) proposal: Option<ProposalName>,
+    /// How mis weighs its samples [default: power]
+    #[arg(long, value_enum)]
+    pub(crate) heuristic: Option<HeuristicName>,
+    /// With mis, draw from the environment's whole table; by default what is dimmer than the mean
+    /// is left to the BRDF samples
+    #[arg(long)]
+    pub(crate) no_compensation: bool,
+}
+
+/// The points of a pixel, and who computes them.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Sampling")]
+pub(crate) struct PixelArguments {
+    /// Which points: Owen-scrambled Sobol' or independent random numbers
+    #[arg(long, value_enum, default_value_t = SamplerName::Sobol)]
+    pub(crate) sampler: SamplerName,
+    /// Pixel filter
+    #[arg(long, default_value = "gaussian", value_parser = one_of::<Filter>(Filter::ALL.map(Filter::name)))]
+    pub(crate) filter: Filter,
+    /// Names the random numbers; the same seed gives the same picture
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Threads [default: SLURM_CPUS_PER_TASK, else the cores that the process may use]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StrategyName {
+    /// From the reflectance alone
+    Brdf,
+    /// From the environment's table alone
+    #[value(alias = "env", alias = "em")]
+    Environment,
+    /// Both, by multiple importance sampling
+    Mis,
+    /// The product of both, by a table a pixel, with the visibility that is learned on the way; traces
+    /// up to --rays where they matter
+    Product,
+    /// The product of both, by rejection from one with a bound on the other
+    Rejection,
+    /// The product of both, by resampling --candidates to --rays
+    Sir,
+    /// The probe as --lights directional lights by median cut: no noise, but bias
+    MedianCut,
+    /// The probe as --lights directional lights by variance minimization: no noise, but bias
+    VarianceMinimization,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum SourceName {
+    /// The environment
+    Environment,
+    /// The reflectance
+    Brdf,
+    /// Half from each
+    Mixture,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ResamplingName {
+    /// Each ray by a number of its own
+    Multinomial,
+    /// Equally spaced picks
+    Systematic,
+    /// Equally spaced picks from candidates sorted in space
+    Sorted,
+    /// Streaming reservoirs: no memory for candidates
+    Reservoir,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ProposalName {
+    /// The environment, with a bound on the reflectance
+    Environment,
+    /// The reflectance, with a bound on the light
+    Brdf,
+    /// Whichever bound is tighter at the point
+    Tighter,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum HeuristicName {
+    /// wᵢ = nᵢpᵢ / Σ nₖpₖ
+    Balance,
+    /// The same with squares
+    Power,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum SamplerName {
+    /// Owen-scrambled Sobol' points
+    Sobol,
+    /// Independent pseudo-random points
+    Independent,
+}
+
+impl From<SamplerName> for SamplerKind {
+    fn from(name: SamplerName) -> Self {
+        match name {
+            SamplerName::Sobol => Self::Sobol,
+            SamplerName::Independent => Self::Independent,
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! What is rendered: scene, environment, camera.
+
+use clap::{Args, ValueEnum};
+use domelight::environment::UpAxis;
+use domelight::environment::mapping::Mapping;
+
+use super::{finite, mapping};
+use crate::values::{NamedMaterial, Size, Triple, not_negative};
+
+/// Rows of a built-in probe unless told otherwise.
+pub(crate) const BUILTIN_ROWS: u32 = 1024;
+
+/// A scene under its light, seen by a camera: for every command that renders.
+#[derive(Args, Debug)]
+pub(crate) struct SceneArguments {
+    /// A built-in scene (statue, spheres, material-ball, sphere, …), a mesh (.ply, .obj, .gltf,
+    /// .glb) or a scene file (.toml)
+    #[arg(default_value = "statue")]
+    pub(crate) scene: String,
+
+    #[command(flatten)]
+    pub(crate) environment: EnvironmentArguments,
+    #[command(flatten)]
+    pub(crate) camera: CameraArguments,
+    #[command(flatten)]
+    pub(crate) stage: StageArguments,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Environment")]
+pub(crate) struct EnvironmentArguments {
+    /// A built-in probe (sky, studio, cathedral, constant) or a file (.hdr, .exr, .pfm; - reads
+    /// standard input) [default: the scene's, else sky]
+    #[arg(long, value_name = "PROBE")]
+    pub(crate) env: Option<String>,
+    /// Turn the environment about the up axis, counter-clockwise seen from above [degrees]
+    #[arg(long, value_name = "DEG", value_parser = finite, allow_negative_numbers = true)]
+    pub(crate) env_rotate: Option<f32>,
+    /// Multiply the environment's radiance
+    #[arg(long, value_name = "X", value_parser = not_negative, allow_negative_numbers = true)]
+    pub(crate) env_scale: Option<f32>,
+    /// Multiply the environment's radiance by 2^EV
+    #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true)]
+    pub(crate) env_exposure: Option<f32>,
+    /// The world axis that the top of the map points to
+    #[arg(long, value_enum, value_name = "AXIS")]
+    pub(crate) env_up: Option<Up>,
+    /// The map's layout, where shape and attributes do not tell it rightly
+    #[arg(long, value_name = "MAPPING", value_parser = mapping())]
+    pub(crate) env_mapping: Option<Mapping>,
+    /// The layer of an OpenEXR map
+    #[arg(long, value_name = "NAME")]
+    pub(crate) env_layer: Option<String>,
+    /// Rows of a built-in probe
+    #[arg(long, value_name = "ROWS", default_value_t = BUILTIN_ROWS,
+          value_parser = clap::value_parser!(u32).range(1..=16_384))]
+    pub(crate) env_rows: u32,
+    /// Repair negative, NaN and infinite texels instead of refusing them
+    #[arg(long)]
+    pub(crate) sanitize: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Camera")]
+pub(crate) struct CameraArguments {
+    /// Size of the picture
+    #[arg(long, value_name = "WxH", default_value = "640x640")]
+    pub(crate) size: Size,
+    /// Where the camera is [default: framed to the scene]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub(crate) origin: Option<Triple>,
+    /// What it looks at
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub(crate) target: Option<Triple>,
+    /// The direction that is up in the picture
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub(crate) up: Option<Triple>,
+    /// Vertical field of view [degrees]
+    #[arg(long, value_name = "DEG", value_parser = not_negative, allow_negative_numbers = true, conflicts_with = "ortho")]
+    pub(crate) fov: Option<f32>,
+    /// Orthographic, with this height of the picture in the world
+    #[arg(long, value_name = "HEIGHT", value_parser = not_negative, allow_negative_numbers = true)]
+    pub(crate) ortho: Option<f32>,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Scene")]
+pub(crate) struct StageArguments {
+    /// Material of the subject: diffuse:0.8, phong:50:1:0.5, ward:0.15:0.5, ggx:0.2, mix, …
+    #[arg(long, value_name = "M")]
+    pub(crate) material: Option<NamedMaterial>,
+    /// Move and scale the scene: centre of the bounds to 0, longest half-extent to 1
+    #[arg(long)]
+    pub(crate) normalize: bool,
+    /// Put a diffuse disk (reflectance 0.5) under the scene
+    #[arg(long)]
+    pub(crate) ground: bool,
+    /// Leave the background out: transparent where nothing is
+    #[arg(long)]
+    pub(crate) hide_env: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Up {
+    /// +Y
+    Y,
+    /// +Z
+    Z,
+}
+
+impl From<Up> for UpAxis {
+    fn from(up: Up) -> Self {
+        match up {
+            Up::Y => Self::Y,
+            Up::Z => Self::Z,
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! References in the user's cache folder, by content.
+//!
+//! An entry is `KEY-SUM.exr`: KEY is the fingerprint of everything that decides the picture, SUM that of
+//! the file itself, so that a damaged entry is known and made again.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+use domelight::fingerprint::{Fingerprint, Fingerprinter};
+use domelight::picture::write_atomically;
+use domelight::render::RenderSettings;
+use etcetera::base_strategy::{BaseStrategy as _, choose_native_strategy};
+
+use crate::failure::warn;
+use crate::scene::View;
+use crate::strategy::Plan;
+
+/// A folder of references.
+pub(super) struct Cache {
+    folder: PathBuf,
+}
+
+impl Cache {
+    /// The folder that was asked for, else that of the platform.
+    pub(super) fn new(folder: Option<&Path>) -> Result<Self> {
+        let folder = match folder {
+            Some(folder) => folder.to_path_buf(),
+            None => match choose_native_strategy() {
+                Ok(places) => places.cache_dir().join("domelight"),
+                Err(_) => bail!("this user has no home; use --cache FOLDER or --no-cache"),
+            },
+        };
+        Ok(Self { folder })
+    }
+
+    /// The entry and its bytes, if it is there and sound; a damaged one is removed.
+    pub(super) fn get(&self, key: &Key, quiet: bool) -> Option<(PathBuf, Vec<u8>)> {
+        let entries = fs::read_dir(&self.folder).ok()?.flatten().map(|entry| entry.path());
+        for path in entries {
+            let Some(sum) = key.sum_in(&path) else { continue };
+            match fs::read(&path) {
+                Ok(bytes) if of(&bytes).to_string() == sum => return Some((path, bytes)),
+                _ => {
+                    warn(quiet, &format!("{}: damaged; it is made again", path.display()));
+                    let _ = fs::remove_file(&path);
+                }
+            }
+        }
+        None
+    }
+
+    /// Keeps the bytes.
+    pub(super) fn put(&self, key: &Key, bytes: &[u8]) -> Result<PathBuf> {
+        let folder = &self.folder;
+        fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the cache folder {}", folder.display()))?;
+        let path = folder.join(format!("{}-{}.exr", key.0, of(bytes)));
+        write_atomically(&path, |out| out.write_all(bytes))?;
+        Ok(path)
+    }
+}
+
+/// Names everything that decides a picture.
+pub(super) struct Key(String);
+
+impl Key {
+    /// Of a reference: scene, light and view, the settings, the plan and the program itself.
+    pub(super) fn new(view: &View, settings: &RenderSettings, plan: Plan) -> Self {
+        let View { scene, camera, environment, .. } = view;
+        let mut key = Fingerprinter::default();
+        key.text(env!("CARGO_PKG_VERSION"));
+        if let Ok(program) = std::env::current_exe().and_then(fs::read) {
+            key.bytes(program);
+        }
+        key.text(scene.fingerprint());
+        key.text(environment.fingerprint());
+        // Debug's text of a number is exact.
+        key.text(format_args!("{camera:?}{settings:?}{plan:?}"));
+        Self(key.finish().to_string())
+    }
+
+    /// The sum that the name of an entry of this key tells.
+    fn sum_in<'a>(&self, path: &'a Path) -> Option<&'a str> {
+        let name = path.file_name()?.to_str()?;
+        name.strip_prefix(&self.0)?.strip_prefix('-')?.strip_suffix(".exr")
+    }
+}
+
+fn of(bytes: &[u8]) -> Fingerprint {
+    let mut fingerprint = Fingerprinter::default();
+    fingerprint.bytes(bytes.iter().copied());
+    fingerprint.finish()
+}

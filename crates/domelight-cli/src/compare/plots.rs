@@ -1,0 +1,61 @@
+//! Error over rays and over time.
+
+use super::entrant::Step;
+use super::report::{CompareReport, ResultReport};
+use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
+use crate::svg::{Document, PALETTE, Rect};
+
+/// What the error is plotted over.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Cost {
+    Rays,
+    Seconds,
+}
+
+/// relMSE of every strategy on its way to the budget, both axes logarithmic; bars are ± one standard
+/// deviation over the seeds.
+pub(super) fn convergence(report: &CompareReport, cost: Cost) -> String {
+    let x = |step: &Step| match cost {
+        Cost::Rays => step.rays,
+        Cost::Seconds => step.cpu_seconds.mean,
+    };
+    let label = match cost {
+        Cost::Rays => "shadow rays a pixel",
+        Cost::Seconds => "CPU seconds",
+    };
+    let results = || report.strategies.iter().filter_map(|s| Some((s, s.result.as_ref()?)));
+    let steps = || results().flat_map(|(_, result)| &result.convergence);
+    let series = results().enumerate().map(|(i, (strategy, result))| Series {
+        name: strategy.name.clone(),
+        color: PALETTE[i % PALETTE.len()],
+        join: if strategy.unbiased { Join::Curve } else { Join::Dashed },
+        marker: Some(Marker::ALL[i % Marker::ALL.len()]),
+        points: points(result, x),
+    });
+    let plot = Plot {
+        title: String::new(),
+        x: Axis::around(label, Scale::Log, steps().map(x)),
+        y: Axis::around("relMSE", Scale::Log, steps().flat_map(|s| <[f64; 2]>::from(ends(s)))),
+        series: series.collect(),
+        legend: Legend::Above,
+    };
+    let (width, height) = (500.0, 450.0);
+    let mut sheet = Document::new(width, height);
+    plot.draw(&mut sheet, Rect::new(0.0, 0.0, width, height));
+    sheet.to_svg()
+}
+
+fn points(result: &ResultReport, x: impl Fn(&Step) -> f64) -> Vec<Datum> {
+    let datum = |step: &Step| Datum {
+        error: step.rel_mse.sd.is_some().then(|| ends(step)),
+        ..Datum::new(x(step), step.rel_mse.mean)
+    };
+    result.convergence.iter().map(datum).collect()
+}
+
+/// The ends of the error bar; where it would reach 0, a fifth of the mean is as low as it goes.
+fn ends(step: &Step) -> (f64, f64) {
+    let mean = step.rel_mse.mean;
+    let sd = step.rel_mse.sd.unwrap_or(0.0);
+    ((mean - sd).max(0.2 * mean), mean + sd)
+}

@@ -1,0 +1,293 @@
+//! How a render proceeds: which tiles, from which checkpoint, saved where and how often, until when.
+
+use std::fs;
+use std::io;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result};
+use domelight::picture::{require_writable, write_atomically};
+use domelight::render::{Checkpoint, Counts, Observer, RenderSettings, Rendering, Session, Tiling};
+use domelight::strategy::Strategy;
+
+use crate::args::course::CourseArguments;
+use crate::failure::{UsageError, warn};
+use crate::output::{PictureFormat, PicturePath};
+use crate::progress::RenderProgress;
+use crate::report::Settings;
+use crate::scene::View;
+use crate::values::{Shard, Tiles};
+
+/// How a render proceeds.
+pub(crate) struct Course {
+    /// Which tiles; all of them make a picture, others a part.
+    tiles: Choice,
+    /// Where its state is saved.
+    save: Option<PathBuf>,
+    every: Duration,
+    /// Where its state came from.
+    from: Option<(PathBuf, Checkpoint)>,
+    time: Option<Duration>,
+    interrupted: &'static AtomicBool,
+    quiet: bool,
+    identity: Vec<(String, String)>,
+    provenance: Vec<(String, String)>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Choice {
+    All,
+    Shard(Shard),
+    Tiles(Tiles),
+}
+
+impl CourseArguments {
+    /// The render makes a part, not pictures.
+    pub(crate) fn is_part(&self) -> bool {
+        self.shard.is_some() || self.tiles.is_some()
+    }
+
+    /// Checks, before the work, what the flags say together with the outputs.
+    pub(crate) fn check(&self, outputs: &[PicturePath]) -> Result<()> {
+        if self.is_part() {
+            let exr = |p: &PicturePath| p.format() == Some(PictureFormat::Exr);
+            if !matches!(outputs, [one] if exr(one)) {
+                let text = "--shard and --tiles write one part: give one -o PART.exr";
+                return Err(UsageError(text.into()).into());
+            }
+        }
+        self.checkpoint.iter().chain(&self.resume).try_for_each(|path| {
+            if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
+                return Ok(require_writable(path)?);
+            }
+            let text = format!("{}: a checkpoint's name must end in .exr", path.display());
+            Err(UsageError(text).into())
+        })
+    }
+
+    /// Reads the checkpoint to go on from, if there is one.
+    pub(crate) fn course(
+        &self,
+        view: &View,
+        settings: &RenderSettings,
+        report: &Settings,
+        outputs: &[PicturePath],
+        interrupted: &'static AtomicBool,
+        quiet: bool,
+    ) -> Result<Course> {
+        let tiles = match (self.shard, self.tiles) {
+            (Some(shard), _) => Choice::Shard(shard),
+            (None, Some(tiles)) => Choice::Tiles(tiles),
+            (None, None) => Choice::All,
+        };
+        let part = self.is_part().then(|| outputs[0].path.clone());
+        let existing = part.clone().filter(|path| path.exists());
+        let save = part.or_else(|| self.checkpoint.clone()).or_else(|| self.resume.clone());
+        let identity = identity(view, settings, report);
+        let from = if let Some(path) = self.resume.clone().or(existing) {
+            let checkpoint = read(&path)?;
+            require_same(&path, &checkpoint, &identity)?;
+            require_more(&path, &checkpoint, settings.n_samples)?;
+            Some((path, checkpoint))
+        } else {
+            self.checkpoint.as_deref().map(refuse_to_replace).transpose()?;
+            None
+        };
+        let Self { checkpoint_every: every, time, .. } = *self;
+        let provenance = report.provenance();
+        Ok(Course { tiles, save, every, from, time, interrupted, quiet, identity, provenance })
+    }
+}
+
+/// What decides the picture, but for the number of samples; by name.
+fn identity(view: &View, settings: &RenderSettings, report: &Settings) -> Vec<(String, String)> {
+    let camera = &view.report.camera;
+    let mut identity = vec![
+        ("background", format!("{:?}", settings.background).to_lowercase()),
+        ("camera", serde_json::to_string(camera).unwrap_or_default()),
+        ("environment", view.environment.fingerprint().to_string()),
+        ("filter", settings.filter.name().to_owned()),
+        ("sampler", report.sampler.clone()),
+        ("scene", view.scene.fingerprint().to_string()),
+        ("seed", settings.seed.to_string()),
+        ("size", format!("{}x{}", settings.width, settings.height)),
+        ("strategy", report.strategy.clone()),
+        ("version", env!("CARGO_PKG_VERSION").to_owned()),
+    ];
+    identity.extend(settings.target_error.map(|e| ("target-error", e.to_string())));
+    identity.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+/// Reads a checkpoint or a part.
+pub(crate) fn read(path: &Path) -> Result<Checkpoint> {
+    let name = || path.display().to_string();
+    let bytes = match fs::read(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Err(UsageError(format!("{}: {error}", name())).into());
+        }
+        read => read.with_context(name)?,
+    };
+    Checkpoint::decode(&bytes).with_context(name)
+}
+
+fn require_same(path: &Path, checkpoint: &Checkpoint, identity: &[(String, String)]) -> Result<()> {
+    let Some(difference) = checkpoint.difference(identity) else { return Ok(()) };
+    let or_none = |value: &str| if value.is_empty() { "none".to_owned() } else { value.to_owned() };
+    let text = format!(
+        "{} is of another render: its {} is {}, that of this render {}",
+        path.display(),
+        difference.name,
+        or_none(difference.here),
+        or_none(difference.there)
+    );
+    Err(UsageError(text).into())
+}
+
+fn require_more(path: &Path, checkpoint: &Checkpoint, n_samples: u32) -> Result<()> {
+    if checkpoint.n_samples <= n_samples {
+        return Ok(());
+    }
+    let text = format!(
+        "{} is of a render with {} samples a pixel: --spp {n_samples} is less; give as many or more",
+        path.display(),
+        checkpoint.n_samples
+    );
+    Err(UsageError(text).into())
+}
+
+/// Refuses to write over the state of an unfinished render.
+fn refuse_to_replace(path: &Path) -> Result<()> {
+    if !path.exists() || read(path).is_ok_and(|checkpoint| checkpoint.complete) {
+        return Ok(());
+    }
+    let text = format!(
+        "{} is there and not a finished checkpoint: go on with --resume, or remove it",
+        path.display()
+    );
+    Err(UsageError(text).into())
+}
+
+impl Course {
+    /// Renders a session to its end or to the end of the time, or until it is interrupted.
+    pub(crate) fn run<S: Strategy>(
+        &self,
+        session: Session<S>,
+        settings: &RenderSettings,
+        progress: &RenderProgress,
+    ) -> Result<Rendering> {
+        let range = self.range(session.tiling())?;
+        let mut session = session.only(range.clone());
+        if let Some((path, checkpoint)) = &self.from {
+            restore(&mut session, path, checkpoint)?;
+        }
+        let pixels: usize = range.map(|t| session.tiling().tile(t).area()).sum();
+        let total = pixels as u64 * u64::from(settings.n_samples);
+        progress.begin(total, session.counts().camera_rays);
+        if !session.is_complete() {
+            self.advance(&mut session, settings, progress)?;
+        } else if self.save.as_ref() != self.from.as_ref().map(|(path, _)| path) {
+            self.save(&session, settings)?;
+        }
+        Ok(session.rendering())
+    }
+
+    /// Renders, and saves from time to time.
+    fn advance<S: Strategy>(
+        &self,
+        session: &mut Session<S>,
+        settings: &RenderSettings,
+        progress: &RenderProgress,
+    ) -> Result<()> {
+        let end = self.time.map(|time| Instant::now() + time);
+        loop {
+            let next_save = self.save.as_ref().map(|_| Instant::now() + self.every);
+            let pause = [end, next_save].into_iter().flatten().min();
+            let complete = session.run(&Until { progress, pause });
+            let interrupted = self.interrupted.load(Ordering::Relaxed);
+            if complete || interrupted || end.is_some_and(|end| Instant::now() >= end) {
+                return self.save(session, settings);
+            }
+            // What was saved before is still there, and the render may yet be written elsewhere.
+            if let Err(error) = self.save(session, settings) {
+                warn(self.quiet, &format!("no checkpoint: {error:#}"));
+            }
+        }
+    }
+
+    fn save<S: Strategy>(&self, session: &Session<S>, settings: &RenderSettings) -> Result<()> {
+        let Some(path) = &self.save else { return Ok(()) };
+        let checkpoint = Checkpoint {
+            identity: self.identity.clone(),
+            provenance: self.provenance.clone(),
+            tiles: session.tiles(),
+            n_tiles: session.tiling().n_tiles(),
+            n_samples: settings.n_samples,
+            complete: session.is_complete(),
+            counts: session.counts(),
+            film: session.film(),
+        };
+        let bytes = checkpoint.encode()?;
+        Ok(write_atomically(path, |out| out.write_all(&bytes))?)
+    }
+
+    fn range(&self, tiling: Tiling) -> Result<Range<usize>> {
+        match self.tiles {
+            Choice::All => Ok(0..tiling.n_tiles()),
+            Choice::Shard(Shard { k, n }) => Ok(tiling.shard(k, n)),
+            Choice::Tiles(Tiles { first, last }) if last < tiling.n_tiles() => Ok(first..last + 1),
+            Choice::Tiles(Tiles { last, .. }) => {
+                let n = tiling.n_tiles();
+                let text =
+                    format!("--tiles: there is no tile {last}; the picture has tiles 0-{}", n - 1);
+                Err(UsageError(text).into())
+            }
+        }
+    }
+
+    /// Where the state is, if it was saved.
+    pub(crate) fn saved(&self) -> Option<&Path> {
+        self.save.as_deref()
+    }
+}
+
+/// Gives a session the state of a checkpoint that is of the same tiles.
+fn restore<S: Strategy>(
+    session: &mut Session<S>,
+    path: &Path,
+    checkpoint: &Checkpoint,
+) -> Result<()> {
+    if checkpoint.tiles != session.tiles() {
+        let name = |t: &Range<usize>| format!("{}-{}", t.start, t.end.saturating_sub(1));
+        let text = format!(
+            "{} holds tiles {} of the picture, not {}",
+            path.display(),
+            name(&checkpoint.tiles),
+            name(&session.tiles())
+        );
+        return Err(UsageError(text).into());
+    }
+    let restored = session.restore(&checkpoint.film, checkpoint.counts);
+    restored.with_context(|| path.display().to_string())
+}
+
+/// Ends a run at a moment.
+struct Until<'a> {
+    progress: &'a RenderProgress,
+    pause: Option<Instant>,
+}
+
+impl Observer for Until<'_> {
+    fn pass_started(&self, samples: Range<u32>) {
+        self.progress.pass_started(samples);
+    }
+
+    fn tile_finished(&self, counts: &Counts) {
+        self.progress.tile_finished(counts);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.progress.cancelled() || self.pause.is_some_and(|pause| Instant::now() >= pause)
+    }
+}

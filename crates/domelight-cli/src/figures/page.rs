@@ -1,0 +1,176 @@
+//! The page: all figures of a run in the lecture's order, in one file that needs no other.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::Result;
+use serde_json::Value;
+
+use super::figure::{Figure, Row, Table, count, number};
+use super::studio::Studio;
+use crate::svg::{Document, data_uri, escape, font_face_css};
+
+/// For formulas: signs that grow, which fonts for text have not.
+const MATH_FONT: &[u8] = include_bytes!("../../assets/math-subset.otf");
+
+/// The page's file.
+pub(crate) const NAME: &str = "index.html";
+
+/// Writes the page.
+pub(crate) fn write(studio: &Studio, folder: &Path, figures: &[Figure]) -> Result<()> {
+    super::figure::write(&folder.join(NAME), page(studio, figures).as_bytes())
+}
+
+fn page(studio: &Studio, figures: &[Figure]) -> String {
+    let mut contents = String::new();
+    let mut sections = String::new();
+    for figure in figures {
+        let (n, title) = (figure.number, escape(figure.title));
+        let _ = write!(contents, "<li value=\"{n}\"><a href=\"#figure-{n}\">{title}</a></li>");
+        sections += &section(studio, figure);
+    }
+    let (scene, probe) = (escape(&studio.scene), escape(&studio.probe));
+    let map = studio.environment.map();
+    let quick = studio.choose("", " This is a quick run: pictures are small and references poor.");
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <title>Sampling direct illumination</title>\n<style>{}{}{STYLE}</style>\n</head>\n<body>\n\
+         <header><h1>Sampling direct illumination</h1>\
+         <p>The figures of the lecture, computed: <b>{scene}</b> in the light of <b>{probe}</b> ({}×{} texels), \
+         by domelight {}.{quick}</p>\
+         <p class=\"command\"><code>domelight figures{}</code></p></header>\n\
+         <nav aria-label=\"Figures\"><h2>Figures</h2><ol>{contents}</ol></nav>\n<main>\n{sections}</main>\n</body>\n</html>\n",
+        font_face_css(),
+        math_font_css(),
+        map.width,
+        map.height,
+        env!("CARGO_PKG_VERSION"),
+        escape(&studio.arguments),
+    )
+}
+
+fn math_font_css() -> String {
+    let source = data_uri("font/otf", MATH_FONT);
+    format!("@font-face{{font-family:'Domelight Math';src:url({source})}}")
+}
+
+fn section(studio: &Studio, figure: &Figure) -> String {
+    let n = figure.number;
+    let mut html = format!(
+        "<section id=\"figure-{n}\"><h2><span>Figure {n}</span> {}</h2><p class=\"slides\">{}</p>{}",
+        escape(figure.title),
+        escape(figure.slides),
+        figure.caption
+    );
+    for formula in &figure.formulas {
+        let _ = write!(html, "<div class=\"formula\">{formula}</div>");
+    }
+    figure.rows.iter().for_each(|row| html += &panels(row));
+    figure.tables.iter().for_each(|table| html += &numbers(table));
+    let files = figure.files().into_iter().map(|f| format!("<a href=\"{f}\">{f}</a>"));
+    let files = files.collect::<Vec<_>>().join(", ");
+    let more = if figure.pictures.is_empty() {
+        String::new()
+    } else {
+        format!("; radiance in <a href=\"figure-{n}/\">figure-{n}/</a> (OpenEXR, PNG)")
+    };
+    let arguments = escape(&studio.arguments);
+    let _ = writeln!(
+        html,
+        "<p class=\"command\"><code>domelight figures --only {n}{arguments}</code></p>\
+         <p class=\"files\">{files}{more}</p></section>"
+    );
+    html
+}
+
+fn panels(row: &Row) -> String {
+    let mut html = String::new();
+    if !row.heading.is_empty() {
+        let _ = write!(html, "<h3>{}</h3>", escape(&row.heading));
+    }
+    let widths = || row.panels.iter().map(Document::width);
+    let columns: Vec<String> = widths().map(|w| format!("{w:.0}fr")).collect();
+    // On a phone two small panels stand side by side.
+    let least = widths().fold(0.0, f64::max).min(480.0) * 0.68;
+    let _ = write!(
+        html,
+        "<div class=\"row\" style=\"--columns:{};--width:{:.0}px;--least:{least:.0}px\">",
+        columns.join(" "),
+        1.25 * widths().sum::<f64>()
+    );
+    for panel in &row.panels {
+        let _ = write!(html, "<figure>{}</figure>", panel.to_svg());
+    }
+    html + "</div>"
+}
+
+fn cell(value: &Value) -> String {
+    match value {
+        Value::Number(n) => {
+            let text = n.as_u64().map_or_else(|| number(n.as_f64().unwrap_or(f64::NAN)), count);
+            format!("<td class=\"n\">{text}</td>")
+        }
+        Value::String(text) => format!("<td>{}</td>", escape(text)),
+        _ => "<td>–</td>".to_owned(),
+    }
+}
+
+fn numbers(table: &Table) -> String {
+    let mut body = "<table><thead><tr>".to_owned();
+    for column in &table.columns {
+        let _ = write!(body, "<th>{}</th>", escape(column));
+    }
+    body += "</tr></thead><tbody>";
+    for row in &table.rows {
+        body += "<tr>";
+        for value in row {
+            body += &cell(value);
+        }
+        body += "</tr>";
+    }
+    body += "</tbody></table>";
+    // A long table would hide the next figure.
+    if table.rows.len() > 14 {
+        format!(
+            "<details><summary>All {} measurements</summary><div class=\"table\">{body}</div></details>",
+            table.rows.len()
+        )
+    } else {
+        format!("<div class=\"table\">{body}</div>")
+    }
+}
+
+const STYLE: &str = "
+:root{--paper:#fff;--ink:#1c1f24;--soft:#5b636e;--line:#dfe3e8;--card:#f5f6f8;--link:#0061a8}
+@media(prefers-color-scheme:dark){:root{--paper:#15171b;--ink:#e8eaed;--soft:#a3abb6;--line:#333941;--card:#1f2329;--link:#7cc0f5}}
+*{box-sizing:border-box}
+html{scroll-behavior:smooth;-webkit-text-size-adjust:100%}
+body{margin:0 auto;max-width:1560px;padding:1.5rem clamp(.8rem,3vw,3rem) 4rem;background:var(--paper);color:var(--ink);font:1.06rem/1.6 Inter,system-ui,sans-serif}
+h1{font-size:clamp(1.7rem,4vw,2.6rem);line-height:1.15;margin:.5rem 0}
+h2{font-size:clamp(1.35rem,3vw,1.9rem);line-height:1.25;margin:0 0 .2rem}
+h2 span{color:var(--soft);font-weight:400}
+h3{font-size:1.12rem;margin:1.6rem 0 .5rem}
+a{color:var(--link)}
+header p,section>p{max-width:75ch}
+nav{background:var(--card);border-radius:.6rem;padding:1rem 1.4rem;margin:1.5rem 0}
+nav h2{font-size:1.1rem}
+nav ol{columns:2 22rem;margin:.4rem 0 0;padding-left:1.5rem}
+section{border-top:1px solid var(--line);margin-top:3rem;padding-top:2rem}
+.slides,.files{color:var(--soft);font-size:.95rem;margin:.1rem 0 .8rem}
+.formula{overflow-x:auto;overflow-y:hidden;padding:.5rem .2rem;font-size:1.15rem}
+math{font-family:'Domelight Math',math,serif}
+.row{display:grid;grid-template-columns:var(--columns);max-width:var(--width);gap:.9rem;align-items:start}
+figure{margin:0;min-width:0;background:#fff;border-radius:.5rem;padding:.7rem;box-shadow:0 0 0 1px var(--line)}
+figure svg{display:block;width:100%;height:auto}
+.table{overflow-x:auto;margin:1.2rem 0}
+table{border-collapse:collapse;font-size:.97rem}
+th,td{padding:.35rem .9rem .35rem 0;border-bottom:1px solid var(--line);text-align:left;vertical-align:top}
+th{color:var(--soft);font-weight:400}
+.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
+summary{cursor:pointer;color:var(--link);margin:1rem 0}
+.command code{display:inline-block;max-width:100%;overflow-x:auto;background:var(--card);border-radius:.4rem;padding:.45rem .8rem;font:.95rem/1.4 ui-monospace,Menlo,Consolas,monospace;white-space:nowrap}
+@media(max-width:800px){.row{grid-template-columns:repeat(auto-fill,minmax(min(100%,var(--least)),1fr));max-width:none}figure{padding:.45rem}}
+@media print{figure{break-inside:avoid}}
+";

@@ -1,0 +1,385 @@
+//! What all figures share: the light, the scene, and a camera that measures what it takes.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::rc::Rc;
+use std::str::FromStr as _;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context as _, Result, bail};
+use domelight::RgbImage;
+use domelight::bsdf::Material;
+use domelight::environment::builtin::BuiltinProbe;
+use domelight::environment::mapping::{Mapping, to_lat_long};
+use domelight::environment::{Environment, Orientation};
+use domelight::math::{Vec3, vec2};
+use domelight::picture::compare::compare;
+use domelight::picture::tone::{ToneCurve, ToneMapping};
+use domelight::render::{Layers, RenderSettings, survey};
+use domelight::sampling::{Heuristic, SamplerKind};
+use domelight::scene::builtin::BuiltinScene;
+use domelight::scene::{
+    Camera, CameraSettings, EnvironmentSettings, EnvironmentSource, Projection, Scene,
+    SceneDescription,
+};
+
+use crate::args::figures::FiguresArguments;
+use crate::args::scene::BUILTIN_ROWS;
+use crate::interrupt;
+use crate::progress::RenderProgress;
+use crate::scene::{load_scene, probe_name};
+use crate::strategy::{Job, Plan};
+use crate::usage::Stopwatch;
+use crate::values::Split;
+
+/// Rows of the map as it is shown.
+const SHOWN_ROWS: usize = 240;
+
+/// The light, the scene and the settings of a run.
+pub(crate) struct Studio {
+    pub(crate) environment: Environment,
+    /// The map, small enough to be shown.
+    pub(crate) map: RgbImage,
+    /// The arguments that all figures of this run have in common, for the commands on the page.
+    pub(crate) arguments: String,
+    pub(crate) probe: String,
+    pub(crate) scene: String,
+    pub(crate) quick: bool,
+    pub(crate) seed: u64,
+    description: SceneDescription,
+    up: Vec3,
+    quiet: bool,
+    interrupted: &'static AtomicBool,
+    references: RefCell<HashMap<String, Rc<Layers>>>,
+}
+
+/// What is in front of the camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Subject<'a> {
+    /// The scene as it is.
+    Scene,
+    /// What the scene is about, without floor and plinth, of one material: the lecture's statue.
+    Alone(&'a str),
+    /// A white matt sphere that fills an orthographic picture.
+    Sphere,
+}
+
+impl Studio {
+    pub(crate) fn new(arguments: &FiguresArguments, quiet: bool) -> Result<Self> {
+        let interrupted = interrupt::flag();
+        let mut description = load_scene(&arguments.scene, quiet)?;
+        let is_builtin = BuiltinScene::from_str(&arguments.scene).is_ok();
+        if is_builtin || description.environment.is_none() {
+            description.environment = Some(EnvironmentSettings {
+                source: EnvironmentSource::Builtin(BuiltinProbe::Cathedral.name().to_owned()),
+                rotate_degrees: 0.0,
+                scale: 1.0,
+                exposure: 0.0,
+                up: description.up.unwrap_or_default(),
+            });
+        }
+        let light = arguments.environment.settings(&description);
+        let map = arguments.environment.load(&light, quiet)?;
+        let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
+        let probe = probe_name(&light.source);
+        let scale = light.scale * light.exposure.exp2();
+        let environment =
+            Environment::new(map, orientation, scale).with_context(|| probe.clone())?;
+        if environment.power() == 0.0 {
+            bail!("{probe}: the map is black; there is nothing to show");
+        }
+        let shown = SHOWN_ROWS.min(environment.map().height);
+        Ok(Self {
+            map: to_lat_long(environment.map(), Mapping::LatLong, shown),
+            environment,
+            arguments: common_arguments(arguments),
+            probe,
+            scene: arguments.scene.clone(),
+            quick: arguments.quick,
+            seed: arguments.seed,
+            up: light.up.vector(),
+            description,
+            quiet,
+            interrupted,
+            references: RefCell::default(),
+        })
+    }
+
+    /// `full`, or `quick` in a quick run.
+    pub(crate) fn choose<T>(&self, full: T, quick: T) -> T {
+        if self.quick { quick } else { full }
+    }
+
+    /// Ends the work at the first Ctrl-C.
+    pub(crate) fn check_interrupted(&self) -> Result<()> {
+        if self.interrupted.load(Ordering::Relaxed) {
+            bail!("interrupted");
+        }
+        Ok(())
+    }
+
+    /// How the map is shown: the mean of its logarithms, which lamps and suns hardly move, a little
+    /// below middle grey.
+    pub(crate) fn map_tone(&self) -> ToneMapping {
+        let lit = self.map.pixels.iter().map(|p| p.luminance()).filter(|&y| y > 0.0);
+        let (sum, n) = lit.fold((0.0, 0.0f32), |(sum, n), y| (sum + y.ln(), n + 1.0));
+        exposed((sum / n.max(1.0)).exp(), 0.09)
+    }
+
+    /// The direction of the map's brightest texel.
+    pub(crate) fn brightest(&self) -> Vec3 {
+        let map = self.environment.map();
+        let brightest = (0..map.pixels.len())
+            .max_by(|&a, &b| map.pixels[a].luminance().total_cmp(&map.pixels[b].luminance()))
+            .unwrap_or(0);
+        let (x, y) = (brightest % map.width, brightest / map.width);
+        let at = |i: usize, n: usize| (i as f32 + 0.5) / n as f32;
+        self.environment.direction(vec2(at(x, map.width), at(y, map.height)))
+    }
+
+    /// Sets up the camera.
+    pub(crate) fn shot(&self, subject: Subject, width: usize, height: usize) -> Result<Shot<'_>> {
+        let mut description = match subject {
+            Subject::Sphere => BuiltinScene::SphereOrthographic.description(),
+            _ => self.description.clone(),
+        };
+        let aspect = width as f32 / height as f32;
+        let view = if let Subject::Alone(material) = subject {
+            leave_alone(&mut description, material)?;
+            close_up(&description, aspect, self.up)
+        } else {
+            view_of(&description, aspect, self.up)
+        };
+        Ok(Shot {
+            studio: self,
+            name: format!("{subject:?} {width}x{height}"),
+            // Noise is told from far fewer samples than it takes to be rid of it; bias is large.
+            reference_rays: match subject {
+                Subject::Alone(_) => self.choose(1024, 64),
+                Subject::Scene | Subject::Sphere => self.choose(256, 32),
+            },
+            camera: Camera::new(&view, width, height)?,
+            scene: Scene::new(description).with_context(|| self.scene.clone())?,
+            settings: RenderSettings {
+                width,
+                height,
+                n_samples: 1,
+                seed: self.seed,
+                ..RenderSettings::default()
+            },
+        })
+    }
+}
+
+/// Removes the scenery, unless there is nothing else, and gives the rest one material.
+fn leave_alone(description: &mut SceneDescription, material: &str) -> Result<()> {
+    let material: Material = material.parse().with_context(|| format!("material {material}"))?;
+    description.set_subject_material(material);
+    let scenery = std::mem::take(&mut description.scenery);
+    if scenery.len() < description.parts.len() {
+        let parts = std::mem::take(&mut description.parts).into_iter().enumerate();
+        description.parts = parts.filter(|(i, _)| !scenery.contains(i)).map(|(_, p)| p).collect();
+    }
+    Ok(())
+}
+
+/// The scene's own camera, or one framed to it.
+fn view_of(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
+    let framed = || CameraSettings::framing(&description.subject_bounds(), aspect, up);
+    description.camera.unwrap_or_else(framed)
+}
+
+/// That view, moved until the scene just fits.
+fn close_up(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
+    const FOV: f32 = 26.0;
+    let view = view_of(description, aspect, up);
+    let bounds = description.bounds();
+    let (center, size) = (bounds.center(), bounds.size());
+    let toward = (view.origin - view.target).normalize_or(Vec3::Z);
+    let height = size.abs().dot(up.abs());
+    // The widest side, whichever way it is turned.
+    let width = (size - up.abs() * height).max_element();
+    let extent = height.max(width / aspect) * 1.08;
+    let distance = 0.5 * extent / (0.5 * FOV.to_radians()).tan() + 0.5 * width;
+    CameraSettings {
+        projection: Projection::Perspective { fov_y_degrees: FOV },
+        origin: center + toward * distance,
+        target: center,
+        up: view.up,
+    }
+}
+
+/// The flags that a command on the page repeats.
+fn common_arguments(arguments: &FiguresArguments) -> String {
+    let mut text = String::new();
+    let mut add = |flag: &str, value: String| {
+        let quoted = value.chars().any(|c| !(c.is_alphanumeric() || "-_./:".contains(c)));
+        let quote = if quoted { "'" } else { "" };
+        let _ = write!(text, " {flag} {quote}{value}{quote}");
+    };
+    let environment = &arguments.environment;
+    if arguments.scene != BuiltinScene::Statue.name() {
+        add("--scene", arguments.scene.clone());
+    }
+    if let Some(probe) = &environment.env {
+        add("--env", probe.clone());
+    }
+    let numbers = [
+        ("--env-rotate", environment.env_rotate),
+        ("--env-scale", environment.env_scale),
+        ("--env-exposure", environment.env_exposure),
+    ];
+    for (flag, value) in numbers {
+        if let Some(value) = value {
+            add(flag, value.to_string());
+        }
+    }
+    if let Some(up) = environment.env_up {
+        add("--env-up", format!("{up:?}").to_lowercase());
+    }
+    if let Some(mapping) = environment.env_mapping {
+        add("--env-mapping", mapping.name().to_owned());
+    }
+    if let Some(layer) = &environment.env_layer {
+        add("--env-layer", layer.clone());
+    }
+    if environment.env_rows != BUILTIN_ROWS {
+        add("--env-rows", environment.env_rows.to_string());
+    }
+    if arguments.seed != 0 {
+        add("--seed", arguments.seed.to_string());
+    }
+    for (flag, given) in [(" --sanitize", environment.sanitize), (" --quick", arguments.quick)] {
+        text += if given { flag } else { "" };
+    }
+    text
+}
+
+/// A scene in front of a camera. All pictures of a shot have the same camera rays under one seed, one
+/// a pixel: what differs between them is the estimate of the light alone.
+pub(crate) struct Shot<'a> {
+    studio: &'a Studio,
+    /// Names what is seen, not how it is sampled.
+    name: String,
+    /// Samples of each kind in a pixel of the converged picture.
+    reference_rays: u32,
+    pub(crate) scene: Scene,
+    pub(crate) camera: Camera,
+    pub(crate) settings: RenderSettings,
+}
+
+/// A picture and what it took.
+pub(crate) struct Taken {
+    pub(crate) layers: Layers,
+    /// What was done, in words.
+    pub(crate) strategy: String,
+    pub(crate) shadow_rays: u64,
+    pub(crate) points: u64,
+    /// CPU seconds of all threads; wall-clock seconds where the system does not tell.
+    pub(crate) seconds: f64,
+}
+
+/// A picture and how far it is from the converged one.
+pub(crate) struct Measured {
+    pub(crate) taken: Taken,
+    /// Mean over pixels that show the scene of (I − R)² / (R² + 0.01).
+    pub(crate) rel_mse: f64,
+}
+
+impl Shot<'_> {
+    /// With as many camera samples a pixel.
+    pub(crate) fn samples(mut self, n_samples: u32) -> Self {
+        self.settings.n_samples = n_samples;
+        self
+    }
+
+    /// Fills in what a plan leaves to the scene.
+    pub(crate) fn complete(&self, plan: Plan) -> Plan {
+        let points = || survey(&self.scene, &self.camera, &self.settings);
+        plan.for_scene(points, &self.studio.environment, self.settings.seed)
+    }
+
+    /// Takes the picture.
+    pub(crate) fn take(&self, plan: Plan) -> Result<Taken> {
+        self.take_with(plan, self.settings.seed, SamplerKind::Sobol)
+    }
+
+    /// Takes the picture with numbers of another seed or kind.
+    pub(crate) fn take_with(&self, plan: Plan, seed: u64, sampler: SamplerKind) -> Result<Taken> {
+        let Studio { environment, quiet, interrupted, .. } = self.studio;
+        let settings = RenderSettings { seed, sampler, ..self.settings };
+        let plan = self.complete(plan);
+        let renderer = plan.prepare(environment)?;
+        let n_rays = (settings.width * settings.height) as u64 * u64::from(settings.n_samples);
+        let progress = &RenderProgress::new("", n_rays, *quiet, interrupted);
+        let (scene, camera, settings) = (&self.scene, &self.camera, &settings);
+        let job = Job { scene, camera, environment, settings, progress, course: None };
+        let mut watch = Stopwatch::start();
+        let rendering = renderer(&job)?;
+        let seconds = watch.lap();
+        progress.finish();
+        self.studio.check_interrupted()?;
+        Ok(Taken {
+            layers: rendering.layers,
+            strategy: plan.describe(),
+            shadow_rays: rendering.counts.shadow_rays,
+            points: rendering.counts.shading_points,
+            seconds: seconds.cpu.unwrap_or(seconds.wall),
+        })
+    }
+
+    /// Takes the picture and compares it with the converged one.
+    pub(crate) fn measure(&self, plan: Plan) -> Result<Measured> {
+        self.measure_with(plan, self.settings.seed, SamplerKind::Sobol)
+    }
+
+    /// As [`Shot::measure`], with numbers of another seed or kind.
+    pub(crate) fn measure_with(
+        &self,
+        plan: Plan,
+        seed: u64,
+        sampler: SamplerKind,
+    ) -> Result<Measured> {
+        let reference = self.reference(seed, sampler)?;
+        let taken = self.take_with(plan, seed, sampler)?;
+        let covered: Vec<bool> = reference.depth.iter().map(|&d| d > 0.0).collect();
+        let error = compare(&taken.layers.color, &reference.color, Some(&covered))?;
+        Ok(Measured { taken, rel_mse: error.rel_mse })
+    }
+
+    /// The converged picture with the camera rays of that seed: many samples of both kinds, by
+    /// multiple importance sampling. Made once in a run.
+    pub(crate) fn reference(&self, seed: u64, sampler: SamplerKind) -> Result<Rc<Layers>> {
+        let n_samples = self.settings.n_samples;
+        let key = format!("{} {n_samples} {seed} {sampler:?}", self.name);
+        if let Some(made) = self.studio.references.borrow().get(&key) {
+            return Ok(made.clone());
+        }
+        let rays = self.reference_rays.div_ceil(n_samples);
+        let split = Split { environment: rays, brdf: rays };
+        let plan = Plan::Mis { split, heuristic: Heuristic::Power, compensation: true };
+        let made = Rc::new(self.take_with(plan, seed, sampler)?.layers);
+        self.studio.references.borrow_mut().insert(key, made.clone());
+        Ok(made)
+    }
+
+    /// How pictures of this shot are shown: the scene's mean in the reference at middle grey.
+    pub(crate) fn tone(&self) -> Result<ToneMapping> {
+        let reference = self.reference(self.settings.seed, SamplerKind::Sobol)?;
+        let covered =
+            reference.color.pixels.iter().zip(&reference.depth).filter(|(_, d)| **d > 0.0);
+        let (mut sum, mut n) = (0.0, 0.0f32);
+        for (color, _) in covered {
+            sum += color.luminance().min(1e6);
+            n += 1.0;
+        }
+        Ok(exposed(sum / n.max(1.0), 0.4))
+    }
+}
+
+/// Exposure that takes `mean` to `grey`, before the curve.
+fn exposed(mean: f32, grey: f32) -> ToneMapping {
+    let exposure = if mean > 0.0 { (grey / mean).log2().clamp(-30.0, 30.0) } else { 0.0 };
+    ToneMapping { exposure, curve: ToneCurve::Agx }
+}

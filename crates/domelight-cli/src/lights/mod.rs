@@ -1,0 +1,259 @@
+//! `domelight lights`: a probe as a rig of lights, and what they leave of it.
+
+mod preview;
+mod report;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use domelight::RgbImage;
+use domelight::environment::mapping::{Mapping, from_lat_long};
+use domelight::environment::{Environment, Orientation};
+use domelight::picture::tone::ToneCurve;
+use domelight::picture::{require_writable, write_atomically};
+use domelight::rig::export::{Dome, DomePicture, Format, RigExport};
+use domelight::rig::{
+    Extraction, ExtractionSettings, ShadingError, ShadingReference, SphericalHarmonics, extract,
+    smallest_rig,
+};
+use domelight::scene::SceneDescription;
+
+use crate::args::lights::{LightsArguments, RigPath};
+use crate::failure::UsageError;
+use crate::output::{PictureFormat, PicturePath, print};
+use crate::usage::Stopwatch;
+use preview::Preview;
+use report::{LightsReport, Stages};
+
+/// Lights where nothing else is said.
+const N_LIGHTS: usize = 64;
+
+/// Runs the subcommand.
+pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
+    let outputs = arguments.outputs()?;
+    arguments.require_writable(&outputs)?;
+    let mut watch = Stopwatch::start();
+
+    let (environment, probe) = arguments.load(quiet)?;
+    let load = watch.lap();
+    let found = arguments.find(&environment).with_context(|| probe.clone())?;
+    let extract = watch.lap();
+
+    let dome_file = arguments.dome_file(&outputs, &found.extraction)?;
+    let dome_files = match (&dome_file, &found.extraction.residual) {
+        (Some(path), Some(dome)) => arguments.write_dome(path, dome.map(), &outputs)?,
+        _ => vec![None; outputs.len()],
+    };
+    let harmonics = found.extraction.residual.as_ref().map(SphericalHarmonics::project);
+    for (output, dome_file) in outputs.iter().zip(&dome_files) {
+        let file = dome_file.as_ref().map(|dome| refer(output.path, &dome.path));
+        let rig = RigExport {
+            probe: &probe,
+            orientation: environment.orientation(),
+            lights: &found.extraction.rig.lights,
+            dome: harmonics.zip(found.extraction.residual.as_ref()).map(
+                |(harmonics, environment)| Dome { environment, harmonics, file: file.as_deref() },
+            ),
+        };
+        let bytes = output.format.encode(&rig).with_context(|| probe.clone())?;
+        write_atomically(output.path, |out| out.write_all(&bytes))?;
+    }
+    if let Some(path) = &arguments.preview {
+        let tone = arguments.tone.mapping(ToneCurve::Aces);
+        let preview = Preview { environment: &environment, found: &found, probe: &probe, tone };
+        let bytes = preview.png()?;
+        write_atomically(&path.0, |out| out.write_all(&bytes))?;
+    }
+    let stages = Stages { load, extract, write: watch.lap() };
+    let report = LightsReport { arguments, probe: &probe, found: &found, stages, dome: harmonics };
+    if arguments.json {
+        print(&serde_json::to_string_pretty(&report.json())?)?;
+    } else if !quiet && arguments.n_on_standard_output() == 0 {
+        print(&report.table())?;
+    }
+    Ok(())
+}
+
+/// A rig and what is known of its error.
+pub(crate) struct Found {
+    pub(crate) extraction: Extraction,
+    /// Numbers of lights that were tried for `--error`, rising; else the rig's alone, if it was
+    /// measured.
+    pub(crate) errors: Vec<(usize, ShadingError)>,
+}
+
+impl Found {
+    /// The rig's own error.
+    pub(crate) fn error(&self) -> Option<ShadingError> {
+        let n = self.extraction.rig.lights.len();
+        self.errors.iter().find(|(tried, _)| *tried == n).map(|(_, error)| *error)
+    }
+}
+
+/// A rig's file whose format is known.
+struct Output<'a> {
+    path: &'a Path,
+    format: Format,
+}
+
+impl LightsArguments {
+    /// Whether regions of the map become lights.
+    fn has_regions(&self) -> bool {
+        self.n_lights.is_some() || self.error.is_some() || !(self.sun || self.lamps > 0)
+    }
+
+    fn settings(&self) -> ExtractionSettings {
+        ExtractionSettings {
+            sun: self.sun,
+            n_lamps: self.lamps as usize,
+            n_lights: self.has_regions().then(|| self.n_lights.map_or(N_LIGHTS, |n| n as usize)),
+            method: self.method.into(),
+            min_share: self.min_energy.map(|percent| (0.01 * percent) as f32),
+        }
+    }
+
+    /// Files with their formats, checked for what does not go together.
+    fn outputs(&self) -> Result<Vec<Output<'_>>> {
+        if self.n_on_standard_output() > 1 {
+            let message = "only one result can go to standard output; give a file name";
+            return Err(UsageError(message.into()).into());
+        }
+        if self.keep_residual.is_some() && self.has_regions() && self.min_energy.is_none() {
+            let message = "nothing is left for --keep-residual: the lights take all of the probe. \
+                           Leave -n and --error out to keep what --sun and --lamps do not take, \
+                           or keep dim lights on the map by --min-energy";
+            return Err(UsageError(message.into()).into());
+        }
+        self.output.iter().map(|o| self.output(o)).collect()
+    }
+
+    fn output<'a>(&self, output: &'a RigPath) -> Result<Output<'a>> {
+        let on_standard_output = output.is_standard_output().then_some(Format::Json);
+        let format = output.format.or(self.format).or(on_standard_output);
+        let Some(format) = format else {
+            let extensions = Format::ALL.map(|f| format!(".{}", f.extensions()[0])).join(", ");
+            let path = output.path.display();
+            let message = format!("-o {path}: name it {extensions}, or give --format");
+            return Err(UsageError(message).into());
+        };
+        Ok(Output { path: &output.path, format })
+    }
+
+    fn n_on_standard_output(&self) -> usize {
+        let rigs = self.output.iter().filter(|o| o.is_standard_output()).count();
+        let residual = self.keep_residual.as_ref().is_some_and(PicturePath::is_standard_output);
+        let preview = self.preview.as_ref().is_some_and(|p| p.is_standard_output());
+        rigs + [residual, preview, self.json].map(usize::from).iter().sum::<usize>()
+    }
+
+    fn require_writable(&self, outputs: &[Output]) -> Result<()> {
+        outputs.iter().try_for_each(|o| require_writable(o.path))?;
+        self.keep_residual.as_ref().map_or(Ok(()), PicturePath::require_writable)?;
+        self.preview.as_ref().map_or(Ok(()), |p| require_writable(&p.0))?;
+        Ok(())
+    }
+
+    fn load(&self, quiet: bool) -> Result<(Environment, String)> {
+        let light = self.environment.settings(&SceneDescription::default());
+        let map = self.environment.load(&light, quiet)?;
+        let probe = self.environment.env.clone().unwrap_or_default();
+        let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
+        let scale = light.scale * light.exposure.exp2();
+        let environment =
+            Environment::new(map, orientation, scale).with_context(|| probe.clone())?;
+        Ok((environment, probe))
+    }
+
+    fn find(&self, environment: &Environment) -> Result<Found> {
+        let settings = self.settings();
+        if let Some(percent) = self.error {
+            let found = smallest_rig(environment, settings, 0.01 * percent)?;
+            return Ok(Found { extraction: found.extraction, errors: found.tried });
+        }
+        let extraction = extract(environment, settings)?;
+        let mut errors = Vec::new();
+        if self.preview.is_some() || self.json {
+            errors.push((extraction.rig.lights.len(), measure(environment, &extraction)));
+        }
+        Ok(Found { extraction, errors })
+    }
+
+    /// The file of the dome: as asked for, or beside the first rig that refers to it.
+    fn dome_file(&self, outputs: &[Output], found: &Extraction) -> Result<Option<PicturePath>> {
+        if found.residual.is_none() {
+            return Ok(None);
+        }
+        if let Some(path) = &self.keep_residual {
+            return Ok(Some(path.clone()));
+        }
+        let needs =
+            outputs.iter().find(|o| o.format.dome_picture().is_some() && o.path != Path::new("-"));
+        let Some(output) = needs else { return Ok(None) };
+        let stem = output.path.file_stem().unwrap_or_default().to_string_lossy();
+        let path = output.path.with_file_name(format!("{stem}_dome.exr"));
+        let path = path.to_string_lossy().parse::<PicturePath>().map_err(UsageError)?;
+        path.require_writable()?;
+        Ok(Some(path))
+    }
+}
+
+impl LightsArguments {
+    /// Writes the dome's map and what else outputs need of it; the picture of each output.
+    fn write_dome(
+        &self,
+        path: &PicturePath,
+        map: &RgbImage,
+        outputs: &[Output],
+    ) -> Result<Vec<Option<PicturePath>>> {
+        let tone = self.tone.mapping(ToneCurve::Srgb);
+        path.write(map, tone, PictureFormat::Exr, None)?;
+        let mut pictures = Vec::new();
+        for output in outputs {
+            let picture = output.format.dome_picture().unwrap_or(DomePicture::LatLong);
+            let file = picture_path(path, picture)?;
+            if file.path != path.path {
+                let mapping = picture.mapping();
+                let size = match mapping {
+                    Mapping::LatLong => (map.width, map.height),
+                    _ => mapping.size_for(map.height),
+                };
+                let converted = from_lat_long(map, mapping, size);
+                file.write(&converted, tone, PictureFormat::Exr, Some(mapping))?;
+            }
+            pictures.push(Some(file));
+        }
+        Ok(pictures)
+    }
+}
+
+/// The name of a picture of the dome beside its map: `dome.exr`, `dome.hdr`, `dome_octahedral.exr`.
+fn picture_path(map: &PicturePath, picture: DomePicture) -> Result<PicturePath> {
+    let path = match picture {
+        DomePicture::LatLong => map.path.clone(),
+        DomePicture::LatLongHdr => map.path.with_extension("hdr"),
+        DomePicture::Octahedral => {
+            let [stem, extension] = [map.path.file_stem(), map.path.extension()]
+                .map(|part| part.unwrap_or_default().to_string_lossy());
+            map.path.with_file_name(format!("{stem}_octahedral.{extension}"))
+        }
+    };
+    Ok(path.to_string_lossy().parse::<PicturePath>().map_err(UsageError)?)
+}
+
+fn measure(environment: &Environment, found: &Extraction) -> ShadingError {
+    let reference = ShadingReference::new(environment);
+    match &found.residual {
+        Some(dome) => reference.error_beside(&found.rig, &ShadingReference::new(dome)),
+        None => reference.error(&found.rig),
+    }
+}
+
+/// How a rig's file refers to the dome's: by its name in the same folder, else by its whole path.
+fn refer(rig: &Path, dome: &Path) -> String {
+    let folder = |path: &Path| path.parent().map(Path::to_path_buf);
+    let name = match (folder(rig) == folder(dome), dome.file_name()) {
+        (true, Some(name)) => PathBuf::from(name),
+        _ => std::path::absolute(dome).unwrap_or_else(|_| dome.to_path_buf()),
+    };
+    name.to_string_lossy().replace('\\', "/")
+}

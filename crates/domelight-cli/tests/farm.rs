@@ -1,0 +1,70 @@
+//! The files for farms; what can be run without the engine is run.
+#![cfg(unix)]
+
+mod common;
+
+use common::{domelight, stderr, stdout};
+use std::fs;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+const SCENE: [&str; 9] =
+    ["spheres", "--env", "sky", "--env-rows", "32", "--size", "50x40", "--spp", "3"];
+
+#[track_caller]
+fn succeeded(output: &Output) {
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
+}
+
+fn farm(folder: &TempDir, engine: &str, more: &[&str]) -> Output {
+    domelight(folder, &[&["farm", engine], &SCENE[..], more].concat())
+}
+
+#[test]
+fn the_tasks_of_an_array_and_their_merge_make_the_single_run() {
+    let folder = TempDir::new().unwrap();
+    succeeded(&domelight(&folder, &[&["render"], &SCENE[..], &["-o", "whole.exr"]].concat()));
+    let output = farm(&folder, "slurm", &["--shards", "3", "-o", "the farm"]);
+    succeeded(&output);
+    let files = folder.path().canonicalize().unwrap().join("the farm");
+    assert_eq!(stdout(&output).trim(), format!("sh '{}'", files.join("submit.sh").display()));
+    let run = |script: &str, task: &str| {
+        let mut command = Command::new("bash");
+        command.arg(files.join(script)).env("SLURM_ARRAY_TASK_ID", task).current_dir("/");
+        succeeded(&command.output().expect("bash"));
+    };
+    for task in ["1", "0", "2", "1"] {
+        run("render.sbatch", task);
+    }
+    run("merge.sbatch", "");
+    let merged = fs::read(files.join("picture.exr")).unwrap();
+    assert!(merged == fs::read(folder.path().join("whole.exr")).unwrap());
+}
+
+#[test]
+fn every_engine_gets_its_files() {
+    let folder = TempDir::new().unwrap();
+    let engines = [
+        ("slurm", vec!["render.sbatch", "merge.sbatch", "submit.sh"], "submit.sh"),
+        ("openjd", vec!["job.yaml"], "openjd run"),
+        ("kubernetes", vec!["render.yaml", "merge.yaml"], "kubectl apply"),
+        ("parallel", vec!["render.sh"], "render.sh"),
+    ];
+    for (engine, names, command) in engines {
+        let output = farm(&folder, engine, &["--shards=5", "-o", engine, "--cpus", "2"]);
+        succeeded(&output);
+        assert!(stdout(&output).contains(command), "{}", stdout(&output));
+        for name in names {
+            let text = fs::read_to_string(folder.path().join(engine).join(name)).unwrap();
+            assert!(name == "submit.sh" || text.contains("domelight"), "{text}");
+            if !name.starts_with("merge") && name != "submit.sh" {
+                assert!(text.contains("spheres --env sky"), "{text}");
+                assert!(text.contains("--threads 2"), "{text}");
+            }
+        }
+    }
+    let refused = farm(&folder, "slurm", &["--rays", "1"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let refused = farm(&folder, "slurm", &["--shards", "2", "--rays", "1"]);
+    assert!(stderr(&refused).contains("--split"), "{}", stderr(&refused));
+}

@@ -1,0 +1,99 @@
+//! `domelight figures` as a user runs it.
+
+mod common;
+
+use common::{domelight, load, stderr};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// The smallest run.
+const QUICK: [&str; 6] = ["figures", "--quick", "--env-rows", "24", "--scene", "sphere"];
+
+fn run(folder: &TempDir, arguments: &[&str]) -> std::process::Output {
+    domelight(folder, &[&QUICK[..], arguments].concat())
+}
+
+fn text(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+#[test]
+fn all_figures_are_written() {
+    let folder = TempDir::new().unwrap();
+    let output = run(&folder, &["-o", "out"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let out = folder.path().join("out");
+    let page = text(&out.join("index.html"));
+    for n in 1..=8 {
+        let picture = load(&folder, &format!("out/figure-{n}.png"));
+        assert!(picture.width > 800 && picture.height > 300);
+        assert!(page.contains(&format!("<section id=\"figure-{n}\">")));
+        assert!(page.contains(&format!(
+            "domelight figures --only {n} --scene sphere --env-rows 24 --quick"
+        )));
+        assert!(stderr(&output).contains(&format!("figure {n}: ")), "{}", stderr(&output));
+    }
+    // Nothing is fetched: what looks like an address names the languages of drawings.
+    let fetched = page.replace("http://www.w3.org/2000/svg", "");
+    for address in ["http:", "https:", "src=\"//", "url(//", "<script", "<link"] {
+        assert!(!fetched.contains(address), "{address} in the page");
+    }
+    assert!(!page.contains("NaN") && page.contains("<math"));
+
+    for (n, columns) in [(4, ["strategy", "relMSE"]), (8, ["method", "RMS relative error"])] {
+        let csv = text(&out.join(format!("figure-{n}.csv")));
+        let json: Value =
+            serde_json::from_str(&text(&out.join(format!("figure-{n}.json")))).unwrap();
+        let rows = json.as_array().unwrap();
+        assert!(rows.len() > 10);
+        assert_eq!(csv.lines().count(), rows.len() + 1);
+        for column in columns {
+            assert!(csv.lines().next().unwrap().contains(column));
+            assert!(rows.iter().all(|row| !row[column].is_null()), "figure {n}: {column}");
+        }
+    }
+    for n in [3, 4, 6, 7] {
+        let mut radiance = 0;
+        for file in fs::read_dir(out.join(format!("figure-{n}"))).unwrap() {
+            let name = file.unwrap().file_name().into_string().unwrap();
+            let picture = load(&folder, &format!("out/figure-{n}/{name}"));
+            assert!(picture.pixels.iter().all(|p| p.is_finite()), "{name}");
+            radiance += usize::from(Path::new(&name).extension().is_some_and(|e| e == "exr"));
+        }
+        assert!(radiance > 1, "figure {n}");
+    }
+}
+
+#[test]
+fn some_figures_can_be_made_alone() {
+    let folder = TempDir::new().unwrap();
+    let output = run(&folder, &["--only", "2,1", "--seed", "3", "-q"]);
+    assert_eq!((output.status.code(), stderr(&output)), (Some(0), ""));
+    let out = folder.path().join("figures");
+    let mut names: Vec<String> = fs::read_dir(&out)
+        .unwrap()
+        .map(|f| f.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["figure-1.png", "figure-2.png", "index.html"]);
+    let page = text(&out.join("index.html"));
+    assert!(page.find("id=\"figure-1\"") < page.find("id=\"figure-2\""));
+    assert!(!page.contains("id=\"figure-3\""));
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused() {
+    let folder = TempDir::new().unwrap();
+    let refused = |arguments: &[&str], code: i32, words: &str| {
+        let output = run(&folder, arguments);
+        assert_eq!(output.status.code(), Some(code), "{}", stderr(&output));
+        assert!(stderr(&output).contains(words), "{}", stderr(&output));
+    };
+    refused(&["--only", "9"], 2, "9");
+    refused(&["--env-scale", "0"], 1, "black");
+    refused(&["--env", "nothing.hdr"], 1, "nothing.hdr");
+    fs::write(folder.path().join("file"), "").unwrap();
+    refused(&["-o", "file"], 1, "file");
+}

@@ -1,0 +1,176 @@
+//! `domelight lights` in a temporary folder: exit codes, messages, files.
+
+mod common;
+
+use common::{domelight, done, json, load, stderr, stdout, write_exr};
+use domelight::{Rgb, RgbImage};
+use serde_json::Value;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// `sun.exr`, a small sun and a lamp under a grey sky; `grey.exr`; `black.exr`.
+fn probes() -> TempDir {
+    let folder = TempDir::new().expect("a temporary folder");
+    let grey = RgbImage::filled(64, 32, Rgb::splat(0.5));
+    write_exr(&folder.path().join("grey.exr"), &grey, None);
+    write_exr(&folder.path().join("black.exr"), &RgbImage::filled(8, 4, Rgb::BLACK), None);
+    let mut sun = grey;
+    sun.pixels[10 * 64 + 40] = Rgb::new(4000.0, 3000.0, 2000.0);
+    for i in [20 * 64 + 9, 20 * 64 + 10, 21 * 64 + 9, 21 * 64 + 10] {
+        sun.pixels[i] = Rgb::new(20.0, 40.0, 60.0);
+    }
+    write_exr(&folder.path().join("sun.exr"), &sun, None);
+    folder
+}
+
+fn rig(folder: &TempDir, name: &str) -> Value {
+    let text = std::fs::read_to_string(folder.path().join(name)).expect(name);
+    serde_json::from_str(&text).expect("JSON")
+}
+
+fn files(folder: &TempDir) -> Vec<String> {
+    let entries = std::fs::read_dir(folder.path()).expect("a folder");
+    let mut names: Vec<String> =
+        entries.map(|e| e.expect("a file").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_table_by_default() {
+    let folder = probes();
+    let output = domelight(&folder, &["lights", "sun.exr", "-n", "8"]);
+    let text = done(&output);
+    assert_eq!(text.lines().filter(|l| l.starts_with("light_")).count(), 8, "{text}");
+    assert!(text.contains("8 lights"), "{text}");
+}
+
+#[test]
+fn the_sun_and_the_probe_without_it() {
+    let folder = probes();
+    let arguments =
+        ["lights", "sun.exr", "--sun", "--keep-residual", "dome.exr", "-o", "sun.json", "-q"];
+    assert_eq!(done(&domelight(&folder, &arguments)), "");
+    let sun = rig(&folder, "sun.json");
+    assert_eq!((&sun["format"], &sun["version"]), (&"domelight-rig".into(), &1.into()));
+    assert_eq!(sun["lights"].as_array().map(Vec::len), Some(1));
+    assert_eq!(sun["lights"][0]["kind"], "sun");
+    assert_eq!(sun["dome"]["file"], "dome.exr");
+    let (dome, probe) = (load(&folder, "dome.exr"), load(&folder, "sun.exr"));
+    // The sun is gone, the lamp is not.
+    assert!((dome.get(40, 10).g - 0.5).abs() < 1e-3);
+    assert_eq!(dome.get(9, 20), probe.get(9, 20));
+    // Irradiance is what the map lost.
+    let solid_angle = |y: f64| {
+        let edge = |y: f64| (std::f64::consts::PI * y / 32.0).cos();
+        std::f64::consts::TAU / 64.0 * (edge(y) - edge(y + 1.0))
+    };
+    let lost = 2999.5 * solid_angle(10.0);
+    let irradiance = sun["lights"][0]["irradiance"][1].as_f64().expect("a number");
+    assert!((irradiance / lost - 1.0).abs() < 1e-3, "{irradiance} {lost}");
+}
+
+#[test]
+fn every_format_to_files_and_standard_output() {
+    let folder = probes();
+    let arguments = ["lights", "sun.exr", "--sun", "--lamps", "3", "-n", "6", "-q"];
+    let with = |more: &[&str]| domelight(&folder, &[&arguments, more].concat());
+    done(&with(&["-o", "rig.json", "-o", "rig.csv"]));
+    let kinds: Vec<Value> = rig(&folder, "rig.json")["lights"]
+        .as_array()
+        .expect("lights")
+        .iter()
+        .map(|l| l["kind"].clone())
+        .collect();
+    assert_eq!(kinds, ["sun", "lamp", "region", "region", "region", "region"]);
+    assert!(rig(&folder, "rig.json")["dome"].is_null());
+    let csv = std::fs::read_to_string(folder.path().join("rig.csv")).expect("rig.csv");
+    assert_eq!(csv.lines().count(), 7);
+    assert_eq!(done(&with(&["-o", "-", "--format", "csv"])), csv);
+    let json: Value = serde_json::from_str(done(&with(&["-o", "-"]))).expect("JSON");
+    assert_eq!(json, rig(&folder, "rig.json"));
+}
+
+#[test]
+fn the_smallest_rig_for_an_error() {
+    let folder = probes();
+    let arguments = ["lights", "sky", "--env-rows", "64", "--error", "10"];
+    let report = json(&domelight(&folder, &[&arguments[..], &["--json"]].concat()));
+    let n = report["lights"].as_array().map_or(0, Vec::len);
+    assert!((2..200).contains(&n), "{n}");
+    for kind in ["diffuse", "glossy"] {
+        assert!(report["error"][kind].as_f64().expect("an error") <= 0.1);
+    }
+    let tried = report["tried"].as_array().expect("a list");
+    assert!(tried.iter().any(|t| t["lights"] == n) && tried.iter().any(|t| t["lights"] == n - 1));
+    let output = domelight(&folder, &[&arguments[..], &["--preview", "rig.png"]].concat());
+    assert!(done(&output).contains("shading error"), "{}", stdout(&output));
+    let preview = load(&folder, "rig.png");
+    assert!(preview.width > 1000 && preview.height > 800);
+}
+
+#[test]
+fn a_preview_shows_the_lights() {
+    let folder = probes();
+    let arguments = ["lights", "sun.exr", "--lamps", "4", "--preview", "lamps.png", "-q"];
+    done(&domelight(&folder, &arguments));
+    let preview = load(&folder, "lamps.png");
+    // Neither blank nor the same everywhere.
+    let mean =
+        preview.pixels.iter().map(|p| p.luminance()).sum::<f32>() / preview.pixels.len() as f32;
+    assert!((0.05..0.95).contains(&mean), "{mean}");
+}
+
+#[test]
+fn nothing_to_extract_is_exit_code_1_and_writes_nothing() {
+    let folder = probes();
+    let before = files(&folder);
+    for (arguments, message) in [
+        (&["black.exr"][..], "black.exr: the map is black; there is no light to extract"),
+        (&["grey.exr", "--sun"], "grey.exr: there is no sun: "),
+        (&["grey.exr", "--lamps", "3"], "grey.exr: there is no lamp: "),
+        (&["grey.exr", "-n", "5000"], "5000 lights were asked for, but only 2048 texels"),
+        (&["grey.exr", "-n", "4", "--min-energy", "90"], "no light holds the least share"),
+        (&["missing.exr"], "missing.exr: "),
+        (&["sun.exr", "-o", "no/folder/rig.json"], "no/folder/rig.json: "),
+        (&["sun.exr", "--preview", "no/rig.png"], "no/rig.png: "),
+        (&["sun.exr", "--sun", "--keep-residual", "no/dome.exr"], "no/dome.exr: "),
+    ] {
+        let more = ["-o", "rig.json", "-o", "rig.csv"];
+        let output = domelight(&folder, &[&["lights"], arguments, &more].concat());
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+        assert!(stderr(&output).contains(message), "{}", stderr(&output));
+        assert_eq!(stdout(&output), "");
+        assert_eq!(files(&folder), before, "{arguments:?}");
+    }
+}
+
+#[test]
+fn bad_usage_is_exit_code_2() {
+    let folder = probes();
+    for (arguments, message) in [
+        (&[][..], "PROBE"),
+        (&["sun.exr", "-n", "0"], "0"),
+        (&["sun.exr", "-n", "4", "--error", "5"], "--error"),
+        (&["sun.exr", "--error", "0"], "percentage"),
+        (&["sun.exr", "-o", "rig.tiff"], ".json, .csv"),
+        (&["sun.exr", "-o", "-", "--json"], "standard output"),
+        (&["sun.exr", "--format", "csv"], "--output"),
+        (&["sun.exr", "--preview", "rig.exr"], ".png"),
+        (&["sun.exr", "-n", "4", "--keep-residual", "dome.exr"], "nothing is left"),
+        (&["sun.exr", "--method", "k-means"], "variance-minimization"),
+    ] {
+        let output = domelight(&folder, &[&["lights"], arguments].concat());
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(message), "{arguments:?}: {}", stderr(&output));
+        assert_eq!(stdout(&output), "");
+    }
+    assert!(!Path::new("rig.tiff").exists());
+}
+
+#[test]
+fn help_shows_examples() {
+    let folder = probes();
+    let output = domelight(&folder, &["lights", "--help"]);
+    assert!(done(&output).contains("Examples:\n  domelight lights"), "{}", stdout(&output));
+}

@@ -1,0 +1,75 @@
+//! What is behind a source: radiance continued from its rim, in value and slope.
+//!
+//! The smoothest continuation of the rim's values is the harmonic one, a membrane. Within a circle
+//! it is Poisson's integral, the mean of the values with weights 1/d², d the distance; on the sphere
+//! as in the plane, for stereographic projection keeps circles and harmonic functions. The same
+//! mean is taken within other outlines, where it is near to the membrane: it passes continuously
+//! into the rim and never leaves the range of its values.
+//!
+//! A membrane alone cuts the glow around a source off to a flat top. By Almansi's theorem the
+//! biharmonic continuation, a thin plate, is the membrane and (R² − r²)/2R times the continuation of
+//! the slope toward the source; and (R² − r²)/2R = π / ∫ ds/d², so that the same weights give it.
+//! (What the membrane's own slope would change is left out; it vanishes where the rim is even.)
+
+use std::f32::consts::PI;
+
+use super::grid::Grid;
+use crate::Rgb;
+use crate::math::Vec3;
+use crate::parallel::in_order;
+
+/// A cell of the rim.
+struct RimCell {
+    direction: Vec3,
+    /// The length of the rim in the cell.
+    length: f32,
+    radiance: Rgb,
+    /// By how much radiance rises toward the source \[per radian\].
+    slope: Rgb,
+}
+
+/// Radiance of each of `cells`, continued from the cells of their `rim`; black if there is none.
+/// `is_outside` tells cells that belong neither to a source nor to the rim.
+pub(super) fn continue_rim(
+    grid: &Grid,
+    cells: &[u32],
+    rim: &[u32],
+    is_outside: impl Fn(usize) -> bool,
+) -> Vec<Rgb> {
+    let rim: Vec<RimCell> =
+        rim.iter().map(|&c| RimCell::new(grid, c as usize, &is_outside)).collect();
+    in_order(cells.len(), |i| thin_plate(grid.direction(cells[i] as usize), &rim))
+}
+
+impl RimCell {
+    fn new(grid: &Grid, cell: usize, is_outside: impl Fn(usize) -> bool) -> Self {
+        let (direction, radiance) = (grid.direction(cell), grid.mean(cell));
+        let (mut rise, mut distance) = (Rgb::BLACK, 0.0);
+        for n in grid.neighbours(cell).into_iter().filter(|&n| is_outside(n)) {
+            rise += radiance - grid.mean(n);
+            distance += direction.distance(grid.direction(n));
+        }
+        let slope = if distance > 0.0 { rise / distance } else { Rgb::BLACK };
+        Self { direction, length: grid.solid_angle(cell).sqrt() as f32, radiance, slope }
+    }
+}
+
+/// Σ s L / d² over Σ s / d², s the length of the rim in a cell, and the like of slopes.
+fn thin_plate(at: Vec3, rim: &[RimCell]) -> Rgb {
+    let (mut radiance, mut slope, mut weights) = (Rgb::BLACK, Rgb::BLACK, 0.0);
+    for cell in rim {
+        let weight = cell.length / at.distance_squared(cell.direction);
+        radiance += cell.radiance * weight;
+        slope += cell.slope * weight;
+        weights += weight;
+    }
+    if weights == 0.0 {
+        return Rgb::BLACK;
+    }
+    let membrane = radiance / weights;
+    let bulge = slope * (PI / (weights * weights));
+    // A glow of 1/r², the steepest that is not the source's, doubles at the middle.
+    let share = membrane.luminance() / bulge.luminance();
+    let bounded = if share > 0.0 { bulge * share.min(1.0) } else { Rgb::BLACK };
+    (membrane + bounded).map(|c| c.max(0.0))
+}

@@ -1,0 +1,111 @@
+//! The grid that sources are searched on: texels, or blocks of texels of a large map.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::math::{Vec3, vec3};
+use crate::parallel::bands;
+use crate::{Rgb, RgbImage};
+
+/// Cells at the most.
+const MAX_CELLS: usize = 1 << 19;
+
+/// Cells of `step` × `step` texels of a lat-long map, the last of a row or column maybe smaller.
+pub(super) struct Grid<'a> {
+    map: &'a RgbImage,
+    pub(super) step: usize,
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+    /// cos θ of the upper edge of each texel row, and of the lower edge of the last.
+    cos_edges: Vec<f64>,
+    /// Mean luminance over the solid angle of each cell, row by row.
+    pub(super) luminance: Vec<f32>,
+}
+
+impl<'a> Grid<'a> {
+    pub(super) fn new(map: &'a RgbImage) -> Self {
+        let mut step = 1;
+        while map.width.div_ceil(step) * map.height.div_ceil(step) > MAX_CELLS {
+            step *= 2;
+        }
+        let (columns, rows) = (map.width.div_ceil(step), map.height.div_ceil(step));
+        let cos = |y: usize| (PI * y as f64 / map.height as f64).cos();
+        let cos_edges = (0..=map.height).map(cos).collect();
+        let mut grid = Self { map, step, columns, rows, cos_edges, luminance: Vec::new() };
+        let mut luminance = vec![0.0; columns * rows];
+        bands(&mut luminance, columns, |row, out| {
+            for (column, out) in out.iter_mut().enumerate() {
+                *out = grid.mean(row * columns + column).luminance();
+            }
+        });
+        grid.luminance = luminance;
+        grid
+    }
+
+    /// ∫ luminance dω over the map.
+    pub(super) fn total(&self) -> f64 {
+        let energy = |(i, &l): (usize, &f32)| f64::from(l) * self.solid_angle(i);
+        self.luminance.iter().enumerate().map(energy).sum()
+    }
+
+    /// Columns and rows of texels of a cell.
+    pub(super) fn texels(&self, cell: usize) -> [std::ops::Range<usize>; 2] {
+        let (x, y) = (cell % self.columns * self.step, cell / self.columns * self.step);
+        [x..(x + self.step).min(self.map.width), y..(y + self.step).min(self.map.height)]
+    }
+
+    /// The mean over the solid angle of a cell.
+    pub(super) fn mean(&self, cell: usize) -> Rgb {
+        let [columns, rows] = self.texels(cell);
+        if self.step == 1 {
+            return self.map.row(rows.start)[columns.start];
+        }
+        let mut sum = [0.0; 3];
+        let mut weight = 0.0;
+        for y in rows {
+            let band = self.cos_edges[y] - self.cos_edges[y + 1];
+            weight += band * columns.len() as f64;
+            for texel in &self.map.row(y)[columns.clone()] {
+                let le = texel.to_array();
+                (0..3).for_each(|c| sum[c] += band * f64::from(le[c]));
+            }
+        }
+        Rgb::from(sum.map(|s| (s / weight) as f32))
+    }
+
+    /// Solid angle of a cell \[sr\].
+    pub(super) fn solid_angle(&self, cell: usize) -> f64 {
+        let [columns, rows] = self.texels(cell);
+        let turn = TAU * columns.len() as f64 / self.map.width as f64;
+        turn * (self.cos_edges[rows.start] - self.cos_edges[rows.end])
+    }
+
+    /// Solid angle of a cell on the horizon \[sr\].
+    pub(super) fn widest_solid_angle(&self) -> f64 {
+        TAU * PI * (self.step * self.step) as f64 / (self.map.width * self.map.height) as f64
+    }
+
+    /// The middle of a cell, unit vector in the map's frame.
+    pub(super) fn direction(&self, cell: usize) -> Vec3 {
+        let [columns, rows] = self.texels(cell);
+        let middle = |r: &std::ops::Range<usize>| 0.5 * (r.start + r.end) as f64;
+        let (sin_phi, cos_phi) = (TAU * (middle(&columns) / self.map.width as f64)).sin_cos();
+        let (sin_theta, cos_theta) = (PI * middle(&rows) / self.map.height as f64).sin_cos();
+        // φ counts from the map's left edge, which is toward +Z.
+        let [x, y, z] = [-sin_phi * sin_theta, cos_theta, cos_phi * sin_theta];
+        vec3(x as f32, y as f32, z as f32)
+    }
+
+    /// The cells around a cell, sides and corners, across the seam and over the poles; on narrow
+    /// maps some twice, or the cell itself.
+    pub(super) fn neighbours(&self, cell: usize) -> [usize; 8] {
+        let (columns, last) = (self.columns, self.rows - 1);
+        let (x, y) = (cell % columns, cell / columns);
+        let left = if x == 0 { columns - 1 } else { x - 1 };
+        let right = if x + 1 == columns { 0 } else { x + 1 };
+        let opposite = y * columns + (x + columns / 2) % columns;
+        let row = |y: usize| [left, x, right].map(|x| y * columns + x);
+        let [a, b, c] = if y == 0 { [opposite; 3] } else { row(y - 1) };
+        let [d, e, f] = if y == last { [opposite; 3] } else { row(y + 1) };
+        [a, b, c, y * columns + left, y * columns + right, d, e, f]
+    }
+}

@@ -1,0 +1,85 @@
+//! Fingerprints of what decides a picture: two scenes or environments with the same one are the same,
+//! wherever their files lie.
+
+use std::fmt;
+
+/// 128 bits of a BLAKE3 hash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Fingerprint([u8; 16]);
+
+/// 32 hexadecimal digits.
+impl fmt::Display for Fingerprint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+/// Takes content in, one array after the other; each is set off from the next by its length.
+#[derive(Clone, Debug, Default)]
+pub struct Fingerprinter {
+    hasher: blake3::Hasher,
+}
+
+impl Fingerprinter {
+    /// Takes bytes in.
+    pub fn bytes(&mut self, bytes: impl IntoIterator<Item = u8>) {
+        let mut buffer = [0; 4096];
+        let (mut filled, mut length) = (0, 0u64);
+        for byte in bytes {
+            buffer[filled] = byte;
+            filled += 1;
+            length += 1;
+            if filled == buffer.len() {
+                self.hasher.update(&buffer);
+                filled = 0;
+            }
+        }
+        self.hasher.update(&buffer[..filled]);
+        self.hasher.update(&length.to_le_bytes());
+    }
+
+    /// Takes the bits of numbers in.
+    pub fn numbers(&mut self, numbers: impl IntoIterator<Item = f32>) {
+        self.words(numbers.into_iter().map(f32::to_bits));
+    }
+
+    /// Takes whole numbers in.
+    pub fn words(&mut self, words: impl IntoIterator<Item = u32>) {
+        self.bytes(words.into_iter().flat_map(u32::to_le_bytes));
+    }
+
+    /// Takes text in; the `Debug` text of numbers is exact in Rust, so that of plain data will do.
+    pub fn text(&mut self, text: impl fmt::Display) {
+        self.bytes(text.to_string().into_bytes());
+    }
+
+    /// The fingerprint of all that was taken in.
+    pub fn finish(&self) -> Fingerprint {
+        let mut short = [0; 16];
+        short.copy_from_slice(&self.hasher.finalize().as_bytes()[..16]);
+        Fingerprint(short)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(parts: &[&[u8]]) -> Fingerprint {
+        let mut fingerprinter = Fingerprinter::default();
+        for part in parts {
+            fingerprinter.bytes(part.iter().copied());
+        }
+        fingerprinter.finish()
+    }
+
+    #[test]
+    fn content_and_its_division_both_count() {
+        assert_eq!(of(&[b"ab", b"c"]), of(&[b"ab", b"c"]));
+        assert_ne!(of(&[b"ab", b"c"]), of(&[b"a", b"bc"]));
+        assert_ne!(of(&[b"ab"]), of(&[b"ab", b""]));
+        let long = vec![7; 10_000];
+        assert_ne!(of(&[&long]), of(&[&long[1..]]));
+        assert_eq!(of(&[]).to_string().len(), 32);
+    }
+}

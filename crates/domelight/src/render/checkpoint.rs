@@ -1,0 +1,203 @@
+//! Checkpoints and parts: a render's sums in an OpenEXR file that other programs can open.
+//!
+//! R, G, B, A and the other layers are the picture so far; the layers below `state` are the exact bits of
+//! the sums, and the attributes say of which render they are. A fingerprint over both tells a damaged file.
+
+use std::ops::Range;
+
+use super::{Counts, Film, Window};
+use crate::fingerprint::Fingerprinter;
+use crate::picture::Problem;
+use crate::picture::exr::{ExrLayers, Plane};
+
+/// The state of a render, or of a shard of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checkpoint {
+    /// What decides the picture, but for the number of samples: names and values, by name. Only a render of
+    /// which all are equal may go on from here.
+    pub identity: Vec<(String, String)>,
+    /// What the finished picture tells of its making: further attributes, by name.
+    pub provenance: Vec<(String, String)>,
+    /// Which tiles.
+    pub tiles: Range<usize>,
+    /// Tiles of the whole picture.
+    pub n_tiles: usize,
+    /// Camera samples that each pixel is to have.
+    pub n_samples: u32,
+    /// All tiles are finished.
+    pub complete: bool,
+    /// What was done.
+    pub counts: Counts,
+    /// The sums.
+    pub film: Film,
+}
+
+/// Why a file is no checkpoint to go on from.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    /// It is no whole OpenEXR file.
+    #[error(transparent)]
+    Picture(#[from] Problem),
+    /// It is a picture of something else.
+    #[error("it is not a checkpoint or part of a render by domelight")]
+    Foreign,
+    /// Another version of the program wrote it.
+    #[error("it is a checkpoint of format {found}; this program reads format {FORMAT}")]
+    Format {
+        /// What the file says.
+        found: String,
+    },
+    /// Its content is not what was written.
+    #[error("it is damaged: {0}")]
+    Damaged(&'static str),
+}
+
+/// The version of the format; another layout gets another number.
+const FORMAT: &str = "1";
+
+/// Before the names of the identity.
+const IDENTITY: &str = "domelight.render.";
+
+/// Before the names of the planes of bits.
+const STATE: &str = "state.";
+
+impl Checkpoint {
+    /// The file's bytes; the same for the same state.
+    ///
+    /// # Errors
+    /// If the picture is too large, or a name of the provenance cannot be one of OpenEXR.
+    pub fn encode(&self) -> Result<Vec<u8>, Problem> {
+        let Film { width, height, window, .. } = self.film;
+        let mut exr = self.film.layers().to_exr(self.attributes());
+        exr.origin = (window.x, window.y);
+        exr.whole = Some((width, height));
+        let mut digest = digest(&exr.attributes);
+        for (name, words) in self.film.words() {
+            digest.words(words.iter().copied());
+            let (layer, channel) = name.rsplit_once('.').unwrap_or(("", name));
+            exr.push_channel(&format!("{STATE}{layer}"), channel, words);
+        }
+        exr.attributes.push(("domelight.digest".into(), digest.finish().to_string()));
+        exr.encode()
+    }
+
+    /// Reads the bytes of [`Checkpoint::encode`].
+    ///
+    /// # Errors
+    /// If they are anything else, incomplete or damaged.
+    pub fn decode(bytes: &[u8]) -> Result<Self, CheckpointError> {
+        let exr = ExrLayers::decode(bytes)?;
+        let mut attributes = exr.attributes.clone();
+        let mut take = |name: &str| {
+            let place = attributes.iter().position(|(n, _)| n == name);
+            place.map(|place| attributes.remove(place).1)
+        };
+        let found = take("domelight.checkpoint").ok_or(CheckpointError::Foreign)?;
+        if found != FORMAT {
+            return Err(CheckpointError::Format { found });
+        }
+        let written = take("domelight.digest").ok_or(CheckpointError::Damaged("no digest"))?;
+        let window =
+            Window { x: exr.origin.0, y: exr.origin.1, width: exr.width, height: exr.height };
+        let (width, height) = exr.whole.unwrap_or((exr.width, exr.height));
+        let inside = window.x + window.width <= width && window.y + window.height <= height;
+        let film = Film::from_words(width, height, window, |name| plane(&exr, name))
+            .filter(|_| inside)
+            .ok_or(CheckpointError::Damaged("a channel of the state is missing"))?;
+
+        let unsigned: Vec<_> =
+            exr.attributes.iter().filter(|(n, _)| n != "domelight.digest").cloned().collect();
+        let mut digest = digest(&unsigned);
+        film.words().for_each(|(_, words)| digest.words(words));
+        if digest.finish().to_string() != written {
+            return Err(CheckpointError::Damaged("its digest does not fit its content"));
+        }
+
+        let missing = || CheckpointError::Damaged("an attribute is missing or no number");
+        let mut number = |name: &str| take(name).and_then(|text| text.parse().ok());
+        let mut count = |name: &str| number(name).ok_or_else(missing);
+        let tiles = count("domelight.state.first-tile")? as usize
+            ..count("domelight.state.end-tile")? as usize;
+        let n_tiles = count("domelight.state.tiles")? as usize;
+        let n_samples = u32::try_from(count("domelight.state.samples")?).map_err(|_| missing())?;
+        let complete = count("domelight.state.complete")? == 1;
+        let counts = Counts {
+            camera_rays: count("domelight.state.camera-rays")?,
+            shading_points: count("domelight.state.shading-points")?,
+            shadow_rays: count("domelight.state.shadow-rays")?,
+            non_finite: count("domelight.state.non-finite")?,
+        };
+        let (identity, provenance) =
+            attributes.into_iter().partition::<Vec<_>, _>(|(name, _)| name.starts_with(IDENTITY));
+        let strip = |(name, value): (String, String)| (name[IDENTITY.len()..].to_owned(), value);
+        let identity = identity.into_iter().map(strip).collect();
+        Ok(Self { identity, provenance, tiles, n_tiles, n_samples, complete, counts, film })
+    }
+
+    /// The first entry of the identity that is not the same here and there: its name, here, there.
+    pub fn difference<'a>(&'a self, identity: &'a [(String, String)]) -> Option<Difference<'a>> {
+        let get = |of: &'a [(String, String)], name: &str| {
+            of.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value)
+        };
+        let names = self.identity.iter().chain(identity).map(|(name, _)| name.as_str());
+        names
+            .map(|name| Difference {
+                name,
+                here: get(&self.identity, name),
+                there: get(identity, name),
+            })
+            .find(|d| d.here != d.there)
+    }
+
+    fn attributes(&self) -> Vec<(String, String)> {
+        let Counts { camera_rays, shading_points, shadow_rays, non_finite } = self.counts;
+        let numbers = [
+            ("first-tile", self.tiles.start as u64),
+            ("end-tile", self.tiles.end as u64),
+            ("tiles", self.n_tiles as u64),
+            ("samples", u64::from(self.n_samples)),
+            ("complete", u64::from(self.complete)),
+            ("camera-rays", camera_rays),
+            ("shading-points", shading_points),
+            ("shadow-rays", shadow_rays),
+            ("non-finite", non_finite),
+        ];
+        let numbers = numbers.map(|(name, n)| (format!("domelight.state.{name}"), n.to_string()));
+        let identity = self.identity.iter().map(|(n, v)| (format!("{IDENTITY}{n}"), v.clone()));
+        let format = ("domelight.checkpoint".to_owned(), FORMAT.to_owned());
+        let all = self.provenance.iter().cloned().chain([format]).chain(numbers).chain(identity);
+        let mut all: Vec<_> = all.collect();
+        all.sort();
+        all
+    }
+}
+
+/// An entry of the identity that differs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Difference<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its value in the checkpoint; empty if there is none.
+    pub here: &'a str,
+    /// Its value in the other identity.
+    pub there: &'a str,
+}
+
+/// A digest that has taken the attributes in; the words follow.
+fn digest(attributes: &[(String, String)]) -> Fingerprinter {
+    let mut digest = Fingerprinter::default();
+    for (name, value) in attributes {
+        digest.text(name);
+        digest.text(value);
+    }
+    digest
+}
+
+fn plane<'a>(exr: &'a ExrLayers, name: &str) -> Option<&'a [u32]> {
+    let (layer, channel) = name.rsplit_once('.').unwrap_or(("", name));
+    let layer = exr.layers.iter().find(|l| l.name.strip_prefix(STATE) == Some(layer))?;
+    match layer.channels.iter().find(|(name, _)| name == channel)? {
+        (_, Plane::Uint(words)) => Some(words),
+        (_, Plane::Float(_)) => None,
+    }
+}

@@ -1,0 +1,194 @@
+//! How a picture is divided into tiles, and tiles into shards.
+
+use std::fmt;
+use std::ops::Range;
+
+use super::RenderSettings;
+use crate::strategy::Strategy;
+
+/// A rectangle of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// First column.
+    pub x: usize,
+    /// First row.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl Window {
+    /// How many pixels.
+    pub fn area(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// Whether a pixel of the picture lies within.
+    pub(super) fn contains(&self, x: usize, y: usize) -> bool {
+        (self.x..self.x + self.width).contains(&x) && (self.y..self.y + self.height).contains(&y)
+    }
+
+    /// The index, row by row, of a pixel of the picture that lies within.
+    pub(super) fn index(&self, x: usize, y: usize) -> usize {
+        (y - self.y) * self.width + x - self.x
+    }
+}
+
+/// As in `640x16+0+32`: columns, rows, and the corner.
+impl fmt::Display for Window {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{}+{}+{}", self.width, self.height, self.x, self.y)
+    }
+}
+
+/// The tiles of a picture, in row order; those at the right and lower border may be smaller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tiling {
+    width: usize,
+    height: usize,
+    size: usize,
+}
+
+/// Shadow rays of a tile in one pass that the caches hold.
+const RAYS_PER_TILE: usize = 1 << 15;
+
+impl Tiling {
+    /// The tiles of a render by a strategy that asks for up to `n_rays` shadow rays at a point:
+    /// smaller than set where one sample of each pixel asks for too many.
+    ///
+    /// # Panics
+    /// If width, height or tile size are zero.
+    pub fn new(settings: &RenderSettings, n_rays: u32) -> Self {
+        let &RenderSettings { width, height, tile_size, .. } = settings;
+        assert!(width > 0 && height > 0 && tile_size > 0, "an empty picture or tile");
+        let most = (RAYS_PER_TILE / n_rays.max(1) as usize).isqrt().max(1);
+        Self { width, height, size: tile_size.min(most) }
+    }
+
+    /// How many tiles.
+    pub fn n_tiles(&self) -> usize {
+        self.across() * self.height.div_ceil(self.size)
+    }
+
+    /// The tiles of shard `k` of `n`: ranges that follow each other and differ by one tile at the most.
+    ///
+    /// # Panics
+    /// Unless k < n.
+    pub fn shard(&self, k: usize, n: usize) -> Range<usize> {
+        assert!(k < n, "shard {k} of {n}");
+        let start = |k: usize| (k as u128 * self.n_tiles() as u128 / n as u128) as usize;
+        start(k)..start(k + 1)
+    }
+
+    /// The pixels of a tile.
+    ///
+    /// # Panics
+    /// If there is no such tile.
+    pub fn tile(&self, index: usize) -> Window {
+        assert!(index < self.n_tiles(), "tile {index} of {}", self.n_tiles());
+        let (x, y) = (index % self.across() * self.size, index / self.across() * self.size);
+        let width = self.size.min(self.width - x);
+        Window { x, y, width, height: self.size.min(self.height - y) }
+    }
+
+    /// The least rectangle around a range of tiles; of an empty range, the first pixel: a file needs one.
+    ///
+    /// # Panics
+    /// If there are no such tiles.
+    pub fn window(&self, tiles: &Range<usize>) -> Window {
+        if tiles.is_empty() {
+            return Window { x: 0, y: 0, width: 1, height: 1 };
+        }
+        let (first, last) = (self.tile(tiles.start), self.tile(tiles.end - 1));
+        let height = last.y + last.height - first.y;
+        if first.y == last.y {
+            Window { width: last.x + last.width - first.x, height, ..first }
+        } else {
+            Window { x: 0, y: first.y, width: self.width, height }
+        }
+    }
+
+    /// Camera samples of the pass that begins at sample `start`: as many as the strategy says, or as went
+    /// before, up to as many as keep a tile's rays in the caches; no more than `left`.
+    pub(super) fn pass(&self, strategy: &impl Strategy, start: u32, left: u32) -> Range<u32> {
+        let count = strategy.samples_per_pass().unwrap_or_else(|| {
+            let rays = self.size * self.size * strategy.n_rays().max(1) as usize;
+            start.clamp(1, (RAYS_PER_TILE / rays).clamp(1, 64) as u32)
+        });
+        start..start + count.clamp(1, left.max(1))
+    }
+
+    fn across(&self) -> usize {
+        self.width.div_ceil(self.size)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Rgb;
+    use crate::environment::Environment;
+    use crate::strategy::{BrdfSampling, ProductSampling};
+
+    fn tiling(width: usize, height: usize, tile_size: usize) -> Tiling {
+        Tiling::new(&RenderSettings { width, height, tile_size, ..Default::default() }, 1)
+    }
+
+    #[test]
+    fn tiles_cover_every_pixel_once() {
+        let tiling = tiling(37, 21, 16);
+        let mut covered = [0; 37 * 21];
+        for tile in (0..tiling.n_tiles()).map(|t| tiling.tile(t)) {
+            for y in tile.y..tile.y + tile.height {
+                covered[y * 37 + tile.x..][..tile.width].iter_mut().for_each(|c| *c += 1);
+            }
+        }
+        assert!(covered.iter().all(|&c| c == 1));
+    }
+
+    #[test]
+    fn shards_cover_every_tile_once_and_windows_hold_their_tiles() {
+        let tiling = tiling(100, 70, 16);
+        for n in [1, 2, 3, 8, 35, 64] {
+            let mut next = 0;
+            for k in 0..n {
+                let shard = tiling.shard(k, n);
+                assert_eq!(shard.start, next);
+                next = shard.end;
+                let window = tiling.window(&shard);
+                for tile in shard.map(|t| tiling.tile(t)) {
+                    assert!(tile.x >= window.x && tile.y >= window.y);
+                    assert!(tile.x + tile.width <= window.x + window.width);
+                    assert!(tile.y + tile.height <= window.y + window.height);
+                }
+            }
+            assert_eq!(next, tiling.n_tiles());
+        }
+    }
+
+    #[test]
+    fn passes_cover_every_sample_once() {
+        let environment = Environment::constant(Rgb::WHITE).expect("a light");
+        let environment = &environment;
+        let tiling = tiling(64, 64, 16);
+        for n_samples in [1, 2, 3, 7, 64, 1000] {
+            for n in [1, 2, 15, 1000] {
+                cover(&tiling, &BrdfSampling { environment, n_samples: n }, n_samples);
+                cover(&tiling, &ProductSampling::new(environment, n), n_samples);
+            }
+        }
+    }
+
+    fn cover(tiling: &Tiling, strategy: &impl Strategy, n_samples: u32) {
+        let mut next = 0;
+        while next < n_samples {
+            let pass = tiling.pass(strategy, next, n_samples - next);
+            assert_eq!(pass.start, next);
+            assert!(pass.end > pass.start);
+            next = pass.end;
+        }
+        assert_eq!(next, n_samples);
+    }
+}

@@ -1,0 +1,150 @@
+//! A script for Blender 4.2 or later: `blender --python rig.py`, or pasted into its console.
+//!
+//! A light is a sun, which shines along its local −Z: `energy` times `color` is what a surface that
+//! faces it receives \[W·m⁻²\], `angle` the full angle of its disc \[rad\]; Blender keeps the
+//! irradiance as the angle changes. The dome becomes the world: an environment texture, whose
+//! middle Blender shows at +X where ours is at +Y. The world is Z-up.
+//!
+//! The console runs a line at a time: blocks have no empty lines within, and one after them.
+
+use std::f32::consts::FRAC_PI_2;
+use std::fmt::Write;
+
+use super::RigExport;
+use super::axes::Axes;
+use super::disc::{Disc, color_and_strength};
+use super::text::{numbers, one_line, quoted, vector};
+use crate::environment::UpAxis;
+
+const ADD_LIGHTS: &str = r#"
+def add_lights():
+    collection = bpy.data.collections.new("domelight")
+    bpy.context.scene.collection.children.link(collection)
+    for name, toward, color, strength, angle in LIGHTS:
+        light = bpy.data.lights.new(name, "SUN")
+        light.color, light.energy, light.angle = color, strength, angle
+        sun = bpy.data.objects.new(name, light)
+        sun.rotation_euler = Vector(toward).to_track_quat("Z", "Y").to_euler()
+        collection.objects.link(sun)
+
+add_lights()
+"#;
+
+const SET_WORLD: &str = r#"
+def find_dome():
+    beside_script = os.path.dirname(os.path.abspath(globals().get("__file__", "")))
+    folders = [beside_script, bpy.path.abspath("//"), os.getcwd()]
+    paths = [os.path.join(folder, DOME) for folder in folders]
+    for path in filter(os.path.isfile, paths):
+        return path
+    raise FileNotFoundError("the residual map is in none of these: " + ", ".join(paths))
+
+def set_world():
+    world = bpy.data.worlds.new("domelight")
+    world.use_nodes = True
+    nodes, link = world.node_tree.nodes, world.node_tree.links.new
+    nodes.clear()
+    place = nodes.new("ShaderNodeTexCoord")
+    turn = nodes.new("ShaderNodeMapping")
+    turn.inputs["Rotation"].default_value = (0, 0, DOME_ROTATION)
+    picture = nodes.new("ShaderNodeTexEnvironment")
+    picture.image = bpy.data.images.load(find_dome())
+    background = nodes.new("ShaderNodeBackground")
+    output = nodes.new("ShaderNodeOutputWorld")
+    link(place.outputs["Generated"], turn.inputs["Vector"])
+    link(turn.outputs["Vector"], picture.inputs["Vector"])
+    link(picture.outputs["Color"], background.inputs["Color"])
+    link(background.outputs["Background"], output.inputs["Surface"])
+    for i, node in enumerate((place, turn, picture, background, output)):
+        node.location = (250 * i, 0)
+    bpy.context.scene.world = world
+
+set_world()
+"#;
+
+pub(super) fn encode(rig: &RigExport) -> String {
+    let axes = Axes::with_up(rig, UpAxis::Z);
+    let mut text = format!(
+        "# The lights of {}, by domelight, for Blender 4.2 or later.\n\
+         import os\nimport bpy\nfrom mathutils import Vector\n\n\
+         # Name, toward the light, color, strength in W/m2, angle in radians\n\
+         LIGHTS = [\n",
+        one_line(rig.probe)
+    );
+    for (light, name) in rig.lights.iter().zip(rig.names()) {
+        let Disc { radius, facing } = Disc::of(light);
+        let (color, strength) = color_and_strength(facing);
+        let _ = writeln!(
+            text,
+            "    ({}, ({}), ({}), {strength}, {}),",
+            quoted(&name),
+            numbers(vector(axes.world * light.direction), ", "),
+            numbers(color.to_array(), ", "),
+            2.0 * radius,
+        );
+    }
+    text += "]\n";
+    text += ADD_LIGHTS;
+    if let Some(file) = rig.dome_file() {
+        // Blender looks a direction up at the place that the mapping turns it to.
+        let rotation = -rig.orientation.rotation.to_radians() - FRAC_PI_2;
+        let _ = write!(
+            text,
+            "\n# The map without the light of these lights\nDOME = {}\nDOME_ROTATION = {rotation}\n",
+            quoted(file)
+        );
+        text += SET_WORLD;
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests_support::{with_dome_file, with_example};
+    use super::*;
+
+    #[test]
+    fn suns_face_surfaces_with_their_discs() {
+        with_example(|rig| {
+            let text = encode(rig);
+            let line = text.lines().find(|line| line.contains("\"sun\"")).unwrap();
+            // Y-up (0, 0.6, −0.8) is Z-up (0, 0.8, 0.6).
+            assert!(line.contains("(0, 0.8, 0.6)"), "{line}");
+            let numbers: Vec<f32> = line
+                .trim_end_matches("),")
+                .rsplit(", ")
+                .take(2)
+                .map(|number| number.parse().unwrap())
+                .collect();
+            assert_eq!(numbers[0], 2.0 * rig.lights[0].angular_radius);
+            let facing = 3.0 * 0.5 * (1.0 + rig.lights[0].angular_radius.cos());
+            assert!((numbers[1] - facing).abs() < 1e-6);
+        });
+    }
+
+    /// In the console an empty line ends a block, and a block needs one to end.
+    #[test]
+    fn blocks_can_be_pasted_into_the_console() {
+        with_example(|rig| {
+            let text = encode(rig);
+            let lines: Vec<&str> = text.lines().collect();
+            for pair in lines.windows(2) {
+                let indented = |line: &str| line.starts_with("    ");
+                if indented(pair[0]) && !pair[0].starts_with("    (") {
+                    assert!(indented(pair[1]) || pair[1].is_empty(), "{pair:?}");
+                }
+                assert!(!(pair[0].is_empty() && indented(pair[1])), "{pair:?}");
+            }
+        });
+    }
+
+    #[test]
+    fn names_are_escaped() {
+        with_dome_file("C:\\maps\\\"r\".exr", |rig| {
+            let text = encode(&RigExport { probe: "a\nimport os", ..*rig });
+            assert!(text.contains(r#"DOME = "C:\\maps\\\"r\".exr""#), "{text}");
+            assert!(text.starts_with("# The lights of a import os, by domelight"));
+            assert!(!encode(&RigExport { dome: None, ..*rig }).contains("set_world"));
+        });
+    }
+}

@@ -1,0 +1,139 @@
+//! domelight's own format: JSON that `docs/rig.schema.json` describes.
+
+use serde::Serialize;
+
+use super::RigExport;
+use crate::environment::UpAxis;
+use crate::rig::{Region, RigLight};
+
+/// The version of the format; it grows when a reader of an older version would be wrong.
+pub const VERSION: u32 = 1;
+
+#[derive(Serialize)]
+struct File<'a> {
+    format: &'static str,
+    version: u32,
+    probe: &'a str,
+    orientation: Orientation,
+    lights: Vec<Light>,
+    dome: Option<Dome<'a>>,
+}
+
+#[derive(Serialize)]
+struct Orientation {
+    up: &'static str,
+    rotation: f32,
+}
+
+#[derive(Serialize)]
+struct Light {
+    name: String,
+    kind: &'static str,
+    direction: [f32; 3],
+    irradiance: [f32; 3],
+    angular_radius: f32,
+    share: f32,
+    solid_angle: f32,
+}
+
+#[derive(Serialize)]
+struct Dome<'a> {
+    file: Option<&'a str>,
+    spherical_harmonics: [[f32; 3]; 9],
+}
+
+pub(super) fn encode(rig: &RigExport) -> String {
+    let file = File {
+        format: "domelight-rig",
+        version: VERSION,
+        probe: rig.probe,
+        orientation: Orientation {
+            up: match rig.orientation.up {
+                UpAxis::Y => "y",
+                UpAxis::Z => "z",
+            },
+            rotation: rig.orientation.rotation,
+        },
+        lights: rig.lights.iter().zip(rig.names()).map(|(l, name)| Light::new(l, name)).collect(),
+        dome: rig.dome.map(|dome| Dome {
+            file: dome.file,
+            spherical_harmonics: dome.harmonics.coefficients.map(crate::Rgb::to_array),
+        }),
+    };
+    let mut text = serde_json::to_string_pretty(&file).expect("strings and numbers");
+    text.push('\n');
+    text
+}
+
+impl Light {
+    fn new(light: &RigLight, name: String) -> Self {
+        Self {
+            name,
+            kind: match light.region {
+                Region::Sun => "sun",
+                Region::Lamp => "lamp",
+                Region::Rectangle(_) | Region::Cell => "region",
+            },
+            direction: light.direction.to_array(),
+            irradiance: light.irradiance.to_array(),
+            angular_radius: light.angular_radius,
+            share: light.share,
+            solid_angle: light.solid_angle,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests_support::with_example;
+    use super::*;
+    use serde_json::Value;
+
+    fn schema() -> jsonschema::Validator {
+        let text = include_str!("../../../../../docs/rig.schema.json");
+        jsonschema::validator_for(&serde_json::from_str(text).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_rig_is_valid_by_the_schema() {
+        with_example(|rig| {
+            for rig in [*rig, RigExport { dome: None, ..*rig }] {
+                let json: Value = serde_json::from_str(&encode(&rig)).unwrap();
+                let errors: Vec<_> = schema().iter_errors(&json).map(|e| e.to_string()).collect();
+                assert!(errors.is_empty(), "{errors:?}");
+                assert_eq!(json["lights"].as_array().unwrap().len(), rig.lights.len());
+                assert_eq!(json["lights"][0]["kind"], "sun");
+                assert_eq!(json["dome"].is_null(), rig.dome.is_none());
+            }
+        });
+    }
+
+    #[test]
+    fn the_schema_refuses_what_is_wrong() {
+        with_example(|rig| {
+            let valid: Value = serde_json::from_str(&encode(rig)).unwrap();
+            let refused = |change: fn(&mut Value)| {
+                let mut json = valid.clone();
+                change(&mut json);
+                !schema().is_valid(&json)
+            };
+            assert!(refused(|json| json["version"] = 2.into()));
+            assert!(refused(|json| json["lights"][0]["share"] = 1.5.into()));
+            assert!(refused(|json| json["lights"][0]["irradiance"][1] = (-1.0).into()));
+            assert!(refused(|json| json["lights"][1]["colour"] = "red".into()));
+            assert!(refused(|json| json["orientation"]["up"] = "x".into()));
+            assert!(refused(|json| drop(json.as_object_mut().unwrap().remove("dome"))));
+        });
+    }
+
+    #[test]
+    fn numbers_keep_their_single_precision() {
+        with_example(|rig| {
+            let json: Value = serde_json::from_str(&encode(rig)).unwrap();
+            for (light, json) in rig.lights.iter().zip(json["lights"].as_array().unwrap()) {
+                let read = |i: usize| json["direction"][i].as_f64().unwrap() as f32;
+                assert_eq!([read(0), read(1), read(2)], light.direction.to_array());
+            }
+        });
+    }
+}

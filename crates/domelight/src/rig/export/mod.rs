@@ -1,0 +1,335 @@
+//! Rigs as files of other programs: one format a file.
+//!
+//! Functions here make bytes and do no I/O. What a format needs of the outside, the name of the
+//! file that holds the residual map, is given as text.
+
+mod axes;
+mod blender;
+mod csv;
+mod disc;
+mod gltf;
+mod json;
+mod mitsuba;
+mod pbrt;
+mod radiance;
+mod sibl;
+mod text;
+mod three;
+mod usd;
+
+pub use json::VERSION as JSON_VERSION;
+
+use std::str::FromStr;
+
+use super::{Region, RigLight, SphericalHarmonics};
+use crate::environment::mapping::Mapping;
+use crate::environment::{Environment, Orientation};
+
+/// What all formats write.
+#[derive(Clone, Copy, Debug)]
+pub struct RigExport<'a> {
+    /// The probe's name, for comments.
+    pub probe: &'a str,
+    /// How the probe stands in the world, whose axes [`RigLight::direction`] is over.
+    pub orientation: Orientation,
+    /// The lights: compact ones first.
+    pub lights: &'a [RigLight],
+    /// What the lights left on the map; none if they took all its light.
+    pub dome: Option<Dome<'a>>,
+}
+
+/// The light that shines beside a rig's lights: the map without what they took.
+#[derive(Clone, Copy, Debug)]
+pub struct Dome<'a> {
+    /// Its map and orientation.
+    pub environment: &'a Environment,
+    /// Its first nine harmonics, over the world's axes.
+    pub harmonics: SphericalHarmonics,
+    /// The file that holds its map, as the rig's file refers to it; none if it was not written.
+    pub file: Option<&'a str>,
+}
+
+impl RigExport<'_> {
+    /// The file of the dome's picture, if there are both.
+    fn dome_file(&self) -> Option<&str> {
+        self.dome.and_then(|dome| dome.file)
+    }
+
+    /// A name for each light, all different: `sun`, `lamp_1`, …, `light_1`, ….
+    pub fn names(&self) -> Vec<String> {
+        let (mut lamps, mut regions) = (0, 0);
+        let numbered = |name: &str, count: &mut usize| {
+            *count += 1;
+            format!("{name}_{count}")
+        };
+        let name = |light: &RigLight| match light.region {
+            Region::Sun => "sun".to_owned(),
+            Region::Lamp => numbered("lamp", &mut lamps),
+            Region::Rectangle(_) | Region::Cell => numbered("light", &mut regions),
+        };
+        self.lights.iter().map(name).collect()
+    }
+}
+
+/// The formats that a rig can be written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Our own, of `docs/rig.schema.json`.
+    Json,
+    /// A table with a light a row.
+    Csv,
+    /// glTF 2.0 as text.
+    Gltf,
+    /// Binary glTF 2.0.
+    Glb,
+    /// OpenUSD as text.
+    Usd,
+    /// A Python script for Blender.
+    Blender,
+    /// A Mitsuba 3 scene.
+    Mitsuba,
+    /// Lights of a pbrt-v4 scene.
+    Pbrt,
+    /// A three.js module.
+    Three,
+    /// Lights of a Radiance scene.
+    Radiance,
+    /// A smart IBL set.
+    Sibl,
+}
+
+/// A picture of the dome beside a rig's file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DomePicture {
+    /// The map itself in any file of high dynamic range.
+    LatLong,
+    /// The map itself as Radiance `.hdr`.
+    LatLongHdr,
+    /// The map in [`Mapping::Octahedral`], in any file of high dynamic range.
+    Octahedral,
+}
+
+impl DomePicture {
+    /// The mapping of the picture, in the map's own frame.
+    pub fn mapping(self) -> Mapping {
+        match self {
+            Self::LatLong | Self::LatLongHdr => Mapping::LatLong,
+            Self::Octahedral => Mapping::Octahedral,
+        }
+    }
+}
+
+/// Why a rig cannot be written.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ExportError {
+    /// A light whose direction is no unit vector, or whose numbers are not finite or negative.
+    #[error(
+        "light {name} has direction {}, irradiance {:?} and angular radius {}; \
+         lights have a unit vector, finite irradiance that is not negative, and a finite radius",
+        light.direction, light.irradiance.to_array(), light.angular_radius
+    )]
+    BadLight {
+        /// The name that it would have.
+        name: String,
+        /// The light.
+        light: RigLight,
+    },
+    /// A file name that the format has no way to write.
+    #[error(
+        "{format} files cannot name the file {file:?}: choose a name without '\"' and control characters"
+    )]
+    BadFileName {
+        /// The format.
+        format: Format,
+        /// The name.
+        file: String,
+    },
+}
+
+/// No format has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{name}' is no format of light rigs: {}", Format::ALL.map(Format::name).join(", "))]
+pub struct UnknownFormat {
+    name: String,
+}
+
+impl Format {
+    /// All formats.
+    pub const ALL: [Self; 11] = [
+        Self::Json,
+        Self::Csv,
+        Self::Gltf,
+        Self::Glb,
+        Self::Usd,
+        Self::Blender,
+        Self::Mitsuba,
+        Self::Pbrt,
+        Self::Three,
+        Self::Radiance,
+        Self::Sibl,
+    ];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Json => "json",
+            Self::Csv => "csv",
+            Self::Gltf => "gltf",
+            Self::Glb => "glb",
+            Self::Usd => "usd",
+            Self::Blender => "blender",
+            Self::Mitsuba => "mitsuba",
+            Self::Pbrt => "pbrt",
+            Self::Three => "three",
+            Self::Radiance => "radiance",
+            Self::Sibl => "sibl",
+        }
+    }
+
+    /// The ends of file names that mean it, in lower case.
+    pub fn extensions(self) -> &'static [&'static str] {
+        match self {
+            Self::Json => &["json"],
+            Self::Csv => &["csv", "txt"],
+            Self::Gltf => &["gltf"],
+            Self::Glb => &["glb"],
+            Self::Usd => &["usda"],
+            Self::Blender => &["py"],
+            Self::Mitsuba => &["xml"],
+            Self::Pbrt => &["pbrt"],
+            Self::Three => &["js", "mjs"],
+            Self::Radiance => &["rad"],
+            Self::Sibl => &["ibl"],
+        }
+    }
+
+    /// The format that the end of a file's name means, in either case.
+    pub fn of_extension(extension: &str) -> Option<Self> {
+        let extension = extension.to_ascii_lowercase();
+        Self::ALL.into_iter().find(|f| f.extensions().contains(&extension.as_str()))
+    }
+
+    /// The picture of the dome that files of this format name and light a scene with, so that it
+    /// must be written beside them.
+    pub fn dome_picture(self) -> Option<DomePicture> {
+        match self {
+            Self::Json | Self::Csv | Self::Gltf | Self::Glb | Self::Three => None,
+            Self::Usd | Self::Blender | Self::Mitsuba | Self::Sibl => Some(DomePicture::LatLong),
+            Self::Pbrt => Some(DomePicture::Octahedral),
+            Self::Radiance => Some(DomePicture::LatLongHdr),
+        }
+    }
+
+    /// The rig as a file of this format.
+    ///
+    /// # Errors
+    /// A light that is not a direction with light of finite amount, or a name of the dome's file
+    /// that the format cannot hold.
+    pub fn encode(self, rig: &RigExport) -> Result<Vec<u8>, ExportError> {
+        self.check(rig)?;
+        Ok(match self {
+            Self::Json => json::encode(rig).into_bytes(),
+            Self::Csv => csv::encode(rig).into_bytes(),
+            Self::Gltf => gltf::encode_text(rig).into_bytes(),
+            Self::Glb => gltf::encode_binary(rig),
+            Self::Usd => usd::encode(rig).into_bytes(),
+            Self::Blender => blender::encode(rig).into_bytes(),
+            Self::Mitsuba => mitsuba::encode(rig).into_bytes(),
+            Self::Pbrt => pbrt::encode(rig).into_bytes(),
+            Self::Three => three::encode(rig).into_bytes(),
+            Self::Radiance => radiance::encode(rig).into_bytes(),
+            Self::Sibl => sibl::encode(rig).into_bytes(),
+        })
+    }
+
+    fn check(self, rig: &RigExport) -> Result<(), ExportError> {
+        for (light, name) in rig.lights.iter().zip(rig.names()) {
+            let e = light.irradiance;
+            let directed = light.direction.is_normalized() && light.angular_radius.is_finite();
+            if !directed || !e.is_finite() || e.min_component() < 0.0 {
+                return Err(ExportError::BadLight { name, light: *light });
+            }
+        }
+        let unquotable = matches!(self, Self::Sibl | Self::Radiance);
+        let bad = |c: char| c.is_control() || unquotable && c == '"';
+        match rig.dome_file() {
+            Some(file) if self.dome_picture().is_some() && file.contains(bad) => {
+                Err(ExportError::BadFileName { format: self, file: file.to_owned() })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl std::fmt::Display for Format {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Format {
+    type Err = UnknownFormat;
+
+    fn from_str(name: &str) -> Result<Self, UnknownFormat> {
+        let found = Self::ALL.into_iter().find(|format| format.name() == name);
+        found.ok_or_else(|| UnknownFormat { name: name.to_owned() })
+    }
+}
+
+/// A rig for the tests of formats.
+#[cfg(test)]
+mod tests_support {
+    use super::*;
+    use crate::math::{Vec3, vec3};
+    use crate::{Rgb, RgbImage};
+
+    /// A light that is small.
+    pub(super) fn light(direction: Vec3, irradiance: Rgb, region: Region) -> RigLight {
+        RigLight {
+            direction,
+            irradiance,
+            angular_radius: 0.01,
+            share: 0.25,
+            solid_angle: 3e-4,
+            region,
+        }
+    }
+
+    /// Passes on a sun, a lamp and a region, red, green and blue, over a dome.
+    pub(super) fn with_example(f: impl FnOnce(&RigExport)) {
+        with_dome_file("residual.exr", f);
+    }
+
+    /// The same with a file of this name.
+    pub(super) fn with_dome_file(file: &str, f: impl FnOnce(&RigExport)) {
+        let lights = [
+            light(vec3(0.0, 0.6, -0.8), Rgb::new(3.0, 0.1, 0.0), Region::Sun),
+            light(vec3(1.0, 0.0, 0.0), Rgb::new(0.0, 2.0, 0.0), Region::Lamp),
+            light(Vec3::ONE.normalize(), Rgb::new(0.0, 0.0, 1.5), Region::Cell),
+        ];
+        let orientation = Orientation { rotation: 30.0, ..Orientation::default() };
+        let map = RgbImage::from_fn(16, 8, |x, y| Rgb::new(0.1 * x as f32, 0.5, 0.2 * y as f32));
+        let environment = Environment::new(map, orientation, 1.0).unwrap();
+        let harmonics = SphericalHarmonics::project(&environment);
+        let dome = Some(Dome { environment: &environment, harmonics, file: Some(file) });
+        f(&RigExport { probe: "probe.hdr", orientation, lights: &lights, dome });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_extensions_are_unambiguous() {
+        for format in Format::ALL {
+            assert_eq!(format.name().parse(), Ok(format));
+            for extension in format.extensions() {
+                assert_eq!(Format::of_extension(&extension.to_uppercase()), Some(format));
+            }
+        }
+        assert_eq!(Format::of_extension("tiff"), None);
+        let error = "tiff".parse::<Format>().unwrap_err().to_string();
+        assert!(error.contains("tiff") && error.contains("json"), "{error}");
+    }
+}

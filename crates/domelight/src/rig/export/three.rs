@@ -1,0 +1,136 @@
+//! A three.js module: `addLights(scene)` puts the lights into a scene.
+//!
+//! A light is a `DirectionalLight`: colour times intensity is the irradiance of a surface that
+//! faces it \[W·m⁻²\]; it shines from its position to its target. It has no size. The dome is a
+//! `LightProbe` of nine harmonics of radiance, whose order and signs are ours; it lights matt
+//! surfaces. `setDome(scene, texture)` lights by a picture of the dome instead, reflections
+//! included, whose middle three.js expects at +X where ours is at −Z. +Y is up.
+
+use std::fmt::Write;
+
+use super::RigExport;
+use super::axes::Axes;
+use super::disc::color_and_strength;
+use super::text::{numbers, one_line, quoted, vector};
+use crate::environment::UpAxis;
+
+const FUNCTIONS: &str = r#"
+/**
+ * Adds the rig to the scene and returns it, a group; light casts shadows if its `castShadow` is set.
+ * The light probe ignores rotations of the group. Leave it out where `setDome` lights the scene.
+ */
+export function addLights(scene, { probe = true } = {}) {
+  const rig = new THREE.Group();
+  rig.name = "domelight";
+  for (const { name, direction, color, intensity } of lights) {
+    const light = new THREE.DirectionalLight(undefined, intensity);
+    light.name = name;
+    light.color.setRGB(...color);
+    light.position.set(...direction);
+    rig.add(light, light.target);
+  }
+  if (probe && harmonics) {
+    rig.add(new THREE.LightProbe(new THREE.SphericalHarmonics3().fromArray(harmonics.flat())));
+  }
+  scene.add(rig);
+  return rig;
+}
+
+/**
+ * Lights the scene by a texture of the residual map, as EXRLoader and HDRLoader load it, and shows
+ * it behind the scene.
+ */
+export function setDome(scene, texture) {
+  texture.mapping = THREE.EquirectangularReflectionMapping;
+  scene.environment = scene.background = texture;
+  scene.environmentRotation.set(0, domeRotation, 0);
+  scene.backgroundRotation.copy(scene.environmentRotation);
+}
+"#;
+
+pub(super) fn encode(rig: &RigExport) -> String {
+    let axes = Axes::with_up(rig, UpAxis::Y);
+    let mut text = format!(
+        "// The lights of {}, by domelight.\n\
+         // import {{ addLights }} from \"./rig.js\"; addLights(scene);\n\
+         import * as THREE from \"three\";\n\n\
+         // Toward the light; linear colour times intensity is irradiance.\n\
+         export const lights = [\n",
+        one_line(rig.probe)
+    );
+    for (light, name) in rig.lights.iter().zip(rig.names()) {
+        let (color, intensity) = color_and_strength(light.irradiance);
+        let _ = writeln!(
+            text,
+            "  {{ name: {}, direction: [{}], color: [{}], intensity: {intensity} }},",
+            quoted(&name),
+            numbers(vector(axes.world * light.direction), ", "),
+            numbers(color.to_array(), ", "),
+        );
+    }
+    text += "];\n\n";
+    match rig.dome {
+        None => text += "export const harmonics = null;\n",
+        Some(dome) => {
+            text += "// Radiance of the residual map, in the order of SphericalHarmonics3.\n\
+                     export const harmonics = [\n";
+            for coefficient in dome.harmonics.turned(axes.world).coefficients {
+                let _ = writeln!(text, "  [{}],", numbers(coefficient.to_array(), ", "));
+            }
+            text += "];\n";
+        }
+    }
+    let turn = rig.orientation.rotation.to_radians() + std::f32::consts::FRAC_PI_2;
+    let _ = writeln!(
+        text,
+        "\n// About +Y: the middle of the map is where three.js looks for it at +X.\n\
+         const domeRotation = {turn};"
+    );
+    text + FUNCTIONS
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests_support::with_example;
+    use super::*;
+    use crate::environment::Orientation;
+    use crate::rig::SphericalHarmonics;
+
+    #[test]
+    fn lights_have_colour_times_intensity() {
+        with_example(|rig| {
+            let text = encode(rig);
+            let sun = r#"{ name: "sun", direction: [0, 0.6, -0.8], color: [1, 0.033333335, 0], intensity: 3 },"#;
+            assert!(text.contains(sun), "{text}");
+            assert_eq!(text.matches("{ name: ").count(), 1 + rig.lights.len());
+        });
+    }
+
+    #[test]
+    fn a_z_up_world_is_turned_with_its_harmonics() {
+        with_example(|rig| {
+            let orientation = Orientation { up: UpAxis::Z, rotation: 0.0 };
+            let mut dome = rig.dome.unwrap();
+            // Light from above is first order in z of the Z-up world, in y of three.js.
+            dome.harmonics = SphericalHarmonics { coefficients: [crate::Rgb::BLACK; 9] };
+            dome.harmonics.coefficients[2] = crate::Rgb::WHITE;
+            let text = encode(&RigExport { orientation, dome: Some(dome), ..*rig });
+            assert!(text.contains("direction: [0, -0.8, -0.6]"), "{text}");
+            let start = text.find("harmonics = [\n").unwrap();
+            let rows: Vec<&str> = text[start..].lines().skip(1).take(9).collect();
+            let first = |row: &str| -> f32 {
+                row.trim_start_matches("  [").split(',').next().unwrap().parse().unwrap()
+            };
+            assert!((first(rows[1]) - 1.0).abs() < 1e-6 && first(rows[2]).abs() < 1e-6, "{rows:?}");
+        });
+    }
+
+    #[test]
+    fn names_are_escaped() {
+        with_example(|rig| {
+            let text = encode(&RigExport { probe: "a\n}*/b", dome: None, ..*rig });
+            assert!(text.starts_with("// The lights of a }*/b, by domelight.\n"));
+            assert!(text.contains("export const harmonics = null;"));
+        });
+    }
+}

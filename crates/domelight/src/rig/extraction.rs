@@ -1,0 +1,255 @@
+//! Lights out of an environment, and what they leave of it.
+//!
+//! Compact sources come first: suns, lamps and windows, each taken out whole where it stands out of
+//! its surroundings, the rest filled from around it. Then regions of what is left become lights, or
+//! it stays as a dome beside the lights. Lights and residual are the environment, channel by
+//! channel: what is taken from a texel is the difference of two numbers of single precision, summed
+//! in double precision.
+
+use super::median_cut::{MedianCut, median_cut};
+use super::texels::Texels;
+use super::variance_minimization::{VarianceMinimization, variance_minimization};
+use super::{Region, RegionSums, Rig, RigError, RigLight};
+use crate::environment::Environment;
+use crate::environment::compact::{CompactSource, Wanted, compact_sources};
+use crate::{Rgb, RgbImage};
+
+/// How a map is divided into regions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Regions of even energy.
+    MedianCut(MedianCut),
+    /// Regions of little spread.
+    VarianceMinimization(VarianceMinimization),
+}
+
+impl Default for Method {
+    fn default() -> Self {
+        Self::VarianceMinimization(VarianceMinimization::default())
+    }
+}
+
+impl Method {
+    /// `n_lights` lights that take all of the environment's light.
+    ///
+    /// # Errors
+    /// Those of [`median_cut`] and [`variance_minimization`].
+    pub fn rig(self, environment: &Environment, n_lights: usize) -> Result<Rig, RigError> {
+        match self {
+            Self::MedianCut(settings) => median_cut(environment, n_lights, settings),
+            Self::VarianceMinimization(settings) => {
+                variance_minimization(environment, n_lights, settings)
+            }
+        }
+    }
+}
+
+/// What is taken out of an environment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ExtractionSettings {
+    /// Take the sun: of the compact sources no wider than a cap of 7° the one with the most light.
+    pub sun: bool,
+    /// Take up to so many other compact sources, those with the most light, none wider than a cap
+    /// of 28°.
+    pub n_lamps: usize,
+    /// Make so many lights, compact ones included, and put all light into them; none leaves what is
+    /// not of compact sources to the residual.
+    pub n_lights: Option<usize>,
+    /// How what compact sources leave is divided.
+    pub method: Method,
+    /// Share of the environment's luminance below which a light is left on the residual, in \[0, 1\];
+    /// by default 0 of regions and 0.001 of compact sources.
+    pub min_share: Option<f32>,
+}
+
+/// An environment without its compact sources, from which rigs of any size are made.
+#[derive(Clone, Debug)]
+pub struct CompactExtraction<'a> {
+    environment: &'a Environment,
+    settings: ExtractionSettings,
+    lights: Vec<RigLight>,
+    sources: Vec<CompactSource>,
+    /// The environment without them; none if there are none.
+    residual: Option<Environment>,
+}
+
+/// Takes the lights that the settings ask for out of an environment.
+///
+/// # Errors
+/// [`RigError::NoLights`] if nothing is asked for, [`RigError::Black`] for an environment without
+/// light, [`RigError::NoSun`] and [`RigError::NoLamp`] if nothing stands out of its surroundings by
+/// a factor of 4 and no other lights were asked for, [`RigError::TooDim`] if `min_share` leaves no
+/// light, and [`RigError::TooFewTexels`].
+pub fn extract(
+    environment: &Environment,
+    settings: ExtractionSettings,
+) -> Result<Extraction, RigError> {
+    let compact = CompactExtraction::new(environment, settings)?;
+    if compact.n_regions(settings.n_lights) == 0 {
+        return Ok(Extraction { rig: compact.compact_rig(), residual: compact.residual });
+    }
+    compact.with_lights(settings.n_lights)
+}
+
+/// A rig and what it leaves on the map: together they are the environment, channel by channel.
+#[derive(Clone, Debug)]
+pub struct Extraction {
+    /// The lights.
+    pub rig: Rig,
+    /// The environment without the light that they took, nowhere negative; none if they took all.
+    pub residual: Option<Environment>,
+}
+
+impl<'a> CompactExtraction<'a> {
+    /// Takes the compact sources out.
+    ///
+    /// # Errors
+    /// As [`extract`].
+    pub fn new(
+        environment: &'a Environment,
+        settings: ExtractionSettings,
+    ) -> Result<Self, RigError> {
+        let ExtractionSettings { sun, n_lamps, n_lights, min_share, .. } = settings;
+        if n_lights == Some(0) || (n_lights.is_none() && !sun && n_lamps == 0) {
+            return Err(RigError::NoLights);
+        }
+        if environment.power() == 0.0 {
+            return Err(RigError::Black);
+        }
+        let n_lamps = n_lights.map_or(n_lamps, |n| n_lamps.min(n - usize::from(sun)));
+        let min_share = min_share.map_or(Wanted::MIN_SHARE, f64::from);
+        let sources = compact_sources(environment.map(), Wanted { sun, n_lamps, min_share });
+        if sun && !sources.first().is_some_and(|s| s.is_sun) {
+            return Err(RigError::NoSun);
+        }
+        if sources.is_empty() && n_lights.is_none() {
+            return Err(RigError::NoLamp);
+        }
+        let texels = Texels::new(environment);
+        let mut lights: Vec<RigLight> = sources.iter().map(|s| compact_light(&texels, s)).collect();
+        // By what was really taken, which may be in another order than what stood out.
+        let mut order: Vec<usize> = (0..sources.len()).collect();
+        order.sort_by(|&a, &b| {
+            let sun = |i: usize| lights[i].region == Region::Sun;
+            sun(b).cmp(&sun(a)).then(lights[b].share.total_cmp(&lights[a].share))
+        });
+        lights = order.iter().map(|&i| lights[i]).collect();
+        let sources: Vec<CompactSource> = order.iter().map(|&i| sources[i].clone()).collect();
+        let residual = (!sources.is_empty()).then(|| without(environment, &sources));
+        Ok(Self { environment, settings, lights, sources, residual })
+    }
+
+    /// How many compact sources were found.
+    pub fn n_compact(&self) -> usize {
+        self.lights.len()
+    }
+
+    /// How many texels are lit beside them.
+    pub(super) fn n_lit(&self) -> usize {
+        self.rest().map().pixels.iter().filter(|le| le.luminance() > 0.0).count()
+    }
+
+    /// A rig of `n_lights` lights, compact ones included, which take all light; or of the compact
+    /// ones alone.
+    ///
+    /// # Errors
+    /// As [`extract`].
+    pub fn with_lights(&self, n_lights: Option<usize>) -> Result<Extraction, RigError> {
+        let n_regions = self.n_regions(n_lights);
+        if n_regions == 0 {
+            return Ok(Extraction { rig: self.compact_rig(), residual: self.residual.clone() });
+        }
+        let regions = self.settings.method.rig(self.rest(), n_regions)?;
+        self.combine(regions)
+    }
+
+    /// What compact sources leave.
+    fn rest(&self) -> &Environment {
+        self.residual.as_ref().unwrap_or(self.environment)
+    }
+
+    /// How many lights of regions a rig of `n_lights` has.
+    fn n_regions(&self, n_lights: Option<usize>) -> usize {
+        // Compact sources may have been all the light there was.
+        let dark = self.rest().power() == 0.0 && !self.lights.is_empty();
+        n_lights.filter(|_| !dark).map_or(0, |n| n.saturating_sub(self.lights.len()))
+    }
+
+    /// The compact lights alone.
+    fn compact_rig(&self) -> Rig {
+        let map = self.environment.map();
+        let mut rig = Rig {
+            lights: self.lights.clone(),
+            width: map.width,
+            height: map.height,
+            labels: vec![Rig::NO_LIGHT; map.pixels.len()],
+        };
+        self.overlay(&mut rig.labels);
+        rig
+    }
+
+    /// Writes the compact lights into labels.
+    fn overlay(&self, labels: &mut [u32]) {
+        for (i, source) in self.sources.iter().enumerate() {
+            source.texels.iter().for_each(|&texel| labels[texel as usize] = i as u32);
+        }
+    }
+
+    /// Compact lights and the lights of regions of the rest, without those that are too dim.
+    fn combine(&self, mut regions: Rig) -> Result<Extraction, RigError> {
+        let rest = self.rest();
+        let scale = (rest.power() / self.environment.power()) as f32;
+        regions.lights.iter_mut().for_each(|l| l.share *= scale);
+        // Lights are in order, the dim ones last.
+        let min_share = self.settings.min_share.unwrap_or(0.0);
+        let n_kept = regions.lights.iter().take_while(|l| l.share >= min_share).count();
+        let residual = (n_kept < regions.lights.len()).then(|| {
+            let kept = |label: &u32| (*label as usize) < n_kept;
+            let left = regions.labels.iter().zip(&rest.map().pixels);
+            let pixels = left.map(|(label, &le)| if kept(label) { Rgb::BLACK } else { le });
+            environment_of(rest, pixels.collect())
+        });
+        regions.lights.truncate(n_kept);
+        let n_compact = self.lights.len() as u32;
+        for label in &mut regions.labels {
+            let kept = (*label as usize) < n_kept;
+            *label = if kept { *label + n_compact } else { Rig::NO_LIGHT };
+        }
+        self.overlay(&mut regions.labels);
+        regions.lights.splice(0..0, self.lights.iter().copied());
+        if regions.lights.is_empty() {
+            return Err(RigError::TooDim);
+        }
+        Ok(Extraction { rig: regions, residual })
+    }
+}
+
+/// The environment without compact sources.
+fn without(environment: &Environment, sources: &[CompactSource]) -> Environment {
+    let mut pixels = environment.map().pixels.clone();
+    for source in sources {
+        for (&texel, &rest) in source.texels.iter().zip(&source.residual) {
+            pixels[texel as usize] = rest;
+        }
+    }
+    environment_of(environment, pixels)
+}
+
+/// Other radiance of the same orientation, nowhere above the first.
+fn environment_of(environment: &Environment, pixels: Vec<Rgb>) -> Environment {
+    let map = RgbImage { pixels, ..*environment.map() };
+    Environment::new(map, environment.orientation(), 1.0).expect("parts of a valid map are valid")
+}
+
+/// The light of what a source took.
+fn compact_light(texels: &Texels, source: &CompactSource) -> RigLight {
+    let mut sums = RegionSums::default();
+    for (&texel, rest) in source.texels.iter().zip(&source.residual) {
+        let (x, y) = (texel as usize % texels.width(), texel as usize / texels.width());
+        let (le, rest) = (texels.row(y)[x].to_array(), rest.to_array());
+        let taken = std::array::from_fn(|c| f64::from(le[c]) - f64::from(rest[c]));
+        sums.add_texel(texels, x, y, taken);
+    }
+    let region = if source.is_sun { Region::Sun } else { Region::Lamp };
+    sums.light(texels, texels.environment().power(), region)
+}

@@ -1,0 +1,91 @@
+//! The smallest rig that shades well enough.
+
+use super::{
+    CompactExtraction, Extraction, ExtractionSettings, RigError, ShadingError, ShadingReference,
+};
+use crate::environment::Environment;
+
+/// Lights above which no rig is tried.
+const MAX_LIGHTS: usize = 4096;
+
+/// A rig that was found by its error.
+#[derive(Clone, Debug)]
+pub struct SmallestRig {
+    /// The lights.
+    pub extraction: Extraction,
+    /// Their error.
+    pub error: ShadingError,
+    /// The numbers of lights that were tried, rising, with their errors.
+    pub tried: Vec<(usize, ShadingError)>,
+}
+
+/// The rig of the fewest lights whose error, matt and glossy, is `target` or less.
+///
+/// The error falls with the number of lights but for small ripples. Numbers are doubled until one
+/// is good enough and the interval before it is halved, so that the rig of one light fewer is not;
+/// a still smaller one may be by chance. [`ExtractionSettings::n_lights`] is ignored.
+///
+/// # Errors
+/// [`RigError::ErrorNotReached`] if 4096 lights, or as many as texels are lit, have a greater
+/// error, and those of [`extract`](super::extract()).
+pub fn smallest_rig(
+    environment: &Environment,
+    settings: ExtractionSettings,
+    target: f64,
+) -> Result<SmallestRig, RigError> {
+    let settings = ExtractionSettings { n_lights: Some(usize::MAX), ..settings };
+    let compact = CompactExtraction::new(environment, settings)?;
+    let reference = ShadingReference::new(environment);
+    let mut search = Search { compact, reference, tried: Vec::new(), best: None };
+    let mut too_few = search.compact.n_compact();
+    let mut enough = too_few + 1;
+    while !search.reaches(enough, target)? {
+        if enough >= search.most() {
+            let (n_lights, error) = search.tried[search.tried.len() - 1];
+            let percent = (100.0 * error.worst()) as f32;
+            return Err(RigError::ErrorNotReached { n_lights, percent });
+        }
+        too_few = enough;
+        enough = (2 * enough).min(search.most());
+    }
+    while enough - too_few > 1 {
+        let middle = too_few.midpoint(enough);
+        if search.reaches(middle, target)? {
+            enough = middle;
+        } else {
+            too_few = middle;
+        }
+    }
+    search.tried.sort_by_key(|(n, _)| *n);
+    let (extraction, error) = search.best.expect("the last that was good enough");
+    Ok(SmallestRig { extraction, error, tried: search.tried })
+}
+
+struct Search<'a> {
+    compact: CompactExtraction<'a>,
+    reference: ShadingReference,
+    tried: Vec<(usize, ShadingError)>,
+    best: Option<(Extraction, ShadingError)>,
+}
+
+impl Search<'_> {
+    fn most(&self) -> usize {
+        MAX_LIGHTS.min(self.compact.n_compact() + self.compact.n_lit()).max(1)
+    }
+
+    fn reaches(&mut self, n_lights: usize, target: f64) -> Result<bool, RigError> {
+        let extraction = self.compact.with_lights(Some(n_lights))?;
+        let error = match &extraction.residual {
+            Some(dome) => {
+                self.reference.error_beside(&extraction.rig, &ShadingReference::new(dome))
+            }
+            None => self.reference.error(&extraction.rig),
+        };
+        self.tried.push((n_lights, error));
+        let reached = error.worst() <= target;
+        if reached {
+            self.best = Some((extraction, error));
+        }
+        Ok(reached)
+    }
+}

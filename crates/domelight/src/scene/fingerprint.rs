@@ -1,0 +1,49 @@
+//! The fingerprint of a scene: geometry, surfaces and textures to the bit; names and files do not count.
+
+use super::Scene;
+use crate::fingerprint::{Fingerprint, Fingerprinter};
+use crate::math::{Vec2, Vec3, Vec4};
+
+impl Scene {
+    /// The fingerprint of all that rays can meet.
+    pub fn fingerprint(&self) -> Fingerprint {
+        let mut f = Fingerprinter::default();
+        for part in &self.parts {
+            let mesh = &part.mesh;
+            f.words([part.surface as u32]);
+            f.words(mesh.triangles.as_flattened().iter().copied());
+            f.numbers(mesh.positions.iter().flat_map(Vec3::to_array));
+            f.numbers(mesh.normals.iter().flat_map(Vec3::to_array));
+            f.numbers(mesh.uvs.iter().flat_map(Vec2::to_array));
+            f.numbers(mesh.tangents.iter().flat_map(Vec4::to_array));
+            f.numbers(mesh.colors.iter().flat_map(|c| c.to_array()));
+        }
+        for surface in &self.surfaces {
+            f.text(format_args!("{:?} {:?}", surface.model, surface.normal_map));
+        }
+        self.textures.iter().for_each(|texture| texture.add_to(&mut f));
+        f.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::Scene;
+    use crate::scene::builtin::BuiltinScene;
+
+    #[test]
+    fn names_do_not_count_and_a_vertex_does() {
+        let description = || BuiltinScene::Spheres.description();
+        let fingerprint = |d| Scene::new(d).expect("a scene").fingerprint();
+        let original = fingerprint(description());
+        let mut renamed = description();
+        renamed.parts[0].name.push('x');
+        assert_eq!(fingerprint(renamed), original);
+        let mut moved = description();
+        moved.parts[0].mesh.positions[0].x += 1e-3;
+        assert_ne!(fingerprint(moved), original);
+        let mut other = description();
+        other.surfaces.reverse();
+        assert_ne!(fingerprint(other), original);
+    }
+}

@@ -1,0 +1,256 @@
+//! Interrupted, saved, divided and merged renders end with the bits of the uninterrupted one.
+#![cfg(feature = "io")]
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use domelight::environment::builtin::BuiltinProbe;
+use domelight::environment::{Environment, Orientation};
+use domelight::picture::exr::ExrLayers;
+use domelight::render::{
+    Checkpoint, CheckpointError, Counts, Film, Misfit, Observer, RenderSettings, Rendering,
+    Session, Window, render,
+};
+use domelight::sampling::{Heuristic, Pcg32};
+use domelight::scene::builtin::BuiltinScene;
+use domelight::scene::{Camera, CameraSettings, Scene};
+use domelight::strategy::{LightTable, MultipleImportanceSampling};
+
+type Mis<'a> = MultipleImportanceSampling<'a>;
+
+/// What a render needs.
+struct Stage {
+    scene: Scene,
+    camera: Camera,
+    environment: Environment,
+}
+
+fn settings() -> RenderSettings {
+    RenderSettings { width: 53, height: 38, n_samples: 9, tile_size: 8, ..Default::default() }
+}
+
+fn stage() -> Stage {
+    let description = BuiltinScene::Spheres.description();
+    let bounds = description.subject_bounds();
+    let RenderSettings { width, height, .. } = settings();
+    let view =
+        CameraSettings::framing(&bounds, width as f32 / height as f32, domelight::math::Vec3::Y);
+    let map = BuiltinProbe::Sky.image(32);
+    Stage {
+        scene: Scene::new(description).unwrap(),
+        camera: Camera::new(&view, width, height).unwrap(),
+        environment: Environment::new(map, Orientation::default(), 1.0).unwrap(),
+    }
+}
+
+fn mis(stage: &Stage) -> Mis<'_> {
+    Mis::new(&stage.environment, LightTable::Full, Heuristic::Balance, 1, 1).unwrap()
+}
+
+fn session<'a>(
+    stage: &'a Stage,
+    mis: &'a Mis<'a>,
+    settings: &'a RenderSettings,
+) -> Session<'a, Mis<'a>> {
+    Session::new(&stage.scene, &stage.camera, &stage.environment, mis, settings)
+}
+
+fn uninterrupted(stage: &Stage, settings: &RenderSettings) -> Rendering {
+    render(&stage.scene, &stage.camera, &stage.environment, &mis(stage), settings, &())
+}
+
+fn checkpoint(session: &Session<Mis>, n_samples: u32) -> Checkpoint {
+    Checkpoint {
+        identity: vec![("scene".into(), "spheres".into()), ("seed".into(), "0".into())],
+        provenance: vec![("domelight.version".into(), "test".into())],
+        tiles: session.tiles(),
+        n_tiles: session.tiling().n_tiles(),
+        n_samples,
+        complete: session.is_complete(),
+        counts: session.counts(),
+        film: session.film(),
+    }
+}
+
+/// Ends a run after some tiles.
+struct After(AtomicUsize);
+
+impl After {
+    fn tiles(n: usize) -> Self {
+        Self(AtomicUsize::new(n))
+    }
+}
+
+impl Observer for After {
+    fn tile_finished(&self, _: &Counts) {
+        let _ = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1));
+    }
+
+    fn cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed) == 0
+    }
+}
+
+fn pool(n_threads: usize) -> rayon::ThreadPool {
+    rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap()
+}
+
+#[test]
+fn a_resumed_render_has_the_bits_of_the_uninterrupted_one() {
+    let (stage, settings) = (stage(), settings());
+    let (mis, expected) = (mis(&stage), uninterrupted(&stage, &settings));
+    let mut random = Pcg32::new(1, 1);
+    for n_threads in [1, 2] {
+        pool(n_threads).install(|| {
+            let mut saved: Option<Vec<u8>> = None;
+            let mut interruptions = 0;
+            let rendering = loop {
+                let mut session = session(&stage, &mis, &settings);
+                if let Some(bytes) = &saved {
+                    let checkpoint = Checkpoint::decode(bytes).unwrap();
+                    session.restore(&checkpoint.film, checkpoint.counts).unwrap();
+                }
+                if session.run(&After::tiles(1 + random.next_u32() as usize % 40)) {
+                    break session.rendering();
+                }
+                interruptions += 1;
+                saved = Some(checkpoint(&session, settings.n_samples).encode().unwrap());
+            };
+            assert!(interruptions >= 5, "{interruptions}");
+            assert_same(&rendering, &expected);
+        });
+    }
+}
+
+#[track_caller]
+fn assert_same(a: &Rendering, b: &Rendering) {
+    let bytes = |r: &Rendering| r.layers.to_exr(Vec::new()).encode().unwrap();
+    assert!(bytes(a) == bytes(b), "the pictures differ");
+    assert_eq!(a.counts, b.counts);
+    assert!(a.complete && b.complete);
+}
+
+#[test]
+fn more_samples_than_before_go_on_from_what_is_there() {
+    let (stage, few) = (stage(), settings());
+    let many = RenderSettings { n_samples: 20, ..few };
+    let mis = mis(&stage);
+    let mut first = session(&stage, &mis, &few);
+    assert!(first.run(&()));
+    let mut second = session(&stage, &mis, &many);
+    second.restore(&first.film(), first.counts()).unwrap();
+    assert!(!second.is_complete());
+    assert!(second.run(&()));
+    assert_same(&second.rendering(), &uninterrupted(&stage, &many));
+}
+
+#[test]
+fn merged_shards_are_the_single_run() {
+    let (stage, settings) = (stage(), settings());
+    let (mis, expected) = (mis(&stage), uninterrupted(&stage, &settings));
+    let RenderSettings { width, height, .. } = settings;
+    for n in [1, 2, 3, 8, 64] {
+        let mut film = Film::new(width, height, Window { x: 0, y: 0, width, height });
+        let mut counts = Counts::default();
+        for k in (0..n).rev() {
+            let whole = session(&stage, &mis, &settings);
+            let tiles = whole.tiling().shard(k, n);
+            let mut shard = whole.only(tiles);
+            pool(1 + k % 3).install(|| shard.run(&()));
+            let bytes = checkpoint(&shard, settings.n_samples).encode().unwrap();
+            let part = Checkpoint::decode(&bytes).unwrap();
+            assert!(part.complete);
+            film.merge(&part.film);
+            counts += part.counts;
+        }
+        let merged = Rendering { layers: film.layers(), counts, complete: true };
+        assert_same(&merged, &expected);
+    }
+}
+
+#[test]
+fn a_checkpoint_is_a_picture_and_keeps_everything() {
+    let (stage, settings) = (stage(), settings());
+    let mis = mis(&stage);
+    let mut shard = session(&stage, &mis, &settings).only(9..12);
+    shard.run(&After::tiles(4));
+    let saved = checkpoint(&shard, settings.n_samples);
+    let bytes = saved.encode().unwrap();
+    assert_eq!(bytes, saved.encode().unwrap());
+    assert_eq!(Checkpoint::decode(&bytes).unwrap(), saved);
+
+    let picture = domelight::picture::exr::decode(&bytes, None).unwrap();
+    assert_eq!(picture.image, saved.film.layers().color);
+    let exr = ExrLayers::decode(&bytes).unwrap();
+    let Window { x, y, width, height } = saved.film.window;
+    assert_eq!((exr.origin, (exr.width, exr.height)), ((x, y), (width, height)));
+    assert_eq!(exr.whole, Some((settings.width, settings.height)));
+
+    assert_eq!(saved.difference(&saved.identity), None);
+    let other = [("scene".into(), "spheres".into()), ("seed".into(), "1".into())];
+    let difference = saved.difference(&other).unwrap();
+    assert_eq!((difference.name, difference.here, difference.there), ("seed", "0", "1"));
+    assert_eq!(saved.difference(&other[..1]).unwrap().there, "");
+}
+
+#[test]
+fn foreign_and_damaged_files_are_refused() {
+    let (stage, settings) = (stage(), settings());
+    let mis = mis(&stage);
+    let mut shard = session(&stage, &mis, &settings).only(0..3);
+    shard.run(&());
+    let saved = checkpoint(&shard, settings.n_samples);
+    let bytes = saved.encode().unwrap();
+
+    let picture = shard.rendering().layers.to_exr(Vec::new()).encode().unwrap();
+    assert!(matches!(Checkpoint::decode(&picture), Err(CheckpointError::Foreign)));
+    assert!(Checkpoint::decode(b"").is_err());
+    for length in (0..bytes.len()).step_by(997).chain([bytes.len() - 1]) {
+        assert!(Checkpoint::decode(&bytes[..length]).is_err(), "{length} bytes of {}", bytes.len());
+    }
+    // A flipped bit is found, or it changed nothing but the layers to look at.
+    let mut random = Pcg32::new(3, 5);
+    for _ in 0..200 {
+        let mut damaged = bytes.clone();
+        let bit = random.next_u32() as usize % (8 * bytes.len());
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        if let Ok(read) = Checkpoint::decode(&damaged) {
+            assert_eq!(read, saved, "bit {bit}");
+        }
+    }
+}
+
+#[test]
+fn sums_of_another_render_are_refused() {
+    let (stage, settings) = (stage(), settings());
+    let mis = mis(&stage);
+    let mut whole = session(&stage, &mis, &settings);
+    let shard = session(&stage, &mis, &settings).only(0..3);
+    let refused = whole.restore(&shard.film(), Counts::default());
+    assert!(matches!(refused, Err(Misfit::Window { .. })), "{refused:?}");
+    let other_size = Film::new(99, 38, whole.film().window);
+    assert!(whole.restore(&other_size, Counts::default()).is_err());
+}
+
+/// A tile stops by its own samples: the same with its neighbours or without.
+#[test]
+fn tiles_decide_for_themselves_when_the_error_is_reached() {
+    let stage = stage();
+    let settings = RenderSettings { n_samples: 256, target_error: Some(8e-3), ..settings() };
+    let mis = mis(&stage);
+    let mut whole = session(&stage, &mis, &settings);
+    assert!(whole.run(&()));
+    let film = whole.film();
+    let layers = film.layers();
+    let least = layers.n_samples.iter().min().copied();
+    let most = layers.n_samples.iter().max().copied();
+    assert!(least >= Some(16) && least < most, "{least:?} to {most:?}");
+    let mut merged = Film::new(film.width, film.height, film.window);
+    for k in 0..3 {
+        let mut shard = session(&stage, &mis, &settings);
+        let tiles = shard.tiling().shard(k, 3);
+        shard = shard.only(tiles);
+        assert!(shard.run(&()));
+        merged.merge(&shard.film());
+    }
+    assert!(merged == film);
+}

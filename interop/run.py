@@ -1,0 +1,390 @@
+"""Exports rigs of the known probe by `domelight lights` and has each consumer show what it reads.
+
+Prints a row for each consumer and check, writes the pictures side by side to out/sheet.png, and
+exits with 1 if a check fails, or with --ci if one could not be run.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import struct
+import subprocess
+import sys
+import zlib
+
+import numpy as np
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE / "consumers")]
+
+import mitsuba3
+import probe
+import radiance
+import readers
+import reference
+import usd
+
+OUT = HERE / "out"
+DOMELIGHT = os.environ["DOMELIGHT"]
+FORMATS = ["json", "csv", "gltf", "glb", "usda", "py", "xml", "pbrt", "js", "rad", "ibl"]
+# Rigs by name: how `domelight lights` is called, the up axis, the rotation [degrees].
+RIGS = {
+    "lamps": (["--lamps", "3"], "y", 40.0),
+    "lamps-z-up": (["--lamps", "3"], "z", -25.0),
+    # Regions take all light: many lights, wide discs, no dome.
+    "regions": (["-n", "16"], "y", 0.0),
+}
+
+
+class Table:
+    """The checks and the pictures."""
+
+    def __init__(self):
+        self.rows, self.pictures = [], []
+
+    def check(self, consumer, what, measured, limit, unit=1.0, text="{:.3f} %"):
+        ok = bool(measured <= limit)
+        show = text.format(100 * measured * unit)
+        self.rows.append((consumer, what, show, text.format(100 * limit * unit), "ok" if ok else "FAILED"))
+
+    def count(self, consumer, what, measured, limit=0):
+        state = "ok" if measured <= limit else "FAILED"
+        self.rows.append((consumer, what, str(measured), str(limit), state))
+
+    def failed(self, consumer, what, error):
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        self.rows.append((consumer, what, lines[-1][:100], "", "FAILED"))
+
+    def not_run(self, consumer, what, why):
+        self.rows.append((consumer, what, why, "", "not run"))
+
+    def compare(self, consumer, rig, view, picture, expected, limit):
+        """A picture with what it must be: RMS difference."""
+        rms, worst = reference.distance(picture, expected, view)
+        self.rows.append(
+            (
+                consumer,
+                f"{rig.name}, {view}: sphere",
+                f"{100 * rms:.2f} % (worst pixel {100 * worst:.1f} %)",
+                f"{100 * limit:.1f} %",
+                "ok" if rms <= limit else "FAILED",
+            )
+        )
+        self.pictures.append((expected, picture))
+
+    def print(self):
+        header = ("consumer", "check", "measured", "limit", "")
+        widths = [max(len(row[i]) for row in [header, *self.rows]) for i in range(5)]
+        for row in [header, tuple("-" * w for w in widths), *self.rows]:
+            print("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip())
+
+    def write_sheet(self, path, columns=4):
+        """Pictures in threes: what it must be, what it is, ten times the difference."""
+        cells = []
+        for expected, picture in self.pictures:
+            difference = np.abs(picture - expected) * 10
+            row = [np.nan_to_num(p) for p in (expected, picture, difference)]
+            cells.append(np.pad(np.concatenate(row, 1), ((2, 2), (2, 6), (0, 0)), constant_values=0.3))
+        while len(cells) % columns:
+            cells.append(np.zeros_like(cells[0]))
+        sheet = np.concatenate(
+            [np.concatenate(cells[i : i + columns], 1) for i in range(0, len(cells), columns)], 0
+        )
+        write_png(path, (255 * np.clip(0.7 * sheet, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8))
+
+
+def write_png(path, pixels):
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    height, width, _ = pixels.shape
+    raw = np.concatenate([np.zeros((height, 1), np.uint8), pixels.reshape(height, -1)], 1).tobytes()
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    data = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(raw)) + chunk(b"IEND", b"")
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + data)
+
+
+def domelight(*arguments):
+    subprocess.run([DOMELIGHT, *map(str, arguments), "--quiet"], check=True)
+
+
+class Rig:
+    """A rig's files, and what our JSON says that it is, turned to +Y up."""
+
+    def __init__(self, name):
+        self.name, self.folder = name, OUT / name
+        (arguments, self.up, rotation) = RIGS[name]
+        self.folder.mkdir(parents=True, exist_ok=True)
+        outputs = [x for e in FORMATS for x in ("-o", self.folder / f"rig.{e}")]
+        if "-n" not in arguments:
+            outputs += ["--keep-residual", self.folder / "residual.exr"]
+        orientation = ["--env-up", self.up, "--env-rotate", rotation]
+        domelight("lights", OUT / "probe.pfm", *arguments, *orientation, *outputs)
+        self.json = json.loads(self.file("json").read_text())
+        world_to_y_up = np.eye(3) if self.up == "y" else np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+        c, s = np.cos(np.radians(rotation)), np.sin(np.radians(rotation))
+        self.map_to_y_up = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+        self.map_to_world = world_to_y_up.T @ self.map_to_y_up
+        self.lights = [
+            {
+                "name": light["name"],
+                "world": np.array(light["direction"]),
+                "direction": world_to_y_up @ np.array(light["direction"]),
+                "irradiance": np.array(light["irradiance"]),
+                "angular_radius": light["angular_radius"],
+            }
+            for light in self.json["lights"]
+        ]
+        self.residual = None
+        if self.json["dome"]:
+            domelight("probe", self.folder / "residual.exr", "-o", self.folder / "residual.pfm")
+            self.residual = probe.read_pfm(self.folder / "residual.pfm")
+            self.dome = reference.environment(self.residual)
+        self.expected = {
+            kind: {view: reference.picture(view, self.irradiance(light), sub=2) for view in reference.VIEWS}
+            for kind, light in [
+                ("parallel", reference.parallel(self.lights)),
+                ("discs", reference.discs(self.lights, np.pi / 2)),
+            ]
+        }
+
+    def file(self, extension):
+        return self.folder / f"rig.{extension}"
+
+    def irradiance(self, lights):
+        """Of lights and dome, over normals of a world with +Y up."""
+        if self.residual is None:
+            return lights
+        return lambda n: lights(n) + self.dome(n @ self.map_to_y_up)
+
+    def texel_directions(self, rows=16):
+        """u, v over the dome's picture and their directions in the world of the rig."""
+        d, _ = probe.directions(2 * rows, rows)
+        v, u = np.meshgrid((np.arange(rows) + 0.5) / rows, (np.arange(2 * rows) + 0.5) / (2 * rows), indexing="ij")
+        return u.ravel(), v.ravel(), d.reshape(-1, 3) @ self.map_to_world.T
+
+    def radiance(self, directions):
+        """Of the dome toward directions in the world of the rig, from the nearest texel."""
+        x, y, z = (directions @ self.map_to_world).T
+        height, width, _ = self.residual.shape
+        u = np.arctan2(x, -z) / (2 * np.pi) + 0.5
+        v = np.arctan2(np.hypot(x, z), y) / np.pi
+        column = np.minimum((u * width).astype(int), width - 1)
+        return self.residual[np.minimum((v * height).astype(int), height - 1), column]
+
+
+def angle(a, b):
+    return np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+
+
+def check_domelight(table, rigs):
+    """Our own renderer, and the rig against the lamps that were put into the probe."""
+    lamps = rigs["lamps"]
+    found = [min(lamps.lights, key=lambda l, e=e: abs(l["irradiance"] - e).max()) for _, e in probe.LAMPS]
+    directions = [lamps.map_to_y_up @ toward for toward, _ in probe.LAMPS]
+    worst = max(angle(l["direction"], d) for l, d in zip(found, directions, strict=True))
+    table.check("domelight lights", "lamps: directions of the lamps", worst, 0.1, 0.01, "{:.4f}°")
+    off = max(abs(l["irradiance"] - e).max() / e.max() for l, (_, e) in zip(found, probe.LAMPS, strict=True))
+    table.check("domelight lights", "lamps: irradiance of the lamps", off, 0.02)
+    camera = ["--target", "0,0,0", "--size", f"{reference.SIZE}x{reference.SIZE}", "--filter", "box"]
+    camera += ["--material", "diffuse:1", "--hide-env"]
+    for rig, light, expected in [
+        (lamps, ["--strategy", "mis", "--spp", "1024"], "discs"),
+        (rigs["regions"], ["--strategy", "variance-minimization", "--lights", "16", "--spp", "64"], "parallel"),
+    ]:
+        _, _, rotation = RIGS[rig.name]
+        for view, side in reference.VIEWS.items():
+            out = rig.folder / f"ours-{view}.pfm"
+            eye = f"0,0,{4 * side:.0f}"
+            environment = ["--env", OUT / "probe.pfm", "--env-rotate", rotation]
+            domelight("render", "sphere-orthographic", *environment, *light, *camera, "--origin", eye, "-o", out)
+            picture = probe.read_pfm(out)
+            rig.ours = {**getattr(rig, "ours", {}), view: picture}
+            table.compare("domelight render", rig, view, picture, rig.expected[expected][view], 0.01)
+
+
+def check_mitsuba(table, rigs):
+    name = f"Mitsuba {mitsuba3.VERSION}"
+    for rig in [rigs["lamps"], rigs["regions"]]:
+        for view in reference.VIEWS:
+            picture = mitsuba3.render(rig.file("xml"), view, rig.residual is not None)
+            table.compare(name, rig, view, picture, rig.expected["parallel"][view], 0.01)
+            if rig.name == "regions":
+                rms, _ = reference.distance(picture, rig.ours[view], view)
+                table.check(name, f"regions, {view}: sphere, against domelight render", rms, 0.01)
+
+
+def check_radiance(table, rigs):
+    for rig in rigs.values():
+        for view in reference.VIEWS:
+            picture = radiance.render(rig.file("rad"), view, rig.residual is not None)
+            expected = rig.expected["parallel"][view]
+            table.compare(f"Radiance {radiance.VERSION}", rig, view, picture, expected, 0.01)
+
+
+def check_usd(table, rigs):
+    name = f"OpenUSD {usd.VERSION}"
+    for rig in rigs.values():
+        path = rig.file("usda")
+        read = usd.lights(path)
+        assert set(read) == {light["name"] for light in rig.lights}
+        table.count(name, f"{rig.name}: up axis is not the rig's", int(usd.up_axis(path).lower() != rig.up))
+        pairs = [(light, *read[light["name"]]) for light in rig.lights]
+        off = max(angle(light["world"], d) for light, d, _, _ in pairs)
+        table.check(name, f"{rig.name}: directions", off, 1e-3, 0.01, "{:.5f}°")
+        off = max(abs(e - light["irradiance"]).max() / e.max() for light, _, e, _ in pairs)
+        table.check(name, f"{rig.name}: radiance times solid angle", off, 1e-4, text="{:.4f} %")
+        off = max(abs(a - min(light["angular_radius"], np.pi / 2)) for light, _, _, a in pairs)
+        table.check(name, f"{rig.name}: angular radius", np.degrees(off), 1e-3, 0.01, "{:.5f}°")
+        if rig.residual is not None:
+            texture, direction = usd.dome(path)
+            table.count(name, f"{rig.name}: dome's texture not found", int(not os.path.isfile(texture)))
+            u, v, world = rig.texel_directions()
+            off = np.linalg.norm(direction(u, v) - world, axis=1).max()
+            table.check(name, f"{rig.name}: directions of the dome's texels", np.degrees(off), 1e-3, 0.01, "{:.5f}°")
+
+
+def check_gltf(table, rigs):
+    files = [rig.file(e) for rig in rigs.values() for e in ("gltf", "glb")]
+    done = subprocess.run(
+        ["node", HERE / "web" / "validate.mjs", *files], capture_output=True, text=True, check=True
+    )
+    result = json.loads(done.stdout)
+    for file, report in result["reports"].items():
+        name = f"gltf-validator {result['version']}"
+        path = pathlib.Path(file)
+        what = f"{path.parent.name}: errors and warnings in {path.name}"
+        table.count(name, what, report["errors"] + report["warnings"])
+
+
+def check_web(table, rigs):
+    jobs = []
+    for rig in rigs.values():
+        calls = [("three", "module", "js"), ("three", "gltf", "glb"), ("three", "gltf", "gltf"), ("babylon", "gltf", "glb")]
+        if rig.residual is not None:
+            calls.append(("three", "dome", "js"))
+        for page, call, extension in calls:
+            for view in reference.VIEWS:
+                out = rig.folder / f"{page}-{call}-{extension}-{view}.raw"
+                job = {"page": page, "call": call, "rig": f"{rig.name}/rig.{extension}", "view": view, "out": str(out)}
+                jobs.append((rig, job))
+    path = OUT / "jobs.json"
+    path.write_text(json.dumps({"size": reference.SIZE, "folder": str(OUT), "jobs": [job for _, job in jobs]}))
+    done = subprocess.run(["node", HERE / "web" / "render.mjs", path], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(done.stderr)
+    versions = json.loads(done.stdout)
+    names = {
+        ("three", "module"): f"three.js {versions['three']}, module",
+        ("three", "dome"): f"three.js {versions['three']}, module with setDome",
+        ("three", "gltf"): f"three.js {versions['three']}, GLTFLoader",
+        ("babylon", "gltf"): f"Babylon.js {versions['babylon']}, glTF",
+    }
+    for rig, job in jobs:
+        page, call, view = job["page"], job["call"], job["view"]
+        pixels = np.fromfile(job["out"], "<f4").reshape(reference.SIZE, reference.SIZE, 4)[::-1, :, :3]
+        expected = rig.expected["parallel"][view]
+        name = names[page, call]
+        if (page, call) == ("three", "gltf"):
+            # GLTFLoader passes over the image-based light.
+            expected = reference.picture(view, reference.parallel(rig.lights), sub=2)
+            name += " " + job["rig"].split(".")[-1]
+        table.compare(name, rig, view, pixels.astype(float), expected, 0.01)
+
+
+def check_blender(table, rigs):
+    script = HERE / "consumers" / "blender_scene.py"
+    for rig in rigs.values():
+        for view in reference.VIEWS:
+            # Once as a script, once line by line as in the console.
+            how = [] if view == "front" else ["paste"]
+            out = rig.folder / f"blender-{view}.npy"
+            command = [sys.executable, script, "rig.py", out, view, reference.SIZE, 1024, *how]
+            done = subprocess.run(list(map(str, command)), cwd=rig.folder, capture_output=True, text=True)
+            if done.returncode:
+                raise RuntimeError(done.stderr)
+            read = json.loads(out.with_suffix(".json").read_text())
+            name = f"Blender {read['version']}, " + ("script" if view == "front" else "pasted")
+            table.compare(name, rig, view, np.load(out), rig.expected["discs"][view], 0.02)
+        z_up = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+        pairs = [(light, read["lights"][light["name"]]) for light in rig.lights]
+        off = max(angle(z_up @ light["direction"], np.array(sun["toward"])) for light, sun in pairs)
+        table.check(name, f"{rig.name}: directions", off, 1e-3, 0.01, "{:.5f}°")
+        off = max(abs(sun["angle"] / 2 - min(light["angular_radius"], np.pi / 2)) for light, sun in pairs)
+        table.check(name, f"{rig.name}: angular radius", np.degrees(off), 1e-3, 0.01, "{:.5f}°")
+
+
+def check_readers(table, rigs):
+    for rig in rigs.values():
+        name = "pbrt-v4, a reader, not the program"
+        lights, file, world_from_light = readers.pbrt(rig.file("pbrt"))
+        off = max(angle(light["world"], d) for light, (d, _) in zip(rig.lights, lights, strict=True))
+        table.check(name, f"{rig.name}: directions", off, 1e-3, 0.01, "{:.5f}°")
+        off = max(abs(light["irradiance"] - e).max() for light, (_, e) in zip(rig.lights, lights, strict=True))
+        table.check(name, f"{rig.name}: irradiance", off, 1e-6, text="{:.4f} %")
+        if rig.residual is not None:
+            octahedral = np.array(mitsuba3.mi.Bitmap(str(rig.folder / file)), float)[..., :3]
+            assert octahedral.shape[0] == octahedral.shape[1]
+            _, _, world = rig.texel_directions()
+            u, v = readers.equal_area_square(world @ world_from_light)
+            size = octahedral.shape[0]
+            read = octahedral[np.minimum((v * size).astype(int), size - 1), np.minimum((u * size).astype(int), size - 1)]
+            expected = rig.radiance(world)
+            off = np.sqrt(((read - expected) ** 2).mean() / (expected**2).mean())
+            table.check(name, f"{rig.name}: radiance of the dome", off, 0.01)
+
+        name = "sIBL, a reader, not a program"
+        lights, file = readers.sibl(rig.file("ibl"))
+        worst, strength = 0.0, 0.0
+        for light, (u, v, color) in zip(rig.lights, lights, strict=True):
+            theta, phi = np.pi * v, 2 * np.pi * (u - 0.5)
+            toward = [np.sin(phi) * np.sin(theta), np.cos(theta), -np.cos(phi) * np.sin(theta)]
+            worst = max(worst, angle(rig.map_to_world @ np.array(toward), light["world"]))
+            strength = max(strength, abs(color * np.pi - light["irradiance"]).max() / light["irradiance"].max())
+        table.check(name, f"{rig.name}: places of the lights", worst, 1e-3, 0.01, "{:.5f}°")
+        table.check(name, f"{rig.name}: colours, of 8 bits", strength, 0.5 / 255 + 1e-6)
+        if rig.residual is not None:
+            table.count(name, f"{rig.name}: panorama not found", int(not (rig.folder / file).is_file()))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--ci", action="store_true", help="leave Blender out; fail if anything else is not run")
+    arguments = parser.parse_args()
+    OUT.mkdir(exist_ok=True)
+    probe.write_pfm(OUT / "probe.pfm", probe.image())
+    rigs = {name: Rig(name) for name in RIGS}
+
+    table = Table()
+    checks = [
+        ("domelight", check_domelight),
+        ("Mitsuba", check_mitsuba),
+        ("Radiance", check_radiance),
+        ("OpenUSD", check_usd),
+        ("gltf-validator", check_gltf),
+        ("three.js, Babylon.js", check_web),
+        ("pbrt-v4, sIBL", check_readers),
+    ]
+    for name, check in checks:
+        try:
+            check(table, rigs)
+        except Exception as error:  # A consumer that fails is a row, and the others still run.
+            table.failed(name, "runs", error)
+    if arguments.ci:
+        table.not_run("Blender", "all", "left out by --ci")
+    elif subprocess.run([sys.executable, "-c", "import bpy"], capture_output=True).returncode:
+        table.not_run("Blender", "all", f"no wheel for Python {sys.version.split()[0]}")
+    else:
+        try:
+            check_blender(table, rigs)
+        except Exception as error:
+            table.failed("Blender", "runs", error)
+    table.print()
+    table.write_sheet(OUT / "sheet.png")
+    failed = sum(row[-1] == "FAILED" for row in table.rows)
+    print(f"\n{len(table.rows)} checks, {failed} failed; pictures in {OUT / 'sheet.png'}")
+    sys.exit(1 if failed else 0)
+
+
+main()
