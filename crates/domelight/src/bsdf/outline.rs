@@ -20,6 +20,17 @@ pub enum Gloss {
     },
 }
 
+impl Gloss {
+    /// The roughness, of a mirror lobe that of the microfacets which reflect as widely: their normals
+    /// turn by half the angle.
+    pub fn width(&self) -> f32 {
+        match *self {
+            Self::Slopes { alpha: [x, y], .. } => x.min(y),
+            Self::Mirror { exponent } => (2.0 / (exponent + 2.0)).sqrt() * 0.5,
+        }
+    }
+}
+
 /// A diffuse part and glossy lobes, weighed by the light that they reflect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outline {
@@ -33,11 +44,6 @@ impl Outline {
     /// The glossy lobes with their albedos.
     pub fn lobes(&self) -> impl Iterator<Item = (f32, Gloss)> {
         self.glossy.iter().copied().flatten()
-    }
-
-    /// Reflects by the cosine alone.
-    pub fn is_diffuse(&self) -> bool {
-        self.glossy[0].is_none()
     }
 }
 

@@ -24,7 +24,7 @@ pub struct Session<'a, S: Strategy> {
     tiling: Tiling,
     /// Which tiles.
     range: Range<usize>,
-    tiles: Vec<(Tile, S::Learned)>,
+    tiles: Vec<Tile>,
     /// What was done before the session was restored.
     before: Counts,
 }
@@ -65,8 +65,7 @@ impl<'a, S: Strategy> Session<'a, S> {
     /// If there are no such tiles.
     #[must_use]
     pub fn only(mut self, tiles: Range<usize>) -> Self {
-        let tile = |t| (Tile::new(self.tiling.tile(t)), S::Learned::default());
-        self.tiles = tiles.clone().map(tile).collect();
+        self.tiles = tiles.clone().map(|t| Tile::new(self.tiling.tile(t))).collect();
         self.range = tiles;
         self
     }
@@ -98,12 +97,12 @@ impl<'a, S: Strategy> Session<'a, S> {
                 |tile: &Tile| tile.n_samples() == start && !tile.is_finished(frame.settings);
             let complete = tiles
                 .par_iter_mut()
-                .filter(|(tile, _)| behind(tile))
-                .map_init(Scratch::<S>::default, |scratch, (tile, learned)| {
+                .filter(|tile| behind(tile))
+                .map_init(Scratch::<S>::default, |scratch, tile| {
                     if observer.cancelled() {
                         return false;
                     }
-                    let counts = tile.render(frame, *strategy, &pass, learned, scratch);
+                    let counts = tile.render(frame, *strategy, &pass, scratch);
                     observer.tile_finished(&counts);
                     true
                 })
@@ -121,13 +120,12 @@ impl<'a, S: Strategy> Session<'a, S> {
     }
 
     fn unfinished(&self) -> impl Iterator<Item = &Tile> {
-        let tiles = self.tiles.iter().map(|(tile, _)| tile);
-        tiles.filter(|tile| !tile.is_finished(self.frame.settings))
+        self.tiles.iter().filter(|tile| !tile.is_finished(self.frame.settings))
     }
 
     /// What was done, before the session was restored as well.
     pub fn counts(&self) -> Counts {
-        self.tiles.iter().fold(self.before, |sum, (tile, _)| sum + tile.counts)
+        self.tiles.iter().fold(self.before, |sum, tile| sum + tile.counts)
     }
 
     /// The sums of all pixels so far.
@@ -135,7 +133,7 @@ impl<'a, S: Strategy> Session<'a, S> {
         let RenderSettings { width, height, .. } = *self.frame.settings;
         let window = self.tiling.window(&self.range);
         let mut film = Film::new(width, height, window);
-        for (tile, _) in &self.tiles {
+        for tile in &self.tiles {
             film.put(tile.window, &tile.pixels);
         }
         film
@@ -147,7 +145,7 @@ impl<'a, S: Strategy> Session<'a, S> {
     /// If they are of another part or size of picture, or of no whole number of passes.
     pub fn restore(&mut self, film: &Film, counts: Counts) -> Result<(), Misfit> {
         film.require_window(self.frame.settings, self.tiling.window(&self.range))?;
-        for (tile, _) in &mut self.tiles {
+        for tile in &mut self.tiles {
             let pixels: Vec<PixelSums> = film.get(tile.window);
             let n_samples = pixels[0].n_samples();
             if pixels.iter().any(|p| p.n_samples() != n_samples) {

@@ -71,14 +71,6 @@ pub(super) struct Pass<S: Strategy> {
     pub(super) shared: S::Pass,
 }
 
-/// A strategy and all that it is given at a tile.
-struct Lesson<'a, S: Strategy> {
-    strategy: &'a S,
-    pass: &'a S::Pass,
-    learned: &'a mut S::Learned,
-    scratch: &'a mut S::Scratch,
-}
-
 /// One pass over a tile.
 #[derive(Default)]
 struct Batch {
@@ -133,7 +125,6 @@ impl Tile {
         frame: &Frame,
         strategy: &S,
         pass: &Pass<S>,
-        learned: &mut S::Learned,
         scratch: &mut Scratch<S>,
     ) -> Counts {
         let Scratch { batch, of_strategy } = scratch;
@@ -144,8 +135,8 @@ impl Tile {
             shading_points: batch.points.len() as u64,
             ..Counts::default()
         };
-        let lesson = Lesson { strategy, pass: &pass.shared, learned, scratch: of_strategy };
-        counts.shadow_rays = batch.trace_strategy(frame, lesson, self.window.width);
+        let (shared, width) = (&pass.shared, self.window.width);
+        counts.shadow_rays = batch.trace_strategy(frame, strategy, shared, of_strategy, width);
         counts.non_finite = self.add_samples(frame, batch);
         self.counts += counts;
         counts
@@ -235,10 +226,11 @@ impl Batch {
     fn trace_strategy<S: Strategy>(
         &mut self,
         frame: &Frame,
-        lesson: Lesson<S>,
+        strategy: &S,
+        pass: &S::Pass,
+        scratch: &mut S::Scratch,
         width: usize,
     ) -> u64 {
-        let Lesson { strategy, pass, learned, scratch } = lesson;
         let n = self.points.len();
         self.radiance.clear();
         self.radiance.resize(n, Rgb::BLACK);
@@ -253,7 +245,7 @@ impl Batch {
                 width,
             };
             self.round.asked.reset(n);
-            let more = strategy.push(pass, &tile, round, learned, scratch, &mut self.round.asked);
+            let more = strategy.push(pass, &tile, round, scratch, &mut self.round.asked);
             n_rays += self.round.asked.len() as u64;
 
             self.round.trace(frame, &self.points, &self.origins);
@@ -270,10 +262,10 @@ impl Batch {
                     self.radiance[point as usize] += weight;
                 }
             }
-            strategy.learn(&tile, &self.round.asked, &self.round.free, scratch, learned);
             if more == Round::Done {
                 break;
             }
+            strategy.learn(&tile, &self.round.asked, &self.round.free, scratch);
         }
         n_rays
     }

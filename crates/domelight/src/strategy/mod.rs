@@ -232,10 +232,8 @@ pub enum Round {
 pub trait Strategy: Sync {
     /// What all tiles of a pass share.
     type Pass: Sync;
-    /// What the rounds of a tile teach, kept from pass to pass.
-    type Learned: Default + Send;
-    /// Memory that a thread keeps from tile to tile; from one round to its lesson it may carry what
-    /// was asked for.
+    /// Memory that a thread keeps. It carries what is learned from round to round of a tile, and nothing
+    /// from tile to tile: passes are independent, so a render may be interrupted between them.
     type Scratch: Default;
 
     /// Shadow rays asked for at each point at the most: for sizing batches.
@@ -257,26 +255,23 @@ pub trait Strategy: Sync {
         pass: &Self::Pass,
         tile: &TileShading,
         round: u32,
-        learned: &Self::Learned,
         scratch: &mut Self::Scratch,
         out: &mut Contributions,
     ) -> Round;
 
-    /// Is told which rays of the last round were free.
+    /// Is told which rays of a round were free that is not the last.
     fn learn(
         &self,
         _tile: &TileShading,
         _pushed: &Contributions,
         _free: &[bool],
         _scratch: &mut Self::Scratch,
-        _learned: &mut Self::Learned,
     ) {
     }
 }
 
 impl<S: PointStrategy> Strategy for S {
     type Pass = ();
-    type Learned = ();
     type Scratch = S::Scratch;
 
     fn n_rays(&self) -> u32 {
@@ -290,7 +285,6 @@ impl<S: PointStrategy> Strategy for S {
         (): &(),
         tile: &TileShading,
         _round: u32,
-        (): &(),
         scratch: &mut S::Scratch,
         out: &mut Contributions,
     ) -> Round {

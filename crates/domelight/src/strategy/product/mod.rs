@@ -14,11 +14,9 @@
 //! base = Σ_j W_j V̂_j − Σ_chosen (W_j/π_j) V̂_j        rays: weight W_j/π_j
 //! ```
 //!
-//! Later passes have no pilots: what earlier passes learned serves all pixels.
-//!
 //! The expectation is ∫ f L V dω for every V̂, brightness and pool, given that they do not depend on
-//! the numbers that strata, samples and choice are drawn with: V̂ and brightness come from other pixels
-//! or earlier passes, and each pixel and pass has a stream of numbers of its own. The density of the
+//! the numbers that strata, samples and choice are drawn with: V̂ and brightness come from other
+//! pixels, and each pixel and pass has a stream of numbers of its own. The density of the
 //! candidates depends on the pixel's hits alone, so what the pool and V̂ have in common does no harm.
 //!
 //! Related: Clarberg & Akenine-Möller 2008, "Practical Product Importance Sampling for Direct
@@ -34,7 +32,6 @@ mod table;
 mod visibility;
 
 pub use pool::Pool;
-pub use visibility::Learned;
 
 use super::{Contributions, PixelPoints, Round, Strategy, TileShading};
 use crate::Rgb;
@@ -46,18 +43,25 @@ use cells::Cells;
 use choose::Choice;
 use hits::Groups;
 use table::Table;
-use visibility::{Blocks, Visibility};
+use visibility::{Blocks, Learned, Visibility};
 
 /// Camera samples of a pass: strata that one random offset spreads over all of them are worth more
 /// than the same number in two sets, and a tile's rays still fit the caches.
-const SAMPLES_PER_PASS: u32 = 16;
+const SAMPLES_PER_PASS: u32 = 32;
 
-/// Of the candidates for a glossy material one in this many comes from the material.
-const BRDF_SHARE: usize = 8;
+/// Candidates of a pixel in a pass, for the sake of memory.
+const MAX_CANDIDATES: u32 = 1 << 14;
+
+/// Of the candidates for a glossy material one in this many comes from the material: of lobes as wide
+/// as cells, and of narrower ones, which the table hardly sees.
+const BRDF_SHARE: [usize; 2] = [8, 4];
+
+/// The roughness below which a lobe is narrower than most cells.
+const NARROW: f32 = 0.1;
 
 /// The error of a candidate that does not matter, as a share of the pixel's brightness over the
 /// number of candidates: of diffuse and of glossy pixels.
-const TOLERANCE: [f32; 2] = [0.64, 1.28];
+const TOLERANCE: [f32; 2] = [0.4, 0.6];
 
 /// Pixels darker than this share of the environment's mean are not held to their own brightness.
 const DARK: f32 = 0.15;
@@ -89,8 +93,10 @@ impl<'a> ProductSampling<'a> {
     /// How many candidates the hits of a pixel have together.
     fn counts(&self, groups: &Groups, n_hits: usize) -> Counts {
         let all = self.n_rays as usize * n_hits;
-        let diffuse = groups.groups.iter().all(|g| g.outline.is_diffuse());
-        let brdf = if diffuse { 0 } else { all.div_ceil(BRDF_SHARE) };
+        let lobes = groups.groups.iter().flat_map(|g| g.outline.lobes());
+        let narrowest = lobes.map(|(_, gloss)| gloss.width()).reduce(f32::min);
+        let share = |width| BRDF_SHARE[usize::from(width < NARROW)];
+        let brdf = narrowest.map_or(0, |width| all.div_ceil(share(width)));
         Counts { light: all - brdf, brdf }
     }
 
@@ -110,34 +116,18 @@ pub struct ProductScratch {
     visibility: Visibility,
     /// Of each ray of the round the cell that it goes to.
     targets: Vec<u16>,
-    /// The pixels of the round.
-    pixels: Vec<usize>,
-    /// This round ends the pass.
-    last: bool,
+    /// The pilots with hits.
+    pilots: Vec<usize>,
+    learned: Learned,
 }
 
-/// Which pixels of a tile a round is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Which {
-    Pilots,
-    Others,
-    All,
-}
-
-impl Which {
-    fn includes(self, x: usize, y: usize) -> bool {
-        let pilot = x.is_multiple_of(2) && y.is_multiple_of(2);
-        match self {
-            Self::Pilots => pilot,
-            Self::Others => !pilot,
-            Self::All => true,
-        }
-    }
+/// One pixel of each 2 × 2 goes first.
+fn is_pilot(x: usize, y: usize) -> bool {
+    x.is_multiple_of(2) && y.is_multiple_of(2)
 }
 
 impl Strategy for ProductSampling<'_> {
     type Pass = Pool;
-    type Learned = Learned;
     type Scratch = ProductScratch;
 
     fn n_rays(&self) -> u32 {
@@ -145,7 +135,7 @@ impl Strategy for ProductSampling<'_> {
     }
 
     fn samples_per_pass(&self) -> Option<u32> {
-        Some(SAMPLES_PER_PASS)
+        Some((MAX_CANDIDATES / self.n_rays).clamp(1, SAMPLES_PER_PASS))
     }
 
     fn begin_pass(&self, stream: Stream) -> Pool {
@@ -158,18 +148,13 @@ impl Strategy for ProductSampling<'_> {
         pool: &Pool,
         tile: &TileShading,
         round: u32,
-        learned: &Learned,
         scratch: &mut ProductScratch,
         out: &mut Contributions,
     ) -> Round {
         let Some(cells) = &self.cells else { return Round::Done };
-        let which = match (learned.n_passes, round) {
-            (0, 0) => Which::Pilots,
-            (0, _) => Which::Others,
-            _ => Which::All,
-        };
-        vectorized(Asking { strategy: self, cells, pool, tile, which, learned, scratch, out });
-        if which == Which::Pilots { Round::More } else { Round::Done }
+        let pilots = round == 0;
+        vectorized(Asking { strategy: self, cells, pool, tile, pilots, scratch, out });
+        if pilots { Round::More } else { Round::Done }
     }
 
     fn learn(
@@ -178,26 +163,22 @@ impl Strategy for ProductSampling<'_> {
         pushed: &Contributions,
         free: &[bool],
         scratch: &mut ProductScratch,
-        learned: &mut Learned,
     ) {
-        if self.cells.is_none() {
-            return;
-        }
         let blocks = tile.blocks();
-        learned.prepare(blocks, tile.pixels.len());
+        let ProductScratch { learned, pilots, targets, .. } = scratch;
+        learned.reset(blocks, tile.pixels.len());
         let mut ray = 0;
-        for &i in &scratch.pixels {
+        for &i in &*pilots {
             let PixelPoints { points, n_samples, .. } = &tile.pixels[i];
             let block = blocks.of(i % tile.width, i / tile.width);
-            let mut sum: Rgb = pushed.base[points.clone()].iter().copied().sum();
+            let mut sum = Rgb::BLACK;
             while pushed.point.get(ray).is_some_and(|&point| (point as usize) < points.end) {
-                learned.count(block, usize::from(scratch.targets[ray]), free[ray]);
+                learned.count(block, usize::from(targets[ray]), free[ray]);
                 sum += if free[ray] { pushed.weight[ray] } else { Rgb::BLACK };
                 ray += 1;
             }
-            learned.add_luminance(i, sum.luminance(), *n_samples);
+            learned.set_luminance(i, sum.luminance() / *n_samples as f32);
         }
-        learned.n_passes += u32::from(scratch.last);
     }
 }
 
@@ -207,8 +188,7 @@ struct Asking<'a, 'e> {
     cells: &'a Cells,
     pool: &'a Pool,
     tile: &'a TileShading<'a>,
-    which: Which,
-    learned: &'a Learned,
+    pilots: bool,
     scratch: &'a mut ProductScratch,
     out: &'a mut Contributions,
 }
@@ -218,18 +198,17 @@ impl Work for Asking<'_, '_> {
 
     #[inline(always)]
     fn run(mut self) {
-        let Self { tile, which, .. } = self;
+        let Self { tile, pilots, .. } = self;
         let blocks = tile.blocks();
-        if which != Which::Pilots {
-            self.scratch.visibility.estimate(self.learned, blocks);
+        let ProductScratch { visibility, learned, .. } = &mut *self.scratch;
+        if !pilots {
+            visibility.estimate(learned, blocks);
         }
         self.scratch.targets.clear();
-        self.scratch.pixels.clear();
-        self.scratch.last = which != Which::Pilots;
+        self.scratch.pilots.clear();
         for (i, pixel) in tile.pixels.iter().enumerate() {
             let (x, y) = (i % tile.width, i / tile.width);
-            if which.includes(x, y) && !pixel.points.is_empty() {
-                self.scratch.pixels.push(i);
+            if is_pilot(x, y) == pilots && !pixel.points.is_empty() {
                 self.ask(i, pixel, blocks.of(x, y));
             }
         }
@@ -240,9 +219,17 @@ impl Asking<'_, '_> {
     /// Asks for the rays of a pixel.
     #[inline(always)]
     fn ask(&mut self, i: usize, pixel: &PixelPoints, block: usize) {
-        let Self { strategy, tile, learned, .. } = *self;
-        let ProductScratch { groups, table, strata, candidates, visibility, targets, .. } =
-            &mut *self.scratch;
+        let Self { strategy, tile, .. } = *self;
+        let ProductScratch {
+            groups,
+            table,
+            strata,
+            candidates,
+            visibility,
+            targets,
+            pilots,
+            learned,
+        } = &mut *self.scratch;
         let points = &tile.points[pixel.points.clone()];
         groups.gather(points);
         table.fill(self.cells, &groups.groups);
@@ -254,7 +241,8 @@ impl Asking<'_, '_> {
         let sources = Sources { environment, cells, pool, table };
         sources.draw(points, counts, &numbers, strata, candidates);
         let mut rays = Rays { pixel, block, out: self.out, targets };
-        if self.which == Which::Pilots {
+        if self.pilots {
+            pilots.push(i);
             rays.push_all(candidates);
         } else {
             let brightness = strategy.expected_brightness(tile.width, learned, i);
@@ -273,12 +261,9 @@ impl TileShading<'_> {
 }
 
 impl ProductSampling<'_> {
-    /// How bright a pixel will be: of what earlier passes found for it, or the harmonic mean over the
-    /// pilots about it, for a dark one among them tells of a shadow's edge.
+    /// How bright a pixel will be: the harmonic mean over the pilots about it, for a dark one among them
+    /// tells of a shadow's edge.
     fn expected_brightness(&self, width: usize, learned: &Learned, pixel: usize) -> f32 {
-        if learned.n_passes > 0 {
-            return self.brightness(learned.luminance(pixel).unwrap_or(0.0));
-        }
         let (x, y) = (pixel % width, pixel / width);
         let (mut n, mut sum) = (0.0, 0.0);
         for y in [y & !1, (y + 1) & !1] {

@@ -11,7 +11,7 @@
 //!
 //! V̂ serves as a control variate: the pixel's estimate is Σ W V̂ + Σ W (V − V̂)/π, whose expectation
 //! does not depend on V̂ as long as V̂ does not depend on the numbers that the second sum is drawn
-//! with. So V̂ comes from other pixels or from earlier passes alone.
+//! with. So V̂ comes from other pixels alone: the pilots.
 
 use super::cells::MAX_CELLS;
 
@@ -22,17 +22,13 @@ const NEIGHBOR: f32 = 0.35;
 
 /// What is known of a tile.
 #[derive(Clone, Debug, Default)]
-pub struct Learned {
+pub(super) struct Learned {
     /// Rays traced from each block to each cell.
-    rays: Vec<u16>,
+    rays: Vec<f32>,
     /// Those that were free.
-    free: Vec<u16>,
-    /// Of each pixel the sum of its luminance over camera samples.
-    luminance: Vec<f32>,
-    /// Of each pixel its camera samples.
-    n_samples: Vec<u32>,
-    /// Passes whose every round is in.
-    pub(super) n_passes: u32,
+    free: Vec<f32>,
+    /// The luminance of each pixel that is known.
+    luminance: Vec<Option<f32>>,
 }
 
 /// A tile cut into blocks.
@@ -69,36 +65,32 @@ impl Blocks {
 }
 
 impl Learned {
-    /// Makes room.
-    pub(super) fn prepare(&mut self, blocks: Blocks, n_pixels: usize) {
-        self.rays.resize(blocks.len() * MAX_CELLS, 0);
-        self.free.resize(blocks.len() * MAX_CELLS, 0);
-        self.luminance.resize(n_pixels, 0.0);
-        self.n_samples.resize(n_pixels, 0);
+    /// Forgets all.
+    pub(super) fn reset(&mut self, blocks: Blocks, n_pixels: usize) {
+        for counts in [&mut self.rays, &mut self.free] {
+            counts.clear();
+            counts.resize(blocks.len() * MAX_CELLS, 0.0);
+        }
+        self.luminance.clear();
+        self.luminance.resize(n_pixels, None);
     }
 
     /// Counts a ray from a block to a cell.
     #[inline(always)]
     pub(super) fn count(&mut self, block: usize, cell: usize, free: bool) {
         let i = block * MAX_CELLS + cell;
-        if self.rays[i] == u16::MAX {
-            self.rays[i] /= 2;
-            self.free[i] /= 2;
-        }
-        self.rays[i] += 1;
-        self.free[i] += u16::from(free);
+        self.rays[i] += 1.0;
+        self.free[i] += if free { 1.0 } else { 0.0 };
     }
 
-    /// Adds the luminance of a pixel, summed over `n` camera samples.
-    pub(super) fn add_luminance(&mut self, pixel: usize, sum: f32, n: u32) {
-        self.luminance[pixel] += sum;
-        self.n_samples[pixel] += n;
+    /// Sets the mean luminance of a pixel.
+    pub(super) fn set_luminance(&mut self, pixel: usize, luminance: f32) {
+        self.luminance[pixel] = Some(luminance);
     }
 
-    /// The mean luminance of a pixel as far as it is known.
+    /// The mean luminance of a pixel, if it is known.
     pub(super) fn luminance(&self, pixel: usize) -> Option<f32> {
-        let n = *self.n_samples.get(pixel)?;
-        (n > 0).then(|| self.luminance[pixel] / n as f32)
+        self.luminance.get(pixel).copied().flatten()
     }
 }
 
@@ -119,8 +111,8 @@ impl Visibility {
         let counts = learned.rays.chunks(MAX_CELLS).zip(learned.free.chunks(MAX_CELLS));
         for (rays, free) in counts {
             for c in 0..MAX_CELLS {
-                n_tile[c] += f32::from(rays[c]);
-                k_tile[c] += f32::from(free[c]);
+                n_tile[c] += rays[c];
+                k_tile[c] += free[c];
             }
         }
         let all = (k_tile.iter().sum::<f32>() + 1.0) / (n_tile.iter().sum::<f32>() + 2.0);
@@ -136,8 +128,8 @@ impl Visibility {
                 let cells = block * MAX_CELLS..(block + 1) * MAX_CELLS;
                 let (rays, free) = (&learned.rays[cells.clone()], &learned.free[cells]);
                 for c in 0..MAX_CELLS {
-                    n[c] += weight * f32::from(rays[c]);
-                    k[c] += weight * f32::from(free[c]);
+                    n[c] += weight * rays[c];
+                    k[c] += weight * free[c];
                 }
             };
             add(block, 1.0);
@@ -169,7 +161,7 @@ mod tests {
         let blocks = Blocks::new(13, 6);
         assert_eq!((blocks.width, blocks.height, blocks.of(12, 5)), (4, 2, 7));
         let mut learned = Learned::default();
-        learned.prepare(blocks, 13 * 6);
+        learned.reset(blocks, 13 * 6);
         let mut visibility = Visibility::default();
         visibility.estimate(&learned, blocks);
         assert!(visibility.visible.iter().all(|&v| v == 0.5));
@@ -189,16 +181,5 @@ mod tests {
                 assert!((visible[cell] - cell as f32 / 100.0).abs() < 0.15);
             }
         }
-    }
-
-    #[test]
-    fn counts_do_not_overflow() {
-        let blocks = Blocks::new(1, 1);
-        let mut learned = Learned::default();
-        learned.prepare(blocks, 1);
-        (0..200_000).for_each(|i| learned.count(0, 3, i % 4 != 0));
-        let mut visibility = Visibility::default();
-        visibility.estimate(&learned, blocks);
-        assert!((visibility.of(0).0[3] - 0.75).abs() < 0.01);
     }
 }
