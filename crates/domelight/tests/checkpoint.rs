@@ -13,7 +13,7 @@ use domelight::render::{
 use domelight::sampling::{Heuristic, Pcg32};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{Camera, CameraSettings, Scene};
-use domelight::strategy::{LightTable, MultipleImportanceSampling};
+use domelight::strategy::{LightTable, MultipleImportanceSampling, ProductSampling, Strategy};
 
 type Mis<'a> = MultipleImportanceSampling<'a>;
 
@@ -46,19 +46,19 @@ fn mis(stage: &Stage) -> Mis<'_> {
     Mis::new(&stage.environment, LightTable::Full, Heuristic::Balance, 1, 1).unwrap()
 }
 
-fn session<'a>(
+fn session<'a, S: Strategy>(
     stage: &'a Stage,
-    mis: &'a Mis<'a>,
+    strategy: &'a S,
     settings: &'a RenderSettings,
-) -> Session<'a, Mis<'a>> {
-    Session::new(&stage.scene, &stage.camera, &stage.environment, mis, settings)
+) -> Session<'a, S> {
+    Session::new(&stage.scene, &stage.camera, &stage.environment, strategy, settings)
 }
 
-fn uninterrupted(stage: &Stage, settings: &RenderSettings) -> Rendering {
-    render(&stage.scene, &stage.camera, &stage.environment, &mis(stage), settings, &())
+fn uninterrupted(stage: &Stage, strategy: &impl Strategy, settings: &RenderSettings) -> Rendering {
+    render(&stage.scene, &stage.camera, &stage.environment, strategy, settings, &())
 }
 
-fn checkpoint(session: &Session<Mis>, n_samples: u32) -> Checkpoint {
+fn checkpoint<S: Strategy>(session: &Session<S>, n_samples: u32) -> Checkpoint {
     Checkpoint {
         identity: vec![("scene".into(), "spheres".into()), ("seed".into(), "0".into())],
         provenance: vec![("domelight.version".into(), "test".into())],
@@ -97,25 +97,36 @@ fn pool(n_threads: usize) -> rayon::ThreadPool {
 #[test]
 fn a_resumed_render_has_the_bits_of_the_uninterrupted_one() {
     let (stage, settings) = (stage(), settings());
-    let (mis, expected) = (mis(&stage), uninterrupted(&stage, &settings));
+    interrupt_and_resume(&stage, &mis(&stage), &settings);
+}
+
+#[test]
+fn a_strategy_that_learns_can_be_interrupted() {
+    let stage = stage();
+    let settings = RenderSettings { n_samples: 40, tile_size: 16, ..settings() };
+    interrupt_and_resume(&stage, &ProductSampling::new(&stage.environment, 2), &settings);
+}
+
+fn interrupt_and_resume<S: Strategy>(stage: &Stage, strategy: &S, settings: &RenderSettings) {
+    let expected = uninterrupted(stage, strategy, settings);
     let mut random = Pcg32::new(1, 1);
     for n_threads in [1, 2] {
         pool(n_threads).install(|| {
             let mut saved: Option<Vec<u8>> = None;
             let mut interruptions = 0;
             let rendering = loop {
-                let mut session = session(&stage, &mis, &settings);
+                let mut session = session(stage, strategy, settings);
                 if let Some(bytes) = &saved {
                     let checkpoint = Checkpoint::decode(bytes).unwrap();
                     session.restore(&checkpoint.film, checkpoint.counts).unwrap();
                 }
-                if session.run(&After::tiles(1 + random.next_u32() as usize % 40)) {
+                if session.run(&After::tiles(1 + random.next_u32() as usize % 10)) {
                     break session.rendering();
                 }
                 interruptions += 1;
                 saved = Some(checkpoint(&session, settings.n_samples).encode().unwrap());
             };
-            assert!(interruptions >= 5, "{interruptions}");
+            assert!(interruptions >= 3, "{interruptions}");
             assert_same(&rendering, &expected);
         });
     }
@@ -140,13 +151,14 @@ fn more_samples_than_before_go_on_from_what_is_there() {
     second.restore(&first.film(), first.counts()).unwrap();
     assert!(!second.is_complete());
     assert!(second.run(&()));
-    assert_same(&second.rendering(), &uninterrupted(&stage, &many));
+    assert_same(&second.rendering(), &uninterrupted(&stage, &mis, &many));
 }
 
 #[test]
 fn merged_shards_are_the_single_run() {
     let (stage, settings) = (stage(), settings());
-    let (mis, expected) = (mis(&stage), uninterrupted(&stage, &settings));
+    let mis = mis(&stage);
+    let expected = uninterrupted(&stage, &mis, &settings);
     let RenderSettings { width, height, .. } = settings;
     for n in [1, 2, 3, 8, 64] {
         let mut layers = Layers::new(width, height);
