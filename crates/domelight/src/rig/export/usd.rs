@@ -84,9 +84,10 @@ fn asset(file: &str) -> String {
     let file = file.replace('\\', "/");
     let anchored = file.starts_with(['/', '.']) || file.contains(':');
     let anchor = if anchored { "" } else { "./" };
-    match file.contains('@') {
-        true => format!("@@@{anchor}{}@@@", file.replace("@@@", "\\@@@")),
-        false => format!("@{anchor}{file}@"),
+    if file.contains('@') {
+        format!("@@@{anchor}{}@@@", file.replace("@@@", "\\@@@"))
+    } else {
+        format!("@{anchor}{file}@")
     }
 }
 
