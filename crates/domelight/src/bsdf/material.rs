@@ -79,7 +79,7 @@ lobe_from!(Lambert, Phong, Ward, Ggx, Beckmann, MetallicRoughness);
 pub const MAX_LOBES: usize = 3;
 
 /// A sum of at most [`MAX_LOBES`] weighted lobes: plain data of 160 bytes, no heap.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Material {
     terms: [Term; MAX_LOBES],
     n_terms: u32,
@@ -208,6 +208,12 @@ impl Material {
 fn reflects(&(weight, lobe): &(f32, Lobe)) -> bool {
     let albedo = lobe.directional_albedo(0.0) + lobe.directional_albedo(1.0);
     weight > 0.0 && !albedo.is_black()
+}
+
+impl PartialEq for Material {
+    fn eq(&self, other: &Self) -> bool {
+        self.terms() == other.terms()
+    }
 }
 
 impl Default for Material {

@@ -119,15 +119,12 @@ impl Cells {
             let (x, y, _) = node.square.turn.quadrant(i);
             let Some(child) = children[2 * y + x] else { continue };
             let child = &tree.nodes[child];
-            self.links[split][2 * y + x] = match child.split {
-                Some(below) => {
-                    self.number(tree, below, child);
-                    Link::Split(below as u16)
-                }
-                None => {
-                    self.squares.push(child.square);
-                    Link::Cell(self.squares.len() as u16 - 1)
-                }
+            self.links[split][2 * y + x] = if let Some(below) = child.split {
+                self.number(tree, below, child);
+                Link::Split(below as u16)
+            } else {
+                self.squares.push(child.square);
+                Link::Cell(self.squares.len() as u16 - 1)
             };
         }
     }

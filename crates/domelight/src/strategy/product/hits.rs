@@ -39,7 +39,7 @@ struct Gathering {
 pub(super) struct Groups {
     gatherings: Vec<Gathering>,
     member: Vec<usize>,
-    pub(super) groups: Vec<Group>,
+    pub(super) all: Vec<Group>,
 }
 
 impl Groups {
@@ -66,13 +66,13 @@ impl Groups {
             gathering.n += 1;
             self.member.push(group);
         }
-        self.groups.clear();
+        self.all.clear();
         for g in &self.gatherings {
             let first = &points[g.first].frame;
             let normal = g.normals.try_normalize().unwrap_or(first.z);
             let frame = Frame::from_z_and_tangent(normal, first.x);
             let wo = frame.to_local(g.viewers).try_normalize().unwrap_or(Vec3::Z);
-            self.groups.push(Group {
+            self.all.push(Group {
                 frame,
                 wo: Vec3::new(wo.x, wo.y, wo.z.max(1e-3)),
                 spread: 0.0,
@@ -81,7 +81,7 @@ impl Groups {
             });
         }
         for (p, &member) in points.iter().zip(&self.member) {
-            let group = &mut self.groups[member];
+            let group = &mut self.all[member];
             // The chord is off the angle by less than a twentieth here.
             let angle = 1.05 * p.frame.z.distance(group.frame.z);
             group.spread = group.spread.max(angle);
@@ -92,13 +92,16 @@ impl Groups {
 /// Of the same kinds of lobes, about as rough.
 fn alike(a: &Outline, b: &Outline) -> bool {
     let near = |a: f32, b: f32| a < LIKE_ROUGHNESS * b && b < LIKE_ROUGHNESS * a;
+    // The width of the lobe falls as the square root of the exponent.
+    let near_exponents = |a: f32, b: f32| {
+        let factor = LIKE_ROUGHNESS * LIKE_ROUGHNESS;
+        a + 1.0 < factor * (b + 1.0) && b + 1.0 < factor * (a + 1.0)
+    };
     let gloss = |a: Gloss, b: Gloss| match (a, b) {
         (Gloss::Slopes { alpha: a, gaussian: c }, Gloss::Slopes { alpha: b, gaussian: d }) => {
             c == d && near(a[0], b[0]) && near(a[1], b[1])
         }
-        (Gloss::Mirror { exponent: a }, Gloss::Mirror { exponent: b }) => {
-            near(a.sqrt() + 1.0, b.sqrt() + 1.0)
-        }
+        (Gloss::Mirror { exponent: a }, Gloss::Mirror { exponent: b }) => near_exponents(a, b),
         _ => false,
     };
     (a.diffuse > 0.0) == (b.diffuse > 0.0)

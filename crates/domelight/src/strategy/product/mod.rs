@@ -93,7 +93,7 @@ impl<'a> ProductSampling<'a> {
     /// How many candidates the hits of a pixel have together.
     fn counts(&self, groups: &Groups, n_hits: usize) -> Counts {
         let all = self.n_rays as usize * n_hits;
-        let lobes = groups.groups.iter().flat_map(|g| g.outline.lobes());
+        let lobes = groups.all.iter().flat_map(|g| g.outline.lobes());
         let narrowest = lobes.map(|(_, gloss)| gloss.width()).reduce(f32::min);
         let share = |width| BRDF_SHARE[usize::from(width < NARROW)];
         let brdf = narrowest.map_or(0, |width| all.div_ceil(share(width)));
@@ -232,7 +232,7 @@ impl Asking<'_, '_> {
         } = &mut *self.scratch;
         let points = &tile.points[pixel.points.clone()];
         groups.gather(points);
-        table.fill(self.cells, &groups.groups);
+        table.fill(self.cells, &groups.all);
         let counts = strategy.counts(groups, points.len());
         // The first camera sample that hits tells passes apart.
         let stream = pixel.stream.part(tile.samples[pixel.points.start]);

@@ -257,7 +257,7 @@ mod tests {
     fn table(cells: &Cells, hits: &[ShadingPoint]) -> Table {
         let (mut groups, mut table) = (Groups::default(), Table::default());
         groups.gather(hits);
-        table.fill(cells, &groups.groups);
+        table.fill(cells, &groups.all);
         table
     }
 
