@@ -11,7 +11,7 @@ const RIGS: [&str; 5] = ["rig.xml", "rig.rad", "rig.pbrt", "rig.js", "rig.glb"];
 fn each_rig_names_the_picture_that_its_program_reads() {
     let folder = TempDir::new().expect("a temporary folder");
     let mut arguments = vec!["lights", "sky", "--env-rows", "64", "--sun", "-q"];
-    RIGS.iter().for_each(|rig| arguments.extend(["-o", rig]));
+    arguments.extend(RIGS.iter().flat_map(|rig| ["-o", rig]));
     done(&domelight(&folder, &arguments));
     for (rig, picture) in [
         ("rig.xml", "rig_dome.exr"),

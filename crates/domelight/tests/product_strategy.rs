@@ -11,6 +11,7 @@ use domelight::bsdf::{Material, MaterialSpec};
 use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::{Frame, Vec3};
 use domelight::sampling::{Heuristic, SamplerKind, Stream};
+use domelight::strategy::product::ProductScratch;
 use domelight::strategy::{
     Contributions, LightTable, MultipleImportanceSampling, PixelPoints, ProductSampling, Round,
     ShadingPoint, Strategy, TileShading,
@@ -41,7 +42,7 @@ fn estimates(
 ) -> [[f64; 3]; 2] {
     let n = hits.len();
     let points = hits.repeat(SIDE * SIDE);
-    let mut scratch = Default::default();
+    let mut scratch = ProductScratch::default();
     let (mut sums, mut counts) = ([[0.0; 3]; 2], [0.0; 2]);
     for pass in 0..N_PASSES {
         let samples: Vec<u32> = (0..points.len()).map(|i| (pass * n + i % n) as u32).collect();
@@ -77,7 +78,7 @@ fn estimates(
             strategy.learn(&tile, &out, &free, &mut scratch);
         }
         for (i, s) in sum.iter().enumerate() {
-            let pilot = i % SIDE % 2 == 0 && i / SIDE % 2 == 0;
+            let pilot = (i % SIDE).is_multiple_of(2) && (i / SIDE).is_multiple_of(2);
             let kind = usize::from(!pilot);
             counts[kind] += 1.0;
             (0..3).for_each(|c| sums[kind][c] += s[c]);
@@ -212,7 +213,7 @@ fn odd_maps_are_unbiased() {
                 let pass = strategy.begin_pass(Stream::of_pass(SamplerKind::Sobol, seed, 0));
                 let mut out = Contributions::default();
                 out.reset(1);
-                let mut scratch = Default::default();
+                let mut scratch = ProductScratch::default();
                 strategy.push(&pass, &tile, 0, &mut scratch, &mut out);
                 out.weight.iter().copied().sum::<Rgb>().to_array().map(f64::from)
             })
