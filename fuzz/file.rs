@@ -1,0 +1,27 @@
+//! Scene files refer to others, so that their readers take a path: the input lies in a folder of its own, in memory
+//! where there is such a place.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+fn folder() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let memory = Path::new("/dev/shm");
+        let parent = if memory.is_dir() { memory.to_owned() } else { std::env::temp_dir() };
+        parent.join(format!("domelight-fuzz-{}", std::process::id()))
+    })
+}
+
+/// Puts a file into the folder.
+pub fn write(name: &str, bytes: &[u8]) {
+    fs::create_dir_all(folder()).expect("a folder");
+    fs::write(folder().join(name), bytes).expect("room for a file");
+}
+
+/// Reads the input as a scene file.
+pub fn load(name: &str, bytes: &[u8]) {
+    write(name, bytes);
+    drop(domelight::scene::load(folder().join(name)));
+}
