@@ -120,7 +120,7 @@ fn interrupt_and_resume<S: Strategy>(stage: &Stage, strategy: &S, settings: &Ren
                     let checkpoint = Checkpoint::decode(bytes).unwrap();
                     session.restore(&checkpoint.film, checkpoint.counts).unwrap();
                 }
-                if session.run(&After::tiles(1 + random.next_u32() as usize % 10)) {
+                if session.run(&After::tiles(1 + random.next_u32() as usize % 5)) {
                     break session.rendering();
                 }
                 interruptions += 1;
