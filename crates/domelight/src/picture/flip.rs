@@ -60,6 +60,9 @@ pub fn ldr_flip(
     pixels_per_degree: f32,
 ) -> Result<Vec<f32>, SizeMismatch> {
     check_sizes(test, reference)?;
+    if reference.pixels.is_empty() {
+        return Ok(Vec::new());
+    }
     let eye = Eye::new(pixels_per_degree);
     let (reference, test) = (eye.see(reference), eye.see(test));
     let c_max = hyab(hunt_lab([0.0, 1.0, 0.0]), hunt_lab([0.0, 0.0, 1.0])).powf(Q_COLOR);
@@ -323,6 +326,14 @@ fn redistribute(difference: f32, greatest: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn empty_pictures_do_not_differ() {
+        for (width, height) in [(0, 0), (0, 3), (3, 0)] {
+            let empty = RgbImage::new(width, height, Vec::new());
+            assert_eq!(hdr_flip(&empty, &empty, PIXELS_PER_DEGREE).map(|f| f.map), Ok(Vec::new()));
+        }
+    }
 
     /// A gradient with a bright disc and a grid: smooth, edges and points, at full range.
     fn pattern(width: usize, height: usize) -> RgbImage {

@@ -10,6 +10,7 @@
 //! The crate `gltf` parses and checks the JSON; accessors are read here, because its readers panic
 //! on sparse data that end early.
 
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -70,7 +71,9 @@ pub enum GltfProblem {
         used_for: String,
     },
     /// An accessor that promises values without saying what they are.
-    #[error("accessor {index} has {count} values but neither data nor a base for sparse ones")]
+    #[error(
+        "accessor {index} has {count} values but no data, or too many sparse ones without a base"
+    )]
     NoData {
         /// The accessor.
         index: usize,
@@ -172,6 +175,9 @@ const MAX_DEPTH: usize = 200;
 /// Extensions that change nothing unseen: read, or warned of where they matter.
 const HANDLED_EXTENSIONS: [&str; 2] = ["KHR_texture_transform", "KHR_materials_emissive_strength"];
 
+/// The most values of sparse accessors that nothing in the file backs, all meshes and their instances together.
+const MAX_ZEROS: usize = 1 << 24;
+
 pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
     let (document, blob) = parse(bytes)
         .map_err(|problem| LoadError::Gltf { path: path.into(), problem: Box::new(problem) })?;
@@ -179,6 +185,7 @@ pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
         path,
         document: &document,
         buffers: Vec::new(),
+        zeros_left: Cell::new(MAX_ZEROS),
         visited: vec![false; document.nodes().len()],
         images: HashMap::new(),
         textures: Textures::default(),
@@ -247,6 +254,8 @@ struct Reader<'a> {
     path: &'a Path,
     document: &'a gltf::Document,
     buffers: Vec<Vec<u8>>,
+    /// Of [`MAX_ZEROS`].
+    zeros_left: Cell<usize>,
     /// Nodes that were reached.
     visited: Vec<bool>,
     /// Textures by image index.
@@ -478,8 +487,9 @@ impl<'a> Reader<'a> {
                     .map(&decode)
                     .collect()
             }
-            // Zeros by the format; bounded, for nothing in the file backs them.
-            None if accessor.sparse().is_some() && count <= 1 << 24 => {
+            // Zeros by the format; bounded in all the file, for nothing in it backs them.
+            None if accessor.sparse().is_some() && count <= self.zeros_left.get() => {
+                self.zeros_left.update(|left| left - count);
                 vec![decode(&vec![0; size]); count]
             }
             None => return Err(GltfProblem::NoData { index, count }),
