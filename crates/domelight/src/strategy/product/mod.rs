@@ -1,14 +1,14 @@
 //! Product sampling: rays follow light times reflectance, and visibility is learned on the way.
 //!
-//! Once for an environment its map is cut into some 384 [`cells`] along Hilbert's curve. Each pass draws
-//! a [`pool`] of directions in every cell. Then, pixel by pixel, all its camera hits together:
+//! Once for an environment its map is cut into some 384 `cells` along Hilbert's curve. Each pass draws
+//! a `pool` of directions in every cell. Then, pixel by pixel, all its camera hits together:
 //!
-//! 1. A [`table`] gives each cell its light times what the pixel reflects of it.
-//! 2. [`candidates`]: strata along the curve, each with one direction of the pool, and samples of the
+//! 1. A `table` gives each cell its light times what the pixel reflects of it.
+//! 2. `candidates`: strata along the curve, each with one direction of the pool, and samples of the
 //!    material, weighed by the balance heuristic.
 //! 3. One pixel of each 2 × 2, a *pilot*, traces all its candidates. From them the tile learns the
-//!    [`visibility`] V̂ of each cell and the brightness of its pixels.
-//! 4. The others take Σ W V̂ without a ray, and [`choose`] those candidates whose visibility matters:
+//!    `visibility` V̂ of each cell and the brightness of its pixels.
+//! 4. The others take Σ W V̂ without a ray, and `choose` those candidates whose visibility matters:
 //!
 //! ```text
 //! base = Σ_j W_j V̂_j − Σ_chosen (W_j/π_j) V̂_j        rays: weight W_j/π_j
