@@ -123,6 +123,10 @@ fn identity(view: &View, settings: &RenderSettings, report: &Settings) -> Vec<(S
 /// Reads a checkpoint or a part.
 pub(crate) fn read(path: &Path) -> Result<Checkpoint> {
     let name = || path.display().to_string();
+    // A pipe might never end.
+    if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+        return Err(UsageError(format!("{}: it is not a plain file", name())).into());
+    }
     let bytes = match fs::read(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             return Err(UsageError(format!("{}: {error}", name())).into());

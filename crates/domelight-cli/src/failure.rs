@@ -75,8 +75,11 @@ fn code(error: &anyhow::Error) -> u8 {
         || error.is::<CameraError>()
         || error.is::<EnvironmentError>()
         || error.is::<CheckpointError>();
-    // A file that is not there was asked for wrongly; other troubles of the system may pass.
-    let passing = io_kind(error).is_some_and(|kind| kind != io::ErrorKind::NotFound);
+    // What is not there or no plain file was asked for wrongly; other troubles of the system may pass.
+    let passing = io_kind(error).is_some_and(|kind| {
+        use io::ErrorKind::{InvalidInput, IsADirectory, NotADirectory, NotFound};
+        !matches!(kind, NotFound | InvalidInput | IsADirectory | NotADirectory)
+    });
     if let Some(error) = error.downcast_ref::<MergeError>() {
         return error.code();
     }

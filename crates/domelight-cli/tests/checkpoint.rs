@@ -167,6 +167,10 @@ fn another_render_is_not_gone_on_with() {
     ended(&render(&folder, &["--resume", "gone.exr"]), 2, &["gone.exr", "No such file"]);
     ended(&render(&folder, &["--resume", "c.png"]), 2, &["c.png", ".exr"]);
 
+    let pipe = folder.path().join("pipe.exr");
+    nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    ended(&render(&folder, &["--resume", "pipe.exr"]), 2, &["pipe.exr", "not a plain file"]);
+
     let bytes = fs::read(folder.path().join("c.exr")).unwrap();
     fs::write(folder.path().join("cut.exr"), &bytes[..bytes.len() / 2]).unwrap();
     ended(&render(&folder, &["--resume", "cut.exr"]), 2, &["cut.exr"]);

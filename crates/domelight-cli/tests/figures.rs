@@ -93,7 +93,7 @@ fn what_cannot_be_shown_is_refused() {
     };
     refused(&["--only", "9"], 2, "9");
     refused(&["--env-scale", "0"], 1, "black");
-    refused(&["--env", "nothing.hdr"], 1, "nothing.hdr");
+    refused(&["--env", "nothing.hdr"], 2, "nothing.hdr");
     fs::write(folder.path().join("file"), "").unwrap();
     refused(&["-o", "file"], 1, "file");
 }

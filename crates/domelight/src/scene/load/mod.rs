@@ -157,7 +157,7 @@ fn load_bytes(path: &Path, bytes: &[u8], mesh_only: bool) -> Result<Loaded, Load
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
-    fs::read(path).map_err(|source| LoadError::Read { path: path.into(), source })
+    read_plain(path).map_err(|source| LoadError::Read { path: path.into(), source })
 }
 
 fn read_referenced(path: &Path, referrer: &str) -> Result<Vec<u8>, LoadError> {
@@ -168,7 +168,7 @@ fn read_referenced(path: &Path, referrer: &str) -> Result<Vec<u8>, LoadError> {
     })
 }
 
-/// The bytes of a plain file: a device or a pipe that a scene names might never end.
+/// The bytes of a plain file: a device or a pipe might never end.
 fn read_plain(path: &Path) -> io::Result<Vec<u8>> {
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a plain file"));
