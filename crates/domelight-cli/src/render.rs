@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
 
 fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let plan = arguments.strategy.plan()?;
-    plan.refuse_repeating_points(arguments.spp)?;
+    plan.refuse_repeating_points(arguments.samples.spp)?;
     let outputs = arguments.output.paths()?;
     arguments.course.check(&outputs)?;
     outputs.iter().try_for_each(PicturePath::require_writable)?;
@@ -45,7 +45,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let View { scene, camera, environment, probe, report } = view;
     let settings = &RenderSettings {
         target_error: arguments.course.target_error,
-        ..arguments.scene.render_settings(&arguments.pixel, arguments.spp)
+        ..arguments.scene.render_settings(&arguments.pixel, arguments.samples.spp)
     };
     let points = || survey(scene, camera, settings);
     let plan = plan.for_scene(points, environment, settings.seed);

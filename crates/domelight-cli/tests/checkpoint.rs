@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{domelight, stderr};
+use common::{domelight, ended};
 use domelight::sampling::Pcg32;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -34,16 +34,6 @@ fn start(folder: &TempDir, arguments: &[&str]) -> Child {
 
 fn signal(child: &Child, signal: Signal) {
     kill(Pid::from_raw(child.id() as i32), signal).expect("the process is there");
-}
-
-#[track_caller]
-fn ended(output: &Output, code: i32, words: &[&str]) {
-    let text = stderr(output);
-    assert_eq!(output.status.code(), Some(code), "{text}");
-    for word in words {
-        assert!(text.contains(word), "'{word}' is not in: {text}");
-    }
-    assert!(!text.contains("panicked"), "{text}");
 }
 
 #[track_caller]

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{domelight, json, stderr, write_exr};
+use common::{domelight, ended as refused, json, stderr, write_exr};
 use domelight::{Rgb, RgbImage};
 use serde_json::Value;
 use std::fs;
@@ -21,16 +21,6 @@ fn compare(folder: &TempDir, arguments: &[&str]) -> Output {
     let quick = ["compare", "--size", "20x16", "--env", "sky", "--env-rows", "16", "--seeds", "2"];
     let reference = ["--reference-spp", "16", "--cache", "cache"];
     domelight(folder, &[&quick[..], &reference[..], arguments].concat())
-}
-
-#[track_caller]
-fn refused(output: &Output, code: i32, words: &[&str]) {
-    let text = stderr(output);
-    assert_eq!(output.status.code(), Some(code), "{text}");
-    for word in words {
-        assert!(text.contains(word), "'{word}' is not in: {text}");
-    }
-    assert!(!text.contains("panicked"), "{text}");
 }
 
 fn keys(value: &Value) -> Vec<&str> {

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{domelight, json, load, stderr, stdout, write_exr};
+use common::{domelight, ended as refused, json, load, stderr, stdout, write_exr};
 use domelight::picture::exr::text_attributes;
 use domelight::{Rgb, RgbImage};
 use std::fs;
@@ -22,16 +22,6 @@ fn folder() -> TempDir {
 #[track_caller]
 fn succeeded(output: &Output) {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
-}
-
-#[track_caller]
-fn refused(output: &Output, code: i32, words: &[&str]) {
-    let text = stderr(output);
-    assert_eq!(output.status.code(), Some(code), "{text}");
-    for word in words {
-        assert!(text.contains(word), "'{word}' is not in: {text}");
-    }
-    assert!(!text.contains("panicked"), "{text}");
 }
 
 const TRIANGLE: &str = "v -1 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n";

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::sampling::{PixelArguments, StrategyArguments};
+use super::sampling::{PixelArguments, SampleArguments, StrategyArguments};
 use super::scene::SceneArguments;
 
 pub(super) const EXAMPLES: &str = "\
@@ -26,10 +26,8 @@ pub(crate) struct FarmArguments {
     pub(crate) scene: SceneArguments,
     #[command(flatten)]
     pub(crate) strategy: StrategyArguments,
-    /// Camera samples of each pixel
-    #[arg(long, value_name = "N", default_value_t = 64, help_heading = "Sampling",
-          value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
-    pub(crate) spp: u32,
+    #[command(flatten)]
+    pub(crate) samples: SampleArguments,
     #[command(flatten)]
     pub(crate) pixel: PixelArguments,
     /// In how many parts

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 
 use super::Tone;
 use super::course::CourseArguments;
-use super::sampling::{PixelArguments, StrategyArguments};
+use super::sampling::{PixelArguments, SampleArguments, StrategyArguments};
 use super::scene::SceneArguments;
 use crate::output::PicturePath;
 
@@ -31,10 +31,8 @@ pub(crate) struct RenderArguments {
     pub(crate) scene: SceneArguments,
     #[command(flatten)]
     pub(crate) strategy: StrategyArguments,
-    /// Camera samples of each pixel
-    #[arg(long, value_name = "N", default_value_t = 64, help_heading = "Sampling",
-          value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
-    pub(crate) spp: u32,
+    #[command(flatten)]
+    pub(crate) samples: SampleArguments,
     #[command(flatten)]
     pub(crate) pixel: PixelArguments,
     #[command(flatten)]

@@ -50,6 +50,16 @@ pub(crate) struct StrategyArguments {
     pub(crate) no_compensation: bool,
 }
 
+/// How many camera samples.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Sampling")]
+pub(crate) struct SampleArguments {
+    /// Camera samples of each pixel
+    #[arg(long, value_name = "N", default_value_t = 64,
+          value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub(crate) spp: u32,
+}
+
 /// The points of a pixel, and who computes them.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Sampling")]

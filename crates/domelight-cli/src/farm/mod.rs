@@ -53,7 +53,7 @@ struct Submission {
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &FarmArguments, quiet: bool) -> Result<()> {
-    arguments.strategy.plan()?.refuse_repeating_points(arguments.spp)?;
+    arguments.strategy.plan()?.refuse_repeating_points(arguments.samples.spp)?;
     let farm = Farm::new(arguments)?;
     let Submission { files, command } = match arguments.engine {
         Engine::Slurm => slurm::submission(&farm),

@@ -47,3 +47,14 @@ pub fn write_exr(path: &Path, image: &RgbImage, alpha: Option<&[f32]>) {
 pub fn load(folder: &TempDir, name: &str) -> RgbImage {
     read(&folder.path().join(name), &ReadOptions::default()).expect(name).image
 }
+
+/// The exit code, and words that standard error holds; a panic is never right.
+#[track_caller]
+pub fn ended(output: &Output, code: i32, words: &[&str]) {
+    let text = stderr(output);
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    for word in words {
+        assert!(text.contains(word), "'{word}' is not in: {text}");
+    }
+    assert!(!text.contains("panicked"), "{text}");
+}
