@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use domelight::render::{Counts, Observer};
@@ -20,7 +21,7 @@ pub(crate) struct RenderProgress {
     interrupted: &'static AtomicBool,
     rays: AtomicU64,
     /// Whole per cent told last.
-    told: AtomicU64,
+    told: Mutex<Option<u64>>,
     started: Instant,
 }
 
@@ -43,7 +44,7 @@ impl RenderProgress {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
         let label = if label.is_empty() { String::new() } else { format!("{label}  ") };
-        let (rays, told) = (AtomicU64::new(0), AtomicU64::new(0));
+        let (rays, told) = (AtomicU64::new(0), Mutex::new(None));
         Self { bar, label, openjd: false, interrupted, rays, told, started: Instant::now() }
     }
 
@@ -71,10 +72,14 @@ impl RenderProgress {
 
     /// Says on standard output, at each whole per cent, how much is done; nobody may be listening.
     fn tell_farm(&self) {
+        if !self.openjd {
+            return;
+        }
+        // Counted and printed under one lock: the lines of several threads come in rising order.
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
         let percent = 100 * self.bar.position() / self.bar.length().unwrap_or(1).max(1);
-        if self.openjd
-            && (percent == 0 || self.told.fetch_max(percent, Ordering::Relaxed) < percent)
-        {
+        if *told < Some(percent) {
+            *told = Some(percent);
             let _ = print(&format!("openjd_progress: {percent}"));
         }
     }

@@ -290,6 +290,9 @@ fn a_farm_hears_how_far_it_is() {
     assert!(text.starts_with("openjd_progress: 0\n"), "{text}");
     assert!(text.contains("openjd_status: samples 3–4\n"), "{text}");
     assert!(text.ends_with("openjd_progress: 100\n"), "{text}");
+    let told = text.lines().filter_map(|line| line.strip_prefix("openjd_progress: "));
+    let told: Vec<u32> = told.map(|percent| percent.parse().expect("a number")).collect();
+    assert!(told.is_sorted(), "{text}");
     let output = render(&folder, &["--env", "gone.hdr", "--progress", "openjd", "-o", "x.exr"]);
     assert!(common::stdout(&output).starts_with("openjd_fail: "), "{output:?}");
     let both = render(&folder, &["--progress", "openjd", "--json"]);
