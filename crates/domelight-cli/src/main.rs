@@ -17,6 +17,7 @@ mod merge;
 mod notation;
 mod output;
 mod probe;
+mod profile;
 mod progress;
 mod render;
 mod report;

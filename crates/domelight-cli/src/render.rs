@@ -69,7 +69,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let n_pixels = (settings.width * settings.height) as u64;
     let total = n_pixels * u64::from(settings.n_samples);
     let openjd = arguments.output.progress == ProgressKind::Openjd;
-    let progress = &RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
+    let progress = RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
+    let progress = &progress.profiled(arguments.output.profile);
     let course = Some(&course);
     let rendering = renderer(&Job { scene, camera, environment, settings, progress, course })?;
     progress.finish();
@@ -98,7 +99,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     }
     let stages = Stages { load, build, render, write: watch.lap() };
     let rejection = plan.acceptance(points, environment, settings.seed)?;
-    let report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
+    let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
+    report.profile = progress.profile();
     if arguments.output.json {
         report.print_json()?;
     } else if !quiet {

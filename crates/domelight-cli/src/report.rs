@@ -10,6 +10,7 @@ use std::path::Path;
 use crate::acceptance::Acceptance;
 use crate::failure::{InterruptedAndSaved, tell, warn};
 use crate::output::{self, PicturePath};
+use crate::profile::{self, StageSeconds};
 use crate::usage::{Seconds, peak_memory};
 
 /// A scene under its light, seen by a camera.
@@ -153,6 +154,9 @@ pub(crate) struct RenderReport {
     complete: bool,
     stopped: Option<Stop>,
     outputs: Vec<String>,
+    /// CPU seconds by stage of the render, if they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) profile: Option<Vec<StageSeconds>>,
 }
 
 impl RenderReport {
@@ -180,6 +184,7 @@ impl RenderReport {
             complete: rendering.complete,
             stopped,
             outputs: outputs.iter().map(ToString::to_string).collect(),
+            profile: None,
         }
     }
 
@@ -203,6 +208,9 @@ impl RenderReport {
             self.rays_per_second * 1e-6,
             self.outputs.join(", ")
         ));
+        if let Some(profile) = &self.profile {
+            tell(&profile::lines(profile));
+        }
     }
 
     /// Complains about what the picture does not show.

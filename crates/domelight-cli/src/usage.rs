@@ -13,6 +13,18 @@ pub(crate) fn cpu_seconds() -> Option<f64> {
     None
 }
 
+/// CPU time of the calling thread so far; none where the system does not tell.
+pub(crate) fn thread_cpu_nanoseconds() -> Option<u64> {
+    #[cfg(unix)]
+    {
+        use nix::time::{ClockId, clock_gettime};
+        let time = clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).ok()?;
+        Some(std::time::Duration::from(time).as_nanos() as u64)
+    }
+    #[cfg(not(unix))]
+    None
+}
+
 /// The most memory that was ever resident \[bytes\]; none where the system does not tell.
 pub(crate) fn peak_memory() -> Option<u64> {
     #[cfg(unix)]

@@ -12,10 +12,10 @@
 //! accept, planes move outward by 16·2⁻²⁴·m: the shear's 7, the box test's own 3, and room to spare
 //! (the paper's section on traversal does it axis by axis).
 
-use super::simd::{Floats, Mask, Simd};
 use super::{Block, Lanes, Node, WIDTH};
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
+use crate::simd::{Floats, Mask, Real, Simd};
 use glam::Vec3A;
 
 /// A ray with what both tests need of it.
@@ -123,7 +123,7 @@ impl<S: Simd> Slabs<S> {
         simd: S,
         ray: &PreparedRay,
         limit: f32,
-    ) -> (<S::Floats as Floats>::Mask, S::Floats) {
+    ) -> (<S::Floats as Real>::Mask, S::Floats) {
         let (mut enter, mut leave) = (simd.splat(0.0), simd.splat(limit));
         for k in 0..3 {
             let inverse_direction = simd.splat(ray.inverse_direction[k]);

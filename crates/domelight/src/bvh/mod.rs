@@ -34,21 +34,21 @@
 
 mod build;
 mod intersect;
-mod simd;
 mod traverse;
 mod validate;
 
 use crate::geometry::{Aabb, Hit, Ray, RayBatch};
 use crate::math::Vec3;
+use crate::simd;
 
-pub use simd::InstructionSet;
+pub use crate::simd::InstructionSet;
 pub use validate::BvhDefect;
 
 /// How many children a node and how many triangles a block has: the width of a vector.
 const WIDTH: usize = 8;
 
 /// One number a lane.
-type Lanes = [f32; WIDTH];
+type Lanes = simd::Lanes;
 
 /// A bounding volume hierarchy over triangles; see the [module](self).
 #[derive(Clone, Debug)]

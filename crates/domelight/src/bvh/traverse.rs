@@ -6,10 +6,10 @@ use std::ops::Range;
 
 use super::build::MAX_DEPTH;
 use super::intersect::{PreparedRay, Slabs, hit_block};
-use super::simd::{Floats, Kernel, Mask, Sets, Simd};
 use super::{Bvh, Child, WIDTH};
 use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
+use crate::simd::{Floats, Kernel, Mask, Sets, Simd};
 
 /// A node leaves at most seven children behind on the way down.
 const STACK: usize = 256;

@@ -102,7 +102,7 @@ impl<'a, S: Strategy> Session<'a, S> {
                     if observer.cancelled() {
                         return false;
                     }
-                    let counts = tile.render(frame, *strategy, &pass, scratch);
+                    let counts = tile.render(frame, *strategy, &pass, scratch, observer);
                     observer.tile_finished(&counts);
                     true
                 })

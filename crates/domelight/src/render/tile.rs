@@ -3,7 +3,7 @@
 
 use super::film::{CameraSample, PixelSums, SurfaceSample};
 use super::tiling::Window;
-use super::{Background, Frame, RenderSettings, Visibility};
+use super::{Background, Frame, Observer, RenderSettings, Stage, Visibility};
 use crate::Rgb;
 use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
 use crate::math::Vec3;
@@ -126,17 +126,21 @@ impl Tile {
         strategy: &S,
         pass: &Pass<S>,
         scratch: &mut Scratch<S>,
+        observer: &impl Observer,
     ) -> Counts {
         let Scratch { batch, of_strategy } = scratch;
+        observer.stage_started(Stage::CameraRays);
         self.trace_camera_rays(frame, &pass.samples, batch);
+        observer.stage_started(Stage::Surfaces);
         batch.gather_points(frame, pass.samples.len());
         let mut counts = Counts {
             camera_rays: batch.rays.len() as u64,
             shading_points: batch.points.len() as u64,
             ..Counts::default()
         };
-        let (shared, width) = (&pass.shared, self.window.width);
-        counts.shadow_rays = batch.trace_strategy(frame, strategy, shared, of_strategy, width);
+        let asked = Asked { frame, strategy, pass: &pass.shared, width: self.window.width };
+        counts.shadow_rays = batch.trace_strategy(&asked, of_strategy, observer);
+        observer.stage_started(Stage::Sums);
         counts.non_finite = self.add_samples(frame, batch);
         self.counts += counts;
         counts
@@ -161,7 +165,8 @@ impl Tile {
                 scratch.rays.push(frame.camera.ray(x as f32 + at.x, y as f32 + at.y));
             }
             let n_samples = samples.len() as u32;
-            scratch.pixels.push(PixelPoints { points: 0..0, n_samples, stream });
+            let (points, one_material) = (0..0, true);
+            scratch.pixels.push(PixelPoints { points, n_samples, stream, one_material });
         }
         scratch.samples.clear();
         scratch.samples.extend(samples.clone());
@@ -209,28 +214,33 @@ impl Batch {
         self.samples.clear();
         for (i, pixel) in self.pixels.iter_mut().enumerate() {
             let start = self.points.len();
+            let (mut surface, mut one_material) = (None, true);
             for s in 0..n_samples {
                 let ray = i * n_samples + s;
                 if let Some(hit) = &self.hits[ray] {
                     let point = frame.scene.shading_point(&self.rays[ray], hit);
+                    let plain = frame.scene.plain_surface(hit.triangle);
+                    let known = self.points.len() == start || plain == surface;
+                    one_material &= known && plain.is_some();
+                    surface = plain;
                     self.origins.push(offset_origin(point.position, point.ng, frame.extent));
                     self.points.push(point);
                     self.samples.push(first_sample + s as u32);
                 }
             }
             pixel.points = start..self.points.len();
+            pixel.one_material = one_material;
         }
     }
 
     /// Runs the strategy's rounds; returns the number of shadow rays.
     fn trace_strategy<S: Strategy>(
         &mut self,
-        frame: &Frame,
-        strategy: &S,
-        pass: &S::Pass,
+        asked: &Asked<S>,
         scratch: &mut S::Scratch,
-        width: usize,
+        observer: &impl Observer,
     ) -> u64 {
+        let &Asked { frame, strategy, pass, width } = asked;
         let n = self.points.len();
         self.radiance.clear();
         self.radiance.resize(n, Rgb::BLACK);
@@ -238,6 +248,7 @@ impl Batch {
         self.unoccluded.resize(n, Rgb::BLACK);
         let mut n_rays = 0;
         for round in 0.. {
+            observer.stage_started(Stage::Strategy);
             let tile = TileShading {
                 points: &self.points,
                 samples: &self.samples,
@@ -248,7 +259,9 @@ impl Batch {
             let more = strategy.push(pass, &tile, round, scratch, &mut self.round.asked);
             n_rays += self.round.asked.len() as u64;
 
+            observer.stage_started(Stage::ShadowRays);
             self.round.trace(frame, &self.points, &self.origins);
+            observer.stage_started(Stage::Strategy);
 
             // base + Σ weight · V
             for (i, &base) in self.round.asked.base.iter().enumerate() {
@@ -283,6 +296,15 @@ impl Batch {
             }),
         }
     }
+}
+
+/// Of whom a tile's shadow rays are asked.
+struct Asked<'a, S: Strategy> {
+    frame: &'a Frame<'a>,
+    strategy: &'a S,
+    pass: &'a S::Pass,
+    /// Pixels in a row of the tile.
+    width: usize,
 }
 
 impl ShadowRays {
