@@ -14,6 +14,7 @@ use domelight::strategy::Strategy;
 
 use crate::args::course::CourseArguments;
 use crate::failure::{UsageError, warn};
+use crate::interrupt;
 use crate::output::{PictureFormat, PicturePath};
 use crate::progress::RenderProgress;
 use crate::report::Settings;
@@ -47,6 +48,12 @@ impl CourseArguments {
     /// The render makes a part, not pictures.
     pub(crate) fn is_part(&self) -> bool {
         self.shard.is_some() || self.tiles.is_some()
+    }
+
+    /// The exit code of a render that is interrupted before its first sample: a farm runs a shard again.
+    pub(crate) fn code_of_an_early_end(&self) -> i32 {
+        let saves = self.is_part() || self.checkpoint.is_some() || self.resume.is_some();
+        if saves { interrupt::RUN_AGAIN } else { interrupt::ENDED }
     }
 
     /// Checks, before the work, what the flags say together with the outputs.

@@ -1,5 +1,6 @@
 //! What the user is told when something fails, and the exit code.
 
+use crate::interrupt::RUN_AGAIN;
 use crate::merge::MergeError;
 use domelight::environment::EnvironmentError;
 use domelight::environment::builtin::BuiltinProbe;
@@ -84,7 +85,7 @@ fn code(error: &anyhow::Error) -> u8 {
         return error.code();
     }
     match () {
-        () if error.is::<InterruptedAndSaved>() => 75,
+        () if error.is::<InterruptedAndSaved>() => RUN_AGAIN as u8,
         () if hopeless && !passing => 2,
         () => 1,
     }

@@ -36,6 +36,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     outputs.iter().try_for_each(PicturePath::require_writable)?;
     arguments.pixel.start_threads()?;
     let interrupted = interrupt::flag();
+    let loading = interrupt::nothing_to_keep(arguments.course.code_of_an_early_end());
     let mut watch = Stopwatch::start();
 
     let loaded = arguments.scene.load(quiet)?;
@@ -62,9 +63,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let course = &arguments.course;
     let course = course.course(view, settings, &described, &outputs, interrupted, quiet)?;
     let build = watch.lap();
-    if interrupted.load(Ordering::Relaxed) {
-        bail!("interrupted before the first sample; nothing was written");
-    }
+    drop(loading);
 
     let n_pixels = (settings.width * settings.height) as u64;
     let total = n_pixels * u64::from(settings.n_samples);

@@ -49,10 +49,12 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     }
     arguments.pixel.start_threads()?;
     interrupt::flag();
+    let loading = interrupt::nothing_to_keep(interrupt::ENDED);
     let size = arguments.scene.camera.size;
     let given = arguments.reference.as_deref();
     let given = given.map(|path| Reference::read(path, [size.width, size.height])).transpose()?;
     let view = arguments.scene.build(arguments.scene.load(quiet)?)?;
+    drop(loading);
     let reference = match given {
         Some(reference) => reference,
         None => Wanted::new(arguments, &view)?.get(&view, quiet)?,
