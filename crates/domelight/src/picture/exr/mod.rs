@@ -1,5 +1,6 @@
 //! OpenEXR: reads one layer of any flat file, writes several layers into one part.
 
+pub mod bands;
 mod read;
 mod read_layers;
 mod write;
