@@ -89,7 +89,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         let mut attributes = described.provenance();
         // If not, the layer of sample counts tells how many there are.
         attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
-        path.write_layers(&rendering.layers, &tone, report.hide_env, attributes)
+        path.write_layers(&rendering.layers, &tone, report.hide_env, &attributes)
     };
     // A part is its own checkpoint, and written.
     if !arguments.course.is_part() {

@@ -19,7 +19,7 @@ mod primaries;
 pub mod tone;
 
 pub use error::{PictureError, Problem};
-pub use output::{require_writable, write_atomically};
+pub use output::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};
 
 use crate::RgbImage;
 use crate::environment::mapping::EnvmapKind;

@@ -14,14 +14,18 @@ use rayon::prelude::*;
 use std::borrow::Borrow;
 use std::io::{Cursor, Seek, SeekFrom, Write};
 
-/// Bands but the last must have a multiple of so many rows.
-pub const BAND_ROWS: usize = 16;
+/// Rows of a band, if it is not the last: whole blocks, some for each of several cores.
+pub const BAND_ROWS: usize = 4 * BLOCK_ROWS;
+
+/// Of deflated blocks; the others have a divisor of it.
+const BLOCK_ROWS: usize = 16;
 
 /// Blocks compressed together: enough for all cores, few enough to need little memory.
 const BATCH: usize = 32;
 
-/// Writes a picture of `height` rows from bands: `band(y)` is what follows from row `y` on. All have the same width and
-/// channels; what else the file tells is from the first. The bytes are those of [`ExrLayers::encode`].
+/// Writes a picture of `height` rows from bands: `band(y)` is what follows from row `y` on, [`BAND_ROWS`] or a
+/// multiple of them but at the end. All have the same width and channels; what else the file tells is from the first.
+/// The bytes are those of [`ExrLayers::encode`].
 ///
 /// # Errors
 /// As [`ExrLayers::encode`], or if `out` does not take it or `band` fails.
@@ -139,10 +143,7 @@ impl Plane {
 }
 
 /// Puts the header over the one that was written, its attributes in their order.
-fn rewrite_header(
-    headers: Headers,
-    out: &mut (impl Write + Seek + ?Sized),
-) -> Result<(), Error> {
+fn rewrite_header(headers: Headers, out: &mut (impl Write + Seek + ?Sized)) -> Result<(), Error> {
     const OFFSET_BYTES: usize = 8;
     let offsets = OFFSET_BYTES * headers[0].chunk_count;
     let mut start = Cursor::new(Vec::new());

@@ -9,9 +9,7 @@ use crate::{Rgb, RgbImage};
 use ::exr::block;
 use ::exr::meta::attribute::EnvironmentMap;
 use ::exr::meta::header::Header;
-use ::exr::prelude::{
-    AttributeValue, ImageAttributes, IntegerBounds, LayerAttributes, Text, Vec2,
-};
+use ::exr::prelude::{AttributeValue, ImageAttributes, IntegerBounds, LayerAttributes, Text, Vec2};
 use std::io::Cursor;
 
 use super::bands;
