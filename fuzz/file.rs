@@ -19,8 +19,11 @@ pub fn write(name: &str, bytes: &[u8]) {
     fs::write(folder().join(name), bytes).expect("room for a file");
 }
 
+/// What a scene of an input may take.
+const MAX_MEMORY: u64 = 1 << 30;
+
 /// Reads the input as a scene file.
 pub fn load(name: &str, bytes: &[u8]) {
     write(name, bytes);
-    drop(domelight::scene::load(folder().join(name)));
+    drop(domelight::scene::load_within(folder().join(name), Some(MAX_MEMORY)));
 }

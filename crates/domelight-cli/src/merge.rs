@@ -19,7 +19,14 @@ use serde::Serialize;
 use crate::args::MergeArguments;
 use crate::course::read;
 use crate::failure::tell;
+use crate::memory;
 use crate::output::{PicturePath, print, require_one_on_standard_output};
+
+/// Memory of a pixel of a band: its layers, as channels, and compressed.
+const BAND_PIXEL: u64 = 300;
+
+/// Memory of a pixel of which colour and alpha are kept: themselves, and as PNG.
+const FLAT_PIXEL: u64 = 20;
 
 /// Why parts make no picture.
 #[derive(Debug, thiserror::Error)]
@@ -213,6 +220,12 @@ impl Merged {
         attributes.push(("domelight.complete".into(), "true".into()));
         let (layered, flat): (Vec<_>, Vec<_>) =
             arguments.output.iter().partition(|output| output.has_all_layers());
+        let (width, height) = (self.width, self.height);
+        memory::allow_picture(width, BAND_ROWS.min(height), BAND_PIXEL)?;
+        if !flat.is_empty() {
+            memory::allow_picture(width, height, FLAT_PIXEL)?;
+            memory::keep(FLAT_PIXEL * (width * height) as u64);
+        }
         let mut picture = (!flat.is_empty()).then(Flat::default);
         for output in &layered {
             let mut bands = Bands::new(self);

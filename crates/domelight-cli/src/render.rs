@@ -11,12 +11,14 @@ use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
 use crate::course::Course;
 use crate::failure::UsageError;
 use crate::interrupt;
+use crate::memory;
 use crate::output::{PicturePath, print, require_one_on_standard_output};
 use crate::progress::RenderProgress;
 use crate::report::{RenderReport, Settings, Stages, Stop};
 use crate::scene::View;
 use crate::strategy::Job;
 use crate::usage::Stopwatch;
+use crate::values::Size;
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
@@ -34,6 +36,11 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let outputs = arguments.output.paths()?;
     arguments.course.check(&outputs)?;
     outputs.iter().try_for_each(PicturePath::require_writable)?;
+    if !arguments.course.is_part() {
+        // Before anything is loaded; again, with what the render is known to save, when all is.
+        let Size { width, height } = arguments.scene.camera.size;
+        memory::allow_picture(width, height, memory::PIXEL)?;
+    }
     arguments.pixel.start_threads()?;
     let interrupted = interrupt::flag();
     let loading = interrupt::nothing_to_keep(arguments.course.code_of_an_early_end());

@@ -1,5 +1,6 @@
 //! What can be wrong with a picture file.
 
+use crate::memory::OverLimit;
 use std::io;
 
 /// A picture file could not be read or written.
@@ -115,6 +116,9 @@ pub enum Problem {
         /// The channels there are.
         present: Vec<String>,
     },
+    /// It takes more memory than [`super::ReadOptions::max_memory`] allows.
+    #[error("{0}")]
+    Memory(#[from] OverLimit),
     /// A decoder of the `image` crate refused the file.
     #[error("{0}")]
     Image(image::ImageError),

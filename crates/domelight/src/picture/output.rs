@@ -39,8 +39,8 @@ pub fn write_atomically_seeking(
     write: impl FnOnce(&mut dyn WriteSeek) -> io::Result<()>,
 ) -> Result<(), PictureError> {
     if path != Path::new("-") && !fs::metadata(path).is_ok_and(|there| !there.is_file()) {
-        return replace_plain(&target(path), |out| write(out))
-            .map_err(|error| Problem::Io(error).in_file(&path.display().to_string()));
+        let replaced = target(path).and_then(|path| replace_plain(&path, |out| write(out)));
+        return replaced.map_err(|error| Problem::Io(error).in_file(&path.display().to_string()));
     }
     write_atomically(path, |out| {
         let mut bytes = Cursor::new(Vec::new());
@@ -62,7 +62,7 @@ pub fn require_writable(path: &Path) -> Result<(), PictureError> {
 }
 
 fn try_place(path: &Path) -> io::Result<()> {
-    let path = target(path);
+    let path = target(path)?;
     match fs::metadata(&path) {
         Ok(there) if there.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
         Ok(there) if !there.is_file() => Ok(()),
@@ -75,16 +75,23 @@ fn try_place(path: &Path) -> io::Result<()> {
 }
 
 fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let path = target(path);
+    let path = target(path)?;
     if fs::metadata(&path).is_ok_and(|there| !there.is_file()) {
         return finish(File::options().write(true).open(&path)?, |out| write(out)).map(drop);
     }
     replace_plain(&path, |out| write(out))
 }
 
-/// Where a symbolic link points.
-fn target(path: &Path) -> PathBuf {
-    fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
+/// The file itself, at the end of symbolic links, also where it is not there yet.
+fn target(path: &Path) -> io::Result<PathBuf> {
+    match fs::canonicalize(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => match fs::read_link(path) {
+            // A circle of links is another error.
+            Ok(link) => target(&path.parent().unwrap_or(Path::new("")).join(link)),
+            Err(_) => Ok(path.to_path_buf()),
+        },
+        canonical => canonical,
+    }
 }
 
 fn replace_plain(

@@ -87,6 +87,16 @@ impl Checkpoint {
         exr.encode()
     }
 
+    /// An estimate of the memory that [`Checkpoint::decode`] takes, the bytes themselves included.
+    ///
+    /// # Errors
+    /// If they are no OpenEXR file.
+    pub fn memory_to_decode(bytes: &[u8]) -> Result<u64, CheckpointError> {
+        // The channels as they are read and the sums that they become.
+        let pixel = 4 * (4 + PixelSums::WORDS.len()) + size_of::<PixelSums>();
+        Ok(bytes.len() as u64 + crate::picture::exr::texels(bytes)? as u64 * pixel as u64)
+    }
+
     /// Reads the bytes of [`Checkpoint::encode`].
     ///
     /// # Errors

@@ -6,4 +6,5 @@ mod read_layers;
 mod write;
 
 pub use read::decode;
+pub(crate) use read::texels;
 pub use write::{Compression, ExrLayers, Layer, Plane, text_attributes};
