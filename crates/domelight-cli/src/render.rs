@@ -52,7 +52,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let view = &arguments.scene.build(loaded)?;
     let View { scene, camera, environment, probe, report } = view;
     let settings = &RenderSettings {
-        target_error: arguments.course.target_error,
+        target_error: arguments.samples.target_error,
         ..arguments.scene.render_settings(&arguments.pixel, arguments.samples.spp)
     };
     let points = || survey(scene, camera, settings);
@@ -110,7 +110,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     } else if !quiet {
         report.print_summary();
     }
-    report.check(saved, quiet)
+    report.check(saved, arguments.course.is_part(), quiet)
 }
 
 impl OutputArguments {

@@ -284,6 +284,8 @@ fn budgets_end_the_render_with_what_is_there() {
     let output = render(&folder, &forever);
     let report: serde_json::Value = common::json(&output);
     assert_eq!((&report["complete"], &report["stopped"]), (&false.into(), &"time".into()));
+    let part = ["--spp", "10000000", "--time", "300ms", "--shard", "0/2", "-o", "part.exr"];
+    ended(&render(&folder, &part), 75, &["time is over", "part.exr"]);
     let precise = ["--spp", "1024", "--target-error", "0.02", "-o", "y.exr", "--json"];
     let report: serde_json::Value = common::json(&render(&folder, &precise));
     assert_eq!(report["complete"], true);
