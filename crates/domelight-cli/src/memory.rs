@@ -43,10 +43,10 @@ pub(crate) const WRITTEN_TEXEL: u64 = 24;
 /// For each triangle: the tree, and what it is built from.
 pub(crate) const TRIANGLE: u64 = 200;
 
-/// For each pixel of a render: its sums, twice while they become layers.
-pub(crate) const PIXEL: u64 = 364;
+/// For each pixel of a render: its sums, and the layers that they become.
+pub(crate) const PIXEL: u64 = 248;
 
-/// The same with a checkpoint, or of a part: the bits of the sums and the file.
+/// The same with a checkpoint, or of a part: the sums again, their bits and the file.
 pub(crate) const SAVED_PIXEL: u64 = 496;
 
 /// For each pixel of a comparison: a render, the reference, and what its page shows.
@@ -77,7 +77,7 @@ pub(crate) fn keep(bytes: u64) {
 
 /// Refuses, by the name of what takes it, more than is left.
 pub(crate) fn allow(what: &str, bytes: u64) -> Result<()> {
-    Ok(require(bytes, left()).with_context(|| what.to_owned())?)
+    require(bytes, left()).with_context(|| what.to_owned())
 }
 
 /// Refuses a picture with so many bytes for each pixel.

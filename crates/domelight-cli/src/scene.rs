@@ -180,8 +180,7 @@ impl EnvironmentArguments {
         let path = match &light.source {
             EnvironmentSource::Builtin(name) => {
                 let rows = u64::from(self.env_rows);
-                let what = || format!("{name} with {rows} rows");
-                allow_environment(what(), 2 * rows * rows)?;
+                allow_environment(&format!("{name} with {rows} rows"), 2 * rows * rows)?;
                 return Ok(BuiltinProbe::from_str(name)?.image(self.env_rows as usize));
             }
             EnvironmentSource::File(path) => path,
@@ -194,7 +193,7 @@ impl EnvironmentArguments {
         };
         let loaded = load_probe(path, &options)?;
         let texels = loaded.image.pixels.len() as u64;
-        allow_environment(path.display().to_string(), texels)?;
+        allow_environment(&path.display().to_string(), texels)?;
         let repaired = loaded.sanitized;
         if repaired.negative + repaired.non_finite > 0 {
             warn(
@@ -212,9 +211,9 @@ impl EnvironmentArguments {
 }
 
 /// Refuses an environment of too many texels, else counts it.
-fn allow_environment(name: String, texels: u64) -> Result<()> {
+fn allow_environment(name: &str, texels: u64) -> Result<()> {
     let bytes = memory::ENVIRONMENT_TEXEL * texels;
-    memory::allow(&name, bytes)?;
+    memory::allow(name, bytes)?;
     memory::keep(bytes);
     Ok(())
 }

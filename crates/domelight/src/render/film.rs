@@ -160,13 +160,14 @@ impl Layers {
     /// If a pixel lies beside the picture.
     pub fn merge(&mut self, part: &Film, y: usize) {
         let (width, height) = (self.width(), self.height());
-        self.put(part, Window { x: 0, y, width, height });
+        self.put(&part.pixels, part.window, Window { x: 0, y, width, height });
     }
 
     /// Some of the rows.
     ///
     /// # Panics
     /// If there are no such rows.
+    #[must_use]
     pub fn rows(&self, rows: Range<usize>) -> Self {
         let (width, height) = (self.width(), rows.len());
         let range = rows.start * width..rows.end * width;
@@ -184,14 +185,13 @@ impl Layers {
         }
     }
 
-    /// Takes the pixels of `film` over that have samples, of its rows that are in `window`; `self` is of the pixels of
-    /// `window`.
-    fn put(&mut self, film: &Film, window: Window) {
-        let from = film.window;
+    /// Takes the pixels over that have samples, of the rows of `from` that are in `window`; `pixels` are those of `from`,
+    /// or none, and `self` is of the pixels of `window`.
+    pub(super) fn put(&mut self, pixels: &[PixelSums], from: Window, window: Window) {
         let start = from.y.max(window.y);
         let end = (from.y + from.height).min(window.y + window.height).max(start);
         let inside = (start - from.y) * from.width..(end - from.y) * from.width;
-        let pixels = film.pixels[inside.clone()].iter().zip(inside);
+        let pixels = pixels.get(inside.clone()).unwrap_or_default().iter().zip(inside);
         for (p, i) in pixels.filter(|(p, _)| p.n_samples > 0) {
             let (x, y) = (from.x + i % from.width, from.y + i / from.width);
             assert!(window.contains(x, y), "pixel ({x}, {y}) outside {window}");
@@ -250,7 +250,7 @@ impl Film {
     /// The picture of the window.
     pub fn layers(&self) -> Layers {
         let mut layers = Layers::new(self.window.width, self.window.height);
-        layers.put(self, self.window);
+        layers.put(&self.pixels, self.window, self.window);
         layers
     }
 

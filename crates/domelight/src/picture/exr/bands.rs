@@ -107,7 +107,9 @@ fn write_rows(
         let end = (start + rows).min(band.height);
         let mut data = Vec::with_capacity((end - start) * band.width * 4 * planes.len());
         for row in start..end {
-            planes.iter().for_each(|(_, plane)| plane.add_row(row, band.width, &mut data));
+            for (_, plane) in &planes {
+                plane.add_row(row, band.width, &mut data);
+            }
         }
         let index = BlockIndex {
             layer: 0,

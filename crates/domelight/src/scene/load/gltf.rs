@@ -287,7 +287,7 @@ impl<'a> Reader<'a> {
         let description = SceneDescription {
             parts: self.parts,
             surfaces: self.surfaces,
-            textures: self.textures.textures,
+            textures: self.textures.loaded,
             camera: self.camera,
             environment: None,
             up: Some(UpAxis::Y),

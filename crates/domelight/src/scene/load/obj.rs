@@ -252,7 +252,7 @@ impl<'a> Reader<'a> {
         let description = SceneDescription {
             parts,
             surfaces: self.surfaces,
-            textures: self.textures.textures,
+            textures: self.textures.loaded,
             ..SceneDescription::default()
         };
         Loaded { description, warnings: self.warnings, memory: 0 }

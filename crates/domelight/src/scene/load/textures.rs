@@ -11,14 +11,14 @@ use crate::scene::texture::{Encoding, Texture};
 
 /// The textures of one scene while it is loaded.
 pub(super) struct Textures<'b> {
-    pub(super) textures: Vec<Texture>,
+    pub(super) loaded: Vec<Texture>,
     files: HashMap<(PathBuf, Encoding), usize>,
     pub(super) budget: &'b Budget,
 }
 
 impl<'b> Textures<'b> {
     pub(super) fn new(budget: &'b Budget) -> Self {
-        Self { textures: Vec::new(), files: HashMap::new(), budget }
+        Self { loaded: Vec::new(), files: HashMap::new(), budget }
     }
 
     /// The index of a file's texture.
@@ -60,8 +60,8 @@ impl<'b> Textures<'b> {
         limits.reserve(decoder.total_bytes()).map_err(error)?;
         decoder.set_limits(limits).map_err(error)?;
         let texture = decode(decoder, name, encoding).map_err(error)?;
-        self.textures.push(texture);
-        Ok(self.textures.len() - 1)
+        self.loaded.push(texture);
+        Ok(self.loaded.len() - 1)
     }
 }
 

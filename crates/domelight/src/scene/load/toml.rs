@@ -270,7 +270,7 @@ impl Reader<'_> {
             self.add_surface(name, surface);
         }
         // The surfaces of [materials] come first, and with them the only textures so far.
-        self.loaded.description.textures = std::mem::take(&mut self.textures.textures);
+        self.loaded.description.textures = std::mem::take(&mut self.textures.loaded);
         if let Some(camera) = file.camera {
             let at = camera.span().start;
             let settings = camera_settings(&camera.into_inner(), file.up)
