@@ -116,7 +116,7 @@ fn what_is_no_plain_file_is_named() {
 
         // A pipe may be a probe or a picture; with nobody who writes it would wait.
         if name != "pipe.ply" {
-            let why = why.replace("not a plain file", "not a picture");
+            let why = why.replace("not a plain file", "the file is empty");
             ended(&render(&folder, &["spheres", "--env", name]), code, &[name, &why]);
             ended(
                 &domelight(&folder, &["lights", name, "-n", "2", "-o", "x.json"]),

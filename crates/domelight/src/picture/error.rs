@@ -21,6 +21,9 @@ pub enum Problem {
     /// The system says so.
     #[error("{0}")]
     Io(io::Error),
+    /// No bytes.
+    #[error("the file is empty")]
+    NoBytes,
     /// The first bytes belong to no known format.
     #[error(
         "not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG): it starts with {start:02x?}"

@@ -101,6 +101,7 @@ pub fn read_bytes(
         Some(Format::Exr) => exr::decode(bytes, options.layer.as_deref()),
         Some(Format::Pfm) => pfm::decode(bytes).map(|image| Picture::opaque(image, Format::Pfm)),
         Some(Format::Png) => png::decode(bytes),
+        None if bytes.is_empty() => Err(Problem::NoBytes),
         None => Err(Problem::UnknownFormat { start: bytes[..bytes.len().min(8)].to_vec() }),
     };
     decoded.map_err(|problem| problem.in_file(name))

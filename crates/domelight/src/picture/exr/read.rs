@@ -88,6 +88,9 @@ pub(crate) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
 }
 
 pub(super) fn open(bytes: &[u8]) -> Result<Reader<Cursor<&[u8]>>, Problem> {
+    if bytes.is_empty() {
+        return Err(Problem::NoBytes);
+    }
     let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(Problem::Exr)?;
     for header in reader.headers() {
         check_promises(header, bytes.len() as u64)?;
