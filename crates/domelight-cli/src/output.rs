@@ -3,10 +3,12 @@
 use crate::failure::UsageError;
 use domelight::RgbImage;
 use domelight::environment::mapping::{EnvmapKind, Mapping};
-use domelight::picture::exr::ExrLayers;
+use domelight::picture::exr::{ExrLayers, bands};
 use domelight::picture::png::Depth;
 use domelight::picture::tone::ToneMapping;
-use domelight::picture::{hdr, pfm, png, require_writable, write_atomically};
+use domelight::picture::{
+    Problem, hdr, pfm, png, require_writable, write_atomically, write_atomically_seeking,
+};
 use domelight::render::Layers;
 use std::fmt;
 use std::io::{self, Write};
@@ -87,20 +89,54 @@ impl PicturePath {
         layers: &Layers,
         tone: &ToneMapping,
         hidden: bool,
-        attributes: Vec<(String, String)>,
+        attributes: &[(String, String)],
     ) -> anyhow::Result<()> {
-        let color = &layers.color;
+        if self.has_all_layers() {
+            write_atomically_seeking(&self.path, |out| {
+                layers.write_exr(attributes, out).map_err(into_io)
+            })?;
+            return Ok(());
+        }
+        self.write_color(&layers.color, hidden.then_some(&layers.alpha[..]), tone)
+    }
+
+    /// Writes OpenEXR from bands of rows, as [`bands::write`] does; no file is there if one fails.
+    pub(crate) fn write_bands(
+        &self,
+        height: usize,
+        band: impl FnMut(usize) -> anyhow::Result<ExrLayers>,
+    ) -> anyhow::Result<()> {
+        let mut failed = None;
+        let written = write_atomically_seeking(&self.path, |out| {
+            bands::write(height, out, band).map_err(|error| match error.downcast() {
+                Ok(problem) => into_io(problem),
+                Err(error) => {
+                    failed = Some(error);
+                    io::Error::other("a band is missing")
+                }
+            })
+        });
+        failed.map_or(Ok(()), Err)?;
+        Ok(written?)
+    }
+
+    /// A rendering goes there with all its layers, into OpenEXR.
+    pub(crate) fn has_all_layers(&self) -> bool {
+        self.format.unwrap_or(PictureFormat::Exr) == PictureFormat::Exr
+    }
+
+    /// Writes colour alone, into PNG with alpha if there is one.
+    pub(crate) fn write_color(
+        &self,
+        color: &RgbImage,
+        alpha: Option<&[f32]>,
+        tone: &ToneMapping,
+    ) -> anyhow::Result<()> {
         write_atomically(&self.path, |out| match self.format.unwrap_or(PictureFormat::Exr) {
-            PictureFormat::Exr => {
-                let bytes = layers.to_exr(attributes).encode().map_err(io::Error::other)?;
-                out.write_all(&bytes)
-            }
+            PictureFormat::Exr => out.write_all(&exr_bytes(color, None)?),
             PictureFormat::Hdr => hdr::encode(color, out),
             PictureFormat::Pfm => pfm::encode(color, out),
-            PictureFormat::Png => {
-                let alpha = hidden.then_some(&layers.alpha[..]);
-                png::encode(color, alpha, tone, Depth::Eight, out)
-            }
+            PictureFormat::Png => png::encode(color, alpha, tone, Depth::Eight, out),
         })?;
         Ok(())
     }
@@ -112,6 +148,14 @@ impl fmt::Display for PicturePath {
             return f.write_str("standard output");
         }
         self.path.display().fmt(f)
+    }
+}
+
+/// What the system says stays what the system says.
+pub(crate) fn into_io(problem: Problem) -> io::Error {
+    match problem {
+        Problem::Io(error) => error,
+        problem => io::Error::other(problem),
     }
 }
 

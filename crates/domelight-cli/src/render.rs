@@ -11,12 +11,14 @@ use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
 use crate::course::Course;
 use crate::failure::UsageError;
 use crate::interrupt;
+use crate::memory;
 use crate::output::{PicturePath, print, require_one_on_standard_output};
 use crate::progress::RenderProgress;
 use crate::report::{RenderReport, Settings, Stages, Stop};
 use crate::scene::View;
 use crate::strategy::Job;
 use crate::usage::Stopwatch;
+use crate::values::Size;
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
@@ -34,8 +36,14 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let outputs = arguments.output.paths()?;
     arguments.course.check(&outputs)?;
     outputs.iter().try_for_each(PicturePath::require_writable)?;
+    if !arguments.course.is_part() {
+        // Before anything is loaded; again, with what the render is known to save, when all is.
+        let Size { width, height } = arguments.scene.camera.size;
+        memory::allow_picture(width, height, memory::PIXEL)?;
+    }
     arguments.pixel.start_threads()?;
     let interrupted = interrupt::flag();
+    let loading = interrupt::nothing_to_keep(arguments.course.code_of_an_early_end());
     let mut watch = Stopwatch::start();
 
     let loaded = arguments.scene.load(quiet)?;
@@ -44,7 +52,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let view = &arguments.scene.build(loaded)?;
     let View { scene, camera, environment, probe, report } = view;
     let settings = &RenderSettings {
-        target_error: arguments.course.target_error,
+        target_error: arguments.samples.target_error,
         ..arguments.scene.render_settings(&arguments.pixel, arguments.samples.spp)
     };
     let points = || survey(scene, camera, settings);
@@ -62,9 +70,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let course = &arguments.course;
     let course = course.course(view, settings, &described, &outputs, interrupted, quiet)?;
     let build = watch.lap();
-    if interrupted.load(Ordering::Relaxed) {
-        bail!("interrupted before the first sample; nothing was written");
-    }
+    drop(loading);
 
     let n_pixels = (settings.width * settings.height) as u64;
     let total = n_pixels * u64::from(settings.n_samples);
@@ -91,7 +97,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         let mut attributes = described.provenance();
         // If not, the layer of sample counts tells how many there are.
         attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
-        path.write_layers(&rendering.layers, &tone, report.hide_env, attributes)
+        path.write_layers(&rendering.layers, &tone, report.hide_env, &attributes)
     };
     // A part is its own checkpoint, and written.
     if !arguments.course.is_part() {
@@ -106,7 +112,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     } else if !quiet {
         report.print_summary();
     }
-    report.check(saved, quiet)
+    report.check(saved, arguments.course.is_part(), quiet)
 }
 
 impl OutputArguments {

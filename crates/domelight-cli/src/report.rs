@@ -216,8 +216,8 @@ impl RenderReport {
     /// Complains about what the picture does not show.
     ///
     /// # Errors
-    /// If the render was interrupted.
-    pub(crate) fn check(&self, saved: Option<&Path>, quiet: bool) -> Result<()> {
+    /// If the render was interrupted, or time ended it before a part was whole.
+    pub(crate) fn check(&self, saved: Option<&Path>, is_part: bool, quiet: bool) -> Result<()> {
         if self.non_finite_samples > 0 {
             let n = self.non_finite_samples;
             warn(quiet, &format!("{n} camera samples were NaN or infinite and count as black"));
@@ -229,6 +229,11 @@ impl RenderReport {
             (Some(Stop::Interrupted), Some(saved)) => Err(InterruptedAndSaved(format!(
                 "interrupted; {} holds the state to go on from",
                 saved.display()
+            ))
+            .into()),
+            (Some(Stop::Time), Some(part)) if is_part => Err(InterruptedAndSaved(format!(
+                "the time is over; {} holds the state to go on from",
+                part.display()
             ))
             .into()),
             (Some(Stop::Time) | None, _) => Ok(()),

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 use domelight::render::Filter;
 use domelight::sampling::SamplerKind;
 
-use super::one_of;
+use super::{one_of, positive};
 use crate::values::Split;
 
 /// A strategy, and what it may be told.
@@ -58,6 +58,9 @@ pub(crate) struct SampleArguments {
     #[arg(long, value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub(crate) spp: u32,
+    /// End each tile when the spread of its samples suggests this relMSE, such as 1e-3, but not before 16 samples
+    #[arg(long, value_name = "E", value_parser = positive)]
+    pub(crate) target_error: Option<f32>,
 }
 
 /// The points of a pixel, and who computes them.

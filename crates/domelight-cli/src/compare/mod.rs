@@ -26,10 +26,12 @@ use crate::args::compare::CompareArguments;
 use crate::args::sampling::StrategyName;
 use crate::failure::{UsageError, tell, warn};
 use crate::interrupt;
+use crate::memory;
 use crate::notation::NamedStrategy;
 use crate::output::print;
 use crate::scene::View;
 use crate::usage::Stopwatch;
+use crate::values::Size;
 use entrant::{Entrant, Measured, Purchase};
 use reference::{Reference, Source, Wanted};
 use report::{CompareReport, ResultReport, StrategyReport};
@@ -47,12 +49,15 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     for path in [Some(&arguments.output), arguments.json.as_ref()].into_iter().flatten() {
         require_writable(path)?;
     }
+    let Size { width, height } = arguments.scene.camera.size;
+    memory::allow_picture(width, height, memory::COMPARED_PIXEL)?;
     arguments.pixel.start_threads()?;
     interrupt::flag();
-    let size = arguments.scene.camera.size;
+    let loading = interrupt::nothing_to_keep(interrupt::ENDED);
     let given = arguments.reference.as_deref();
-    let given = given.map(|path| Reference::read(path, [size.width, size.height])).transpose()?;
+    let given = given.map(|path| Reference::read(path, [width, height])).transpose()?;
     let view = arguments.scene.build(arguments.scene.load(quiet)?)?;
+    drop(loading);
     let reference = match given {
         Some(reference) => reference,
         None => Wanted::new(arguments, &view)?.get(&view, quiet)?,

@@ -14,6 +14,7 @@ use serde::Serialize;
 use super::cache::{Cache, Key};
 use super::shot::Studio;
 use crate::args::compare::CompareArguments;
+use crate::memory;
 use crate::scene::View;
 use crate::strategy::Plan;
 use crate::values::Split;
@@ -62,7 +63,8 @@ impl Reference {
     /// Reads a reference of the wanted size.
     pub(super) fn read(path: &Path, size: [usize; 2]) -> Result<Self> {
         let name = path.display().to_string();
-        let image = read(path, &ReadOptions::default())?.image;
+        let image =
+            read(path, &ReadOptions { max_memory: memory::left(), ..Default::default() })?.image;
         if [image.width, image.height] != size {
             let mismatch =
                 SizeMismatch { test: (size[0], size[1]), reference: (image.width, image.height) };

@@ -68,6 +68,7 @@ pub(crate) enum Subject<'a> {
 impl Studio {
     pub(crate) fn new(arguments: &FiguresArguments, quiet: bool) -> Result<Self> {
         let interrupted = interrupt::flag();
+        let _loading = interrupt::nothing_to_keep(interrupt::ENDED);
         let mut description = load_scene(&arguments.scene, quiet)?;
         let is_builtin = BuiltinScene::from_str(&arguments.scene).is_ok();
         if is_builtin || description.environment.is_none() {

@@ -17,6 +17,7 @@ const FEWEST_SAMPLES: u32 = 16;
 #[derive(Clone, Debug)]
 pub(super) struct Tile {
     pub(super) window: Window,
+    /// Empty before the first sample: of a shard's picture most tiles are others' work.
     pub(super) pixels: Vec<PixelSums>,
     pub(super) counts: Counts,
 }
@@ -97,13 +98,12 @@ struct ShadowRays {
 impl Tile {
     /// Without samples.
     pub(super) fn new(window: Window) -> Self {
-        let pixels = vec![PixelSums::default(); window.area()];
-        Self { window, pixels, counts: Counts::default() }
+        Self { window, pixels: Vec::new(), counts: Counts::default() }
     }
 
     /// Camera samples of each pixel.
     pub(super) fn n_samples(&self) -> u32 {
-        self.pixels[0].n_samples()
+        self.pixels.first().map_or(0, PixelSums::n_samples)
     }
 
     /// Has all samples, or as few as the error allows: a decision that no other tile has a part in.
@@ -129,6 +129,7 @@ impl Tile {
         observer: &impl Observer,
     ) -> Counts {
         let Scratch { batch, of_strategy } = scratch;
+        self.pixels.resize(self.window.area(), PixelSums::default());
         observer.stage_started(Stage::CameraRays);
         self.trace_camera_rays(frame, &pass.samples, batch);
         observer.stage_started(Stage::Surfaces);

@@ -20,7 +20,7 @@ pub use crate::environment::UpAxis;
 pub use camera::{Camera, CameraError, CameraSettings, Projection};
 pub use description::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription};
 #[cfg(feature = "io")]
-pub use load::{LoadError, Loaded, load};
+pub use load::{LoadError, Loaded, load, load_within};
 pub use surface::{MetallicRoughnessSurface, NormalMap, PhongSurface, Surface, SurfaceModel};
 pub use texture::{Encoding, Texture, TextureError, TextureRef, UvTransform, Wrap};
 
