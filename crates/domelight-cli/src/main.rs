@@ -5,6 +5,7 @@
 
 mod acceptance;
 mod args;
+mod bench;
 mod compare;
 mod course;
 mod diff;
@@ -23,6 +24,7 @@ mod report;
 mod scene;
 mod strategy;
 mod svg;
+mod typed;
 mod usage;
 mod values;
 
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
         Command::Merge(arguments) => merge::run(&arguments, quiet),
         Command::Farm(arguments) => farm::run(&arguments, quiet),
         Command::Compare(arguments) => compare::run(&arguments, quiet),
+        Command::Bench(arguments) => bench::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Lights(arguments) => lights::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),

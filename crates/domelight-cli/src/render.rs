@@ -14,7 +14,7 @@ use crate::interrupt;
 use crate::output::{PicturePath, print, require_one_on_standard_output};
 use crate::progress::RenderProgress;
 use crate::report::{RenderReport, Settings, Stages, Stop};
-use crate::scene::View;
+use crate::scene::{View, start_threads};
 use crate::strategy::Job;
 use crate::usage::Stopwatch;
 
@@ -34,7 +34,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let outputs = arguments.output.paths()?;
     arguments.course.check(&outputs)?;
     outputs.iter().try_for_each(PicturePath::require_writable)?;
-    arguments.pixel.start_threads()?;
+    start_threads(arguments.pixel.threads)?;
     let interrupted = interrupt::flag();
     let mut watch = Stopwatch::start();
 

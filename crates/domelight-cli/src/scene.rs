@@ -101,18 +101,16 @@ impl SceneArguments {
     }
 }
 
-impl PixelArguments {
-    /// Starts as many threads as asked for.
-    pub(crate) fn start_threads(&self) -> Result<()> {
-        // Slurm grants threads that only some of its set-ups enforce.
-        let granted = std::env::var("SLURM_CPUS_PER_TASK").ok();
-        let granted = granted.and_then(|n| n.parse().ok()).filter(|&n| n > 0);
-        if let Some(threads) = self.threads.or(granted) {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
-            pool.build_global().context("cannot start the threads")?;
-        }
-        Ok(())
+/// Starts as many threads as asked for.
+pub(crate) fn start_threads(asked: Option<u32>) -> Result<()> {
+    // Slurm grants threads that only some of its set-ups enforce.
+    let granted = std::env::var("SLURM_CPUS_PER_TASK").ok();
+    let granted = granted.and_then(|n| n.parse().ok()).filter(|&n| n > 0);
+    if let Some(threads) = asked.or(granted) {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
+        pool.build_global().context("cannot start the threads")?;
     }
+    Ok(())
 }
 
 /// A built-in scene by its name, else a file.

@@ -28,7 +28,8 @@ use crate::failure::{UsageError, tell, warn};
 use crate::interrupt;
 use crate::notation::NamedStrategy;
 use crate::output::print;
-use crate::scene::View;
+use crate::scene::{View, start_threads};
+use crate::typed;
 use crate::usage::Stopwatch;
 use entrant::{Entrant, Measured, Purchase};
 use reference::{Reference, Source, Wanted};
@@ -47,7 +48,7 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     for path in [Some(&arguments.output), arguments.json.as_ref()].into_iter().flatten() {
         require_writable(path)?;
     }
-    arguments.pixel.start_threads()?;
+    start_threads(arguments.pixel.threads)?;
     interrupt::flag();
     let size = arguments.scene.camera.size;
     let given = arguments.reference.as_deref();
@@ -132,7 +133,7 @@ impl Competition<'_> {
         compare_with(of_mis, &mut strategies);
         let report = CompareReport {
             version: env!("CARGO_PKG_VERSION"),
-            command: command(std::env::args().skip(1)),
+            command: typed::command(),
             budget: arguments.budget,
             scene: self.view.report.clone(),
             sampler: format!("{:?}", settings.sampler).to_lowercase(),
@@ -302,30 +303,5 @@ impl CompareReport {
             ));
         }
         tell(&format!("-> {}", output.display()));
-    }
-}
-
-/// The command as it would be typed.
-fn command(arguments: impl Iterator<Item = String>) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+@%".contains(c);
-    let quoted = arguments.map(|argument| {
-        if !argument.is_empty() && argument.chars().all(plain) {
-            argument
-        } else {
-            format!("'{}'", argument.replace('\'', "'\\''"))
-        }
-    });
-    std::iter::once("domelight".to_owned()).chain(quoted).collect::<Vec<_>>().join(" ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_command_can_be_typed_again() {
-        let typed = ["compare", "my scene.toml", "--budget", "time:2s", "it's", ""];
-        let text = command(typed.iter().map(ToString::to_string));
-        assert_eq!(text, "domelight compare 'my scene.toml' --budget time:2s 'it'\\''s' ''");
     }
 }
