@@ -14,6 +14,7 @@ mod farm;
 mod figures;
 mod interrupt;
 mod lights;
+mod measure;
 mod merge;
 mod notation;
 mod output;
