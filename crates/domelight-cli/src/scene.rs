@@ -113,6 +113,32 @@ pub(crate) fn start_threads(asked: Option<u32>) -> Result<()> {
     Ok(())
 }
 
+/// The scene's own camera, or one framed to it.
+pub(crate) fn view_of(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
+    let framed = || CameraSettings::framing(&description.subject_bounds(), aspect, up);
+    description.camera.unwrap_or_else(framed)
+}
+
+/// That view, moved until the scene just fits.
+pub(crate) fn close_up(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
+    const FOV: f32 = 26.0;
+    let view = view_of(description, aspect, up);
+    let bounds = description.bounds();
+    let (center, size) = (bounds.center(), bounds.size());
+    let toward = (view.origin - view.target).normalize_or(Vec3::Z);
+    let height = size.abs().dot(up.abs());
+    // The widest side, whichever way it is turned.
+    let width = (size - up.abs() * height).max_element();
+    let extent = height.max(width / aspect) * 1.08;
+    let distance = 0.5 * extent / (0.5 * FOV.to_radians()).tan() + 0.5 * width;
+    CameraSettings {
+        projection: Projection::Perspective { fov_y_degrees: FOV },
+        origin: center + toward * distance,
+        target: center,
+        up: view.up,
+    }
+}
+
 /// A built-in scene by its name, else a file.
 pub(crate) fn load_scene(name: &str, quiet: bool) -> Result<SceneDescription> {
     if let Ok(builtin) = BuiltinScene::from_str(name) {

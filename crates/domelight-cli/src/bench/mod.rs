@@ -1,8 +1,14 @@
 //! `domelight bench`: what error costs, in CPU time.
 
+mod bound;
 mod cases;
+mod contestant;
 mod kernels;
+mod ladder;
 mod machine;
+mod mitsuba;
+mod ply;
+mod renders;
 mod results;
 mod rigs;
 mod table;
@@ -48,9 +54,9 @@ struct Bench<'a> {
 impl Bench<'_> {
     fn measure(&self, rows: &mut Rows) -> Result<()> {
         match rows {
-            Rows::Lecture(rows) => cases::run_lecture(self, rows),
+            Rows::Lecture(rows) => renders::run_lecture(self, rows),
             Rows::Kernels(rows) => kernels::run(self, rows),
-            Rows::Probes(rows) => cases::run_probes(self, rows),
+            Rows::Probes(rows) => renders::run_probes(self, rows),
             Rows::Rigs(rows) => rigs::run(self, rows),
         }
     }

@@ -164,14 +164,14 @@ impl Reference {
         cache: Option<&Cache>,
         key: &Key,
         goal: Goal,
-        strategy: String,
+        strategy: &str,
         quiet: bool,
         shoot: impl FnMut(u32, usize) -> Result<Picture>,
     ) -> Result<Self> {
         let report = |source, file: Option<&Path>, noise, spp| ReferenceReport {
             source,
             file: file.map(|path| path.display().to_string()),
-            strategy: Some(strategy.clone()),
+            strategy: Some(strategy.to_owned()),
             spp: Some(spp),
             rel_mse: Some(noise),
         };
@@ -204,7 +204,7 @@ impl Reference {
         let key = Key::of_program(view, format_args!("{settings:?}{PLAN:?}{goal:?}"));
         let renderer = PLAN.prepare(&view.environment)?;
         let studio = Studio { view, settings, renderer: &renderer, quiet };
-        Self::get(cache, &key, goal, PLAN.describe(), quiet, |n_samples, half| {
+        Self::get(cache, &key, goal, &PLAN.describe(), quiet, |n_samples, half| {
             let label = format!("reference, half {} of 2", half + 1);
             Ok(studio.shoot(&label, n_samples, SEEDS[half])?.layers.into())
         })
