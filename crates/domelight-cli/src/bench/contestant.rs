@@ -21,7 +21,7 @@ use crate::usage::{Seconds, Stopwatch};
 /// The error that most comparisons of renderers are made at.
 pub(super) const HEADLINE: f64 = 1e-3;
 /// How near to it an error must be for more time to be spent.
-const NEAR: f64 = 4.0;
+const NEAR: f64 = 8.0;
 /// How much more.
 const MORE: f64 = 4.0;
 /// How far beyond the errors that are wanted a single picture's error must be for those of other seeds to
@@ -201,11 +201,13 @@ impl<'a> Contestant<'a> {
     }
 
     /// Chooses the budgets by a picture each: from the last with more than the greatest error to the first
-    /// with less than the least, as far as time allows. Warms caches and compilers, too.
+    /// with less than the least, as far as time allows.
     pub(super) fn choose_budgets(&mut self, limits: &Limits) -> Result<()> {
         let (least, greatest) = limits.errors;
         let mut tried: Vec<(u32, f64)> = Vec::new();
         let mut n = self.first;
+        // Warms caches; other programs compile what they run.
+        self.take(n, PILOT_SEED)?;
         loop {
             let taken = self.take(n, PILOT_SEED)?;
             tried.push((n, taken.rel_mse));
@@ -290,7 +292,8 @@ pub(super) struct Reached {
     pub(super) wall_seconds: f64,
     /// 1 / (relMSE · CPU seconds).
     pub(super) efficiency: f64,
-    /// That over the efficiency of perfect product sampling at the ray kernel's rate; null for other programs.
+    /// That over the efficiency of perfect product sampling at the ray kernel's rate; null for other programs
+    /// and where nothing is hidden, as it then is 0.
     pub(super) efficiency_of_bound: Option<f64>,
 }
 
@@ -315,7 +318,9 @@ impl Reached {
             range: range.filter(|_| n_seeds > 1),
             wall_seconds: wall.seconds,
             efficiency,
-            efficiency_of_bound: bound.map(|bound| efficiency * bound.rel_mse_seconds),
+            efficiency_of_bound: bound
+                .filter(|bound| bound.rel_mse_seconds > 0.0)
+                .map(|bound| efficiency * bound.rel_mse_seconds),
         })
     }
 }
