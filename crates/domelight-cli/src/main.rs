@@ -5,6 +5,7 @@
 
 mod acceptance;
 mod args;
+mod bench;
 mod compare;
 mod course;
 mod diff;
@@ -13,6 +14,7 @@ mod farm;
 mod figures;
 mod interrupt;
 mod lights;
+mod measure;
 mod memory;
 mod merge;
 mod notation;
@@ -25,6 +27,7 @@ mod report;
 mod scene;
 mod strategy;
 mod svg;
+mod typed;
 mod usage;
 mod values;
 
@@ -40,6 +43,7 @@ fn main() -> ExitCode {
         Command::Merge(arguments) => merge::run(&arguments, quiet),
         Command::Farm(arguments) => farm::run(&arguments, quiet),
         Command::Compare(arguments) => compare::run(&arguments, quiet),
+        Command::Bench(arguments) => bench::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Lights(arguments) => lights::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),

@@ -15,7 +15,7 @@ use crate::memory;
 use crate::output::{PicturePath, print, require_one_on_standard_output};
 use crate::progress::RenderProgress;
 use crate::report::{RenderReport, Settings, Stages, Stop};
-use crate::scene::View;
+use crate::scene::{View, start_threads};
 use crate::strategy::Job;
 use crate::usage::Stopwatch;
 use crate::values::Size;
@@ -41,7 +41,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         let Size { width, height } = arguments.scene.camera.size;
         memory::allow_picture(width, height, memory::PIXEL)?;
     }
-    arguments.pixel.start_threads()?;
+    start_threads(arguments.pixel.threads)?;
     let interrupted = interrupt::flag();
     let loading = interrupt::nothing_to_keep(arguments.course.code_of_an_early_end());
     let mut watch = Stopwatch::start();

@@ -114,17 +114,41 @@ impl SceneArguments {
     }
 }
 
-impl PixelArguments {
-    /// Starts as many threads as asked for.
-    pub(crate) fn start_threads(&self) -> Result<()> {
-        // Slurm grants threads that only some of its set-ups enforce.
-        let granted = std::env::var("SLURM_CPUS_PER_TASK").ok();
-        let granted = granted.and_then(|n| n.parse().ok()).filter(|&n| n > 0);
-        if let Some(threads) = self.threads.or(granted) {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
-            pool.build_global().context("cannot start the threads")?;
-        }
-        Ok(())
+/// Starts as many threads as asked for.
+pub(crate) fn start_threads(asked: Option<u32>) -> Result<()> {
+    // Slurm grants threads that only some of its set-ups enforce.
+    let granted = std::env::var("SLURM_CPUS_PER_TASK").ok();
+    let granted = granted.and_then(|n| n.parse().ok()).filter(|&n| n > 0);
+    if let Some(threads) = asked.or(granted) {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
+        pool.build_global().context("cannot start the threads")?;
+    }
+    Ok(())
+}
+
+/// The scene's own camera, or one framed to it.
+pub(crate) fn view_of(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
+    let framed = || CameraSettings::framing(&description.subject_bounds(), aspect, up);
+    description.camera.unwrap_or_else(framed)
+}
+
+/// That view, moved until the scene just fits.
+pub(crate) fn close_up(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
+    const FOV: f32 = 26.0;
+    let view = view_of(description, aspect, up);
+    let bounds = description.bounds();
+    let (center, size) = (bounds.center(), bounds.size());
+    let toward = (view.origin - view.target).normalize_or(Vec3::Z);
+    let height = size.abs().dot(up.abs());
+    // The widest side, whichever way it is turned.
+    let width = (size - up.abs() * height).max_element();
+    let extent = height.max(width / aspect) * 1.08;
+    let distance = 0.5 * extent / (0.5 * FOV.to_radians()).tan() + 0.5 * width;
+    CameraSettings {
+        projection: Projection::Perspective { fov_y_degrees: FOV },
+        origin: center + toward * distance,
+        target: center,
+        up: view.up,
     }
 }
 

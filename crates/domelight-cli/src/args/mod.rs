@@ -1,5 +1,6 @@
 //! The command line, typed.
 
+pub(crate) mod bench;
 pub(crate) mod compare;
 pub(crate) mod course;
 pub(crate) mod farm;
@@ -55,6 +56,10 @@ pub(crate) enum Command {
     /// Compare strategies on one scene at equal samples, rays or time, in a report to look at.
     #[command(after_help = compare::EXAMPLES)]
     Compare(Box<compare::CompareArguments>),
+    /// Measure what error costs: CPU time of each strategy to a wanted error, rays a second, rigs; also
+    /// against other programs.
+    #[command(after_help = bench::EXAMPLES)]
+    Bench(Box<bench::BenchArguments>),
     /// Turn a light probe into a rig of lights, and the probe without them.
     #[command(after_help = lights::EXAMPLES, mut_arg("env", lights::positional))]
     Lights(Box<lights::LightsArguments>),

@@ -1,14 +1,11 @@
 //! `domelight compare`: strategies on one scene at equal samples, rays or time.
 
 mod budget;
-mod cache;
 mod entrant;
 mod page;
 mod pixels;
 mod plots;
-mod reference;
 mod report;
-mod shot;
 
 use std::path::Path;
 
@@ -26,16 +23,18 @@ use crate::args::compare::CompareArguments;
 use crate::args::sampling::StrategyName;
 use crate::failure::{UsageError, tell, warn};
 use crate::interrupt;
+use crate::measure::cache::Cache;
+use crate::measure::reference::{Goal, Reference, Source};
+use crate::measure::shot::Studio;
 use crate::memory;
 use crate::notation::NamedStrategy;
 use crate::output::print;
-use crate::scene::View;
+use crate::scene::{View, start_threads};
+use crate::typed;
 use crate::usage::Stopwatch;
 use crate::values::Size;
 use entrant::{Entrant, Measured, Purchase};
-use reference::{Reference, Source, Wanted};
 use report::{CompareReport, ResultReport, StrategyReport};
-use shot::Studio;
 
 /// The relMSE of the reference should be this far below the least that is measured against it.
 const CONVERGED: f64 = 0.2;
@@ -51,7 +50,7 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     }
     let Size { width, height } = arguments.scene.camera.size;
     memory::allow_picture(width, height, memory::COMPARED_PIXEL)?;
-    arguments.pixel.start_threads()?;
+    start_threads(arguments.pixel.threads)?;
     interrupt::flag();
     let loading = interrupt::nothing_to_keep(interrupt::ENDED);
     let given = arguments.reference.as_deref();
@@ -60,16 +59,25 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     drop(loading);
     let reference = match given {
         Some(reference) => reference,
-        None => Wanted::new(arguments, &view)?.get(&view, quiet)?,
+        None => converged(arguments, &view, quiet)?,
     };
     let competition = Competition { arguments, view: &view, reference: &reference, quiet };
     let (report, pictures) = competition.run()?;
     report.warn(quiet);
-    write(arguments, &report, &pictures, &reference.image)?;
+    write(arguments, &report, &pictures, &reference.picture.image)?;
     if !quiet {
         report.summarise(&arguments.output);
     }
     Ok(())
+}
+
+/// The reference that the cache may have.
+fn converged(arguments: &CompareArguments, view: &View, quiet: bool) -> Result<Reference> {
+    let cache =
+        (!arguments.no_cache).then(|| Cache::new(arguments.cache.as_deref())).transpose()?;
+    let settings = arguments.scene.render_settings(&arguments.pixel, 1);
+    let goal = Goal::Samples(arguments.reference_spp);
+    Reference::of_view(cache.as_ref(), view, settings, goal, quiet)
 }
 
 /// Refuses what does not go together.
@@ -137,7 +145,7 @@ impl Competition<'_> {
         compare_with(of_mis, &mut strategies);
         let report = CompareReport {
             version: env!("CARGO_PKG_VERSION"),
-            command: command(std::env::args().skip(1)),
+            command: typed::command(),
             budget: arguments.budget,
             scene: self.view.report.clone(),
             sampler: format!("{:?}", settings.sampler).to_lowercase(),
@@ -167,7 +175,7 @@ impl Competition<'_> {
         let entrant = Entrant {
             studio,
             label: strategy.text.clone(),
-            reference: &self.reference.image,
+            reference: &self.reference.picture.image,
             n_seeds: self.arguments.seeds,
         };
         let mut report = StrategyReport {
@@ -194,7 +202,7 @@ impl Competition<'_> {
     }
 
     fn picture(&self, measured: &Measured) -> Result<Picture> {
-        let reference = &self.reference.image;
+        let reference = &self.reference.picture.image;
         let tone = ToneMapping { exposure: self.arguments.exposure, curve: ToneCurve::Srgb };
         let shown = |image: &RgbImage| {
             let pixels = image.pixels.iter().map(|&p| tone.apply(p)).collect();
@@ -307,30 +315,5 @@ impl CompareReport {
             ));
         }
         tell(&format!("-> {}", output.display()));
-    }
-}
-
-/// The command as it would be typed.
-fn command(arguments: impl Iterator<Item = String>) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+@%".contains(c);
-    let quoted = arguments.map(|argument| {
-        if !argument.is_empty() && argument.chars().all(plain) {
-            argument
-        } else {
-            format!("'{}'", argument.replace('\'', "'\\''"))
-        }
-    });
-    std::iter::once("domelight".to_owned()).chain(quoted).collect::<Vec<_>>().join(" ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_command_can_be_typed_again() {
-        let typed = ["compare", "my scene.toml", "--budget", "time:2s", "it's", ""];
-        let text = command(typed.iter().map(ToString::to_string));
-        assert_eq!(text, "domelight compare 'my scene.toml' --budget time:2s 'it'\\''s' ''");
     }
 }

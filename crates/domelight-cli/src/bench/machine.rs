@@ -1,0 +1,63 @@
+//! What the results were measured on.
+
+use std::fs;
+
+use domelight::bvh::InstructionSet;
+use serde::{Deserialize, Serialize};
+
+/// As cargo was told.
+const RUSTFLAGS: &str = env!("DOMELIGHT_RUSTFLAGS");
+
+/// The computer and the build of this program.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Machine {
+    /// Null where the system does not tell.
+    cpu: Option<String>,
+    /// Cores that the process may use.
+    cores: usize,
+    /// That the ray kernel runs with.
+    instruction_set: String,
+    target: String,
+    rustc: String,
+    /// Release or debug.
+    profile: String,
+    /// Flags beside those of the profile.
+    rustflags: String,
+    /// Processes that wanted to run in the last minute, before the first measurement; null where the system
+    /// does not tell. What is above 0 was there beside us.
+    load_average: Option<f64>,
+}
+
+impl Machine {
+    pub(super) fn this() -> Self {
+        Self {
+            cpu: cpu(),
+            cores: std::thread::available_parallelism().map_or(1, Into::into),
+            instruction_set: format!("{:?}", InstructionSet::best()).to_lowercase(),
+            target: env!("DOMELIGHT_TARGET").to_owned(),
+            rustc: env!("DOMELIGHT_RUSTC").to_owned(),
+            profile: env!("DOMELIGHT_PROFILE").to_owned(),
+            rustflags: RUSTFLAGS.to_owned(),
+            load_average: load_average(),
+        }
+    }
+
+    /// Part of a sentence.
+    pub(super) fn describe(&self) -> String {
+        let Self { cpu, cores, instruction_set, .. } = self;
+        let cpu = cpu.as_deref().unwrap_or("unknown processor");
+        let cores = if *cores == 1 { "1 core".to_owned() } else { format!("{cores} cores") };
+        format!("{cores} of {cpu}, {instruction_set}")
+    }
+}
+
+/// As Linux names it; `None` elsewhere.
+fn cpu() -> Option<String> {
+    let info = fs::read_to_string("/proc/cpuinfo").ok()?;
+    let line = info.lines().find(|line| line.starts_with("model name"))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}
+
+fn load_average() -> Option<f64> {
+    fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
+}

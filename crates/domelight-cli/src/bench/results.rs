@@ -1,0 +1,121 @@
+//! What a run measured, as `--json` gives it and `--table` reads it.
+
+use std::path::Path;
+use std::time::SystemTime;
+use std::{fs, io};
+
+use anyhow::{Context as _, Result};
+use domelight::picture::write_atomically;
+use serde::{Deserialize, Serialize};
+
+use super::machine::Machine;
+use super::table::Table;
+use super::{kernels, renders, rigs};
+use crate::args::bench::Suite;
+use crate::failure::UsageError;
+use crate::typed;
+
+/// Raised when a file of before can no longer be read.
+const SCHEMA: u32 = 1;
+
+/// A run: when, where, with what, and the rows.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Results {
+    schema: u32,
+    /// Of domelight.
+    version: String,
+    /// When it began, RFC 3339.
+    date: String,
+    /// As it was typed.
+    command: String,
+    machine: Machine,
+    threads: usize,
+    /// False if it was interrupted or failed: then the rows are what was done.
+    pub(super) complete: bool,
+    #[serde(flatten)]
+    pub(super) rows: Rows,
+}
+
+/// One list of rows a suite.
+#[derive(Serialize, Deserialize)]
+#[serde(tag = "suite", content = "rows", rename_all = "lowercase")]
+pub(super) enum Rows {
+    Lecture(Vec<renders::Row>),
+    Kernels(Vec<kernels::Row>),
+    Probes(Vec<renders::Row>),
+    Rigs(Vec<rigs::Row>),
+}
+
+impl Results {
+    /// Nothing yet.
+    pub(super) fn new(suite: Suite) -> Self {
+        Self {
+            schema: SCHEMA,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
+            command: typed::command(),
+            machine: Machine::this(),
+            threads: rayon::current_num_threads(),
+            complete: false,
+            rows: match suite {
+                Suite::Lecture => Rows::Lecture(Vec::new()),
+                Suite::Kernels => Rows::Kernels(Vec::new()),
+                Suite::Probes => Rows::Probes(Vec::new()),
+                Suite::Rigs => Rows::Rigs(Vec::new()),
+            },
+        }
+    }
+
+    /// Reads what [`Results::write`] wrote.
+    pub(super) fn read(path: &Path) -> Result<Self> {
+        let name = path.display();
+        let text = fs::read_to_string(path).map_err(|error| match error.kind() {
+            io::ErrorKind::NotFound => UsageError(format!("{name}: {error}")).into(),
+            _ => anyhow::Error::new(error).context(name.to_string()),
+        })?;
+        let usage = |why: String| UsageError(format!("{name}: {why}"));
+        let value: serde_json::Value = serde_json::from_str(&text)
+            .map_err(|e| usage(format!("it is no JSON of domelight bench ({e})")))?;
+        match value["schema"].as_u64() {
+            Some(schema) if schema == u64::from(SCHEMA) => {}
+            Some(schema) => {
+                let why = format!("its schema is {schema}, that of this version {SCHEMA}");
+                return Err(usage(why).into());
+            }
+            None => return Err(usage("it is no JSON of domelight bench".into()).into()),
+        }
+        let results = serde_json::from_value(value);
+        Ok(results.map_err(|e| usage(format!("it is damaged ({e})")))?)
+    }
+
+    pub(super) fn json(&self) -> Result<String> {
+        serde_json::to_string_pretty(self).context("the results cannot be written as JSON")
+    }
+
+    pub(super) fn write(&self, path: &Path) -> Result<()> {
+        let json = self.json()?;
+        Ok(write_atomically(path, |out| writeln!(out, "{json}"))?)
+    }
+
+    /// When, where and with what, in a sentence.
+    pub(super) fn describe(&self) -> String {
+        let day = self.date.split('T').next().unwrap_or(&self.date);
+        let threads = if self.threads == 1 { "thread" } else { "threads" };
+        let complete = if self.complete { "" } else { "; not all of it was done" };
+        format!(
+            "domelight {}, {day}, {} {threads} on {}{complete}",
+            self.version,
+            self.threads,
+            self.machine.describe()
+        )
+    }
+
+    pub(super) fn tables(&self) -> Vec<Table> {
+        match &self.rows {
+            Rows::Lecture(rows) => renders::lecture_tables(rows),
+            Rows::Probes(rows) => renders::tables(rows),
+            Rows::Kernels(rows) => kernels::tables(rows),
+            Rows::Rigs(rows) => rigs::tables(rows),
+        }
+    }
+}
