@@ -34,7 +34,7 @@ impl Machine {
             target: env!("DOMELIGHT_TARGET").to_owned(),
             rustc: env!("DOMELIGHT_RUSTC").to_owned(),
             profile: env!("DOMELIGHT_PROFILE").to_owned(),
-            rustflags: env!("DOMELIGHT_RUSTFLAGS").into(),
+            rustflags: option_env!("DOMELIGHT_RUSTFLAGS").unwrap_or_default().to_owned(),
             load_average: load_average(),
         }
     }

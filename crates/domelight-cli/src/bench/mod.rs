@@ -1,6 +1,7 @@
 //! `domelight bench`: what error costs, in CPU time.
 
 mod cases;
+mod embree;
 mod kernels;
 mod machine;
 mod results;
