@@ -60,6 +60,14 @@ impl Simd for Avx2 {
         F32x8(unsafe { _mm256_loadu_ps(x.as_ptr()) })
     }
     #[inline(always)]
+    fn prefetch<T>(self, x: &T) {
+        let start = std::ptr::from_ref(x).cast::<i8>();
+        for offset in (0..size_of::<T>()).step_by(64) {
+            // SAFETY: a prefetch reads nothing; `offset` is within `x`.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.add(offset)) };
+        }
+    }
+    #[inline(always)]
     fn empty(self) -> Sets8 {
         // SAFETY: `self` proves AVX2.
         Sets8(unsafe { _mm256_setzero_si256() })
@@ -113,6 +121,11 @@ impl Floats for F32x8 {
     fn eq(self, b: Self) -> Mask8 {
         // SAFETY: `self` proves AVX2.
         Mask8(unsafe { _mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn select(m: Mask8, a: Self, b: Self) -> Self {
+        // SAFETY: the arguments prove AVX2.
+        Self(unsafe { _mm256_blendv_ps(b.0, a.0, m.0) })
     }
     #[inline(always)]
     fn store(self) -> Lanes {

@@ -77,6 +77,8 @@ pub(super) trait Simd: Copy {
 
     fn splat(self, x: f32) -> Self::Floats;
     fn load(self, x: &Lanes) -> Self::Floats;
+    /// Asks for memory that will be read soon.
+    fn prefetch<T>(self, x: &T);
     /// Eight empty sets.
     fn empty(self) -> Self::Sets;
 }
@@ -97,6 +99,8 @@ pub(super) trait Floats:
     fn lt(self, b: Self) -> Self::Mask;
     /// self = b; false if either is NaN.
     fn eq(self, b: Self) -> Self::Mask;
+    /// a where `m` is true, else b.
+    fn select(m: Self::Mask, a: Self, b: Self) -> Self;
     fn store(self) -> Lanes;
 }
 

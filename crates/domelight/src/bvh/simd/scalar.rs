@@ -30,6 +30,8 @@ impl Simd for Scalar {
         F32x8(*x)
     }
     #[inline(always)]
+    fn prefetch<T>(self, _: &T) {}
+    #[inline(always)]
     fn empty(self) -> Sets8 {
         Sets8([0; 8])
     }
@@ -76,6 +78,10 @@ impl Floats for F32x8 {
     #[inline(always)]
     fn eq(self, b: Self) -> Mask8 {
         Mask8(from_fn(|i| self.0[i] == b.0[i]))
+    }
+    #[inline(always)]
+    fn select(m: Mask8, a: Self, b: Self) -> Self {
+        Self(from_fn(|i| if m.0[i] { a.0[i] } else { b.0[i] }))
     }
     #[inline(always)]
     fn store(self) -> Lanes {
