@@ -4,11 +4,14 @@
 //! operation a lane. Nothing fuses or reorders them, so a kernel gives the same bits on every
 //! instruction set. [`dispatch`] compiles it for each and picks at run time, so that a portable
 //! binary traces as fast as one built for the machine. Another instruction set is one more file like
-//! `avx2.rs` and one more line in [`InstructionSet`] and [`dispatch`]; two vectors of four, as of
-//! NEON, make one of eight.
+//! `avx2.rs`, or `neon.rs` of half the width, and one more line in [`InstructionSet`] and [`dispatch`].
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod scalar;
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
@@ -20,22 +23,32 @@ use super::Lanes;
 pub enum InstructionSet {
     /// One number at a time; the reference, on every processor.
     Scalar,
+    /// AArch64 NEON: four numbers at a time.
+    Neon,
     /// x86-64 AVX2: eight numbers at a time.
     Avx2,
+    /// x86-64 AVX-512: eight numbers at a time, with masks.
+    Avx512,
 }
 
 impl InstructionSet {
     /// All that this version knows, the fastest last.
-    pub const ALL: [Self; 2] = [Self::Scalar, Self::Avx2];
+    pub const ALL: [Self; 4] = [Self::Scalar, Self::Neon, Self::Avx2, Self::Avx512];
 
     /// Whether this processor has the instructions.
     pub fn is_available(self) -> bool {
         match self {
             Self::Scalar => true,
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon => neon::Neon::new().is_some(),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => avx2::Avx2::new().is_some(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => avx512::Avx512::new().is_some(),
+            #[cfg(not(target_arch = "aarch64"))]
+            Self::Neon => false,
             #[cfg(not(target_arch = "x86_64"))]
-            Self::Avx2 => false,
+            Self::Avx2 | Self::Avx512 => false,
         }
     }
 
@@ -58,15 +71,27 @@ pub(super) trait Kernel {
 #[inline]
 pub(super) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) -> K::Output {
     match instruction_set {
-        InstructionSet::Scalar => kernel.run(scalar::Scalar),
+        #[cfg(target_arch = "aarch64")]
+        InstructionSet::Neon => {
+            if let Some(simd) = neon::Neon::new() {
+                return simd.run(kernel);
+            }
+        }
+        #[cfg(target_arch = "x86_64")]
         InstructionSet::Avx2 => {
-            #[cfg(target_arch = "x86_64")]
             if let Some(simd) = avx2::Avx2::new() {
                 return simd.run(kernel);
             }
-            kernel.run(scalar::Scalar)
         }
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx512 => {
+            if let Some(simd) = avx512::Avx512::new() {
+                return simd.run(kernel);
+            }
+        }
+        _ => {}
     }
+    kernel.run(scalar::Scalar)
 }
 
 /// An instruction set. A value of it, and any vector made with one, proves that the processor has
