@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use domelight::render::Stage;
 use serde::Serialize;
 
-use crate::usage::thread_cpu_nanoseconds;
+use crate::usage::thread_seconds;
 
 thread_local! {
     /// What this thread is at, and its CPU time when that began.
-    static CURRENT: Cell<Option<(Stage, u64)>> = const { Cell::new(None) };
+    static CURRENT: Cell<Option<(Stage, f64)>> = const { Cell::new(None) };
 }
 
 /// CPU time by stage, of all threads together.
@@ -31,9 +31,9 @@ pub(crate) struct StageSeconds {
 impl Profile {
     /// The calling thread ends what it was at, and begins `stage`.
     pub(crate) fn begin(&self, stage: Option<Stage>) {
-        let Some(now) = thread_cpu_nanoseconds() else { return };
+        let now = thread_seconds();
         if let Some((last, since)) = CURRENT.replace(stage.map(|stage| (stage, now))) {
-            let spent = now.saturating_sub(since);
+            let spent = ((now - since) * 1e9) as u64;
             self.nanoseconds[last as usize].fetch_add(spent, Ordering::Relaxed);
         }
     }

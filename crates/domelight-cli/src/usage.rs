@@ -13,16 +13,18 @@ pub(crate) fn cpu_seconds() -> Option<f64> {
     None
 }
 
-/// CPU time of the calling thread so far; none where the system does not tell.
-pub(crate) fn thread_cpu_nanoseconds() -> Option<u64> {
+/// CPU seconds of this thread since some moment; wall-clock where the system does not tell.
+pub(crate) fn thread_seconds() -> f64 {
+    use std::{sync::LazyLock, time::Instant};
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
     #[cfg(unix)]
     {
         use nix::time::{ClockId, clock_gettime};
-        let time = clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).ok()?;
-        Some(std::time::Duration::from(time).as_nanos() as u64)
+        if let Ok(time) = clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID) {
+            return time.tv_sec() as f64 + time.tv_nsec() as f64 * 1e-9;
+        }
     }
-    #[cfg(not(unix))]
-    None
+    START.elapsed().as_secs_f64()
 }
 
 /// The most memory that was ever resident \[bytes\]; none where the system does not tell.

@@ -3,6 +3,7 @@
 mod bound;
 mod cases;
 mod contestant;
+mod embree;
 mod kernels;
 mod ladder;
 mod machine;

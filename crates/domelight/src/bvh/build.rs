@@ -2,14 +2,15 @@
 //!
 //! A node starts as one range of triangles; the range of the largest surface is split in two until
 //! there are eight. A split minimises area × blocks over equal bins of the centroids on each axis
-//! (Wald 2007). Past a certain depth ranges are halved instead, which bounds the depth of the tree
+//! (Wald 2007). Boxes are four-wide vectors, of which x, y and z count. Past a certain depth ranges are halved instead, which bounds the depth of the tree
 //! and with it the traversal's stack, whatever the input.
 
 use rayon::prelude::*;
 
 use super::{Block, Bvh, BvhError, Child, InstructionSet, Lanes, Node, WIDTH};
 use crate::geometry::Aabb;
-use crate::math::Vec3;
+use crate::math::{Vec3, Vec4};
+use glam::Vec4Swizzles;
 
 /// Triangle numbers and block numbers share 31 bits.
 const MAX_TRIANGLES: usize = (1 << 31) - 1;
@@ -21,30 +22,82 @@ pub(super) const MAX_DEPTH: u32 = MAX_HEURISTIC_DEPTH + 10;
 const PARALLEL_THRESHOLD: usize = 4096;
 const MAX_BINS: usize = 32;
 
-/// A triangle's box and number.
+/// A box as two vectors whose fourth numbers mean nothing.
 #[derive(Clone, Copy)]
-struct Primitive {
-    bounds: Aabb,
-    id: u32,
+struct Box4 {
+    lower: Vec4,
+    upper: Vec4,
 }
 
+impl Box4 {
+    const EMPTY: Self = Self { lower: Vec4::INFINITY, upper: Vec4::NEG_INFINITY };
+
+    fn union(self, o: Self) -> Self {
+        Self { lower: self.lower.min(o.lower), upper: self.upper.max(o.upper) }
+    }
+
+    fn including(self, p: Vec4) -> Self {
+        Self { lower: self.lower.min(p), upper: self.upper.max(p) }
+    }
+
+    /// Half the surface area; 0 for an empty box.
+    fn area(self) -> f32 {
+        let size = (self.upper - self.lower).max(Vec4::ZERO);
+        let faces = size * size.yzxw();
+        faces.x + faces.y + faces.z
+    }
+
+    fn aabb(self) -> Aabb {
+        Aabb { min: self.lower.truncate(), max: self.upper.truncate() }
+    }
+}
+
+/// A triangle's box; the lower half of its number in `lower.w`, the upper half in `upper.w`.
+///
+/// As whole numbers: bits of an integer would be those of denormal numbers, and slow.
+#[derive(Clone, Copy)]
+struct Primitive(Box4);
+
 impl Primitive {
-    fn centroid(&self) -> Vec3 {
-        0.5 * self.bounds.min + 0.5 * self.bounds.max
+    fn new(bounds: &Aabb, id: u32) -> Self {
+        let half = |half: u32| (half & 0xffff) as f32;
+        let (lower, upper) = (bounds.min.extend(half(id)), bounds.max.extend(half(id >> 16)));
+        Self(Box4 { lower, upper })
+    }
+
+    fn id(self) -> u32 {
+        self.0.lower.w as u32 | (self.0.upper.w as u32) << 16
+    }
+
+    fn centroid(self) -> Vec4 {
+        0.5 * self.0.lower + 0.5 * self.0.upper
     }
 }
 
 /// The tree before it is laid out.
 enum Tree<'a> {
     Leaf(&'a [Primitive]),
-    Inner(Vec<(Aabb, Self)>),
+    Inner(Vec<(Box4, Self)>),
+}
+
+impl Tree<'_> {
+    /// How many nodes and leaves.
+    fn counts(&self) -> (usize, usize) {
+        match self {
+            Self::Leaf(_) => (0, 1),
+            Self::Inner(children) => children
+                .iter()
+                .map(|(_, tree)| tree.counts())
+                .fold((1, 0), |a, b| (a.0 + b.0, a.1 + b.1)),
+        }
+    }
 }
 
 pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Bvh, BvhError> {
     let mut primitives = primitives(positions, triangles)?;
+    let triangle_count = primitives.len();
     let root = Range::new(&mut primitives);
     let bounds = root.bounds;
-    let triangle_count = root.primitives.len();
     let tree = if triangle_count == 0 {
         Tree::Inner(Vec::new())
     } else if root.fits_a_leaf() {
@@ -52,12 +105,9 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Bvh, B
     } else {
         subtree(root, 0)
     };
-    let mut layout = Layout { positions, triangles, nodes: Vec::new(), blocks: Vec::new() };
-    if let Tree::Inner(children) = &tree {
-        layout.push_node(children);
-    }
-    let Layout { nodes, blocks, .. } = layout;
-    Ok(Bvh { nodes, blocks, bounds, triangle_count, instruction_set: InstructionSet::best() })
+    let (nodes, blocks) = lay_out(positions, triangles, &tree);
+    let (bounds, instruction_set) = (bounds.aabb(), InstructionSet::best());
+    Ok(Bvh { nodes, blocks, bounds, triangle_count, instruction_set })
 }
 
 /// Checks the input and boxes every triangle that has an area.
@@ -76,7 +126,7 @@ fn primitives(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Vec<Primitiv
         }
         let corners = indices.map(|i| positions[i as usize]);
         if has_area(corners) {
-            primitives.push(Primitive { bounds: Aabb::around(corners), id: triangle as u32 });
+            primitives.push(Primitive::new(&Aabb::around(corners), triangle as u32));
         }
     }
     Ok(primitives)
@@ -90,15 +140,15 @@ fn has_area([a, b, c]: [Vec3; 3]) -> bool {
 /// Consecutive primitives with their box and that of their centroids.
 struct Range<'a> {
     primitives: &'a mut [Primitive],
-    bounds: Aabb,
-    centroids: Aabb,
+    bounds: Box4,
+    centroids: Box4,
 }
 
 impl<'a> Range<'a> {
     fn new(primitives: &'a mut [Primitive]) -> Self {
-        let (mut bounds, mut centroids) = (Aabb::EMPTY, Aabb::EMPTY);
+        let (mut bounds, mut centroids) = (Box4::EMPTY, Box4::EMPTY);
         for p in primitives.iter() {
-            bounds = bounds.union(p.bounds);
+            bounds = bounds.union(p.0);
             centroids = centroids.including(p.centroid());
         }
         Self { primitives, bounds, centroids }
@@ -110,71 +160,94 @@ impl<'a> Range<'a> {
 
     /// Splits where the heuristic is least, or in halves if all centroids fall into one bin.
     fn split(self) -> [Self; 2] {
-        let Some(plane) = Bins::new(&self).best_plane() else {
+        let bins = Bins::new(&self);
+        let Some(plane) = bins.best_plane() else {
             return self.halve();
         };
-        let middle = partition(self.primitives, |p| plane.is_left(p));
-        self.split_at(middle)
+        let [left, right] = bins.sides(&plane);
+        let (middle, centroids) = partition(self.primitives, &plane);
+        let (first, second) = self.primitives.split_at_mut(middle);
+        [
+            Self { primitives: first, bounds: left, centroids: centroids[0] },
+            Self { primitives: second, bounds: right, centroids: centroids[1] },
+        ]
     }
 
     /// Splits at the median of the longest axis of the centroids.
     fn halve(self) -> [Self; 2] {
-        let axis = self.centroids.size().max_position();
+        let Aabb { min, max } = self.centroids.aabb();
+        let axis = (max - min).max_position();
         let middle = self.primitives.len() / 2;
         self.primitives.select_nth_unstable_by(middle, |a, b| {
-            a.centroid()[axis].total_cmp(&b.centroid()[axis]).then(a.id.cmp(&b.id))
+            a.centroid()[axis].total_cmp(&b.centroid()[axis]).then(a.id().cmp(&b.id()))
         });
-        self.split_at(middle)
-    }
-
-    fn split_at(self, middle: usize) -> [Self; 2] {
         let (left, right) = self.primitives.split_at_mut(middle);
         [Self::new(left), Self::new(right)]
     }
 }
 
-/// Moves what is left to the front; returns how many those are.
-fn partition(primitives: &mut [Primitive], is_left: impl Fn(&Primitive) -> bool) -> usize {
-    let mut middle = 0;
-    for i in 0..primitives.len() {
-        if is_left(&primitives[i]) {
-            primitives.swap(i, middle);
-            middle += 1;
+/// Moves what is left of the plane to the front; returns how many those are, and the boxes of the
+/// centroids of both sides.
+fn partition(primitives: &mut [Primitive], plane: &Plane) -> (usize, [Box4; 2]) {
+    let mut centroids = [Box4::EMPTY; 2];
+    let mut side = |p: &Primitive| {
+        let side = usize::from(!plane.is_left(p));
+        centroids[side] = centroids[side].including(p.centroid());
+        side
+    };
+    let (mut i, mut end) = (0, primitives.len());
+    while i < end {
+        if side(&primitives[i]) == 0 {
+            i += 1;
+            continue;
         }
+        end -= 1;
+        while i < end && side(&primitives[end]) == 1 {
+            end -= 1;
+        }
+        primitives.swap(i, end);
+        i += usize::from(i < end);
     }
-    middle
+    (i, centroids)
 }
 
 /// Maps centroids to equal bins on each axis.
 #[derive(Clone, Copy)]
 struct Binning {
-    origin: Vec3,
-    scale: Vec3,
+    origin: Vec4,
+    scale: Vec4,
     count: usize,
 }
 
 impl Binning {
     fn new(range: &Range<'_>) -> Self {
         let count = (16 + range.primitives.len() / 16).min(MAX_BINS);
+        let Box4 { lower, upper } = range.centroids;
+        let scale = (count as f32 / (upper - lower)).to_array();
         Self {
-            origin: range.centroids.min,
-            scale: Vec3::splat(count as f32) / range.centroids.size(),
+            origin: lower,
+            // Where all centroids agree all go into the first bin.
+            scale: scale.map(|s| if s.is_finite() { s } else { 0.0 }).into(),
             count,
         }
     }
 
-    /// The bins of a primitive on the three axes; 0 where all centroids agree.
+    /// The bins of a primitive on the three axes.
     fn bins(&self, p: &Primitive) -> [usize; 3] {
-        let at = (p.centroid() - self.origin) * self.scale;
-        at.to_array().map(|x| (x as usize).min(self.count - 1))
+        // Numbers from 2²³ have no fraction, so that the last bits of this sum are a whole number.
+        const WHOLE: f32 = (1 << 23) as f32;
+        let at = (p.centroid() - self.origin) * self.scale - 0.5;
+        let at = at.max(Vec4::ZERO).min(Vec4::splat((self.count - 1) as f32));
+        let [x, y, z, _] = (at + WHOLE).to_array();
+        [x, y, z].map(|x| x.to_bits() as usize % MAX_BINS)
     }
 }
 
 /// How many primitives fall into each bin of each axis, and their boxes.
 struct Bins {
     binning: Binning,
-    counts: [[usize; MAX_BINS]; 3],
-    bounds: [[Aabb; MAX_BINS]; 3],
+    counts: [[u32; MAX_BINS]; 3],
+    bounds: [[Box4; MAX_BINS]; 3],
 }
 
 /// A split: the bins below `bin` are left.
@@ -194,11 +267,11 @@ impl Bins {
     fn new(range: &Range<'_>) -> Self {
         let binning = Binning::new(range);
         let mut bins =
-            Self { binning, counts: [[0; MAX_BINS]; 3], bounds: [[Aabb::EMPTY; MAX_BINS]; 3] };
+            Self { binning, counts: [[0; MAX_BINS]; 3], bounds: [[Box4::EMPTY; MAX_BINS]; 3] };
         for p in range.primitives.iter() {
             for (axis, bin) in binning.bins(p).into_iter().enumerate() {
                 bins.counts[axis][bin] += 1;
-                bins.bounds[axis][bin] = bins.bounds[axis][bin].union(p.bounds);
+                bins.bounds[axis][bin] = bins.bounds[axis][bin].union(p.0);
             }
         }
         bins
@@ -206,14 +279,14 @@ impl Bins {
 
     /// The plane of least area × blocks; none if one side of each would be empty.
     fn best_plane(&self) -> Option<Plane> {
-        let mut best = (f64::INFINITY, None);
+        let mut best = (f32::INFINITY, None);
         for axis in 0..3 {
             let right_costs = self.right_costs(axis);
-            let (mut count, mut bounds) = (0, Aabb::EMPTY);
+            let (mut count, mut bounds) = (0, Box4::EMPTY);
             for bin in 1..self.binning.count {
                 count += self.counts[axis][bin - 1];
                 bounds = bounds.union(self.bounds[axis][bin - 1]);
-                let cost = cost(count, &bounds) + right_costs[bin];
+                let cost = cost(count, bounds) + right_costs[bin];
                 if count > 0 && cost < best.0 {
                     best = (cost, Some(Plane { binning: self.binning, axis, bin }));
                 }
@@ -223,29 +296,29 @@ impl Bins {
     }
 
     /// The cost of the right side of each plane; infinite where it is empty.
-    fn right_costs(&self, axis: usize) -> [f64; MAX_BINS] {
-        let mut costs = [f64::INFINITY; MAX_BINS];
-        let (mut count, mut bounds) = (0, Aabb::EMPTY);
+    fn right_costs(&self, axis: usize) -> [f32; MAX_BINS] {
+        let mut costs = [f32::INFINITY; MAX_BINS];
+        let (mut count, mut bounds) = (0, Box4::EMPTY);
         for bin in (1..self.binning.count).rev() {
             count += self.counts[axis][bin];
             bounds = bounds.union(self.bounds[axis][bin]);
             if count > 0 {
-                costs[bin] = cost(count, &bounds);
+                costs[bin] = cost(count, bounds);
             }
         }
         costs
     }
+
+    /// The boxes left and right of a plane.
+    fn sides(&self, plane: &Plane) -> [Box4; 2] {
+        let (left, right) = self.bounds[plane.axis].split_at(plane.bin);
+        [left, right].map(|bins| bins.iter().copied().fold(Box4::EMPTY, Box4::union))
+    }
 }
 
 /// Area × blocks: what the range would cost as leaves.
-fn cost(count: usize, bounds: &Aabb) -> f64 {
-    area(bounds) * count.div_ceil(WIDTH) as f64
-}
-
-/// Half the surface area, in f64 so that no finite box overflows.
-fn area(bounds: &Aabb) -> f64 {
-    let s = (bounds.max.as_dvec3() - bounds.min.as_dvec3()).max(glam::DVec3::ZERO);
-    s.x * s.y + s.y * s.z + s.z * s.x
+fn cost(count: u32, bounds: Box4) -> f32 {
+    bounds.area() * count.div_ceil(WIDTH as u32) as f32
 }
 
 /// The subtree of a range that is too large for a leaf.
@@ -259,7 +332,7 @@ fn subtree(range: Range<'_>, depth: u32) -> Tree<'_> {
     })
 }
 
-fn child(range: Range<'_>, depth: u32) -> (Aabb, Tree<'_>) {
+fn child(range: Range<'_>, depth: u32) -> (Box4, Tree<'_>) {
     let bounds = range.bounds;
     let tree =
         if range.fits_a_leaf() { Tree::Leaf(range.primitives) } else { subtree(range, depth) };
@@ -270,7 +343,7 @@ fn child(range: Range<'_>, depth: u32) -> (Aabb, Tree<'_>) {
 fn split_in_eight(range: Range<'_>, depth: u32) -> Vec<Range<'_>> {
     let by_heuristic = depth < MAX_HEURISTIC_DEPTH;
     let size =
-        |r: &Range<'_>| if by_heuristic { area(&r.bounds) } else { r.primitives.len() as f64 };
+        |r: &Range<'_>| if by_heuristic { r.bounds.area() } else { r.primitives.len() as f32 };
     let mut children = Vec::with_capacity(WIDTH);
     children.push(range);
     while children.len() < WIDTH {
@@ -281,8 +354,19 @@ fn split_in_eight(range: Range<'_>, depth: u32) -> Vec<Range<'_>> {
         let range = children.swap_remove(largest);
         children.extend(if by_heuristic { range.split() } else { range.halve() });
     }
-    children.sort_by(|a, b| area(&b.bounds).total_cmp(&area(&a.bounds)));
+    children.sort_by(|a, b| b.bounds.area().total_cmp(&a.bounds.area()));
     children
+}
+
+/// The nodes and blocks of a tree.
+fn lay_out(positions: &[Vec3], triangles: &[[u32; 3]], tree: &Tree<'_>) -> (Vec<Node>, Vec<Block>) {
+    let (nodes, blocks) = tree.counts();
+    let (nodes, blocks) = (Vec::with_capacity(nodes), Vec::with_capacity(blocks));
+    let mut layout = Layout { positions, triangles, nodes, blocks };
+    if let Tree::Inner(children) = tree {
+        layout.push_node(children);
+    }
+    (layout.nodes, layout.blocks)
 }
 
 /// Writes the tree depth first.
@@ -294,7 +378,7 @@ struct Layout<'a> {
 }
 
 impl Layout<'_> {
-    fn push_node(&mut self, children: &[(Aabb, Tree<'_>)]) -> Child {
+    fn push_node(&mut self, children: &[(Box4, Tree<'_>)]) -> Child {
         let index = self.nodes.len();
         let empty = [[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]];
         self.nodes.push(Node { planes: [empty; 3], children: [Child::block(0); WIDTH] });
@@ -306,8 +390,8 @@ impl Layout<'_> {
             let node = &mut self.nodes[index];
             node.children[lane] = child;
             for axis in 0..3 {
-                node.planes[axis][0][lane] = bounds.min[axis];
-                node.planes[axis][1][lane] = bounds.max[axis];
+                node.planes[axis][0][lane] = bounds.lower[axis];
+                node.planes[axis][1][lane] = bounds.upper[axis];
             }
         }
         Child::node(index)
@@ -317,8 +401,8 @@ impl Layout<'_> {
         let missing: Lanes = [f32::NAN; WIDTH];
         let mut block = Block { vertices: [[missing; 3]; 3], ids: [Block::NONE; WIDTH] };
         for (lane, p) in primitives.iter().enumerate() {
-            block.ids[lane] = p.id;
-            for (vertex, &index) in self.triangles[p.id as usize].iter().enumerate() {
+            block.ids[lane] = p.id();
+            for (vertex, &index) in self.triangles[p.id() as usize].iter().enumerate() {
                 for axis in 0..3 {
                     block.vertices[vertex][axis][lane] = self.positions[index as usize][axis];
                 }
@@ -351,7 +435,7 @@ mod tests {
         let mut primitives: Vec<_> = (0..8 * 8 * 8 * 8)
             .map(|i| {
                 let corner = Vec3::new((i * i % 97) as f32, (i % 31) as f32, 1.5f32.powi(i % 50));
-                Primitive { bounds: Aabb { min: corner, max: corner + 1.0 }, id: i as u32 }
+                Primitive::new(&Aabb { min: corner, max: corner + 1.0 }, i as u32)
             })
             .collect();
         assert_eq!(depth(&subtree(Range::new(&mut primitives), MAX_HEURISTIC_DEPTH)), 3);
@@ -363,7 +447,7 @@ mod tests {
             .map(|id| {
                 let x = f32::MAX * (id as f32 / 50.0 - 1.0);
                 let bounds = Aabb { min: Vec3::splat(x), max: Vec3::splat(x) };
-                Primitive { bounds, id }
+                Primitive::new(&bounds, id)
             })
             .collect();
         assert!(depth(&subtree(Range::new(&mut primitives), 0)) <= 3);

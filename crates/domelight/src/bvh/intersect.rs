@@ -12,87 +12,9 @@
 //! accept, planes move outward by 16·2⁻²⁴·m: the shear's 7, the box test's own 3, and room to spare
 //! (the paper's section on traversal does it axis by axis).
 
+use super::prepare::PreparedRays;
 use super::{Block, Lanes, Node, WIDTH};
-use crate::geometry::{Aabb, Ray};
-use crate::math::Vec3;
 use crate::simd::{Floats, Mask, Real, Simd};
-use glam::Vec3A;
-
-/// A ray with what both tests need of it.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct PreparedRay {
-    /// One bit an axis: set where the ray enters through the upper plane.
-    octant: u32,
-    /// The origin moved forward along each axis, for near planes.
-    near_origin: [f32; 3],
-    /// The origin moved backward along each axis, for far planes.
-    far_origin: [f32; 3],
-    inverse_direction: [f32; 3],
-    origin: [f32; 3],
-    direction: [f32; 3],
-    /// The axes x, y, z of the sheared space; z is the longest of the direction.
-    axes: [u8; 3],
-    /// Direction x/z, y/z and 1/z.
-    shear: [f32; 3],
-}
-
-impl PreparedRay {
-    /// None if the ray can hit nothing, because it is not finite or has no direction.
-    #[inline(always)]
-    pub(super) fn new(ray: &Ray, scene: &Aabb) -> Option<Self> {
-        const INFLATION: f32 = 1.0 / (1 << 20) as f32;
-        // The rounding of origin ± inflation, twice over.
-        const ORIGIN_ROUNDING: f32 = 1.0 / (1 << 22) as f32;
-        // A component so small moves the ray by less than the inflation while it crosses the scene.
-        const NEGLIGIBLE: f32 = 1.0 / (1u64 << 40) as f32;
-
-        let [origin, direction] = [ray.origin, ray.direction].map(Vec3A::from);
-        let [lower, upper] = [scene.min, scene.max].map(|p| (Vec3A::from(p) - origin).abs());
-        let inflation = INFLATION * lower.max(upper).max_element();
-        let margin = Vec3A::splat(inflation) + ORIGIN_ROUNDING * origin.abs();
-        let forward = margin.copysign(direction);
-
-        let negligible = NEGLIGIBLE * direction.abs().max_element();
-        let nonzero = direction.abs().max(Vec3A::splat(negligible)).copysign(direction);
-        let inverse_direction = nonzero.recip().to_array();
-
-        let d = direction.to_array();
-        let z = longest_axis(d);
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let scale = inverse_direction[z];
-        let prepared = Self {
-            octant: ray.direction.is_negative_bitmask(),
-            near_origin: (origin + forward).to_array(),
-            far_origin: (origin - forward).to_array(),
-            inverse_direction,
-            origin: ray.origin.to_array(),
-            direction: d,
-            axes: [x as u8, y as u8, z as u8],
-            shear: [d[x] * scale, d[y] * scale, scale],
-        };
-        // Not finite if any of the numbers is not.
-        let sum = origin + direction + Vec3A::from(inverse_direction) + Vec3A::splat(inflation);
-        sum.is_finite().then_some(prepared)
-    }
-
-    /// One bit an axis: set where the direction is negative.
-    #[inline(always)]
-    pub(super) fn octant(direction: Vec3) -> usize {
-        direction.is_negative_bitmask() as usize
-    }
-}
-
-#[inline(always)]
-fn longest_axis(d: [f32; 3]) -> usize {
-    let [x, y, z] = d.map(f32::abs);
-    if x > y && x > z {
-        0
-    } else if y > z {
-        1
-    } else {
-        2
-    }
-}
 
 /// A node's planes in the order in which rays of one octant cross them.
 #[derive(Clone, Copy)]
@@ -102,13 +24,12 @@ pub(super) struct Slabs<S: Simd> {
 }
 
 impl<S: Simd> Slabs<S> {
-    /// Takes the octant from any ray of it.
     #[inline(always)]
-    pub(super) fn load(simd: S, node: &Node, ray: &PreparedRay) -> Self {
+    pub(super) fn load(simd: S, node: &Node, octant: u32) -> Self {
         let [[x_near, x_far], [y_near, y_far], [z_near, z_far]] = [
-            ordered(&node.planes[0], ray.octant),
-            ordered(&node.planes[1], ray.octant >> 1),
-            ordered(&node.planes[2], ray.octant >> 2),
+            ordered(&node.planes[0], octant),
+            ordered(&node.planes[1], octant >> 1),
+            ordered(&node.planes[2], octant >> 2),
         ];
         Self {
             near: [simd.load(x_near), simd.load(y_near), simd.load(z_near)],
@@ -116,19 +37,20 @@ impl<S: Simd> Slabs<S> {
         }
     }
 
-    /// Which boxes the ray crosses within [0, `limit`], and the distances where it enters them.
+    /// Which boxes ray `i` crosses within [0, `limit`], and the distances where it enters them.
     #[inline(always)]
-    pub(super) fn cross(
+    pub(super) fn cross<const N: usize>(
         &self,
         simd: S,
-        ray: &PreparedRay,
+        rays: &PreparedRays<N>,
+        i: usize,
         limit: f32,
     ) -> (<S::Floats as Real>::Mask, S::Floats) {
         let (mut enter, mut leave) = (simd.splat(0.0), simd.splat(limit));
         for k in 0..3 {
-            let inverse_direction = simd.splat(ray.inverse_direction[k]);
-            let near = (self.near[k] - simd.splat(ray.near_origin[k])) * inverse_direction;
-            let far = (self.far[k] - simd.splat(ray.far_origin[k])) * inverse_direction;
+            let inverse_direction = simd.splat(rays.inverse_directions[k][i]);
+            let near = (self.near[k] - simd.splat(rays.near_origins[k][i])) * inverse_direction;
+            let far = (self.far[k] - simd.splat(rays.far_origins[k][i])) * inverse_direction;
             enter = near.max(enter);
             leave = far.min(leave);
         }
@@ -182,6 +104,19 @@ impl<F: Floats> Points<F> {
     }
 }
 
+/// A ray and the triangles of a block, in the plane across the ray's longest axis.
+pub(super) struct Sheared<'a, S: Simd, const N: usize> {
+    block: &'a Block,
+    rays: &'a PreparedRays<N>,
+    i: usize,
+    /// The depths of the corners, in units of the direction along z.
+    depths: [S::Floats; 3],
+    /// Barycentric weights, scaled alike.
+    weights: [S::Floats; 3],
+    /// Where the ray's line goes through the triangle.
+    inside: <S::Floats as Real>::Mask,
+}
+
 /// The triangles of a block that a ray hits.
 pub(super) struct BlockHits<S: Simd> {
     /// Bit i: triangle i is hit; the rest of its lane means nothing otherwise.
@@ -202,68 +137,90 @@ impl<S: Simd> BlockHits<S> {
     }
 }
 
-/// The triangles hit at 0 < t ≤ `limit`; None if there are none.
-#[inline(always)]
-pub(super) fn hit_block<S: Simd>(
-    simd: S,
-    block: &Block,
-    ray: &PreparedRay,
-    limit: f32,
-) -> Option<BlockHits<S>> {
-    let zero = simd.splat(0.0);
-    let frame = ShearedFrame::new(simd, ray);
-    let a = frame.shear(simd, &block.vertices[0]);
-    let b = frame.shear(simd, &block.vertices[1]);
-    let c = frame.shear(simd, &block.vertices[2]);
+impl<'a, S: Simd, const N: usize> Sheared<'a, S, N> {
+    /// Ray `i` modulo `N`.
+    #[inline(always)]
+    pub(super) fn new(simd: S, block: &'a Block, rays: &'a PreparedRays<N>, i: usize) -> Self {
+        let i = i % N;
+        let zero = simd.splat(0.0);
+        let frame = ShearedFrame::new(simd, rays, i);
+        let a = frame.shear(simd, &block.vertices[0]);
+        let b = frame.shear(simd, &block.vertices[1]);
+        let c = frame.shear(simd, &block.vertices[2]);
 
-    // Scaled barycentric weights.
-    let (mut u, mut v, mut w) = (edge(c, b), edge(a, c), edge(b, a));
-    if (u.eq(zero) | v.eq(zero) | w.eq(zero)).bits() != 0 {
-        let corners =
-            [[a.x.store(), a.y.store()], [b.x.store(), b.y.store()], [c.x.store(), c.y.store()]];
-        let exact = exact_edges(corners, [u.store(), v.store(), w.store()]);
-        (u, v, w) = (simd.load(&exact[0]), simd.load(&exact[1]), simd.load(&exact[2]));
+        // All of one sign inside; zero on an edge.
+        let (mut u, mut v, mut w) = (edge(c, b), edge(a, c), edge(b, a));
+        let (mut least, mut greatest) = (u.min(v).min(w), u.max(v).max(w));
+        if (least.eq(zero) | greatest.eq(zero)).bits() != 0 {
+            let corners = [
+                [a.x.store(), a.y.store()],
+                [b.x.store(), b.y.store()],
+                [c.x.store(), c.y.store()],
+            ];
+            let exact = exact_edges(corners, [u.store(), v.store(), w.store()]);
+            (u, v, w) = (simd.load(&exact[0]), simd.load(&exact[1]), simd.load(&exact[2]));
+            (least, greatest) = (u.min(v).min(w), u.max(v).max(w));
+        }
+        let inside = zero.le(least) | greatest.le(zero);
+        Self { block, rays, i, depths: [a.z, b.z, c.z], weights: [u, v, w], inside }
     }
-    let inside = zero.le(u.min(v).min(w)) | u.max(v).max(w).le(zero);
-    if inside.bits() == 0 {
-        return None;
+
+    /// Whether the ray's line goes through none of the triangles.
+    #[inline(always)]
+    pub(super) fn misses(&self) -> bool {
+        self.inside.bits() == 0
     }
 
-    // The distance to the plane, but within that of the corners even where the plane is edge-on.
-    let nearest = a.z.min(b.z).min(c.z);
-    let farthest = a.z.max(b.z).max(c.z);
-    let t = plane_distance(simd, block, ray).max(nearest).min(farthest);
+    /// The triangles hit at 0 < t ≤ `limit`.
+    #[inline(always)]
+    pub(super) fn hits(&self, simd: S, limit: f32) -> BlockHits<S> {
+        // The distance to the plane, but within that of the corners even where the plane is edge-on.
+        let scale = simd.splat(self.rays.shears[2][self.i]);
+        let [a, b, c] = self.depths;
+        let (a, b, c) = (scale * a, scale * b, scale * c);
+        let (nearest, farthest) = (a.min(b).min(c), a.max(b).max(c));
+        let plane = plane_distance(simd, self.block, self.rays, self.i);
+        let t = plane.max(nearest).min(farthest);
 
-    // A determinant that is zero or NaN is no hit.
-    let determinant = u + v + w;
-    let has_area = determinant.lt(zero) | zero.lt(determinant);
-    let mask = (inside & has_area & zero.lt(t) & t.le(simd.splat(limit))).bits();
-    (mask != 0).then_some(BlockHits { mask, t, weights: [v, w], determinant })
+        // A determinant that is zero or NaN is no hit.
+        let [u, v, w] = self.weights;
+        let zero = simd.splat(0.0);
+        let determinant = u + v + w;
+        let has_area = determinant.lt(zero) | zero.lt(determinant);
+        let mask = (self.inside & has_area & zero.lt(t) & t.le(simd.splat(limit))).bits();
+        BlockHits { mask, t, weights: [v, w], determinant }
+    }
 }
 
-/// Where the ray is the z axis and z is the distance.
+/// Where the ray is the z axis.
 struct ShearedFrame<F> {
     axes: [usize; 3],
     origin: Points<F>,
-    /// Direction x/z, y/z and 1/z.
-    shear: Points<F>,
+    /// Direction x/z, y/z.
+    shear: [F; 2],
 }
 
 impl<F: Floats> ShearedFrame<F> {
     #[inline(always)]
-    fn new<S: Simd<Floats = F>>(simd: S, ray: &PreparedRay) -> Self {
-        let [x, y, z] = ray.axes.map(usize::from);
-        let axes = [x.min(2), y.min(2), z.min(2)]; // in bounds, for the compiler
-        let origin = [ray.origin[axes[0]], ray.origin[axes[1]], ray.origin[axes[2]]];
-        Self { axes, origin: Points::splat(simd, origin), shear: Points::splat(simd, ray.shear) }
+    fn new<S: Simd<Floats = F>, const N: usize>(simd: S, rays: &PreparedRays<N>, i: usize) -> Self {
+        let axes @ [x, y, z] = rays.axes(i);
+        Self {
+            axes,
+            origin: Points::splat(
+                simd,
+                [rays.origins[x][i], rays.origins[y][i], rays.origins[z][i]],
+            ),
+            shear: [simd.splat(rays.shears[0][i]), simd.splat(rays.shears[1][i])],
+        }
     }
 
+    /// Depths stay in units of z.
     #[inline(always)]
     fn shear<S: Simd<Floats = F>>(&self, simd: S, vertex: &[Lanes; 3]) -> Points<F> {
         let z = simd.load(&vertex[self.axes[2]]) - self.origin.z;
-        let x = simd.load(&vertex[self.axes[0]]) - self.origin.x - self.shear.x * z;
-        let y = simd.load(&vertex[self.axes[1]]) - self.origin.y - self.shear.y * z;
-        Points { x, y, z: self.shear.z * z }
+        let x = simd.load(&vertex[self.axes[0]]) - self.origin.x - self.shear[0] * z;
+        let y = simd.load(&vertex[self.axes[1]]) - self.origin.y - self.shear[1] * z;
+        Points { x, y, z }
     }
 }
 
@@ -277,13 +234,19 @@ fn edge<F: Floats>(p: Points<F>, q: Points<F>) -> F {
 ///
 /// More accurate than to interpolate the corners' distances where the triangle is large and near.
 #[inline(always)]
-fn plane_distance<S: Simd>(simd: S, block: &Block, ray: &PreparedRay) -> S::Floats {
+fn plane_distance<S: Simd, const N: usize>(
+    simd: S,
+    block: &Block,
+    rays: &PreparedRays<N>,
+    i: usize,
+) -> S::Floats {
+    let of_ray = |numbers: &[[f32; N]; 3]| [numbers[0][i], numbers[1][i], numbers[2][i]];
     let a = Points::load(simd, &block.vertices[0]);
     let b = Points::load(simd, &block.vertices[1]);
     let c = Points::load(simd, &block.vertices[2]);
     let n = b.sub(a).cross(c.sub(a));
-    let to_plane = a.sub(Points::splat(simd, ray.origin));
-    n.dot(to_plane) / n.dot(Points::splat(simd, ray.direction))
+    let to_plane = a.sub(Points::splat(simd, of_ray(&rays.origins)));
+    n.dot(to_plane) / n.dot(Points::splat(simd, of_ray(&rays.directions)))
 }
 
 /// Where an edge function is zero, all three in f64, in which the products of f32 are exact.

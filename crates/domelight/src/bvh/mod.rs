@@ -34,6 +34,7 @@
 
 mod build;
 mod intersect;
+mod prepare;
 mod traverse;
 mod validate;
 
@@ -192,6 +193,7 @@ impl Bvh {
     /// `hits` is overwritten, one entry a ray.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
         hits.clear();
+        hits.resize(rays.len(), None);
         simd::dispatch(self.instruction_set, traverse::ClosestHits { bvh: self, rays, hits });
     }
 

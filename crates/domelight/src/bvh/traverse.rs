@@ -1,11 +1,13 @@
-//! Walking the tree: one ray to its closest or any hit, and streams of shadow rays.
+//! Walking the tree: one ray to its closest or any hit, and streams of rays.
 //!
 //! Everything here is generic over the instruction set and inlined into it.
+#![allow(clippy::large_stack_arrays)] // Some streams, 20 KiB.
 
 use std::ops::Range;
 
 use super::build::MAX_DEPTH;
-use super::intersect::{PreparedRay, Slabs, hit_block};
+use super::intersect::{Sheared, Slabs};
+use super::prepare::{PreparedRays, octant};
 use super::{Bvh, Child, WIDTH};
 use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
@@ -17,6 +19,8 @@ const _: () = assert!(MAX_DEPTH as usize * (WIDTH - 1) + WIDTH <= STACK);
 
 /// Rays of a stream: one bit each in a word.
 const STREAM: usize = 32;
+/// Streams in flight: while one waits for memory the others go on.
+const INTERLEAVED: usize = 4;
 /// Rays sorted at once: enough to fill the streams of all octants, few enough to stay coherent.
 const WINDOW: usize = 4096;
 
@@ -31,15 +35,16 @@ impl Kernel for ClosestHit<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Option<Hit> {
-        closest_hit(simd, self.bvh, self.ray, &mut ClosestStack::new())
+        let ray = prepare_one(simd, self.bvh, self.ray)?;
+        closest_hit(simd, self.bvh, &ray, last_below(self.ray.t_max))
     }
 }
 
-/// [`Bvh::closest_hits`]
+/// [`Bvh::closest_hits`]; `hits` start all empty.
 pub(super) struct ClosestHits<'a> {
     pub(super) bvh: &'a Bvh,
     pub(super) rays: &'a [Ray],
-    pub(super) hits: &'a mut Vec<Option<Hit>>,
+    pub(super) hits: &'a mut [Option<Hit>],
 }
 
 impl Kernel for ClosestHits<'_> {
@@ -47,15 +52,15 @@ impl Kernel for ClosestHits<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let mut stack = [StreamEntry::default(); STACK];
-        let mut stream = ClosestStream::default();
-        let octant = |ray: &Ray| PreparedRay::octant(ray.direction);
-        for run in self.rays.chunk_by(|a, b| octant(a) == octant(b)) {
-            for rays in run.chunks(STREAM) {
-                closest_hits(simd, self.bvh, rays, &mut stream, &mut stack);
-                self.hits.extend_from_slice(&stream.hits[..rays.len()]);
-            }
-        }
+        let same_octant = |a: &Ray, b: &Ray| octant(a.direction) == octant(b.direction);
+        let runs = self.rays.chunk_by(same_octant).flat_map(|run| run.chunks(STREAM));
+        let mut streams = [const { ClosestStream::EMPTY }; INTERLEAVED];
+        let mut first = 0;
+        let starts = runs.map(|rays| {
+            first += rays.len();
+            (first - rays.len(), rays)
+        });
+        interleave(simd, self.bvh, &mut streams, starts, self.hits);
     }
 }
 
@@ -70,7 +75,7 @@ impl Kernel for AnyHit<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> bool {
-        let Some(ray) = PreparedRay::new(self.ray, &self.bvh.bounds) else { return false };
+        let Some(ray) = prepare_one(simd, self.bvh, self.ray) else { return false };
         any_hit(simd, self.bvh, &ray, last_below(self.ray.t_max))
     }
 }
@@ -87,29 +92,14 @@ impl Kernel for Occluded<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let mut stack = [StreamEntry::default(); STACK];
-        let mut stream = [PreparedRay::default(); STREAM];
-        let mut members = [0; STREAM];
+        let mut streams = [const { ShadowStream::EMPTY }; INTERLEAVED];
         let mut order = [0; WINDOW];
         for start in (0..self.rays.len()).step_by(WINDOW) {
             let end = self.rays.len().min(start + WINDOW);
             let octants = sort_by_octant(&self.rays.directions[start..end], &mut order);
-            for chunk in octants.iter().flat_map(|octant| order[octant.clone()].chunks(STREAM)) {
-                // Leave out the rays that can hit nothing.
-                let mut len = 0;
-                for i in chunk.iter().map(|&offset| start + usize::from(offset)) {
-                    let ray = Ray::new(self.rays.origins[i], self.rays.directions[i]);
-                    if let Some(ray) = PreparedRay::new(&ray, &self.bvh.bounds) {
-                        stream[len] = ray;
-                        members[len] = i;
-                        len += 1;
-                    }
-                }
-                let hit = occluded_stream(simd, self.bvh, &stream[..len], &mut stack);
-                for i in lanes(hit) {
-                    self.answers[members[i]] = true;
-                }
-            }
+            let chunks = octants.iter().flat_map(|octant| order[octant.clone()].chunks(STREAM));
+            let starts = chunks.map(|members| ShadowRays { batch: self.rays, start, members });
+            interleave(simd, self.bvh, &mut streams, starts, self.answers);
         }
     }
 }
@@ -119,6 +109,16 @@ impl Kernel for Occluded<'_> {
 fn last_below(t_max: f32) -> f32 {
     t_max.next_down()
 }
+
+/// None if the ray can hit nothing.
+#[inline(always)]
+fn prepare_one<S: Simd>(simd: S, bvh: &Bvh, ray: &Ray) -> Option<PreparedRays<WIDTH>> {
+    let mut rays = PreparedRays::EMPTY;
+    rays.set(0, ray.origin, ray.direction);
+    (rays.prepare(simd, octant(ray.direction), 1, &bvh.bounds) != 0).then_some(rays)
+}
+
+// ---- one ray -------------------------------------------------------------------------------------
 
 /// A child yet to visit, and where the ray enters it.
 #[derive(Clone, Copy, Default)]
@@ -166,21 +166,25 @@ impl ClosestStack {
 }
 
 #[inline(always)]
-fn closest_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &Ray, stack: &mut ClosestStack) -> Option<Hit> {
-    let prepared = PreparedRay::new(ray, &bvh.bounds)?;
-    let mut limit = last_below(ray.t_max);
+fn closest_hit<S: Simd>(
+    simd: S,
+    bvh: &Bvh,
+    ray: &PreparedRays<WIDTH>,
+    mut limit: f32,
+) -> Option<Hit> {
+    let mut stack = ClosestStack::new();
     let mut closest: Option<Hit> = None;
-    stack.len = 0;
     let mut child = Child::node(0);
     loop {
         if child.is_leaf() {
-            if let Some(hit) = closest_in_block(simd, bvh, child, &prepared, limit, closest) {
+            if let Some(hit) = closest_in_block(simd, bvh, child, ray, 0, limit, closest) {
                 limit = hit.t;
                 closest = Some(hit);
             }
         } else {
             let node = &bvh.nodes[child.index()];
-            let (crossed, enter) = Slabs::load(simd, node, &prepared).cross(simd, &prepared, limit);
+            let slabs = Slabs::load(simd, node, ray.octant);
+            let (crossed, enter) = slabs.cross(simd, ray, 0, limit);
             let crossed = crossed.bits();
             if crossed.is_power_of_two() {
                 child = node.children[crossed.trailing_zeros() as usize % WIDTH];
@@ -200,117 +204,20 @@ fn closest_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &Ray, stack: &mut ClosestStack)
     }
 }
 
-/// Rays of one octant on their way to their closest hits.
-struct ClosestStream {
-    rays: [PreparedRay; STREAM],
-    limits: [f32; STREAM],
-    hits: [Option<Hit>; STREAM],
-}
-
-impl Default for ClosestStream {
-    fn default() -> Self {
-        Self { rays: [PreparedRay::default(); STREAM], limits: [0.0; STREAM], hits: [None; STREAM] }
-    }
-}
-
-/// [`closest_hit`] of up to [`STREAM`] rays of one octant, together: a node's planes are loaded once for
-/// all rays that reach it. Children are visited in the order in which one of them enters; the answer
-/// does not depend on the order.
 #[inline(always)]
-fn closest_hits<S: Simd>(
-    simd: S,
-    bvh: &Bvh,
-    rays: &[Ray],
-    stream: &mut ClosestStream,
-    stack: &mut [StreamEntry; STACK],
-) {
-    let ClosestStream { rays: prepared, limits, hits } = stream;
-    hits[..rays.len()].fill(None);
-    let (mut all, mut first) = (0, 0);
-    for (i, ray) in rays.iter().enumerate() {
-        if let Some(ray) = PreparedRay::new(ray, &bvh.bounds) {
-            (prepared[i], first) = (ray, i);
-            all |= 1 << i;
-        }
-        limits[i] = last_below(ray.t_max);
-    }
-    stack[0] = StreamEntry { child: Child::node(0), rays: all };
-    let mut len = usize::from(all != 0);
-    while len > 0 {
-        len -= 1;
-        let StreamEntry { child, rays } = stack[len];
-        if child.is_leaf() {
-            for i in lanes(rays) {
-                let hit = closest_in_block(simd, bvh, child, &prepared[i], limits[i], hits[i]);
-                if let Some(hit) = hit {
-                    limits[i] = hit.t;
-                    hits[i] = Some(hit);
-                }
-            }
-            continue;
-        }
-        let node = &bvh.nodes[child.index()];
-        let slabs = Slabs::load(simd, node, &prepared[first]);
-        let mut crossing = simd.empty();
-        let mut enter = simd.splat(0.0);
-        for i in lanes(rays) {
-            let (crossed, entered) = slabs.cross(simd, &prepared[i], limits[i]);
-            crossing = crossing.insert(crossed, 1 << i);
-            enter = entered;
-        }
-        let (sets, enter) = (crossing.store(), enter.store());
-        // The nearest child of the last ray on top.
-        let base = len;
-        let mut keys = [0.0; WIDTH];
-        for lane in lanes(crossing.not_empty()) {
-            let mut at = len;
-            while at > base && keys[at - 1 - base] < enter[lane] {
-                stack[at] = stack[at - 1];
-                keys[at - base] = keys[at - 1 - base];
-                at -= 1;
-            }
-            stack[at] = StreamEntry { child: node.children[lane], rays: sets[lane] };
-            keys[at - base] = enter[lane];
-            len += 1;
-        }
-    }
-}
-
-/// The best hit of a leaf if it is nearer than `closest`, or as near and of a lower number.
-#[inline(always)]
-fn closest_in_block<S: Simd>(
-    simd: S,
-    bvh: &Bvh,
-    leaf: Child,
-    ray: &PreparedRay,
-    limit: f32,
-    closest: Option<Hit>,
-) -> Option<Hit> {
-    let block = &bvh.blocks[leaf.index()];
-    let hits = hit_block(simd, block, ray, limit)?;
-    let t = hits.t.store();
-    let lane = lanes(hits.mask)
-        .reduce(|a, b| if (t[b], block.ids[b]) < (t[a], block.ids[a]) { b } else { a })?;
-    if closest.is_some_and(|c| (c.t, c.triangle) < (t[lane], block.ids[lane])) {
-        return None;
-    }
-    let [u, v] = hits.barycentric();
-    Some(Hit { t: t[lane], u: u[lane], v: v[lane], triangle: block.ids[lane] })
-}
-
-#[inline(always)]
-fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRay, limit: f32) -> bool {
+fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRays<WIDTH>, limit: f32) -> bool {
     let mut stack = [Child::default(); STACK];
     let mut len = 0;
     let mut child = Child::node(0);
     loop {
         if child.is_leaf() {
-            if hit_block(simd, &bvh.blocks[child.index()], ray, limit).is_some() {
+            let sheared = Sheared::new(simd, &bvh.blocks[child.index()], ray, 0);
+            if sheared.hits(simd, limit).mask != 0 {
                 return true;
             }
         } else {
             let node = &bvh.nodes[child.index()];
-            let (crossed, _) = Slabs::load(simd, node, ray).cross(simd, ray, limit);
+            let (crossed, _) = Slabs::load(simd, node, ray.octant).cross(simd, ray, 0, limit);
             // On with the first and largest; the others wait.
             let mut crossed = lanes(crossed.bits());
             if let Some(first) = crossed.next() {
@@ -330,6 +237,76 @@ fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRay, limit: f32) -> bool {
     }
 }
 
+/// The best hit of a leaf if it is nearer than `closest`, or as near and of a lower number.
+#[inline(always)]
+fn closest_in_block<S: Simd, const N: usize>(
+    simd: S,
+    bvh: &Bvh,
+    leaf: Child,
+    rays: &PreparedRays<N>,
+    i: usize,
+    limit: f32,
+    closest: Option<Hit>,
+) -> Option<Hit> {
+    let block = &bvh.blocks[leaf.index()];
+    let sheared = Sheared::new(simd, block, rays, i);
+    if sheared.misses() {
+        return None;
+    }
+    let hits = sheared.hits(simd, limit);
+    let t = hits.t.store();
+    let lane = lanes(hits.mask)
+        .reduce(|a, b| if (t[b], block.ids[b]) < (t[a], block.ids[a]) { b } else { a })?;
+    if closest.is_some_and(|c| (c.t, c.triangle) < (t[lane], block.ids[lane])) {
+        return None;
+    }
+    let [u, v] = hits.barycentric();
+    Some(Hit { t: t[lane], u: u[lane], v: v[lane], triangle: block.ids[lane] })
+}
+
+// ---- streams -------------------------------------------------------------------------------------
+
+/// Rays of one octant on their way through the tree, together: a node's planes are loaded once for all
+/// rays that reach it. The order of the visits does not change the answers.
+trait Stream {
+    /// The rays to start with.
+    type Rays<'a>;
+    type Answer;
+
+    /// Begins at the root.
+    fn start<S: Simd>(&mut self, simd: S, bvh: &Bvh, rays: Self::Rays<'_>);
+    /// Visits the next node or leaf; false if there is none.
+    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh) -> bool;
+    /// Hands over the answers.
+    fn finish(&mut self, answers: &mut [Self::Answer]);
+}
+
+/// Runs some streams in turns, each again and again, until nothing is left to start with.
+#[inline(always)]
+fn interleave<'a, S: Simd, T: Stream>(
+    simd: S,
+    bvh: &Bvh,
+    streams: &mut [T; INTERLEAVED],
+    mut starts: impl Iterator<Item = T::Rays<'a>>,
+    answers: &mut [T::Answer],
+) {
+    let mut running = true;
+    while running {
+        running = false;
+        for stream in &mut *streams {
+            if stream.advance(simd, bvh) {
+                running = true;
+                continue;
+            }
+            stream.finish(answers);
+            if let Some(rays) = starts.next() {
+                stream.start(simd, bvh, rays);
+                running = true;
+            }
+        }
+    }
+}
+
 /// A child yet to visit, and the rays of the stream that enter it.
 #[derive(Clone, Copy, Default)]
 struct StreamEntry {
@@ -337,61 +314,224 @@ struct StreamEntry {
     rays: u32,
 }
 
-/// The rays of a stream, all of one octant, that hit anything, as bits.
-///
-/// The node's planes stay in registers while one ray after the other is tested against the eight
-/// boxes and its bit added to the sets of those that it crosses.
-#[inline(always)]
-fn occluded_stream<S: Simd>(
-    simd: S,
-    bvh: &Bvh,
-    stream: &[PreparedRay],
-    stack: &mut [StreamEntry; STACK],
-) -> u32 {
-    if stream.is_empty() {
-        return 0;
+/// Children yet to visit.
+struct StreamStack {
+    entries: [StreamEntry; STACK],
+    len: usize,
+}
+
+impl StreamStack {
+    const EMPTY: Self = Self { entries: [StreamEntry { child: Child(0), rays: 0 }; STACK], len: 0 };
+
+    #[inline(always)]
+    fn push(&mut self, child: Child, rays: u32) {
+        self.entries[self.len] = StreamEntry { child, rays };
+        self.len += 1;
     }
-    let all = u32::MAX >> (STREAM - stream.len());
-    let mut free = all;
-    stack[0] = StreamEntry { child: Child::node(0), rays: all };
-    let mut len = 1;
-    while len > 0 {
-        len -= 1;
-        let StreamEntry { child, rays } = stack[len];
-        let rays = rays & free;
-        if rays == 0 {
-            continue;
+
+    /// The next child that any of the rays `free` enters, and which.
+    #[inline(always)]
+    fn pop(&mut self, free: u32) -> Option<StreamEntry> {
+        while self.len > 0 {
+            self.len -= 1;
+            let StreamEntry { child, rays } = self.entries[self.len];
+            if rays & free != 0 {
+                return Some(StreamEntry { child, rays: rays & free });
+            }
         }
+        None
+    }
+
+    /// Asks for the memory of the next child.
+    #[inline(always)]
+    fn prefetch<S: Simd>(&self, simd: S, bvh: &Bvh) {
+        let Some(top) = self.entries[..self.len].last() else { return };
+        if top.child.is_leaf() {
+            simd.prefetch(&bvh.blocks[top.child.index()]);
+        } else {
+            simd.prefetch(&bvh.nodes[top.child.index()]);
+        }
+    }
+}
+
+/// [`closest_hit`] of up to [`STREAM`] rays.
+struct ClosestStream {
+    rays: PreparedRays<STREAM>,
+    limits: [f32; STREAM],
+    hits: [Option<Hit>; STREAM],
+    /// Where the rays are in their batch.
+    members: Range<usize>,
+    stack: StreamStack,
+}
+
+impl ClosestStream {
+    const EMPTY: Self = Self {
+        rays: PreparedRays::EMPTY,
+        limits: [0.0; STREAM],
+        hits: [None; STREAM],
+        members: 0..0,
+        stack: StreamStack::EMPTY,
+    };
+}
+
+impl Stream for ClosestStream {
+    /// With the number of the first.
+    type Rays<'a> = (usize, &'a [Ray]);
+    type Answer = Option<Hit>;
+
+    #[inline(always)]
+    fn start<S: Simd>(&mut self, simd: S, bvh: &Bvh, (first, rays): (usize, &[Ray])) {
+        for (i, ray) in rays.iter().enumerate() {
+            self.rays.set(i, ray.origin, ray.direction);
+            self.limits[i] = last_below(ray.t_max);
+        }
+        self.hits[..rays.len()].fill(None);
+        self.members = first..first + rays.len();
+        let valid = self.rays.prepare(simd, octant(rays[0].direction), rays.len(), &bvh.bounds);
+        self.stack.push(Child::node(0), valid);
+    }
+
+    #[inline(always)]
+    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh) -> bool {
+        let Some(StreamEntry { child, rays }) = self.stack.pop(u32::MAX) else { return false };
+        if child.is_leaf() {
+            for i in lanes(rays) {
+                let (limit, closest) = (self.limits[i], self.hits[i]);
+                let hit = closest_in_block(simd, bvh, child, &self.rays, i, limit, closest);
+                if let Some(hit) = hit {
+                    self.limits[i] = hit.t;
+                    self.hits[i] = Some(hit);
+                }
+            }
+        } else {
+            let node = &bvh.nodes[child.index()];
+            let slabs = Slabs::load(simd, node, self.rays.octant);
+            let mut crossing = simd.empty();
+            let mut enter = simd.splat(0.0);
+            for i in lanes(rays) {
+                let (crossed, entered) = slabs.cross(simd, &self.rays, i, self.limits[i]);
+                crossing = crossing.insert(crossed, 1 << i);
+                enter = entered;
+            }
+            let (sets, enter) = (crossing.store(), enter.store());
+            // The nearest child of the last ray on top.
+            let base = self.stack.len;
+            let mut keys = [0.0; WIDTH];
+            for lane in lanes(crossing.not_empty()) {
+                let mut at = self.stack.len;
+                while at > base && keys[at - 1 - base] < enter[lane] {
+                    self.stack.entries[at] = self.stack.entries[at - 1];
+                    keys[at - base] = keys[at - 1 - base];
+                    at -= 1;
+                }
+                self.stack.entries[at] =
+                    StreamEntry { child: node.children[lane], rays: sets[lane] };
+                keys[at - base] = enter[lane];
+                self.stack.len += 1;
+            }
+        }
+        self.stack.prefetch(simd, bvh);
+        true
+    }
+
+    #[inline(always)]
+    fn finish(&mut self, answers: &mut [Option<Hit>]) {
+        let members = std::mem::take(&mut self.members);
+        let count = members.len();
+        answers[members].copy_from_slice(&self.hits[..count]);
+    }
+}
+
+/// [`any_hit`] to infinity of up to [`STREAM`] rays.
+struct ShadowStream {
+    rays: PreparedRays<STREAM>,
+    /// Where the rays are in their batch.
+    members: [usize; STREAM],
+    /// Rays that have hit nothing yet, and those that have, as bits.
+    free: u32,
+    hit: u32,
+    stack: StreamStack,
+}
+
+impl ShadowStream {
+    const EMPTY: Self = Self {
+        rays: PreparedRays::EMPTY,
+        members: [0; STREAM],
+        free: 0,
+        hit: 0,
+        stack: StreamStack::EMPTY,
+    };
+}
+
+/// Rays of a batch: those whose numbers are `start` and one of `members`.
+struct ShadowRays<'a> {
+    batch: &'a RayBatch,
+    start: usize,
+    members: &'a [u16],
+}
+
+impl Stream for ShadowStream {
+    type Rays<'a> = ShadowRays<'a>;
+    type Answer = bool;
+
+    #[inline(always)]
+    fn start<S: Simd>(&mut self, simd: S, bvh: &Bvh, rays: ShadowRays<'_>) {
+        let RayBatch { origins, directions } = rays.batch;
+        let numbers = rays.members.iter().map(|&member| rays.start + usize::from(member));
+        for (i, number) in numbers.enumerate() {
+            self.rays.set(i, origins[number], directions[number]);
+            self.members[i] = number;
+        }
+        let octant = octant(directions[self.members[0]]);
+        self.free = self.rays.prepare(simd, octant, rays.members.len(), &bvh.bounds);
+        self.stack.push(Child::node(0), self.free);
+    }
+
+    /// The node's planes stay in registers while one ray after the other is tested against the eight
+    /// boxes and its bit added to the sets of those that it crosses.
+    #[inline(always)]
+    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh) -> bool {
+        let Some(StreamEntry { child, rays }) = self.stack.pop(self.free) else { return false };
         if child.is_leaf() {
             let block = &bvh.blocks[child.index()];
             for i in lanes(rays) {
-                if hit_block(simd, block, &stream[i], f32::MAX).is_some() {
-                    free &= !(1 << i);
-                }
+                // Without branches: a shadow ray starts on a triangle, so half of the tests would go
+                // wrong halfway.
+                let mask = Sheared::new(simd, block, &self.rays, i).hits(simd, f32::MAX).mask;
+                self.hit |= u32::from(mask != 0) << i;
             }
-            continue;
+            self.free &= !self.hit;
+        } else {
+            let node = &bvh.nodes[child.index()];
+            let slabs = Slabs::load(simd, node, self.rays.octant);
+            let mut crossing = simd.empty();
+            for i in lanes(rays) {
+                let (crossed, _) = slabs.cross(simd, &self.rays, i, f32::MAX);
+                crossing = crossing.insert(crossed, 1 << i);
+            }
+            let sets = crossing.store();
+            for lane in lanes_from_last(crossing.not_empty()) {
+                self.stack.push(node.children[lane], sets[lane]);
+            }
         }
-        let node = &bvh.nodes[child.index()];
-        let slabs = Slabs::load(simd, node, &stream[0]);
-        let mut crossing = simd.empty();
-        for i in lanes(rays) {
-            let (crossed, _) = slabs.cross(simd, &stream[i], f32::MAX);
-            crossing = crossing.insert(crossed, 1 << i);
-        }
-        let sets = crossing.store();
-        for lane in lanes_from_last(crossing.not_empty()) {
-            stack[len] = StreamEntry { child: node.children[lane], rays: sets[lane] };
-            len += 1;
-        }
+        self.stack.prefetch(simd, bvh);
+        true
     }
-    all & !free
+
+    #[inline(always)]
+    fn finish(&mut self, answers: &mut [bool]) {
+        for i in lanes(self.hit) {
+            answers[self.members[i]] = true;
+        }
+        self.hit = 0;
+    }
 }
 
 /// Orders the rays of a window by octant and keeps their order within; returns the octants' ranges.
 fn sort_by_octant(directions: &[Vec3], order: &mut [u16; WINDOW]) -> [Range<usize>; 8] {
     let mut counts = [0; 8];
     for &direction in directions {
-        counts[PreparedRay::octant(direction)] += 1;
+        counts[octant(direction) as usize] += 1;
     }
     let mut end = 0;
     let octants = counts.map(|count| {
@@ -400,7 +540,7 @@ fn sort_by_octant(directions: &[Vec3], order: &mut [u16; WINDOW]) -> [Range<usiz
     });
     let mut next = octants.clone().map(|range| range.start);
     for (i, &direction) in directions.iter().enumerate() {
-        let slot = &mut next[PreparedRay::octant(direction)];
+        let slot = &mut next[octant(direction) as usize];
         order[*slot] = i as u16;
         *slot += 1;
     }

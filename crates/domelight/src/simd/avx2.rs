@@ -65,6 +65,14 @@ impl Simd for Avx2 {
         F32x8(unsafe { _mm256_loadu_ps(x.as_ptr()) })
     }
     #[inline(always)]
+    fn prefetch<T>(self, x: &T) {
+        let start = std::ptr::from_ref(x).cast::<i8>();
+        for offset in (0..size_of::<T>()).step_by(64) {
+            // SAFETY: a prefetch reads nothing; `offset` is within `x`.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.add(offset)) };
+        }
+    }
+    #[inline(always)]
     fn splat_int(self, x: i32) -> I32x8 {
         // SAFETY: `self` proves AVX2.
         I32x8(unsafe { _mm256_set1_epi32(x) })

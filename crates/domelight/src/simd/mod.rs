@@ -4,11 +4,16 @@
 //! operation a lane. Nothing fuses or reorders them, so a kernel gives the same bits on every
 //! instruction set. [`dispatch`] compiles it for each and picks at run time, so that a portable
 //! binary traces as fast as one built for the machine. Another instruction set is one more file like
-//! `avx2.rs` and one more line in [`InstructionSet`] and [`dispatch`]; two vectors of four, as of
-//! NEON, make one of eight.
+//! `avx2.rs`, or `neon.rs` of half the width, and one more line in [`InstructionSet`] and [`dispatch`].
+//!
+//! Formulas are written over [`Real`], which is one number or a vector of them.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod scalar;
 mod single;
 mod vector;
@@ -23,27 +28,37 @@ pub(crate) const LANES: usize = 8;
 /// One number a lane.
 pub(crate) type Lanes = [f32; LANES];
 
-/// The instructions that trace rays.
+/// The instructions that trace rays and weigh light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
     /// One number at a time; the reference, on every processor.
     Scalar,
+    /// AArch64 NEON: four numbers at a time.
+    Neon,
     /// x86-64 AVX2: eight numbers at a time.
     Avx2,
+    /// x86-64 AVX-512: eight numbers at a time, with masks.
+    Avx512,
 }
 
 impl InstructionSet {
     /// All that this version knows, the fastest last.
-    pub const ALL: [Self; 2] = [Self::Scalar, Self::Avx2];
+    pub const ALL: [Self; 4] = [Self::Scalar, Self::Neon, Self::Avx2, Self::Avx512];
 
     /// Whether this processor has the instructions.
     pub fn is_available(self) -> bool {
         match self {
             Self::Scalar => true,
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon => neon::Neon::new().is_some(),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => avx2::Avx2::new().is_some(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => avx512::Avx512::new().is_some(),
+            #[cfg(not(target_arch = "aarch64"))]
+            Self::Neon => false,
             #[cfg(not(target_arch = "x86_64"))]
-            Self::Avx2 => false,
+            Self::Avx2 | Self::Avx512 => false,
         }
     }
 
@@ -66,15 +81,27 @@ pub(crate) trait Kernel {
 #[inline]
 pub(crate) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) -> K::Output {
     match instruction_set {
-        InstructionSet::Scalar => kernel.run(scalar::Scalar),
+        #[cfg(target_arch = "aarch64")]
+        InstructionSet::Neon => {
+            if let Some(simd) = neon::Neon::new() {
+                return simd.run(kernel);
+            }
+        }
+        #[cfg(target_arch = "x86_64")]
         InstructionSet::Avx2 => {
-            #[cfg(target_arch = "x86_64")]
             if let Some(simd) = avx2::Avx2::new() {
                 return simd.run(kernel);
             }
-            kernel.run(scalar::Scalar)
         }
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx512 => {
+            if let Some(simd) = avx512::Avx512::new() {
+                return simd.run(kernel);
+            }
+        }
+        _ => {}
     }
+    kernel.run(scalar::Scalar)
 }
 
 /// An instruction set. A value of it, and any vector made with one, proves that the processor has
@@ -86,6 +113,8 @@ pub(crate) trait Simd: Copy {
 
     fn splat(self, x: f32) -> Self::Floats;
     fn load(self, x: &Lanes) -> Self::Floats;
+    /// Asks for memory that will be read soon.
+    fn prefetch<T>(self, x: &T);
     fn splat_int(self, x: i32) -> Self::Ints;
     fn load_ints(self, x: &[i32; LANES]) -> Self::Ints;
     /// 0, 1, … 7.

@@ -34,6 +34,8 @@ impl Simd for Scalar {
         F32x8(*x)
     }
     #[inline(always)]
+    fn prefetch<T>(self, _: &T) {}
+    #[inline(always)]
     fn splat_int(self, x: i32) -> I32x8 {
         I32x8([x; 8])
     }

@@ -1,0 +1,162 @@
+//! What the tests need of rays, computed for eight at a time.
+
+use super::{Lanes, WIDTH};
+use crate::geometry::Aabb;
+use crate::math::Vec3;
+use crate::simd::{Floats, Mask, Real, Simd};
+
+/// Up to `N` rays of one octant, `N` a multiple of eight, with what both tests need of them.
+pub(super) struct PreparedRays<const N: usize> {
+    /// One bit an axis: set where the rays enter through the upper plane.
+    pub(super) octant: u32,
+    /// By axis; origins and directions are given, the rest is computed from them.
+    pub(super) origins: [[f32; N]; 3],
+    pub(super) directions: [[f32; N]; 3],
+    /// The origins moved forward along each axis, for near planes.
+    pub(super) near_origins: [[f32; N]; 3],
+    /// The origins moved backward along each axis, for far planes.
+    pub(super) far_origins: [[f32; N]; 3],
+    pub(super) inverse_directions: [[f32; N]; 3],
+    /// The longest axis of the direction: z of the sheared space, and x and y are the two that follow.
+    pub(super) longest: [u8; N],
+    /// Direction x/z, y/z and 1/z.
+    pub(super) shears: [[f32; N]; 3],
+}
+
+/// The axes x, y and z of the space whose z axis is the first, second, third.
+const AXES: [[u8; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+
+/// One bit an axis: set where the direction is negative.
+#[inline(always)]
+pub(super) fn octant(direction: Vec3) -> u32 {
+    direction.is_negative_bitmask()
+}
+
+impl<const N: usize> PreparedRays<N> {
+    pub(super) const EMPTY: Self = Self {
+        octant: 0,
+        origins: [[0.0; N]; 3],
+        directions: [[0.0; N]; 3],
+        near_origins: [[0.0; N]; 3],
+        far_origins: [[0.0; N]; 3],
+        inverse_directions: [[0.0; N]; 3],
+        longest: [0; N],
+        shears: [[0.0; N]; 3],
+    };
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, i: usize, origin: Vec3, direction: Vec3) {
+        for axis in 0..3 {
+            self.origins[axis][i] = origin[axis];
+            self.directions[axis][i] = direction[axis];
+        }
+    }
+
+    /// Computes the rest for the first `count` rays; returns as bits which of them can hit anything: those
+    /// that are finite and have a direction.
+    #[inline(always)]
+    pub(super) fn prepare<S: Simd>(
+        &mut self,
+        simd: S,
+        octant: u32,
+        count: usize,
+        scene: &Aabb,
+    ) -> u32 {
+        self.octant = octant;
+        let mut valid = 0;
+        for first in (0..count).step_by(WIDTH) {
+            valid |= self.prepare_eight(simd, first, scene) << first;
+        }
+        valid & u32::MAX.checked_shr(u32::BITS - count as u32).unwrap_or(0)
+    }
+
+    #[inline(always)]
+    fn prepare_eight<S: Simd>(&mut self, simd: S, first: usize, scene: &Aabb) -> u32 {
+        const INFLATION: f32 = 1.0 / (1 << 20) as f32;
+        // The rounding of origin ± inflation, twice over.
+        const ORIGIN_ROUNDING: f32 = 1.0 / (1 << 22) as f32;
+        // A component so small moves the ray by less than the inflation while it crosses the scene.
+        const NEGLIGIBLE: f32 = 1.0 / (1u64 << 40) as f32;
+
+        let sign = |axis: usize| if self.octant >> axis & 1 == 0 { 1.0 } else { -1.0 };
+        let signs = [simd.splat(sign(0)), simd.splat(sign(1)), simd.splat(sign(2))];
+        let o = load(simd, &self.origins, first);
+        let d = load(simd, &self.directions, first);
+        let length = [signs[0] * d[0], signs[1] * d[1], signs[2] * d[2]];
+
+        // The greatest distance to the scene along an axis, and the greatest component.
+        let (mut farthest, mut greatest) = (simd.splat(0.0), simd.splat(0.0));
+        for k in 0..3 {
+            let lower = simd.splat(scene.min[k]) - o[k];
+            let upper = simd.splat(scene.max[k]) - o[k];
+            farthest = abs(simd, lower).max(abs(simd, upper)).max(farthest);
+            greatest = length[k].max(greatest);
+        }
+        let inflation = simd.splat(INFLATION) * farthest;
+        let negligible = simd.splat(NEGLIGIBLE) * greatest;
+
+        let mut inverse = [simd.splat(1.0); 3];
+        let mut is_finite = simd.splat(0.0).eq(simd.splat(0.0));
+        for k in 0..3 {
+            let margin = inflation + simd.splat(ORIGIN_ROUNDING) * abs(simd, o[k]);
+            let forward = signs[k] * margin;
+            store(o[k] + forward, &mut self.near_origins[k], first);
+            store(o[k] - forward, &mut self.far_origins[k], first);
+            inverse[k] = inverse[k] / (signs[k] * length[k].max(negligible));
+            store(inverse[k], &mut self.inverse_directions[k], first);
+            // Not finite if any of the numbers is not.
+            let sum = o[k] + d[k] + inverse[k] + inflation;
+            is_finite = is_finite & abs(simd, sum).lt(simd.splat(f32::INFINITY));
+        }
+
+        let is_x = length[1].lt(length[0]) & length[2].lt(length[0]);
+        let is_y = length[2].lt(length[1]);
+        let [x, y] = [is_x.bits(), is_y.bits()];
+        for i in 0..WIDTH {
+            let not_x = 1 - (x >> i & 1) as u8;
+            self.longest[first + i] = not_x * (2 - (y >> i & 1) as u8);
+        }
+        let scale = pick(is_x, is_y, inverse);
+        store(pick(is_x, is_y, [d[1], d[2], d[0]]) * scale, &mut self.shears[0], first);
+        store(pick(is_x, is_y, [d[2], d[0], d[1]]) * scale, &mut self.shears[1], first);
+        store(scale, &mut self.shears[2], first);
+        is_finite.bits()
+    }
+
+    /// The axes x, y and z of the space whose z axis is the longest of ray `i`.
+    #[inline(always)]
+    pub(super) fn axes(&self, i: usize) -> [usize; 3] {
+        // In bounds, for the compiler.
+        AXES[usize::from(self.longest[i]).min(2)].map(|axis| usize::from(axis).min(2))
+    }
+}
+
+#[inline(always)]
+fn load<S: Simd, const N: usize>(simd: S, numbers: &[[f32; N]; 3], first: usize) -> [S::Floats; 3] {
+    [
+        simd.load(eight(&numbers[0], first)),
+        simd.load(eight(&numbers[1], first)),
+        simd.load(eight(&numbers[2], first)),
+    ]
+}
+
+#[inline(always)]
+fn eight(numbers: &[f32], first: usize) -> &Lanes {
+    numbers[first..].first_chunk().expect("a multiple of eight")
+}
+
+#[inline(always)]
+fn store<F: Floats>(x: F, numbers: &mut [f32], first: usize) {
+    *numbers[first..].first_chunk_mut().expect("a multiple of eight") = x.store();
+}
+
+#[inline(always)]
+fn abs<S: Simd>(simd: S, x: S::Floats) -> S::Floats {
+    x.max(simd.splat(0.0) - x)
+}
+
+/// The first where the longest axis is x, the second where it is y, else the third.
+#[inline(always)]
+fn pick<F: Floats>(is_x: F::Mask, is_y: F::Mask, of: [F; 3]) -> F {
+    F::select(is_x, of[0], F::select(is_y, of[1], of[2]))
+}
