@@ -32,6 +32,13 @@ pub(crate) enum PictureFormat {
     Png,
 }
 
+impl PicturePath {
+    /// A PNG file.
+    pub(crate) fn is_png(&self) -> bool {
+        self.format == Some(PictureFormat::Png)
+    }
+}
+
 impl FromStr for PicturePath {
     type Err = String;
 

@@ -72,6 +72,19 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let build = watch.lap();
     drop(loading);
 
+    let tone = arguments.output.tone.mapping(ToneCurve::Agx);
+    if arguments.output.preview {
+        let settings = &RenderSettings { n_samples: 1, target_error: None, ..settings.clone() };
+        let progress = &RenderProgress::new("", 1, true, interrupted);
+        let job = Job { scene, camera, environment, settings, progress, course: None };
+        let layers = renderer(&job)?.layers;
+        let pictures = outputs.iter().filter(|path| path.is_png());
+        for path in pictures {
+            let attributes = described.provenance();
+            path.write_layers(&layers, &tone, report.hide_env, &attributes)?;
+        }
+    }
+
     let n_pixels = (settings.width * settings.height) as u64;
     let total = n_pixels * u64::from(settings.n_samples);
     let openjd = arguments.output.progress == ProgressKind::Openjd;
@@ -91,7 +104,6 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     }
     let render = watch.lap();
 
-    let tone = arguments.output.tone.mapping(ToneCurve::Agx);
     // A full disk under one file must not cost the others.
     let write = |path: &PicturePath| {
         let mut attributes = described.provenance();

@@ -12,10 +12,10 @@ use crate::values::Split;
 #[command(next_help_heading = "Sampling")]
 pub(crate) struct StrategyArguments {
     /// How directions are chosen
-    #[arg(long, value_enum, default_value_t = StrategyName::Mis)]
+    #[arg(long, value_enum, default_value_t = StrategyName::Product)]
     pub(crate) strategy: StrategyName,
-    /// Shadow rays of each camera sample; with rejection, samples to accept [default: 1,
-    /// with mis 2, with product 8]
+    /// Shadow rays of each camera sample; with product no more than these, with rejection samples to
+    /// accept [default: with product 8, with mis 2, else 1]
     #[arg(long, value_name = "N", conflicts_with = "split",
           value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub(crate) rays: Option<u32>,

@@ -33,6 +33,7 @@
 //! depth. Packets of rays with the same origin would speed up camera rays alone, which are few.
 
 mod build;
+mod frustum;
 mod intersect;
 mod prepare;
 mod traverse;
@@ -43,6 +44,7 @@ use crate::math::Vec3;
 use crate::simd;
 
 pub use crate::simd::InstructionSet;
+pub use frustum::Frustum;
 pub use validate::BvhDefect;
 
 /// How many children a node and how many triangles a block has: the width of a vector.
@@ -217,6 +219,13 @@ impl Bvh {
     /// Whether the ray meets any triangle in its open interval (0, `t_max`).
     pub fn any_hit(&self, ray: &Ray) -> bool {
         simd::dispatch(self.instruction_set, traverse::AnyHit { bvh: self, ray })
+    }
+
+    /// Whether a ray within the frustum may hit anything; false only if none does.
+    ///
+    /// By the boxes alone: cheap, and true near what is there.
+    pub fn may_hit(&self, frustum: &Frustum) -> bool {
+        simd::dispatch(self.instruction_set, frustum::MayHit { bvh: self, frustum })
     }
 
     /// Checks that every triangle is in the tree once, each box holds what is below it, and every

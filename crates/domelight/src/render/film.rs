@@ -64,6 +64,11 @@ impl PixelSums {
         finite
     }
 
+    /// Adds `n` samples that saw nothing, before no background.
+    pub(super) fn add_misses(&mut self, n: u32) {
+        self.n_samples += n;
+    }
+
     pub(super) fn n_samples(&self) -> u32 {
         self.n_samples
     }
