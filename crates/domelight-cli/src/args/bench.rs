@@ -69,11 +69,11 @@ pub(crate) struct BenchArguments {
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Measurement")]
     pub(crate) seed: u64,
     /// CPU seconds that the pictures of a strategy's last budget may take together; four times as many
-    /// where an error of 1e-3 is near
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = positive,
+    /// where an error of 1e-3 is wanted and near
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = positive,
           help_heading = "Measurement")]
     pub(crate) most: f32,
-    /// The errors (relMSE) that strategies are to reach [default: 4e-3,1e-3,1e-4; of the lecture 1e-3]
+    /// The errors (relMSE) that strategies are to reach [default: 4e-3,1e-3,1e-4; of the lecture 4e-3]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = error,
           help_heading = "Measurement")]
     pub(crate) errors: Vec<f64>,

@@ -211,7 +211,7 @@ impl<'a> Contestant<'a> {
         loop {
             let taken = self.take(n, PILOT_SEED)?;
             tried.push((n, taken.rel_mse));
-            let near = (HEADLINE..NEAR * HEADLINE).contains(&taken.rel_mse);
+            let near = least <= HEADLINE && (HEADLINE..NEAR * HEADLINE).contains(&taken.rel_mse);
             let most = limits.most * if near { MORE } else { 1.0 };
             let next = n.saturating_mul(self.growth);
             let seconds = taken.cpu * f64::from(self.growth * limits.n_seeds);
