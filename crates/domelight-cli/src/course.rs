@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 use domelight::picture::{require_writable, write_atomically};
-use domelight::render::{Checkpoint, Counts, Observer, RenderSettings, Rendering, Session, Tiling};
+use domelight::render::{Checkpoint, Counts, Observer, RenderSettings, Rendering, Session, Stage, Tiling};
 use domelight::strategy::Strategy;
 
 use crate::args::course::CourseArguments;
@@ -305,6 +305,10 @@ struct Until<'a> {
 impl Observer for Until<'_> {
     fn pass_started(&self, samples: Range<u32>) {
         self.progress.pass_started(samples);
+    }
+
+    fn stage_started(&self, stage: Stage) {
+        self.progress.stage_started(stage);
     }
 
     fn tile_finished(&self, counts: &Counts) {

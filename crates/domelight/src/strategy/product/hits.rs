@@ -44,6 +44,7 @@ pub(super) struct Groups {
 
 impl Groups {
     /// Groups the hits of a pixel.
+    #[inline(always)]
     pub(super) fn gather(&mut self, Hits { points, one_material }: Hits) {
         self.gatherings.clear();
         self.member.clear();

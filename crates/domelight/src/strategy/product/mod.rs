@@ -387,21 +387,23 @@ impl Rays<'_> {
         chances: &[u32],
         mut choice: Choice,
     ) {
-        let scale = self.scale();
         let Candidates { lights, brdf, deal, .. } = candidates;
-        let mut push = |c: &Candidate, p: u32| {
-            let value = c.value * (scale * weight(p));
-            *self.base(c.hit) += value * -at(visible, c.slot as usize);
-            self.push(c, value);
-        };
         let (of_lights, of_brdf) = chances.split_at(deal.n_strata);
         for (k, &p) in of_lights.iter().enumerate().filter(|&(_, &p)| choice.offer(p)) {
             let (hit, i) = (deal.hit(k), k / deal.n_hits);
             let block = &lights[hit * deal.blocks() + i / LANES];
-            push(&block.get(i % LANES, hit as u32), p);
+            self.push_one(&block.get(i % LANES, hit as u32), p, visible);
         }
         for (c, &p) in brdf.iter().zip(of_brdf).filter(|&(_, &p)| choice.offer(p)) {
-            push(c, p);
+            self.push_one(c, p, visible);
         }
+    }
+
+    /// W (V − V̂)/π of one candidate.
+    #[inline(always)]
+    fn push_one(&mut self, c: &Candidate, p: u32, visible: &Slots) {
+        let value = c.value * (self.scale() * weight(p));
+        *self.base(c.hit) += value * -at(visible, c.slot as usize);
+        self.push(c, value);
     }
 }
