@@ -41,7 +41,7 @@ pub(crate) const MAP_TEXEL: u64 = 24;
 pub(crate) const WRITTEN_TEXEL: u64 = 24;
 
 /// For each triangle: the tree, and what it is built from.
-pub(crate) const TRIANGLE: u64 = 200;
+pub(crate) const TRIANGLE: u64 = 140;
 
 /// For each pixel of a render: its sums, and the layers that they become.
 pub(crate) const PIXEL: u64 = 248;

@@ -3,7 +3,8 @@
 use crate::failure::UsageError;
 use domelight::RgbImage;
 use domelight::environment::mapping::{EnvmapKind, Mapping};
-use domelight::picture::exr::{ExrLayers, bands};
+use domelight::picture::exr::ExrLayers;
+use domelight::picture::exr::bands::{self, BAND_ROWS};
 use domelight::picture::png::Depth;
 use domelight::picture::tone::ToneMapping;
 use domelight::picture::{
@@ -80,12 +81,41 @@ impl PicturePath {
         for_standard_output: PictureFormat,
         mapping: Option<Mapping>,
     ) -> anyhow::Result<()> {
-        write_atomically(&self.path, |out| match self.format.unwrap_or(for_standard_output) {
-            PictureFormat::Exr => out.write_all(&exr_bytes(image, mapping)?),
-            PictureFormat::Hdr => hdr::encode(image, out),
-            PictureFormat::Pfm => pfm::encode(image, out),
-            PictureFormat::Png => png::encode(image, None, &tone, Depth::Eight, out),
-        })?;
+        let format = self.format.unwrap_or(for_standard_output);
+        self.write_as(format, image, None, &tone, mapping)
+    }
+
+    fn write_exr(&self, image: &RgbImage, mapping: Option<Mapping>) -> anyhow::Result<()> {
+        let envmap = match mapping {
+            Some(Mapping::LatLongExr) => Some(EnvmapKind::LatLong),
+            Some(Mapping::CubeStripVertical) => Some(EnvmapKind::Cube),
+            _ => None,
+        };
+        let RgbImage { width, height, ref pixels } = *image;
+        self.write_bands(height, |y| {
+            let end = height.min(y + BAND_ROWS);
+            let rows = RgbImage::new(width, end - y, pixels[y * width..end * width].to_vec());
+            Ok(ExrLayers { envmap, ..ExrLayers::from_image(&rows, None) })
+        })
+    }
+
+    fn write_as(
+        &self,
+        format: PictureFormat,
+        image: &RgbImage,
+        alpha: Option<&[f32]>,
+        tone: &ToneMapping,
+        mapping: Option<Mapping>,
+    ) -> anyhow::Result<()> {
+        let path = &self.path;
+        match format {
+            PictureFormat::Exr => return self.write_exr(image, mapping),
+            PictureFormat::Hdr => write_atomically(path, |out| hdr::encode(image, out)),
+            PictureFormat::Pfm => write_atomically(path, |out| pfm::encode(image, out)),
+            PictureFormat::Png => {
+                write_atomically(path, |out| png::encode(image, alpha, tone, Depth::Eight, out))
+            }
+        }?;
         Ok(())
     }
 
@@ -139,13 +169,8 @@ impl PicturePath {
         alpha: Option<&[f32]>,
         tone: &ToneMapping,
     ) -> anyhow::Result<()> {
-        write_atomically(&self.path, |out| match self.format.unwrap_or(PictureFormat::Exr) {
-            PictureFormat::Exr => out.write_all(&exr_bytes(color, None)?),
-            PictureFormat::Hdr => hdr::encode(color, out),
-            PictureFormat::Pfm => pfm::encode(color, out),
-            PictureFormat::Png => png::encode(color, alpha, tone, Depth::Eight, out),
-        })?;
-        Ok(())
+        let format = self.format.unwrap_or(PictureFormat::Exr);
+        self.write_as(format, color, alpha, tone, None)
     }
 }
 
@@ -164,16 +189,6 @@ pub(crate) fn into_io(problem: Problem) -> io::Error {
         Problem::Io(error) => error,
         problem => io::Error::other(problem),
     }
-}
-
-fn exr_bytes(image: &RgbImage, mapping: Option<Mapping>) -> io::Result<Vec<u8>> {
-    let mut layers = ExrLayers::from_image(image, None);
-    layers.envmap = match mapping {
-        Some(Mapping::LatLongExr) => Some(EnvmapKind::LatLong),
-        Some(Mapping::CubeStripVertical) => Some(EnvmapKind::Cube),
-        _ => None,
-    };
-    layers.encode().map_err(io::Error::other)
 }
 
 /// Refuses two results on standard output.
