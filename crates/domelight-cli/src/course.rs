@@ -9,7 +9,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 use domelight::picture::{require_writable, write_atomically};
-use domelight::render::{Checkpoint, Counts, Observer, RenderSettings, Rendering, Session, Stage, Tiling};
+use domelight::render::{
+    Checkpoint, Counts, Observer, RenderSettings, Rendering, Session, Stage, Tiling,
+};
 use domelight::strategy::Strategy;
 
 use crate::args::course::CourseArguments;

@@ -427,6 +427,93 @@ fn a_frustum_sees_what_its_rays_hit() {
     assert!(empty > 5_000 && hits > 5_000, "{empty} {hits}");
 }
 
+/// Any bits, and those that go wrong: NaN, infinities, denormals, zeros of both signs, the greatest.
+fn hostile_number(random: &mut Random) -> f32 {
+    let special = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        f32::MIN_POSITIVE,
+        f32::from_bits(1),
+        -f32::from_bits(0x7f_ffff),
+        f32::MAX,
+        f32::MIN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::NAN,
+        1e-20,
+        -1e20,
+        1.0 + f32::EPSILON,
+    ];
+    match random.below(4) {
+        0 => f32::from_bits(random.bits() as u32),
+        1 | 2 => special[random.below(special.len())],
+        _ => 2.0 * random.unit() - 1.0,
+    }
+}
+
+fn hostile_vector(random: &mut Random) -> Vec3 {
+    vec3(hostile_number(random), hostile_number(random), hostile_number(random))
+}
+
+/// Triangles of any finite numbers: huge, denormal, without area, all in one point.
+fn hostile_scene(count: usize, seed: u64) -> Scene {
+    let mut random = Random(seed);
+    let mut scene = soup(count, 0.5, seed);
+    for p in &mut scene.positions {
+        *p = match random.below(8) {
+            0 => hostile_vector(&mut random).map(|x| if x.is_finite() { x } else { 0.5 }),
+            1 => Vec3::ZERO,
+            2 => vec3(0.25, -0.0, 0.5),
+            _ => *p,
+        };
+    }
+    scene
+}
+
+#[test]
+fn instruction_sets_give_the_same_bits_for_hostile_numbers() {
+    let bits =
+        |hit: &Option<Hit>| hit.map(|h| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.triangle]);
+    for seed in 0..24 {
+        let scene = match seed % 3 {
+            0 => soup(200, 0.4, seed),
+            1 => hostile_scene(8, seed),
+            _ => hostile_scene(300, seed),
+        };
+        let bvh = scene.bvh();
+        let mut random = Random(500 + seed);
+        let mut rays = rays(&scene, &bvh, 1000, seed);
+        for ray in &mut rays {
+            match random.below(4) {
+                0 => ray.origin = hostile_vector(&mut random),
+                1 => ray.direction = hostile_vector(&mut random),
+                2 => ray.t_max = hostile_number(&mut random),
+                _ => {}
+            }
+        }
+        // Streams that are empty, not full, full, and one ray more.
+        for count in [0, 1, 7, 8, 9, 31, 32, 33, 1000] {
+            let rays = &rays[..count];
+            let answers = on(&bvh).into_iter().map(|bvh| {
+                let (mut hits, mut occluded) = (Vec::new(), Vec::new());
+                bvh.closest_hits(rays, &mut hits);
+                bvh.occluded(&batch(rays), &mut occluded);
+                let hits = hits.iter().map(bits).collect::<Vec<_>>();
+                let singles: Vec<_> = rays.iter().map(|r| bits(&bvh.closest_hit(r))).collect();
+                let any: Vec<_> = rays.iter().map(|r| bvh.any_hit(r)).collect();
+                (hits, occluded, singles, any)
+            });
+            let answers: Vec<_> = answers.collect();
+            assert!(answers.iter().all(|a| a.0.len() == count && a.1.len() == count));
+            for (i, pair) in answers.windows(2).enumerate() {
+                assert!(pair[0] == pair[1], "seed {seed}, {count} rays, sets {i} and {}", i + 1);
+            }
+        }
+    }
+}
+
 // ---- watertightness ----------------------------------------------------------------------------
 
 /// An interior point of a convex mesh, drawn so that some lie very near the surface.

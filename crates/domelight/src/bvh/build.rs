@@ -339,7 +339,7 @@ fn child(range: Range<'_>, depth: u32) -> (Box4, Tree<'_>) {
     (bounds, tree)
 }
 
-/// Splits the largest range until there are eight or all fit a leaf; the largest surface first.
+/// Splits the largest range until there are eight or all fit a leaf; the largest surface last.
 fn split_in_eight(range: Range<'_>, depth: u32) -> Vec<Range<'_>> {
     let by_heuristic = depth < MAX_HEURISTIC_DEPTH;
     let size =
@@ -354,7 +354,7 @@ fn split_in_eight(range: Range<'_>, depth: u32) -> Vec<Range<'_>> {
         let range = children.swap_remove(largest);
         children.extend(if by_heuristic { range.split() } else { range.halve() });
     }
-    children.sort_by(|a, b| b.bounds.area().total_cmp(&a.bounds.area()));
+    children.sort_by(|a, b| a.bounds.area().total_cmp(&b.bounds.area()));
     children
 }
 

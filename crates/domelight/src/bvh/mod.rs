@@ -12,9 +12,10 @@
 //! - **Box test**: boxes are widened by the rounding error of the triangle test, so that *the tree
 //!   never changes the answer*: it is that of a loop over all triangles, bit for bit. (The exception
 //!   is a triangle seen so nearly edge-on that its distance has no correct digit.)
-//! - **Shadow rays**: sorted by octant and traced as streams of 32 (Tsakok 2009, "Faster Incoherent
-//!   Rays: Multi-BVH Ray Stream Tracing"; Fuetterling et al. 2015, "Efficient Ray Tracing Kernels
-//!   for Modern CPU Architectures").
+//! - **Many rays**: traced as streams of 32 of one octant, into which shadow rays are sorted (Tsakok
+//!   2009, "Faster Incoherent Rays: Multi-BVH Ray Stream Tracing"; Fuetterling et al. 2015, "Efficient
+//!   Ray Tracing Kernels for Modern CPU Architectures"). Four streams take turns, each asking for the
+//!   memory of its next node before the others go on, so that none waits for it.
 //!
 //! Every kernel is written once over vectors of eight numbers and compiled for each instruction set;
 //! none uses a fused multiply-add, so all of them **give the same bits** ([`InstructionSet`]).
@@ -30,7 +31,8 @@
 //! would make the edge functions of two neighbours differ, and be slow on processors without them.
 //! Sorting shadow rays more finely than by octant loses more coherence of the origins than it wins.
 //! Clustering from below (PLOC) with reinsertion gives trees of similar quality, but of no bounded
-//! depth. Packets of rays with the same origin would speed up camera rays alone, which are few.
+//! depth. Packets of camera rays, 16 to a vector, are quicker than streams where the tree fits the
+//! cache, and camera rays are few. `docs/experiments.md` has figures.
 
 mod build;
 mod frustum;

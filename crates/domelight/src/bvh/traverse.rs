@@ -13,7 +13,7 @@ use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
 use crate::simd::{Floats, Kernel, Mask, Sets, Simd};
 
-/// A node leaves at most seven children behind on the way down.
+/// A node leaves at most seven children behind on the way down, and pushes eight.
 const STACK: usize = 256;
 const _: () = assert!(MAX_DEPTH as usize * (WIDTH - 1) + WIDTH <= STACK);
 
@@ -218,15 +218,10 @@ fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRays<WIDTH>, limit: f32) -
         } else {
             let node = &bvh.nodes[child.index()];
             let (crossed, _) = Slabs::load(simd, node, ray.octant).cross(simd, ray, 0, limit);
-            // On with the first and largest; the others wait.
-            let mut crossed = lanes(crossed.bits());
-            if let Some(first) = crossed.next() {
-                for lane in crossed {
-                    stack[len] = node.children[lane];
-                    len += 1;
-                }
-                child = node.children[first];
-                continue;
+            // The last and largest on top.
+            for lane in lanes(crossed.bits()) {
+                stack[len] = node.children[lane];
+                len += 1;
             }
         }
         if len == 0 {
@@ -307,36 +302,41 @@ fn interleave<'a, S: Simd, T: Stream>(
     }
 }
 
-/// A child yet to visit, and the rays of the stream that enter it.
-#[derive(Clone, Copy, Default)]
-struct StreamEntry {
-    child: Child,
-    rays: u32,
-}
-
-/// Children yet to visit.
+/// Children yet to visit, and for each the rays of the stream that enter it.
 struct StreamStack {
-    entries: [StreamEntry; STACK],
+    children: [u32; STACK],
+    rays: [u32; STACK],
     len: usize,
 }
 
 impl StreamStack {
-    const EMPTY: Self = Self { entries: [StreamEntry { child: Child(0), rays: 0 }; STACK], len: 0 };
+    const EMPTY: Self = Self { children: [0; STACK], rays: [0; STACK], len: 0 };
 
     #[inline(always)]
     fn push(&mut self, child: Child, rays: u32) {
-        self.entries[self.len] = StreamEntry { child, rays };
+        self.children[self.len] = child.0;
+        self.rays[self.len] = rays;
         self.len += 1;
+    }
+
+    /// Pushes the children that any ray enters, the last on top.
+    #[inline(always)]
+    fn push_entered<S: Simd>(&mut self, children: &[Child; WIDTH], rays: S::Sets) {
+        let (rays, children, count) = rays.pack(children.map(|child| child.0));
+        // What lies beyond `count` is overwritten by the next.
+        self.children[self.len..self.len + WIDTH].copy_from_slice(&children);
+        self.rays[self.len..self.len + WIDTH].copy_from_slice(&rays);
+        self.len += count;
     }
 
     /// The next child that any of the rays `free` enters, and which.
     #[inline(always)]
-    fn pop(&mut self, free: u32) -> Option<StreamEntry> {
+    fn pop(&mut self, free: u32) -> Option<(Child, u32)> {
         while self.len > 0 {
             self.len -= 1;
-            let StreamEntry { child, rays } = self.entries[self.len];
-            if rays & free != 0 {
-                return Some(StreamEntry { child, rays: rays & free });
+            let rays = self.rays[self.len] & free;
+            if rays != 0 {
+                return Some((Child(self.children[self.len]), rays));
             }
         }
         None
@@ -345,11 +345,12 @@ impl StreamStack {
     /// Asks for the memory of the next child.
     #[inline(always)]
     fn prefetch<S: Simd>(&self, simd: S, bvh: &Bvh) {
-        let Some(top) = self.entries[..self.len].last() else { return };
-        if top.child.is_leaf() {
-            simd.prefetch(&bvh.blocks[top.child.index()]);
+        let Some(&top) = self.children[..self.len].last() else { return };
+        let child = Child(top);
+        if child.is_leaf() {
+            simd.prefetch(&bvh.blocks[child.index()]);
         } else {
-            simd.prefetch(&bvh.nodes[top.child.index()]);
+            simd.prefetch(&bvh.nodes[child.index()]);
         }
     }
 }
@@ -393,7 +394,7 @@ impl Stream for ClosestStream {
 
     #[inline(always)]
     fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh) -> bool {
-        let Some(StreamEntry { child, rays }) = self.stack.pop(u32::MAX) else { return false };
+        let Some((child, rays)) = self.stack.pop(u32::MAX) else { return false };
         if child.is_leaf() {
             for i in lanes(rays) {
                 let (limit, closest) = (self.limits[i], self.hits[i]);
@@ -415,19 +416,21 @@ impl Stream for ClosestStream {
             }
             let (sets, enter) = (crossing.store(), enter.store());
             // The nearest child of the last ray on top.
-            let base = self.stack.len;
+            let stack = &mut self.stack;
+            let base = stack.len;
             let mut keys = [0.0; WIDTH];
             for lane in lanes(crossing.not_empty()) {
-                let mut at = self.stack.len;
+                let mut at = stack.len;
                 while at > base && keys[at - 1 - base] < enter[lane] {
-                    self.stack.entries[at] = self.stack.entries[at - 1];
+                    stack.children[at] = stack.children[at - 1];
+                    stack.rays[at] = stack.rays[at - 1];
                     keys[at - base] = keys[at - 1 - base];
                     at -= 1;
                 }
-                self.stack.entries[at] =
-                    StreamEntry { child: node.children[lane], rays: sets[lane] };
+                stack.children[at] = node.children[lane].0;
+                stack.rays[at] = sets[lane];
                 keys[at - base] = enter[lane];
-                self.stack.len += 1;
+                stack.len += 1;
             }
         }
         self.stack.prefetch(simd, bvh);
@@ -491,7 +494,7 @@ impl Stream for ShadowStream {
     /// boxes and its bit added to the sets of those that it crosses.
     #[inline(always)]
     fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh) -> bool {
-        let Some(StreamEntry { child, rays }) = self.stack.pop(self.free) else { return false };
+        let Some((child, rays)) = self.stack.pop(self.free) else { return false };
         if child.is_leaf() {
             let block = &bvh.blocks[child.index()];
             for i in lanes(rays) {
@@ -509,10 +512,7 @@ impl Stream for ShadowStream {
                 let (crossed, _) = slabs.cross(simd, &self.rays, i, f32::MAX);
                 crossing = crossing.insert(crossed, 1 << i);
             }
-            let sets = crossing.store();
-            for lane in lanes_from_last(crossing.not_empty()) {
-                self.stack.push(node.children[lane], sets[lane]);
-            }
+            self.stack.push_entered::<S>(&node.children, crossing);
         }
         self.stack.prefetch(simd, bvh);
         true
@@ -554,15 +554,5 @@ fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
         let lane = bits.trailing_zeros();
         bits &= bits.wrapping_sub(1);
         (lane < u32::BITS).then_some(lane as usize)
-    })
-}
-
-/// The set bits of a byte, from the highest: what is pushed last comes off the stack first.
-#[inline(always)]
-fn lanes_from_last(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = bits.checked_ilog2()?;
-        bits ^= 1 << lane;
-        Some(lane as usize)
     })
 }

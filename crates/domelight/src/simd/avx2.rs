@@ -294,6 +294,19 @@ impl Sets for Sets8 {
         }
     }
     #[inline(always)]
+    fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
+        let not_empty = self.not_empty();
+        let lanes = &super::PACKED_LANES[not_empty as usize % 256];
+        // SAFETY: `self` proves AVX2; both arrays are 32 readable bytes, the loads need no alignment.
+        let (sets, numbers) = unsafe {
+            let lanes = _mm256_loadu_si256(lanes.as_ptr().cast());
+            let numbers = _mm256_loadu_si256(numbers.as_ptr().cast());
+            let sets = _mm256_permutevar8x32_epi32(self.0, lanes);
+            (Self(sets), Self(_mm256_permutevar8x32_epi32(numbers, lanes)))
+        };
+        (sets.store(), numbers.store(), not_empty.count_ones() as usize)
+    }
+    #[inline(always)]
     fn store(self) -> [u32; 8] {
         let mut lanes = [0; 8];
         // SAFETY: `self` proves AVX2; `lanes` is 32 writable bytes, the store needs no alignment.

@@ -304,6 +304,17 @@ impl Sets for Sets8 {
         u32::from(unsafe { _mm256_test_epi32_mask(self.0, self.0) })
     }
     #[inline(always)]
+    fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
+        // SAFETY: `self` proves AVX-512; `numbers` is 32 readable bytes, the load needs no alignment.
+        let (sets, numbers, not_empty) = unsafe {
+            let not_empty = _mm256_test_epi32_mask(self.0, self.0);
+            let numbers = _mm256_loadu_si256(numbers.as_ptr().cast());
+            let sets = _mm256_maskz_compress_epi32(not_empty, self.0);
+            (Self(sets), Self(_mm256_maskz_compress_epi32(not_empty, numbers)), not_empty)
+        };
+        (sets.store(), numbers.store(), not_empty.count_ones() as usize)
+    }
+    #[inline(always)]
     fn store(self) -> [u32; 8] {
         let mut lanes = [0; 8];
         // SAFETY: `self` proves AVX-512; `lanes` is 32 writable bytes, the store needs no alignment.

@@ -206,6 +206,38 @@ pub trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
     fn bits(self) -> u32;
 }
 
+/// For each set of lanes its members from the lowest, then anything.
+#[cfg(target_arch = "x86_64")]
+static PACKED_LANES: [[u32; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut set = 0;
+    while set < 256 {
+        let (mut lane, mut len) = (0, 0);
+        while lane < 8 {
+            if set >> lane & 1 == 1 {
+                table[set][len] = lane;
+                len += 1;
+            }
+            lane += 1;
+        }
+        set += 1;
+    }
+    table
+};
+
+/// [`Sets::pack`], one lane after the other.
+#[inline(always)]
+fn pack(sets: [u32; 8], numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
+    let (mut packed_sets, mut packed_numbers, mut len) = ([0; 8], [0; 8], 0);
+    for (set, number) in sets.into_iter().zip(numbers) {
+        // Overwritten by the next if the set is empty; in bounds, for the compiler.
+        packed_sets[len % 8] = set;
+        packed_numbers[len % 8] = number;
+        len += usize::from(set != 0);
+    }
+    (packed_sets, packed_numbers, len)
+}
+
 /// Eight sets of the numbers 0 to 31.
 pub(crate) trait Sets: Copy {
     type Mask;
@@ -215,6 +247,9 @@ pub(crate) trait Sets: Copy {
     fn insert(self, m: Self::Mask, bit: u32) -> Self;
     /// Bit i: set i is not empty.
     fn not_empty(self) -> u32;
+    /// Moves the sets that are not empty, and the numbers of their lanes, to the front; also how many
+    /// they are.
+    fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize);
     fn store(self) -> [u32; 8];
 }
 

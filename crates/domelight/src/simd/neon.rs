@@ -286,6 +286,10 @@ impl Sets for Sets8 {
         mask.bits()
     }
     #[inline(always)]
+    fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
+        super::pack(self.store(), numbers)
+    }
+    #[inline(always)]
     fn store(self) -> [u32; 8] {
         let mut lanes = [0; 8];
         // SAFETY: `self` proves NEON; `lanes` is 8 writable u32, and the stores need no alignment.

@@ -203,6 +203,10 @@ impl Sets for Sets8 {
         (0..8).fold(0, |bits, i| bits | u32::from(self.0[i] != 0) << i)
     }
     #[inline(always)]
+    fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
+        super::pack(self.store(), numbers)
+    }
+    #[inline(always)]
     fn store(self) -> [u32; 8] {
         self.0
     }
