@@ -1,5 +1,5 @@
-//! Scene files refer to others, so that their readers take a path: the input lies in a folder of its own, in memory
-//! where there is such a place.
+//! Scene files refer to others, so that their readers take a path: the input lies in a folder of its own, below
+//! `FUZZ_FOLDER` if that is set.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,8 +8,7 @@ use std::sync::OnceLock;
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
-        let memory = Path::new("/dev/shm");
-        let parent = if memory.is_dir() { memory.to_owned() } else { std::env::temp_dir() };
+        let parent = std::env::var_os("FUZZ_FOLDER").map_or_else(std::env::temp_dir, PathBuf::from);
         parent.join(format!("domelight-fuzz-{}", std::process::id()))
     })
 }
@@ -20,8 +19,11 @@ pub fn write(name: &str, bytes: &[u8]) {
     fs::write(folder().join(name), bytes).expect("room for a file");
 }
 
+/// What a scene of an input may take.
+const MAX_MEMORY: u64 = 1 << 30;
+
 /// Reads the input as a scene file.
 pub fn load(name: &str, bytes: &[u8]) {
     write(name, bytes);
-    drop(domelight::scene::load(folder().join(name)));
+    drop(domelight::scene::load_within(folder().join(name), Some(MAX_MEMORY)));
 }

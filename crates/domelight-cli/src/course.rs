@@ -9,11 +9,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 use domelight::picture::{require_writable, write_atomically};
-use domelight::render::{Checkpoint, Counts, Observer, RenderSettings, Rendering, Session, Tiling};
+use domelight::render::{Checkpoint, Counts, Observer, RenderSettings, Rendering, Session, Stage, Tiling};
 use domelight::strategy::Strategy;
 
 use crate::args::course::CourseArguments;
 use crate::failure::{UsageError, warn};
+use crate::interrupt;
+use crate::memory;
 use crate::output::{PictureFormat, PicturePath};
 use crate::progress::RenderProgress;
 use crate::report::Settings;
@@ -47,6 +49,12 @@ impl CourseArguments {
     /// The render makes a part, not pictures.
     pub(crate) fn is_part(&self) -> bool {
         self.shard.is_some() || self.tiles.is_some()
+    }
+
+    /// The exit code of a render that is interrupted before its first sample: a farm runs a shard again.
+    pub(crate) fn code_of_an_early_end(&self) -> i32 {
+        let saves = self.is_part() || self.checkpoint.is_some() || self.resume.is_some();
+        if saves { interrupt::RUN_AGAIN } else { interrupt::ENDED }
     }
 
     /// Checks, before the work, what the flags say together with the outputs.
@@ -123,9 +131,12 @@ fn identity(view: &View, settings: &RenderSettings, report: &Settings) -> Vec<(S
 /// Reads a checkpoint or a part.
 pub(crate) fn read(path: &Path) -> Result<Checkpoint> {
     let name = || path.display().to_string();
-    // A pipe might never end.
-    if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
-        return Err(UsageError(format!("{}: it is not a plain file", name())).into());
+    if let Ok(there) = fs::metadata(path) {
+        // A pipe might never end.
+        if !there.is_file() {
+            return Err(UsageError(format!("{}: it is not a plain file", name())).into());
+        }
+        memory::allow(&name(), there.len())?;
     }
     let bytes = match fs::read(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -133,6 +144,7 @@ pub(crate) fn read(path: &Path) -> Result<Checkpoint> {
         }
         read => read.with_context(name)?,
     };
+    memory::allow(&name(), Checkpoint::memory_to_decode(&bytes).with_context(name)?)?;
     Checkpoint::decode(&bytes).with_context(name)
 }
 
@@ -182,6 +194,8 @@ impl Course {
         progress: &RenderProgress,
     ) -> Result<Rendering> {
         let range = self.range(session.tiling())?;
+        let window = session.tiling().window(&range);
+        self.allow(window.width, window.height)?;
         let mut session = session.only(range.clone());
         if let Some((path, checkpoint)) = &self.from {
             restore(&mut session, path, checkpoint)?;
@@ -236,6 +250,12 @@ impl Course {
         Ok(write_atomically(path, |out| out.write_all(&bytes))?)
     }
 
+    /// Refuses more pixels than there is memory for.
+    fn allow(&self, width: usize, height: usize) -> Result<()> {
+        let pixel = if self.save.is_some() { memory::SAVED_PIXEL } else { memory::PIXEL };
+        memory::allow_picture(width, height, pixel)
+    }
+
     fn range(&self, tiling: Tiling) -> Result<Range<usize>> {
         match self.tiles {
             Choice::All => Ok(0..tiling.n_tiles()),
@@ -285,6 +305,10 @@ struct Until<'a> {
 impl Observer for Until<'_> {
     fn pass_started(&self, samples: Range<u32>) {
         self.progress.pass_started(samples);
+    }
+
+    fn stage_started(&self, stage: Stage) {
+        self.progress.stage_started(stage);
     }
 
     fn tile_finished(&self, counts: &Counts) {

@@ -2,6 +2,7 @@
 
 use crate::args::{DiffArguments, Metric};
 use crate::failure::UsageError;
+use crate::memory;
 use crate::output::{PictureFormat, PicturePath, print, require_one_on_standard_output};
 use domelight::RgbImage;
 use domelight::picture::compare::{
@@ -13,6 +14,12 @@ use domelight::picture::{ReadOptions, read};
 use std::fmt::Write;
 use std::path::Path;
 
+/// Memory of a texel of a picture: colour and alpha.
+const PICTURE_TEXEL: u64 = 16;
+
+/// Memory of a texel while two pictures are compared, beside the pictures.
+const COMPARISON_TEXEL: u64 = 112;
+
 /// Alpha above which a pixel counts as covered.
 const COVERED: f32 = 0.999;
 
@@ -21,9 +28,13 @@ pub(crate) fn run(arguments: &DiffArguments, quiet: bool) -> anyhow::Result<()> 
     if [&arguments.test, &arguments.reference].iter().all(|path| path.as_path() == Path::new("-")) {
         return Err(UsageError("only one of the two pictures can be standard input".into()).into());
     }
-    let options = ReadOptions { layer: arguments.layer.clone() };
-    let test = read(&arguments.test, &options)?;
-    let reference = read(&arguments.reference, &options)?;
+    let options = || ReadOptions { layer: arguments.layer.clone(), max_memory: memory::left() };
+    let test = read(&arguments.test, &options())?;
+    memory::keep(PICTURE_TEXEL * test.image.pixels.len() as u64);
+    let reference = read(&arguments.reference, &options())?;
+    memory::keep(PICTURE_TEXEL * reference.image.pixels.len() as u64);
+    let texels = test.image.pixels.len().max(reference.image.pixels.len()) as u64;
+    memory::allow("comparing the pictures", COMPARISON_TEXEL * texels)?;
     let mask = match (&reference.alpha, arguments.covered) {
         (_, false) => None,
         (Some(alpha), true) => Some(alpha.iter().map(|&a| a > COVERED).collect::<Vec<_>>()),

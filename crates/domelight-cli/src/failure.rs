@@ -1,9 +1,12 @@
 //! What the user is told when something fails, and the exit code.
 
+use crate::interrupt::RUN_AGAIN;
+use crate::memory;
 use crate::merge::MergeError;
 use domelight::environment::EnvironmentError;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::ProbeError;
+use domelight::memory::OverLimit;
 use domelight::picture::Problem;
 use domelight::picture::compare::SizeMismatch;
 use domelight::render::CheckpointError;
@@ -74,7 +77,8 @@ fn code(error: &anyhow::Error) -> u8 {
         || error.is::<SceneError>()
         || error.is::<CameraError>()
         || error.is::<EnvironmentError>()
-        || error.is::<CheckpointError>();
+        || error.is::<CheckpointError>()
+        || over_limit(error).is_some();
     // What is not there or no plain file was asked for wrongly; other troubles of the system may pass.
     let passing = io_kind(error).is_some_and(|kind| {
         use io::ErrorKind::{InvalidInput, IsADirectory, NotADirectory, NotFound};
@@ -84,7 +88,7 @@ fn code(error: &anyhow::Error) -> u8 {
         return error.code();
     }
     match () {
-        () if error.is::<InterruptedAndSaved>() => 75,
+        () if error.is::<InterruptedAndSaved>() => RUN_AGAIN as u8,
         () if hopeless && !passing => 2,
         () => 1,
     }
@@ -105,6 +109,9 @@ fn hint(error: &anyhow::Error) -> Option<String> {
     if error.is::<SizeMismatch>() {
         return Some("render both with the same --size".into());
     }
+    if let Some(error) = over_limit(error) {
+        return Some(memory::hint(error));
+    }
     match error.downcast_ref()? {
         ProbeError::Picture(_) if io_kind(error) == Some(io::ErrorKind::NotFound) => {
             let names = BuiltinProbe::ALL.map(BuiltinProbe::name).join(", ");
@@ -115,6 +122,14 @@ fn hint(error: &anyhow::Error) -> Option<String> {
         }
         _ => None,
     }
+}
+
+/// More memory than is allowed: the same again would not help.
+fn over_limit(error: &anyhow::Error) -> Option<&OverLimit> {
+    error.chain().find_map(|cause| match cause.downcast_ref() {
+        Some(Problem::Memory(error)) => Some(error),
+        _ => cause.downcast_ref(),
+    })
 }
 
 /// Whoever read our output has seen enough.

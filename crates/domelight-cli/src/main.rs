@@ -14,10 +14,13 @@ mod farm;
 mod figures;
 mod interrupt;
 mod lights;
+mod measure;
+mod memory;
 mod merge;
 mod notation;
 mod output;
 mod probe;
+mod profile;
 mod progress;
 mod render;
 mod report;
@@ -33,7 +36,8 @@ use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let Arguments { command, quiet } = Arguments::parse();
+    let Arguments { command, quiet, max_memory } = Arguments::parse();
+    memory::limit(max_memory);
     let done = match command {
         Command::Render(arguments) => render::run(&arguments, quiet),
         Command::Merge(arguments) => merge::run(&arguments, quiet),

@@ -1,18 +1,32 @@
 //! `domelight merge`: from parts to the picture.
+//!
+//! The parts are read twice: first to see that they are whole, of one render, and all there, then band by band from
+//! top to bottom, each part only while its rows are written.
 
 use std::fs;
+use std::iter::Peekable;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::slice;
 
 use anyhow::{Context as _, Result};
+use domelight::picture::exr::bands::BAND_ROWS;
 use domelight::picture::tone::ToneCurve;
 use domelight::render::{Checkpoint, CheckpointError, Counts, Film, Layers};
+use domelight::{Rgb, RgbImage};
 use serde::Serialize;
 
 use crate::args::MergeArguments;
 use crate::course::read;
 use crate::failure::tell;
+use crate::memory;
 use crate::output::{PicturePath, print, require_one_on_standard_output};
+
+/// Memory of a pixel of a band: its layers, as channels, and compressed.
+const BAND_PIXEL: u64 = 300;
+
+/// Memory of a pixel of which colour and alpha are kept: themselves, and as PNG.
+const FLAT_PIXEL: u64 = 20;
 
 /// Why parts make no picture.
 #[derive(Debug, thiserror::Error)]
@@ -39,18 +53,27 @@ impl MergeError {
     }
 }
 
-/// What the parts have in common, and the picture that they make.
+/// What the parts have in common, and where they are.
 struct Merged {
     /// The first part's file; the others are held against it.
     name: String,
     identity: Vec<(String, String)>,
     provenance: Vec<(String, String)>,
+    width: usize,
+    height: usize,
     n_tiles: usize,
     n_samples: u32,
     counts: Counts,
-    layers: Layers,
-    /// Which tiles are there, and whose.
-    taken: Vec<(Range<usize>, String)>,
+    /// In the order of their tiles once all are there.
+    parts: Vec<Part>,
+}
+
+/// A part that was read and found whole.
+struct Part {
+    path: PathBuf,
+    name: String,
+    tiles: Range<usize>,
+    first_row: usize,
 }
 
 /// Runs the subcommand.
@@ -61,8 +84,8 @@ pub(crate) fn run(arguments: &MergeArguments, quiet: bool) -> Result<()> {
     let files = files(&arguments.parts)?;
     let mut merged: Option<Merged> = None;
     let mut unfinished = Vec::new();
-    for path in &files {
-        let part = read_part(path)?;
+    for path in files {
+        let part = read_part(&path)?;
         let name = path.display().to_string();
         let merged = match &mut merged {
             Some(merged) => {
@@ -74,22 +97,15 @@ pub(crate) fn run(arguments: &MergeArguments, quiet: bool) -> Result<()> {
         if !part.complete {
             unfinished.push(name.clone());
         }
-        merged.take(name, &part)?;
+        merged.take(path, name, &part)?;
     }
     let Some(mut merged) = merged else {
         return Err(MergeError::Missing("there are no parts in the folder".into()).into());
     };
     merged.require_all(&unfinished)?;
 
-    let tone = arguments.tone.mapping(ToneCurve::Agx);
-    let mut attributes = merged.provenance.clone();
-    attributes.push(("domelight.complete".into(), "true".into()));
-    let background = |(name, value): &(String, String)| name == "background" && value == "hidden";
-    let hidden = merged.identity.iter().any(background);
-    for output in &arguments.output {
-        output.write_layers(&merged.layers, &tone, hidden, attributes.clone())?;
-    }
-    merged.report(files.len(), arguments, quiet)
+    merged.write(arguments)?;
+    merged.report(arguments, quiet)
 }
 
 /// The files themselves, and the pictures in folders by name.
@@ -129,11 +145,12 @@ impl Merged {
             name: name.to_owned(),
             identity: part.identity.clone(),
             provenance: part.provenance.clone(),
+            width,
+            height,
             n_tiles: part.n_tiles,
             n_samples: part.n_samples,
             counts: Counts::default(),
-            layers: Layers::new(width, height),
-            taken: Vec::new(),
+            parts: Vec::new(),
         }
     }
 
@@ -154,32 +171,31 @@ impl Merged {
         }
         let size = |width: usize, height: usize| format!("{width}x{height}");
         let here = (size(part.film.width, part.film.height), part.n_tiles);
-        let there = (size(self.layers.width(), self.layers.height()), self.n_tiles);
+        let there = (size(self.width, self.height), self.n_tiles);
         if here != there {
             return foreign("division into tiles", &format!("{here:?}"), &format!("{there:?}"));
         }
         Ok(())
     }
 
-    fn take(&mut self, name: String, part: &Checkpoint) -> Result<(), MergeError> {
+    fn take(&mut self, path: PathBuf, name: String, part: &Checkpoint) -> Result<(), MergeError> {
         let tiles = part.tiles.clone();
-        let overlap = |(taken, first): &(Range<usize>, String)| {
-            let tile = taken.start.max(tiles.start);
-            (tile < taken.end.min(tiles.end)).then(|| (tile, first.clone()))
+        let overlap = |other: &Part| {
+            let tile = other.tiles.start.max(tiles.start);
+            (tile < other.tiles.end.min(tiles.end)).then(|| (tile, other.name.clone()))
         };
-        if let Some((tile, first)) = self.taken.iter().find_map(overlap) {
+        if let Some((tile, first)) = self.parts.iter().find_map(overlap) {
             return Err(MergeError::Doubled { first, second: name, tile });
         }
-        self.layers.merge(&part.film);
         self.counts += part.counts;
-        self.taken.push((tiles, name));
+        self.parts.push(Part { path, name, tiles, first_row: part.film.window.y });
         Ok(())
     }
 
     fn require_all(&mut self, unfinished: &[String]) -> Result<(), MergeError> {
-        self.taken.sort_by_key(|(tiles, _)| tiles.start);
-        let ends = self.taken.iter().map(|(tiles, _)| tiles.end);
-        let starts = self.taken.iter().map(|(tiles, _)| tiles.start).chain([self.n_tiles]);
+        self.parts.sort_by_key(|part| (part.tiles.start, part.tiles.end));
+        let ends = self.parts.iter().map(|part| part.tiles.end);
+        let starts = self.parts.iter().map(|part| part.tiles.start).chain([self.n_tiles]);
         let gap =
             |(end, start): (usize, usize)| (end < start).then(|| format!("{end}-{}", start - 1));
         let missing: Vec<_> = [0].into_iter().chain(ends).zip(starts).filter_map(gap).collect();
@@ -198,7 +214,47 @@ impl Merged {
         if text.is_empty() { Ok(()) } else { Err(MergeError::Missing(text.join("; "))) }
     }
 
-    fn report(&self, n_parts: usize, arguments: &MergeArguments, quiet: bool) -> Result<()> {
+    /// Writes all outputs; what is no OpenEXR needs all of the picture's colours in memory.
+    fn write(&self, arguments: &MergeArguments) -> Result<()> {
+        let mut attributes = self.provenance.clone();
+        attributes.push(("domelight.complete".into(), "true".into()));
+        let (layered, flat): (Vec<_>, Vec<_>) =
+            arguments.output.iter().partition(|output| output.has_all_layers());
+        let (width, height) = (self.width, self.height);
+        memory::allow_picture(width, BAND_ROWS.min(height), BAND_PIXEL)?;
+        if !flat.is_empty() {
+            memory::allow_picture(width, height, FLAT_PIXEL)?;
+            memory::keep(FLAT_PIXEL * (width * height) as u64);
+        }
+        let mut picture = (!flat.is_empty()).then(Flat::default);
+        for output in &layered {
+            let mut bands = Bands::new(self);
+            let mut gathered = picture.as_mut().filter(|picture| picture.color.is_empty());
+            output.write_bands(self.height, |y| {
+                let band = bands.next(y)?;
+                if let Some(picture) = &mut gathered {
+                    picture.add(&band);
+                }
+                Ok(band.to_exr(attributes.clone()))
+            })?;
+        }
+        let Some(mut picture) = picture else { return Ok(()) };
+        if layered.is_empty() {
+            let mut bands = Bands::new(self);
+            for y in (0..self.height).step_by(BAND_ROWS) {
+                picture.add(&bands.next(y)?);
+            }
+        }
+        let background =
+            |(name, value): &(String, String)| name == "background" && value == "hidden";
+        let hidden = self.identity.iter().any(background);
+        let tone = arguments.tone.mapping(ToneCurve::Agx);
+        let color = RgbImage::new(self.width, self.height, picture.color);
+        let alpha = hidden.then_some(&picture.alpha[..]);
+        flat.iter().try_for_each(|output| output.write_color(&color, alpha, &tone))
+    }
+
+    fn report(&self, arguments: &MergeArguments, quiet: bool) -> Result<()> {
         #[derive(Serialize)]
         struct Report {
             parts: usize,
@@ -211,9 +267,9 @@ impl Merged {
             outputs: Vec<String>,
         }
         let report = Report {
-            parts: n_parts,
+            parts: self.parts.len(),
             tiles: self.n_tiles,
-            size: [self.layers.width(), self.layers.height()],
+            size: [self.width, self.height],
             spp: self.n_samples,
             camera_rays: self.counts.camera_rays,
             shadow_rays: self.counts.shadow_rays,
@@ -228,5 +284,48 @@ impl Merged {
             tell(&format!("{parts} parts: {w}x{h}, {spp} samples a pixel -> {outputs}"));
         }
         Ok(())
+    }
+}
+
+/// The rows of the picture from top to bottom, [`BAND_ROWS`] at a time.
+struct Bands<'m> {
+    merged: &'m Merged,
+    waiting: Peekable<slice::Iter<'m, Part>>,
+    /// Parts that have rows here.
+    open: Vec<Film>,
+}
+
+impl<'m> Bands<'m> {
+    fn new(merged: &'m Merged) -> Self {
+        Self { merged, waiting: merged.parts.iter().peekable(), open: Vec::new() }
+    }
+
+    /// The band that begins at row `y`, where the last one ended.
+    fn next(&mut self, y: usize) -> Result<Layers> {
+        let Merged { width, height, .. } = *self.merged;
+        let end = height.min(y + BAND_ROWS);
+        while let Some(part) = self.waiting.next_if(|part| part.first_row < end) {
+            let read = read_part(&part.path)?;
+            self.merged.require_same(&part.name, &read)?;
+            self.open.push(read.film);
+        }
+        let mut band = Layers::new(width, end - y);
+        self.open.iter().for_each(|film| band.merge(film, y));
+        self.open.retain(|film| film.window.y + film.window.height > end);
+        Ok(band)
+    }
+}
+
+/// Colour and alpha alone, row by row.
+#[derive(Default)]
+struct Flat {
+    color: Vec<Rgb>,
+    alpha: Vec<f32>,
+}
+
+impl Flat {
+    fn add(&mut self, band: &Layers) {
+        self.color.extend_from_slice(&band.color.pixels);
+        self.alpha.extend_from_slice(&band.alpha);
     }
 }

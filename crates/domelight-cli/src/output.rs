@@ -4,9 +4,12 @@ use crate::failure::UsageError;
 use domelight::RgbImage;
 use domelight::environment::mapping::{EnvmapKind, Mapping};
 use domelight::picture::exr::ExrLayers;
+use domelight::picture::exr::bands::{self, BAND_ROWS};
 use domelight::picture::png::Depth;
 use domelight::picture::tone::ToneMapping;
-use domelight::picture::{hdr, pfm, png, require_writable, write_atomically};
+use domelight::picture::{
+    Problem, hdr, pfm, png, require_writable, write_atomically, write_atomically_seeking,
+};
 use domelight::render::Layers;
 use std::fmt;
 use std::io::{self, Write};
@@ -28,6 +31,13 @@ pub(crate) enum PictureFormat {
     Hdr,
     Pfm,
     Png,
+}
+
+impl PicturePath {
+    /// A PNG file.
+    pub(crate) fn is_png(&self) -> bool {
+        self.format == Some(PictureFormat::Png)
+    }
 }
 
 impl FromStr for PicturePath {
@@ -71,12 +81,41 @@ impl PicturePath {
         for_standard_output: PictureFormat,
         mapping: Option<Mapping>,
     ) -> anyhow::Result<()> {
-        write_atomically(&self.path, |out| match self.format.unwrap_or(for_standard_output) {
-            PictureFormat::Exr => out.write_all(&exr_bytes(image, mapping)?),
-            PictureFormat::Hdr => hdr::encode(image, out),
-            PictureFormat::Pfm => pfm::encode(image, out),
-            PictureFormat::Png => png::encode(image, None, &tone, Depth::Eight, out),
-        })?;
+        let format = self.format.unwrap_or(for_standard_output);
+        self.write_as(format, image, None, &tone, mapping)
+    }
+
+    fn write_exr(&self, image: &RgbImage, mapping: Option<Mapping>) -> anyhow::Result<()> {
+        let envmap = match mapping {
+            Some(Mapping::LatLongExr) => Some(EnvmapKind::LatLong),
+            Some(Mapping::CubeStripVertical) => Some(EnvmapKind::Cube),
+            _ => None,
+        };
+        let RgbImage { width, height, ref pixels } = *image;
+        self.write_bands(height, |y| {
+            let end = height.min(y + BAND_ROWS);
+            let rows = RgbImage::new(width, end - y, pixels[y * width..end * width].to_vec());
+            Ok(ExrLayers { envmap, ..ExrLayers::from_image(&rows, None) })
+        })
+    }
+
+    fn write_as(
+        &self,
+        format: PictureFormat,
+        image: &RgbImage,
+        alpha: Option<&[f32]>,
+        tone: &ToneMapping,
+        mapping: Option<Mapping>,
+    ) -> anyhow::Result<()> {
+        let path = &self.path;
+        match format {
+            PictureFormat::Exr => return self.write_exr(image, mapping),
+            PictureFormat::Hdr => write_atomically(path, |out| hdr::encode(image, out)),
+            PictureFormat::Pfm => write_atomically(path, |out| pfm::encode(image, out)),
+            PictureFormat::Png => {
+                write_atomically(path, |out| png::encode(image, alpha, tone, Depth::Eight, out))
+            }
+        }?;
         Ok(())
     }
 
@@ -87,22 +126,51 @@ impl PicturePath {
         layers: &Layers,
         tone: &ToneMapping,
         hidden: bool,
-        attributes: Vec<(String, String)>,
+        attributes: &[(String, String)],
     ) -> anyhow::Result<()> {
-        let color = &layers.color;
-        write_atomically(&self.path, |out| match self.format.unwrap_or(PictureFormat::Exr) {
-            PictureFormat::Exr => {
-                let bytes = layers.to_exr(attributes).encode().map_err(io::Error::other)?;
-                out.write_all(&bytes)
-            }
-            PictureFormat::Hdr => hdr::encode(color, out),
-            PictureFormat::Pfm => pfm::encode(color, out),
-            PictureFormat::Png => {
-                let alpha = hidden.then_some(&layers.alpha[..]);
-                png::encode(color, alpha, tone, Depth::Eight, out)
-            }
-        })?;
-        Ok(())
+        if self.has_all_layers() {
+            write_atomically_seeking(&self.path, |out| {
+                layers.write_exr(attributes, out).map_err(into_io)
+            })?;
+            return Ok(());
+        }
+        self.write_color(&layers.color, hidden.then_some(&layers.alpha[..]), tone)
+    }
+
+    /// Writes OpenEXR from bands of rows, as [`bands::write`] does; no file is there if one fails.
+    pub(crate) fn write_bands(
+        &self,
+        height: usize,
+        band: impl FnMut(usize) -> anyhow::Result<ExrLayers>,
+    ) -> anyhow::Result<()> {
+        let mut failed = None;
+        let written = write_atomically_seeking(&self.path, |out| {
+            bands::write(height, out, band).map_err(|error| match error.downcast() {
+                Ok(problem) => into_io(problem),
+                Err(error) => {
+                    failed = Some(error);
+                    io::Error::other("a band is missing")
+                }
+            })
+        });
+        failed.map_or(Ok(()), Err)?;
+        Ok(written?)
+    }
+
+    /// A rendering goes there with all its layers, into OpenEXR.
+    pub(crate) fn has_all_layers(&self) -> bool {
+        self.format.unwrap_or(PictureFormat::Exr) == PictureFormat::Exr
+    }
+
+    /// Writes colour alone, into PNG with alpha if there is one.
+    pub(crate) fn write_color(
+        &self,
+        color: &RgbImage,
+        alpha: Option<&[f32]>,
+        tone: &ToneMapping,
+    ) -> anyhow::Result<()> {
+        let format = self.format.unwrap_or(PictureFormat::Exr);
+        self.write_as(format, color, alpha, tone, None)
     }
 }
 
@@ -115,14 +183,12 @@ impl fmt::Display for PicturePath {
     }
 }
 
-fn exr_bytes(image: &RgbImage, mapping: Option<Mapping>) -> io::Result<Vec<u8>> {
-    let mut layers = ExrLayers::from_image(image, None);
-    layers.envmap = match mapping {
-        Some(Mapping::LatLongExr) => Some(EnvmapKind::LatLong),
-        Some(Mapping::CubeStripVertical) => Some(EnvmapKind::Cube),
-        _ => None,
-    };
-    layers.encode().map_err(io::Error::other)
+/// What the system says stays what the system says.
+pub(crate) fn into_io(problem: Problem) -> io::Error {
+    match problem {
+        Problem::Io(error) => error,
+        problem => io::Error::other(problem),
+    }
 }
 
 /// Refuses two results on standard output.

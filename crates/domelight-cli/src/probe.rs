@@ -1,6 +1,7 @@
 //! `domelight probe`: what a light probe is like, and its conversion.
 
 use crate::args::ProbeArguments;
+use crate::memory;
 use crate::output::{PictureFormat, PicturePath, print, require_one_on_standard_output};
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{LoadedProbe, ProbeOptions, SanitizeReport, load_probe};
@@ -32,7 +33,10 @@ pub(crate) fn run(arguments: &ProbeArguments, quiet: bool) -> anyhow::Result<()>
 fn load(arguments: &ProbeArguments) -> anyhow::Result<LoadedProbe> {
     let name = arguments.probe.to_str().and_then(|name| name.parse::<BuiltinProbe>().ok());
     if let Some(builtin) = name {
-        let image = builtin.image(arguments.size.unwrap_or(BUILTIN_ROWS) as usize);
+        let rows = arguments.size.unwrap_or(BUILTIN_ROWS);
+        let what = format!("{} with {rows} rows", builtin.name());
+        memory::allow(&what, memory::MAP_TEXEL * 2 * u64::from(rows).pow(2))?;
+        let image = builtin.image(rows as usize);
         let (mapping, file_size) = (Mapping::LatLong, (image.width, image.height));
         return Ok(LoadedProbe { image, mapping, file_size, sanitized: SanitizeReport::default() });
     }
@@ -40,6 +44,7 @@ fn load(arguments: &ProbeArguments) -> anyhow::Result<LoadedProbe> {
         mapping: arguments.mapping,
         layer: arguments.layer.clone(),
         sanitize: arguments.sanitize,
+        max_memory: memory::left(),
     };
     Ok(load_probe(&arguments.probe, &options)?)
 }
@@ -49,6 +54,9 @@ fn write_pictures(arguments: &ProbeArguments, map: &RgbImage) -> anyhow::Result<
         return Ok(());
     }
     let rows = arguments.size.map_or(map.height, |size| size as usize);
+    memory::keep(12 * map.pixels.len() as u64);
+    let what = format!("{} with {rows} rows", arguments.probe.display());
+    memory::allow(&what, (12 + memory::WRITTEN_TEXEL) * 2 * (rows as u64).pow(2))?;
     let resized = (rows != map.height).then(|| to_lat_long(map, Mapping::LatLong, rows));
     let map = resized.as_ref().unwrap_or(map);
     let tone = arguments.tone.mapping(ToneCurve::Aces);

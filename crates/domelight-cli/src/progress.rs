@@ -5,10 +5,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use domelight::render::{Counts, Observer};
+use domelight::render::{Counts, Observer, Stage};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::output::print;
+use crate::profile::{Profile, StageSeconds};
 
 /// Shows camera samples done, passes, rays a second and the time left on standard error, if that is
 /// a terminal and nobody asked for quiet, or tells a farm on standard output; passes the interrupt flag
@@ -23,6 +24,7 @@ pub(crate) struct RenderProgress {
     /// Whole per cent told last.
     told: Mutex<Option<u64>>,
     started: Instant,
+    profile: Option<Profile>,
 }
 
 impl RenderProgress {
@@ -45,7 +47,16 @@ impl RenderProgress {
         }
         let label = if label.is_empty() { String::new() } else { format!("{label}  ") };
         let (rays, told) = (AtomicU64::new(0), Mutex::new(None));
-        Self { bar, label, openjd: false, interrupted, rays, told, started: Instant::now() }
+        Self {
+            bar,
+            label,
+            openjd: false,
+            interrupted,
+            rays,
+            told,
+            started: Instant::now(),
+            profile: None,
+        }
     }
 
     /// The lines of Open Job Description on standard output instead of the bar, if `on`.
@@ -55,6 +66,17 @@ impl RenderProgress {
         }
         self.openjd = on;
         self
+    }
+
+    /// Measures which stages the time goes to, if `on`.
+    pub(crate) fn profiled(mut self, on: bool) -> Self {
+        self.profile = on.then(Profile::default);
+        self
+    }
+
+    /// What each stage took, if that was measured.
+    pub(crate) fn profile(&self) -> Option<Vec<StageSeconds>> {
+        self.profile.as_ref().map(Profile::seconds)
     }
 
     /// Sets the bar to `done` of `total` camera rays.
@@ -94,7 +116,16 @@ impl Observer for RenderProgress {
         self.bar.set_prefix(samples);
     }
 
+    fn stage_started(&self, stage: Stage) {
+        if let Some(profile) = &self.profile {
+            profile.begin(Some(stage));
+        }
+    }
+
     fn tile_finished(&self, counts: &Counts) {
+        if let Some(profile) = &self.profile {
+            profile.begin(None);
+        }
         let rays = counts.camera_rays + counts.shadow_rays;
         let rays = self.rays.fetch_add(rays, Ordering::Relaxed) + rays;
         let rate = rays as f64 / self.started.elapsed().as_secs_f64().max(1e-3);

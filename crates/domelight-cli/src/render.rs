@@ -11,12 +11,14 @@ use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
 use crate::course::Course;
 use crate::failure::UsageError;
 use crate::interrupt;
+use crate::memory;
 use crate::output::{PicturePath, print, require_one_on_standard_output};
 use crate::progress::RenderProgress;
 use crate::report::{RenderReport, Settings, Stages, Stop};
 use crate::scene::{View, start_threads};
 use crate::strategy::Job;
 use crate::usage::Stopwatch;
+use crate::values::Size;
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
@@ -34,8 +36,14 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let outputs = arguments.output.paths()?;
     arguments.course.check(&outputs)?;
     outputs.iter().try_for_each(PicturePath::require_writable)?;
+    if !arguments.course.is_part() {
+        // Before anything is loaded; again, with what the render is known to save, when all is.
+        let Size { width, height } = arguments.scene.camera.size;
+        memory::allow_picture(width, height, memory::PIXEL)?;
+    }
     start_threads(arguments.pixel.threads)?;
     let interrupted = interrupt::flag();
+    let loading = interrupt::nothing_to_keep(arguments.course.code_of_an_early_end());
     let mut watch = Stopwatch::start();
 
     let loaded = arguments.scene.load(quiet)?;
@@ -44,7 +52,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let view = &arguments.scene.build(loaded)?;
     let View { scene, camera, environment, probe, report } = view;
     let settings = &RenderSettings {
-        target_error: arguments.course.target_error,
+        target_error: arguments.samples.target_error,
         ..arguments.scene.render_settings(&arguments.pixel, arguments.samples.spp)
     };
     let points = || survey(scene, camera, settings);
@@ -62,14 +70,26 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let course = &arguments.course;
     let course = course.course(view, settings, &described, &outputs, interrupted, quiet)?;
     let build = watch.lap();
-    if interrupted.load(Ordering::Relaxed) {
-        bail!("interrupted before the first sample; nothing was written");
+    drop(loading);
+
+    let tone = arguments.output.tone.mapping(ToneCurve::Agx);
+    if arguments.output.preview {
+        let settings = &RenderSettings { n_samples: 1, target_error: None, ..settings.clone() };
+        let progress = &RenderProgress::new("", 1, true, interrupted);
+        let job = Job { scene, camera, environment, settings, progress, course: None };
+        let layers = renderer(&job)?.layers;
+        let pictures = outputs.iter().filter(|path| path.is_png());
+        for path in pictures {
+            let attributes = described.provenance();
+            path.write_layers(&layers, &tone, report.hide_env, &attributes)?;
+        }
     }
 
     let n_pixels = (settings.width * settings.height) as u64;
     let total = n_pixels * u64::from(settings.n_samples);
     let openjd = arguments.output.progress == ProgressKind::Openjd;
-    let progress = &RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
+    let progress = RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
+    let progress = &progress.profiled(arguments.output.profile);
     let course = Some(&course);
     let rendering = renderer(&Job { scene, camera, environment, settings, progress, course })?;
     progress.finish();
@@ -84,13 +104,12 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     }
     let render = watch.lap();
 
-    let tone = arguments.output.tone.mapping(ToneCurve::Agx);
     // A full disk under one file must not cost the others.
     let write = |path: &PicturePath| {
         let mut attributes = described.provenance();
         // If not, the layer of sample counts tells how many there are.
         attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
-        path.write_layers(&rendering.layers, &tone, report.hide_env, attributes)
+        path.write_layers(&rendering.layers, &tone, report.hide_env, &attributes)
     };
     // A part is its own checkpoint, and written.
     if !arguments.course.is_part() {
@@ -98,13 +117,14 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     }
     let stages = Stages { load, build, render, write: watch.lap() };
     let rejection = plan.acceptance(points, environment, settings.seed)?;
-    let report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
+    let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
+    report.profile = progress.profile();
     if arguments.output.json {
         report.print_json()?;
     } else if !quiet {
         report.print_summary();
     }
-    report.check(saved, quiet)
+    report.check(saved, arguments.course.is_part(), quiet)
 }
 
 impl OutputArguments {

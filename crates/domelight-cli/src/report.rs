@@ -10,6 +10,7 @@ use std::path::Path;
 use crate::acceptance::Acceptance;
 use crate::failure::{InterruptedAndSaved, tell, warn};
 use crate::output::{self, PicturePath};
+use crate::profile::{self, StageSeconds};
 use crate::usage::{Seconds, peak_memory};
 
 /// A scene under its light, seen by a camera.
@@ -153,6 +154,9 @@ pub(crate) struct RenderReport {
     complete: bool,
     stopped: Option<Stop>,
     outputs: Vec<String>,
+    /// CPU seconds by stage of the render, if they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) profile: Option<Vec<StageSeconds>>,
 }
 
 impl RenderReport {
@@ -180,6 +184,7 @@ impl RenderReport {
             complete: rendering.complete,
             stopped,
             outputs: outputs.iter().map(ToString::to_string).collect(),
+            profile: None,
         }
     }
 
@@ -203,13 +208,16 @@ impl RenderReport {
             self.rays_per_second * 1e-6,
             self.outputs.join(", ")
         ));
+        if let Some(profile) = &self.profile {
+            tell(&profile::lines(profile));
+        }
     }
 
     /// Complains about what the picture does not show.
     ///
     /// # Errors
-    /// If the render was interrupted.
-    pub(crate) fn check(&self, saved: Option<&Path>, quiet: bool) -> Result<()> {
+    /// If the render was interrupted, or time ended it before a part was whole.
+    pub(crate) fn check(&self, saved: Option<&Path>, is_part: bool, quiet: bool) -> Result<()> {
         if self.non_finite_samples > 0 {
             let n = self.non_finite_samples;
             warn(quiet, &format!("{n} camera samples were NaN or infinite and count as black"));
@@ -221,6 +229,11 @@ impl RenderReport {
             (Some(Stop::Interrupted), Some(saved)) => Err(InterruptedAndSaved(format!(
                 "interrupted; {} holds the state to go on from",
                 saved.display()
+            ))
+            .into()),
+            (Some(Stop::Time), Some(part)) if is_part => Err(InterruptedAndSaved(format!(
+                "the time is over; {} holds the state to go on from",
+                part.display()
             ))
             .into()),
             (Some(Stop::Time) | None, _) => Ok(()),

@@ -15,12 +15,13 @@ use domelight::render::{Background, RenderSettings};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
     Camera, CameraSettings, EnvironmentSettings, EnvironmentSource, Projection, Scene,
-    SceneDescription, load,
+    SceneDescription, load_within,
 };
 
 use crate::args::sampling::PixelArguments;
 use crate::args::scene::{CameraArguments, EnvironmentArguments, SceneArguments, StageArguments};
-use crate::failure::warn;
+use crate::failure::{UsageError, warn};
+use crate::memory;
 use crate::report::{CameraReport, EnvironmentReport, SceneReport};
 use crate::values::{Size, Triple};
 
@@ -48,7 +49,7 @@ impl SceneArguments {
         let mut description = load_scene(&self.scene, quiet)?;
         let light = self.environment.settings(&description);
         let map = self.environment.load(&light, quiet)?;
-        let view = self.stage(&mut description, light.up.vector());
+        let view = self.stage(&mut description, light.up.vector())?;
         Ok(LoadedScene { description, light, map, view })
     }
 
@@ -57,6 +58,12 @@ impl SceneArguments {
         let LoadedScene { description, light, map, view } = loaded;
         let Size { width, height } = self.camera.size;
         let camera = Camera::new(&view, width, height)?;
+        let n_triangles: usize = description.parts.iter().map(|p| p.mesh.triangles.len()).sum();
+        memory::allow(
+            &format!("{}: a tree over {n_triangles} triangles", self.scene),
+            memory::TRIANGLE * n_triangles as u64,
+        )?;
+        memory::keep(memory::TRIANGLE * n_triangles as u64);
         let scene = Scene::new(description).with_context(|| self.scene.clone())?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
         let scale = light.scale * light.exposure.exp2();
@@ -78,12 +85,18 @@ impl SceneArguments {
     }
 
     /// Changes the scene as the flags say; the camera frames what is not scenery.
-    fn stage(&self, scene: &mut SceneDescription, up: Vec3) -> CameraSettings {
+    fn stage(&self, scene: &mut SceneDescription, up: Vec3) -> Result<CameraSettings> {
         let Size { width, height } = self.camera.size;
         let bounds = self.stage.apply(scene, up);
-        self.camera.settings(scene.camera.as_ref(), || {
+        // Squares of lengths must be finite.
+        let extent = bounds.size().max_element();
+        if extent > 1e18 {
+            let text = format!("{}: the scene is too large: {extent:e} across", self.scene);
+            return Err(UsageError(text).into());
+        }
+        Ok(self.camera.settings(scene.camera.as_ref(), || {
             CameraSettings::framing(&bounds, width as f32 / height as f32, up)
-        })
+        }))
     }
 
     /// With so many camera samples a pixel.
@@ -113,12 +126,39 @@ pub(crate) fn start_threads(asked: Option<u32>) -> Result<()> {
     Ok(())
 }
 
+/// The scene's own camera, or one framed to it.
+pub(crate) fn view_of(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
+    let framed = || CameraSettings::framing(&description.subject_bounds(), aspect, up);
+    description.camera.unwrap_or_else(framed)
+}
+
+/// That view, moved until the scene just fits.
+pub(crate) fn close_up(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
+    const FOV: f32 = 26.0;
+    let view = view_of(description, aspect, up);
+    let bounds = description.bounds();
+    let (center, size) = (bounds.center(), bounds.size());
+    let toward = (view.origin - view.target).normalize_or(Vec3::Z);
+    let height = size.abs().dot(up.abs());
+    // The widest side, whichever way it is turned.
+    let width = (size - up.abs() * height).max_element();
+    let extent = height.max(width / aspect) * 1.08;
+    let distance = 0.5 * extent / (0.5 * FOV.to_radians()).tan() + 0.5 * width;
+    CameraSettings {
+        projection: Projection::Perspective { fov_y_degrees: FOV },
+        origin: center + toward * distance,
+        target: center,
+        up: view.up,
+    }
+}
+
 /// A built-in scene by its name, else a file.
 pub(crate) fn load_scene(name: &str, quiet: bool) -> Result<SceneDescription> {
     if let Ok(builtin) = BuiltinScene::from_str(name) {
         return Ok(builtin.description());
     }
-    let loaded = load(Path::new(name))?;
+    let loaded = load_within(Path::new(name), memory::left())?;
+    memory::keep(loaded.memory);
     for warning in &loaded.warnings {
         warn(quiet, warning);
     }
@@ -163,6 +203,8 @@ impl EnvironmentArguments {
     pub(crate) fn load(&self, light: &EnvironmentSettings, quiet: bool) -> Result<RgbImage> {
         let path = match &light.source {
             EnvironmentSource::Builtin(name) => {
+                let rows = u64::from(self.env_rows);
+                allow_environment(&format!("{name} with {rows} rows"), 2 * rows * rows)?;
                 return Ok(BuiltinProbe::from_str(name)?.image(self.env_rows as usize));
             }
             EnvironmentSource::File(path) => path,
@@ -171,8 +213,11 @@ impl EnvironmentArguments {
             mapping: self.env_mapping,
             layer: self.env_layer.clone(),
             sanitize: self.sanitize,
+            max_memory: memory::left(),
         };
         let loaded = load_probe(path, &options)?;
+        let texels = loaded.image.pixels.len() as u64;
+        allow_environment(&path.display().to_string(), texels)?;
         let repaired = loaded.sanitized;
         if repaired.negative + repaired.non_finite > 0 {
             warn(
@@ -187,6 +232,14 @@ impl EnvironmentArguments {
         }
         Ok(loaded.image)
     }
+}
+
+/// Refuses an environment of too many texels, else counts it.
+fn allow_environment(name: &str, texels: u64) -> Result<()> {
+    let bytes = memory::ENVIRONMENT_TEXEL * texels;
+    memory::allow(name, bytes)?;
+    memory::keep(bytes);
+    Ok(())
 }
 
 impl StageArguments {

@@ -42,7 +42,7 @@ pub(crate) fn peak_memory() -> Option<u64> {
 }
 
 /// Wall-clock and CPU seconds between two moments.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Seconds {
     pub(crate) wall: f64,
     pub(crate) cpu: Option<f64>,

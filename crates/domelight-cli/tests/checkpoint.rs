@@ -133,6 +133,42 @@ fn a_signal_saves_and_says_that_it_can_go_on() {
 }
 
 #[test]
+fn a_signal_while_the_probe_is_read_ends_at_once() {
+    let folder = folder();
+    let pipe = folder.path().join("pipe");
+    nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    let cases: [(&[&str], i32); 2] =
+        [(&["-o", "x.exr"], 130), (&["--shard", "0/2", "-o", "x.exr"], 75)];
+    for (arguments, code) in cases {
+        for signal_sent in [Signal::SIGINT, Signal::SIGTERM] {
+            let child = start(&folder, &[&["--env", "pipe"], arguments].concat());
+            // That the pipe can be opened shows that the program reads; nobody ever writes.
+            let writer = fs::File::options().write(true).open(&pipe).unwrap();
+            signal(&child, signal_sent);
+            let output = child.wait_with_output().expect("a child");
+            drop(writer);
+            ended(&output, code, &["interrupted before the first sample"]);
+            assert_eq!(fs::read_dir(&folder).unwrap().count(), 1, "the pipe alone is there");
+        }
+    }
+}
+
+#[test]
+fn a_second_interrupt_ends_at_once() {
+    let folder = folder();
+    // A picture that nobody fetches: the orderly end would wait for ever.
+    let pipe = folder.path().join("pipe.pfm");
+    nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    let save = ["--checkpoint", "c.exr", "--checkpoint-every", "20ms"];
+    let mut child = start(&folder, &[&["--spp", "1000000", "-o", "pipe.pfm"], &save[..]].concat());
+    wait_for(&folder.path().join("c.exr"));
+    signal(&child, Signal::SIGINT);
+    std::thread::sleep(Duration::from_millis(50));
+    signal(&child, Signal::SIGINT);
+    assert_eq!(child.wait().expect("a child").code(), Some(130));
+}
+
+#[test]
 fn another_render_is_not_gone_on_with() {
     let folder = folder();
     let few = ["--spp", "4", "--checkpoint", "c.exr", "-o", "x.pfm"];
@@ -248,6 +284,8 @@ fn budgets_end_the_render_with_what_is_there() {
     let output = render(&folder, &forever);
     let report: serde_json::Value = common::json(&output);
     assert_eq!((&report["complete"], &report["stopped"]), (&false.into(), &"time".into()));
+    let part = ["--spp", "10000000", "--time", "300ms", "--shard", "0/2", "-o", "part.exr"];
+    ended(&render(&folder, &part), 75, &["time is over", "part.exr"]);
     let precise = ["--spp", "1024", "--target-error", "0.02", "-o", "y.exr", "--json"];
     let report: serde_json::Value = common::json(&render(&folder, &precise));
     assert_eq!(report["complete"], true);

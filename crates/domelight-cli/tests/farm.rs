@@ -8,8 +8,19 @@ use std::fs;
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-const SCENE: [&str; 9] =
-    ["spheres", "--env", "sky", "--env-rows", "32", "--size", "50x40", "--spp", "3"];
+const SCENE: [&str; 11] = [
+    "spheres",
+    "--env",
+    "sky",
+    "--env-rows",
+    "32",
+    "--size",
+    "50x40",
+    "--spp",
+    "30",
+    "--target-error",
+    "0.01",
+];
 
 #[track_caller]
 fn succeeded(output: &Output) {
@@ -63,6 +74,8 @@ fn every_engine_gets_its_files() {
             }
         }
     }
+    let refused = farm(&folder, "slurm", &["--shards", "2", "--time", "1h"]);
+    assert_eq!(refused.status.code(), Some(2));
     let refused = farm(&folder, "slurm", &["--rays", "1"]);
     assert_eq!(refused.status.code(), Some(2));
     let refused = farm(&folder, "slurm", &["--shards", "2", "--rays", "1"]);

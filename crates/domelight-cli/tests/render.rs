@@ -160,7 +160,7 @@ fn missing_and_bad_files_are_named() {
     refused(&render(&folder, &["bunny.ply"]), 2, &["bunny.ply", "No such file"]);
     refused(&render(&folder, &["statuette"]), 2, &["statuette"]);
     fs::create_dir(folder.path().join("folder.ply")).unwrap();
-    refused(&render(&folder, &["folder.ply"]), 2, &["folder.ply", "not a plain file"]);
+    refused(&render(&folder, &["folder.ply"]), 2, &["folder.ply", "is a directory"]);
     refused(&render(&folder, &["--env", "grace.hdr"]), 2, &["grace.hdr", "No such file", "sky"]);
     fs::write(at("broken.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
     refused(&render(&folder, &["broken.obj"]), 2, &["broken.obj", "2"]);

@@ -36,9 +36,13 @@ impl Rgb {
         [self.r, self.g, self.b]
     }
 
+    /// The weights of [`Rgb::luminance`].
+    pub const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
+
     /// Relative luminance of Rec. 709: 0.2126 R + 0.7152 G + 0.0722 B.
     pub fn luminance(self) -> f32 {
-        0.2126 * self.r + 0.7152 * self.g + 0.0722 * self.b
+        let [r, g, b] = Self::LUMINANCE;
+        r * self.r + g * self.g + b * self.b
     }
 
     /// (R + G + B) / 3.

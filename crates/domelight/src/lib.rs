@@ -64,6 +64,8 @@ pub mod scene;
 #[cfg(feature = "io")]
 pub mod fingerprint;
 #[cfg(feature = "io")]
+pub mod memory;
+#[cfg(feature = "io")]
 pub mod picture;
 
 pub use color::Rgb;

@@ -171,7 +171,7 @@ fn merged_shards_are_the_single_run() {
             let bytes = checkpoint(&shard, settings.n_samples).encode().unwrap();
             let part = Checkpoint::decode(&bytes).unwrap();
             assert!(part.complete);
-            layers.merge(&part.film);
+            layers.merge(&part.film, 0);
             counts += part.counts;
         }
         let merged = Rendering { layers, counts, complete: true };
@@ -261,7 +261,7 @@ fn tiles_decide_for_themselves_when_the_error_is_reached() {
         let tiles = shard.tiling().shard(k, 3);
         shard = shard.only(tiles);
         assert!(shard.run(&()));
-        merged.merge(&shard.film());
+        merged.merge(&shard.film(), 0);
     }
     let bytes = |layers: &Layers| layers.to_exr(Vec::new()).encode().unwrap();
     assert!(bytes(&merged) == bytes(&layers));

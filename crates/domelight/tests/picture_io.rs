@@ -443,7 +443,11 @@ fn exr_layers_are_written_and_found_again() {
     assert_eq!(text_attributes(&bytes).unwrap(), layers.attributes);
 
     let layer = |name: Option<&str>| {
-        read_bytes(&bytes, "test", &ReadOptions { layer: name.map(Into::into) })
+        read_bytes(
+            &bytes,
+            "test",
+            &ReadOptions { layer: name.map(Into::into), ..Default::default() },
+        )
     };
     let main = layer(None).unwrap();
     assert_eq!(

@@ -8,6 +8,7 @@ use common::{
     white_environment,
 };
 use domelight::bsdf::{Material, MaterialSpec};
+use domelight::bvh::InstructionSet;
 use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::{Frame, Vec3};
 use domelight::sampling::{Heuristic, SamplerKind, Stream};
@@ -51,6 +52,7 @@ fn estimates(
                 points: i * n..(i + 1) * n,
                 n_samples: n as u32,
                 stream: Stream::new(sampler, seed, i as u64),
+                one_material: hits.iter().all(|h| h.material == hits[0].material),
             })
             .collect();
         let tile = TileShading { points: &points, samples: &samples, pixels: &pixels, width: SIDE };
@@ -104,6 +106,22 @@ fn check(
         let batches: Vec<[f64; 3]> = batches.iter().map(|b| b[kind]).collect();
         let label = format!("{label}, {name}");
         test.against(&label, &batches, expected).unwrap_or_else(|f| panic!("{f}"));
+    }
+}
+
+/// The numbers that a processor's vectors compute are those of one number at a time.
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    let env = environment(true, UpAxis::Z);
+    for (name, sampler) in
+        MATERIALS.iter().zip([SamplerKind::Sobol, SamplerKind::Independent].iter().cycle())
+    {
+        let hits = [0.2, 0.7, 1.3].map(|theta| point(material(name), theta));
+        let [scalar, best] = [InstructionSet::Scalar, InstructionSet::best()].map(|set| {
+            let strategy = ProductSampling::new(&env, 7).with_instruction_set(set).unwrap();
+            estimates(&strategy, &env, &hits, *sampler, 5)
+        });
+        assert_eq!(scalar, best, "{name}");
     }
 }
 
@@ -207,7 +225,12 @@ fn odd_maps_are_unbiased() {
                 let tile = TileShading {
                     points: &[at],
                     samples: &[0],
-                    pixels: &[PixelPoints { points: 0..1, n_samples: 1, stream }],
+                    pixels: &[PixelPoints {
+                        points: 0..1,
+                        n_samples: 1,
+                        stream,
+                        one_material: true,
+                    }],
                     width: 1,
                 };
                 let pass = strategy.begin_pass(Stream::of_pass(SamplerKind::Sobol, seed, 0));

@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::positive;
 use crate::values::{Shard, Tiles, duration};
 
 #[derive(Args, Debug)]
@@ -28,10 +27,8 @@ pub(crate) struct CourseArguments {
     /// As --shard, for tiles A to B of the picture
     #[arg(long, value_name = "A-B", requires = "output")]
     pub(crate) tiles: Option<Tiles>,
-    /// End the render after this time with what is there
+    /// End the render after this time with what is there; a part is then saved unfinished, with exit code 75, and the
+    /// same again goes on with it
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub(crate) time: Option<Duration>,
-    /// End each tile when the spread of its samples suggests this relMSE, such as 1e-3, but not before 16 samples
-    #[arg(long, value_name = "E", value_parser = positive)]
-    pub(crate) target_error: Option<f32>,
 }

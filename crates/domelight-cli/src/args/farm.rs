@@ -17,6 +17,10 @@ Examples:
       eight parts on this machine, as many at a time as it has cores";
 
 /// Write the files that render a picture in parts on a farm, and print the command that submits them.
+///
+/// The arguments are those of render. There is no --time: a part must be whole before it is merged, and how far a
+/// machine comes in a time must not decide how a picture looks. Limits of time are the engine's: what it ends with
+/// SIGTERM is saved and goes on when it is run again. --target-error ends each tile by itself.
 #[derive(Args, Debug)]
 pub(crate) struct FarmArguments {
     /// What runs the jobs

@@ -10,6 +10,7 @@ pub(crate) mod render;
 pub(crate) mod sampling;
 pub(crate) mod scene;
 
+use crate::memory::MaxMemory;
 use crate::output::PicturePath;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -35,6 +36,9 @@ pub(crate) struct Arguments {
     /// Print nothing but errors and what --json asks for.
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
+    /// Refuse what would take more memory, such as 4GiB or none [default: nine tenths of what there is]
+    #[arg(long, global = true, value_name = "SIZE")]
+    pub(crate) max_memory: Option<MaxMemory>,
 }
 
 /// One variant a subcommand.

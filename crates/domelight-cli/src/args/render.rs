@@ -54,6 +54,12 @@ pub(crate) struct OutputArguments {
     /// Print settings, times and counts as JSON on standard output
     #[arg(long)]
     pub(crate) json: bool,
+    /// Write PNG output first after one sample of each pixel, to look at while the rest is rendered
+    #[arg(long)]
+    pub(crate) preview: bool,
+    /// Say which stages the time goes to: CPU seconds on standard error, and in --json
+    #[arg(long)]
+    pub(crate) profile: bool,
     /// How progress is shown
     #[arg(long, value_enum, value_name = "HOW", default_value_t = ProgressKind::Bar)]
     pub(crate) progress: ProgressKind,

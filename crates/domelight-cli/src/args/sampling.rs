@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 use domelight::render::Filter;
 use domelight::sampling::SamplerKind;
 
-use super::one_of;
+use super::{one_of, positive};
 use crate::values::Split;
 
 /// A strategy, and what it may be told.
@@ -12,10 +12,10 @@ use crate::values::Split;
 #[command(next_help_heading = "Sampling")]
 pub(crate) struct StrategyArguments {
     /// How directions are chosen
-    #[arg(long, value_enum, default_value_t = StrategyName::Mis)]
+    #[arg(long, value_enum, default_value_t = StrategyName::Product)]
     pub(crate) strategy: StrategyName,
-    /// Shadow rays of each camera sample; with rejection, samples to accept [default: 1,
-    /// with mis 2, with product 8]
+    /// Shadow rays of each camera sample; with product no more than these, with rejection samples to
+    /// accept [default: with product 8, with mis 2, else 1]
     #[arg(long, value_name = "N", conflicts_with = "split",
           value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub(crate) rays: Option<u32>,
@@ -58,6 +58,9 @@ pub(crate) struct SampleArguments {
     #[arg(long, value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub(crate) spp: u32,
+    /// End each tile when the spread of its samples suggests this relMSE, such as 1e-3, but not before 16 samples
+    #[arg(long, value_name = "E", value_parser = positive)]
+    pub(crate) target_error: Option<f32>,
 }
 
 /// The points of a pixel, and who computes them.

@@ -1,28 +1,311 @@
-//! The suites `lecture` and `probes`: what error costs in a render.
+//! What is rendered: scenes of a material, under a probe, seen by a camera.
 
-use anyhow::Result;
-use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::path::Path;
+use std::str::FromStr as _;
 
-use super::Bench;
-use super::table::Table;
+use anyhow::{Context as _, Result};
+use domelight::bsdf::{Material, MaterialSpec};
+use domelight::environment::builtin::BuiltinProbe;
+use domelight::environment::{Environment, Orientation};
+use domelight::math::{Vec3, vec3};
+use domelight::render::{Background, Filter, RenderSettings};
+use domelight::scene::builtin::BuiltinScene;
+use domelight::scene::{CameraSettings, SceneDescription};
 
-/// A case.
-#[derive(Serialize, Deserialize)]
-pub(super) struct Row {}
+use crate::args::bench::BenchArguments;
+use crate::args::scene::{CameraArguments, EnvironmentArguments, SceneArguments, StageArguments};
+use crate::failure::UsageError;
+use crate::scene::{View, close_up};
+use crate::usage::{Seconds, Stopwatch};
+use crate::values::{Size, Triple};
 
-/// Measures, and keeps each row as it is done.
-pub(super) fn run_lecture(bench: &Bench, rows: &mut Vec<Row>) -> Result<()> {
-    bench.check_interrupted()?;
-    rows.clear();
-    Ok(())
+/// The lecture's picture.
+const LECTURE_SIZE: Size = Size { width: 176, height: 248 };
+const LECTURE_MATERIALS: [&str; 2] = ["phong:50:1", "phong:50:1:0.5"];
+
+const SIZE: Size = Size { width: 256, height: 256 };
+const MATERIALS: &str = "diffuse:0.8,ggx:0.2,ggx:0.05,phong:50:0.5:0.5";
+const MESH: BuiltinScene = BuiltinScene::Statue;
+const PROBES: [BuiltinProbe; 3] =
+    [BuiltinProbe::Sky, BuiltinProbe::Studio, BuiltinProbe::Cathedral];
+/// Of a built-in probe.
+const ROWS: u32 = 512;
+
+/// Where normalized meshes are looked at from, and how wide.
+const ORIGIN: Vec3 = vec3(0.0, 1.0, 4.0);
+const FOV: f32 = 35.0;
+
+/// What a picture shows, in words.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Case {
+    /// A built-in scene or a file.
+    pub(super) scene: String,
+    /// A built-in probe or a file.
+    pub(super) probe: String,
+    pub(super) look: Look,
+    stand: Stand,
 }
 
-/// Scenes, probes and materials.
-pub(super) fn run_probes(bench: &Bench, rows: &mut Vec<Row>) -> Result<()> {
-    run_lecture(bench, rows)
+/// What the scene is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Look {
+    /// As it is, with floor and plinth.
+    Own,
+    /// Its subject alone, of one material.
+    Of { text: String, material: MaterialSpec },
 }
 
-pub(super) fn tables(rows: &[Row]) -> Vec<Table> {
-    let _ = rows;
-    Vec::new()
+/// Where the camera is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stand {
+    /// In front of the normalized mesh; in front of scenes of their own look as they say.
+    Usual,
+    /// As near as the picture allows.
+    CloseUp,
+}
+
+/// A case that can be rendered.
+pub(super) struct Built {
+    pub(super) view: View,
+    pub(super) camera: CameraSettings,
+    pub(super) settings: RenderSettings,
+    /// For the BVH and the environment's table.
+    pub(super) time: Seconds,
+}
+
+/// The two of the lecture.
+pub(super) fn of_lecture() -> Result<Vec<Case>> {
+    let case = |text: &&str| {
+        let scene = BuiltinScene::Statue.name().to_owned();
+        let probe = BuiltinProbe::Cathedral.name().to_owned();
+        Ok(Case { scene, probe, look: look(text)?, stand: Stand::CloseUp })
+    };
+    LECTURE_MATERIALS.iter().map(case).collect()
+}
+
+/// Those of the arguments: every scene under every probe, of every material.
+pub(super) fn of_arguments(arguments: &BenchArguments) -> Result<Vec<Case>> {
+    let BenchArguments { meshes, probes, materials, cases, .. } = arguments;
+    let mut found = Vec::new();
+    for case in cases.chunks_exact(3) {
+        let list = |text: &str| text.split(',').map(str::to_owned).collect::<Vec<_>>();
+        found.extend(product(&list(&case[0]), &list(&case[1]), Some(&case[2]))?);
+    }
+    let lists_given = !meshes.is_empty() || !probes.is_empty() || materials.is_some();
+    if cases.is_empty() || lists_given {
+        let builtin = [MESH.name().to_owned()];
+        let meshes = if meshes.is_empty() { &builtin[..] } else { meshes };
+        let builtin = PROBES.map(|probe| probe.name().to_owned());
+        let probes = if probes.is_empty() { &builtin[..] } else { probes };
+        found.extend(product(meshes, probes, materials.as_deref())?);
+    }
+    Ok(found)
+}
+
+fn product(meshes: &[String], probes: &[String], materials: Option<&str>) -> Result<Vec<Case>> {
+    let probes = probes.iter().map(|probe| files(probe)).collect::<Result<Vec<_>>>()?.concat();
+    let mut cases = Vec::new();
+    for scene in meshes {
+        let looks = looks(materials.unwrap_or(if has_own_look(scene) { OWN } else { MATERIALS }))?;
+        for probe in &probes {
+            cases.extend(looks.iter().map(|look| Case {
+                scene: scene.clone(),
+                probe: probe.clone(),
+                look: look.clone(),
+                stand: Stand::Usual,
+            }));
+        }
+    }
+    Ok(cases)
+}
+
+const OWN: &str = "own";
+
+/// Formats that say what their parts are made of.
+fn has_own_look(scene: &str) -> bool {
+    let extension = Path::new(scene).extension();
+    extension.is_some_and(|e| ["gltf", "glb", "toml"].iter().any(|own| e.eq_ignore_ascii_case(own)))
+}
+
+/// The probes of a folder, in the order of their names; else what was given.
+fn files(probe: &str) -> Result<Vec<String>> {
+    if !Path::new(probe).is_dir() {
+        return Ok(vec![probe.to_owned()]);
+    }
+    let entries = std::fs::read_dir(probe).with_context(|| probe.to_owned())?.flatten();
+    let is_probe = |path: &Path| {
+        path.extension()
+            .is_some_and(|e| ["hdr", "exr", "pfm"].iter().any(|p| e.eq_ignore_ascii_case(p)))
+    };
+    let mut files: Vec<String> = entries
+        .map(|entry| entry.path())
+        .filter(|path| is_probe(path))
+        .map(|path| path.display().to_string())
+        .collect();
+    files.sort();
+    if files.is_empty() {
+        return Err(
+            UsageError(format!("{probe}: no probes (.hdr, .exr, .pfm) in the folder")).into()
+        );
+    }
+    Ok(files)
+}
+
+/// Materials begin with a letter, further numbers of a colour do not.
+fn looks(list: &str) -> Result<Vec<Look>> {
+    let mut texts: Vec<String> = Vec::new();
+    for part in list.split(',') {
+        match texts.last_mut() {
+            Some(last) if !part.trim_start().starts_with(|c: char| c.is_ascii_alphabetic()) => {
+                *last += ",";
+                *last += part;
+            }
+            _ => texts.push(part.trim().to_owned()),
+        }
+    }
+    texts.iter().map(|text| look(text)).collect()
+}
+
+fn look(text: &str) -> Result<Look> {
+    if text == OWN {
+        return Ok(Look::Own);
+    }
+    let material = text.parse().map_err(|e| UsageError(format!("material '{text}': {e}")))?;
+    Ok(Look::Of { text: text.to_owned(), material })
+}
+
+impl fmt::Display for Look {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Own => OWN,
+            Self::Of { text, .. } => text,
+        })
+    }
+}
+
+/// A file without its folder and extension; other names as they are.
+pub(super) fn short(name: &str) -> &str {
+    let stem = Path::new(name).file_stem().and_then(|stem| stem.to_str());
+    stem.filter(|_| name.contains(['.', '/'])).unwrap_or(name)
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} / {} / {}", short(&self.scene), short(&self.probe), self.look)
+    }
+}
+
+impl Case {
+    /// Reads scene and probe and builds them.
+    pub(super) fn build(&self, arguments: &BenchArguments, quiet: bool) -> Result<Built> {
+        let size = arguments.size.unwrap_or(match self.stand {
+            Stand::Usual => SIZE,
+            Stand::CloseUp => LECTURE_SIZE,
+        });
+        let scene = self.arguments(arguments, size);
+        let mut loaded = scene.load(quiet)?;
+        if let Look::Of { material, .. } = self.look {
+            loaded.description.set_subject_material(Material::from(material));
+            loaded.description.remove_scenery();
+        }
+        if self.stand == Stand::CloseUp {
+            let aspect = size.width as f32 / size.height as f32;
+            loaded.view = close_up(&loaded.description, aspect, loaded.light.up.vector());
+        }
+        let camera = loaded.view;
+        let mut watch = Stopwatch::start();
+        let view = scene.build(loaded)?;
+        let settings = RenderSettings {
+            width: size.width,
+            height: size.height,
+            filter: Filter::Box,
+            background: Background::Hidden,
+            ..RenderSettings::default()
+        };
+        Ok(Built { view, camera, settings, time: watch.lap() })
+    }
+
+    /// As `render` would be told.
+    fn arguments(&self, arguments: &BenchArguments, size: Size) -> SceneArguments {
+        let normalize = self.look != Look::Own;
+        let usual = normalize && self.stand == Stand::Usual;
+        SceneArguments {
+            scene: self.scene.clone(),
+            environment: light(&self.probe, arguments.env_rotate, ROWS),
+            camera: CameraArguments {
+                size,
+                origin: usual.then_some(Triple(ORIGIN)),
+                target: usual.then_some(Triple(Vec3::ZERO)),
+                up: usual.then_some(Triple(Vec3::Y)),
+                fov: usual.then_some(FOV),
+                ortho: None,
+            },
+            stage: StageArguments { material: None, normalize, ground: false, hide_env: true },
+        }
+    }
+}
+
+/// A probe as `render` would be told.
+fn light(probe: &str, rotate: f32, rows: u32) -> EnvironmentArguments {
+    EnvironmentArguments {
+        env: Some(probe.to_owned()),
+        env_rotate: Some(rotate),
+        env_scale: None,
+        env_exposure: None,
+        env_up: None,
+        env_mapping: None,
+        env_layer: None,
+        env_rows: rows,
+        sanitize: false,
+    }
+}
+
+/// The probes of the arguments, built-in ones with each number of rows.
+pub(super) fn environments(
+    arguments: &BenchArguments,
+    rows: &[u32],
+    quiet: bool,
+) -> Result<Vec<(String, Environment)>> {
+    let builtin = PROBES.map(|probe| probe.name().to_owned());
+    let given = arguments.probes.iter().map(|probe| files(probe));
+    let given = given.collect::<Result<Vec<_>>>()?.concat();
+    let mut found = Vec::new();
+    for probe in if given.is_empty() { &builtin[..] } else { &given } {
+        let is_builtin = BuiltinProbe::from_str(probe).is_ok();
+        for &rows in if is_builtin { rows } else { &rows[..1] } {
+            let arguments = light(probe, arguments.env_rotate, rows);
+            let settings = arguments.settings(&SceneDescription::default());
+            let map = arguments.load(&settings, quiet)?;
+            let orientation = Orientation { up: settings.up, rotation: settings.rotate_degrees };
+            let environment =
+                Environment::new(map, orientation, 1.0).with_context(|| probe.clone())?;
+            found.push((probe.clone(), environment));
+        }
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn materials_may_have_colours() {
+        let texts = |list| looks(list).unwrap().iter().map(Look::to_string).collect::<Vec<_>>();
+        assert_eq!(texts("diffuse:0.8,ggx:0.2"), ["diffuse:0.8", "ggx:0.2"]);
+        assert_eq!(texts("diffuse:0.1,0.2,0.3, own"), ["diffuse:0.1,0.2,0.3", "own"]);
+        assert!(looks("velvet").unwrap_err().to_string().contains("velvet"));
+        assert!(looks("").is_err());
+    }
+
+    #[test]
+    fn every_scene_under_every_probe() {
+        let list = |texts: &[&str]| texts.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let cases = product(&list(&["a/b.ply", "c.glb"]), &list(&["sky", "x.hdr"]), None).unwrap();
+        let text: Vec<String> = cases.iter().map(Case::to_string).collect();
+        assert_eq!(text.len(), 2 * 4 + 2);
+        assert_eq!(text[0], "b / sky / diffuse:0.8");
+        assert_eq!(text[9], "c / x / own");
+    }
 }

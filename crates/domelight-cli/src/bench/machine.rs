@@ -5,6 +5,9 @@ use std::fs;
 use domelight::bvh::InstructionSet;
 use serde::{Deserialize, Serialize};
 
+/// As cargo was told.
+const RUSTFLAGS: &str = env!("DOMELIGHT_RUSTFLAGS");
+
 /// The computer and the build of this program.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Machine {
@@ -34,7 +37,7 @@ impl Machine {
             target: env!("DOMELIGHT_TARGET").to_owned(),
             rustc: env!("DOMELIGHT_RUSTC").to_owned(),
             profile: env!("DOMELIGHT_PROFILE").to_owned(),
-            rustflags: option_env!("DOMELIGHT_RUSTFLAGS").unwrap_or_default().to_owned(),
+            rustflags: RUSTFLAGS.to_owned(),
             load_average: load_average(),
         }
     }

@@ -1,9 +1,15 @@
 //! `domelight bench`: what error costs, in CPU time.
 
+mod bound;
 mod cases;
+mod contestant;
 mod embree;
 mod kernels;
+mod ladder;
 mod machine;
+mod mitsuba;
+mod ply;
+mod renders;
 mod results;
 mod rigs;
 mod table;
@@ -13,8 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Result, bail};
 use domelight::picture::require_writable;
 
-use crate::args::bench::BenchArguments;
-use crate::failure::tell;
+use crate::args::bench::{BenchArguments, Suite};
+use crate::failure::{UsageError, tell};
 use crate::interrupt;
 use crate::output::print;
 use crate::scene::start_threads;
@@ -28,6 +34,7 @@ pub(crate) fn run(arguments: &BenchArguments, quiet: bool) -> Result<()> {
         let tables = results.tables().iter().map(Table::markdown).collect::<Vec<_>>();
         return Ok(print(&format!("{}\n{}.", tables.join("\n"), results.describe()))?);
     }
+    check(arguments)?;
     arguments.output.as_deref().map(require_writable).transpose()?;
     start_threads(arguments.threads)?;
     let bench = Bench { arguments, quiet, interrupted: interrupt::flag() };
@@ -36,7 +43,31 @@ pub(crate) fn run(arguments: &BenchArguments, quiet: bool) -> Result<()> {
     let done = bench.measure(&mut results.rows);
     results.complete = done.is_ok();
     bench.show(&results)?;
+    bench.check_interrupted()?;
     done
+}
+
+/// Refuses what the suite has no use for.
+fn check(arguments: &BenchArguments) -> Result<(), UsageError> {
+    use Suite::{Kernels, Lecture, Probes, Rigs};
+    let BenchArguments { meshes, probes, materials, cases, strategies, vs, embree, .. } = arguments;
+    let given: [(&str, bool, &[Suite]); 7] = [
+        ("--meshes", !meshes.is_empty(), &[Probes, Kernels]),
+        ("--probes", !probes.is_empty(), &[Probes, Rigs]),
+        ("--materials", materials.is_some(), &[Probes]),
+        ("--case", !cases.is_empty(), &[Probes]),
+        ("--strategies", !strategies.is_empty(), &[Probes, Lecture]),
+        ("--vs", vs.is_some(), &[Probes]),
+        ("--embree", embree.is_some(), &[Kernels]),
+    ];
+    for (flag, given, suites) in given {
+        if given && !suites.contains(&arguments.suite) {
+            let names: Vec<String> =
+                suites.iter().map(|s| format!("{s:?}").to_lowercase()).collect();
+            return Err(UsageError(format!("{flag} goes with --suite {}", names.join(" or "))));
+        }
+    }
+    Ok(())
 }
 
 /// What all suites share.
@@ -49,9 +80,9 @@ struct Bench<'a> {
 impl Bench<'_> {
     fn measure(&self, rows: &mut Rows) -> Result<()> {
         match rows {
-            Rows::Lecture(rows) => cases::run_lecture(self, rows),
+            Rows::Lecture(rows) => renders::run_lecture(self, rows),
             Rows::Kernels(rows) => kernels::run(self, rows),
-            Rows::Probes(rows) => cases::run_probes(self, rows),
+            Rows::Probes(rows) => renders::run_probes(self, rows),
             Rows::Rigs(rows) => rigs::run(self, rows),
         }
     }

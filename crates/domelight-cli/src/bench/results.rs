@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::machine::Machine;
 use super::table::Table;
-use super::{cases, kernels, rigs};
+use super::{kernels, renders, rigs};
 use crate::args::bench::Suite;
 use crate::failure::UsageError;
 use crate::typed;
@@ -40,9 +40,9 @@ pub(super) struct Results {
 #[derive(Serialize, Deserialize)]
 #[serde(tag = "suite", content = "rows", rename_all = "lowercase")]
 pub(super) enum Rows {
-    Lecture(Vec<cases::Row>),
+    Lecture(Vec<renders::Row>),
     Kernels(Vec<kernels::Row>),
-    Probes(Vec<cases::Row>),
+    Probes(Vec<renders::Row>),
     Rigs(Vec<rigs::Row>),
 }
 
@@ -112,7 +112,8 @@ impl Results {
 
     pub(super) fn tables(&self) -> Vec<Table> {
         match &self.rows {
-            Rows::Lecture(rows) | Rows::Probes(rows) => cases::tables(rows),
+            Rows::Lecture(rows) => renders::lecture_tables(rows),
+            Rows::Probes(rows) => renders::tables(rows),
             Rows::Kernels(rows) => kernels::tables(rows),
             Rows::Rigs(rows) => rigs::tables(rows),
         }

@@ -55,15 +55,14 @@ impl Table {
 
 /// Three significant digits, without powers of ten where the number is of everyday size.
 pub(super) fn number(value: f64) -> String {
-    let magnitude = value.abs();
-    match () {
-        () if !value.is_finite() => "–".to_owned(),
-        () if value == 0.0 => "0".to_owned(),
-        () if !(1e-3..1e6).contains(&magnitude) => format!("{value:.2e}"),
-        () => {
-            let decimals = (2 - magnitude.log10().floor() as i32).max(0) as usize;
-            format!("{value:.decimals$}")
-        }
+    let scientific = format!("{value:.2e}");
+    // That of the rounded number: 9.999 is 10.0.
+    let exponent = scientific.split_once('e').and_then(|(_, e)| e.parse::<i32>().ok());
+    match exponent {
+        _ if value == 0.0 => "0".to_owned(),
+        None => "–".to_owned(),
+        Some(exponent @ -3..=5) => format!("{value:.*}", (2 - exponent).max(0) as usize),
+        Some(_) => scientific,
     }
 }
 
@@ -88,8 +87,14 @@ mod tests {
 
     #[test]
     fn numbers_have_three_digits() {
-        let cases =
-            [(0.0, "0"), (0.0123, "0.0123"), (1.5, "1.50"), (18.66, "18.7"), (-340.2, "-340")];
+        let cases = [
+            (0.0, "0"),
+            (0.0123, "0.0123"),
+            (1.5, "1.50"),
+            (18.66, "18.7"),
+            (-340.2, "-340"),
+            (9.999, "10.0"),
+        ];
         for (value, text) in cases {
             assert_eq!(number(value), text);
         }

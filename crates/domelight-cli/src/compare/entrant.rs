@@ -6,7 +6,7 @@ use domelight::picture::compare::compare;
 use serde::Serialize;
 
 use super::budget::{Budget, MOST_SAMPLES};
-use super::shot::{Shot, Studio};
+use crate::measure::shot::{Shot, Studio};
 
 /// How far beyond its budget a strategy may be where it cannot meet it.
 const MOST_EXCESS: f64 = 1.5;
@@ -80,7 +80,7 @@ impl Entrant<'_> {
         match budget {
             Budget::Samples(n) => Ok(Purchase::Samples(n)),
             Budget::Rays(rays) => {
-                let each = self.pilot(4)?.rays / 4.0;
+                let each = self.pilot(4)?.rays() / 4.0;
                 Ok(buy(rays, each, &format!("traces {each:.1} shadow rays")))
             }
             Budget::Time(seconds) => self.calibrate_time(seconds),
@@ -91,11 +91,11 @@ impl Entrant<'_> {
     /// the last two.
     fn calibrate_time(&self, seconds: f64) -> Result<Purchase> {
         self.pilot(1)?; // warms the caches
-        let mut last = (1, self.pilot(1)?.seconds);
+        let mut last = (1, self.pilot(1)?.seconds());
         let mut before = (0, 0.0);
         while last.1 < seconds / 8.0 && last.0 < MOST_SAMPLES {
             let n = last.0 * 2;
-            (before, last) = (last, (n, self.pilot(n)?.seconds));
+            (before, last) = (last, (n, self.pilot(n)?.seconds()));
         }
         let slope = (last.1 - before.1) / f64::from(last.0 - before.0);
         let each = if slope > 0.0 { slope } else { last.1 / f64::from(last.0) };
@@ -128,9 +128,9 @@ impl Entrant<'_> {
             let label = format!("{}, {n_samples} spp, seed {} of {of}", self.label, i + 1);
             let seed = self.studio.settings.seed.wrapping_add(u64::from(i));
             let shot = self.studio.shoot(&label, n_samples, seed)?;
-            rays += shot.rays / f64::from(of);
-            seconds.push(shot.seconds);
-            errors.push(compare(&shot.image, self.reference, None)?.rel_mse);
+            rays += shot.rays() / f64::from(of);
+            seconds.push(shot.seconds());
+            errors.push(compare(&shot.layers.color, self.reference, None)?.rel_mse);
             see(&shot);
         }
         let (cpu_seconds, rel_mse) = (Spread::of(&seconds), Spread::of(&errors));
@@ -158,16 +158,16 @@ struct Pictures {
 
 impl Pictures {
     fn add(&mut self, shot: &Shot) {
-        let pixels = &shot.image.pixels;
+        let pixels = &shot.layers.color.pixels;
         self.sum.resize(pixels.len(), [0.0; 3]);
         for (sum, pixel) in self.sum.iter_mut().zip(pixels) {
             for (sum, c) in sum.iter_mut().zip(pixel.to_array()) {
                 *sum += f64::from(c);
             }
         }
-        self.first.get_or_insert_with(|| shot.image.clone());
+        self.first.get_or_insert_with(|| shot.layers.color.clone());
         self.n += 1;
-        self.non_finite += shot.non_finite;
+        self.non_finite += shot.counts.non_finite;
     }
 
     /// With `error` = bias² + variance and that of the mean of n pictures bias² + variance / n, the

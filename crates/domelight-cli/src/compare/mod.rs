@@ -1,14 +1,11 @@
 //! `domelight compare`: strategies on one scene at equal samples, rays or time.
 
 mod budget;
-mod cache;
 mod entrant;
 mod page;
 mod pixels;
 mod plots;
-mod reference;
 mod report;
-mod shot;
 
 use std::path::Path;
 
@@ -26,15 +23,18 @@ use crate::args::compare::CompareArguments;
 use crate::args::sampling::StrategyName;
 use crate::failure::{UsageError, tell, warn};
 use crate::interrupt;
+use crate::measure::cache::Cache;
+use crate::measure::reference::{Goal, Reference, Source};
+use crate::measure::shot::Studio;
+use crate::memory;
 use crate::notation::NamedStrategy;
 use crate::output::print;
 use crate::scene::{View, start_threads};
 use crate::typed;
 use crate::usage::Stopwatch;
+use crate::values::Size;
 use entrant::{Entrant, Measured, Purchase};
-use reference::{Reference, Source, Wanted};
 use report::{CompareReport, ResultReport, StrategyReport};
-use shot::Studio;
 
 /// The relMSE of the reference should be this far below the least that is measured against it.
 const CONVERGED: f64 = 0.2;
@@ -48,24 +48,36 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     for path in [Some(&arguments.output), arguments.json.as_ref()].into_iter().flatten() {
         require_writable(path)?;
     }
+    let Size { width, height } = arguments.scene.camera.size;
+    memory::allow_picture(width, height, memory::COMPARED_PIXEL)?;
     start_threads(arguments.pixel.threads)?;
     interrupt::flag();
-    let size = arguments.scene.camera.size;
+    let loading = interrupt::nothing_to_keep(interrupt::ENDED);
     let given = arguments.reference.as_deref();
-    let given = given.map(|path| Reference::read(path, [size.width, size.height])).transpose()?;
+    let given = given.map(|path| Reference::read(path, [width, height])).transpose()?;
     let view = arguments.scene.build(arguments.scene.load(quiet)?)?;
+    drop(loading);
     let reference = match given {
         Some(reference) => reference,
-        None => Wanted::new(arguments, &view)?.get(&view, quiet)?,
+        None => converged(arguments, &view, quiet)?,
     };
     let competition = Competition { arguments, view: &view, reference: &reference, quiet };
     let (report, pictures) = competition.run()?;
     report.warn(quiet);
-    write(arguments, &report, &pictures, &reference.image)?;
+    write(arguments, &report, &pictures, &reference.picture.image)?;
     if !quiet {
         report.summarise(&arguments.output);
     }
     Ok(())
+}
+
+/// The reference that the cache may have.
+fn converged(arguments: &CompareArguments, view: &View, quiet: bool) -> Result<Reference> {
+    let cache =
+        (!arguments.no_cache).then(|| Cache::new(arguments.cache.as_deref())).transpose()?;
+    let settings = arguments.scene.render_settings(&arguments.pixel, 1);
+    let goal = Goal::Samples(arguments.reference_spp);
+    Reference::of_view(cache.as_ref(), view, settings, goal, quiet)
 }
 
 /// Refuses what does not go together.
@@ -163,7 +175,7 @@ impl Competition<'_> {
         let entrant = Entrant {
             studio,
             label: strategy.text.clone(),
-            reference: &self.reference.image,
+            reference: &self.reference.picture.image,
             n_seeds: self.arguments.seeds,
         };
         let mut report = StrategyReport {
@@ -190,7 +202,7 @@ impl Competition<'_> {
     }
 
     fn picture(&self, measured: &Measured) -> Result<Picture> {
-        let reference = &self.reference.image;
+        let reference = &self.reference.picture.image;
         let tone = ToneMapping { exposure: self.arguments.exposure, curve: ToneCurve::Srgb };
         let shown = |image: &RgbImage| {
             let pixels = image.pixels.iter().map(|&p| tone.apply(p)).collect();

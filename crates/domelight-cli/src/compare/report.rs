@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 
 use super::budget::Budget;
 use super::entrant::{Spread, Step};
-use super::reference::ReferenceReport;
+use crate::measure::reference::ReferenceReport;
 use crate::report::SceneReport;
 
 /// All numbers.

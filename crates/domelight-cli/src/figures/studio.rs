@@ -19,16 +19,13 @@ use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::render::{Layers, RenderSettings, survey};
 use domelight::sampling::{Heuristic, SamplerKind};
 use domelight::scene::builtin::BuiltinScene;
-use domelight::scene::{
-    Camera, CameraSettings, EnvironmentSettings, EnvironmentSource, Projection, Scene,
-    SceneDescription,
-};
+use domelight::scene::{Camera, EnvironmentSettings, EnvironmentSource, Scene, SceneDescription};
 
 use crate::args::figures::FiguresArguments;
 use crate::args::scene::BUILTIN_ROWS;
 use crate::interrupt;
 use crate::progress::RenderProgress;
-use crate::scene::{load_scene, probe_name};
+use crate::scene::{close_up, load_scene, probe_name, view_of};
 use crate::strategy::{Job, Plan};
 use crate::usage::Stopwatch;
 use crate::values::Split;
@@ -68,6 +65,7 @@ pub(crate) enum Subject<'a> {
 impl Studio {
     pub(crate) fn new(arguments: &FiguresArguments, quiet: bool) -> Result<Self> {
         let interrupted = interrupt::flag();
+        let _loading = interrupt::nothing_to_keep(interrupt::ENDED);
         let mut description = load_scene(&arguments.scene, quiet)?;
         let is_builtin = BuiltinScene::from_str(&arguments.scene).is_ok();
         if is_builtin || description.environment.is_none() {
@@ -146,7 +144,10 @@ impl Studio {
         };
         let aspect = width as f32 / height as f32;
         let view = if let Subject::Alone(material) = subject {
-            leave_alone(&mut description, material)?;
+            let text = material;
+            let material: Material = text.parse().with_context(|| format!("material {text}"))?;
+            description.set_subject_material(material);
+            description.remove_scenery();
             close_up(&description, aspect, self.up)
         } else {
             view_of(&description, aspect, self.up)
@@ -169,44 +170,6 @@ impl Studio {
                 ..RenderSettings::default()
             },
         })
-    }
-}
-
-/// Removes the scenery, unless there is nothing else, and gives the rest one material.
-fn leave_alone(description: &mut SceneDescription, material: &str) -> Result<()> {
-    let material: Material = material.parse().with_context(|| format!("material {material}"))?;
-    description.set_subject_material(material);
-    let scenery = std::mem::take(&mut description.scenery);
-    if scenery.len() < description.parts.len() {
-        let parts = std::mem::take(&mut description.parts).into_iter().enumerate();
-        description.parts = parts.filter(|(i, _)| !scenery.contains(i)).map(|(_, p)| p).collect();
-    }
-    Ok(())
-}
-
-/// The scene's own camera, or one framed to it.
-fn view_of(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
-    let framed = || CameraSettings::framing(&description.subject_bounds(), aspect, up);
-    description.camera.unwrap_or_else(framed)
-}
-
-/// That view, moved until the scene just fits.
-fn close_up(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
-    const FOV: f32 = 26.0;
-    let view = view_of(description, aspect, up);
-    let bounds = description.bounds();
-    let (center, size) = (bounds.center(), bounds.size());
-    let toward = (view.origin - view.target).normalize_or(Vec3::Z);
-    let height = size.abs().dot(up.abs());
-    // The widest side, whichever way it is turned.
-    let width = (size - up.abs() * height).max_element();
-    let extent = height.max(width / aspect) * 1.08;
-    let distance = 0.5 * extent / (0.5 * FOV.to_radians()).tan() + 0.5 * width;
-    CameraSettings {
-        projection: Projection::Perspective { fov_y_degrees: FOV },
-        origin: center + toward * distance,
-        target: center,
-        up: view.up,
     }
 }
 

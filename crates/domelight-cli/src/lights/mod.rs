@@ -20,6 +20,7 @@ use domelight::scene::SceneDescription;
 
 use crate::args::lights::{LightsArguments, PngPath, RigPath};
 use crate::failure::UsageError;
+use crate::memory;
 use crate::output::{PictureFormat, PicturePath, print};
 use crate::usage::Stopwatch;
 use preview::Preview;
@@ -166,6 +167,8 @@ impl LightsArguments {
         let light = self.environment.settings(&SceneDescription::default());
         let map = self.environment.load(&light, quiet)?;
         let probe = self.environment.env.clone().unwrap_or_default();
+        let more = memory::EXTRACTION_TEXEL - memory::ENVIRONMENT_TEXEL;
+        memory::allow(&format!("{probe}: its lights"), more * map.pixels.len() as u64)?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
         let scale = light.scale * light.exposure.exp2();
         let environment =

@@ -11,6 +11,7 @@
 use super::Fresnel;
 use super::microfacet::{Masking, Microfacet, NormalDistribution, clamp_alpha, gaussian_slopes};
 use crate::math::{FRAC_1_PI, Vec2, Vec3, sqr};
+use crate::simd::{Real, Vectors};
 
 /// A Beckmann lobe.
 pub type Beckmann = Microfacet<BeckmannNormals>;
@@ -41,12 +42,14 @@ impl NormalDistribution for BeckmannNormals {
         self.alpha
     }
 
-    #[inline]
-    fn d(&self, h: Vec3) -> f32 {
+    #[inline(always)]
+    fn d<F: Real>(&self, h: Vectors<F>) -> F {
+        let one = |x| h.z.splat(x);
         let [ax, ay] = self.alpha;
-        let z2 = sqr(h.z);
-        let gauss = (-(sqr(h.x / ax) + sqr(h.y / ay)) / z2).exp();
-        FRAC_1_PI / (ax * ay) * gauss * sqr(h.length_squared() / z2)
+        let z2 = h.z.squared();
+        let slope2 = ((h.x / one(ax)).squared() + (h.y / one(ay)).squared()) / z2;
+        let gauss = slope2.map(|s| (-s).exp());
+        one(FRAC_1_PI / (ax * ay)) * gauss * (h.length_squared() / z2).squared()
     }
 
     /// exp(−t/α²)(1 + t)² has its one maximum at t = 2α² − 1.
@@ -59,15 +62,14 @@ impl NormalDistribution for BeckmannNormals {
 
     /// cos θ (1 + Λ), with the fit Λ(a) = (1 − 1.259 a + 0.396 a²)/(3.535 a + 2.181 a²) below
     /// a = cos θ/√(α_x² w_x² + α_y² w_y²) = 1.6 and zero above (Walter et al. 2007, eq. 27).
-    #[inline]
-    fn sigma(&self, w: Vec3) -> f32 {
+    #[inline(always)]
+    fn sigma<F: Real>(&self, w: Vectors<F>) -> F {
+        let one = |x| w.z.splat(x);
         let [ax, ay] = self.alpha;
-        let spread = (sqr(ax * w.x) + sqr(ay * w.y)).sqrt();
-        if w.z >= 1.6 * spread {
-            return w.z;
-        }
+        let spread = ((one(ax) * w.x).squared() + (one(ay) * w.y).squared()).sqrt();
         let a = w.z / spread;
-        w.z + spread * (1.0 + a * (0.396 * a - 1.259)) / (3.535 + 2.181 * a)
+        let fit = (one(1.0) + a * (one(0.396) * a - one(1.259))) / (one(3.535) + one(2.181) * a);
+        F::select((one(1.6) * spread).le(w.z), w.z, w.z + spread * fit)
     }
 
     #[inline]
@@ -76,9 +78,9 @@ impl NormalDistribution for BeckmannNormals {
     }
 
     /// D cos θ_h/(4 h·wo) = D H_z/(2|H|²).
-    #[inline]
-    fn reflected_pdf(&self, h: Vec3, d: f32, _sigma_o: f32) -> f32 {
-        0.5 * d * h.z / h.length_squared()
+    #[inline(always)]
+    fn reflected_pdf<F: Real>(&self, h: Vectors<F>, d: F, _sigma_o: F) -> F {
+        d.splat(0.5) * d * h.z / h.length_squared()
     }
 }
 

@@ -5,7 +5,7 @@
 //!   colour channel; for its arithmetic see Lagarde 2013, "Memo on Fresnel equations".
 
 use crate::Rgb;
-use crate::math::sqr;
+use crate::simd::{Colors, Real};
 
 /// What a microfacet reflects.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -26,10 +26,16 @@ impl Fresnel {
     /// F at the cosine between direction and microfacet normal, in [0, 1].
     #[inline(always)]
     pub fn eval(&self, cos_theta: f32) -> Rgb {
+        self.eval_lanes(cos_theta).single()
+    }
+
+    /// [`Fresnel::eval`] of several cosines side by side.
+    #[inline(always)]
+    pub(super) fn eval_lanes<F: Real>(&self, cos_theta: F) -> Colors<F> {
         match self {
-            Self::One => Rgb::WHITE,
+            Self::One => Colors::splat(cos_theta, Rgb::WHITE),
             Self::Schlick { f0 } => schlick(*f0, cos_theta),
-            Self::Conductor(c) => c.reflectance(cos_theta),
+            Self::Conductor(c) => c.reflectance_lanes(cos_theta),
         }
     }
 
@@ -42,15 +48,23 @@ impl Fresnel {
 
 /// Schlick's approximation.
 #[inline(always)]
-pub(super) fn schlick(f0: Rgb, cos_theta: f32) -> Rgb {
-    f0 + (Rgb::WHITE - f0) * schlick_weight(cos_theta)
+pub(super) fn schlick<F: Real>(f0: Rgb, cos_theta: F) -> Colors<F> {
+    let weight = schlick_weight(cos_theta);
+    let rest = Colors::splat(weight, Rgb::WHITE - f0).scaled(weight);
+    Colors::splat(weight, f0).zip(rest, |f0, rest| f0 + rest)
 }
 
 /// (1 − cos θ)⁵, how far F is from f0 to 1.
 #[inline(always)]
-pub(super) fn schlick_weight(cos_theta: f32) -> f32 {
-    let x = (1.0 - cos_theta).clamp(0.0, 1.0);
-    sqr(sqr(x)) * x
+pub(super) fn schlick_weight<F: Real>(cos_theta: F) -> F {
+    let x = unit(cos_theta.splat(1.0) - cos_theta);
+    x.squared().squared() * x
+}
+
+/// Clamped to [0, 1].
+#[inline(always)]
+fn unit<F: Real>(x: F) -> F {
+    x.max(x.splat(0.0)).min(x.splat(1.0))
 }
 
 /// A complex refractive index per colour channel.
@@ -108,33 +122,37 @@ impl Conductor {
     /// Unpolarised reflectance per channel at the cosine of incidence in [0, 1].
     #[inline]
     pub fn reflectance(&self, cos_theta: f32) -> Rgb {
-        let c = cos_theta.clamp(0.0, 1.0);
-        Rgb::new(
-            conductor(c, self.eta.r, self.k.r),
-            conductor(c, self.eta.g, self.k.g),
-            conductor(c, self.eta.b, self.k.b),
-        )
+        self.reflectance_lanes(cos_theta).single()
+    }
+
+    #[inline(always)]
+    fn reflectance_lanes<F: Real>(&self, cos_theta: F) -> Colors<F> {
+        let c = unit(cos_theta);
+        let (eta, k) = (Colors::splat(c, self.eta), Colors::splat(c, self.k));
+        eta.zip(k, |eta, k| conductor(c, eta, k))
     }
 }
 
 /// (R_s + R_p)/2, with a² + b² = |√((η + ik)² − sin² θ)|².
-#[inline]
-fn conductor(cos: f32, eta: f32, k: f32) -> f32 {
+#[inline(always)]
+fn conductor<F: Real>(cos: F, eta: F, k: F) -> F {
+    let one = |x| cos.splat(x);
     let (cos2, eta2, k2) = (cos * cos, eta * eta, k * k);
-    let sin2 = 1.0 - cos2;
+    let sin2 = one(1.0) - cos2;
     let t = eta2 - k2 - sin2;
-    let a2_b2 = (t * t + 4.0 * eta2 * k2).sqrt();
-    let a = (0.5 * (a2_b2 + t)).max(0.0).sqrt();
-    let (sum, cross) = (a2_b2 + cos2, 2.0 * cos * a);
+    let a2_b2 = (t * t + one(4.0) * eta2 * k2).sqrt();
+    let a = (one(0.5) * (a2_b2 + t)).max(one(0.0)).sqrt();
+    let (sum, cross) = (a2_b2 + cos2, one(2.0) * cos * a);
     let r_s = (sum - cross) / (sum + cross);
     let (sum, cross) = (cos2 * a2_b2 + sin2 * sin2, cross * sin2);
     let r_p = r_s * (sum - cross) / (sum + cross);
-    0.5 * (r_s + r_p)
+    one(0.5) * (r_s + r_p)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::sqr;
 
     #[test]
     fn normal_and_grazing_incidence() {
@@ -145,8 +163,8 @@ mod tests {
             assert!((f.r - at_normal(metal.eta.r, metal.k.r)).abs() < 1e-5, "{name}");
             assert!((metal.reflectance(0.0).g - 1.0).abs() < 1e-5, "{name}");
         }
-        assert_eq!(schlick(Rgb::splat(0.04), 1.0), Rgb::splat(0.04));
-        assert_eq!(schlick(Rgb::splat(0.04), 0.0), Rgb::WHITE);
+        assert_eq!(schlick(Rgb::splat(0.04), 1.0).single(), Rgb::splat(0.04));
+        assert_eq!(schlick(Rgb::splat(0.04), 0.0).single(), Rgb::WHITE);
     }
 
     #[test]
@@ -155,7 +173,7 @@ mod tests {
         let (cos_i, cos_t) = (0.5f32, (1.0 - 0.75 / 2.25f32).sqrt());
         let r_s = sqr((cos_i - 1.5 * cos_t) / (cos_i + 1.5 * cos_t));
         let r_p = sqr((1.5 * cos_i - cos_t) / (1.5 * cos_i + cos_t));
-        assert!((conductor(cos_i, 1.5, 0.0) - 0.5 * (r_s + r_p)).abs() < 1e-6);
+        assert!((conductor(cos_i, 1.5f32, 0.0) - 0.5 * (r_s + r_p)).abs() < 1e-6);
     }
 
     #[test]

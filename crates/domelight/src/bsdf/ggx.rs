@@ -8,6 +8,7 @@
 use super::Fresnel;
 use super::microfacet::{Masking, Microfacet, NormalDistribution, clamp_alpha};
 use crate::math::{FRAC_1_PI, TAU, Vec2, Vec3, sqr, vec3};
+use crate::simd::{Real, Vectors};
 
 /// A GGX lobe.
 pub type Ggx = Microfacet<GgxNormals>;
@@ -39,10 +40,12 @@ impl NormalDistribution for GgxNormals {
     }
 
     #[inline(always)]
-    fn d(&self, h: Vec3) -> f32 {
+    fn d<F: Real>(&self, h: Vectors<F>) -> F {
+        let one = |x| h.z.splat(x);
         let [ax, ay] = self.alpha;
-        let stretched = sqr(h.x / ax) + sqr(h.y / ay) + sqr(h.z);
-        FRAC_1_PI / (ax * ay) * sqr(h.length_squared() / stretched)
+        let stretched =
+            (h.x * one(1.0 / ax)).squared() + (h.y * one(1.0 / ay)).squared() + h.z.squared();
+        one(FRAC_1_PI / (ax * ay)) * (h.length_squared() / stretched).squared()
     }
 
     /// D is monotone in tan² θ_h, falling for α < 1.
@@ -55,9 +58,11 @@ impl NormalDistribution for GgxNormals {
 
     /// (cos θ + √(cos² θ + α_x² w_x² + α_y² w_y²))/2.
     #[inline(always)]
-    fn sigma(&self, w: Vec3) -> f32 {
+    fn sigma<F: Real>(&self, w: Vectors<F>) -> F {
+        let one = |x| w.z.splat(x);
         let [ax, ay] = self.alpha;
-        0.5 * (w.z + (sqr(w.z) + sqr(ax * w.x) + sqr(ay * w.y)).sqrt())
+        let stretched = w.z.squared() + (one(ax) * w.x).squared() + (one(ay) * w.y).squared();
+        one(0.5) * (w.z + stretched.sqrt())
     }
 
     /// Dupuy & Benyoub 2023, listing 3.
@@ -77,8 +82,8 @@ impl NormalDistribution for GgxNormals {
 
     /// D G₁(wo)/(4 cos θ_o) = D/(4 σ_o).
     #[inline(always)]
-    fn reflected_pdf(&self, _h: Vec3, d: f32, sigma_o: f32) -> f32 {
-        0.25 * d / sigma_o
+    fn reflected_pdf<F: Real>(&self, _h: Vectors<F>, d: F, sigma_o: F) -> F {
+        d.splat(0.25) * d / sigma_o
     }
 }
 

@@ -1,9 +1,10 @@
 //! Lambert's law: f_r = ρ/π.
 
-use super::{Brdf, above};
+use super::{Brdf, where_above};
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec2, Vec3};
 use crate::sampling::warp;
+use crate::simd::{Colors, Real, Vectors};
 
 /// Ideal diffuse reflection, sampled by the cosine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,12 +22,9 @@ impl Lambert {
 
 impl Brdf for Lambert {
     #[inline(always)]
-    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        if !above(wo, wi) {
-            return (Rgb::BLACK, 0.0);
-        }
-        let pdf = warp::cosine_hemisphere_pdf(wi.z);
-        (self.albedo * pdf, pdf)
+    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+        let pdf = where_above(wo, wi, wi.z * wi.z.splat(FRAC_1_PI));
+        (Colors::splat(pdf, self.albedo).scaled(pdf), pdf)
     }
 
     #[inline]

@@ -3,9 +3,10 @@
 //! A material is sampled by choosing one lobe and drawing from it; its density is that of the
 //! mixture, so no sample is worse than the chosen lobes' own by more than the choice.
 
-use super::{Beckmann, Brdf, Ggx, Lambert, MetallicRoughness, Phong, ValueBlock, VecBlock, Ward};
+use super::{Beckmann, Brdf, Ggx, Lambert, MetallicRoughness, Phong, Ward};
 use crate::Rgb;
 use crate::math::{Vec2, Vec3};
+use crate::simd::{Colors, Real, Vectors};
 
 /// One reflectance lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,14 +40,9 @@ macro_rules! each {
 }
 
 impl Brdf for Lobe {
-    #[inline]
-    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        each!(self, l => l.eval_pdf(wo, wi))
-    }
-
     #[inline(always)]
-    fn add_block(&self, wo: Vec3, wi: &VecBlock, factors: [f32; 2], sum: &mut ValueBlock) {
-        each!(self, l => l.add_block(wo, wi, factors, sum));
+    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+        each!(self, l => l.eval_lanes(wo, wi))
     }
 
     #[inline]
@@ -178,16 +174,6 @@ impl Material {
         }
     }
 
-    /// [`Brdf::eval_pdf`] of a block of directions, to the same bits.
-    #[inline(always)]
-    pub fn eval_pdf_block(&self, wo: Vec3, wi: &VecBlock) -> ValueBlock {
-        let mut sum = ValueBlock::default();
-        for term in self.terms() {
-            term.lobe.add_block(wo, wi, [term.weight, term.probability], &mut sum);
-        }
-        sum
-    }
-
     /// The colour of the surface, roughly: its albedo seen from above.
     pub fn albedo(&self) -> Rgb {
         self.directional_albedo(1.0)
@@ -230,13 +216,14 @@ impl From<Lobe> for Material {
 }
 
 impl Brdf for Material {
-    #[inline]
-    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        let (mut value, mut pdf) = (Rgb::BLACK, 0.0);
+    #[inline(always)]
+    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+        let one = |x| wi.z.splat(x);
+        let (mut value, mut pdf) = (Colors::splat(wi.z, Rgb::BLACK), one(0.0));
         for term in self.terms() {
-            let (v, p) = term.lobe.eval_pdf(wo, wi);
-            value += v * term.weight;
-            pdf += p * term.probability;
+            let (v, p) = term.lobe.eval_lanes(wo, wi);
+            value = value.zip(v.scaled(one(term.weight)), |a, b| a + b);
+            pdf = pdf + p * one(term.probability);
         }
         (value, pdf)
     }
@@ -277,8 +264,9 @@ impl Term {
 mod tests {
     use super::*;
     use crate::bsdf::test_support::{check_bound, check_lobe, toward};
-    use crate::bsdf::{Fresnel, LANES, Masking, WardForm};
+    use crate::bsdf::{Fresnel, Masking, WardForm};
     use crate::math::vec2;
+    use crate::simd::{self, InstructionSet, Kernel, LANES, Simd};
 
     fn glossy(f0: f32) -> Lobe {
         Ggx::new([0.1; 2], Fresnel::Schlick { f0: Rgb::splat(f0) }, Masking::Correlated).into()
@@ -311,8 +299,27 @@ mod tests {
         assert!((mix.eval(wo, wi) - expected).max_component().abs() < 1e-6);
     }
 
+    struct SideBySide<'a> {
+        material: &'a Material,
+        wo: Vec3,
+        wi: [Vec3; LANES],
+    }
+
+    impl Kernel for SideBySide<'_> {
+        type Output = [(Rgb, f32); LANES];
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Self::Output {
+            let [x, y, z] = [0, 1, 2].map(|c| simd.load(&self.wi.map(|w| w[c])));
+            let (value, pdf) =
+                self.material.eval_lanes(Vectors::splat(x, self.wo), Vectors { x, y, z });
+            let ([r, g, b], pdf) = (value.0.map(simd::Floats::store), simd::Floats::store(pdf));
+            std::array::from_fn(|i| (Rgb::new(r[i], g[i], b[i]), pdf[i]))
+        }
+    }
+
     #[test]
-    fn blocks_are_directions_side_by_side() {
+    fn lanes_are_directions_side_by_side() {
         let lambert = Lobe::from(Lambert::new(Rgb::new(0.5, 0.3, 0.1)));
         let gltf = MetallicRoughness::new(Rgb::new(0.5, 0.3, 0.1), 0.3, 0.4);
         let silver = Fresnel::Conductor(crate::bsdf::Conductor::SILVER);
@@ -321,14 +328,12 @@ mod tests {
             [three(), Material::single(gltf), Material::new(&[lambert, metal.into()]).unwrap()];
         for material in materials {
             for view in [0.0, 50.0, 89.0] {
-                let (wo, mut block) = (toward(view, 0.3), VecBlock::default());
-                for lane in 0..LANES {
-                    block.set(lane, toward(18.0 * lane as f32, 0.5 * lane as f32));
-                }
-                let values = material.eval_pdf_block(wo, &block);
-                for lane in 0..LANES {
-                    let expected = material.eval_pdf(wo, block.get(lane));
-                    assert_eq!((values.value(lane), values.pdf[lane]), expected);
+                let wi = std::array::from_fn(|i| toward(18.0 * i as f32, 0.5 * i as f32));
+                let wo = toward(view, 0.3);
+                let expected = wi.map(|wi| material.eval_pdf(wo, wi));
+                for set in InstructionSet::ALL {
+                    let values = simd::dispatch(set, SideBySide { material: &material, wo, wi });
+                    assert_eq!(values, expected, "{set:?}");
                 }
             }
         }

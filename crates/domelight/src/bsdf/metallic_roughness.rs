@@ -13,10 +13,11 @@
 
 use super::ggx::{Ggx, GgxNormals};
 use super::microfacet::{Masking, reflect_about};
-use super::{Brdf, Fresnel, HORIZON, NormalDistribution as _, above, fresnel};
+use super::{Brdf, Fresnel, HORIZON, NormalDistribution as _, fresnel, where_above};
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec2, Vec3, sqr};
 use crate::sampling::warp;
+use crate::simd::{Colors, Real, Vectors};
 
 /// glTF's metallic-roughness lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,28 +59,29 @@ impl MetallicRoughness {
 
     /// The probability of drawing from the specular part.
     #[inline]
-    pub(super) fn specular_share(&self, wo: Vec3) -> f32 {
-        let grazing = fresnel::schlick_weight(wo.z);
-        let specular = self.f0_mean + (1.0 - self.f0_mean) * grazing;
-        let diffuse = (1.0 - specular) * self.diffuse_mean;
+    pub(super) fn specular_share<F: Real>(&self, cos_theta_o: F) -> F {
+        let one = |x| cos_theta_o.splat(x);
+        let grazing = fresnel::schlick_weight(cos_theta_o);
+        let specular = one(self.f0_mean) + one(1.0 - self.f0_mean) * grazing;
+        let diffuse = (one(1.0) - specular) * one(self.diffuse_mean);
         // Zero only for a black metal, which has no diffuse part either.
-        if specular > 0.0 { specular / (specular + diffuse) } else { 1.0 }
+        F::select(one(0.0).lt(specular), specular / (specular + diffuse), one(1.0))
     }
 }
 
 impl Brdf for MetallicRoughness {
     #[inline(always)]
-    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        if !above(wo, wi) {
-            return (Rgb::BLACK, 0.0);
-        }
-        let h = wo + wi;
+    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+        let one = |x| wi.z.splat(x);
+        let h = wi.plus(wo);
         let (geometry, pdf_specular) = self.specular().geometry_pdf(wo, wi, h);
-        let f = fresnel::schlick(self.f0, 0.5 * h.length());
-        let cosine = warp::cosine_hemisphere_pdf(wi.z);
-        let value = (Rgb::WHITE - f) * self.diffuse * cosine + f * geometry;
-        let share = self.specular_share(wo);
-        (value, share * pdf_specular + (1.0 - share) * cosine)
+        let [geometry, pdf_specular] = [geometry, pdf_specular].map(|x| where_above(wo, wi, x));
+        let f = fresnel::schlick(self.f0, one(0.5) * h.length_squared().sqrt());
+        let cosine = where_above(wo, wi, wi.z * one(FRAC_1_PI));
+        let diffuse = Colors::splat(cosine, self.diffuse).scaled(cosine);
+        let value = diffuse.zip(f, |d, f| (one(1.0) - f) * d + f * geometry);
+        let share = self.specular_share(wo.z);
+        (value, share * pdf_specular + (one(1.0) - share) * cosine)
     }
 
     #[inline]
@@ -87,7 +89,7 @@ impl Brdf for MetallicRoughness {
         if wo.z <= HORIZON {
             return None;
         }
-        if u_lobe < self.specular_share(wo) {
+        if u_lobe < self.specular_share(wo.z) {
             let h = GgxNormals::new([self.alpha; 2]).sample_normal(wo, u);
             return Some(reflect_about(wo, h));
         }
@@ -106,7 +108,7 @@ impl Brdf for MetallicRoughness {
 
     #[inline]
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb {
-        let f = fresnel::schlick(self.f0, cos_theta_o);
+        let f = fresnel::schlick(self.f0, cos_theta_o).single();
         (Rgb::WHITE - f) * self.diffuse + f
     }
 }

@@ -16,9 +16,10 @@
 //!
 //! Single scattering only: rough lobes lose the light that bounces twice.
 
-use super::{Brdf, Fresnel, HORIZON, ROUNDING, above};
+use super::{Brdf, Fresnel, HORIZON, ROUNDING, where_above};
 use crate::Rgb;
 use crate::math::{TAU, Vec2, Vec3, sqr, vec3};
+use crate::simd::{Colors, Real, Vectors};
 
 /// The least roughness of a lobe; f32 directions resolve no narrower one.
 pub const MIN_ALPHA: f32 = 1e-4;
@@ -44,20 +45,20 @@ pub trait NormalDistribution: Copy + Send + Sync {
     fn alpha(&self) -> [f32; 2];
 
     /// D(h/|h|) \[sr⁻¹\] for an `h` of any length.
-    fn d(&self, h: Vec3) -> f32;
+    fn d<F: Real>(&self, h: Vectors<F>) -> F;
 
     /// The greatest D where tan² θ_h lies in a closed range, which may end at infinity.
     fn max_d(&self, tan2: [f32; 2]) -> f32;
 
     /// σ(w) = cos θ (1 + Λ(w)), the projected area of the microfacets facing `w`.
-    fn sigma(&self, w: Vec3) -> f32;
+    fn sigma<F: Real>(&self, w: Vectors<F>) -> F;
 
     /// Draws a normal, of any length, for the viewer `wo`.
     fn sample_normal(&self, wo: Vec3, u: Vec2) -> Vec3;
 
     /// Density \[sr⁻¹\] of `wo` reflected about the drawn normal, where `h` = wo + wi, `d` = D(h) and
     /// `sigma_o` = σ(wo).
-    fn reflected_pdf(&self, h: Vec3, d: f32, sigma_o: f32) -> f32;
+    fn reflected_pdf<F: Real>(&self, h: Vectors<F>, d: F, sigma_o: F) -> F;
 }
 
 /// A microfacet lobe over a distribution of normals.
@@ -80,32 +81,37 @@ impl<D: NormalDistribution> Microfacet<D> {
 
     /// D G₂/(4 cos θ_o), the lobe without Fresnel's factor, and the density.
     #[inline(always)]
-    pub(super) fn geometry_pdf(&self, wo: Vec3, wi: Vec3, h: Vec3) -> (f32, f32) {
+    pub(super) fn geometry_pdf<F: Real>(
+        &self,
+        wo: Vectors<F>,
+        wi: Vectors<F>,
+        h: Vectors<F>,
+    ) -> (F, F) {
         let d = self.normals.d(h);
         let (sigma_o, sigma_i) = (self.normals.sigma(wo), self.normals.sigma(wi));
-        let geometry = d * masked(self.masking, [wo.z, wi.z], [sigma_o, sigma_i]);
+        let geometry = d * masked(self.masking, [wo.z, sigma_o], [wi.z, sigma_i]);
         (geometry, self.normals.reflected_pdf(h, d, sigma_o))
     }
 }
 
-/// G₂ cos θ_i / (4 cos θ_i cos θ_o) of the cosines and projected areas of (wo, wi).
+/// G₂ cos θ_i / (4 cos θ_i cos θ_o) of the cosines and projected areas of `wo` and `wi`.
 #[inline(always)]
-fn masked(masking: Masking, [cos_o, cos_i]: [f32; 2], [sigma_o, sigma_i]: [f32; 2]) -> f32 {
-    match masking {
-        Masking::Separable => 0.25 * cos_i / (sigma_o * sigma_i),
-        Masking::Correlated => 0.25 * cos_i / (sigma_o * cos_i + sigma_i * cos_o - cos_i * cos_o),
-    }
+fn masked<F: Real>(masking: Masking, [cos_o, sigma_o]: [F; 2], [cos_i, sigma_i]: [F; 2]) -> F {
+    let below = match masking {
+        Masking::Separable => sigma_o * sigma_i,
+        Masking::Correlated => sigma_o * cos_i + sigma_i * cos_o - cos_i * cos_o,
+    };
+    cos_i.splat(0.25) * cos_i / below
 }
 
 impl<D: NormalDistribution> Brdf for Microfacet<D> {
     #[inline(always)]
-    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        if !above(wo, wi) {
-            return (Rgb::BLACK, 0.0);
-        }
-        let h = wo + wi;
+    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+        let h = wi.plus(wo);
         let (geometry, pdf) = self.geometry_pdf(wo, wi, h);
-        (self.fresnel.eval(0.5 * h.length()) * geometry, pdf)
+        let cos_d = pdf.splat(0.5) * h.length_squared().sqrt();
+        let geometry = where_above(wo, wi, geometry);
+        (self.fresnel.eval_lanes(cos_d).scaled(geometry), where_above(wo, wi, pdf))
     }
 
     #[inline]
@@ -121,14 +127,14 @@ impl<D: NormalDistribution> Brdf for Microfacet<D> {
             return 0.0;
         }
         let [ax, ay] = self.normals.alpha();
-        let sigma_o = self.normals.sigma(wo);
+        let sigma_o = self.normals.sigma(Vectors::from(wo));
         let bound = |ring: Ring| {
             let (z, x) = (ring.max_cos_i, (1.0 - sqr(ring.max_cos_i)).max(0.0).sqrt());
             let smoothest = if ax < ay { vec3(x, 0.0, z) } else { vec3(0.0, x, z) };
-            let sigma_i = self.normals.sigma(smoothest);
+            let sigma_i = self.normals.sigma(smoothest.into());
             self.normals.max_d(ring.tan2)
                 * self.fresnel.max_from(ring.min_cos_d)
-                * masked(self.masking, [wo.z, z], [sigma_o, sigma_i])
+                * masked(self.masking, [wo.z, sigma_o], [z, sigma_i])
         };
         rings(wo, ax.max(ay)).map(bound).fold(0.0, f32::max) * ROUNDING
     }
@@ -215,9 +221,9 @@ mod tests {
             let w = toward(degrees, 0.7);
             let [area] = quadrature.hemisphere(|h| {
                 let h = Vec3::from(h.map(|c| c as f32));
-                [f64::from(normals.d(h) * h.dot(w).max(0.0))]
+                [f64::from(normals.d(Vectors::from(h)) * h.dot(w).max(0.0))]
             });
-            let sigma = f64::from(normals.sigma(w));
+            let sigma = f64::from(normals.sigma(Vectors::from(w)));
             assert!((area - sigma).abs() < tolerance * area, "{degrees}°: {area} {sigma}");
         }
     }
@@ -246,8 +252,8 @@ mod tests {
                 Masking::Separable => 1.0 / ((1.0 + lambda_o) * (1.0 + lambda_i)),
             };
             for masking in [Masking::Correlated, Masking::Separable] {
-                let sigmas = [normals.sigma(wo), normals.sigma(wi)];
-                let found = masked(masking, [wo.z, wi.z], sigmas);
+                let sigma = |w: Vec3| [w.z, normals.sigma(w.into())];
+                let found = masked(masking, sigma(wo), sigma(wi));
                 let expected = g2(masking) / (4.0 * wo.z);
                 assert!((found - expected).abs() < 1e-5 * expected, "{found} {expected}");
             }

@@ -24,7 +24,6 @@
 //! energy compensation (its tables would have to enter the bounds of [`Brdf::max_eval`]).
 
 mod beckmann;
-mod block;
 mod fresnel;
 mod ggx;
 mod lambert;
@@ -39,7 +38,6 @@ mod test_support;
 mod ward;
 
 pub use beckmann::{Beckmann, BeckmannNormals};
-pub use block::{LANES, Lanes, ValueBlock, VecBlock};
 pub use fresnel::{Conductor, Fresnel};
 pub use ggx::{Ggx, GgxNormals};
 pub use lambert::Lambert;
@@ -53,11 +51,13 @@ pub use ward::{Ward, WardForm};
 
 use crate::Rgb;
 use crate::math::{Vec2, Vec3};
+use crate::simd::{Colors, Real, Vectors};
 
 /// A reflectance lobe in the local frame (z the shading normal).
 pub trait Brdf: Copy + Send + Sync {
-    /// [`Brdf::eval`] and [`Brdf::pdf`] at once.
-    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32);
+    /// [`Brdf::eval`] and [`Brdf::pdf`] of one pair of directions or of several side by side: the
+    /// lobe's formula.
+    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F);
 
     /// The direction of [`Brdf::sample`] alone. It may lie below the surface, be NaN, or be `None`:
     /// all of them are the sample of value zero.
@@ -70,20 +70,14 @@ pub trait Brdf: Copy + Send + Sync {
     /// chooses between lobes and colours previews. Never negative.
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb;
 
-    /// Adds [`Brdf::eval_pdf`] of a block of directions, values times `weight` and densities times
-    /// `probability`.
-    #[inline(always)]
-    fn add_block(
-        &self,
-        wo: Vec3,
-        wi: &VecBlock,
-        [weight, probability]: [f32; 2],
-        sum: &mut ValueBlock,
-    ) {
-        for lane in 0..LANES {
-            let (value, pdf) = self.eval_pdf(wo, wi.get(lane));
-            sum.add(lane, value * weight, pdf * probability);
+    /// [`Brdf::eval`] and [`Brdf::pdf`] at once.
+    #[inline]
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        if !above(wo, wi) {
+            return (Rgb::BLACK, 0.0);
         }
+        let (value, pdf) = self.eval_lanes(wo.into(), wi.into());
+        (value.single(), pdf)
     }
 
     /// f_r(wo, wi) · max(0, cos θ_i) \[sr⁻¹\], the cosine inside; black when either direction lies
@@ -132,6 +126,13 @@ const HORIZON: f32 = 1e-7;
 #[inline(always)]
 fn above(wo: Vec3, wi: Vec3) -> bool {
     wo.z > HORIZON && wi.z > HORIZON
+}
+
+/// `x` where both directions lie above the surface, else zero.
+#[inline(always)]
+fn where_above<F: Real>(wo: Vectors<F>, wi: Vectors<F>, x: F) -> F {
+    let horizon = x.splat(HORIZON);
+    F::select(horizon.lt(wo.z) & horizon.lt(wi.z), x, x.splat(0.0))
 }
 
 /// What [`Brdf::max_eval`] adds for the rounding of an evaluation in f32.

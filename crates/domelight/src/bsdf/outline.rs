@@ -68,7 +68,7 @@ impl Material {
                     add(albedo, Gloss::Slopes { alpha: l.alpha(), gaussian: true });
                 }
                 Lobe::MetallicRoughness(l) => {
-                    let specular = l.specular_share(wo);
+                    let specular = l.specular_share(wo.z);
                     diffuse += (1.0 - specular) * albedo;
                     let alpha = l.alpha();
                     add(specular * albedo, Gloss::Slopes { alpha, gaussian: false });

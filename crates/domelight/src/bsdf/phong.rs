@@ -8,10 +8,11 @@
 //! Those samples are lost and counted; redrawing them would need their fraction in the density,
 //! which has no closed form for real n.
 
-use super::{Brdf, HORIZON, ROUNDING, above};
+use super::{Brdf, HORIZON, ROUNDING, where_above};
 use crate::Rgb;
 use crate::math::{Frame, TAU, Vec2, Vec3, vec3};
 use crate::sampling::warp;
+use crate::simd::{Colors, Real, Vectors};
 
 /// A normalised Phong lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,17 +38,17 @@ fn mirror(w: Vec3) -> Vec3 {
 }
 
 impl Brdf for Phong {
-    #[inline]
-    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+    #[inline(always)]
+    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+        let n = self.exponent;
         // cos α = 1 − |wi − mirror|²/2: a scalar product would carry the rounding of the vectors'
         // lengths, which the power multiplies by n.
-        let versine = 0.5 * mirror(wo).distance_squared(wi);
-        if !above(wo, wi) || versine >= 1.0 {
-            return (Rgb::BLACK, 0.0);
-        }
-        let power = (self.exponent * f32::ln_1p(-versine)).exp() / TAU;
-        let value = self.specular * ((self.exponent + 2.0) * power * wi.z);
-        (value, (self.exponent + 1.0) * power)
+        let versine = wi.z.splat(0.5)
+            * Vectors { x: wi.x + wo.x, y: wi.y + wo.y, z: wi.z - wo.z }.length_squared();
+        let power = versine.map(|v| if v < 1.0 { (n * f32::ln_1p(-v)).exp() / TAU } else { 0.0 });
+        let power = where_above(wo, wi, power);
+        let value = power.splat(n + 2.0) * power * wi.z;
+        (Colors::splat(value, self.specular).scaled(value), power.splat(n + 1.0) * power)
     }
 
     #[inline]

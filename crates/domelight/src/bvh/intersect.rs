@@ -13,8 +13,8 @@
 //! (the paper's section on traversal does it axis by axis).
 
 use super::prepare::PreparedRays;
-use super::simd::{Floats, Mask, Simd};
 use super::{Block, Lanes, Node, WIDTH};
+use crate::simd::{Floats, Mask, Real, Simd};
 
 /// A node's planes in the order in which rays of one octant cross them.
 #[derive(Clone, Copy)]
@@ -45,7 +45,7 @@ impl<S: Simd> Slabs<S> {
         rays: &PreparedRays<N>,
         i: usize,
         limit: f32,
-    ) -> (<S::Floats as Floats>::Mask, S::Floats) {
+    ) -> (<S::Floats as Real>::Mask, S::Floats) {
         let (mut enter, mut leave) = (simd.splat(0.0), simd.splat(limit));
         for k in 0..3 {
             let inverse_direction = simd.splat(rays.inverse_directions[k][i]);
@@ -114,7 +114,7 @@ pub(super) struct Sheared<'a, S: Simd, const N: usize> {
     /// Barycentric weights, scaled alike.
     weights: [S::Floats; 3],
     /// Where the ray's line goes through the triangle.
-    inside: <S::Floats as Floats>::Mask,
+    inside: <S::Floats as Real>::Mask,
 }
 
 /// The triangles of a block that a ray hits.

@@ -35,23 +35,25 @@
 //! cache, and camera rays are few. `docs/experiments.md` has figures.
 
 mod build;
+mod frustum;
 mod intersect;
 mod prepare;
-mod simd;
 mod traverse;
 mod validate;
 
 use crate::geometry::{Aabb, Hit, Ray, RayBatch};
 use crate::math::Vec3;
+use crate::simd;
 
-pub use simd::InstructionSet;
+pub use crate::simd::InstructionSet;
+pub use frustum::Frustum;
 pub use validate::BvhDefect;
 
 /// How many children a node and how many triangles a block has: the width of a vector.
 const WIDTH: usize = 8;
 
 /// One number a lane.
-type Lanes = [f32; WIDTH];
+type Lanes = simd::Lanes;
 
 /// A bounding volume hierarchy over triangles; see the [module](self).
 #[derive(Clone, Debug)]
@@ -219,6 +221,13 @@ impl Bvh {
     /// Whether the ray meets any triangle in its open interval (0, `t_max`).
     pub fn any_hit(&self, ray: &Ray) -> bool {
         simd::dispatch(self.instruction_set, traverse::AnyHit { bvh: self, ray })
+    }
+
+    /// Whether a ray within the frustum may hit anything; false only if none does.
+    ///
+    /// By the boxes alone: cheap, and true near what is there.
+    pub fn may_hit(&self, frustum: &Frustum) -> bool {
+        simd::dispatch(self.instruction_set, frustum::MayHit { bvh: self, frustum })
     }
 
     /// Checks that every triangle is in the tree once, each box holds what is below it, and every

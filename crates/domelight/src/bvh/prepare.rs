@@ -1,9 +1,9 @@
 //! What the tests need of rays, computed for eight at a time.
 
-use super::simd::{Floats, Mask, Simd};
 use super::{Lanes, WIDTH};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
+use crate::simd::{Floats, Mask, Real, Simd};
 
 /// Up to `N` rays of one octant, `N` a multiple of eight, with what both tests need of them.
 pub(super) struct PreparedRays<const N: usize> {

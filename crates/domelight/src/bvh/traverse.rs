@@ -8,10 +8,10 @@ use std::ops::Range;
 use super::build::MAX_DEPTH;
 use super::intersect::{Sheared, Slabs};
 use super::prepare::{PreparedRays, octant};
-use super::simd::{Floats, Kernel, Mask, Sets, Simd};
 use super::{Bvh, Child, WIDTH};
 use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
+use crate::simd::{Floats, Kernel, Mask, Sets, Simd};
 
 /// A node leaves at most seven children behind on the way down, and pushes eight.
 const STACK: usize = 256;

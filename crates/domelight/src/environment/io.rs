@@ -19,6 +19,8 @@ pub struct ProbeOptions {
     pub layer: Option<String>,
     /// Repair negative and non-finite values instead of refusing them.
     pub sanitize: bool,
+    /// The most memory that reading may take, see [`ReadOptions::max_memory`].
+    pub max_memory: Option<u64>,
 }
 
 /// A probe in the working map.
@@ -86,7 +88,7 @@ pub enum ProbeError {
 /// If the picture cannot be read, has not the mapping's shape, or has values that are no radiance and `sanitize` is
 /// not set.
 pub fn load_probe(path: &Path, options: &ProbeOptions) -> Result<LoadedProbe, ProbeError> {
-    let read = ReadOptions { layer: options.layer.clone() };
+    let read = ReadOptions { layer: options.layer.clone(), max_memory: options.max_memory };
     let picture = picture::read(path, &read)?;
     let file =
         if path == Path::new("-") { "standard input".into() } else { path.display().to_string() };

@@ -1,5 +1,6 @@
 //! What can be wrong with a picture file.
 
+use crate::memory::OverLimit;
 use std::io;
 
 /// A picture file could not be read or written.
@@ -20,6 +21,9 @@ pub enum Problem {
     /// The system says so.
     #[error("{0}")]
     Io(io::Error),
+    /// No bytes.
+    #[error("the file is empty")]
+    NoBytes,
     /// The first bytes belong to no known format.
     #[error(
         "not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG): it starts with {start:02x?}"
@@ -115,6 +119,9 @@ pub enum Problem {
         /// The channels there are.
         present: Vec<String>,
     },
+    /// It takes more memory than [`super::ReadOptions::max_memory`] allows.
+    #[error("{0}")]
+    Memory(#[from] OverLimit),
     /// A decoder of the `image` crate refused the file.
     #[error("{0}")]
     Image(image::ImageError),

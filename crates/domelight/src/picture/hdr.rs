@@ -49,6 +49,12 @@ pub fn decode(bytes: &[u8]) -> Result<RgbImage, Problem> {
     Ok(header.upright(pixels))
 }
 
+/// How many texels the header promises.
+pub(super) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
+    let header = Header::parse(bytes)?;
+    checked_area(header.length, header.lines)
+}
+
 /// Which way an axis of the picture goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Axis {

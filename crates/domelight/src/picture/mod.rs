@@ -19,11 +19,13 @@ mod primaries;
 pub mod tone;
 
 pub use error::{PictureError, Problem};
-pub use output::{require_writable, write_atomically};
+pub use output::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};
 
 use crate::RgbImage;
 use crate::environment::mapping::EnvmapKind;
-use std::io::Read;
+use crate::memory;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
 /// No picture with more texels than this is read (2²⁹: 32768 × 16384).
@@ -66,6 +68,8 @@ impl Picture {
 pub struct ReadOptions {
     /// The OpenEXR layer; by default the unnamed R, G, B channels, else the first layer that has them.
     pub layer: Option<String>,
+    /// The most memory that reading may take, in bytes: file and picture; by default there is no limit.
+    pub max_memory: Option<u64>,
 }
 
 /// The picture in a file, or on standard input if `path` is `-`.
@@ -74,7 +78,7 @@ pub struct ReadOptions {
 /// If the file cannot be read or is not a whole, valid picture in one of the known formats.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Picture, PictureError> {
     let name = display_name(path);
-    let bytes = read_all(path).map_err(|error| Problem::Io(error).in_file(&name))?;
+    let bytes = read_all(path, options.max_memory).map_err(|problem| problem.in_file(&name))?;
     read_bytes(&bytes, &name, options)
 }
 
@@ -87,14 +91,36 @@ pub fn read_bytes(
     name: &str,
     options: &ReadOptions,
 ) -> Result<Picture, PictureError> {
+    let allowed = || match options.max_memory {
+        Some(_) => Ok(memory::require(memory_to_read(bytes)?, options.max_memory)?),
+        None => Ok(()),
+    };
+    allowed().map_err(|problem: Problem| problem.in_file(name))?;
     let decoded = match format_of(bytes) {
         Some(Format::Hdr) => hdr::decode(bytes).map(|image| Picture::opaque(image, Format::Hdr)),
         Some(Format::Exr) => exr::decode(bytes, options.layer.as_deref()),
         Some(Format::Pfm) => pfm::decode(bytes).map(|image| Picture::opaque(image, Format::Pfm)),
         Some(Format::Png) => png::decode(bytes),
+        None if bytes.is_empty() => Err(Problem::NoBytes),
         None => Err(Problem::UnknownFormat { start: bytes[..bytes.len().min(8)].to_vec() }),
     };
     decoded.map_err(|problem| problem.in_file(name))
+}
+
+/// An estimate of the memory that the file and its picture take while it is read, from the header alone.
+///
+/// # Errors
+/// If the header is damaged.
+pub fn memory_to_read(bytes: &[u8]) -> Result<u64, Problem> {
+    // Bytes for a texel: what the decoder makes, and the picture made of it.
+    let (texels, per_texel) = match format_of(bytes) {
+        Some(Format::Hdr) => (hdr::texels(bytes)?, 24),
+        Some(Format::Exr) => (exr::texels(bytes)?, 24),
+        Some(Format::Pfm) => (pfm::texels(bytes)?, 12),
+        Some(Format::Png) => (png::texels(bytes)?, 40),
+        None => (0, 0),
+    };
+    Ok(bytes.len() as u64 + texels as u64 * per_texel)
 }
 
 /// The format that the first bytes promise.
@@ -112,12 +138,22 @@ fn display_name(path: &Path) -> String {
     if path == Path::new("-") { "standard input".into() } else { path.display().to_string() }
 }
 
-fn read_all(path: &Path) -> std::io::Result<Vec<u8>> {
-    if path != Path::new("-") {
-        return std::fs::read(path);
+/// All bytes; of a pipe or device, which might never end, no more than are allowed.
+fn read_all(path: &Path, max_memory: Option<u64>) -> Result<Vec<u8>, Problem> {
+    if path == Path::new("-") {
+        return read_to_end(io::stdin().lock(), max_memory);
     }
+    let file = File::open(path).map_err(Problem::Io)?;
+    let length = file.metadata().map_err(Problem::Io)?.len();
+    memory::require(length, max_memory)?;
+    read_to_end(file, max_memory)
+}
+
+fn read_to_end(from: impl Read, max_memory: Option<u64>) -> Result<Vec<u8>, Problem> {
+    let limit = max_memory.unwrap_or(u64::MAX);
     let mut bytes = Vec::new();
-    std::io::stdin().lock().read_to_end(&mut bytes)?;
+    from.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(Problem::Io)?;
+    memory::require(bytes.len() as u64, max_memory)?;
     Ok(bytes)
 }
 

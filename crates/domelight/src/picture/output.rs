@@ -2,7 +2,7 @@
 
 use super::{PictureError, Problem};
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// Runs `write` on a new file beside `path` and renames it to `path` when all of it is on the disk, so
@@ -24,6 +24,31 @@ pub fn write_atomically(
     replace(path, write).map_err(|error| Problem::Io(error).in_file(&path.display().to_string()))
 }
 
+/// A file that is written in any order.
+pub trait WriteSeek: Write + Seek {}
+
+impl<T: Write + Seek> WriteSeek for T {}
+
+/// As [`write_atomically`], for what is not written from beginning to end. Where one cannot go back (standard output, a
+/// device, a pipe) the bytes are gathered in memory first.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn write_atomically_seeking(
+    path: &Path,
+    write: impl FnOnce(&mut dyn WriteSeek) -> io::Result<()>,
+) -> Result<(), PictureError> {
+    if path != Path::new("-") && !fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+        let replaced = target(path).and_then(|path| replace_plain(&path, |out| write(out)));
+        return replaced.map_err(|error| Problem::Io(error).in_file(&path.display().to_string()));
+    }
+    write_atomically(path, |out| {
+        let mut bytes = Cursor::new(Vec::new());
+        write(&mut bytes)?;
+        out.write_all(bytes.get_ref())
+    })
+}
+
 /// Whether [`write_atomically`] can make a file at `path` now: to be asked before hours of work. Leaves nothing behind
 /// and does not open devices and pipes.
 ///
@@ -37,7 +62,7 @@ pub fn require_writable(path: &Path) -> Result<(), PictureError> {
 }
 
 fn try_place(path: &Path) -> io::Result<()> {
-    let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    let path = target(path)?;
     match fs::metadata(&path) {
         Ok(there) if there.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
         Ok(there) if !there.is_file() => Ok(()),
@@ -50,18 +75,40 @@ fn try_place(path: &Path) -> io::Result<()> {
 }
 
 fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    let path = target(path)?;
     if fs::metadata(&path).is_ok_and(|there| !there.is_file()) {
-        return finish(File::options().write(true).open(&path)?, write).map(drop);
+        return finish(File::options().write(true).open(&path)?, |out| write(out)).map(drop);
     }
-    let temporary = beside(&path)?;
+    replace_plain(&path, |out| write(out))
+}
+
+/// The file itself, at the end of symbolic links, also where it is not there yet.
+fn target(path: &Path) -> io::Result<PathBuf> {
+    match fs::canonicalize(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => match fs::read_link(path) {
+            // A circle of links is another error.
+            Ok(link) => target(&path.parent().unwrap_or(Path::new("")).join(link)),
+            Err(_) => Ok(path.to_path_buf()),
+        },
+        canonical => canonical,
+    }
+}
+
+fn replace_plain(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> io::Result<()> {
+    let temporary = beside(path)?;
     finish(File::create_new(&temporary)?, write)
         .and_then(|file| file.sync_all())
-        .and_then(|()| fs::rename(&temporary, &path))
+        .and_then(|()| fs::rename(&temporary, path))
         .inspect_err(|_| drop(fs::remove_file(&temporary)))
 }
 
-fn finish(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<File> {
+fn finish(
+    file: File,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> io::Result<File> {
     let mut out = BufWriter::new(file);
     write(&mut out)?;
     Ok(out.into_inner()?)

@@ -7,6 +7,13 @@ use super::{Problem, allocate, checked_area};
 use crate::{Rgb, RgbImage};
 use std::io::{self, Write};
 
+/// How many texels the header promises.
+pub(super) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
+    let mut header = Words { bytes, at: 0, line: 1 };
+    header.next()?;
+    checked_area(header.number("a width")?, header.number("a height")?)
+}
+
 /// Decodes a whole file, top row first.
 ///
 /// # Errors

@@ -68,6 +68,13 @@ fn quantize(value: f32, depth: Depth, bytes: &mut Vec<u8>) {
     }
 }
 
+/// How many texels the header promises.
+pub(super) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
+    let reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
+    let (width, height) = reader.into_dimensions().map_err(Problem::Image)?;
+    checked_area(width as usize, height as usize)
+}
+
 /// Decodes a PNG as sRGB (whatever it says of its colours) into linear, premultiplied colour.
 ///
 /// # Errors

@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use super::film::PixelSums;
 use super::{Counts, Film, Window};
 use crate::fingerprint::Fingerprinter;
 use crate::picture::Problem;
@@ -86,6 +87,16 @@ impl Checkpoint {
         exr.encode()
     }
 
+    /// An estimate of the memory that [`Checkpoint::decode`] takes, the bytes themselves included.
+    ///
+    /// # Errors
+    /// If they are no OpenEXR file.
+    pub fn memory_to_decode(bytes: &[u8]) -> Result<u64, CheckpointError> {
+        // The channels as they are read and the sums that they become.
+        let pixel = 4 * (4 + PixelSums::WORDS.len()) + size_of::<PixelSums>();
+        Ok(bytes.len() as u64 + crate::picture::exr::texels(bytes)? as u64 * pixel as u64)
+    }
+
     /// Reads the bytes of [`Checkpoint::encode`].
     ///
     /// # Errors
@@ -113,7 +124,8 @@ impl Checkpoint {
         let unsigned: Vec<_> =
             exr.attributes.iter().filter(|(n, _)| n != "domelight.digest").cloned().collect();
         let mut digest = digest(&unsigned);
-        film.words().for_each(|(_, words)| digest.words(words));
+        let planes = PixelSums::WORDS.iter().filter_map(|name| plane(&exr, name));
+        planes.for_each(|words| digest.words(words.iter().copied()));
         if digest.finish().to_string() != written {
             return Err(CheckpointError::Damaged("its digest does not fit its content"));
         }

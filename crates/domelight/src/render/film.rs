@@ -1,5 +1,7 @@
 //! Sums of camera samples, pixel by pixel, and the layers that they become.
 
+use std::ops::Range;
+
 use super::RenderSettings;
 use super::tiling::Window;
 use crate::math::Vec3;
@@ -60,6 +62,11 @@ impl PixelSums {
             self.n_hits += 1;
         }
         finite
+    }
+
+    /// Adds `n` samples that saw nothing, before no background.
+    pub(super) fn add_misses(&mut self, n: u32) {
+        self.n_samples += n;
     }
 
     pub(super) fn n_samples(&self) -> u32 {
@@ -151,19 +158,46 @@ impl Layers {
         }
     }
 
-    /// Takes the pixels that have samples in a part of the picture over.
+    /// Takes the pixels that have samples in a part of the picture over; `self` is a band of its rows, of which row `y` is
+    /// the first.
     ///
     /// # Panics
-    /// If one lies outside the picture.
-    pub fn merge(&mut self, part: &Film) {
+    /// If a pixel lies beside the picture.
+    pub fn merge(&mut self, part: &Film, y: usize) {
         let (width, height) = (self.width(), self.height());
-        self.put(part, Window { x: 0, y: 0, width, height });
+        self.put(&part.pixels, part.window, Window { x: 0, y, width, height });
     }
 
-    /// Takes the pixels of `film` over that have samples; `self` is of the pixels of `window`.
-    fn put(&mut self, film: &Film, window: Window) {
-        let from = film.window;
-        for (i, p) in film.pixels.iter().enumerate().filter(|(_, p)| p.n_samples > 0) {
+    /// Some of the rows.
+    ///
+    /// # Panics
+    /// If there are no such rows.
+    #[must_use]
+    pub fn rows(&self, rows: Range<usize>) -> Self {
+        let (width, height) = (self.width(), rows.len());
+        let range = rows.start * width..rows.end * width;
+        let image =
+            |image: &RgbImage| RgbImage::new(width, height, image.pixels[range.clone()].to_vec());
+        Self {
+            color: image(&self.color),
+            alpha: self.alpha[range.clone()].to_vec(),
+            unoccluded: image(&self.unoccluded),
+            albedo: image(&self.albedo),
+            normal: self.normal[range.clone()].to_vec(),
+            depth: self.depth[range.clone()].to_vec(),
+            variance: image(&self.variance),
+            n_samples: self.n_samples[range].to_vec(),
+        }
+    }
+
+    /// Takes the pixels over that have samples, of the rows of `from` that are in `window`; `pixels` are those of `from`,
+    /// or none, and `self` is of the pixels of `window`.
+    pub(super) fn put(&mut self, pixels: &[PixelSums], from: Window, window: Window) {
+        let start = from.y.max(window.y);
+        let end = (from.y + from.height).min(window.y + window.height).max(start);
+        let inside = (start - from.y) * from.width..(end - from.y) * from.width;
+        let pixels = pixels.get(inside.clone()).unwrap_or_default().iter().zip(inside);
+        for (p, i) in pixels.filter(|(p, _)| p.n_samples > 0) {
             let (x, y) = (from.x + i % from.width, from.y + i / from.width);
             assert!(window.contains(x, y), "pixel ({x}, {y}) outside {window}");
             let i = window.index(x, y);
@@ -221,7 +255,7 @@ impl Film {
     /// The picture of the window.
     pub fn layers(&self) -> Layers {
         let mut layers = Layers::new(self.window.width, self.window.height);
-        layers.put(self, self.window);
+        layers.put(&self.pixels, self.window, self.window);
         layers
     }
 
@@ -385,7 +419,7 @@ mod tests {
         assert_eq!(Film::from_words(9, 9, window, without), None);
 
         let mut whole = Layers::new(9, 9);
-        whole.merge(&film);
+        whole.merge(&film, 0);
         let part = film.layers();
         assert_eq!(whole.n_samples[10..14], [0, 1, 2, 0]);
         assert_eq!(whole.color.pixels[11..13], part.color.pixels);

@@ -97,6 +97,11 @@ impl FilterSampler {
         Self { radius, table }
     }
 
+    /// How far positions lie outside of their pixel at the most \[pixels\].
+    pub(super) fn reach(&self) -> f32 {
+        self.radius - 0.5
+    }
+
     /// A position relative to the pixel's upper left corner \[pixels\].
     pub fn sample(&self, u: Vec2) -> Vec2 {
         vec2(self.sample_1d(u.x), self.sample_1d(u.y))

@@ -83,12 +83,36 @@ impl Default for RenderSettings {
     }
 }
 
+/// What a tile goes through in a pass, for profiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Camera rays are made and traced.
+    CameraRays,
+    /// Hits become shading points: interpolation, textures, materials.
+    Surfaces,
+    /// The strategy asks for shadow rays, and learns from the last ones.
+    Strategy,
+    /// Shadow rays are traced.
+    ShadowRays,
+    /// Samples are added to their pixels.
+    Sums,
+}
+
+impl Stage {
+    /// All, in order.
+    pub const ALL: [Self; 5] =
+        [Self::CameraRays, Self::Surfaces, Self::Strategy, Self::ShadowRays, Self::Sums];
+}
+
 /// Watches a render and may end it. Called from many threads.
 pub trait Observer: Sync {
     /// A pass over the picture begins: camera samples `samples` of each pixel.
     fn pass_started(&self, _samples: std::ops::Range<u32>) {}
 
-    /// A tile of a pass is complete.
+    /// The calling thread begins a stage of a tile.
+    fn stage_started(&self, _stage: Stage) {}
+
+    /// A tile of a pass is complete, and with it the thread's last stage.
     fn tile_finished(&self, _counts: &Counts) {}
 
     /// True ends the render: running tiles are finished, the others keep what they have.

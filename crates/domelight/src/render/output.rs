@@ -1,7 +1,11 @@
 //! A rendered picture as the layers of an OpenEXR file.
 
+use std::io::{Seek, Write};
+
 use super::Layers;
+use crate::picture::Problem;
 use crate::picture::exr::ExrLayers;
+use crate::picture::exr::bands::{self, BAND_ROWS};
 
 impl Layers {
     /// All layers in one part: the picture itself as R, G, B, A; `unoccluded`, `albedo` and
@@ -19,5 +23,20 @@ impl Layers {
         exr.push_channel("samples", "Y", n_samples.collect::<Vec<_>>());
         exr.attributes = attributes;
         exr
+    }
+
+    /// Writes the bytes of [`Layers::to_exr`] without a copy of all layers.
+    ///
+    /// # Errors
+    /// If `out` does not take them, or a name of an attribute cannot be one of OpenEXR.
+    pub fn write_exr(
+        &self,
+        attributes: &[(String, String)],
+        out: &mut (impl Write + Seek + ?Sized),
+    ) -> Result<(), Problem> {
+        bands::write(self.height(), out, |y| {
+            let rows = y..self.height().min(y + BAND_ROWS);
+            Ok(self.rows(rows).to_exr(attributes.to_vec()))
+        })
     }
 }

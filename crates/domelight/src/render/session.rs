@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::film::{Film, Misfit, PixelSums};
+use super::film::{Film, Layers, Misfit, PixelSums};
 use super::filter::FilterSampler;
 use super::tile::{Counts, Pass, Scratch, Tile};
 use super::tiling::{Tiling, Window};
@@ -102,7 +102,7 @@ impl<'a, S: Strategy> Session<'a, S> {
                     if observer.cancelled() {
                         return false;
                     }
-                    let counts = tile.render(frame, *strategy, &pass, scratch);
+                    let counts = tile.render(frame, *strategy, &pass, scratch, observer);
                     observer.tile_finished(&counts);
                     true
                 })
@@ -160,7 +160,11 @@ impl<'a, S: Strategy> Session<'a, S> {
 
     /// The picture of all tiles so far.
     pub fn rendering(&self) -> Rendering {
-        let layers = self.film().layers();
+        let window = self.tiling.window(&self.range);
+        let mut layers = Layers::new(window.width, window.height);
+        for tile in &self.tiles {
+            layers.put(&tile.pixels, tile.window, window);
+        }
         Rendering { layers, counts: self.counts(), complete: self.is_complete() }
     }
 }

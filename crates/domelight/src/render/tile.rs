@@ -3,7 +3,7 @@
 
 use super::film::{CameraSample, PixelSums, SurfaceSample};
 use super::tiling::Window;
-use super::{Background, Frame, RenderSettings, Visibility};
+use super::{Background, Frame, Observer, RenderSettings, Stage, Visibility};
 use crate::Rgb;
 use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
 use crate::math::Vec3;
@@ -17,6 +17,7 @@ const FEWEST_SAMPLES: u32 = 16;
 #[derive(Clone, Debug)]
 pub(super) struct Tile {
     pub(super) window: Window,
+    /// Empty before the first sample: of a shard's picture most tiles are others' work.
     pub(super) pixels: Vec<PixelSums>,
     pub(super) counts: Counts,
 }
@@ -24,7 +25,7 @@ pub(super) struct Tile {
 /// What was done, for the statistics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Camera rays.
+    /// Camera rays, with those of which it is known that they meet nothing.
     pub camera_rays: u64,
     /// Camera rays that hit the scene.
     pub shading_points: u64,
@@ -76,6 +77,8 @@ pub(super) struct Pass<S: Strategy> {
 struct Batch {
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
+    /// Of each pixel that may see something, the first of its rays.
+    first_ray: Vec<Option<usize>>,
     points: Vec<ShadingPoint>,
     samples: Vec<u32>,
     pixels: Vec<PixelPoints>,
@@ -97,13 +100,12 @@ struct ShadowRays {
 impl Tile {
     /// Without samples.
     pub(super) fn new(window: Window) -> Self {
-        let pixels = vec![PixelSums::default(); window.area()];
-        Self { window, pixels, counts: Counts::default() }
+        Self { window, pixels: Vec::new(), counts: Counts::default() }
     }
 
     /// Camera samples of each pixel.
     pub(super) fn n_samples(&self) -> u32 {
-        self.pixels[0].n_samples()
+        self.pixels.first().map_or(0, PixelSums::n_samples)
     }
 
     /// Has all samples, or as few as the error allows: a decision that no other tile has a part in.
@@ -126,18 +128,23 @@ impl Tile {
         strategy: &S,
         pass: &Pass<S>,
         scratch: &mut Scratch<S>,
+        observer: &impl Observer,
     ) -> Counts {
         let Scratch { batch, of_strategy } = scratch;
+        self.pixels.resize(self.window.area(), PixelSums::default());
+        observer.stage_started(Stage::CameraRays);
         self.trace_camera_rays(frame, &pass.samples, batch);
-        batch.gather_points(frame, pass.samples.len());
+        observer.stage_started(Stage::Surfaces);
+        batch.gather_points(frame, &pass.samples);
         let mut counts = Counts {
-            camera_rays: batch.rays.len() as u64,
+            camera_rays: (self.pixels.len() * pass.samples.len()) as u64,
             shading_points: batch.points.len() as u64,
             ..Counts::default()
         };
-        let (shared, width) = (&pass.shared, self.window.width);
-        counts.shadow_rays = batch.trace_strategy(frame, strategy, shared, of_strategy, width);
-        counts.non_finite = self.add_samples(frame, batch);
+        let asked = Asked { frame, strategy, pass: &pass.shared, width: self.window.width };
+        counts.shadow_rays = batch.trace_strategy(&asked, of_strategy, observer);
+        observer.stage_started(Stage::Sums);
+        counts.non_finite = self.add_samples(frame, &pass.samples, batch);
         self.counts += counts;
         counts
     }
@@ -148,46 +155,103 @@ impl Tile {
         samples: &std::ops::Range<u32>,
         scratch: &mut Batch,
     ) {
-        scratch.rays.clear();
-        scratch.pixels.clear();
-        for i in 0..self.pixels.len() {
-            let Window { x, y, width, .. } = self.window;
-            let (x, y) = (x + i % width, y + i / width);
-            let pixel = (y * frame.settings.width + x) as u64;
-            let stream = Stream::new(frame.settings.sampler, frame.settings.seed, pixel);
-            for sample in samples.clone() {
-                let u = stream.numbers(Dimension::Film, sample).u();
-                let at = frame.filter.sample(u);
-                scratch.rays.push(frame.camera.ray(x as f32 + at.x, y as f32 + at.y));
+        let Batch { rays, hits, first_ray, pixels, .. } = scratch;
+        rays.clear();
+        pixels.clear();
+        first_ray.clear();
+        first_ray.resize(self.pixels.len(), None);
+        self.find_seen(frame, self.window, first_ray);
+        for (i, first) in first_ray.iter_mut().enumerate() {
+            let (x, y) = self.position(i);
+            let stream = self.stream(frame, i);
+            if first.is_some() {
+                *first = Some(rays.len());
+                rays.extend(samples.clone().map(|sample| camera_ray(frame, x, y, stream, sample)));
             }
+            let (points, one_material) = (0..0, true);
             let n_samples = samples.len() as u32;
-            scratch.pixels.push(PixelPoints { points: 0..0, n_samples, stream });
+            pixels.push(PixelPoints { points, n_samples, stream, one_material });
         }
-        scratch.samples.clear();
-        scratch.samples.extend(samples.clone());
-        frame.scene.bvh().closest_hits(&scratch.rays, &mut scratch.hits);
+        frame.scene.bvh().closest_hits(rays, hits);
+    }
+
+    /// Marks the pixels of a part of the tile that may see something.
+    fn find_seen(&self, frame: &Frame, part: Window, seen: &mut [Option<usize>]) {
+        /// Parts no larger than this are not divided further \[pixels\].
+        const SMALL: usize = 4;
+        let reach = frame.filter.reach() + 0.01;
+        let span = |start: usize, n: usize| [start as f32 - reach, (start + n) as f32 + reach];
+        let Window { x, y, width, height } = part;
+        let frustum = frame.camera.frustum(span(x, width), span(y, height));
+        if !frame.scene.bvh().may_hit(&frustum) {
+            return;
+        }
+        if width.max(height) > SMALL {
+            part.quarters().for_each(|quarter| self.find_seen(frame, quarter, seen));
+            return;
+        }
+        for y in y - self.window.y..y - self.window.y + height {
+            let start = y * self.window.width + x - self.window.x;
+            seen[start..start + width].fill(Some(0));
+        }
+    }
+
+    /// Where pixel `i` is in the picture.
+    fn position(&self, i: usize) -> (usize, usize) {
+        let Window { x, y, width, .. } = self.window;
+        (x + i % width, y + i / width)
+    }
+
+    /// The uniform numbers of pixel `i`.
+    fn stream(&self, frame: &Frame, i: usize) -> Stream {
+        let (x, y) = self.position(i);
+        let pixel = (y * frame.settings.width + x) as u64;
+        Stream::new(frame.settings.sampler, frame.settings.seed, pixel)
     }
 
     /// Adds each camera sample to its pixel, in order.
-    fn add_samples(&mut self, frame: &Frame, scratch: &Batch) -> u64 {
+    fn add_samples(
+        &mut self,
+        frame: &Frame,
+        samples: &std::ops::Range<u32>,
+        scratch: &Batch,
+    ) -> u64 {
         let mut non_finite = 0;
         let mut point = 0;
-        let mut ray = 0;
-        for (sums, pixel) in self.pixels.iter_mut().zip(&scratch.pixels) {
-            for _ in 0..pixel.n_samples {
-                let sample = match scratch.hits[ray] {
-                    Some(hit) => {
+        for i in 0..self.pixels.len() {
+            let (x, y) = self.position(i);
+            let stream = scratch.pixels[i].stream;
+            let shown = frame.settings.background == Background::Shown;
+            let first = scratch.first_ray[i];
+            if first.is_none() && !shown {
+                self.pixels[i].add_misses(samples.len() as u32);
+                continue;
+            }
+            for (s, sample) in samples.clone().enumerate() {
+                let ray = first.map(|first| first + s);
+                let sample = match ray.map(|ray| (&scratch.rays[ray], scratch.hits[ray])) {
+                    Some((ray, Some(hit))) => {
                         point += 1;
-                        scratch.surface_sample(frame, point - 1, &scratch.rays[ray], &hit)
+                        scratch.surface_sample(frame, point - 1, ray, &hit)
                     }
-                    None => background_sample(frame, scratch.rays[ray].direction),
+                    Some((ray, None)) => background_sample(frame, ray.direction),
+                    None => {
+                        let ray = camera_ray(frame, x, y, stream, sample);
+                        background_sample(frame, ray.direction)
+                    }
                 };
-                non_finite += u64::from(!sums.add(&sample));
-                ray += 1;
+                non_finite += u64::from(!self.pixels[i].add(&sample));
             }
         }
         non_finite
     }
+}
+
+/// Camera sample `sample` of the pixel at (`x`, `y`).
+#[inline]
+fn camera_ray(frame: &Frame, x: usize, y: usize, stream: Stream, sample: u32) -> Ray {
+    let at = frame.filter.sample(stream.numbers(Dimension::Film, sample).u());
+    frame.camera.ray(x as f32 + at.x, y as f32 + at.y)
 }
 
 fn background_sample(frame: &Frame, direction: Vec3) -> CameraSample {
@@ -202,35 +266,39 @@ fn background_sample(frame: &Frame, direction: Vec3) -> CameraSample {
 
 impl Batch {
     /// Turns hits into shading points, grouped by pixel.
-    fn gather_points(&mut self, frame: &Frame, n_samples: usize) {
-        let first_sample = self.samples.first().copied().unwrap_or(0);
+    fn gather_points(&mut self, frame: &Frame, samples: &std::ops::Range<u32>) {
         self.points.clear();
         self.origins.clear();
         self.samples.clear();
         for (i, pixel) in self.pixels.iter_mut().enumerate() {
             let start = self.points.len();
-            for s in 0..n_samples {
-                let ray = i * n_samples + s;
+            let (mut surface, mut one_material) = (None, true);
+            let rays = self.first_ray[i].map_or(0..0, |first| first..first + samples.len());
+            for (ray, sample) in rays.zip(samples.clone()) {
                 if let Some(hit) = &self.hits[ray] {
                     let point = frame.scene.shading_point(&self.rays[ray], hit);
+                    let plain = frame.scene.plain_surface(hit.triangle);
+                    let known = self.points.len() == start || plain == surface;
+                    one_material &= known && plain.is_some();
+                    surface = plain;
                     self.origins.push(offset_origin(point.position, point.ng, frame.extent));
                     self.points.push(point);
-                    self.samples.push(first_sample + s as u32);
+                    self.samples.push(sample);
                 }
             }
             pixel.points = start..self.points.len();
+            pixel.one_material = one_material;
         }
     }
 
     /// Runs the strategy's rounds; returns the number of shadow rays.
     fn trace_strategy<S: Strategy>(
         &mut self,
-        frame: &Frame,
-        strategy: &S,
-        pass: &S::Pass,
+        asked: &Asked<S>,
         scratch: &mut S::Scratch,
-        width: usize,
+        observer: &impl Observer,
     ) -> u64 {
+        let &Asked { frame, strategy, pass, width } = asked;
         let n = self.points.len();
         self.radiance.clear();
         self.radiance.resize(n, Rgb::BLACK);
@@ -238,6 +306,7 @@ impl Batch {
         self.unoccluded.resize(n, Rgb::BLACK);
         let mut n_rays = 0;
         for round in 0.. {
+            observer.stage_started(Stage::Strategy);
             let tile = TileShading {
                 points: &self.points,
                 samples: &self.samples,
@@ -248,7 +317,9 @@ impl Batch {
             let more = strategy.push(pass, &tile, round, scratch, &mut self.round.asked);
             n_rays += self.round.asked.len() as u64;
 
+            observer.stage_started(Stage::ShadowRays);
             self.round.trace(frame, &self.points, &self.origins);
+            observer.stage_started(Stage::Strategy);
 
             // base + Σ weight · V
             for (i, &base) in self.round.asked.base.iter().enumerate() {
@@ -283,6 +354,15 @@ impl Batch {
             }),
         }
     }
+}
+
+/// Of whom a tile's shadow rays are asked.
+struct Asked<'a, S: Strategy> {
+    frame: &'a Frame<'a>,
+    strategy: &'a S,
+    pass: &'a S::Pass,
+    /// Pixels in a row of the tile.
+    width: usize,
 }
 
 impl ShadowRays {

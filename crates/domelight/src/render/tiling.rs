@@ -25,6 +25,17 @@ impl Window {
         self.width * self.height
     }
 
+    /// The quarters that have pixels.
+    pub(super) fn quarters(self) -> impl Iterator<Item = Self> {
+        let halves = |start: usize, n: usize| [(start, n / 2), (start + n / 2, n - n / 2)];
+        let rows = halves(self.y, self.height);
+        let windows = rows.into_iter().flat_map(move |(y, height)| {
+            let columns = halves(self.x, self.width).into_iter();
+            columns.map(move |(x, width)| Self { x, y, width, height })
+        });
+        windows.filter(|window| window.area() > 0)
+    }
+
     /// Whether a pixel of the picture lies within.
     pub(super) fn contains(&self, x: usize, y: usize) -> bool {
         (self.x..self.x + self.width).contains(&x) && (self.y..self.y + self.height).contains(&y)

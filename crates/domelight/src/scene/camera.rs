@@ -9,6 +9,7 @@
 //! so pixel centres lie at +½, pixels are square and `fov` is the vertical field of view. The
 //! orthographic camera moves the origin instead, with height/2 in the place of tan(fov/2).
 
+use crate::bvh::Frustum;
 use crate::geometry::{Aabb, Ray};
 use crate::math::{Mat4, Vec3};
 
@@ -208,6 +209,18 @@ impl Camera {
             Ray::new(self.origin + step, self.direction)
         } else {
             Ray::new(self.origin, (self.direction + step).normalize())
+        }
+    }
+
+    /// What the rays see through the rectangle of the picture from (`x[0]`, `y[0]`) to
+    /// (`x[1]`, `y[1]`) \[pixels\].
+    pub fn frustum(&self, x: [f32; 2], y: [f32; 2]) -> Frustum {
+        let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
+        let steps = corners.map(|[x, y]| x * self.step_x + y * self.step_y);
+        if self.orthographic {
+            Frustum::new(steps.map(|step| self.origin + step), [self.direction; 4])
+        } else {
+            Frustum::new([self.origin; 4], steps.map(|step| self.direction + step))
         }
     }
 

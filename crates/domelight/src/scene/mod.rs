@@ -20,7 +20,7 @@ pub use crate::environment::UpAxis;
 pub use camera::{Camera, CameraError, CameraSettings, Projection};
 pub use description::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription};
 #[cfg(feature = "io")]
-pub use load::{LoadError, Loaded, load};
+pub use load::{LoadError, Loaded, load, load_within};
 pub use surface::{MetallicRoughnessSurface, NormalMap, PhongSurface, Surface, SurfaceModel};
 pub use texture::{Encoding, Texture, TextureError, TextureRef, UvTransform, Wrap};
 
@@ -117,6 +117,15 @@ impl Scene {
     /// How many triangles all meshes have together.
     pub fn triangle_count(&self) -> usize {
         self.parts.iter().map(|p| p.mesh.triangles.len()).sum()
+    }
+
+    /// The surface that a triangle has, if its material is the same all over.
+    #[inline]
+    pub(crate) fn plain_surface(&self, triangle: u32) -> Option<usize> {
+        let (part, _) = self.locate(triangle);
+        let mut textures = self.surfaces[part.surface].textures();
+        let plain = textures.next().is_none() && part.mesh.colors.is_empty();
+        plain.then_some(part.surface)
     }
 
     /// The part that a triangle of the hierarchy belongs to, and the triangle's index in its mesh.

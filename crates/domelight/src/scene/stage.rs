@@ -39,6 +39,15 @@ impl SceneDescription {
         }
     }
 
+    /// Removes the scenery, unless there is nothing else.
+    pub fn remove_scenery(&mut self) {
+        let scenery = std::mem::take(&mut self.scenery);
+        if scenery.len() < self.parts.len() {
+            let mut index = 0..;
+            self.parts.retain(|_| index.next().is_some_and(|i| !scenery.contains(&i)));
+        }
+    }
+
     /// Puts a diffuse disk of reflectance 0.5 under the scene, facing `up`, five times as wide as
     /// the subject's longest extent. An empty scene gets none.
     pub fn add_ground(&mut self, up: Vec3) {
@@ -111,5 +120,16 @@ mod tests {
         scene.add_ground(Vec3::Y);
         scene.set_subject_material(Material::BLACK);
         assert_eq!((scene.parts[0].surface, scene.parts[1].surface), (2, 1));
+    }
+
+    #[test]
+    fn scenery_goes_but_not_all_that_there_is() {
+        let mut scene = ball();
+        scene.add_ground(Vec3::Y);
+        scene.remove_scenery();
+        assert_eq!(scene.parts.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), ["ball"]);
+        scene.scenery = vec![0];
+        scene.remove_scenery();
+        assert_eq!(scene.parts.len(), 1);
     }
 }

@@ -34,10 +34,11 @@ pub use sir::{
 };
 
 use crate::Rgb;
-use crate::bsdf::{Brdf, LANES, Material, ValueBlock, VecBlock};
+use crate::bsdf::{Brdf, Material};
 use crate::math::{Frame, Vec2, Vec3};
 use crate::sampling::stream::Numbers;
 use crate::sampling::{Dimension, Pcg32, Stream};
+use crate::simd::{Colors, Real, Vectors};
 
 /// Where a camera ray met an opaque surface.
 #[derive(Clone, Copy, Debug)]
@@ -73,21 +74,19 @@ impl ShadingPoint {
         self.material.eval_pdf(self.wo, self.frame.to_local(wi))
     }
 
-    /// [`ShadingPoint::eval_pdf`] of a block of world directions.
+    /// [`ShadingPoint::eval_pdf`] of world directions side by side, of another material.
     #[inline(always)]
-    pub fn eval_pdf_block(&self, wi: &VecBlock) -> ValueBlock {
+    pub(crate) fn eval_lanes<F: Real>(
+        &self,
+        material: &Material,
+        wi: Vectors<F>,
+    ) -> (Colors<F>, F) {
         let Frame { x, y, z } = self.frame;
-        let local = VecBlock { x: wi.dot(x), y: wi.dot(y), z: wi.dot(z) };
-        let mut block = self.material.eval_pdf_block(self.wo, &local);
-        let above = wi.dot(self.ng);
-        for lane in 0..LANES {
-            let keep = above[lane] > 0.0;
-            for channel in &mut block.value {
-                channel[lane] = if keep { channel[lane] } else { 0.0 };
-            }
-            block.pdf[lane] = if keep { block.pdf[lane] } else { 0.0 };
-        }
-        block
+        let local = Vectors { x: wi.dot(x), y: wi.dot(y), z: wi.dot(z) };
+        let (value, pdf) = material.eval_lanes(Vectors::splat(wi.x, self.wo), local);
+        let zero = pdf.splat(0.0);
+        let above = zero.lt(wi.dot(self.ng));
+        (value.map(|c| F::select(above, c, zero)), F::select(above, pdf, zero))
     }
 
     /// Draws a world direction from the material; none is a sample of value zero.
@@ -216,6 +215,9 @@ pub struct PixelPoints {
     pub n_samples: u32,
     /// The pixel's uniform numbers.
     pub stream: Stream,
+    /// All show one surface without textures: their materials differ in no more than what
+    /// [`Material::for_view`] makes of them.
+    pub one_material: bool,
 }
 
 /// Whether a strategy wants another round.

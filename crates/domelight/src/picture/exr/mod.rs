@@ -1,8 +1,10 @@
 //! OpenEXR: reads one layer of any flat file, writes several layers into one part.
 
+pub mod bands;
 mod read;
 mod read_layers;
 mod write;
 
 pub use read::decode;
+pub(crate) use read::texels;
 pub use write::{Compression, ExrLayers, Layer, Plane, text_attributes};

@@ -78,7 +78,19 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Proble
     Ok(Picture { image: image.0, alpha: image.1, envmap, format: Format::Exr })
 }
 
+/// How many texels the largest part has.
+pub(crate) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
+    guarded(|| {
+        let reader = open(bytes)?;
+        let areas = reader.headers().iter().map(|header| header.layer_size.area());
+        Ok(areas.max().unwrap_or(0))
+    })
+}
+
 pub(super) fn open(bytes: &[u8]) -> Result<Reader<Cursor<&[u8]>>, Problem> {
+    if bytes.is_empty() {
+        return Err(Problem::NoBytes);
+    }
     let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(Problem::Exr)?;
     for header in reader.headers() {
         check_promises(header, bytes.len() as u64)?;

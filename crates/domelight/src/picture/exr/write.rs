@@ -7,17 +7,12 @@ use crate::environment::mapping::EnvmapKind;
 use crate::picture::{Problem, checked_area};
 use crate::{Rgb, RgbImage};
 use ::exr::block;
-use ::exr::block::lines::LineRefMut;
-use ::exr::image::write::samples::{SamplesWriter, WritableSamples};
-use ::exr::math::RoundingMode;
 use ::exr::meta::attribute::EnvironmentMap;
-use ::exr::meta::attribute::LevelMode;
 use ::exr::meta::header::Header;
-use ::exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Encoding, Image, IntegerBounds, LayerAttributes,
-    SampleType, SmallVec, Text, Vec2, WritableImage,
-};
+use ::exr::prelude::{AttributeValue, ImageAttributes, IntegerBounds, LayerAttributes, Text, Vec2};
 use std::io::Cursor;
+
+use super::bands;
 
 /// Channels that belong together, such as `albedo` with R, G and B.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,45 +44,6 @@ impl Plane {
     /// No values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
-    }
-}
-
-/// What the encoder takes a channel's values from.
-#[derive(Clone, Copy)]
-struct Rows<'p> {
-    plane: &'p Plane,
-    width: usize,
-}
-
-impl<'s, 'p: 's> WritableSamples<'s> for Rows<'p> {
-    type Writer = Rows<'s>;
-
-    fn sample_type(&self) -> SampleType {
-        match self.plane {
-            Plane::Float(_) => SampleType::F32,
-            Plane::Uint(_) => SampleType::U32,
-        }
-    }
-
-    fn infer_level_modes(&self) -> (LevelMode, RoundingMode) {
-        (LevelMode::Singular, RoundingMode::Down)
-    }
-
-    fn create_samples_writer(&'s self, _: &Header) -> Rows<'s> {
-        *self
-    }
-}
-
-impl SamplesWriter for Rows<'_> {
-    fn extract_line(&self, line: LineRefMut<'_>) {
-        let place = line.location;
-        let start = place.position.1 * self.width + place.position.0;
-        let range = start..start + place.sample_count;
-        let written = match self.plane {
-            Plane::Float(values) => line.write_samples_from_slice(&values[range]),
-            Plane::Uint(values) => line.write_samples_from_slice(&values[range]),
-        };
-        written.expect("a line in memory has room");
     }
 }
 
@@ -179,48 +135,36 @@ impl ExrLayers {
     /// If there are no texels or no channels, two channels have one name, a name is not ASCII or too long, or a
     /// channel has not `width · height` values.
     pub fn encode(&self) -> Result<Vec<u8>, Problem> {
+        let mut bytes = Cursor::new(Vec::new());
+        bands::write(self.height, &mut bytes, |_| Ok::<_, Problem>(self))?;
+        Ok(bytes.into_inner())
+    }
+
+    /// The channels by their full names, in the order of a file: by name.
+    pub(super) fn sorted_planes(&self) -> Result<Vec<(String, &Plane)>, Problem> {
         let area = checked_area(self.width, self.height)?;
-        let mut names = std::collections::BTreeSet::new();
-        let mut list = SmallVec::new();
-        for (layer, channel, values) in self.planes() {
+        let full_name = |(layer, channel, values): (&str, &String, _)| {
             let name =
                 if layer.is_empty() { channel.clone() } else { format!("{layer}.{channel}") };
-            let refuse = |why| Err(Problem::Channel { channel: name.clone(), why });
+            (name, values)
+        };
+        let mut planes: Vec<(String, &Plane)> = self.planes().map(full_name).collect();
+        planes.sort_by(|a, b| a.0.cmp(&b.0));
+        let refuse = |channel: &str, why| Err(Problem::Channel { channel: channel.into(), why });
+        for (name, values) in &planes {
             if !name.is_ascii() || name.is_empty() || name.len() > 255 {
-                return refuse("its name must be ASCII and 1 to 255 characters long");
+                return refuse(name, "its name must be ASCII and 1 to 255 characters long");
             } else if values.len() != area {
-                return refuse("it has not one value for each texel");
-            } else if !names.insert(name.clone()) {
-                return refuse("another channel has the same name");
+                return refuse(name, "it has not one value for each texel");
             }
-            list.push(AnyChannel::new(
-                Text::from(name.as_str()),
-                Rows { plane: values, width: self.width },
-            ));
         }
-        if list.is_empty() {
+        if let Some(pair) = planes.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            return refuse(&pair[0].0, "another channel has the same name");
+        }
+        if planes.is_empty() {
             return Err(Problem::NoColor { present: Vec::new() });
         }
-        let size = (self.width, self.height);
-        let compression = match self.compression {
-            Compression::Zip => ::exr::prelude::Compression::ZIP16,
-            Compression::Rle => ::exr::prelude::Compression::RLE,
-        };
-        let layer = ::exr::prelude::Layer::new(
-            size,
-            self.layer_attributes(),
-            Encoding { compression, ..Encoding::SMALL_LOSSLESS },
-            AnyChannels::sort(list),
-        );
-        let mut image = Image::from_layer(layer);
-        if let Some((width, height)) = self.whole {
-            image.attributes.display_window = IntegerBounds::from_dimensions((width, height));
-        }
-        let mut bytes = Cursor::new(Vec::new());
-        image.write().to_buffered(&mut bytes).map_err(Problem::Exr)?;
-        let mut bytes = bytes.into_inner();
-        sort_attributes(&mut bytes);
-        Ok(bytes)
+        Ok(planes)
     }
 
     fn planes(&self) -> impl Iterator<Item = (&str, &String, &Plane)> {
@@ -229,7 +173,13 @@ impl ExrLayers {
         })
     }
 
-    fn layer_attributes(&self) -> LayerAttributes {
+    /// The size of the whole picture, of which `self` may be a band.
+    pub(super) fn image_attributes(&self, height: usize) -> ImageAttributes {
+        let whole = self.whole.unwrap_or((self.width, height));
+        ImageAttributes::new(IntegerBounds::from_dimensions(whole))
+    }
+
+    pub(super) fn layer_attributes(&self) -> LayerAttributes {
         let text = |text: &str| Text::from_slice_unchecked(text.as_bytes());
         let mut attributes = LayerAttributes {
             software_name: Some(text("domelight")),
@@ -249,7 +199,7 @@ impl ExrLayers {
 
 /// Puts the header's attributes in the order of their names, as OpenEXR itself does: the encoder keeps some in a hash
 /// map, whose order changes from run to run, and the same picture should give the same bytes.
-fn sort_attributes(bytes: &mut [u8]) {
+pub(super) fn sort_attributes(bytes: &mut [u8]) {
     const MAGIC_AND_VERSION: usize = 8;
     let mut attributes = Vec::new();
     let mut rest = bytes.get(MAGIC_AND_VERSION..).unwrap_or_default();

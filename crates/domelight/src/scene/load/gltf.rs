@@ -21,7 +21,7 @@ use gltf::mesh::{Mode, Semantic};
 use gltf::texture::WrappingMode;
 
 use super::textures::Textures;
-use super::{LoadError, Loaded, read_referenced, relative};
+use super::{Budget, LoadError, Loaded, read_referenced, relative};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Mat4, Vec2, Vec3, Vec4};
@@ -178,7 +178,7 @@ const HANDLED_EXTENSIONS: [&str; 2] = ["KHR_texture_transform", "KHR_materials_e
 /// The most values of sparse accessors that nothing in the file backs, all meshes and their instances together.
 const MAX_ZEROS: usize = 1 << 24;
 
-pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
+pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
     let (document, blob) = parse(bytes)
         .map_err(|problem| LoadError::Gltf { path: path.into(), problem: Box::new(problem) })?;
     let mut reader = Reader {
@@ -188,7 +188,8 @@ pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
         zeros_left: Cell::new(MAX_ZEROS),
         visited: vec![false; document.nodes().len()],
         images: HashMap::new(),
-        textures: Textures::default(),
+        textures: Textures::new(budget),
+        budget,
         surfaces: Vec::new(),
         surface_of: HashMap::new(),
         parts: Vec::new(),
@@ -260,7 +261,8 @@ struct Reader<'a> {
     visited: Vec<bool>,
     /// Textures by image index.
     images: HashMap<(usize, Encoding), usize>,
-    textures: Textures,
+    textures: Textures<'a>,
+    budget: &'a Budget,
     surfaces: Vec<Surface>,
     /// Surfaces and the set of texture coordinates by material index.
     surface_of: HashMap<Option<usize>, (usize, u32)>,
@@ -285,13 +287,13 @@ impl<'a> Reader<'a> {
         let description = SceneDescription {
             parts: self.parts,
             surfaces: self.surfaces,
-            textures: self.textures.textures,
+            textures: self.textures.loaded,
             camera: self.camera,
             environment: None,
             up: Some(UpAxis::Y),
             scenery: Vec::new(),
         };
-        Loaded { description, warnings: self.warnings }
+        Loaded { description, warnings: self.warnings, memory: 0 }
     }
 
     fn read_buffers(&mut self, blob: Option<&[u8]>) -> Result<(), LoadError> {
@@ -331,7 +333,7 @@ impl<'a> Reader<'a> {
             return Err(self.error(GltfProblem::Uri { what, index, uri }));
         }
         let referrer = format!("{}, {what} {index},", self.path.display());
-        read_referenced(&relative(self.path, &percent_decoded(uri)), &referrer)
+        read_referenced(&relative(self.path, &percent_decoded(uri)), &referrer, self.budget)
     }
 
     /// The bytes of a buffer view.
@@ -372,6 +374,7 @@ impl<'a> Reader<'a> {
                 self.warn("points and lines are not rendered");
                 continue;
             }
+            self.take_memory(mesh.index(), &primitive)?;
             let (surface, uv_set) = self.surface(&primitive.material())?;
             let mut geometry = self
                 .geometry(mesh.index(), &primitive, uv_set)
@@ -381,6 +384,19 @@ impl<'a> Reader<'a> {
             self.parts.push(Part { name, mesh: geometry, surface });
         }
         Ok(())
+    }
+
+    /// What a mesh takes by the counts of its accessors, for each of the nodes that show it.
+    fn take_memory(&self, mesh: usize, primitive: &gltf::Primitive<'a>) -> Result<(), LoadError> {
+        // Values are read as four floats, and kept as two to four.
+        const VALUE: u64 = 16 + 16;
+        // An index, and a triangle for each in a strip.
+        const INDEX: u64 = 4 + 12;
+        let values: u64 = primitive.attributes().map(|(_, a)| a.count() as u64 * VALUE).sum();
+        let vertices = primitive.get(&Semantic::Positions).map_or(0, |a| a.count());
+        let indices = primitive.indices().map_or(vertices, |a| a.count()) as u64;
+        let bytes = values.saturating_add(indices.saturating_mul(INDEX));
+        self.budget.take(&format!("{}, mesh {mesh}", self.path.display()), bytes)
     }
 
     fn geometry(

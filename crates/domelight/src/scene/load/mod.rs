@@ -11,6 +11,7 @@
 //! Every loader checks what it reads before it takes memory for it; bad input is a [`LoadError`]
 //! that names the file and the place, never a panic.
 
+mod budget;
 mod gltf;
 mod mtl;
 mod obj;
@@ -28,6 +29,8 @@ pub use ply::{PlyPlace, PlyProblem};
 pub use toml::TomlProblem;
 
 use super::SceneDescription;
+use crate::memory::OverLimit;
+use budget::Budget;
 
 /// A scene from a file, and what the loader passed over.
 #[derive(Clone, Debug, Default)]
@@ -36,6 +39,8 @@ pub struct Loaded {
     pub description: SceneDescription,
     /// What the picture will lack, one sentence each.
     pub warnings: Vec<String>,
+    /// An estimate of the memory that loading took, in bytes.
+    pub memory: u64,
 }
 
 /// Why a file makes no scene.
@@ -70,6 +75,14 @@ pub enum LoadError {
         referrer: String,
         /// What the decoder says.
         source: image::ImageError,
+    },
+    /// A file that takes more memory than is allowed.
+    #[error("{file}: {source}")]
+    Memory {
+        /// The file, or its place in another one.
+        file: String,
+        /// How much.
+        source: OverLimit,
     },
     /// Neither content nor extension is known.
     #[error(
@@ -130,24 +143,39 @@ pub enum LoadError {
 /// # Errors
 /// A [`LoadError`] that names the file and the place.
 pub fn load(path: impl AsRef<Path>) -> Result<Loaded, LoadError> {
+    load_within(path, None)
+}
+
+/// As [`load`], with a limit on what its meshes and textures together take of the memory \[bytes\].
+///
+/// # Errors
+/// As [`load`]; a file that would exceed the limit is refused before the memory is taken.
+pub fn load_within(path: impl AsRef<Path>, max_memory: Option<u64>) -> Result<Loaded, LoadError> {
     let path = path.as_ref();
-    load_bytes(path, &read(path)?, false)
+    let budget = &Budget::new(max_memory);
+    let loaded = load_bytes(path, &read(path, budget)?, false, budget)?;
+    Ok(Loaded { memory: budget.taken(), ..loaded })
 }
 
 /// Loads what is no scene file, for a scene file that refers to it.
-fn load_mesh(path: &Path, referrer: &str) -> Result<Loaded, LoadError> {
-    load_bytes(path, &read_referenced(path, referrer)?, true)
+fn load_mesh(path: &Path, referrer: &str, budget: &Budget) -> Result<Loaded, LoadError> {
+    load_bytes(path, &read_referenced(path, referrer, budget)?, true, budget)
 }
 
-fn load_bytes(path: &Path, bytes: &[u8], mesh_only: bool) -> Result<Loaded, LoadError> {
+fn load_bytes(
+    path: &Path,
+    bytes: &[u8],
+    mesh_only: bool,
+    budget: &Budget,
+) -> Result<Loaded, LoadError> {
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     let loaded = match extension.to_str() {
-        _ if bytes.starts_with(b"ply") => ply::load(path, bytes)?,
-        _ if bytes.starts_with(b"glTF") => gltf::load(path, bytes)?,
-        Some("ply") => ply::load(path, bytes)?,
-        Some("gltf" | "glb") => gltf::load(path, bytes)?,
-        Some("obj") => obj::load(path, bytes)?,
-        Some("toml") if !mesh_only => toml::load(path, bytes)?,
+        _ if bytes.starts_with(b"ply") => ply::load(path, bytes, budget)?,
+        _ if bytes.starts_with(b"glTF") => gltf::load(path, bytes, budget)?,
+        Some("ply") => ply::load(path, bytes, budget)?,
+        Some("gltf" | "glb") => gltf::load(path, bytes, budget)?,
+        Some("obj") => obj::load(path, bytes, budget)?,
+        Some("toml") if !mesh_only => toml::load(path, bytes, budget)?,
         _ => return Err(LoadError::UnknownFormat { path: path.into() }),
     };
     if loaded.description.parts.iter().all(|p| p.mesh.triangles.is_empty()) {
@@ -156,12 +184,12 @@ fn load_bytes(path: &Path, bytes: &[u8], mesh_only: bool) -> Result<Loaded, Load
     Ok(loaded)
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
-    read_plain(path).map_err(|source| LoadError::Read { path: path.into(), source })
+fn read(path: &Path, budget: &Budget) -> Result<Vec<u8>, LoadError> {
+    read_plain(path, budget, |source| LoadError::Read { path: path.into(), source })
 }
 
-fn read_referenced(path: &Path, referrer: &str) -> Result<Vec<u8>, LoadError> {
-    read_plain(path).map_err(|source| LoadError::ReadReferenced {
+fn read_referenced(path: &Path, referrer: &str, budget: &Budget) -> Result<Vec<u8>, LoadError> {
+    read_plain(path, budget, |source| LoadError::ReadReferenced {
         path: path.into(),
         referrer: referrer.into(),
         source,
@@ -169,11 +197,20 @@ fn read_referenced(path: &Path, referrer: &str) -> Result<Vec<u8>, LoadError> {
 }
 
 /// The bytes of a plain file: a device or a pipe might never end.
-fn read_plain(path: &Path) -> io::Result<Vec<u8>> {
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a plain file"));
+fn read_plain(
+    path: &Path,
+    budget: &Budget,
+    error: impl Fn(io::Error) -> LoadError,
+) -> Result<Vec<u8>, LoadError> {
+    let metadata = fs::metadata(path).map_err(&error)?;
+    if metadata.is_dir() {
+        return Err(error(io::ErrorKind::IsADirectory.into()));
     }
-    fs::read(path)
+    if !metadata.is_file() {
+        return Err(error(io::Error::new(io::ErrorKind::InvalidInput, "it is not a plain file")));
+    }
+    budget.take(&path.display().to_string(), metadata.len())?;
+    fs::read(path).map_err(error)
 }
 
 /// The name of a file without folder and extension.

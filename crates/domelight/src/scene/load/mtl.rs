@@ -33,7 +33,7 @@ struct Entry {
 pub(super) fn parse(
     path: &Path,
     bytes: &[u8],
-    textures: &mut Textures,
+    textures: &mut Textures<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Surface>, LoadError> {
     let mut entries: Vec<Entry> = Vec::new();

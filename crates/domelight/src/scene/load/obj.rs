@@ -14,7 +14,7 @@ use std::path::Path;
 
 use super::ply::DEFAULT_ALBEDO;
 use super::textures::Textures;
-use super::{LoadError, Loaded, mtl, stem};
+use super::{Budget, LoadError, Loaded, mtl, stem};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
@@ -75,8 +75,13 @@ pub enum ObjProblem {
     },
 }
 
-pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
-    let mut reader = Reader::new(path);
+/// Memory of a mesh for each byte of its text: a corner of a face is some 3 to 10 bytes, and takes 20 while it is read and
+/// up to 32 as a vertex.
+const MEMORY_PER_BYTE: u64 = 8;
+
+pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
+    budget.take(&path.display().to_string(), MEMORY_PER_BYTE * bytes.len() as u64)?;
+    let mut reader = Reader::new(path, budget);
     for (index, line) in bytes.split(|&b| b == b'\n').enumerate() {
         let text = String::from_utf8_lossy(line);
         reader.line(index + 1, &text)?;
@@ -109,12 +114,12 @@ struct Reader<'a> {
     normals: Vec<Vec3>,
     groups: Vec<Group>,
     surfaces: Vec<Surface>,
-    textures: Textures,
+    textures: Textures<'a>,
     warnings: Vec<String>,
 }
 
 impl<'a> Reader<'a> {
-    fn new(path: &'a Path) -> Self {
+    fn new(path: &'a Path, budget: &'a Budget) -> Self {
         Self {
             path,
             positions: Vec::new(),
@@ -123,7 +128,7 @@ impl<'a> Reader<'a> {
             normals: Vec::new(),
             groups: vec![Group { name: stem(path), ..Group::default() }],
             surfaces: Vec::new(),
-            textures: Textures::default(),
+            textures: Textures::new(budget),
             warnings: Vec::new(),
         }
     }
@@ -216,17 +221,18 @@ impl<'a> Reader<'a> {
     /// Reads a material library; one that is missing is a warning.
     fn library(&mut self, line: usize, name: &str) -> Result<(), LoadError> {
         let path = super::relative(self.path, name);
-        match super::read_plain(&path) {
+        match super::read(&path, self.textures.budget) {
             Ok(bytes) => {
                 let mut surfaces =
                     mtl::parse(&path, &bytes, &mut self.textures, &mut self.warnings)?;
                 self.surfaces.append(&mut surfaces);
             }
-            Err(error) => self.warnings.push(format!(
-                "{}, line {line}: cannot read the material library {}: {error}; its materials are grey",
+            Err(LoadError::Read { source, .. }) => self.warnings.push(format!(
+                "{}, line {line}: cannot read the material library {}: {source}; its materials are grey",
                 self.path.display(),
                 path.display()
             )),
+            Err(error) => return Err(error),
         }
         Ok(())
     }
@@ -246,10 +252,10 @@ impl<'a> Reader<'a> {
         let description = SceneDescription {
             parts,
             surfaces: self.surfaces,
-            textures: self.textures.textures,
+            textures: self.textures.loaded,
             ..SceneDescription::default()
         };
-        Loaded { description, warnings: self.warnings }
+        Loaded { description, warnings: self.warnings, memory: 0 }
     }
 
     /// The surface of a name; an unknown one becomes a new grey one.

@@ -10,7 +10,7 @@
 use std::fmt;
 use std::path::Path;
 
-use super::{LoadError, Loaded, stem};
+use super::{Budget, LoadError, Loaded, stem};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
@@ -116,33 +116,32 @@ pub enum PlyProblem {
 
 type Located<T> = Result<T, (PlyPlace, PlyProblem)>;
 
-pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
-    let mesh = parse(bytes).map_err(|(place, problem)| LoadError::Ply {
-        path: path.into(),
-        place,
-        problem: Box::new(problem),
-    })?;
+pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
+    let error =
+        |(place, problem)| LoadError::Ply { path: path.into(), place, problem: Box::new(problem) };
+    let header = Header::parse(bytes).map_err(error)?;
+    header.check_size(bytes.len() - header.length).map_err(error)?;
+    budget.take(&path.display().to_string(), header.memory())?;
+    let mesh = parse(&header, bytes).map_err(error)?;
     let albedo = if mesh.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
     let description = SceneDescription {
         parts: vec![Part { name: stem(path), mesh, surface: 0 }],
         surfaces: vec![Surface::diffuse("default", albedo)],
         ..SceneDescription::default()
     };
-    Ok(Loaded { description, warnings: Vec::new() })
+    Ok(Loaded { description, ..Loaded::default() })
 }
 
-fn parse(bytes: &[u8]) -> Located<Mesh> {
-    let header = Header::parse(bytes)?;
+fn parse(header: &Header, bytes: &[u8]) -> Located<Mesh> {
     let body = &bytes[header.length..];
-    header.check_size(body.len())?;
     let at = header.length;
     let mut mesh = match header.format {
-        Format::Ascii => read_body(&header, &mut Ascii { data: body, position: 0, start: at })?,
+        Format::Ascii => read_body(header, &mut Ascii { data: body, position: 0, start: at })?,
         Format::Little => {
-            read_body(&header, &mut Binary::<false> { data: body, start: at, position: 0 })?
+            read_body(header, &mut Binary::<false> { data: body, start: at, position: 0 })?
         }
         Format::Big => {
-            read_body(&header, &mut Binary::<true> { data: body, start: at, position: 0 })?
+            read_body(header, &mut Binary::<true> { data: body, start: at, position: 0 })?
         }
     };
     if mesh.normals.is_empty() {
@@ -274,6 +273,18 @@ impl Header {
             }
         }
         Err((PlyPlace::Byte(bytes.len()), PlyProblem::NoEndOfHeader))
+    }
+
+    /// An estimate of what the mesh takes, of triangles and quadrilaterals; greater polygons are longer in the file too.
+    fn memory(&self) -> u64 {
+        let row = |element: &Element| match element.name.as_str() {
+            // Position, normal, texture coordinate, colour.
+            "vertex" => 12 + 12 + 8 + 12,
+            // Where it ends, its indices as they are read, and two triangles.
+            "face" => 8 + 4 * 8 + 2 * 12,
+            _ => 0,
+        };
+        self.elements.iter().map(|element| element.count.saturating_mul(row(element))).sum()
     }
 
     /// Refuses a header that promises more rows than `left` bytes can hold.

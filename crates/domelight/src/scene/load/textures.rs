@@ -4,19 +4,23 @@ use std::collections::HashMap;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use image::{DynamicImage, ImageReader};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits};
 
-use super::{LoadError, read_referenced};
+use super::{Budget, LoadError, read_referenced};
 use crate::scene::texture::{Encoding, Texture};
 
 /// The textures of one scene while it is loaded.
-#[derive(Default)]
-pub(super) struct Textures {
-    pub(super) textures: Vec<Texture>,
+pub(super) struct Textures<'b> {
+    pub(super) loaded: Vec<Texture>,
     files: HashMap<(PathBuf, Encoding), usize>,
+    pub(super) budget: &'b Budget,
 }
 
-impl Textures {
+impl<'b> Textures<'b> {
+    pub(super) fn new(budget: &'b Budget) -> Self {
+        Self { loaded: Vec::new(), files: HashMap::new(), budget }
+    }
+
     /// The index of a file's texture.
     pub(super) fn file(
         &mut self,
@@ -28,7 +32,7 @@ impl Textures {
         if let Some(&index) = self.files.get(&key) {
             return Ok(index);
         }
-        let bytes = read_referenced(path, referrer)?;
+        let bytes = read_referenced(path, referrer, self.budget)?;
         let index = self.bytes(&path.display().to_string(), &bytes, encoding, referrer)?;
         self.files.insert(key, index);
         Ok(index)
@@ -42,32 +46,51 @@ impl Textures {
         encoding: Encoding,
         referrer: &str,
     ) -> Result<usize, LoadError> {
-        let texture = decode(name, bytes, encoding).map_err(|source| LoadError::Image {
-            image: name.into(),
-            referrer: referrer.into(),
-            source,
-        })?;
-        self.textures.push(texture);
-        Ok(self.textures.len() - 1)
+        let error =
+            |source| LoadError::Image { image: name.into(), referrer: referrer.into(), source };
+        let mut decoder = reader(name, bytes).and_then(ImageReader::into_decoder).map_err(error)?;
+        // What the decoder makes, what it becomes as RGB, and what is kept.
+        let (width, height) = decoder.dimensions();
+        let rgb = if is_deep(decoder.color_type()) { 6 } else { 3 };
+        let texels = u64::from(width) * u64::from(height);
+        self.budget.take(name, decoder.total_bytes().saturating_add(2 * rgb * texels))?;
+        // Where nothing else limits it, as much as the crate thinks right.
+        let mut limits = Limits::default();
+        limits.max_alloc = self.budget.left().or(limits.max_alloc);
+        limits.reserve(decoder.total_bytes()).map_err(error)?;
+        decoder.set_limits(limits).map_err(error)?;
+        let texture = decode(decoder, name, encoding).map_err(error)?;
+        self.loaded.push(texture);
+        Ok(self.loaded.len() - 1)
     }
 }
 
-fn decode(name: &str, bytes: &[u8], encoding: Encoding) -> Result<Texture, image::ImageError> {
+fn reader<'a>(
+    name: &str,
+    bytes: &'a [u8],
+) -> Result<ImageReader<Cursor<&'a [u8]>>, image::ImageError> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
     if reader.format().is_none()
         && let Ok(format) = image::ImageFormat::from_path(name)
     {
         reader.set_format(format);
     }
-    let image = reader.decode()?;
+    Ok(reader)
+}
+
+fn is_deep(color: ColorType) -> bool {
+    use ColorType::{L16, La16, Rgb16, Rgba16};
+    matches!(color, L16 | La16 | Rgb16 | Rgba16)
+}
+
+fn decode(
+    decoder: impl ImageDecoder,
+    name: &str,
+    encoding: Encoding,
+) -> Result<Texture, image::ImageError> {
+    let deep = is_deep(decoder.color_type());
+    let image = DynamicImage::from_decoder(decoder)?;
     let (width, height) = (image.width(), image.height());
-    let deep = matches!(
-        image,
-        DynamicImage::ImageLuma16(_)
-            | DynamicImage::ImageLumaA16(_)
-            | DynamicImage::ImageRgb16(_)
-            | DynamicImage::ImageRgba16(_)
-    );
     let texture = if deep {
         let texels = image.into_rgb16().pixels().map(|p| p.0).collect();
         Texture::from_rgb16(name, width, height, texels, encoding)

@@ -52,7 +52,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::textures::Textures;
-use super::{LoadError, Loaded, load_mesh, relative};
+use super::{Budget, LoadError, Loaded, load_mesh, relative};
 use crate::Rgb;
 use crate::bsdf::{Material, ParseMaterialError};
 use crate::math::{Mat4, Vec2, Vec3, Vec4};
@@ -220,7 +220,7 @@ fn white() -> [f32; 3] {
     [1.0; 3]
 }
 
-pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
+pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
     let failed =
         |line, problem| LoadError::Toml { path: path.into(), line, problem: Box::new(problem) };
     let text = std::str::from_utf8(bytes)
@@ -233,7 +233,8 @@ pub(super) fn load(path: &Path, bytes: &[u8]) -> Result<Loaded, LoadError> {
         path,
         text,
         named: BTreeMap::new(),
-        textures: Textures::default(),
+        textures: Textures::new(budget),
+        budget,
         loaded: Loaded::default(),
     };
     reader.scene(file)?;
@@ -249,7 +250,8 @@ struct Reader<'a> {
     text: &'a str,
     /// Surfaces by the name or notation of their material.
     named: BTreeMap<String, usize>,
-    textures: Textures,
+    textures: Textures<'a>,
+    budget: &'a Budget,
     loaded: Loaded,
 }
 
@@ -268,7 +270,7 @@ impl Reader<'_> {
             self.add_surface(name, surface);
         }
         // The surfaces of [materials] come first, and with them the only textures so far.
-        self.loaded.description.textures = std::mem::take(&mut self.textures.textures);
+        self.loaded.description.textures = std::mem::take(&mut self.textures.loaded);
         if let Some(camera) = file.camera {
             let at = camera.span().start;
             let settings = camera_settings(&camera.into_inner(), file.up)
@@ -390,13 +392,13 @@ impl Reader<'_> {
             (Some(file), None) => {
                 let line = line_of(self.text, at);
                 let referrer = format!("{}, line {line}, an object,", self.path.display());
-                load_mesh(&relative(self.path, file), &referrer)?
+                load_mesh(&relative(self.path, file), &referrer, self.budget)?
             }
             (None, Some(name)) => {
                 let scene = name.parse::<BuiltinScene>();
                 let scene = scene.map_err(|unknown| self.error(at, unknown.into()))?;
                 let description = scene.description();
-                Loaded { description, warnings: Vec::new() }
+                Loaded { description, ..Loaded::default() }
             }
             _ => return Err(self.error(at, one_of("an object"))),
         };

@@ -14,17 +14,18 @@
 //! N/n in expectation.
 
 use super::super::ShadingPoint;
-use super::cells::Cells;
-use super::pool::Pool;
+use super::cells::{Cells, slot};
+use super::pool::{Lights, Pool};
 use super::table::Table;
 use crate::Rgb;
-use crate::bsdf::{LANES, VecBlock};
+use crate::bsdf::{Brdf as _, Material};
 use crate::environment::Environment;
 use crate::math::Vec3;
 use crate::sampling::{Dimension, Stream};
+use crate::simd::{Floats, Ints, LANES, Lanes, Real, Simd, Vectors};
 
 /// A direction that may become a shadow ray.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
     /// World direction.
     pub(super) wi: Vec3,
@@ -32,10 +33,117 @@ pub(super) struct Candidate {
     pub(super) value: Rgb,
     /// Its luminance.
     pub(super) luminance: f32,
-    /// Where its light is.
-    pub(super) cell: u32,
+    /// The slot of the cell where its light is.
+    pub(super) slot: u32,
     /// Which hit of the pixel.
     pub(super) hit: u32,
+}
+
+/// Candidates of one hit side by side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CandidateBlock {
+    pub(super) wi: [Lanes; 3],
+    /// Black in a lane without a candidate.
+    pub(super) value: [Lanes; 3],
+    pub(super) luminance: Lanes,
+    pub(super) slots: [i32; LANES],
+}
+
+impl CandidateBlock {
+    /// One of them, of hit `hit`.
+    #[inline(always)]
+    pub(super) fn get(&self, lane: usize, hit: u32) -> Candidate {
+        Candidate {
+            wi: Vec3::from(self.wi.map(|c| c[lane])),
+            value: Rgb::from(self.value.map(|c| c[lane])),
+            luminance: self.luminance[lane],
+            slot: self.slots[lane] as u32,
+            hit,
+        }
+    }
+}
+
+/// The candidates of a pixel.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Candidates {
+    /// From the table: as many blocks for each hit.
+    pub(super) lights: Vec<CandidateBlock>,
+    /// From the material.
+    pub(super) brdf: Vec<Candidate>,
+    /// How the strata are dealt to the hits.
+    pub(super) deal: Deal,
+    /// The slot of each stratum.
+    slots: Vec<i32>,
+}
+
+/// Stratum k belongs to hit (k − r) mod n: who has which.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Deal {
+    /// M.
+    pub(super) n_strata: usize,
+    /// n.
+    pub(super) n_hits: usize,
+    /// r.
+    shift: usize,
+}
+
+impl Deal {
+    /// Of M strata to n hits, shifted by a number in [0, 1).
+    fn new(n_strata: usize, n_hits: usize, shift: f32) -> Self {
+        Self { n_strata, n_hits, shift: (shift * n_hits as f32) as usize % n_hits.max(1) }
+    }
+
+    /// Blocks of each hit.
+    pub(super) fn blocks(self) -> usize {
+        self.n_strata.div_ceil(self.n_hits.max(1)).div_ceil(LANES)
+    }
+
+    /// The first stratum of a hit; every n-th follows.
+    #[inline(always)]
+    fn first(self, hit: usize) -> usize {
+        let k = hit + self.shift;
+        if k < self.n_hits { k } else { k - self.n_hits }
+    }
+
+    /// The stratum of a lane of a block of a hit; at or beyond M there is none.
+    #[inline(always)]
+    pub(super) fn stratum(self, hit: usize, block: usize, lane: usize) -> usize {
+        self.first(hit) + (block * LANES + lane) * self.n_hits
+    }
+
+    /// The hit that has stratum k.
+    #[inline(always)]
+    pub(super) fn hit(self, k: usize) -> usize {
+        (k + self.n_hits - self.shift) % self.n_hits
+    }
+}
+
+/// Strata of a table that share one random offset.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Strata {
+    /// M.
+    pub(super) n: usize,
+    /// ξ in [0, 1).
+    pub(super) offset: f32,
+    /// Their width in the running sum.
+    pub(super) width: f32,
+    /// What none may reach.
+    total: f32,
+}
+
+impl Strata {
+    /// `n` strata of a table of the given total.
+    pub(super) fn new(n: usize, offset: f32, total: f32) -> Self {
+        Self { n, offset, width: total / n as f32, total }
+    }
+
+    /// Where strata `first`, `first` + `step`, … fall in the running sum.
+    #[inline(always)]
+    pub(super) fn places<S: Simd>(&self, simd: S, first: usize, step: usize) -> S::Floats {
+        let k = simd.counting().to_floats() * simd.splat(step as f32) + simd.splat(first as f32);
+        let last = simd.splat(self.total * (1.0 - f32::EPSILON));
+        ((k + simd.splat(self.offset)) * simd.splat(self.width)).min(last)
+    }
 }
 
 /// How many candidates.
@@ -74,11 +182,6 @@ impl PixelNumbers {
         Self { strata, choice, shift: [a, b], stream }
     }
 
-    /// The first stratum of a hit, of `n` hits; every n-th follows.
-    fn first(&self, hit: usize, n: usize) -> usize {
-        (hit + (self.shift[0] * n as f32) as usize) % n
-    }
-
     /// The hit of sample `j` of the material, of `n` hits.
     fn brdf_hit(&self, j: usize, n: usize) -> usize {
         (j + (self.shift[1] * n as f32) as usize) % n
@@ -86,109 +189,174 @@ impl PixelNumbers {
 }
 
 impl Sources<'_> {
-    /// Draws all candidates: first along the curve, then those of the material. Some are black.
+    /// Draws all candidates. Some are black.
     #[inline(always)]
-    pub(super) fn draw(
+    pub(super) fn draw<S: Simd>(
         &self,
-        points: &[ShadingPoint],
+        simd: S,
+        hits: Hits,
         counts: Counts,
         numbers: &PixelNumbers,
-        strata: &mut Vec<u32>,
-        candidates: &mut Vec<Candidate>,
+        candidates: &mut Candidates,
     ) {
         let total = self.table.total();
-        let scale = if total > 0.0 { counts.light as f32 / total } else { 0.0 };
-        if scale > 0.0 {
-            self.table.strata(counts.light, numbers.strata, strata);
-            candidates.resize(counts.light, Candidate::default());
-            for (hit, at) in points.iter().enumerate() {
-                let first = numbers.first(hit, points.len());
-                let step = points.len();
-                let of_hit = OfHit { hit, at, scale, n_brdf: counts.brdf as f32 };
-                for first in (first..counts.light).step_by(step * LANES) {
-                    self.draw_lights(&of_hit, first, step, numbers.strata, strata, candidates);
+        let n_strata = if total > 0.0 { counts.light } else { 0 };
+        let deal = Deal::new(n_strata, hits.points.len(), numbers.shift[0]);
+        let strata = Strata::new(n_strata, numbers.strata, total);
+        let scale = if n_strata > 0 { n_strata as f32 / total } else { 0.0 };
+        candidates.deal = deal;
+        candidates.lights.clear();
+        if n_strata > 0 {
+            self.table.deal(simd, &strata, &mut candidates.slots);
+        }
+        for (hit, at) in hits.points.iter().enumerate() {
+            let of_hit =
+                OfHit { at, material: hits.material(hit), scale, n_brdf: counts.brdf as f32 };
+            for block in 0..deal.blocks() {
+                let first = deal.stratum(hit, block, 0);
+                let places = strata.places(simd, first, deal.n_hits);
+                let n = n_strata.saturating_sub(first).div_ceil(deal.n_hits);
+                let mut slots = [0; LANES];
+                for (lane, slot) in slots.iter_mut().enumerate().take(n) {
+                    *slot = candidates.slots[first + lane * deal.n_hits];
                 }
+                let slots = simd.load_ints(&slots);
+                candidates.lights.push(self.draw_lights(simd, &of_hit, slots, places, n));
             }
-        } else {
-            candidates.clear();
         }
-        self.draw_brdf(points, counts, scale, numbers, candidates);
+        candidates.brdf.clear();
+        for first in (0..counts.brdf).step_by(LANES) {
+            let n = (counts.brdf - first).min(LANES);
+            self.draw_brdf(simd, hits, counts, scale, numbers, first..first + n, candidates);
+        }
     }
 
-    /// Strata `first`, `first` + `step`, … of a hit, up to a block of them.
+    /// The first `n` lanes of a block of strata that fall at `places`.
     #[inline(always)]
-    fn draw_lights(
+    fn draw_lights<S: Simd>(
         &self,
+        simd: S,
         of_hit: &OfHit,
-        first: usize,
-        step: usize,
-        xi: f32,
-        strata: &[u32],
-        candidates: &mut [Candidate],
-    ) {
-        let m = strata.len();
-        let n = (m - first).div_ceil(step).min(LANES);
-        let mut wi = VecBlock::default();
-        let mut le = [[0.0; LANES]; 3];
-        let mut density = [1.0; LANES];
-        for lane in 0..n {
-            let k = first + lane * step;
-            let cell = strata[k] as usize;
-            let light = self.pool.at(cell, self.table.inside(cell, k, m, xi));
-            wi.set(lane, light.wi);
-            (le[0][lane], le[1][lane], le[2][lane]) = (light.le.r, light.le.g, light.le.b);
-            density[lane] = of_hit.scale * self.table.width(cell) * light.density;
-        }
-        let f = of_hit.at.eval_pdf_block(&wi);
-        let mut value = [[0.0; LANES]; 3];
-        let mut luminance = [0.0; LANES];
-        for lane in 0..LANES {
-            let weight = 1.0 / (density[lane] + of_hit.n_brdf * f.pdf[lane]);
-            for c in 0..3 {
-                value[c][lane] = f.value[c][lane] * le[c][lane] * weight;
-            }
-            let [r, g, b] = [0, 1, 2].map(|c| value[c][lane]);
-            luminance[lane] = Rgb::new(r, g, b).luminance();
-        }
-        for lane in 0..n {
-            let k = first + lane * step;
-            candidates[k] = Candidate {
-                wi: wi.get(lane),
-                value: Rgb::new(value[0][lane], value[1][lane], value[2][lane]),
-                luminance: luminance[lane],
-                cell: strata[k],
-                hit: of_hit.hit as u32,
-            };
+        slots: S::Ints,
+        places: S::Floats,
+        n: usize,
+    ) -> CandidateBlock {
+        let one = |x| simd.splat(x);
+        let inside = self.table.inside(slots, places);
+        let Lights { wi, le, density } = self.pool.at(simd, slots, inside);
+        let (f, pdf) = of_hit.at.eval_lanes(of_hit.material, wi);
+        let density = one(of_hit.scale) * self.table.widths(slots) * density;
+        let weight = one(1.0) / (density + one(of_hit.n_brdf) * pdf);
+        let there = simd.counting().to_floats().lt(one(n as f32));
+        let weight = Real::select(there, weight, one(0.0));
+        let value = f.zip(le, |f, le| f * le).scaled(weight);
+        CandidateBlock {
+            wi: [wi.x, wi.y, wi.z].map(Floats::store),
+            value: value.0.map(Floats::store),
+            luminance: value.luminance().store(),
+            slots: slots.store(),
         }
     }
 
-    /// Samples of the material.
-    fn draw_brdf(
+    /// Samples `which` of the material, no more than there are lanes: each of another hit.
+    #[inline(always)]
+    fn draw_brdf<S: Simd>(
         &self,
-        points: &[ShadingPoint],
+        simd: S,
+        hits: Hits,
         counts: Counts,
         scale: f32,
         numbers: &PixelNumbers,
-        candidates: &mut Vec<Candidate>,
+        which: std::ops::Range<usize>,
+        candidates: &mut Candidates,
     ) {
-        for j in 0..counts.brdf {
-            let hit = numbers.brdf_hit(j, points.len());
+        let mut drawn = Drawn::default();
+        for j in which {
+            let hit = numbers.brdf_hit(j, hits.points.len());
+            let at = &hits.points[hit];
             let u = numbers.stream.numbers(Dimension::Brdf, j as u32);
-            let Some(s) = points[hit].sample(u.u_lobe(), u.u()) else { continue };
-            let Some((cell, le)) = self.cells.find(self.environment, s.wi) else { continue };
+            let local = hits.material(hit).sample_direction(at.wo, u.u_lobe(), u.u());
+            let Some(local) = local.filter(|wi| wi.is_finite()) else { continue };
+            let wi = at.frame.to_world(local);
+            if at.ng.dot(wi) > 0.0 {
+                drawn.push(hit, at.wo, local, wi);
+            }
+        }
+        let (f, pdf) = self.eval_drawn(simd, hits, &drawn);
+        for lane in (0..drawn.n).filter(|&lane| pdf[lane] > 0.0 && pdf[lane].is_finite()) {
+            let wi = drawn.world[lane];
+            let Some((cell, le)) = self.cells.find(self.environment, wi) else { continue };
+            let (slot, hit) = (slot(cell), drawn.hits[lane] as u32);
             let density = le.luminance() / self.cells.mass_of(cell);
-            let density = scale * self.table.width(cell) * density + counts.brdf as f32 * s.pdf;
-            let value = s.value * le / density;
-            let (wi, luminance) = (s.wi, value.luminance());
-            candidates.push(Candidate { wi, value, luminance, cell: cell as u32, hit: hit as u32 });
+            let density = scale * self.table.width(slot) * density + counts.brdf as f32 * pdf[lane];
+            let value = f[lane] * le / density;
+            let (slot, luminance) = (slot as u32, value.luminance());
+            candidates.brdf.push(Candidate { wi, value, luminance, slot, hit });
+        }
+    }
+
+    /// Values and densities of what was drawn.
+    #[inline(always)]
+    fn eval_drawn<S: Simd>(&self, simd: S, hits: Hits, drawn: &Drawn) -> ([Rgb; LANES], Lanes) {
+        if hits.one_material {
+            let wo = Vectors::load(simd, &drawn.wo);
+            let wi = Vectors::load(simd, &drawn.wi);
+            let (f, pdf) = hits.material(0).eval_lanes(wo, wi);
+            let f = f.0.map(Floats::store);
+            (std::array::from_fn(|lane| Rgb::from(f.map(|c| c[lane]))), pdf.store())
+        } else {
+            let (mut f, mut pdf) = ([Rgb::BLACK; LANES], [0.0; LANES]);
+            for lane in 0..drawn.n {
+                let [wo, wi] = [drawn.wo, drawn.wi].map(|v| Vec3::from(v.map(|c| c[lane])));
+                (f[lane], pdf[lane]) = hits.material(drawn.hits[lane]).eval_pdf(wo, wi);
+            }
+            (f, pdf)
+        }
+    }
+}
+
+/// The camera hits of a pixel.
+#[derive(Clone, Copy)]
+pub(super) struct Hits<'a> {
+    pub(super) points: &'a [ShadingPoint],
+    /// The material of the first is that of all.
+    pub(super) one_material: bool,
+}
+
+impl<'a> Hits<'a> {
+    /// The material that a hit is sampled by.
+    fn material(self, hit: usize) -> &'a Material {
+        &self.points[if self.one_material { 0 } else { hit }].material
+    }
+}
+
+/// Samples of the material side by side, in the local frames.
+#[derive(Default)]
+struct Drawn {
+    n: usize,
+    hits: [usize; LANES],
+    wo: [Lanes; 3],
+    wi: [Lanes; 3],
+    world: [Vec3; LANES],
+}
+
+impl Drawn {
+    #[inline(always)]
+    fn push(&mut self, hit: usize, wo: Vec3, wi: Vec3, world: Vec3) {
+        let lane = self.n;
+        self.n += 1;
+        self.hits[lane] = hit;
+        self.world[lane] = world;
+        for c in 0..3 {
+            (self.wo[c][lane], self.wi[c][lane]) = (wo[c], wi[c]);
         }
     }
 }
 
 /// A hit whose candidates are drawn.
 struct OfHit<'a> {
-    hit: usize,
     at: &'a ShadingPoint,
+    material: &'a Material,
     /// M over the total of the table.
     scale: f32,
     /// N.

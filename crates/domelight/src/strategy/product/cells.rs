@@ -24,21 +24,40 @@ use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::Vec3;
 use crate::sampling::hilbert::Turn;
+use crate::simd::{LANES, Lanes};
 
-/// Cells side by side in a vector: the lanes of a running sum.
-pub(super) const LANES: usize = 8;
 /// Cells of each lane: an eighth of the curve.
 pub(super) const ROWS: usize = 48;
 /// The most cells.
 pub(super) const MAX_CELLS: usize = LANES * ROWS;
 
-/// One number a cell, at [`slot`].
-pub(super) type Slots = [f32; MAX_CELLS];
+/// Rows of a table: a power of two, so that an index that is masked with it needs no other check.
+pub(super) const TABLE_ROWS: usize = ROWS.next_power_of_two();
+/// Places in a table; those from [`MAX_CELLS`] on are nobody's.
+pub(super) const SLOTS: usize = TABLE_ROWS * LANES;
 
-/// Where a cell's number is: lane l has the l-th eighth of the curve, row by row, so that one running
+/// One number a cell, at [`slot`], by row.
+pub(super) type Slots = [Lanes; TABLE_ROWS];
+
+/// Where a cell's number is, row by row: lane l has the l-th eighth of the curve, row by row, so that one running
 /// sum a lane and one over the lanes make the sum along the curve.
 pub(super) fn slot(cell: usize) -> usize {
     cell % ROWS * LANES + cell / ROWS
+}
+
+/// Zero for each cell.
+pub(super) const NO_SLOTS: Slots = [[0.0; LANES]; TABLE_ROWS];
+
+/// The number in a slot.
+#[inline(always)]
+pub(super) fn at(slots: &Slots, slot: usize) -> f32 {
+    slots[slot / LANES % TABLE_ROWS][slot % LANES]
+}
+
+/// The number in a slot, to be changed.
+#[inline(always)]
+pub(super) fn at_mut(slots: &mut Slots, slot: usize) -> &mut f32 {
+    &mut slots[slot / LANES % TABLE_ROWS][slot % LANES]
 }
 
 /// Texels are cut no finer than into squares of 2⁻⁸ of their side.
@@ -75,8 +94,8 @@ pub(super) struct Cells {
     links: Vec<[Link; 4]>,
     /// Unit direction of the light's mean, in the world.
     pub(super) center: [Box<Slots>; 3],
-    /// Square of the angular radius.
-    pub(super) radius2: Box<Slots>,
+    /// Angular radius.
+    pub(super) radius: Box<Slots>,
     /// No direction of the cell is further from its centre than this \[rad\].
     pub(super) reach: Box<Slots>,
     /// ∫ luminance dω; 0 where there is no cell.
@@ -88,12 +107,12 @@ impl Cells {
     pub(super) fn new(environment: &Environment) -> Option<Self> {
         let map = Map { environment };
         let tree = Tree::grow(&map, map.root()?);
-        let zeros = || Box::new([0.0; MAX_CELLS]);
+        let zeros = || Box::new(NO_SLOTS);
         let mut cells = Self {
             squares: Vec::new(),
             links: vec![[Link::Dark; 4]; tree.links.len()],
             center: [zeros(), zeros(), zeros()],
-            radius2: zeros(),
+            radius: zeros(),
             reach: zeros(),
             mass: zeros(),
         };
@@ -101,13 +120,13 @@ impl Cells {
         for cell in 0..cells.squares.len() {
             let square = cells.squares[cell];
             let (center, radius, reach) = map.extent(&square);
-            let at = slot(cell);
+            let slot = slot(cell);
             for (c, x) in cells.center.iter_mut().zip(center.to_array()) {
-                c[at] = x;
+                *at_mut(c, slot) = x;
             }
-            cells.radius2[at] = radius * radius;
-            cells.reach[at] = reach;
-            cells.mass[at] = square.mass;
+            *at_mut(&mut cells.radius, slot) = radius;
+            *at_mut(&mut cells.reach, slot) = reach;
+            *at_mut(&mut cells.mass, slot) = square.mass;
         }
         Some(cells)
     }
@@ -136,7 +155,7 @@ impl Cells {
 
     /// ∫ luminance dω over a cell.
     pub(super) fn mass_of(&self, cell: usize) -> f32 {
-        self.mass[slot(cell)]
+        at(&self.mass, slot(cell))
     }
 
     /// The cell that `wi` looks at and the radiance from there; none where there is no light.
@@ -428,7 +447,7 @@ mod tests {
         for (name, environment) in environments() {
             let cells = Cells::new(&environment).unwrap();
             assert!((100..=MAX_CELLS).contains(&cells.len()), "{name}: {}", cells.len());
-            let total: f64 = cells.mass.iter().map(|&m| f64::from(m)).sum();
+            let total: f64 = cells.mass.iter().flatten().map(|&m| f64::from(m)).sum();
             assert!((total / environment.power() - 1.0).abs() < 1e-5, "{name}");
 
             // Sum over a grid of equal steps in φ and cos θ that is finer than any cell.
@@ -447,8 +466,10 @@ mod tests {
                     assert_eq!(le, *texel, "{name}");
                     found[cell] += f64::from(le.luminance()) * solid_angle;
                     // No direction lies further from the centre than the reach.
-                    let center = Vec3::from(cells.center.each_ref().map(|c| c[slot(cell)]));
-                    assert!(center.angle_between(wi) <= cells.reach[slot(cell)], "{name} {cell}");
+                    let center =
+                        Vec3::from(cells.center.each_ref().map(|c| super::at(c, slot(cell))));
+                    let reach = super::at(&cells.reach, slot(cell));
+                    assert!(center.angle_between(wi) <= reach, "{name} {cell}");
                 }
             }
             for (cell, found) in found.into_iter().enumerate() {
@@ -485,7 +506,7 @@ mod tests {
                     last = Some(wi);
                 }
                 // A curve through n points of a square is some √n sides long.
-                let reach = cells.reach[slot(cell)];
+                let reach = at(&cells.reach, slot(cell));
                 assert!(
                     steps < 6.0 * f32::sqrt(n as f32) * reach,
                     "{name} {cell}: {steps} {reach}"

@@ -13,30 +13,51 @@
 //! offset, picks the candidate at which it passes an integer. Each is picked with probability π_j
 //! exactly, and the picks are spread over the sky.
 
+use crate::simd::{Floats, Ints, LANES, Real, Simd};
+
+/// π = 1: probabilities are whole numbers of 2⁻²⁴, so that their running sum is exact.
+const ONE: u32 = 1 << 24;
+
+/// π of a candidate whose size W_j g_j/τ is given: positive where the size is.
+#[inline(always)]
+pub(super) fn probability(size: f32) -> u32 {
+    let rounded = (size.min(1.0) * (ONE - 1) as f32) as u32;
+    if size > 0.0 { rounded + 1 } else { 0 }
+}
+
+/// [`probability`] of candidates side by side.
+#[inline(always)]
+pub(super) fn probabilities<S: Simd>(simd: S, size: S::Floats) -> [i32; LANES] {
+    let rounded = (size.min(simd.splat(1.0)) * simd.splat((ONE - 1) as f32)).truncated();
+    let positive = simd.splat(0.0).lt(size);
+    Ints::select(positive, rounded + simd.splat_int(1), simd.splat_int(0)).store()
+}
+
+/// 1/π.
+#[inline(always)]
+pub(super) fn weight(probability: u32) -> f32 {
+    ONE as f32 / probability as f32
+}
+
 /// A systematic choice in progress.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Choice {
-    sum: f32,
-    /// 1/τ.
-    scale: f32,
+    /// Modulo 2⁸ choices.
+    sum: u32,
 }
 
 impl Choice {
-    /// From an offset in [0, 1) and a threshold τ > 0.
-    pub(super) fn new(offset: f32, threshold: f32) -> Self {
-        Self { sum: offset, scale: 1.0 / threshold }
+    /// From an offset in [0, 1).
+    pub(super) fn new(offset: f32) -> Self {
+        Self { sum: (offset * ONE as f32) as u32 }
     }
 
-    /// The weight 1/π_j if a candidate of size W_j g_j > 0 is chosen.
+    /// Whether a candidate of the given probability is chosen.
     #[inline(always)]
-    pub(super) fn offer(&mut self, size: f32) -> Option<f32> {
-        let probability = (size * self.scale).min(1.0);
-        self.sum += probability;
-        if self.sum < 1.0 {
-            return None;
-        }
-        self.sum -= 1.0;
-        Some(1.0 / probability)
+    pub(super) fn offer(&mut self, probability: u32) -> bool {
+        let before = self.sum;
+        self.sum = before.wrapping_add(probability);
+        (before ^ self.sum) >= ONE
     }
 }
 
@@ -57,9 +78,10 @@ mod tests {
         let test = ZTest::in_suite_of(3);
         for threshold in [0.1, 1.0, 30.0] {
             let batches = testkit::batches(40, 500, || {
-                let mut choice = Choice::new(offsets.next_f32(), threshold);
+                let mut choice = Choice::new(offsets.next_f32());
                 let chosen = sizes.iter().zip(&values).filter_map(|(&size, &value)| {
-                    choice.offer(size).map(|weight| f64::from(weight * value))
+                    let p = probability(size / threshold);
+                    choice.offer(p).then(|| f64::from(weight(p) * value))
                 });
                 [chosen.sum()]
             });
@@ -70,9 +92,13 @@ mod tests {
     /// Of n candidates with π = p, n p are chosen, give or take one.
     #[test]
     fn the_choice_is_systematic() {
-        let mut choice = Choice::new(0.3, 4.0);
-        let chosen: Vec<usize> = (0..16).filter(|_| choice.offer(1.0).is_some()).collect();
+        let mut choice = Choice::new(0.3);
+        let chosen: Vec<usize> = (0..16).filter(|_| choice.offer(probability(0.25))).collect();
         assert_eq!(chosen, [2, 6, 10, 14]);
-        assert_eq!(Choice::new(0.0, 0.5).offer(1.0), Some(1.0));
+        let mut choice = Choice::new(0.0);
+        assert!((0..1000).all(|_| choice.offer(probability(2.0))));
+        assert!((0..1000).all(|_| !choice.offer(probability(0.0))));
+        assert_eq!((probability(1.0), weight(ONE)), (ONE, 1.0));
+        assert_eq!(probability(1e-30), 1);
     }
 }

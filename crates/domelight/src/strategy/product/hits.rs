@@ -1,6 +1,6 @@
 //! The camera hits of a pixel in groups that look alike: one table serves a group.
 
-use super::super::ShadingPoint;
+use super::candidates::Hits;
 use crate::bsdf::{Gloss, Outline};
 use crate::math::{Frame, Vec3};
 
@@ -44,16 +44,18 @@ pub(super) struct Groups {
 
 impl Groups {
     /// Groups the hits of a pixel.
-    pub(super) fn gather(&mut self, points: &[ShadingPoint]) {
+    #[inline(always)]
+    pub(super) fn gather(&mut self, Hits { points, one_material }: Hits) {
         self.gatherings.clear();
         self.member.clear();
         let mut outline = Outline::default();
         for (i, p) in points.iter().enumerate() {
-            if i == 0 || p.material != points[i - 1].material {
+            if i == 0 || !one_material {
                 outline = p.material.outline(p.wo);
             }
             let like = |g: &Gathering| {
-                points[g.first].frame.z.dot(p.frame.z) > LIKE_NORMALS && alike(&g.outline, &outline)
+                points[g.first].frame.z.dot(p.frame.z) > LIKE_NORMALS
+                    && (one_material || alike(&g.outline, &outline))
             };
             let group = self.gatherings.iter().position(like).unwrap_or_else(|| {
                 let (normals, viewers) = (Vec3::ZERO, Vec3::ZERO);

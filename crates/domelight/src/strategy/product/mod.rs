@@ -37,10 +37,10 @@ use super::{Contributions, PixelPoints, Round, Strategy, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::sampling::Stream;
-use crate::simd::{Work, vectorized};
-use candidates::{Candidate, Counts, PixelNumbers, Sources};
-use cells::Cells;
-use choose::Choice;
+use crate::simd::{Floats, InstructionSet, Kernel, LANES, Simd, dispatch};
+use candidates::{Candidate, Candidates, Counts, Hits, PixelNumbers, Sources};
+use cells::{Cells, Slots, at};
+use choose::{Choice, probabilities, probability, weight};
 use hits::Groups;
 use table::Table;
 use visibility::{Blocks, Learned, Visibility};
@@ -60,8 +60,8 @@ const BRDF_SHARE: [usize; 2] = [8, 4];
 const NARROW: f32 = 0.1;
 
 /// The error of a candidate that does not matter, as a share of the pixel's brightness over the
-/// number of candidates: of diffuse and of glossy pixels.
-const TOLERANCE: [f32; 2] = [0.4, 0.6];
+/// number of candidates.
+const TOLERANCE: f32 = 0.6;
 
 /// Pixels darker than this share of the environment's mean are not held to their own brightness.
 const DARK: f32 = 0.15;
@@ -75,6 +75,7 @@ pub struct ProductSampling<'a> {
     /// Luminance below which brightness does not count.
     dark: f32,
     n_rays: u32,
+    instruction_set: InstructionSet,
 }
 
 impl<'a> ProductSampling<'a> {
@@ -87,7 +88,16 @@ impl<'a> ProductSampling<'a> {
             cells: Cells::new(environment),
             dark: (f64::from(DARK) * mean) as f32,
             n_rays: n_rays.max(1),
+            instruction_set: InstructionSet::best(),
         }
+    }
+
+    /// The same with another instruction set; `None` if this processor lacks it. All give the same bits:
+    /// this is for comparing them.
+    #[must_use]
+    pub fn with_instruction_set(mut self, instruction_set: InstructionSet) -> Option<Self> {
+        self.instruction_set = instruction_set;
+        instruction_set.is_available().then_some(self)
     }
 
     /// How many candidates the hits of a pixel have together.
@@ -111,10 +121,11 @@ impl<'a> ProductSampling<'a> {
 pub struct ProductScratch {
     groups: Groups,
     table: Table,
-    strata: Vec<u32>,
-    candidates: Vec<Candidate>,
+    candidates: Candidates,
+    /// π of each candidate: strata along the curve, then samples of the material.
+    chances: Vec<u32>,
     visibility: Visibility,
-    /// Of each ray of the round the cell that it goes to.
+    /// Of each ray of the round the slot of the cell that it goes to.
     targets: Vec<u16>,
     /// The pilots with hits.
     pilots: Vec<usize>,
@@ -140,7 +151,7 @@ impl Strategy for ProductSampling<'_> {
 
     fn begin_pass(&self, stream: Stream) -> Pool {
         let draw = |cells| Pool::draw(cells, self.environment, stream);
-        self.cells.as_ref().map_or_else(Pool::default, draw)
+        self.cells.as_ref().map_or_else(Pool::empty, draw)
     }
 
     fn push(
@@ -153,7 +164,8 @@ impl Strategy for ProductSampling<'_> {
     ) -> Round {
         let Some(cells) = &self.cells else { return Round::Done };
         let pilots = round == 0;
-        vectorized(Asking { strategy: self, cells, pool, tile, pilots, scratch, out });
+        let asking = Asking { strategy: self, cells, pool, tile, pilots, scratch, out };
+        dispatch(self.instruction_set, asking);
         if pilots { Round::More } else { Round::Done }
     }
 
@@ -193,23 +205,23 @@ struct Asking<'a, 'e> {
     out: &'a mut Contributions,
 }
 
-impl Work for Asking<'_, '_> {
+impl Kernel for Asking<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(mut self) {
+    fn run<S: Simd>(mut self, simd: S) {
         let Self { tile, pilots, .. } = self;
         let blocks = tile.blocks();
         let ProductScratch { visibility, learned, .. } = &mut *self.scratch;
         if !pilots {
-            visibility.estimate(learned, blocks);
+            visibility.estimate(simd, learned, blocks);
         }
         self.scratch.targets.clear();
         self.scratch.pilots.clear();
         for (i, pixel) in tile.pixels.iter().enumerate() {
             let (x, y) = (i % tile.width, i / tile.width);
             if is_pilot(x, y) == pilots && !pixel.points.is_empty() {
-                self.ask(i, pixel, blocks.of(x, y));
+                self.ask(simd, i, pixel, blocks.of(x, y));
             }
         }
     }
@@ -218,38 +230,41 @@ impl Work for Asking<'_, '_> {
 impl Asking<'_, '_> {
     /// Asks for the rays of a pixel.
     #[inline(always)]
-    fn ask(&mut self, i: usize, pixel: &PixelPoints, block: usize) {
+    fn ask<S: Simd>(&mut self, simd: S, i: usize, pixel: &PixelPoints, block: usize) {
         let Self { strategy, tile, .. } = *self;
         let ProductScratch {
             groups,
             table,
-            strata,
             candidates,
+            chances,
             visibility,
             targets,
             pilots,
             learned,
         } = &mut *self.scratch;
         let points = &tile.points[pixel.points.clone()];
-        groups.gather(points);
-        table.fill(self.cells, &groups.all);
+        let hits = Hits { points, one_material: pixel.one_material };
+        groups.gather(hits);
+        table.fill(simd, self.cells, &groups.all);
         let counts = strategy.counts(groups, points.len());
         // The first camera sample that hits tells passes apart.
         let stream = pixel.stream.part(tile.samples[pixel.points.start]);
         let numbers = PixelNumbers::new(stream);
         let (environment, cells, pool) = (strategy.environment, self.cells, self.pool);
         let sources = Sources { environment, cells, pool, table };
-        sources.draw(points, counts, &numbers, strata, candidates);
-        let mut rays = Rays { pixel, block, out: self.out, targets };
+        sources.draw(simd, hits, counts, &numbers, candidates);
+        let mut rays = Rays { pixel, out: self.out, targets };
         if self.pilots {
             pilots.push(i);
             rays.push_all(candidates);
         } else {
             let brightness = strategy.expected_brightness(tile.width, learned, i);
             let n = (counts.light + counts.brdf) as f32;
-            let tolerance = TOLERANCE[usize::from(counts.brdf > 0)];
-            let choice = Choice::new(numbers.choice, tolerance * brightness / n);
-            rays.push_chosen(candidates, visibility, choice);
+            let covered = points.len() as f32 / pixel.n_samples as f32;
+            let scale = covered * n / (TOLERANCE * brightness);
+            let visibility = visibility.of(block);
+            rays.weigh(simd, candidates, visibility, scale, chances);
+            rays.push_chosen(candidates, visibility, chances, Choice::new(numbers.choice));
         }
     }
 }
@@ -283,7 +298,6 @@ impl ProductSampling<'_> {
 /// Where the rays of a pixel go.
 struct Rays<'a> {
     pixel: &'a PixelPoints,
-    block: usize,
     out: &'a mut Contributions,
     targets: &'a mut Vec<u16>,
 }
@@ -294,45 +308,102 @@ impl Rays<'_> {
         self.pixel.points.len() as f32
     }
 
+    /// What `hit` has without rays.
+    #[inline(always)]
+    fn base(&mut self, hit: u32) -> &mut Rgb {
+        &mut self.out.base[self.pixel.points.start + hit as usize]
+    }
+
     #[inline(always)]
     fn push(&mut self, c: &Candidate, weight: Rgb) {
         let point = self.pixel.points.start as u32 + c.hit;
         self.out.wi.push(c.wi);
         self.out.weight.push(weight);
         self.out.point.push(point);
-        self.targets.push(c.cell as u16);
+        self.targets.push(c.slot as u16);
     }
 
     /// Σ W V: traces every candidate.
     #[inline(always)]
-    fn push_all(&mut self, candidates: &[Candidate]) {
+    fn push_all(&mut self, candidates: &Candidates) {
         let scale = self.scale();
-        for c in candidates.iter().filter(|c| c.luminance > 0.0) {
+        let n_blocks = candidates.deal.blocks().max(1);
+        for (i, block) in candidates.lights.iter().enumerate() {
+            for lane in (0..LANES).filter(|&lane| block.luminance[lane] > 0.0) {
+                let c = block.get(lane, (i / n_blocks) as u32);
+                self.push(&c, c.value * scale);
+            }
+        }
+        for c in candidates.brdf.iter().filter(|c| c.luminance > 0.0) {
             self.push(c, c.value * scale);
         }
     }
 
-    /// Σ W V̂ + Σ W (V − V̂)/π: traces the chosen ones.
+    /// Adds Σ W V̂ and sets the π of all candidates: W g times `importance`.
+    #[inline(always)]
+    fn weigh<S: Simd>(
+        &mut self,
+        simd: S,
+        candidates: &Candidates,
+        (visible, doubt): (&Slots, &Slots),
+        importance: f32,
+        chances: &mut Vec<u32>,
+    ) {
+        let scale = self.scale();
+        let Candidates { lights, brdf, deal, .. } = candidates;
+        chances.clear();
+        chances.resize(deal.n_strata, 0);
+        for (hit, blocks) in lights.chunks(deal.blocks().max(1)).enumerate() {
+            let mut sums = [simd.splat(0.0); 3];
+            for (i, c) in blocks.iter().enumerate() {
+                let slots = simd.load_ints(&c.slots);
+                let visible = S::Floats::gather(visible, slots);
+                for (sum, value) in sums.iter_mut().zip(&c.value) {
+                    *sum = *sum + simd.load(value) * visible;
+                }
+                let doubt = S::Floats::gather(doubt, slots);
+                let size = simd.load(&c.luminance) * doubt * simd.splat(importance);
+                for (lane, p) in probabilities(simd, size).into_iter().enumerate() {
+                    if let Some(chance) = chances.get_mut(deal.stratum(hit, i, lane)) {
+                        *chance = p as u32;
+                    }
+                }
+            }
+            *self.base(hit as u32) += Rgb::from(sums.map(Floats::sum)) * scale;
+        }
+        for c in brdf {
+            let slot = c.slot as usize;
+            *self.base(c.hit) += c.value * (scale * at(visible, slot));
+            chances.push(probability(c.luminance * at(doubt, slot) * importance));
+        }
+    }
+
+    /// Σ W (V − V̂)/π: traces the chosen ones.
     #[inline(always)]
     fn push_chosen(
         &mut self,
-        candidates: &[Candidate],
-        visibility: &Visibility,
+        candidates: &Candidates,
+        (visible, _): (&Slots, &Slots),
+        chances: &[u32],
         mut choice: Choice,
     ) {
-        let scale = self.scale();
-        let covered = scale / self.pixel.n_samples as f32;
-        let (visible, doubt) = visibility.of(self.block);
-        for c in candidates {
-            let cell = c.cell as usize;
-            let value = c.value * scale;
-            let base = &mut self.out.base[self.pixel.points.start + c.hit as usize];
-            *base += value * visible[cell];
-            if let Some(weight) = choice.offer(c.luminance * covered * doubt[cell]) {
-                let value = value * weight;
-                *base += value * -visible[cell];
-                self.push(c, value);
-            }
+        let Candidates { lights, brdf, deal, .. } = candidates;
+        let (of_lights, of_brdf) = chances.split_at(deal.n_strata);
+        for (k, &p) in of_lights.iter().enumerate().filter(|&(_, &p)| choice.offer(p)) {
+            let (hit, i) = (deal.hit(k), k / deal.n_hits);
+            let block = &lights[hit * deal.blocks() + i / LANES];
+            self.push_one(&block.get(i % LANES, hit as u32), p, visible);
         }
+        for (c, &p) in brdf.iter().zip(of_brdf).filter(|&(_, &p)| choice.offer(p)) {
+            self.push_one(c, p, visible);
+        }
+    }
+
+    /// W (V − V̂)/π of one candidate.
+    #[inline(always)]
+    fn push_one(&mut self, c: &Candidate, p: u32, visible: &Slots) {
+        let value = c.value * (self.scale() * weight(p));
+        *self.base(c.hit) += value * -at(visible, c.slot as usize);
+        self.push(c, value);
     }
 }

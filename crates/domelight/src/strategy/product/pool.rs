@@ -5,37 +5,48 @@
 //! stratum that falls into the cell takes the one where it falls. The estimate of a pixel is unbiased
 //! over the pools; what the pool of one pass has in error, all its pixels share.
 
-use super::cells::Cells;
-use crate::Rgb;
+use super::cells::{Cells, SLOTS, slot};
 use crate::environment::Environment;
-use crate::math::Vec3;
 use crate::sampling::Stream;
+use crate::simd::{Colors, Floats, Ints, LANES, Lanes, Simd, Vectors};
 
 /// Directions of each cell.
 pub(super) const PER_CELL: usize = 32;
 
-/// A direction toward the light: half a line of the cache.
+/// A direction toward the light: half a line of the cache. x, y and z of the unit direction in the
+/// world; red, green and blue of the radiance from there; its density within its cell \[sr⁻¹\];
+/// nothing.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
-pub(super) struct Light {
-    /// Unit direction, world frame.
-    pub(super) wi: Vec3,
-    /// Radiance from there.
-    pub(super) le: Rgb,
-    /// Its density within its cell \[sr⁻¹\].
-    pub(super) density: f32,
-}
+#[repr(align(32))]
+struct Light(Lanes);
+
+/// How many all slots have: a power of two.
+const LIGHTS: usize = SLOTS * PER_CELL;
 
 /// The directions of all cells.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Pool {
-    lights: Vec<Light>,
+    /// By slot.
+    lights: Box<[Light; LIGHTS]>,
+}
+
+/// Lights side by side.
+pub(super) struct Lights<F> {
+    pub(super) wi: Vectors<F>,
+    pub(super) le: Colors<F>,
+    pub(super) density: F,
 }
 
 impl Pool {
+    /// Of no light.
+    pub(super) fn empty() -> Self {
+        let lights = vec![Light([0.0; LANES]); LIGHTS].into_boxed_slice();
+        Self { lights: lights.try_into().expect("as many as asked for") }
+    }
+
     /// Draws the directions of a pass.
     pub(super) fn draw(cells: &Cells, environment: &Environment, stream: Stream) -> Self {
-        let mut lights = Vec::with_capacity(cells.len() * PER_CELL);
+        let mut pool = Self::empty();
         for cell in 0..cells.len() {
             let mut numbers = stream.generator(cell as u32);
             let mass = cells.mass_of(cell);
@@ -43,26 +54,59 @@ impl Pool {
                 let u = (j as f64 + f64::from(numbers.next_f32())) / PER_CELL as f64;
                 let jitter = [numbers.next_f32(), numbers.next_f32()];
                 let (wi, le) = cells.draw(environment, cell, u, jitter);
-                lights.push(Light { wi, le, density: le.luminance() / mass });
+                let density = le.luminance() / mass;
+                let light = Light([wi.x, wi.y, wi.z, le.r, le.g, le.b, density, 0.0]);
+                pool.lights[slot(cell) * PER_CELL + j] = light;
             }
         }
-        Self { lights }
+        pool
     }
 
-    /// The direction of a cell at `u` in [0, 1) of its part of the curve.
+    /// The directions of the cells in `slots`, each at `u` in [0, 1) of its part of the curve.
     #[inline(always)]
-    pub(super) fn at(&self, cell: usize, u: f32) -> &Light {
-        let j = ((u * PER_CELL as f32) as usize).min(PER_CELL - 1);
-        &self.lights[cell * PER_CELL + j]
+    pub(super) fn at<S: Simd>(&self, simd: S, slots: S::Ints, u: S::Floats) -> Lights<S::Floats> {
+        let last = simd.splat_int(PER_CELL as i32 - 1);
+        let j = (u * simd.splat(PER_CELL as f32)).truncated().min(last);
+        let index = (slots.shifted::<{ PER_CELL.ilog2() as i32 }>() + j).store();
+        let lights = index.map(|i| &self.lights[i as usize % LIGHTS].0);
+        let [x, y, z, r, g, b, density, _] = simd.transposed(lights);
+        Lights { wi: Vectors { x, y, z }, le: Colors([r, g, b]), density }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Rgb;
     use crate::environment::Orientation;
     use crate::environment::builtin::BuiltinProbe;
+    use crate::math::{Vec3, vec3};
     use crate::sampling::SamplerKind;
+    use crate::simd::{InstructionSet, Kernel, dispatch};
+
+    struct At<'a> {
+        pool: &'a Pool,
+        slot: usize,
+        u: f32,
+    }
+
+    impl Kernel for At<'_> {
+        type Output = (Vec3, Rgb, f32);
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Self::Output {
+            let slots = simd.splat_int(self.slot as i32);
+            let Lights { wi, le, density } = self.pool.at(simd, slots, simd.splat(self.u));
+            let third = |x: S::Floats| x.store()[3];
+            let wi = vec3(third(wi.x), third(wi.y), third(wi.z));
+            (wi, Rgb::from(le.0.map(third)), third(density))
+        }
+    }
+
+    /// The direction of a cell at `u`, its radiance and its density.
+    fn light(pool: &Pool, cell: usize, u: f32) -> (Vec3, Rgb, f32) {
+        dispatch(InstructionSet::best(), At { pool, slot: slot(cell), u })
+    }
 
     /// The mean over a cell's directions of any function over the density is its integral; of the
     /// radiance's luminance exactly the mass.
@@ -74,12 +118,12 @@ mod tests {
         let pool = Pool::draw(&cells, &environment, Stream::of_pass(SamplerKind::Sobol, 1, 0));
         for cell in 0..cells.len() {
             for j in 0..PER_CELL {
-                let light = pool.at(cell, (j as f32 + 0.5) / PER_CELL as f32);
-                let mass = light.le.luminance() / light.density;
-                assert!((mass / cells.mass_of(cell) - 1.0).abs() < 1e-5);
+                let (wi, le, density) = light(&pool, cell, (j as f32 + 0.5) / PER_CELL as f32);
+                assert!((le.luminance() / density / cells.mass_of(cell) - 1.0).abs() < 1e-5);
+                assert_eq!(cells.find(&environment, wi), Some((cell, le)));
             }
         }
         let other = Pool::draw(&cells, &environment, Stream::of_pass(SamplerKind::Sobol, 1, 8));
-        assert_ne!(pool.at(7, 0.5).wi, other.at(7, 0.5).wi);
+        assert_ne!(light(&pool, 7, 0.5).0, light(&other, 7, 0.5).0);
     }
 }

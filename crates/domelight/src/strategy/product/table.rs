@@ -14,228 +14,283 @@
 //! The running sum of the table is a distribution along the curve. Its M strata share one random
 //! offset: stratum k falls at u = (k + ξ)/M.
 
-use super::cells::{Cells, LANES, MAX_CELLS, ROWS, Slots, slot};
+use super::candidates::Strata;
+use super::cells::{Cells, NO_SLOTS, ROWS, Slots, TABLE_ROWS, at};
 use super::hits::Group;
 use crate::bsdf::Gloss;
 use crate::math::{FRAC_1_PI, Vec3, sqr};
+use crate::simd::{Floats, Ints, LANES, Mask, Real, Simd, Vectors};
 
 /// The least cosine of a cell that is not all below the surface: what the table leaves to chance.
 const LEAST_COSINE: f32 = 0.01;
 
-/// A distribution over cells.
+/// A distribution over cells, by slot.
 #[derive(Clone, Debug)]
 pub(super) struct Table {
     /// What the cell is worth; after [`Table::accumulate`] its part of the running sum exactly.
     weight: Slots,
-    /// The running sum along the curve up to and with the cell.
+    /// The running sum along the curve up to the cell.
+    start: Slots,
+    /// The running sum up to and with it.
     end: Slots,
     /// How much light reaches a surface facing the cell, at least [`LEAST_COSINE`]; 0 below it.
     cosine: Slots,
+    /// The sum over all cells.
+    total: f32,
 }
 
 impl Default for Table {
     fn default() -> Self {
-        let zeros = [0.0; MAX_CELLS];
-        Self { weight: zeros, end: zeros, cosine: zeros }
+        Self { weight: NO_SLOTS, start: NO_SLOTS, end: NO_SLOTS, cosine: NO_SLOTS, total: 0.0 }
     }
 }
 
 impl Table {
     /// Fills the table for groups of hits.
     #[inline(always)]
-    pub(super) fn fill(&mut self, cells: &Cells, groups: &[Group]) {
-        self.weight.fill(0.0);
+    pub(super) fn fill<S: Simd>(&mut self, simd: S, cells: &Cells, groups: &[Group]) {
+        for row in &mut self.weight[..ROWS] {
+            *row = [0.0; LANES];
+        }
         for group in groups {
-            self.add(cells, group);
+            self.add(simd, cells, group);
         }
-        for (weight, mass) in self.weight.iter_mut().zip(cells.mass.iter()) {
-            *weight *= mass;
+        for row in 0..ROWS {
+            let weight = simd.load(&self.weight[row]) * simd.load(&cells.mass[row]);
+            self.weight[row] = weight.store();
         }
-        self.accumulate();
+        self.accumulate(simd);
     }
 
     /// Adds what a group reflects from each cell per light.
     #[inline(always)]
-    fn add(&mut self, cells: &Cells, group: &Group) {
-        let spread2 = sqr(group.spread);
-        self.face(cells, group.frame.z, group.spread);
-        let diffuse = FRAC_1_PI * group.share * group.outline.diffuse;
-        for (weight, cosine) in self.weight.iter_mut().zip(&self.cosine) {
-            *weight += diffuse * cosine;
-        }
+    fn add<S: Simd>(&mut self, simd: S, cells: &Cells, group: &Group) {
+        self.face(simd, cells, group);
         for (albedo, gloss) in group.outline.lobes() {
             let share = group.share * albedo;
             match gloss {
                 Gloss::Slopes { alpha, gaussian: true } => {
-                    self.add_slopes::<true>(cells, group, alpha, spread2, share);
+                    self.add_slopes::<S, true>(simd, cells, group, alpha, share);
                 }
                 Gloss::Slopes { alpha, gaussian: false } => {
-                    self.add_slopes::<false>(cells, group, alpha, spread2, share);
+                    self.add_slopes::<S, false>(simd, cells, group, alpha, share);
                 }
                 Gloss::Mirror { exponent } => {
-                    self.add_mirror(cells, group, exponent, spread2, share);
+                    self.add_mirror(simd, cells, group, exponent, share);
                 }
             }
         }
     }
 
-    /// The ramp of the cosine.
+    /// The ramp of the cosine, and the diffuse part.
     #[inline(always)]
-    fn face(&mut self, cells: &Cells, normal: Vec3, spread: f32) {
-        let [cx, cy, cz] = &cells.center;
-        for i in 0..MAX_CELLS {
-            let x = normal.x * cx[i] + normal.y * cy[i] + normal.z * cz[i];
-            let s = (cells.radius2[i] + spread * spread).sqrt() + 1e-6;
-            let ramp = sqr((x + s).max(0.0)) / (4.0 * s);
-            let cosine = if x > s { x } else { ramp };
-            let reached = x > -(cells.reach[i] + spread);
-            self.cosine[i] = if reached { cosine.max(LEAST_COSINE) } else { 0.0 };
+    fn face<S: Simd>(&mut self, simd: S, cells: &Cells, group: &Group) {
+        let diffuse = simd.splat(FRAC_1_PI * group.share * group.outline.diffuse);
+        let (zero, least) = (simd.splat(0.0), simd.splat(LEAST_COSINE));
+        let (spread, four) = (simd.splat(group.spread), simd.splat(4.0));
+        for row in 0..ROWS {
+            let x = center(simd, cells, row).dot(group.frame.z);
+            let s = (simd.load(&cells.radius[row]).squared() + spread.squared()).sqrt()
+                + simd.splat(1e-6);
+            let ramp = (x + s).max(zero).squared() / (four * s);
+            let cosine = Real::select(s.lt(x), x, ramp);
+            let reached = zero.lt(x + simd.load(&cells.reach[row]) + spread);
+            let cosine = Real::select(reached, cosine.max(least), zero);
+            self.cosine[row] = cosine.store();
+            self.weight[row] = (simd.load(&self.weight[row]) + diffuse * cosine).store();
         }
     }
 
     /// D(h) cos θ_i/(4 σ_o σ_i), of GGX or with tails (1 + t/3)⁻⁴ that are near to a Gaussian's.
     #[inline(always)]
-    fn add_slopes<const GAUSSIAN: bool>(
+    fn add_slopes<S: Simd, const GAUSSIAN: bool>(
         &mut self,
+        simd: S,
         cells: &Cells,
         group: &Group,
         alpha: [f32; 2],
-        spread2: f32,
         share: f32,
     ) {
-        let [cx, cy, cz] = &cells.center;
+        let one = |x| simd.splat(x);
         let (x, y, wo) = (group.frame.x, group.frame.y, group.wo);
-        let (half, z) = (group.frame.to_world(wo), group.frame.z);
-        let [ax2, ay2] = alpha.map(sqr);
-        let rough2 = 0.5 * (ax2 + ay2);
-        let sigma = |cosine: f32| {
-            0.5 * (cosine + (cosine * cosine + rough2 * (1.0 - cosine * cosine).max(0.0)).sqrt())
-        };
-        let scale = 0.25 * FRAC_1_PI * share / sigma(wo.z);
-        for i in 0..MAX_CELLS {
-            let (hx, hy, hz) = (half.x + cx[i], half.y + cy[i], half.z + cz[i]);
-            let along = |axis: Vec3| axis.x * hx + axis.y * hy + axis.z * hz;
-            let (tx2, ty2, n) = (sqr(along(x)), sqr(along(y)), along(z).max(1e-3));
-            let wide2 = 0.25 * cells.radius2[i] + spread2;
+        let half = Vectors::splat(one(0.0), group.frame.to_world(wo));
+        let z = group.frame.z;
+        let [ax2, ay2] = alpha.map(|a| one(sqr(a)));
+        let rough2 = one(0.5) * (ax2 + ay2);
+        let spread2 = one(sqr(group.spread));
+        let scale = one(0.25 * FRAC_1_PI * share) / sigma(one(wo.z), rough2);
+        for row in 0..ROWS {
+            let h = center(simd, cells, row).plus(half);
+            let n2 = h.dot(z).max(one(1e-3)).squared();
+            let (tx2, ty2) = (h.dot(x).squared(), h.dot(y).squared());
+            let wide2 = one(0.25) * simd.load(&cells.radius[row]).squared() + spread2;
             let (ax2, ay2) = (ax2 + wide2, ay2 + wide2);
-            let t = (tx2 / ax2 + ty2 / ay2) / (n * n);
-            let d =
-                if GAUSSIAN { 1.0 / sqr(sqr(1.0 + t * (1.0 / 3.0))) } else { 1.0 / sqr(1.0 + t) };
-            let length2 = (tx2 + ty2 + n * n) / (n * n);
-            let cosine = self.cosine[i];
-            let masked = cosine / sigma(cosine);
-            self.weight[i] += scale * d * sqr(length2) * masked / (ax2 * ay2).sqrt();
+            let area2 = ax2 * ay2;
+            // t = (t_x²/a_x² + t_y²/a_y²)/n²
+            let t = (tx2 * ay2 + ty2 * ax2) / (area2 * n2);
+            let tail = if GAUSSIAN {
+                (one(1.0) + t * one(1.0 / 3.0)).squared().squared()
+            } else {
+                (one(1.0) + t).squared()
+            };
+            let length2 = (tx2 + ty2 + n2) / n2;
+            let cosine = simd.load(&self.cosine[row]);
+            let below = tail * sigma(cosine, rough2) * area2.sqrt();
+            let weight = scale * length2.squared() * cosine / below;
+            self.weight[row] = (simd.load(&self.weight[row]) + weight).store();
         }
     }
 
     /// (1 + v/3σ²)⁻⁴/(2πσ²) of the versine v to the mirror direction, with σ² = 1/n: near to a
     /// Gaussian of the power's variance.
     #[inline(always)]
-    fn add_mirror(
+    fn add_mirror<S: Simd>(
         &mut self,
+        simd: S,
         cells: &Cells,
         group: &Group,
         exponent: f32,
-        spread2: f32,
         share: f32,
     ) {
-        let [cx, cy, cz] = &cells.center;
+        let one = |x| simd.splat(x);
         let wo = group.wo;
         let mirror = group.frame.to_world(Vec3::new(-wo.x, -wo.y, wo.z));
-        for i in 0..MAX_CELLS {
-            let versine = 1.0 - (mirror.x * cx[i] + mirror.y * cy[i] + mirror.z * cz[i]);
-            let sigma2 = 1.0 / (exponent + 1.0) + cells.radius2[i] + 4.0 * spread2;
-            let tail = 1.0 / sqr(sqr(1.0 + versine.max(0.0) / (3.0 * sigma2)));
-            self.weight[i] += 0.5 * FRAC_1_PI * share * tail * self.cosine[i] / sigma2;
+        let narrow = one(1.0 / (exponent + 1.0) + 4.0 * sqr(group.spread));
+        let scale = one(0.5 * FRAC_1_PI * share);
+        for row in 0..ROWS {
+            let versine = (one(1.0) - center(simd, cells, row).dot(mirror)).max(one(0.0));
+            let sigma2 = narrow + simd.load(&cells.radius[row]).squared();
+            let tail = (one(1.0) + versine / (one(3.0) * sigma2)).squared().squared();
+            let weight = scale * simd.load(&self.cosine[row]) / (tail * sigma2);
+            self.weight[row] = (simd.load(&self.weight[row]) + weight).store();
         }
     }
 
     /// The running sum: down the rows in all lanes at once, then over the lanes.
     #[inline(always)]
-    fn accumulate(&mut self) {
-        let mut sum = [0.0; LANES];
+    fn accumulate<S: Simd>(&mut self, simd: S) {
+        let mut sum = simd.splat(0.0);
         for row in 0..ROWS {
-            for lane in 0..LANES {
-                let i = row * LANES + lane;
-                sum[lane] += self.weight[i];
-                self.end[i] = sum[lane];
-            }
+            sum = sum + simd.load(&self.weight[row]);
+            self.end[row] = sum.store();
         }
+        let sum = sum.store();
         let mut before = [0.0; LANES];
         for lane in 1..LANES {
             before[lane] = before[lane - 1] + sum[lane - 1];
         }
+        self.total = before[LANES - 1] + sum[LANES - 1];
         // The width of a cell is the difference of its ends as rounded: what strata fall into.
+        let before = simd.load(&before);
         let mut last = before;
         for row in 0..ROWS {
-            for lane in 0..LANES {
-                let i = row * LANES + lane;
-                let end = before[lane] + self.end[i];
-                self.end[i] = end;
-                self.weight[i] = end - last[lane];
-                last[lane] = end;
-            }
+            let end = before + simd.load(&self.end[row]);
+            self.start[row] = last.store();
+            self.end[row] = end.store();
+            self.weight[row] = (end - last).store();
+            last = end;
         }
     }
 
     /// The sum over all cells.
     pub(super) fn total(&self) -> f32 {
-        self.end[MAX_CELLS - 1]
+        self.total
     }
 
-    /// What a cell has of [`Table::total`].
-    pub(super) fn width(&self, cell: usize) -> f32 {
-        self.weight[slot(cell)]
-    }
-
-    /// Sets `cells[k]` to the cell that stratum k of `n` falls into, with the offset `xi` in [0, 1)
-    /// common to all.
-    ///
-    /// A cell begins with the first stratum that does not lie before it. Every cell marks that stratum,
-    /// a later one over an earlier one without strata, and marks spread to the right.
+    /// What the cell in a slot has of [`Table::total`].
     #[inline(always)]
-    pub(super) fn strata(&self, n: usize, xi: f32, cells: &mut Vec<u32>) {
-        cells.clear();
-        cells.resize(n + 1, 0);
-        let scale = n as f32 / self.total();
-        let mut first = [0; MAX_CELLS];
-        for i in 0..MAX_CELLS {
-            let start = self.end[i] - self.weight[i];
-            let stratum = (start * scale - xi).ceil().clamp(0.0, n as f32);
-            first[i] = if self.weight[i] > 0.0 { stratum as i32 } else { n as i32 };
-        }
-        for lane in 0..LANES {
-            for row in 0..ROWS {
-                cells[first[row * LANES + lane] as usize] = (lane * ROWS + row) as u32;
+    pub(super) fn width(&self, slot: usize) -> f32 {
+        at(&self.weight, slot)
+    }
+
+    /// [`Table::width`] of cells side by side.
+    #[inline(always)]
+    pub(super) fn widths<F: Floats>(&self, slots: F::Ints) -> F {
+        F::gather(&self.weight, slots)
+    }
+
+    /// Sets `slots[k]` to the slot of the cell that stratum k falls into.
+    ///
+    /// Stratum k lies at or after a cell's start s if k ≥ s/w − ξ, so a cell has the strata from the
+    /// first that does to the first that does for the next cell. It marks its first; marks, which rise
+    /// along the curve, spread to the right.
+    #[inline(always)]
+    pub(super) fn deal<S: Simd>(&self, simd: S, strata: &Strata, slots: &mut Vec<i32>) {
+        let n = strata.n;
+        slots.clear();
+        slots.resize(n.next_multiple_of(LANES), 0);
+        for row in 0..ROWS {
+            let from = first(simd, strata, simd.load(&self.start[row]));
+            let to = first(simd, strata, simd.load(&self.end[row]));
+            let mut lanes = from.lt(to).bits();
+            let from = from.store();
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                if let Some(mark) = slots.get_mut(from[lane] as usize) {
+                    *mark = (lane << MARK | row) as i32;
+                }
             }
         }
-        cells.truncate(n);
         let mut last = 0;
-        for cell in cells {
-            last = last.max(*cell);
-            *cell = last;
+        for mark in slots {
+            last = last.max(*mark);
+            // Row and lane as they follow each other in memory.
+            *mark = (last & ((1 << MARK) - 1)) << ROW | last >> MARK;
         }
     }
 
-    /// Where in `cell` stratum `k` of `n` falls, in [0, 1).
+    /// Where in the cells in `slots` the sums `at` lie, in [0, 1].
     #[inline(always)]
-    pub(super) fn inside(&self, cell: usize, k: usize, n: usize, xi: f32) -> f32 {
-        let at = slot(cell);
-        let u = (k as f32 + xi) * (self.total() / n as f32);
-        let width = self.weight[at];
-        let start = self.end[at] - width;
-        ((u - start) / width).max(0.0)
+    pub(super) fn inside<F: Floats>(&self, slots: F::Ints, at: F) -> F {
+        let start = F::gather(&self.start, slots);
+        ((at - start) / self.widths(slots)).max(at.splat(0.0))
     }
+}
+
+/// The first stratum that does not lie before `start`.
+#[inline(always)]
+fn first<S: Simd>(simd: S, strata: &Strata, start: S::Floats) -> S::Ints {
+    let k = start * simd.splat(1.0 / strata.width) - simd.splat(strata.offset);
+    let below = k.truncated();
+    let above = below + simd.splat_int(1);
+    let first = Ints::select(Real::lt(below.to_floats(), k), above, below);
+    first.min(simd.splat_int(strata.n as i32))
+}
+
+/// Bits of a row's number in a mark: marks are ordered by lane, then by row.
+const MARK: i32 = TABLE_ROWS.ilog2() as i32;
+
+/// The power of two that a row's length is.
+const ROW: i32 = LANES.ilog2() as i32;
+
+/// (cos θ + √(cos² θ + α² sin² θ))/2.
+#[inline(always)]
+fn sigma<F: Real>(cosine: F, alpha2: F) -> F {
+    let (zero, one) = (cosine.splat(0.0), cosine.splat(1.0));
+    let cosine2 = cosine.squared();
+    let sine2 = (one - cosine2).max(zero);
+    cosine.splat(0.5) * (cosine + (cosine2 + alpha2 * sine2).sqrt())
+}
+
+/// The centres of a row of cells.
+#[inline(always)]
+fn center<S: Simd>(simd: S, cells: &Cells, row: usize) -> Vectors<S::Floats> {
+    let [x, y, z] = &cells.center;
+    Vectors { x: simd.load(&x[row]), y: simd.load(&y[row]), z: simd.load(&z[row]) }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::candidates::Hits;
+    use super::super::cells::{MAX_CELLS, slot};
     use super::super::hits::Groups;
     use super::*;
     use crate::bsdf::{Material, MaterialSpec};
     use crate::environment::builtin::BuiltinProbe;
     use crate::environment::{Environment, Orientation};
     use crate::math::{Frame, vec3};
+    use crate::simd::{InstructionSet, Kernel, dispatch};
     use crate::strategy::ShadingPoint;
     use testkit::Chi2;
     use testkit::quadrature::Adaptive;
@@ -255,10 +310,45 @@ mod tests {
     }
 
     fn table(cells: &Cells, hits: &[ShadingPoint]) -> Table {
-        let (mut groups, mut table) = (Groups::default(), Table::default());
-        groups.gather(hits);
-        table.fill(cells, &groups.all);
-        table
+        let mut groups = Groups::default();
+        groups.gather(Hits { points: hits, one_material: false });
+        dispatch(InstructionSet::best(), Fill { cells, groups: &groups.all })
+    }
+
+    struct Fill<'a> {
+        cells: &'a Cells,
+        groups: &'a [Group],
+    }
+
+    impl Kernel for Fill<'_> {
+        type Output = Table;
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Table {
+            let mut table = Table::default();
+            table.fill(simd, self.cells, self.groups);
+            table
+        }
+    }
+
+    /// Where a stratum falls.
+    struct Find<'a> {
+        table: &'a Table,
+        strata: Strata,
+        stratum: usize,
+    }
+
+    impl Kernel for Find<'_> {
+        type Output = (usize, f32);
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Self::Output {
+            let mut slots = Vec::new();
+            self.table.deal(simd, &self.strata, &mut slots);
+            let at = self.strata.places(simd, self.stratum, 0);
+            let slot = slots[self.stratum];
+            (slot as usize, self.table.inside(simd.splat_int(slot), at).store()[0])
+        }
     }
 
     /// A stratum at random falls into a cell with the probability of its width, and directions drawn
@@ -279,20 +369,20 @@ mod tests {
         };
         for name in MATERIALS {
             let table = table(&cells, &[hit(name, vec3(0.3, 0.9, -0.2))]);
-            let mut strata = Vec::new();
             let sample = |[xi, which]: [f32; 2], u: f32| {
-                let k = (which * M as f32) as usize;
-                table.strata(M, xi, &mut strata);
-                let cell = strata[k] as usize;
-                let inside = table.inside(cell, k, M, xi);
-                assert!((-1e-3..1.001).contains(&inside), "{inside}");
-                let jitter = [u, (which * M as f32).fract()];
+                let stratum = (which * M as f32).floor();
+                let strata = Strata::new(M, xi, table.total());
+                let find = Find { table: &table, strata, stratum: stratum as usize };
+                let (found, inside) = dispatch(InstructionSet::best(), find);
+                assert!((0.0..1.001).contains(&inside), "{inside:?}");
+                let cell = (0..cells.len()).find(|&c| slot(c) == found).unwrap();
+                let jitter = [u, which * M as f32 - stratum];
                 Some(cells.draw(&environment, cell, f64::from(inside), jitter).0.to_array())
             };
             let pdf = |wi: [f32; 3]| {
                 let Some((cell, le)) = cells.find(&environment, Vec3::from(wi)) else { return 0.0 };
                 let within = f64::from(le.luminance() / cells.mass_of(cell));
-                f64::from(table.width(cell) / table.total()) * within
+                f64::from(table.width(slot(cell)) / table.total()) * within
             };
             test.sphere(name, sample, pdf).unwrap();
         }
@@ -317,7 +407,7 @@ mod tests {
                     !(f * le).is_black() && (name.starts_with("diffuse") || pdf == 0.0)
                 };
                 let needed = hits.iter().any(left_to_table);
-                assert!(!needed || table.width(cell) > 0.0, "{name} {cell} {wi}");
+                assert!(!needed || table.width(slot(cell)) > 0.0, "{name} {cell} {wi}");
             }
         }
     }
@@ -329,11 +419,11 @@ mod tests {
         let table = table(&cells, &[hit("diffuse:0.8", Vec3::Y)]);
         let mut sum = 0.0;
         for cell in 0..MAX_CELLS {
-            let end = table.end[slot(cell)];
-            assert!((end - table.width(cell) - sum).abs() <= 1e-6 * table.total());
-            sum = table.end[slot(cell)];
+            let end = at(&table.end, slot(cell));
+            assert!((end - table.width(slot(cell)) - sum).abs() <= 1e-6 * table.total());
+            sum = at(&table.end, slot(cell));
         }
         assert_eq!(table.total(), sum);
-        assert!(table.width(cells.len() - 1) >= 0.0);
+        assert!(table.width(slot(cells.len() - 1)) >= 0.0);
     }
 }

@@ -1,32 +1,37 @@
 //! What shadow rays have taught about a tile: how visible each light cell is from each block of
 //! pixels, and how bright the pixels are.
 //!
-//! With n rays to a cell, k of them free, counted in a block and 0.35 times in its four neighbours,
+//! With n rays to a cell, k of them free, counted in a block, 0.35 times in its four neighbours, and
+//! 0.25 times to the two cells beside it along the curve,
 //!
 //! ```text
-//! V̂ = (k + p)/(n + 1)        p = (K + v₀)/(N + 1)
+//! V̂ = (k + p)/(n + 1)        p = (K + v₀)/(N + 1)        g² = V̂(1 − V̂) + 0.005 + 0.1/(n + 1)
 //! ```
 //!
-//! p is the same of the whole tile, K of N rays to the cell, and v₀ that of all cells.
+//! p is the same of the whole tile, K of N rays to the cell, and v₀ that of all cells. g is the standard
+//! deviation of a ray about V̂, and what V̂ itself may be wrong by.
 //!
 //! V̂ serves as a control variate: the pixel's estimate is Σ W V̂ + Σ W (V − V̂)/π, whose expectation
 //! does not depend on V̂ as long as V̂ does not depend on the numbers that the second sum is drawn
 //! with. So V̂ comes from other pixels alone: the pilots.
 
-use super::cells::MAX_CELLS;
+use super::cells::{NO_SLOTS, ROWS, Slots, at_mut};
+use crate::simd::{Floats, LANES, Real, Simd};
 
 /// Pixels along the side of a block.
 pub(super) const BLOCK: usize = 4;
 /// What a ray of a neighbouring block counts.
 const NEIGHBOR: f32 = 0.35;
+/// What a ray to a neighbouring cell counts.
+const BESIDE: f32 = 0.25;
 
 /// What is known of a tile.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Learned {
     /// Rays traced from each block to each cell.
-    rays: Vec<f32>,
+    rays: Vec<Slots>,
     /// Those that were free.
-    free: Vec<f32>,
+    free: Vec<Slots>,
     /// The luminance of each pixel that is known.
     luminance: Vec<Option<f32>>,
 }
@@ -53,14 +58,15 @@ impl Blocks {
         y / BLOCK * self.width + x / BLOCK
     }
 
-    /// The blocks that share an edge.
-    fn neighbors(self, block: usize) -> impl Iterator<Item = usize> {
+    /// The blocks that share an edge; itself where there is none.
+    fn neighbors(self, block: usize) -> [usize; 4] {
         let (x, y) = (block % self.width, block / self.width);
-        let left = (x > 0).then(|| block - 1);
-        let right = (x + 1 < self.width).then(|| block + 1);
-        let above = (y > 0).then(|| block - self.width);
-        let below = (y + 1 < self.height).then(|| block + self.width);
-        [left, right, above, below].into_iter().flatten()
+        [
+            if x > 0 { block - 1 } else { block },
+            if x + 1 < self.width { block + 1 } else { block },
+            if y > 0 { block - self.width } else { block },
+            if y + 1 < self.height { block + self.width } else { block },
+        ]
     }
 }
 
@@ -69,18 +75,17 @@ impl Learned {
     pub(super) fn reset(&mut self, blocks: Blocks, n_pixels: usize) {
         for counts in [&mut self.rays, &mut self.free] {
             counts.clear();
-            counts.resize(blocks.len() * MAX_CELLS, 0.0);
+            counts.resize(blocks.len(), NO_SLOTS);
         }
         self.luminance.clear();
         self.luminance.resize(n_pixels, None);
     }
 
-    /// Counts a ray from a block to a cell.
+    /// Counts a ray from a block to the cell in a slot.
     #[inline(always)]
-    pub(super) fn count(&mut self, block: usize, cell: usize, free: bool) {
-        let i = block * MAX_CELLS + cell;
-        self.rays[i] += 1.0;
-        self.free[i] += if free { 1.0 } else { 0.0 };
+    pub(super) fn count(&mut self, block: usize, slot: usize, free: bool) {
+        *at_mut(&mut self.rays[block], slot) += 1.0;
+        *at_mut(&mut self.free[block], slot) += if free { 1.0 } else { 0.0 };
     }
 
     /// Sets the mean luminance of a pixel.
@@ -97,64 +102,109 @@ impl Learned {
 /// V̂ of each block and cell.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Visibility {
-    visible: Vec<f32>,
-    /// √(V̂(1 − V̂) + 0.02): the standard deviation of a ray about V̂, and what V̂ itself may be wrong
-    /// by.
-    doubt: Vec<f32>,
+    visible: Vec<Slots>,
+    /// g.
+    doubt: Vec<Slots>,
 }
 
 impl Visibility {
     /// Estimates all.
     #[inline(always)]
-    pub(super) fn estimate(&mut self, learned: &Learned, blocks: Blocks) {
-        let [mut n_tile, mut k_tile] = [[0.0; MAX_CELLS]; 2];
-        let counts = learned.rays.chunks(MAX_CELLS).zip(learned.free.chunks(MAX_CELLS));
-        for (rays, free) in counts {
-            for c in 0..MAX_CELLS {
-                n_tile[c] += rays[c];
-                k_tile[c] += free[c];
-            }
+    pub(super) fn estimate<S: Simd>(&mut self, simd: S, learned: &Learned, blocks: Blocks) {
+        let one = simd.splat(1.0);
+        let Learned { rays, free, .. } = learned;
+        let (mut n, mut k) = (simd.splat(0.0), simd.splat(0.0));
+        let mut tile = [[[0.0; LANES]; 2]; ROWS];
+        for (row, [n_cells, k_cells]) in tile.iter_mut().enumerate() {
+            let [n_row, k_row] = [sum(simd, rays, row), sum(simd, free, row)];
+            (n, k) = (n + n_row, k + k_row);
+            (*n_cells, *k_cells) = (n_row.store(), k_row.store());
         }
-        let all = (k_tile.iter().sum::<f32>() + 1.0) / (n_tile.iter().sum::<f32>() + 2.0);
-        let mut prior = [0.0; MAX_CELLS];
-        for c in 0..MAX_CELLS {
-            prior[c] = (k_tile[c] + all) / (n_tile[c] + 1.0);
+        let all = simd.splat((k.sum() + 1.0) / (n.sum() + 2.0));
+        let mut prior = [[0.0; LANES]; ROWS];
+        for (prior, [n, k]) in prior.iter_mut().zip(&tile) {
+            *prior = ((simd.load(k) + all) / (simd.load(n) + one)).store();
         }
-        self.visible.resize(blocks.len() * MAX_CELLS, 0.0);
-        self.doubt.resize(blocks.len() * MAX_CELLS, 0.0);
+        self.visible.resize(blocks.len(), NO_SLOTS);
+        self.doubt.resize(blocks.len(), NO_SLOTS);
         for block in 0..blocks.len() {
-            let [mut n, mut k] = [[0.0; MAX_CELLS]; 2];
-            let mut add = |block: usize, weight: f32| {
-                let cells = block * MAX_CELLS..(block + 1) * MAX_CELLS;
-                let (rays, free) = (&learned.rays[cells.clone()], &learned.free[cells]);
-                for c in 0..MAX_CELLS {
-                    n[c] += weight * rays[c];
-                    k[c] += weight * free[c];
-                }
-            };
-            add(block, 1.0);
-            blocks.neighbors(block).for_each(|neighbor| add(neighbor, NEIGHBOR));
-            let cells = block * MAX_CELLS..(block + 1) * MAX_CELLS;
-            let (visible, doubt) = (&mut self.visible[cells.clone()], &mut self.doubt[cells]);
-            for c in 0..MAX_CELLS {
-                let v = ((k[c] + prior[c]) / (n[c] + 1.0)).min(1.0);
-                visible[c] = v;
-                doubt[c] = (v * (1.0 - v) + 0.02).sqrt();
+            let neighbors = blocks.neighbors(block);
+            let (visible, doubt) = (&mut self.visible[block], &mut self.doubt[block]);
+            for row in 0..ROWS {
+                let n = around(simd, rays, block, &neighbors, row);
+                let k = around(simd, free, block, &neighbors, row);
+                let v = ((k + simd.load(&prior[row])) / (n + one)).min(one);
+                visible[row] = v.store();
+                let unsure = simd.splat(0.005) + simd.splat(0.1) / (n + one);
+                doubt[row] = (v * (one - v) + unsure).sqrt().store();
             }
         }
     }
 
-    /// V̂ of the cells from a block, and their doubts.
-    pub(super) fn of(&self, block: usize) -> (&[f32], &[f32]) {
-        let cells = block * MAX_CELLS..(block + 1) * MAX_CELLS;
-        (&self.visible[cells.clone()], &self.doubt[cells])
+    /// V̂ of the cells from a block, and their doubts, by slot.
+    pub(super) fn of(&self, block: usize) -> (&Slots, &Slots) {
+        (&self.visible[block], &self.doubt[block])
     }
+}
+
+/// The sum of a row's counts over blocks.
+#[inline(always)]
+fn sum<S: Simd>(simd: S, counts: &[Slots], row: usize) -> S::Floats {
+    let mut sum = simd.splat(0.0);
+    for count in counts {
+        sum = sum + simd.load(&count[row]);
+    }
+    sum
+}
+
+/// A row's counts in a block and, less, about it. Rows follow each other along the curve.
+#[inline(always)]
+fn around<S: Simd>(
+    simd: S,
+    counts: &[Slots],
+    block: usize,
+    neighbors: &[usize; 4],
+    row: usize,
+) -> S::Floats {
+    let mut sum = simd.load(&counts[block][row]);
+    let beside = simd.splat(BESIDE);
+    if row > 0 {
+        sum = sum + beside * simd.load(&counts[block][row - 1]);
+    }
+    if row + 1 < ROWS {
+        sum = sum + beside * simd.load(&counts[block][row + 1]);
+    }
+    for &neighbor in neighbors {
+        // A block without a neighbour on a side is its own there, and counts nothing.
+        let share = simd.splat(if neighbor == block { 0.0 } else { NEIGHBOR });
+        sum = sum + share * simd.load(&counts[neighbor][row]);
+    }
+    sum
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::cells::at;
     use super::*;
     use crate::sampling::Pcg32;
+    use crate::simd::{InstructionSet, Kernel, dispatch};
+
+    struct Estimate<'a>(&'a Learned, Blocks);
+
+    impl Kernel for Estimate<'_> {
+        type Output = Visibility;
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Visibility {
+            let mut visibility = Visibility::default();
+            visibility.estimate(simd, self.0, self.1);
+            visibility
+        }
+    }
+
+    fn estimate(learned: &Learned, blocks: Blocks) -> Visibility {
+        dispatch(InstructionSet::best(), Estimate(learned, blocks))
+    }
 
     #[test]
     fn estimates_are_probabilities_and_follow_the_counts() {
@@ -162,9 +212,8 @@ mod tests {
         assert_eq!((blocks.width, blocks.height, blocks.of(12, 5)), (4, 2, 7));
         let mut learned = Learned::default();
         learned.reset(blocks, 13 * 6);
-        let mut visibility = Visibility::default();
-        visibility.estimate(&learned, blocks);
-        assert!(visibility.visible.iter().all(|&v| v == 0.5));
+        let visibility = estimate(&learned, blocks);
+        assert!(visibility.visible.iter().all(|v| v[..ROWS] == [[0.5; LANES]; ROWS]));
 
         let mut pcg = Pcg32::new(1, 1);
         for _ in 0..200_000 {
@@ -172,13 +221,13 @@ mod tests {
             // Cell c is free c times of 100.
             learned.count(block, cell, pcg.next_f32() * 100.0 < cell as f32);
         }
-        visibility.estimate(&learned, blocks);
+        let visibility = estimate(&learned, blocks);
         for block in 0..blocks.len() {
             let (visible, doubt) = visibility.of(block);
-            assert!(visible.iter().all(|v| (0.0..=1.0).contains(v)));
-            assert!(doubt.iter().all(|d| (0.14..0.73).contains(d)));
+            assert!(visible[..ROWS].iter().flatten().all(|v| (0.0..=1.0).contains(v)));
+            assert!(doubt[..ROWS].iter().flatten().all(|d| (0.07..0.78).contains(d)));
             for cell in 0..100 {
-                assert!((visible[cell] - cell as f32 / 100.0).abs() < 0.15);
+                assert!((at(visible, cell) - cell as f32 / 100.0).abs() < 0.15);
             }
         }
     }

@@ -5,6 +5,8 @@
 //! instruction set. [`dispatch`] compiles it for each and picks at run time, so that a portable
 //! binary traces as fast as one built for the machine. Another instruction set is one more file like
 //! `avx2.rs`, or `neon.rs` of half the width, and one more line in [`InstructionSet`] and [`dispatch`].
+//!
+//! Formulas are written over [`Real`], which is one number or a vector of them.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -13,12 +15,20 @@ mod avx512;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod scalar;
+mod single;
+mod vector;
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-use super::Lanes;
+pub(crate) use vector::{Colors, Vectors};
 
-/// The instructions that trace rays.
+/// Numbers in a vector.
+pub(crate) const LANES: usize = 8;
+
+/// One number a lane.
+pub(crate) type Lanes = [f32; LANES];
+
+/// The instructions that trace rays and weigh light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
     /// One number at a time; the reference, on every processor.
@@ -62,14 +72,14 @@ impl InstructionSet {
 ///
 /// `run` and all that handles vectors below it must be `#[inline(always)]` functions: what is not
 /// inlined lacks the instructions and is slow, as is a closure over vectors.
-pub(super) trait Kernel {
+pub(crate) trait Kernel {
     type Output;
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
 /// Runs the kernel with the given instructions, or the scalar ones if the processor lacks them.
 #[inline]
-pub(super) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) -> K::Output {
+pub(crate) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) -> K::Output {
     match instruction_set {
         #[cfg(target_arch = "aarch64")]
         InstructionSet::Neon => {
@@ -96,24 +106,33 @@ pub(super) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) ->
 
 /// An instruction set. A value of it, and any vector made with one, proves that the processor has
 /// the instructions.
-pub(super) trait Simd: Copy {
-    type Floats: Floats;
-    type Sets: Sets<Mask = <Self::Floats as Floats>::Mask>;
+pub(crate) trait Simd: Copy {
+    type Floats: Floats<Ints = Self::Ints>;
+    type Ints: Ints<Floats = Self::Floats>;
+    type Sets: Sets<Mask = <Self::Floats as Real>::Mask>;
 
     fn splat(self, x: f32) -> Self::Floats;
     fn load(self, x: &Lanes) -> Self::Floats;
     /// Asks for memory that will be read soon.
     fn prefetch<T>(self, x: &T);
+    fn splat_int(self, x: i32) -> Self::Ints;
+    fn load_ints(self, x: &[i32; LANES]) -> Self::Ints;
+    /// 0, 1, … 7.
+    fn counting(self) -> Self::Ints;
     /// Eight empty sets.
     fn empty(self) -> Self::Sets;
+    /// Component j of eight rows, for each j.
+    fn transposed(self, rows: [&Lanes; LANES]) -> [Self::Floats; LANES];
 }
 
-/// Eight f32.
-pub(super) trait Floats:
+/// A number, or some side by side: what a formula is written for once.
+pub trait Real:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     type Mask: Mask;
 
+    /// `x` in every lane.
+    fn splat(self, x: f32) -> Self;
     /// self < b ? self : b; so b if either is NaN.
     fn min(self, b: Self) -> Self;
     /// self > b ? self : b; so b if either is NaN.
@@ -124,13 +143,65 @@ pub(super) trait Floats:
     fn lt(self, b: Self) -> Self::Mask;
     /// self = b; false if either is NaN.
     fn eq(self, b: Self) -> Self::Mask;
-    /// a where `m` is true, else b.
-    fn select(m: Self::Mask, a: Self, b: Self) -> Self;
-    fn store(self) -> Lanes;
+    fn sqrt(self) -> Self;
+    /// mask ? a : b.
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// A function of M numbers, one lane after the other: for what no instruction does.
+    fn each<const M: usize, const N: usize>(
+        arguments: [Self; M],
+        f: impl FnMut([f32; M]) -> [f32; N],
+    ) -> [Self; N];
+
+    #[inline(always)]
+    fn squared(self) -> Self {
+        self * self
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.max(self.splat(0.0) - self)
+    }
+
+    /// A function of one number, one lane after the other.
+    #[inline(always)]
+    fn map(self, mut f: impl FnMut(f32) -> f32) -> Self {
+        let [y] = Self::each([self], |[x]| [f(x)]);
+        y
+    }
 }
 
-/// Eight truth values.
-pub(super) trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
+/// Eight f32.
+pub trait Floats: Real {
+    type Ints: Ints<Floats = Self>;
+
+    fn store(self) -> Lanes;
+    /// Toward zero; of numbers beyond 2³¹ and NaN anything.
+    fn truncated(self) -> Self::Ints;
+    /// Numbers of a table of N rows, a power of two, at `at` modulo 8 N.
+    fn gather<const N: usize>(table: &[Lanes; N], at: Self::Ints) -> Self;
+
+    /// The sum of all lanes, from the first to the last.
+    #[inline(always)]
+    fn sum(self) -> f32 {
+        self.store().iter().sum()
+    }
+}
+
+/// Eight i32.
+pub trait Ints: Copy + Add<Output = Self> {
+    type Floats: Floats<Ints = Self>;
+
+    /// Times 2ⁿ.
+    fn shifted<const N: i32>(self) -> Self;
+    fn min(self, b: Self) -> Self;
+    fn lt(self, b: Self) -> <Self::Floats as Real>::Mask;
+    fn to_floats(self) -> Self::Floats;
+    fn select(mask: <Self::Floats as Real>::Mask, a: Self, b: Self) -> Self;
+    fn store(self) -> [i32; LANES];
+}
+
+/// Truth values.
+pub trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
     /// Bit i is lane i.
     fn bits(self) -> u32;
 }
@@ -168,7 +239,7 @@ fn pack(sets: [u32; 8], numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
 }
 
 /// Eight sets of the numbers 0 to 31.
-pub(super) trait Sets: Copy {
+pub(crate) trait Sets: Copy {
     type Mask;
 
     /// Adds `bit` to the sets of the lanes in `m`.
@@ -181,3 +252,13 @@ pub(super) trait Sets: Copy {
     fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize);
     fn store(self) -> [u32; 8];
 }
+
+/// The last index of a table of N = 2ⁿ rows.
+#[inline(always)]
+const fn last_of<const N: usize>() -> usize {
+    const { assert!(N.is_power_of_two() && N < 1 << 24) };
+    N * LANES - 1
+}
+
+#[cfg(test)]
+mod tests;

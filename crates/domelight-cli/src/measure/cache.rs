@@ -3,27 +3,26 @@
 //! An entry is `KEY-SUM.exr`: KEY is the fingerprint of everything that decides the picture, SUM that of
 //! the file itself, so that a damaged entry is known and made again.
 
+use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use domelight::fingerprint::{Fingerprint, Fingerprinter};
 use domelight::picture::write_atomically;
-use domelight::render::RenderSettings;
 use etcetera::base_strategy::{BaseStrategy as _, choose_native_strategy};
 
 use crate::failure::warn;
 use crate::scene::View;
-use crate::strategy::Plan;
 
 /// A folder of references.
-pub(super) struct Cache {
+pub(crate) struct Cache {
     folder: PathBuf,
 }
 
 impl Cache {
     /// The folder that was asked for, else that of the platform.
-    pub(super) fn new(folder: Option<&Path>) -> Result<Self> {
+    pub(crate) fn new(folder: Option<&Path>) -> Result<Self> {
         let folder = match folder {
             Some(folder) => folder.to_path_buf(),
             None => match choose_native_strategy() {
@@ -35,7 +34,7 @@ impl Cache {
     }
 
     /// The entry and its bytes, if it is there and sound; a damaged one is removed.
-    pub(super) fn get(&self, key: &Key, quiet: bool) -> Option<(PathBuf, Vec<u8>)> {
+    pub(crate) fn get(&self, key: &Key, quiet: bool) -> Option<(PathBuf, Vec<u8>)> {
         let entries = fs::read_dir(&self.folder).ok()?.flatten().map(|entry| entry.path());
         for path in entries {
             let Some(sum) = key.sum_in(&path) else { continue };
@@ -51,7 +50,7 @@ impl Cache {
     }
 
     /// Keeps the bytes.
-    pub(super) fn put(&self, key: &Key, bytes: &[u8]) -> Result<PathBuf> {
+    pub(crate) fn put(&self, key: &Key, bytes: &[u8]) -> Result<PathBuf> {
         let folder = &self.folder;
         fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the cache folder {}", folder.display()))?;
@@ -62,21 +61,30 @@ impl Cache {
 }
 
 /// Names everything that decides a picture.
-pub(super) struct Key(String);
+pub(crate) struct Key(String);
 
 impl Key {
-    /// Of a reference: scene, light and view, the settings, the plan and the program itself.
-    pub(super) fn new(view: &View, settings: &RenderSettings, plan: Plan) -> Self {
-        let View { scene, camera, environment, .. } = view;
+    /// Of what this program makes: scene, light and view, the program itself, and what `settings` say.
+    pub(crate) fn of_program(view: &View, settings: impl Display) -> Self {
         let mut key = Fingerprinter::default();
         key.text(env!("CARGO_PKG_VERSION"));
         if let Ok(program) = std::env::current_exe().and_then(fs::read) {
             key.bytes(program);
         }
+        Self::of(key, view, settings)
+    }
+
+    /// Of what another program makes, which `settings` name.
+    pub(crate) fn of_other(view: &View, settings: impl Display) -> Self {
+        Self::of(Fingerprinter::default(), view, settings)
+    }
+
+    fn of(mut key: Fingerprinter, view: &View, settings: impl Display) -> Self {
+        let View { scene, camera, environment, .. } = view;
         key.text(scene.fingerprint());
         key.text(environment.fingerprint());
         // Debug's text of a number is exact.
-        key.text(format_args!("{camera:?}{settings:?}{plan:?}"));
+        key.text(format_args!("{camera:?}{settings}"));
         Self(key.finish().to_string())
     }
 

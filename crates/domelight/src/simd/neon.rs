@@ -6,32 +6,36 @@ use std::arch::aarch64::*;
 use std::arch::{asm, is_aarch64_feature_detected};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-use super::{Floats, Kernel, Lanes, Mask, Sets, Simd};
+use super::{Floats, Ints, Kernel, LANES, Lanes, Mask, Real, Sets, Simd, last_of};
 
 /// Exists only where the processor has NEON.
 #[derive(Clone, Copy)]
-pub(super) struct Neon(());
+pub(crate) struct Neon(());
 
 /// Made only by a [`Neon`], so it proves the same.
 #[derive(Clone, Copy)]
-pub(super) struct F32x8(float32x4_t, float32x4_t);
+pub(crate) struct F32x8(float32x4_t, float32x4_t);
+
+/// Made only by a [`Neon`], so it proves the same.
+#[derive(Clone, Copy)]
+pub(crate) struct I32x8(int32x4_t, int32x4_t);
 
 /// Made only from a vector, so it proves the same; a lane has all bits set or none.
 #[derive(Clone, Copy)]
-pub(super) struct Mask8(uint32x4_t, uint32x4_t);
+pub(crate) struct Mask8(uint32x4_t, uint32x4_t);
 
 /// Made only by a [`Neon`], so it proves the same.
 #[derive(Clone, Copy)]
-pub(super) struct Sets8(uint32x4_t, uint32x4_t);
+pub(crate) struct Sets8(uint32x4_t, uint32x4_t);
 
 impl Neon {
     #[inline]
-    pub(super) fn new() -> Option<Self> {
+    pub(crate) fn new() -> Option<Self> {
         is_aarch64_feature_detected!("neon").then_some(Self(()))
     }
 
     #[inline]
-    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         #[target_feature(enable = "neon")]
         fn run<K: Kernel>(simd: Neon, kernel: K) -> K::Output {
             kernel.run(simd)
@@ -43,6 +47,7 @@ impl Neon {
 
 impl Simd for Neon {
     type Floats = F32x8;
+    type Ints = I32x8;
     type Sets = Sets8;
 
     #[inline(always)]
@@ -71,6 +76,25 @@ impl Simd for Neon {
         }
     }
     #[inline(always)]
+    fn splat_int(self, x: i32) -> I32x8 {
+        // SAFETY: `self` proves NEON.
+        let x = unsafe { vdupq_n_s32(x) };
+        I32x8(x, x)
+    }
+    #[inline(always)]
+    fn load_ints(self, x: &[i32; LANES]) -> I32x8 {
+        // SAFETY: `self` proves NEON; `x` is 8 readable i32, and the loads need no alignment.
+        unsafe { I32x8(vld1q_s32(x.as_ptr()), vld1q_s32(x.as_ptr().add(4))) }
+    }
+    #[inline(always)]
+    fn counting(self) -> I32x8 {
+        self.load_ints(&[0, 1, 2, 3, 4, 5, 6, 7])
+    }
+    #[inline(always)]
+    fn transposed(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
+        std::array::from_fn(|column| self.load(&rows.map(|row| row[column])))
+    }
+    #[inline(always)]
     fn empty(self) -> Sets8 {
         // SAFETY: `self` proves NEON.
         let none = unsafe { vdupq_n_u32(0) };
@@ -95,11 +119,19 @@ operator!(Add, add, F32x8, vaddq_f32);
 operator!(Sub, sub, F32x8, vsubq_f32);
 operator!(Mul, mul, F32x8, vmulq_f32);
 operator!(Div, div, F32x8, vdivq_f32);
+operator!(Add, add, I32x8, vaddq_s32);
 operator!(BitAnd, bitand, Mask8, vandq_u32);
 operator!(BitOr, bitor, Mask8, vorrq_u32);
 
-impl Floats for F32x8 {
+impl Real for F32x8 {
     type Mask = Mask8;
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> Self {
+        // SAFETY: `self` proves NEON.
+        let x = unsafe { vdupq_n_f32(x) };
+        Self(x, x)
+    }
 
     // The instructions FMIN and FMAX treat NaN and −0 otherwise.
     #[inline(always)]
@@ -126,10 +158,36 @@ impl Floats for F32x8 {
         unsafe { Mask8(vceqq_f32(self.0, b.0), vceqq_f32(self.1, b.1)) }
     }
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        // SAFETY: `self` proves NEON.
+        unsafe { Self(vsqrtq_f32(self.0), vsqrtq_f32(self.1)) }
+    }
+    #[inline(always)]
     fn select(m: Mask8, a: Self, b: Self) -> Self {
         // SAFETY: the arguments prove NEON.
         unsafe { Self(vbslq_f32(m.0, a.0, b.0), vbslq_f32(m.1, a.1, b.1)) }
     }
+    #[inline(always)]
+    fn each<const M: usize, const N: usize>(
+        arguments: [Self; M],
+        mut f: impl FnMut([f32; M]) -> [f32; N],
+    ) -> [Self; N] {
+        const { assert!(M > 0) };
+        let arguments = arguments.map(Self::store);
+        let mut values = [[0.0; LANES]; N];
+        for lane in 0..LANES {
+            for (value, y) in values.iter_mut().zip(f(arguments.map(|x| x[lane]))) {
+                value[lane] = y;
+            }
+        }
+        // The arguments prove NEON.
+        values.map(|value| Neon(()).load(&value))
+    }
+}
+
+impl Floats for F32x8 {
+    type Ints = I32x8;
+
     #[inline(always)]
     fn store(self) -> Lanes {
         let mut lanes = [0.0; 8];
@@ -137,6 +195,60 @@ impl Floats for F32x8 {
         unsafe {
             vst1q_f32(lanes.as_mut_ptr(), self.0);
             vst1q_f32(lanes.as_mut_ptr().add(4), self.1);
+        };
+        lanes
+    }
+    #[inline(always)]
+    fn truncated(self) -> I32x8 {
+        // SAFETY: `self` proves NEON.
+        unsafe { I32x8(vcvtq_s32_f32(self.0), vcvtq_s32_f32(self.1)) }
+    }
+    #[inline(always)]
+    fn gather<const N: usize>(table: &[Lanes; N], at: I32x8) -> Self {
+        let lanes = at.store().map(|i| {
+            let i = i as usize & last_of::<N>();
+            table[i / LANES][i % LANES]
+        });
+        // `at` proves NEON.
+        Neon(()).load(&lanes)
+    }
+}
+
+impl Ints for I32x8 {
+    type Floats = F32x8;
+
+    #[inline(always)]
+    fn shifted<const N: i32>(self) -> Self {
+        // SAFETY: `self` proves NEON.
+        unsafe { Self(vshlq_n_s32::<N>(self.0), vshlq_n_s32::<N>(self.1)) }
+    }
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        // SAFETY: `self` proves NEON.
+        unsafe { Self(vminq_s32(self.0, b.0), vminq_s32(self.1, b.1)) }
+    }
+    #[inline(always)]
+    fn lt(self, b: Self) -> Mask8 {
+        // SAFETY: `self` proves NEON.
+        unsafe { Mask8(vcltq_s32(self.0, b.0), vcltq_s32(self.1, b.1)) }
+    }
+    #[inline(always)]
+    fn to_floats(self) -> F32x8 {
+        // SAFETY: `self` proves NEON.
+        unsafe { F32x8(vcvtq_f32_s32(self.0), vcvtq_f32_s32(self.1)) }
+    }
+    #[inline(always)]
+    fn select(m: Mask8, a: Self, b: Self) -> Self {
+        // SAFETY: the arguments prove NEON.
+        unsafe { Self(vbslq_s32(m.0, a.0, b.0), vbslq_s32(m.1, a.1, b.1)) }
+    }
+    #[inline(always)]
+    fn store(self) -> [i32; 8] {
+        let mut lanes = [0; 8];
+        // SAFETY: `self` proves NEON; `lanes` is 8 writable i32, and the stores need no alignment.
+        unsafe {
+            vst1q_s32(lanes.as_mut_ptr(), self.0);
+            vst1q_s32(lanes.as_mut_ptr().add(4), self.1);
         };
         lanes
     }

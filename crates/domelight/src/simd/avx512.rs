@@ -6,27 +6,31 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-use super::{Floats, Kernel, Lanes, Mask, Sets, Simd};
+use super::{Floats, Ints, Kernel, LANES, Lanes, Mask, Real, Sets, Simd, last_of};
 
 /// Exists only where the processor has AVX-512 F and VL and the bit instructions of AVX2's time.
 #[derive(Clone, Copy)]
-pub(super) struct Avx512(());
+pub(crate) struct Avx512(());
 
 /// Made only by an [`Avx512`], so it proves the same.
 #[derive(Clone, Copy)]
-pub(super) struct F32x8(__m256);
+pub(crate) struct F32x8(__m256);
+
+/// Made only by an [`Avx512`], so it proves the same.
+#[derive(Clone, Copy)]
+pub(crate) struct I32x8(__m256i);
 
 /// A bit a lane.
 #[derive(Clone, Copy)]
-pub(super) struct Mask8(__mmask8);
+pub(crate) struct Mask8(__mmask8);
 
 /// Made only by an [`Avx512`], so it proves the same.
 #[derive(Clone, Copy)]
-pub(super) struct Sets8(__m256i);
+pub(crate) struct Sets8(__m256i);
 
 impl Avx512 {
     #[inline]
-    pub(super) fn new() -> Option<Self> {
+    pub(crate) fn new() -> Option<Self> {
         let available = is_x86_feature_detected!("avx512f")
             && is_x86_feature_detected!("avx512vl")
             && is_x86_feature_detected!("bmi1")
@@ -37,7 +41,7 @@ impl Avx512 {
     }
 
     #[inline]
-    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         #[target_feature(enable = "avx512f,avx512vl,bmi1,bmi2,lzcnt,popcnt")]
         fn run<K: Kernel>(simd: Avx512, kernel: K) -> K::Output {
             kernel.run(simd)
@@ -49,6 +53,7 @@ impl Avx512 {
 
 impl Simd for Avx512 {
     type Floats = F32x8;
+    type Ints = I32x8;
     type Sets = Sets8;
 
     #[inline(always)]
@@ -67,6 +72,48 @@ impl Simd for Avx512 {
         for offset in (0..size_of::<T>()).step_by(64) {
             // SAFETY: a prefetch reads nothing; `offset` is within `x`.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(start.add(offset)) };
+        }
+    }
+    #[inline(always)]
+    fn splat_int(self, x: i32) -> I32x8 {
+        // SAFETY: `self` proves AVX-512.
+        I32x8(unsafe { _mm256_set1_epi32(x) })
+    }
+    #[inline(always)]
+    fn load_ints(self, x: &[i32; LANES]) -> I32x8 {
+        // SAFETY: `self` proves AVX-512; `x` is 32 readable bytes, and the load needs no alignment.
+        I32x8(unsafe { _mm256_loadu_si256(x.as_ptr().cast()) })
+    }
+    #[inline(always)]
+    fn counting(self) -> I32x8 {
+        // SAFETY: `self` proves AVX-512.
+        I32x8(unsafe { _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7) })
+    }
+    #[inline(always)]
+    fn transposed(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
+        let r = rows.map(|row| self.load(row).0);
+        // SAFETY: `self` proves AVX-512.
+        unsafe {
+            // Pairs of rows, then fours, then all eight.
+            let pair =
+                |i: usize| [_mm256_unpacklo_ps(r[i], r[i + 1]), _mm256_unpackhi_ps(r[i], r[i + 1])];
+            let [a, b, c, d] = [pair(0), pair(2), pair(4), pair(6)];
+            let four = |a: [__m256; 2], b: [__m256; 2]| {
+                [
+                    _mm256_shuffle_ps::<0x44>(a[0], b[0]),
+                    _mm256_shuffle_ps::<0xee>(a[0], b[0]),
+                    _mm256_shuffle_ps::<0x44>(a[1], b[1]),
+                    _mm256_shuffle_ps::<0xee>(a[1], b[1]),
+                ]
+            };
+            let (low, high) = (four(a, b), four(c, d));
+            std::array::from_fn(|i| {
+                F32x8(if i < 4 {
+                    _mm256_permute2f128_ps::<0x20>(low[i], high[i])
+                } else {
+                    _mm256_permute2f128_ps::<0x31>(low[i - 4], high[i - 4])
+                })
+            })
         }
     }
     #[inline(always)]
@@ -93,7 +140,7 @@ operator!(Add, add, F32x8, _mm256_add_ps);
 operator!(Sub, sub, F32x8, _mm256_sub_ps);
 operator!(Mul, mul, F32x8, _mm256_mul_ps);
 operator!(Div, div, F32x8, _mm256_div_ps);
-
+operator!(Add, add, I32x8, _mm256_add_epi32);
 impl BitAnd for Mask8 {
     type Output = Self;
 
@@ -112,9 +159,14 @@ impl BitOr for Mask8 {
     }
 }
 
-impl Floats for F32x8 {
+impl Real for F32x8 {
     type Mask = Mask8;
 
+    #[inline(always)]
+    fn splat(self, x: f32) -> Self {
+        // SAFETY: `self` proves AVX-512.
+        Self(unsafe { _mm256_set1_ps(x) })
+    }
     #[inline(always)]
     fn min(self, b: Self) -> Self {
         // SAFETY: `self` proves AVX-512.
@@ -141,15 +193,92 @@ impl Floats for F32x8 {
         Mask8(unsafe { _mm256_cmp_ps_mask::<_CMP_EQ_OQ>(self.0, b.0) })
     }
     #[inline(always)]
-    fn select(m: Mask8, a: Self, b: Self) -> Self {
-        // SAFETY: the arguments prove AVX-512.
-        Self(unsafe { _mm256_mask_blend_ps(m.0, b.0, a.0) })
+    fn sqrt(self) -> Self {
+        // SAFETY: `self` proves AVX-512.
+        Self(unsafe { _mm256_sqrt_ps(self.0) })
     }
+    #[inline(always)]
+    fn select(mask: Mask8, a: Self, b: Self) -> Self {
+        // SAFETY: `a` proves AVX-512.
+        Self(unsafe { _mm256_mask_blend_ps(mask.0, b.0, a.0) })
+    }
+    #[inline(always)]
+    fn each<const M: usize, const N: usize>(
+        arguments: [Self; M],
+        mut f: impl FnMut([f32; M]) -> [f32; N],
+    ) -> [Self; N] {
+        let arguments = arguments.map(Self::store);
+        let mut values = [[0.0; LANES]; N];
+        for lane in 0..LANES {
+            for (value, y) in values.iter_mut().zip(f(arguments.map(|x| x[lane]))) {
+                value[lane] = y;
+            }
+        }
+        // SAFETY: the arguments prove AVX-512 (M > 0); each value is 8 readable f32, and the load
+        // needs no alignment.
+        const { assert!(M > 0) };
+        values.map(|value| Self(unsafe { _mm256_loadu_ps(value.as_ptr()) }))
+    }
+}
+
+impl Floats for F32x8 {
+    type Ints = I32x8;
+
     #[inline(always)]
     fn store(self) -> Lanes {
         let mut lanes = [0.0; 8];
         // SAFETY: `self` proves AVX-512; `lanes` is 8 writable f32, and the store needs no alignment.
         unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), self.0) };
+        lanes
+    }
+    #[inline(always)]
+    fn truncated(self) -> I32x8 {
+        // SAFETY: `self` proves AVX-512.
+        I32x8(unsafe { _mm256_cvttps_epi32(self.0) })
+    }
+    #[inline(always)]
+    fn gather<const N: usize>(table: &[Lanes; N], at: I32x8) -> Self {
+        // SAFETY: `at` proves AVX-512; masked with 8 N − 1 every index is within the 8 N = 2ⁿ⁺³ numbers.
+        Self(unsafe {
+            let at = _mm256_and_si256(at.0, _mm256_set1_epi32(last_of::<N>() as i32));
+            _mm256_i32gather_ps::<4>(table.as_ptr().cast(), at)
+        })
+    }
+}
+
+impl Ints for I32x8 {
+    type Floats = F32x8;
+
+    #[inline(always)]
+    fn shifted<const N: i32>(self) -> Self {
+        // SAFETY: `self` proves AVX-512.
+        Self(unsafe { _mm256_slli_epi32::<N>(self.0) })
+    }
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        // SAFETY: `self` proves AVX-512.
+        Self(unsafe { _mm256_min_epi32(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn lt(self, b: Self) -> Mask8 {
+        // SAFETY: `self` proves AVX-512.
+        Mask8(unsafe { _mm256_cmplt_epi32_mask(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn to_floats(self) -> F32x8 {
+        // SAFETY: `self` proves AVX-512.
+        F32x8(unsafe { _mm256_cvtepi32_ps(self.0) })
+    }
+    #[inline(always)]
+    fn select(mask: Mask8, a: Self, b: Self) -> Self {
+        // SAFETY: `a` proves AVX-512.
+        Self(unsafe { _mm256_mask_blend_epi32(mask.0, b.0, a.0) })
+    }
+    #[inline(always)]
+    fn store(self) -> [i32; 8] {
+        let mut lanes = [0; 8];
+        // SAFETY: `self` proves AVX-512; `lanes` is 32 writable bytes, the store needs no alignment.
+        unsafe { _mm256_storeu_si256(lanes.as_mut_ptr().cast(), self.0) };
         lanes
     }
 }

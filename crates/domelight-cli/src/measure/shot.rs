@@ -1,39 +1,49 @@
 //! One picture and what it cost.
 
 use anyhow::{Result, bail};
-use domelight::RgbImage;
-use domelight::render::RenderSettings;
+use domelight::render::{Counts, Layers, RenderSettings};
 
 use crate::interrupt;
 use crate::progress::RenderProgress;
 use crate::scene::View;
 use crate::strategy::{Job, Renderer};
-use crate::usage::Stopwatch;
+use crate::usage::{Seconds, Stopwatch};
 
 /// Where a strategy's pictures are taken.
 #[derive(Clone, Copy)]
-pub(super) struct Studio<'a> {
-    pub(super) view: &'a View,
+pub(crate) struct Studio<'a> {
+    pub(crate) view: &'a View,
     /// But for the number of samples and the seed.
-    pub(super) settings: RenderSettings,
-    pub(super) renderer: &'a Renderer<'a>,
-    pub(super) quiet: bool,
+    pub(crate) settings: RenderSettings,
+    pub(crate) renderer: &'a Renderer<'a>,
+    pub(crate) quiet: bool,
 }
 
 /// A picture and what it cost.
-pub(super) struct Shot {
-    pub(super) image: RgbImage,
-    /// Shadow rays of a pixel that the scene covers.
-    pub(super) rays: f64,
+pub(crate) struct Shot {
+    pub(crate) layers: Layers,
+    pub(crate) counts: Counts,
+    /// Of rendering alone.
+    pub(crate) time: Seconds,
+    n_samples: u32,
+}
+
+impl Shot {
     /// CPU seconds of rendering; wall-clock seconds where the system does not tell.
-    pub(super) seconds: f64,
-    /// Camera samples whose value was NaN or infinite.
-    pub(super) non_finite: u64,
+    pub(crate) fn seconds(&self) -> f64 {
+        self.time.cpu.unwrap_or(self.time.wall)
+    }
+
+    /// Shadow rays of a pixel that the scene covers.
+    pub(crate) fn rays(&self) -> f64 {
+        let points_of_a_sample = self.counts.shading_points as f64 / f64::from(self.n_samples);
+        self.counts.shadow_rays as f64 / points_of_a_sample
+    }
 }
 
 impl Studio<'_> {
     /// Renders with so many camera samples a pixel; an error if interrupted.
-    pub(super) fn shoot(&self, label: &str, n_samples: u32, seed: u64) -> Result<Shot> {
+    pub(crate) fn shoot(&self, label: &str, n_samples: u32, seed: u64) -> Result<Shot> {
         let View { scene, camera, environment, .. } = self.view;
         let settings = &RenderSettings { n_samples, seed, ..self.settings };
         let n_camera_rays = (settings.width * settings.height) as u64 * u64::from(n_samples);
@@ -48,16 +58,9 @@ impl Studio<'_> {
         if !rendering.complete {
             bail!("interrupted; no report was written");
         }
-        let counts = rendering.counts;
-        if counts.shading_points == 0 {
+        if rendering.counts.shading_points == 0 {
             bail!("the camera sees nothing of the scene: there is nothing to compare");
         }
-        let points_of_a_sample = counts.shading_points as f64 / f64::from(n_samples);
-        Ok(Shot {
-            image: rendering.layers.color,
-            rays: counts.shadow_rays as f64 / points_of_a_sample,
-            seconds: time.cpu.unwrap_or(time.wall),
-            non_finite: counts.non_finite,
-        })
+        Ok(Shot { layers: rendering.layers, counts: rendering.counts, time, n_samples })
     }
 }

@@ -1,0 +1,255 @@
+//! The converged picture that all others are measured against.
+
+use std::path::Path;
+
+use anyhow::{Context as _, Result, bail};
+use domelight::picture::compare::{SizeMismatch, compare};
+use domelight::picture::exr::{ExrLayers, text_attributes};
+use domelight::picture::{ReadOptions, read, read_bytes};
+use domelight::render::{Layers, RenderSettings};
+use domelight::sampling::Heuristic;
+use domelight::{Rgb, RgbImage};
+use serde::{Deserialize, Serialize};
+
+use super::cache::{Cache, Key};
+use super::shot::Studio;
+use crate::memory;
+use crate::scene::View;
+use crate::strategy::Plan;
+use crate::values::Split;
+
+/// How a reference is rendered.
+pub(crate) const PLAN: Plan = Plan::Mis {
+    split: Split { environment: 4, brdf: 4 },
+    heuristic: Heuristic::Power,
+    compensation: true,
+};
+
+/// Seeds of its halves, which nobody takes for pictures.
+const SEEDS: [u64; 2] = [0x7265_6665_7265_6e63, 0x6365_6e65_7265_6665];
+
+/// The attributes that keep the noise and the samples.
+const NOISE: &str = "domelight.reference.noise";
+const SAMPLES: &str = "domelight.reference.samples";
+
+/// The layer that keeps the picture without shadows.
+const UNOCCLUDED: &str = "unoccluded";
+
+/// The converged picture.
+pub(crate) struct Reference {
+    pub(crate) picture: Picture,
+    pub(crate) report: ReferenceReport,
+}
+
+/// What is kept of a converged picture.
+pub(crate) struct Picture {
+    pub(crate) image: RgbImage,
+    /// Coverage; none of a file without it.
+    pub(crate) alpha: Option<Vec<f32>>,
+    /// With every shadow ray free; none of files and of other programs.
+    pub(crate) unoccluded: Option<RgbImage>,
+}
+
+/// Where the reference comes from.
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct ReferenceReport {
+    pub(crate) source: Source,
+    pub(crate) file: Option<String>,
+    /// How it was rendered; null for files.
+    pub(crate) strategy: Option<String>,
+    pub(crate) spp: Option<u32>,
+    /// relMSE of the reference itself, estimated from its halves; null for files.
+    pub(crate) rel_mse: Option<f64>,
+}
+
+/// Where the reference comes from.
+#[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Source {
+    File,
+    Cache,
+    Rendered,
+}
+
+/// When a reference is good enough.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Goal {
+    /// With so many camera samples a pixel.
+    Samples(u32),
+    /// When the relMSE of the covered pixels is no greater than `noise`, or after `most` camera samples a pixel.
+    Noise { noise: f64, most: u32 },
+}
+
+/// Camera samples of a pilot's halves.
+const PILOT: u32 = 16;
+
+impl From<Layers> for Picture {
+    fn from(layers: Layers) -> Self {
+        let Layers { color: image, alpha, unoccluded, .. } = layers;
+        Self { image, alpha: Some(alpha), unoccluded: Some(unoccluded) }
+    }
+}
+
+impl Picture {
+    /// Which pixels the scene fills.
+    pub(crate) fn covered(&self) -> Option<Vec<bool>> {
+        Some(self.alpha.as_ref()?.iter().map(|&alpha| alpha > 0.999).collect())
+    }
+
+    /// The mean m of two halves.
+    fn mean(&self, other: &Self) -> Self {
+        let alpha = self.alpha.iter().flatten().zip(other.alpha.iter().flatten());
+        let unoccluded = self.unoccluded.as_ref().zip(other.unoccluded.as_ref());
+        Self {
+            image: mean(&self.image, &other.image),
+            alpha: self.alpha.as_ref().map(|_| alpha.map(|(a, b)| 0.5 * (a + b)).collect()),
+            unoccluded: unoccluded.map(|(a, b)| mean(a, b)),
+        }
+    }
+
+    fn encode(&self, noise: f64, spp: u32) -> Result<Vec<u8>> {
+        let mut layers = ExrLayers::from_image(&self.image, self.alpha.as_deref());
+        if let Some(unoccluded) = &self.unoccluded {
+            layers.push_rgb(UNOCCLUDED, unoccluded, None);
+        }
+        let attribute = |name: &str, value: String| (name.to_owned(), value);
+        layers.attributes =
+            vec![attribute(NOISE, noise.to_string()), attribute(SAMPLES, spp.to_string())];
+        Ok(layers.encode()?)
+    }
+
+    /// The picture, its noise and its samples.
+    fn decode(bytes: &[u8], file: &str) -> Option<(Self, f64, u32)> {
+        let main = read_bytes(bytes, file, &ReadOptions::default()).ok()?;
+        let layer = ReadOptions { layer: Some(UNOCCLUDED.to_owned()), max_memory: memory::left() };
+        let unoccluded = read_bytes(bytes, file, &layer).ok().map(|read| read.image);
+        let attributes = text_attributes(bytes).ok()?;
+        let attribute = |key| attributes.iter().find(|(name, _)| name == key).map(|(_, text)| text);
+        let (noise, spp) = (attribute(NOISE)?.parse().ok()?, attribute(SAMPLES)?.parse().ok()?);
+        Some((Self { image: main.image, alpha: main.alpha, unoccluded }, noise, spp))
+    }
+}
+
+fn mean(a: &RgbImage, b: &RgbImage) -> RgbImage {
+    let mean = a.pixels.iter().zip(&b.pixels).map(|(&a, &b)| (a + b) * 0.5);
+    RgbImage::new(a.width, a.height, mean.collect::<Vec<Rgb>>())
+}
+
+impl Reference {
+    /// Reads a reference of the wanted size.
+    pub(crate) fn read(path: &Path, size: [usize; 2]) -> Result<Self> {
+        let name = path.display().to_string();
+        let options = ReadOptions { max_memory: memory::left(), ..Default::default() };
+        let image = read(path, &options)?.image;
+        if [image.width, image.height] != size {
+            let mismatch =
+                SizeMismatch { test: (size[0], size[1]), reference: (image.width, image.height) };
+            return Err(anyhow::Error::new(mismatch).context(name));
+        }
+        if let Some(i) = image.pixels.iter().position(|pixel| !pixel.is_finite()) {
+            let (x, y) = (i % image.width, i / image.width);
+            bail!("{name}: pixel ({x}, {y}) is NaN or infinite; a reference must not be");
+        }
+        let report = ReferenceReport {
+            source: Source::File,
+            file: Some(name),
+            strategy: None,
+            spp: None,
+            rel_mse: None,
+        };
+        Ok(Self { picture: Picture { image, alpha: None, unoccluded: None }, report })
+    }
+
+    /// From the cache, else taken half by half by `shoot`, which is given camera samples a pixel and 0 or 1,
+    /// and kept.
+    pub(crate) fn get(
+        cache: Option<&Cache>,
+        key: &Key,
+        goal: Goal,
+        strategy: &str,
+        quiet: bool,
+        shoot: impl FnMut(u32, usize) -> Result<Picture>,
+    ) -> Result<Self> {
+        let report = |source, file: Option<&Path>, noise, spp| ReferenceReport {
+            source,
+            file: file.map(|path| path.display().to_string()),
+            strategy: Some(strategy.to_owned()),
+            spp: Some(spp),
+            rel_mse: Some(noise),
+        };
+        let kept = cache.and_then(|cache| cache.get(key, quiet));
+        if let Some((path, bytes)) = kept
+            && let Some((picture, noise, spp)) = Picture::decode(&bytes, &path.to_string_lossy())
+        {
+            return Ok(Self { picture, report: report(Source::Cache, Some(&path), noise, spp) });
+        }
+        let (picture, noise, spp) = goal.reach(shoot)?;
+        let path = match cache {
+            None => None,
+            Some(cache) => {
+                let path = cache.put(key, &picture.encode(noise, spp)?);
+                Some(path.context("cannot keep the reference; --no-cache does without")?)
+            }
+        };
+        Ok(Self { picture, report: report(Source::Rendered, path.as_deref(), noise, spp) })
+    }
+
+    /// Of a view, by [`PLAN`].
+    pub(crate) fn of_view(
+        cache: Option<&Cache>,
+        view: &View,
+        settings: RenderSettings,
+        goal: Goal,
+        quiet: bool,
+    ) -> Result<Self> {
+        let settings = RenderSettings { n_samples: 0, seed: SEEDS[0], ..settings };
+        let key = Key::of_program(view, format_args!("{settings:?}{PLAN:?}{goal:?}"));
+        let renderer = PLAN.prepare(&view.environment)?;
+        let studio = Studio { view, settings, renderer: &renderer, quiet };
+        Self::get(cache, &key, goal, &PLAN.describe(), quiet, |n_samples, half| {
+            let label = format!("reference, half {} of 2", half + 1);
+            Ok(studio.shoot(&label, n_samples, SEEDS[half])?.layers.into())
+        })
+    }
+}
+
+impl Goal {
+    /// The mean of two halves, its relMSE and its camera samples a pixel.
+    fn reach(
+        self,
+        mut shoot: impl FnMut(u32, usize) -> Result<Picture>,
+    ) -> Result<(Picture, f64, u32)> {
+        let mut take = |each: u32| -> Result<(Picture, f64)> {
+            let [a, b] = [shoot(each, 0)?, shoot(each, 1)?];
+            let mean = a.mean(&b);
+            let mask = mean.covered().filter(|_| matches!(self, Self::Noise { .. }));
+            // (a − m)² = ((a − b) / 2)², whose expected value is the variance of m.
+            let noise = compare(&a.image, &mean.image, mask.as_deref())?.rel_mse;
+            Ok((mean, noise))
+        };
+        match self {
+            Self::Samples(n) => {
+                let each = n.div_ceil(2);
+                let (picture, noise) = take(each)?;
+                Ok((picture, noise, 2 * each))
+            }
+            Self::Noise { noise: goal, most } => {
+                let most = most.div_ceil(2);
+                let mut each = PILOT.min(most);
+                loop {
+                    let (picture, noise) = take(each)?;
+                    if noise <= goal || each == most {
+                        return Ok((picture, noise, 2 * each));
+                    }
+                    each = next_samples(each, noise / goal).min(most);
+                }
+            }
+        }
+    }
+}
+
+/// Enough to divide the noise by `ratio`, which falls with the samples or faster: not much more at once
+/// than was tried, and twice as many at least.
+fn next_samples(each: u32, ratio: f64) -> u32 {
+    (f64::from(each) * ratio.clamp(2.0, 16.0)).ceil() as u32
+}

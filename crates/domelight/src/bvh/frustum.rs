@@ -1,0 +1,94 @@
+//! Whether anything may lie in a pyramid or a prism: what spares camera rays into nothing.
+
+use super::{Bvh, Node};
+use crate::geometry::Aabb;
+use crate::math::Vec3;
+use crate::simd::{Kernel, Mask, Real, Simd};
+
+/// The points on the inner side of four planes: the view of a rectangle of the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frustum {
+    /// Normals, pointing inward.
+    normals: [Vec3; 4],
+    /// Points on the planes.
+    points: [Vec3; 4],
+}
+
+impl Frustum {
+    /// What the rays see that start at `origins` toward `directions`, which are the corners of a
+    /// rectangle in order, clockwise or not, and all that lie between them.
+    pub fn new(origins: [Vec3; 4], directions: [Vec3; 4]) -> Self {
+        let inner = directions.iter().sum::<Vec3>();
+        let middle = origins.iter().sum::<Vec3>() * 0.25;
+        let normals = std::array::from_fn(|i| {
+            let next = (i + 1) % 4;
+            // An edge runs along both directions, and of parallel ones from corner to corner.
+            let across = directions[next] - directions[i] + origins[next] - origins[i];
+            let normal = directions[i].cross(across).normalize_or_zero();
+            let inward = normal.dot(inner - directions[i] * 4.0) + normal.dot(middle - origins[i]);
+            if inward < 0.0 { -normal } else { normal }
+        });
+        Self { normals, points: origins }
+    }
+}
+
+/// [`Bvh::may_hit`]
+pub(super) struct MayHit<'a> {
+    pub(super) bvh: &'a Bvh,
+    pub(super) frustum: &'a Frustum,
+}
+
+impl Kernel for MayHit<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> bool {
+        let planes = planes(self.frustum, &self.bvh.bounds);
+        let mut stack = vec![0];
+        while let Some(node) = stack.pop().and_then(|node: usize| self.bvh.nodes.get(node)) {
+            let mut children = inside(simd, &planes, node);
+            while children != 0 {
+                let child = node.children[children.trailing_zeros() as usize];
+                children &= children - 1;
+                if child.is_leaf() {
+                    return true;
+                }
+                stack.push(child.index());
+            }
+        }
+        false
+    }
+}
+
+/// n·p ≥ d on the inner side.
+struct Plane {
+    normal: Vec3,
+    d: f32,
+}
+
+/// The planes, moved outward by what rounding may move a ray or a box.
+fn planes(frustum: &Frustum, bounds: &Aabb) -> [Plane; 4] {
+    const ROUNDING: f32 = 16.0 * f32::EPSILON;
+    std::array::from_fn(|i| {
+        let (normal, point) = (frustum.normals[i], frustum.points[i]);
+        let scale = point.abs().max(bounds.min.abs()).max(bounds.max.abs()).element_sum();
+        Plane { normal, d: normal.dot(point) - ROUNDING * scale }
+    })
+}
+
+/// The children of a node that are not all outside of one plane.
+#[inline(always)]
+fn inside<S: Simd>(simd: S, planes: &[Plane; 4], node: &Node) -> u32 {
+    let mut all = !0;
+    for Plane { normal, d } in planes {
+        // The corner that lies furthest inward; NaN of a missing child's is not inside.
+        let mut furthest = simd.splat(0.0);
+        for axis in 0..3 {
+            let n = normal[axis];
+            let corner = simd.load(&node.planes[axis][usize::from(n > 0.0)]);
+            furthest = furthest + simd.splat(n) * corner;
+        }
+        all &= simd.splat(*d).le(furthest).bits();
+    }
+    all
+}

@@ -1,0 +1,213 @@
+//! The reference: plain Rust, one lane after the other.
+
+use std::array::from_fn;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
+
+use super::{Floats, Ints, LANES, Lanes, Mask, Real, Sets, Simd, last_of};
+
+#[derive(Clone, Copy)]
+pub(crate) struct Scalar;
+
+#[derive(Clone, Copy)]
+pub(crate) struct F32x8(Lanes);
+
+#[derive(Clone, Copy)]
+pub(crate) struct I32x8([i32; 8]);
+
+#[derive(Clone, Copy)]
+pub(crate) struct Mask8([bool; 8]);
+
+#[derive(Clone, Copy)]
+pub(crate) struct Sets8([u32; 8]);
+
+impl Simd for Scalar {
+    type Floats = F32x8;
+    type Ints = I32x8;
+    type Sets = Sets8;
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> F32x8 {
+        F32x8([x; 8])
+    }
+    #[inline(always)]
+    fn load(self, x: &Lanes) -> F32x8 {
+        F32x8(*x)
+    }
+    #[inline(always)]
+    fn prefetch<T>(self, _: &T) {}
+    #[inline(always)]
+    fn splat_int(self, x: i32) -> I32x8 {
+        I32x8([x; 8])
+    }
+    #[inline(always)]
+    fn load_ints(self, x: &[i32; LANES]) -> I32x8 {
+        I32x8(*x)
+    }
+    #[inline(always)]
+    fn counting(self) -> I32x8 {
+        I32x8([0, 1, 2, 3, 4, 5, 6, 7])
+    }
+    #[inline(always)]
+    fn empty(self) -> Sets8 {
+        Sets8([0; 8])
+    }
+    #[inline(always)]
+    fn transposed(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
+        from_fn(|column| F32x8(rows.map(|row| row[column])))
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $method:ident, $type:ident, $op:tt) => {
+        impl $trait for $type {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, b: Self) -> Self {
+                Self(from_fn(|i| self.0[i] $op b.0[i]))
+            }
+        }
+    };
+}
+operator!(Add, add, F32x8, +);
+operator!(Sub, sub, F32x8, -);
+operator!(Mul, mul, F32x8, *);
+operator!(Div, div, F32x8, /);
+operator!(BitAnd, bitand, Mask8, &);
+operator!(BitOr, bitor, Mask8, |);
+
+impl Real for F32x8 {
+    type Mask = Mask8;
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> Self {
+        Self([x; 8])
+    }
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        Self(from_fn(|i| if self.0[i] < b.0[i] { self.0[i] } else { b.0[i] }))
+    }
+    #[inline(always)]
+    fn max(self, b: Self) -> Self {
+        Self(from_fn(|i| if self.0[i] > b.0[i] { self.0[i] } else { b.0[i] }))
+    }
+    #[inline(always)]
+    fn le(self, b: Self) -> Mask8 {
+        Mask8(from_fn(|i| self.0[i] <= b.0[i]))
+    }
+    #[inline(always)]
+    fn lt(self, b: Self) -> Mask8 {
+        Mask8(from_fn(|i| self.0[i] < b.0[i]))
+    }
+    #[inline(always)]
+    fn eq(self, b: Self) -> Mask8 {
+        Mask8(from_fn(|i| self.0[i] == b.0[i]))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f32::sqrt))
+    }
+    #[inline(always)]
+    fn select(mask: Mask8, a: Self, b: Self) -> Self {
+        Self(from_fn(|i| if mask.0[i] { a.0[i] } else { b.0[i] }))
+    }
+    #[inline(always)]
+    fn each<const M: usize, const N: usize>(
+        arguments: [Self; M],
+        mut f: impl FnMut([f32; M]) -> [f32; N],
+    ) -> [Self; N] {
+        let mut values = [[0.0; LANES]; N];
+        for lane in 0..LANES {
+            for (value, y) in values.iter_mut().zip(f(arguments.map(|x| x.0[lane]))) {
+                value[lane] = y;
+            }
+        }
+        values.map(Self)
+    }
+}
+
+impl Floats for F32x8 {
+    type Ints = I32x8;
+
+    #[inline(always)]
+    fn store(self) -> Lanes {
+        self.0
+    }
+    #[inline(always)]
+    fn truncated(self) -> I32x8 {
+        I32x8(self.0.map(|x| x as i32))
+    }
+    #[inline(always)]
+    fn gather<const N: usize>(table: &[Lanes; N], at: I32x8) -> Self {
+        Self(at.0.map(|i| {
+            let i = i as usize & last_of::<N>();
+            table[i / LANES][i % LANES]
+        }))
+    }
+}
+
+impl Add for I32x8 {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        Self(from_fn(|i| self.0[i].wrapping_add(b.0[i])))
+    }
+}
+
+impl Ints for I32x8 {
+    type Floats = F32x8;
+
+    #[inline(always)]
+    fn shifted<const N: i32>(self) -> Self {
+        Self(self.0.map(|x| x << N))
+    }
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        Self(from_fn(|i| self.0[i].min(b.0[i])))
+    }
+    #[inline(always)]
+    fn lt(self, b: Self) -> Mask8 {
+        Mask8(from_fn(|i| self.0[i] < b.0[i]))
+    }
+    #[inline(always)]
+    fn to_floats(self) -> F32x8 {
+        F32x8(self.0.map(|x| x as f32))
+    }
+    #[inline(always)]
+    fn select(mask: Mask8, a: Self, b: Self) -> Self {
+        Self(from_fn(|i| if mask.0[i] { a.0[i] } else { b.0[i] }))
+    }
+    #[inline(always)]
+    fn store(self) -> [i32; 8] {
+        self.0
+    }
+}
+
+impl Mask for Mask8 {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        (0..8).fold(0, |bits, i| bits | u32::from(self.0[i]) << i)
+    }
+}
+
+impl Sets for Sets8 {
+    type Mask = Mask8;
+
+    #[inline(always)]
+    fn insert(self, m: Mask8, bit: u32) -> Self {
+        Self(from_fn(|i| if m.0[i] { self.0[i] | bit } else { self.0[i] }))
+    }
+    #[inline(always)]
+    fn not_empty(self) -> u32 {
+        (0..8).fold(0, |bits, i| bits | u32::from(self.0[i] != 0) << i)
+    }
+    #[inline(always)]
+    fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
+        super::pack(self.store(), numbers)
+    }
+    #[inline(always)]
+    fn store(self) -> [u32; 8] {
+        self.0
+    }
+}

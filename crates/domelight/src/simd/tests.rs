@@ -1,0 +1,124 @@
+//! Every operation of every instruction set against one number at a time, on numbers that hurt.
+
+use super::*;
+use crate::sampling::Pcg32;
+
+/// What the operations make of two vectors, as bits; any NaN is the same.
+struct All {
+    a: Lanes,
+    b: Lanes,
+}
+
+impl Kernel for All {
+    type Output = Vec<[u32; LANES]>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let (a, b) = (simd.load(&self.a), simd.load(&self.b));
+        let masks = [a.le(b), a.lt(b), a.eq(b), a.le(b) & b.le(a), a.lt(b) | b.lt(a)];
+        let [each] = Real::each([a, b], |[a, b]| [a.atan2(b)]);
+        let floats = [
+            a + b,
+            a - b,
+            a * b,
+            a / b,
+            a.min(b),
+            a.max(b),
+            a.sqrt(),
+            a.abs(),
+            a.squared(),
+            a.splat(3.0),
+            a.map(|x| 2.0 * x),
+            each,
+            Real::select(a.lt(b), a, b),
+            simd.splat(self.a[3]),
+        ];
+        let rows: [Lanes; LANES] = std::array::from_fn(|i| self.a.map(|x| x * i as f32));
+        let columns = simd.transposed(rows.each_ref());
+        let bits = |x: f32| if x.is_nan() { u32::MAX } else { x.to_bits() };
+        let mut all: Vec<[u32; LANES]> =
+            floats.into_iter().chain(columns).map(|x| x.store().map(bits)).collect();
+        all.push(std::array::from_fn(|i| masks.get(i).map_or(0, |m| m.bits())));
+        all.push(std::array::from_fn(|_| bits(a.sum())));
+        let mut sets = simd.empty();
+        for (i, mask) in masks.into_iter().enumerate() {
+            sets = sets.insert(mask, 1 << i);
+        }
+        all.push(sets.store());
+        all.push([sets.not_empty(); LANES]);
+        all
+    }
+}
+
+/// The same of whole numbers.
+struct Whole {
+    a: [i32; LANES],
+    b: [i32; LANES],
+}
+
+impl Kernel for Whole {
+    type Output = Vec<[i32; LANES]>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let (a, b) = (simd.load_ints(&self.a), simd.load_ints(&self.b));
+        let table: [Lanes; 4] =
+            std::array::from_fn(|row| std::array::from_fn(|lane| (row * LANES + lane) as f32));
+        let gathered = S::Floats::gather(&table, a);
+        let ints = [
+            a + b,
+            a.shifted::<3>(),
+            a.min(b),
+            Ints::select(a.lt(b), a, b),
+            a.to_floats().truncated(),
+            gathered.truncated(),
+            simd.counting(),
+            simd.splat_int(self.a[5]),
+        ];
+        ints.map(Ints::store).to_vec()
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    const HARD: [f32; 16] = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::MAX,
+        f32::MIN,
+        f32::MIN_POSITIVE,
+        1e-42,
+        -1e-42,
+        f32::EPSILON,
+        16_777_216.0,
+        0.1,
+        -3.5,
+    ];
+    let mut pcg = Pcg32::new(1, 2);
+    let mut hard = || match pcg.next_u32() % 3 {
+        0 => f32::from_bits(pcg.next_u32()),
+        _ => HARD[pcg.next_u32() as usize % HARD.len()],
+    };
+    for _ in 0..5000 {
+        let (a, b) = (std::array::from_fn(|_| hard()), std::array::from_fn(|_| hard()));
+        let expected = dispatch(InstructionSet::Scalar, All { a, b });
+        for set in InstructionSet::ALL {
+            assert_eq!(dispatch(set, All { a, b }), expected, "{set:?} {a:?} {b:?}");
+        }
+    }
+    let mut pcg = Pcg32::new(3, 4);
+    for _ in 0..5000 {
+        // Within what a single holds exactly, which `truncated` takes back.
+        let mut number = || pcg.next_u32() as i32 >> 8;
+        let (a, b) = (std::array::from_fn(|_| number()), std::array::from_fn(|_| number()));
+        let expected = dispatch(InstructionSet::Scalar, Whole { a, b });
+        for set in InstructionSet::ALL {
+            assert_eq!(dispatch(set, Whole { a, b }), expected, "{set:?} {a:?} {b:?}");
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Directions and colours side by side.
+
+use super::{Floats, Lanes, Real, Simd};
+use crate::Rgb;
+use crate::math::Vec3;
+
+/// Vectors by component.
+#[derive(Clone, Copy, Debug)]
+pub struct Vectors<F> {
+    pub(crate) x: F,
+    pub(crate) y: F,
+    pub(crate) z: F,
+}
+
+impl<F: Real> Vectors<F> {
+    /// The scalar products with one vector.
+    #[inline(always)]
+    pub(crate) fn dot(self, v: Vec3) -> F {
+        self.x * self.x.splat(v.x) + self.y * self.x.splat(v.y) + self.z * self.x.splat(v.z)
+    }
+
+    #[inline(always)]
+    pub(crate) fn length_squared(self) -> F {
+        self.x * self.x + self.y * self.y + self.z * self.z
+    }
+
+    /// `v` in every lane, beside numbers that prove the instructions.
+    #[inline(always)]
+    pub(crate) fn splat(like: F, v: Vec3) -> Self {
+        Self { x: like.splat(v.x), y: like.splat(v.y), z: like.splat(v.z) }
+    }
+
+    #[inline(always)]
+    pub(crate) fn plus(self, b: Self) -> Self {
+        Self { x: self.x + b.x, y: self.y + b.y, z: self.z + b.z }
+    }
+}
+
+impl<F: Floats> Vectors<F> {
+    /// By component.
+    #[inline(always)]
+    pub(crate) fn load<S: Simd<Floats = F>>(simd: S, v: &[Lanes; 3]) -> Self {
+        let [x, y, z] = v;
+        Self { x: simd.load(x), y: simd.load(y), z: simd.load(z) }
+    }
+}
+
+impl From<Vec3> for Vectors<f32> {
+    #[inline(always)]
+    fn from(v: Vec3) -> Self {
+        Self { x: v.x, y: v.y, z: v.z }
+    }
+}
+
+/// Colours by channel.
+#[derive(Clone, Copy, Debug)]
+pub struct Colors<F>(pub(crate) [F; 3]);
+
+impl<F: Real> Colors<F> {
+    /// `color` in every lane, beside numbers that prove the instructions.
+    #[inline(always)]
+    pub(crate) fn splat(like: F, color: Rgb) -> Self {
+        Self(color.to_array().map(|c| like.splat(c)))
+    }
+
+    /// Channel by channel with another.
+    #[inline(always)]
+    pub(crate) fn zip(self, b: Self, f: impl Fn(F, F) -> F) -> Self {
+        let ([r, g, b], [r2, g2, b2]) = (self.0, b.0);
+        Self([f(r, r2), f(g, g2), f(b, b2)])
+    }
+
+    #[inline(always)]
+    pub(crate) fn map(self, f: impl Fn(F) -> F) -> Self {
+        Self(self.0.map(f))
+    }
+
+    /// Times a number.
+    #[inline(always)]
+    pub(crate) fn scaled(self, x: F) -> Self {
+        self.map(|c| c * x)
+    }
+
+    /// Luminance by Rec. 709.
+    #[inline(always)]
+    pub(crate) fn luminance(self) -> F {
+        let [r, g, b] = self.0;
+        let [wr, wg, wb] = Rgb::LUMINANCE.map(|w| r.splat(w));
+        wr * r + wg * g + wb * b
+    }
+}
+
+impl Colors<f32> {
+    pub(crate) fn single(self) -> Rgb {
+        Rgb::from(self.0)
+    }
+}
