@@ -17,17 +17,24 @@ use tempfile::TempDir;
 const SCENE: [&str; 9] =
     ["render", "spheres", "--env", "sky", "--env-rows", "32", "--size", "70x50", "-q"];
 
+/// The arguments of a render; by `mis`, whose passes are short, unless they say otherwise.
+fn scene<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
+    let given = arguments.contains(&"--strategy");
+    let strategy: &[&str] = if given { &[] } else { &["--strategy", "mis"] };
+    [&SCENE[..], strategy, arguments].concat()
+}
+
 fn folder() -> TempDir {
     TempDir::new().expect("a temporary folder")
 }
 
 fn render(folder: &TempDir, arguments: &[&str]) -> Output {
-    domelight(folder, &[&SCENE[..], arguments].concat())
+    domelight(folder, &scene(arguments))
 }
 
 fn start(folder: &TempDir, arguments: &[&str]) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_domelight"));
-    command.args(SCENE).args(arguments).current_dir(folder);
+    command.args(scene(arguments)).current_dir(folder);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command.spawn().expect("the program starts")
 }
@@ -89,8 +96,10 @@ fn kill_and_resume(folder: &TempDir, arguments: &[&str], checkpoint: &str, seed:
 fn killed_at_random_moments_it_ends_with_the_same_bits() {
     let folder = folder();
     let mut kills = 0;
-    for (seed, threads) in [(1, "1"), (2, "2"), (3, "1"), (4, "2")] {
-        let samples = ["--spp", "250", "--threads", threads, "--filter", "box"];
+    let runs = [(1, "1", "product"), (2, "2", "product"), (3, "1", "mis"), (4, "2", "mis")];
+    for (seed, threads, strategy) in runs {
+        let samples =
+            ["--spp", "250", "--threads", threads, "--filter", "box", "--strategy", strategy];
         let whole = [&samples[..], &["-o", "whole.exr"]].concat();
         ended(&render(&folder, &whole), 0, &[]);
         let resumed = [&samples[..], &["-o", "resumed.exr"]].concat();
@@ -302,8 +311,8 @@ fn what_was_saved_survives_a_full_disk_and_a_vanished_folder() {
     let program = env!("CARGO_BIN_EXE_domelight");
     let script = format!("trap '' XFSZ; ulimit -f 8; exec {program} \"$@\"");
     let mut command = Command::new("sh");
-    command.args(["-c", &script, "sh"]).args(SCENE).current_dir(&folder);
-    command.args(["--spp", "50", "--resume", "c.exr", "--checkpoint-every", "1ms"]);
+    command.args(["-c", &script, "sh"]).current_dir(&folder);
+    command.args(scene(&["--spp", "50", "--resume", "c.exr", "--checkpoint-every", "1ms"]));
     ended(&command.output().expect("a shell"), 1, &["c.exr"]);
     assert_eq!(fs::read(folder.path().join("c.exr")).unwrap(), before);
 
@@ -337,7 +346,7 @@ fn a_farm_hears_how_far_it_is() {
     ended(&both, 2, &["--json", "--progress"]);
 
     let mut command = Command::new(env!("CARGO_BIN_EXE_domelight"));
-    command.args(SCENE).args(["--spp", "1", "--json", "-o", "x.exr"]).current_dir(&folder);
+    command.args(scene(&["--spp", "1", "--json", "-o", "x.exr"])).current_dir(&folder);
     let output = command.env("SLURM_CPUS_PER_TASK", "3").output().expect("the program");
     assert_eq!(common::json(&output)["settings"]["threads"], 3);
 }

@@ -52,7 +52,7 @@ fn check(arguments: &BenchArguments) -> Result<(), UsageError> {
     use Suite::{Kernels, Lecture, Probes, Rigs};
     let BenchArguments { meshes, probes, materials, cases, strategies, vs, embree, .. } = arguments;
     let given: [(&str, bool, &[Suite]); 7] = [
-        ("--meshes", !meshes.is_empty(), &[Probes, Kernels]),
+        ("--meshes", !meshes.is_empty(), &[Probes]),
         ("--probes", !probes.is_empty(), &[Probes, Rigs]),
         ("--materials", materials.is_some(), &[Probes]),
         ("--case", !cases.is_empty(), &[Probes]),

@@ -227,7 +227,8 @@ impl Sources<'_> {
         candidates.brdf.clear();
         for first in (0..counts.brdf).step_by(LANES) {
             let n = (counts.brdf - first).min(LANES);
-            self.draw_brdf(simd, hits, counts, scale, numbers, first..first + n, candidates);
+            let drawn = Drawn::draw(hits, numbers, first..first + n);
+            self.weigh_drawn(simd, hits, &drawn, [scale, counts.brdf as f32], &mut candidates.brdf);
         }
     }
 
@@ -258,59 +259,26 @@ impl Sources<'_> {
         }
     }
 
-    /// Samples `which` of the material, no more than there are lanes: each of another hit.
+    /// Adds samples of the material, weighed with `counts`: M over the total of the table, and N.
     #[inline(always)]
-    fn draw_brdf<S: Simd>(
+    fn weigh_drawn<S: Simd>(
         &self,
         simd: S,
         hits: Hits,
-        counts: Counts,
-        scale: f32,
-        numbers: &PixelNumbers,
-        which: std::ops::Range<usize>,
-        candidates: &mut Candidates,
+        drawn: &Drawn,
+        counts: [f32; 2],
+        candidates: &mut Vec<Candidate>,
     ) {
-        let mut drawn = Drawn::default();
-        for j in which {
-            let hit = numbers.brdf_hit(j, hits.points.len());
-            let at = &hits.points[hit];
-            let u = numbers.stream.numbers(Dimension::Brdf, j as u32);
-            let local = hits.material(hit).sample_direction(at.wo, u.u_lobe(), u.u());
-            let Some(local) = local.filter(|wi| wi.is_finite()) else { continue };
-            let wi = at.frame.to_world(local);
-            if at.ng.dot(wi) > 0.0 {
-                drawn.push(hit, at.wo, local, wi);
-            }
-        }
-        let (f, pdf) = self.eval_drawn(simd, hits, &drawn);
+        let (f, pdf) = drawn.eval(simd, hits);
         for lane in (0..drawn.n).filter(|&lane| pdf[lane] > 0.0 && pdf[lane].is_finite()) {
             let wi = drawn.world[lane];
             let Some((cell, le)) = self.cells.find(self.environment, wi) else { continue };
             let (slot, hit) = (slot(cell), drawn.hits[lane] as u32);
-            let density = le.luminance() / self.cells.mass_of(cell);
-            let density = scale * self.table.width(slot) * density + counts.brdf as f32 * pdf[lane];
+            let within = le.luminance() / self.cells.mass_of(cell);
+            let density = counts[0] * self.table.width(slot) * within + counts[1] * pdf[lane];
             let value = f[lane] * le / density;
             let (slot, luminance) = (slot as u32, value.luminance());
-            candidates.brdf.push(Candidate { wi, value, luminance, slot, hit });
-        }
-    }
-
-    /// Values and densities of what was drawn.
-    #[inline(always)]
-    fn eval_drawn<S: Simd>(&self, simd: S, hits: Hits, drawn: &Drawn) -> ([Rgb; LANES], Lanes) {
-        if hits.one_material {
-            let wo = Vectors::load(simd, &drawn.wo);
-            let wi = Vectors::load(simd, &drawn.wi);
-            let (f, pdf) = hits.material(0).eval_lanes(wo, wi);
-            let f = f.0.map(Floats::store);
-            (std::array::from_fn(|lane| Rgb::from(f.map(|c| c[lane]))), pdf.store())
-        } else {
-            let (mut f, mut pdf) = ([Rgb::BLACK; LANES], [0.0; LANES]);
-            for lane in 0..drawn.n {
-                let [wo, wi] = [drawn.wo, drawn.wi].map(|v| Vec3::from(v.map(|c| c[lane])));
-                (f[lane], pdf[lane]) = hits.material(drawn.hits[lane]).eval_pdf(wo, wi);
-            }
-            (f, pdf)
+            candidates.push(Candidate { wi, value, luminance, slot, hit });
         }
     }
 }
@@ -341,6 +309,24 @@ struct Drawn {
 }
 
 impl Drawn {
+    /// Samples `which` of the pixel, no more than there are lanes: each of another hit.
+    #[inline(always)]
+    fn draw(hits: Hits, numbers: &PixelNumbers, which: std::ops::Range<usize>) -> Self {
+        let mut drawn = Self::default();
+        for j in which {
+            let hit = numbers.brdf_hit(j, hits.points.len());
+            let at = &hits.points[hit];
+            let u = numbers.stream.numbers(Dimension::Brdf, j as u32);
+            let local = hits.material(hit).sample_direction(at.wo, u.u_lobe(), u.u());
+            let Some(local) = local.filter(|wi| wi.is_finite()) else { continue };
+            let wi = at.frame.to_world(local);
+            if at.ng.dot(wi) > 0.0 {
+                drawn.push(hit, at.wo, local, wi);
+            }
+        }
+        drawn
+    }
+
     #[inline(always)]
     fn push(&mut self, hit: usize, wo: Vec3, wi: Vec3, world: Vec3) {
         let lane = self.n;
@@ -349,6 +335,24 @@ impl Drawn {
         self.world[lane] = world;
         for c in 0..3 {
             (self.wo[c][lane], self.wi[c][lane]) = (wo[c], wi[c]);
+        }
+    }
+
+    /// Their values and densities.
+    #[inline(always)]
+    fn eval<S: Simd>(&self, simd: S, hits: Hits) -> ([Rgb; LANES], Lanes) {
+        if hits.one_material {
+            let (wo, wi) = (Vectors::load(simd, &self.wo), Vectors::load(simd, &self.wi));
+            let (f, pdf) = hits.material(0).eval_lanes(wo, wi);
+            let f = f.0.map(Floats::store);
+            (std::array::from_fn(|lane| Rgb::from(f.map(|c| c[lane]))), pdf.store())
+        } else {
+            let (mut f, mut pdf) = ([Rgb::BLACK; LANES], [0.0; LANES]);
+            for lane in 0..self.n {
+                let [wo, wi] = [self.wo, self.wi].map(|v| Vec3::from(v.map(|c| c[lane])));
+                (f[lane], pdf[lane]) = hits.material(self.hits[lane]).eval_pdf(wo, wi);
+            }
+            (f, pdf)
         }
     }
 }
