@@ -74,7 +74,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
 
     let tone = arguments.output.tone.mapping(ToneCurve::Agx);
     if arguments.output.preview {
-        let settings = &RenderSettings { n_samples: 1, target_error: None, ..settings.clone() };
+        let settings = &RenderSettings { n_samples: 1, target_error: None, ..*settings };
         let progress = &RenderProgress::new("", 1, true, interrupted);
         let job = Job { scene, camera, environment, settings, progress, course: None };
         let layers = renderer(&job)?.layers;

@@ -514,42 +514,6 @@ fn instruction_sets_give_the_same_bits_for_hostile_numbers() {
     }
 }
 
-/// What a ray through a rectangle of the picture hits is seen, and what is beside or behind is not.
-#[test]
-fn a_frustum_sees_what_its_rays_hit() {
-    use domelight::scene::{Camera, CameraSettings, Projection};
-    let (mut empty, mut hits) = (0, 0);
-    for (name, scene) in closed_meshes() {
-        let bvh = scene.bvh();
-        let sets = on(&bvh);
-        for projection in [
-            Projection::Perspective { fov_y_degrees: 40.0 },
-            Projection::Orthographic { height: 1.0 },
-        ] {
-            let mut settings = CameraSettings::framing(&bvh.bounds(), 1.5, Vec3::Y);
-            if let Projection::Orthographic { .. } = projection {
-                let height = 2.0 * bvh.bounds().size().max_element();
-                settings.projection = Projection::Orthographic { height };
-            }
-            let camera = Camera::new(&settings, 60, 40).unwrap();
-            let mut random = Random(77);
-            for _ in 0..4000 {
-                let [x, y] = [random.below(60) as f32, random.below(40) as f32];
-                let size = [0.01, 1.0, 7.0][random.below(3)];
-                let frustum = camera.frustum([x, x + size], [y, y + size]);
-                let seen = bvh.may_hit(&frustum);
-                assert!(sets.iter().all(|bvh| bvh.may_hit(&frustum) == seen));
-                let ray = camera.ray(x + size * random.unit(), y + size * random.unit());
-                let hit = bvh.closest_hit(&ray).is_some();
-                assert!(seen || !hit, "{name} {projection:?} {x} {y} {size}");
-                empty += usize::from(!seen);
-                hits += usize::from(hit);
-            }
-        }
-    }
-    assert!(empty > 5_000 && hits > 5_000, "{empty} {hits}");
-}
-
 // ---- watertightness ----------------------------------------------------------------------------
 
 /// An interior point of a convex mesh, drawn so that some lie very near the surface.

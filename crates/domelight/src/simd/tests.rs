@@ -46,6 +46,8 @@ impl Kernel for All {
         }
         all.push(sets.store());
         all.push([sets.not_empty(); LANES]);
+        let (packed, numbers, n) = sets.pack([0, 1, 2, 3, 4, 5, 6, 7]);
+        all.push(std::array::from_fn(|i| if i < n { packed[i] | numbers[i] << 16 } else { 0 }));
         all
     }
 }
