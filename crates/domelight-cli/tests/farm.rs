@@ -78,6 +78,6 @@ fn every_engine_gets_its_files() {
     assert_eq!(refused.status.code(), Some(2));
     let refused = farm(&folder, "slurm", &["--rays", "1"]);
     assert_eq!(refused.status.code(), Some(2));
-    let refused = farm(&folder, "slurm", &["--shards", "2", "--rays", "1"]);
+    let refused = farm(&folder, "slurm", &["--shards", "2", "--strategy", "mis", "--rays", "1"]);
     assert!(stderr(&refused).contains("--split"), "{}", stderr(&refused));
 }
