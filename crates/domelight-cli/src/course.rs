@@ -224,7 +224,8 @@ impl Course {
         loop {
             let next_save = self.save.as_ref().map(|_| Instant::now() + self.every);
             let pause = [end, next_save].into_iter().flatten().min();
-            let complete = session.run(&Until { progress, pause });
+            let complete =
+                session.run(&Until { progress, pause, advanced: AtomicBool::new(false) });
             let interrupted = self.interrupted.load(Ordering::Relaxed);
             if complete || interrupted || end.is_some_and(|end| Instant::now() >= end) {
                 return self.save(session, settings);
@@ -302,6 +303,8 @@ fn restore<S: Strategy>(
 struct Until<'a> {
     progress: &'a RenderProgress,
     pause: Option<Instant>,
+    /// A tile was finished: however short the time, every run gets further.
+    advanced: AtomicBool,
 }
 
 impl Observer for Until<'_> {
@@ -315,9 +318,11 @@ impl Observer for Until<'_> {
 
     fn tile_finished(&self, counts: &Counts) {
         self.progress.tile_finished(counts);
+        self.advanced.store(true, Ordering::Relaxed);
     }
 
     fn cancelled(&self) -> bool {
-        self.progress.cancelled() || self.pause.is_some_and(|pause| Instant::now() >= pause)
+        let late = || self.pause.is_some_and(|pause| Instant::now() >= pause);
+        self.progress.cancelled() || (self.advanced.load(Ordering::Relaxed) && late())
     }
 }

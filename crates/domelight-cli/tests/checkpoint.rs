@@ -92,6 +92,15 @@ fn kill_and_resume(folder: &TempDir, arguments: &[&str], checkpoint: &str, seed:
     }
 }
 
+/// A pass whose preparation takes longer than the time to the next checkpoint gets on all the same.
+#[test]
+fn saving_all_the_time_leaves_time_to_render() {
+    let folder = folder();
+    let rest = ["--spp", "40", "--strategy", "product", "-o", "x.exr"];
+    let all_the_time = ["--checkpoint", "c.exr", "--checkpoint-every", "1ms"];
+    ended(&render(&folder, &[&rest[..], &all_the_time].concat()), 0, &[]);
+}
+
 #[test]
 fn killed_at_random_moments_it_ends_with_the_same_bits() {
     let folder = folder();
