@@ -95,6 +95,22 @@ fn the_same_seed_gives_the_same_file() {
     assert_ne!(picture("a.pfm", "7", "1"), picture("c.pfm", "8", "1"));
 }
 
+/// A preview and a profile leave the picture as it is.
+#[test]
+fn previews_and_profiles_change_nothing() {
+    let folder = folder();
+    succeeded(&render(&folder, &["-o", "plain.png"]));
+    let output = render(&folder, &["--preview", "--profile", "--json", "-o", "watched.png"]);
+    succeeded(&output);
+    let bytes = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    assert!(bytes("plain.png") == bytes("watched.png"));
+    let profile = &json(&output)["profile"];
+    let stages: Vec<_> = profile.as_array().unwrap().iter().map(|s| &s["stage"]).collect();
+    assert_eq!(stages, ["camera rays", "surfaces", "strategy", "shadow rays", "sums"]);
+    let shares = profile.as_array().unwrap().iter().map(|s| s["share"].as_f64().unwrap());
+    assert!((shares.sum::<f64>() - 1.0).abs() < 1e-6);
+}
+
 #[test]
 fn own_meshes_render_under_own_probes() {
     let folder = folder();
