@@ -25,6 +25,7 @@ mod progress;
 mod render;
 mod report;
 mod scene;
+mod shell;
 mod strategy;
 mod svg;
 mod typed;

@@ -1,5 +1,7 @@
 //! The command as it was typed, for reports.
 
+use crate::shell::quote;
+
 /// The command line of this process.
 pub(crate) fn command() -> String {
     quoted(std::env::args().skip(1))
@@ -7,15 +9,8 @@ pub(crate) fn command() -> String {
 
 /// As it may be typed again.
 fn quoted(arguments: impl Iterator<Item = String>) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+@%".contains(c);
-    let quoted = arguments.map(|argument| {
-        if !argument.is_empty() && argument.chars().all(plain) {
-            argument
-        } else {
-            format!("'{}'", argument.replace('\'', "'\\''"))
-        }
-    });
-    std::iter::once("domelight".to_owned()).chain(quoted).collect::<Vec<_>>().join(" ")
+    let words = std::iter::once("domelight".to_owned()).chain(arguments);
+    words.map(|word| quote(&word)).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

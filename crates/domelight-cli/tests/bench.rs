@@ -141,24 +141,24 @@ fn bad_usage_is_named() {
 #[cfg(unix)]
 #[test]
 fn an_interrupt_keeps_what_is_done() {
-    use nix::sys::signal::{Signal, kill};
-    use nix::unistd::Pid;
-    use std::process::{Command, Stdio};
-    use std::time::Duration;
-
     let folder = folder();
-    let child = Command::new(env!("CARGO_BIN_EXE_domelight"))
-        .args(["bench", "--suite", "probes", "--meshes", "sphere", "--most", "1e6"])
-        .args(["--no-cache", "--errors", "1e-9", "--reference-error", "1", "-o", "x.json"])
-        .current_dir(&folder)
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    std::thread::sleep(Duration::from_millis(1500));
-    kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();
-    let output = child.wait_with_output().unwrap();
+    let arguments = [
+        "bench",
+        "--suite",
+        "probes",
+        "--meshes",
+        "sphere",
+        "--most",
+        "1e6",
+        "--no-cache",
+        "--errors",
+        "1e-9",
+        "--reference-error",
+        "1",
+        "-o",
+        "x.json",
+    ];
+    let output = common::interrupted(&folder, &arguments);
     refused(&output, 1, &["interrupted", "what was done"]);
     let results = fs::read_to_string(folder.path().join("x.json")).unwrap();
     let results: Value = serde_json::from_str(&results).unwrap();

@@ -244,23 +244,23 @@ fn names_cannot_break_the_page() {
 #[cfg(unix)]
 #[test]
 fn an_interrupt_leaves_no_report() {
-    use nix::sys::signal::{Signal, kill};
-    use nix::unistd::Pid;
-    use std::process::{Command, Stdio};
-    use std::time::Duration;
-
     let folder = folder();
-    let child = Command::new(env!("CARGO_BIN_EXE_domelight"))
-        .args(["compare", "sphere", "--env", "constant", "--env-rows", "16", "--size", "64x64"])
-        .args(["--reference-spp", "1000000", "--cache", "cache", "--json=x.json"])
-        .current_dir(&folder)
-        .stdin(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    std::thread::sleep(Duration::from_millis(1500));
-    kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();
-    let output = child.wait_with_output().unwrap();
+    let arguments = [
+        "compare",
+        "sphere",
+        "--env",
+        "constant",
+        "--env-rows",
+        "16",
+        "--size",
+        "64x64",
+        "--reference-spp",
+        "1000000",
+        "--cache",
+        "cache",
+        "--json=x.json",
+    ];
+    let output = common::interrupted(&folder, &arguments);
     refused(&output, 1, &["interrupted", "no report"]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -238,11 +238,6 @@ fn a_full_standard_error_does_no_harm() {
 #[cfg(unix)]
 #[test]
 fn an_interrupt_keeps_what_is_done() {
-    use nix::sys::signal::{Signal, kill};
-    use nix::unistd::Pid;
-    use std::process::{Command, Stdio};
-    use std::time::Duration;
-
     let folder = folder();
     let arguments = [
         "render",
@@ -258,17 +253,7 @@ fn an_interrupt_keeps_what_is_done() {
         "-o",
         "x.exr",
     ];
-    let child = Command::new(env!("CARGO_BIN_EXE_domelight"))
-        .args(arguments)
-        .current_dir(&folder)
-        .stdin(Stdio::null())
-        .stderr(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    std::thread::sleep(Duration::from_millis(1500));
-    kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();
-    let output = child.wait_with_output().unwrap();
+    let output = common::interrupted(&folder, &arguments);
     refused(&output, 1, &["interrupted", "x.exr"]);
     assert_eq!(stdout(&output), "");
     assert!(load(&folder, "x.exr").pixels.iter().all(|p| p.is_finite()));

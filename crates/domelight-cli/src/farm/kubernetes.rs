@@ -1,7 +1,7 @@
 //! Kubernetes: an Indexed Job, and a Job that merges.
 
-use super::shell::quote;
 use super::{Farm, File, Submission, text};
+use crate::shell::quote;
 
 /// `render.yaml` and `merge.yaml`: scene and parts lie on the volume claim `domelight`, mounted at `/work`.
 pub(super) fn submission(farm: &Farm) -> Submission {

@@ -4,7 +4,6 @@
 mod kubernetes;
 mod openjd;
 mod parallel;
-mod shell;
 mod slurm;
 
 use std::fs;
@@ -16,7 +15,7 @@ use domelight::picture::write_atomically;
 use crate::args::farm::{Engine, FarmArguments};
 use crate::failure::{UsageError, tell};
 use crate::output::print;
-use shell::quote;
+use crate::shell::quote;
 
 /// What every engine is told.
 struct Farm {

@@ -1,7 +1,7 @@
 //! Open Job Description: a job template for Deadline Cloud and others.
 
-use super::shell::quote;
 use super::{Farm, File, Submission, text};
+use crate::shell::quote;
 
 /// `job.yaml`. A default of a path must be relative to the template's folder, so that what lies elsewhere is given
 /// on the command line.

@@ -1,7 +1,7 @@
 //! GNU parallel: one machine, or several through ssh.
 
-use super::shell::quote;
 use super::{Farm, File, Submission, text};
+use crate::shell::quote;
 
 /// `render.sh`, which can be run again until all is there.
 pub(super) fn submission(farm: &Farm) -> Submission {

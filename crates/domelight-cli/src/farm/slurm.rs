@@ -1,7 +1,7 @@
 //! Slurm: an array job and a merge after it.
 
-use super::shell::quote;
 use super::{Farm, File, Submission, text};
+use crate::shell::quote;
 
 /// `render.sbatch`, `merge.sbatch` and `submit.sh`.
 pub(super) fn submission(farm: &Farm) -> Submission {

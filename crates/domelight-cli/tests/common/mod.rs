@@ -48,6 +48,24 @@ pub fn load(folder: &TempDir, name: &str) -> RgbImage {
     read(&folder.path().join(name), &ReadOptions::default()).expect(name).image
 }
 
+/// What the program says and leaves when it is interrupted while it works.
+#[cfg(unix)]
+pub fn interrupted(folder: &TempDir, arguments: &[&str]) -> Output {
+    use nix::sys::signal::{Signal, kill};
+    use nix::unistd::Pid;
+    let child = Command::new(env!("CARGO_BIN_EXE_domelight"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).expect("the process is there");
+    child.wait_with_output().expect("a child")
+}
+
 /// The exit code, and words that standard error holds; a panic is never right.
 #[track_caller]
 pub fn ended(output: &Output, code: i32, words: &[&str]) {

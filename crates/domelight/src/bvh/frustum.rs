@@ -1,9 +1,10 @@
 //! Whether anything may lie in a pyramid or a prism: what spares camera rays into nothing.
 
+use super::traverse::STACK;
 use super::{Bvh, Node};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
-use crate::simd::{Kernel, Mask, Real, Simd};
+use crate::simd::{Kernel, Mask, Real, Simd, set_bits};
 
 /// The points on the inner side of four planes: the view of a rectangle of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,16 +45,17 @@ impl Kernel for MayHit<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> bool {
         let planes = planes(self.frustum, &self.bvh.bounds);
-        let mut stack = vec![0];
-        while let Some(node) = stack.pop().and_then(|node: usize| self.bvh.nodes.get(node)) {
-            let mut children = inside(simd, &planes, node);
-            while children != 0 {
-                let child = node.children[children.trailing_zeros() as usize];
-                children &= children - 1;
+        let mut stack = [0; STACK];
+        let mut len = usize::from(!self.bvh.nodes.is_empty());
+        while len > 0 {
+            len -= 1;
+            let node = &self.bvh.nodes[stack[len]];
+            for child in set_bits(inside(simd, &planes, node)).map(|lane| node.children[lane]) {
                 if child.is_leaf() {
                     return true;
                 }
-                stack.push(child.index());
+                stack[len] = child.index();
+                len += 1;
             }
         }
         false

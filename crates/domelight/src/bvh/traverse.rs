@@ -11,10 +11,10 @@ use super::prepare::{PreparedRays, octant};
 use super::{Bvh, Child, WIDTH};
 use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
-use crate::simd::{Floats, Kernel, Mask, Sets, Simd};
+use crate::simd::{Floats, Kernel, Mask, Sets, Simd, set_bits};
 
 /// A node leaves at most seven children behind on the way down, and pushes eight.
-const STACK: usize = 256;
+pub(super) const STACK: usize = 256;
 const _: () = assert!(MAX_DEPTH as usize * (WIDTH - 1) + WIDTH <= STACK);
 
 /// Rays of a stream: one bit each in a word.
@@ -192,7 +192,7 @@ fn closest_hit<S: Simd>(
             }
             let enter = enter.store();
             let base = stack.len;
-            for lane in lanes(crossed) {
+            for lane in set_bits(crossed) {
                 let entry = ClosestEntry { enter: enter[lane], child: node.children[lane] };
                 stack.insert(base, entry);
             }
@@ -219,7 +219,7 @@ fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRays<WIDTH>, limit: f32) -
             let node = &bvh.nodes[child.index()];
             let (crossed, _) = Slabs::load(simd, node, ray.octant).cross(simd, ray, 0, limit);
             // The last and largest on top.
-            for lane in lanes(crossed.bits()) {
+            for lane in set_bits(crossed.bits()) {
                 stack[len] = node.children[lane];
                 len += 1;
             }
@@ -250,7 +250,7 @@ fn closest_in_block<S: Simd, const N: usize>(
     }
     let hits = sheared.hits(simd, limit);
     let t = hits.t.store();
-    let lane = lanes(hits.mask)
+    let lane = set_bits(hits.mask)
         .reduce(|a, b| if (t[b], block.ids[b]) < (t[a], block.ids[a]) { b } else { a })?;
     if closest.is_some_and(|c| (c.t, c.triangle) < (t[lane], block.ids[lane])) {
         return None;
@@ -396,7 +396,7 @@ impl Stream for ClosestStream {
     fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh) -> bool {
         let Some((child, rays)) = self.stack.pop(u32::MAX) else { return false };
         if child.is_leaf() {
-            for i in lanes(rays) {
+            for i in set_bits(rays) {
                 let (limit, closest) = (self.limits[i], self.hits[i]);
                 let hit = closest_in_block(simd, bvh, child, &self.rays, i, limit, closest);
                 if let Some(hit) = hit {
@@ -409,7 +409,7 @@ impl Stream for ClosestStream {
             let slabs = Slabs::load(simd, node, self.rays.octant);
             let mut crossing = simd.empty();
             let mut enter = simd.splat(0.0);
-            for i in lanes(rays) {
+            for i in set_bits(rays) {
                 let (crossed, entered) = slabs.cross(simd, &self.rays, i, self.limits[i]);
                 crossing = crossing.insert(crossed, 1 << i);
                 enter = entered;
@@ -419,7 +419,7 @@ impl Stream for ClosestStream {
             let stack = &mut self.stack;
             let base = stack.len;
             let mut keys = [0.0; WIDTH];
-            for lane in lanes(crossing.not_empty()) {
+            for lane in set_bits(crossing.not_empty()) {
                 let mut at = stack.len;
                 while at > base && keys[at - 1 - base] < enter[lane] {
                     stack.children[at] = stack.children[at - 1];
@@ -497,7 +497,7 @@ impl Stream for ShadowStream {
         let Some((child, rays)) = self.stack.pop(self.free) else { return false };
         if child.is_leaf() {
             let block = &bvh.blocks[child.index()];
-            for i in lanes(rays) {
+            for i in set_bits(rays) {
                 // Without branches: a shadow ray starts on a triangle, so half of the tests would go
                 // wrong halfway.
                 let mask = Sheared::new(simd, block, &self.rays, i).hits(simd, f32::MAX).mask;
@@ -508,7 +508,7 @@ impl Stream for ShadowStream {
             let node = &bvh.nodes[child.index()];
             let slabs = Slabs::load(simd, node, self.rays.octant);
             let mut crossing = simd.empty();
-            for i in lanes(rays) {
+            for i in set_bits(rays) {
                 let (crossed, _) = slabs.cross(simd, &self.rays, i, f32::MAX);
                 crossing = crossing.insert(crossed, 1 << i);
             }
@@ -520,7 +520,7 @@ impl Stream for ShadowStream {
 
     #[inline(always)]
     fn finish(&mut self, answers: &mut [bool]) {
-        for i in lanes(self.hit) {
+        for i in set_bits(self.hit) {
             answers[self.members[i]] = true;
         }
         self.hit = 0;
@@ -545,14 +545,4 @@ fn sort_by_octant(directions: &[Vec3], order: &mut [u16; WINDOW]) -> [Range<usiz
         *slot += 1;
     }
     octants
-}
-
-/// The set bits, from the lowest.
-#[inline(always)]
-fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = bits.trailing_zeros();
-        bits &= bits.wrapping_sub(1);
-        (lane < u32::BITS).then_some(lane as usize)
-    })
 }

@@ -17,7 +17,6 @@ pub use compensation::CompensatedTable;
 
 use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, vec3};
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
-use crate::simd::{Real, Vectors};
 use crate::{Rgb, RgbImage};
 
 /// A world axis that points up; the top row of a map faces it.
@@ -436,20 +435,12 @@ impl Grid {
     }
 
     fn uv(&self, d: Vec3) -> Vec2 {
-        let [u, v] = self.uv_lanes(d.into());
-        Vec2::new(u, v)
-    }
-
-    /// Of directions side by side.
-    #[inline(always)]
-    fn uv_lanes<F: Real>(&self, d: Vectors<F>) -> [F; 2] {
-        let one = |x| d.x.splat(x);
-        let turn = atan2(d.x, one(0.0) - d.z) * one(1.0 / TAU) + one(0.5 + self.turn);
         // Between 0 and 2.
-        let u = F::select(turn.lt(one(1.0)), turn, turn - one(1.0)).max(one(0.0));
+        let turn = atan2(d.x, -d.z) * (1.0 / TAU) + (0.5 + self.turn);
+        let u = if turn < 1.0 { turn } else { turn - 1.0 };
         // acos would lose the rows next to the poles.
-        let theta = atan2((d.x.squared() + d.z.squared()).sqrt(), d.y);
-        [u, theta * one(1.0 / PI)]
+        let theta = atan2((d.x * d.x + d.z * d.z).sqrt(), d.y);
+        Vec2::new(u.max(0.0), theta * (1.0 / PI))
     }
 
     fn texel(&self, d: Vec3) -> Texel {

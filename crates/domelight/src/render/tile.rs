@@ -276,8 +276,7 @@ impl Batch {
             let rays = self.first_ray[i].map_or(0..0, |first| first..first + samples.len());
             for (ray, sample) in rays.zip(samples.clone()) {
                 if let Some(hit) = &self.hits[ray] {
-                    let point = frame.scene.shading_point(&self.rays[ray], hit);
-                    let plain = frame.scene.plain_surface(hit.triangle);
+                    let (point, plain) = frame.scene.shade(&self.rays[ray], hit);
                     let known = self.points.len() == start || plain == surface;
                     one_material &= known && plain.is_some();
                     surface = plain;

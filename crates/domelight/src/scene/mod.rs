@@ -119,15 +119,6 @@ impl Scene {
         self.parts.iter().map(|p| p.mesh.triangles.len()).sum()
     }
 
-    /// The surface that a triangle has, if its material is the same all over.
-    #[inline]
-    pub(crate) fn plain_surface(&self, triangle: u32) -> Option<usize> {
-        let (part, _) = self.locate(triangle);
-        let mut textures = self.surfaces[part.surface].textures();
-        let plain = textures.next().is_none() && part.mesh.colors.is_empty();
-        plain.then_some(part.surface)
-    }
-
     /// The part that a triangle of the hierarchy belongs to, and the triangle's index in its mesh.
     #[inline]
     pub(crate) fn locate(&self, triangle: u32) -> (&Part, usize) {

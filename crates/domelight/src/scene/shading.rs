@@ -24,6 +24,11 @@ impl Scene {
     /// # Panics
     /// If `hit.triangle` is not one of this scene's.
     pub fn shading_point(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
+        self.shade(ray, hit).0
+    }
+
+    /// [`Scene::shading_point`], and the surface if its material is the same all over.
+    pub(crate) fn shade(&self, ray: &Ray, hit: &Hit) -> (ShadingPoint, Option<usize>) {
         let (part, triangle) = self.locate(hit.triangle);
         let surface = &self.surfaces[part.surface];
         let corner = Corners::new(&part.mesh, triangle, hit);
@@ -45,7 +50,8 @@ impl Scene {
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
         let material = surface.material(&self.textures, uv, tint).for_view(wo);
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
-        ShadingPoint { position, ng, frame, wo, material }
+        let plain = surface.textures().next().is_none() && part.mesh.colors.is_empty();
+        (ShadingPoint { position, ng, frame, wo, material }, plain.then_some(part.surface))
     }
 
     /// On the front side: the interpolated normal, the same with the normal map applied, and the

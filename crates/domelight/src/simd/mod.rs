@@ -157,11 +157,6 @@ pub trait Real:
         self * self
     }
 
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.max(self.splat(0.0) - self)
-    }
-
     /// A function of one number, one lane after the other.
     #[inline(always)]
     fn map(self, mut f: impl FnMut(f32) -> f32) -> Self {
@@ -251,6 +246,16 @@ pub(crate) trait Sets: Copy {
     /// they are.
     fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize);
     fn store(self) -> [u32; 8];
+}
+
+/// The set bits, from the lowest.
+#[inline(always)]
+pub(crate) fn set_bits(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = bits.trailing_zeros();
+        bits &= bits.wrapping_sub(1);
+        (lane < u32::BITS).then_some(lane as usize)
+    })
 }
 
 /// The last index of a table of N = 2ⁿ rows.

@@ -25,7 +25,6 @@ impl Kernel for All {
             a.min(b),
             a.max(b),
             a.sqrt(),
-            a.abs(),
             a.squared(),
             a.splat(3.0),
             a.map(|x| 2.0 * x),

@@ -19,7 +19,7 @@ use super::cells::{Cells, NO_SLOTS, ROWS, Slots, TABLE_ROWS, at};
 use super::hits::Group;
 use crate::bsdf::Gloss;
 use crate::math::{FRAC_1_PI, Vec3, sqr};
-use crate::simd::{Floats, Ints, LANES, Mask, Real, Simd, Vectors};
+use crate::simd::{Floats, Ints, LANES, Mask, Real, Simd, Vectors, set_bits};
 
 /// The least cosine of a cell that is not all below the surface: what the table leaves to chance.
 const LEAST_COSINE: f32 = 0.01;
@@ -222,11 +222,9 @@ impl Table {
         for row in 0..ROWS {
             let from = first(simd, strata, simd.load(&self.start[row]));
             let to = first(simd, strata, simd.load(&self.end[row]));
-            let mut lanes = from.lt(to).bits();
+            let not_empty = from.lt(to).bits();
             let from = from.store();
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
+            for lane in set_bits(not_empty) {
                 if let Some(mark) = slots.get_mut(from[lane] as usize) {
                     *mark = (lane << MARK | row) as i32;
                 }

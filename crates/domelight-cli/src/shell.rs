@@ -1,7 +1,7 @@
 //! Words for a POSIX shell.
 
 /// The word as it is where that is plain, else in single quotes.
-pub(super) fn quote(word: &str) -> String {
+pub(crate) fn quote(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();
