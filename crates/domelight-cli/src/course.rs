@@ -115,6 +115,7 @@ impl CourseArguments {
 fn identity(view: &View, settings: &RenderSettings, report: &Settings) -> Vec<(String, String)> {
     let camera = &view.report.camera;
     let mut identity = vec![
+        ("adaptive", settings.adaptive.to_string()),
         ("background", format!("{:?}", settings.background).to_lowercase()),
         ("camera", serde_json::to_string(camera).unwrap_or_default()),
         ("environment", view.environment.fingerprint().to_string()),

@@ -52,6 +52,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let view = &arguments.scene.build(loaded)?;
     let View { scene, camera, environment, probe, report } = view;
     let settings = &RenderSettings {
+        adaptive: !arguments.samples.no_adaptive,
         target_error: arguments.samples.target_error,
         ..arguments.scene.render_settings(&arguments.pixel, arguments.samples.spp)
     };

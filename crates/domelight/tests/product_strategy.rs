@@ -12,9 +12,10 @@ use domelight::bvh::InstructionSet;
 use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::{Frame, Vec3};
 use domelight::sampling::{Heuristic, SamplerKind, Stream};
+use domelight::strategy::levels::{N_LEVELS, level};
 use domelight::strategy::product::ProductScratch;
 use domelight::strategy::{
-    Contributions, LightTable, MultipleImportanceSampling, PixelPoints, ProductSampling, Round,
+    Contributions, LightTable, MultipleImportanceSampling, PixelPoints, ProductSampling,
     ShadingPoint, Strategy, TileShading,
 };
 use domelight::{Rgb, RgbImage};
@@ -31,7 +32,7 @@ const SIDE: usize = 5;
 /// Passes under one seed.
 const N_PASSES: usize = 2;
 /// Those that trace all their candidates, and those that choose by what the former taught.
-const KINDS: [&str; 2] = ["pilots", "others"];
+const KINDS: [&str; N_LEVELS as usize] = ["pilots", "second", "third"];
 
 /// The mean estimate of each kind of pixel under one seed.
 fn estimates(
@@ -40,50 +41,42 @@ fn estimates(
     hits: &[ShadingPoint],
     sampler: SamplerKind,
     seed: u64,
-) -> [[f64; 3]; 2] {
+) -> [[f64; 3]; KINDS.len()] {
     let n = hits.len();
-    let points = hits.repeat(SIDE * SIDE);
     let mut scratch = ProductScratch::default();
-    let (mut sums, mut counts) = ([[0.0; 3]; 2], [0.0; 2]);
+    let (mut sums, mut counts) = ([[0.0; 3]; KINDS.len()], [0.0; KINDS.len()]);
     for pass in 0..N_PASSES {
-        let samples: Vec<u32> = (0..points.len()).map(|i| (pass * n + i % n) as u32).collect();
-        let pixels: Vec<PixelPoints> = (0..SIDE * SIDE)
-            .map(|i| PixelPoints {
-                points: i * n..(i + 1) * n,
-                n_samples: n as u32,
-                stream: Stream::new(sampler, seed, i as u64),
-                one_material: hits.iter().all(|h| h.material == hits[0].material),
-            })
-            .collect();
-        let tile = TileShading { points: &points, samples: &samples, pixels: &pixels, width: SIDE };
         let shared = strategy.begin_pass(Stream::of_pass(sampler, seed, (pass * n) as u32));
-        let mut sum = vec![[0.0; 3]; SIDE * SIDE];
         let mut out = Contributions::default();
-        for round in 0.. {
+        for round in 0..ProductSampling::N_ROUNDS {
+            let (mut points, mut samples) = (Vec::new(), Vec::new());
+            let pixels: Vec<PixelPoints> = (0..SIDE * SIDE)
+                .map(|i| {
+                    let start = points.len();
+                    if level(i % SIDE, i / SIDE) == round {
+                        points.extend(hits);
+                        samples.extend((0..n).map(|j| (pass * n + j) as u32));
+                        counts[round as usize] += 1.0;
+                    }
+                    PixelPoints {
+                        points: start..points.len(),
+                        n_samples: (points.len() - start) as u32,
+                        stream: Stream::new(sampler, seed, i as u64),
+                        one_material: hits.iter().all(|h| h.material == hits[0].material),
+                    }
+                })
+                .collect();
+            let tile =
+                TileShading { points: &points, samples: &samples, pixels: &pixels, width: SIDE };
             out.reset(points.len());
-            let more = strategy.push(&shared, &tile, round, &mut scratch, &mut out);
+            strategy.push(&shared, &tile, round, &mut scratch, &mut out);
             let free: Vec<bool> = out.wi.iter().map(|&wi| !hidden(env, wi)).collect();
-            let mut add = |point: usize, value: Rgb| {
-                for (s, v) in sum[point / n].iter_mut().zip(value.to_array()) {
-                    *s += f64::from(v) / n as f64;
-                }
-            };
-            for (i, &base) in out.base.iter().enumerate() {
-                add(i, base);
-            }
-            for (i, _) in free.iter().enumerate().filter(|(_, free)| **free) {
-                add(out.point[i] as usize, out.weight[i]);
-            }
-            if more == Round::Done {
-                break;
+            let seen = out.weight.iter().zip(&free).filter(|(_, free)| **free).map(|(w, _)| w);
+            let sum: Rgb = out.base.iter().chain(seen).copied().sum();
+            for (s, v) in sums[round as usize].iter_mut().zip(sum.to_array()) {
+                *s += f64::from(v) / n as f64;
             }
             strategy.learn(&tile, &out, &free, &mut scratch);
-        }
-        for (i, s) in sum.iter().enumerate() {
-            let pilot = (i % SIDE).is_multiple_of(2) && (i / SIDE).is_multiple_of(2);
-            let kind = usize::from(!pilot);
-            counts[kind] += 1.0;
-            (0..3).for_each(|c| sums[kind][c] += s[c]);
         }
     }
     std::array::from_fn(|kind| sums[kind].map(|s| s / counts[kind]))

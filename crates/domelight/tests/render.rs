@@ -226,6 +226,52 @@ fn pictures<S: Strategy>(
     (0..40).map(picture).collect()
 }
 
+/// Pixels that get more samples where others are noisy, and visibility learned from others, leave no error behind that
+/// seeds have in common.
+#[test]
+fn the_mean_of_32_pictures_has_a_32nd_of_the_error() {
+    let (scene, environment) = (scene("ggx:0.2"), environment());
+    let settings = RenderSettings { n_samples: 8, filter: Filter::Box, ..small() };
+    let strategy = ProductSampling::new(&environment, 4);
+    let pictures: Vec<Layers> = (0..32)
+        .map(|seed| {
+            let settings = RenderSettings { seed, ..settings };
+            draw(&scene, &environment, &strategy, &settings).layers
+        })
+        .collect();
+    let some = |p: &Layers, f: fn(&u32) -> bool| p.n_samples.iter().any(f);
+    assert!(pictures.iter().all(|p| some(p, |&n| n < 8) && some(p, |&n| n > 8)));
+
+    let converged = |seed| {
+        let settings = RenderSettings { n_samples: 2048, seed, ..settings };
+        draw(&scene, &environment, &mis(&environment), &settings).layers.color
+    };
+    let halves = [converged(1000), converged(1001)];
+    let reference = mean(&halves);
+    let noise = rel_mse(&halves[0], &halves[1]) / 4.0;
+    let colors: Vec<RgbImage> = pictures.into_iter().map(|p| p.color).collect();
+    let single = colors.iter().map(|c| rel_mse(c, &reference)).sum::<f64>() / 32.0 - noise;
+    let left = rel_mse(&mean(&colors), &reference) - noise;
+    let ratio = left / (single / 32.0);
+    assert!((0.8..1.25).contains(&ratio), "{ratio}: {left} of {single}, reference {noise}");
+}
+
+fn mean(pictures: &[RgbImage]) -> RgbImage {
+    let RgbImage { width, height, .. } = pictures[0];
+    let pixel = |i: usize| {
+        let sum: Rgb = pictures.iter().map(|p| p.pixels[i]).sum();
+        sum / pictures.len() as f32
+    };
+    RgbImage::new(width, height, (0..width * height).map(pixel).collect())
+}
+
+fn rel_mse(picture: &RgbImage, reference: &RgbImage) -> f64 {
+    let error = |(p, r): (f32, f32)| f64::from((p - r) * (p - r) / (r * r + 0.01));
+    let pairs = picture.pixels.iter().zip(&reference.pixels);
+    let errors = pairs.flat_map(|(p, r)| p.to_array().into_iter().zip(r.to_array())).map(error);
+    errors.sum::<f64>() / (3 * reference.pixels.len()) as f64
+}
+
 #[test]
 fn a_white_sphere_in_a_white_furnace_vanishes() {
     let environment = Environment::constant(Rgb::WHITE).unwrap();

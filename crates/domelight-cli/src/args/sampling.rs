@@ -54,10 +54,13 @@ pub(crate) struct StrategyArguments {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Sampling")]
 pub(crate) struct SampleArguments {
-    /// Camera samples of each pixel
+    /// Camera samples of each pixel; with product the usual number: noisy pixels get more, others fewer
     #[arg(long, value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub(crate) spp: u32,
+    /// With product, as many camera samples for every pixel
+    #[arg(long)]
+    pub(crate) no_adaptive: bool,
     /// End each tile when the spread of its samples suggests this relMSE, such as 1e-3, but not before 16 samples
     #[arg(long, value_name = "E", value_parser = positive)]
     pub(crate) target_error: Option<f32>,

@@ -236,8 +236,8 @@ pub enum Misfit {
         /// Of the render.
         expected: Window,
     },
-    /// Some pixels of a tile have more samples than others.
-    #[error("the tile at ({x}, {y}) is torn: its pixels have different numbers of samples")]
+    /// Some pixels of a tile have samples and others none.
+    #[error("the tile at ({x}, {y}) is torn: some of its pixels have samples and others none")]
     Samples {
         /// Column of the tile's corner.
         x: usize,

@@ -11,6 +11,7 @@ mod filter;
 #[cfg(feature = "io")]
 mod output;
 mod session;
+mod spread;
 mod tile;
 mod tiling;
 mod visibility;
@@ -50,6 +51,9 @@ pub struct RenderSettings {
     pub height: usize,
     /// Camera samples of each pixel, at least 1.
     pub n_samples: u32,
+    /// Of strategies that render a tile in rounds, pixels whose samples spread more get more of them:
+    /// `n_samples` are then the usual number, not each pixel's.
+    pub adaptive: bool,
     /// A tile is finished before its samples are, but not before 16, when the spread of its samples
     /// suggests this relMSE or less: mean of variance over (luminance² + 0.01). To stop on what was
     /// drawn biases a picture by far less than the error.
@@ -73,6 +77,7 @@ impl Default for RenderSettings {
             width: 512,
             height: 512,
             n_samples: 64,
+            adaptive: true,
             target_error: None,
             seed: 0,
             filter: Filter::default(),

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::film::{Film, Layers, Misfit, PixelSums};
 use super::filter::FilterSampler;
+use super::spread::usual_growth;
 use super::tile::{Counts, Pass, Scratch, Tile};
 use super::tiling::{Tiling, Window};
 use super::{Frame, Observer, RenderSettings, Rendering};
@@ -92,7 +93,11 @@ impl<'a, S: Strategy> Session<'a, S> {
             let samples = tiling.pass(*strategy, start, n_samples - start);
             observer.pass_started(samples.clone());
             let stream = Stream::of_pass(frame.settings.sampler, frame.settings.seed, start);
-            let pass = Pass { samples, shared: strategy.begin_pass(stream) };
+            let shared = strategy.begin_pass(stream);
+            let mut pass = Pass { n_samples: samples.len() as u32, usual_growth: None, shared };
+            if frame.settings.adaptive && S::N_ROUNDS > 1 {
+                pass.usual_growth = usual_growth(frame, *strategy, &pass);
+            }
             let behind =
                 |tile: &Tile| tile.n_samples() == start && !tile.is_finished(frame.settings);
             let complete = tiles
@@ -148,7 +153,7 @@ impl<'a, S: Strategy> Session<'a, S> {
         for tile in &mut self.tiles {
             let pixels: Vec<PixelSums> = film.get(tile.window);
             let n_samples = pixels[0].n_samples();
-            if pixels.iter().any(|p| p.n_samples() != n_samples) {
+            if pixels.iter().any(|p| (p.n_samples() == 0) != (n_samples == 0)) {
                 let Window { x, y, .. } = tile.window;
                 return Err(Misfit::Samples { x, y });
             }

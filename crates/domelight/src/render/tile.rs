@@ -1,14 +1,18 @@
 //! The unit of work: a tile's camera rays, its shading points grouped by pixel, a strategy's rounds
 //! of shadow rays, and their sums.
 
+use std::ops::Range;
+
 use super::film::{CameraSample, PixelSums, SurfaceSample};
+use super::spread::Spreads;
 use super::tiling::Window;
 use super::{Background, Frame, Observer, RenderSettings, Stage, Visibility};
 use crate::Rgb;
 use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
 use crate::math::Vec3;
 use crate::sampling::{Dimension, Stream};
-use crate::strategy::{Contributions, PixelPoints, Round, ShadingPoint, Strategy, TileShading};
+use crate::strategy::levels::level;
+use crate::strategy::{Contributions, PixelPoints, ShadingPoint, Strategy, TileShading};
 
 /// Camera samples below which a spread says nothing.
 const FEWEST_SAMPLES: u32 = 16;
@@ -65,20 +69,32 @@ impl<S: Strategy> Default for Scratch<S> {
     }
 }
 
+impl<S: Strategy> Scratch<S> {
+    /// What the last tile has shown of the spread of its samples.
+    pub(super) fn spreads(&self) -> &Spreads {
+        &self.batch.spreads
+    }
+}
+
 /// A pass over the picture.
 pub(super) struct Pass<S: Strategy> {
-    /// Its camera samples of each pixel.
-    pub(super) samples: std::ops::Range<u32>,
+    /// Its camera samples of each pixel, as a rule.
+    pub(super) n_samples: u32,
+    /// The mean [growth](super::spread) of the picture's pixels; if none, all get as many samples.
+    pub(super) usual_growth: Option<f32>,
     pub(super) shared: S::Pass,
 }
 
-/// One pass over a tile.
+/// A round of a pass over a tile.
 #[derive(Default)]
 struct Batch {
+    /// Of each pixel of the tile, whether it may see anything.
+    seen: Vec<bool>,
+    spreads: Spreads,
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
-    /// Of each pixel that may see something, the first of its rays.
-    first_ray: Vec<Option<usize>>,
+    /// Of each pixel.
+    camera_rays: Vec<CameraRays>,
     points: Vec<ShadingPoint>,
     samples: Vec<u32>,
     pixels: Vec<PixelPoints>,
@@ -87,6 +103,22 @@ struct Batch {
     round: ShadowRays,
     radiance: Vec<Rgb>,
     unoccluded: Vec<Rgb>,
+}
+
+/// The camera rays of a pixel.
+#[derive(Clone)]
+struct CameraRays {
+    /// Which camera samples; none in a pixel of another round.
+    samples: Range<u32>,
+    /// The place of the first ray; none if nothing is to be seen.
+    first: Option<usize>,
+}
+
+impl CameraRays {
+    /// Where the rays are.
+    fn range(&self) -> Range<usize> {
+        self.first.map_or(0..0, |first| first..first + self.samples.len())
+    }
 }
 
 /// The shadow rays of a round.
@@ -121,7 +153,7 @@ impl Tile {
         sum / self.pixels.len() as f32
     }
 
-    /// Adds camera samples `samples` to each pixel.
+    /// Adds the samples of a pass to each pixel.
     pub(super) fn render<S: Strategy>(
         &mut self,
         frame: &Frame,
@@ -130,53 +162,68 @@ impl Tile {
         scratch: &mut Scratch<S>,
         observer: &impl Observer,
     ) -> Counts {
-        let Scratch { batch, of_strategy } = scratch;
-        self.pixels.resize(self.window.area(), PixelSums::default());
         observer.stage_started(Stage::CameraRays);
-        self.trace_camera_rays(frame, &pass.samples, batch);
-        observer.stage_started(Stage::Surfaces);
-        batch.gather_points(frame, &pass.samples);
-        let mut counts = Counts {
-            camera_rays: (self.pixels.len() * pass.samples.len()) as u64,
-            shading_points: batch.points.len() as u64,
-            ..Counts::default()
-        };
-        let asked = Asked { frame, strategy, pass: &pass.shared, width: self.window.width };
-        counts.shadow_rays = batch.trace_strategy(&asked, of_strategy, observer);
-        observer.stage_started(Stage::Sums);
-        counts.non_finite = self.add_samples(frame, &pass.samples, batch);
+        let Scratch { batch, of_strategy } = scratch;
+        let Window { width, .. } = self.window;
+        let n_pixels = self.window.area();
+        self.pixels.resize(n_pixels, PixelSums::default());
+        batch.seen.clear();
+        batch.seen.resize(n_pixels, false);
+        self.find_seen(frame, self.window, &mut batch.seen);
+        batch.spreads.reset(width, n_pixels);
+        let asked = Asked { frame, strategy, pass: &pass.shared, width };
+        let mut counts = Counts::default();
+        for round in 0..S::N_ROUNDS {
+            observer.stage_started(Stage::CameraRays);
+            counts.camera_rays += self.trace_camera_rays(frame, pass, round, batch);
+            observer.stage_started(Stage::Surfaces);
+            batch.gather_points(frame);
+            counts.shading_points += batch.points.len() as u64;
+            counts.shadow_rays += batch.trace_strategy(&asked, round, of_strategy, observer);
+            observer.stage_started(Stage::Sums);
+            batch.learn_spreads();
+            counts.non_finite += self.add_samples(frame, batch);
+        }
         self.counts += counts;
         counts
     }
 
-    fn trace_camera_rays(
+    /// Those of the pixels of a round; returns how many.
+    fn trace_camera_rays<S: Strategy>(
         &self,
         frame: &Frame,
-        samples: &std::ops::Range<u32>,
-        scratch: &mut Batch,
-    ) {
-        let Batch { rays, hits, first_ray, pixels, .. } = scratch;
+        pass: &Pass<S>,
+        round: u32,
+        batch: &mut Batch,
+    ) -> u64 {
+        let Batch { seen, spreads, rays, hits, camera_rays, pixels, .. } = batch;
         rays.clear();
         pixels.clear();
-        first_ray.clear();
-        first_ray.resize(self.pixels.len(), None);
-        self.find_seen(frame, self.window, first_ray);
-        for (i, first) in first_ray.iter_mut().enumerate() {
+        camera_rays.clear();
+        let mut count = 0;
+        for (i, &seen) in seen.iter().enumerate() {
             let (x, y) = self.position(i);
             let stream = self.stream(frame, i);
+            let column = i % self.window.width;
+            let now = S::N_ROUNDS == 1 || level(column, i / self.window.width) == round;
+            let n_samples =
+                if now { spreads.samples(i, pass.n_samples, pass.usual_growth) } else { 0 };
+            let start = self.pixels[i].n_samples();
+            let samples = start..start + n_samples;
+            let first = (seen && now).then_some(rays.len());
             if first.is_some() {
-                *first = Some(rays.len());
                 rays.extend(samples.clone().map(|sample| camera_ray(frame, x, y, stream, sample)));
             }
-            let (points, one_material) = (0..0, true);
-            let n_samples = samples.len() as u32;
-            pixels.push(PixelPoints { points, n_samples, stream, one_material });
+            camera_rays.push(CameraRays { samples, first });
+            pixels.push(PixelPoints { points: 0..0, n_samples, stream, one_material: true });
+            count += u64::from(n_samples);
         }
         frame.scene.bvh().closest_hits(rays, hits);
+        count
     }
 
     /// Marks the pixels of a part of the tile that may see something.
-    fn find_seen(&self, frame: &Frame, part: Window, seen: &mut [Option<usize>]) {
+    fn find_seen(&self, frame: &Frame, part: Window, seen: &mut [bool]) {
         /// Parts no larger than this are not divided further \[pixels\].
         const SMALL: usize = 4;
         let reach = frame.filter.reach() + 0.01;
@@ -192,7 +239,7 @@ impl Tile {
         }
         for y in y - self.window.y..y - self.window.y + height {
             let start = y * self.window.width + x - self.window.x;
-            seen[start..start + width].fill(Some(0));
+            seen[start..start + width].fill(true);
         }
     }
 
@@ -209,34 +256,27 @@ impl Tile {
         Stream::new(frame.settings.sampler, frame.settings.seed, pixel)
     }
 
-    /// Adds each camera sample to its pixel, in order.
-    fn add_samples(
-        &mut self,
-        frame: &Frame,
-        samples: &std::ops::Range<u32>,
-        scratch: &Batch,
-    ) -> u64 {
+    /// Adds each camera sample to its pixel, in order; returns how many are not finite.
+    fn add_samples(&mut self, frame: &Frame, batch: &Batch) -> u64 {
         let mut non_finite = 0;
         let mut point = 0;
-        for i in 0..self.pixels.len() {
+        for (i, CameraRays { samples, first }) in batch.camera_rays.iter().enumerate() {
             let (x, y) = self.position(i);
-            let stream = scratch.pixels[i].stream;
             let shown = frame.settings.background == Background::Shown;
-            let first = scratch.first_ray[i];
             if first.is_none() && !shown {
                 self.pixels[i].add_misses(samples.len() as u32);
                 continue;
             }
             for (s, sample) in samples.clone().enumerate() {
                 let ray = first.map(|first| first + s);
-                let sample = match ray.map(|ray| (&scratch.rays[ray], scratch.hits[ray])) {
+                let sample = match ray.map(|ray| (&batch.rays[ray], batch.hits[ray])) {
                     Some((ray, Some(hit))) => {
                         point += 1;
-                        scratch.surface_sample(frame, point - 1, ray, &hit)
+                        batch.surface_sample(frame, point - 1, ray, &hit)
                     }
                     Some((ray, None)) => background_sample(frame, ray.direction),
                     None => {
-                        let ray = camera_ray(frame, x, y, stream, sample);
+                        let ray = camera_ray(frame, x, y, batch.pixels[i].stream, sample);
                         background_sample(frame, ray.direction)
                     }
                 };
@@ -266,15 +306,14 @@ fn background_sample(frame: &Frame, direction: Vec3) -> CameraSample {
 
 impl Batch {
     /// Turns hits into shading points, grouped by pixel.
-    fn gather_points(&mut self, frame: &Frame, samples: &std::ops::Range<u32>) {
+    fn gather_points(&mut self, frame: &Frame) {
         self.points.clear();
         self.origins.clear();
         self.samples.clear();
-        for (i, pixel) in self.pixels.iter_mut().enumerate() {
+        for (pixel, of_pixel) in self.pixels.iter_mut().zip(&self.camera_rays) {
             let start = self.points.len();
             let (mut surface, mut one_material) = (None, true);
-            let rays = self.first_ray[i].map_or(0..0, |first| first..first + samples.len());
-            for (ray, sample) in rays.zip(samples.clone()) {
+            for (ray, sample) in of_pixel.range().zip(of_pixel.samples.clone()) {
                 if let Some(hit) = &self.hits[ray] {
                     let (point, plain) = frame.scene.shade(&self.rays[ray], hit);
                     let known = self.points.len() == start || plain == surface;
@@ -290,54 +329,46 @@ impl Batch {
         }
     }
 
-    /// Runs the strategy's rounds; returns the number of shadow rays.
+    /// Runs a round of the strategy; returns the number of shadow rays.
     fn trace_strategy<S: Strategy>(
         &mut self,
         asked: &Asked<S>,
+        round: u32,
         scratch: &mut S::Scratch,
         observer: &impl Observer,
     ) -> u64 {
         let &Asked { frame, strategy, pass, width } = asked;
-        let n = self.points.len();
-        self.radiance.clear();
-        self.radiance.resize(n, Rgb::BLACK);
-        self.unoccluded.clear();
-        self.unoccluded.resize(n, Rgb::BLACK);
-        let mut n_rays = 0;
-        for round in 0.. {
-            observer.stage_started(Stage::Strategy);
-            let tile = TileShading {
-                points: &self.points,
-                samples: &self.samples,
-                pixels: &self.pixels,
-                width,
-            };
-            self.round.asked.reset(n);
-            let more = strategy.push(pass, &tile, round, scratch, &mut self.round.asked);
-            n_rays += self.round.asked.len() as u64;
+        observer.stage_started(Stage::Strategy);
+        let Self { points, samples, pixels, origins, round: rays, .. } = self;
+        let tile = TileShading { points, samples, pixels, width };
+        rays.asked.reset(points.len());
+        strategy.push(pass, &tile, round, scratch, &mut rays.asked);
 
-            observer.stage_started(Stage::ShadowRays);
-            self.round.trace(frame, &self.points, &self.origins);
-            observer.stage_started(Stage::Strategy);
+        observer.stage_started(Stage::ShadowRays);
+        rays.trace(frame, points, origins);
+        observer.stage_started(Stage::Strategy);
 
-            // base + Σ weight · V
-            for (i, &base) in self.round.asked.base.iter().enumerate() {
-                self.radiance[i] += base;
-                self.unoccluded[i] += base;
+        // base + Σ weight · V
+        self.radiance.clone_from(&rays.asked.base);
+        self.unoccluded.clone_from(&rays.asked.base);
+        let pairs = rays.asked.point.iter().zip(&rays.asked.weight);
+        for ((&point, &weight), &free) in pairs.zip(&rays.free) {
+            self.unoccluded[point as usize] += weight;
+            if free {
+                self.radiance[point as usize] += weight;
             }
-            let pairs = self.round.asked.point.iter().zip(&self.round.asked.weight);
-            for ((&point, &weight), &free) in pairs.zip(&self.round.free) {
-                self.unoccluded[point as usize] += weight;
-                if free {
-                    self.radiance[point as usize] += weight;
-                }
-            }
-            if more == Round::Done {
-                break;
-            }
-            strategy.learn(&tile, &self.round.asked, &self.round.free, scratch);
         }
-        n_rays
+        if round + 1 < S::N_ROUNDS {
+            strategy.learn(&tile, &rays.asked, &rays.free, scratch);
+        }
+        rays.asked.len() as u64
+    }
+
+    /// Learns how the samples of the round's pixels spread.
+    fn learn_spreads(&mut self) {
+        for (i, pixel) in self.pixels.iter().enumerate() {
+            self.spreads.learn(i, &self.radiance[pixel.points.clone()]);
+        }
     }
 
     fn surface_sample(&self, frame: &Frame, point: usize, ray: &Ray, hit: &Hit) -> CameraSample {

@@ -15,6 +15,7 @@
 
 mod brdf;
 mod environment;
+pub mod levels;
 mod light_set;
 mod mis;
 pub mod product;
@@ -196,11 +197,11 @@ pub trait PointStrategy: Sync {
 /// The shading points of a tile, grouped by pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct TileShading<'a> {
-    /// All camera hits of the tile in this pass.
+    /// All camera hits of the round.
     pub points: &'a [ShadingPoint],
     /// Index of each point's camera sample in its pixel.
     pub samples: &'a [u32],
-    /// The pixels in row order, those without a hit as well.
+    /// The pixels of the tile in row order, those of other rounds and those without a hit as well.
     pub pixels: &'a [PixelPoints],
     /// Pixels in a row of the tile.
     pub width: usize,
@@ -211,7 +212,7 @@ pub struct TileShading<'a> {
 pub struct PixelPoints {
     /// Their range in [`TileShading::points`].
     pub points: std::ops::Range<usize>,
-    /// Camera samples of the pixel in this pass, hits and misses.
+    /// Camera samples of the pixel in this round, hits and misses.
     pub n_samples: u32,
     /// The pixel's uniform numbers.
     pub stream: Stream,
@@ -220,20 +221,14 @@ pub struct PixelPoints {
     pub one_material: bool,
 }
 
-/// Whether a strategy wants another round.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Round {
-    /// Trace these, tell which were free, and ask again.
-    More,
-    /// Trace these; the tile is complete.
-    Done,
-}
-
-/// A strategy that looks at a tile at a time, in rounds. Every [`PointStrategy`] is one: it needs a
-/// single round and learns nothing.
+/// A strategy that looks at a tile at a time, in rounds: all its pixels, or one of their [`levels`] after the other.
+/// Every [`PointStrategy`] is one: it needs a single round and learns nothing.
 pub trait Strategy: Sync {
     /// What all tiles of a pass share.
     type Pass: Sync;
+    /// Rounds of a tile: 1, or [`levels::N_LEVELS`].
+    const N_ROUNDS: u32 = 1;
+
     /// Memory that a thread keeps. It carries what is learned from round to round of a tile, and nothing
     /// from tile to tile: passes are independent, so a render may be interrupted between them.
     type Scratch: Default;
@@ -250,8 +245,7 @@ pub trait Strategy: Sync {
     /// Prepares a pass; `stream` is its own, independent of those of pixels and other passes.
     fn begin_pass(&self, stream: Stream) -> Self::Pass;
 
-    /// Asks for the shadow rays of a round; `out` comes reset. A point's `base` and rays of all
-    /// rounds add up.
+    /// Asks for the shadow rays of a round; `out` comes reset. Pixels of other rounds have no points.
     fn push(
         &self,
         pass: &Self::Pass,
@@ -259,9 +253,9 @@ pub trait Strategy: Sync {
         round: u32,
         scratch: &mut Self::Scratch,
         out: &mut Contributions,
-    ) -> Round;
+    );
 
-    /// Is told which rays of a round were free that is not the last.
+    /// Is told which rays of a round were free, but for the last round.
     fn learn(
         &self,
         _tile: &TileShading,
@@ -289,7 +283,7 @@ impl<S: PointStrategy> Strategy for S {
         _round: u32,
         scratch: &mut S::Scratch,
         out: &mut Contributions,
-    ) -> Round {
+    ) {
         for pixel in tile.pixels {
             for i in pixel.points.clone() {
                 let numbers = SampleNumbers { stream: pixel.stream, sample: tile.samples[i] };
@@ -297,6 +291,5 @@ impl<S: PointStrategy> Strategy for S {
                 self.sample(&tile.points[i], numbers, scratch, push);
             }
         }
-        Round::Done
     }
 }

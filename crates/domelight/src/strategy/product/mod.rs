@@ -6,17 +6,16 @@
 //! 1. A `table` gives each cell its light times what the pixel reflects of it.
 //! 2. `candidates`: strata along the curve, each with one direction of the pool, and samples of the
 //!    material, weighed by the balance heuristic.
-//! 3. One pixel of each 2 × 2, a *pilot*, traces all its candidates. From them the tile learns the
-//!    `visibility` V̂ of each cell and the brightness of its pixels.
-//! 4. The others take Σ W V̂ without a ray, and `choose` those candidates whose visibility matters:
+//! 3. The tile's pixels come in [levels](super::levels). Those of the first, *pilots*, trace all their candidates.
+//!    From the rays of each level the tile learns the `visibility` V̂ of each cell and the brightness of its pixels.
+//! 4. The next levels take Σ W V̂ without a ray, and `choose` those candidates whose visibility matters:
 //!
 //! ```text
 //! base = Σ_j W_j V̂_j − Σ_chosen (W_j/π_j) V̂_j        rays: weight W_j/π_j
 //! ```
 //!
 //! The expectation is ∫ f L V dω for every V̂, brightness and pool, given that they do not depend on
-//! the numbers that strata, samples and choice are drawn with: V̂ and brightness come from other
-//! pixels, and each pixel and pass has a stream of numbers of its own. The density of the
+//! the numbers that strata, samples and choice are drawn with: V̂ and brightness come from pixels of lower levels, and each pixel and pass has a stream of numbers of its own. The density of the
 //! candidates depends on the pixel's hits alone, so what the pool and V̂ have in common does no harm.
 //!
 //! Related: Clarberg & Akenine-Möller 2008, "Practical Product Importance Sampling for Direct
@@ -33,7 +32,8 @@ mod visibility;
 
 pub use pool::Pool;
 
-use super::{Contributions, PixelPoints, Round, Strategy, TileShading};
+use super::levels::{N_LEVELS, coarser};
+use super::{Contributions, PixelPoints, Strategy, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::sampling::Stream;
@@ -127,17 +127,13 @@ pub struct ProductScratch {
     visibility: Visibility,
     /// Of each ray of the round the slot of the cell that it goes to.
     targets: Vec<u16>,
-    /// The pilots with hits.
-    pilots: Vec<usize>,
+    /// The pixels of the round that have hits.
+    asked: Vec<usize>,
     learned: Learned,
 }
 
-/// One pixel of each 2 × 2 goes first.
-fn is_pilot(x: usize, y: usize) -> bool {
-    x.is_multiple_of(2) && y.is_multiple_of(2)
-}
-
 impl Strategy for ProductSampling<'_> {
+    const N_ROUNDS: u32 = N_LEVELS;
     type Pass = Pool;
     type Scratch = ProductScratch;
 
@@ -161,12 +157,14 @@ impl Strategy for ProductSampling<'_> {
         round: u32,
         scratch: &mut ProductScratch,
         out: &mut Contributions,
-    ) -> Round {
-        let Some(cells) = &self.cells else { return Round::Done };
+    ) {
+        let Some(cells) = &self.cells else { return };
+        if round == 0 {
+            scratch.learned.reset(tile.blocks(), tile.pixels.len());
+        }
         let pilots = round == 0;
         let asking = Asking { strategy: self, cells, pool, tile, pilots, scratch, out };
         dispatch(self.instruction_set, asking);
-        if pilots { Round::More } else { Round::Done }
     }
 
     fn learn(
@@ -177,19 +175,18 @@ impl Strategy for ProductSampling<'_> {
         scratch: &mut ProductScratch,
     ) {
         let blocks = tile.blocks();
-        let ProductScratch { learned, pilots, targets, .. } = scratch;
-        learned.reset(blocks, tile.pixels.len());
+        let ProductScratch { learned, asked, targets, .. } = scratch;
         let mut ray = 0;
-        for &i in &*pilots {
+        for &i in &*asked {
             let PixelPoints { points, n_samples, .. } = &tile.pixels[i];
             let block = blocks.of(i % tile.width, i / tile.width);
-            let mut sum = Rgb::BLACK;
+            let mut sum: Rgb = pushed.base[points.clone()].iter().copied().sum();
             while pushed.point.get(ray).is_some_and(|&point| (point as usize) < points.end) {
                 learned.count(block, usize::from(targets[ray]), free[ray]);
                 sum += if free[ray] { pushed.weight[ray] } else { Rgb::BLACK };
                 ray += 1;
             }
-            learned.set_luminance(i, sum.luminance() / *n_samples as f32);
+            learned.set_luminance(i, sum.luminance().max(0.0) / *n_samples as f32);
         }
     }
 }
@@ -217,11 +214,11 @@ impl Kernel for Asking<'_, '_> {
             visibility.estimate(simd, learned, blocks);
         }
         self.scratch.targets.clear();
-        self.scratch.pilots.clear();
+        self.scratch.asked.clear();
         for (i, pixel) in tile.pixels.iter().enumerate() {
-            let (x, y) = (i % tile.width, i / tile.width);
-            if is_pilot(x, y) == pilots && !pixel.points.is_empty() {
-                self.ask(simd, i, pixel, blocks.of(x, y));
+            if !pixel.points.is_empty() {
+                let block = blocks.of(i % tile.width, i / tile.width);
+                self.ask(simd, i, pixel, block);
             }
         }
     }
@@ -239,9 +236,10 @@ impl Asking<'_, '_> {
             chances,
             visibility,
             targets,
-            pilots,
+            asked,
             learned,
         } = &mut *self.scratch;
+        asked.push(i);
         let points = &tile.points[pixel.points.clone()];
         let hits = Hits { points, one_material: pixel.one_material };
         groups.gather(hits);
@@ -255,10 +253,9 @@ impl Asking<'_, '_> {
         sources.draw(simd, hits, counts, &numbers, candidates);
         let mut rays = Rays { pixel, out: self.out, targets };
         if self.pilots {
-            pilots.push(i);
             rays.push_all(candidates);
         } else {
-            let brightness = strategy.expected_brightness(tile.width, learned, i);
+            let brightness = strategy.expected_brightness(tile, learned, i);
             let n = (counts.light + counts.brdf) as f32;
             let covered = points.len() as f32 / pixel.n_samples as f32;
             let scale = covered * n / (TOLERANCE * brightness);
@@ -276,21 +273,13 @@ impl TileShading<'_> {
 }
 
 impl ProductSampling<'_> {
-    /// How bright a pixel will be: the harmonic mean over the pilots about it, for a dark one among them
-    /// tells of a shadow's edge.
-    fn expected_brightness(&self, width: usize, learned: &Learned, pixel: usize) -> f32 {
-        let (x, y) = (pixel % width, pixel / width);
-        let (mut n, mut sum) = (0.0, 0.0);
-        for y in [y & !1, (y + 1) & !1] {
-            for x in [x & !1, (x + 1) & !1] {
-                if x < width
-                    && let Some(luminance) = learned.luminance(y * width + x)
-                {
-                    n += 1.0;
-                    sum += 1.0 / self.brightness(luminance);
-                }
-            }
-        }
+    /// How bright a pixel will be: the harmonic mean over those of lower levels about it, for a dark one among
+    /// them tells of a shadow's edge.
+    fn expected_brightness(&self, tile: &TileShading, learned: &Learned, pixel: usize) -> f32 {
+        let around = coarser(pixel, tile.width, tile.pixels.len());
+        let known = around.filter_map(|i| learned.luminance(i));
+        let add = |(n, sum), luminance| (n + 1.0, sum + 1.0 / self.brightness(luminance));
+        let (n, sum) = known.fold((0.0, 0.0), add);
         if n > 0.0 { n / sum } else { self.dark }
     }
 }

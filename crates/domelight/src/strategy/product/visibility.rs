@@ -13,7 +13,7 @@
 //!
 //! V̂ serves as a control variate: the pixel's estimate is Σ W V̂ + Σ W (V − V̂)/π, whose expectation
 //! does not depend on V̂ as long as V̂ does not depend on the numbers that the second sum is drawn
-//! with. So V̂ comes from other pixels alone: the pilots.
+//! with. So V̂ comes from pixels of lower levels alone.
 
 use super::cells::{NO_SLOTS, ROWS, Slots, at_mut};
 use crate::simd::{Floats, LANES, Real, Simd};
