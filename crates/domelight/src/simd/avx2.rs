@@ -258,6 +258,16 @@ impl Ints for I32x8 {
         Self(unsafe { _mm256_blendv_epi8(b.0, a.0, _mm256_castps_si256(mask.0)) })
     }
     #[inline(always)]
+    fn packed(self, keep: Mask8) -> [i32; 8] {
+        let lanes = &super::PACKED_LANES[keep.bits() as usize % 256];
+        // SAFETY: `self` proves AVX2; `lanes` is 32 readable bytes, the load needs no alignment.
+        Self(unsafe {
+            let lanes = _mm256_loadu_si256(lanes.as_ptr().cast());
+            _mm256_permutevar8x32_epi32(self.0, lanes)
+        })
+        .store()
+    }
+    #[inline(always)]
     fn store(self) -> [i32; 8] {
         let mut lanes = [0; 8];
         // SAFETY: `self` proves AVX2; `lanes` is 32 writable bytes, the store needs no alignment.

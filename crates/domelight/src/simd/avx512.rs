@@ -275,6 +275,11 @@ impl Ints for I32x8 {
         Self(unsafe { _mm256_mask_blend_epi32(mask.0, b.0, a.0) })
     }
     #[inline(always)]
+    fn packed(self, keep: Mask8) -> [i32; 8] {
+        // SAFETY: `self` proves AVX-512.
+        Self(unsafe { _mm256_maskz_compress_epi32(keep.0, self.0) }).store()
+    }
+    #[inline(always)]
     fn store(self) -> [i32; 8] {
         let mut lanes = [0; 8];
         // SAFETY: `self` proves AVX-512; `lanes` is 32 writable bytes, the store needs no alignment.

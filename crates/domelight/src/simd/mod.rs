@@ -192,6 +192,8 @@ pub trait Ints: Copy + Add<Output = Self> {
     fn lt(self, b: Self) -> <Self::Floats as Real>::Mask;
     fn to_floats(self) -> Self::Floats;
     fn select(mask: <Self::Floats as Real>::Mask, a: Self, b: Self) -> Self;
+    /// The lanes that are kept at the front, then anything.
+    fn packed(self, keep: <Self::Floats as Real>::Mask) -> [i32; LANES];
     fn store(self) -> [i32; LANES];
 }
 
@@ -219,6 +221,18 @@ static PACKED_LANES: [[u32; 8]; 256] = {
     }
     table
 };
+
+/// [`Ints::packed`], one lane after the other.
+#[inline(always)]
+fn packed(lanes: [i32; LANES], keep: u32) -> [i32; LANES] {
+    let (mut packed, mut len) = ([0; LANES], 0);
+    for (i, lane) in lanes.into_iter().enumerate() {
+        // Overwritten by the next if it is not kept; in bounds, for the compiler.
+        packed[len % LANES] = lane;
+        len += (keep >> i & 1) as usize;
+    }
+    packed
+}
 
 /// [`Sets::pack`], one lane after the other.
 #[inline(always)]

@@ -243,6 +243,10 @@ impl Ints for I32x8 {
         unsafe { Self(vbslq_s32(m.0, a.0, b.0), vbslq_s32(m.1, a.1, b.1)) }
     }
     #[inline(always)]
+    fn packed(self, keep: Mask8) -> [i32; 8] {
+        super::packed(self.store(), keep.bits())
+    }
+    #[inline(always)]
     fn store(self) -> [i32; 8] {
         let mut lanes = [0; 8];
         // SAFETY: `self` proves NEON; `lanes` is 8 writable i32, and the stores need no alignment.

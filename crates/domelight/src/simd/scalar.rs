@@ -179,6 +179,10 @@ impl Ints for I32x8 {
         Self(from_fn(|i| if mask.0[i] { a.0[i] } else { b.0[i] }))
     }
     #[inline(always)]
+    fn packed(self, keep: Mask8) -> [i32; 8] {
+        super::packed(self.store(), keep.bits())
+    }
+    #[inline(always)]
     fn store(self) -> [i32; 8] {
         self.0
     }

@@ -76,7 +76,11 @@ impl Kernel for Whole {
             simd.counting(),
             simd.splat_int(self.a[5]),
         ];
-        ints.map(Ints::store).to_vec()
+        let keep = a.lt(b);
+        let (packed, n) = (a.packed(keep), keep.bits().count_ones() as usize);
+        let mut all = ints.map(Ints::store).to_vec();
+        all.push(std::array::from_fn(|i| if i < n { packed[i] } else { 0 }));
+        all
     }
 }
 

@@ -37,6 +37,8 @@ pub(super) struct Candidate {
     pub(super) slot: u32,
     /// Which hit of the pixel.
     pub(super) hit: u32,
+    /// π, as [`choose`](super::choose) has it.
+    pub(super) chance: u32,
 }
 
 /// Candidates of one hit side by side.
@@ -47,6 +49,8 @@ pub(super) struct CandidateBlock {
     pub(super) value: [Lanes; 3],
     pub(super) luminance: Lanes,
     pub(super) slots: [i32; LANES],
+    /// π of each.
+    pub(super) chances: [i32; LANES],
 }
 
 impl CandidateBlock {
@@ -59,6 +63,7 @@ impl CandidateBlock {
             luminance: self.luminance[lane],
             slot: self.slots[lane] as u32,
             hit,
+            chance: self.chances[lane] as u32,
         }
     }
 }
@@ -72,15 +77,17 @@ pub(super) struct Candidates {
     pub(super) brdf: Vec<Candidate>,
     /// How the strata are dealt to the hits.
     pub(super) deal: Deal,
-    /// The slot of each stratum.
-    slots: Vec<i32>,
+    /// The slot of each stratum, where its candidate is in `lights`.
+    slots: Vec<[i32; LANES]>,
+    /// Memory of [`Table::deal`].
+    marks: Vec<i32>,
 }
 
 /// Stratum k belongs to hit (k − r) mod n: who has which.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Deal {
     /// M.
-    pub(super) n_strata: usize,
+    n_strata: usize,
     /// n.
     pub(super) n_hits: usize,
     /// r.
@@ -89,7 +96,7 @@ pub(super) struct Deal {
 
 impl Deal {
     /// Of M strata to n hits, shifted by a number in [0, 1).
-    fn new(n_strata: usize, n_hits: usize, shift: f32) -> Self {
+    pub(super) fn new(n_strata: usize, n_hits: usize, shift: f32) -> Self {
         Self { n_strata, n_hits, shift: (shift * n_hits as f32) as usize % n_hits.max(1) }
     }
 
@@ -105,17 +112,36 @@ impl Deal {
         if k < self.n_hits { k } else { k - self.n_hits }
     }
 
-    /// The stratum of a lane of a block of a hit; at or beyond M there is none.
+    /// The places of strata 0 to M − 1 in blocks of hits that follow each other.
     #[inline(always)]
-    pub(super) fn stratum(self, hit: usize, block: usize, lane: usize) -> usize {
-        self.first(hit) + (block * LANES + lane) * self.n_hits
+    pub(super) fn places(self) -> impl Iterator<Item = Place> {
+        let (n, stride) = (self.n_hits, self.blocks() * LANES);
+        let start = if self.shift == 0 { 0 } else { n - self.shift };
+        let mut next = Place { hit: start, lane: start * stride };
+        let mut left = n;
+        (0..self.n_strata).map(move |_| {
+            let place = next;
+            next.hit += 1;
+            next.lane += stride;
+            if next.hit == n {
+                next = Place { hit: 0, lane: next.lane - n * stride };
+            }
+            left -= 1;
+            if left == 0 {
+                next.lane += 1;
+                left = n;
+            }
+            place
+        })
     }
+}
 
-    /// The hit that has stratum k.
-    #[inline(always)]
-    pub(super) fn hit(self, k: usize) -> usize {
-        (k + self.n_hits - self.shift) % self.n_hits
-    }
+/// Where a stratum's candidate is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Place {
+    pub(super) hit: usize,
+    /// Counted through all blocks.
+    pub(super) lane: usize,
 }
 
 /// Strata of a table that share one random offset.
@@ -207,20 +233,17 @@ impl Sources<'_> {
         candidates.deal = deal;
         candidates.lights.clear();
         if n_strata > 0 {
-            self.table.deal(simd, &strata, &mut candidates.slots);
+            let Candidates { slots, marks, .. } = &mut *candidates;
+            self.table.deal(simd, &strata, deal, marks, slots);
         }
         for (hit, at) in hits.points.iter().enumerate() {
             let of_hit =
                 OfHit { at, material: hits.material(hit), scale, n_brdf: counts.brdf as f32 };
             for block in 0..deal.blocks() {
-                let first = deal.stratum(hit, block, 0);
+                let first = deal.first(hit) + block * LANES * deal.n_hits;
                 let places = strata.places(simd, first, deal.n_hits);
                 let n = n_strata.saturating_sub(first).div_ceil(deal.n_hits);
-                let mut slots = [0; LANES];
-                for (lane, slot) in slots.iter_mut().enumerate().take(n) {
-                    *slot = candidates.slots[first + lane * deal.n_hits];
-                }
-                let slots = simd.load_ints(&slots);
+                let slots = simd.load_ints(&candidates.slots[hit * deal.blocks() + block]);
                 candidates.lights.push(self.draw_lights(simd, &of_hit, slots, places, n));
             }
         }
@@ -256,6 +279,7 @@ impl Sources<'_> {
             value: value.0.map(Floats::store),
             luminance: value.luminance().store(),
             slots: slots.store(),
+            chances: [0; LANES],
         }
     }
 
@@ -278,7 +302,7 @@ impl Sources<'_> {
             let density = counts[0] * self.table.width(slot) * within + counts[1] * pdf[lane];
             let value = f[lane] * le / density;
             let (slot, luminance) = (slot as u32, value.luminance());
-            candidates.push(Candidate { wi, value, luminance, slot, hit });
+            candidates.push(Candidate { wi, value, luminance, slot, hit, chance: 0 });
         }
     }
 }

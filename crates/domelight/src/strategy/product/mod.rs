@@ -38,7 +38,7 @@ use crate::Rgb;
 use crate::environment::Environment;
 use crate::sampling::Stream;
 use crate::simd::{Floats, InstructionSet, Kernel, LANES, Simd, dispatch};
-use candidates::{Candidate, Candidates, Counts, Hits, PixelNumbers, Sources};
+use candidates::{Candidate, Candidates, Counts, Hits, PixelNumbers, Place, Sources};
 use cells::{Cells, Slots, at};
 use choose::{Choice, probabilities, probability, weight};
 use hits::Groups;
@@ -122,8 +122,8 @@ pub struct ProductScratch {
     groups: Groups,
     table: Table,
     candidates: Candidates,
-    /// π of each candidate: strata along the curve, then samples of the material.
-    chances: Vec<u32>,
+    /// The chosen strata's candidates.
+    chosen: Vec<Place>,
     visibility: Visibility,
     /// Of each ray of the round the slot of the cell that it goes to.
     targets: Vec<u16>,
@@ -233,7 +233,7 @@ impl Asking<'_, '_> {
             groups,
             table,
             candidates,
-            chances,
+            chosen,
             visibility,
             targets,
             asked,
@@ -260,8 +260,8 @@ impl Asking<'_, '_> {
             let covered = points.len() as f32 / pixel.n_samples as f32;
             let scale = covered * n / (TOLERANCE * brightness);
             let visibility = visibility.of(block);
-            rays.weigh(simd, candidates, visibility, scale, chances);
-            rays.push_chosen(candidates, visibility, chances, Choice::new(numbers.choice));
+            rays.weigh(simd, candidates, visibility, scale);
+            rays.push_chosen(candidates, visibility.0, Choice::new(numbers.choice), chosen);
         }
     }
 }
@@ -333,18 +333,15 @@ impl Rays<'_> {
     fn weigh<S: Simd>(
         &mut self,
         simd: S,
-        candidates: &Candidates,
+        candidates: &mut Candidates,
         (visible, doubt): (&Slots, &Slots),
         importance: f32,
-        chances: &mut Vec<u32>,
     ) {
         let scale = self.scale();
         let Candidates { lights, brdf, deal, .. } = candidates;
-        chances.clear();
-        chances.resize(deal.n_strata, 0);
-        for (hit, blocks) in lights.chunks(deal.blocks().max(1)).enumerate() {
+        for (hit, blocks) in lights.chunks_mut(deal.blocks().max(1)).enumerate() {
             let mut sums = [simd.splat(0.0); 3];
-            for (i, c) in blocks.iter().enumerate() {
+            for c in blocks {
                 let slots = simd.load_ints(&c.slots);
                 let visible = S::Floats::gather(visible, slots);
                 for (sum, value) in sums.iter_mut().zip(&c.value) {
@@ -352,18 +349,14 @@ impl Rays<'_> {
                 }
                 let doubt = S::Floats::gather(doubt, slots);
                 let size = simd.load(&c.luminance) * doubt * simd.splat(importance);
-                for (lane, p) in probabilities(simd, size).into_iter().enumerate() {
-                    if let Some(chance) = chances.get_mut(deal.stratum(hit, i, lane)) {
-                        *chance = p as u32;
-                    }
-                }
+                c.chances = probabilities(simd, size);
             }
             *self.base(hit as u32) += Rgb::from(sums.map(Floats::sum)) * scale;
         }
         for c in brdf {
             let slot = c.slot as usize;
             *self.base(c.hit) += c.value * (scale * at(visible, slot));
-            chances.push(probability(c.luminance * at(doubt, slot) * importance));
+            c.chance = probability(c.luminance * at(doubt, slot) * importance);
         }
     }
 
@@ -372,26 +365,31 @@ impl Rays<'_> {
     fn push_chosen(
         &mut self,
         candidates: &Candidates,
-        (visible, _): (&Slots, &Slots),
-        chances: &[u32],
+        visible: &Slots,
         mut choice: Choice,
+        chosen: &mut Vec<Place>,
     ) {
         let Candidates { lights, brdf, deal, .. } = candidates;
-        let (of_lights, of_brdf) = chances.split_at(deal.n_strata);
-        for (k, &p) in of_lights.iter().enumerate().filter(|&(_, &p)| choice.offer(p)) {
-            let (hit, i) = (deal.hit(k), k / deal.n_hits);
-            let block = &lights[hit * deal.blocks() + i / LANES];
-            self.push_one(&block.get(i % LANES, hit as u32), p, visible);
+        chosen.resize(lights.len() * LANES + 1, Place::default());
+        let mut n_chosen = 0;
+        for place in deal.places() {
+            // Overwritten by the next unless it is chosen.
+            chosen[n_chosen] = place;
+            let chance = lights[place.lane / LANES].chances[place.lane % LANES];
+            n_chosen += usize::from(choice.offer(chance as u32));
         }
-        for (c, &p) in brdf.iter().zip(of_brdf).filter(|&(_, &p)| choice.offer(p)) {
-            self.push_one(c, p, visible);
+        for &Place { hit, lane } in &chosen[..n_chosen] {
+            self.push_one(&lights[lane / LANES].get(lane % LANES, hit as u32), visible);
+        }
+        for c in brdf.iter().filter(|c| choice.offer(c.chance)) {
+            self.push_one(c, visible);
         }
     }
 
     /// W (V − V̂)/π of one candidate.
     #[inline(always)]
-    fn push_one(&mut self, c: &Candidate, p: u32, visible: &Slots) {
-        let value = c.value * (self.scale() * weight(p));
+    fn push_one(&mut self, c: &Candidate, visible: &Slots) {
+        let value = c.value * (self.scale() * weight(c.chance));
         *self.base(c.hit) += value * -at(visible, c.slot as usize);
         self.push(c, value);
     }

@@ -14,12 +14,12 @@
 //! The running sum of the table is a distribution along the curve. Its M strata share one random
 //! offset: stratum k falls at u = (k + ξ)/M.
 
-use super::candidates::Strata;
+use super::candidates::{Deal, Strata};
 use super::cells::{Cells, NO_SLOTS, ROWS, Slots, TABLE_ROWS, at};
 use super::hits::Group;
 use crate::bsdf::Gloss;
 use crate::math::{FRAC_1_PI, Vec3, sqr};
-use crate::simd::{Floats, Ints, LANES, Mask, Real, Simd, Vectors, set_bits};
+use crate::simd::{Floats, Ints, LANES, Mask, Real, Simd, Vectors};
 
 /// The least cosine of a cell that is not all below the surface: what the table leaves to chance.
 const LEAST_COSINE: f32 = 0.01;
@@ -209,32 +209,49 @@ impl Table {
         F::gather(&self.weight, slots)
     }
 
-    /// Sets `slots[k]` to the slot of the cell that stratum k falls into.
+    /// Sets the slot of the cell that each stratum falls into, at the stratum's place.
     ///
     /// Stratum k lies at or after a cell's start s if k ≥ s/w − ξ, so a cell has the strata from the
     /// first that does to the first that does for the next cell. It marks its first; marks, which rise
     /// along the curve, spread to the right.
     #[inline(always)]
-    pub(super) fn deal<S: Simd>(&self, simd: S, strata: &Strata, slots: &mut Vec<i32>) {
-        let n = strata.n;
-        slots.clear();
-        slots.resize(n.next_multiple_of(LANES), 0);
-        for row in 0..ROWS {
-            let from = first(simd, strata, simd.load(&self.start[row]));
-            let to = first(simd, strata, simd.load(&self.end[row]));
-            let not_empty = from.lt(to).bits();
-            let from = from.store();
-            for lane in set_bits(not_empty) {
-                if let Some(mark) = slots.get_mut(from[lane] as usize) {
-                    *mark = (lane << MARK | row) as i32;
-                }
+    pub(super) fn deal<S: Simd>(
+        &self,
+        simd: S,
+        strata: &Strata,
+        deal: Deal,
+        marks: &mut Vec<i32>,
+        slots: &mut Vec<[i32; LANES]>,
+    ) {
+        marks.clear();
+        marks.resize(strata.n, 0);
+        // Of each cell that has strata the first, and its mark.
+        let mut firsts = [0; LANES * (ROWS + 1)];
+        let mut n_firsts = 0;
+        let mut mark = simd.counting().shifted::<MARK>();
+        let mut from = first(simd, strata, simd.load(&self.start[0]));
+        for end in &self.end[..ROWS] {
+            let to = first(simd, strata, simd.load(end));
+            let not_empty = from.lt(to);
+            let packed = (from.shifted::<MARKS>() + mark).packed(not_empty);
+            firsts[n_firsts..n_firsts + LANES].copy_from_slice(&packed);
+            n_firsts += not_empty.bits().count_ones() as usize;
+            mark = mark + simd.splat_int(1);
+            from = to;
+        }
+        for first in &firsts[..n_firsts] {
+            if let Some(mark) = marks.get_mut((first >> MARKS) as usize) {
+                *mark = first & ((1 << MARKS) - 1);
             }
         }
+        // Lanes without a stratum keep any slot.
+        slots.resize(deal.blocks() * deal.n_hits, [0; LANES]);
         let mut last = 0;
-        for mark in slots {
+        for (mark, place) in marks.iter().zip(deal.places()) {
             last = last.max(*mark);
             // Row and lane as they follow each other in memory.
-            *mark = (last & ((1 << MARK) - 1)) << ROW | last >> MARK;
+            let slot = (last & ((1 << MARK) - 1)) << ROW | last >> MARK;
+            slots[place.lane / LANES][place.lane % LANES] = slot;
         }
     }
 
@@ -258,6 +275,9 @@ fn first<S: Simd>(simd: S, strata: &Strata, start: S::Floats) -> S::Ints {
 
 /// Bits of a row's number in a mark: marks are ordered by lane, then by row.
 const MARK: i32 = TABLE_ROWS.ilog2() as i32;
+
+/// Bits of a mark.
+const MARKS: i32 = MARK + ROW;
 
 /// The power of two that a row's length is.
 const ROW: i32 = LANES.ilog2() as i32;
@@ -341,10 +361,11 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Self::Output {
-            let mut slots = Vec::new();
-            self.table.deal(simd, &self.strata, &mut slots);
+            let (mut marks, mut slots) = (Vec::new(), Vec::new());
+            let deal = Deal::new(self.strata.n, 1, 0.0);
+            self.table.deal(simd, &self.strata, deal, &mut marks, &mut slots);
             let at = self.strata.places(simd, self.stratum, 0);
-            let slot = slots[self.stratum];
+            let slot = slots[self.stratum / LANES][self.stratum % LANES];
             (slot as usize, self.table.inside(simd.splat_int(slot), at).store()[0])
         }
     }
