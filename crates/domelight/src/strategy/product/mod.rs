@@ -61,7 +61,7 @@ const NARROW: f32 = 0.1;
 
 /// The error of a candidate that does not matter, as a share of the pixel's brightness over the
 /// number of candidates.
-const TOLERANCE: f32 = 0.6;
+const TOLERANCE: f32 = 0.8;
 
 /// Pixels darker than this share of the environment's mean are not held to their own brightness.
 const DARK: f32 = 0.15;

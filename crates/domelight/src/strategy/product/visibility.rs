@@ -5,7 +5,7 @@
 //! 0.25 times to the two cells beside it along the curve,
 //!
 //! ```text
-//! V̂ = (k + p)/(n + 1)        p = (K + v₀)/(N + 1)        g² = V̂(1 − V̂) + 0.005 + 0.1/(n + 1)
+//! V̂ = (k + p)/(n + 1)        p = (K + v₀)/(N + 1)        g² = V̂(1 − V̂) + 0.002 + 0.07/(n + 1)
 //! ```
 //!
 //! p is the same of the whole tile, K of N rays to the cell, and v₀ that of all cells. g is the standard
@@ -135,7 +135,7 @@ impl Visibility {
                 let k = around(simd, free, block, &neighbors, row);
                 let v = ((k + simd.load(&prior[row])) / (n + one)).min(one);
                 visible[row] = v.store();
-                let unsure = simd.splat(0.005) + simd.splat(0.1) / (n + one);
+                let unsure = simd.splat(0.002) + simd.splat(0.07) / (n + one);
                 doubt[row] = (v * (one - v) + unsure).sqrt().store();
             }
         }
@@ -225,7 +225,7 @@ mod tests {
         for block in 0..blocks.len() {
             let (visible, doubt) = visibility.of(block);
             assert!(visible[..ROWS].iter().flatten().all(|v| (0.0..=1.0).contains(v)));
-            assert!(doubt[..ROWS].iter().flatten().all(|d| (0.07..0.78).contains(d)));
+            assert!(doubt[..ROWS].iter().flatten().all(|d| (0.04..0.76).contains(d)));
             for cell in 0..100 {
                 assert!((at(visible, cell) - cell as f32 / 100.0).abs() < 0.15);
             }
