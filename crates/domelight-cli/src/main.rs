@@ -19,6 +19,7 @@ mod memory;
 mod merge;
 mod notation;
 mod output;
+mod preview;
 mod probe;
 mod profile;
 mod progress;

@@ -13,6 +13,7 @@ use crate::failure::UsageError;
 use crate::interrupt;
 use crate::memory;
 use crate::output::{PicturePath, print, require_one_on_standard_output};
+use crate::preview;
 use crate::progress::RenderProgress;
 use crate::report::{RenderReport, Settings, Stages, Stop};
 use crate::scene::{View, start_threads};
@@ -50,7 +51,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let load = watch.lap();
 
     let view = &arguments.scene.build(loaded)?;
-    let View { scene, camera, environment, probe, report } = view;
+    let View { scene, camera, environment, probe, report, .. } = view;
     let settings = &RenderSettings {
         adaptive: !arguments.samples.no_adaptive,
         target_error: arguments.samples.target_error,
@@ -75,15 +76,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
 
     let tone = arguments.output.tone.mapping(ToneCurve::Agx);
     if arguments.output.preview {
-        let settings = &RenderSettings { n_samples: 1, target_error: None, ..*settings };
-        let progress = &RenderProgress::new("", 1, true, interrupted);
-        let job = Job { scene, camera, environment, settings, progress, course: None };
-        let layers = renderer(&job)?.layers;
-        let pictures = outputs.iter().filter(|path| path.is_png());
-        for path in pictures {
-            let attributes = described.provenance();
-            path.write_layers(&layers, &tone, report.hide_env, &attributes)?;
-        }
+        preview::write(view, settings, &renderer, &outputs, &tone, interrupted)?;
     }
 
     let n_pixels = (settings.width * settings.height) as u64;

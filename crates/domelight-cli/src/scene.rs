@@ -37,6 +37,7 @@ pub(crate) struct LoadedScene {
 pub(crate) struct View {
     pub(crate) scene: Scene,
     pub(crate) camera: Camera,
+    pub(crate) camera_settings: CameraSettings,
     pub(crate) environment: Environment,
     /// What a user would call the probe.
     pub(crate) probe: String,
@@ -46,9 +47,20 @@ pub(crate) struct View {
 impl SceneArguments {
     /// Reads scene and probe.
     pub(crate) fn load(&self, quiet: bool) -> Result<LoadedScene> {
-        let mut description = load_scene(&self.scene, quiet)?;
-        let light = self.environment.settings(&description);
-        let map = self.environment.load(&light, quiet)?;
+        let (mut description, light, map) = if let Ok(scene) = BuiltinScene::from_str(&self.scene) {
+            // It takes no memory to speak of, so that its light may be read meanwhile.
+            let environment = Some(scene.environment());
+            let of_scene = SceneDescription { environment, ..SceneDescription::default() };
+            let light = self.environment.settings(&of_scene);
+            let map = || self.environment.load(&light, quiet);
+            let (description, map) = rayon::join(|| scene.description(), map);
+            (description, light, map?)
+        } else {
+            let description = load_scene(&self.scene, quiet)?;
+            let light = self.environment.settings(&description);
+            let map = self.environment.load(&light, quiet)?;
+            (description, light, map)
+        };
         let view = self.stage(&mut description, light.up.vector())?;
         Ok(LoadedScene { description, light, map, view })
     }
@@ -81,7 +93,7 @@ impl SceneArguments {
             camera: CameraReport::new(&view),
             size: [width, height],
         };
-        Ok(View { scene, camera, environment, probe, report })
+        Ok(View { scene, camera, camera_settings: view, environment, probe, report })
     }
 
     /// Changes the scene as the flags say; the camera frames what is not scenery.

@@ -54,7 +54,7 @@ pub(crate) struct OutputArguments {
     /// Print settings, times and counts as JSON on standard output
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write PNG output first after one sample of each pixel, to look at while the rest is rendered
+    /// Write PNG output first in half the size, after one sample, to look at while the rest is rendered
     #[arg(long)]
     pub(crate) preview: bool,
     /// Say which stages the time goes to: CPU seconds on standard error, and in --json

@@ -15,7 +15,7 @@ pub(crate) struct StrategyArguments {
     #[arg(long, value_enum, default_value_t = StrategyName::Product)]
     pub(crate) strategy: StrategyName,
     /// Shadow rays of each camera sample; with product no more than these, with rejection samples to
-    /// accept [default: with product 8, with mis 2, else 1]
+    /// accept [default: with product 16, with mis 2, else 1]
     #[arg(long, value_name = "N", conflicts_with = "split",
           value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub(crate) rays: Option<u32>,
@@ -55,7 +55,7 @@ pub(crate) struct StrategyArguments {
 #[command(next_help_heading = "Sampling")]
 pub(crate) struct SampleArguments {
     /// Camera samples of each pixel; with product the usual number: noisy pixels get more, others fewer
-    #[arg(long, value_name = "N", default_value_t = 64,
+    #[arg(long, value_name = "N", default_value_t = 32,
           value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub(crate) spp: u32,
     /// With product, as many camera samples for every pixel

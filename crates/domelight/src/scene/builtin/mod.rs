@@ -1,7 +1,7 @@
 //! Scenes made in code, for pictures and tests.
 //!
 //! Each shows what one question needs: self-shadowing, roughness, a material, or a plain sphere whose
-//! every normal is seen. They name no environment; [`BuiltinScene::probe`] says which built-in one suits.
+//! every normal is seen. [`BuiltinScene::environment`] is the light that suits.
 
 pub mod material_ball;
 pub mod shapes;
@@ -102,17 +102,20 @@ impl BuiltinScene {
         }
     }
 
-    /// The scene, with a camera for a square picture and the probe that suits it.
-    pub fn description(self) -> SceneDescription {
-        let source = EnvironmentSource::Builtin(self.probe().to_owned());
-        let environment = EnvironmentSettings {
-            source,
+    /// The probe that suits it, turned.
+    pub fn environment(self) -> EnvironmentSettings {
+        EnvironmentSettings {
+            source: EnvironmentSource::Builtin(self.probe().to_owned()),
             rotate_degrees: self.probe_rotation(),
             scale: 1.0,
             exposure: 0.0,
             up: UpAxis::Y,
-        };
-        SceneDescription { environment: Some(environment), ..self.geometry() }
+        }
+    }
+
+    /// The scene, with a camera for a square picture and the probe that suits it.
+    pub fn description(self) -> SceneDescription {
+        SceneDescription { environment: Some(self.environment()), ..self.geometry() }
     }
 
     fn geometry(self) -> SceneDescription {

@@ -1,0 +1,44 @@
+//! A first picture of a render, to look at while the rest is made.
+
+use std::sync::atomic::AtomicBool;
+
+use anyhow::Result;
+use domelight::RgbImage;
+use domelight::picture::tone::ToneMapping;
+use domelight::render::RenderSettings;
+use domelight::scene::Camera;
+
+use crate::output::PicturePath;
+use crate::progress::RenderProgress;
+use crate::scene::View;
+use crate::strategy::{Job, Renderer};
+
+/// Writes PNG output after one sample of each square of 2 × 2 pixels.
+pub(crate) fn write(
+    view: &View,
+    settings: &RenderSettings,
+    renderer: &Renderer,
+    outputs: &[PicturePath],
+    tone: &ToneMapping,
+    interrupted: &'static AtomicBool,
+) -> Result<()> {
+    let (width, height) = (settings.width.div_ceil(2), settings.height.div_ceil(2));
+    let settings = &RenderSettings { width, height, n_samples: 1, target_error: None, ..*settings };
+    let camera = &Camera::new(&view.camera_settings, width, height)?;
+    let progress = &RenderProgress::new("", 1, true, interrupted);
+    let View { scene, environment, .. } = view;
+    let job = Job { scene, camera, environment, settings, progress, course: None };
+    let layers = renderer(&job)?.layers;
+
+    let [whole_width, whole_height] = view.report.size;
+    let at = |x: usize, y: usize| y / 2 * width + x / 2;
+    let color = RgbImage::from_fn(whole_width, whole_height, |x, y| layers.color.pixels[at(x, y)]);
+    let alpha: Vec<f32> = (0..whole_width * whole_height)
+        .map(|i| layers.alpha[at(i % whole_width, i / whole_width)])
+        .collect();
+    let alpha = view.report.hide_env.then_some(&alpha[..]);
+    outputs.iter().filter(|path| path.is_png()).try_for_each(|path| {
+        // What it shows is not the render that the attributes would tell of.
+        path.write_color(&color, alpha, tone)
+    })
+}
