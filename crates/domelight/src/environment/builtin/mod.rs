@@ -108,18 +108,25 @@ impl FromStr for BuiltinProbe {
 fn averaged(height: usize, fine_rows: usize, radiance: impl Fn(Vec3) -> Rgb + Sync) -> RgbImage {
     let width = 2 * height;
     let grid = fine_rows.div_ceil(height);
+    let columns: Vec<(f64, f64)> = (0..width * grid)
+        .map(|x| (TAU * ((x as f64 + 0.5) / (width * grid) as f64 - 0.5)).sin_cos())
+        .collect();
     let rows = map_rows(height, |y| {
         let mut sums = vec![[0.0f64; 3]; width];
         let mut total = 0.0;
         for fine_y in y * grid..(y + 1) * grid {
             let theta = PI * (fine_y as f64 + 0.5) / (height * grid) as f64;
-            total += theta.sin() * grid as f64;
-            for (x, sum) in sums.iter_mut().enumerate() {
-                for fine_x in x * grid..(x + 1) * grid {
-                    let phi = TAU * ((fine_x as f64 + 0.5) / (width * grid) as f64 - 0.5);
-                    let le = radiance(direction(theta, phi));
+            let (sin_theta, cos_theta) = theta.sin_cos();
+            total += sin_theta * grid as f64;
+            for (sum, columns) in sums.iter_mut().zip(columns.chunks_exact(grid)) {
+                for &(sin_phi, cos_phi) in columns {
+                    let le = radiance(vec3(
+                        (sin_phi * sin_theta) as f32,
+                        cos_theta as f32,
+                        (-cos_phi * sin_theta) as f32,
+                    ));
                     for (s, c) in sum.iter_mut().zip(le.to_array()) {
-                        *s += c as f64 * theta.sin();
+                        *s += c as f64 * sin_theta;
                     }
                 }
             }
