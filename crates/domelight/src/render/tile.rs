@@ -206,8 +206,11 @@ impl Tile {
             let stream = self.stream(frame, i);
             let column = i % self.window.width;
             let now = S::N_ROUNDS == 1 || level(column, i / self.window.width) == round;
-            let n_samples =
-                if now { spreads.samples(i, pass.n_samples, pass.usual_growth) } else { 0 };
+            let n_samples = match (now, seen) {
+                (true, true) => spreads.samples(i, pass.n_samples, pass.usual_growth),
+                (true, false) => pass.n_samples,
+                (false, _) => 0,
+            };
             let start = self.pixels[i].n_samples();
             let samples = start..start + n_samples;
             let first = (seen && now).then_some(rays.len());

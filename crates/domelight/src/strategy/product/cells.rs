@@ -96,11 +96,25 @@ pub(super) struct Cells {
     pub(super) center: [Box<Slots>; 3],
     /// Angular radius.
     pub(super) radius: Box<Slots>,
+    /// For normals that spread by each of [`SPREADS`].
+    ramps: [Ramp; SPREADS.len()],
     /// No direction of the cell is further from its centre than this \[rad\].
     pub(super) reach: Box<Slots>,
     /// ∫ luminance dω; 0 where there is no cell.
     pub(super) mass: Box<Slots>,
 }
+
+/// The soft step of the cosine on a cell: what r and the spread of normals make of it.
+#[derive(Clone, Debug)]
+pub(super) struct Ramp {
+    /// s = √(r² + spread²).
+    pub(super) s: Box<Slots>,
+    /// 1/4s.
+    pub(super) scale: Box<Slots>,
+}
+
+/// Spreads of normals that ramps are made for \[rad\].
+const SPREADS: [f32; 7] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28];
 
 impl Cells {
     /// Cuts an environment; none of a black one.
@@ -113,6 +127,7 @@ impl Cells {
             links: vec![[Link::Dark; 4]; tree.links.len()],
             center: [zeros(), zeros(), zeros()],
             radius: zeros(),
+            ramps: SPREADS.map(|_| Ramp { s: zeros(), scale: zeros() }),
             reach: zeros(),
             mass: zeros(),
         };
@@ -125,6 +140,11 @@ impl Cells {
                 *at_mut(c, slot) = x;
             }
             *at_mut(&mut cells.radius, slot) = radius;
+            for (spread, ramp) in SPREADS.iter().zip(&mut cells.ramps) {
+                let s = radius.hypot(*spread);
+                *at_mut(&mut ramp.s, slot) = s;
+                *at_mut(&mut ramp.scale, slot) = 0.25 / s;
+            }
             *at_mut(&mut cells.reach, slot) = reach;
             *at_mut(&mut cells.mass, slot) = square.mass;
         }
@@ -146,6 +166,12 @@ impl Cells {
                 Link::Cell(self.squares.len() as u16 - 1)
             };
         }
+    }
+
+    /// The ramps for normals that spread by `spread`, or a little more.
+    pub(super) fn ramp(&self, spread: f32) -> &Ramp {
+        let above = SPREADS.partition_point(|&s| s < spread);
+        &self.ramps[above.min(SPREADS.len() - 1)]
     }
 
     /// How many.
@@ -196,11 +222,11 @@ impl Cells {
         mut u: f64,
         jitter: [f32; 2],
     ) -> (Vec3, Rgb) {
-        /// Levels below a texel, or below a cell within one.
+        /// Levels below the cell that the curve is followed for, if not to single texels.
         const BELOW: i32 = 3;
         let map = Map { environment };
         let mut square = self.squares[cell];
-        let last = square.size.min(0) - BELOW;
+        let last = (square.size - BELOW).min(0);
         while square.size > last {
             let quarters = map.quarters(&square);
             let total: f64 = quarters.iter().map(|q| f64::from(q.mass)).sum();

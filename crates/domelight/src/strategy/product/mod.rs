@@ -162,6 +162,10 @@ impl Strategy for ProductSampling<'_> {
         if round == 0 {
             scratch.learned.reset(tile.blocks(), tile.pixels.len());
         }
+        if tile.points.is_empty() {
+            scratch.asked.clear();
+            return;
+        }
         let pilots = round == 0;
         let asking = Asking { strategy: self, cells, pool, tile, pilots, scratch, out };
         dispatch(self.instruction_set, asking);

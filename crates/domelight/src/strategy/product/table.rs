@@ -49,23 +49,16 @@ impl Table {
     /// Fills the table for groups of hits.
     #[inline(always)]
     pub(super) fn fill<S: Simd>(&mut self, simd: S, cells: &Cells, groups: &[Group]) {
-        for row in &mut self.weight[..ROWS] {
-            *row = [0.0; LANES];
+        for (i, group) in groups.iter().enumerate() {
+            self.add(simd, cells, group, i > 0);
         }
-        for group in groups {
-            self.add(simd, cells, group);
-        }
-        for row in 0..ROWS {
-            let weight = simd.load(&self.weight[row]) * simd.load(&cells.mass[row]);
-            self.weight[row] = weight.store();
-        }
-        self.accumulate(simd);
+        self.accumulate(simd, &cells.mass);
     }
 
-    /// Adds what a group reflects from each cell per light.
+    /// Adds what a group reflects from each cell per light, to what others do if there are `others`.
     #[inline(always)]
-    fn add<S: Simd>(&mut self, simd: S, cells: &Cells, group: &Group) {
-        self.face(simd, cells, group);
+    fn add<S: Simd>(&mut self, simd: S, cells: &Cells, group: &Group, others: bool) {
+        self.face(simd, cells, group, others);
         for (albedo, gloss) in group.outline.lobes() {
             let share = group.share * albedo;
             match gloss {
@@ -84,20 +77,22 @@ impl Table {
 
     /// The ramp of the cosine, and the diffuse part.
     #[inline(always)]
-    fn face<S: Simd>(&mut self, simd: S, cells: &Cells, group: &Group) {
+    fn face<S: Simd>(&mut self, simd: S, cells: &Cells, group: &Group, others: bool) {
         let diffuse = simd.splat(FRAC_1_PI * group.share * group.outline.diffuse);
         let (zero, least) = (simd.splat(0.0), simd.splat(LEAST_COSINE));
-        let (spread, four) = (simd.splat(group.spread), simd.splat(4.0));
+        let spread = simd.splat(group.spread);
+        let ramps = cells.ramp(group.spread);
+        let before = simd.splat(if others { 1.0 } else { 0.0 });
         for row in 0..ROWS {
             let x = center(simd, cells, row).dot(group.frame.z);
-            let s = (simd.load(&cells.radius[row]).squared() + spread.squared()).sqrt()
-                + simd.splat(1e-6);
-            let ramp = (x + s).max(zero).squared() / (four * s);
+            let s = simd.load(&ramps.s[row]);
+            let ramp = (x + s).max(zero).squared() * simd.load(&ramps.scale[row]);
             let cosine = Real::select(s.lt(x), x, ramp);
             let reached = zero.lt(x + simd.load(&cells.reach[row]) + spread);
             let cosine = Real::select(reached, cosine.max(least), zero);
             self.cosine[row] = cosine.store();
-            self.weight[row] = (simd.load(&self.weight[row]) + diffuse * cosine).store();
+            let weight = before * simd.load(&self.weight[row]) + diffuse * cosine;
+            self.weight[row] = weight.store();
         }
     }
 
@@ -166,12 +161,12 @@ impl Table {
         }
     }
 
-    /// The running sum: down the rows in all lanes at once, then over the lanes.
+    /// The running sum of weight times light: down the rows in all lanes at once, then over the lanes.
     #[inline(always)]
-    fn accumulate<S: Simd>(&mut self, simd: S) {
+    fn accumulate<S: Simd>(&mut self, simd: S, mass: &Slots) {
         let mut sum = simd.splat(0.0);
         for row in 0..ROWS {
-            sum = sum + simd.load(&self.weight[row]);
+            sum = sum + simd.load(&self.weight[row]) * simd.load(&mass[row]);
             self.end[row] = sum.store();
         }
         let sum = sum.store();
