@@ -173,15 +173,20 @@ impl Tile {
         batch.spreads.reset(width, n_pixels);
         let asked = Asked { frame, strategy, pass: &pass.shared, width };
         let mut counts = Counts::default();
-        for round in 0..S::N_ROUNDS {
+        // Where nothing is seen there is nothing to learn.
+        let n_rounds = if batch.seen.contains(&true) { S::N_ROUNDS } else { 1 };
+        for round in 0..n_rounds {
             observer.stage_started(Stage::CameraRays);
-            counts.camera_rays += self.trace_camera_rays(frame, pass, round, batch);
+            let of_round = |x, y| n_rounds == 1 || level(x, y) == round;
+            counts.camera_rays += self.trace_camera_rays(frame, pass, of_round, batch);
             observer.stage_started(Stage::Surfaces);
             batch.gather_points(frame);
             counts.shading_points += batch.points.len() as u64;
             counts.shadow_rays += batch.trace_strategy(&asked, round, of_strategy, observer);
             observer.stage_started(Stage::Sums);
-            batch.learn_spreads();
+            if n_rounds > 1 {
+                batch.learn_spreads();
+            }
             counts.non_finite += self.add_samples(frame, batch);
         }
         self.counts += counts;
@@ -193,7 +198,7 @@ impl Tile {
         &self,
         frame: &Frame,
         pass: &Pass<S>,
-        round: u32,
+        of_round: impl Fn(usize, usize) -> bool,
         batch: &mut Batch,
     ) -> u64 {
         let Batch { seen, spreads, rays, hits, camera_rays, pixels, .. } = batch;
@@ -204,8 +209,7 @@ impl Tile {
         for (i, &seen) in seen.iter().enumerate() {
             let (x, y) = self.position(i);
             let stream = self.stream(frame, i);
-            let column = i % self.window.width;
-            let now = S::N_ROUNDS == 1 || level(column, i / self.window.width) == round;
+            let now = of_round(i % self.window.width, i / self.window.width);
             let n_samples = match (now, seen) {
                 (true, true) => spreads.samples(i, pass.n_samples, pass.usual_growth),
                 (true, false) => pass.n_samples,
