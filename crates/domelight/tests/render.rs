@@ -226,6 +226,25 @@ fn pictures<S: Strategy>(
     (0..40).map(picture).collect()
 }
 
+#[test]
+fn noisy_pixels_get_more_camera_samples() {
+    let (scene, environment) = (scene("ggx:0.2"), environment());
+    let strategy = ProductSampling::new(&environment, 4);
+    let picture = |adaptive| {
+        let settings = RenderSettings { n_samples: 40, adaptive, ..small() };
+        draw(&scene, &environment, &strategy, &settings)
+    };
+    assert!(picture(false).layers.n_samples.iter().all(|&n| n == 40));
+    let Rendering { layers, counts, complete } = picture(true);
+    assert!(complete);
+    let [least, most] = [layers.n_samples.iter().min(), layers.n_samples.iter().max()];
+    assert!(least < Some(&40) && most > Some(&80), "{least:?} {most:?}");
+    let sum: u64 = layers.n_samples.iter().map(|&n| u64::from(n)).sum();
+    assert_eq!(sum, counts.camera_rays);
+    let mean = sum as f64 / layers.n_samples.len() as f64;
+    assert!((30.0..60.0).contains(&mean), "{mean}");
+}
+
 /// Pixels that get more samples where others are noisy, and visibility learned from others, leave no error behind that
 /// seeds have in common.
 #[test]
