@@ -22,7 +22,8 @@ pub(crate) fn write(
     tone: &ToneMapping,
     interrupted: &'static AtomicBool,
 ) -> Result<()> {
-    let (width, height) = (settings.width.div_ceil(2), settings.height.div_ceil(2));
+    let (whole_width, whole_height) = (settings.width, settings.height);
+    let (width, height) = (whole_width.div_ceil(2), whole_height.div_ceil(2));
     let settings = &RenderSettings { width, height, n_samples: 1, target_error: None, ..*settings };
     let camera = &Camera::new(&view.camera_settings, width, height)?;
     let progress = &RenderProgress::new("", 1, true, interrupted);
@@ -30,7 +31,6 @@ pub(crate) fn write(
     let job = Job { scene, camera, environment, settings, progress, course: None };
     let layers = renderer(&job)?.layers;
 
-    let [whole_width, whole_height] = view.report.size;
     let at = |x: usize, y: usize| y / 2 * width + x / 2;
     let color = RgbImage::from_fn(whole_width, whole_height, |x, y| layers.color.pixels[at(x, y)]);
     let alpha: Vec<f32> = (0..whole_width * whole_height)

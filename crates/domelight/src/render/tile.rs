@@ -183,10 +183,10 @@ impl Tile {
             batch.gather_points(frame);
             counts.shading_points += batch.points.len() as u64;
             counts.shadow_rays += batch.trace_strategy(&asked, round, of_strategy, observer);
-            observer.stage_started(Stage::Sums);
-            if n_rounds > 1 {
-                batch.learn_spreads();
+            if round + 1 < n_rounds {
+                batch.learn(&asked, of_strategy);
             }
+            observer.stage_started(Stage::Sums);
             counts.non_finite += self.add_samples(frame, batch);
         }
         self.counts += counts;
@@ -365,14 +365,15 @@ impl Batch {
                 self.radiance[point as usize] += weight;
             }
         }
-        if round + 1 < S::N_ROUNDS {
-            strategy.learn(&tile, &rays.asked, &rays.free, scratch);
-        }
         rays.asked.len() as u64
     }
 
-    /// Learns how the samples of the round's pixels spread.
-    fn learn_spreads(&mut self) {
+    /// Lets the strategy learn from the round, and how the samples of its pixels spread.
+    fn learn<S: Strategy>(&mut self, asked: &Asked<S>, scratch: &mut S::Scratch) {
+        let Self { points, samples, pixels, round: ShadowRays { asked: rays, free, .. }, .. } =
+            self;
+        let tile = TileShading { points, samples, pixels, width: asked.width };
+        asked.strategy.learn(&tile, rays, free, scratch);
         for (i, pixel) in self.pixels.iter().enumerate() {
             self.spreads.learn(i, &self.radiance[pixel.points.clone()]);
         }

@@ -224,8 +224,8 @@ static PACKED_LANES: [[u32; 8]; 256] = {
 
 /// [`Ints::packed`], one lane after the other.
 #[inline(always)]
-fn packed(lanes: [i32; LANES], keep: u32) -> [i32; LANES] {
-    let (mut packed, mut len) = ([0; LANES], 0);
+fn packed<T: Copy + Default>(lanes: [T; LANES], keep: u32) -> [T; LANES] {
+    let (mut packed, mut len) = ([T::default(); LANES], 0);
     for (i, lane) in lanes.into_iter().enumerate() {
         // Overwritten by the next if it is not kept; in bounds, for the compiler.
         packed[len % LANES] = lane;
@@ -237,14 +237,8 @@ fn packed(lanes: [i32; LANES], keep: u32) -> [i32; LANES] {
 /// [`Sets::pack`], one lane after the other.
 #[inline(always)]
 fn pack(sets: [u32; 8], numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
-    let (mut packed_sets, mut packed_numbers, mut len) = ([0; 8], [0; 8], 0);
-    for (set, number) in sets.into_iter().zip(numbers) {
-        // Overwritten by the next if the set is empty; in bounds, for the compiler.
-        packed_sets[len % 8] = set;
-        packed_numbers[len % 8] = number;
-        len += usize::from(set != 0);
-    }
-    (packed_sets, packed_numbers, len)
+    let not_empty = (0..LANES).fold(0, |bits, i| bits | u32::from(sets[i] != 0) << i);
+    (packed(sets, not_empty), packed(numbers, not_empty), not_empty.count_ones() as usize)
 }
 
 /// Eight sets of the numbers 0 to 31.

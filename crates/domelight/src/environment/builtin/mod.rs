@@ -120,11 +120,7 @@ fn averaged(height: usize, fine_rows: usize, radiance: impl Fn(Vec3) -> Rgb + Sy
             total += sin_theta * grid as f64;
             for (sum, columns) in sums.iter_mut().zip(columns.chunks_exact(grid)) {
                 for &(sin_phi, cos_phi) in columns {
-                    let le = radiance(vec3(
-                        (sin_phi * sin_theta) as f32,
-                        cos_theta as f32,
-                        (-cos_phi * sin_theta) as f32,
-                    ));
+                    let le = radiance(toward((sin_theta, cos_theta), (sin_phi, cos_phi)));
                     for (s, c) in sum.iter_mut().zip(le.to_array()) {
                         *s += c as f64 * sin_theta;
                     }
@@ -149,8 +145,11 @@ fn map_rows(height: usize, row: impl Fn(usize) -> Vec<Rgb> + Sync) -> Vec<Vec<Rg
 
 /// The unit vector θ from +Y and φ from −Z toward +X \[rad\].
 fn direction(theta: f64, phi: f64) -> Vec3 {
-    let (sin_theta, cos_theta) = theta.sin_cos();
-    let (sin_phi, cos_phi) = phi.sin_cos();
+    toward(theta.sin_cos(), phi.sin_cos())
+}
+
+/// [`direction`] by sine and cosine of its angles.
+fn toward((sin_theta, cos_theta): (f64, f64), (sin_phi, cos_phi): (f64, f64)) -> Vec3 {
     vec3((sin_phi * sin_theta) as f32, cos_theta as f32, (-cos_phi * sin_theta) as f32)
 }
 
