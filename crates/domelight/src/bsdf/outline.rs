@@ -1,9 +1,10 @@
 //! What a material looks like from afar: the least that a density needs to follow it roughly.
 
 use super::{Brdf as _, Lobe, Material};
+use crate::Rgb;
 use crate::math::Vec3;
 
-/// A glossy lobe without its colour.
+/// The shape of a glossy lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gloss {
     /// Microfacets of roughness α along x and y. Gaussian slopes have short tails, GGX's long ones.
@@ -35,30 +36,30 @@ impl Gloss {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outline {
     /// Albedo of what reflects by the cosine.
-    pub diffuse: f32,
+    pub diffuse: Rgb,
     /// The glossy lobes with their albedos; the first of none ends them.
-    pub glossy: [Option<(f32, Gloss)>; super::MAX_LOBES],
+    pub glossy: [Option<(Rgb, Gloss)>; super::MAX_LOBES],
 }
 
 impl Outline {
     /// The glossy lobes with their albedos.
-    pub fn lobes(&self) -> impl Iterator<Item = (f32, Gloss)> {
+    pub fn lobes(&self) -> impl Iterator<Item = (Rgb, Gloss)> {
         self.glossy.iter().copied().flatten()
     }
 }
 
 impl Material {
-    /// The material seen from `wo`, in luminances.
+    /// The material seen from `wo`.
     pub fn outline(&self, wo: Vec3) -> Outline {
         let mut outline = Outline::default();
         let mut n = 0;
-        let mut add = |weight: f32, gloss| {
-            outline.glossy[n] = Some((weight, gloss));
+        let mut add = |albedo: Rgb, gloss| {
+            outline.glossy[n] = Some((albedo, gloss));
             n += 1;
         };
-        let mut diffuse = 0.0;
+        let mut diffuse = Rgb::BLACK;
         for (weight, lobe) in self.lobes() {
-            let albedo = weight * lobe.directional_albedo(wo.z).luminance();
+            let albedo = lobe.directional_albedo(wo.z) * weight;
             match lobe {
                 Lobe::Lambert(_) => diffuse += albedo,
                 Lobe::Phong(l) => add(albedo, Gloss::Mirror { exponent: l.exponent() }),
@@ -69,9 +70,9 @@ impl Material {
                 }
                 Lobe::MetallicRoughness(l) => {
                     let specular = l.specular_share(wo.z);
-                    diffuse += (1.0 - specular) * albedo;
+                    diffuse += albedo * (1.0 - specular);
                     let alpha = l.alpha();
-                    add(specular * albedo, Gloss::Slopes { alpha, gaussian: false });
+                    add(albedo * specular, Gloss::Slopes { alpha, gaussian: false });
                 }
             }
         }

@@ -36,6 +36,14 @@ impl<F: Real> Vectors<F> {
     }
 }
 
+impl<F: Real> Vectors<F> {
+    /// Each times a number.
+    #[inline(always)]
+    pub(crate) fn times(self, f: F) -> Self {
+        Self { x: self.x * f, y: self.y * f, z: self.z * f }
+    }
+}
+
 impl<F: Floats> Vectors<F> {
     /// By component.
     #[inline(always)]

@@ -15,6 +15,7 @@
 
 use super::super::ShadingPoint;
 use super::cells::{Cells, slot};
+use super::control::Control;
 use super::pool::{Lights, Pool};
 use super::table::Table;
 use crate::Rgb;
@@ -47,6 +48,8 @@ pub(super) struct CandidateBlock {
     pub(super) wi: [Lanes; 3],
     /// Black in a lane without a candidate.
     pub(super) value: [Lanes; 3],
+    /// W without what the control variate knows of it.
+    pub(super) rest: [Lanes; 3],
     pub(super) luminance: Lanes,
     pub(super) slots: [i32; LANES],
     /// π of each.
@@ -187,6 +190,8 @@ pub(super) struct Sources<'a> {
     pub(super) cells: &'a Cells,
     pub(super) pool: &'a Pool,
     pub(super) table: &'a Table,
+    /// None if visibility is not known.
+    pub(super) control: Option<&'a Control>,
 }
 
 /// The random numbers of a pixel in a pass.
@@ -221,6 +226,7 @@ impl Sources<'_> {
         &self,
         simd: S,
         hits: Hits,
+        diffuse: &[Rgb],
         counts: Counts,
         numbers: &PixelNumbers,
         candidates: &mut Candidates,
@@ -237,8 +243,8 @@ impl Sources<'_> {
             self.table.deal(simd, &strata, deal, marks, slots);
         }
         for (hit, at) in hits.points.iter().enumerate() {
-            let of_hit =
-                OfHit { at, material: hits.material(hit), scale, n_brdf: counts.brdf as f32 };
+            let (material, diffuse) = (hits.material(hit), diffuse[hit]);
+            let of_hit = OfHit { at, material, diffuse, scale, n_brdf: counts.brdf as f32 };
             for block in 0..deal.blocks() {
                 let first = deal.first(hit) + block * LANES * deal.n_hits;
                 let places = strata.places(simd, first, deal.n_hits);
@@ -274,9 +280,20 @@ impl Sources<'_> {
         let there = simd.counting().to_floats().lt(one(n as f32));
         let weight = Real::select(there, weight, one(0.0));
         let value = f.zip(le, |f, le| f * le).scaled(weight);
+        let rest = match self.control {
+            Some(control) => {
+                let cosine = wi.dot(of_hit.at.frame.z);
+                let h = control.at(slots, wi, cosine, of_hit.diffuse);
+                let weight = Real::select(there, one(1.0) / density, one(0.0));
+                let known = h.zip(le, |h, le| h * le).scaled(weight);
+                value.zip(known, |value, known| value - known)
+            }
+            None => value,
+        };
         CandidateBlock {
             wi: [wi.x, wi.y, wi.z].map(Floats::store),
             value: value.0.map(Floats::store),
+            rest: rest.0.map(Floats::store),
             luminance: value.luminance().store(),
             slots: slots.store(),
             chances: [0; LANES],
@@ -385,6 +402,8 @@ impl Drawn {
 struct OfHit<'a> {
     at: &'a ShadingPoint,
     material: &'a Material,
+    /// What it reflects by the cosine.
+    diffuse: Rgb,
     /// M over the total of the table.
     scale: f32,
     /// N.

@@ -102,6 +102,8 @@ pub(super) struct Cells {
     pub(super) reach: Box<Slots>,
     /// ∫ luminance dω; 0 where there is no cell.
     pub(super) mass: Box<Slots>,
+    /// The solid angle over it.
+    pub(super) dimness: Box<Slots>,
 }
 
 /// The soft step of the cosine on a cell: what r and the spread of normals make of it.
@@ -130,6 +132,7 @@ impl Cells {
             ramps: SPREADS.map(|_| Ramp { s: zeros(), scale: zeros() }),
             reach: zeros(),
             mass: zeros(),
+            dimness: zeros(),
         };
         cells.number(&tree, 0, &tree.nodes[0]);
         for cell in 0..cells.squares.len() {
@@ -147,6 +150,7 @@ impl Cells {
             }
             *at_mut(&mut cells.reach, slot) = reach;
             *at_mut(&mut cells.mass, slot) = square.mass;
+            *at_mut(&mut cells.dimness, slot) = (map.area(&square).0 / f64::from(square.mass)) as f32;
         }
         Some(cells)
     }

@@ -1,6 +1,7 @@
 //! The camera hits of a pixel in groups that look alike: one table serves a group.
 
-use super::candidates::Hits;
+use super::candidates::{Counts, Hits};
+use crate::Rgb;
 use crate::bsdf::{Gloss, Outline};
 use crate::math::{Frame, Vec3};
 
@@ -39,6 +40,8 @@ struct Gathering {
 pub(super) struct Groups {
     gatherings: Vec<Gathering>,
     member: Vec<usize>,
+    /// What each hit reflects by the cosine.
+    pub(super) diffuse: Vec<Rgb>,
     pub(super) all: Vec<Group>,
 }
 
@@ -48,6 +51,7 @@ impl Groups {
     pub(super) fn gather(&mut self, Hits { points, one_material }: Hits) {
         self.gatherings.clear();
         self.member.clear();
+        self.diffuse.clear();
         let mut outline = Outline::default();
         for (i, p) in points.iter().enumerate() {
             if i == 0 || !one_material {
@@ -67,6 +71,7 @@ impl Groups {
             gathering.viewers += p.frame.to_world(p.wo);
             gathering.n += 1;
             self.member.push(group);
+            self.diffuse.push(outline.diffuse);
         }
         self.all.clear();
         for g in &self.gatherings {
@@ -91,6 +96,23 @@ impl Groups {
     }
 }
 
+impl Groups {
+    /// How dense samples of the material are beside strata of a table with this total, where the light of a cell
+    /// has the density 1: their number over that of the strata, times the light that the pixel reflects
+    /// in the mean over its lobes.
+    pub(super) fn brdf_share(&self, counts: Counts, total: f32) -> f32 {
+        let lobes = self.all.iter().flat_map(|g| {
+            let diffuse = std::iter::once(g.outline.diffuse);
+            diffuse.chain(g.outline.lobes().map(|(c, _)| c)).map(|c| c.luminance() * g.share)
+        });
+        let albedo: f32 = lobes.sum();
+        if counts.brdf == 0 || counts.light == 0 || albedo <= 0.0 {
+            return 0.0;
+        }
+        counts.brdf as f32 / counts.light as f32 * total / albedo
+    }
+}
+
 /// Of the same kinds of lobes, about as rough.
 fn alike(a: &Outline, b: &Outline) -> bool {
     let near = |a: f32, b: f32| a < LIKE_ROUGHNESS * b && b < LIKE_ROUGHNESS * a;
@@ -106,7 +128,7 @@ fn alike(a: &Outline, b: &Outline) -> bool {
         (Gloss::Mirror { exponent: a }, Gloss::Mirror { exponent: b }) => near_exponents(a, b),
         _ => false,
     };
-    (a.diffuse > 0.0) == (b.diffuse > 0.0)
+    a.diffuse.is_black() == b.diffuse.is_black()
         && a.glossy.iter().zip(&b.glossy).all(|pair| match pair {
             (Some((_, a)), Some((_, b))) => gloss(*a, *b),
             (None, None) => true,

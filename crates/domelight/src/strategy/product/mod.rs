@@ -25,6 +25,7 @@
 mod candidates;
 mod cells;
 mod choose;
+mod control;
 mod hits;
 mod pool;
 mod table;
@@ -41,6 +42,7 @@ use crate::simd::{Floats, InstructionSet, Kernel, LANES, Simd, dispatch};
 use candidates::{Candidate, Candidates, Counts, Hits, PixelNumbers, Place, Sources};
 use cells::{Cells, Slots, at};
 use choose::{Choice, probabilities, probability, weight};
+use control::Control;
 use hits::Groups;
 use table::Table;
 use visibility::{Blocks, Learned, Visibility};
@@ -121,6 +123,7 @@ impl<'a> ProductSampling<'a> {
 pub struct ProductScratch {
     groups: Groups,
     table: Table,
+    control: Control,
     candidates: Candidates,
     /// The chosen strata's candidates.
     chosen: Vec<Place>,
@@ -236,6 +239,7 @@ impl Asking<'_, '_> {
         let ProductScratch {
             groups,
             table,
+            control,
             candidates,
             chosen,
             visibility,
@@ -247,25 +251,35 @@ impl Asking<'_, '_> {
         let points = &tile.points[pixel.points.clone()];
         let hits = Hits { points, one_material: pixel.one_material };
         groups.gather(hits);
-        table.fill(simd, self.cells, &groups.all);
         let counts = strategy.counts(groups, points.len());
+        if self.pilots {
+            table.fill::<S, false>(simd, self.cells, &groups.all, control);
+        } else {
+            table.fill::<S, true>(simd, self.cells, &groups.all, control);
+            control.balance(simd, self.cells, groups.brdf_share(counts, table.total()));
+        }
         // The first camera sample that hits tells passes apart.
         let stream = pixel.stream.part(tile.samples[pixel.points.start]);
         let numbers = PixelNumbers::new(stream);
         let (environment, cells, pool) = (strategy.environment, self.cells, self.pool);
-        let sources = Sources { environment, cells, pool, table };
-        sources.draw(simd, hits, counts, &numbers, candidates);
+        let control = (!self.pilots).then_some(&*control);
+        let sources = Sources { environment, cells, pool, table, control };
+        sources.draw(simd, hits, &groups.diffuse, counts, &numbers, candidates);
         let mut rays = Rays { pixel, out: self.out, targets };
-        if self.pilots {
-            rays.push_all(candidates);
-        } else {
+        if let Some(control) = control {
             let brightness = strategy.expected_brightness(tile, learned, i);
             let n = (counts.light + counts.brdf) as f32;
             let covered = points.len() as f32 / pixel.n_samples as f32;
             let scale = covered * n / (TOLERANCE * brightness);
             let visibility = visibility.of(block);
+            let integral = control.integral(simd, pool, visibility.0);
+            for (hit, (at, &diffuse)) in points.iter().zip(&groups.diffuse).enumerate() {
+                *rays.base(hit as u32) += integral.at(at.frame.z, diffuse);
+            }
             rays.weigh(simd, candidates, visibility, scale);
             rays.push_chosen(candidates, visibility.0, Choice::new(numbers.choice), chosen);
+        } else {
+            rays.push_all(candidates);
         }
     }
 }
@@ -348,8 +362,8 @@ impl Rays<'_> {
             for c in blocks {
                 let slots = simd.load_ints(&c.slots);
                 let visible = S::Floats::gather(visible, slots);
-                for (sum, value) in sums.iter_mut().zip(&c.value) {
-                    *sum = *sum + simd.load(value) * visible;
+                for (sum, rest) in sums.iter_mut().zip(&c.rest) {
+                    *sum = *sum + simd.load(rest) * visible;
                 }
                 let doubt = S::Floats::gather(doubt, slots);
                 let size = simd.load(&c.luminance) * doubt * simd.splat(importance);

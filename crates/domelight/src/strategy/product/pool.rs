@@ -5,7 +5,7 @@
 //! stratum that falls into the cell takes the one where it falls. The estimate of a pixel is unbiased
 //! over the pools; what the pool of one pass has in error, all its pixels share.
 
-use super::cells::{Cells, SLOTS, slot};
+use super::cells::{Cells, NO_SLOTS, SLOTS, Slots, at_mut, slot};
 use crate::environment::Environment;
 use crate::sampling::Stream;
 use crate::simd::{Colors, Floats, Ints, LANES, Lanes, Simd, Vectors};
@@ -28,6 +28,8 @@ const LIGHTS: usize = SLOTS * PER_CELL;
 pub struct Pool {
     /// By slot.
     lights: Box<[Light; LIGHTS]>,
+    /// By channel of the radiance L: ∫ L dω, and ∫ L ω dω by component, as the directions estimate it.
+    pub(super) moments: Box<[[Slots; 4]; 3]>,
 }
 
 /// Lights side by side.
@@ -41,7 +43,8 @@ impl Pool {
     /// Of no light.
     pub(super) fn empty() -> Self {
         let lights = vec![Light([0.0; LANES]); LIGHTS].into_boxed_slice();
-        Self { lights: lights.try_into().expect("as many as asked for") }
+        let moments = Box::new([[NO_SLOTS; 4]; 3]);
+        Self { lights: lights.try_into().expect("as many as asked for"), moments }
     }
 
     /// Draws the directions of a pass.
@@ -50,6 +53,7 @@ impl Pool {
         for cell in 0..cells.len() {
             let mut numbers = stream.generator(cell as u32);
             let mass = cells.mass_of(cell);
+            let mut moments = [[0.0; 4]; 3];
             for j in 0..PER_CELL {
                 let u = (j as f64 + f64::from(numbers.next_f32())) / PER_CELL as f64;
                 let jitter = [numbers.next_f32(), numbers.next_f32()];
@@ -57,6 +61,14 @@ impl Pool {
                 let density = le.luminance() / mass;
                 let light = Light([wi.x, wi.y, wi.z, le.r, le.g, le.b, density, 0.0]);
                 pool.lights[slot(cell) * PER_CELL + j] = light;
+                for (sums, c) in moments.iter_mut().zip(le.to_array()) {
+                    for (sum, x) in sums.iter_mut().zip([1.0, wi.x, wi.y, wi.z]) {
+                        *sum += c * x / density;
+                    }
+                }
+            }
+            for (slots, sums) in pool.moments.iter_mut().flatten().zip(moments.as_flattened()) {
+                *at_mut(slots, slot(cell)) = sums / PER_CELL as f32;
             }
         }
         pool

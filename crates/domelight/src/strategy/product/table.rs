@@ -16,9 +16,10 @@
 
 use super::candidates::{Deal, Strata};
 use super::cells::{Cells, NO_SLOTS, ROWS, Slots, TABLE_ROWS, at};
+use super::control::Control;
 use super::hits::Group;
 use crate::bsdf::Gloss;
-use crate::math::{FRAC_1_PI, Vec3, sqr};
+use crate::math::{FRAC_1_PI, Frame, Vec3, sqr};
 use crate::simd::{Floats, Ints, LANES, Mask, Real, Simd, Vectors};
 
 /// The least cosine of a cell that is not all below the surface: what the table leaves to chance.
@@ -46,39 +47,53 @@ impl Default for Table {
 }
 
 impl Table {
-    /// Fills the table for groups of hits.
+    /// Fills the table for groups of hits; with `CONTROL` its control variate as well.
     #[inline(always)]
-    pub(super) fn fill<S: Simd>(&mut self, simd: S, cells: &Cells, groups: &[Group]) {
+    pub(super) fn fill<S: Simd, const CONTROL: bool>(
+        &mut self,
+        simd: S,
+        cells: &Cells,
+        groups: &[Group],
+        control: &mut Control,
+    ) {
+        if CONTROL {
+            control.reset(groups);
+        }
+        let mut n_lobes = 0;
         for (i, group) in groups.iter().enumerate() {
-            self.add(simd, cells, group, i > 0);
+            self.face::<S, CONTROL>(simd, cells, group, control, i > 0);
+            for (albedo, gloss) in group.outline.lobes() {
+                let share = group.share * albedo.luminance();
+                let lobe = LobeOf { cells, group, share, first: n_lobes == 0 };
+                match gloss {
+                    Gloss::Slopes { alpha, gaussian: true } => {
+                        self.add_slopes::<S, true, CONTROL>(simd, lobe, alpha, control);
+                    }
+                    Gloss::Slopes { alpha, gaussian: false } => {
+                        self.add_slopes::<S, false, CONTROL>(simd, lobe, alpha, control);
+                    }
+                    Gloss::Mirror { exponent } => {
+                        self.add_mirror::<S, CONTROL>(simd, lobe, exponent, control);
+                    }
+                }
+                n_lobes += 1;
+            }
         }
         self.accumulate(simd, &cells.mass);
     }
 
-    /// Adds what a group reflects from each cell per light, to what others do if there are `others`.
+    /// The ramp of the cosine, and the diffuse part, added to what other groups have if there are `others`.
     #[inline(always)]
-    fn add<S: Simd>(&mut self, simd: S, cells: &Cells, group: &Group, others: bool) {
-        self.face(simd, cells, group, others);
-        for (albedo, gloss) in group.outline.lobes() {
-            let share = group.share * albedo;
-            match gloss {
-                Gloss::Slopes { alpha, gaussian: true } => {
-                    self.add_slopes::<S, true>(simd, cells, group, alpha, share);
-                }
-                Gloss::Slopes { alpha, gaussian: false } => {
-                    self.add_slopes::<S, false>(simd, cells, group, alpha, share);
-                }
-                Gloss::Mirror { exponent } => {
-                    self.add_mirror(simd, cells, group, exponent, share);
-                }
-            }
-        }
-    }
-
-    /// The ramp of the cosine, and the diffuse part.
-    #[inline(always)]
-    fn face<S: Simd>(&mut self, simd: S, cells: &Cells, group: &Group, others: bool) {
-        let diffuse = simd.splat(FRAC_1_PI * group.share * group.outline.diffuse);
+    fn face<S: Simd, const CONTROL: bool>(
+        &mut self,
+        simd: S,
+        cells: &Cells,
+        group: &Group,
+        control: &mut Control,
+        others: bool,
+    ) {
+        let diffuse = FRAC_1_PI * group.share * group.outline.diffuse.luminance();
+        let diffuse = simd.splat(diffuse);
         let (zero, least) = (simd.splat(0.0), simd.splat(LEAST_COSINE));
         let spread = simd.splat(group.spread);
         let ramps = cells.ramp(group.spread);
@@ -93,59 +108,80 @@ impl Table {
             self.cosine[row] = cosine.store();
             let weight = before * simd.load(&self.weight[row]) + diffuse * cosine;
             self.weight[row] = weight.store();
+            if CONTROL {
+                let by_others = if others { simd.load(&control.above[row]) } else { simd.splat(1.0) };
+                control.above[row] = S::Floats::select(s.lt(x), by_others, zero).store();
+            }
         }
     }
 
-    /// D(h) cos θ_i/(4 σ_o σ_i), of GGX or with tails (1 + t/3)⁻⁴ that are near to a Gaussian's.
+    /// D(h) cos θ_i/(4 σ_o σ_i), of GGX or with tails (1 + t/3)⁻⁴ that are near to a Gaussian's, where
+    /// t = (h_x²/a_x² + h_y²/a_y²)/h_z² for h = ω_i + ω_o.
     #[inline(always)]
-    fn add_slopes<S: Simd, const GAUSSIAN: bool>(
+    fn add_slopes<S: Simd, const GAUSSIAN: bool, const CONTROL: bool>(
         &mut self,
         simd: S,
-        cells: &Cells,
-        group: &Group,
+        LobeOf { cells, group, share, first }: LobeOf,
         alpha: [f32; 2],
-        share: f32,
+        control: &mut Control,
     ) {
         let one = |x| simd.splat(x);
-        let (x, y, wo) = (group.frame.x, group.frame.y, group.wo);
-        let half = Vectors::splat(one(0.0), group.frame.to_world(wo));
-        let z = group.frame.z;
+        let frame = &group.frame;
+        let wo = group.wo;
+        let half = Vectors::splat(one(0.0), frame.to_world(wo));
         let [ax2, ay2] = alpha.map(|a| one(sqr(a)));
         let rough2 = one(0.5) * (ax2 + ay2);
         let spread2 = one(sqr(group.spread));
         let scale = one(0.25 * FRAC_1_PI * share) / sigma(one(wo.z), rough2);
+        let tail = one(if GAUSSIAN { 1.0 / 3.0 } else { 1.0 });
         for row in 0..ROWS {
-            let h = center(simd, cells, row).plus(half);
-            let n2 = h.dot(z).max(one(1e-3)).squared();
-            let (tx2, ty2) = (h.dot(x).squared(), h.dot(y).squared());
+            let center = center(simd, cells, row);
+            let h = center.plus(half);
+            let (hx, hy, hz) = (h.dot(frame.x), h.dot(frame.y), h.dot(frame.z).max(one(1e-3)));
+            let hz2 = hz.squared();
+            let h2 = hx.squared() + hy.squared() + hz2;
             let wide2 = one(0.25) * simd.load(&cells.radius[row]).squared() + spread2;
             let (ax2, ay2) = (ax2 + wide2, ay2 + wide2);
-            let area2 = ax2 * ay2;
-            // t = (t_x²/a_x² + t_y²/a_y²)/n²
-            let t = (tx2 * ay2 + ty2 * ax2) / (area2 * n2);
-            let tail = if GAUSSIAN {
-                (one(1.0) + t * one(1.0 / 3.0)).squared().squared()
-            } else {
-                (one(1.0) + t).squared()
-            };
-            let length2 = (tx2 + ty2 + n2) / n2;
+            let inverse = one(1.0) / (ax2 * ay2);
+            let (x, y) = (hx * ay2 * inverse, hy * ax2 * inverse);
+            // h_z² (1 + t) or h_z² (1 + t/3)
+            let spread = hz2 + tail * (hx * x + hy * y);
             let cosine = simd.load(&self.cosine[row]);
-            let below = tail * sigma(cosine, rough2) * area2.sqrt();
-            let weight = scale * length2.squared() * cosine / below;
+            let sigma = sigma(cosine, rough2);
+            let both = one(1.0) / (spread * sigma);
+            let narrow = sigma * both;
+            // |h|⁴/h_z⁴ over (1 + t)² or (1 + t/3)⁴
+            let mut shape = (h2 * narrow).squared();
+            if GAUSSIAN {
+                shape = shape * (hz2 * narrow).squared();
+            }
+            let weight = scale * shape * inverse.sqrt() * cosine * (spread * both);
             self.weight[row] = (simd.load(&self.weight[row]) + weight).store();
+            if CONTROL {
+                // ∇ ln of the shape, over 4: along h, and along the axes of the frame.
+                let along = one(1.0) / h2;
+                let [mut up, mut out] = [zero(simd) - hz * narrow, zero(simd) - narrow];
+                if GAUSSIAN {
+                    up = up + up + one(1.0) / hz;
+                    out = out * one(2.0 / 3.0);
+                }
+                let four = weight * one(4.0);
+                let [along, x, y, z] = [along, out * x, out * y, up].map(|c| c * four);
+                let slope = h.times(along).plus(frame_vector(frame, [x, y, z]));
+                control.add_gloss(simd, row, [center, slope], weight, first);
+            }
         }
     }
 
     /// (1 + v/3σ²)⁻⁴/(2πσ²) of the versine v to the mirror direction, with σ² = 1/n: near to a
     /// Gaussian of the power's variance.
     #[inline(always)]
-    fn add_mirror<S: Simd>(
+    fn add_mirror<S: Simd, const CONTROL: bool>(
         &mut self,
         simd: S,
-        cells: &Cells,
-        group: &Group,
+        LobeOf { cells, group, share, first }: LobeOf,
         exponent: f32,
-        share: f32,
+        control: &mut Control,
     ) {
         let one = |x| simd.splat(x);
         let wo = group.wo;
@@ -153,11 +189,19 @@ impl Table {
         let narrow = one(1.0 / (exponent + 1.0) + 4.0 * sqr(group.spread));
         let scale = one(0.5 * FRAC_1_PI * share);
         for row in 0..ROWS {
-            let versine = (one(1.0) - center(simd, cells, row).dot(mirror)).max(one(0.0));
+            let center = center(simd, cells, row);
+            let versine = (one(1.0) - center.dot(mirror)).max(one(0.0));
             let sigma2 = narrow + simd.load(&cells.radius[row]).squared();
-            let tail = (one(1.0) + versine / (one(3.0) * sigma2)).squared().squared();
-            let weight = scale * simd.load(&self.cosine[row]) / (tail * sigma2);
+            let wide = one(3.0) * sigma2;
+            let tail = one(1.0) + versine / wide;
+            let weight =
+                scale * simd.load(&self.cosine[row]) / (tail.squared().squared() * sigma2);
             self.weight[row] = (simd.load(&self.weight[row]) + weight).store();
+            if CONTROL {
+                let slope = weight * one(4.0) / (wide * tail);
+                let slope = Vectors::splat(slope, mirror).times(slope);
+                control.add_gloss(simd, row, [center, slope], weight, first);
+            }
         }
     }
 
@@ -286,6 +330,28 @@ fn sigma<F: Real>(cosine: F, alpha2: F) -> F {
     cosine.splat(0.5) * (cosine + (cosine2 + alpha2 * sine2).sqrt())
 }
 
+/// A lobe of a group to be added to a table.
+struct LobeOf<'a> {
+    cells: &'a Cells,
+    group: &'a Group,
+    /// Its part of what the pixel reflects.
+    share: f32,
+    /// It is the first of the pixel.
+    first: bool,
+}
+
+#[inline(always)]
+fn zero<S: Simd>(simd: S) -> S::Floats {
+    simd.splat(0.0)
+}
+
+/// Vectors given in a frame.
+#[inline(always)]
+fn frame_vector<F: Floats>(frame: &Frame, [x, y, z]: [F; 3]) -> Vectors<F> {
+    let axis = |v: Vec3, c: F| Vectors::splat(c, v).times(c);
+    axis(frame.x, x).plus(axis(frame.y, y)).plus(axis(frame.z, z))
+}
+
 /// The centres of a row of cells.
 #[inline(always)]
 fn center<S: Simd>(simd: S, cells: &Cells, row: usize) -> Vectors<S::Floats> {
@@ -302,7 +368,7 @@ mod tests {
     use crate::bsdf::{Material, MaterialSpec};
     use crate::environment::builtin::BuiltinProbe;
     use crate::environment::{Environment, Orientation};
-    use crate::math::{Frame, vec3};
+    use crate::math::vec3;
     use crate::simd::{InstructionSet, Kernel, dispatch};
     use crate::strategy::ShadingPoint;
     use testkit::Chi2;
@@ -339,7 +405,7 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Table {
             let mut table = Table::default();
-            table.fill(simd, self.cells, self.groups);
+            table.fill::<S, false>(simd, self.cells, self.groups, &mut Control::default());
             table
         }
     }

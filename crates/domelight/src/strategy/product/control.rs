@@ -1,0 +1,150 @@
+//! A control variate for the light itself: what a pixel reflects from each cell, as a function h of the
+//! direction whose integral is known.
+//!
+//! ```text
+//! h(ω) = k_d/π · n·ω, where the whole cell is above the horizon      + k_s (a_c + b_c·ω)
+//! ```
+//!
+//! The first part is what a diffuse surface reflects, exactly. The second follows the glossy lobes about the
+//! middle of the cell c to first order. Both are linear in ω, so that ∫ h L dω over a cell follows from the
+//! moments ∫ L dω and ∫ L ω dω of its light. Then
+//!
+//! ```text
+//! Σ_j W_j V̂_j     becomes     Σ_c V̂_c ∫ h L dω + Σ_j V̂_j (W_j − h(ω_j) L_j/(M p_table(ω_j)))
+//! ```
+//!
+//! of the same expectation for any h, as little of the second sum is left to chance as h is like f.
+//!
+//! The moments are those of the pass's pool: given the pool, the strata draw its directions, and no
+//! others. Samples of the material have no part in h, for what they expect is the integral over the
+//! map, not over the pool. So h is also weighed as the balance heuristic weighs strata in the middle of
+//! the cell.
+
+use super::cells::{Cells, NO_SLOTS, ROWS, Slots};
+use super::hits::Group;
+use super::pool::Pool;
+use crate::Rgb;
+use crate::math::{FRAC_1_PI, Vec3};
+use crate::simd::{Colors, Floats, Real, Simd, Vectors};
+
+/// h of a pixel.
+#[derive(Clone, Debug)]
+pub(super) struct Control {
+    /// 1 where a cell is above the horizon of all groups, else 0.
+    pub(super) above: Slots,
+    /// a, and b by component, of the glossy lobes together, in luminance.
+    pub(super) gloss: [Slots; 4],
+    /// k_s, of luminance 1; none without glossy lobes.
+    tint: Option<Rgb>,
+}
+
+impl Default for Control {
+    fn default() -> Self {
+        Self { above: NO_SLOTS, gloss: [NO_SLOTS; 4], tint: None }
+    }
+}
+
+/// Σ_c V̂_c ∫ h L dω.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Integral {
+    /// ∫ L ω dω over the cells above the horizon, by channel.
+    diffuse: [Vec3; 3],
+    gloss: Rgb,
+}
+
+impl Integral {
+    /// At a hit with the normal `n` that reflects `diffuse`.
+    #[inline(always)]
+    pub(super) fn at(&self, n: Vec3, diffuse: Rgb) -> Rgb {
+        let facing = Rgb::from(self.diffuse.map(|r| FRAC_1_PI * n.dot(r)));
+        facing * diffuse + self.gloss
+    }
+}
+
+impl Control {
+    /// Forgets the glossy lobes of the pixel before.
+    pub(super) fn reset(&mut self, groups: &[Group]) {
+        let lobes = groups.iter().flat_map(|g| g.outline.lobes().map(|(c, _)| c * g.share));
+        let color: Rgb = lobes.sum();
+        let luminance = color.luminance();
+        self.tint = (luminance > 0.0).then(|| color / luminance);
+    }
+
+    /// Adds w + `slope`·(ω − centre) of a glossy lobe in a row of cells; sets it if it is the first.
+    #[inline(always)]
+    pub(super) fn add_gloss<S: Simd>(
+        &mut self,
+        simd: S,
+        row: usize,
+        [center, slope]: [Vectors<S::Floats>; 2],
+        weight: S::Floats,
+        first: bool,
+    ) {
+        let before = simd.splat(if first { 0.0 } else { 1.0 });
+        let a = weight - (center.x * slope.x + center.y * slope.y + center.z * slope.z);
+        for (sum, x) in self.gloss.iter_mut().zip([a, slope.x, slope.y, slope.z]) {
+            sum[row] = (before * simd.load(&sum[row]) + x).store();
+        }
+    }
+
+    /// Weighs the glossy part as strata are weighed beside samples of the material: a cell whose light is
+    /// as dense as `share` times what the pixel sees in the mean counts half.
+    #[inline(always)]
+    pub(super) fn balance<S: Simd>(&mut self, simd: S, cells: &Cells, share: f32) {
+        if self.tint.is_none() || share == 0.0 {
+            return;
+        }
+        let one = simd.splat(1.0);
+        for row in 0..ROWS {
+            let weight = one / (one + simd.splat(share) * simd.load(&cells.dimness[row]));
+            for sum in &mut self.gloss {
+                sum[row] = (simd.load(&sum[row]) * weight).store();
+            }
+        }
+    }
+
+    /// Its integral over all cells, each seen through `visible`.
+    #[inline(always)]
+    pub(super) fn integral<S: Simd>(&self, simd: S, pool: &Pool, visible: &Slots) -> Integral {
+        let zero = simd.splat(0.0);
+        let (mut diffuse, mut gloss) = ([[zero; 3]; 3], [zero; 3]);
+        for row in 0..ROWS {
+            let seen = simd.load(&visible[row]);
+            let above = seen * simd.load(&self.above[row]);
+            for (sums, [_, vector @ ..]) in diffuse.iter_mut().zip(pool.moments.iter()) {
+                for (sum, moment) in sums.iter_mut().zip(vector) {
+                    *sum = *sum + above * simd.load(&moment[row]);
+                }
+            }
+            if self.tint.is_some() {
+                let [a, x, y, z] = &self.gloss;
+                let [a, x, y, z] = [a, x, y, z].map(|c| simd.load(&c[row]) * seen);
+                for (sum, [m, mx, my, mz]) in gloss.iter_mut().zip(pool.moments.iter()) {
+                    let [m, mx, my, mz] = [m, mx, my, mz].map(|m| simd.load(&m[row]));
+                    *sum = *sum + (a * m + x * mx + y * my + z * mz);
+                }
+            }
+        }
+        let diffuse = diffuse.map(|r| Vec3::from(r.map(Floats::sum)));
+        let gloss = Rgb::from(gloss.map(Floats::sum)) * self.tint.unwrap_or(Rgb::BLACK);
+        Integral { diffuse, gloss }
+    }
+
+    /// h toward `wi` in the cells in `slots`, at a hit that reflects `diffuse` and has these cosines.
+    #[inline(always)]
+    pub(super) fn at<F: Floats>(
+        &self,
+        slots: F::Ints,
+        wi: Vectors<F>,
+        cosine: F,
+        diffuse: Rgb,
+    ) -> Colors<F> {
+        let facing = F::gather(&self.above, slots) * cosine * cosine.splat(FRAC_1_PI);
+        let diffuse = Colors::splat(cosine, diffuse).scaled(facing);
+        let Some(tint) = self.tint else { return diffuse };
+        let [a, x, y, z] = &self.gloss;
+        let [a, x, y, z] = [a, x, y, z].map(|c| F::gather(c, slots));
+        let gloss = a + x * wi.x + y * wi.y + z * wi.z;
+        diffuse.zip(Colors::splat(cosine, tint).scaled(gloss), |d, g| d + g)
+    }
+}
