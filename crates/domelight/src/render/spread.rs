@@ -17,7 +17,7 @@ use super::tiling::Window;
 use super::{Frame, RenderSettings};
 use crate::Rgb;
 use crate::strategy::Strategy;
-use crate::strategy::levels::coarser;
+use crate::strategy::levels::{N_LEVELS, coarser, level};
 
 /// Of the spread, what the number of samples grows with.
 const EXPONENT: f32 = 0.3;
@@ -63,9 +63,17 @@ impl Spreads {
         let known = || coarser(pixel, self.width, self.pixels.len()).filter_map(|i| self.get(i));
         let (Some(usual), count @ 1..) = (usual, known().count()) else { return n };
         let mean = known().sum::<f32>() / count as f32;
-        let octaves = (growth(mean) / usual).log2().round().clamp(OCTAVES[0], OCTAVES[1]);
+        let [fewest, most] = OCTAVES;
+        let fewest = if teaches(pixel, self.width) { 0.0 } else { fewest };
+        let octaves = (growth(mean) / usual).log2().round().clamp(fewest, most);
         ((n as f32 * octaves.exp2()) as u32).max(1)
     }
+}
+
+/// Whether more than half of the other pixels look at what this one tells: it has the usual samples at least, for
+/// their own sake.
+fn teaches(pixel: usize, width: usize) -> bool {
+    level(pixel % width, pixel / width) + 2 < N_LEVELS
 }
 
 /// What the number of samples is proportional to.

@@ -207,17 +207,21 @@ impl Tile {
         camera_rays.clear();
         let mut count = 0;
         for (i, &seen) in seen.iter().enumerate() {
+            let start = self.pixels[i].n_samples();
+            if !of_round(i % self.window.width, i / self.window.width) {
+                camera_rays.push(CameraRays { samples: start..start, first: None });
+                pixels.push(PixelPoints::NONE);
+                continue;
+            }
             let (x, y) = self.position(i);
             let stream = self.stream(frame, i);
-            let now = of_round(i % self.window.width, i / self.window.width);
-            let n_samples = match (now, seen) {
-                (true, true) => spreads.samples(i, pass.n_samples, pass.usual_growth),
-                (true, false) => pass.n_samples,
-                (false, _) => 0,
+            let n_samples = if seen {
+                spreads.samples(i, pass.n_samples, pass.usual_growth)
+            } else {
+                pass.n_samples
             };
-            let start = self.pixels[i].n_samples();
             let samples = start..start + n_samples;
-            let first = (seen && now).then_some(rays.len());
+            let first = seen.then_some(rays.len());
             if first.is_some() {
                 rays.extend(samples.clone().map(|sample| camera_ray(frame, x, y, stream, sample)));
             }
@@ -268,6 +272,9 @@ impl Tile {
         let mut non_finite = 0;
         let mut point = 0;
         for (i, CameraRays { samples, first }) in batch.camera_rays.iter().enumerate() {
+            if samples.is_empty() {
+                continue;
+            }
             let (x, y) = self.position(i);
             let shown = frame.settings.background == Background::Shown;
             if first.is_none() && !shown {

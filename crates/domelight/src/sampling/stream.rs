@@ -64,6 +64,9 @@ pub struct Stream {
 }
 
 impl Stream {
+    /// Nobody's.
+    pub(crate) const NONE: Self = Self { kind: SamplerKind::Sobol, key: 0 };
+
     /// The stream of a pixel under a seed.
     pub fn new(kind: SamplerKind, seed: u64, pixel: u64) -> Self {
         Self { kind, key: hash2(seed, pixel) }

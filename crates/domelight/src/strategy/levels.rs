@@ -1,35 +1,44 @@
-//! The order of a tile's pixels: every fourth pixel of every fourth row, then what makes that every second, then
-//! the rest. What is learned from one level helps the next.
+//! The order of a tile's pixels: every fourth pixel of every fourth row, then those in the middle of four known
+//! ones, then those between two rows and columns of them, and so on to the last. Each level doubles what is
+//! known; what is learned from one helps the next.
+//!
+//! ```text
+//! 0 4 2 4 0
+//! 4 3 4 3 4
+//! 2 4 1 4 2
+//! 4 3 4 3 4
+//! 0 4 2 4 0
+//! ```
 
 /// Levels of pixels.
-pub const N_LEVELS: u32 = 3;
+pub const N_LEVELS: u32 = 5;
 
 /// The level of the pixel at (`x`, `y`) of its tile.
 #[inline]
 pub fn level(x: usize, y: usize) -> u32 {
-    let finest = N_LEVELS - 1;
-    finest - (x | y).trailing_zeros().min(finest)
+    const LEVELS: [[u32; 4]; 4] = [[0, 4, 2, 4], [4, 3, 4, 3], [2, 4, 1, 4], [4, 3, 4, 3]];
+    LEVELS[y % 4][x % 4]
 }
 
-/// The pixels of lower levels next to pixel `i` of a tile of `width` columns and `n` pixels: up to four; none of a pixel
-/// of the first level.
+/// The pixels of lower levels next to pixel `i` of a tile of `width` columns and `n` pixels: four, or those of
+/// them that the tile has; none of a pixel of the first level.
 pub fn coarser(i: usize, width: usize, n: usize) -> impl Iterator<Item = usize> {
+    /// Columns and rows from a pixel in the middle of four, and from one between two rows or columns.
+    const DIAGONAL: [(isize, isize); 4] = [(-1, -1), (1, -1), (-1, 1), (1, 1)];
+    const STRAIGHT: [(isize, isize); 4] = [(-1, 0), (1, 0), (0, -1), (0, 1)];
     let (x, y) = (i % width, i / width);
-    let level = level(x, y);
-    let step = 1 << (N_LEVELS - 1 - level);
-    // Where x or y is of a lower level it stays.
-    let around =
-        move |c: usize| if c.is_multiple_of(2 * step) { [c, c] } else { [c - step, c + step] };
-    let rows = around(y);
-    let [above, below] = rows;
-    let [left, right] = around(x);
-    let corners = [(left, above), (right, above), (left, below), (right, below)];
-    let twice = [false, left == right, above == below, left == right || above == below];
-    corners
-        .into_iter()
-        .zip(twice)
-        .filter(move |&((x, y), twice)| level > 0 && !twice && x < width && y * width + x < n)
-        .map(move |((x, y), _)| y * width + x)
+    let (step, around) = match level(x, y) {
+        0 => (0, DIAGONAL),
+        1 => (2, DIAGONAL),
+        2 => (2, STRAIGHT),
+        3 => (1, DIAGONAL),
+        _ => (1, STRAIGHT),
+    };
+    let place = move |(dx, dy): (isize, isize)| {
+        let (x, y) = (x.checked_add_signed(step * dx)?, y.checked_add_signed(step * dy)?);
+        (step > 0 && x < width && y * width + x < n).then_some(y * width + x)
+    };
+    around.into_iter().filter_map(place)
 }
 
 #[cfg(test)]
@@ -37,11 +46,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_are_nested_grids() {
-        let of_row = |y| (0..8).map(|x| level(x, y)).collect::<Vec<_>>();
-        assert_eq!(of_row(0), [0, 2, 1, 2, 0, 2, 1, 2]);
-        assert_eq!(of_row(1), [2; 8]);
-        assert_eq!(of_row(2), [1, 2, 1, 2, 1, 2, 1, 2]);
+    fn each_level_doubles_what_is_known() {
+        let count = |l| (0..256).filter(|i| level(i % 16, i / 16) == l).count();
+        assert_eq!([0, 1, 2, 3, 4].map(count), [16, 16, 32, 64, 128]);
     }
 
     #[test]
@@ -50,11 +57,11 @@ mod tests {
         let at = |x: usize, y: usize| y * width + x;
         let of = |x, y| coarser(at(x, y), width, width * height).collect::<Vec<_>>();
         assert!(of(4, 0).is_empty());
-        assert_eq!(of(2, 0), [at(0, 0), at(4, 0)]);
+        assert_eq!(of(2, 0), [at(0, 0), at(4, 0), at(2, 2)]);
         assert_eq!(of(2, 2), [at(0, 0), at(4, 0), at(0, 4), at(4, 4)]);
         assert_eq!(of(1, 1), [at(0, 0), at(2, 0), at(0, 2), at(2, 2)]);
-        assert_eq!(of(3, 2), [at(2, 2), at(4, 2)]);
-        assert_eq!(of(5, 5), [at(4, 4), at(6, 4)]);
+        assert_eq!(of(3, 2), [at(2, 2), at(4, 2), at(3, 1), at(3, 3)]);
+        assert_eq!(of(6, 5), [at(5, 5), at(6, 4)]);
         for i in 0..width * height {
             let own = level(i % width, i / width);
             assert!(coarser(i, width, width * height).all(|j| level(j % width, j / width) < own));

@@ -221,6 +221,12 @@ pub struct PixelPoints {
     pub one_material: bool,
 }
 
+impl PixelPoints {
+    /// Of a pixel of another round.
+    pub(crate) const NONE: Self =
+        Self { points: 0..0, n_samples: 0, stream: Stream::NONE, one_material: true };
+}
+
 /// A strategy that looks at a tile at a time, in rounds: all its pixels, or one of their [`levels`] after the other.
 /// Every [`PointStrategy`] is one: it needs a single round and learns nothing.
 pub trait Strategy: Sync {

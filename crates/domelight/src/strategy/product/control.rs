@@ -25,7 +25,7 @@ use super::hits::Group;
 use super::pool::Pool;
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3};
-use crate::simd::{Colors, Floats, Real, Simd, Vectors};
+use crate::simd::{Colors, Floats, Simd, Vectors};
 
 /// h of a pixel.
 #[derive(Clone, Debug)]
@@ -117,11 +117,16 @@ impl Control {
                 }
             }
             if self.tint.is_some() {
-                let [a, x, y, z] = &self.gloss;
-                let [a, x, y, z] = [a, x, y, z].map(|c| simd.load(&c[row]) * seen);
+                let a = simd.load(&self.gloss[0][row]) * seen;
+                let x = simd.load(&self.gloss[1][row]) * seen;
+                let y = simd.load(&self.gloss[2][row]) * seen;
+                let z = simd.load(&self.gloss[3][row]) * seen;
                 for (sum, [m, mx, my, mz]) in gloss.iter_mut().zip(pool.moments.iter()) {
-                    let [m, mx, my, mz] = [m, mx, my, mz].map(|m| simd.load(&m[row]));
-                    *sum = *sum + (a * m + x * mx + y * my + z * mz);
+                    let constant = a * simd.load(&m[row]);
+                    let linear = x * simd.load(&mx[row])
+                        + y * simd.load(&my[row])
+                        + z * simd.load(&mz[row]);
+                    *sum = *sum + (constant + linear);
                 }
             }
         }
@@ -143,8 +148,10 @@ impl Control {
         let diffuse = Colors::splat(cosine, diffuse).scaled(facing);
         let Some(tint) = self.tint else { return diffuse };
         let [a, x, y, z] = &self.gloss;
-        let [a, x, y, z] = [a, x, y, z].map(|c| F::gather(c, slots));
-        let gloss = a + x * wi.x + y * wi.y + z * wi.z;
+        let gloss = F::gather(a, slots)
+            + F::gather(x, slots) * wi.x
+            + F::gather(y, slots) * wi.y
+            + F::gather(z, slots) * wi.z;
         diffuse.zip(Colors::splat(cosine, tint).scaled(gloss), |d, g| d + g)
     }
 }

@@ -97,6 +97,17 @@ impl Groups {
 }
 
 impl Groups {
+    /// The roughness of the narrowest lobe; none if all is diffuse.
+    pub(super) fn narrowest(&self) -> Option<f32> {
+        let lobes = self.all.iter().flat_map(|g| g.outline.lobes());
+        lobes.map(|(_, gloss)| gloss.width()).reduce(f32::min)
+    }
+
+    /// The widest spread of normals of a group.
+    pub(super) fn spread(&self) -> f32 {
+        self.all.iter().map(|g| g.spread).fold(0.0, f32::max)
+    }
+
     /// How dense samples of the material are beside strata of a table with this total, where the light of a cell
     /// has the density 1: their number over that of the strata, times the light that the pixel reflects
     /// in the mean over its lobes.

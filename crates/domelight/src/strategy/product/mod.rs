@@ -54,16 +54,19 @@ const SAMPLES_PER_PASS: u32 = 32;
 /// Candidates of a pixel in a pass, for the sake of memory.
 const MAX_CANDIDATES: u32 = 1 << 14;
 
-/// Of the candidates for a glossy material one in this many comes from the material: of lobes as wide
-/// as cells, and of narrower ones, which the table hardly sees.
+/// Of the candidates one in this many comes from the material, where the table does not know it well: where normals
+/// spread more than [`SPREAD`] allows, and of lobes narrower than most cells.
 const BRDF_SHARE: [usize; 2] = [8, 4];
 
 /// The roughness below which a lobe is narrower than most cells.
 const NARROW: f32 = 0.1;
 
+/// The spread of normals, as a share of the roughness, up to which the table follows a lobe.
+const SPREAD: f32 = 0.25;
+
 /// The error of a candidate that does not matter, as a share of the pixel's brightness over the
-/// number of candidates.
-const TOLERANCE: f32 = 0.8;
+/// number of candidates: of a diffuse pixel, where nothing else is left to chance, and of a glossy one.
+const TOLERANCE: [f32; 2] = [0.25, 0.5];
 
 /// Pixels darker than this share of the environment's mean are not held to their own brightness.
 const DARK: f32 = 0.15;
@@ -105,10 +108,11 @@ impl<'a> ProductSampling<'a> {
     /// How many candidates the hits of a pixel have together.
     fn counts(&self, groups: &Groups, n_hits: usize) -> Counts {
         let all = self.n_rays as usize * n_hits;
-        let lobes = groups.all.iter().flat_map(|g| g.outline.lobes());
-        let narrowest = lobes.map(|(_, gloss)| gloss.width()).reduce(f32::min);
-        let share = |width| BRDF_SHARE[usize::from(width < NARROW)];
-        let brdf = narrowest.map_or(0, |width| all.div_ceil(share(width)));
+        let brdf = match groups.narrowest() {
+            Some(width) if width < NARROW => all.div_ceil(BRDF_SHARE[1]),
+            Some(width) if groups.spread() > SPREAD * width => all.div_ceil(BRDF_SHARE[0]),
+            _ => 0,
+        };
         Counts { light: all - brdf, brdf }
     }
 
@@ -251,11 +255,19 @@ impl Asking<'_, '_> {
         let points = &tile.points[pixel.points.clone()];
         let hits = Hits { points, one_material: pixel.one_material };
         groups.gather(hits);
+        let is_glossy = groups.narrowest().is_some();
         let counts = strategy.counts(groups, points.len());
         if self.pilots {
             table.fill::<S, false>(simd, self.cells, &groups.all, control);
         } else {
             table.fill::<S, true>(simd, self.cells, &groups.all, control);
+            if !is_glossy {
+                let (visible, doubt) = visibility.of(block);
+                table.attend(simd, &control.above, visible, doubt);
+            }
+        }
+        table.accumulate(simd, &self.cells.mass);
+        if !self.pilots {
             control.balance(simd, self.cells, groups.brdf_share(counts, table.total()));
         }
         // The first camera sample that hits tells passes apart.
@@ -269,8 +281,9 @@ impl Asking<'_, '_> {
         if let Some(control) = control {
             let brightness = strategy.expected_brightness(tile, learned, i);
             let n = (counts.light + counts.brdf) as f32;
+            let tolerance = TOLERANCE[usize::from(is_glossy)];
             let covered = points.len() as f32 / pixel.n_samples as f32;
-            let scale = covered * n / (TOLERANCE * brightness);
+            let scale = covered * n / (tolerance * brightness);
             let visibility = visibility.of(block);
             let integral = control.integral(simd, pool, visibility.0);
             for (hit, (at, &diffuse)) in points.iter().zip(&groups.diffuse).enumerate() {

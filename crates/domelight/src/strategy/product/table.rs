@@ -47,7 +47,8 @@ impl Default for Table {
 }
 
 impl Table {
-    /// Fills the table for groups of hits; with `CONTROL` its control variate as well.
+    /// Fills the table for groups of hits, with `CONTROL` their control variate as well; [`Table::accumulate`] makes
+    /// it a distribution.
     #[inline(always)]
     pub(super) fn fill<S: Simd, const CONTROL: bool>(
         &mut self,
@@ -79,7 +80,26 @@ impl Table {
                 n_lobes += 1;
             }
         }
-        self.accumulate(simd, &cells.mass);
+    }
+
+    /// Turns a table of a diffuse pixel to what is left to chance: visibility, by its `doubt`, and the light of
+    /// cells across the horizon.
+    #[inline(always)]
+    pub(super) fn attend<S: Simd>(
+        &mut self,
+        simd: S,
+        above: &Slots,
+        visible: &Slots,
+        doubt: &Slots,
+    ) {
+        /// Of the light of a cell across the horizon, the variance that its control variate leaves.
+        const ACROSS: f32 = 0.1;
+        for row in 0..ROWS {
+            let across = simd.splat(1.0) - simd.load(&above[row]);
+            let light = simd.load(&visible[row]).squared() * across * simd.splat(ACROSS);
+            let chance = (simd.load(&doubt[row]).squared() + light).sqrt();
+            self.weight[row] = (simd.load(&self.weight[row]) * chance).store();
+        }
     }
 
     /// The ramp of the cosine, and the diffuse part, added to what other groups have if there are `others`.
@@ -165,9 +185,9 @@ impl Table {
                     up = up + up + one(1.0) / hz;
                     out = out * one(2.0 / 3.0);
                 }
-                let four = weight * one(4.0);
-                let [along, x, y, z] = [along, out * x, out * y, up].map(|c| c * four);
-                let slope = h.times(along).plus(frame_vector(frame, [x, y, z]));
+                let across = [out * x, out * y, up];
+                let slope = h.times(along).plus(frame_vector(frame, across));
+                let slope = slope.times(weight * one(4.0));
                 control.add_gloss(simd, row, [center, slope], weight, first);
             }
         }
@@ -207,7 +227,7 @@ impl Table {
 
     /// The running sum of weight times light: down the rows in all lanes at once, then over the lanes.
     #[inline(always)]
-    fn accumulate<S: Simd>(&mut self, simd: S, mass: &Slots) {
+    pub(super) fn accumulate<S: Simd>(&mut self, simd: S, mass: &Slots) {
         let mut sum = simd.splat(0.0);
         for row in 0..ROWS {
             sum = sum + simd.load(&self.weight[row]) * simd.load(&mass[row]);
@@ -348,8 +368,12 @@ fn zero<S: Simd>(simd: S) -> S::Floats {
 /// Vectors given in a frame.
 #[inline(always)]
 fn frame_vector<F: Floats>(frame: &Frame, [x, y, z]: [F; 3]) -> Vectors<F> {
-    let axis = |v: Vec3, c: F| Vectors::splat(c, v).times(c);
-    axis(frame.x, x).plus(axis(frame.y, y)).plus(axis(frame.z, z))
+    let [x, y, z] = [
+        Vectors::splat(x, frame.x).times(x),
+        Vectors::splat(y, frame.y).times(y),
+        Vectors::splat(z, frame.z).times(z),
+    ];
+    x.plus(y).plus(z)
 }
 
 /// The centres of a row of cells.
@@ -406,6 +430,7 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Table {
             let mut table = Table::default();
             table.fill::<S, false>(simd, self.cells, self.groups, &mut Control::default());
+            table.accumulate(simd, &self.cells.mass);
             table
         }
     }
