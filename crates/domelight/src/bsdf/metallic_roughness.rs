@@ -75,7 +75,8 @@ impl Brdf for MetallicRoughness {
         let one = |x| wi.z.splat(x);
         let h = wi.plus(wo);
         let (geometry, pdf_specular) = self.specular().geometry_pdf(wo, wi, h);
-        let [geometry, pdf_specular] = [geometry, pdf_specular].map(|x| where_above(wo, wi, x));
+        let geometry = where_above(wo, wi, geometry);
+        let pdf_specular = where_above(wo, wi, pdf_specular);
         let f = fresnel::schlick(self.f0, one(0.5) * h.length_squared().sqrt());
         let cosine = where_above(wo, wi, wi.z * one(FRAC_1_PI));
         let diffuse = Colors::splat(cosine, self.diffuse).scaled(cosine);

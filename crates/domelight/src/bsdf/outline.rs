@@ -49,6 +49,16 @@ impl Outline {
 }
 
 impl Material {
+    /// Whether it looks the same when it turns about the normal.
+    pub(crate) fn is_isotropic(&self) -> bool {
+        self.lobes().all(|(_, lobe)| match lobe {
+            Lobe::Ward(l) => l.alpha()[0] == l.alpha()[1],
+            Lobe::Ggx(l) => l.alpha()[0] == l.alpha()[1],
+            Lobe::Beckmann(l) => l.alpha()[0] == l.alpha()[1],
+            Lobe::Lambert(_) | Lobe::Phong(_) | Lobe::MetallicRoughness(_) => true,
+        })
+    }
+
     /// The material seen from `wo`.
     pub fn outline(&self, wo: Vec3) -> Outline {
         let mut outline = Outline::default();

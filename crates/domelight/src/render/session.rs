@@ -93,8 +93,9 @@ impl<'a, S: Strategy> Session<'a, S> {
             let samples = tiling.pass(*strategy, start, n_samples - start);
             observer.pass_started(samples.clone());
             let stream = Stream::of_pass(frame.settings.sampler, frame.settings.seed, start);
-            let shared = strategy.begin_pass(stream);
-            let mut pass = Pass { n_samples: samples.len() as u32, usual_growth: None, shared };
+            let n_samples = samples.len() as u32;
+            let shared = strategy.begin_pass(stream, n_samples);
+            let mut pass = Pass { n_samples, usual_growth: None, shared };
             if frame.settings.adaptive && S::N_ROUNDS > 1 {
                 pass.usual_growth = usual_growth(frame, *strategy, &pass);
             }

@@ -28,6 +28,7 @@ impl Scene {
     }
 
     /// [`Scene::shading_point`], and the surface if its material is the same all over.
+    #[inline]
     pub(crate) fn shade(&self, ray: &Ray, hit: &Hit) -> (ShadingPoint, Option<usize>) {
         let (part, triangle) = self.locate(hit.triangle);
         let surface = &self.surfaces[part.surface];
@@ -55,7 +56,7 @@ impl Scene {
     }
 
     /// On the front side: the interpolated normal, the same with the normal map applied, and the
-    /// tangent. Which side the viewer is on follows from the first, for relief may tip the second over.
+    /// tangent where it matters. Which side the viewer is on follows from the first, for relief may tip the second over.
     fn normals_and_tangent(
         &self,
         part: &Part,
@@ -66,6 +67,9 @@ impl Scene {
     ) -> (Vec3, Vec3, Option<Vec4>) {
         let mesh = &part.mesh;
         let normal = corner.mix(&mesh.normals).and_then(Vec3::try_normalize).unwrap_or(ng);
+        if !surface.has_grain() {
+            return (normal, normal, None);
+        }
         let tangent = corner.mix(&mesh.tangents).or_else(|| corner.uv_tangent(mesh, normal));
         let mapped = surface.normal_map.zip(tangent).and_then(|(map, tangent)| {
             let frame = Frame::from_z_and_tangent(normal, tangent.truncate());

@@ -92,6 +92,16 @@ impl Surface {
         of_model.into_iter().flatten().chain(self.normal_map.as_ref().map(|n| &n.texture))
     }
 
+    /// Whether it matters which way the tangent points.
+    #[inline]
+    pub(crate) fn has_grain(&self) -> bool {
+        let fixed = match &self.model {
+            SurfaceModel::Fixed(material) => !material.is_isotropic(),
+            SurfaceModel::Phong(_) | SurfaceModel::MetallicRoughness(_) => false,
+        };
+        fixed || self.normal_map.is_some()
+    }
+
     /// Adds `by` to the index of every texture.
     pub(crate) fn shift_textures(&mut self, by: usize) {
         let shift = |t: &mut TextureRef| t.texture += by;

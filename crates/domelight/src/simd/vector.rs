@@ -51,6 +51,18 @@ impl<F: Floats> Vectors<F> {
         let [x, y, z] = v;
         Self { x: simd.load(x), y: simd.load(y), z: simd.load(z) }
     }
+
+    /// By component.
+    #[inline(always)]
+    pub(crate) fn store(self) -> [Lanes; 3] {
+        [self.x.store(), self.y.store(), self.z.store()]
+    }
+
+    /// The sum of all.
+    #[inline(always)]
+    pub(crate) fn sum(self) -> Vec3 {
+        Vec3::new(self.x.sum(), self.y.sum(), self.z.sum())
+    }
 }
 
 impl From<Vec3> for Vectors<f32> {
@@ -68,7 +80,7 @@ impl<F: Real> Colors<F> {
     /// `color` in every lane, beside numbers that prove the instructions.
     #[inline(always)]
     pub(crate) fn splat(like: F, color: Rgb) -> Self {
-        Self(color.to_array().map(|c| like.splat(c)))
+        Self([like.splat(color.r), like.splat(color.g), like.splat(color.b)])
     }
 
     /// Channel by channel with another.
@@ -80,21 +92,40 @@ impl<F: Real> Colors<F> {
 
     #[inline(always)]
     pub(crate) fn map(self, f: impl Fn(F) -> F) -> Self {
-        Self(self.0.map(f))
+        let [r, g, b] = self.0;
+        Self([f(r), f(g), f(b)])
     }
 
     /// Times a number.
     #[inline(always)]
     pub(crate) fn scaled(self, x: F) -> Self {
-        self.map(|c| c * x)
+        let [r, g, b] = self.0;
+        Self([r * x, g * x, b * x])
     }
 
     /// Luminance by Rec. 709.
     #[inline(always)]
     pub(crate) fn luminance(self) -> F {
         let [r, g, b] = self.0;
-        let [wr, wg, wb] = Rgb::LUMINANCE.map(|w| r.splat(w));
-        wr * r + wg * g + wb * b
+        let [wr, wg, wb] = Rgb::LUMINANCE;
+        r.splat(wr) * r + g.splat(wg) * g + b.splat(wb) * b
+    }
+}
+
+// Arrays of vectors are spelled out: `map` is too large to be inlined for certain.
+impl<F: Floats> Colors<F> {
+    /// By channel.
+    #[inline(always)]
+    pub(crate) fn store(self) -> [Lanes; 3] {
+        let [r, g, b] = self.0;
+        [r.store(), g.store(), b.store()]
+    }
+
+    /// The sum of all.
+    #[inline(always)]
+    pub(crate) fn sum(self) -> Rgb {
+        let [r, g, b] = self.0;
+        Rgb::new(r.sum(), g.sum(), b.sum())
     }
 }
 

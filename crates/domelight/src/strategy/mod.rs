@@ -248,8 +248,9 @@ pub trait Strategy: Sync {
         None
     }
 
-    /// Prepares a pass; `stream` is its own, independent of those of pixels and other passes.
-    fn begin_pass(&self, stream: Stream) -> Self::Pass;
+    /// Prepares a pass of `n_samples` camera samples a pixel, as a rule; `stream` is its own, independent of those of
+    /// pixels and other passes.
+    fn begin_pass(&self, stream: Stream, n_samples: u32) -> Self::Pass;
 
     /// Asks for the shadow rays of a round; `out` comes reset. Pixels of other rounds have no points.
     fn push(
@@ -280,7 +281,7 @@ impl<S: PointStrategy> Strategy for S {
         PointStrategy::n_rays(self)
     }
 
-    fn begin_pass(&self, _: Stream) {}
+    fn begin_pass(&self, _: Stream, _: u32) {}
 
     fn push(
         &self,

@@ -291,9 +291,9 @@ impl Sources<'_> {
             None => value,
         };
         CandidateBlock {
-            wi: [wi.x, wi.y, wi.z].map(Floats::store),
-            value: value.0.map(Floats::store),
-            rest: rest.0.map(Floats::store),
+            wi: wi.store(),
+            value: value.store(),
+            rest: rest.store(),
             luminance: value.luminance().store(),
             slots: slots.store(),
             chances: [0; LANES],
@@ -385,7 +385,7 @@ impl Drawn {
         if hits.one_material {
             let (wo, wi) = (Vectors::load(simd, &self.wo), Vectors::load(simd, &self.wi));
             let (f, pdf) = hits.material(0).eval_lanes(wo, wi);
-            let f = f.0.map(Floats::store);
+            let f = f.store();
             (std::array::from_fn(|lane| Rgb::from(f.map(|c| c[lane]))), pdf.store())
         } else {
             let (mut f, mut pdf) = ([Rgb::BLACK; LANES], [0.0; LANES]);

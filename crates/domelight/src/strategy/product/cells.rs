@@ -45,6 +45,11 @@ pub(super) fn slot(cell: usize) -> usize {
     cell % ROWS * LANES + cell / ROWS
 }
 
+/// The cell whose number is in a slot.
+pub(super) fn cell_in(slot: usize) -> usize {
+    slot % LANES * ROWS + slot / LANES
+}
+
 /// Zero for each cell.
 pub(super) const NO_SLOTS: Slots = [[0.0; LANES]; TABLE_ROWS];
 

@@ -130,8 +130,13 @@ impl Control {
                 }
             }
         }
-        let diffuse = diffuse.map(|r| Vec3::from(r.map(Floats::sum)));
-        let gloss = Rgb::from(gloss.map(Floats::sum)) * self.tint.unwrap_or(Rgb::BLACK);
+        let [[rx, ry, rz], [gx, gy, gz], [bx, by, bz]] = diffuse;
+        let diffuse = [
+            Vectors { x: rx, y: ry, z: rz }.sum(),
+            Vectors { x: gx, y: gy, z: gz }.sum(),
+            Vectors { x: bx, y: by, z: bz }.sum(),
+        ];
+        let gloss = Colors(gloss).sum() * self.tint.unwrap_or(Rgb::BLACK);
         Integral { diffuse, gloss }
     }
 

@@ -38,7 +38,7 @@ use super::{Contributions, PixelPoints, Strategy, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::sampling::Stream;
-use crate::simd::{Floats, InstructionSet, Kernel, LANES, Simd, dispatch};
+use crate::simd::{Colors, Floats, InstructionSet, Kernel, LANES, Simd, dispatch};
 use candidates::{Candidate, Candidates, Counts, Hits, PixelNumbers, Place, Sources};
 use cells::{Cells, Slots, at};
 use choose::{Choice, probabilities, probability, weight};
@@ -152,8 +152,8 @@ impl Strategy for ProductSampling<'_> {
         Some((MAX_CANDIDATES / self.n_rays).clamp(1, SAMPLES_PER_PASS))
     }
 
-    fn begin_pass(&self, stream: Stream) -> Pool {
-        let draw = |cells| Pool::draw(cells, self.environment, stream);
+    fn begin_pass(&self, stream: Stream, n_samples: u32) -> Pool {
+        let draw = |cells| Pool::draw(cells, self.environment, stream, n_samples);
         self.cells.as_ref().map_or_else(Pool::empty, draw)
     }
 
@@ -382,7 +382,7 @@ impl Rays<'_> {
                 let size = simd.load(&c.luminance) * doubt * simd.splat(importance);
                 c.chances = probabilities(simd, size);
             }
-            *self.base(hit as u32) += Rgb::from(sums.map(Floats::sum)) * scale;
+            *self.base(hit as u32) += Colors(sums).sum() * scale;
         }
         for c in brdf {
             let slot = c.slot as usize;

@@ -1,17 +1,22 @@
 //! A pool of directions toward the light, drawn anew for each pass and shared by its pixels.
 //!
 //! Drawing from the map costs a walk through its pyramid and a direction; a pixel takes some hundred.
-//! Instead each cell has 32 directions ready, stratified along the curve within the cell, and a
+//! Instead each cell has 32 directions ready, or 16, stratified along the curve within the cell, and a
 //! stratum that falls into the cell takes the one where it falls. The estimate of a pixel is unbiased
 //! over the pools; what the pool of one pass has in error, all its pixels share.
 
-use super::cells::{Cells, NO_SLOTS, SLOTS, Slots, at_mut, slot};
+use super::cells::{Cells, MAX_CELLS, NO_SLOTS, SLOTS, Slots, at_mut, cell_in};
+use rayon::prelude::*;
+
 use crate::environment::Environment;
 use crate::sampling::Stream;
 use crate::simd::{Colors, Floats, Ints, LANES, Lanes, Simd, Vectors};
 
-/// Directions of each cell.
+/// Directions of each cell, or half of that in short passes.
 pub(super) const PER_CELL: usize = 32;
+
+/// Camera samples up to which a pass is short: its pixels' own errors hide the pool's.
+const SHORT_PASS: u32 = 8;
 
 /// A direction toward the light: half a line of the cache. x, y and z of the unit direction in the
 /// world; red, green and blue of the radiance from there; its density within its cell \[sr⁻¹\];
@@ -28,6 +33,8 @@ const LIGHTS: usize = SLOTS * PER_CELL;
 pub struct Pool {
     /// By slot.
     lights: Box<[Light; LIGHTS]>,
+    /// Directions that each cell has: the first of its places.
+    per_cell: usize,
     /// By channel of the radiance L: ∫ L dω, and ∫ L ω dω by component, as the directions estimate it.
     pub(super) moments: Box<[[Slots; 4]; 3]>,
 }
@@ -44,31 +51,48 @@ impl Pool {
     pub(super) fn empty() -> Self {
         let lights = vec![Light([0.0; LANES]); LIGHTS].into_boxed_slice();
         let moments = Box::new([[NO_SLOTS; 4]; 3]);
-        Self { lights: lights.try_into().expect("as many as asked for"), moments }
+        Self { lights: lights.try_into().expect("as many as asked for"), per_cell: 1, moments }
     }
 
-    /// Draws the directions of a pass.
-    pub(super) fn draw(cells: &Cells, environment: &Environment, stream: Stream) -> Self {
+    /// Draws the directions of a pass of so many camera samples.
+    pub(super) fn draw(
+        cells: &Cells,
+        environment: &Environment,
+        stream: Stream,
+        n_samples: u32,
+    ) -> Self {
         let mut pool = Self::empty();
-        for cell in 0..cells.len() {
-            let mut numbers = stream.generator(cell as u32);
-            let mass = cells.mass_of(cell);
-            let mut moments = [[0.0; 4]; 3];
-            for j in 0..PER_CELL {
-                let u = (j as f64 + f64::from(numbers.next_f32())) / PER_CELL as f64;
-                let jitter = [numbers.next_f32(), numbers.next_f32()];
-                let (wi, le) = cells.draw(environment, cell, u, jitter);
-                let density = le.luminance() / mass;
-                let light = Light([wi.x, wi.y, wi.z, le.r, le.g, le.b, density, 0.0]);
-                pool.lights[slot(cell) * PER_CELL + j] = light;
-                for (sums, c) in moments.iter_mut().zip(le.to_array()) {
-                    for (sum, x) in sums.iter_mut().zip([1.0, wi.x, wi.y, wi.z]) {
-                        *sum += c * x / density;
+        pool.per_cell = if n_samples > SHORT_PASS { PER_CELL } else { PER_CELL / 2 };
+        let per_cell = pool.per_cell;
+        let of_slots = pool.lights.par_chunks_mut(PER_CELL).take(MAX_CELLS).enumerate();
+        let moments: Vec<[[f32; 4]; 3]> = of_slots
+            .map(|(slot, lights)| {
+                let mut moments = [[0.0; 4]; 3];
+                let cell = cell_in(slot);
+                if cell >= cells.len() {
+                    return moments;
+                }
+                let mut numbers = stream.generator(cell as u32);
+                let mass = cells.mass_of(cell);
+                for (j, light) in lights[..per_cell].iter_mut().enumerate() {
+                    let u = (j as f64 + f64::from(numbers.next_f32())) / per_cell as f64;
+                    let jitter = [numbers.next_f32(), numbers.next_f32()];
+                    let (wi, le) = cells.draw(environment, cell, u, jitter);
+                    let density = le.luminance() / mass;
+                    *light = Light([wi.x, wi.y, wi.z, le.r, le.g, le.b, density, 0.0]);
+                    let share = 1.0 / (density * per_cell as f32);
+                    for (sums, c) in moments.iter_mut().zip(le.to_array()) {
+                        for (sum, x) in sums.iter_mut().zip([1.0, wi.x, wi.y, wi.z]) {
+                            *sum += c * x * share;
+                        }
                     }
                 }
-            }
-            for (slots, sums) in pool.moments.iter_mut().flatten().zip(moments.as_flattened()) {
-                *at_mut(slots, slot(cell)) = sums / PER_CELL as f32;
+                moments
+            })
+            .collect();
+        for (slot, moments) in moments.iter().enumerate() {
+            for (slots, &moment) in pool.moments.iter_mut().flatten().zip(moments.as_flattened()) {
+                *at_mut(slots, slot) = moment;
             }
         }
         pool
@@ -77,8 +101,8 @@ impl Pool {
     /// The directions of the cells in `slots`, each at `u` in [0, 1) of its part of the curve.
     #[inline(always)]
     pub(super) fn at<S: Simd>(&self, simd: S, slots: S::Ints, u: S::Floats) -> Lights<S::Floats> {
-        let last = simd.splat_int(PER_CELL as i32 - 1);
-        let j = (u * simd.splat(PER_CELL as f32)).truncated().min(last);
+        let last = simd.splat_int(self.per_cell as i32 - 1);
+        let j = (u * simd.splat(self.per_cell as f32)).truncated().min(last);
         let index = (slots.shifted::<{ PER_CELL.ilog2() as i32 }>() + j).store();
         let lights = index.map(|i| &self.lights[i as usize % LIGHTS].0);
         let [x, y, z, r, g, b, density, _] = simd.transposed(lights);
@@ -88,6 +112,7 @@ impl Pool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cells::slot;
     use super::*;
     use crate::Rgb;
     use crate::environment::Orientation;
@@ -127,7 +152,7 @@ mod tests {
         let map = BuiltinProbe::Sky.image(32);
         let environment = Environment::new(map, Orientation::default(), 1.0).unwrap();
         let cells = Cells::new(&environment).unwrap();
-        let pool = Pool::draw(&cells, &environment, Stream::of_pass(SamplerKind::Sobol, 1, 0));
+        let pool = Pool::draw(&cells, &environment, Stream::of_pass(SamplerKind::Sobol, 1, 0), 32);
         for cell in 0..cells.len() {
             for j in 0..PER_CELL {
                 let (wi, le, density) = light(&pool, cell, (j as f32 + 0.5) / PER_CELL as f32);
@@ -135,7 +160,7 @@ mod tests {
                 assert_eq!(cells.find(&environment, wi), Some((cell, le)));
             }
         }
-        let other = Pool::draw(&cells, &environment, Stream::of_pass(SamplerKind::Sobol, 1, 8));
+        let other = Pool::draw(&cells, &environment, Stream::of_pass(SamplerKind::Sobol, 1, 8), 8);
         assert_ne!(light(&pool, 7, 0.5).0, light(&other, 7, 0.5).0);
     }
 }
