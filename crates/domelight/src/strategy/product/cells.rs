@@ -155,7 +155,8 @@ impl Cells {
             }
             *at_mut(&mut cells.reach, slot) = reach;
             *at_mut(&mut cells.mass, slot) = square.mass;
-            *at_mut(&mut cells.dimness, slot) = (map.area(&square).0 / f64::from(square.mass)) as f32;
+            *at_mut(&mut cells.dimness, slot) =
+                (map.area(&square).0 / f64::from(square.mass)) as f32;
         }
         Some(cells)
     }

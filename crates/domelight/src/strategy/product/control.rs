@@ -123,9 +123,8 @@ impl Control {
                 let z = simd.load(&self.gloss[3][row]) * seen;
                 for (sum, [m, mx, my, mz]) in gloss.iter_mut().zip(pool.moments.iter()) {
                     let constant = a * simd.load(&m[row]);
-                    let linear = x * simd.load(&mx[row])
-                        + y * simd.load(&my[row])
-                        + z * simd.load(&mz[row]);
+                    let linear =
+                        x * simd.load(&mx[row]) + y * simd.load(&my[row]) + z * simd.load(&mz[row]);
                     *sum = *sum + (constant + linear);
                 }
             }

@@ -25,6 +25,11 @@ const LIKE_NORMALS: f32 = 0.95;
 /// The roughnesses of a group are within this factor of the first one's.
 const LIKE_ROUGHNESS: f32 = 1.5;
 
+/// The spread of normals that hardly turns a lobe, as a share of its roughness.
+const PLAIN_SPREAD: f32 = 0.25;
+/// The cosine of the view from which lobes are not drawn out.
+const PLAIN_COSINE: f32 = 0.5;
+
 /// A group in the making.
 #[derive(Clone, Debug)]
 struct Gathering {
@@ -103,9 +108,10 @@ impl Groups {
         lobes.map(|(_, gloss)| gloss.width()).reduce(f32::min)
     }
 
-    /// The widest spread of normals of a group.
-    pub(super) fn spread(&self) -> f32 {
-        self.all.iter().map(|g| g.spread).fold(0.0, f32::max)
+    /// Whether a table follows lobes of this roughness well: the lobe hardly turns within a group, and is not
+    /// drawn out along the horizon.
+    pub(super) fn is_plain(&self, roughness: f32) -> bool {
+        self.all.iter().all(|g| g.spread <= PLAIN_SPREAD * roughness && g.wo.z >= PLAIN_COSINE)
     }
 
     /// How dense samples of the material are beside strata of a table with this total, where the light of a cell

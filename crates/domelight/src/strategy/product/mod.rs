@@ -55,14 +55,11 @@ const SAMPLES_PER_PASS: u32 = 32;
 const MAX_CANDIDATES: u32 = 1 << 14;
 
 /// Of the candidates one in this many comes from the material, where the table does not know it well: where normals
-/// spread more than [`SPREAD`] allows, and of lobes narrower than most cells.
+/// spread or the view is oblique, and of lobes narrower than most cells.
 const BRDF_SHARE: [usize; 2] = [8, 4];
 
 /// The roughness below which a lobe is narrower than most cells.
 const NARROW: f32 = 0.1;
-
-/// The spread of normals, as a share of the roughness, up to which the table follows a lobe.
-const SPREAD: f32 = 0.25;
 
 /// The error of a candidate that does not matter, as a share of the pixel's brightness over the
 /// number of candidates: of a diffuse pixel, where nothing else is left to chance, and of a glossy one.
@@ -110,7 +107,7 @@ impl<'a> ProductSampling<'a> {
         let all = self.n_rays as usize * n_hits;
         let brdf = match groups.narrowest() {
             Some(width) if width < NARROW => all.div_ceil(BRDF_SHARE[1]),
-            Some(width) if groups.spread() > SPREAD * width => all.div_ceil(BRDF_SHARE[0]),
+            Some(width) if !groups.is_plain(width) => all.div_ceil(BRDF_SHARE[0]),
             _ => 0,
         };
         Counts { light: all - brdf, brdf }
@@ -279,16 +276,22 @@ impl Asking<'_, '_> {
         sources.draw(simd, hits, &groups.diffuse, counts, &numbers, candidates);
         let mut rays = Rays { pixel, out: self.out, targets };
         if let Some(control) = control {
+            let visibility = visibility.of(block);
+            let integral = control.integral(simd, pool, visibility.0);
+            let mut known = Rgb::BLACK;
+            for (hit, (at, &diffuse)) in points.iter().zip(&groups.diffuse).enumerate() {
+                let of_hit = integral.at(at.frame.z, diffuse);
+                *rays.base(hit as u32) += of_hit;
+                known += of_hit;
+            }
+            // No brighter than what is known of it: it may lie in a shadow or beside a highlight.
+            let known = known.luminance().max(0.0) / points.len() as f32;
             let brightness = strategy.expected_brightness(tile, learned, i);
+            let brightness = brightness.min(strategy.brightness(known));
             let n = (counts.light + counts.brdf) as f32;
             let tolerance = TOLERANCE[usize::from(is_glossy)];
             let covered = points.len() as f32 / pixel.n_samples as f32;
             let scale = covered * n / (tolerance * brightness);
-            let visibility = visibility.of(block);
-            let integral = control.integral(simd, pool, visibility.0);
-            for (hit, (at, &diffuse)) in points.iter().zip(&groups.diffuse).enumerate() {
-                *rays.base(hit as u32) += integral.at(at.frame.z, diffuse);
-            }
             rays.weigh(simd, candidates, visibility, scale);
             rays.push_chosen(candidates, visibility.0, Choice::new(numbers.choice), chosen);
         } else {

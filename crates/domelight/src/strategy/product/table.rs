@@ -129,7 +129,8 @@ impl Table {
             let weight = before * simd.load(&self.weight[row]) + diffuse * cosine;
             self.weight[row] = weight.store();
             if CONTROL {
-                let by_others = if others { simd.load(&control.above[row]) } else { simd.splat(1.0) };
+                let by_others =
+                    if others { simd.load(&control.above[row]) } else { simd.splat(1.0) };
                 control.above[row] = S::Floats::select(s.lt(x), by_others, zero).store();
             }
         }
@@ -214,8 +215,7 @@ impl Table {
             let sigma2 = narrow + simd.load(&cells.radius[row]).squared();
             let wide = one(3.0) * sigma2;
             let tail = one(1.0) + versine / wide;
-            let weight =
-                scale * simd.load(&self.cosine[row]) / (tail.squared().squared() * sigma2);
+            let weight = scale * simd.load(&self.cosine[row]) / (tail.squared().squared() * sigma2);
             self.weight[row] = (simd.load(&self.weight[row]) + weight).store();
             if CONTROL {
                 let slope = weight * one(4.0) / (wide * tail);
