@@ -58,7 +58,7 @@ impl StrategyArguments {
             S::Brdf => Plan::Brdf { n },
             S::Environment => Plan::Environment { n },
             S::Mis => self.mis()?,
-            S::Product => Plan::Product { n: self.rays.unwrap_or(16) },
+            S::Product => Plan::Product { n: self.rays.unwrap_or(8) },
             S::Rejection => self.rejection()?,
             S::Sir => self.sir(n)?,
             S::MedianCut => Plan::MedianCut { n_lights },

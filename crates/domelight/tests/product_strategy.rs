@@ -32,7 +32,7 @@ const SIDE: usize = 5;
 /// Passes under one seed.
 const N_PASSES: usize = 2;
 /// Those that trace all their candidates, and those that choose by what the former taught.
-const KINDS: [&str; N_LEVELS as usize] = ["pilots", "second", "third"];
+const KINDS: [&str; N_LEVELS as usize] = ["pilots", "first", "second", "third", "last"];
 
 /// The mean estimate of each kind of pixel under one seed.
 fn estimates(
@@ -46,7 +46,8 @@ fn estimates(
     let mut scratch = ProductScratch::default();
     let (mut sums, mut counts) = ([[0.0; 3]; KINDS.len()], [0.0; KINDS.len()]);
     for pass in 0..N_PASSES {
-        let shared = strategy.begin_pass(Stream::of_pass(sampler, seed, (pass * n) as u32));
+        let shared =
+            strategy.begin_pass(Stream::of_pass(sampler, seed, (pass * n) as u32), n as u32);
         let mut out = Contributions::default();
         for round in 0..ProductSampling::N_ROUNDS {
             let (mut points, mut samples) = (Vec::new(), Vec::new());
@@ -179,7 +180,7 @@ fn mirror_like_lobes_agree_with_multiple_importance_sampling() {
         .collect();
     for (kind, name) in KINDS.iter().enumerate() {
         let found: Vec<[f64; 3]> = found.iter().map(|b| b[kind]).collect();
-        ZTest::in_suite_of(2).two_sample(name, &found, &expected).unwrap();
+        ZTest::in_suite_of(KINDS.len()).two_sample(name, &found, &expected).unwrap();
     }
 }
 
@@ -226,7 +227,7 @@ fn odd_maps_are_unbiased() {
                     }],
                     width: 1,
                 };
-                let pass = strategy.begin_pass(Stream::of_pass(SamplerKind::Sobol, seed, 0));
+                let pass = strategy.begin_pass(Stream::of_pass(SamplerKind::Sobol, seed, 0), 32);
                 let mut out = Contributions::default();
                 out.reset(1);
                 let mut scratch = ProductScratch::default();

@@ -15,7 +15,7 @@ pub(crate) struct StrategyArguments {
     #[arg(long, value_enum, default_value_t = StrategyName::Product)]
     pub(crate) strategy: StrategyName,
     /// Shadow rays of each camera sample; with product no more than these, with rejection samples to
-    /// accept [default: with product 16, with mis 2, else 1]
+    /// accept [default: with product 8, with mis 2, else 1]
     #[arg(long, value_name = "N", conflicts_with = "split",
           value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub(crate) rays: Option<u32>,

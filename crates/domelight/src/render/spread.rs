@@ -114,19 +114,21 @@ mod tests {
     fn noisy_pixels_get_more_samples() {
         let mut spreads = Spreads::default();
         spreads.reset(5, 25);
-        // Pixels 0 and 4 are of the first level, 2 between them, and 1 between 0 and 2.
+        // Pixels 0 and 4 are of the first level, 2 between them is of one that teaches, and 1 of the last.
         let samples = |spread: f32| [1.0 - spread, 1.0 + spread].map(Rgb::splat);
-        assert_eq!(spreads.samples(2, 8, Some(0.5)), 8);
+        assert_eq!(spreads.samples(1, 8, Some(0.5)), 8);
         spreads.learn(0, &samples(0.9));
         spreads.learn(4, &[Rgb::WHITE]);
         assert_eq!(spreads.get(4), None);
         let growth = growth(spreads.get(0).unwrap());
-        assert_eq!(spreads.samples(2, 8, None), 8);
-        assert_eq!(spreads.samples(2, 8, Some(growth)), 8);
+        assert_eq!(spreads.samples(1, 8, None), 8);
+        assert_eq!(spreads.samples(1, 8, Some(growth)), 8);
+        assert_eq!(spreads.samples(1, 8, Some(growth / 2.1)), 16);
+        assert_eq!(spreads.samples(1, 8, Some(growth / 1000.0)), 64);
+        assert_eq!(spreads.samples(1, 8, Some(growth * 1000.0)), 2);
+        assert_eq!(spreads.samples(1, 1, Some(growth * 1000.0)), 1);
         assert_eq!(spreads.samples(2, 8, Some(growth / 2.1)), 16);
-        assert_eq!(spreads.samples(2, 8, Some(growth / 1000.0)), 64);
-        assert_eq!(spreads.samples(2, 8, Some(growth * 1000.0)), 2);
-        assert_eq!(spreads.samples(2, 1, Some(growth * 1000.0)), 1);
+        assert_eq!(spreads.samples(2, 8, Some(growth * 1000.0)), 8);
         assert_eq!(spreads.samples(0, 8, Some(growth / 1000.0)), 8);
     }
 
@@ -135,6 +137,6 @@ mod tests {
         let mut spreads = Spreads::default();
         spreads.reset(5, 25);
         spreads.learn(0, &[Rgb::BLACK; 4]);
-        assert_eq!(spreads.samples(2, 8, Some(0.5)), 2);
+        assert_eq!(spreads.samples(1, 8, Some(0.5)), 2);
     }
 }

@@ -159,3 +159,115 @@ impl Control {
         diffuse.zip(Colors::splat(cosine, tint).scaled(gloss), |d, g| d + g)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidates::{Candidates, Counts, Hits, PixelNumbers, Sources};
+    use super::super::hits::Groups;
+    use super::super::table::Table;
+    use super::*;
+    use crate::bsdf::{Material, MaterialSpec};
+    use crate::environment::builtin::BuiltinProbe;
+    use crate::environment::{Environment, Orientation};
+    use crate::math::{Frame, vec3};
+    use crate::sampling::{SamplerKind, Stream};
+    use crate::simd::{InstructionSet, Kernel, LANES, dispatch};
+    use crate::strategy::ShadingPoint;
+    use testkit::ZTest;
+
+    fn hit(material: &str, normal: Vec3) -> ShadingPoint {
+        let material = Material::from(material.parse::<MaterialSpec>().unwrap());
+        let frame = Frame::from_z_and_tangent(normal.normalize(), Vec3::X);
+        let wo = vec3(0.5, 0.1, 0.8).normalize();
+        ShadingPoint { position: Vec3::ZERO, ng: frame.z, frame, wo, material }
+    }
+
+    /// The candidates of a pixel of some hits with all that is known of them.
+    struct Draw<'a> {
+        environment: &'a Environment,
+        cells: &'a Cells,
+        pool: &'a Pool,
+        hits: &'a [ShadingPoint],
+        visible: &'a Slots,
+        seed: u64,
+    }
+
+    impl Kernel for Draw<'_> {
+        /// Σ V̂ W, Σ V̂ h L/p, and what that is expected to be.
+        type Output = [Rgb; 3];
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Self::Output {
+            let Self { environment, cells, pool, .. } = self;
+            let hits = Hits { points: self.hits, one_material: false };
+            let (mut groups, mut table) = (Groups::default(), Table::default());
+            let (mut control, mut candidates) = (Control::default(), Candidates::default());
+            groups.gather(hits);
+            table.fill::<S, true>(simd, cells, &groups.all, &mut control);
+            table.accumulate(simd, &cells.mass);
+            let counts = Counts { light: 40, brdf: 4 };
+            control.balance(simd, cells, groups.brdf_share(counts, table.total()));
+            let numbers = PixelNumbers::new(Stream::new(SamplerKind::Independent, self.seed, 0));
+            let sources =
+                Sources { environment, cells, pool, table: &table, control: Some(&control) };
+            sources.draw(simd, hits, &groups.diffuse, counts, &numbers, &mut candidates);
+            let (mut value, mut known) = (Rgb::BLACK, Rgb::BLACK);
+            for block in &candidates.lights {
+                for lane in 0..LANES {
+                    let v = super::super::cells::at(self.visible, block.slots[lane] as usize);
+                    let of = |c: &[crate::simd::Lanes; 3]| Rgb::from(c.map(|c| c[lane])) * v;
+                    value += of(&block.value);
+                    known += of(&block.value) - of(&block.rest);
+                }
+            }
+            let integral = control.integral(simd, pool, self.visible);
+            let of_hits = self.hits.iter().zip(&groups.diffuse);
+            let sum: Rgb = of_hits.map(|(at, &diffuse)| integral.at(at.frame.z, diffuse)).sum();
+            [value, known, sum / self.hits.len() as f32]
+        }
+    }
+
+    /// The expectation of what is taken from the candidates is what is added: for materials of all kinds of lobes,
+    /// hits of several normals, any visibility; and of broad lobes it is most of their light.
+    #[test]
+    fn what_is_taken_is_added() {
+        let map = BuiltinProbe::Sky.image(32);
+        let environment = Environment::new(map, Orientation::default(), 1.0).unwrap();
+        let cells = Cells::new(&environment).unwrap();
+        let stream = Stream::of_pass(SamplerKind::Sobol, 1, 0);
+        let pool = Pool::draw(&cells, &environment, stream, 1);
+        let mut visible = NO_SLOTS;
+        for (i, v) in visible.iter_mut().flatten().enumerate() {
+            *v = (i % 7) as f32 / 6.0;
+        }
+        let materials =
+            ["diffuse:0.8,0.5,0.2", "ggx:0.2", "ward:0.15:0.5", "phong:50:0.5:0.5", "beckmann:0.3"];
+        let test = ZTest::in_suite_of(materials.len());
+        for name in materials {
+            let normals = [vec3(0.1, 1.0, 0.2), vec3(0.2, 0.9, 0.1), vec3(0.4, 0.8, -0.1)];
+            let hits = normals.map(|normal| hit(name, normal));
+            let mut seed = 0;
+            let (mut value, mut rest, mut expected) = (0.0, 0.0, Rgb::BLACK);
+            let batches = testkit::batches(40, 50, || {
+                seed += 1;
+                let (cells, pool) = (&cells, &pool);
+                let draw = Draw {
+                    environment: &environment,
+                    cells,
+                    pool,
+                    hits: &hits,
+                    visible: &visible,
+                    seed,
+                };
+                let [w, known, integral] = dispatch(InstructionSet::best(), draw);
+                expected = integral;
+                value += f64::from(w.luminance());
+                rest += f64::from((w - known).luminance());
+                known.to_array().map(f64::from)
+            });
+            let expected = expected.to_array().map(f64::from);
+            test.against(name, &batches, expected).unwrap();
+            eprintln!("{name}: {rest} of {value} is left");
+        }
+    }
+}

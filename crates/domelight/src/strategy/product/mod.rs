@@ -5,18 +5,24 @@
 //!
 //! 1. A `table` gives each cell its light times what the pixel reflects of it.
 //! 2. `candidates`: strata along the curve, each with one direction of the pool, and samples of the
-//!    material, weighed by the balance heuristic.
+//!    material where the table does not know it well, weighed by the balance heuristic.
 //! 3. The tile's pixels come in [levels](super::levels). Those of the first, *pilots*, trace all their candidates.
 //!    From the rays of each level the tile learns the `visibility` V̂ of each cell and the brightness of its pixels.
-//! 4. The next levels take Σ W V̂ without a ray, and `choose` those candidates whose visibility matters:
+//! 4. What the next levels reflect of light that is seen through V̂ is known but for its details: the integral of
+//!    a `control` variate h over all cells. They `choose` those candidates whose visibility matters:
 //!
 //! ```text
-//! base = Σ_j W_j V̂_j − Σ_chosen (W_j/π_j) V̂_j        rays: weight W_j/π_j
+//! base = Σ_c V̂_c ∫ h L + Σ_j V̂_j (W_j − h_j L_j/p_j) − Σ_chosen (W_j/π_j) V̂_j        rays: weight W_j/π_j
 //! ```
 //!
+//!    The table of a diffuse pixel, whose light h knows, follows what is in doubt.
+//!
 //! The expectation is ∫ f L V dω for every V̂, brightness and pool, given that they do not depend on
-//! the numbers that strata, samples and choice are drawn with: V̂ and brightness come from pixels of lower levels, and each pixel and pass has a stream of numbers of its own. The density of the
-//! candidates depends on the pixel's hits alone, so what the pool and V̂ have in common does no harm.
+//! the numbers that strata, samples and choice are drawn with: V̂ and brightness come from pixels of lower levels,
+//! and each pixel and pass has a stream of numbers of its own. V̂ has the pool in common with the candidates. That does
+//! no harm: given the pool, strata draw nothing else, and the expectation of their part is a sum over the pool
+//! whatever V̂ and the density made of it are. Samples of the material do not come from the pool, so where there are any
+//! the density depends on the pixel's hits alone.
 //!
 //! Related: Clarberg & Akenine-Möller 2008, "Practical Product Importance Sampling for Direct
 //! Illumination", multiplies trees of BRDF and map; Atanasov et al. 2018, "Adaptive Environment
@@ -48,8 +54,8 @@ use table::Table;
 use visibility::{Blocks, Learned, Visibility};
 
 /// Camera samples of a pass: strata that one random offset spreads over all of them are worth more
-/// than the same number in two sets, and a tile's rays still fit the caches.
-const SAMPLES_PER_PASS: u32 = 32;
+/// than the same number in two sets.
+const SAMPLES_PER_PASS: u32 = 64;
 
 /// Candidates of a pixel in a pass, for the sake of memory.
 const MAX_CANDIDATES: u32 = 1 << 14;
