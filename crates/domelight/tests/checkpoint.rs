@@ -103,7 +103,7 @@ fn a_resumed_render_has_the_bits_of_the_uninterrupted_one() {
 #[test]
 fn a_strategy_that_learns_can_be_interrupted() {
     let stage = stage();
-    let settings = RenderSettings { n_samples: 40, tile_size: 16, ..settings() };
+    let settings = RenderSettings { n_samples: 80, tile_size: 16, ..settings() };
     interrupt_and_resume(&stage, &ProductSampling::new(&stage.environment, 2), &settings);
 }
 
