@@ -161,7 +161,8 @@ impl Table {
             let (hx, hy, hz) = (h.dot(frame.x), h.dot(frame.y), h.dot(frame.z).max(one(1e-3)));
             let hz2 = hz.squared();
             let h2 = hx.squared() + hy.squared() + hz2;
-            let wide2 = one(0.25) * simd.load(&cells.radius[row]).squared() + spread2;
+            let radius2 = simd.load(&cells.radius[row]).squared();
+            let wide2 = one(0.25) * radius2 + spread2;
             let (ax2, ay2) = (ax2 + wide2, ay2 + wide2);
             let inverse = one(1.0) / (ax2 * ay2);
             let (x, y) = (hx * ay2 * inverse, hy * ax2 * inverse);
@@ -179,15 +180,17 @@ impl Table {
             let weight = scale * shape * inverse.sqrt() * cosine * (spread * both);
             self.weight[row] = (simd.load(&self.weight[row]) + weight).store();
             if CONTROL {
-                // ∇ ln of the shape, over 4: along h, and along the axes of the frame.
-                let along = one(1.0) / h2;
+                // ∇ ln of the shape, over 4: along h, and along the axes of the frame; less where h turns much
+                // within the cell.
+                let along = one(1.0) / (h2 + radius2);
+                let steady = h2 * along;
                 let [mut up, mut out] = [zero(simd) - hz * narrow, zero(simd) - narrow];
                 if GAUSSIAN {
                     up = up + up + one(1.0) / hz;
                     out = out * one(2.0 / 3.0);
                 }
                 let across = [out * x, out * y, up];
-                let slope = h.times(along).plus(frame_vector(frame, across));
+                let slope = h.times(along).plus(frame_vector(frame, across).times(steady));
                 let slope = slope.times(weight * one(4.0));
                 control.add_gloss(simd, row, [center, slope], weight, first);
             }
