@@ -50,8 +50,9 @@ impl Pool {
     /// Of no light.
     pub(super) fn empty() -> Self {
         let lights = vec![Light([0.0; LANES]); LIGHTS].into_boxed_slice();
-        let moments = Box::new([[NO_SLOTS; 4]; 3]);
-        Self { lights: lights.try_into().expect("as many as asked for"), per_cell: 1, moments }
+        let lights = lights.try_into().expect("as many as asked for");
+        let moments = vec![[NO_SLOTS; 4]; 3].into_boxed_slice();
+        Self { lights, per_cell: 1, moments: moments.try_into().expect("three channels") }
     }
 
     /// Draws the directions of a pass of so many camera samples.
