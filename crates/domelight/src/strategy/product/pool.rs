@@ -6,9 +6,8 @@
 //! over the pools; what the pool of one pass has in error, all its pixels share.
 
 use super::cells::{Cells, MAX_CELLS, NO_SLOTS, SLOTS, Slots, at_mut, cell_in};
-use rayon::prelude::*;
-
 use crate::environment::Environment;
+use crate::parallel;
 use crate::sampling::Stream;
 use crate::simd::{Colors, Floats, Ints, LANES, Lanes, Simd, Vectors};
 
@@ -65,33 +64,24 @@ impl Pool {
         let mut pool = Self::empty();
         pool.per_cell = if n_samples > SHORT_PASS { PER_CELL } else { PER_CELL / 2 };
         let per_cell = pool.per_cell;
-        let of_slots = pool.lights.par_chunks_mut(PER_CELL).take(MAX_CELLS).enumerate();
-        let moments: Vec<[[f32; 4]; 3]> = of_slots
-            .map(|(slot, lights)| {
-                let mut moments = [[0.0; 4]; 3];
-                let cell = cell_in(slot);
-                if cell >= cells.len() {
-                    return moments;
-                }
-                let mut numbers = stream.generator(cell as u32);
-                let mass = cells.mass_of(cell);
-                for (j, light) in lights[..per_cell].iter_mut().enumerate() {
-                    let u = (j as f64 + f64::from(numbers.next_f32())) / per_cell as f64;
-                    let jitter = [numbers.next_f32(), numbers.next_f32()];
-                    let (wi, le) = cells.draw(environment, cell, u, jitter);
-                    let density = le.luminance() / mass;
-                    *light = Light([wi.x, wi.y, wi.z, le.r, le.g, le.b, density, 0.0]);
-                    let share = 1.0 / (density * per_cell as f32);
-                    for (sums, c) in moments.iter_mut().zip(le.to_array()) {
-                        for (sum, x) in sums.iter_mut().zip([1.0, wi.x, wi.y, wi.z]) {
-                            *sum += c * x * share;
-                        }
-                    }
-                }
-                moments
-            })
-            .collect();
-        for (slot, moments) in moments.iter().enumerate() {
+        let lights = &mut pool.lights[..MAX_CELLS * PER_CELL];
+        parallel::bands(lights, PER_CELL, |slot, lights| {
+            let cell = cell_in(slot);
+            if cell >= cells.len() {
+                return;
+            }
+            let mut numbers = stream.generator(cell as u32);
+            let mass = cells.mass_of(cell);
+            for (j, light) in lights[..per_cell].iter_mut().enumerate() {
+                let u = (j as f64 + f64::from(numbers.next_f32())) / per_cell as f64;
+                let jitter = [numbers.next_f32(), numbers.next_f32()];
+                let (wi, le) = cells.draw(environment, cell, u, jitter);
+                let density = le.luminance() / mass;
+                *light = Light([wi.x, wi.y, wi.z, le.r, le.g, le.b, density, 0.0]);
+            }
+        });
+        for slot in (0..MAX_CELLS).filter(|&slot| cell_in(slot) < cells.len()) {
+            let moments = moments(&pool.lights[slot * PER_CELL..][..per_cell]);
             for (slots, &moment) in pool.moments.iter_mut().flatten().zip(moments.as_flattened()) {
                 *at_mut(slots, slot) = moment;
             }
@@ -109,6 +99,20 @@ impl Pool {
         let [x, y, z, r, g, b, density, _] = simd.transposed(lights);
         Lights { wi: Vectors { x, y, z }, le: Colors([r, g, b]), density }
     }
+}
+
+/// ∫ L dω and ∫ L ω dω over a cell, by channel of L, as its directions estimate them.
+fn moments(lights: &[Light]) -> [[f32; 4]; 3] {
+    let mut moments = [[0.0; 4]; 3];
+    for &Light([x, y, z, r, g, b, density, _]) in lights {
+        let share = 1.0 / (density * lights.len() as f32);
+        for (sums, c) in moments.iter_mut().zip([r, g, b]) {
+            for (sum, x) in sums.iter_mut().zip([1.0, x, y, z]) {
+                *sum += c * x * share;
+            }
+        }
+    }
+    moments
 }
 
 #[cfg(test)]
