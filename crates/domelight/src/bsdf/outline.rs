@@ -50,6 +50,7 @@ impl Outline {
 
 impl Material {
     /// Whether it looks the same when it turns about the normal.
+    #[cfg(feature = "render")]
     pub(crate) fn is_isotropic(&self) -> bool {
         self.lobes().all(|(_, lobe)| match lobe {
             Lobe::Ward(l) => l.alpha()[0] == l.alpha()[1],

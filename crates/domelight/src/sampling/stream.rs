@@ -65,6 +65,7 @@ pub struct Stream {
 
 impl Stream {
     /// Nobody's.
+    #[cfg(feature = "render")]
     pub(crate) const NONE: Self = Self { kind: SamplerKind::Sobol, key: 0 };
 
     /// The stream of a pixel under a seed.

@@ -221,6 +221,7 @@ pub struct PixelPoints {
     pub one_material: bool,
 }
 
+#[cfg(feature = "render")]
 impl PixelPoints {
     /// Of a pixel of another round.
     pub(crate) const NONE: Self =
