@@ -70,8 +70,7 @@ impl Spreads {
     }
 }
 
-/// Whether more than half of the other pixels look at what this one tells: it has the usual samples at least, for
-/// their own sake.
+/// Whether two more levels build on what the pixel tells: then it has the usual samples at least, for their sake.
 fn teaches(pixel: usize, width: usize) -> bool {
     level(pixel % width, pixel / width) + 2 < N_LEVELS
 }

@@ -33,7 +33,7 @@ pub(super) struct Control {
     /// 1 where a cell is above the horizon of all groups, else 0.
     pub(super) above: Slots,
     /// a, and b by component, of the glossy lobes together, in luminance.
-    pub(super) gloss: [Slots; 4],
+    gloss: [Slots; 4],
     /// k_s, of luminance 1; none without glossy lobes.
     tint: Option<Rgb>,
 }
@@ -80,10 +80,10 @@ impl Control {
         weight: S::Floats,
         first: bool,
     ) {
-        let before = simd.splat(if first { 0.0 } else { 1.0 });
         let a = weight - (center.x * slope.x + center.y * slope.y + center.z * slope.z);
         for (sum, x) in self.gloss.iter_mut().zip([a, slope.x, slope.y, slope.z]) {
-            sum[row] = (before * simd.load(&sum[row]) + x).store();
+            let before = if first { simd.splat(0.0) } else { simd.load(&sum[row]) };
+            sum[row] = (before + x).store();
         }
     }
 
@@ -165,22 +165,14 @@ mod tests {
     use super::super::candidates::{Candidates, Counts, Hits, PixelNumbers, Sources};
     use super::super::hits::Groups;
     use super::super::table::Table;
+    use super::super::test_support::{hit, sky};
     use super::*;
-    use crate::bsdf::{Material, MaterialSpec};
-    use crate::environment::builtin::BuiltinProbe;
-    use crate::environment::{Environment, Orientation};
-    use crate::math::{Frame, vec3};
+    use crate::environment::Environment;
+    use crate::math::vec3;
     use crate::sampling::{SamplerKind, Stream};
     use crate::simd::{InstructionSet, Kernel, LANES, dispatch};
     use crate::strategy::ShadingPoint;
     use testkit::ZTest;
-
-    fn hit(material: &str, normal: Vec3) -> ShadingPoint {
-        let material = Material::from(material.parse::<MaterialSpec>().unwrap());
-        let frame = Frame::from_z_and_tangent(normal.normalize(), Vec3::X);
-        let wo = vec3(0.5, 0.1, 0.8).normalize();
-        ShadingPoint { position: Vec3::ZERO, ng: frame.z, frame, wo, material }
-    }
 
     /// The candidates of a pixel of some hits with all that is known of them.
     struct Draw<'a> {
@@ -231,8 +223,7 @@ mod tests {
     /// hits of several normals, any visibility; and of broad lobes it is most of their light.
     #[test]
     fn what_is_taken_is_added() {
-        let map = BuiltinProbe::Sky.image(32);
-        let environment = Environment::new(map, Orientation::default(), 1.0).unwrap();
+        let environment = sky();
         let cells = Cells::new(&environment).unwrap();
         let stream = Stream::of_pass(SamplerKind::Sobol, 1, 0);
         let pool = Pool::draw(&cells, &environment, stream, 1);

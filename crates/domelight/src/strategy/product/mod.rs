@@ -35,6 +35,8 @@ mod control;
 mod hits;
 mod pool;
 mod table;
+#[cfg(test)]
+mod test_support;
 mod visibility;
 
 pub use pool::Pool;

@@ -118,10 +118,9 @@ fn moments(lights: &[Light]) -> [[f32; 4]; 3] {
 #[cfg(test)]
 mod tests {
     use super::super::cells::slot;
+    use super::super::test_support::sky;
     use super::*;
     use crate::Rgb;
-    use crate::environment::Orientation;
-    use crate::environment::builtin::BuiltinProbe;
     use crate::math::{Vec3, vec3};
     use crate::sampling::SamplerKind;
     use crate::simd::{InstructionSet, Kernel, dispatch};
@@ -154,8 +153,7 @@ mod tests {
     /// radiance's luminance exactly the mass.
     #[test]
     fn the_pool_stands_for_the_light() {
-        let map = BuiltinProbe::Sky.image(32);
-        let environment = Environment::new(map, Orientation::default(), 1.0).unwrap();
+        let environment = sky();
         let cells = Cells::new(&environment).unwrap();
         let pool = Pool::draw(&cells, &environment, Stream::of_pass(SamplerKind::Sobol, 1, 0), 32);
         for cell in 0..cells.len() {

@@ -184,7 +184,7 @@ impl Table {
                 // within the cell.
                 let along = one(1.0) / (h2 + radius2);
                 let steady = h2 * along;
-                let [mut up, mut out] = [zero(simd) - hz * narrow, zero(simd) - narrow];
+                let [mut up, mut out] = [one(0.0) - hz * narrow, one(0.0) - narrow];
                 if GAUSSIAN {
                     up = up + up + one(1.0) / hz;
                     out = out * one(2.0 / 3.0);
@@ -363,11 +363,6 @@ struct LobeOf<'a> {
     first: bool,
 }
 
-#[inline(always)]
-fn zero<S: Simd>(simd: S) -> S::Floats {
-    simd.splat(0.0)
-}
-
 /// Vectors given in a frame.
 #[inline(always)]
 fn frame_vector<F: Floats>(frame: &Frame, [x, y, z]: [F; 3]) -> Vectors<F> {
@@ -391,10 +386,8 @@ mod tests {
     use super::super::candidates::Hits;
     use super::super::cells::{MAX_CELLS, slot};
     use super::super::hits::Groups;
+    use super::super::test_support::{hit, sky};
     use super::*;
-    use crate::bsdf::{Material, MaterialSpec};
-    use crate::environment::builtin::BuiltinProbe;
-    use crate::environment::{Environment, Orientation};
     use crate::math::vec3;
     use crate::simd::{InstructionSet, Kernel, dispatch};
     use crate::strategy::ShadingPoint;
@@ -403,17 +396,6 @@ mod tests {
 
     const MATERIALS: [&str; 5] =
         ["diffuse:0.8", "phong:50:0.5:0.5", "ward:0.15:0.5", "ggx:0.2", "gltf:0.9,0.6,0.3:0.5:0.5"];
-
-    fn hit(material: &str, normal: Vec3) -> ShadingPoint {
-        let material = Material::from(material.parse::<MaterialSpec>().unwrap());
-        let frame = Frame::from_z_and_tangent(normal.normalize(), Vec3::X);
-        let wo = vec3(0.5, 0.1, 0.8).normalize();
-        ShadingPoint { position: Vec3::ZERO, ng: frame.z, frame, wo, material }
-    }
-
-    fn sky() -> Environment {
-        Environment::new(BuiltinProbe::Sky.image(32), Orientation::default(), 1.0).unwrap()
-    }
 
     fn table(cells: &Cells, hits: &[ShadingPoint]) -> Table {
         let mut groups = Groups::default();

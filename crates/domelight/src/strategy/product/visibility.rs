@@ -11,9 +11,9 @@
 //! p is the same of the whole tile, K of N rays to the cell, and v₀ that of all cells. g is the standard
 //! deviation of a ray about V̂, and what V̂ itself may be wrong by.
 //!
-//! V̂ serves as a control variate: the pixel's estimate is Σ W V̂ + Σ W (V − V̂)/π, whose expectation
-//! does not depend on V̂ as long as V̂ does not depend on the numbers that the second sum is drawn
-//! with. So V̂ comes from pixels of lower levels alone.
+//! V̂ serves as a control variate: the pixel's estimate is what it reflects of light seen through V̂, and
+//! Σ W (V − V̂)/π, whose expectation does not depend on V̂ as long as V̂ does not depend on the numbers that strata
+//! and choice are drawn with. So V̂ comes from pixels of lower levels alone.
 
 use super::cells::{NO_SLOTS, ROWS, Slots, at_mut};
 use crate::simd::{Floats, LANES, Real, Simd};
