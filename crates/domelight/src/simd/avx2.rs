@@ -5,6 +5,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
+use super::pair::Pair;
 use super::{Floats, Ints, Kernel, LANES, Lanes, Mask, Real, Sets, Simd, last_of};
 
 /// Exists only where the processor has AVX2 and the bit instructions that came with it.
@@ -52,6 +53,7 @@ impl Avx2 {
 impl Simd for Avx2 {
     type Floats = F32x8;
     type Ints = I32x8;
+    type Wide = Pair<F32x8>;
     type Sets = Sets8;
 
     #[inline(always)]
@@ -63,6 +65,14 @@ impl Simd for Avx2 {
     fn load(self, x: &Lanes) -> F32x8 {
         // SAFETY: `self` proves AVX2; `x` is 8 readable f32, and the load needs no alignment.
         F32x8(unsafe { _mm256_loadu_ps(x.as_ptr()) })
+    }
+    #[inline(always)]
+    fn splat_wide(self, x: f32) -> Pair<F32x8> {
+        Pair(self.splat(x), self.splat(x))
+    }
+    #[inline(always)]
+    fn load_wide(self, [low, high]: [&Lanes; 2]) -> Pair<F32x8> {
+        Pair(self.load(low), self.load(high))
     }
     #[inline(always)]
     fn prefetch<T>(self, x: &T) {

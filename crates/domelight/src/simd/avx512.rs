@@ -1,12 +1,12 @@
-//! x86-64 AVX-512 with vectors of eight: comparisons go to mask registers, and there are twice as many
-//! registers.
+//! x86-64 AVX-512: comparisons go to mask registers, there are twice as many registers, and sixteen numbers
+//! fit into one.
 #![allow(unsafe_code)]
 #![allow(clippy::wildcard_imports)] // The intrinsics' names are distinctive enough.
 
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-use super::{Floats, Ints, Kernel, LANES, Lanes, Mask, Real, Sets, Simd, last_of};
+use super::{Floats, Ints, Kernel, LANES, Lanes, Mask, Real, Sets, Simd, Wide, last_of};
 
 /// Exists only where the processor has AVX-512 F and VL and the bit instructions of AVX2's time.
 #[derive(Clone, Copy)]
@@ -20,9 +20,17 @@ pub(crate) struct F32x8(__m256);
 #[derive(Clone, Copy)]
 pub(crate) struct I32x8(__m256i);
 
+/// Made only by an [`Avx512`], so it proves the same.
+#[derive(Clone, Copy)]
+pub(crate) struct F32x16(__m512);
+
 /// A bit a lane.
 #[derive(Clone, Copy)]
 pub(crate) struct Mask8(__mmask8);
+
+/// A bit a lane.
+#[derive(Clone, Copy)]
+pub(crate) struct Mask16(__mmask16);
 
 /// Made only by an [`Avx512`], so it proves the same.
 #[derive(Clone, Copy)]
@@ -54,6 +62,7 @@ impl Avx512 {
 impl Simd for Avx512 {
     type Floats = F32x8;
     type Ints = I32x8;
+    type Wide = F32x16;
     type Sets = Sets8;
 
     #[inline(always)]
@@ -65,6 +74,20 @@ impl Simd for Avx512 {
     fn load(self, x: &Lanes) -> F32x8 {
         // SAFETY: `self` proves AVX-512; `x` is 8 readable f32, and the load needs no alignment.
         F32x8(unsafe { _mm256_loadu_ps(x.as_ptr()) })
+    }
+    #[inline(always)]
+    fn splat_wide(self, x: f32) -> F32x16 {
+        // SAFETY: `self` proves AVX-512.
+        F32x16(unsafe { _mm512_set1_ps(x) })
+    }
+    #[inline(always)]
+    fn load_wide(self, [low, high]: [&Lanes; 2]) -> F32x16 {
+        // SAFETY: `self` proves AVX-512; `low` and `high` are 8 readable f32, and the loads need no alignment.
+        F32x16(unsafe {
+            let low = _mm256_castps_pd(_mm256_loadu_ps(low.as_ptr()));
+            let high = _mm256_castps_pd(_mm256_loadu_ps(high.as_ptr()));
+            _mm512_castpd_ps(_mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low), high))
+        })
     }
     #[inline(always)]
     fn prefetch<T>(self, x: &T) {
@@ -141,83 +164,177 @@ operator!(Sub, sub, F32x8, _mm256_sub_ps);
 operator!(Mul, mul, F32x8, _mm256_mul_ps);
 operator!(Div, div, F32x8, _mm256_div_ps);
 operator!(Add, add, I32x8, _mm256_add_epi32);
-impl BitAnd for Mask8 {
-    type Output = Self;
+operator!(Add, add, F32x16, _mm512_add_ps);
+operator!(Sub, sub, F32x16, _mm512_sub_ps);
+operator!(Mul, mul, F32x16, _mm512_mul_ps);
+operator!(Div, div, F32x16, _mm512_div_ps);
 
-    #[inline(always)]
-    fn bitand(self, b: Self) -> Self {
-        Self(self.0 & b.0)
-    }
-}
+macro_rules! mask {
+    ($mask:ident) => {
+        impl BitAnd for $mask {
+            type Output = Self;
 
-impl BitOr for Mask8 {
-    type Output = Self;
-
-    #[inline(always)]
-    fn bitor(self, b: Self) -> Self {
-        Self(self.0 | b.0)
-    }
-}
-
-impl Real for F32x8 {
-    type Mask = Mask8;
-
-    #[inline(always)]
-    fn splat(self, x: f32) -> Self {
-        // SAFETY: `self` proves AVX-512.
-        Self(unsafe { _mm256_set1_ps(x) })
-    }
-    #[inline(always)]
-    fn min(self, b: Self) -> Self {
-        // SAFETY: `self` proves AVX-512.
-        Self(unsafe { _mm256_min_ps(self.0, b.0) })
-    }
-    #[inline(always)]
-    fn max(self, b: Self) -> Self {
-        // SAFETY: `self` proves AVX-512.
-        Self(unsafe { _mm256_max_ps(self.0, b.0) })
-    }
-    #[inline(always)]
-    fn le(self, b: Self) -> Mask8 {
-        // SAFETY: `self` proves AVX-512.
-        Mask8(unsafe { _mm256_cmp_ps_mask::<_CMP_LE_OQ>(self.0, b.0) })
-    }
-    #[inline(always)]
-    fn lt(self, b: Self) -> Mask8 {
-        // SAFETY: `self` proves AVX-512.
-        Mask8(unsafe { _mm256_cmp_ps_mask::<_CMP_LT_OQ>(self.0, b.0) })
-    }
-    #[inline(always)]
-    fn eq(self, b: Self) -> Mask8 {
-        // SAFETY: `self` proves AVX-512.
-        Mask8(unsafe { _mm256_cmp_ps_mask::<_CMP_EQ_OQ>(self.0, b.0) })
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        // SAFETY: `self` proves AVX-512.
-        Self(unsafe { _mm256_sqrt_ps(self.0) })
-    }
-    #[inline(always)]
-    fn select(mask: Mask8, a: Self, b: Self) -> Self {
-        // SAFETY: `a` proves AVX-512.
-        Self(unsafe { _mm256_mask_blend_ps(mask.0, b.0, a.0) })
-    }
-    #[inline(always)]
-    fn each<const M: usize, const N: usize>(
-        arguments: [Self; M],
-        mut f: impl FnMut([f32; M]) -> [f32; N],
-    ) -> [Self; N] {
-        let arguments = arguments.map(Self::store);
-        let mut values = [[0.0; LANES]; N];
-        for lane in 0..LANES {
-            for (value, y) in values.iter_mut().zip(f(arguments.map(|x| x[lane]))) {
-                value[lane] = y;
+            #[inline(always)]
+            fn bitand(self, b: Self) -> Self {
+                Self(self.0 & b.0)
             }
         }
-        // SAFETY: the arguments prove AVX-512 (M > 0); each value is 8 readable f32, and the load
-        // needs no alignment.
-        const { assert!(M > 0) };
-        values.map(|value| Self(unsafe { _mm256_loadu_ps(value.as_ptr()) }))
+
+        impl BitOr for $mask {
+            type Output = Self;
+
+            #[inline(always)]
+            fn bitor(self, b: Self) -> Self {
+                Self(self.0 | b.0)
+            }
+        }
+
+        impl Mask for $mask {
+            #[inline(always)]
+            fn bits(self) -> u32 {
+                u32::from(self.0)
+            }
+        }
+    };
+}
+mask!(Mask8);
+mask!(Mask16);
+
+macro_rules! real {
+    ($type:ident, $mask:ident, $set1:ident, $min:ident, $max:ident, $cmp:ident, $sqrt:ident, $blend:ident) => {
+        impl Real for $type {
+            type Mask = $mask;
+
+            #[inline(always)]
+            fn splat(self, x: f32) -> Self {
+                // SAFETY: `self` proves AVX-512.
+                Self(unsafe { $set1(x) })
+            }
+            #[inline(always)]
+            fn min(self, b: Self) -> Self {
+                // SAFETY: `self` proves AVX-512.
+                Self(unsafe { $min(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn max(self, b: Self) -> Self {
+                // SAFETY: `self` proves AVX-512.
+                Self(unsafe { $max(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn le(self, b: Self) -> $mask {
+                // SAFETY: `self` proves AVX-512.
+                $mask(unsafe { $cmp::<_CMP_LE_OQ>(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn lt(self, b: Self) -> $mask {
+                // SAFETY: `self` proves AVX-512.
+                $mask(unsafe { $cmp::<_CMP_LT_OQ>(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn eq(self, b: Self) -> $mask {
+                // SAFETY: `self` proves AVX-512.
+                $mask(unsafe { $cmp::<_CMP_EQ_OQ>(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                // SAFETY: `self` proves AVX-512.
+                Self(unsafe { $sqrt(self.0) })
+            }
+            #[inline(always)]
+            fn select(mask: $mask, a: Self, b: Self) -> Self {
+                // SAFETY: `a` proves AVX-512.
+                Self(unsafe { $blend(mask.0, b.0, a.0) })
+            }
+            #[inline(always)]
+            fn each<const M: usize, const N: usize>(
+                arguments: [Self; M],
+                mut f: impl FnMut([f32; M]) -> [f32; N],
+            ) -> [Self; N] {
+                const { assert!(M > 0) };
+                let lanes = arguments.map(Self::to_array);
+                let mut values = [arguments[0].to_array(); N];
+                for lane in 0..values[0].len() {
+                    for (value, y) in values.iter_mut().zip(f(lanes.map(|x| x[lane]))) {
+                        value[lane] = y;
+                    }
+                }
+                values.map(|value| arguments[0].replaced(value))
+            }
+        }
+    };
+}
+real!(
+    F32x8,
+    Mask8,
+    _mm256_set1_ps,
+    _mm256_min_ps,
+    _mm256_max_ps,
+    _mm256_cmp_ps_mask,
+    _mm256_sqrt_ps,
+    _mm256_mask_blend_ps
+);
+real!(
+    F32x16,
+    Mask16,
+    _mm512_set1_ps,
+    _mm512_min_ps,
+    _mm512_max_ps,
+    _mm512_cmp_ps_mask,
+    _mm512_sqrt_ps,
+    _mm512_mask_blend_ps
+);
+
+impl F32x8 {
+    #[inline(always)]
+    fn to_array(self) -> Lanes {
+        let mut lanes = [0.0; 8];
+        // SAFETY: `self` proves AVX-512; `lanes` is 8 writable f32, and the store needs no alignment.
+        unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), self.0) };
+        lanes
+    }
+
+    /// Other numbers, beside a vector that proves the instructions.
+    #[inline(always)]
+    fn replaced(self, lanes: Lanes) -> Self {
+        // SAFETY: `self` proves AVX-512; `lanes` is 8 readable f32, and the load needs no alignment.
+        Self(unsafe { _mm256_loadu_ps(lanes.as_ptr()) })
+    }
+}
+
+impl F32x16 {
+    #[inline(always)]
+    fn to_array(self) -> [f32; 16] {
+        let mut lanes = [0.0; 16];
+        // SAFETY: `self` proves AVX-512; `lanes` is 16 writable f32, and the store needs no alignment.
+        unsafe { _mm512_storeu_ps(lanes.as_mut_ptr(), self.0) };
+        lanes
+    }
+
+    /// Other numbers, beside a vector that proves the instructions.
+    #[inline(always)]
+    fn replaced(self, lanes: [f32; 16]) -> Self {
+        // SAFETY: `self` proves AVX-512; `lanes` is 16 readable f32, and the load needs no alignment.
+        Self(unsafe { _mm512_loadu_ps(lanes.as_ptr()) })
+    }
+}
+
+impl Wide for F32x16 {
+    type Half = F32x8;
+
+    #[inline(always)]
+    fn store(self) -> [Lanes; 2] {
+        let mut lanes = [[0.0; 8]; 2];
+        // SAFETY: `self` proves AVX-512; `lanes` is 16 writable f32, and the store needs no alignment.
+        unsafe { _mm512_storeu_ps(lanes.as_mut_ptr().cast(), self.0) };
+        lanes
+    }
+    #[inline(always)]
+    fn folded(self) -> F32x8 {
+        // SAFETY: `self` proves AVX-512.
+        F32x8(unsafe {
+            let high = _mm512_extractf64x4_pd::<1>(_mm512_castps_pd(self.0));
+            _mm256_add_ps(_mm512_castps512_ps256(self.0), _mm256_castpd_ps(high))
+        })
     }
 }
 
@@ -226,10 +343,7 @@ impl Floats for F32x8 {
 
     #[inline(always)]
     fn store(self) -> Lanes {
-        let mut lanes = [0.0; 8];
-        // SAFETY: `self` proves AVX-512; `lanes` is 8 writable f32, and the store needs no alignment.
-        unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), self.0) };
-        lanes
+        self.to_array()
     }
     #[inline(always)]
     fn truncated(self) -> I32x8 {
@@ -285,13 +399,6 @@ impl Ints for I32x8 {
         // SAFETY: `self` proves AVX-512; `lanes` is 32 writable bytes, the store needs no alignment.
         unsafe { _mm256_storeu_si256(lanes.as_mut_ptr().cast(), self.0) };
         lanes
-    }
-}
-
-impl Mask for Mask8 {
-    #[inline(always)]
-    fn bits(self) -> u32 {
-        u32::from(self.0)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Vectors of eight numbers on each instruction set: the only unsafe code of the library.
+//! Vectors of eight numbers, and of sixteen, on each instruction set: the only unsafe code of the library.
 //!
 //! A [`Kernel`] is written once over the vectors of a [`Simd`], whose operators are one IEEE
 //! operation a lane. Nothing fuses or reorders them, so a kernel gives the same bits on every
@@ -14,6 +14,7 @@ mod avx2;
 mod avx512;
 #[cfg(target_arch = "aarch64")]
 mod neon;
+mod pair;
 mod scalar;
 mod single;
 mod vector;
@@ -37,7 +38,7 @@ pub enum InstructionSet {
     Neon,
     /// x86-64 AVX2: eight numbers at a time.
     Avx2,
-    /// x86-64 AVX-512: eight numbers at a time, with masks.
+    /// x86-64 AVX-512: eight or sixteen numbers at a time, with masks.
     Avx512,
 }
 
@@ -109,10 +110,13 @@ pub(crate) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) ->
 pub(crate) trait Simd: Copy {
     type Floats: Floats<Ints = Self::Ints>;
     type Ints: Ints<Floats = Self::Floats>;
+    type Wide: Wide<Half = Self::Floats>;
     type Sets: Sets<Mask = <Self::Floats as Real>::Mask>;
 
     fn splat(self, x: f32) -> Self::Floats;
     fn load(self, x: &Lanes) -> Self::Floats;
+    fn splat_wide(self, x: f32) -> Self::Wide;
+    fn load_wide(self, halves: [&Lanes; 2]) -> Self::Wide;
     /// Asks for memory that will be read soon.
     fn prefetch<T>(self, x: &T);
     fn splat_int(self, x: i32) -> Self::Ints;
@@ -179,6 +183,22 @@ pub trait Floats: Real {
     #[inline(always)]
     fn sum(self) -> f32 {
         self.store().iter().sum()
+    }
+}
+
+/// Sixteen f32.
+pub(crate) trait Wide: Real {
+    type Half: Floats;
+
+    /// The first eight, and the others.
+    fn store(self) -> [Lanes; 2];
+    /// The first eight plus the others.
+    fn folded(self) -> Self::Half;
+
+    /// The sum of all lanes, of the halves' sum from the first to the last.
+    #[inline(always)]
+    fn sum(self) -> f32 {
+        self.folded().sum()
     }
 }
 

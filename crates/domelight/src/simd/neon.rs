@@ -6,6 +6,7 @@ use std::arch::aarch64::*;
 use std::arch::{asm, is_aarch64_feature_detected};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
+use super::pair::Pair;
 use super::{Floats, Ints, Kernel, LANES, Lanes, Mask, Real, Sets, Simd, last_of};
 
 /// Exists only where the processor has NEON.
@@ -48,6 +49,7 @@ impl Neon {
 impl Simd for Neon {
     type Floats = F32x8;
     type Ints = I32x8;
+    type Wide = Pair<F32x8>;
     type Sets = Sets8;
 
     #[inline(always)]
@@ -60,6 +62,14 @@ impl Simd for Neon {
     fn load(self, x: &Lanes) -> F32x8 {
         // SAFETY: `self` proves NEON; `x` is 8 readable f32, and the loads need no alignment.
         unsafe { F32x8(vld1q_f32(x.as_ptr()), vld1q_f32(x.as_ptr().add(4))) }
+    }
+    #[inline(always)]
+    fn splat_wide(self, x: f32) -> Pair<F32x8> {
+        Pair(self.splat(x), self.splat(x))
+    }
+    #[inline(always)]
+    fn load_wide(self, [low, high]: [&Lanes; 2]) -> Pair<F32x8> {
+        Pair(self.load(low), self.load(high))
     }
     #[inline(always)]
     fn prefetch<T>(self, x: &T) {

@@ -3,6 +3,7 @@
 use std::array::from_fn;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
+use super::pair::Pair;
 use super::{Floats, Ints, LANES, Lanes, Mask, Real, Sets, Simd, last_of};
 
 #[derive(Clone, Copy)]
@@ -23,6 +24,7 @@ pub(crate) struct Sets8([u32; 8]);
 impl Simd for Scalar {
     type Floats = F32x8;
     type Ints = I32x8;
+    type Wide = Pair<F32x8>;
     type Sets = Sets8;
 
     #[inline(always)]
@@ -32,6 +34,14 @@ impl Simd for Scalar {
     #[inline(always)]
     fn load(self, x: &Lanes) -> F32x8 {
         F32x8(*x)
+    }
+    #[inline(always)]
+    fn splat_wide(self, x: f32) -> Pair<F32x8> {
+        Pair(self.splat(x), self.splat(x))
+    }
+    #[inline(always)]
+    fn load_wide(self, [low, high]: [&Lanes; 2]) -> Pair<F32x8> {
+        Pair(self.load(low), self.load(high))
     }
     #[inline(always)]
     fn prefetch<T>(self, _: &T) {}

@@ -57,12 +57,6 @@ impl<F: Floats> Vectors<F> {
     pub(crate) fn store(self) -> [Lanes; 3] {
         [self.x.store(), self.y.store(), self.z.store()]
     }
-
-    /// The sum of all.
-    #[inline(always)]
-    pub(crate) fn sum(self) -> Vec3 {
-        Vec3::new(self.x.sum(), self.y.sum(), self.z.sum())
-    }
 }
 
 impl From<Vec3> for Vectors<f32> {

@@ -19,12 +19,13 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::f64::consts::{PI, TAU};
+use std::ops::{Deref, DerefMut};
 
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::Vec3;
 use crate::sampling::hilbert::Turn;
-use crate::simd::{LANES, Lanes};
+use crate::simd::{LANES, Lanes, Simd, Wide};
 
 /// Cells of each lane: an eighth of the curve.
 pub(super) const ROWS: usize = 48;
@@ -37,7 +38,41 @@ pub(super) const TABLE_ROWS: usize = ROWS.next_power_of_two();
 pub(super) const SLOTS: usize = TABLE_ROWS * LANES;
 
 /// One number a cell, at [`slot`], by row.
-pub(super) type Slots = [Lanes; TABLE_ROWS];
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
+pub(super) struct Slots([Lanes; TABLE_ROWS]);
+
+/// Rows are taken in pairs where all lanes are alike.
+pub(super) const PAIRS: usize = ROWS / 2;
+
+impl Slots {
+    /// A pair of rows.
+    #[inline(always)]
+    pub(super) fn pair<S: Simd>(&self, simd: S, pair: usize) -> S::Wide {
+        simd.load_wide([&self.0[2 * pair], &self.0[2 * pair + 1]])
+    }
+
+    #[inline(always)]
+    pub(super) fn set_pair(&mut self, pair: usize, numbers: impl Wide) {
+        [self.0[2 * pair], self.0[2 * pair + 1]] = numbers.store();
+    }
+}
+
+impl Deref for Slots {
+    type Target = [Lanes; TABLE_ROWS];
+
+    #[inline(always)]
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl DerefMut for Slots {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
+    }
+}
 
 /// Where a cell's number is, row by row: lane l has the l-th eighth of the curve, row by row, so that one running
 /// sum a lane and one over the lanes make the sum along the curve.
@@ -51,7 +86,7 @@ pub(super) fn cell_in(slot: usize) -> usize {
 }
 
 /// Zero for each cell.
-pub(super) const NO_SLOTS: Slots = [[0.0; LANES]; TABLE_ROWS];
+pub(super) const NO_SLOTS: Slots = Slots([[0.0; LANES]; TABLE_ROWS]);
 
 /// The number in a slot.
 #[inline(always)]

@@ -20,12 +20,12 @@
 //! map, not over the pool. So h is also weighed as the balance heuristic weighs strata in the middle of
 //! the cell.
 
-use super::cells::{Cells, NO_SLOTS, ROWS, Slots};
+use super::cells::{Cells, NO_SLOTS, PAIRS, Slots};
 use super::hits::Group;
 use super::pool::Pool;
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3};
-use crate::simd::{Colors, Floats, Simd, Vectors};
+use crate::simd::{Colors, Floats, Simd, Vectors, Wide};
 
 /// h of a pixel.
 #[derive(Clone, Debug)]
@@ -70,20 +70,20 @@ impl Control {
         self.tint = (luminance > 0.0).then(|| color / luminance);
     }
 
-    /// Adds w + `slope`·(ω − centre) of a glossy lobe in a row of cells; sets it if it is the first.
+    /// Adds w + `slope`·(ω − centre) of a glossy lobe in a pair of rows of cells; sets it if it is the first.
     #[inline(always)]
     pub(super) fn add_gloss<S: Simd>(
         &mut self,
         simd: S,
-        row: usize,
-        [center, slope]: [Vectors<S::Floats>; 2],
-        weight: S::Floats,
+        pair: usize,
+        [center, slope]: [Vectors<S::Wide>; 2],
+        weight: S::Wide,
         first: bool,
     ) {
         let a = weight - (center.x * slope.x + center.y * slope.y + center.z * slope.z);
         for (sum, x) in self.gloss.iter_mut().zip([a, slope.x, slope.y, slope.z]) {
-            let before = if first { simd.splat(0.0) } else { simd.load(&sum[row]) };
-            sum[row] = (before + x).store();
+            let before = if first { simd.splat_wide(0.0) } else { sum.pair(simd, pair) };
+            sum.set_pair(pair, before + x);
         }
     }
 
@@ -94,11 +94,11 @@ impl Control {
         if self.tint.is_none() || share == 0.0 {
             return;
         }
-        let one = simd.splat(1.0);
-        for row in 0..ROWS {
-            let weight = one / (one + simd.splat(share) * simd.load(&cells.dimness[row]));
+        let (one, share) = (simd.splat_wide(1.0), simd.splat_wide(share));
+        for pair in 0..PAIRS {
+            let weight = one / (one + share * cells.dimness.pair(simd, pair));
             for sum in &mut self.gloss {
-                sum[row] = (simd.load(&sum[row]) * weight).store();
+                sum.set_pair(pair, sum.pair(simd, pair) * weight);
             }
         }
     }
@@ -106,36 +106,37 @@ impl Control {
     /// Its integral over all cells, each seen through `visible`.
     #[inline(always)]
     pub(super) fn integral<S: Simd>(&self, simd: S, pool: &Pool, visible: &Slots) -> Integral {
-        let zero = simd.splat(0.0);
+        let zero = simd.splat_wide(0.0);
         let (mut diffuse, mut gloss) = ([[zero; 3]; 3], [zero; 3]);
-        for row in 0..ROWS {
-            let seen = simd.load(&visible[row]);
-            let above = seen * simd.load(&self.above[row]);
+        for pair in 0..PAIRS {
+            let seen = visible.pair(simd, pair);
+            let above = seen * self.above.pair(simd, pair);
             for (sums, [_, vector @ ..]) in diffuse.iter_mut().zip(pool.moments.iter()) {
                 for (sum, moment) in sums.iter_mut().zip(vector) {
-                    *sum = *sum + above * simd.load(&moment[row]);
+                    *sum = *sum + above * moment.pair(simd, pair);
                 }
             }
             if self.tint.is_some() {
-                let a = simd.load(&self.gloss[0][row]) * seen;
-                let x = simd.load(&self.gloss[1][row]) * seen;
-                let y = simd.load(&self.gloss[2][row]) * seen;
-                let z = simd.load(&self.gloss[3][row]) * seen;
+                let a = self.gloss[0].pair(simd, pair) * seen;
+                let x = self.gloss[1].pair(simd, pair) * seen;
+                let y = self.gloss[2].pair(simd, pair) * seen;
+                let z = self.gloss[3].pair(simd, pair) * seen;
                 for (sum, [m, mx, my, mz]) in gloss.iter_mut().zip(pool.moments.iter()) {
-                    let constant = a * simd.load(&m[row]);
+                    let constant = a * m.pair(simd, pair);
                     let linear =
-                        x * simd.load(&mx[row]) + y * simd.load(&my[row]) + z * simd.load(&mz[row]);
+                        x * mx.pair(simd, pair) + y * my.pair(simd, pair) + z * mz.pair(simd, pair);
                     *sum = *sum + (constant + linear);
                 }
             }
         }
         let [[rx, ry, rz], [gx, gy, gz], [bx, by, bz]] = diffuse;
         let diffuse = [
-            Vectors { x: rx, y: ry, z: rz }.sum(),
-            Vectors { x: gx, y: gy, z: gz }.sum(),
-            Vectors { x: bx, y: by, z: bz }.sum(),
+            Vec3::new(rx.sum(), ry.sum(), rz.sum()),
+            Vec3::new(gx.sum(), gy.sum(), gz.sum()),
+            Vec3::new(bx.sum(), by.sum(), bz.sum()),
         ];
-        let gloss = Colors(gloss).sum() * self.tint.unwrap_or(Rgb::BLACK);
+        let [r, g, b] = gloss;
+        let gloss = Rgb::new(r.sum(), g.sum(), b.sum()) * self.tint.unwrap_or(Rgb::BLACK);
         Integral { diffuse, gloss }
     }
 

@@ -52,12 +52,17 @@ use cells::{Cells, Slots, at};
 use choose::{Choice, probabilities, probability, weight};
 use control::Control;
 use hits::Groups;
+use pool::SHORT_PASS;
 use table::Table;
 use visibility::{Blocks, Learned, Visibility};
 
 /// Camera samples of a pass: strata that one random offset spreads over all of them are worth more
 /// than the same number in two sets.
 const SAMPLES_PER_PASS: u32 = 64;
+
+/// A pilot of a short pass has as many times the candidates of other pixels: it has no control variate, and it
+/// teaches.
+const PILOT: usize = 2;
 
 /// Candidates of a pixel in a pass, for the sake of memory.
 const MAX_CANDIDATES: u32 = 1 << 14;
@@ -89,8 +94,8 @@ pub struct ProductSampling<'a> {
 }
 
 impl<'a> ProductSampling<'a> {
-    /// With at most `n_rays` ≥ 1 shadow rays for each camera sample that hits. It is the number of
-    /// candidates: those that cannot change the pixel visibly are not traced.
+    /// With at most `n_rays` ≥ 1 shadow rays for each camera sample that hits, in pilots (one pixel of 16) twice as
+    /// many. It is the number of candidates: those that cannot change the pixel visibly are not traced.
     pub fn new(environment: &'a Environment, n_rays: u32) -> Self {
         let mean = environment.power() / (4.0 * std::f64::consts::PI);
         Self {
@@ -111,8 +116,9 @@ impl<'a> ProductSampling<'a> {
     }
 
     /// How many candidates the hits of a pixel have together.
-    fn counts(&self, groups: &Groups, n_hits: usize) -> Counts {
-        let all = self.n_rays as usize * n_hits;
+    fn counts(&self, groups: &Groups, n_hits: usize, pilot: bool) -> Counts {
+        let times = if pilot && n_hits <= SHORT_PASS as usize { PILOT } else { 1 };
+        let all = self.n_rays as usize * n_hits * times;
         let brdf = match groups.narrowest() {
             Some(width) if width < NARROW => all.div_ceil(BRDF_SHARE[1]),
             Some(width) if !groups.is_plain(width) => all.div_ceil(BRDF_SHARE[0]),
@@ -261,7 +267,7 @@ impl Asking<'_, '_> {
         let hits = Hits { points, one_material: pixel.one_material };
         groups.gather(hits);
         let is_glossy = groups.narrowest().is_some();
-        let counts = strategy.counts(groups, points.len());
+        let counts = strategy.counts(groups, points.len(), self.pilots);
         if self.pilots {
             table.fill::<S, false>(simd, self.cells, &groups.all, control);
         } else {

@@ -15,7 +15,7 @@ use crate::simd::{Colors, Floats, Ints, LANES, Lanes, Simd, Vectors};
 pub(super) const PER_CELL: usize = 32;
 
 /// Camera samples up to which a pass is short: its pixels' own errors hide the pool's.
-const SHORT_PASS: u32 = 8;
+pub(super) const SHORT_PASS: u32 = 8;
 
 /// A direction toward the light: half a line of the cache. x, y and z of the unit direction in the
 /// world; red, green and blue of the radiance from there; its density within its cell \[sr⁻¹\];

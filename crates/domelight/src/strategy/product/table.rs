@@ -15,7 +15,7 @@
 //! offset: stratum k falls at u = (k + ξ)/M.
 
 use super::candidates::{Deal, Strata};
-use super::cells::{Cells, NO_SLOTS, ROWS, Slots, TABLE_ROWS, at};
+use super::cells::{Cells, NO_SLOTS, PAIRS, ROWS, Slots, TABLE_ROWS, at};
 use super::control::Control;
 use super::hits::Group;
 use crate::bsdf::Gloss;
@@ -94,11 +94,12 @@ impl Table {
     ) {
         /// Of the light of a cell across the horizon, the variance that its control variate leaves.
         const ACROSS: f32 = 0.1;
-        for row in 0..ROWS {
-            let across = simd.splat(1.0) - simd.load(&above[row]);
-            let light = simd.load(&visible[row]).squared() * across * simd.splat(ACROSS);
-            let chance = (simd.load(&doubt[row]).squared() + light).sqrt();
-            self.weight[row] = (simd.load(&self.weight[row]) * chance).store();
+        let one = |x| simd.splat_wide(x);
+        for pair in 0..PAIRS {
+            let across = one(1.0) - above.pair(simd, pair);
+            let light = visible.pair(simd, pair).squared() * across * one(ACROSS);
+            let chance = (doubt.pair(simd, pair).squared() + light).sqrt();
+            self.weight.set_pair(pair, self.weight.pair(simd, pair) * chance);
         }
     }
 
@@ -112,26 +113,26 @@ impl Table {
         control: &mut Control,
         others: bool,
     ) {
+        let one = |x| simd.splat_wide(x);
         let diffuse = FRAC_1_PI * group.share * group.outline.diffuse.luminance();
-        let diffuse = simd.splat(diffuse);
-        let (zero, least) = (simd.splat(0.0), simd.splat(LEAST_COSINE));
-        let spread = simd.splat(group.spread);
+        let diffuse = one(diffuse);
+        let (zero, least) = (one(0.0), one(LEAST_COSINE));
+        let spread = one(group.spread);
         let ramps = cells.ramp(group.spread);
-        let before = simd.splat(if others { 1.0 } else { 0.0 });
-        for row in 0..ROWS {
-            let x = center(simd, cells, row).dot(group.frame.z);
-            let s = simd.load(&ramps.s[row]);
-            let ramp = (x + s).max(zero).squared() * simd.load(&ramps.scale[row]);
+        let before = one(if others { 1.0 } else { 0.0 });
+        for pair in 0..PAIRS {
+            let x = center(simd, cells, pair).dot(group.frame.z);
+            let s = ramps.s.pair(simd, pair);
+            let ramp = (x + s).max(zero).squared() * ramps.scale.pair(simd, pair);
             let cosine = Real::select(s.lt(x), x, ramp);
-            let reached = zero.lt(x + simd.load(&cells.reach[row]) + spread);
+            let reached = zero.lt(x + cells.reach.pair(simd, pair) + spread);
             let cosine = Real::select(reached, cosine.max(least), zero);
-            self.cosine[row] = cosine.store();
-            let weight = before * simd.load(&self.weight[row]) + diffuse * cosine;
-            self.weight[row] = weight.store();
+            self.cosine.set_pair(pair, cosine);
+            let weight = before * self.weight.pair(simd, pair) + diffuse * cosine;
+            self.weight.set_pair(pair, weight);
             if CONTROL {
-                let by_others =
-                    if others { simd.load(&control.above[row]) } else { simd.splat(1.0) };
-                control.above[row] = S::Floats::select(s.lt(x), by_others, zero).store();
+                let by_others = if others { control.above.pair(simd, pair) } else { one(1.0) };
+                control.above.set_pair(pair, Real::select(s.lt(x), by_others, zero));
             }
         }
     }
@@ -146,7 +147,7 @@ impl Table {
         alpha: [f32; 2],
         control: &mut Control,
     ) {
-        let one = |x| simd.splat(x);
+        let one = |x| simd.splat_wide(x);
         let frame = &group.frame;
         let wo = group.wo;
         let half = Vectors::splat(one(0.0), frame.to_world(wo));
@@ -155,20 +156,20 @@ impl Table {
         let spread2 = one(sqr(group.spread));
         let scale = one(0.25 * FRAC_1_PI * share) / sigma(one(wo.z), rough2);
         let tail = one(if GAUSSIAN { 1.0 / 3.0 } else { 1.0 });
-        for row in 0..ROWS {
-            let center = center(simd, cells, row);
+        for pair in 0..PAIRS {
+            let center = center(simd, cells, pair);
             let h = center.plus(half);
             let (hx, hy, hz) = (h.dot(frame.x), h.dot(frame.y), h.dot(frame.z).max(one(1e-3)));
             let hz2 = hz.squared();
             let h2 = hx.squared() + hy.squared() + hz2;
-            let radius2 = simd.load(&cells.radius[row]).squared();
+            let radius2 = cells.radius.pair(simd, pair).squared();
             let wide2 = one(0.25) * radius2 + spread2;
             let (ax2, ay2) = (ax2 + wide2, ay2 + wide2);
             let inverse = one(1.0) / (ax2 * ay2);
             let (x, y) = (hx * ay2 * inverse, hy * ax2 * inverse);
             // h_z² (1 + t) or h_z² (1 + t/3)
             let spread = hz2 + tail * (hx * x + hy * y);
-            let cosine = simd.load(&self.cosine[row]);
+            let cosine = self.cosine.pair(simd, pair);
             let sigma = sigma(cosine, rough2);
             let both = one(1.0) / (spread * sigma);
             let narrow = sigma * both;
@@ -178,7 +179,7 @@ impl Table {
                 shape = shape * (hz2 * narrow).squared();
             }
             let weight = scale * shape * inverse.sqrt() * cosine * (spread * both);
-            self.weight[row] = (simd.load(&self.weight[row]) + weight).store();
+            self.weight.set_pair(pair, self.weight.pair(simd, pair) + weight);
             if CONTROL {
                 // ∇ ln of the shape, over 4: along h, and along the axes of the frame; less where h turns much
                 // within the cell.
@@ -192,7 +193,7 @@ impl Table {
                 let across = [out * x, out * y, up];
                 let slope = h.times(along).plus(frame_vector(frame, across).times(steady));
                 let slope = slope.times(weight * one(4.0));
-                control.add_gloss(simd, row, [center, slope], weight, first);
+                control.add_gloss(simd, pair, [center, slope], weight, first);
             }
         }
     }
@@ -207,23 +208,23 @@ impl Table {
         exponent: f32,
         control: &mut Control,
     ) {
-        let one = |x| simd.splat(x);
+        let one = |x| simd.splat_wide(x);
         let wo = group.wo;
         let mirror = group.frame.to_world(Vec3::new(-wo.x, -wo.y, wo.z));
         let narrow = one(1.0 / (exponent + 1.0) + 4.0 * sqr(group.spread));
         let scale = one(0.5 * FRAC_1_PI * share);
-        for row in 0..ROWS {
-            let center = center(simd, cells, row);
+        for pair in 0..PAIRS {
+            let center = center(simd, cells, pair);
             let versine = (one(1.0) - center.dot(mirror)).max(one(0.0));
-            let sigma2 = narrow + simd.load(&cells.radius[row]).squared();
+            let sigma2 = narrow + cells.radius.pair(simd, pair).squared();
             let wide = one(3.0) * sigma2;
             let tail = one(1.0) + versine / wide;
-            let weight = scale * simd.load(&self.cosine[row]) / (tail.squared().squared() * sigma2);
-            self.weight[row] = (simd.load(&self.weight[row]) + weight).store();
+            let weight = scale * self.cosine.pair(simd, pair) / (tail.squared().squared() * sigma2);
+            self.weight.set_pair(pair, self.weight.pair(simd, pair) + weight);
             if CONTROL {
                 let slope = weight * one(4.0) / (wide * tail);
                 let slope = Vectors::splat(slope, mirror).times(slope);
-                control.add_gloss(simd, row, [center, slope], weight, first);
+                control.add_gloss(simd, pair, [center, slope], weight, first);
             }
         }
     }
@@ -365,7 +366,7 @@ struct LobeOf<'a> {
 
 /// Vectors given in a frame.
 #[inline(always)]
-fn frame_vector<F: Floats>(frame: &Frame, [x, y, z]: [F; 3]) -> Vectors<F> {
+fn frame_vector<F: Real>(frame: &Frame, [x, y, z]: [F; 3]) -> Vectors<F> {
     let [x, y, z] = [
         Vectors::splat(x, frame.x).times(x),
         Vectors::splat(y, frame.y).times(y),
@@ -374,11 +375,11 @@ fn frame_vector<F: Floats>(frame: &Frame, [x, y, z]: [F; 3]) -> Vectors<F> {
     x.plus(y).plus(z)
 }
 
-/// The centres of a row of cells.
+/// The centres of a pair of rows of cells.
 #[inline(always)]
-fn center<S: Simd>(simd: S, cells: &Cells, row: usize) -> Vectors<S::Floats> {
+fn center<S: Simd>(simd: S, cells: &Cells, pair: usize) -> Vectors<S::Wide> {
     let [x, y, z] = &cells.center;
-    Vectors { x: simd.load(&x[row]), y: simd.load(&y[row]), z: simd.load(&z[row]) }
+    Vectors { x: x.pair(simd, pair), y: y.pair(simd, pair), z: z.pair(simd, pair) }
 }
 
 #[cfg(test)]
