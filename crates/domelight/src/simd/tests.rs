@@ -51,6 +51,42 @@ impl Kernel for All {
     }
 }
 
+/// The same of sixteen numbers.
+struct Sixteen {
+    a: [Lanes; 2],
+    b: [Lanes; 2],
+}
+
+impl Kernel for Sixteen {
+    type Output = Vec<[[u32; LANES]; 2]>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let (a, b) = (simd.load_wide(self.a.each_ref()), simd.load_wide(self.b.each_ref()));
+        let masks = [a.le(b), a.lt(b), a.eq(b), a.le(b) & b.le(a), a.lt(b) | b.lt(a)];
+        let [each] = Real::each([a, b], |[a, b]| [a.atan2(b)]);
+        let floats = [
+            a + b,
+            a - b,
+            a * b,
+            a / b,
+            a.min(b),
+            a.max(b),
+            a.sqrt(),
+            a.splat(3.0),
+            each,
+            Real::select(a.lt(b), a, b),
+            simd.splat_wide(self.a[1][3]),
+        ];
+        let bits = |x: f32| if x.is_nan() { u32::MAX } else { x.to_bits() };
+        let mut all: Vec<_> =
+            floats.into_iter().map(|x| x.store().map(|half| half.map(bits))).collect();
+        all.push([std::array::from_fn(|i| masks.get(i).map_or(0, |m| m.bits())); 2]);
+        all.push([a.folded().store().map(bits), [bits(a.sum()); LANES]]);
+        all
+    }
+}
+
 /// The same of whole numbers.
 struct Whole {
     a: [i32; LANES],
@@ -114,6 +150,11 @@ fn every_instruction_set_gives_the_same_bits() {
         let expected = dispatch(InstructionSet::Scalar, All { a, b });
         for set in InstructionSet::ALL {
             assert_eq!(dispatch(set, All { a, b }), expected, "{set:?} {a:?} {b:?}");
+        }
+        let (a, b) = ([a, b], [b, std::array::from_fn(|_| hard())]);
+        let expected = dispatch(InstructionSet::Scalar, Sixteen { a, b });
+        for set in InstructionSet::ALL {
+            assert_eq!(dispatch(set, Sixteen { a, b }), expected, "{set:?} {a:?} {b:?}");
         }
     }
     let mut pcg = Pcg32::new(3, 4);
