@@ -106,7 +106,6 @@ impl<F: Floats> Points<F> {
 
 /// A ray and the triangles of a block, in the plane across the ray's longest axis.
 pub(super) struct Sheared<'a, S: Simd, const N: usize> {
-    block: &'a Block,
     rays: &'a PreparedRays<N>,
     i: usize,
     /// The depths of the corners, in units of the direction along z.
@@ -140,7 +139,7 @@ impl<S: Simd> BlockHits<S> {
 impl<'a, S: Simd, const N: usize> Sheared<'a, S, N> {
     /// Ray `i` modulo `N`.
     #[inline(always)]
-    pub(super) fn new(simd: S, block: &'a Block, rays: &'a PreparedRays<N>, i: usize) -> Self {
+    pub(super) fn new(simd: S, block: &Block, rays: &'a PreparedRays<N>, i: usize) -> Self {
         let i = i % N;
         let zero = simd.splat(0.0);
         let frame = ShearedFrame::new(simd, rays, i);
@@ -162,7 +161,7 @@ impl<'a, S: Simd, const N: usize> Sheared<'a, S, N> {
             (least, greatest) = (u.min(v).min(w), u.max(v).max(w));
         }
         let inside = zero.le(least) | greatest.le(zero);
-        Self { block, rays, i, depths: [a.z, b.z, c.z], weights: [u, v, w], inside }
+        Self { rays, i, depths: [a.z, b.z, c.z], weights: [u, v, w], inside }
     }
 
     /// Whether the ray's line goes through none of the triangles.
@@ -173,13 +172,13 @@ impl<'a, S: Simd, const N: usize> Sheared<'a, S, N> {
 
     /// The triangles hit at 0 < t ≤ `limit`.
     #[inline(always)]
-    pub(super) fn hits(&self, simd: S, limit: f32) -> BlockHits<S> {
+    pub(super) fn hits(&self, simd: S, planes: &Planes<S::Floats>, limit: f32) -> BlockHits<S> {
         // The distance to the plane, but within that of the corners even where the plane is edge-on.
         let scale = simd.splat(self.rays.shears[2][self.i]);
         let [a, b, c] = self.depths;
         let (a, b, c) = (scale * a, scale * b, scale * c);
         let (nearest, farthest) = (a.min(b).min(c), a.max(b).max(c));
-        let plane = plane_distance(simd, self.block, self.rays, self.i);
+        let plane = planes.distance(simd, self.rays, self.i);
         let t = plane.max(nearest).min(farthest);
 
         // A determinant that is zero or NaN is no hit.
@@ -230,23 +229,36 @@ fn edge<F: Floats>(p: Points<F>, q: Points<F>) -> F {
     p.x * q.y - p.y * q.x
 }
 
-/// n · (a − o) / (n · d) with n = (b − a) × (c − a).
-///
-/// More accurate than to interpolate the corners' distances where the triangle is large and near.
-#[inline(always)]
-fn plane_distance<S: Simd, const N: usize>(
-    simd: S,
-    block: &Block,
-    rays: &PreparedRays<N>,
-    i: usize,
-) -> S::Floats {
-    let of_ray = |numbers: &[[f32; N]; 3]| [numbers[0][i], numbers[1][i], numbers[2][i]];
-    let a = Points::load(simd, &block.vertices[0]);
-    let b = Points::load(simd, &block.vertices[1]);
-    let c = Points::load(simd, &block.vertices[2]);
-    let n = b.sub(a).cross(c.sub(a));
-    let to_plane = a.sub(Points::splat(simd, of_ray(&rays.origins)));
-    n.dot(to_plane) / n.dot(Points::splat(simd, of_ray(&rays.directions)))
+/// The planes of a block's triangles.
+pub(super) struct Planes<F> {
+    /// A point of each.
+    a: Points<F>,
+    /// (b − a) × (c − a).
+    normal: Points<F>,
+}
+
+impl<F: Floats> Planes<F> {
+    #[inline(always)]
+    pub(super) fn of<S: Simd<Floats = F>>(simd: S, block: &Block) -> Self {
+        let a = Points::load(simd, &block.vertices[0]);
+        let b = Points::load(simd, &block.vertices[1]);
+        let c = Points::load(simd, &block.vertices[2]);
+        Self { a, normal: b.sub(a).cross(c.sub(a)) }
+    }
+
+    /// n · (a − o) / (n · d).
+    ///
+    /// More accurate than to interpolate the corners' distances where the triangle is large and near.
+    #[inline(always)]
+    fn distance<S, const N: usize>(&self, simd: S, rays: &PreparedRays<N>, i: usize) -> F
+    where
+        S: Simd<Floats = F>,
+    {
+        let of_ray = |numbers: &[[f32; N]; 3]| [numbers[0][i], numbers[1][i], numbers[2][i]];
+        let to_plane = self.a.sub(Points::splat(simd, of_ray(&rays.origins)));
+        let along = self.normal.dot(Points::splat(simd, of_ray(&rays.directions)));
+        self.normal.dot(to_plane) / along
+    }
 }
 
 /// Where an edge function is zero, all three in f64, in which the products of f32 are exact.

@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use super::build::MAX_DEPTH;
-use super::intersect::{Sheared, Slabs};
+use super::intersect::{Planes, Sheared, Slabs};
 use super::prepare::{PreparedRays, octant};
 use super::{Bvh, Child, WIDTH};
 use crate::geometry::{Hit, Ray, RayBatch};
@@ -211,8 +211,9 @@ fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRays<WIDTH>, limit: f32) -
     let mut child = Child::node(0);
     loop {
         if child.is_leaf() {
-            let sheared = Sheared::new(simd, &bvh.blocks[child.index()], ray, 0);
-            if sheared.hits(simd, limit).mask != 0 {
+            let block = &bvh.blocks[child.index()];
+            let sheared = Sheared::new(simd, block, ray, 0);
+            if sheared.hits(simd, &Planes::of(simd, block), limit).mask != 0 {
                 return true;
             }
         } else {
@@ -248,7 +249,7 @@ fn closest_in_block<S: Simd, const N: usize>(
     if sheared.misses() {
         return None;
     }
-    let hits = sheared.hits(simd, limit);
+    let hits = sheared.hits(simd, &Planes::of(simd, block), limit);
     let t = hits.t.store();
     let lane = set_bits(hits.mask)
         .reduce(|a, b| if (t[b], block.ids[b]) < (t[a], block.ids[a]) { b } else { a })?;
@@ -497,10 +498,12 @@ impl Stream for ShadowStream {
         let Some((child, rays)) = self.stack.pop(self.free) else { return false };
         if child.is_leaf() {
             let block = &bvh.blocks[child.index()];
+            let planes = Planes::of(simd, block);
             for i in set_bits(rays) {
                 // Without branches: a shadow ray starts on a triangle, so half of the tests would go
                 // wrong halfway.
-                let mask = Sheared::new(simd, block, &self.rays, i).hits(simd, f32::MAX).mask;
+                let sheared = Sheared::new(simd, block, &self.rays, i);
+                let mask = sheared.hits(simd, &planes, f32::MAX).mask;
                 self.hit |= u32::from(mask != 0) << i;
             }
             self.free &= !self.hit;
