@@ -153,6 +153,7 @@ impl Material {
     /// The same material with its lobes chosen in proportion to their albedos toward `wo`: Fresnel's
     /// reflectance then has the right share at every angle. Worth its cost from a few samples up.
     #[must_use]
+    #[inline]
     pub fn for_view(mut self, wo: Vec3) -> Self {
         if self.n_terms > 1 {
             self.choose_by_albedo(wo.z.clamp(0.0, 1.0));
