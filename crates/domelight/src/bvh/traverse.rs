@@ -21,6 +21,9 @@ const _: () = assert!(MAX_DEPTH as usize * (WIDTH - 1) + WIDTH <= STACK);
 const STREAM: usize = 32;
 /// Streams in flight: while one waits for memory the others go on.
 const INTERLEAVED: usize = 4;
+/// Shadow rays through a tree of so many bytes or fewer, which the caches hold, go in two streams: they wait little,
+/// and leave more of the nearest cache to the tree.
+const CACHED: usize = 1 << 24;
 /// Rays sorted at once: enough to fill the streams of all octants, few enough to stay coherent.
 const WINDOW: usize = 4096;
 
@@ -92,7 +95,19 @@ impl Kernel for Occluded<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let mut streams = [const { ShadowStream::EMPTY }; INTERLEAVED];
+        if self.bvh.bytes() <= CACHED {
+            self.interleaved::<S, 2>(simd);
+        } else {
+            self.interleaved::<S, INTERLEAVED>(simd);
+        }
+    }
+}
+
+impl Occluded<'_> {
+    /// In `N` streams.
+    #[inline(always)]
+    fn interleaved<S: Simd, const N: usize>(self, simd: S) {
+        let mut streams = [const { ShadowStream::EMPTY }; N];
         let mut order = [0; WINDOW];
         for start in (0..self.rays.len()).step_by(WINDOW) {
             let end = self.rays.len().min(start + WINDOW);
@@ -279,10 +294,10 @@ trait Stream {
 
 /// Runs some streams in turns, each again and again, until nothing is left to start with.
 #[inline(always)]
-fn interleave<'a, S: Simd, T: Stream>(
+fn interleave<'a, S: Simd, T: Stream, const N: usize>(
     simd: S,
     bvh: &Bvh,
-    streams: &mut [T; INTERLEAVED],
+    streams: &mut [T; N],
     mut starts: impl Iterator<Item = T::Rays<'a>>,
     answers: &mut [T::Answer],
 ) {

@@ -118,7 +118,6 @@ impl Surface {
 
     /// The material at texture coordinates `uv` under the vertex colour `tint`.
     #[inline]
-    #[inline]
     pub(crate) fn material(&self, textures: &[Texture], uv: Vec2, tint: Rgb) -> Material {
         let look_up =
             |t: &Option<TextureRef>| t.as_ref().map_or(Rgb::WHITE, |t| t.at(textures, uv));
