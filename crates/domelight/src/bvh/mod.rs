@@ -14,7 +14,7 @@
 //!   is a triangle seen so nearly edge-on that its distance has no correct digit.)
 //! - **Many rays**: traced as streams of 32 of one octant, into which shadow rays are sorted (Tsakok
 //!   2009, "Faster Incoherent Rays: Multi-BVH Ray Stream Tracing"; Fuetterling et al. 2015, "Efficient
-//!   Ray Tracing Kernels for Modern CPU Architectures"). Four streams take turns, each asking for the
+//!   Ray Tracing Kernels for Modern CPU Architectures"). Two or four streams take turns, each asking for the
 //!   memory of its next node before the others go on, so that none waits for it.
 //!
 //! Every kernel is written once over vectors of eight numbers and compiled for each instruction set;
