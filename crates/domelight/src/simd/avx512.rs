@@ -201,7 +201,7 @@ mask!(Mask8);
 mask!(Mask16);
 
 macro_rules! real {
-    ($type:ident, $mask:ident, $set1:ident, $min:ident, $max:ident, $cmp:ident, $sqrt:ident, $blend:ident) => {
+    ($type:ident, $mask:ident, $set1:ident, $min:ident, $max:ident, $cmp:ident, $sqrt:ident, $blend:ident, $loadu:ident) => {
         impl Real for $type {
             type Mask = $mask;
 
@@ -258,7 +258,11 @@ macro_rules! real {
                         value[lane] = y;
                     }
                 }
-                values.map(|value| arguments[0].replaced(value))
+                values.map(|value| {
+                    // SAFETY: the arguments prove AVX-512; `value` is as many readable f32 as a vector has, and the load
+                    // needs no alignment.
+                    Self(unsafe { $loadu(value.as_ptr()) })
+                })
             }
         }
     };
@@ -271,7 +275,8 @@ real!(
     _mm256_max_ps,
     _mm256_cmp_ps_mask,
     _mm256_sqrt_ps,
-    _mm256_mask_blend_ps
+    _mm256_mask_blend_ps,
+    _mm256_loadu_ps
 );
 real!(
     F32x16,
@@ -281,7 +286,8 @@ real!(
     _mm512_max_ps,
     _mm512_cmp_ps_mask,
     _mm512_sqrt_ps,
-    _mm512_mask_blend_ps
+    _mm512_mask_blend_ps,
+    _mm512_loadu_ps
 );
 
 impl F32x8 {
@@ -292,13 +298,6 @@ impl F32x8 {
         unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), self.0) };
         lanes
     }
-
-    /// Other numbers, beside a vector that proves the instructions.
-    #[inline(always)]
-    fn replaced(self, lanes: Lanes) -> Self {
-        // SAFETY: `self` proves AVX-512; `lanes` is 8 readable f32, and the load needs no alignment.
-        Self(unsafe { _mm256_loadu_ps(lanes.as_ptr()) })
-    }
 }
 
 impl F32x16 {
@@ -308,13 +307,6 @@ impl F32x16 {
         // SAFETY: `self` proves AVX-512; `lanes` is 16 writable f32, and the store needs no alignment.
         unsafe { _mm512_storeu_ps(lanes.as_mut_ptr(), self.0) };
         lanes
-    }
-
-    /// Other numbers, beside a vector that proves the instructions.
-    #[inline(always)]
-    fn replaced(self, lanes: [f32; 16]) -> Self {
-        // SAFETY: `self` proves AVX-512; `lanes` is 16 readable f32, and the load needs no alignment.
-        Self(unsafe { _mm512_loadu_ps(lanes.as_ptr()) })
     }
 }
 
