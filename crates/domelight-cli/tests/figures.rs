@@ -19,6 +19,14 @@ fn text(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
+/// The page but for embedded files, whose letters may spell anything.
+fn without_data(page: &str) -> String {
+    let is_data = |c: char| c.is_ascii_alphanumeric() || "+/=".contains(c);
+    let mut parts = page.split("base64,");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |text, part| text + part.trim_start_matches(is_data))
+}
+
 #[test]
 fn all_figures_are_written() {
     let folder = TempDir::new().unwrap();
@@ -40,7 +48,7 @@ fn all_figures_are_written() {
     for address in ["http:", "https:", "src=\"//", "url(//", "<script", "<link"] {
         assert!(!fetched.contains(address), "{address} in the page");
     }
-    assert!(!page.contains("NaN") && page.contains("<math"));
+    assert!(!without_data(&page).contains("NaN") && page.contains("<math"));
 
     for (n, columns) in [(4, ["strategy", "relMSE"]), (8, ["method", "RMS relative error"])] {
         let csv = text(&out.join(format!("figure-{n}.csv")));

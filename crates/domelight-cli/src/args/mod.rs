@@ -201,7 +201,8 @@ pub(crate) struct Tone {
     /// Exposure in stops, for what is looked at.
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
     exposure: f32,
-    /// Tone curve, for what is looked at [default: srgb, which cuts off at 1; of previews aces].
+    /// Tone curve, for what is looked at [default: of pictures agx, of a probe's preview aces, of
+    /// differences srgb, which cuts off at 1].
     #[arg(long, value_name = "CURVE", value_parser = tone_curve())]
     tone: Option<ToneCurve>,
 }

@@ -3,6 +3,30 @@
 use super::*;
 use crate::sampling::Pcg32;
 
+#[inline(always)]
+fn masks<F: Real>(a: F, b: F) -> [F::Mask; 5] {
+    [a.le(b), a.lt(b), a.eq(b), a.le(b) & b.le(a), a.lt(b) | b.lt(a)]
+}
+
+#[inline(always)]
+fn operations<F: Real>(a: F, b: F) -> [F; 12] {
+    let [each] = Real::each([a, b], |[a, b]| [a.atan2(b)]);
+    [
+        a + b,
+        a - b,
+        a * b,
+        a / b,
+        a.min(b),
+        a.max(b),
+        a.sqrt(),
+        a.squared(),
+        a.splat(3.0),
+        a.map(|x| 2.0 * x),
+        each,
+        Real::select(a.lt(b), a, b),
+    ]
+}
+
 /// What the operations make of two vectors, as bits; any NaN is the same.
 struct All {
     a: Lanes,
@@ -15,28 +39,13 @@ impl Kernel for All {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let (a, b) = (simd.load(&self.a), simd.load(&self.b));
-        let masks = [a.le(b), a.lt(b), a.eq(b), a.le(b) & b.le(a), a.lt(b) | b.lt(a)];
-        let [each] = Real::each([a, b], |[a, b]| [a.atan2(b)]);
-        let floats = [
-            a + b,
-            a - b,
-            a * b,
-            a / b,
-            a.min(b),
-            a.max(b),
-            a.sqrt(),
-            a.squared(),
-            a.splat(3.0),
-            a.map(|x| 2.0 * x),
-            each,
-            Real::select(a.lt(b), a, b),
-            simd.splat(self.a[3]),
-        ];
+        let (masks, floats) = (masks(a, b), operations(a, b));
+        let floats = floats.into_iter().chain([simd.splat(self.a[3])]);
         let rows: [Lanes; LANES] = std::array::from_fn(|i| self.a.map(|x| x * i as f32));
         let columns = simd.transposed(rows.each_ref());
         let bits = |x: f32| if x.is_nan() { u32::MAX } else { x.to_bits() };
         let mut all: Vec<[u32; LANES]> =
-            floats.into_iter().chain(columns).map(|x| x.store().map(bits)).collect();
+            floats.chain(columns).map(|x| x.store().map(bits)).collect();
         all.push(std::array::from_fn(|i| masks.get(i).map_or(0, |m| m.bits())));
         all.push(std::array::from_fn(|_| bits(a.sum())));
         let mut sets = simd.empty();
@@ -63,24 +72,10 @@ impl Kernel for Sixteen {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let (a, b) = (simd.load_wide(self.a.each_ref()), simd.load_wide(self.b.each_ref()));
-        let masks = [a.le(b), a.lt(b), a.eq(b), a.le(b) & b.le(a), a.lt(b) | b.lt(a)];
-        let [each] = Real::each([a, b], |[a, b]| [a.atan2(b)]);
-        let floats = [
-            a + b,
-            a - b,
-            a * b,
-            a / b,
-            a.min(b),
-            a.max(b),
-            a.sqrt(),
-            a.splat(3.0),
-            each,
-            Real::select(a.lt(b), a, b),
-            simd.splat_wide(self.a[1][3]),
-        ];
+        let (masks, floats) = (masks(a, b), operations(a, b));
+        let floats = floats.into_iter().chain([simd.splat_wide(self.a[1][3])]);
         let bits = |x: f32| if x.is_nan() { u32::MAX } else { x.to_bits() };
-        let mut all: Vec<_> =
-            floats.into_iter().map(|x| x.store().map(|half| half.map(bits))).collect();
+        let mut all: Vec<_> = floats.map(|x| x.store().map(|half| half.map(bits))).collect();
         all.push([std::array::from_fn(|i| masks.get(i).map_or(0, |m| m.bits())); 2]);
         all.push([a.folded().store().map(bits), [bits(a.sum()); LANES]]);
         all
