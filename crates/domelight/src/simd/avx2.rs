@@ -67,14 +67,6 @@ impl Simd for Avx2 {
         F32x8(unsafe { _mm256_loadu_ps(x.as_ptr()) })
     }
     #[inline(always)]
-    fn splat_wide(self, x: f32) -> Pair<F32x8> {
-        Pair(self.splat(x), self.splat(x))
-    }
-    #[inline(always)]
-    fn load_wide(self, [low, high]: [&Lanes; 2]) -> Pair<F32x8> {
-        Pair(self.load(low), self.load(high))
-    }
-    #[inline(always)]
     fn prefetch<T>(self, x: &T) {
         let start = std::ptr::from_ref(x).cast::<i8>();
         for offset in (0..size_of::<T>()).step_by(64) {

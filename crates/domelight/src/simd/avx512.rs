@@ -76,20 +76,6 @@ impl Simd for Avx512 {
         F32x8(unsafe { _mm256_loadu_ps(x.as_ptr()) })
     }
     #[inline(always)]
-    fn splat_wide(self, x: f32) -> F32x16 {
-        // SAFETY: `self` proves AVX-512.
-        F32x16(unsafe { _mm512_set1_ps(x) })
-    }
-    #[inline(always)]
-    fn load_wide(self, [low, high]: [&Lanes; 2]) -> F32x16 {
-        // SAFETY: `self` proves AVX-512; `low` and `high` are 8 readable f32, and the loads need no alignment.
-        F32x16(unsafe {
-            let low = _mm256_castps_pd(_mm256_loadu_ps(low.as_ptr()));
-            let high = _mm256_castps_pd(_mm256_loadu_ps(high.as_ptr()));
-            _mm512_castpd_ps(_mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low), high))
-        })
-    }
-    #[inline(always)]
     fn prefetch<T>(self, x: &T) {
         let start = std::ptr::from_ref(x).cast::<i8>();
         for offset in (0..size_of::<T>()).step_by(64) {
@@ -313,6 +299,14 @@ impl F32x16 {
 impl Wide for F32x16 {
     type Half = F32x8;
 
+    #[inline(always)]
+    fn of([low, high]: [F32x8; 2]) -> Self {
+        // SAFETY: `low` proves AVX-512.
+        Self(unsafe {
+            let low = _mm512_castpd256_pd512(_mm256_castps_pd(low.0));
+            _mm512_castpd_ps(_mm512_insertf64x4::<1>(low, _mm256_castps_pd(high.0)))
+        })
+    }
     #[inline(always)]
     fn store(self) -> [Lanes; 2] {
         let mut lanes = [[0.0; 8]; 2];

@@ -115,8 +115,6 @@ pub(crate) trait Simd: Copy {
 
     fn splat(self, x: f32) -> Self::Floats;
     fn load(self, x: &Lanes) -> Self::Floats;
-    fn splat_wide(self, x: f32) -> Self::Wide;
-    fn load_wide(self, halves: [&Lanes; 2]) -> Self::Wide;
     /// Asks for memory that will be read soon.
     fn prefetch<T>(self, x: &T);
     fn splat_int(self, x: i32) -> Self::Ints;
@@ -127,6 +125,16 @@ pub(crate) trait Simd: Copy {
     fn empty(self) -> Self::Sets;
     /// Component j of eight rows, for each j.
     fn transposed(self, rows: [&Lanes; LANES]) -> [Self::Floats; LANES];
+
+    /// `x` in all sixteen lanes.
+    #[inline(always)]
+    fn splat_wide(self, x: f32) -> Self::Wide {
+        Wide::of([self.splat(x), self.splat(x)])
+    }
+    #[inline(always)]
+    fn load_wide(self, [first, others]: [&Lanes; 2]) -> Self::Wide {
+        Wide::of([self.load(first), self.load(others)])
+    }
 }
 
 /// A number, or some side by side: what a formula is written for once.
@@ -190,6 +198,8 @@ pub trait Floats: Real {
 pub(crate) trait Wide: Real {
     type Half: Floats;
 
+    /// The first eight, and the others.
+    fn of(halves: [Self::Half; 2]) -> Self;
     /// The first eight, and the others.
     fn store(self) -> [Lanes; 2];
     /// The first eight plus the others.

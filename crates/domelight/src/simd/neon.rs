@@ -64,14 +64,6 @@ impl Simd for Neon {
         unsafe { F32x8(vld1q_f32(x.as_ptr()), vld1q_f32(x.as_ptr().add(4))) }
     }
     #[inline(always)]
-    fn splat_wide(self, x: f32) -> Pair<F32x8> {
-        Pair(self.splat(x), self.splat(x))
-    }
-    #[inline(always)]
-    fn load_wide(self, [low, high]: [&Lanes; 2]) -> Pair<F32x8> {
-        Pair(self.load(low), self.load(high))
-    }
-    #[inline(always)]
     fn prefetch<T>(self, x: &T) {
         let start = std::ptr::from_ref(x).cast::<u8>();
         for offset in (0..size_of::<T>()).step_by(64) {

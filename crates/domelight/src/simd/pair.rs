@@ -6,7 +6,7 @@ use super::{Floats, Lanes, Mask, Real, Wide};
 
 /// The first eight, and the others.
 #[derive(Clone, Copy)]
-pub(crate) struct Pair<T>(pub(super) T, pub(super) T);
+pub(crate) struct Pair<T>(T, T);
 
 macro_rules! operator {
     ($trait:ident, $method:ident) => {
@@ -83,6 +83,10 @@ impl<M: Mask> Mask for Pair<M> {
 impl<F: Floats> Wide for Pair<F> {
     type Half = F;
 
+    #[inline(always)]
+    fn of([first, others]: [F; 2]) -> Self {
+        Self(first, others)
+    }
     #[inline(always)]
     fn store(self) -> [Lanes; 2] {
         [self.0.store(), self.1.store()]

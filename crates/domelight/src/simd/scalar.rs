@@ -36,14 +36,6 @@ impl Simd for Scalar {
         F32x8(*x)
     }
     #[inline(always)]
-    fn splat_wide(self, x: f32) -> Pair<F32x8> {
-        Pair(self.splat(x), self.splat(x))
-    }
-    #[inline(always)]
-    fn load_wide(self, [low, high]: [&Lanes; 2]) -> Pair<F32x8> {
-        Pair(self.load(low), self.load(high))
-    }
-    #[inline(always)]
     fn prefetch<T>(self, _: &T) {}
     #[inline(always)]
     fn splat_int(self, x: i32) -> I32x8 {
