@@ -76,7 +76,7 @@ const NARROW: f32 = 0.1;
 
 /// The error of a candidate that does not matter, as a share of the pixel's brightness over the
 /// number of candidates: of a diffuse pixel, where nothing else is left to chance, and of a glossy one.
-const TOLERANCE: [f32; 2] = [0.25, 0.5];
+const TOLERANCE: [f32; 2] = [0.15, 0.35];
 
 /// Pixels darker than this share of the environment's mean are not held to their own brightness.
 const DARK: f32 = 0.15;

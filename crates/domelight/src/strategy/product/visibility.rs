@@ -5,11 +5,12 @@
 //! 0.25 times to the two cells beside it along the curve,
 //!
 //! ```text
-//! V̂ = (k + p)/(n + 1)        p = (K + v₀)/(N + 1)        g² = V̂(1 − V̂) + 0.002 + 0.07/(n + 1)
+//! V̂ = (k + p)/(n + 1)        p = (K + v₀)/(N + 1)
+//! g² = V̂(1 − V̂) + (p(1 − p)/2 + 0.005)/(n + 1) + 0.0003
 //! ```
 //!
 //! p is the same of the whole tile, K of N rays to the cell, and v₀ that of all cells. g is the standard
-//! deviation of a ray about V̂, and what V̂ itself may be wrong by.
+//! deviation of a ray about V̂, and what V̂ itself may be wrong by: much, where rays of the tile to the cell differ.
 //!
 //! V̂ serves as a control variate: the pixel's estimate is what it reflects of light seen through V̂, and
 //! Σ W (V − V̂)/π, whose expectation does not depend on V̂ as long as V̂ does not depend on the numbers that strata
@@ -133,9 +134,11 @@ impl Visibility {
             for row in 0..ROWS {
                 let n = around(simd, rays, block, &neighbors, row);
                 let k = around(simd, free, block, &neighbors, row);
-                let v = ((k + simd.load(&prior[row])) / (n + one)).min(one);
+                let p = simd.load(&prior[row]);
+                let v = ((k + p) / (n + one)).min(one);
                 visible[row] = v.store();
-                let unsure = simd.splat(0.002) + simd.splat(0.07) / (n + one);
+                let differ = simd.splat(0.5) * p * (one - p) + simd.splat(0.005);
+                let unsure = simd.splat(0.0003) + differ / (n + one);
                 doubt[row] = (v * (one - v) + unsure).sqrt().store();
             }
         }
@@ -225,7 +228,7 @@ mod tests {
         for block in 0..blocks.len() {
             let (visible, doubt) = visibility.of(block);
             assert!(visible[..ROWS].iter().flatten().all(|v| (0.0..=1.0).contains(v)));
-            assert!(doubt[..ROWS].iter().flatten().all(|d| (0.04..0.76).contains(d)));
+            assert!(doubt[..ROWS].iter().flatten().all(|d| (0.017..0.8).contains(d)));
             for cell in 0..100 {
                 assert!((at(visible, cell) - cell as f32 / 100.0).abs() < 0.15);
             }
