@@ -267,10 +267,9 @@ fn watertight(ray: &Ray, corners: [Vec3; 3]) -> Option<(f32, f32, f32)> {
     let (x, y) = ((z + 1) % 3, (z + 2) % 3);
     let scale = 1.0 / d[z];
     let (sx, sy) = (d[x] * scale, d[y] * scale);
-    let [a, b, c] = corners.map(|p| {
-        let [px, py, pz] = [x, y, z].map(|k| p[k] - ray.origin[k]);
-        (px - sx * pz, py - sy * pz, pz)
-    });
+    let turned = |p: Vec3| vec3(p[x], p[y], p[z]);
+    let to_corners = corners.map(|p| turned(p - ray.origin));
+    let [a, b, c] = to_corners.map(|p| (p.x - sx * p.z, p.y - sy * p.z, p.z));
     let edge = |p: (f32, f32, f32), q: (f32, f32, f32)| p.0 * q.1 - p.1 * q.0;
     let exact = |p: (f32, f32, f32), q: (f32, f32, f32)| {
         (f64::from(p.0) * f64::from(q.1) - f64::from(p.1) * f64::from(q.0)) as f32
@@ -280,12 +279,12 @@ fn watertight(ray: &Ray, corners: [Vec3; 3]) -> Option<(f32, f32, f32)> {
         (u, v, w) = (exact(c, b), exact(a, c), exact(b, a));
     }
     let inside = u >= 0.0 && v >= 0.0 && w >= 0.0 || u <= 0.0 && v <= 0.0 && w <= 0.0;
-    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-    let dot = |p: Vec3, q: Vec3| p.x * q.x + p.y * q.y + p.z * q.z;
-    let plane = dot(normal, corners[0] - ray.origin) / dot(normal, d);
-    let depths = [a, b, c].map(|p| p.2 * scale);
-    let t = plane.max(depths[0].min(depths[1]).min(depths[2]));
-    let t = t.min(depths[0].max(depths[1]).max(depths[2]));
+    let n = turned((corners[1] - corners[0]).cross(corners[2] - corners[0]));
+    let to_plane = n.x * to_corners[0].x + n.y * to_corners[0].y + n.z * to_corners[0].z;
+    let plane = to_plane / (n.z + n.x * sx + n.y * sy);
+    let depths = [a.2, b.2, c.2];
+    let depth = plane.max(depths[0].min(depths[1]).min(depths[2]));
+    let t = scale * depth.min(depths[0].max(depths[1]).max(depths[2]));
     let determinant = u + v + w;
     let hit = inside && determinant != 0.0 && t > 0.0 && t < ray.t_max;
     hit.then(|| (t, v / determinant, w / determinant))

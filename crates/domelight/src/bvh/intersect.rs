@@ -9,7 +9,8 @@
 //! the greatest distance from the origin to the scene along an axis.
 //!
 //! The box test asks about the unsheared ray. To let everything through that the triangle test would
-//! accept, planes move outward by 16·2⁻²⁴·m: the shear's 7, the box test's own 3, and room to spare
+//! accept, planes move outward by 16·2⁻²⁴·m: the shear's 7, the box test's own 3, 1 for a
+//! component of the direction that counts as greater than it is, and room to spare
 //! (the paper's section on traversal does it axis by axis).
 
 use super::prepare::PreparedRays;
@@ -37,24 +38,27 @@ impl<S: Simd> Slabs<S> {
         }
     }
 
-    /// Which boxes ray `i` crosses within [0, `limit`], and the distances where it enters them.
+    /// Where ray `i` enters the boxes, 0 in one that it starts in, and where it leaves them: before it enters where it
+    /// misses.
     #[inline(always)]
     pub(super) fn cross<const N: usize>(
         &self,
         simd: S,
         rays: &PreparedRays<N>,
         i: usize,
-        limit: f32,
-    ) -> (<S::Floats as Real>::Mask, S::Floats) {
-        let (mut enter, mut leave) = (simd.splat(0.0), simd.splat(limit));
-        for k in 0..3 {
-            let inverse_direction = simd.splat(rays.inverse_directions[k][i]);
-            let near = (self.near[k] - simd.splat(rays.near_origins[k][i])) * inverse_direction;
-            let far = (self.far[k] - simd.splat(rays.far_origins[k][i])) * inverse_direction;
-            enter = near.max(enter);
-            leave = far.min(leave);
-        }
-        (enter.le(leave), enter)
+    ) -> [S::Floats; 2] {
+        let one = |numbers: &[[f32; N]; 3], k: usize| simd.splat(numbers[k][i]);
+        let [near, far] = [&rays.near_origins, &rays.far_origins];
+        let x = one(&rays.inverse_directions, 0);
+        let y = one(&rays.inverse_directions, 1);
+        let z = one(&rays.inverse_directions, 2);
+        let enter_x = self.near[0].times_minus(x, one(near, 0));
+        let enter_y = self.near[1].times_minus(y, one(near, 1));
+        let enter_z = self.near[2].times_minus(z, one(near, 2));
+        let leave_x = self.far[0].times_minus(x, one(far, 0));
+        let leave_y = self.far[1].times_minus(y, one(far, 1));
+        let leave_z = self.far[2].times_minus(z, one(far, 2));
+        [enter_x.max(enter_y).max(enter_z.max(simd.splat(0.0))), leave_x.min(leave_y).min(leave_z)]
     }
 }
 
@@ -79,9 +83,21 @@ impl<F: Floats> Points<F> {
         Self { x: simd.load(&lanes[0]), y: simd.load(&lanes[1]), z: simd.load(&lanes[2]) }
     }
 
+    /// Of numbers of ray `i`.
     #[inline(always)]
-    fn splat<S: Simd<Floats = F>>(simd: S, [x, y, z]: [f32; 3]) -> Self {
-        Self { x: simd.splat(x), y: simd.splat(y), z: simd.splat(z) }
+    fn of_ray<S: Simd<Floats = F>, const N: usize>(
+        simd: S,
+        numbers: &[[f32; N]; 3],
+        i: usize,
+    ) -> Self {
+        let [x, y, z] = numbers;
+        Self { x: simd.splat(x[i]), y: simd.splat(y[i]), z: simd.splat(z[i]) }
+    }
+
+    /// By the axes of `space`.
+    #[inline(always)]
+    fn along<S: Simd<Floats = F>>(simd: S, lanes: &[Lanes; 3], [x, y, z]: [usize; 3]) -> Self {
+        Self { x: simd.load(&lanes[x]), y: simd.load(&lanes[y]), z: simd.load(&lanes[z]) }
     }
 
     #[inline(always)]
@@ -105,10 +121,11 @@ impl<F: Floats> Points<F> {
 }
 
 /// A ray and the triangles of a block, in the plane across the ray's longest axis.
-pub(super) struct Sheared<'a, S: Simd, const N: usize> {
-    rays: &'a PreparedRays<N>,
-    i: usize,
-    /// The depths of the corners, in units of the direction along z.
+pub(super) struct Sheared<S: Simd> {
+    frame: ShearedFrame<S::Floats>,
+    /// From the origin to the first corner, not sheared.
+    to_corner: Points<S::Floats>,
+    /// The depths of the corners: how far they are along z.
     depths: [S::Floats; 3],
     /// Barycentric weights, scaled alike.
     weights: [S::Floats; 3],
@@ -136,16 +153,22 @@ impl<S: Simd> BlockHits<S> {
     }
 }
 
-impl<'a, S: Simd, const N: usize> Sheared<'a, S, N> {
+impl<S: Simd> Sheared<S> {
     /// Ray `i` modulo `N`.
     #[inline(always)]
-    pub(super) fn new(simd: S, block: &Block, rays: &'a PreparedRays<N>, i: usize) -> Self {
+    pub(super) fn new<const N: usize>(
+        simd: S,
+        block: &Block,
+        rays: &PreparedRays<N>,
+        i: usize,
+    ) -> Self {
         let i = i % N;
         let zero = simd.splat(0.0);
         let frame = ShearedFrame::new(simd, rays, i);
-        let a = frame.shear(simd, &block.vertices[0]);
-        let b = frame.shear(simd, &block.vertices[1]);
-        let c = frame.shear(simd, &block.vertices[2]);
+        let to_corner = frame.to(simd, &block.vertices[0]);
+        let a = frame.sheared(to_corner);
+        let b = frame.sheared(frame.to(simd, &block.vertices[1]));
+        let c = frame.sheared(frame.to(simd, &block.vertices[2]));
 
         // All of one sign inside; zero on an edge.
         let (mut u, mut v, mut w) = (edge(c, b), edge(a, c), edge(b, a));
@@ -161,7 +184,7 @@ impl<'a, S: Simd, const N: usize> Sheared<'a, S, N> {
             (least, greatest) = (u.min(v).min(w), u.max(v).max(w));
         }
         let inside = zero.le(least) | greatest.le(zero);
-        Self { rays, i, depths: [a.z, b.z, c.z], weights: [u, v, w], inside }
+        Self { frame, to_corner, depths: [a.z, b.z, c.z], weights: [u, v, w], inside }
     }
 
     /// Whether the ray's line goes through none of the triangles.
@@ -172,14 +195,12 @@ impl<'a, S: Simd, const N: usize> Sheared<'a, S, N> {
 
     /// The triangles hit at 0 < t ≤ `limit`.
     #[inline(always)]
-    pub(super) fn hits(&self, simd: S, planes: &Planes<S::Floats>, limit: f32) -> BlockHits<S> {
-        // The distance to the plane, but within that of the corners even where the plane is edge-on.
-        let scale = simd.splat(self.rays.shears[2][self.i]);
+    pub(super) fn hits(&self, simd: S, planes: &Planes, limit: f32) -> BlockHits<S> {
+        // The depth of the plane, but within that of the corners even where the plane is edge-on.
         let [a, b, c] = self.depths;
-        let (a, b, c) = (scale * a, scale * b, scale * c);
         let (nearest, farthest) = (a.min(b).min(c), a.max(b).max(c));
-        let plane = planes.distance(simd, self.rays, self.i);
-        let t = plane.max(nearest).min(farthest);
+        let plane = planes.depth(simd, &self.frame, self.to_corner);
+        let t = self.frame.scale * plane.max(nearest).min(farthest);
 
         // A determinant that is zero or NaN is no hit.
         let [u, v, w] = self.weights;
@@ -197,29 +218,31 @@ struct ShearedFrame<F> {
     origin: Points<F>,
     /// Direction x/z, y/z.
     shear: [F; 2],
+    /// 1/z.
+    scale: F,
 }
 
 impl<F: Floats> ShearedFrame<F> {
     #[inline(always)]
     fn new<S: Simd<Floats = F>, const N: usize>(simd: S, rays: &PreparedRays<N>, i: usize) -> Self {
-        let axes @ [x, y, z] = rays.axes(i);
+        let shears = Points::of_ray(simd, &rays.shears, i);
         Self {
-            axes,
-            origin: Points::splat(
-                simd,
-                [rays.origins[x][i], rays.origins[y][i], rays.origins[z][i]],
-            ),
-            shear: [simd.splat(rays.shears[0][i]), simd.splat(rays.shears[1][i])],
+            axes: rays.axes(i),
+            origin: Points::of_ray(simd, &rays.sheared_origins, i),
+            shear: [shears.x, shears.y],
+            scale: shears.z,
         }
     }
 
-    /// Depths stay in units of z.
+    /// From the origin to a vertex, not sheared.
     #[inline(always)]
-    fn shear<S: Simd<Floats = F>>(&self, simd: S, vertex: &[Lanes; 3]) -> Points<F> {
-        let z = simd.load(&vertex[self.axes[2]]) - self.origin.z;
-        let x = simd.load(&vertex[self.axes[0]]) - self.origin.x - self.shear[0] * z;
-        let y = simd.load(&vertex[self.axes[1]]) - self.origin.y - self.shear[1] * z;
-        Points { x, y, z }
+    fn to<S: Simd<Floats = F>>(&self, simd: S, vertex: &[Lanes; 3]) -> Points<F> {
+        Points::along(simd, vertex, self.axes).sub(self.origin)
+    }
+
+    #[inline(always)]
+    fn sheared(&self, Points { x, y, z }: Points<F>) -> Points<F> {
+        Points { x: x - self.shear[0] * z, y: y - self.shear[1] * z, z }
     }
 }
 
@@ -230,34 +253,34 @@ fn edge<F: Floats>(p: Points<F>, q: Points<F>) -> F {
 }
 
 /// The planes of a block's triangles.
-pub(super) struct Planes<F> {
-    /// A point of each.
-    a: Points<F>,
-    /// (b − a) × (c − a).
-    normal: Points<F>,
+pub(super) struct Planes {
+    /// n = (b − a) × (c − a), by axis.
+    normals: [Lanes; 3],
 }
 
-impl<F: Floats> Planes<F> {
+impl Planes {
     #[inline(always)]
-    pub(super) fn of<S: Simd<Floats = F>>(simd: S, block: &Block) -> Self {
+    pub(super) fn of<S: Simd>(simd: S, block: &Block) -> Self {
         let a = Points::load(simd, &block.vertices[0]);
         let b = Points::load(simd, &block.vertices[1]);
         let c = Points::load(simd, &block.vertices[2]);
-        Self { a, normal: b.sub(a).cross(c.sub(a)) }
+        let Points { x, y, z } = b.sub(a).cross(c.sub(a));
+        Self { normals: [x.store(), y.store(), z.store()] }
     }
 
-    /// n · (a − o) / (n · d).
+    /// n · (a − o) / (n · d/d_z).
     ///
-    /// More accurate than to interpolate the corners' distances where the triangle is large and near.
+    /// More accurate than to interpolate the corners' depths where the triangle is large and near.
     #[inline(always)]
-    fn distance<S, const N: usize>(&self, simd: S, rays: &PreparedRays<N>, i: usize) -> F
-    where
-        S: Simd<Floats = F>,
-    {
-        let of_ray = |numbers: &[[f32; N]; 3]| [numbers[0][i], numbers[1][i], numbers[2][i]];
-        let to_plane = self.a.sub(Points::splat(simd, of_ray(&rays.origins)));
-        let along = self.normal.dot(Points::splat(simd, of_ray(&rays.directions)));
-        self.normal.dot(to_plane) / along
+    fn depth<S: Simd>(
+        &self,
+        simd: S,
+        frame: &ShearedFrame<S::Floats>,
+        to_corner: Points<S::Floats>,
+    ) -> S::Floats {
+        let n = Points::along(simd, &self.normals, frame.axes);
+        let along = n.z + n.x * frame.shear[0] + n.y * frame.shear[1];
+        n.dot(to_corner) / along
     }
 }
 

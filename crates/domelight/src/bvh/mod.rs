@@ -12,23 +12,24 @@
 //! - **Box test**: boxes are widened by the rounding error of the triangle test, so that *the tree
 //!   never changes the answer*: it is that of a loop over all triangles, bit for bit. (The exception
 //!   is a triangle seen so nearly edge-on that its distance has no correct digit.)
-//! - **Many rays**: traced as streams of 32 of one octant, into which shadow rays are sorted (Tsakok
+//! - **Many rays**: traced as streams of 64 of one octant, into which shadow rays are sorted (Tsakok
 //!   2009, "Faster Incoherent Rays: Multi-BVH Ray Stream Tracing"; Fuetterling et al. 2015, "Efficient
 //!   Ray Tracing Kernels for Modern CPU Architectures"). Two or four streams take turns, each asking for the
 //!   memory of its next node before the others go on, so that none waits for it.
 //!
-//! Every kernel is written once over vectors of eight numbers and compiled for each instruction set;
-//! none uses a fused multiply-add, so all of them **give the same bits** ([`InstructionSet`]).
+//! Every kernel is written once over vectors of eight numbers and compiled for each instruction set. Box tests
+//! multiply and subtract in one rounding on all of them, and nothing else is fused, so all of them **give the same
+//! bits** ([`InstructionSet`]).
 //!
 //! # Limits
-//! Coordinates from about 1e-12 to 1e12 in magnitude, and directions from about 1e-20 to 1e20 in
+//! Coordinates from about 1e-12 to 1e12 in magnitude, and directions from about 1e-18 to 1e20 in
 //! length, keep all intermediate products finite and normal. Beyond that rays may miss; nothing
 //! panics. From further away than some 10⁴ times the scene's size boxes are widened so much that
 //! rays become slow.
 //!
 //! # Alternatives
 //! Möller–Trumbore makes rays 3 to 7 % quicker and leaks along shared edges. Fused multiply-adds
-//! would make the edge functions of two neighbours differ, and be slow on processors without them.
+//! in the edge functions would make those of two neighbours differ.
 //! Sorting shadow rays more finely than by octant loses more coherence of the origins than it wins.
 //! Clustering from below (PLOC) with reinsertion gives trees of similar quality, but of no bounded
 //! depth. Packets of camera rays, 16 to a vector, are quicker than streams where the tree fits the

@@ -12,13 +12,15 @@ pub(super) struct PreparedRays<const N: usize> {
     /// By axis; origins and directions are given, the rest is computed from them.
     pub(super) origins: [[f32; N]; 3],
     pub(super) directions: [[f32; N]; 3],
-    /// The origins moved forward along each axis, for near planes.
+    /// The origins moved forward along each axis, times the inverse direction, for near planes.
     pub(super) near_origins: [[f32; N]; 3],
-    /// The origins moved backward along each axis, for far planes.
+    /// The origins moved backward along each axis, times the inverse direction, for far planes.
     pub(super) far_origins: [[f32; N]; 3],
     pub(super) inverse_directions: [[f32; N]; 3],
-    /// The longest axis of the direction: z of the sheared space, and x and y are the two that follow.
-    pub(super) longest: [u8; N],
+    /// The axes x, y and z of the sheared space: z is the direction's longest, and x and y are the two that follow it.
+    axes: [[u8; N]; 3],
+    /// The origins' x, y and z.
+    pub(super) sheared_origins: [[f32; N]; 3],
     /// Direction x/z, y/z and 1/z.
     pub(super) shears: [[f32; N]; 3],
 }
@@ -40,7 +42,8 @@ impl<const N: usize> PreparedRays<N> {
         near_origins: [[0.0; N]; 3],
         far_origins: [[0.0; N]; 3],
         inverse_directions: [[0.0; N]; 3],
-        longest: [0; N],
+        axes: [[0; N]; 3],
+        sheared_origins: [[0.0; N]; 3],
         shears: [[0.0; N]; 3],
     };
 
@@ -61,22 +64,22 @@ impl<const N: usize> PreparedRays<N> {
         octant: u32,
         count: usize,
         scene: &Aabb,
-    ) -> u32 {
+    ) -> u64 {
         self.octant = octant;
         let mut valid = 0;
         for first in (0..count).step_by(WIDTH) {
-            valid |= self.prepare_eight(simd, first, scene) << first;
+            valid |= u64::from(self.prepare_eight(simd, first, scene)) << first;
         }
-        valid & u32::MAX.checked_shr(u32::BITS - count as u32).unwrap_or(0)
+        valid & u64::MAX.checked_shr(u64::BITS - count as u32).unwrap_or(0)
     }
 
     #[inline(always)]
     fn prepare_eight<S: Simd>(&mut self, simd: S, first: usize, scene: &Aabb) -> u32 {
         const INFLATION: f32 = 1.0 / (1 << 20) as f32;
-        // The rounding of origin ± inflation, twice over.
+        // The rounding of origin ± inflation and of its product with the inverse direction, twice over.
         const ORIGIN_ROUNDING: f32 = 1.0 / (1 << 22) as f32;
         // A component so small moves the ray by less than the inflation while it crosses the scene.
-        const NEGLIGIBLE: f32 = 1.0 / (1u64 << 40) as f32;
+        const NEGLIGIBLE: f32 = 1.0 / (1 << 24) as f32;
 
         let sign = |axis: usize| if self.octant >> axis & 1 == 0 { 1.0 } else { -1.0 };
         let signs = [simd.splat(sign(0)), simd.splat(sign(1)), simd.splat(sign(2))];
@@ -100,9 +103,9 @@ impl<const N: usize> PreparedRays<N> {
         for k in 0..3 {
             let margin = inflation + simd.splat(ORIGIN_ROUNDING) * abs(simd, o[k]);
             let forward = signs[k] * margin;
-            store(o[k] + forward, &mut self.near_origins[k], first);
-            store(o[k] - forward, &mut self.far_origins[k], first);
             inverse[k] = inverse[k] / (signs[k] * length[k].max(negligible));
+            store((o[k] + forward) * inverse[k], &mut self.near_origins[k], first);
+            store((o[k] - forward) * inverse[k], &mut self.far_origins[k], first);
             store(inverse[k], &mut self.inverse_directions[k], first);
             // Not finite if any of the numbers is not.
             let sum = o[k] + d[k] + inverse[k] + inflation;
@@ -114,7 +117,13 @@ impl<const N: usize> PreparedRays<N> {
         let [x, y] = [is_x.bits(), is_y.bits()];
         for i in 0..WIDTH {
             let not_x = 1 - (x >> i & 1) as u8;
-            self.longest[first + i] = not_x * (2 - (y >> i & 1) as u8);
+            let longest = not_x * (2 - (y >> i & 1) as u8);
+            for (axes, axis) in self.axes.iter_mut().zip(AXES[usize::from(longest)]) {
+                axes[first + i] = axis;
+            }
+        }
+        for (k, rotated) in [[o[1], o[2], o[0]], [o[2], o[0], o[1]], o].into_iter().enumerate() {
+            store(pick(is_x, is_y, rotated), &mut self.sheared_origins[k], first);
         }
         let scale = pick(is_x, is_y, inverse);
         store(pick(is_x, is_y, [d[1], d[2], d[0]]) * scale, &mut self.shears[0], first);
@@ -123,11 +132,11 @@ impl<const N: usize> PreparedRays<N> {
         is_finite.bits()
     }
 
-    /// The axes x, y and z of the space whose z axis is the longest of ray `i`.
+    /// The axes x, y and z of the sheared space of ray `i`.
     #[inline(always)]
     pub(super) fn axes(&self, i: usize) -> [usize; 3] {
-        // In bounds, for the compiler.
-        AXES[usize::from(self.longest[i]).min(2)].map(|axis| usize::from(axis).min(2))
+        let [x, y, z] = &self.axes;
+        [usize::from(x[i]), usize::from(y[i]), usize::from(z[i])]
     }
 }
 

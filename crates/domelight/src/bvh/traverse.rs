@@ -11,14 +11,14 @@ use super::prepare::{PreparedRays, octant};
 use super::{Bvh, Child, WIDTH};
 use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
-use crate::simd::{Floats, Kernel, Mask, Sets, Simd, set_bits};
+use crate::simd::{Floats, Kernel, Mask, Real, Sets, Simd, set_bits};
 
 /// A node leaves at most seven children behind on the way down, and pushes eight.
 pub(super) const STACK: usize = 256;
 const _: () = assert!(MAX_DEPTH as usize * (WIDTH - 1) + WIDTH <= STACK);
 
-/// Rays of a stream: one bit each in a word.
-const STREAM: usize = 32;
+/// Rays of a stream: one bit each in two words.
+const STREAM: usize = 64;
 /// Streams in flight: while one waits for memory the others go on.
 const INTERLEAVED: usize = 4;
 /// Shadow rays through a tree of so many bytes or fewer, which the caches hold, go in two streams: they wait little,
@@ -199,8 +199,8 @@ fn closest_hit<S: Simd>(
         } else {
             let node = &bvh.nodes[child.index()];
             let slabs = Slabs::load(simd, node, ray.octant);
-            let (crossed, enter) = slabs.cross(simd, ray, 0, limit);
-            let crossed = crossed.bits();
+            let [enter, leave] = slabs.cross(simd, ray, 0);
+            let crossed = enter.le(leave.min(simd.splat(limit))).bits();
             if crossed.is_power_of_two() {
                 child = node.children[crossed.trailing_zeros() as usize % WIDTH];
                 continue;
@@ -233,9 +233,9 @@ fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRays<WIDTH>, limit: f32) -
             }
         } else {
             let node = &bvh.nodes[child.index()];
-            let (crossed, _) = Slabs::load(simd, node, ray.octant).cross(simd, ray, 0, limit);
+            let [enter, leave] = Slabs::load(simd, node, ray.octant).cross(simd, ray, 0);
             // The last and largest on top.
-            for lane in set_bits(crossed.bits()) {
+            for lane in set_bits(enter.le(leave.min(simd.splat(limit))).bits()) {
                 stack[len] = node.children[lane];
                 len += 1;
             }
@@ -321,36 +321,70 @@ fn interleave<'a, S: Simd, T: Stream, const N: usize>(
 /// Children yet to visit, and for each the rays of the stream that enter it.
 struct StreamStack {
     children: [u32; STACK],
-    rays: [u32; STACK],
+    /// The lower and the upper half of the rays.
+    rays: [[u32; STACK]; 2],
     len: usize,
 }
 
+/// The bit of each ray, in two halves.
+static BITS: [[u32; 2]; STREAM] = {
+    let mut bits = [[0; 2]; STREAM];
+    let mut i = 0;
+    while i < STREAM {
+        bits[i][i / 32] = 1 << (i % 32);
+        i += 1;
+    }
+    bits
+};
+
+/// The rays that enter each child of a node, in two halves.
+struct Entering<S: Simd>([S::Sets; 2]);
+
+impl<S: Simd> Entering<S> {
+    #[inline(always)]
+    fn none(simd: S) -> Self {
+        Self([simd.empty(); 2])
+    }
+
+    /// Adds ray `i` to the sets of the children in `crossed`.
+    #[inline(always)]
+    fn insert(&mut self, i: usize, crossed: <S::Floats as Real>::Mask) {
+        let [low, high] = self.0;
+        let [in_low, in_high] = BITS[i % STREAM];
+        self.0 = [low.insert(crossed, in_low), high.insert(crossed, in_high)];
+    }
+}
+
 impl StreamStack {
-    const EMPTY: Self = Self { children: [0; STACK], rays: [0; STACK], len: 0 };
+    const EMPTY: Self = Self { children: [0; STACK], rays: [[0; STACK]; 2], len: 0 };
 
     #[inline(always)]
-    fn push(&mut self, child: Child, rays: u32) {
+    fn push(&mut self, child: Child, rays: u64) {
         self.children[self.len] = child.0;
-        self.rays[self.len] = rays;
+        self.rays[0][self.len] = rays as u32;
+        self.rays[1][self.len] = (rays >> 32) as u32;
         self.len += 1;
     }
 
     /// Pushes the children that any ray enters, the last on top.
     #[inline(always)]
-    fn push_entered<S: Simd>(&mut self, children: &[Child; WIDTH], rays: S::Sets) {
-        let (rays, children, count) = rays.pack(children.map(|child| child.0));
+    fn push_entered<S: Simd>(&mut self, children: &[Child; WIDTH], rays: Entering<S>) {
+        let (rays, children, count) = Sets::pack(rays.0, children.map(|child| child.0));
         // What lies beyond `count` is overwritten by the next.
         self.children[self.len..self.len + WIDTH].copy_from_slice(&children);
-        self.rays[self.len..self.len + WIDTH].copy_from_slice(&rays);
+        for (stack, rays) in self.rays.iter_mut().zip(&rays) {
+            stack[self.len..self.len + WIDTH].copy_from_slice(rays);
+        }
         self.len += count;
     }
 
     /// The next child that any of the rays `free` enters, and which.
     #[inline(always)]
-    fn pop(&mut self, free: u32) -> Option<(Child, u32)> {
+    fn pop(&mut self, free: u64) -> Option<(Child, u64)> {
         while self.len > 0 {
             self.len -= 1;
-            let rays = self.rays[self.len] & free;
+            let [low, high] = [self.rays[0][self.len], self.rays[1][self.len]];
+            let rays = (u64::from(high) << 32 | u64::from(low)) & free;
             if rays != 0 {
                 return Some((Child(self.children[self.len]), rays));
             }
@@ -410,7 +444,7 @@ impl Stream for ClosestStream {
 
     #[inline(always)]
     fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh) -> bool {
-        let Some((child, rays)) = self.stack.pop(u32::MAX) else { return false };
+        let Some((child, rays)) = self.stack.pop(u64::MAX) else { return false };
         if child.is_leaf() {
             for i in set_bits(rays) {
                 let (limit, closest) = (self.limits[i], self.hits[i]);
@@ -423,28 +457,33 @@ impl Stream for ClosestStream {
         } else {
             let node = &bvh.nodes[child.index()];
             let slabs = Slabs::load(simd, node, self.rays.octant);
-            let mut crossing = simd.empty();
+            let mut entering = Entering::none(simd);
             let mut enter = simd.splat(0.0);
             for i in set_bits(rays) {
-                let (crossed, entered) = slabs.cross(simd, &self.rays, i, self.limits[i]);
-                crossing = crossing.insert(crossed, 1 << i);
+                let [entered, leave] = slabs.cross(simd, &self.rays, i);
+                entering.insert(i, entered.le(leave.min(simd.splat(self.limits[i]))));
                 enter = entered;
             }
-            let (sets, enter) = (crossing.store(), enter.store());
+            let not_empty = entering.0.map(Sets::not_empty);
+            let (halves, enter) = (entering.0.map(Sets::store), enter.store());
             // The nearest child of the last ray on top.
             let stack = &mut self.stack;
             let base = stack.len;
             let mut keys = [0.0; WIDTH];
-            for lane in set_bits(crossing.not_empty()) {
+            for lane in set_bits(not_empty[0] | not_empty[1]) {
                 let mut at = stack.len;
                 while at > base && keys[at - 1 - base] < enter[lane] {
                     stack.children[at] = stack.children[at - 1];
-                    stack.rays[at] = stack.rays[at - 1];
+                    for rays in &mut stack.rays {
+                        rays[at] = rays[at - 1];
+                    }
                     keys[at - base] = keys[at - 1 - base];
                     at -= 1;
                 }
                 stack.children[at] = node.children[lane].0;
-                stack.rays[at] = sets[lane];
+                for (rays, sets) in stack.rays.iter_mut().zip(&halves) {
+                    rays[at] = sets[lane];
+                }
                 keys[at - base] = enter[lane];
                 stack.len += 1;
             }
@@ -467,8 +506,8 @@ struct ShadowStream {
     /// Where the rays are in their batch.
     members: [usize; STREAM],
     /// Rays that have hit nothing yet, and those that have, as bits.
-    free: u32,
-    hit: u32,
+    free: u64,
+    hit: u64,
     stack: StreamStack,
 }
 
@@ -514,23 +553,25 @@ impl Stream for ShadowStream {
         if child.is_leaf() {
             let block = &bvh.blocks[child.index()];
             let planes = Planes::of(simd, block);
+            let mut hit = 0;
             for i in set_bits(rays) {
                 // Without branches: a shadow ray starts on a triangle, so half of the tests would go
                 // wrong halfway.
                 let sheared = Sheared::new(simd, block, &self.rays, i);
                 let mask = sheared.hits(simd, &planes, f32::MAX).mask;
-                self.hit |= u32::from(mask != 0) << i;
+                hit |= u64::from(mask != 0) << i;
             }
+            self.hit |= hit;
             self.free &= !self.hit;
         } else {
             let node = &bvh.nodes[child.index()];
             let slabs = Slabs::load(simd, node, self.rays.octant);
-            let mut crossing = simd.empty();
+            let mut entering = Entering::none(simd);
             for i in set_bits(rays) {
-                let (crossed, _) = slabs.cross(simd, &self.rays, i, f32::MAX);
-                crossing = crossing.insert(crossed, 1 << i);
+                let [enter, leave] = slabs.cross(simd, &self.rays, i);
+                entering.insert(i, enter.le(leave));
             }
-            self.stack.push_entered::<S>(&node.children, crossing);
+            self.stack.push_entered(&node.children, entering);
         }
         self.stack.prefetch(simd, bvh);
         true

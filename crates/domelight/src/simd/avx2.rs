@@ -8,7 +8,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 use super::pair::Pair;
 use super::{Floats, Ints, Kernel, LANES, Lanes, Mask, Real, Sets, Simd, last_of};
 
-/// Exists only where the processor has AVX2 and the bit instructions that came with it.
+/// Exists only where the processor has AVX2, and FMA and the bit instructions that came with it.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(());
 
@@ -32,6 +32,7 @@ impl Avx2 {
     #[inline]
     pub(crate) fn new() -> Option<Self> {
         let available = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
             && is_x86_feature_detected!("bmi1")
             && is_x86_feature_detected!("bmi2")
             && is_x86_feature_detected!("lzcnt")
@@ -41,7 +42,7 @@ impl Avx2 {
 
     #[inline]
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+        #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn run<K: Kernel>(simd: Avx2, kernel: K) -> K::Output {
             kernel.run(simd)
         }
@@ -210,6 +211,11 @@ impl Floats for F32x8 {
     type Ints = I32x8;
 
     #[inline(always)]
+    fn times_minus(self, b: Self, c: Self) -> Self {
+        // SAFETY: `self` proves AVX2 and FMA.
+        Self(unsafe { _mm256_fmsub_ps(self.0, b.0, c.0) })
+    }
+    #[inline(always)]
     fn store(self) -> Lanes {
         let mut lanes = [0.0; 8];
         // SAFETY: `self` proves AVX2; `lanes` is 8 writable f32, and the store needs no alignment.
@@ -306,17 +312,19 @@ impl Sets for Sets8 {
         }
     }
     #[inline(always)]
-    fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
-        let not_empty = self.not_empty();
+    fn pack([a, b]: [Self; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
+        // SAFETY: `a` proves AVX2.
+        let not_empty = Self(unsafe { _mm256_or_si256(a.0, b.0) }).not_empty();
         let lanes = &super::PACKED_LANES[not_empty as usize % 256];
-        // SAFETY: `self` proves AVX2; both arrays are 32 readable bytes, the loads need no alignment.
-        let (sets, numbers) = unsafe {
+        // SAFETY: `a` proves AVX2; both arrays are 32 readable bytes, the loads need no alignment.
+        let (pair, numbers) = unsafe {
             let lanes = _mm256_loadu_si256(lanes.as_ptr().cast());
             let numbers = _mm256_loadu_si256(numbers.as_ptr().cast());
-            let sets = _mm256_permutevar8x32_epi32(self.0, lanes);
-            (Self(sets), Self(_mm256_permutevar8x32_epi32(numbers, lanes)))
+            let a = Self(_mm256_permutevar8x32_epi32(a.0, lanes));
+            let b = Self(_mm256_permutevar8x32_epi32(b.0, lanes));
+            ([a, b], Self(_mm256_permutevar8x32_epi32(numbers, lanes)))
         };
-        (sets.store(), numbers.store(), not_empty.count_ones() as usize)
+        (pair.map(Self::store), numbers.store(), not_empty.count_ones() as usize)
     }
     #[inline(always)]
     fn store(self) -> [u32; 8] {

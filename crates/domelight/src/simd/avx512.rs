@@ -8,7 +8,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 use super::{Floats, Ints, Kernel, LANES, Lanes, Mask, Real, Sets, Simd, Wide, last_of};
 
-/// Exists only where the processor has AVX-512 F and VL and the bit instructions of AVX2's time.
+/// Exists only where the processor has AVX-512 F and VL, and FMA and the bit instructions of AVX2's time.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx512(());
 
@@ -41,6 +41,7 @@ impl Avx512 {
     pub(crate) fn new() -> Option<Self> {
         let available = is_x86_feature_detected!("avx512f")
             && is_x86_feature_detected!("avx512vl")
+            && is_x86_feature_detected!("fma")
             && is_x86_feature_detected!("bmi1")
             && is_x86_feature_detected!("bmi2")
             && is_x86_feature_detected!("lzcnt")
@@ -50,7 +51,7 @@ impl Avx512 {
 
     #[inline]
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        #[target_feature(enable = "avx512f,avx512vl,bmi1,bmi2,lzcnt,popcnt")]
+        #[target_feature(enable = "avx512f,avx512vl,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn run<K: Kernel>(simd: Avx512, kernel: K) -> K::Output {
             kernel.run(simd)
         }
@@ -328,6 +329,12 @@ impl Floats for F32x8 {
     type Ints = I32x8;
 
     #[inline(always)]
+    fn times_minus(self, b: Self, c: Self) -> Self {
+        // SAFETY: `self` proves AVX-512.
+        Self(unsafe { _mm256_fmsub_ps(self.0, b.0, c.0) })
+    }
+
+    #[inline(always)]
     fn store(self) -> Lanes {
         self.to_array()
     }
@@ -402,15 +409,17 @@ impl Sets for Sets8 {
         u32::from(unsafe { _mm256_test_epi32_mask(self.0, self.0) })
     }
     #[inline(always)]
-    fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
-        // SAFETY: `self` proves AVX-512; `numbers` is 32 readable bytes, the load needs no alignment.
-        let (sets, numbers, not_empty) = unsafe {
-            let not_empty = _mm256_test_epi32_mask(self.0, self.0);
+    fn pack([a, b]: [Self; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
+        // SAFETY: `a` proves AVX-512; `numbers` is 32 readable bytes, the load needs no alignment.
+        let (pair, numbers, not_empty) = unsafe {
+            let any = _mm256_or_si256(a.0, b.0);
+            let not_empty = _mm256_test_epi32_mask(any, any);
             let numbers = _mm256_loadu_si256(numbers.as_ptr().cast());
-            let sets = _mm256_maskz_compress_epi32(not_empty, self.0);
-            (Self(sets), Self(_mm256_maskz_compress_epi32(not_empty, numbers)), not_empty)
+            let a = Self(_mm256_maskz_compress_epi32(not_empty, a.0));
+            let b = Self(_mm256_maskz_compress_epi32(not_empty, b.0));
+            ([a, b], Self(_mm256_maskz_compress_epi32(not_empty, numbers)), not_empty)
         };
-        (sets.store(), numbers.store(), not_empty.count_ones() as usize)
+        (pair.map(Self::store), numbers.store(), not_empty.count_ones() as usize)
     }
     #[inline(always)]
     fn store(self) -> [u32; 8] {

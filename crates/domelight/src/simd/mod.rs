@@ -1,7 +1,7 @@
 //! Vectors of eight numbers, and of sixteen, on each instruction set: the only unsafe code of the library.
 //!
 //! A [`Kernel`] is written once over the vectors of a [`Simd`], whose operators are one IEEE
-//! operation a lane. Nothing fuses or reorders them, so a kernel gives the same bits on every
+//! operation a lane; what is fused says so and is so everywhere. Nothing else fuses or reorders them, so a kernel gives the same bits on every
 //! instruction set. [`dispatch`] compiles it for each and picks at run time, so that a portable
 //! binary traces as fast as one built for the machine. Another instruction set is one more file like
 //! `avx2.rs`, or `neon.rs` of half the width, and one more line in [`InstructionSet`] and [`dispatch`].
@@ -36,7 +36,7 @@ pub enum InstructionSet {
     Scalar,
     /// AArch64 NEON: four numbers at a time.
     Neon,
-    /// x86-64 AVX2: eight numbers at a time.
+    /// x86-64 AVX2 and FMA: eight numbers at a time.
     Avx2,
     /// x86-64 AVX-512: eight or sixteen numbers at a time, with masks.
     Avx512,
@@ -184,6 +184,9 @@ pub trait Floats: Real {
     fn store(self) -> Lanes;
     /// Toward zero; of numbers beyond 2³¹ and NaN anything.
     fn truncated(self) -> Self::Ints;
+    /// a b − c, rounded once.
+    #[must_use]
+    fn times_minus(self, b: Self, c: Self) -> Self;
     /// Numbers of a table of N rows, a power of two, at `at` modulo 8 N.
     fn gather<const N: usize>(table: &[Lanes; N], at: Self::Ints) -> Self;
 
@@ -266,9 +269,11 @@ fn packed<T: Copy + Default>(lanes: [T; LANES], keep: u32) -> [T; LANES] {
 
 /// [`Sets::pack`], one lane after the other.
 #[inline(always)]
-fn pack(sets: [u32; 8], numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
-    let not_empty = (0..LANES).fold(0, |bits, i| bits | u32::from(sets[i] != 0) << i);
-    (packed(sets, not_empty), packed(numbers, not_empty), not_empty.count_ones() as usize)
+fn pack(pair: [[u32; 8]; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
+    let [a, b] = pair;
+    let not_empty = (0..LANES).fold(0, |bits, i| bits | u32::from(a[i] | b[i] != 0) << i);
+    let pair = pair.map(|sets| packed(sets, not_empty));
+    (pair, packed(numbers, not_empty), not_empty.count_ones() as usize)
 }
 
 /// Eight sets of the numbers 0 to 31.
@@ -280,19 +285,20 @@ pub(crate) trait Sets: Copy {
     fn insert(self, m: Self::Mask, bit: u32) -> Self;
     /// Bit i: set i is not empty.
     fn not_empty(self) -> u32;
-    /// Moves the sets that are not empty, and the numbers of their lanes, to the front; also how many
-    /// they are.
-    fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize);
+    /// Moves the pairs of sets of which one is not empty, and the numbers of their lanes, to the front; also how
+    /// many they are.
+    fn pack(pair: [Self; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize);
     fn store(self) -> [u32; 8];
 }
 
 /// The set bits, from the lowest.
 #[inline(always)]
-pub(crate) fn set_bits(mut bits: u32) -> impl Iterator<Item = usize> {
+pub(crate) fn set_bits(bits: impl Into<u64>) -> impl Iterator<Item = usize> {
+    let mut bits = bits.into();
     std::iter::from_fn(move || {
         let lane = bits.trailing_zeros();
         bits &= bits.wrapping_sub(1);
-        (lane < u32::BITS).then_some(lane as usize)
+        (lane < u64::BITS).then_some(lane as usize)
     })
 }
 

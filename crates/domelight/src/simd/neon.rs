@@ -191,6 +191,13 @@ impl Floats for F32x8 {
     type Ints = I32x8;
 
     #[inline(always)]
+    fn times_minus(self, b: Self, c: Self) -> Self {
+        // SAFETY: `self` proves NEON.
+        unsafe {
+            Self(vfmaq_f32(vnegq_f32(c.0), self.0, b.0), vfmaq_f32(vnegq_f32(c.1), self.1, b.1))
+        }
+    }
+    #[inline(always)]
     fn store(self) -> Lanes {
         let mut lanes = [0.0; 8];
         // SAFETY: `self` proves NEON; `lanes` is 8 writable f32, and the stores need no alignment.
@@ -292,8 +299,8 @@ impl Sets for Sets8 {
         mask.bits()
     }
     #[inline(always)]
-    fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
-        super::pack(self.store(), numbers)
+    fn pack(pair: [Self; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
+        super::pack(pair.map(Self::store), numbers)
     }
     #[inline(always)]
     fn store(self) -> [u32; 8] {

@@ -132,6 +132,10 @@ impl Floats for F32x8 {
     type Ints = I32x8;
 
     #[inline(always)]
+    fn times_minus(self, b: Self, c: Self) -> Self {
+        Self(from_fn(|i| self.0[i].mul_add(b.0[i], -c.0[i])))
+    }
+    #[inline(always)]
     fn store(self) -> Lanes {
         self.0
     }
@@ -209,8 +213,8 @@ impl Sets for Sets8 {
         (0..8).fold(0, |bits, i| bits | u32::from(self.0[i] != 0) << i)
     }
     #[inline(always)]
-    fn pack(self, numbers: [u32; 8]) -> ([u32; 8], [u32; 8], usize) {
-        super::pack(self.store(), numbers)
+    fn pack(pair: [Self; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
+        super::pack(pair.map(Self::store), numbers)
     }
     #[inline(always)]
     fn store(self) -> [u32; 8] {

@@ -40,7 +40,7 @@ impl Kernel for All {
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let (a, b) = (simd.load(&self.a), simd.load(&self.b));
         let (masks, floats) = (masks(a, b), operations(a, b));
-        let floats = floats.into_iter().chain([simd.splat(self.a[3])]);
+        let floats = floats.into_iter().chain([simd.splat(self.a[3]), a.times_minus(b, a)]);
         let rows: [Lanes; LANES] = std::array::from_fn(|i| self.a.map(|x| x * i as f32));
         let columns = simd.transposed(rows.each_ref());
         let bits = |x: f32| if x.is_nan() { u32::MAX } else { x.to_bits() };
@@ -54,8 +54,10 @@ impl Kernel for All {
         }
         all.push(sets.store());
         all.push([sets.not_empty(); LANES]);
-        let (packed, numbers, n) = sets.pack([0, 1, 2, 3, 4, 5, 6, 7]);
-        all.push(std::array::from_fn(|i| if i < n { packed[i] | numbers[i] << 16 } else { 0 }));
+        let first = simd.empty().insert(masks[0], 1 << 31);
+        let (packed, numbers, n) = Sets::pack([sets, first], [0, 1, 2, 3, 4, 5, 6, 7]);
+        let number = |i| packed[0][i] | packed[1][i] | numbers[i] << 16;
+        all.push(std::array::from_fn(|i| if i < n { number(i) } else { 0 }));
         all
     }
 }
