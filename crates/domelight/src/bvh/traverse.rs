@@ -21,7 +21,7 @@ const _: () = assert!(MAX_DEPTH as usize * (WIDTH - 1) + WIDTH <= STACK);
 const STREAM: usize = 64;
 /// Streams in flight: while one waits for memory the others go on.
 const INTERLEAVED: usize = 4;
-/// Shadow rays through a tree of so many bytes or fewer, which the caches hold, go in two streams: they wait little,
+/// Rays through a tree of so many bytes or fewer, which the caches hold, go in two streams: they wait little,
 /// and leave more of the nearest cache to the tree.
 const CACHED: usize = 1 << 24;
 /// Rays sorted at once: enough to fill the streams of all octants, few enough to stay coherent.
@@ -55,9 +55,21 @@ impl Kernel for ClosestHits<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
+        if self.bvh.bytes() <= CACHED {
+            self.interleaved::<S, 2>(simd);
+        } else {
+            self.interleaved::<S, INTERLEAVED>(simd);
+        }
+    }
+}
+
+impl ClosestHits<'_> {
+    /// In `N` streams.
+    #[inline(always)]
+    fn interleaved<S: Simd, const N: usize>(self, simd: S) {
         let same_octant = |a: &Ray, b: &Ray| octant(a.direction) == octant(b.direction);
         let runs = self.rays.chunk_by(same_octant).flat_map(|run| run.chunks(STREAM));
-        let mut streams = [const { ClosestStream::EMPTY }; INTERLEAVED];
+        let mut streams = [const { ClosestStream::EMPTY }; N];
         let mut first = 0;
         let starts = runs.map(|rays| {
             first += rays.len();

@@ -65,8 +65,9 @@ impl Spreads {
         let mean = known().sum::<f32>() / count as f32;
         let [fewest, most] = OCTAVES;
         let fewest = if teaches(pixel, self.width) { 0.0 } else { fewest };
-        let octaves = (growth(mean) / usual).log2().round().clamp(fewest, most);
-        ((n as f32 * octaves.exp2()) as u32).max(1)
+        let octaves = (growth(mean) - usual).round().clamp(fewest, most) as i32;
+        let n = if octaves < 0 { n >> -octaves } else { n << octaves };
+        n.max(1)
     }
 }
 
@@ -75,12 +76,12 @@ fn teaches(pixel: usize, width: usize) -> bool {
     level(pixel % width, pixel / width) + 2 < N_LEVELS
 }
 
-/// What the number of samples is proportional to.
+/// What the number of samples is proportional to, in octaves.
 fn growth(spread: f32) -> f32 {
-    spread.powf(EXPONENT)
+    EXPONENT * spread.log2()
 }
 
-/// The mean [`growth`] over the picture, from a few of its pixels.
+/// The mean [`growth`] over the picture, from a few of its pixels: of the numbers, not of their octaves.
 pub(super) fn usual_growth<S: Strategy>(
     frame: &Frame,
     strategy: &S,
@@ -98,11 +99,11 @@ pub(super) fn usual_growth<S: Strategy>(
             let (x, y) = (at(i % ACROSS, width), at(i / ACROSS, height));
             let mut tile = Tile::new(Window { x, y, width: 1, height: 1 });
             tile.render(frame, strategy, pass, scratch, &());
-            scratch.spreads().get(0).map(growth)
+            scratch.spreads().get(0).map(|spread| growth(spread).exp2())
         })
         .collect();
     let (sum, n) = grows.iter().flatten().fold((0.0, 0.0), |(sum, n), g| (sum + g, n + 1.0));
-    (sum > 0.0).then_some(sum / n)
+    (sum > 0.0).then(|| f32::log2(sum / n))
 }
 
 #[cfg(test)]
@@ -115,20 +116,20 @@ mod tests {
         spreads.reset(5, 25);
         // Pixels 0 and 4 are of the first level, 2 between them is of one that teaches, and 1 of the last.
         let samples = |spread: f32| [1.0 - spread, 1.0 + spread].map(Rgb::splat);
-        assert_eq!(spreads.samples(1, 8, Some(0.5)), 8);
+        assert_eq!(spreads.samples(1, 8, Some(-1.0)), 8);
         spreads.learn(0, &samples(0.9));
         spreads.learn(4, &[Rgb::WHITE]);
         assert_eq!(spreads.get(4), None);
         let growth = growth(spreads.get(0).unwrap());
         assert_eq!(spreads.samples(1, 8, None), 8);
         assert_eq!(spreads.samples(1, 8, Some(growth)), 8);
-        assert_eq!(spreads.samples(1, 8, Some(growth / 2.1)), 16);
-        assert_eq!(spreads.samples(1, 8, Some(growth / 1000.0)), 64);
-        assert_eq!(spreads.samples(1, 8, Some(growth * 1000.0)), 2);
-        assert_eq!(spreads.samples(1, 1, Some(growth * 1000.0)), 1);
-        assert_eq!(spreads.samples(2, 8, Some(growth / 2.1)), 16);
-        assert_eq!(spreads.samples(2, 8, Some(growth * 1000.0)), 8);
-        assert_eq!(spreads.samples(0, 8, Some(growth / 1000.0)), 8);
+        assert_eq!(spreads.samples(1, 8, Some(growth - 1.1)), 16);
+        assert_eq!(spreads.samples(1, 8, Some(growth - 10.0)), 64);
+        assert_eq!(spreads.samples(1, 8, Some(growth + 10.0)), 2);
+        assert_eq!(spreads.samples(1, 1, Some(growth + 10.0)), 1);
+        assert_eq!(spreads.samples(2, 8, Some(growth - 1.1)), 16);
+        assert_eq!(spreads.samples(2, 8, Some(growth + 10.0)), 8);
+        assert_eq!(spreads.samples(0, 8, Some(growth - 10.0)), 8);
     }
 
     #[test]
@@ -136,6 +137,6 @@ mod tests {
         let mut spreads = Spreads::default();
         spreads.reset(5, 25);
         spreads.learn(0, &[Rgb::BLACK; 4]);
-        assert_eq!(spreads.samples(1, 8, Some(0.5)), 2);
+        assert_eq!(spreads.samples(1, 8, Some(-1.0)), 2);
     }
 }

@@ -329,12 +329,13 @@ impl Batch {
             let (mut surface, mut one_material) = (None, true);
             for (ray, sample) in of_pixel.range().zip(of_pixel.samples.clone()) {
                 if let Some(hit) = &self.hits[ray] {
-                    let (point, plain) = frame.scene.shade(&self.rays[ray], hit);
+                    let plain = frame.scene.plain_surface(hit);
                     let known = self.points.len() == start || plain == surface;
                     one_material &= known && plain.is_some();
                     surface = plain;
+                    self.points.push(frame.scene.shading_point(&self.rays[ray], hit));
+                    let point = &self.points[self.points.len() - 1];
                     self.origins.push(offset_origin(point.position, point.ng, frame.extent));
-                    self.points.push(point);
                     self.samples.push(sample);
                 }
             }

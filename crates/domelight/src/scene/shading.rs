@@ -23,13 +23,8 @@ impl Scene {
     ///
     /// # Panics
     /// If `hit.triangle` is not one of this scene's.
-    pub fn shading_point(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
-        self.shade(ray, hit).0
-    }
-
-    /// [`Scene::shading_point`], and the surface if its material is the same all over.
     #[inline]
-    pub(crate) fn shade(&self, ray: &Ray, hit: &Hit) -> (ShadingPoint, Option<usize>) {
+    pub fn shading_point(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
         let (part, triangle) = self.locate(hit.triangle);
         let surface = &self.surfaces[part.surface];
         let corner = Corners::new(&part.mesh, triangle, hit);
@@ -51,8 +46,16 @@ impl Scene {
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
         let material = surface.material(&self.textures, uv, tint).for_view(wo);
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
-        let plain = surface.textures().next().is_none() && part.mesh.colors.is_empty();
-        (ShadingPoint { position, ng, frame, wo, material }, plain.then_some(part.surface))
+        ShadingPoint { position, ng, frame, wo, material }
+    }
+
+    /// The surface of a hit, if its material is the same all over.
+    #[inline]
+    pub(crate) fn plain_surface(&self, hit: &Hit) -> Option<usize> {
+        let (part, _) = self.locate(hit.triangle);
+        let is_plain =
+            part.mesh.colors.is_empty() && self.surfaces[part.surface].textures().next().is_none();
+        is_plain.then_some(part.surface)
     }
 
     /// On the front side: the interpolated normal, the same with the normal map applied, and the
