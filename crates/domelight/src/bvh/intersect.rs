@@ -170,10 +170,11 @@ impl<S: Simd> Sheared<S> {
         let b = frame.sheared(frame.to(simd, &block.vertices[1]));
         let c = frame.sheared(frame.to(simd, &block.vertices[2]));
 
-        // All of one sign inside; zero on an edge.
+        // All of one sign inside; zero on an edge, or so near to one that the product underflows.
         let (mut u, mut v, mut w) = (edge(c, b), edge(a, c), edge(b, a));
-        let (mut least, mut greatest) = (u.min(v).min(w), u.max(v).max(w));
-        if (least.eq(zero) | greatest.eq(zero)).bits() != 0 {
+        let signs = u.min(v).min(w) * u.max(v).max(w);
+        let mut inside = zero.lt(signs);
+        if signs.eq(zero).bits() != 0 {
             let corners = [
                 [a.x.store(), a.y.store()],
                 [b.x.store(), b.y.store()],
@@ -181,9 +182,12 @@ impl<S: Simd> Sheared<S> {
             ];
             let exact = exact_edges(corners, [u.store(), v.store(), w.store()]);
             (u, v, w) = (simd.load(&exact[0]), simd.load(&exact[1]), simd.load(&exact[2]));
-            (least, greatest) = (u.min(v).min(w), u.max(v).max(w));
+            // A determinant that is zero or NaN is no hit.
+            let determinant = u + v + w;
+            let has_area = determinant.lt(zero) | zero.lt(determinant);
+            let same = zero.le(u.min(v).min(w)) | u.max(v).max(w).le(zero);
+            inside = same & has_area;
         }
-        let inside = zero.le(least) | greatest.le(zero);
         Self { frame, to_corner, depths: [a.z, b.z, c.z], weights: [u, v, w], inside }
     }
 
@@ -202,13 +206,9 @@ impl<S: Simd> Sheared<S> {
         let plane = planes.depth(simd, &self.frame, self.to_corner);
         let t = self.frame.scale * plane.max(nearest).min(farthest);
 
-        // A determinant that is zero or NaN is no hit.
         let [u, v, w] = self.weights;
-        let zero = simd.splat(0.0);
-        let determinant = u + v + w;
-        let has_area = determinant.lt(zero) | zero.lt(determinant);
-        let mask = (self.inside & has_area & zero.lt(t) & t.le(simd.splat(limit))).bits();
-        BlockHits { mask, t, weights: [v, w], determinant }
+        let mask = (self.inside & simd.splat(0.0).lt(t) & t.le(simd.splat(limit))).bits();
+        BlockHits { mask, t, weights: [v, w], determinant: u + v + w }
     }
 }
 
