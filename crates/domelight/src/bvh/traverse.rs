@@ -350,6 +350,7 @@ static BITS: [[u32; 2]; STREAM] = {
 };
 
 /// The rays that enter each child of a node, in two halves.
+#[derive(Clone, Copy)]
 struct Entering<S: Simd>([S::Sets; 2]);
 
 impl<S: Simd> Entering<S> {
