@@ -1,7 +1,7 @@
 //! Walking the tree: one ray to its closest or any hit, and streams of rays.
 //!
 //! Everything here is generic over the instruction set and inlined into it.
-#![allow(clippy::large_stack_arrays)] // Some streams, 20 KiB.
+#![allow(clippy::large_stack_arrays)] // Some streams, 50 KiB.
 
 use std::ops::Range;
 
@@ -330,14 +330,6 @@ fn interleave<'a, S: Simd, T: Stream, const N: usize>(
     }
 }
 
-/// Children yet to visit, and for each the rays of the stream that enter it.
-struct StreamStack {
-    children: [u32; STACK],
-    /// The lower and the upper half of the rays.
-    rays: [[u32; STACK]; 2],
-    len: usize,
-}
-
 /// The bit of each ray, in two halves.
 static BITS: [[u32; 2]; STREAM] = {
     let mut bits = [[0; 2]; STREAM];
@@ -366,6 +358,14 @@ impl<S: Simd> Entering<S> {
         let [in_low, in_high] = BITS[i % STREAM];
         self.0 = [low.insert(crossed, in_low), high.insert(crossed, in_high)];
     }
+}
+
+/// Children yet to visit, and for each the rays of the stream that enter it.
+struct StreamStack {
+    children: [u32; STACK],
+    /// The lower and the upper half of the rays.
+    rays: [[u32; STACK]; 2],
+    len: usize,
 }
 
 impl StreamStack {
