@@ -492,8 +492,8 @@ fn instruction_sets_give_the_same_bits_for_hostile_numbers() {
                 _ => {}
             }
         }
-        // Streams that are empty, not full, full, and one ray more.
-        for count in [0, 1, 7, 8, 9, 63, 64, 65, 1000] {
+        // Streams that are empty, not full, half full, full, and one ray more.
+        for count in [0, 1, 7, 8, 9, 31, 32, 33, 63, 64, 65, 1000] {
             let rays = &rays[..count];
             let answers = on(&bvh).into_iter().map(|bvh| {
                 let (mut hits, mut occluded) = (Vec::new(), Vec::new());

@@ -60,6 +60,19 @@ impl<S: Simd> Slabs<S> {
         let leave_z = self.far[2].times_minus(z, one(far, 2));
         [enter_x.max(enter_y).max(enter_z.max(simd.splat(0.0))), leave_x.min(leave_y).min(leave_z)]
     }
+
+    /// Which boxes ray `i` crosses within [0, `limit`], and the distances where it enters them.
+    #[inline(always)]
+    pub(super) fn cross_within<const N: usize>(
+        &self,
+        simd: S,
+        rays: &PreparedRays<N>,
+        i: usize,
+        limit: f32,
+    ) -> (<S::Floats as Real>::Mask, S::Floats) {
+        let [enter, leave] = self.cross(simd, rays, i);
+        (enter.le(leave.min(simd.splat(limit))), enter)
+    }
 }
 
 /// The planes of an axis, the near one first; the lowest bit says whether that is the upper.
@@ -94,7 +107,7 @@ impl<F: Floats> Points<F> {
         Self { x: simd.splat(x[i]), y: simd.splat(y[i]), z: simd.splat(z[i]) }
     }
 
-    /// By the axes of `space`.
+    /// Of three rows of numbers, those of the axes x, y and z.
     #[inline(always)]
     fn along<S: Simd<Floats = F>>(simd: S, lanes: &[Lanes; 3], [x, y, z]: [usize; 3]) -> Self {
         Self { x: simd.load(&lanes[x]), y: simd.load(&lanes[y]), z: simd.load(&lanes[z]) }

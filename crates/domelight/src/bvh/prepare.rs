@@ -10,8 +10,8 @@ pub(super) struct PreparedRays<const N: usize> {
     /// One bit an axis: set where the rays enter through the upper plane.
     pub(super) octant: u32,
     /// By axis; origins and directions are given, the rest is computed from them.
-    pub(super) origins: [[f32; N]; 3],
-    pub(super) directions: [[f32; N]; 3],
+    origins: [[f32; N]; 3],
+    directions: [[f32; N]; 3],
     /// The origins moved forward along each axis, times the inverse direction, for near planes.
     pub(super) near_origins: [[f32; N]; 3],
     /// The origins moved backward along each axis, times the inverse direction, for far planes.
@@ -122,13 +122,13 @@ impl<const N: usize> PreparedRays<N> {
                 axes[first + i] = axis;
             }
         }
-        for (k, rotated) in [[o[1], o[2], o[0]], [o[2], o[0], o[1]], o].into_iter().enumerate() {
-            store(pick(is_x, is_y, rotated), &mut self.sheared_origins[k], first);
+        for (k, origin) in turned(is_x, is_y, o).into_iter().enumerate() {
+            store(origin, &mut self.sheared_origins[k], first);
         }
-        let scale = pick(is_x, is_y, inverse);
-        store(pick(is_x, is_y, [d[1], d[2], d[0]]) * scale, &mut self.shears[0], first);
-        store(pick(is_x, is_y, [d[2], d[0], d[1]]) * scale, &mut self.shears[1], first);
-        store(scale, &mut self.shears[2], first);
+        let ([x, y, _], [_, _, scale]) = (turned(is_x, is_y, d), turned(is_x, is_y, inverse));
+        for (k, shear) in [x * scale, y * scale, scale].into_iter().enumerate() {
+            store(shear, &mut self.shears[k], first);
+        }
         is_finite.bits()
     }
 
@@ -162,6 +162,12 @@ fn store<F: Floats>(x: F, numbers: &mut [f32], first: usize) {
 #[inline(always)]
 fn abs<S: Simd>(simd: S, x: S::Floats) -> S::Floats {
     x.max(simd.splat(0.0) - x)
+}
+
+/// By the axes of the sheared space: z is x where that is the longest, y where it is, else z.
+#[inline(always)]
+fn turned<F: Floats>(is_x: F::Mask, is_y: F::Mask, [x, y, z]: [F; 3]) -> [F; 3] {
+    [pick(is_x, is_y, [y, z, x]), pick(is_x, is_y, [z, x, y]), pick(is_x, is_y, [x, y, z])]
 }
 
 /// The first where the longest axis is x, the second where it is y, else the third.

@@ -55,27 +55,14 @@ impl Kernel for ClosestHits<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        if self.bvh.bytes() <= CACHED {
-            self.interleaved::<S, 2>(simd);
-        } else {
-            self.interleaved::<S, INTERLEAVED>(simd);
-        }
-    }
-}
-
-impl ClosestHits<'_> {
-    /// In `N` streams.
-    #[inline(always)]
-    fn interleaved<S: Simd, const N: usize>(self, simd: S) {
         let same_octant = |a: &Ray, b: &Ray| octant(a.direction) == octant(b.direction);
         let runs = self.rays.chunk_by(same_octant).flat_map(|run| run.chunks(STREAM));
-        let mut streams = [const { ClosestStream::EMPTY }; N];
         let mut first = 0;
         let starts = runs.map(|rays| {
             first += rays.len();
             (first - rays.len(), rays)
         });
-        interleave(simd, self.bvh, &mut streams, starts, self.hits);
+        interleave::<S, ClosestStream>(simd, self.bvh, starts, self.hits);
     }
 }
 
@@ -107,26 +94,13 @@ impl Kernel for Occluded<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        if self.bvh.bytes() <= CACHED {
-            self.interleaved::<S, 2>(simd);
-        } else {
-            self.interleaved::<S, INTERLEAVED>(simd);
-        }
-    }
-}
-
-impl Occluded<'_> {
-    /// In `N` streams.
-    #[inline(always)]
-    fn interleaved<S: Simd, const N: usize>(self, simd: S) {
-        let mut streams = [const { ShadowStream::EMPTY }; N];
         let mut order = [0; WINDOW];
         for start in (0..self.rays.len()).step_by(WINDOW) {
             let end = self.rays.len().min(start + WINDOW);
             let octants = sort_by_octant(&self.rays.directions[start..end], &mut order);
             let chunks = octants.iter().flat_map(|octant| order[octant.clone()].chunks(STREAM));
             let starts = chunks.map(|members| ShadowRays { batch: self.rays, start, members });
-            interleave(simd, self.bvh, &mut streams, starts, self.answers);
+            interleave::<S, ShadowStream>(simd, self.bvh, starts, self.answers);
         }
     }
 }
@@ -211,8 +185,8 @@ fn closest_hit<S: Simd>(
         } else {
             let node = &bvh.nodes[child.index()];
             let slabs = Slabs::load(simd, node, ray.octant);
-            let [enter, leave] = slabs.cross(simd, ray, 0);
-            let crossed = enter.le(leave.min(simd.splat(limit))).bits();
+            let (crossed, enter) = slabs.cross_within(simd, ray, 0, limit);
+            let crossed = crossed.bits();
             if crossed.is_power_of_two() {
                 child = node.children[crossed.trailing_zeros() as usize % WIDTH];
                 continue;
@@ -245,9 +219,10 @@ fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRays<WIDTH>, limit: f32) -
             }
         } else {
             let node = &bvh.nodes[child.index()];
-            let [enter, leave] = Slabs::load(simd, node, ray.octant).cross(simd, ray, 0);
+            let slabs = Slabs::load(simd, node, ray.octant);
+            let (crossed, _) = slabs.cross_within(simd, ray, 0, limit);
             // The last and largest on top.
-            for lane in set_bits(enter.le(leave.min(simd.splat(limit))).bits()) {
+            for lane in set_bits(crossed.bits()) {
                 stack[len] = node.children[lane];
                 len += 1;
             }
@@ -291,7 +266,8 @@ fn closest_in_block<S: Simd, const N: usize>(
 
 /// Rays of one octant on their way through the tree, together: a node's planes are loaded once for all
 /// rays that reach it. The order of the visits does not change the answers.
-trait Stream {
+trait Stream: Sized {
+    const EMPTY: Self;
     /// The rays to start with.
     type Rays<'a>;
     type Answer;
@@ -304,19 +280,34 @@ trait Stream {
     fn finish(&mut self, answers: &mut [Self::Answer]);
 }
 
-/// Runs some streams in turns, each again and again, until nothing is left to start with.
+/// Runs as many streams in turns as the tree's size asks for.
 #[inline(always)]
-fn interleave<'a, S: Simd, T: Stream, const N: usize>(
+fn interleave<'a, S: Simd, T: Stream>(
     simd: S,
     bvh: &Bvh,
-    streams: &mut [T; N],
+    starts: impl Iterator<Item = T::Rays<'a>>,
+    answers: &mut [T::Answer],
+) {
+    if bvh.bytes() <= CACHED {
+        take_turns::<S, T, 2>(simd, bvh, starts, answers);
+    } else {
+        take_turns::<S, T, INTERLEAVED>(simd, bvh, starts, answers);
+    }
+}
+
+/// Runs `N` streams in turns, each again and again, until nothing is left to start with.
+#[inline(always)]
+fn take_turns<'a, S: Simd, T: Stream, const N: usize>(
+    simd: S,
+    bvh: &Bvh,
     mut starts: impl Iterator<Item = T::Rays<'a>>,
     answers: &mut [T::Answer],
 ) {
+    let mut streams = [const { T::EMPTY }; N];
     let mut running = true;
     while running {
         running = false;
-        for stream in &mut *streams {
+        for stream in &mut streams {
             if stream.advance(simd, bvh) {
                 running = true;
                 continue;
@@ -428,7 +419,7 @@ struct ClosestStream {
     stack: StreamStack,
 }
 
-impl ClosestStream {
+impl Stream for ClosestStream {
     const EMPTY: Self = Self {
         rays: PreparedRays::EMPTY,
         limits: [0.0; STREAM],
@@ -436,9 +427,7 @@ impl ClosestStream {
         members: 0..0,
         stack: StreamStack::EMPTY,
     };
-}
 
-impl Stream for ClosestStream {
     /// With the number of the first.
     type Rays<'a> = (usize, &'a [Ray]);
     type Answer = Option<Hit>;
@@ -473,8 +462,8 @@ impl Stream for ClosestStream {
             let mut entering = Entering::none(simd);
             let mut enter = simd.splat(0.0);
             for i in set_bits(rays) {
-                let [entered, leave] = slabs.cross(simd, &self.rays, i);
-                entering.insert(i, entered.le(leave.min(simd.splat(self.limits[i]))));
+                let (crossed, entered) = slabs.cross_within(simd, &self.rays, i, self.limits[i]);
+                entering.insert(i, crossed);
                 enter = entered;
             }
             let not_empty = entering.0.map(Sets::not_empty);
@@ -524,16 +513,6 @@ struct ShadowStream {
     stack: StreamStack,
 }
 
-impl ShadowStream {
-    const EMPTY: Self = Self {
-        rays: PreparedRays::EMPTY,
-        members: [0; STREAM],
-        free: 0,
-        hit: 0,
-        stack: StreamStack::EMPTY,
-    };
-}
-
 /// Rays of a batch: those whose numbers are `start` and one of `members`.
 struct ShadowRays<'a> {
     batch: &'a RayBatch,
@@ -542,6 +521,14 @@ struct ShadowRays<'a> {
 }
 
 impl Stream for ShadowStream {
+    const EMPTY: Self = Self {
+        rays: PreparedRays::EMPTY,
+        members: [0; STREAM],
+        free: 0,
+        hit: 0,
+        stack: StreamStack::EMPTY,
+    };
+
     type Rays<'a> = ShadowRays<'a>;
     type Answer = bool;
 

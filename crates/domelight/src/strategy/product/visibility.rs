@@ -228,7 +228,7 @@ mod tests {
         for block in 0..blocks.len() {
             let (visible, doubt) = visibility.of(block);
             assert!(visible[..ROWS].iter().flatten().all(|v| (0.0..=1.0).contains(v)));
-            assert!(doubt[..ROWS].iter().flatten().all(|d| (0.017..0.8).contains(d)));
+            assert!(doubt[..ROWS].iter().flatten().all(|d| (0.017..0.62).contains(d)));
             for cell in 0..100 {
                 assert!((at(visible, cell) - cell as f32 / 100.0).abs() < 0.15);
             }
