@@ -9,8 +9,8 @@ use super::tiling::Window;
 use super::{Background, Frame, Observer, RenderSettings, Stage, Visibility};
 use crate::Rgb;
 use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
-use crate::math::Vec3;
-use crate::sampling::{Dimension, Stream};
+use crate::math::{Vec3, vec2};
+use crate::sampling::{Dimension, NumberSet, Stream};
 use crate::strategy::levels::level;
 use crate::strategy::{Contributions, PixelPoints, ShadingPoint, Strategy, TileShading};
 
@@ -223,7 +223,8 @@ impl Tile {
             let samples = start..start + n_samples;
             let first = seen.then_some(rays.len());
             if first.is_some() {
-                rays.extend(samples.clone().map(|sample| camera_ray(frame, x, y, stream, sample)));
+                let set = stream.set(Dimension::Film);
+                rays.extend(samples.clone().map(|sample| camera_ray(frame, x, y, &set, sample)));
             }
             camera_rays.push(CameraRays { samples, first });
             pixels.push(PixelPoints { points: 0..0, n_samples, stream, one_material: true });
@@ -290,7 +291,8 @@ impl Tile {
                     }
                     Some((ray, None)) => background_sample(frame, ray.direction),
                     None => {
-                        let ray = camera_ray(frame, x, y, batch.pixels[i].stream, sample);
+                        let set = batch.pixels[i].stream.set(Dimension::Film);
+                        let ray = camera_ray(frame, x, y, &set, sample);
                         background_sample(frame, ray.direction)
                     }
                 };
@@ -301,10 +303,11 @@ impl Tile {
     }
 }
 
-/// Camera sample `sample` of the pixel at (`x`, `y`).
+/// Camera sample `sample` of the pixel at (`x`, `y`), by its numbers for the film.
 #[inline]
-fn camera_ray(frame: &Frame, x: usize, y: usize, stream: Stream, sample: u32) -> Ray {
-    let at = frame.filter.sample(stream.numbers(Dimension::Film, sample).u());
+fn camera_ray(frame: &Frame, x: usize, y: usize, set: &NumberSet, sample: u32) -> Ray {
+    let [[u], [v]] = set.u(sample);
+    let at = frame.filter.sample(vec2(u, v));
     frame.camera.ray(x as f32 + at.x, y as f32 + at.y)
 }
 

@@ -16,13 +16,14 @@ pub use hierarchy::HierarchicalTable;
 pub use mis::Heuristic;
 pub use reservoir::WeightedReservoirs;
 pub use rng::Pcg32;
-pub use stream::{Dimension, SamplerKind, Stream};
+pub use stream::{Dimension, NumberSet, SamplerKind, Stream};
 pub use table::{Table1d, Table2d, TableError, TableSample};
 
 /// The greatest number below 1 in single precision.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// The upper 24 bits as a number in [0, 1), never 1.
+#[inline(always)]
 pub fn unit_f32(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }

@@ -79,6 +79,7 @@ const fn byte_tables() -> [[[u32; 4]; 256]; 4] {
 /// A hash in which bit i of the result depends on bits 0…i of `x` alone: on a bit-reversed number
 /// it is an Owen scramble. Laine & Karras 2011's form with Vegdahl's constants ("Building a Better
 /// LK Hash", 2021).
+#[inline(always)]
 fn laine_karras(mut x: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(seed);
@@ -92,9 +93,7 @@ fn laine_karras(mut x: u32, seed: u32) -> u32 {
 /// The index is shuffled by an Owen scramble of its own, so that sets do not line up; then each
 /// dimension is scrambled by itself.
 pub fn point(index: u32, seed: u64) -> [u32; 4] {
-    let seeds = [seed as u32, (seed >> 32) as u32];
-    let shuffled = laine_karras(index.reverse_bits(), seeds[0] ^ seeds[1].rotate_left(13));
-    let bytes = shuffled.to_le_bytes();
+    let bytes = shuffled(index, seed).to_le_bytes();
     let mut point = [0u32; 4];
     for (table, byte) in BYTES.iter().zip(bytes) {
         let row = &table[byte as usize];
@@ -103,10 +102,40 @@ pub fn point(index: u32, seed: u64) -> [u32; 4] {
         }
     }
     for (d, x) in point.iter_mut().enumerate() {
-        let key = seeds[d & 1].wrapping_add(0x9e37_79b9u32.wrapping_mul(d as u32 + 1));
-        *x = laine_karras(*x, key.wrapping_mul(0x2c1b_3c6d) ^ (key >> 15)).reverse_bits();
+        *x = scrambled(*x, seed, d as u32);
     }
     point
+}
+
+/// The first two of [`point`], by arithmetic alone: loops over them become vectors.
+///
+/// Dimension 0 is the index. The columns of dimension 1 are the binomials: it is the index as a polynomial over
+/// GF(2), moved by one, where (1 + x)^2ᵏ = 1 + x^2ᵏ.
+#[inline(always)]
+pub fn first_two(index: u32, seed: u64) -> [u32; 2] {
+    let x = shuffled(index, seed).reverse_bits();
+    let mut y = x;
+    y ^= (y & 0xffff_0000) >> 16;
+    y ^= (y & 0xff00_ff00) >> 8;
+    y ^= (y & 0xf0f0_f0f0) >> 4;
+    y ^= (y & 0xcccc_cccc) >> 2;
+    y ^= (y & 0xaaaa_aaaa) >> 1;
+    [scrambled(x, seed, 0), scrambled(y, seed, 1)]
+}
+
+/// The scrambled index, bit-reversed.
+#[inline(always)]
+fn shuffled(index: u32, seed: u64) -> u32 {
+    let (low, high) = (seed as u32, (seed >> 32) as u32);
+    laine_karras(index.reverse_bits(), low ^ high.rotate_left(13))
+}
+
+/// Coordinate `d` of a point, bit-reversed, scrambled.
+#[inline(always)]
+fn scrambled(x: u32, seed: u64, d: u32) -> u32 {
+    let half = (seed >> (32 * (d & 1))) as u32;
+    let key = half.wrapping_add(0x9e37_79b9u32.wrapping_mul(d + 1));
+    laine_karras(x, key.wrapping_mul(0x2c1b_3c6d) ^ (key >> 15)).reverse_bits()
 }
 
 #[cfg(test)]
@@ -128,6 +157,14 @@ mod tests {
             for d in 0..3 {
                 assert_eq!(unscrambled(i ^ (i >> 1), d) >> 29, e[d], "point {i}, dimension {d}");
             }
+        }
+    }
+
+    #[test]
+    fn the_first_two_are_those_of_the_point() {
+        for i in (0..5000).chain([u32::MAX, 1 << 31, 0x8765_4321]) {
+            let (seed, [x, y, ..]) = (mix64(u64::from(i % 7)), point(i, mix64(u64::from(i % 7))));
+            assert_eq!(first_two(i, seed), [x, y]);
         }
     }
 

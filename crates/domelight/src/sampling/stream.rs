@@ -56,6 +56,48 @@ impl Numbers {
     }
 }
 
+/// All numbers of one dimension of a stream.
+#[derive(Clone, Copy, Debug)]
+pub struct NumberSet {
+    kind: SamplerKind,
+    seed: u64,
+}
+
+impl NumberSet {
+    /// Point `index`, each number in [0, 1), see [`Stream::numbers`].
+    #[inline]
+    pub fn numbers(&self, index: u32) -> Numbers {
+        Numbers(match self.kind {
+            SamplerKind::Sobol => sobol::point(index, self.seed).map(unit_f32),
+            SamplerKind::Independent => {
+                let mut pcg = generator(self.seed, index);
+                [(); 4].map(|()| pcg.next_f32())
+            }
+        })
+    }
+
+    /// [`Numbers::u`] of N points from `first` on, by coordinate.
+    #[inline(always)]
+    pub fn u<const N: usize>(&self, first: u32) -> [[f32; N]; 2] {
+        let (mut x, mut y) = ([0.0; N], [0.0; N]);
+        match self.kind {
+            SamplerKind::Sobol => {
+                for i in 0..N {
+                    let [a, b] = sobol::first_two(first.wrapping_add(i as u32), self.seed);
+                    (x[i], y[i]) = (unit_f32(a), unit_f32(b));
+                }
+            }
+            SamplerKind::Independent => {
+                for i in 0..N {
+                    let u = self.numbers(first.wrapping_add(i as u32)).u();
+                    (x[i], y[i]) = (u.x, u.y);
+                }
+            }
+        }
+        [x, y]
+    }
+}
+
 /// All numbers of one pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Stream {
@@ -91,14 +133,13 @@ impl Stream {
     /// Consecutive indices are well distributed together: number all samples of a pixel that serve
     /// one purpose in one sequence.
     pub fn numbers(&self, dimension: Dimension, index: u32) -> Numbers {
-        let set = hash2(self.key, dimension as u64);
-        Numbers(match self.kind {
-            SamplerKind::Sobol => sobol::point(index, set).map(unit_f32),
-            SamplerKind::Independent => {
-                let mut pcg = generator(set, index);
-                [(); 4].map(|()| pcg.next_f32())
-            }
-        })
+        self.set(dimension).numbers(index)
+    }
+
+    /// The numbers of one dimension.
+    #[inline]
+    pub fn set(&self, dimension: Dimension) -> NumberSet {
+        NumberSet { kind: self.kind, seed: hash2(self.key, dimension as u64) }
     }
 
     /// Independent numbers without end, sequence `index` of this stream: for procedures that stop at
@@ -129,6 +170,8 @@ mod tests {
                 assert_ne!(n, b.numbers(Dimension::Brdf, i));
                 assert_ne!(n, a.numbers(Dimension::Film, i));
                 assert_eq!(n, a.numbers(Dimension::Brdf, i));
+                let [[x, ..], [y, ..]] = a.set(Dimension::Brdf).u::<8>(i);
+                assert_eq!(n.u().to_array(), [x, y]);
             }
         }
     }
