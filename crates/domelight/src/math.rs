@@ -6,12 +6,14 @@ pub use glam::{Mat3, Mat4, Quat, Vec2, Vec3, Vec4, vec2, vec3};
 
 pub use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 
+use crate::simd::{Real, Vectors};
+
 /// The angle of (x, y) from the x axis in [−π, π], to 5·10⁻⁷.
 ///
 /// arctan t = t P(t²) on [0, 1], P a minimax polynomial of relative error 2·10⁻⁸; the other octants by
 /// reflection.
-#[inline]
-pub(crate) fn atan2(y: f32, x: f32) -> f32 {
+#[inline(always)]
+pub(crate) fn atan2<F: Real>(y: F, x: F) -> F {
     const P: [f32; 9] = [
         1.0,
         -0.333_330_72,
@@ -24,11 +26,51 @@ pub(crate) fn atan2(y: f32, x: f32) -> f32 {
         0.002_849_890_6,
     ];
     let (ax, ay) = (x.abs(), y.abs());
-    let t = ax.min(ay) / ax.max(ay).max(f32::MIN_POSITIVE);
-    let octant = t * P.iter().rfold(0.0, |p, c| p * (t * t) + c);
-    let quadrant = if ax < ay { FRAC_PI_2 - octant } else { octant };
-    let half = if x < 0.0 { PI - quadrant } else { quadrant };
-    if y < 0.0 { -half } else { half }
+    let t = ax.min(ay) / ax.max(ay).max(x.splat(f32::MIN_POSITIVE));
+    let octant = t * polynomial(t.squared(), &P);
+    let quadrant = F::select(ax.lt(ay), x.splat(FRAC_PI_2) - octant, octant);
+    let zero = x.splat(0.0);
+    let half = F::select(x.lt(zero), x.splat(PI) - quadrant, quadrant);
+    F::select(y.lt(zero), zero - half, half)
+}
+
+/// Sine and cosine of `u` turns for u in [0, 1], to 2·10⁻⁷.
+///
+/// sin 2πt = t P(t²) on [0, ¼], P a minimax polynomial; the other quadrants by reflection.
+#[inline(always)]
+pub(crate) fn sin_cos_turns<F: Real>(u: F) -> [F; 2] {
+    let (zero, quarter) = (u.splat(0.0), u.splat(0.25));
+    // Half a turn less, which changes both signs.
+    let x = u - u.splat(0.5);
+    let t = x.abs();
+    let folded = t.min(u.splat(0.5) - t);
+    let (sin, cos) = (sine_of_quarter(folded), sine_of_quarter(quarter - folded));
+    let sin = F::select(x.lt(zero), sin, zero - sin);
+    [sin, F::select(t.lt(quarter), zero - cos, cos)]
+}
+
+/// Sine and cosine of `t` eighths of a turn for t in [−1, 1], to 2·10⁻⁷.
+#[inline(always)]
+pub(crate) fn sin_cos_eighth<F: Real>(t: F) -> [F; 2] {
+    let t = t * t.splat(0.125);
+    [sine_of_quarter(t), sine_of_quarter(t.splat(0.25) - t.abs())]
+}
+
+/// sin 2πt on [−¼, ¼].
+#[inline(always)]
+fn sine_of_quarter<F: Real>(t: F) -> F {
+    const P: [f32; 5] = [6.283_185_5, -41.341_68, 81.602_234, -76.574_99, 39.710_92];
+    t * polynomial(t.squared(), &P)
+}
+
+/// Σ cₖ xᵏ by Horner's rule.
+#[inline(always)]
+fn polynomial<F: Real, const N: usize>(x: F, c: &[f32; N]) -> F {
+    let mut sum = x.splat(c[N - 1]);
+    for &c in c[..N - 1].iter().rev() {
+        sum = sum * x + x.splat(c);
+    }
+    sum
 }
 
 /// 1 / (4π), the density of the uniform distribution over the sphere \[sr⁻¹\].
@@ -49,17 +91,9 @@ pub struct Frame {
 
 impl Frame {
     /// A frame around the unit vector `z`, continuous everywhere but at z = −Z.
-    ///
-    /// Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
     pub fn from_z(z: Vec3) -> Self {
-        let sign = 1f32.copysign(z.z);
-        let a = -1.0 / (sign + z.z);
-        let b = z.x * z.y * a;
-        Self {
-            x: vec3(1.0 + sign * z.x * z.x * a, sign * b, -sign * z.x),
-            y: vec3(b, sign + z.y * z.y * a, -z.y),
-            z,
-        }
+        let [x, y] = tangents(z.into()).map(Vec3::from);
+        Self { x, y, z }
     }
 
     /// A frame around the unit vector `z` whose x axis lies as near to `tangent` as it can.
@@ -82,6 +116,21 @@ impl Frame {
     pub fn to_world(&self, v: Vec3) -> Vec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }
+}
+
+/// The x and y axes of frames around unit vectors, see [`Frame::from_z`].
+///
+/// Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
+#[inline(always)]
+pub(crate) fn tangents<F: Real>(n: Vectors<F>) -> [Vectors<F>; 2] {
+    let (zero, one) = (n.z.splat(0.0), n.z.splat(1.0));
+    let sign = F::select(n.z.lt(zero), zero - one, one);
+    let a = (zero - one) / (sign + n.z);
+    let b = n.x * n.y * a;
+    [
+        Vectors { x: one + sign * n.x * n.x * a, y: sign * b, z: (zero - sign) * n.x },
+        Vectors { x: b, y: sign + n.y * n.y * a, z: zero - n.y },
+    ]
 }
 
 /// The mirror direction of `w` about the unit vector `n`; both point away from the surface.
@@ -119,6 +168,18 @@ mod tests {
         assert!(worst < 5e-7, "{worst}");
         assert_eq!((atan2(0.0, 0.0), atan2(0.0, 1.0), atan2(0.0, -1.0)), (0.0, 0.0, PI));
         assert_eq!((atan2(1.0, 0.0), atan2(-1.0, 0.0)), (FRAC_PI_2, -FRAC_PI_2));
+    }
+
+    #[test]
+    fn turns_are_those_of_double_precision() {
+        let mut worst = 0.0f64;
+        for i in 0..=1 << 16 {
+            let u = i as f32 / 65536.0;
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(u)).sin_cos();
+            let [s, c] = sin_cos_turns(u).map(f64::from);
+            worst = worst.max((s - sin).abs()).max((c - cos).abs());
+        }
+        assert!(worst < 2.5e-7, "{worst}");
     }
 
     #[test]

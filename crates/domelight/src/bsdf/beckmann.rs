@@ -10,7 +10,7 @@
 
 use super::Fresnel;
 use super::microfacet::{Masking, Microfacet, NormalDistribution, clamp_alpha, gaussian_slopes};
-use crate::math::{FRAC_1_PI, Vec2, Vec3, sqr};
+use crate::math::{FRAC_1_PI, sqr};
 use crate::simd::{Real, Vectors};
 
 /// A Beckmann lobe.
@@ -72,8 +72,8 @@ impl NormalDistribution for BeckmannNormals {
         F::select((one(1.6) * spread).le(w.z), w.z, w.z + spread * fit)
     }
 
-    #[inline]
-    fn sample_normal(&self, _wo: Vec3, u: Vec2) -> Vec3 {
+    #[inline(always)]
+    fn sample_normals<F: Real>(&self, _wo: Vectors<F>, u: [F; 2]) -> Vectors<F> {
         gaussian_slopes(u, self.alpha)
     }
 

@@ -7,7 +7,7 @@
 
 use super::Fresnel;
 use super::microfacet::{Masking, Microfacet, NormalDistribution, clamp_alpha};
-use crate::math::{FRAC_1_PI, TAU, Vec2, Vec3, sqr, vec3};
+use crate::math::{FRAC_1_PI, sin_cos_turns, sqr};
 use crate::simd::{Real, Vectors};
 
 /// A GGX lobe.
@@ -66,18 +66,20 @@ impl NormalDistribution for GgxNormals {
     }
 
     /// Dupuy & Benyoub 2023, listing 3.
-    #[inline]
-    fn sample_normal(&self, wo: Vec3, u: Vec2) -> Vec3 {
-        let [ax, ay] = self.alpha;
+    #[inline(always)]
+    fn sample_normals<F: Real>(&self, wo: Vectors<F>, u: [F; 2]) -> Vectors<F> {
+        let (zero, one) = (wo.z.splat(0.0), wo.z.splat(1.0));
+        let [ax, ay] = [wo.z.splat(self.alpha[0]), wo.z.splat(self.alpha[1])];
         // Stretch to the configuration of unit roughness.
-        let w = vec3(ax * wo.x, ay * wo.y, wo.z).normalize();
+        let w = Vectors { x: ax * wo.x, y: ay * wo.y, z: wo.z };
+        let w = w.times(one / w.length_squared().sqrt());
         // A uniform direction of the cap z > −w_z.
-        let z = (1.0 - u.x) * (1.0 + w.z) - w.z;
-        let sin_theta = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
-        let (sin_phi, cos_phi) = (TAU * u.y).sin_cos();
+        let z = (one - u[0]) * (one + w.z) - w.z;
+        let sin_theta = ((one - z) * (one + z)).max(zero).sqrt();
+        let [sin_phi, cos_phi] = sin_cos_turns(u[1]);
         // The half vector, and back.
-        let h = vec3(sin_theta * cos_phi, sin_theta * sin_phi, z) + w;
-        vec3(ax * h.x, ay * h.y, h.z)
+        let h = Vectors { x: sin_theta * cos_phi, y: sin_theta * sin_phi, z }.plus(w);
+        Vectors { x: ax * h.x, y: ay * h.y, z: h.z }
     }
 
     /// D G₁(wo)/(4 cos θ_o) = D/(4 σ_o).

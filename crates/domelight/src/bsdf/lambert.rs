@@ -2,7 +2,7 @@
 
 use super::{Brdf, where_above};
 use crate::Rgb;
-use crate::math::{FRAC_1_PI, Vec2, Vec3};
+use crate::math::{FRAC_1_PI, Vec3};
 use crate::sampling::warp;
 use crate::simd::{Colors, Real, Vectors};
 
@@ -27,9 +27,9 @@ impl Brdf for Lambert {
         (Colors::splat(pdf, self.albedo).scaled(pdf), pdf)
     }
 
-    #[inline]
-    fn sample_direction(&self, _wo: Vec3, _u_lobe: f32, u: Vec2) -> Option<Vec3> {
-        Some(warp::cosine_hemisphere(u))
+    #[inline(always)]
+    fn sample_lanes<F: Real>(&self, _wo: Vectors<F>, _u_lobe: F, u: [F; 2]) -> Vectors<F> {
+        warp::cosine_lanes(u)
     }
 
     /// ρ/π, reached at the normal.

@@ -5,8 +5,8 @@
 
 use super::{Beckmann, Brdf, Ggx, Lambert, MetallicRoughness, Phong, Ward};
 use crate::Rgb;
-use crate::math::{Vec2, Vec3};
-use crate::simd::{Colors, Real, Vectors};
+use crate::math::Vec3;
+use crate::simd::{Colors, Mask as _, Real, Vectors};
 
 /// One reflectance lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,9 +45,9 @@ impl Brdf for Lobe {
         each!(self, l => l.eval_lanes(wo, wi))
     }
 
-    #[inline]
-    fn sample_direction(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Vec3> {
-        each!(self, l => l.sample_direction(wo, u_lobe, u))
+    #[inline(always)]
+    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
+        each!(self, l => l.sample_lanes(wo, u_lobe, u))
     }
 
     fn max_eval(&self, wo: Vec3) -> f32 {
@@ -180,6 +180,12 @@ impl Material {
         self.directional_albedo(1.0)
     }
 
+    /// Whether samples choose among lobes or parts of them: if not, `u_lobe` does not matter.
+    pub(crate) fn has_choice(&self) -> bool {
+        let mut terms = self.terms().iter();
+        self.n_terms > 1 || terms.any(|t| matches!(t.lobe, Lobe::MetallicRoughness(_)))
+    }
+
     /// The lobes with their weights.
     pub fn lobes(&self) -> impl Iterator<Item = (f32, &Lobe)> {
         self.terms().iter().map(|t| (t.weight, &t.lobe))
@@ -229,17 +235,26 @@ impl Brdf for Material {
         (value, pdf)
     }
 
-    #[inline]
-    fn sample_direction(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Vec3> {
-        let (last, others) = self.terms().split_last()?;
-        let mut rest = u_lobe;
-        for term in others {
-            if rest < term.probability {
-                return term.sample_direction(wo, rest, u);
+    /// What is left of `u_lobe` after the choice of a lobe is uniform again, and chooses within the lobe.
+    #[inline(always)]
+    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
+        const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+        let one = |x| wo.z.splat(x);
+        let mut wi = Vectors::splat(wo.z, Vec3::ZERO);
+        // Lanes whose lobe is this one or a later one, and what is left of their numbers.
+        let (mut open, mut rest) = (u_lobe.le(u_lobe), u_lobe);
+        for (i, term) in self.terms().iter().enumerate() {
+            let probability = one(term.probability);
+            let is_last = i + 1 == self.terms().len();
+            let chosen = if is_last { open } else { open & rest.lt(probability) };
+            if chosen.bits() != 0 {
+                let within = (rest / probability).min(one(BELOW_ONE));
+                wi = Vectors::select(chosen, term.lobe.sample_lanes(wo, within, u), wi);
             }
-            rest -= term.probability;
+            open = open & probability.le(rest);
+            rest = rest - probability;
         }
-        last.sample_direction(wo, rest, u)
+        wi
     }
 
     /// The sum of the lobes' bounds.
@@ -249,15 +264,6 @@ impl Brdf for Material {
 
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb {
         self.terms().iter().map(|t| t.weight * t.lobe.directional_albedo(cos_theta_o)).sum()
-    }
-}
-
-impl Term {
-    /// What is left of `u_lobe` after the choice is uniform again, and chooses within the lobe.
-    #[inline]
-    fn sample_direction(&self, wo: Vec3, rest: f32, u: Vec2) -> Option<Vec3> {
-        const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
-        self.lobe.sample_direction(wo, (rest / self.probability).min(BELOW_ONE), u)
     }
 }
 
@@ -316,6 +322,47 @@ mod tests {
                 self.material.eval_lanes(Vectors::splat(x, self.wo), Vectors { x, y, z });
             let ([r, g, b], pdf) = (value.0.map(simd::Floats::store), simd::Floats::store(pdf));
             std::array::from_fn(|i| (Rgb::new(r[i], g[i], b[i]), pdf[i]))
+        }
+    }
+
+    struct DrawnSideBySide<'a> {
+        material: &'a Material,
+        wo: Vec3,
+        u: [[f32; LANES]; 3],
+    }
+
+    impl Kernel for DrawnSideBySide<'_> {
+        type Output = [[f32; LANES]; 3];
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Self::Output {
+            let [u_lobe, u, v] = self.u.each_ref().map(|u| simd.load(u));
+            let wo = Vectors::splat(u, self.wo);
+            self.material.sample_lanes(wo, u_lobe, [u, v]).store()
+        }
+    }
+
+    /// Lanes of all lobes at once are what each is alone, bit for bit.
+    #[test]
+    fn lanes_are_samples_side_by_side() {
+        let beckmann = Beckmann::new([0.2, 0.3], Fresnel::One, Masking::Correlated);
+        let gltf = MetallicRoughness::new(Rgb::new(0.5, 0.3, 0.1), 0.3, 0.4);
+        let lobes = [beckmann.into(), gltf.into(), glossy(0.5)];
+        for material in [three(), Material::new(&lobes).unwrap(), Material::single(gltf)] {
+            for view in [0.0, 50.0, 89.0] {
+                let wo = toward(view, 0.3);
+                let number = |i: usize, step: f32| (0.1 + step * i as f32).fract();
+                let u = [0.137, 0.618, 0.755].map(|step| std::array::from_fn(|i| number(i, step)));
+                let alone = |i: usize| -> Vec3 {
+                    material.sample_lanes(wo.into(), u[0][i], [u[1][i], u[2][i]]).into()
+                };
+                for set in InstructionSet::ALL {
+                    let draw = DrawnSideBySide { material: &material, wo, u };
+                    let drawn = simd::dispatch(set, draw);
+                    let drawn: [Vec3; LANES] = std::array::from_fn(|i| drawn.map(|c| c[i]).into());
+                    assert_eq!(drawn, std::array::from_fn(alone), "{set:?}");
+                }
+            }
         }
     }
 

@@ -15,9 +15,9 @@ use super::ggx::{Ggx, GgxNormals};
 use super::microfacet::{Masking, reflect_about};
 use super::{Brdf, Fresnel, HORIZON, NormalDistribution as _, fresnel, where_above};
 use crate::Rgb;
-use crate::math::{FRAC_1_PI, Vec2, Vec3, sqr};
+use crate::math::{FRAC_1_PI, Vec3, sqr};
 use crate::sampling::warp;
-use crate::simd::{Colors, Real, Vectors};
+use crate::simd::{Colors, Mask as _, Real, Vectors};
 
 /// glTF's metallic-roughness lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,16 +85,18 @@ impl Brdf for MetallicRoughness {
         (value, share * pdf_specular + (one(1.0) - share) * cosine)
     }
 
-    #[inline]
-    fn sample_direction(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Vec3> {
-        if wo.z <= HORIZON {
-            return None;
+    #[inline(always)]
+    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
+        let share = self.specular_share(wo.z);
+        let (specular, diffuse) = (u_lobe.lt(share), share.le(u_lobe));
+        let mut wi = wo;
+        if specular.bits() != 0 {
+            wi = reflect_about(wo, GgxNormals::new([self.alpha; 2]).sample_normals(wo, u));
         }
-        if u_lobe < self.specular_share(wo.z) {
-            let h = GgxNormals::new([self.alpha; 2]).sample_normal(wo, u);
-            return Some(reflect_about(wo, h));
+        if diffuse.bits() != 0 {
+            wi = Vectors::select(diffuse, warp::cosine_lanes(u), wi);
         }
-        Some(warp::cosine_hemisphere(u))
+        wi
     }
 
     /// The sum of the two parts' bounds, with 1 − F ≤ 1 − f0 in the diffuse one; within a factor of

@@ -18,7 +18,7 @@
 
 use super::{Brdf, Fresnel, HORIZON, ROUNDING, where_above};
 use crate::Rgb;
-use crate::math::{TAU, Vec2, Vec3, sqr, vec3};
+use crate::math::{Vec3, sin_cos_turns, sqr, vec3};
 use crate::simd::{Colors, Real, Vectors};
 
 /// The least roughness of a lobe; f32 directions resolve no narrower one.
@@ -53,8 +53,8 @@ pub trait NormalDistribution: Copy + Send + Sync {
     /// σ(w) = cos θ (1 + Λ(w)), the projected area of the microfacets facing `w`.
     fn sigma<F: Real>(&self, w: Vectors<F>) -> F;
 
-    /// Draws a normal, of any length, for the viewer `wo`.
-    fn sample_normal(&self, wo: Vec3, u: Vec2) -> Vec3;
+    /// Draws a normal, of any length, for each viewer `wo`.
+    fn sample_normals<F: Real>(&self, wo: Vectors<F>, u: [F; 2]) -> Vectors<F>;
 
     /// Density \[sr⁻¹\] of `wo` reflected about the drawn normal, where `h` = wo + wi, `d` = D(h) and
     /// `sigma_o` = σ(wo).
@@ -114,9 +114,9 @@ impl<D: NormalDistribution> Brdf for Microfacet<D> {
         (self.fresnel.eval_lanes(cos_d).scaled(geometry), where_above(wo, wi, pdf))
     }
 
-    #[inline]
-    fn sample_direction(&self, wo: Vec3, _u_lobe: f32, u: Vec2) -> Option<Vec3> {
-        (wo.z > HORIZON).then(|| reflect_about(wo, self.normals.sample_normal(wo, u)))
+    #[inline(always)]
+    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, _u_lobe: F, u: [F; 2]) -> Vectors<F> {
+        reflect_about(wo, self.normals.sample_normals(wo, u))
     }
 
     /// Bounded ring by ring of h: the greatest D of a ring, Fresnel's factor at its lowest h·wo, and
@@ -147,18 +147,19 @@ impl<D: NormalDistribution> Brdf for Microfacet<D> {
 }
 
 /// The mirror direction of `wo` about an `h` of any length but zero.
-#[inline]
-pub(super) fn reflect_about(wo: Vec3, h: Vec3) -> Vec3 {
-    (2.0 * wo.dot(h) / h.length_squared()) * h - wo
+#[inline(always)]
+pub(super) fn reflect_about<F: Real>(wo: Vectors<F>, h: Vectors<F>) -> Vectors<F> {
+    let along = wo.dot_each(h) / h.length_squared();
+    h.times(along + along).minus(wo)
 }
 
 /// A normal, z = 1, whose slopes are Gaussian of variance α²/2: density per solid angle
 /// exp(−tan² θ_h (cos² φ_h/α_x² + sin² φ_h/α_y²)) / (π α_x α_y cos³ θ_h).
-#[inline]
-pub(super) fn gaussian_slopes(u: Vec2, [ax, ay]: [f32; 2]) -> Vec3 {
-    let radius = (-f32::ln_1p(-u.x)).sqrt();
-    let (sin, cos) = (TAU * u.y).sin_cos();
-    vec3(ax * radius * cos, ay * radius * sin, 1.0)
+#[inline(always)]
+pub(super) fn gaussian_slopes<F: Real>([u, v]: [F; 2], [ax, ay]: [f32; 2]) -> Vectors<F> {
+    let radius = u.map(|u| -f32::ln_1p(-u)).sqrt();
+    let [sin, cos] = sin_cos_turns(v);
+    Vectors { x: u.splat(ax) * radius * cos, y: u.splat(ay) * radius * sin, z: u.splat(1.0) }
 }
 
 /// A ring of half vectors θ₀ ≤ θ_h ≤ θ₁ about the normal, and what follows for the directions.
@@ -265,7 +266,8 @@ mod tests {
     fn rings_hold_their_directions() {
         let mut rng = testkit::Pcg::new(3);
         for _ in 0..20_000 {
-            let direction = |u| crate::sampling::warp::uniform_hemisphere(Vec2::from(u));
+            let direction =
+                |u| crate::sampling::warp::uniform_hemisphere(crate::math::Vec2::from(u));
             let (wo, wi) = (direction(rng.next_2d()), direction(rng.next_2d()));
             let h = wo + wi;
             let tan2 = (sqr(h.x) + sqr(h.y)) / sqr(h.z);

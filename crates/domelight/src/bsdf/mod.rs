@@ -59,9 +59,9 @@ pub trait Brdf: Copy + Send + Sync {
     /// lobe's formula.
     fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F);
 
-    /// The direction of [`Brdf::sample`] alone. It may lie below the surface, be NaN, or be `None`:
-    /// all of them are the sample of value zero.
-    fn sample_direction(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Vec3>;
+    /// The directions of [`Brdf::sample`], of one sample or of several side by side. One that lies below the surface
+    /// or is not finite is the sample of value zero.
+    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F>;
 
     /// An upper bound over all `wi` of the greatest channel of [`Brdf::eval`] \[sr⁻¹\].
     fn max_eval(&self, wo: Vec3) -> f32;
@@ -101,7 +101,7 @@ pub trait Brdf: Copy + Send + Sync {
     /// with any later evaluation to the last bit, however narrow the lobe.
     #[inline]
     fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<BrdfSample> {
-        let wi = self.sample_direction(wo, u_lobe, u)?;
+        let wi = self.sample_lanes(wo.into(), u_lobe, u.to_array()).into();
         let (value, pdf) = self.eval_pdf(wo, wi);
         (pdf > 0.0 && pdf.is_finite()).then_some(BrdfSample { wi, value, pdf })
     }

@@ -10,7 +10,7 @@
 
 use super::{Brdf, HORIZON, ROUNDING, where_above};
 use crate::Rgb;
-use crate::math::{Frame, TAU, Vec2, Vec3, vec3};
+use crate::math::{TAU, Vec3, tangents};
 use crate::sampling::warp;
 use crate::simd::{Colors, Real, Vectors};
 
@@ -32,11 +32,6 @@ impl Phong {
     }
 }
 
-/// The mirror direction of `w` about the normal.
-fn mirror(w: Vec3) -> Vec3 {
-    vec3(-w.x, -w.y, w.z)
-}
-
 impl Brdf for Phong {
     #[inline(always)]
     fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
@@ -51,10 +46,13 @@ impl Brdf for Phong {
         (Colors::splat(value, self.specular).scaled(value), power.splat(n + 1.0) * power)
     }
 
-    #[inline]
-    fn sample_direction(&self, wo: Vec3, _u_lobe: f32, u: Vec2) -> Option<Vec3> {
-        let lobe = warp::phong_lobe(u, self.exponent);
-        Some(Frame::from_z(mirror(wo)).to_world(lobe))
+    #[inline(always)]
+    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, _u_lobe: F, u: [F; 2]) -> Vectors<F> {
+        let lobe = warp::phong_lanes(u, self.exponent);
+        let zero = wo.z.splat(0.0);
+        let mirror = Vectors { x: zero - wo.x, y: zero - wo.y, z: wo.z };
+        let [x, y] = tangents(mirror);
+        x.times(lobe.x).plus(y.times(lobe.y)).plus(mirror.times(lobe.z))
     }
 
     /// The exact maximum. By symmetry it lies in the plane of incidence, at the angle α from the

@@ -17,6 +17,7 @@ pub use compensation::CompensatedTable;
 
 use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, vec3};
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
+use crate::simd::{Floats, Ints as _, LANES, Real, Vectors};
 use crate::{Rgb, RgbImage};
 
 /// A world axis that points up; the top row of a map faces it.
@@ -46,10 +47,11 @@ impl UpAxis {
     }
 
     /// World to the map's own frame, where +Y is up.
-    pub(crate) fn to_map(self, w: Vec3) -> Vec3 {
+    #[inline(always)]
+    pub(crate) fn to_map<F: Real>(self, w: Vectors<F>) -> Vectors<F> {
         match self {
             Self::Y => w,
-            Self::Z => vec3(w.x, w.z, -w.y),
+            Self::Z => Vectors { x: w.x, y: w.z, z: w.y.splat(0.0) - w.y },
         }
     }
 
@@ -318,7 +320,7 @@ impl Environment {
     }
 
     fn texel(&self, wi: Vec3) -> Texel {
-        self.grid.texel(self.orientation.up.to_map(wi))
+        self.grid.texel(self.orientation.up.to_map(wi.into()).into())
     }
 
     /// The direction of a place on the map, in texels from its upper left corner, in the map's own
@@ -334,17 +336,29 @@ impl Environment {
         edges[texel] + (row - texel as f64) * (edges[texel + 1] - edges[texel])
     }
 
-    /// The column and the row that `wi` looks at, and the radiance there.
-    pub(crate) fn look_up(&self, wi: Vec3) -> (usize, usize, Rgb) {
+    /// The columns and the rows that directions look at; of one that is not finite anything.
+    #[inline(always)]
+    pub(crate) fn texels_at<F: Floats>(&self, wi: Vectors<F>) -> [[i32; LANES]; 2] {
+        let [u, v] = self.grid.uv(self.orientation.up.to_map(wi));
+        // What is rounded up to the edge is of the last texel; these are exact.
+        let [width, height] = [self.map.width as f32, self.map.height as f32];
+        let column = (u * u.splat(width)).min(u.splat(width - 1.0));
+        let row = (v * v.splat(height)).min(v.splat(height - 1.0));
+        [column.truncated().store(), row.truncated().store()]
+    }
+
+    /// The column and the row that `wi` looks at.
+    #[cfg(test)]
+    pub(crate) fn texel_at(&self, wi: Vec3) -> [usize; 2] {
         let Texel { column, row } = self.texel(wi);
-        (column, row, self.map.get(column, row))
+        [column, row]
     }
 
     /// Where in its texel `wi` looks, in [0, 1)²: linear in φ and cos θ.
     pub(crate) fn inside(&self, wi: Vec3) -> Vec2 {
-        let wi = self.orientation.up.to_map(wi);
+        let wi = Vec3::from(self.orientation.up.to_map(wi.into()));
         let Texel { column, row } = self.grid.texel(wi);
-        let x = self.grid.uv(wi).x * self.grid.width as f32 - column as f32;
+        let x = self.grid.uv(wi.into())[0] * self.grid.width as f32 - column as f32;
         let (top, bottom) = (self.grid.cos_edges[row], self.grid.cos_edges[row + 1]);
         let y = ((top - f64::from(wi.y)) / (top - bottom)) as f32;
         Vec2::new(x, y).clamp(Vec2::ZERO, Vec2::splat(ONE_MINUS_EPSILON))
@@ -358,7 +372,7 @@ impl Environment {
 
     /// The point of the map that `wi` looks at, in [0, 1]².
     pub fn uv(&self, wi: Vec3) -> Vec2 {
-        self.grid.uv(self.orientation.up.to_map(wi))
+        self.grid.uv(self.orientation.up.to_map(wi.into())).into()
     }
 }
 
@@ -434,19 +448,21 @@ impl Grid {
         if safe || self.texel(wi) == t { wi } else { self.direction_in(t, inside.clamp(low, high)) }
     }
 
-    fn uv(&self, d: Vec3) -> Vec2 {
+    #[inline(always)]
+    fn uv<F: Real>(&self, d: Vectors<F>) -> [F; 2] {
+        let (zero, one) = (d.x.splat(0.0), d.x.splat(1.0));
         // Between 0 and 2.
-        let turn = atan2(d.x, -d.z) * (1.0 / TAU) + (0.5 + self.turn);
-        let u = if turn < 1.0 { turn } else { turn - 1.0 };
+        let turn = atan2(d.x, zero - d.z) * d.x.splat(1.0 / TAU) + d.x.splat(0.5 + self.turn);
+        let u = F::select(turn.lt(one), turn, turn - one);
         // acos would lose the rows next to the poles.
         let theta = atan2((d.x * d.x + d.z * d.z).sqrt(), d.y);
-        Vec2::new(u.max(0.0), theta * (1.0 / PI))
+        [u.max(zero), theta * d.x.splat(1.0 / PI)]
     }
 
     fn texel(&self, d: Vec3) -> Texel {
-        let uv = self.uv(d);
-        let column = ((uv.x * self.width as f32) as usize).min(self.width - 1);
-        let row = ((uv.y * self.height as f32) as usize).min(self.height - 1);
+        let [u, v] = self.uv(d.into());
+        let column = ((u * self.width as f32) as usize).min(self.width - 1);
+        let row = ((v * self.height as f32) as usize).min(self.height - 1);
         Texel { column, row }
     }
 }

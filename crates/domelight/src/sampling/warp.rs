@@ -5,27 +5,41 @@
 //! keeps the stratification of `u` and needs one sine and cosine; the polar map √u has the same
 //! density and distorts more.
 
-use crate::math::{FRAC_1_4PI, FRAC_1_PI, PI, TAU, Vec2, Vec3, from_spherical, vec2};
+use crate::math::{
+    FRAC_1_4PI, FRAC_1_PI, TAU, Vec2, Vec3, from_spherical, sin_cos_eighth, sin_cos_turns,
+};
+use crate::simd::{Real, Vectors};
 
 /// Uniform over the unit disk: density 1/π.
 pub fn concentric_disk(u: Vec2) -> Vec2 {
-    let p = 2.0 * u - Vec2::ONE;
-    if p == Vec2::ZERO {
-        return p;
-    }
-    let (radius, phi) = if p.x.abs() > p.y.abs() {
-        (p.x, 0.25 * PI * (p.y / p.x))
-    } else {
-        (p.y, 0.5 * PI - 0.25 * PI * (p.x / p.y))
-    };
-    let (sin, cos) = phi.sin_cos();
-    radius * vec2(cos, sin)
+    disk_lanes(u.to_array()).into()
+}
+
+/// [`concentric_disk`] of several side by side.
+#[inline(always)]
+fn disk_lanes<F: Real>([u, v]: [F; 2]) -> [F; 2] {
+    let (zero, one) = (u.splat(0.0), u.splat(1.0));
+    let (x, y) = (u + u - one, v + v - one);
+    // |x| is the radius and y/x the part of an eighth of a turn, or the other way round.
+    let is_wide = y.abs().lt(x.abs());
+    let radius = F::select(is_wide, x, y);
+    let ratio = F::select(is_wide, y, x) / radius;
+    let ratio = F::select(radius.eq(zero), zero, ratio);
+    let [sin, cos] = sin_cos_eighth(ratio);
+    [radius * F::select(is_wide, cos, sin), radius * F::select(is_wide, sin, cos)]
 }
 
 /// Cosine-weighted over the hemisphere: density [`cosine_hemisphere_pdf`] (Malley's method).
 pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
-    let d = concentric_disk(u);
-    d.extend((1.0 - d.length_squared()).max(0.0).sqrt())
+    cosine_lanes(u.to_array()).into()
+}
+
+/// [`cosine_hemisphere`] of several side by side.
+#[inline(always)]
+pub(crate) fn cosine_lanes<F: Real>(u: [F; 2]) -> Vectors<F> {
+    let [x, y] = disk_lanes(u);
+    let (zero, one) = (x.splat(0.0), x.splat(1.0));
+    Vectors { x, y, z: (one - (x * x + y * y)).max(zero).sqrt() }
 }
 
 /// cos θ / π \[sr⁻¹\], zero below the horizon.
@@ -57,11 +71,17 @@ pub fn uniform_sphere_pdf() -> f32 {
 ///
 /// 1 − cos θ is computed by itself, so that a narrow lobe keeps its shape in f32.
 pub fn phong_lobe(u: Vec2, exponent: f32) -> Vec3 {
+    phong_lanes(u.to_array(), exponent).into()
+}
+
+/// [`phong_lobe`] of several side by side.
+#[inline(always)]
+pub(crate) fn phong_lanes<F: Real>([u, v]: [F; 2], exponent: f32) -> Vectors<F> {
     // cos θ = (1 − u)^(1/(n + 1))
-    let versine = -f32::exp_m1(f32::ln_1p(-u.x) / (exponent + 1.0));
-    let sin_theta = (versine * (2.0 - versine)).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = (TAU * u.y).sin_cos();
-    Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, 1.0 - versine)
+    let versine = u.map(|u| -f32::exp_m1(f32::ln_1p(-u) / (exponent + 1.0)));
+    let sin_theta = (versine * (u.splat(2.0) - versine)).max(u.splat(0.0)).sqrt();
+    let [sin_phi, cos_phi] = sin_cos_turns(v);
+    Vectors { x: sin_theta * cos_phi, y: sin_theta * sin_phi, z: u.splat(1.0) - versine }
 }
 
 /// (n + 1)/(2π) cosⁿ θ \[sr⁻¹\], zero below the horizon.
@@ -72,6 +92,7 @@ pub fn phong_lobe_pdf(cos_theta: f32, exponent: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::vec2;
     use testkit::Chi2;
 
     /// Runs the χ² test of a warp onto the sphere.

@@ -169,6 +169,11 @@ pub trait Real:
         self * self
     }
 
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.max(self.splat(0.0) - self)
+    }
+
     /// A function of one number, one lane after the other.
     #[inline(always)]
     fn map(self, mut f: impl FnMut(f32) -> f32) -> Self {

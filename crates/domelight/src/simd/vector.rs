@@ -19,9 +19,15 @@ impl<F: Real> Vectors<F> {
         self.x * self.x.splat(v.x) + self.y * self.x.splat(v.y) + self.z * self.x.splat(v.z)
     }
 
+    /// The scalar products of pairs.
+    #[inline(always)]
+    pub(crate) fn dot_each(self, b: Self) -> F {
+        self.x * b.x + self.y * b.y + self.z * b.z
+    }
+
     #[inline(always)]
     pub(crate) fn length_squared(self) -> F {
-        self.x * self.x + self.y * self.y + self.z * self.z
+        self.dot_each(self)
     }
 
     /// `v` in every lane, beside numbers that prove the instructions.
@@ -34,9 +40,19 @@ impl<F: Real> Vectors<F> {
     pub(crate) fn plus(self, b: Self) -> Self {
         Self { x: self.x + b.x, y: self.y + b.y, z: self.z + b.z }
     }
-}
 
-impl<F: Real> Vectors<F> {
+    #[inline(always)]
+    pub(crate) fn minus(self, b: Self) -> Self {
+        Self { x: self.x - b.x, y: self.y - b.y, z: self.z - b.z }
+    }
+
+    /// mask ? a : b.
+    #[inline(always)]
+    pub(crate) fn select(mask: F::Mask, a: Self, b: Self) -> Self {
+        let Self { x, y, z } = a;
+        Self { x: F::select(mask, x, b.x), y: F::select(mask, y, b.y), z: F::select(mask, z, b.z) }
+    }
+
     /// Each times a number.
     #[inline(always)]
     pub(crate) fn times(self, f: F) -> Self {
@@ -56,6 +72,13 @@ impl<F: Floats> Vectors<F> {
     #[inline(always)]
     pub(crate) fn store(self) -> [Lanes; 3] {
         [self.x.store(), self.y.store(), self.z.store()]
+    }
+}
+
+impl From<Vectors<f32>> for Vec3 {
+    #[inline(always)]
+    fn from(Vectors { x, y, z }: Vectors<f32>) -> Self {
+        Self { x, y, z }
     }
 }
 

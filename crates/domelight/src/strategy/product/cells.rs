@@ -100,6 +100,9 @@ pub(super) fn at_mut(slots: &mut Slots, slot: usize) -> &mut f32 {
     &mut slots[slot / LANES % TABLE_ROWS][slot % LANES]
 }
 
+/// Steps of a search that are looked up.
+const KNOWN_DEPTH: u32 = 6;
+
 /// Texels are cut no finer than into squares of 2⁻⁸ of their side.
 const FINEST: i32 = -8;
 
@@ -132,6 +135,10 @@ pub(super) struct Cells {
     squares: Vec<Square>,
     /// The four quarters of each square that was split, by row; the first is the whole.
     links: Vec<[Link; 4]>,
+    /// How often the map is halved down to its texels.
+    depth: u32,
+    /// Where the links lead to in the first [`KNOWN_DEPTH`] steps, for each square there, by row.
+    known: Vec<Link>,
     /// Unit direction of the light's mean, in the world.
     pub(super) center: [Box<Slots>; 3],
     /// Angular radius.
@@ -167,6 +174,8 @@ impl Cells {
         let mut cells = Self {
             squares: Vec::new(),
             links: vec![[Link::Dark; 4]; tree.links.len()],
+            depth: environment.table()?.depth() as u32,
+            known: Vec::new(),
             center: [zeros(), zeros(), zeros()],
             radius: zeros(),
             ramps: SPREADS.map(|_| Ramp { s: zeros(), scale: zeros() }),
@@ -175,6 +184,7 @@ impl Cells {
             dimness: zeros(),
         };
         cells.number(&tree, 0, &tree.nodes[0]);
+        cells.known = cells.first_steps();
         for cell in 0..cells.squares.len() {
             let square = cells.squares[cell];
             let (center, radius, reach) = map.extent(&square);
@@ -213,6 +223,25 @@ impl Cells {
         }
     }
 
+    fn known_depth(&self) -> u32 {
+        self.depth.min(KNOWN_DEPTH)
+    }
+
+    /// [`Cells::known`].
+    fn first_steps(&self) -> Vec<Link> {
+        let depth = self.known_depth();
+        let step = |link, (x, y)| match link {
+            Link::Split(below) => self.links[usize::from(below)][2 * y + x],
+            end => end,
+        };
+        let walk = |square: usize| {
+            let (column, row) = (square & ((1 << depth) - 1), square >> depth);
+            let quarters = (0..depth).rev().map(|bit| (column >> bit & 1, row >> bit & 1));
+            quarters.fold(Link::Split(0), step)
+        };
+        (0..1 << (2 * depth)).map(walk).collect()
+    }
+
     /// The ramps for normals that spread by `spread`, or a little more.
     pub(super) fn ramp(&self, spread: f32) -> &Ramp {
         let above = SPREADS.partition_point(|&s| s < spread);
@@ -229,31 +258,41 @@ impl Cells {
         at(&self.mass, slot(cell))
     }
 
-    /// The cell that `wi` looks at and the radiance from there; none where there is no light.
-    pub(super) fn find(&self, environment: &Environment, wi: Vec3) -> Option<(usize, Rgb)> {
-        let (column, row, le) = environment.look_up(wi);
-        let mut bit = environment.table()?.depth();
-        let mut links = &self.links[0];
-        while bit > 0 {
-            bit -= 1;
-            match links[(row >> bit & 1) << 1 | column >> bit & 1] {
-                Link::Dark => return None,
-                Link::Cell(cell) => return Some((usize::from(cell), le)),
-                Link::Split(below) => links = &self.links[usize::from(below)],
-            }
-        }
-        // Within the texel.
-        let mut at = environment.inside(wi);
+    /// The cell that `wi` looks at, in this texel (column and row); none where there is no light.
+    #[inline]
+    pub(super) fn at_texel(
+        &self,
+        environment: &Environment,
+        [column, row]: [usize; 2],
+        wi: Vec3,
+    ) -> Option<usize> {
+        let mut bit = self.depth - self.known_depth();
+        let mut link = self.known[(row >> bit) << self.known_depth() | column >> bit];
+        let mut inside = None;
         loop {
-            at *= 2.0;
-            let (x, y) = (at.x as usize, at.y as usize);
-            at = at.fract();
-            match links[2 * y + x] {
+            let below = match link {
                 Link::Dark => return None,
-                Link::Cell(cell) => return Some((usize::from(cell), le)),
-                Link::Split(below) => links = &self.links[usize::from(below)],
-            }
+                Link::Cell(cell) => return Some(usize::from(cell)),
+                Link::Split(below) => usize::from(below),
+            };
+            let (x, y) = if bit > 0 {
+                bit -= 1;
+                (column >> bit & 1, row >> bit & 1)
+            } else {
+                let at = 2.0 * inside.unwrap_or_else(|| environment.inside(wi));
+                inside = Some(at.fract());
+                (at.x as usize, at.y as usize)
+            };
+            link = self.links[below][2 * y + x];
         }
+    }
+
+    /// The cell that `wi` looks at and the radiance from there.
+    #[cfg(test)]
+    pub(super) fn find(&self, environment: &Environment, wi: Vec3) -> Option<(usize, Rgb)> {
+        let texel = environment.texel_at(wi);
+        let le = environment.map().get(texel[0], texel[1]);
+        Some((self.at_texel(environment, texel, wi)?, le))
     }
 
     /// Draws a direction in a cell in proportion to luminance; neighbouring `u` in [0, 1) give

@@ -15,7 +15,7 @@
 //! offset: stratum k falls at u = (k + ξ)/M.
 
 use super::candidates::{Deal, Strata};
-use super::cells::{Cells, NO_SLOTS, PAIRS, ROWS, Slots, TABLE_ROWS, at};
+use super::cells::{Cells, NO_SLOTS, PAIRS, ROWS, Slots, TABLE_ROWS};
 use super::control::Control;
 use super::hits::Group;
 use crate::bsdf::Gloss;
@@ -262,8 +262,9 @@ impl Table {
 
     /// What the cell in a slot has of [`Table::total`].
     #[inline(always)]
+    #[cfg(test)]
     pub(super) fn width(&self, slot: usize) -> f32 {
-        at(&self.weight, slot)
+        super::cells::at(&self.weight, slot)
     }
 
     /// [`Table::width`] of cells side by side.
@@ -385,7 +386,7 @@ fn center<S: Simd>(simd: S, cells: &Cells, pair: usize) -> Vectors<S::Wide> {
 #[cfg(test)]
 mod tests {
     use super::super::candidates::Hits;
-    use super::super::cells::{MAX_CELLS, slot};
+    use super::super::cells::{MAX_CELLS, at, slot};
     use super::super::hits::Groups;
     use super::super::test_support::{hit, sky};
     use super::*;
