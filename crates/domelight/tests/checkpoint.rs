@@ -7,8 +7,8 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::{Environment, Orientation};
 use domelight::picture::exr::ExrLayers;
 use domelight::render::{
-    Checkpoint, CheckpointError, Counts, Film, Layers, Misfit, Observer, RenderSettings, Rendering,
-    Session, Window, render,
+    Background, Checkpoint, CheckpointError, Counts, Film, Layers, Misfit, Observer,
+    RenderSettings, Rendering, Session, Window, render,
 };
 use domelight::sampling::{Heuristic, Pcg32};
 use domelight::scene::builtin::BuiltinScene;
@@ -105,6 +105,25 @@ fn a_strategy_that_learns_can_be_interrupted() {
     let stage = stage();
     let settings = RenderSettings { n_samples: 80, tile_size: 16, ..settings() };
     interrupt_and_resume(&stage, &ProductSampling::new(&stage.environment, 2), &settings);
+}
+
+/// Before no background tiles that see nothing keep no sums.
+#[test]
+fn tiles_that_see_nothing_can_be_interrupted() {
+    let mut stage = stage();
+    let RenderSettings { width, height, .. } = settings();
+    let fov_y_degrees = 120.0;
+    let projection = domelight::scene::Projection::Perspective { fov_y_degrees };
+    let [origin, target, up] = [[0.0, 1.0, 9.0], [0.0; 3], [0.0, 1.0, 0.0]].map(Into::into);
+    let view = CameraSettings { projection, origin, target, up };
+    stage.camera = Camera::new(&view, width, height).unwrap();
+    let settings = RenderSettings { background: Background::Hidden, n_samples: 7, ..settings() };
+    interrupt_and_resume(&stage, &mis(&stage), &settings);
+    let rendering = uninterrupted(&stage, &mis(&stage), &settings);
+    let corners = [0, width - 1, width * height - 1];
+    assert!(corners.into_iter().all(|i| rendering.layers.n_samples[i] == 7));
+    assert!(rendering.layers.alpha.contains(&0.0) && rendering.layers.alpha.contains(&1.0));
+    assert_eq!(rendering.counts.camera_rays, (7 * width * height) as u64);
 }
 
 fn interrupt_and_resume<S: Strategy>(stage: &Stage, strategy: &S, settings: &RenderSettings) {

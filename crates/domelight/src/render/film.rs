@@ -41,6 +41,11 @@ pub(super) struct PixelSums {
 }
 
 impl PixelSums {
+    /// After `n_samples` that saw nothing, before no background.
+    pub(super) fn missed(n_samples: u32) -> Self {
+        Self { n_samples, ..Self::default() }
+    }
+
     /// Adds a sample. A sample that is not finite counts as black and is reported: it returns false.
     pub(super) fn add(&mut self, sample: &CameraSample) -> bool {
         let finite = sample.color.is_finite() && sample.unoccluded.is_finite();

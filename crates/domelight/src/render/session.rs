@@ -140,7 +140,7 @@ impl<'a, S: Strategy> Session<'a, S> {
         let window = self.tiling.window(&self.range);
         let mut film = Film::new(width, height, window);
         for tile in &self.tiles {
-            film.put(tile.window, &tile.pixels);
+            film.put(tile.window, &tile.sums());
         }
         film
     }
@@ -158,7 +158,7 @@ impl<'a, S: Strategy> Session<'a, S> {
                 let Window { x, y, .. } = tile.window;
                 return Err(Misfit::Samples { x, y });
             }
-            (tile.pixels, tile.counts) = (pixels, Counts::default());
+            tile.restore(pixels);
         }
         self.before = counts;
         Ok(())
@@ -169,7 +169,7 @@ impl<'a, S: Strategy> Session<'a, S> {
         let window = self.tiling.window(&self.range);
         let mut layers = Layers::new(window.width, window.height);
         for tile in &self.tiles {
-            layers.put(&tile.pixels, tile.window, window);
+            layers.put(&tile.sums(), tile.window, window);
         }
         Rendering { layers, counts: self.counts(), complete: self.is_complete() }
     }

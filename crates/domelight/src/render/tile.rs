@@ -1,6 +1,7 @@
 //! The unit of work: a tile's camera rays, its shading points grouped by pixel, a strategy's rounds
 //! of shadow rays, and their sums.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use super::film::{CameraSample, PixelSums, SurfaceSample};
@@ -21,8 +22,11 @@ const FEWEST_SAMPLES: u32 = 16;
 #[derive(Clone, Debug)]
 pub(super) struct Tile {
     pub(super) window: Window,
-    /// Empty before the first sample: of a shard's picture most tiles are others' work.
-    pub(super) pixels: Vec<PixelSums>,
+    /// Empty before the first sample, for of a shard's picture most tiles are others' work, and where nothing is to
+    /// be seen.
+    pixels: Vec<PixelSums>,
+    /// Camera samples of each pixel while `pixels` are empty.
+    n_missed: u32,
     pub(super) counts: Counts,
 }
 
@@ -132,12 +136,26 @@ struct ShadowRays {
 impl Tile {
     /// Without samples.
     pub(super) fn new(window: Window) -> Self {
-        Self { window, pixels: Vec::new(), counts: Counts::default() }
+        Self { window, pixels: Vec::new(), n_missed: 0, counts: Counts::default() }
     }
 
     /// Camera samples of each pixel.
     pub(super) fn n_samples(&self) -> u32 {
-        self.pixels.first().map_or(0, PixelSums::n_samples)
+        self.pixels.first().map_or(self.n_missed, PixelSums::n_samples)
+    }
+
+    /// The sums of all pixels.
+    pub(super) fn sums(&self) -> Cow<'_, [PixelSums]> {
+        if self.pixels.is_empty() {
+            Cow::Owned(vec![PixelSums::missed(self.n_missed); self.window.area()])
+        } else {
+            Cow::Borrowed(&self.pixels)
+        }
+    }
+
+    /// Takes over the sums of a tile whose work is not counted here.
+    pub(super) fn restore(&mut self, pixels: Vec<PixelSums>) {
+        *self = Self { pixels, ..Self::new(self.window) };
     }
 
     /// Has all samples, or as few as the error allows: a decision that no other tile has a part in.
@@ -150,7 +168,7 @@ impl Tile {
     /// The relMSE that the spread of the samples suggests.
     fn error(&self) -> f32 {
         let sum: f32 = self.pixels.iter().map(PixelSums::relative_variance).sum();
-        sum / self.pixels.len() as f32
+        sum / self.window.area() as f32
     }
 
     /// Adds the samples of a pass to each pixel.
@@ -166,11 +184,19 @@ impl Tile {
         let Scratch { batch, of_strategy } = scratch;
         let Window { width, .. } = self.window;
         let n_pixels = self.window.area();
-        self.pixels.resize(n_pixels, PixelSums::default());
         batch.seen.clear();
         batch.seen.resize(n_pixels, false);
         self.find_seen(frame, self.window, &mut batch.seen);
         batch.spreads.reset(width, n_pixels);
+        let hidden = frame.settings.background == Background::Hidden;
+        if self.pixels.is_empty() && hidden && !batch.seen.contains(&true) {
+            self.n_missed += pass.n_samples;
+            let camera_rays = u64::from(pass.n_samples) * n_pixels as u64;
+            let counts = Counts { camera_rays, ..Counts::default() };
+            self.counts += counts;
+            return counts;
+        }
+        self.pixels.resize(n_pixels, PixelSums::missed(self.n_missed));
         let asked = Asked { frame, strategy, pass: &pass.shared, width };
         let mut counts = Counts::default();
         // Where nothing is seen there is nothing to learn.

@@ -53,6 +53,7 @@ impl Turn {
     ///
     /// # Panics
     /// If `i` exceeds 3.
+    #[inline]
     pub fn quadrant(self, i: usize) -> (usize, usize, Self) {
         let (x, y) = [(false, false), (false, true), (true, true), (true, false)][i];
         let inner = Self { swap: self.swap ^ !y, reverse: self.reverse ^ (!y & x) };

@@ -119,6 +119,20 @@ struct Square {
     mass: f32,
 }
 
+impl Square {
+    /// The quarter that the curve visits as number `i` of four, which has the given mass.
+    fn quarter(&self, i: usize, mass: f32) -> Self {
+        let (x, y, turn) = self.turn.quadrant(i);
+        Self {
+            size: self.size - 1,
+            column: 2 * self.column + x as u32,
+            row: 2 * self.row + y as u32,
+            turn,
+            mass,
+        }
+    }
+}
+
 /// What a link of the tree leads to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Link {
@@ -312,19 +326,19 @@ impl Cells {
         let mut square = self.squares[cell];
         let last = (square.size - BELOW).min(0);
         while square.size > last {
-            let quarters = map.quarters(&square);
-            let total: f64 = quarters.iter().map(|q| f64::from(q.mass)).sum();
-            let mut at = u * total;
-            // The last that has any mass ends the search whatever the rounding.
-            for quarter in quarters.into_iter().filter(|q| q.mass > 0.0) {
-                square = quarter;
-                let mass = f64::from(quarter.mass);
-                u = (at / mass).min(1.0 - f64::EPSILON);
-                if at < mass {
-                    break;
-                }
-                at -= mass;
+            let masses = map.masses(&square);
+            let [a, b, c, d] = masses.map(f64::from);
+            let (b, c, d) = (a + b, a + b + c, a + b + c + d);
+            let at = u * d;
+            // Without branches, for they are not foreseen.
+            let mut i = usize::from(at >= a) + usize::from(at >= b) + usize::from(at >= c);
+            // Rounding may lead past the last that has any mass.
+            while masses[i] <= 0.0 && i > 0 {
+                i -= 1;
             }
+            let mass = masses[i];
+            u = ((at - [0.0, a, b, c][i]) / f64::from(mass)).clamp(0.0, 1.0 - f64::EPSILON);
+            square = square.quarter(i, mass);
         }
         let side = f64::from(square.size).exp2();
         let column = (f64::from(square.column) + f64::from(jitter[0])) * side;
@@ -351,20 +365,19 @@ impl Map<'_> {
 
     /// Along the curve.
     fn quarters(&self, square: &Square) -> [Square; 4] {
-        let &Square { size, column, row, turn, mass } = square;
+        let masses = self.masses(square);
+        std::array::from_fn(|i| square.quarter(i, masses[i]))
+    }
+
+    /// Those of the quarters.
+    fn masses(&self, &Square { size, column, row, turn, mass }: &Square) -> [f32; 4] {
         let masses = match self.environment.table() {
             Some(table) if size > 0 => table.quarters(size as usize, column as usize, row as usize),
             _ => [0.25 * mass; 4],
         };
         std::array::from_fn(|i| {
-            let (x, y, turn) = turn.quadrant(i);
-            Square {
-                size: size - 1,
-                column: 2 * column + x as u32,
-                row: 2 * row + y as u32,
-                turn,
-                mass: masses[2 * y + x],
-            }
+            let (x, y, _) = turn.quadrant(i);
+            masses[2 * y + x]
         })
     }
 
