@@ -1,9 +1,12 @@
 //! AArch64 NEON: a vector is two registers of four.
 #![allow(unsafe_code)]
 #![allow(clippy::wildcard_imports)] // The intrinsics' names are distinctive enough.
+#![cfg_attr(not(target_arch = "aarch64"), allow(unused_unsafe))]
 
+#[cfg(not(target_arch = "aarch64"))]
+use super::neon_model::*;
+#[cfg(target_arch = "aarch64")]
 use std::arch::aarch64::*;
-use std::arch::{asm, is_aarch64_feature_detected};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 use super::pair::Pair;
@@ -32,12 +35,16 @@ pub(crate) struct Sets8(uint32x4_t, uint32x4_t);
 impl Neon {
     #[inline]
     pub(crate) fn new() -> Option<Self> {
-        is_aarch64_feature_detected!("neon").then_some(Self(()))
+        #[cfg(target_arch = "aarch64")]
+        let is_available = std::arch::is_aarch64_feature_detected!("neon");
+        #[cfg(not(target_arch = "aarch64"))]
+        let is_available = true;
+        is_available.then_some(Self(()))
     }
 
     #[inline]
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        #[target_feature(enable = "neon")]
+        #[cfg_attr(target_arch = "aarch64", target_feature(enable = "neon"))]
         fn run<K: Kernel>(simd: Neon, kernel: K) -> K::Output {
             kernel.run(simd)
         }
@@ -67,14 +74,19 @@ impl Simd for Neon {
     fn prefetch<T>(self, x: &T) {
         let start = std::ptr::from_ref(x).cast::<u8>();
         for offset in (0..size_of::<T>()).step_by(64) {
-            // SAFETY: a prefetch reads nothing and changes nothing; `offset` is within `x`.
+            // SAFETY: `offset` is within `x`.
+            let line = unsafe { start.add(offset) };
+            // SAFETY: a prefetch reads nothing and changes nothing.
+            #[cfg(target_arch = "aarch64")]
             unsafe {
-                asm!(
+                std::arch::asm!(
                     "prfm pldl1keep, [{at}]",
-                    at = in(reg) start.add(offset),
+                    at = in(reg) line,
                     options(nostack, readonly, preserves_flags)
                 );
             };
+            #[cfg(not(target_arch = "aarch64"))]
+            let _ = line;
         }
     }
     #[inline(always)]
