@@ -443,17 +443,16 @@ struct Asked<'a, S: Strategy> {
 impl ShadowRays {
     /// Tests the visibility of all rays asked for at once.
     fn trace(&mut self, frame: &Frame, points: &[ShadingPoint], origins: &[Vec3]) {
-        self.traced.clear();
-        for (&wi, &point) in self.asked.wi.iter().zip(&self.asked.point) {
+        let origin = |(&wi, &point): (&Vec3, &u32)| {
             let p = &points[point as usize];
             let behind = p.ng.dot(wi) < 0.0;
-            let origin = if behind {
-                offset_origin(p.position, -p.ng, frame.extent)
-            } else {
-                origins[point as usize]
-            };
-            self.traced.push(origin, wi);
-        }
+            let other_side = || offset_origin(p.position, -p.ng, frame.extent);
+            if behind { other_side() } else { origins[point as usize] }
+        };
+        let Contributions { wi, point, .. } = &self.asked;
+        self.traced.clear();
+        self.traced.origins.extend(wi.iter().zip(point).map(origin));
+        self.traced.directions.extend_from_slice(wi);
         Visibility::occluded(frame.scene.bvh(), &self.traced, &mut self.free);
         self.free.iter_mut().for_each(|answer| *answer = !*answer);
     }

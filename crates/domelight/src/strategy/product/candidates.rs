@@ -14,16 +14,17 @@
 //! N/n in expectation.
 
 use super::super::ShadingPoint;
-use super::cells::{Cells, at, slot};
+use super::brdf_samples::BrdfSamples;
+use super::cells::Cells;
 use super::control::Control;
 use super::pool::{Lights, Pool};
 use super::table::Table;
 use crate::Rgb;
-use crate::bsdf::{Brdf as _, Material};
+use crate::bsdf::Material;
 use crate::environment::Environment;
 use crate::math::Vec3;
 use crate::sampling::{Dimension, Stream};
-use crate::simd::{Colors, Floats, Ints, LANES, Lanes, Mask as _, Real, Simd, Vectors, set_bits};
+use crate::simd::{Floats, Ints, LANES, Lanes, Real, Simd};
 
 /// A direction that may become a shadow ray.
 #[derive(Clone, Copy, Debug)]
@@ -203,7 +204,7 @@ pub(super) struct PixelNumbers {
     pub(super) choice: f32,
     /// Shifts of the hits against the strata and against the samples of the material.
     shift: [f32; 2],
-    stream: Stream,
+    pub(super) stream: Stream,
 }
 
 impl PixelNumbers {
@@ -214,7 +215,7 @@ impl PixelNumbers {
     }
 
     /// The hit of sample `j` of the material, of `n` hits.
-    fn brdf_hit(&self, j: usize, n: usize) -> usize {
+    pub(super) fn brdf_hit(&self, j: usize, n: usize) -> usize {
         (j + (self.shift[1] * n as f32) as usize) % n
     }
 }
@@ -256,8 +257,9 @@ impl Sources<'_> {
         candidates.brdf.clear();
         for first in (0..counts.brdf).step_by(LANES) {
             let n = (counts.brdf - first).min(LANES);
-            let drawn = Drawn::new(hits, numbers, first..first + n);
-            self.weigh_drawn(simd, hits, &drawn, [scale, counts.brdf as f32], &mut candidates.brdf);
+            let samples = BrdfSamples::new(hits, numbers, first..first + n);
+            let counts = [scale, counts.brdf as f32];
+            self.weigh_samples(simd, hits, &samples, counts, &mut candidates.brdf);
         }
     }
 
@@ -299,50 +301,6 @@ impl Sources<'_> {
             chances: [0; LANES],
         }
     }
-
-    /// Adds samples of the material, weighed with `counts`: M over the total of the table, and N.
-    #[inline(always)]
-    fn weigh_drawn<S: Simd>(
-        &self,
-        simd: S,
-        hits: Hits,
-        drawn: &Drawn,
-        counts: [f32; 2],
-        candidates: &mut Vec<Candidate>,
-    ) {
-        let wi = drawn.sample(simd, hits);
-        let (f, pdf) = drawn.eval(simd, hits, wi);
-        let wi = drawn.to_world(simd, wi);
-        let zero = simd.splat(0.0);
-        let above = zero.lt(wi.dot_each(Vectors::load(simd, &drawn.ng)));
-        let possible = zero.lt(pdf) & pdf.le(simd.splat(f32::MAX)) & above;
-        let [columns, rows] = self.environment.texels_at(wi);
-        let (world, mut found) = (wi.store(), Found::default());
-        for lane in set_bits(possible.bits() & ((1 << drawn.n) - 1)) {
-            let wi = Vec3::from(world.map(|c| c[lane]));
-            let texel = [columns[lane], rows[lane]].map(|i| i as usize);
-            let Some(cell) = self.cells.at_texel(self.environment, texel, wi) else { continue };
-            let le = self.environment.map().get(texel[0], texel[1]);
-            found.push(lane, slot(cell), le, at(&self.cells.mass, slot(cell)));
-        }
-        let [r, g, b] = &found.le;
-        let le = Colors([simd.load(r), simd.load(g), simd.load(b)]);
-        let width = self.table.widths(simd.load_ints(&found.slots));
-        let within = le.luminance() / simd.load(&found.mass);
-        let density = simd.splat(counts[0]) * width * within + simd.splat(counts[1]) * pdf;
-        let value = f.zip(le, |f, le| f * le).scaled(simd.splat(1.0) / density);
-        let (value, luminance) = (value.store(), value.luminance().store());
-        for lane in set_bits(found.lanes) {
-            candidates.push(Candidate {
-                wi: Vec3::from(world.map(|c| c[lane])),
-                value: Rgb::from(value.map(|c| c[lane])),
-                luminance: luminance[lane],
-                slot: found.slots[lane] as u32,
-                hit: drawn.hits[lane] as u32,
-                chance: 0,
-            });
-        }
-    }
 }
 
 /// The camera hits of a pixel.
@@ -355,119 +313,8 @@ pub(super) struct Hits<'a> {
 
 impl<'a> Hits<'a> {
     /// The material that a hit is sampled by.
-    fn material(self, hit: usize) -> &'a Material {
+    pub(super) fn material(self, hit: usize) -> &'a Material {
         &self.points[if self.one_material { 0 } else { hit }].material
-    }
-}
-
-/// Samples of the material side by side: where they are drawn, and by which numbers.
-#[derive(Default)]
-struct Drawn {
-    n: usize,
-    hits: [usize; LANES],
-    wo: [Lanes; 3],
-    /// The axes of the shading frames by component.
-    frame: [[Lanes; 3]; 3],
-    ng: [Lanes; 3],
-    u: [Lanes; 2],
-    u_lobe: Lanes,
-}
-
-impl Drawn {
-    /// Samples `which` of the pixel, no more than there are lanes.
-    #[inline(always)]
-    fn new(hits: Hits, numbers: &PixelNumbers, which: std::ops::Range<usize>) -> Self {
-        let set = numbers.stream.set(Dimension::Brdf);
-        let u = set.u(which.start as u32);
-        let mut drawn = Self { n: which.len(), u, ..Self::default() };
-        for (lane, j) in which.enumerate() {
-            let hit = numbers.brdf_hit(j, hits.points.len());
-            let at = &hits.points[hit];
-            drawn.hits[lane] = hit;
-            if hits.material(hit).has_choice() {
-                drawn.u_lobe[lane] = set.numbers(j as u32).u_lobe();
-            }
-            let axes = [at.frame.x, at.frame.y, at.frame.z];
-            for c in 0..3 {
-                (drawn.wo[c][lane], drawn.ng[c][lane]) = (at.wo[c], at.ng[c]);
-                for (lanes, axis) in drawn.frame.iter_mut().zip(axes) {
-                    lanes[c][lane] = axis[c];
-                }
-            }
-        }
-        drawn
-    }
-
-    /// Their directions in the local frames.
-    #[inline(always)]
-    fn sample<S: Simd>(&self, simd: S, hits: Hits) -> Vectors<S::Floats> {
-        if hits.one_material {
-            let (wo, u_lobe) = (Vectors::load(simd, &self.wo), simd.load(&self.u_lobe));
-            let u = [simd.load(&self.u[0]), simd.load(&self.u[1])];
-            return hits.material(0).sample_lanes(wo, u_lobe, u);
-        }
-        let mut wi = [[0.0; LANES]; 3];
-        for lane in 0..self.n {
-            let (wo, u) = (Vec3::from(self.wo.map(|c| c[lane])), self.u.map(|u| u[lane]));
-            let material = hits.material(self.hits[lane]);
-            let of_lane = Vec3::from(material.sample_lanes(wo.into(), self.u_lobe[lane], u));
-            (0..3).for_each(|c| wi[c][lane] = of_lane[c]);
-        }
-        Vectors::load(simd, &wi)
-    }
-
-    /// The values and densities of directions in the local frames.
-    #[inline(always)]
-    fn eval<S: Simd>(
-        &self,
-        simd: S,
-        hits: Hits,
-        wi: Vectors<S::Floats>,
-    ) -> (Colors<S::Floats>, S::Floats) {
-        if hits.one_material {
-            return hits.material(0).eval_lanes(Vectors::load(simd, &self.wo), wi);
-        }
-        let (mut f, mut pdf, wi) = ([[0.0; LANES]; 3], [0.0; LANES], wi.store());
-        for lane in 0..self.n {
-            let [wo, wi] = [self.wo, wi].map(|v| Vec3::from(v.map(|c| c[lane])));
-            let (value, density) = hits.material(self.hits[lane]).eval_pdf(wo, wi);
-            (f[0][lane], f[1][lane], f[2][lane]) = (value.r, value.g, value.b);
-            pdf[lane] = density;
-        }
-        (Colors([simd.load(&f[0]), simd.load(&f[1]), simd.load(&f[2])]), simd.load(&pdf))
-    }
-
-    #[inline(always)]
-    fn to_world<S: Simd>(&self, simd: S, v: Vectors<S::Floats>) -> Vectors<S::Floats> {
-        let [x, y, z] = &self.frame;
-        let (x, y, z) = (Vectors::load(simd, x), Vectors::load(simd, y), Vectors::load(simd, z));
-        x.times(v.x).plus(y.times(v.y)).plus(z.times(v.z))
-    }
-}
-
-/// What samples of the material meet on the map.
-struct Found {
-    /// Bit i: there is light for lane i.
-    lanes: u32,
-    slots: [i32; LANES],
-    le: [Lanes; 3],
-    /// Of the cell.
-    mass: Lanes,
-}
-
-impl Default for Found {
-    fn default() -> Self {
-        Self { lanes: 0, slots: [0; LANES], le: [[0.0; LANES]; 3], mass: [1.0; LANES] }
-    }
-}
-
-impl Found {
-    #[inline(always)]
-    fn push(&mut self, lane: usize, slot: usize, le: Rgb, mass: f32) {
-        self.lanes |= 1 << lane;
-        self.slots[lane] = slot as i32;
-        (self.le[0][lane], self.le[1][lane], self.le[2][lane]) = (le.r, le.g, le.b);
-        self.mass[lane] = mass;
     }
 }
 

@@ -28,6 +28,7 @@
 //! Illumination", multiplies trees of BRDF and map; Atanasov et al. 2018, "Adaptive Environment
 //! Sampling on CPU and GPU", learns visibility for the density.
 
+mod brdf_samples;
 mod candidates;
 mod cells;
 mod choose;

@@ -1,0 +1,168 @@
+//! Candidates from the material: samples of several hits side by side.
+
+use super::candidates::{Candidate, Hits, PixelNumbers, Sources};
+use super::cells::{at, slot};
+use crate::Rgb;
+use crate::bsdf::Brdf as _;
+use crate::math::Vec3;
+use crate::sampling::Dimension;
+use crate::simd::{
+    Colors, Floats as _, LANES, Lanes, Mask as _, Real as _, Simd, Vectors, set_bits,
+};
+
+/// Samples of the material side by side: where they are drawn, and by which numbers.
+#[derive(Default)]
+pub(super) struct BrdfSamples {
+    n: usize,
+    hits: [usize; LANES],
+    wo: [Lanes; 3],
+    /// The axes of the shading frames by component.
+    frame: [[Lanes; 3]; 3],
+    ng: [Lanes; 3],
+    u: [Lanes; 2],
+    u_lobe: Lanes,
+}
+
+impl BrdfSamples {
+    /// Samples `which` of the pixel, no more than there are lanes.
+    #[inline(always)]
+    pub(super) fn new(hits: Hits, numbers: &PixelNumbers, which: std::ops::Range<usize>) -> Self {
+        let set = numbers.stream.set(Dimension::Brdf);
+        let u = set.u(which.start as u32);
+        let mut samples = Self { n: which.len(), u, ..Self::default() };
+        for (lane, j) in which.enumerate() {
+            let hit = numbers.brdf_hit(j, hits.points.len());
+            let at = &hits.points[hit];
+            samples.hits[lane] = hit;
+            if hits.material(hit).has_choice() {
+                samples.u_lobe[lane] = set.numbers(j as u32).u_lobe();
+            }
+            let axes = [at.frame.x, at.frame.y, at.frame.z];
+            for c in 0..3 {
+                (samples.wo[c][lane], samples.ng[c][lane]) = (at.wo[c], at.ng[c]);
+                for (lanes, axis) in samples.frame.iter_mut().zip(axes) {
+                    lanes[c][lane] = axis[c];
+                }
+            }
+        }
+        samples
+    }
+
+    /// Their directions in the local frames.
+    #[inline(always)]
+    fn sample<S: Simd>(&self, simd: S, hits: Hits) -> Vectors<S::Floats> {
+        if hits.one_material {
+            let (wo, u_lobe) = (Vectors::load(simd, &self.wo), simd.load(&self.u_lobe));
+            let u = [simd.load(&self.u[0]), simd.load(&self.u[1])];
+            return hits.material(0).sample_lanes(wo, u_lobe, u);
+        }
+        let mut wi = [[0.0; LANES]; 3];
+        for lane in 0..self.n {
+            let (wo, u) = (Vec3::from(self.wo.map(|c| c[lane])), self.u.map(|u| u[lane]));
+            let material = hits.material(self.hits[lane]);
+            let of_lane = Vec3::from(material.sample_lanes(wo.into(), self.u_lobe[lane], u));
+            (0..3).for_each(|c| wi[c][lane] = of_lane[c]);
+        }
+        Vectors::load(simd, &wi)
+    }
+
+    /// The values and densities of directions in the local frames.
+    #[inline(always)]
+    fn eval<S: Simd>(
+        &self,
+        simd: S,
+        hits: Hits,
+        wi: Vectors<S::Floats>,
+    ) -> (Colors<S::Floats>, S::Floats) {
+        if hits.one_material {
+            return hits.material(0).eval_lanes(Vectors::load(simd, &self.wo), wi);
+        }
+        let (mut f, mut pdf, wi) = ([[0.0; LANES]; 3], [0.0; LANES], wi.store());
+        for lane in 0..self.n {
+            let [wo, wi] = [self.wo, wi].map(|v| Vec3::from(v.map(|c| c[lane])));
+            let (value, density) = hits.material(self.hits[lane]).eval_pdf(wo, wi);
+            (f[0][lane], f[1][lane], f[2][lane]) = (value.r, value.g, value.b);
+            pdf[lane] = density;
+        }
+        (Colors([simd.load(&f[0]), simd.load(&f[1]), simd.load(&f[2])]), simd.load(&pdf))
+    }
+
+    #[inline(always)]
+    fn to_world<S: Simd>(&self, simd: S, v: Vectors<S::Floats>) -> Vectors<S::Floats> {
+        let [x, y, z] = &self.frame;
+        let (x, y, z) = (Vectors::load(simd, x), Vectors::load(simd, y), Vectors::load(simd, z));
+        x.times(v.x).plus(y.times(v.y)).plus(z.times(v.z))
+    }
+}
+
+/// What samples of the material meet on the map.
+struct Found {
+    /// Bit i: there is light for lane i.
+    lanes: u32,
+    slots: [i32; LANES],
+    le: [Lanes; 3],
+    /// Of the cell.
+    mass: Lanes,
+}
+
+impl Default for Found {
+    fn default() -> Self {
+        Self { lanes: 0, slots: [0; LANES], le: [[0.0; LANES]; 3], mass: [1.0; LANES] }
+    }
+}
+
+impl Found {
+    #[inline(always)]
+    fn push(&mut self, lane: usize, slot: usize, le: Rgb, mass: f32) {
+        self.lanes |= 1 << lane;
+        self.slots[lane] = slot as i32;
+        (self.le[0][lane], self.le[1][lane], self.le[2][lane]) = (le.r, le.g, le.b);
+        self.mass[lane] = mass;
+    }
+}
+
+impl Sources<'_> {
+    /// Adds samples of the material, weighed with `counts`: M over the total of the table, and N.
+    #[inline(always)]
+    pub(super) fn weigh_samples<S: Simd>(
+        &self,
+        simd: S,
+        hits: Hits,
+        samples: &BrdfSamples,
+        counts: [f32; 2],
+        candidates: &mut Vec<Candidate>,
+    ) {
+        let wi = samples.sample(simd, hits);
+        let (f, pdf) = samples.eval(simd, hits, wi);
+        let wi = samples.to_world(simd, wi);
+        let zero = simd.splat(0.0);
+        let above = zero.lt(wi.dot_each(Vectors::load(simd, &samples.ng)));
+        let possible = zero.lt(pdf) & pdf.le(simd.splat(f32::MAX)) & above;
+        let [columns, rows] = self.environment.texels_at(wi);
+        let (world, mut found) = (wi.store(), Found::default());
+        for lane in set_bits(possible.bits() & ((1 << samples.n) - 1)) {
+            let wi = Vec3::from(world.map(|c| c[lane]));
+            let texel = [columns[lane], rows[lane]].map(|i| i as usize);
+            let Some(cell) = self.cells.at_texel(self.environment, texel, wi) else { continue };
+            let le = self.environment.map().get(texel[0], texel[1]);
+            found.push(lane, slot(cell), le, at(&self.cells.mass, slot(cell)));
+        }
+        let [r, g, b] = &found.le;
+        let le = Colors([simd.load(r), simd.load(g), simd.load(b)]);
+        let width = self.table.widths(simd.load_ints(&found.slots));
+        let within = le.luminance() / simd.load(&found.mass);
+        let density = simd.splat(counts[0]) * width * within + simd.splat(counts[1]) * pdf;
+        let value = f.zip(le, |f, le| f * le).scaled(simd.splat(1.0) / density);
+        let (value, luminance) = (value.store(), value.luminance().store());
+        for lane in set_bits(found.lanes) {
+            candidates.push(Candidate {
+                wi: Vec3::from(world.map(|c| c[lane])),
+                value: Rgb::from(value.map(|c| c[lane])),
+                luminance: luminance[lane],
+                slot: found.slots[lane] as u32,
+                hit: samples.hits[lane] as u32,
+                chance: 0,
+            });
+        }
+    }
+}
