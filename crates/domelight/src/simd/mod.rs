@@ -7,6 +7,7 @@
 //! `avx2.rs`, or `neon.rs` of half the width, and one more line in [`InstructionSet`] and [`dispatch`].
 //!
 //! Formulas are written over [`Real`], which is one number or a vector of them.
+#![cfg_attr(not(feature = "render"), allow(dead_code))] // Some of it serves rays alone.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
