@@ -6,6 +6,7 @@
 use super::{Beckmann, Brdf, Ggx, Lambert, MetallicRoughness, Phong, Ward};
 use crate::Rgb;
 use crate::math::Vec3;
+use crate::sampling::ONE_MINUS_EPSILON;
 use crate::simd::{Colors, Mask as _, Real, Vectors};
 
 /// One reflectance lobe.
@@ -238,7 +239,6 @@ impl Brdf for Material {
     /// What is left of `u_lobe` after the choice of a lobe is uniform again, and chooses within the lobe.
     #[inline(always)]
     fn sample_lanes<F: Real>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
-        const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
         let one = |x| wo.z.splat(x);
         let mut wi = Vectors::splat(wo.z, Vec3::ZERO);
         // Lanes whose lobe is this one or a later one, and what is left of their numbers.
@@ -248,7 +248,7 @@ impl Brdf for Material {
             let is_last = i + 1 == self.terms().len();
             let chosen = if is_last { open } else { open & rest.lt(probability) };
             if chosen.bits() != 0 {
-                let within = (rest / probability).min(one(BELOW_ONE));
+                let within = (rest / probability).min(one(ONE_MINUS_EPSILON));
                 wi = Vectors::select(chosen, term.lobe.sample_lanes(wo, within, u), wi);
             }
             open = open & probability.le(rest);

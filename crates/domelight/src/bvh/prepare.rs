@@ -92,7 +92,7 @@ impl<const N: usize> PreparedRays<N> {
         for k in 0..3 {
             let lower = simd.splat(scene.min[k]) - o[k];
             let upper = simd.splat(scene.max[k]) - o[k];
-            farthest = abs(simd, lower).max(abs(simd, upper)).max(farthest);
+            farthest = lower.abs().max(upper.abs()).max(farthest);
             greatest = length[k].max(greatest);
         }
         let inflation = simd.splat(INFLATION) * farthest;
@@ -101,7 +101,7 @@ impl<const N: usize> PreparedRays<N> {
         let mut inverse = [simd.splat(1.0); 3];
         let mut is_finite = simd.splat(0.0).eq(simd.splat(0.0));
         for k in 0..3 {
-            let margin = inflation + simd.splat(ORIGIN_ROUNDING) * abs(simd, o[k]);
+            let margin = inflation + simd.splat(ORIGIN_ROUNDING) * o[k].abs();
             let forward = signs[k] * margin;
             inverse[k] = inverse[k] / (signs[k] * length[k].max(negligible));
             store((o[k] + forward) * inverse[k], &mut self.near_origins[k], first);
@@ -109,7 +109,7 @@ impl<const N: usize> PreparedRays<N> {
             store(inverse[k], &mut self.inverse_directions[k], first);
             // Not finite if any of the numbers is not.
             let sum = o[k] + d[k] + inverse[k] + inflation;
-            is_finite = is_finite & abs(simd, sum).lt(simd.splat(f32::INFINITY));
+            is_finite = is_finite & sum.abs().lt(simd.splat(f32::INFINITY));
         }
 
         let is_x = length[1].lt(length[0]) & length[2].lt(length[0]);
@@ -157,11 +157,6 @@ fn eight(numbers: &[f32], first: usize) -> &Lanes {
 #[inline(always)]
 fn store<F: Floats>(x: F, numbers: &mut [f32], first: usize) {
     *numbers[first..].first_chunk_mut().expect("a multiple of eight") = x.store();
-}
-
-#[inline(always)]
-fn abs<S: Simd>(simd: S, x: S::Floats) -> S::Floats {
-    x.max(simd.splat(0.0) - x)
 }
 
 /// By the axes of the sheared space: z is x where that is the longest, y where it is, else z.

@@ -1,7 +1,7 @@
 //! Candidates from the material: samples of several hits side by side.
 
 use super::candidates::{Candidate, Hits, PixelNumbers, Sources};
-use super::cells::{at, slot};
+use super::cells::slot;
 use crate::Rgb;
 use crate::bsdf::Brdf as _;
 use crate::math::Vec3;
@@ -96,28 +96,20 @@ impl BrdfSamples {
 }
 
 /// What samples of the material meet on the map.
+#[derive(Default)]
 struct Found {
     /// Bit i: there is light for lane i.
     lanes: u32,
     slots: [i32; LANES],
     le: [Lanes; 3],
-    /// Of the cell.
-    mass: Lanes,
-}
-
-impl Default for Found {
-    fn default() -> Self {
-        Self { lanes: 0, slots: [0; LANES], le: [[0.0; LANES]; 3], mass: [1.0; LANES] }
-    }
 }
 
 impl Found {
     #[inline(always)]
-    fn push(&mut self, lane: usize, slot: usize, le: Rgb, mass: f32) {
+    fn push(&mut self, lane: usize, slot: usize, le: Rgb) {
         self.lanes |= 1 << lane;
         self.slots[lane] = slot as i32;
         (self.le[0][lane], self.le[1][lane], self.le[2][lane]) = (le.r, le.g, le.b);
-        self.mass[lane] = mass;
     }
 }
 
@@ -145,13 +137,14 @@ impl Sources<'_> {
             let texel = [columns[lane], rows[lane]].map(|i| i as usize);
             let Some(cell) = self.cells.at_texel(self.environment, texel, wi) else { continue };
             let le = self.environment.map().get(texel[0], texel[1]);
-            found.push(lane, slot(cell), le, at(&self.cells.mass, slot(cell)));
+            found.push(lane, slot(cell), le);
         }
         let [r, g, b] = &found.le;
         let le = Colors([simd.load(r), simd.load(g), simd.load(b)]);
-        let width = self.table.widths(simd.load_ints(&found.slots));
-        let within = le.luminance() / simd.load(&found.mass);
-        let density = simd.splat(counts[0]) * width * within + simd.splat(counts[1]) * pdf;
+        let slots = simd.load_ints(&found.slots);
+        let within = le.luminance() / S::Floats::gather(&self.cells.mass, slots);
+        let density =
+            simd.splat(counts[0]) * self.table.widths(slots) * within + simd.splat(counts[1]) * pdf;
         let value = f.zip(le, |f, le| f * le).scaled(simd.splat(1.0) / density);
         let (value, luminance) = (value.store(), value.luminance().store());
         for lane in set_bits(found.lanes) {

@@ -260,14 +260,7 @@ impl Table {
         self.total
     }
 
-    /// What the cell in a slot has of [`Table::total`].
-    #[inline(always)]
-    #[cfg(test)]
-    pub(super) fn width(&self, slot: usize) -> f32 {
-        super::cells::at(&self.weight, slot)
-    }
-
-    /// [`Table::width`] of cells side by side.
+    /// What the cells in `slots` have of [`Table::total`].
     #[inline(always)]
     pub(super) fn widths<F: Floats>(&self, slots: F::Ints) -> F {
         F::gather(&self.weight, slots)
@@ -395,6 +388,13 @@ mod tests {
     use crate::strategy::ShadingPoint;
     use testkit::Chi2;
     use testkit::quadrature::Adaptive;
+
+    impl Table {
+        /// One of [`Table::widths`].
+        fn width(&self, slot: usize) -> f32 {
+            at(&self.weight, slot)
+        }
+    }
 
     const MATERIALS: [&str; 5] =
         ["diffuse:0.8", "phong:50:0.5:0.5", "ward:0.15:0.5", "ggx:0.2", "gltf:0.9,0.6,0.3:0.5:0.5"];
