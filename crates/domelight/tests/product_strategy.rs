@@ -111,19 +111,23 @@ fn every_instruction_set_gives_the_same_bits() {
         MATERIALS.iter().zip([SamplerKind::Sobol, SamplerKind::Independent].iter().cycle())
     {
         let hits = [0.2, 0.7, 1.3].map(|theta| point(material(name), theta));
-        let [scalar, best] = [InstructionSet::Scalar, InstructionSet::best()].map(|set| {
-            let strategy = ProductSampling::new(&env, 7).with_instruction_set(set).unwrap();
-            estimates(&strategy, &env, &hits, *sampler, 5)
-        });
-        assert_eq!(scalar, best, "{name}");
+        // In a short pass and in a long one.
+        for (hits, n_rays) in [(hits.to_vec(), 7), (hits.repeat(3), 2)] {
+            let [scalar, best] = [InstructionSet::Scalar, InstructionSet::best()].map(|set| {
+                let strategy =
+                    ProductSampling::new(&env, n_rays).with_instruction_set(set).unwrap();
+                estimates(&strategy, &env, &hits, *sampler, 5)
+            });
+            assert_eq!(scalar, best, "{name}");
+        }
     }
 }
 
 #[test]
 fn every_round_is_unbiased_on_every_material() {
     let environments = [environment(true, UpAxis::Z), white_environment()];
-    // Views, rays of each camera sample, and camera samples.
-    let cases = [(0.2, 8, 3), (1.3, 3, 4)];
+    // Views, rays of each camera sample, and camera samples: two short passes and a long one.
+    let cases = [(0.2, 8, 3), (1.3, 3, 4), (0.7, 1, 12)];
     let suite = Suite::of(MATERIALS.len() * environments.len() * cases.len() * KINDS.len());
     let test = ZTest { suite, ..ZTest::default() };
     for env in &environments {

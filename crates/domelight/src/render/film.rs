@@ -195,6 +195,15 @@ impl Layers {
         }
     }
 
+    /// Counts `n` camera samples that saw nothing to the pixels of a tile that have none; `self` is of the pixels of
+    /// `window`.
+    pub(super) fn add_misses(&mut self, n: u32, tile: Window, window: Window) {
+        for y in tile.y..tile.y + tile.height {
+            let start = window.index(tile.x, y);
+            self.n_samples[start..start + tile.width].fill(n);
+        }
+    }
+
     /// Takes the pixels over that have samples, of the rows of `from` that are in `window`; `pixels` are those of `from`,
     /// or none, and `self` is of the pixels of `window`.
     pub(super) fn put(&mut self, pixels: &[PixelSums], from: Window, window: Window) {

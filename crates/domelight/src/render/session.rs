@@ -169,7 +169,7 @@ impl<'a, S: Strategy> Session<'a, S> {
         let window = self.tiling.window(&self.range);
         let mut layers = Layers::new(window.width, window.height);
         for tile in &self.tiles {
-            layers.put(&tile.sums(), tile.window, window);
+            tile.put_into(&mut layers, window);
         }
         Rendering { layers, counts: self.counts(), complete: self.is_complete() }
     }

@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::film::{CameraSample, PixelSums, SurfaceSample};
+use super::film::{CameraSample, Layers, PixelSums, SurfaceSample};
 use super::spread::Spreads;
 use super::tiling::Window;
 use super::{Background, Frame, Observer, RenderSettings, Stage, Visibility};
@@ -150,6 +150,15 @@ impl Tile {
             Cow::Owned(vec![PixelSums::missed(self.n_missed); self.window.area()])
         } else {
             Cow::Borrowed(&self.pixels)
+        }
+    }
+
+    /// Adds its pixels to `layers` of the pixels of `window`.
+    pub(super) fn put_into(&self, layers: &mut Layers, window: Window) {
+        if self.pixels.is_empty() {
+            layers.add_misses(self.n_missed, self.window, window);
+        } else {
+            layers.put(&self.pixels, self.window, window);
         }
     }
 

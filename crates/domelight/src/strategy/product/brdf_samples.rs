@@ -1,7 +1,6 @@
 //! Candidates from the material: samples of several hits side by side.
 
 use super::candidates::{Candidate, Hits, PixelNumbers, Sources};
-use super::cells::slot;
 use crate::Rgb;
 use crate::bsdf::Brdf as _;
 use crate::math::Vec3;
@@ -137,7 +136,7 @@ impl Sources<'_> {
             let texel = [columns[lane], rows[lane]].map(|i| i as usize);
             let Some(cell) = self.cells.at_texel(self.environment, texel, wi) else { continue };
             let le = self.environment.map().get(texel[0], texel[1]);
-            found.push(lane, slot(cell), le);
+            found.push(lane, self.cells.slot(cell), le);
         }
         let [r, g, b] = &found.le;
         let le = Colors([simd.load(r), simd.load(g), simd.load(b)]);

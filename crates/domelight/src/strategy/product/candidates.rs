@@ -241,7 +241,7 @@ impl Sources<'_> {
         candidates.lights.clear();
         if n_strata > 0 {
             let Candidates { slots, marks, .. } = &mut *candidates;
-            self.table.deal(simd, &strata, deal, marks, slots);
+            self.table.deal(simd, self.cells, &strata, deal, marks, slots);
         }
         for (hit, at) in hits.points.iter().enumerate() {
             let (material, diffuse) = (hits.material(hit), diffuse[hit]);

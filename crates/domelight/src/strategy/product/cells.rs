@@ -19,7 +19,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::f64::consts::{PI, TAU};
-use std::ops::{Deref, DerefMut};
+use std::ops::{Deref, DerefMut, Range};
 
 use crate::Rgb;
 use crate::environment::Environment;
@@ -27,23 +27,18 @@ use crate::math::Vec3;
 use crate::sampling::hilbert::Turn;
 use crate::simd::{LANES, Lanes, Simd, Wide};
 
-/// Cells of each lane: an eighth of the curve.
-pub(super) const ROWS: usize = 48;
-/// The most cells.
-pub(super) const MAX_CELLS: usize = LANES * ROWS;
+/// The most cells of a lane, which has an eighth of the curve.
+pub(super) const MAX_ROWS: usize = 48;
 
 /// Rows of a table: a power of two, so that an index that is masked with it needs no other check.
-pub(super) const TABLE_ROWS: usize = ROWS.next_power_of_two();
-/// Places in a table; those from [`MAX_CELLS`] on are nobody's.
+pub(super) const TABLE_ROWS: usize = MAX_ROWS.next_power_of_two();
+/// Places in a table; those of rows that the cells do not fill are nobody's.
 pub(super) const SLOTS: usize = TABLE_ROWS * LANES;
 
 /// One number a cell, at [`slot`], by row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
 pub(super) struct Slots([Lanes; TABLE_ROWS]);
-
-/// Rows are taken in pairs where all lanes are alike.
-pub(super) const PAIRS: usize = ROWS / 2;
 
 impl Slots {
     /// A pair of rows.
@@ -72,17 +67,6 @@ impl DerefMut for Slots {
     fn deref_mut(&mut self) -> &mut Self::Target {
         &mut self.0
     }
-}
-
-/// Where a cell's number is, row by row: lane l has the l-th eighth of the curve, row by row, so that one running
-/// sum a lane and one over the lanes make the sum along the curve.
-pub(super) fn slot(cell: usize) -> usize {
-    cell % ROWS * LANES + cell / ROWS
-}
-
-/// The cell whose number is in a slot.
-pub(super) fn cell_in(slot: usize) -> usize {
-    slot % LANES * ROWS + slot / LANES
 }
 
 /// Zero for each cell.
@@ -145,6 +129,8 @@ enum Link {
 /// The cells of an environment.
 #[derive(Clone, Debug)]
 pub(super) struct Cells {
+    /// Of each lane.
+    rows: usize,
     /// Along the curve.
     squares: Vec<Square>,
     /// The four quarters of each square that was split, by row; the first is the whole.
@@ -180,12 +166,13 @@ pub(super) struct Ramp {
 const SPREADS: [f32; 7] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28];
 
 impl Cells {
-    /// Cuts an environment; none of a black one.
-    pub(super) fn new(environment: &Environment) -> Option<Self> {
+    /// Cuts an environment into as many cells as `rows` ≤ [`MAX_ROWS`] hold, an even number; none of a black one.
+    pub(super) fn new(environment: &Environment, rows: usize) -> Option<Self> {
         let map = Map { environment };
-        let tree = Tree::grow(&map, map.root()?);
+        let tree = Tree::grow(&map, map.root()?, rows * LANES);
         let zeros = || Box::new(NO_SLOTS);
         let mut cells = Self {
+            rows,
             squares: Vec::new(),
             links: vec![[Link::Dark; 4]; tree.links.len()],
             depth: environment.table()?.depth() as u32,
@@ -202,7 +189,7 @@ impl Cells {
         for cell in 0..cells.squares.len() {
             let square = cells.squares[cell];
             let (center, radius, reach) = map.extent(&square);
-            let slot = slot(cell);
+            let slot = cells.slot(cell);
             for (c, x) in cells.center.iter_mut().zip(center.to_array()) {
                 *at_mut(c, slot) = x;
             }
@@ -262,6 +249,36 @@ impl Cells {
         &self.ramps[above.min(SPREADS.len() - 1)]
     }
 
+    /// The rows of a table that they fill.
+    #[inline(always)]
+    pub(super) fn rows(&self) -> Range<usize> {
+        0..self.rows.min(MAX_ROWS)
+    }
+
+    /// Places in these rows.
+    pub(super) fn n_slots(&self) -> usize {
+        self.rows * LANES
+    }
+
+    /// The same rows by two, where all lanes are alike.
+    #[inline(always)]
+    pub(super) fn pairs(&self) -> Range<usize> {
+        0..self.rows.min(MAX_ROWS) / 2
+    }
+
+    /// Where a cell's number is, row by row: lane l has the l-th eighth of the curve, row by row, so that one running
+    /// sum a lane and one over the lanes make the sum along the curve.
+    pub(super) fn slot(&self, cell: usize) -> usize {
+        cell % self.rows * LANES + cell / self.rows
+    }
+
+    /// The cell whose number is in a slot; none in rows that are not theirs and behind the last.
+    pub(super) fn cell_in(&self, slot: usize) -> Option<usize> {
+        let (row, lane) = (slot / LANES, slot % LANES);
+        let cell = lane * self.rows + row;
+        (row < self.rows && cell < self.len()).then_some(cell)
+    }
+
     /// How many.
     pub(super) fn len(&self) -> usize {
         self.squares.len()
@@ -269,7 +286,7 @@ impl Cells {
 
     /// ∫ luminance dω over a cell.
     pub(super) fn mass_of(&self, cell: usize) -> f32 {
-        at(&self.mass, slot(cell))
+        at(&self.mass, self.slot(cell))
     }
 
     /// The cell that `wi` looks at, in this texel (column and row); none where there is no light.
@@ -483,12 +500,13 @@ struct Node {
 }
 
 impl Tree {
-    fn grow(map: &Map, root: Square) -> Self {
+    /// With `most` leaves at most.
+    fn grow(map: &Map, root: Square, most: usize) -> Self {
         let nodes = vec![Node { square: root, split: None }];
         let mut tree = Self { nodes, links: Vec::new() };
         let mut queue = BinaryHeap::from([Next { priority: f64::INFINITY, node: 0 }]);
         let mut n_cells = 1;
-        while n_cells + 3 <= MAX_CELLS {
+        while n_cells + 3 <= most {
             let Some(next) = queue.pop() else { break };
             let square = tree.nodes[next.node].square;
             tree.nodes[next.node].split = Some(tree.links.len());
@@ -561,15 +579,21 @@ mod tests {
 
     #[test]
     fn black_has_no_cells() {
-        assert!(Cells::new(&Environment::constant(Rgb::BLACK).unwrap()).is_none());
+        assert!(Cells::new(&Environment::constant(Rgb::BLACK).unwrap(), MAX_ROWS).is_none());
     }
 
     /// The masses add up to the whole, and each is the light that a direction finds in it.
     #[test]
     fn cells_partition_the_light() {
-        for (name, environment) in environments() {
-            let cells = Cells::new(&environment).unwrap();
-            assert!((100..=MAX_CELLS).contains(&cells.len()), "{name}: {}", cells.len());
+        let rows = [MAX_ROWS, 24, 32].into_iter().cycle();
+        for ((name, environment), rows) in environments().into_iter().zip(rows) {
+            let cells = Cells::new(&environment, rows).unwrap();
+            assert!((100..=rows * LANES).contains(&cells.len()), "{name}: {}", cells.len());
+            for cell in 0..cells.len() {
+                assert_eq!(cells.cell_in(cells.slot(cell)), Some(cell));
+            }
+            let slots = (0..SLOTS).filter(|&slot| cells.cell_in(slot).is_some());
+            assert_eq!(slots.count(), cells.len());
             let total: f64 = cells.mass.iter().flatten().map(|&m| f64::from(m)).sum();
             assert!((total / environment.power() - 1.0).abs() < 1e-5, "{name}");
 
@@ -590,8 +614,8 @@ mod tests {
                     found[cell] += f64::from(le.luminance()) * solid_angle;
                     // No direction lies further from the centre than the reach.
                     let center =
-                        Vec3::from(cells.center.each_ref().map(|c| super::at(c, slot(cell))));
-                    let reach = super::at(&cells.reach, slot(cell));
+                        Vec3::from(cells.center.each_ref().map(|c| super::at(c, cells.slot(cell))));
+                    let reach = super::at(&cells.reach, cells.slot(cell));
                     assert!(center.angle_between(wi) <= reach, "{name} {cell}");
                 }
             }
@@ -607,7 +631,7 @@ mod tests {
     fn directions_are_drawn_by_luminance_along_the_curve() {
         let mut pcg = Pcg32::new(5, 6);
         for (name, environment) in environments() {
-            let cells = Cells::new(&environment).unwrap();
+            let cells = Cells::new(&environment, MAX_ROWS).unwrap();
             for cell in (0..cells.len()).step_by(17) {
                 let n = 256;
                 let mut steps = 0.0;
@@ -629,7 +653,7 @@ mod tests {
                     last = Some(wi);
                 }
                 // A curve through n points of a square is some √n sides long.
-                let reach = at(&cells.reach, slot(cell));
+                let reach = at(&cells.reach, cells.slot(cell));
                 assert!(
                     steps < 6.0 * f32::sqrt(n as f32) * reach,
                     "{name} {cell}: {steps} {reach}"

@@ -20,7 +20,7 @@
 //! map, not over the pool. So h is also weighed as the balance heuristic weighs strata in the middle of
 //! the cell.
 
-use super::cells::{Cells, NO_SLOTS, PAIRS, Slots};
+use super::cells::{Cells, NO_SLOTS, Slots};
 use super::hits::Group;
 use super::pool::Pool;
 use crate::Rgb;
@@ -95,7 +95,7 @@ impl Control {
             return;
         }
         let (one, share) = (simd.splat_wide(1.0), simd.splat_wide(share));
-        for pair in 0..PAIRS {
+        for pair in cells.pairs() {
             let weight = one / (one + share * cells.dimness.pair(simd, pair));
             for sum in &mut self.gloss {
                 sum.set_pair(pair, sum.pair(simd, pair) * weight);
@@ -105,10 +105,16 @@ impl Control {
 
     /// Its integral over all cells, each seen through `visible`.
     #[inline(always)]
-    pub(super) fn integral<S: Simd>(&self, simd: S, pool: &Pool, visible: &Slots) -> Integral {
+    pub(super) fn integral<S: Simd>(
+        &self,
+        simd: S,
+        cells: &Cells,
+        pool: &Pool,
+        visible: &Slots,
+    ) -> Integral {
         let zero = simd.splat_wide(0.0);
         let (mut diffuse, mut gloss) = ([[zero; 3]; 3], [zero; 3]);
-        for pair in 0..PAIRS {
+        for pair in cells.pairs() {
             let seen = visible.pair(simd, pair);
             let above = seen * self.above.pair(simd, pair);
             for (sums, [_, vector @ ..]) in diffuse.iter_mut().zip(pool.moments.iter()) {
@@ -165,6 +171,7 @@ impl Control {
 mod tests {
     use super::super::candidates::{Candidates, Counts, Hits, PixelNumbers, Sources};
     use super::super::hits::Groups;
+    use super::super::pool::PassLength;
     use super::super::table::Table;
     use super::super::test_support::{hit, sky};
     use super::*;
@@ -197,7 +204,7 @@ mod tests {
             let (mut control, mut candidates) = (Control::default(), Candidates::default());
             groups.gather(hits);
             table.fill::<S, true>(simd, cells, &groups.all, &mut control);
-            table.accumulate(simd, &cells.mass);
+            table.accumulate(simd, cells);
             let counts = Counts { light: 40, brdf: 4 };
             control.balance(simd, cells, groups.brdf_share(counts, table.total()));
             let numbers = PixelNumbers::new(Stream::new(SamplerKind::Independent, self.seed, 0));
@@ -213,7 +220,7 @@ mod tests {
                     known += of(&block.value) - of(&block.rest);
                 }
             }
-            let integral = control.integral(simd, pool, self.visible);
+            let integral = control.integral(simd, cells, pool, self.visible);
             let of_hits = self.hits.iter().zip(&groups.diffuse);
             let sum: Rgb = of_hits.map(|(at, &diffuse)| integral.at(at.frame.z, diffuse)).sum();
             [value, known, sum / self.hits.len() as f32]
@@ -225,9 +232,9 @@ mod tests {
     #[test]
     fn what_is_taken_is_added() {
         let environment = sky();
-        let cells = Cells::new(&environment).unwrap();
+        let cells = Cells::new(&environment, PassLength::Short.rows()).unwrap();
         let stream = Stream::of_pass(SamplerKind::Sobol, 1, 0);
-        let pool = Pool::draw(&cells, &environment, stream, 1);
+        let pool = Pool::draw(&cells, &environment, stream, PassLength::Short);
         let mut visible = NO_SLOTS;
         for (i, v) in visible.iter_mut().flatten().enumerate() {
             *v = (i % 7) as f32 / 6.0;

@@ -1,6 +1,6 @@
 //! Product sampling: rays follow light times reflectance, and visibility is learned on the way.
 //!
-//! Once for an environment its map is cut into some 384 `cells` along Hilbert's curve. Each pass draws
+//! Once for an environment its map is cut into some hundred `cells` along Hilbert's curve. Each pass draws
 //! a `pool` of directions in every cell. Then, pixel by pixel, all its camera hits together:
 //!
 //! 1. A `table` gives each cell its light times what the pixel reflects of it.
@@ -53,7 +53,7 @@ use cells::{Cells, Slots, at};
 use choose::{Choice, probabilities, probability, weight};
 use control::Control;
 use hits::Groups;
-use pool::SHORT_PASS;
+use pool::PassLength;
 use table::Table;
 use visibility::{Blocks, Learned, Visibility};
 
@@ -86,8 +86,8 @@ const DARK: f32 = 0.15;
 #[derive(Clone, Debug)]
 pub struct ProductSampling<'a> {
     environment: &'a Environment,
-    /// None under a black sky.
-    cells: Option<Cells>,
+    /// Of short passes and of long ones; none under a black sky.
+    cells: Option<[Cells; 2]>,
     /// Luminance below which brightness does not count.
     dark: f32,
     n_rays: u32,
@@ -99,9 +99,10 @@ impl<'a> ProductSampling<'a> {
     /// many. It is the number of candidates: those that cannot change the pixel visibly are not traced.
     pub fn new(environment: &'a Environment, n_rays: u32) -> Self {
         let mean = environment.power() / (4.0 * std::f64::consts::PI);
+        let cells = |length: PassLength| Cells::new(environment, length.rows());
         Self {
             environment,
-            cells: Cells::new(environment),
+            cells: cells(PassLength::Short).zip(cells(PassLength::Long)).map(Into::into),
             dark: (f64::from(DARK) * mean) as f32,
             n_rays: n_rays.max(1),
             instruction_set: InstructionSet::best(),
@@ -118,7 +119,7 @@ impl<'a> ProductSampling<'a> {
 
     /// How many candidates the hits of a pixel have together.
     fn counts(&self, groups: &Groups, n_hits: usize, pilot: bool) -> Counts {
-        let times = if pilot && n_hits <= SHORT_PASS as usize { PILOT } else { 1 };
+        let times = if pilot && PassLength::new(n_hits) == PassLength::Short { PILOT } else { 1 };
         let all = self.n_rays as usize * n_hits * times;
         let brdf = match groups.narrowest() {
             Some(width) if width < NARROW => all.div_ceil(BRDF_SHARE[1]),
@@ -126,6 +127,15 @@ impl<'a> ProductSampling<'a> {
             _ => 0,
         };
         Counts { light: all - brdf, brdf }
+    }
+
+    /// The cells of a pass.
+    fn cells(&self, length: PassLength) -> Option<&Cells> {
+        let [of_short, of_long] = self.cells.as_ref()?;
+        Some(match length {
+            PassLength::Short => of_short,
+            PassLength::Long => of_long,
+        })
     }
 
     /// The brightness of a pixel that its error is measured by.
@@ -165,8 +175,9 @@ impl Strategy for ProductSampling<'_> {
     }
 
     fn begin_pass(&self, stream: Stream, n_samples: u32) -> Pool {
-        let draw = |cells| Pool::draw(cells, self.environment, stream, n_samples);
-        self.cells.as_ref().map_or_else(Pool::empty, draw)
+        let length = PassLength::new(n_samples as usize);
+        let draw = |cells| Pool::draw(cells, self.environment, stream, length);
+        self.cells(length).map_or_else(Pool::empty, draw)
     }
 
     fn push(
@@ -177,7 +188,7 @@ impl Strategy for ProductSampling<'_> {
         scratch: &mut ProductScratch,
         out: &mut Contributions,
     ) {
-        let Some(cells) = &self.cells else { return };
+        let Some(cells) = self.cells(pool.length) else { return };
         if round == 0 {
             scratch.learned.reset(tile.blocks(), tile.pixels.len());
         }
@@ -234,7 +245,7 @@ impl Kernel for Asking<'_, '_> {
         let blocks = tile.blocks();
         let ProductScratch { visibility, learned, .. } = &mut *self.scratch;
         if !pilots {
-            visibility.estimate(simd, learned, blocks);
+            visibility.estimate(simd, self.cells, learned, blocks);
         }
         self.scratch.targets.clear();
         self.scratch.asked.clear();
@@ -275,10 +286,10 @@ impl Asking<'_, '_> {
             table.fill::<S, true>(simd, self.cells, &groups.all, control);
             if !is_glossy {
                 let (visible, doubt) = visibility.of(block);
-                table.attend(simd, &control.above, visible, doubt);
+                table.attend(simd, self.cells, &control.above, visible, doubt);
             }
         }
-        table.accumulate(simd, &self.cells.mass);
+        table.accumulate(simd, self.cells);
         if !self.pilots {
             control.balance(simd, self.cells, groups.brdf_share(counts, table.total()));
         }
@@ -292,7 +303,7 @@ impl Asking<'_, '_> {
         let mut rays = Rays { pixel, out: self.out, targets };
         if let Some(control) = control {
             let visibility = visibility.of(block);
-            let integral = control.integral(simd, pool, visibility.0);
+            let integral = control.integral(simd, cells, pool, visibility.0);
             let mut known = Rgb::BLACK;
             for (hit, (at, &diffuse)) in points.iter().zip(&groups.diffuse).enumerate() {
                 let of_hit = integral.at(at.frame.z, diffuse);

@@ -5,17 +5,45 @@
 //! stratum that falls into the cell takes the one where it falls. The estimate of a pixel is unbiased
 //! over the pools; what the pool of one pass has in error, all its pixels share.
 
-use super::cells::{Cells, MAX_CELLS, NO_SLOTS, SLOTS, Slots, at_mut, cell_in};
+use super::cells::{Cells, MAX_ROWS, NO_SLOTS, SLOTS, Slots, at_mut};
 use crate::environment::Environment;
 use crate::parallel;
 use crate::sampling::Stream;
 use crate::simd::{Colors, Floats, Ints, LANES, Lanes, Simd, Vectors};
 
-/// Directions of each cell, or half of that in short passes.
+/// Directions of each cell at the most.
 pub(super) const PER_CELL: usize = 32;
 
-/// Camera samples up to which a pass is short: its pixels' own errors hide the pool's.
-pub(super) const SHORT_PASS: u32 = 8;
+/// How long a pass is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PassLength {
+    /// Up to 8 camera samples: the pixels' own errors hide what coarser cells and fewer directions err by.
+    Short,
+    Long,
+}
+
+impl PassLength {
+    /// Of a pass of so many camera samples.
+    pub(super) fn new(n_samples: usize) -> Self {
+        if n_samples <= 8 { Self::Short } else { Self::Long }
+    }
+
+    /// Rows of its cells.
+    pub(super) fn rows(self) -> usize {
+        match self {
+            Self::Short => 32,
+            Self::Long => MAX_ROWS,
+        }
+    }
+
+    /// Directions of each cell.
+    fn per_cell(self) -> usize {
+        match self {
+            Self::Short => PER_CELL / 2,
+            Self::Long => PER_CELL,
+        }
+    }
+}
 
 /// A direction toward the light: half a line of the cache. x, y and z of the unit direction in the
 /// world; red, green and blue of the radiance from there; its density within its cell \[sr⁻¹\];
@@ -32,8 +60,8 @@ const LIGHTS: usize = SLOTS * PER_CELL;
 pub struct Pool {
     /// By slot.
     lights: Box<[Light; LIGHTS]>,
-    /// Directions that each cell has: the first of its places.
-    per_cell: usize,
+    /// Each cell has the first of its places.
+    pub(super) length: PassLength,
     /// By channel of the radiance L: ∫ L dω, and ∫ L ω dω by component, as the directions estimate it.
     pub(super) moments: Box<[[Slots; 4]; 3]>,
 }
@@ -51,25 +79,22 @@ impl Pool {
         let lights = vec![Light([0.0; LANES]); LIGHTS].into_boxed_slice();
         let lights = lights.try_into().expect("as many as asked for");
         let moments = vec![[NO_SLOTS; 4]; 3].into_boxed_slice();
-        Self { lights, per_cell: 1, moments: moments.try_into().expect("three channels") }
+        let moments = moments.try_into().expect("three channels");
+        Self { lights, length: PassLength::Short, moments }
     }
 
-    /// Draws the directions of a pass of so many camera samples.
+    /// Draws the directions of a pass.
     pub(super) fn draw(
         cells: &Cells,
         environment: &Environment,
         stream: Stream,
-        n_samples: u32,
+        length: PassLength,
     ) -> Self {
-        let mut pool = Self::empty();
-        pool.per_cell = if n_samples > SHORT_PASS { PER_CELL } else { PER_CELL / 2 };
-        let per_cell = pool.per_cell;
-        let lights = &mut pool.lights[..MAX_CELLS * PER_CELL];
+        let per_cell = length.per_cell();
+        let mut pool = Self { length, ..Self::empty() };
+        let lights = &mut pool.lights[..cells.n_slots() * PER_CELL];
         parallel::bands(lights, PER_CELL, |slot, lights| {
-            let cell = cell_in(slot);
-            if cell >= cells.len() {
-                return;
-            }
+            let Some(cell) = cells.cell_in(slot) else { return };
             let mut numbers = stream.generator(cell as u32);
             let mass = cells.mass_of(cell);
             for (j, light) in lights[..per_cell].iter_mut().enumerate() {
@@ -80,7 +105,7 @@ impl Pool {
                 *light = Light([wi.x, wi.y, wi.z, le.r, le.g, le.b, density, 0.0]);
             }
         });
-        for slot in (0..MAX_CELLS).filter(|&slot| cell_in(slot) < cells.len()) {
+        for slot in (0..cells.n_slots()).filter(|&slot| cells.cell_in(slot).is_some()) {
             let moments = moments(&pool.lights[slot * PER_CELL..][..per_cell]);
             for (slots, &moment) in pool.moments.iter_mut().flatten().zip(moments.as_flattened()) {
                 *at_mut(slots, slot) = moment;
@@ -92,8 +117,9 @@ impl Pool {
     /// The directions of the cells in `slots`, each at `u` in [0, 1) of its part of the curve.
     #[inline(always)]
     pub(super) fn at<S: Simd>(&self, simd: S, slots: S::Ints, u: S::Floats) -> Lights<S::Floats> {
-        let last = simd.splat_int(self.per_cell as i32 - 1);
-        let j = (u * simd.splat(self.per_cell as f32)).truncated().min(last);
+        let per_cell = self.length.per_cell();
+        let last = simd.splat_int(per_cell as i32 - 1);
+        let j = (u * simd.splat(per_cell as f32)).truncated().min(last);
         let index = (slots.shifted::<{ PER_CELL.ilog2() as i32 }>() + j).store();
         let lights = index.map(|i| &self.lights[i as usize % LIGHTS].0);
         let [x, y, z, r, g, b, density, _] = simd.transposed(lights);
@@ -117,7 +143,6 @@ fn moments(lights: &[Light]) -> [[f32; 4]; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::cells::slot;
     use super::super::test_support::sky;
     use super::*;
     use crate::Rgb;
@@ -144,9 +169,9 @@ mod tests {
         }
     }
 
-    /// The direction of a cell at `u`, its radiance and its density.
-    fn light(pool: &Pool, cell: usize, u: f32) -> (Vec3, Rgb, f32) {
-        dispatch(InstructionSet::best(), At { pool, slot: slot(cell), u })
+    /// The direction of the cell in a slot at `u`, its radiance and its density.
+    fn light(pool: &Pool, slot: usize, u: f32) -> (Vec3, Rgb, f32) {
+        dispatch(InstructionSet::best(), At { pool, slot, u })
     }
 
     /// The mean over a cell's directions of any function over the density is its integral; of the
@@ -154,16 +179,22 @@ mod tests {
     #[test]
     fn the_pool_stands_for_the_light() {
         let environment = sky();
-        let cells = Cells::new(&environment).unwrap();
-        let pool = Pool::draw(&cells, &environment, Stream::of_pass(SamplerKind::Sobol, 1, 0), 32);
-        for cell in 0..cells.len() {
-            for j in 0..PER_CELL {
-                let (wi, le, density) = light(&pool, cell, (j as f32 + 0.5) / PER_CELL as f32);
-                assert!((le.luminance() / density / cells.mass_of(cell) - 1.0).abs() < 1e-5);
-                assert_eq!(cells.find(&environment, wi), Some((cell, le)));
+        for length in [PassLength::Short, PassLength::Long] {
+            let cells = Cells::new(&environment, length.rows()).unwrap();
+            let draw = |pass| {
+                let stream = Stream::of_pass(SamplerKind::Sobol, 1, pass);
+                Pool::draw(&cells, &environment, stream, length)
+            };
+            let pool = draw(0);
+            for cell in 0..cells.len() {
+                let slot = cells.slot(cell);
+                for j in 0..PER_CELL {
+                    let (wi, le, density) = light(&pool, slot, (j as f32 + 0.5) / PER_CELL as f32);
+                    assert!((le.luminance() / density / cells.mass_of(cell) - 1.0).abs() < 1e-5);
+                    assert_eq!(cells.find(&environment, wi), Some((cell, le)));
+                }
             }
+            assert_ne!(light(&pool, 7, 0.5).0, light(&draw(8), 7, 0.5).0);
         }
-        let other = Pool::draw(&cells, &environment, Stream::of_pass(SamplerKind::Sobol, 1, 8), 8);
-        assert_ne!(light(&pool, 7, 0.5).0, light(&other, 7, 0.5).0);
     }
 }

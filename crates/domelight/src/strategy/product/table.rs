@@ -15,7 +15,7 @@
 //! offset: stratum k falls at u = (k + ξ)/M.
 
 use super::candidates::{Deal, Strata};
-use super::cells::{Cells, NO_SLOTS, PAIRS, ROWS, Slots, TABLE_ROWS};
+use super::cells::{Cells, MAX_ROWS, NO_SLOTS, Slots, TABLE_ROWS};
 use super::control::Control;
 use super::hits::Group;
 use crate::bsdf::Gloss;
@@ -88,6 +88,7 @@ impl Table {
     pub(super) fn attend<S: Simd>(
         &mut self,
         simd: S,
+        cells: &Cells,
         above: &Slots,
         visible: &Slots,
         doubt: &Slots,
@@ -95,7 +96,7 @@ impl Table {
         /// Of the light of a cell across the horizon, the variance that its control variate leaves.
         const ACROSS: f32 = 0.1;
         let one = |x| simd.splat_wide(x);
-        for pair in 0..PAIRS {
+        for pair in cells.pairs() {
             let across = one(1.0) - above.pair(simd, pair);
             let light = visible.pair(simd, pair).squared() * across * one(ACROSS);
             let chance = (doubt.pair(simd, pair).squared() + light).sqrt();
@@ -120,7 +121,7 @@ impl Table {
         let spread = one(group.spread);
         let ramps = cells.ramp(group.spread);
         let before = one(if others { 1.0 } else { 0.0 });
-        for pair in 0..PAIRS {
+        for pair in cells.pairs() {
             let x = center(simd, cells, pair).dot(group.frame.z);
             let s = ramps.s.pair(simd, pair);
             let ramp = (x + s).max(zero).squared() * ramps.scale.pair(simd, pair);
@@ -156,7 +157,7 @@ impl Table {
         let spread2 = one(sqr(group.spread));
         let scale = one(0.25 * FRAC_1_PI * share) / sigma(one(wo.z), rough2);
         let tail = one(if GAUSSIAN { 1.0 / 3.0 } else { 1.0 });
-        for pair in 0..PAIRS {
+        for pair in cells.pairs() {
             let center = center(simd, cells, pair);
             let h = center.plus(half);
             let (hx, hy, hz) = (h.dot(frame.x), h.dot(frame.y), h.dot(frame.z).max(one(1e-3)));
@@ -213,7 +214,7 @@ impl Table {
         let mirror = group.frame.to_world(Vec3::new(-wo.x, -wo.y, wo.z));
         let narrow = one(1.0 / (exponent + 1.0) + 4.0 * sqr(group.spread));
         let scale = one(0.5 * FRAC_1_PI * share);
-        for pair in 0..PAIRS {
+        for pair in cells.pairs() {
             let center = center(simd, cells, pair);
             let versine = (one(1.0) - center.dot(mirror)).max(one(0.0));
             let sigma2 = narrow + cells.radius.pair(simd, pair).squared();
@@ -231,10 +232,10 @@ impl Table {
 
     /// The running sum of weight times light: down the rows in all lanes at once, then over the lanes.
     #[inline(always)]
-    pub(super) fn accumulate<S: Simd>(&mut self, simd: S, mass: &Slots) {
+    pub(super) fn accumulate<S: Simd>(&mut self, simd: S, cells: &Cells) {
         let mut sum = simd.splat(0.0);
-        for row in 0..ROWS {
-            sum = sum + simd.load(&self.weight[row]) * simd.load(&mass[row]);
+        for row in cells.rows() {
+            sum = sum + simd.load(&self.weight[row]) * simd.load(&cells.mass[row]);
             self.end[row] = sum.store();
         }
         let sum = sum.store();
@@ -246,7 +247,7 @@ impl Table {
         // The width of a cell is the difference of its ends as rounded: what strata fall into.
         let before = simd.load(&before);
         let mut last = before;
-        for row in 0..ROWS {
+        for row in cells.rows() {
             let end = before + simd.load(&self.end[row]);
             self.start[row] = last.store();
             self.end[row] = end.store();
@@ -275,6 +276,7 @@ impl Table {
     pub(super) fn deal<S: Simd>(
         &self,
         simd: S,
+        cells: &Cells,
         strata: &Strata,
         deal: Deal,
         marks: &mut Vec<i32>,
@@ -283,11 +285,11 @@ impl Table {
         marks.clear();
         marks.resize(strata.n, 0);
         // Of each cell that has strata the first, and its mark.
-        let mut firsts = [0; LANES * (ROWS + 1)];
+        let mut firsts = [0; LANES * (MAX_ROWS + 1)];
         let mut n_firsts = 0;
         let mut mark = simd.counting().shifted::<MARK>();
         let mut from = first(simd, strata, simd.load(&self.start[0]));
-        for end in &self.end[..ROWS] {
+        for end in &self.end[cells.rows()] {
             let to = first(simd, strata, simd.load(end));
             let not_empty = from.lt(to);
             let packed = (from.shifted::<MARKS>() + mark).packed(not_empty);
@@ -379,7 +381,7 @@ fn center<S: Simd>(simd: S, cells: &Cells, pair: usize) -> Vectors<S::Wide> {
 #[cfg(test)]
 mod tests {
     use super::super::candidates::Hits;
-    use super::super::cells::{MAX_CELLS, at, slot};
+    use super::super::cells::{MAX_ROWS, at};
     use super::super::hits::Groups;
     use super::super::test_support::{hit, sky};
     use super::*;
@@ -417,13 +419,14 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Table {
             let mut table = Table::default();
             table.fill::<S, false>(simd, self.cells, self.groups, &mut Control::default());
-            table.accumulate(simd, &self.cells.mass);
+            table.accumulate(simd, self.cells);
             table
         }
     }
 
     /// Where a stratum falls.
     struct Find<'a> {
+        cells: &'a Cells,
         table: &'a Table,
         strata: Strata,
         stratum: usize,
@@ -436,7 +439,7 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let (mut marks, mut slots) = (Vec::new(), Vec::new());
             let deal = Deal::new(self.strata.n, 1, 0.0);
-            self.table.deal(simd, &self.strata, deal, &mut marks, &mut slots);
+            self.table.deal(simd, self.cells, &self.strata, deal, &mut marks, &mut slots);
             let at = self.strata.places(simd, self.stratum, 0);
             let slot = slots[self.stratum / LANES][self.stratum % LANES];
             (slot as usize, self.table.inside(simd.splat_int(slot), at).store()[0])
@@ -449,7 +452,6 @@ mod tests {
     fn strata_follow_the_table() {
         const M: usize = 7;
         let environment = sky();
-        let cells = Cells::new(&environment).unwrap();
         // The density has jumps at every texel's edge.
         let quadrature = Adaptive { tolerance: 1e-5, min_depth: 1, max_depth: 7 };
         let test = Chi2 {
@@ -459,22 +461,23 @@ mod tests {
             mass_tolerance: 1e-3,
             ..Chi2::in_suite_of(MATERIALS.len())
         };
-        for name in MATERIALS {
+        for (name, rows) in MATERIALS.into_iter().zip([32, MAX_ROWS].into_iter().cycle()) {
+            let cells = Cells::new(&environment, rows).unwrap();
             let table = table(&cells, &[hit(name, vec3(0.3, 0.9, -0.2))]);
             let sample = |[xi, which]: [f32; 2], u: f32| {
                 let stratum = (which * M as f32).floor();
                 let strata = Strata::new(M, xi, table.total());
-                let find = Find { table: &table, strata, stratum: stratum as usize };
+                let find = Find { cells: &cells, table: &table, strata, stratum: stratum as usize };
                 let (found, inside) = dispatch(InstructionSet::best(), find);
                 assert!((0.0..1.001).contains(&inside), "{inside:?}");
-                let cell = (0..cells.len()).find(|&c| slot(c) == found).unwrap();
+                let cell = (0..cells.len()).find(|&c| cells.slot(c) == found).unwrap();
                 let jitter = [u, which * M as f32 - stratum];
                 Some(cells.draw(&environment, cell, f64::from(inside), jitter).0.to_array())
             };
             let pdf = |wi: [f32; 3]| {
                 let Some((cell, le)) = cells.find(&environment, Vec3::from(wi)) else { return 0.0 };
                 let within = f64::from(le.luminance() / cells.mass_of(cell));
-                f64::from(table.width(slot(cell)) / table.total()) * within
+                f64::from(table.width(cells.slot(cell)) / table.total()) * within
             };
             test.sphere(name, sample, pdf).unwrap();
         }
@@ -484,7 +487,7 @@ mod tests {
     #[test]
     fn the_table_leaves_nothing_out() {
         let environment = sky();
-        let cells = Cells::new(&environment).unwrap();
+        let cells = Cells::new(&environment, MAX_ROWS).unwrap();
         let normals = [vec3(0.0, 1.0, 0.1), vec3(0.2, 1.0, 0.0), vec3(-1.0, 0.2, 0.3)];
         for name in MATERIALS {
             let hits = normals.map(|normal| hit(name, normal));
@@ -499,7 +502,7 @@ mod tests {
                     !(f * le).is_black() && (name.starts_with("diffuse") || pdf == 0.0)
                 };
                 let needed = hits.iter().any(left_to_table);
-                assert!(!needed || table.width(slot(cell)) > 0.0, "{name} {cell} {wi}");
+                assert!(!needed || table.width(cells.slot(cell)) > 0.0, "{name} {cell} {wi}");
             }
         }
     }
@@ -507,15 +510,15 @@ mod tests {
     #[test]
     fn running_sums_go_along_the_curve() {
         let environment = sky();
-        let cells = Cells::new(&environment).unwrap();
+        let cells = Cells::new(&environment, MAX_ROWS).unwrap();
         let table = table(&cells, &[hit("diffuse:0.8", Vec3::Y)]);
         let mut sum = 0.0;
-        for cell in 0..MAX_CELLS {
-            let end = at(&table.end, slot(cell));
-            assert!((end - table.width(slot(cell)) - sum).abs() <= 1e-6 * table.total());
-            sum = at(&table.end, slot(cell));
+        for cell in 0..cells.len() {
+            let end = at(&table.end, cells.slot(cell));
+            assert!((end - table.width(cells.slot(cell)) - sum).abs() <= 1e-6 * table.total());
+            sum = at(&table.end, cells.slot(cell));
         }
         assert_eq!(table.total(), sum);
-        assert!(table.width(slot(cells.len() - 1)) >= 0.0);
+        assert!(table.width(cells.slot(cells.len() - 1)) >= 0.0);
     }
 }

@@ -16,7 +16,7 @@
 //! Σ W (V − V̂)/π, whose expectation does not depend on V̂ as long as V̂ does not depend on the numbers that strata
 //! and choice are drawn with. So V̂ comes from pixels of lower levels alone.
 
-use super::cells::{NO_SLOTS, ROWS, Slots, at_mut};
+use super::cells::{Cells, MAX_ROWS, NO_SLOTS, Slots, at_mut};
 use crate::simd::{Floats, LANES, Real, Simd};
 
 /// Pixels along the side of a block.
@@ -111,18 +111,25 @@ pub(super) struct Visibility {
 impl Visibility {
     /// Estimates all.
     #[inline(always)]
-    pub(super) fn estimate<S: Simd>(&mut self, simd: S, learned: &Learned, blocks: Blocks) {
+    pub(super) fn estimate<S: Simd>(
+        &mut self,
+        simd: S,
+        cells: &Cells,
+        learned: &Learned,
+        blocks: Blocks,
+    ) {
         let one = simd.splat(1.0);
         let Learned { rays, free, .. } = learned;
+        let n_rows = cells.rows().end;
         let (mut n, mut k) = (simd.splat(0.0), simd.splat(0.0));
-        let mut tile = [[[0.0; LANES]; 2]; ROWS];
-        for (row, [n_cells, k_cells]) in tile.iter_mut().enumerate() {
+        let mut tile = [[[0.0; LANES]; 2]; MAX_ROWS];
+        for (row, [n_cells, k_cells]) in cells.rows().zip(&mut tile) {
             let [n_row, k_row] = [sum(simd, rays, row), sum(simd, free, row)];
             (n, k) = (n + n_row, k + k_row);
             (*n_cells, *k_cells) = (n_row.store(), k_row.store());
         }
         let all = simd.splat((k.sum() + 1.0) / (n.sum() + 2.0));
-        let mut prior = [[0.0; LANES]; ROWS];
+        let mut prior = [[0.0; LANES]; MAX_ROWS];
         for (prior, [n, k]) in prior.iter_mut().zip(&tile) {
             *prior = ((simd.load(k) + all) / (simd.load(n) + one)).store();
         }
@@ -131,9 +138,9 @@ impl Visibility {
         for block in 0..blocks.len() {
             let neighbors = blocks.neighbors(block);
             let (visible, doubt) = (&mut self.visible[block], &mut self.doubt[block]);
-            for row in 0..ROWS {
-                let n = around(simd, rays, block, &neighbors, row);
-                let k = around(simd, free, block, &neighbors, row);
+            for row in cells.rows() {
+                let n = around(simd, rays, block, &neighbors, row, n_rows);
+                let k = around(simd, free, block, &neighbors, row, n_rows);
                 let p = simd.load(&prior[row]);
                 let v = ((k + p) / (n + one)).min(one);
                 visible[row] = v.store();
@@ -168,13 +175,14 @@ fn around<S: Simd>(
     block: usize,
     neighbors: &[usize; 4],
     row: usize,
+    n_rows: usize,
 ) -> S::Floats {
     let mut sum = simd.load(&counts[block][row]);
     let beside = simd.splat(BESIDE);
     if row > 0 {
         sum = sum + beside * simd.load(&counts[block][row - 1]);
     }
-    if row + 1 < ROWS {
+    if row + 1 < n_rows {
         sum = sum + beside * simd.load(&counts[block][row + 1]);
     }
     for &neighbor in neighbors {
@@ -188,11 +196,12 @@ fn around<S: Simd>(
 #[cfg(test)]
 mod tests {
     use super::super::cells::at;
+    use super::super::test_support::sky;
     use super::*;
     use crate::sampling::Pcg32;
     use crate::simd::{InstructionSet, Kernel, dispatch};
 
-    struct Estimate<'a>(&'a Learned, Blocks);
+    struct Estimate<'a>(&'a Cells, &'a Learned, Blocks);
 
     impl Kernel for Estimate<'_> {
         type Output = Visibility;
@@ -200,17 +209,18 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Visibility {
             let mut visibility = Visibility::default();
-            visibility.estimate(simd, self.0, self.1);
+            visibility.estimate(simd, self.0, self.1, self.2);
             visibility
         }
     }
 
-    fn estimate(learned: &Learned, blocks: Blocks) -> Visibility {
-        dispatch(InstructionSet::best(), Estimate(learned, blocks))
-    }
-
     #[test]
     fn estimates_are_probabilities_and_follow_the_counts() {
+        const ROWS: usize = 32;
+        let cells = Cells::new(&sky(), ROWS).unwrap();
+        let estimate = |learned: &Learned, blocks| {
+            dispatch(InstructionSet::best(), Estimate(&cells, learned, blocks))
+        };
         let blocks = Blocks::new(13, 6);
         assert_eq!((blocks.width, blocks.height, blocks.of(12, 5)), (4, 2, 7));
         let mut learned = Learned::default();
