@@ -155,11 +155,12 @@ impl Material {
     /// reflectance then has the right share at every angle. Worth its cost from a few samples up.
     #[must_use]
     #[inline]
-    pub fn for_view(mut self, wo: Vec3) -> Self {
+    pub fn for_view(&self, wo: Vec3) -> Self {
+        let mut seen = *self;
         if self.n_terms > 1 {
-            self.choose_by_albedo(wo.z.clamp(0.0, 1.0));
+            seen.choose_by_albedo(wo.z.clamp(0.0, 1.0));
         }
-        self
+        seen
     }
 
     fn choose_by_albedo(&mut self, cos_theta_o: f32) {

@@ -33,7 +33,12 @@ impl Scene {
         let [p0, p1, p2] = corner.of(&part.mesh.positions);
         let ng = (p1 - p0).cross(p2 - p0).try_normalize().unwrap_or(viewer);
         let uv = corner.mix(&part.mesh.uvs).unwrap_or_default();
-        let (smooth, normal, tangent) = self.normals_and_tangent(part, surface, &corner, ng, uv);
+        let smooth = corner.mix(&part.mesh.normals).and_then(Vec3::try_normalize).unwrap_or(ng);
+        let (normal, tangent) = if surface.has_grain() {
+            self.normal_and_tangent(part, surface, &corner, smooth, uv)
+        } else {
+            (smooth, None)
+        };
 
         let ng = if ng.dot(viewer) < 0.0 { -ng } else { ng };
         let normal = if smooth.dot(ng) < 0.0 { -normal } else { normal };
@@ -44,7 +49,7 @@ impl Scene {
         );
         let wo = frame.to_local(viewer).normalize();
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
-        let material = surface.material(&self.textures, uv, tint).for_view(wo);
+        let material = surface.material(&self.textures, uv, tint, wo);
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
         ShadingPoint { position, ng, frame, wo, material }
     }
@@ -58,21 +63,17 @@ impl Scene {
         is_plain.then_some(part.surface)
     }
 
-    /// On the front side: the interpolated normal, the same with the normal map applied, and the
-    /// tangent where it matters. Which side the viewer is on follows from the first, for relief may tip the second over.
-    fn normals_and_tangent(
+    /// On the front side: the interpolated normal with the normal map applied, and the tangent. Which side the viewer is
+    /// on follows from the first, for relief may tip the second over.
+    fn normal_and_tangent(
         &self,
         part: &Part,
         surface: &Surface,
         corner: &Corners,
-        ng: Vec3,
+        normal: Vec3,
         uv: Vec2,
-    ) -> (Vec3, Vec3, Option<Vec4>) {
+    ) -> (Vec3, Option<Vec4>) {
         let mesh = &part.mesh;
-        let normal = corner.mix(&mesh.normals).and_then(Vec3::try_normalize).unwrap_or(ng);
-        if !surface.has_grain() {
-            return (normal, normal, None);
-        }
         let tangent = corner.mix(&mesh.tangents).or_else(|| corner.uv_tangent(mesh, normal));
         let mapped = surface.normal_map.zip(tangent).and_then(|(map, tangent)| {
             let frame = Frame::from_z_and_tangent(normal, tangent.truncate());
@@ -80,7 +81,7 @@ impl Scene {
             let bitangent = frame.y * 1f32.copysign(tangent.w);
             (frame.x * n.x + bitangent * n.y + frame.z * n.z).try_normalize()
         });
-        (normal, mapped.unwrap_or(normal), tangent)
+        (mapped.unwrap_or(normal), tangent)
     }
 }
 

@@ -116,16 +116,16 @@ impl Surface {
         self.normal_map.iter_mut().for_each(|n| shift(&mut n.texture));
     }
 
-    /// The material at texture coordinates `uv` under the vertex colour `tint`.
+    /// The material at texture coordinates `uv` under the vertex colour `tint`, seen from `wo`.
     #[inline]
-    pub(crate) fn material(&self, textures: &[Texture], uv: Vec2, tint: Rgb) -> Material {
+    pub(crate) fn material(&self, textures: &[Texture], uv: Vec2, tint: Rgb, wo: Vec3) -> Material {
         let look_up =
             |t: &Option<TextureRef>| t.as_ref().map_or(Rgb::WHITE, |t| t.at(textures, uv));
         match &self.model {
-            SurfaceModel::Fixed(material) => *material,
+            SurfaceModel::Fixed(material) => material.for_view(wo),
             SurfaceModel::Phong(p) => {
                 let diffuse = p.diffuse * look_up(&p.diffuse_texture) * tint;
-                lambert_phong(diffuse.map(unit), p.specular, p.exponent)
+                lambert_phong(diffuse.map(unit), p.specular, p.exponent).for_view(wo)
             }
             SurfaceModel::MetallicRoughness(m) => {
                 let base = m.base_color * look_up(&m.base_color_texture) * tint;
