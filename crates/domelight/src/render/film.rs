@@ -195,9 +195,8 @@ impl Layers {
         }
     }
 
-    /// Counts `n` camera samples that saw nothing to the pixels of a tile that have none; `self` is of the pixels of
-    /// `window`.
-    pub(super) fn add_misses(&mut self, n: u32, tile: Window, window: Window) {
+    /// Sets the samples of the pixels of a tile, which saw nothing in any of them; `self` is of the pixels of `window`.
+    pub(super) fn set_misses(&mut self, n: u32, tile: Window, window: Window) {
         for y in tile.y..tile.y + tile.height {
             let start = window.index(tile.x, y);
             self.n_samples[start..start + tile.width].fill(n);

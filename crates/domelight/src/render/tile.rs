@@ -156,7 +156,7 @@ impl Tile {
     /// Adds its pixels to `layers` of the pixels of `window`.
     pub(super) fn put_into(&self, layers: &mut Layers, window: Window) {
         if self.pixels.is_empty() {
-            layers.add_misses(self.n_missed, self.window, window);
+            layers.set_misses(self.n_missed, self.window, window);
         } else {
             layers.put(&self.pixels, self.window, window);
         }

@@ -130,8 +130,9 @@ impl Visibility {
         }
         let all = simd.splat((k.sum() + 1.0) / (n.sum() + 2.0));
         let mut prior = [[0.0; LANES]; MAX_ROWS];
-        for (prior, [n, k]) in prior.iter_mut().zip(&tile) {
-            *prior = ((simd.load(k) + all) / (simd.load(n) + one)).store();
+        for row in cells.rows() {
+            let [n, k] = &tile[row];
+            prior[row] = ((simd.load(k) + all) / (simd.load(n) + one)).store();
         }
         self.visible.resize(blocks.len(), NO_SLOTS);
         self.doubt.resize(blocks.len(), NO_SLOTS);
