@@ -166,16 +166,27 @@ pub(super) struct Ramp {
 const SPREADS: [f32; 7] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28];
 
 impl Cells {
-    /// Cuts an environment into as many cells as `rows` ≤ [`MAX_ROWS`] hold, an even number; none of a black one.
-    pub(super) fn new(environment: &Environment, rows: usize) -> Option<Self> {
+    /// Cuts an environment into as many cells as each of some numbers of rows holds, which are even and at most
+    /// [`MAX_ROWS`]; none of a black one.
+    pub(super) fn new<const N: usize>(
+        environment: &Environment,
+        rows: [usize; N],
+    ) -> Option<[Self; N]> {
         let map = Map { environment };
-        let tree = Tree::grow(&map, map.root()?, rows * LANES);
+        let root = map.root()?;
+        let most = rows.into_iter().max().unwrap_or(0) * LANES;
+        let tree = Tree::grow(&map, root, most);
+        Some(rows.map(|rows| Self::of(&map, &tree, rows)))
+    }
+
+    /// The leaves of the first splits of a tree.
+    fn of(map: &Map, tree: &Tree, rows: usize) -> Self {
         let zeros = || Box::new(NO_SLOTS);
         let mut cells = Self {
             rows,
             squares: Vec::new(),
-            links: vec![[Link::Dark; 4]; tree.links.len()],
-            depth: environment.table()?.depth() as u32,
+            links: vec![[Link::Dark; 4]; tree.n_splits(rows * LANES)],
+            depth: tree.nodes[0].square.size as u32,
             known: Vec::new(),
             center: [zeros(), zeros(), zeros()],
             radius: zeros(),
@@ -184,7 +195,7 @@ impl Cells {
             mass: zeros(),
             dimness: zeros(),
         };
-        cells.number(&tree, 0, &tree.nodes[0]);
+        cells.number(tree, 0, &tree.nodes[0]);
         cells.known = cells.first_steps();
         for cell in 0..cells.squares.len() {
             let square = cells.squares[cell];
@@ -204,7 +215,7 @@ impl Cells {
             *at_mut(&mut cells.dimness, slot) =
                 (map.area(&square).0 / f64::from(square.mass)) as f32;
         }
-        Some(cells)
+        cells
     }
 
     /// Numbers the leaves below split `split` along the curve.
@@ -214,7 +225,8 @@ impl Cells {
             let (x, y, _) = node.square.turn.quadrant(i);
             let Some(child) = children[2 * y + x] else { continue };
             let child = &tree.nodes[child];
-            self.links[split][2 * y + x] = if let Some(below) = child.split {
+            let split_below = child.split.filter(|&below| below < self.links.len());
+            self.links[split][2 * y + x] = if let Some(below) = split_below {
                 self.number(tree, below, child);
                 Link::Split(below as u16)
             } else {
@@ -490,7 +502,7 @@ fn wrapped(angle: f64) -> f64 {
 /// The squares in the course of splitting.
 struct Tree {
     nodes: Vec<Node>,
-    /// The children of each square that was split, by row; those without light are left out.
+    /// The children of each square that was split, one after the other, by row; those without light are left out.
     links: Vec<[Option<usize>; 4]>,
 }
 
@@ -506,7 +518,7 @@ impl Tree {
         let mut tree = Self { nodes, links: Vec::new() };
         let mut queue = BinaryHeap::from([Next { priority: f64::INFINITY, node: 0 }]);
         let mut n_cells = 1;
-        while n_cells + 3 <= most {
+        while may_split(n_cells, most) {
             let Some(next) = queue.pop() else { break };
             let square = tree.nodes[next.node].square;
             tree.nodes[next.node].split = Some(tree.links.len());
@@ -525,6 +537,22 @@ impl Tree {
         }
         tree
     }
+
+    /// How many of its splits were made with `most` leaves at most.
+    fn n_splits(&self, most: usize) -> usize {
+        let mut n_cells = 1;
+        let made = self.links.iter().take_while(|children| {
+            let may = may_split(n_cells, most);
+            n_cells += children.iter().flatten().count() - 1;
+            may
+        });
+        made.count()
+    }
+}
+
+/// Whether one of so many cells may become four.
+fn may_split(n_cells: usize, most: usize) -> bool {
+    n_cells + 3 <= most
 }
 
 /// A square waiting to be split; the earlier node first among equals.
@@ -579,7 +607,7 @@ mod tests {
 
     #[test]
     fn black_has_no_cells() {
-        assert!(Cells::new(&Environment::constant(Rgb::BLACK).unwrap(), MAX_ROWS).is_none());
+        assert!(Cells::new(&Environment::constant(Rgb::BLACK).unwrap(), [MAX_ROWS]).is_none());
     }
 
     /// The masses add up to the whole, and each is the light that a direction finds in it.
@@ -587,7 +615,10 @@ mod tests {
     fn cells_partition_the_light() {
         let of_rows = |rows| environments().into_iter().map(move |(name, env)| (name, env, rows));
         for (name, environment, rows) in of_rows(32).chain(of_rows(MAX_ROWS)) {
-            let cells = Cells::new(&environment, rows).unwrap();
+            let [cells] = Cells::new(&environment, [rows]).unwrap();
+            // Cut together with finer ones they are the same.
+            let [together, _] = Cells::new(&environment, [rows, MAX_ROWS]).unwrap();
+            assert_eq!((&together.mass, &together.known), (&cells.mass, &cells.known), "{name}");
             assert!((100..=rows * LANES).contains(&cells.len()), "{name}: {}", cells.len());
             for cell in 0..cells.len() {
                 assert_eq!(cells.cell_in(cells.slot(cell)), Some(cell));
@@ -631,7 +662,7 @@ mod tests {
     fn directions_are_drawn_by_luminance_along_the_curve() {
         let mut pcg = Pcg32::new(5, 6);
         for (name, environment) in environments() {
-            let cells = Cells::new(&environment, MAX_ROWS).unwrap();
+            let [cells] = Cells::new(&environment, [MAX_ROWS]).unwrap();
             for cell in (0..cells.len()).step_by(17) {
                 let n = 256;
                 let mut steps = 0.0;

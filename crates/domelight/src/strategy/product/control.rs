@@ -232,7 +232,7 @@ mod tests {
     #[test]
     fn what_is_taken_is_added() {
         let environment = sky();
-        let cells = Cells::new(&environment, PassLength::Short.rows()).unwrap();
+        let [cells] = Cells::new(&environment, [PassLength::Short.rows()]).unwrap();
         let stream = Stream::of_pass(SamplerKind::Sobol, 1, 0);
         let pool = Pool::draw(&cells, &environment, stream, PassLength::Short);
         let mut visible = NO_SLOTS;

@@ -99,10 +99,12 @@ impl<'a> ProductSampling<'a> {
     /// many. It is the number of candidates: those that cannot change the pixel visibly are not traced.
     pub fn new(environment: &'a Environment, n_rays: u32) -> Self {
         let mean = environment.power() / (4.0 * std::f64::consts::PI);
-        let cells = |length: PassLength| Cells::new(environment, length.rows());
         Self {
             environment,
-            cells: cells(PassLength::Short).zip(cells(PassLength::Long)).map(Into::into),
+            cells: Cells::new(
+                environment,
+                [PassLength::Short, PassLength::Long].map(PassLength::rows),
+            ),
             dark: (f64::from(DARK) * mean) as f32,
             n_rays: n_rays.max(1),
             instruction_set: InstructionSet::best(),

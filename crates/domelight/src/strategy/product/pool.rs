@@ -180,7 +180,7 @@ mod tests {
     fn the_pool_stands_for_the_light() {
         let environment = sky();
         for length in [PassLength::Short, PassLength::Long] {
-            let cells = Cells::new(&environment, length.rows()).unwrap();
+            let [cells] = Cells::new(&environment, [length.rows()]).unwrap();
             let draw = |pass| {
                 let stream = Stream::of_pass(SamplerKind::Sobol, 1, pass);
                 Pool::draw(&cells, &environment, stream, length)

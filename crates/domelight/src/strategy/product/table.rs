@@ -461,7 +461,7 @@ mod tests {
             mass_tolerance: 1e-3,
             ..Chi2::in_suite_of(2 * MATERIALS.len())
         };
-        let of_rows = [32, MAX_ROWS].map(|rows| Cells::new(&environment, rows).unwrap());
+        let of_rows = Cells::new(&environment, [32, MAX_ROWS]).unwrap();
         for (name, cells) in
             MATERIALS.iter().flat_map(|name| of_rows.iter().map(move |c| (name, c)))
         {
@@ -489,7 +489,7 @@ mod tests {
     #[test]
     fn the_table_leaves_nothing_out() {
         let environment = sky();
-        let cells = Cells::new(&environment, MAX_ROWS).unwrap();
+        let [cells] = Cells::new(&environment, [MAX_ROWS]).unwrap();
         let normals = [vec3(0.0, 1.0, 0.1), vec3(0.2, 1.0, 0.0), vec3(-1.0, 0.2, 0.3)];
         for name in MATERIALS {
             let hits = normals.map(|normal| hit(name, normal));
@@ -512,7 +512,7 @@ mod tests {
     #[test]
     fn running_sums_go_along_the_curve() {
         let environment = sky();
-        let cells = Cells::new(&environment, MAX_ROWS).unwrap();
+        let [cells] = Cells::new(&environment, [MAX_ROWS]).unwrap();
         let table = table(&cells, &[hit("diffuse:0.8", Vec3::Y)]);
         let mut sum = 0.0;
         for cell in 0..cells.n_slots() {

@@ -218,7 +218,7 @@ mod tests {
     #[test]
     fn estimates_are_probabilities_and_follow_the_counts() {
         const ROWS: usize = 32;
-        let cells = Cells::new(&sky(), ROWS).unwrap();
+        let [cells] = Cells::new(&sky(), [ROWS]).unwrap();
         let estimate = |learned: &Learned, blocks| {
             dispatch(InstructionSet::best(), Estimate(&cells, learned, blocks))
         };
