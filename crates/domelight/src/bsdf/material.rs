@@ -156,11 +156,22 @@ impl Material {
     #[must_use]
     #[inline]
     pub fn for_view(&self, wo: Vec3) -> Self {
-        let mut seen = *self;
-        if self.n_terms > 1 {
-            seen.choose_by_albedo(wo.z.clamp(0.0, 1.0));
-        }
+        let mut seen = Self::BLACK;
+        seen.set(self, wo);
         seen
+    }
+
+    /// Makes it what [`Material::for_view`] makes of `other`, in place.
+    #[inline]
+    pub(crate) fn set(&mut self, other: &Self, wo: Vec3) {
+        self.n_terms = other.n_terms;
+        let n_terms = other.n_terms as usize;
+        for (term, other) in self.terms.iter_mut().zip(&other.terms).take(n_terms) {
+            *term = *other;
+        }
+        if n_terms > 1 {
+            self.choose_by_albedo(wo.z.clamp(0.0, 1.0));
+        }
     }
 
     fn choose_by_albedo(&mut self, cos_theta_o: f32) {

@@ -359,25 +359,24 @@ fn background_sample(frame: &Frame, direction: Vec3) -> CameraSample {
 impl Batch {
     /// Turns hits into shading points, grouped by pixel.
     fn gather_points(&mut self, frame: &Frame) {
-        self.points.clear();
         self.origins.clear();
         self.samples.clear();
+        self.points.resize(self.hits.iter().flatten().count(), ShadingPoint::UNSET);
         for (pixel, of_pixel) in self.pixels.iter_mut().zip(&self.camera_rays) {
-            let start = self.points.len();
+            let start = self.samples.len();
             let (mut surface, mut one_material) = (None, true);
             for (ray, sample) in of_pixel.range().zip(of_pixel.samples.clone()) {
-                if let Some(hit) = &self.hits[ray] {
-                    let plain = frame.scene.plain_surface(hit);
-                    let known = self.points.len() == start || plain == surface;
-                    one_material &= known && plain.is_some();
-                    surface = plain;
-                    self.points.push(frame.scene.shading_point(&self.rays[ray], hit));
-                    let point = &self.points[self.points.len() - 1];
-                    self.origins.push(offset_origin(point.position, point.ng, frame.extent));
-                    self.samples.push(sample);
-                }
+                let Some(hit) = &self.hits[ray] else { continue };
+                let plain = frame.scene.plain_surface(hit);
+                let known = self.samples.len() == start || plain == surface;
+                one_material &= known && plain.is_some();
+                surface = plain;
+                let point = &mut self.points[self.samples.len()];
+                frame.scene.shade(&self.rays[ray], hit, point);
+                self.origins.push(offset_origin(point.position, point.ng, frame.extent));
+                self.samples.push(sample);
             }
-            pixel.points = start..self.points.len();
+            pixel.points = start..self.samples.len();
             pixel.one_material = one_material;
         }
     }

@@ -23,8 +23,15 @@ impl Scene {
     ///
     /// # Panics
     /// If `hit.triangle` is not one of this scene's.
-    #[inline]
     pub fn shading_point(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
+        let mut point = ShadingPoint::UNSET;
+        self.shade(ray, hit, &mut point);
+        point
+    }
+
+    /// Makes a point that of a hit, in place: it is large.
+    #[inline]
+    pub(crate) fn shade(&self, ray: &Ray, hit: &Hit, point: &mut ShadingPoint) {
         let (part, triangle) = self.locate(hit.triangle);
         let surface = &self.surfaces[part.surface];
         let corner = Corners::new(&part.mesh, triangle, hit);
@@ -49,9 +56,9 @@ impl Scene {
         );
         let wo = frame.to_local(viewer).normalize();
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
-        let material = surface.material(&self.textures, uv, tint, wo);
+        surface.look(&self.textures, uv, tint, wo, &mut point.material);
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
-        ShadingPoint { position, ng, frame, wo, material }
+        (point.position, point.ng, point.frame, point.wo) = (position, ng, frame, wo);
     }
 
     /// The surface of a hit, if its material is the same all over.

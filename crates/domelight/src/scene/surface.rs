@@ -116,22 +116,29 @@ impl Surface {
         self.normal_map.iter_mut().for_each(|n| shift(&mut n.texture));
     }
 
-    /// The material at texture coordinates `uv` under the vertex colour `tint`, seen from `wo`.
+    /// The material at texture coordinates `uv` under the vertex colour `tint`, seen from `wo`, into `material`.
     #[inline]
-    pub(crate) fn material(&self, textures: &[Texture], uv: Vec2, tint: Rgb, wo: Vec3) -> Material {
+    pub(crate) fn look(
+        &self,
+        textures: &[Texture],
+        uv: Vec2,
+        tint: Rgb,
+        wo: Vec3,
+        material: &mut Material,
+    ) {
         let look_up =
             |t: &Option<TextureRef>| t.as_ref().map_or(Rgb::WHITE, |t| t.at(textures, uv));
         match &self.model {
-            SurfaceModel::Fixed(material) => material.for_view(wo),
+            SurfaceModel::Fixed(fixed) => material.set(fixed, wo),
             SurfaceModel::Phong(p) => {
                 let diffuse = p.diffuse * look_up(&p.diffuse_texture) * tint;
-                lambert_phong(diffuse.map(unit), p.specular, p.exponent).for_view(wo)
+                material.set(&lambert_phong(diffuse.map(unit), p.specular, p.exponent), wo);
             }
             SurfaceModel::MetallicRoughness(m) => {
                 let base = m.base_color * look_up(&m.base_color_texture) * tint;
                 let factors = look_up(&m.metallic_roughness_texture);
                 let (metallic, roughness) = (m.metallic * factors.b, m.roughness * factors.g);
-                Material::single(MetallicRoughness::new(base, metallic, roughness))
+                *material = Material::single(MetallicRoughness::new(base, metallic, roughness));
             }
         }
     }

@@ -57,6 +57,14 @@ pub struct ShadingPoint {
 }
 
 impl ShadingPoint {
+    /// Memory for a point.
+    #[cfg(feature = "render")]
+    pub(crate) const UNSET: Self = {
+        let frame = Frame { x: Vec3::X, y: Vec3::Y, z: Vec3::Z };
+        let (position, ng, wo) = (Vec3::ZERO, Vec3::Z, Vec3::Z);
+        Self { position, ng, frame, wo, material: Material::BLACK }
+    };
+
     /// f_r · max(0, cos θ_i) for the world direction `wi` \[sr⁻¹\].
     ///
     /// Black below the geometric surface as well: it is opaque, and no ray need be traced to know.

@@ -16,9 +16,10 @@
 //! of the same expectation for any h, as little of the second sum is left to chance as h is like f.
 //!
 //! The moments are those of the pass's pool: given the pool, the strata draw its directions, and no
-//! others. Samples of the material have no part in h, for what they expect is the integral over the
-//! map, not over the pool. So h is also weighed as the balance heuristic weighs strata in the middle of
-//! the cell.
+//! others. Those of the map would not do: V̂ has learned from the pool, too, and the mean of a product of two things
+//! that err together is not the product of their means. Samples of the material have no part in h, for what they
+//! expect is the integral over the map, not over the pool. So h is also weighed as the balance heuristic weighs strata
+//! in the middle of the cell.
 
 use super::cells::{Cells, NO_SLOTS, Slots};
 use super::hits::Group;
