@@ -379,6 +379,7 @@ impl Batch {
             pixel.points = start..self.samples.len();
             pixel.one_material = one_material;
         }
+        debug_assert_eq!(self.samples.len(), self.points.len(), "a point for each hit");
     }
 
     /// Runs a round of the strategy; returns the number of shadow rays.

@@ -29,7 +29,7 @@ impl Scene {
         point
     }
 
-    /// Makes a point that of a hit, in place: it is large.
+    /// Sets `point` to [`Scene::shading_point`]: a point is large, and need not be copied.
     #[inline]
     pub(crate) fn shade(&self, ray: &Ray, hit: &Hit, point: &mut ShadingPoint) {
         let (part, triangle) = self.locate(hit.triangle);
@@ -56,7 +56,7 @@ impl Scene {
         );
         let wo = frame.to_local(viewer).normalize();
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
-        surface.look(&self.textures, uv, tint, wo, &mut point.material);
+        surface.set_material(&self.textures, uv, tint, wo, &mut point.material);
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
         (point.position, point.ng, point.frame, point.wo) = (position, ng, frame, wo);
     }

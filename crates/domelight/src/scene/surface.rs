@@ -116,9 +116,9 @@ impl Surface {
         self.normal_map.iter_mut().for_each(|n| shift(&mut n.texture));
     }
 
-    /// The material at texture coordinates `uv` under the vertex colour `tint`, seen from `wo`, into `material`.
+    /// Sets `material` to that at texture coordinates `uv` under the vertex colour `tint`, seen from `wo`.
     #[inline]
-    pub(crate) fn look(
+    pub(crate) fn set_material(
         &self,
         textures: &[Texture],
         uv: Vec2,
