@@ -165,11 +165,10 @@ impl Material {
     #[inline]
     pub(crate) fn set(&mut self, other: &Self, wo: Vec3) {
         self.n_terms = other.n_terms;
-        let n_terms = other.n_terms as usize;
-        for (term, other) in self.terms.iter_mut().zip(&other.terms).take(n_terms) {
+        for (term, other) in self.terms.iter_mut().zip(other.terms()) {
             *term = *other;
         }
-        if n_terms > 1 {
+        if self.n_terms > 1 {
             self.choose_by_albedo(wo.z.clamp(0.0, 1.0));
         }
     }
