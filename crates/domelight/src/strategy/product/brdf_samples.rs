@@ -94,6 +94,20 @@ impl BrdfSamples {
     }
 }
 
+/// Directions of samples of the material and where they look.
+#[derive(Clone, Debug)]
+pub(super) struct Drawn {
+    /// Bit i: lane i may find light.
+    possible: u32,
+    hits: [usize; LANES],
+    /// In the world.
+    wi: [Lanes; 3],
+    f: [Lanes; 3],
+    pdf: Lanes,
+    /// Columns and rows of the map.
+    texels: [[i32; LANES]; 2],
+}
+
 /// What samples of the material meet on the map.
 #[derive(Default)]
 struct Found {
@@ -113,46 +127,73 @@ impl Found {
 }
 
 impl Sources<'_> {
+    /// Draws `n` samples of the material, and asks for the texels that they look at: far from each other, and seldom in
+    /// a near cache.
+    #[inline(always)]
+    pub(super) fn draw_samples<S: Simd>(
+        &self,
+        simd: S,
+        hits: Hits,
+        numbers: &PixelNumbers,
+        n: usize,
+        drawn: &mut Vec<Drawn>,
+    ) {
+        drawn.clear();
+        let map = self.environment.map();
+        for first in (0..n).step_by(LANES) {
+            let samples = BrdfSamples::new(hits, numbers, first..n.min(first + LANES));
+            let wi = samples.sample(simd, hits);
+            let (f, pdf) = samples.eval(simd, hits, wi);
+            let wi = samples.to_world(simd, wi);
+            let zero = simd.splat(0.0);
+            let above = zero.lt(wi.dot_each(Vectors::load(simd, &samples.ng)));
+            let possible = zero.lt(pdf) & pdf.le(simd.splat(f32::MAX)) & above;
+            let possible = possible.bits() & ((1 << samples.n) - 1);
+            let texels = self.environment.texels_at(wi);
+            for lane in set_bits(possible) {
+                let [column, row] = [texels[0][lane], texels[1][lane]].map(|i| i as usize);
+                simd.prefetch(&map.pixels[row * map.width + column]);
+            }
+            let (wi, f, pdf) = (wi.store(), f.store(), pdf.store());
+            drawn.push(Drawn { possible, hits: samples.hits, wi, f, pdf, texels });
+        }
+    }
+
     /// Adds samples of the material, weighed with `counts`: M over the total of the table, and N.
     #[inline(always)]
     pub(super) fn weigh_samples<S: Simd>(
         &self,
         simd: S,
-        hits: Hits,
-        samples: &BrdfSamples,
+        drawn: &Drawn,
         counts: [f32; 2],
         candidates: &mut Vec<Candidate>,
     ) {
-        let wi = samples.sample(simd, hits);
-        let (f, pdf) = samples.eval(simd, hits, wi);
-        let wi = samples.to_world(simd, wi);
-        let zero = simd.splat(0.0);
-        let above = zero.lt(wi.dot_each(Vectors::load(simd, &samples.ng)));
-        let possible = zero.lt(pdf) & pdf.le(simd.splat(f32::MAX)) & above;
-        let [columns, rows] = self.environment.texels_at(wi);
-        let (world, mut found) = (wi.store(), Found::default());
-        for lane in set_bits(possible.bits() & ((1 << samples.n) - 1)) {
-            let wi = Vec3::from(world.map(|c| c[lane]));
-            let texel = [columns[lane], rows[lane]].map(|i| i as usize);
-            let Some(cell) = self.cells.at_texel(self.environment, texel, wi) else { continue };
+        let mut found = Found::default();
+        let at = |lane: usize| Vec3::from(drawn.wi.map(|c| c[lane]));
+        for lane in set_bits(drawn.possible) {
+            let texel = drawn.texels.map(|i| i[lane] as usize);
+            let Some(cell) = self.cells.at_texel(self.environment, texel, at(lane)) else {
+                continue;
+            };
             let le = self.environment.map().get(texel[0], texel[1]);
             found.push(lane, self.cells.slot(cell), le);
         }
-        let [r, g, b] = &found.le;
+        let ([r, g, b], [fr, fg, fb]) = (&found.le, &drawn.f);
         let le = Colors([simd.load(r), simd.load(g), simd.load(b)]);
+        let f = Colors([simd.load(fr), simd.load(fg), simd.load(fb)]);
         let slots = simd.load_ints(&found.slots);
         let within = le.luminance() / S::Floats::gather(&self.cells.mass, slots);
-        let density =
-            simd.splat(counts[0]) * self.table.widths(slots) * within + simd.splat(counts[1]) * pdf;
+        let density = simd.splat(counts[0]) * self.table.widths(slots) * within
+            + simd.splat(counts[1]) * simd.load(&drawn.pdf);
         let value = f.zip(le, |f, le| f * le).scaled(simd.splat(1.0) / density);
         let (value, luminance) = (value.store(), value.luminance().store());
         for lane in set_bits(found.lanes) {
             candidates.push(Candidate {
-                wi: Vec3::from(world.map(|c| c[lane])),
+                wi: at(lane),
                 value: Rgb::from(value.map(|c| c[lane])),
                 luminance: luminance[lane],
                 slot: found.slots[lane] as u32,
-                hit: samples.hits[lane] as u32,
+                hit: drawn.hits[lane] as u32,
                 chance: 0,
             });
         }

@@ -14,7 +14,7 @@
 //! N/n in expectation.
 
 use super::super::ShadingPoint;
-use super::brdf_samples::BrdfSamples;
+use super::brdf_samples::Drawn;
 use super::cells::Cells;
 use super::control::Control;
 use super::pool::{Lights, Pool};
@@ -85,6 +85,8 @@ pub(super) struct Candidates {
     slots: Vec<[i32; LANES]>,
     /// Memory of [`Table::deal`].
     marks: Vec<i32>,
+    /// What those from the material look at.
+    drawn: Vec<Drawn>,
 }
 
 /// Stratum k belongs to hit (k − r) mod n: who has which.
@@ -238,6 +240,8 @@ impl Sources<'_> {
         let strata = Strata::new(n_strata, numbers.strata, total);
         let scale = if n_strata > 0 { n_strata as f32 / total } else { 0.0 };
         candidates.deal = deal;
+        // First, for what they look at comes from far.
+        self.draw_samples(simd, hits, numbers, counts.brdf, &mut candidates.drawn);
         candidates.lights.clear();
         if n_strata > 0 {
             let Candidates { slots, marks, .. } = &mut *candidates;
@@ -255,11 +259,9 @@ impl Sources<'_> {
             }
         }
         candidates.brdf.clear();
-        for first in (0..counts.brdf).step_by(LANES) {
-            let n = (counts.brdf - first).min(LANES);
-            let samples = BrdfSamples::new(hits, numbers, first..first + n);
+        for drawn in &candidates.drawn {
             let counts = [scale, counts.brdf as f32];
-            self.weigh_samples(simd, hits, &samples, counts, &mut candidates.brdf);
+            self.weigh_samples(simd, drawn, counts, &mut candidates.brdf);
         }
     }
 
