@@ -266,6 +266,10 @@ fn edge<F: Floats>(p: Points<F>, q: Points<F>) -> F {
 }
 
 /// The planes of a block's triangles.
+///
+/// Aligned like a vector, and with it the stack of the kernels: what AVX2 has no register for is kept there, and waits
+/// where it straddles two lines of the cache.
+#[repr(align(32))]
 pub(super) struct Planes {
     /// n = (b − a) × (c − a), by axis.
     normals: [Lanes; 3],
