@@ -133,6 +133,13 @@ impl<F: Real> Colors<F> {
 impl<F: Floats> Colors<F> {
     /// By channel.
     #[inline(always)]
+    pub(crate) fn load<S: Simd<Floats = F>>(simd: S, color: &[Lanes; 3]) -> Self {
+        let [r, g, b] = color;
+        Self([simd.load(r), simd.load(g), simd.load(b)])
+    }
+
+    /// By channel.
+    #[inline(always)]
     pub(crate) fn store(self) -> [Lanes; 3] {
         let [r, g, b] = self.0;
         [r.store(), g.store(), b.store()]

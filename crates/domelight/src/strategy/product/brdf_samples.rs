@@ -83,7 +83,7 @@ impl BrdfSamples {
             (f[0][lane], f[1][lane], f[2][lane]) = (value.r, value.g, value.b);
             pdf[lane] = density;
         }
-        (Colors([simd.load(&f[0]), simd.load(&f[1]), simd.load(&f[2])]), simd.load(&pdf))
+        (Colors::load(simd, &f), simd.load(&pdf))
     }
 
     #[inline(always)]
@@ -152,7 +152,7 @@ impl Sources<'_> {
             let texels = self.environment.texels_at(wi);
             for lane in set_bits(possible) {
                 let [column, row] = [texels[0][lane], texels[1][lane]].map(|i| i as usize);
-                simd.prefetch(&map.pixels[row * map.width + column]);
+                simd.prefetch(&map.row(row)[column]);
             }
             let (wi, f, pdf) = (wi.store(), f.store(), pdf.store());
             drawn.push(Drawn { possible, hits: samples.hits, wi, f, pdf, texels });
@@ -178,9 +178,7 @@ impl Sources<'_> {
             let le = self.environment.map().get(texel[0], texel[1]);
             found.push(lane, self.cells.slot(cell), le);
         }
-        let ([r, g, b], [fr, fg, fb]) = (&found.le, &drawn.f);
-        let le = Colors([simd.load(r), simd.load(g), simd.load(b)]);
-        let f = Colors([simd.load(fr), simd.load(fg), simd.load(fb)]);
+        let (le, f) = (Colors::load(simd, &found.le), Colors::load(simd, &drawn.f));
         let slots = simd.load_ints(&found.slots);
         let within = le.luminance() / S::Floats::gather(&self.cells.mass, slots);
         let density = simd.splat(counts[0]) * self.table.widths(slots) * within
