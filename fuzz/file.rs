@@ -25,5 +25,7 @@ const MAX_MEMORY: u64 = 1 << 30;
 /// Reads the input as a scene file.
 pub fn load(name: &str, bytes: &[u8]) {
     write(name, bytes);
-    drop(domelight::scene::load_within(folder().join(name), Some(MAX_MEMORY)));
+    let (max_memory, reach) = (Some(MAX_MEMORY), Default::default());
+    let options = domelight::scene::LoadOptions { max_memory, reach, ..Default::default() };
+    drop(domelight::scene::load_with(folder().join(name), &options));
 }

@@ -8,14 +8,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
-use domelight::picture::{require_writable, write_atomically};
 use domelight::render::{
-    Checkpoint, Counts, Observer, RenderSettings, Rendering, Session, Stage, Tiling,
+    Checkpoint, Counts, Observer, RenderSettings, Renderer, Rendering, Stage, Tiling,
 };
 use domelight::strategy::Strategy;
 
 use crate::args::course::CourseArguments;
 use crate::failure::{UsageError, warn};
+use crate::files;
 use crate::interrupt;
 use crate::memory;
 use crate::output::{PictureFormat, PicturePath};
@@ -68,13 +68,21 @@ impl CourseArguments {
                 return Err(UsageError(text.into()).into());
             }
         }
-        self.checkpoint.iter().chain(&self.resume).try_for_each(|path| {
-            if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
-                return Ok(require_writable(path)?);
+        for path in self.checkpoint.iter().chain(&self.resume) {
+            if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
+                let text = format!("{}: a checkpoint's name must end in .exr", path.display());
+                return Err(UsageError(text).into());
             }
-            let text = format!("{}: a checkpoint's name must end in .exr", path.display());
-            Err(UsageError(text).into())
-        })
+        }
+        match (&self.checkpoint, &self.resume) {
+            // One that goes on in another file is only read.
+            (Some(to), Some(from)) if !same_file(to, from) => {
+                files::reads(from)?;
+                files::writes(to)
+            }
+            (Some(path), _) | (None, Some(path)) => files::writes(path),
+            (None, None) => Ok(()),
+        }
     }
 
     /// Reads the checkpoint to go on from, if there is one.
@@ -110,6 +118,12 @@ impl CourseArguments {
         let provenance = report.provenance();
         Ok(Course { tiles, save, every, from, time, interrupted, quiet, identity, provenance })
     }
+}
+
+/// Both are there and the same.
+fn same_file(a: &Path, b: &Path) -> bool {
+    let real = |path: &Path| fs::canonicalize(path).ok();
+    a == b || real(a).is_some_and(|a| Some(a) == real(b))
 }
 
 /// What decides the picture, but for the number of samples; by name.
@@ -193,7 +207,7 @@ impl Course {
     /// Renders a session to its end or to the end of the time, or until it is interrupted.
     pub(crate) fn run<S: Strategy>(
         &self,
-        session: Session<S>,
+        session: Renderer<S>,
         settings: &RenderSettings,
         progress: &RenderProgress,
     ) -> Result<Rendering> {
@@ -218,7 +232,7 @@ impl Course {
     /// Renders, and saves from time to time.
     fn advance<S: Strategy>(
         &self,
-        session: &mut Session<S>,
+        session: &mut Renderer<S>,
         settings: &RenderSettings,
         progress: &RenderProgress,
     ) -> Result<()> {
@@ -239,7 +253,7 @@ impl Course {
         }
     }
 
-    fn save<S: Strategy>(&self, session: &Session<S>, settings: &RenderSettings) -> Result<()> {
+    fn save<S: Strategy>(&self, session: &Renderer<S>, settings: &RenderSettings) -> Result<()> {
         let Some(path) = &self.save else { return Ok(()) };
         let checkpoint = Checkpoint {
             identity: self.identity.clone(),
@@ -252,7 +266,7 @@ impl Course {
             film: session.film(),
         };
         let bytes = checkpoint.encode()?;
-        Ok(write_atomically(path, |out| out.write_all(&bytes))?)
+        files::write(path, |out| out.write_all(&bytes))
     }
 
     /// Refuses more pixels than there is memory for.
@@ -283,14 +297,18 @@ impl Course {
 
 /// Gives a session the state of a checkpoint that is of the same tiles.
 fn restore<S: Strategy>(
-    session: &mut Session<S>,
+    session: &mut Renderer<S>,
     path: &Path,
     checkpoint: &Checkpoint,
 ) -> Result<()> {
     if checkpoint.tiles != session.tiles() {
-        let name = |t: &Range<usize>| format!("{}-{}", t.start, t.end.saturating_sub(1));
+        let name = |t: &Range<usize>| match t.len() {
+            0 => "no tiles".to_owned(),
+            1 => format!("tile {}", t.start),
+            _ => format!("tiles {}-{}", t.start, t.end - 1),
+        };
         let text = format!(
-            "{} holds tiles {} of the picture, not {}",
+            "{} holds {} of the picture, not {}",
             path.display(),
             name(&checkpoint.tiles),
             name(&session.tiles())

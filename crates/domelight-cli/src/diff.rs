@@ -2,8 +2,11 @@
 
 use crate::args::{DiffArguments, Metric};
 use crate::failure::UsageError;
+use crate::files;
 use crate::memory;
-use crate::output::{PictureFormat, PicturePath, print, require_one_on_standard_output};
+use crate::output::{
+    PictureFormat, PicturePath, print, print_json, require_one_on_standard_output,
+};
 use domelight::RgbImage;
 use domelight::picture::compare::{
     ColorScale, Comparison, absolute_error_map, compare, relative_error_map,
@@ -28,6 +31,11 @@ pub(crate) fn run(arguments: &DiffArguments, quiet: bool) -> anyhow::Result<()> 
     if [&arguments.test, &arguments.reference].iter().all(|path| path.as_path() == Path::new("-")) {
         return Err(UsageError("only one of the two pictures can be standard input".into()).into());
     }
+    if let Some(output) = &arguments.output {
+        output.declare()?;
+    }
+    files::reads(&arguments.test)?;
+    files::reads(&arguments.reference)?;
     let options = || ReadOptions { layer: arguments.layer.clone(), max_memory: memory::left() };
     let test = read(&arguments.test, &options())?;
     memory::keep(PICTURE_TEXEL * test.image.pixels.len() as u64);
@@ -46,7 +54,7 @@ pub(crate) fn run(arguments: &DiffArguments, quiet: bool) -> anyhow::Result<()> 
     let difference = Difference::new(arguments, &test.image, &reference.image, mask.as_deref())?;
     let white = difference.write_picture(arguments, &test.image, &reference.image)?;
     if arguments.json {
-        print(&serde_json::to_string_pretty(&difference.json(arguments, white))?)?;
+        print_json(&difference.json(arguments, white))?;
     } else if !quiet && !arguments.output.as_ref().is_some_and(PicturePath::is_standard_output) {
         print(&difference.table(white.map(|w| (w, arguments.metric))))?;
     }
@@ -149,8 +157,8 @@ impl Difference {
     fn json(&self, arguments: &DiffArguments, white: Option<f32>) -> serde_json::Value {
         let c = &self.comparison;
         serde_json::json!({
-            "a": arguments.test,
-            "b": arguments.reference,
+            "a": arguments.test.to_string_lossy(),
+            "b": arguments.reference.to_string_lossy(),
             "pixels": c.n_pixels,
             "mse": c.mse,
             "rel_mse": c.rel_mse,

@@ -3,12 +3,15 @@
 use crate::interrupt::RUN_AGAIN;
 use crate::memory;
 use crate::merge::MergeError;
+use crate::output::NobodyReads;
 use domelight::environment::EnvironmentError;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::ProbeError;
+use domelight::files::FileConflict;
 use domelight::memory::OverLimit;
 use domelight::picture::Problem;
 use domelight::picture::compare::SizeMismatch;
+use domelight::quote::terminal;
 use domelight::render::CheckpointError;
 use domelight::scene::{CameraError, LoadError, SceneError};
 use std::fmt::Write as _;
@@ -39,32 +42,81 @@ impl std::fmt::Display for InterruptedAndSaved {
 
 impl std::error::Error for InterruptedAndSaved {}
 
-/// Prints a line to standard error. If that is closed or full, nobody can be told, and the work goes on.
-pub(crate) fn tell(text: &str) {
-    let _ = writeln!(io::stderr(), "{text}");
+/// Prints a line to standard error, in which nothing commands the terminal. If that is closed or full, nobody can be
+/// told, and the work goes on.
+pub(crate) fn tell(line: &str) {
+    let _ = writeln!(io::stderr(), "{}", terminal::line(line));
+}
+
+/// The same with several lines.
+pub(crate) fn tell_lines(text: &str) {
+    text.lines().for_each(tell);
+}
+
+/// Prints a line after a label.
+fn tell_after(label: Label, text: &str) {
+    let (code, name) = match label {
+        Label::Error => ("1;31", "error:"),
+        Label::Hint => ("1;36", "hint:"),
+        Label::Warning => ("1;33", "warning:"),
+    };
+    let line = terminal::line(text);
+    let _ = if colored() {
+        writeln!(io::stderr(), "\x1b[{code}m{name}\x1b[0m {line}")
+    } else {
+        writeln!(io::stderr(), "{name} {line}")
+    };
+}
+
+#[derive(Clone, Copy)]
+enum Label {
+    Error,
+    Hint,
+    Warning,
+}
+
+/// Warns of `n` camera samples that were NaN or infinite, of the picture named by `label`: they are black in it,
+/// and a defect.
+pub(crate) fn warn_of_non_finite(quiet: bool, label: &str, n: u64) {
+    if n > 0 {
+        warn(
+            quiet,
+            &format!(
+                "{label}{n} camera samples were NaN or infinite and count as black, which is a defect of \
+                 domelight: please report this command with its scene and probe"
+            ),
+        );
+    }
 }
 
 /// Prints a warning unless asked for quiet.
 pub(crate) fn warn(quiet: bool, text: &str) {
     if !quiet {
-        let label = if colored() { "\x1b[1;33mwarning:\x1b[0m" } else { "warning:" };
-        tell(&format!("{label} {text}"));
+        tell_after(Label::Warning, text);
     }
+}
+
+/// Prints what is wrong with the command line, or the help that was asked for; the exit code.
+pub(crate) fn report_usage(error: &clap::Error) -> ExitCode {
+    let text = error.to_string();
+    if terminal::lines(&text) == text {
+        // In colour.
+        let _ = error.print();
+    } else {
+        tell_lines(text.trim_end());
+    }
+    ExitCode::from(error.exit_code() as u8)
 }
 
 /// Prints `error` with its causes on one line and a hint where there is one; the exit code.
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
-    if is_broken_pipe(error) {
+    // Whoever read our report has seen enough.
+    if error.is::<NobodyReads>() {
         return ExitCode::SUCCESS;
     }
-    let (error_label, hint_label) = if colored() {
-        ("\x1b[1;31merror:\x1b[0m", "\x1b[1;36mhint:\x1b[0m")
-    } else {
-        ("error:", "hint:")
-    };
-    tell(&format!("{error_label} {}", chain(error)));
+    tell_after(Label::Error, &chain(error));
     if let Some(hint) = hint(error) {
-        tell(&format!("{hint_label} {hint}"));
+        tell_after(Label::Hint, &hint);
     }
     ExitCode::from(code(error))
 }
@@ -78,6 +130,7 @@ fn code(error: &anyhow::Error) -> u8 {
         || error.is::<CameraError>()
         || error.is::<EnvironmentError>()
         || error.is::<CheckpointError>()
+        || error.is::<FileConflict>()
         || over_limit(error).is_some();
     // What is not there or no plain file was asked for wrongly; other troubles of the system may pass.
     let passing = io_kind(error).is_some_and(|kind| {
@@ -130,11 +183,6 @@ fn over_limit(error: &anyhow::Error) -> Option<&OverLimit> {
         Some(Problem::Memory(error)) => Some(error),
         _ => cause.downcast_ref(),
     })
-}
-
-/// Whoever read our output has seen enough.
-fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    io_kind(error) == Some(io::ErrorKind::BrokenPipe)
 }
 
 fn io_kind(error: &anyhow::Error) -> Option<io::ErrorKind> {

@@ -1,7 +1,9 @@
 //! The program `domelight`: one module a subcommand, their arguments in [`args`].
 //!
-//! Exit codes: 0 done (also when the reader of our output went away), 1 failed, 2 bad usage or input, 75
+//! Exit codes: 0 done (also when the reader of a report went away), 1 failed, 2 bad usage or input, 75
 //! interrupted and saved; `merge` has three of its own.
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod acceptance;
 mod args;
@@ -12,12 +14,12 @@ mod diff;
 mod failure;
 mod farm;
 mod figures;
+mod files;
 mod interrupt;
 mod lights;
 mod measure;
 mod memory;
 mod merge;
-mod notation;
 mod output;
 mod preview;
 mod probe;
@@ -26,7 +28,6 @@ mod progress;
 mod render;
 mod report;
 mod scene;
-mod shell;
 mod strategy;
 mod svg;
 mod typed;
@@ -38,8 +39,11 @@ use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let Arguments { command, quiet, max_memory } = Arguments::parse();
-    memory::limit(max_memory);
+    let Arguments { command, quiet, memory } = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return failure::report_usage(&error),
+    };
+    memory::limit(memory.max_memory);
     let done = match command {
         Command::Render(arguments) => render::run(&arguments, quiet),
         Command::Merge(arguments) => merge::run(&arguments, quiet),

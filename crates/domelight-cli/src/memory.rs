@@ -44,13 +44,13 @@ pub(crate) const WRITTEN_TEXEL: u64 = 24;
 pub(crate) const TRIANGLE: u64 = 140;
 
 /// For each pixel of a render: its sums, and the layers that they become.
-pub(crate) const PIXEL: u64 = 248;
+pub(crate) const PIXEL: u64 = 308;
 
 /// The same with a checkpoint, or of a part: the sums again, their bits and the file.
-pub(crate) const SAVED_PIXEL: u64 = 496;
+pub(crate) const SAVED_PIXEL: u64 = 716;
 
 /// For each pixel of a comparison: a render, the reference, and what its page shows.
-pub(crate) const COMPARED_PIXEL: u64 = 800;
+pub(crate) const COMPARED_PIXEL: u64 = 884;
 
 static LIMIT: OnceLock<Option<u64>> = OnceLock::new();
 static TAKEN: AtomicU64 = AtomicU64::new(0);

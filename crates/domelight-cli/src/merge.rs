@@ -12,15 +12,15 @@ use std::slice;
 use anyhow::{Context as _, Result};
 use domelight::picture::exr::bands::BAND_ROWS;
 use domelight::picture::tone::ToneCurve;
-use domelight::render::{Checkpoint, CheckpointError, Counts, Film, Layers};
+use domelight::render::{Checkpoint, CheckpointError, Counts, Film, Layers, VarianceSums};
 use domelight::{Rgb, RgbImage};
 use serde::Serialize;
 
 use crate::args::MergeArguments;
 use crate::course::read;
-use crate::failure::tell;
+use crate::failure::{tell, warn_of_non_finite};
 use crate::memory;
-use crate::output::{PicturePath, print, require_one_on_standard_output};
+use crate::output::{PicturePath, print_json, require_one_on_standard_output};
 
 /// Memory of a pixel of a band: its layers, as channels, and compressed.
 const BAND_PIXEL: u64 = 300;
@@ -64,6 +64,8 @@ struct Merged {
     n_tiles: usize,
     n_samples: u32,
     counts: Counts,
+    /// Over all parts.
+    variance: VarianceSums,
     /// In the order of their tiles once all are there.
     parts: Vec<Part>,
 }
@@ -80,11 +82,12 @@ struct Part {
 pub(crate) fn run(arguments: &MergeArguments, quiet: bool) -> Result<()> {
     let outputs: Vec<_> = arguments.output.iter().map(Some).collect();
     require_one_on_standard_output(&outputs, arguments.json)?;
-    arguments.output.iter().try_for_each(PicturePath::require_writable)?;
-    let files = files(&arguments.parts)?;
+    arguments.output.iter().try_for_each(PicturePath::declare)?;
+    let parts = files(&arguments.parts)?;
+    parts.iter().try_for_each(|part| crate::files::reads(part))?;
     let mut merged: Option<Merged> = None;
     let mut unfinished = Vec::new();
-    for path in files {
+    for path in parts {
         let part = read_part(&path)?;
         let name = path.display().to_string();
         let merged = match &mut merged {
@@ -150,6 +153,7 @@ impl Merged {
             n_tiles: part.n_tiles,
             n_samples: part.n_samples,
             counts: Counts::default(),
+            variance: VarianceSums::default(),
             parts: Vec::new(),
         }
     }
@@ -188,6 +192,7 @@ impl Merged {
             return Err(MergeError::Doubled { first, second: name, tile });
         }
         self.counts += part.counts;
+        self.variance.add(&part.film.variance_sums());
         self.parts.push(Part { path, name, tiles, first_row: part.film.window.y });
         Ok(())
     }
@@ -266,6 +271,7 @@ impl Merged {
             non_finite_samples: u64,
             outputs: Vec<String>,
         }
+        warn_of_non_finite(quiet, "", self.counts.non_finite);
         let report = Report {
             parts: self.parts.len(),
             tiles: self.n_tiles,
@@ -277,7 +283,7 @@ impl Merged {
             outputs: arguments.output.iter().map(ToString::to_string).collect(),
         };
         if arguments.json {
-            print(&serde_json::to_string_pretty(&report)?)?;
+            print_json(&report)?;
         } else if !quiet {
             let Report { parts, size: [w, h], spp, outputs, .. } = report;
             let outputs = outputs.join(", ");
@@ -310,7 +316,7 @@ impl<'m> Bands<'m> {
             self.open.push(read.film);
         }
         let mut band = Layers::new(width, end - y);
-        self.open.iter().for_each(|film| band.merge(film, y));
+        self.open.iter().for_each(|film| band.merge(film, y, &self.merged.variance));
         self.open.retain(|film| film.window.y + film.window.height > end);
         Ok(band)
     }

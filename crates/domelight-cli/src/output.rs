@@ -1,18 +1,20 @@
 //! Where results go: pictures by their file's extension, reports to standard output.
 
 use crate::failure::UsageError;
+use crate::files;
+use crate::interrupt;
 use domelight::RgbImage;
 use domelight::environment::mapping::{EnvmapKind, Mapping};
 use domelight::picture::exr::ExrLayers;
 use domelight::picture::exr::bands::{self, BAND_ROWS};
 use domelight::picture::png::Depth;
 use domelight::picture::tone::ToneMapping;
-use domelight::picture::{
-    Problem, hdr, pfm, png, require_writable, write_atomically, write_atomically_seeking,
-};
+use domelight::picture::{Problem, hdr, pfm, png};
+use domelight::quote::{Code, Shell, terminal};
 use domelight::render::Layers;
+use serde::Serialize;
 use std::fmt;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -68,9 +70,9 @@ impl PicturePath {
         self.format
     }
 
-    /// Asks before the work whether its result can be written.
-    pub(crate) fn require_writable(&self) -> anyhow::Result<()> {
-        Ok(require_writable(&self.path)?)
+    /// Declares it before the work as a result.
+    pub(crate) fn declare(&self) -> anyhow::Result<()> {
+        files::writes(&self.path)
     }
 
     /// Writes the picture; the tone curve matters to PNG alone.
@@ -109,14 +111,13 @@ impl PicturePath {
     ) -> anyhow::Result<()> {
         let path = &self.path;
         match format {
-            PictureFormat::Exr => return self.write_exr(image, mapping),
-            PictureFormat::Hdr => write_atomically(path, |out| hdr::encode(image, out)),
-            PictureFormat::Pfm => write_atomically(path, |out| pfm::encode(image, out)),
+            PictureFormat::Exr => self.write_exr(image, mapping),
+            PictureFormat::Hdr => files::write(path, |out| hdr::encode(image, out)),
+            PictureFormat::Pfm => files::write(path, |out| pfm::encode(image, out)),
             PictureFormat::Png => {
-                write_atomically(path, |out| png::encode(image, alpha, tone, Depth::Eight, out))
+                files::write(path, |out| png::encode(image, alpha, tone, Depth::Eight, out))
             }
-        }?;
-        Ok(())
+        }
     }
 
     /// Writes a rendering: OpenEXR, also to standard output, gets all its layers and `attributes`.
@@ -129,10 +130,9 @@ impl PicturePath {
         attributes: &[(String, String)],
     ) -> anyhow::Result<()> {
         if self.has_all_layers() {
-            write_atomically_seeking(&self.path, |out| {
+            return files::write_seeking(&self.path, |out| {
                 layers.write_exr(attributes, out).map_err(into_io)
-            })?;
-            return Ok(());
+            });
         }
         self.write_color(&layers.color, hidden.then_some(&layers.alpha[..]), tone)
     }
@@ -144,7 +144,7 @@ impl PicturePath {
         band: impl FnMut(usize) -> anyhow::Result<ExrLayers>,
     ) -> anyhow::Result<()> {
         let mut failed = None;
-        let written = write_atomically_seeking(&self.path, |out| {
+        let written = files::write_seeking(&self.path, |out| {
             bands::write(height, out, band).map_err(|error| match error.downcast() {
                 Ok(problem) => into_io(problem),
                 Err(error) => {
@@ -154,7 +154,7 @@ impl PicturePath {
             })
         });
         failed.map_or(Ok(()), Err)?;
-        Ok(written?)
+        written
     }
 
     /// A rendering goes there with all its layers, into OpenEXR.
@@ -205,9 +205,48 @@ pub(crate) fn require_one_on_standard_output(
     Ok(())
 }
 
-/// Prints a report; an error of kind `BrokenPipe` if nobody reads.
-pub(crate) fn print(report: &str) -> io::Result<()> {
+/// Whoever was to read a report is gone. Half a picture is another matter.
+#[derive(Debug, thiserror::Error)]
+#[error("nobody reads the report")]
+pub(crate) struct NobodyReads;
+
+/// Prints a report, in which nothing commands the terminal.
+///
+/// # Errors
+/// [`NobodyReads`] if that is so, or what the system says.
+pub(crate) fn print(report: &str) -> anyhow::Result<()> {
+    let _waiting = interrupt::while_waiting();
+    print_raw(&terminal::lines(report))
+}
+
+/// Prints a line while the work goes on, which an interruption must not end without saving.
+pub(crate) fn print_progress(line: &str) {
+    let _ = print_raw(&terminal::line(line));
+}
+
+/// Prints a report as JSON, in which nothing commands the terminal.
+///
+/// # Errors
+/// As [`print`].
+pub(crate) fn print_json(report: &impl Serialize) -> anyhow::Result<()> {
+    let _waiting = interrupt::while_waiting();
+    print_raw(&terminal::json(&serde_json::to_string_pretty(report)?))
+}
+
+/// Prints what a shell may be given.
+///
+/// # Errors
+/// As [`print`].
+pub(crate) fn print_code(command: &Code<Shell>) -> anyhow::Result<()> {
+    // What is invisible in it was quoted for the shell, which would not find the file under another name.
+    if io::stdout().is_terminal() { print(command.as_str()) } else { print_raw(command.as_str()) }
+}
+
+fn print_raw(text: &str) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
-    writeln!(out, "{}", report.trim_end())?;
-    out.flush()
+    let printed = writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush());
+    printed.map_err(|error| match error.kind() {
+        io::ErrorKind::BrokenPipe => NobodyReads.into(),
+        _ => anyhow::Error::new(error).context("standard output"),
+    })
 }

@@ -7,17 +7,18 @@ use domelight::RgbImage;
 use domelight::picture::tone::ToneMapping;
 use domelight::render::RenderSettings;
 use domelight::scene::Camera;
+use domelight::strategy::PreparedStrategy;
 
 use crate::output::PicturePath;
 use crate::progress::RenderProgress;
 use crate::scene::View;
-use crate::strategy::{Job, Renderer};
+use crate::strategy::Job;
 
 /// Writes PNG output after one sample of each square of 2 × 2 pixels.
 pub(crate) fn write(
     view: &View,
     settings: &RenderSettings,
-    renderer: &Renderer,
+    strategy: &PreparedStrategy,
     outputs: &[PicturePath],
     tone: &ToneMapping,
     interrupted: &'static AtomicBool,
@@ -29,7 +30,7 @@ pub(crate) fn write(
     let progress = &RenderProgress::new("", 1, true, interrupted);
     let View { scene, environment, .. } = view;
     let job = Job { scene, camera, environment, settings, progress, course: None };
-    let layers = renderer(&job)?.layers;
+    let layers = job.render(strategy)?.layers;
 
     let at = |x: usize, y: usize| y / 2 * width + x / 2;
     let color = RgbImage::from_fn(whole_width, whole_height, |x, y| layers.color.pixels[at(x, y)]);

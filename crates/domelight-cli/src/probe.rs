@@ -1,8 +1,12 @@
 //! `domelight probe`: what a light probe is like, and its conversion.
 
 use crate::args::ProbeArguments;
+use crate::failure::warn;
+use crate::files;
 use crate::memory;
-use crate::output::{PictureFormat, PicturePath, print, require_one_on_standard_output};
+use crate::output::{
+    PictureFormat, PicturePath, print, print_json, require_one_on_standard_output,
+};
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{LoadedProbe, ProbeOptions, SanitizeReport, load_probe};
 use domelight::environment::mapping::{Mapping, from_lat_long, to_lat_long};
@@ -17,12 +21,16 @@ const BUILTIN_ROWS: u32 = 512;
 pub(crate) fn run(arguments: &ProbeArguments, quiet: bool) -> anyhow::Result<()> {
     let (preview, output) = (arguments.preview.as_ref(), arguments.output.as_ref());
     require_one_on_standard_output(&[preview, output], arguments.json)?;
+    for path in [preview, output].into_iter().flatten() {
+        path.declare()?;
+    }
     let probe = load(arguments)?;
+    probe.warnings.iter().for_each(|warning| warn(quiet, warning));
     write_pictures(arguments, &probe.image)?;
     let on_standard_output =
         [preview, output].into_iter().flatten().any(PicturePath::is_standard_output);
     if arguments.json {
-        print(&serde_json::to_string_pretty(&json(arguments, &probe))?)?;
+        print_json(&json(arguments, &probe))?;
     } else if !quiet && !on_standard_output {
         print(&table(&probe))?;
     }
@@ -38,12 +46,15 @@ fn load(arguments: &ProbeArguments) -> anyhow::Result<LoadedProbe> {
         memory::allow(&what, memory::MAP_TEXEL * 2 * u64::from(rows).pow(2))?;
         let image = builtin.image(rows as usize);
         let (mapping, file_size) = (Mapping::LatLong, (image.width, image.height));
-        return Ok(LoadedProbe { image, mapping, file_size, sanitized: SanitizeReport::default() });
+        let sanitized = SanitizeReport::default();
+        let warnings = Vec::new();
+        return Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings });
     }
+    files::reads(&arguments.probe)?;
     let options = ProbeOptions {
         mapping: arguments.mapping,
         layer: arguments.layer.clone(),
-        sanitize: arguments.sanitize,
+        strict: arguments.strict && !arguments.sanitize,
         max_memory: memory::left(),
     };
     Ok(load_probe(&arguments.probe, &options)?)
@@ -120,7 +131,7 @@ fn rgb(c: Rgb) -> String {
 fn json(arguments: &ProbeArguments, probe: &LoadedProbe) -> serde_json::Value {
     let s = ProbeStatistics::new(&probe.image);
     serde_json::json!({
-        "probe": arguments.probe,
+        "probe": arguments.probe.to_string_lossy(),
         "file_width": probe.file_size.0,
         "file_height": probe.file_size.1,
         "mapping": probe.mapping.name(),

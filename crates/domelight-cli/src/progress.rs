@@ -5,10 +5,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use domelight::quote::terminal;
 use domelight::render::{Counts, Observer, Stage};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::output::print;
+use crate::output::print_progress;
 use crate::profile::{Profile, StageSeconds};
 
 /// Shows camera samples done, passes, rays a second and the time left on standard error, if that is
@@ -45,7 +46,7 @@ impl RenderProgress {
         if !bar.is_hidden() {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
-        let label = if label.is_empty() { String::new() } else { format!("{label}  ") };
+        let label = if label.is_empty() { String::new() } else { terminal::line(label) + "  " };
         let (rays, told) = (AtomicU64::new(0), Mutex::new(None));
         Self {
             bar,
@@ -102,7 +103,7 @@ impl RenderProgress {
         let percent = 100 * self.bar.position() / self.bar.length().unwrap_or(1).max(1);
         if *told < Some(percent) {
             *told = Some(percent);
-            let _ = print(&format!("openjd_progress: {percent}"));
+            print_progress(&format!("openjd_progress: {percent}"));
         }
     }
 }
@@ -111,7 +112,7 @@ impl Observer for RenderProgress {
     fn pass_started(&self, samples: Range<u32>) {
         let samples = format!("samples {}–{}", samples.start + 1, samples.end);
         if self.openjd {
-            let _ = print(&format!("openjd_status: {samples}"));
+            print_progress(&format!("openjd_status: {samples}"));
         }
         self.bar.set_prefix(samples);
     }

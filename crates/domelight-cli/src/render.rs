@@ -6,18 +6,19 @@ use std::sync::atomic::Ordering;
 use anyhow::{Context as _, Result, bail};
 use domelight::picture::tone::ToneCurve;
 use domelight::render::{RenderSettings, survey};
+use domelight::strategy::PreparedStrategy;
 
 use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
 use crate::course::Course;
 use crate::failure::UsageError;
 use crate::interrupt;
 use crate::memory;
-use crate::output::{PicturePath, print, require_one_on_standard_output};
+use crate::output::{PicturePath, print_progress, require_one_on_standard_output};
 use crate::preview;
 use crate::progress::RenderProgress;
 use crate::report::{RenderReport, Settings, Stages, Stop};
 use crate::scene::{View, start_threads};
-use crate::strategy::Job;
+use crate::strategy::{Job, acceptance, refuse_repeating_points};
 use crate::usage::Stopwatch;
 use crate::values::Size;
 
@@ -26,17 +27,17 @@ pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let openjd = arguments.output.progress == ProgressKind::Openjd;
     render(arguments, quiet).inspect_err(|error| {
         if openjd {
-            let _ = print(&format!("openjd_fail: {error:#}"));
+            print_progress(&format!("openjd_fail: {error:#}"));
         }
     })
 }
 
 fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
-    let plan = arguments.strategy.plan()?;
-    plan.refuse_repeating_points(arguments.samples.spp)?;
+    let spec = arguments.strategy.spec()?;
+    refuse_repeating_points(spec, arguments.samples.spp)?;
     let outputs = arguments.output.paths()?;
     arguments.course.check(&outputs)?;
-    outputs.iter().try_for_each(PicturePath::require_writable)?;
+    outputs.iter().try_for_each(PicturePath::declare)?;
     if !arguments.course.is_part() {
         // Before anything is loaded; again, with what the render is known to save, when all is.
         let Size { width, height } = arguments.scene.camera.size;
@@ -58,11 +59,11 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         ..arguments.scene.render_settings(&arguments.pixel, arguments.samples.spp)
     };
     let points = || survey(scene, camera, settings);
-    let plan = plan.for_scene(points, environment, settings.seed);
-    let renderer = plan.prepare(environment).with_context(|| probe.clone())?;
+    let spec = spec.for_scene(points, environment, settings.seed);
+    let strategy = &PreparedStrategy::new(spec, environment).with_context(|| probe.clone())?;
     let described = Settings {
         scene: report.clone(),
-        strategy: plan.describe(),
+        strategy: spec.description(),
         spp: settings.n_samples,
         sampler: format!("{:?}", settings.sampler).to_lowercase(),
         filter: settings.filter.name(),
@@ -76,7 +77,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
 
     let tone = arguments.output.tone.mapping(ToneCurve::Agx);
     if arguments.output.preview {
-        preview::write(view, settings, &renderer, &outputs, &tone, interrupted)?;
+        preview::write(view, settings, strategy, &outputs, &tone, interrupted)?;
     }
 
     let n_pixels = (settings.width * settings.height) as u64;
@@ -85,7 +86,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let progress = RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
     let progress = &progress.profiled(arguments.output.profile);
     let course = Some(&course);
-    let rendering = renderer(&Job { scene, camera, environment, settings, progress, course })?;
+    let job = Job { scene, camera, environment, settings, progress, course };
+    let rendering = job.render(strategy)?;
     progress.finish();
     let stopped = match () {
         () if rendering.complete => None,
@@ -110,7 +112,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         outputs.iter().map(write).fold(Ok(()), Result::and)?;
     }
     let stages = Stages { load, build, render, write: watch.lap() };
-    let rejection = plan.acceptance(points, environment, settings.seed)?;
+    let rejection = acceptance(spec, points, environment, settings.seed)?;
     let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
     report.profile = progress.profile();
     if arguments.output.json {

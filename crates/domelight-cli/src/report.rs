@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::path::Path;
 
 use crate::acceptance::Acceptance;
-use crate::failure::{InterruptedAndSaved, tell, warn};
+use crate::failure::{InterruptedAndSaved, tell, tell_lines, warn_of_non_finite};
 use crate::output::{self, PicturePath};
 use crate::profile::{self, StageSeconds};
 use crate::usage::{Seconds, peak_memory};
@@ -18,6 +18,8 @@ use crate::usage::{Seconds, peak_memory};
 pub(crate) struct SceneReport {
     pub(crate) scene: String,
     pub(crate) triangles: usize,
+    /// What the picture lacks of the file, one sentence each.
+    pub(crate) warnings: Vec<String>,
     pub(crate) material: Option<String>,
     pub(crate) normalize: bool,
     pub(crate) ground: bool,
@@ -189,7 +191,7 @@ impl RenderReport {
     }
 
     pub(crate) fn print_json(&self) -> Result<()> {
-        Ok(output::print(&serde_json::to_string_pretty(self)?)?)
+        output::print_json(self)
     }
 
     /// Two lines on standard error.
@@ -199,9 +201,9 @@ impl RenderReport {
         let environment = &environment.probe;
         let Stages { load, build, render, .. } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
+        tell(&format!("{scene} under {environment}: {w}x{h}, {spp} samples a pixel, {strategy}"));
         tell(&format!(
-            "{scene} under {environment}: {w}x{h}, {spp} samples a pixel, {strategy}\n\
-             loaded in {:.2} s, built in {:.2} s, rendered in {:.2} s{cpu}, {:.1} Mrays/s -> {}",
+            "loaded in {:.2} s, built in {:.2} s, rendered in {:.2} s{cpu}, {:.1} Mrays/s -> {}",
             load.wall,
             build.wall,
             render.wall,
@@ -209,7 +211,7 @@ impl RenderReport {
             self.outputs.join(", ")
         ));
         if let Some(profile) = &self.profile {
-            tell(&profile::lines(profile));
+            tell_lines(&profile::lines(profile));
         }
     }
 
@@ -218,10 +220,7 @@ impl RenderReport {
     /// # Errors
     /// If the render was interrupted, or time ended it before a part was whole.
     pub(crate) fn check(&self, saved: Option<&Path>, is_part: bool, quiet: bool) -> Result<()> {
-        if self.non_finite_samples > 0 {
-            let n = self.non_finite_samples;
-            warn(quiet, &format!("{n} camera samples were NaN or infinite and count as black"));
-        }
+        warn_of_non_finite(quiet, "", self.non_finite_samples);
         match (self.stopped, saved) {
             (Some(Stop::Interrupted), None) => {
                 bail!("interrupted; what was done so far is in {}", self.outputs.join(", "))

@@ -14,13 +14,17 @@ use domelight::math::Vec3;
 use domelight::render::{Background, RenderSettings};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
-    Camera, CameraSettings, EnvironmentSettings, EnvironmentSource, Projection, Scene,
-    SceneDescription, load_within,
+    AnimationTime, Camera, CameraSettings, EnvironmentSettings, EnvironmentSource, LoadOptions,
+    NamedCamera, Projection, Scene, SceneDescription, load_with,
 };
 
 use crate::args::sampling::PixelArguments;
-use crate::args::scene::{CameraArguments, EnvironmentArguments, SceneArguments, StageArguments};
+use crate::args::scene::{
+    CameraArguments, EnvironmentArguments, FileArguments, SceneArguments, StageArguments,
+};
 use crate::failure::{UsageError, warn};
+use crate::files;
+use crate::interrupt;
 use crate::memory;
 use crate::report::{CameraReport, EnvironmentReport, SceneReport};
 use crate::values::{Size, Triple};
@@ -31,6 +35,7 @@ pub(crate) struct LoadedScene {
     pub(crate) light: EnvironmentSettings,
     pub(crate) map: RgbImage,
     pub(crate) view: CameraSettings,
+    pub(crate) warnings: Vec<String>,
 }
 
 /// A scene under its light, seen by a camera.
@@ -45,30 +50,49 @@ pub(crate) struct View {
 }
 
 impl SceneArguments {
+    /// Declares what is read where the scene is rendered later.
+    pub(crate) fn declare(&self) -> Result<()> {
+        if BuiltinScene::from_str(&self.scene).is_err() {
+            files::reads(Path::new(&self.scene))?;
+        }
+        if let Some(probe) = &self.environment.env
+            && BuiltinProbe::from_str(probe).is_err()
+        {
+            files::reads(Path::new(probe))?;
+        }
+        Ok(())
+    }
+
     /// Reads scene and probe.
     pub(crate) fn load(&self, quiet: bool) -> Result<LoadedScene> {
-        let (mut description, light, map) = if let Ok(scene) = BuiltinScene::from_str(&self.scene) {
+        let is_builtin = BuiltinScene::from_str(&self.scene);
+        let (mut description, light, map, warnings) = if let Ok(scene) = is_builtin {
+            self.file.check_builtin(&self.scene)?;
             // It takes no memory to speak of, so that its light may be read meanwhile.
             let environment = Some(scene.environment());
             let of_scene = SceneDescription { environment, ..SceneDescription::default() };
             let light = self.environment.settings(&of_scene);
             let map = || self.environment.load(&light, quiet);
             let (description, map) = rayon::join(|| scene.description(), map);
-            (description, light, map?)
+            (description, light, map?, Vec::new())
         } else {
-            let description = load_scene(&self.scene, quiet)?;
+            let (description, warnings) =
+                load_scene(&self.scene, &self.file, self.environment.strict, quiet)?;
             let light = self.environment.settings(&description);
             let map = self.environment.load(&light, quiet)?;
-            (description, light, map)
+            (description, light, map, warnings)
         };
+        self.camera.choose(&self.scene, &mut description)?;
         let view = self.stage(&mut description, light.up.vector())?;
-        Ok(LoadedScene { description, light, map, view })
+        Ok(LoadedScene { description, light, map, view, warnings })
     }
 
     /// Builds what was loaded.
     pub(crate) fn build(&self, loaded: LoadedScene) -> Result<View> {
-        let LoadedScene { description, light, map, view } = loaded;
+        let LoadedScene { mut description, light, map, mut view, warnings } = loaded;
         let Size { width, height } = self.camera.size;
+        let camera_report = CameraReport::new(&view);
+        description.rescale(&mut view);
         let camera = Camera::new(&view, width, height)?;
         let n_triangles: usize = description.parts.iter().map(|p| p.mesh.triangles.len()).sum();
         memory::allow(
@@ -85,12 +109,13 @@ impl SceneArguments {
         let report = SceneReport {
             scene: self.scene.clone(),
             triangles: scene.triangle_count(),
+            warnings,
             material: self.stage.material.as_ref().map(|m| m.text.clone()),
             normalize: self.stage.normalize,
             ground: self.stage.ground,
             hide_env: self.stage.hide_env,
             environment: EnvironmentReport::new(probe.clone(), &light, &environment),
-            camera: CameraReport::new(&view),
+            camera: camera_report,
             size: [width, height],
         };
         Ok(View { scene, camera, camera_settings: view, environment, probe, report })
@@ -102,8 +127,9 @@ impl SceneArguments {
         let bounds = self.stage.apply(scene, up);
         // Squares of lengths must be finite.
         let extent = bounds.size().max_element();
-        if extent > 1e18 {
-            let text = format!("{}: the scene is too large: {extent:e} across", self.scene);
+        if extent > 1e18 || extent > 0.0 && extent < 1e-18 {
+            let how = if extent < 1.0 { "small" } else { "large" };
+            let text = format!("{}: the scene is too {how}: {extent:e} across", self.scene);
             return Err(UsageError(text).into());
         }
         Ok(self.camera.settings(scene.camera.as_ref(), || {
@@ -130,8 +156,10 @@ impl SceneArguments {
 pub(crate) fn start_threads(asked: Option<u32>) -> Result<()> {
     // Slurm grants threads that only some of its set-ups enforce.
     let granted = std::env::var("SLURM_CPUS_PER_TASK").ok();
-    let granted = granted.and_then(|n| n.parse().ok()).filter(|&n| n > 0);
-    if let Some(threads) = asked.or(granted) {
+    let granted = granted.and_then(|n| n.parse::<u32>().ok()).filter(|&n| n > 0);
+    // More threads than cores win nothing, and too many end the process.
+    let cores = std::thread::available_parallelism().map_or(1024, |n| n.get() as u32);
+    if let Some(threads) = asked.or(granted.map(|n| n.min(cores))) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
         pool.build_global().context("cannot start the threads")?;
     }
@@ -164,17 +192,43 @@ pub(crate) fn close_up(description: &SceneDescription, aspect: f32, up: Vec3) ->
     }
 }
 
-/// A built-in scene by its name, else a file.
-pub(crate) fn load_scene(name: &str, quiet: bool) -> Result<SceneDescription> {
+/// A built-in scene by its name, else a file, and what of it is not shown.
+pub(crate) fn load_scene(
+    name: &str,
+    file: &FileArguments,
+    strict: bool,
+    quiet: bool,
+) -> Result<(SceneDescription, Vec<String>)> {
     if let Ok(builtin) = BuiltinScene::from_str(name) {
-        return Ok(builtin.description());
+        return Ok((builtin.description(), Vec::new()));
     }
-    let loaded = load_within(Path::new(name), memory::left())?;
+    files::reads(Path::new(name))?;
+    let options = LoadOptions {
+        max_memory: memory::left(),
+        strict,
+        scene: file.scene.clone(),
+        animation: file.animation.clone().map(|name| AnimationTime { name, seconds: file.at }),
+        ..LoadOptions::default()
+    };
+    let loaded = load_with(Path::new(name), &options)?;
+    loaded.files.iter().try_for_each(|file| files::reads(file))?;
     memory::keep(loaded.memory);
     for warning in &loaded.warnings {
         warn(quiet, warning);
     }
-    Ok(loaded.description)
+    Ok((loaded.description, loaded.warnings))
+}
+
+impl FileArguments {
+    /// Refuses what a built-in scene does not have.
+    fn check_builtin(&self, scene: &str) -> Result<(), UsageError> {
+        match (&self.scene, &self.animation) {
+            (None, None) => Ok(()),
+            _ => Err(UsageError(format!(
+                "--scene and --animation choose in a glTF file; {scene} is built in"
+            ))),
+        }
+    }
 }
 
 /// What a user would call the probe.
@@ -224,24 +278,19 @@ impl EnvironmentArguments {
         let options = ProbeOptions {
             mapping: self.env_mapping,
             layer: self.env_layer.clone(),
-            sanitize: self.sanitize,
+            strict: self.strict && !self.sanitize,
             max_memory: memory::left(),
         };
-        let loaded = load_probe(path, &options)?;
+        files::reads(path)?;
+        let loaded = if files::waits(path) {
+            let (pipe, name) = (path.clone(), path.display().to_string());
+            interrupt::unless_interrupted(&name, move || load_probe(&pipe, &options))??
+        } else {
+            load_probe(path, &options)?
+        };
         let texels = loaded.image.pixels.len() as u64;
         allow_environment(&path.display().to_string(), texels)?;
-        let repaired = loaded.sanitized;
-        if repaired.negative + repaired.non_finite > 0 {
-            warn(
-                quiet,
-                &format!(
-                    "{}: repaired {} negative and {} non-finite values",
-                    path.display(),
-                    repaired.negative,
-                    repaired.non_finite
-                ),
-            );
-        }
+        loaded.warnings.iter().for_each(|warning| warn(quiet, warning));
         Ok(loaded.image)
     }
 }
@@ -272,6 +321,25 @@ impl StageArguments {
 }
 
 impl CameraArguments {
+    /// Makes the camera that was asked for the scene's.
+    fn choose(&self, name: &str, scene: &mut SceneDescription) -> Result<(), UsageError> {
+        let Some(asked) = &self.camera else { return Ok(()) };
+        let cameras = &scene.cameras;
+        let by_name = cameras.iter().find(|camera| camera.name == *asked);
+        let by_number = || asked.parse().ok().and_then(|i: usize| cameras.get(i));
+        if let Some(NamedCamera { settings, .. }) = by_name.or_else(by_number) {
+            scene.camera = Some(*settings);
+            return Ok(());
+        }
+        let names: Vec<_> =
+            cameras.iter().enumerate().map(|(i, c)| format!("{i} '{}'", c.name)).collect();
+        let known = match names.len() {
+            0 => "has no camera to choose".to_owned(),
+            _ => format!("has no camera '{asked}'; there are {}", names.join(", ")),
+        };
+        Err(UsageError(format!("{name} {known}")))
+    }
+
     /// The flags over the scene's own camera, or over one framed to the scene.
     fn settings(
         &self,

@@ -1,16 +1,17 @@
 //! The command as it was typed, for reports.
 
-use crate::shell::quote;
+use domelight::quote::shell;
 
 /// The command line of this process.
 pub(crate) fn command() -> String {
-    quoted(std::env::args().skip(1))
+    // A name may be no UTF-8.
+    quoted(std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()))
 }
 
 /// As it may be typed again.
 fn quoted(arguments: impl Iterator<Item = String>) -> String {
     let words = std::iter::once("domelight".to_owned()).chain(arguments);
-    words.map(|word| quote(&word)).collect::<Vec<_>>().join(" ")
+    shell::words(words).into_string()
 }
 
 #[cfg(test)]

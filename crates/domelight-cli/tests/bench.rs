@@ -46,9 +46,11 @@ fn results_hold_what_was_measured_and_become_tables() {
     let strategies = row["strategies"].as_array().unwrap();
     assert_eq!([&strategies[0]["name"], &strategies[1]["name"]], ["mis", "product:4"]);
     for strategy in strategies {
-        assert_eq!(strategy["reached"].as_array().unwrap().len(), 2);
+        for reached in ["reached", "reached_covered"] {
+            assert_eq!(strategy[reached].as_array().unwrap().len(), 2);
+        }
         for rung in strategy["rungs"].as_array().unwrap() {
-            for values in ["cpu_seconds", "wall_seconds", "rel_mse"] {
+            for values in ["cpu_seconds", "wall_seconds", "rel_mse", "rel_mse_covered"] {
                 assert_eq!(rung[values].as_array().unwrap().len(), 2, "one a seed");
             }
         }
@@ -56,7 +58,7 @@ fn results_hold_what_was_measured_and_become_tables() {
     let table = domelight(&folder, &["bench", "--table", "results.json"]);
     let table = done(&table);
     assert!(table.contains("| sphere / studio / diffuse:0.8 | mis |"), "{table}");
-    assert!(table.contains("| to 1e-1 | to 1e-2 |"), "{table}");
+    assert!(table.contains("| to 1e-1 | to 1e-2 | inside, to 1e-1 | inside, to 1e-2 |"), "{table}");
 }
 
 /// Another program's pictures are measured against its own reference, and the ratio is printed.

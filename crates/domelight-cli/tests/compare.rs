@@ -3,6 +3,7 @@
 mod common;
 
 use common::{domelight, ended as refused, json, stderr, write_exr};
+use domelight::picture::{ReadOptions, read_bytes};
 use domelight::{Rgb, RgbImage};
 use serde_json::Value;
 use std::fs;
@@ -63,6 +64,8 @@ fn a_page_and_the_same_numbers_as_json() {
         let result = &strategy["result"];
         let of_result = [
             "bias",
+            "bias_interval",
+            "camera_samples",
             "convergence",
             "cpu_seconds",
             "efficiency",
@@ -113,11 +116,75 @@ fn equal_samples_and_a_json_file() {
         serde_json::from_slice(&fs::read(folder.path().join("numbers.json")).unwrap()).unwrap();
     let result = &report["strategies"][0]["result"];
     assert_eq!(result["spp"], 3);
-    for unknown in [&result["rel_mse"]["sd"], &result["bias"], &result["error_ratio_to_mis"]] {
-        assert!(unknown.is_null());
-    }
+    let unknown = [&result["bias"], &result["bias_interval"], &result["error_ratio_to_mis"]];
+    assert!(unknown.into_iter().chain([&result["rel_mse"]["sd"]]).all(Value::is_null));
     assert_eq!(report["reference"]["file"], Value::Null);
     assert!(fs::read(folder.path().join("page.html")).is_ok());
+}
+
+/// Samples and rays of every strategy are those that the films of the same pictures count, however a strategy divides
+/// them among pixels.
+#[test]
+fn figures_are_those_of_the_film() {
+    const STRATEGIES: [&str; 8] = [
+        "brdf",
+        "environment",
+        "mis",
+        "product",
+        "rejection",
+        "sir:1/4",
+        "median-cut:4",
+        "variance-minimization:4",
+    ];
+    let folder = folder();
+    let scene = ["statue", "--env", "sky", "--env-rows", "32", "--size", "48x40", "--hide-env"];
+    let budget = ["--budget", "spp:6", "--strategies", &STRATEGIES.join(","), "--seeds", "2"];
+    let quick = ["--reference-spp", "4", "--cache", "cache", "-q", "--json"];
+    let report = json(&domelight(&folder, &[&["compare"], &scene[..], &budget, &quick].concat()));
+    for (strategy, text) in report["strategies"].as_array().unwrap().iter().zip(STRATEGIES) {
+        let flags = match text.split_once(':') {
+            None => vec!["--strategy", text],
+            Some(("sir", _)) => vec!["--strategy", "sir", "--candidates", "4"],
+            Some((name, n)) => vec!["--strategy", name, "--lights", n],
+        };
+        let (mut samples, mut rays) = (0.0, 0.0);
+        for seed in ["0", "1"] {
+            let render = ["--spp", "6", "--seed", seed, "-q", "--json", "-o", "x.exr"];
+            let report =
+                json(&domelight(&folder, &[&["render"], &scene[..], &flags, &render].concat()));
+            let file = fs::read(folder.path().join("x.exr")).unwrap();
+            let alpha = read_bytes(&file, "x.exr", &ReadOptions::default()).unwrap().alpha.unwrap();
+            let covered: f64 = alpha.into_iter().map(f64::from).sum();
+            samples += number(&report["camera_rays"]) / (48.0 * 40.0) / 2.0;
+            rays += number(&report["shadow_rays"]) / covered / 2.0;
+        }
+        let result = &strategy["result"];
+        assert_eq!(result["spp"], 6);
+        let of_compare = (number(&result["camera_samples"]), number(&result["rays"]));
+        assert!((of_compare.0 / samples - 1.0).abs() < 1e-9, "{text}: {of_compare:?} {samples}");
+        assert!((of_compare.1 / rays - 1.0).abs() < 1e-6, "{text}: {of_compare:?} {rays}");
+        // As many as asked for; with product, which learns how many pixels need, about as many.
+        let tolerance = if text == "product" { 0.4 } else { 1e-9 };
+        assert!((samples / 6.0 - 1.0).abs() < tolerance, "{text}: {samples}");
+    }
+}
+
+/// A strategy that traces fewer rays the more it knows is within a budget as the others are.
+#[test]
+fn equal_rays_are_found_by_measurement() {
+    let folder = folder();
+    let scene = ["statue", "--env", "sky", "--env-rows", "64", "--size", "64x64", "--hide-env"];
+    let quick = ["--reference-spp", "4", "--cache", "cache", "--seeds", "2", "-q", "--json"];
+    for (budget, within) in [("rays:32", 0.15), ("rays:128", 0.05)] {
+        let budget = ["--budget", budget, "--strategies", "mis,product"];
+        let output = domelight(&folder, &[&["compare"], &scene[..], &budget, &quick].concat());
+        let report = json(&output);
+        let rays = budget[1].trim_start_matches("rays:").parse::<f64>().unwrap();
+        for strategy in report["strategies"].as_array().unwrap() {
+            let off = number(&strategy["result"]["rays"]) / rays - 1.0;
+            assert!(off.abs() < within, "{rays}: {} is off by {off}", strategy["name"]);
+        }
+    }
 }
 
 #[test]
@@ -215,7 +282,11 @@ fn bad_usage_is_named() {
     let folder = folder();
     let compare = |arguments: &[&str]| compare(&folder, arguments);
     refused(&compare(&["--strategies", "mis,velvet"]), 2, &["velvet", "median-cut"]);
-    refused(&compare(&["--strategies", "brdf:lights=3"]), 2, &["brdf:lights=3", "--lights"]);
+    refused(
+        &compare(&["--strategies", "brdf:lights=3"]),
+        2,
+        &["brdf:lights=3", "lights goes with"],
+    );
     refused(&compare(&["--strategies", "mis,mis"]), 2, &["mis", "twice"]);
     refused(&compare(&["--budget", "watts:3"]), 2, &["watts:3", "rays:N"]);
     refused(&compare(&["--seeds", "0"]), 2, &["--seeds"]);

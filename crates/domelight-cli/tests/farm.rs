@@ -69,7 +69,8 @@ fn every_engine_gets_its_files() {
             let text = fs::read_to_string(folder.path().join(engine).join(name)).unwrap();
             assert!(name == "submit.sh" || text.contains("domelight"), "{text}");
             if !name.starts_with("merge") && name != "submit.sh" {
-                assert!(text.contains("spheres --env sky"), "{text}");
+                assert!(text.contains("--env=sky"), "{text}");
+                assert!(text.contains("spheres"), "{text}");
                 assert!(text.contains("--threads 2"), "{text}");
             }
         }
@@ -79,5 +80,5 @@ fn every_engine_gets_its_files() {
     let refused = farm(&folder, "slurm", &["--rays", "1"]);
     assert_eq!(refused.status.code(), Some(2));
     let refused = farm(&folder, "slurm", &["--shards", "2", "--strategy", "mis", "--rays", "1"]);
-    assert!(stderr(&refused).contains("--split"), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("split 1:0"), "{}", stderr(&refused));
 }

@@ -183,7 +183,7 @@ fn too_large_a_picture_is_refused_before_it_is_made() {
     let folder = folder();
     let hint = "--max-memory";
     let size = ["--size", "65536x4096", "--max-memory", "4GiB"];
-    let refused = ["a picture of 65536x4096", "62.0 GiB", "4.0 GiB", hint];
+    let refused = ["a picture of 65536x4096", "77.0 GiB", "4.0 GiB", hint];
     ended(&render(&folder, &[&["spheres"], &size[..]].concat()), 2, &refused);
     ended(&domelight(&folder, &[&["compare", "spheres"], &size[..]].concat()), 2, &refused[..1]);
     // A shard of it is another thing.

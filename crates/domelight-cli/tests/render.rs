@@ -145,18 +145,18 @@ fn standard_output_takes_a_picture() {
 #[test]
 fn flags_that_contradict_are_usage_errors() {
     let folder = folder();
-    refused(&render(&folder, &["--strategy", "mis", "--rays", "1"]), 2, &["--split 1:0"]);
+    refused(&render(&folder, &["--strategy", "mis", "--rays", "1"]), 2, &["split 1:0"]);
     refused(&render(&folder, &["--strategy", "brdf", "--split", "1:1"]), 2, &["--split", "mis"]);
     refused(&render(&folder, &["--lights", "4"]), 2, &["--lights", "median-cut"]);
     refused(&render(&folder, &["--candidates", "9"]), 2, &["--candidates", "sir"]);
     let few = ["--strategy", "sir", "--rays", "9", "--candidates", "8"];
-    refused(&render(&folder, &few), 2, &["--candidates", "--rays"]);
+    refused(&render(&folder, &few), 2, &["candidates", "rays"]);
     let many = ["--strategy", "sir", "--candidates", "1048576", "--spp", "16384"];
     refused(&render(&folder, &many), 2, &["2^32", "--spp"]);
     let one = ["--strategy", "rejection", "--rays", "1"];
-    refused(&render(&folder, &one), 2, &["--tries", "2"]);
+    refused(&render(&folder, &one), 2, &["tries", "2"]);
     let rays = ["--strategy", "median-cut", "--rays", "4"];
-    refused(&render(&folder, &rays), 2, &["--rays", "--lights"]);
+    refused(&render(&folder, &rays), 2, &["--rays", "lights"]);
     let other = ["--no-compensation", "--strategy", "environment"];
     refused(&render(&folder, &other), 2, &["--no-compensation", "mis"]);
     refused(&render(&folder, &["--size", "0x4"]), 2, &["0x4", "800x600"]);
@@ -196,8 +196,9 @@ fn bad_texels_are_refused_or_repaired() {
     map.pixels[16].r = f32::NAN;
     write_exr(&folder.path().join("bad.exr"), &map, None);
     let arguments = ["sphere", "--env", "bad.exr", "-o", "x.pfm"];
-    refused(&render(&folder, &arguments), 2, &["bad.exr", "(3, 1)", "-2", "--sanitize"]);
-    let output = render(&folder, &[&arguments[..], &["--sanitize"]].concat());
+    let strict = [&arguments[..], &["--strict"]].concat();
+    refused(&render(&folder, &strict), 2, &["bad.exr", "(3, 1)", "-2", "--strict"]);
+    let output = render(&folder, &arguments);
     succeeded(&output);
     assert!(stderr(&output).contains("1 negative"), "{}", stderr(&output));
     let picture = load(&folder, "x.pfm");
@@ -260,4 +261,68 @@ fn an_interrupt_keeps_what_is_done() {
     let bytes = fs::read(folder.path().join("x.exr")).unwrap();
     let complete = ("domelight.complete".to_owned(), "false".to_owned());
     assert!(text_attributes(&bytes).unwrap().contains(&complete));
+}
+
+/// A triangle before two cameras, of a material that is not drawn in full; required: an extension.
+fn gltf(required: &str) -> String {
+    // Positions (−1, 0, 0), (1, 0, 0), (0, 2, 0).
+    let data = "AACAvwAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAAEAAAAAA";
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"extensionsRequired":[{required}],"scenes":[{{"name":"all","nodes":[0,1,2]}}],
+"nodes":[{{"mesh":0}},{{"camera":0,"name":"front","translation":[0,1,5]}},{{"camera":0,"name":"far","translation":[0,1,50]}}],
+"cameras":[{{"type":"perspective","perspective":{{"yfov":0.6,"znear":1}}}}],
+"materials":[{{"name":"leaf","alphaMode":"BLEND","emissiveFactor":[1,1,1]}}],
+"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"material":0}}]}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],
+"bufferViews":[{{"buffer":0,"byteLength":36}}],
+"buffers":[{{"byteLength":36,"uri":"data:;base64,{data}"}}]}}"#
+    )
+}
+
+#[test]
+fn what_a_picture_lacks_is_said_on_the_terminal_and_in_json() {
+    let folder = folder();
+    fs::write(folder.path().join("a.gltf"), gltf("")).unwrap();
+    let output = render(&folder, &["a.gltf", "-o", "a.exr", "--json", "--strategy", "mis"]);
+    succeeded(&output);
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let warnings = &report["settings"]["warnings"];
+    for (i, feature) in ["alphaMode BLEND", "emission"].into_iter().enumerate() {
+        assert!(warnings[i].as_str().unwrap().contains(feature), "{warnings}");
+        assert_eq!(stderr(&output).matches(feature).count(), 1, "{}", stderr(&output));
+    }
+    let output = render(&folder, &["a.gltf", "-o", "a.exr", "-q"]);
+    assert_eq!(stderr(&output), "");
+}
+
+#[test]
+fn cameras_scenes_and_animations_are_chosen_by_name_or_number() {
+    let folder = folder();
+    fs::write(folder.path().join("a.gltf"), gltf("")).unwrap();
+    let usual = ["a.gltf", "-o", "a.exr", "-q", "--strategy", "mis", "--hide-env"];
+    let covered = |more: &[&str]| {
+        succeeded(&render(&folder, &[&usual[..], more].concat()));
+        load(&folder, "a.exr").pixels.iter().filter(|p| p.g > 0.0).count()
+    };
+    let front = covered(&[]);
+    assert_eq!(covered(&["--camera", "front"]), front);
+    assert_eq!(covered(&["--camera", "0", "--scene", "all"]), front);
+    assert!(covered(&["--camera", "far"]) < front / 4 && covered(&["--camera", "1"]) < front / 4);
+    let with = |more: &[&str]| render(&folder, &[&usual[..], more].concat());
+    refused(&with(&["--camera", "side"]), 2, &["a.gltf", "'side'", "0 'front', 1 'far'"]);
+    refused(&with(&["--scene", "none"]), 2, &["a.gltf", "'none'", "0 'all'"]);
+    refused(&with(&["--animation", "walk"]), 2, &["a.gltf", "animation 'walk'", "has none"]);
+    refused(&with(&["--at", "1"]), 2, &["--animation"]);
+    refused(&render(&folder, &["statue", "--scene", "0"]), 2, &["statue", "built in"]);
+    refused(&render(&folder, &["statue", "--camera", "x"]), 2, &["statue", "no camera"]);
+}
+
+#[test]
+fn unknown_required_extensions_are_refused_by_strict() {
+    let folder = folder();
+    fs::write(folder.path().join("a.gltf"), gltf("\"ACME_shape\"")).unwrap();
+    let output = render(&folder, &["a.gltf", "-o", "a.exr", "--strategy", "mis"]);
+    succeeded(&output);
+    assert!(stderr(&output).contains("requires the extension ACME_shape"), "{}", stderr(&output));
+    refused(&render(&folder, &["a.gltf", "--strict"]), 2, &["a.gltf", "ACME_shape"]);
 }

@@ -61,12 +61,20 @@ pub mod render;
 #[cfg(feature = "render")]
 pub mod scene;
 
+mod error;
+pub mod prelude;
+
+#[cfg(feature = "io")]
+pub mod files;
 #[cfg(feature = "io")]
 pub mod fingerprint;
 #[cfg(feature = "io")]
 pub mod memory;
 #[cfg(feature = "io")]
 pub mod picture;
+#[cfg(feature = "io")]
+pub mod quote;
 
 pub use color::Rgb;
+pub use error::Error;
 pub use image::RgbImage;

@@ -8,7 +8,7 @@ use domelight::environment::{Environment, Orientation};
 use domelight::picture::exr::ExrLayers;
 use domelight::render::{
     Background, Checkpoint, CheckpointError, Counts, Film, Layers, Misfit, Observer,
-    RenderSettings, Rendering, Session, Window, render,
+    RenderSettings, Renderer, Rendering, VarianceSums, Window, render,
 };
 use domelight::sampling::{Heuristic, Pcg32};
 use domelight::scene::builtin::BuiltinScene;
@@ -46,28 +46,28 @@ fn mis(stage: &Stage) -> Mis<'_> {
     Mis::new(&stage.environment, LightTable::Full, Heuristic::Balance, 1, 1).unwrap()
 }
 
-fn session<'a, S: Strategy>(
+fn renderer<'a, S: Strategy>(
     stage: &'a Stage,
     strategy: &'a S,
-    settings: &'a RenderSettings,
-) -> Session<'a, S> {
-    Session::new(&stage.scene, &stage.camera, &stage.environment, strategy, settings)
+    settings: &RenderSettings,
+) -> Renderer<'a, S> {
+    Renderer::with_strategy(&stage.scene, &stage.camera, &stage.environment, strategy, *settings)
 }
 
 fn uninterrupted(stage: &Stage, strategy: &impl Strategy, settings: &RenderSettings) -> Rendering {
     render(&stage.scene, &stage.camera, &stage.environment, strategy, settings, &())
 }
 
-fn checkpoint<S: Strategy>(session: &Session<S>, n_samples: u32) -> Checkpoint {
+fn checkpoint<S: Strategy>(renderer: &Renderer<S>, n_samples: u32) -> Checkpoint {
     Checkpoint {
         identity: vec![("scene".into(), "spheres".into()), ("seed".into(), "0".into())],
         provenance: vec![("domelight.version".into(), "test".into())],
-        tiles: session.tiles(),
-        n_tiles: session.tiling().n_tiles(),
+        tiles: renderer.tiles(),
+        n_tiles: renderer.tiling().n_tiles(),
         n_samples,
-        complete: session.is_complete(),
-        counts: session.counts(),
-        film: session.film(),
+        complete: renderer.is_complete(),
+        counts: renderer.counts(),
+        film: renderer.film(),
     }
 }
 
@@ -134,16 +134,16 @@ fn interrupt_and_resume<S: Strategy>(stage: &Stage, strategy: &S, settings: &Ren
             let mut saved: Option<Vec<u8>> = None;
             let mut interruptions = 0;
             let rendering = loop {
-                let mut session = session(stage, strategy, settings);
+                let mut renderer = renderer(stage, strategy, settings);
                 if let Some(bytes) = &saved {
                     let checkpoint = Checkpoint::decode(bytes).unwrap();
-                    session.restore(&checkpoint.film, checkpoint.counts).unwrap();
+                    renderer.restore(&checkpoint.film, checkpoint.counts).unwrap();
                 }
-                if session.run(&After::tiles(1 + random.next_u32() as usize % 5)) {
-                    break session.rendering();
+                if renderer.run(&After::tiles(1 + random.next_u32() as usize % 5)) {
+                    break renderer.rendering();
                 }
                 interruptions += 1;
-                saved = Some(checkpoint(&session, settings.n_samples).encode().unwrap());
+                saved = Some(checkpoint(&renderer, settings.n_samples).encode().unwrap());
             };
             assert!(interruptions >= 3, "{interruptions}");
             assert_same(&rendering, &expected);
@@ -164,9 +164,9 @@ fn more_samples_than_before_go_on_from_what_is_there() {
     let (stage, few) = (stage(), settings());
     let many = RenderSettings { n_samples: 20, ..few };
     let mis = mis(&stage);
-    let mut first = session(&stage, &mis, &few);
+    let mut first = renderer(&stage, &mis, &few);
     assert!(first.run(&()));
-    let mut second = session(&stage, &mis, &many);
+    let mut second = renderer(&stage, &mis, &many);
     second.restore(&first.film(), first.counts()).unwrap();
     assert!(!second.is_complete());
     assert!(second.run(&()));
@@ -180,18 +180,24 @@ fn merged_shards_are_the_single_run() {
     let expected = uninterrupted(&stage, &mis, &settings);
     let RenderSettings { width, height, .. } = settings;
     for n in [1, 2, 3, 8, 64] {
-        let mut layers = Layers::new(width, height);
         let mut counts = Counts::default();
+        let mut variance = VarianceSums::default();
+        let mut films = Vec::new();
         for k in (0..n).rev() {
-            let whole = session(&stage, &mis, &settings);
+            let whole = renderer(&stage, &mis, &settings);
             let tiles = whole.tiling().shard(k, n);
             let mut shard = whole.only(tiles);
             pool(1 + k % 3).install(|| shard.run(&()));
             let bytes = checkpoint(&shard, settings.n_samples).encode().unwrap();
             let part = Checkpoint::decode(&bytes).unwrap();
             assert!(part.complete);
-            layers.merge(&part.film, 0);
+            variance.add(&part.film.variance_sums());
+            films.push(part.film);
             counts += part.counts;
+        }
+        let mut layers = Layers::new(width, height);
+        for film in &films {
+            layers.merge(film, 0, &variance);
         }
         let merged = Rendering { layers, counts, complete: true };
         assert_same(&merged, &expected);
@@ -202,7 +208,7 @@ fn merged_shards_are_the_single_run() {
 fn a_checkpoint_is_a_picture_and_keeps_everything() {
     let (stage, settings) = (stage(), settings());
     let mis = mis(&stage);
-    let mut shard = session(&stage, &mis, &settings).only(9..12);
+    let mut shard = renderer(&stage, &mis, &settings).only(9..12);
     shard.run(&After::tiles(4));
     let saved = checkpoint(&shard, settings.n_samples);
     let bytes = saved.encode().unwrap();
@@ -227,7 +233,7 @@ fn a_checkpoint_is_a_picture_and_keeps_everything() {
 fn foreign_and_damaged_files_are_refused() {
     let (stage, settings) = (stage(), settings());
     let mis = mis(&stage);
-    let mut shard = session(&stage, &mis, &settings).only(0..3);
+    let mut shard = renderer(&stage, &mis, &settings).only(0..3);
     shard.run(&());
     let saved = checkpoint(&shard, settings.n_samples);
     let bytes = saved.encode().unwrap();
@@ -254,8 +260,8 @@ fn foreign_and_damaged_files_are_refused() {
 fn sums_of_another_render_are_refused() {
     let (stage, settings) = (stage(), settings());
     let mis = mis(&stage);
-    let mut whole = session(&stage, &mis, &settings);
-    let shard = session(&stage, &mis, &settings).only(0..3);
+    let mut whole = renderer(&stage, &mis, &settings);
+    let shard = renderer(&stage, &mis, &settings).only(0..3);
     let refused = whole.restore(&shard.film(), Counts::default());
     assert!(matches!(refused, Err(Misfit::Window { .. })), "{refused:?}");
     let other_size = Film::new(99, 38, whole.film().window);
@@ -268,19 +274,25 @@ fn tiles_decide_for_themselves_when_the_error_is_reached() {
     let stage = stage();
     let settings = RenderSettings { n_samples: 256, target_error: Some(8e-3), ..settings() };
     let mis = mis(&stage);
-    let mut whole = session(&stage, &mis, &settings);
+    let mut whole = renderer(&stage, &mis, &settings);
     assert!(whole.run(&()));
     let layers = whole.film().layers();
     let least = layers.n_samples.iter().min().copied();
     let most = layers.n_samples.iter().max().copied();
     assert!(least >= Some(16) && least < most, "{least:?} to {most:?}");
-    let mut merged = Layers::new(layers.width(), layers.height());
+    let mut films = Vec::new();
+    let mut variance = VarianceSums::default();
     for k in 0..3 {
-        let mut shard = session(&stage, &mis, &settings);
+        let mut shard = renderer(&stage, &mis, &settings);
         let tiles = shard.tiling().shard(k, 3);
         shard = shard.only(tiles);
         assert!(shard.run(&()));
-        merged.merge(&shard.film(), 0);
+        films.push(shard.film());
+        variance.add(&shard.film().variance_sums());
+    }
+    let mut merged = Layers::new(layers.width(), layers.height());
+    for film in &films {
+        merged.merge(film, 0, &variance);
     }
     let bytes = |layers: &Layers| layers.to_exr(Vec::new()).encode().unwrap();
     assert!(bytes(&merged) == bytes(&layers));

@@ -1,24 +1,38 @@
 //! The examples run.
-#![allow(missing_docs, unreachable_pub)]
+#![cfg(feature = "io")]
 
 #[path = "../examples/extract_lights.rs"]
 mod extract_lights;
 #[path = "../examples/one_pixel.rs"]
 mod one_pixel;
-#[path = "../examples/render_sphere.rs"]
-mod render_sphere;
+#[path = "../examples/product_on_your_own_geometry.rs"]
+mod product_on_your_own_geometry;
+#[path = "../examples/render_file.rs"]
+mod render_file;
+#[path = "../examples/your_own_bsdf.rs"]
+mod your_own_bsdf;
 
 #[test]
-fn one_pixel_runs() {
-    one_pixel::main().unwrap();
+fn render_file() {
+    render_file::main().unwrap();
 }
 
 #[test]
-fn render_sphere_runs() {
-    render_sphere::main().unwrap();
+fn your_own_bsdf() {
+    your_own_bsdf::main().unwrap();
 }
 
 #[test]
-fn extract_lights_runs() {
+fn product_on_your_own_geometry() {
+    product_on_your_own_geometry::main();
+}
+
+#[test]
+fn extract_lights() {
     extract_lights::main().unwrap();
+}
+
+#[test]
+fn one_pixel() {
+    one_pixel::main().unwrap();
 }

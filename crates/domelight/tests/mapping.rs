@@ -267,6 +267,89 @@ fn a_small_sun_keeps_its_energy() {
     }
 }
 
+/// ∫ L dω of a picture in any mapping, each texel's solid angle by its Jacobian over fine cells.
+fn texel_solid_angle(mapping: Mapping, (width, height): (usize, usize), x: usize, y: usize) -> f64 {
+    let n = 64;
+    let mut sum = 0.0;
+    for i in 0..n * n {
+        let u = (x as f64 + ((i % n) as f64 + 0.5) / n as f64) / width as f64;
+        let v = (y as f64 + ((i / n) as f64 + 0.5) / n as f64) / height as f64;
+        sum += f64::from(mapping.solid_angle_density(vec2(u as f32, v as f32)));
+    }
+    sum / (n * n * width * height) as f64
+}
+
+/// The light of a single lit texel arrives whole, wherever it is: in the middle of the picture, at its rim, at a
+/// pole, at the seam.
+#[test]
+fn the_flux_of_every_texel_goes_somewhere() {
+    for mapping in Mapping::ALL {
+        let size = mapping.size_for(6);
+        let black = RgbImage::filled(size.0, size.1, Rgb::BLACK);
+        let mut total = 0.0;
+        for i in 0..size.0 * size.1 {
+            let mut picture = black.clone();
+            picture.pixels[i] = Rgb::WHITE;
+            let flux = energy(&to_lat_long(&picture, mapping, 16))[0];
+            total += flux;
+            let (x, y) = (i % size.0, i / size.0);
+            let expected = texel_solid_angle(mapping, size, x, y);
+            if mapping
+                .direction(
+                    vec2(x as f32 + 0.5, y as f32 + 0.5) / vec2(size.0 as f32, size.1 as f32),
+                )
+                .is_none()
+            {
+                assert!(flux <= expected + 1e-2, "{mapping} ({x}, {y})");
+                continue;
+            }
+            // The cells resolve a texel on the disc's rim to a few per cent, others well.
+            let rim = matches!(mapping, Mapping::Angular | Mapping::MirrorBall);
+            let tolerance = if rim { 0.05 } else { 2e-3 };
+            assert!(
+                (flux / expected - 1.0).abs() < tolerance,
+                "{mapping} ({x}, {y}): {flux} {expected}"
+            );
+        }
+        assert!((total / (4.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6, "{mapping}: {total}");
+    }
+}
+
+/// Of a map of noise over four orders of magnitude, to any mapping and back: to 10⁻⁵.
+#[test]
+fn conversion_conserves_energy() {
+    let noise = |i: usize| ((i as u32).wrapping_mul(2_654_435_761) >> 8) as f32 / 16_777_216.0;
+    for mapping in Mapping::ALL {
+        for (rows, size) in
+            [(33, mapping.size_for(32)), (20, mapping.size_for(64)), (64, mapping.size_for(9))]
+        {
+            let picture = RgbImage::from_fn(size.0, size.1, |x, y| {
+                let n = noise(y * size.0 + x);
+                Rgb::new(n, n.powi(8), 1e4 * f32::from(n > 0.99) + 1.0)
+            });
+            let map = to_lat_long(&picture, mapping, rows);
+            let back = from_lat_long(&map, mapping, size);
+            let again = to_lat_long(&back, mapping, rows);
+            for (a, b) in energy(&map).into_iter().zip(energy(&again)) {
+                assert!((a / b - 1.0).abs() < 1e-5, "{mapping} {size:?}: {a} {b}");
+            }
+        }
+    }
+}
+
+/// One size of lat-long map to another, up and down.
+#[test]
+fn resizing_conserves_energy() {
+    let map = lat_long_of(radiance, 24);
+    for rows in [1, 5, 23, 25, 48, 100] {
+        for (a, b) in
+            energy(&map).into_iter().zip(energy(&to_lat_long(&map, Mapping::LatLong, rows)))
+        {
+            assert!((a / b - 1.0).abs() < 1e-6, "{rows}: {a} {b}");
+        }
+    }
+}
+
 #[test]
 fn lat_long_maps_pass_through_bit_for_bit() {
     let map = lat_long_of(radiance, 33);

@@ -429,6 +429,51 @@ fn exr_data_window_attribute_and_chromaticities() {
     assert!((to - expected).map(f32::abs).max_component() < 2e-3, "{to:?} {expected:?}");
 }
 
+/// Files of 16 × 36 texels that OpenEXR's own library wrote (3.5.3, by its Python module), chroma at every second
+/// texel: R = 0.5 + 0.4 x / 16, G = 0.3 + 0.2 y / 36, B = 0.2 + 0.3 (x + y) / 52.
+#[test]
+fn exr_of_luminance_and_chroma() {
+    for compression in ["no", "rle", "zips", "zip", "piz", "pxr24"] {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data");
+        let bytes = std::fs::read(format!("{folder}/luminance_chroma_{compression}.exr")).unwrap();
+        let picture = decode(&bytes).unwrap_or_else(|error| panic!("{compression}: {error}"));
+        assert_eq!((picture.image.width, picture.image.height), (16, 36));
+        let tolerance = 0.012;
+        for (i, color) in picture.image.pixels.iter().enumerate() {
+            let (x, y) = ((i % 16) as f32, (i / 16) as f32);
+            let expected =
+                Rgb::new(0.5 + 0.4 * x / 16.0, 0.3 + 0.2 * y / 36.0, 0.2 + 0.3 * (x + y) / 52.0);
+            let error = (*color - expected).map(f32::abs).max_component();
+            // Chroma goes on beyond its last sample.
+            let is_border = i % 16 == 15 || i / 16 == 35;
+            let tolerance = if is_border { tolerance + 0.02 } else { tolerance };
+            assert!(error < tolerance, "{compression} ({x}, {y}): {color:?} {expected:?}");
+        }
+        for length in 0..bytes.len() {
+            assert!(decode(&bytes[..length]).is_err(), "{compression}: {length} bytes");
+        }
+        let mut rng = Pcg(3);
+        for _ in 0..500 {
+            let mut damaged = bytes.clone();
+            let at = rng.below(damaged.len());
+            damaged[at] = rng.next() as u8;
+            let _ = decode(&damaged);
+        }
+    }
+}
+
+#[test]
+fn exr_of_one_channel_of_any_name_is_grey() {
+    for name in ["R", "luminance", "Y"] {
+        let mut layers = ExrLayers::new(4, 2);
+        layers.push_channel("", name, vec![2.5; 8]);
+        assert_eq!(decode(&layers.encode().unwrap()).unwrap().image.pixels, [Rgb::splat(2.5); 8]);
+    }
+    let mut layers = ExrLayers::new(4, 2);
+    layers.push_channel("", "Z", vec![2.5; 8]);
+    assert!(matches!(problem(&layers.encode().unwrap()), Problem::NoColor { .. }));
+}
+
 #[test]
 fn exr_layers_are_written_and_found_again() {
     let (color, albedo) = (picture(33, 17), smooth(33, 17));
@@ -497,6 +542,10 @@ fn samples() -> Vec<(String, Vec<u8>)> {
     let mut bytes = Vec::new();
     png::encode(&image, None, &ToneMapping::default(), png::Depth::Eight, &mut bytes).unwrap();
     files.push(("png".to_owned(), bytes));
+    let mut bytes = Cursor::new(Vec::new());
+    let grey = image::RgbImage::from_fn(37, 11, |x, y| image::Rgb([x as u8 * 6, y as u8 * 20, 99]));
+    grey.write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
+    files.push(("jpeg".to_owned(), bytes.into_inner()));
     for encoding in encodings() {
         let channels = rgb_channels(&image, "", SampleType::F16);
         let bytes = exr_bytes((37, 11), channels, encoding, LayerAttributes::default());
@@ -593,7 +642,7 @@ fn promises_beyond_the_file_are_refused_before_memory_is_taken() {
 fn unknown_formats_are_named() {
     assert_eq!(
         decode(b"GIF89a").unwrap_err().to_string(),
-        "test: not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG): it starts with [47, 49, 46, 38, 39, 61]"
+        "test: not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG, JPEG), by its first bytes"
     );
     assert!(decode(b"").is_err());
 }
@@ -670,21 +719,76 @@ fn texels_that_are_no_radiance_are_named_or_repaired() {
     image.pixels[8 + 3] = Rgb::new(1.0, f32::NAN, -2.0);
     image.pixels[16 + 5].r = f32::INFINITY;
     let path = saved(&folder, "bad.pfm", &image);
-    let error = load_probe(&path, &ProbeOptions::default()).unwrap_err();
+    let error =
+        load_probe(&path, &ProbeOptions { strict: true, ..Default::default() }).unwrap_err();
     assert!(matches!(error, ProbeError::BadTexel { x: 3, y: 1, channel: 'G', count: 3, .. }));
     assert_eq!(
         error.to_string(),
         format!(
-            "{}: texel (3, 1) has G = NaN, and 3 value(s) in all are negative, NaN or infinite; --sanitize repairs them",
+            "{}: texel (3, 1) has G = NaN, and 3 value(s) in all are negative, NaN or infinite; without --strict they are repaired",
             path.display()
         )
     );
-    let repaired =
-        load_probe(&path, &ProbeOptions { sanitize: true, ..Default::default() }).unwrap();
+    let repaired = load_probe(&path, &ProbeOptions::default()).unwrap();
+    let [warning] = &repaired.warnings[..] else { panic!("{:?}", repaired.warnings) };
+    assert!(warning.contains("1 negative and 2 NaN or infinite"), "{warning}");
     assert_eq!(repaired.sanitized, SanitizeReport { negative: 1, non_finite: 2 });
     // The mean of 2, 3, 4 in the rows around and 2, 4 beside it.
     assert_eq!(repaired.image.get(3, 1), Rgb::new(1.0, 3.0, 0.0));
     assert_eq!(repaired.image.get(5, 2).r, 5.0);
+}
+
+/// A map whose black borders were cropped, one with texels beyond its frame, and one with any frame.
+#[test]
+fn data_windows_stand_in_display_windows_that_are_maps() {
+    let folder = tempfile::tempdir().unwrap();
+    let image = smooth(12, 5);
+    let probe = |data: &RgbImage, origin: (i32, i32), display: (usize, usize)| {
+        let channels = rgb_channels(data, "", SampleType::F32);
+        let attributes = LayerAttributes {
+            layer_position: Vec2(origin.0, origin.1),
+            ..LayerAttributes::default()
+        };
+        let layer = Layer::new(
+            (data.width, data.height),
+            attributes,
+            Encoding::SMALL_LOSSLESS,
+            AnyChannels::sort(channels.into_iter().collect()),
+        );
+        let mut file = Image::from_layer(layer);
+        file.attributes.display_window = exr::meta::attribute::IntegerBounds::new((3, -2), display);
+        let path = folder.path().join("p.exr");
+        file.write().to_file(&path).unwrap();
+        load_probe(&path, &ProbeOptions::default()).unwrap()
+    };
+    let cropped = probe(&image, (5, 0), (16, 8));
+    assert_eq!(cropped.file_size, (16, 8));
+    assert_eq!(cropped.image.get(2, 2), image.get(0, 0));
+    assert_eq!(cropped.image.get(13, 6), image.get(11, 4));
+    assert_eq!((cropped.image.get(1, 2), cropped.image.get(2, 7)), (Rgb::BLACK, Rgb::BLACK));
+    assert!(cropped.warnings[0].contains("12x5") && cropped.warnings[0].contains("16x8"));
+    let beyond = probe(&smooth(18, 10), (2, -3), (16, 8));
+    assert_eq!(beyond.image.get(0, 0), smooth(18, 10).get(1, 1));
+    let as_is = probe(&smooth(16, 8), (0, 0), (19, 11));
+    assert_eq!((as_is.image, as_is.warnings.len()), (smooth(16, 8), 0));
+}
+
+#[test]
+fn pictures_of_a_screen_are_maps_with_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let deep = image::ImageBuffer::from_pixel(8, 4, image::Rgb([65535u16, 32768, 0]));
+    deep.save(folder.path().join("a.png")).unwrap();
+    let small = image::RgbImage::from_pixel(8, 4, image::Rgb([255, 188, 0]));
+    small.save(folder.path().join("b.png")).unwrap();
+    small.save(folder.path().join("c.jpg")).unwrap();
+    for (name, green, tolerance) in
+        [("a.png", 0.2140, 1e-4), ("b.png", 0.5029, 1e-4), ("c.jpg", 0.5029, 0.02)]
+    {
+        let probe = load_probe(&folder.path().join(name), &ProbeOptions::default()).unwrap();
+        let texel = probe.image.get(3, 2);
+        assert!((texel.r - 1.0).abs() < 0.02 && (texel.g - green).abs() < tolerance, "{texel:?}");
+        assert!(probe.warnings[0].contains("suns"), "{:?}", probe.warnings);
+    }
 }
 
 #[test]

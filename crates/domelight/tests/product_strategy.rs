@@ -49,7 +49,7 @@ fn estimates(
         let shared =
             strategy.begin_pass(Stream::of_pass(sampler, seed, (pass * n) as u32), n as u32);
         let mut out = Contributions::default();
-        for round in 0..ProductSampling::N_ROUNDS {
+        for round in 0..strategy.n_rounds() {
             let (mut points, mut samples) = (Vec::new(), Vec::new());
             let pixels: Vec<PixelPoints> = (0..SIDE * SIDE)
                 .map(|i| {
@@ -71,13 +71,15 @@ fn estimates(
                 TileShading { points: &points, samples: &samples, pixels: &pixels, width: SIDE };
             out.reset(points.len());
             strategy.push(&shared, &tile, round, &mut scratch, &mut out);
-            let free: Vec<bool> = out.wi.iter().map(|&wi| !hidden(env, wi)).collect();
-            let seen = out.weight.iter().zip(&free).filter(|(_, free)| **free).map(|(w, _)| w);
+            let visible = |&wi| if hidden(env, wi) { 0.0 } else { 1.0 };
+            let visibility: Vec<f32> = out.wi.iter().map(visible).collect();
+            let seen =
+                out.weight.iter().zip(&visibility).filter(|(_, v)| **v > 0.0).map(|(w, _)| w);
             let sum: Rgb = out.base.iter().chain(seen).copied().sum();
             for (s, v) in sums[round as usize].iter_mut().zip(sum.to_array()) {
                 *s += f64::from(v) / n as f64;
             }
-            strategy.learn(&tile, &out, &free, &mut scratch);
+            strategy.learn(&tile, &out, &visibility, &mut scratch);
         }
     }
     std::array::from_fn(|kind| sums[kind].map(|s| s / counts[kind]))

@@ -44,7 +44,7 @@ fn strategies_agree_with_quadrature() {
                     MultipleImportanceSampling::new(env, table, heuristic, m, n).unwrap()
                 };
                 for kind in [SamplerKind::Independent, SamplerKind::Sobol] {
-                    let table = LightTable::Compensated(&table);
+                    let table = LightTable::Compensated(table.clone());
                     let default = mis(table, Heuristic::Power, 1, 1);
                     check("mis power compensated", batches(&default, env, &at, kind, 1024));
                 }
@@ -53,7 +53,7 @@ fn strategies_agree_with_quadrature() {
                 check("mis balance", batches(&balance, env, &at, kind, 1024));
                 let power = mis(LightTable::Full, Heuristic::Power, 3, 1);
                 check("mis power 3:1", batches(&power, env, &at, kind, 1024));
-                let compensated = LightTable::Compensated(&table);
+                let compensated = LightTable::Compensated(table.clone());
                 let compensated = mis(compensated, Heuristic::Balance, 1, 2);
                 check("mis compensated", batches(&compensated, env, &at, kind, 1024));
                 let alone = mis(LightTable::Full, Heuristic::Balance, 2, 0);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args, ValueEnum};
 
 use super::{finite, positive};
-use crate::notation::NamedStrategy;
+use crate::strategy::NamedStrategy;
 use crate::values::Size;
 
 pub(super) const EXAMPLES: &str = "\

@@ -8,7 +8,7 @@ use super::finite;
 use super::sampling::PixelArguments;
 use super::scene::SceneArguments;
 use crate::compare::Budget;
-use crate::notation::NamedStrategy;
+use crate::strategy::NamedStrategy;
 
 pub(super) const EXAMPLES: &str = "\
 Strategies are NAME[:OPTION]…, separated by commas; an option is a flag of render without its

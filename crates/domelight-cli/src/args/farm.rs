@@ -1,11 +1,15 @@
 //! The arguments of `domelight farm`.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::parser::ValueSource;
+use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 
+use super::MemoryArguments;
 use super::sampling::{PixelArguments, SampleArguments, StrategyArguments};
 use super::scene::SceneArguments;
+use crate::output::PicturePath;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -23,6 +27,9 @@ Examples:
 /// SIGTERM is saved and goes on when it is run again. --target-error ends each tile by itself.
 #[derive(Args, Debug)]
 pub(crate) struct FarmArguments {
+    // First, for the others take their values out of what was parsed.
+    #[command(flatten)]
+    pub(crate) render: RenderWords,
     /// What runs the jobs
     #[arg(value_enum)]
     pub(crate) engine: Engine,
@@ -43,7 +50,7 @@ pub(crate) struct FarmArguments {
     pub(crate) output: PathBuf,
     /// The merged picture [default: picture.exr in the folder]
     #[arg(long, value_name = "FILE", help_heading = "Farm")]
-    pub(crate) picture: Option<PathBuf>,
+    pub(crate) picture: Option<PicturePath>,
     /// Cores of each task
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Farm",
           value_parser = clap::value_parser!(u32).range(1..=1024))]
@@ -63,4 +70,123 @@ pub(crate) enum Engine {
     Kubernetes,
     /// GNU parallel
     Parallel,
+}
+
+/// The arguments of `render` that were given, as words that say the same to `render`; the scene comes last.
+#[derive(Clone, Debug)]
+pub(crate) struct RenderWords {
+    pub(crate) words: Vec<OsString>,
+}
+
+impl RenderWords {
+    /// The arguments that are written into jobs as they are.
+    fn command() -> Command {
+        let command = SceneArguments::augment_args(Command::new("render"));
+        let command = StrategyArguments::augment_args(command);
+        let command = SampleArguments::augment_args(command);
+        MemoryArguments::augment_args(PixelArguments::augment_args(command))
+    }
+}
+
+impl Args for RenderWords {
+    fn augment_args(command: Command) -> Command {
+        command
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        command
+    }
+}
+
+impl FromArgMatches for RenderWords {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let mut words = Vec::new();
+        let mut scene = Vec::new();
+        for argument in Self::command().get_arguments() {
+            let id = argument.get_id().as_str();
+            // Threads are each engine's to set.
+            if id == "threads" || matches.value_source(id) != Some(ValueSource::CommandLine) {
+                continue;
+            }
+            // What is given twice counts as it was given last.
+            let value = matches.get_raw(id).and_then(Iterator::last).unwrap_or_default();
+            match (argument.get_long(), argument.get_action()) {
+                (Some(long), ArgAction::SetTrue) => words.push(format!("--{long}").into()),
+                (Some(long), _) => {
+                    let mut word = OsString::from(format!("--{long}="));
+                    word.push(value);
+                    words.push(word);
+                }
+                (None, _) if value.to_string_lossy().starts_with('-') => {
+                    scene.extend([OsString::from("--"), value.to_owned()]);
+                }
+                (None, _) => scene.push(value.to_owned()),
+            }
+        }
+        words.append(&mut scene);
+        Ok(Self { words })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Arguments, Command as Subcommand};
+    use clap::Parser as _;
+
+    fn words(arguments: &[&str]) -> String {
+        let all = ["domelight"].iter().chain(arguments);
+        let Subcommand::Farm(farm) = Arguments::try_parse_from(all).unwrap().command else {
+            panic!("no farm")
+        };
+        // Render understands them, and alike.
+        let render =
+            ["domelight", "render"].map(Into::into).into_iter().chain(farm.render.words.clone());
+        let Subcommand::Render(render) = Arguments::try_parse_from(render).unwrap().command else {
+            panic!("no render")
+        };
+        assert_eq!(format!("{:?}", render.scene), format!("{:?}", farm.scene));
+        assert_eq!(format!("{:?}", render.strategy), format!("{:?}", farm.strategy));
+        assert_eq!(format!("{:?}", render.samples), format!("{:?}", farm.samples));
+        let words: Vec<_> = farm.render.words.iter().map(|w| w.to_string_lossy()).collect();
+        words.join(" ")
+    }
+
+    #[test]
+    fn jobs_are_told_what_was_understood() {
+        let scene = "a scene.toml";
+        for (given, told) in [
+            (
+                &["farm", "slurm", scene, "--spp", "9", "--shards", "8", "-o", "x"][..],
+                "--spp=9 a scene.toml",
+            ),
+            (&["farm", "--shards", "4", "slurm", "sphere"], "sphere"),
+            (&["farm", "slurm", "--shards", "4", "--", "sphere"], "sphere"),
+            (&["farm", "slurm", "--shards", "4", "--", "-sphere.ply"], "-- -sphere.ply"),
+            (&["farm", "slurm", "sphere", "--shards", "4", "-qo", "name"], "sphere"),
+            (&["farm", "slurm", "sphere", "--shards", "4", "-qofarm"], "sphere"),
+            (&["-q", "farm", "slurm", "farm", "--shards", "4"], "farm"),
+            (&["--max-memory", "4GiB", "farm", "slurm", "--shards=4"], "--max-memory=4GiB"),
+            (&["farm", "--max-memory=4GiB", "slurm", "--shards=4"], "--max-memory=4GiB"),
+            (
+                &["farm", "openjd", "--shards=8", "--threads=3", "statue", "--env=it's.hdr"],
+                "--env=it's.hdr statue",
+            ),
+            (
+                &["farm", "parallel", "--shards", "2", "--origin", "-1,2,3", "--threads", "4"],
+                "--origin=-1,2,3",
+            ),
+            (
+                &["farm", "slurm", "--shards", "2", "--spp", "4", "--ground", "--spp=5"],
+                "--ground --spp=5",
+            ),
+            (&["farm", "slurm", "--shards", "2", "--env=--shards"], "--env=--shards"),
+        ] {
+            assert_eq!(words(given), told);
+        }
+    }
 }

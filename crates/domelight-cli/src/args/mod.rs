@@ -36,6 +36,13 @@ pub(crate) struct Arguments {
     /// Print nothing but errors and what --json asks for.
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
+    #[command(flatten)]
+    pub(crate) memory: MemoryArguments,
+}
+
+/// How much memory the program may take.
+#[derive(Args, Debug)]
+pub(crate) struct MemoryArguments {
     /// Refuse what would take more memory, such as 4GiB or none [default: nine tenths of what there is]
     #[arg(long, global = true, value_name = "SIZE")]
     pub(crate) max_memory: Option<MaxMemory>,
@@ -163,7 +170,7 @@ pub(crate) enum Metric {
 /// Measure, look at and convert a light probe.
 #[derive(Args, Debug)]
 pub(crate) struct ProbeArguments {
-    /// A file (.hdr, .exr, .pfm; - reads standard input) or sky, studio, cathedral, constant.
+    /// A file (.hdr, .exr, .pfm, .png, .jpg; - reads standard input) or sky, studio, cathedral, constant.
     #[arg(value_name = "FILE|NAME")]
     pub(crate) probe: PathBuf,
     /// Print JSON.
@@ -184,8 +191,11 @@ pub(crate) struct ProbeArguments {
     /// The mapping of the file [default: guessed from its shape].
     #[arg(long, value_parser = mapping())]
     pub(crate) mapping: Option<Mapping>,
-    /// Repair negative, infinite and NaN values instead of refusing them.
+    /// Refuse what is repaired with a warning otherwise: negative, NaN and infinite values.
     #[arg(long)]
+    pub(crate) strict: bool,
+    /// What is done without --strict; scripts may still say so.
+    #[arg(long, hide = true, conflicts_with = "strict")]
     pub(crate) sanitize: bool,
     /// The OpenEXR layer.
     #[arg(long, value_name = "NAME")]

@@ -2,18 +2,22 @@
 
 use clap::{Args, ValueEnum};
 use domelight::render::Filter;
-use domelight::sampling::SamplerKind;
+use domelight::sampling::{Heuristic, SamplerKind};
+use domelight::strategy::{Candidates, Proposal, Resampling, StrategyKind};
 
 use super::{one_of, positive};
+use crate::strategy::StrategyText;
 use crate::values::Split;
 
 /// A strategy, and what it may be told.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Sampling")]
 pub(crate) struct StrategyArguments {
-    /// How directions are chosen
-    #[arg(long, value_enum, default_value_t = StrategyName::Product)]
-    pub(crate) strategy: StrategyName,
+    /// How directions are chosen: brdf, environment, mis, product, rejection, sir, median-cut or
+    /// variance-minimization, also with numbers and options as in mis:3:1, sir:15/800 or product:8
+    #[arg(long, value_name = "NAME[:OPTIONS]", default_value = "product",
+          long_help = strategy_help())]
+    pub(crate) strategy: StrategyText,
     /// Shadow rays of each camera sample; with product no more than these, with rejection samples to
     /// accept [default: with product 8, with mis 2, else 1]
     #[arg(long, value_name = "N", conflicts_with = "split",
@@ -84,28 +88,6 @@ pub(crate) struct PixelArguments {
     pub(crate) threads: Option<u32>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum StrategyName {
-    /// From the reflectance alone
-    Brdf,
-    /// From the environment's table alone
-    #[value(alias = "env", alias = "em")]
-    Environment,
-    /// Both, by multiple importance sampling
-    Mis,
-    /// The product of both, by a table a pixel, with the visibility that is learned on the way; traces
-    /// up to --rays where they matter
-    Product,
-    /// The product of both, by rejection from one with a bound on the other
-    Rejection,
-    /// The product of both, by resampling --candidates to --rays
-    Sir,
-    /// The probe as --lights directional lights by median cut: no noise, but bias
-    MedianCut,
-    /// The probe as --lights directional lights by variance minimization: no noise, but bias
-    VarianceMinimization,
-}
-
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum SourceName {
     /// The environment
@@ -152,6 +134,57 @@ pub(crate) enum SamplerName {
     Sobol,
     /// Independent pseudo-random points
     Independent,
+}
+
+/// All strategies with a line each, for `--help`.
+fn strategy_help() -> String {
+    let line = |kind: StrategyKind| format!("- {}: {}", kind.name(), kind.summary());
+    let lines: Vec<String> = StrategyKind::ALL.into_iter().map(line).collect();
+    format!(
+        "How directions are chosen, also with numbers and options as in mis:3:1, sir:15/800, product:8 or \
+         rejection:16:proposal=brdf\n\nStrategies:\n{}\n",
+        lines.join("\n")
+    )
+}
+
+impl From<SourceName> for Candidates {
+    fn from(name: SourceName) -> Self {
+        match name {
+            SourceName::Environment => Self::Environment,
+            SourceName::Brdf => Self::Brdf,
+            SourceName::Mixture => Self::Mixture,
+        }
+    }
+}
+
+impl From<ResamplingName> for Resampling {
+    fn from(name: ResamplingName) -> Self {
+        match name {
+            ResamplingName::Multinomial => Self::Multinomial,
+            ResamplingName::Systematic => Self::Systematic,
+            ResamplingName::Sorted => Self::SystematicSorted,
+            ResamplingName::Reservoir => Self::Reservoir,
+        }
+    }
+}
+
+impl From<ProposalName> for Proposal {
+    fn from(name: ProposalName) -> Self {
+        match name {
+            ProposalName::Environment => Self::Environment,
+            ProposalName::Brdf => Self::Brdf,
+            ProposalName::Tighter => Self::Tighter,
+        }
+    }
+}
+
+impl From<HeuristicName> for Heuristic {
+    fn from(name: HeuristicName) -> Self {
+        match name {
+            HeuristicName::Balance => Self::Balance,
+            HeuristicName::Power => Self::Power,
+        }
+    }
 }
 
 impl From<SamplerName> for SamplerKind {

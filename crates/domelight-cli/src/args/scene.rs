@@ -13,11 +13,13 @@ pub(crate) const BUILTIN_ROWS: u32 = 1024;
 /// A scene under its light, seen by a camera: for every command that renders.
 #[derive(Args, Debug)]
 pub(crate) struct SceneArguments {
-    /// A built-in scene (statue, spheres, material-ball, sphere, …), a mesh (.ply, .obj, .gltf,
-    /// .glb) or a scene file (.toml)
+    /// A built-in scene (statue, spheres, material-ball, sphere, …), a mesh (.ply, .obj, .stl, .off,
+    /// .gltf, .glb) or a scene file (.toml)
     #[arg(default_value = "statue")]
     pub(crate) scene: String,
 
+    #[command(flatten)]
+    pub(crate) file: FileArguments,
     #[command(flatten)]
     pub(crate) environment: EnvironmentArguments,
     #[command(flatten)]
@@ -26,11 +28,27 @@ pub(crate) struct SceneArguments {
     pub(crate) stage: StageArguments,
 }
 
+/// What of a file is shown.
+#[derive(Args, Debug, Default)]
+#[command(next_help_heading = "Scene file")]
+pub(crate) struct FileArguments {
+    /// The scene of a glTF file with several, by name or number from 0 [default: the file's own]
+    #[arg(long = "scene", id = "file_scene", value_name = "NAME|N")]
+    pub(crate) scene: Option<String>,
+    /// An animation of a glTF file, by name or number from 0 [default: at rest]
+    #[arg(long, value_name = "NAME|N")]
+    pub(crate) animation: Option<String>,
+    /// The moment of the animation that is shown [seconds]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = finite,
+          allow_negative_numbers = true, requires = "animation")]
+    pub(crate) at: f32,
+}
+
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Environment")]
 pub(crate) struct EnvironmentArguments {
-    /// A built-in probe (sky, studio, cathedral, constant) or a file (.hdr, .exr, .pfm; - reads
-    /// standard input) [default: the scene's, else sky]
+    /// A built-in probe (sky, studio, cathedral, constant) or a file (.hdr, .exr, .pfm, .png, .jpg;
+    /// - reads standard input) [default: the scene's, else sky]
     #[arg(long, value_name = "PROBE")]
     pub(crate) env: Option<String>,
     /// Turn the environment about the up axis, counter-clockwise seen from above [degrees]
@@ -55,8 +73,12 @@ pub(crate) struct EnvironmentArguments {
     #[arg(long, value_name = "ROWS", default_value_t = BUILTIN_ROWS,
           value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(crate) env_rows: u32,
-    /// Repair negative, NaN and infinite texels instead of refusing them
+    /// Refuse what is repaired or left out with a warning otherwise: negative, NaN and infinite texels, and in glTF
+    /// files unknown extensions that are required and images that are missing
     #[arg(long)]
+    pub(crate) strict: bool,
+    /// What is done without --strict; scripts may still say so.
+    #[arg(long, hide = true, conflicts_with = "strict")]
     pub(crate) sanitize: bool,
 }
 
@@ -66,6 +88,9 @@ pub(crate) struct CameraArguments {
     /// Size of the picture
     #[arg(long, value_name = "WxH", default_value = "640x640")]
     pub(crate) size: Size,
+    /// One of the scene's cameras, by name or number from 0 [default: the first]
+    #[arg(long, value_name = "NAME|N")]
+    pub(crate) camera: Option<String>,
     /// Where the camera is [default: framed to the scene]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) origin: Option<Triple>,

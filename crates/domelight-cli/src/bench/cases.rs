@@ -14,7 +14,9 @@ use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{CameraSettings, SceneDescription};
 
 use crate::args::bench::BenchArguments;
-use crate::args::scene::{CameraArguments, EnvironmentArguments, SceneArguments, StageArguments};
+use crate::args::scene::{
+    CameraArguments, EnvironmentArguments, FileArguments, SceneArguments, StageArguments,
+};
 use crate::failure::UsageError;
 use crate::scene::{View, close_up};
 use crate::usage::{Seconds, Stopwatch};
@@ -121,6 +123,19 @@ fn product(meshes: &[String], probes: &[String], materials: Option<&str>) -> Res
 }
 
 const OWN: &str = "own";
+
+/// Declares the files that are read.
+pub(super) fn declare(arguments: &BenchArguments) -> Result<()> {
+    let BenchArguments { meshes, probes, cases, .. } = arguments;
+    let of_cases =
+        cases.chunks_exact(3).flat_map(|case| case[..2].iter()).flat_map(|s| s.split(','));
+    for name in meshes.iter().chain(probes).map(String::as_str).chain(of_cases) {
+        for file in files(name)?.iter().map(Path::new).filter(|file| file.is_file()) {
+            crate::files::reads(file)?;
+        }
+    }
+    Ok(())
+}
 
 /// Formats that say what their parts are made of.
 fn has_own_look(scene: &str) -> bool {
@@ -232,9 +247,11 @@ impl Case {
         let usual = normalize && self.stand == Stand::Usual;
         SceneArguments {
             scene: self.scene.clone(),
+            file: FileArguments::default(),
             environment: light(&self.probe, arguments.env_rotate, ROWS),
             camera: CameraArguments {
                 size,
+                camera: None,
                 origin: usual.then_some(Triple(ORIGIN)),
                 target: usual.then_some(Triple(Vec3::ZERO)),
                 up: usual.then_some(Triple(Vec3::Y)),
@@ -257,6 +274,7 @@ fn light(probe: &str, rotate: f32, rows: u32) -> EnvironmentArguments {
         env_mapping: None,
         env_layer: None,
         env_rows: rows,
+        strict: false,
         sanitize: false,
     }
 }

@@ -6,6 +6,7 @@ use anyhow::Result;
 use domelight::RgbImage;
 use domelight::picture::compare::compare;
 use domelight::render::survey;
+use domelight::strategy::{PreparedStrategy, StrategySpec};
 use serde::{Deserialize, Serialize};
 
 use super::bound::Bound;
@@ -14,8 +15,8 @@ use super::ladder::{Cost, How, Point, cost_of};
 use super::mitsuba::Mitsuba;
 use crate::measure::reference::Reference;
 use crate::measure::shot::Studio;
-use crate::notation::NamedStrategy;
-use crate::strategy::{Plan, Renderer};
+use crate::strategy::NamedStrategy;
+use crate::strategy::refuse_repeating_points;
 use crate::usage::{Seconds, Stopwatch};
 
 /// The error that most comparisons of renderers are made at.
@@ -37,21 +38,40 @@ const MOST_SAMPLES: u32 = 1 << 16;
 /// What pictures are measured against.
 pub(super) struct Judge {
     pub(super) reference: Reference,
+    /// Pixels that show any of the scene; all others are exact.
+    touched: Vec<bool>,
+    /// Pixels that the scene fills.
     pub(super) covered: Vec<bool>,
+}
+
+/// relMSE of a picture.
+struct Errors {
+    /// Over the pixels that show any of the scene.
+    all: f64,
+    /// Over those that it fills.
+    covered: f64,
 }
 
 impl Judge {
     pub(super) fn new(reference: Reference) -> Self {
         let covered = reference.picture.covered().unwrap_or_default();
-        Self { reference, covered }
+        let touched = reference.picture.touched().unwrap_or_default();
+        Self { reference, touched, covered }
     }
 
-    /// relMSE over the covered pixels. Of independent pictures I and R it is that of I and that of R added,
+    fn errors(&self, image: &RgbImage) -> Result<Errors> {
+        let report = &self.reference.report;
+        Ok(Errors {
+            all: self.error(image, &self.touched, report.rel_mse)?,
+            covered: self.error(image, &self.covered, report.rel_mse_covered)?,
+        })
+    }
+
+    /// relMSE over some pixels. Of independent pictures I and R it is that of I and that of R added,
     /// so the latter is taken off.
-    fn error(&self, image: &RgbImage) -> Result<f64> {
-        let measured = compare(image, &self.reference.picture.image, Some(&self.covered))?.rel_mse;
-        let noise = self.reference.report.rel_mse.unwrap_or(0.0);
-        Ok((measured - noise).max(LEAST_PART * measured))
+    fn error(&self, image: &RgbImage, mask: &[bool], noise: Option<f64>) -> Result<f64> {
+        let measured = compare(image, &self.reference.picture.image, Some(mask))?.rel_mse;
+        Ok((measured - noise.unwrap_or(0.0)).max(LEAST_PART * measured))
     }
 
     pub(super) fn covered_pixels(&self) -> usize {
@@ -62,8 +82,8 @@ impl Judge {
 /// A plan and what it made of the environment.
 pub(super) struct Prepared<'e> {
     name: String,
-    plan: Plan,
-    renderer: Renderer<'e>,
+    spec: StrategySpec,
+    strategy: PreparedStrategy<'e>,
     setup: Seconds,
 }
 
@@ -72,9 +92,10 @@ impl<'e> Prepared<'e> {
         let Built { view, settings, .. } = built;
         let mut watch = Stopwatch::start();
         let points = || survey(&view.scene, &view.camera, settings);
-        let plan = strategy.plan.for_scene(points, &view.environment, seed);
-        let renderer = plan.prepare(&view.environment)?;
-        Ok(Self { name: strategy.text.clone(), plan, renderer, setup: watch.lap() })
+        let spec = strategy.spec.for_scene(points, &view.environment, seed);
+        let prepared = PreparedStrategy::new(spec, &view.environment)?;
+        let name = strategy.text.clone();
+        Ok(Self { name, spec, strategy: prepared, setup: watch.lap() })
     }
 }
 
@@ -101,8 +122,12 @@ pub(super) struct Rung {
     /// Of rendering alone; wall-clock seconds where the system does not tell.
     pub(super) cpu_seconds: Vec<f64>,
     pub(super) wall_seconds: Vec<f64>,
-    /// Without that of the reference.
+    /// Over the pixels that show any of the scene, without that of the reference.
     pub(super) rel_mse: Vec<f64>,
+    /// Over the pixels that the scene fills.
+    pub(super) rel_mse_covered: Vec<f64>,
+    /// Camera samples of a pixel, as counted; null where a program does not tell.
+    pub(super) camera_samples: Option<f64>,
     /// Of a pixel that the scene covers; null where a program does not tell.
     pub(super) shadow_rays: Option<f64>,
     /// Camera and shadow rays a CPU second.
@@ -110,6 +135,11 @@ pub(super) struct Rung {
 }
 
 impl Rung {
+    /// With the errors over the pixels that the scene fills.
+    fn of_covered(&self) -> Self {
+        Self { rel_mse: self.rel_mse_covered.clone(), ..self.clone() }
+    }
+
     /// The median: other work on the machine only adds.
     pub(super) fn seconds(&self) -> f64 {
         median(&self.cpu_seconds)
@@ -135,7 +165,8 @@ pub(super) fn median(values: &[f64]) -> f64 {
 struct Taken {
     cpu: f64,
     wall: f64,
-    rel_mse: f64,
+    errors: Errors,
+    camera_samples: Option<f64>,
     shadow_rays: Option<f64>,
     rays: Option<u64>,
 }
@@ -157,7 +188,7 @@ impl<'a> Contestant<'a> {
     ) -> Contestant<'a> {
         let Built { view, settings, .. } = built;
         let settings = *settings;
-        let studio = Studio { view, settings, renderer: &prepared.renderer, quiet: true };
+        let studio = Studio { view, settings, strategy: &prepared.strategy, quiet: true };
         let source = Source::Ours { prepared, studio };
         Contestant { source, judge, first: 1, growth: 2, rungs: Vec::new() }
     }
@@ -175,7 +206,8 @@ impl<'a> Contestant<'a> {
                 Taken {
                     cpu: shot.seconds(),
                     wall: shot.time.wall,
-                    rel_mse: self.judge.error(&shot.layers.color)?,
+                    errors: self.judge.errors(&shot.layers.color)?,
+                    camera_samples: Some(shot.camera_samples()),
                     shadow_rays: Some(shot.rays()),
                     rays: Some(shot.counts.camera_rays + shot.counts.shadow_rays),
                 }
@@ -185,7 +217,8 @@ impl<'a> Contestant<'a> {
                 Taken {
                     cpu: time.cpu.unwrap_or(time.wall),
                     wall: time.wall,
-                    rel_mse: self.judge.error(&picture.image)?,
+                    errors: self.judge.errors(&picture.image)?,
+                    camera_samples: None,
                     shadow_rays: None,
                     rays: None,
                 }
@@ -195,7 +228,7 @@ impl<'a> Contestant<'a> {
 
     /// The mean error over seeds at a number of camera samples.
     pub(super) fn error_at(&self, n_samples: u32, seeds: impl Iterator<Item = u64>) -> Result<f64> {
-        let errors = seeds.map(|seed| Ok(self.take(n_samples, seed)?.rel_mse));
+        let errors = seeds.map(|seed| Ok(self.take(n_samples, seed)?.errors.all));
         let errors = errors.collect::<Result<Vec<_>>>()?;
         Ok(errors.iter().sum::<f64>() / errors.len() as f64)
     }
@@ -210,12 +243,13 @@ impl<'a> Contestant<'a> {
         self.take(n, PILOT_SEED)?;
         loop {
             let taken = self.take(n, PILOT_SEED)?;
-            tried.push((n, taken.rel_mse));
-            let near = least <= HEADLINE && (HEADLINE..NEAR * HEADLINE).contains(&taken.rel_mse);
+            let error = taken.errors.all;
+            tried.push((n, error));
+            let near = least <= HEADLINE && (HEADLINE..NEAR * HEADLINE).contains(&error);
             let most = limits.most * if near { MORE } else { 1.0 };
             let next = n.saturating_mul(self.growth);
             let seconds = taken.cpu * f64::from(self.growth * limits.n_seeds);
-            if taken.rel_mse < least / MARGIN || seconds > most || !self.may(next) {
+            if error < least / MARGIN || seconds > most || !self.may(next) {
                 break;
             }
             n = next;
@@ -229,7 +263,7 @@ impl<'a> Contestant<'a> {
     fn may(&self, n_samples: u32) -> bool {
         let fits = match &self.source {
             Source::Ours { prepared, .. } => {
-                prepared.plan.refuse_repeating_points(n_samples).is_ok()
+                refuse_repeating_points(prepared.spec, n_samples).is_ok()
             }
             Source::Mitsuba(_) => true,
         };
@@ -243,7 +277,9 @@ impl<'a> Contestant<'a> {
             let rung = &mut self.rungs[i];
             rung.cpu_seconds.push(taken.cpu);
             rung.wall_seconds.push(taken.wall);
-            rung.rel_mse.push(taken.rel_mse);
+            rung.rel_mse.push(taken.errors.all);
+            rung.rel_mse_covered.push(taken.errors.covered);
+            rung.camera_samples = taken.camera_samples;
             rung.shadow_rays = taken.shadow_rays;
             rung.rays_per_cpu_second = taken.rays.map(|rays| rays as f64 / rung.seconds());
         }
@@ -253,17 +289,20 @@ impl<'a> Contestant<'a> {
     /// What was measured.
     pub(super) fn entry(self, errors: &[f64], bound: Option<Bound>) -> Entry {
         let rungs = self.rungs;
-        let reached = errors.iter().map(|&error| Reached::new(error, &rungs, bound)).collect();
+        let reached = errors.iter().map(|&error| Reached::new(error, &rungs, None)).collect();
+        let of_covered: Vec<Rung> = rungs.iter().map(Rung::of_covered).collect();
+        let reached_covered =
+            errors.iter().map(|&error| Reached::new(error, &of_covered, bound)).collect();
         let (name, settings, setup) = match self.source {
             Source::Ours { prepared, .. } => {
-                (prepared.name.clone(), prepared.plan.describe(), prepared.setup)
+                (prepared.name.clone(), prepared.spec.description(), prepared.setup)
             }
             Source::Mitsuba(mitsuba) => {
                 let mitsuba = mitsuba.borrow();
                 ("mitsuba".to_owned(), mitsuba.describe(), mitsuba.setup())
             }
         };
-        Entry { name, settings, setup, reached, rungs }
+        Entry { name, settings, setup, reached, reached_covered, rungs }
     }
 }
 
@@ -278,6 +317,8 @@ pub(super) struct Entry {
     setup: Seconds,
     /// One for each error that was wanted.
     pub(super) reached: Vec<Option<Reached>>,
+    /// The same over the pixels that the scene fills, as tables had it before silhouettes counted.
+    pub(super) reached_covered: Vec<Option<Reached>>,
     pub(super) rungs: Vec<Rung>,
 }
 
@@ -293,7 +334,7 @@ pub(super) struct Reached {
     /// 1 / (relMSE · CPU seconds).
     pub(super) efficiency: f64,
     /// That over the efficiency of perfect product sampling at the ray kernel's rate; null for other programs
-    /// and where nothing is hidden, as it then is 0.
+    /// and where nothing is hidden, as it then is 0. Of the pixels that the scene fills alone.
     pub(super) efficiency_of_bound: Option<f64>,
 }
 

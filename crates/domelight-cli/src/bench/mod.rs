@@ -17,12 +17,12 @@ mod table;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Result, bail};
-use domelight::picture::require_writable;
 
 use crate::args::bench::{BenchArguments, Suite};
 use crate::failure::{UsageError, tell};
+use crate::files;
 use crate::interrupt;
-use crate::output::print;
+use crate::output::{print, print_json};
 use crate::scene::start_threads;
 use results::{Results, Rows};
 use table::Table;
@@ -32,10 +32,11 @@ pub(crate) fn run(arguments: &BenchArguments, quiet: bool) -> Result<()> {
     if let Some(path) = &arguments.table {
         let results = Results::read(path)?;
         let tables = results.tables().iter().map(Table::markdown).collect::<Vec<_>>();
-        return Ok(print(&format!("{}\n{}.", tables.join("\n"), results.describe()))?);
+        return print(&format!("{}\n{}.", tables.join("\n"), results.describe()));
     }
     check(arguments)?;
-    arguments.output.as_deref().map(require_writable).transpose()?;
+    arguments.output.as_deref().map(files::writes).transpose()?;
+    cases::declare(arguments)?;
     start_threads(arguments.threads)?;
     let bench = Bench { arguments, quiet, interrupted: interrupt::flag() };
     let mut results = Results::new(arguments.suite);
@@ -93,7 +94,7 @@ impl Bench<'_> {
             results.write(path)?;
         }
         if self.arguments.json {
-            print(&results.json()?)?;
+            print_json(results)?;
         } else if !self.quiet {
             let tables = results.tables().iter().map(Table::text).collect::<Vec<_>>();
             print(&format!("{}\n{}", tables.join("\n"), results.describe()))?;

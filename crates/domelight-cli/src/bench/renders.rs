@@ -16,7 +16,7 @@ use crate::args::bench::Peer;
 use crate::failure::warn;
 use crate::measure::cache::Cache;
 use crate::measure::reference::{Goal, Reference, ReferenceReport};
-use crate::notation::NamedStrategy;
+use crate::strategy::NamedStrategy;
 use crate::usage::Seconds;
 
 /// Strategies of the program that are unbiased.
@@ -102,8 +102,7 @@ fn run(
     {
         strategies.push(optimum.parse()?);
     }
-    let cache =
-        (!arguments.no_cache).then(|| Cache::new(arguments.cache.as_deref())).transpose()?;
+    let cache = Cache::unless(arguments.no_cache, arguments.cache.as_deref(), bench.quiet);
     let threads = rayon::current_num_threads();
     let peer = arguments.vs.map(|Peer::Mitsuba| Mitsuba::start(&arguments.python, threads));
     let peer = peer.transpose()?.map(RefCell::new);
@@ -328,6 +327,7 @@ fn costs(rows: &[Row], first_error: usize) -> Table {
     let errors = rows.first().map_or(&[][..], |row| &row.errors[first_error..]);
     let mut table = Table::new("CPU seconds to an error", &["case", "strategy"]);
     table.head.extend(errors.iter().map(|&error| format!("to {}", power(error))));
+    table.head.extend(errors.iter().map(|&error| format!("inside, to {}", power(error))));
     table.head.extend(["of bound".to_owned(), "Mrays/CPU-s".to_owned()]);
     table.notes.push(COSTS_NOTE.to_owned());
     for row in rows {
@@ -335,9 +335,10 @@ fn costs(rows: &[Row], first_error: usize) -> Table {
             let reached = &entry.reached[first_error..];
             let mut cells =
                 vec![if i == 0 { row.name() } else { String::new() }, entry.name.clone()];
-            cells.extend(reached.iter().map(|r| cell(r.as_ref())));
+            let inside = &entry.reached_covered[first_error..];
+            cells.extend(reached.iter().chain(inside).map(|r| cell(r.as_ref())));
             let near = |r: &&Reached| r.rel_mse <= HEADLINE;
-            let at = reached.iter().flatten().find(near).or(reached.iter().flatten().last());
+            let at = inside.iter().flatten().find(near).or(inside.iter().flatten().last());
             let of_bound = at.and_then(|reached| reached.efficiency_of_bound);
             cells.push(number(of_bound.unwrap_or(f64::NAN)));
             let rate = entry.rungs.last().and_then(|rung| rung.rays_per_cpu_second);
@@ -348,9 +349,9 @@ fn costs(rows: &[Row], first_error: usize) -> Table {
     table
 }
 
-const COSTS_NOTE: &str = "relMSE over the pixels that the scene fills; ~ extrapolated, ≤ cheaper still, – far beyond \
+const COSTS_NOTE: &str = "relMSE over all pixels that show any of the scene, silhouettes with them; inside: over those that the scene fills; ~ extrapolated, ≤ cheaper still, – far beyond \
      what was measured; in brackets the range over the seeds. Of bound: efficiency 1/(relMSE · CPU-s) at 1e-3, else at the least error, over \
-     that of perfect product sampling at the ray kernel's rate.";
+     that of perfect product sampling at the ray kernel's rate, both inside.";
 
 /// How many times as long the other program takes, at each error.
 fn ratios(rows: &[Row]) -> Table {

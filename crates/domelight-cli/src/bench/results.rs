@@ -5,7 +5,6 @@ use std::time::SystemTime;
 use std::{fs, io};
 
 use anyhow::{Context as _, Result};
-use domelight::picture::write_atomically;
 use serde::{Deserialize, Serialize};
 
 use super::machine::Machine;
@@ -13,6 +12,7 @@ use super::table::Table;
 use super::{kernels, renders, rigs};
 use crate::args::bench::Suite;
 use crate::failure::UsageError;
+use crate::files;
 use crate::typed;
 
 /// Raised when a file of before can no longer be read.
@@ -94,7 +94,7 @@ impl Results {
 
     pub(super) fn write(&self, path: &Path) -> Result<()> {
         let json = self.json()?;
-        Ok(write_atomically(path, |out| writeln!(out, "{json}"))?)
+        files::write(path, |out| writeln!(out, "{json}"))
     }
 
     /// When, where and with what, in a sentence.

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use domelight::quote::terminal;
+
 /// A heading, column heads and rows of as many cells.
 pub(super) struct Table {
     pub(super) title: String,
@@ -19,7 +21,11 @@ impl Table {
 
     /// The first column to the left, numbers to the right.
     pub(super) fn text(&self) -> String {
-        let lines = || std::iter::once(&self.head).chain(&self.rows);
+        // A name stays in its cell.
+        let visible = |row: &Vec<String>| row.iter().map(|cell| terminal::line(cell)).collect();
+        let all: Vec<Vec<String>> =
+            std::iter::once(&self.head).chain(&self.rows).map(visible).collect();
+        let lines = || all.iter();
         let width = |column: usize| {
             lines().map(|l| l.get(column).map_or(0, |c| c.chars().count())).max().unwrap_or(0)
         };
@@ -40,7 +46,10 @@ impl Table {
 
     /// As GitHub shows it.
     pub(super) fn markdown(&self) -> String {
-        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+        let cell = |cell: &String| terminal::line(cell).replace('\\', "\\\\").replace('|', "\\|");
+        let line = |cells: &[String]| {
+            format!("| {} |\n", cells.iter().map(cell).collect::<Vec<_>>().join(" | "))
+        };
         let rule = "---:|".repeat(self.head.len().saturating_sub(1));
         let mut text = format!("{}\n\n{}|---|{rule}\n", self.title, line(&self.head));
         for row in &self.rows {

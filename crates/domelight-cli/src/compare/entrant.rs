@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use domelight::RgbImage;
-use domelight::picture::compare::compare;
+use domelight::picture::compare::{REGULARIZER, compare};
 use serde::Serialize;
 
 use super::budget::{Budget, MOST_SAMPLES};
@@ -41,11 +41,22 @@ impl Spread {
 /// Cost and error at a number of samples.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct Step {
+    /// As asked for.
     pub(super) spp: u32,
-    /// Shadow rays of a pixel that the scene covers.
+    /// Camera samples of a pixel, as counted; the mean over seeds.
+    pub(super) camera_samples: f64,
+    /// Shadow rays of a pixel that the scene covers, as counted; the mean over seeds.
     pub(super) rays: f64,
     pub(super) cpu_seconds: Spread,
     pub(super) rel_mse: Spread,
+}
+
+/// relMSE that no more samples take away. An estimate, which may be below 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bias {
+    pub(super) mean: f64,
+    /// Of 95 %.
+    pub(super) interval: [f64; 2],
 }
 
 /// All that was measured of a strategy.
@@ -54,8 +65,8 @@ pub(super) struct Measured {
     pub(super) steps: Vec<Step>,
     /// The first seed's picture.
     pub(super) image: RgbImage,
-    /// relMSE that no more samples take away, estimated from the mean picture; none for one seed.
-    pub(super) bias: Option<f64>,
+    /// None for one seed.
+    pub(super) bias: Option<Bias>,
     pub(super) non_finite: u64,
 }
 
@@ -65,6 +76,8 @@ pub(super) struct Entrant<'a> {
     /// For the progress bar.
     pub(super) label: String,
     pub(super) reference: &'a RgbImage,
+    /// relMSE of the reference itself, as far as it is known.
+    pub(super) reference_noise: f64,
     pub(super) n_seeds: u32,
 }
 
@@ -79,12 +92,29 @@ impl Entrant<'_> {
     pub(super) fn calibrate(&self, budget: Budget) -> Result<Purchase> {
         match budget {
             Budget::Samples(n) => Ok(Purchase::Samples(n)),
-            Budget::Rays(rays) => {
-                let each = self.pilot(4)?.rays() / 4.0;
-                Ok(buy(rays, each, &format!("traces {each:.1} shadow rays")))
-            }
+            Budget::Rays(rays) => self.calibrate_rays(rays),
             Budget::Time(seconds) => self.calibrate_time(seconds),
         }
+    }
+
+    /// Goes from pilot to pilot, as strategies that learn trace fewer rays for a camera sample the more there are, and
+    /// takes the number whose rays came nearest.
+    fn calibrate_rays(&self, rays: f64) -> Result<Purchase> {
+        const MOST_PILOTS: usize = 4;
+        let each = self.pilot(4)?.rays() / 4.0;
+        let mut purchase = buy(rays, each, &format!("traces {each:.1} shadow rays"));
+        let mut tried: Vec<(u32, f64)> = Vec::new();
+        while let Purchase::Samples(n) = purchase {
+            if tried.len() == MOST_PILOTS || tried.iter().any(|&(m, _)| m == n) {
+                break;
+            }
+            let traced = self.pilot(n)?.rays();
+            tried.push((n, traced));
+            purchase = buy(rays, traced / f64::from(n), "");
+        }
+        let off = |traced: f64| (traced / rays).ln().abs();
+        let nearest = tried.into_iter().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+        Ok(nearest.map_or(purchase, |(n, _)| Purchase::Samples(n)))
     }
 
     /// Doubles the samples until they take an eighth of the time, then goes along the line through
@@ -113,28 +143,29 @@ impl Entrant<'_> {
             }
         }
         let mut pictures = Pictures::default();
-        let last = self.step(n_samples, |shot| pictures.add(shot))?;
-        steps.push(last);
-        let bias = pictures.bias(self.reference, last.rel_mse.mean);
+        steps.push(self.step(n_samples, |shot| pictures.add(shot, self.reference))?);
+        let bias = pictures.bias(self.reference_noise);
         let Pictures { first, non_finite, .. } = pictures;
         let image = first.unwrap_or_else(|| RgbImage::new(0, 0, Vec::new()));
         Ok(Measured { steps, image, bias, non_finite })
     }
 
     fn step(&self, n_samples: u32, mut see: impl FnMut(&Shot)) -> Result<Step> {
-        let (mut rays, mut seconds, mut errors) = (0.0, Vec::new(), Vec::new());
+        let (mut camera_samples, mut rays) = (0.0, 0.0);
+        let (mut seconds, mut errors) = (Vec::new(), Vec::new());
         for i in 0..self.n_seeds {
             let of = self.n_seeds;
             let label = format!("{}, {n_samples} spp, seed {} of {of}", self.label, i + 1);
             let seed = self.studio.settings.seed.wrapping_add(u64::from(i));
             let shot = self.studio.shoot(&label, n_samples, seed)?;
+            camera_samples += shot.camera_samples() / f64::from(of);
             rays += shot.rays() / f64::from(of);
             seconds.push(shot.seconds());
             errors.push(compare(&shot.layers.color, self.reference, None)?.rel_mse);
             see(&shot);
         }
         let (cpu_seconds, rel_mse) = (Spread::of(&seconds), Spread::of(&errors));
-        Ok(Step { spp: n_samples, rays, cpu_seconds, rel_mse })
+        Ok(Step { spp: n_samples, camera_samples, rays, cpu_seconds, rel_mse })
     }
 }
 
@@ -151,42 +182,57 @@ fn buy(budget: f64, each: f64, one_sample: &str) -> Purchase {
 #[derive(Default)]
 struct Pictures {
     first: Option<RgbImage>,
-    sum: Vec<[f64; 3]>,
+    /// Of each pixel and channel the differences d from the reference R, over √(R² + 0.01): Σ d and Σ d².
+    sums: Vec<[[f64; 2]; 3]>,
     n: u32,
     non_finite: u64,
 }
 
 impl Pictures {
-    fn add(&mut self, shot: &Shot) {
-        let pixels = &shot.layers.color.pixels;
-        self.sum.resize(pixels.len(), [0.0; 3]);
-        for (sum, pixel) in self.sum.iter_mut().zip(pixels) {
-            for (sum, c) in sum.iter_mut().zip(pixel.to_array()) {
-                *sum += f64::from(c);
-            }
-        }
-        self.first.get_or_insert_with(|| shot.layers.color.clone());
-        self.n += 1;
+    fn add(&mut self, shot: &Shot, reference: &RgbImage) {
+        self.add_picture(&shot.layers.color, reference);
         self.non_finite += shot.counts.non_finite;
     }
 
-    /// With `error` = bias² + variance and that of the mean of n pictures bias² + variance / n, the
-    /// bias² = (n error of the mean − error) / (n − 1); an estimate, which may be below 0.
-    fn bias(&self, reference: &RgbImage, error: f64) -> Option<f64> {
+    fn add_picture(&mut self, image: &RgbImage, reference: &RgbImage) {
+        self.sums.resize(image.pixels.len(), [[0.0; 2]; 3]);
+        for (sums, (x, r)) in self.sums.iter_mut().zip(image.pixels.iter().zip(&reference.pixels)) {
+            for (sums, (x, r)) in sums.iter_mut().zip(x.to_array().into_iter().zip(r.to_array())) {
+                let (x, r) = (f64::from(x), f64::from(r));
+                let d = (x - r) / (r * r + REGULARIZER).sqrt();
+                *sums = [sums[0] + d, sums[1] + d * d];
+            }
+        }
+        self.first.get_or_insert_with(|| image.clone());
+        self.n += 1;
+    }
+
+    /// Two independent pictures I and J have E[(I − R)(J − R)] = bias² + that of the reference's own error, so the mean
+    /// over all pairs, ((Σ d)² − Σ d²) / (n (n − 1)), less `noise` estimates bias². Pixels err independently of one
+    /// another, so their spread gives the interval.
+    fn bias(&self, noise: f64) -> Option<Bias> {
         if self.n < 2 {
             return None;
         }
         let n = f64::from(self.n);
-        let mean = self.sum.iter().map(|sum| sum.map(|c| (c / n) as f32).into()).collect();
-        let mean = RgbImage::new(reference.width, reference.height, mean);
-        let of_mean = compare(&mean, reference, None).ok()?.rel_mse;
-        Some((n * of_mean - error) / (n - 1.0))
+        let of_channel = |[sum, squares]: [f64; 2]| (sum * sum - squares) / (n * (n - 1.0));
+        let of_pixel =
+            |sums: &[[f64; 2]; 3]| sums.iter().copied().map(of_channel).sum::<f64>() / 3.0;
+        let n_pixels = self.sums.len() as f64;
+        let mean = self.sums.iter().map(of_pixel).sum::<f64>() / n_pixels;
+        let variance = self.sums.iter().map(|s| (of_pixel(s) - mean).powi(2)).sum::<f64>()
+            / (n_pixels * (n_pixels - 1.0).max(1.0));
+        let half = 1.96 * variance.sqrt();
+        let mean = mean - noise;
+        Some(Bias { mean, interval: [mean - half, mean + half] })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use domelight::Rgb;
+    use domelight::sampling::Pcg32;
 
     #[test]
     fn samples_are_whole_and_never_none() {
@@ -207,5 +253,39 @@ mod tests {
         let spread = Spread::of(&[1.0, 2.0, 3.0]);
         assert_eq!((spread.mean, spread.sd), (2.0, Some(1.0)));
         assert!(Spread::of(&[4.0]).sd.is_none());
+    }
+
+    /// Of noisy pictures without bias against a noisy reference, and of pictures with bias.
+    #[test]
+    fn the_noise_of_the_reference_is_no_bias() {
+        let (width, height, n_seeds) = (64, 64, 5);
+        let mut pcg = Pcg32::new(7, 8);
+        // Little, as errors are divided by the reference with its noise.
+        let noise = 0.01f64;
+        // A uniform number of variance noise².
+        let mut noisy = |value: f32| {
+            let pixel =
+                |_, _| Rgb::splat(value + noise as f32 * 12f32.sqrt() * (pcg.next_f32() - 0.5));
+            RgbImage::from_fn(width, height, pixel)
+        };
+        let of_reference = noise * noise / 1.01;
+        for bias in [0.0f64, 0.005] {
+            let truth = bias * bias / 1.01;
+            let mut n_inside = 0;
+            for _ in 0..60 {
+                let reference = noisy(1.0);
+                let mut pictures = Pictures::default();
+                assert_eq!(pictures.bias(of_reference), None);
+                for _ in 0..n_seeds {
+                    pictures.add_picture(&noisy(1.0 + bias as f32), &reference);
+                }
+                let Bias { mean, interval: [low, high] } = pictures.bias(of_reference).unwrap();
+                assert!(low < mean && mean < high, "{low} to {high}");
+                assert!(high - low < 0.3 * of_reference, "{low} to {high}");
+                n_inside += u32::from(low <= truth && truth <= high);
+            }
+            // 95 % of 60 are 57, give or take 1.7.
+            assert!(n_inside >= 50, "{bias}: {n_inside} of 60 intervals hold the truth");
+        }
     }
 }

@@ -14,22 +14,22 @@ use domelight::RgbImage;
 use domelight::picture::compare::relative_error_map;
 use domelight::picture::flip::{PIXELS_PER_DEGREE, ldr_flip};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
-use domelight::picture::{require_writable, write_atomically};
 use domelight::render::{RenderSettings, survey};
+use domelight::strategy::{PreparedStrategy, StrategyKind};
 
 pub(crate) use budget::Budget;
 
 use crate::args::compare::CompareArguments;
-use crate::args::sampling::StrategyName;
-use crate::failure::{UsageError, tell, warn};
+use crate::failure::{UsageError, tell, warn, warn_of_non_finite};
+use crate::files;
 use crate::interrupt;
 use crate::measure::cache::Cache;
 use crate::measure::reference::{Goal, Reference, Source};
 use crate::measure::shot::Studio;
 use crate::memory;
-use crate::notation::NamedStrategy;
-use crate::output::print;
+use crate::output::print_json;
 use crate::scene::{View, start_threads};
+use crate::strategy::{NamedStrategy, refuse_repeating_points};
 use crate::typed;
 use crate::usage::Stopwatch;
 use crate::values::Size;
@@ -46,7 +46,7 @@ const TOLERANCE: f64 = 0.1;
 pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     check(arguments)?;
     for path in [Some(&arguments.output), arguments.json.as_ref()].into_iter().flatten() {
-        require_writable(path)?;
+        files::writes(path)?;
     }
     let Size { width, height } = arguments.scene.camera.size;
     memory::allow_picture(width, height, memory::COMPARED_PIXEL)?;
@@ -73,8 +73,7 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
 
 /// The reference that the cache may have.
 fn converged(arguments: &CompareArguments, view: &View, quiet: bool) -> Result<Reference> {
-    let cache =
-        (!arguments.no_cache).then(|| Cache::new(arguments.cache.as_deref())).transpose()?;
+    let cache = Cache::unless(arguments.no_cache, arguments.cache.as_deref(), quiet);
     let settings = arguments.scene.render_settings(&arguments.pixel, 1);
     let goal = Goal::Samples(arguments.reference_spp);
     Reference::of_view(cache.as_ref(), view, settings, goal, quiet)
@@ -100,16 +99,14 @@ fn write(
     pictures: &[Option<Picture>],
     reference: &RgbImage,
 ) -> Result<()> {
-    let html = page::html(report, pictures, reference)?;
-    write_atomically(&arguments.output, |out| out.write_all(html.as_bytes()))?;
+    let page = page::page(report, pictures, reference)?;
+    files::write(&arguments.output, |out| out.write_all(page.as_str().as_bytes()))?;
     let Some(path) = &arguments.json else { return Ok(()) };
-    let json = serde_json::to_string_pretty(report)?;
     if path == Path::new("-") {
-        print(&json)?;
-    } else {
-        write_atomically(path, |out| writeln!(out, "{json}"))?;
+        return print_json(report);
     }
-    Ok(())
+    let json = serde_json::to_string_pretty(report)?;
+    files::write(path, |out| writeln!(out, "{json}"))
 }
 
 /// What the page shows of a strategy.
@@ -141,7 +138,7 @@ impl Competition<'_> {
             strategies.push(report);
             pictures.push(picture);
         }
-        let of_mis = arguments.strategies.iter().position(|s| s.name == StrategyName::Mis);
+        let of_mis = arguments.strategies.iter().position(|s| s.spec.kind() == StrategyKind::Mis);
         compare_with(of_mis, &mut strategies);
         let report = CompareReport {
             version: env!("CARGO_PKG_VERSION"),
@@ -168,20 +165,21 @@ impl Competition<'_> {
         let View { scene, camera, environment, .. } = self.view;
         let mut watch = Stopwatch::start();
         let points = || survey(scene, camera, &settings);
-        let plan = strategy.plan.for_scene(points, environment, settings.seed);
-        let renderer = plan.prepare(environment)?;
+        let spec = strategy.spec.for_scene(points, environment, settings.seed);
+        let prepared = PreparedStrategy::new(spec, environment)?;
         let setup = watch.lap();
-        let studio = Studio { view: self.view, settings, renderer: &renderer, quiet: self.quiet };
+        let studio = Studio { view: self.view, settings, strategy: &prepared, quiet: self.quiet };
         let entrant = Entrant {
             studio,
             label: strategy.text.clone(),
             reference: &self.reference.picture.image,
+            reference_noise: self.reference.report.rel_mse.unwrap_or(0.0),
             n_seeds: self.arguments.seeds,
         };
         let mut report = StrategyReport {
             name: strategy.text.clone(),
-            settings: plan.describe(),
-            unbiased: plan.is_unbiased(),
+            settings: spec.description(),
+            unbiased: spec.is_unbiased(),
             setup_seconds: setup.cpu.unwrap_or(setup.wall),
             left_out: None,
             result: None,
@@ -192,7 +190,7 @@ impl Competition<'_> {
                 Ok((report, None))
             }
             Purchase::Samples(n) => {
-                plan.refuse_repeating_points(n)?;
+                refuse_repeating_points(spec, n)?;
                 let measured = entrant.measure(n)?;
                 let picture = self.picture(&measured)?;
                 report.result = ResultReport::new(&measured, &picture.flip);
@@ -222,11 +220,13 @@ impl ResultReport {
         let last = measured.steps.last()?;
         Some(Self {
             spp: last.spp,
+            camera_samples: last.camera_samples,
             rays: last.rays,
             cpu_seconds: last.cpu_seconds,
             rel_mse: last.rel_mse,
             flip: flip.iter().map(|&e| f64::from(e)).sum::<f64>() / flip.len() as f64,
-            bias: measured.bias,
+            bias: measured.bias.map(|bias| bias.mean),
+            bias_interval: measured.bias.map(|bias| bias.interval),
             efficiency: 1.0 / (last.rel_mse.mean * last.cpu_seconds.mean),
             error_ratio_to_mis: None,
             efficiency_ratio_to_mis: None,
@@ -259,10 +259,7 @@ impl CompareReport {
             if let Some((what, off)) = self.miss(result) {
                 warn(quiet, &format!("{name} misses the budget by {off:+.0} %: {what}"));
             }
-            if result.non_finite_samples > 0 {
-                let n = result.non_finite_samples;
-                warn(quiet, &format!("{name}: {n} samples were NaN or infinite, taken as black"));
-            }
+            warn_of_non_finite(quiet, &format!("{name}: "), result.non_finite_samples);
             // Noise makes the estimate uncertain, never that much.
             let is_off = result.bias.is_some_and(|bias| bias > 0.5 * result.rel_mse.mean);
             if *unbiased && is_off && self.reference.source == Source::File {

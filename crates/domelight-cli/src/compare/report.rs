@@ -47,15 +47,21 @@ pub(super) struct StrategyReport {
 /// What a strategy did with the budget.
 #[derive(Serialize)]
 pub(super) struct ResultReport {
+    /// As asked for.
     pub(super) spp: u32,
-    /// Shadow rays of a pixel that the scene covers.
+    /// Camera samples of a pixel, as counted; the mean over seeds.
+    pub(super) camera_samples: f64,
+    /// Shadow rays of a pixel that the scene covers, as counted; the mean over seeds.
     pub(super) rays: f64,
     pub(super) cpu_seconds: Spread,
     pub(super) rel_mse: Spread,
     /// Mean ꟻLIP of the first seed's picture.
     pub(super) flip: f64,
-    /// The part of relMSE that more samples do not take away, estimated; null for a single seed.
+    /// The part of relMSE that more samples do not take away: an estimate, which may be below 0, without the reference's
+    /// own error where that is known; null for a single seed.
     pub(super) bias: Option<f64>,
+    /// The 95 % interval of `bias`.
+    pub(super) bias_interval: Option<[f64; 2]>,
     /// 1 / (relMSE · CPU seconds).
     pub(super) efficiency: f64,
     /// relMSE of mis over this one's: above 1 is better than mis. Null without mis in the list.

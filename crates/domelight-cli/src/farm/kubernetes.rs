@@ -1,15 +1,16 @@
 //! Kubernetes: an Indexed Job, and a Job that merges.
 
-use super::{Farm, File, Submission, text};
-use crate::shell::quote;
+use domelight::code;
+use domelight::quote::{Code, Shell, Yaml, shell, yaml};
+
+use super::{Farm, File, Submission};
 
 /// `render.yaml` and `merge.yaml`: scene and parts lie on the volume claim `domelight`, mounted at `/work`.
 pub(super) fn submission(farm: &Farm) -> Submission {
-    let Farm { render, n_shards, threads, name, image, .. } = farm;
-    let image = serde_json::Value::from(image.as_str()).to_string();
-    let job = |name: &str, spec: &str, command: &str, cpus: u32| {
-        let command = serde_json::Value::from(command).to_string();
-        format!(
+    let Farm { render, n_shards, threads, name, .. } = farm;
+    let job = |name: &str, spec: &Code<Yaml>, command: &Code<Shell>, cpus: u32| {
+        code!(
+            Yaml,
             r#"apiVersion: batch/v1
 kind: Job
 metadata: {{ name: {name} }}
@@ -28,10 +29,16 @@ spec:
           resources: {{ requests: {{ cpu: "{cpus}" }}, limits: {{ cpu: "{cpus}" }} }}
           volumeMounts: [{{ name: work, mountPath: /work }}]
       volumes: [{{ name: work, persistentVolumeClaim: {{ claimName: domelight }} }}]
-"#
+"#,
+            name = yaml::string(name),
+            spec = spec,
+            image = yaml::string(&farm.image),
+            command = yaml::kubernetes_argument(command.as_str()),
+            cpus = cpus,
         )
     };
-    let spec = format!(
+    let spec = code!(
+        Yaml,
         "  completions: {n_shards}
   parallelism: {n_shards}
   completionMode: Indexed
@@ -44,24 +51,36 @@ spec:
       - action: Ignore # 75: interrupted and saved, no failure
         onExitCodes: {{ containerName: domelight, operator: In, values: [75] }}
       - action: Ignore # evicted or drained: no failure
-        onPodConditions: [{{ type: DisruptionTarget }}]"
+        onPodConditions: [{{ type: DisruptionTarget }}]",
+        n_shards = *n_shards,
     );
-    let shard = format!(
-        "mkdir -p {name}-parts && exec domelight render {render} --shard $JOB_COMPLETION_INDEX/{n_shards} --threads {threads} --quiet -o {name}-parts/part-$JOB_COMPLETION_INDEX.exr"
+    let parts = shell::word(&format!("{name}-parts"));
+    let shard = code!(
+        Shell,
+        "mkdir -p {parts} && exec domelight render --shard $JOB_COMPLETION_INDEX/{n_shards} --threads {threads} --quiet \
+         -o {parts}/part-$JOB_COMPLETION_INDEX.exr {render}",
+        parts = parts,
+        n_shards = *n_shards,
+        threads = *threads,
+        render = render,
     );
-    let merge = format!("exec domelight merge {name}-parts -o {name}.exr");
+    let merge = code!(
+        Shell,
+        "exec domelight merge {parts} -o {picture}",
+        parts = parts,
+        picture = shell::word(&format!("{name}.exr")),
+    );
+    let merge_spec = Code::literal("  backoffLimit: 3");
     let files = vec![
-        File { name: "render.yaml", text: job(name, &spec, &shard, *threads) },
-        File {
-            name: "merge.yaml",
-            text: job(&format!("{name}-merge"), "  backoffLimit: 3", &merge, 1),
-        },
+        File::template("render.yaml", job(name, &spec, &shard, *threads)),
+        File::template("merge.yaml", job(&format!("{name}-merge"), &merge_spec, &merge, 1)),
     ];
-    let file = |name: &str| quote(&text(&farm.folder.join(name)));
-    let command = format!(
-        "kubectl apply -f {} && kubectl wait --for=condition=complete --timeout=-1s job/{name} && kubectl apply -f {}",
-        file("render.yaml"),
-        file("merge.yaml")
+    let command = code!(
+        Shell,
+        "kubectl apply -f {render} && kubectl wait --for=condition=complete --timeout=-1s {job} && kubectl apply -f {merge}",
+        render = farm.file("render.yaml"),
+        job = shell::word(&format!("job/{name}")),
+        merge = farm.file("merge.yaml"),
     );
     Submission { files, command }
 }

@@ -7,15 +7,17 @@ mod parallel;
 mod slurm;
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context as _, Result};
-use domelight::picture::write_atomically;
+use domelight::code;
+use domelight::quote::{Code, Shell, Yaml, shell};
 
 use crate::args::farm::{Engine, FarmArguments};
 use crate::failure::{UsageError, tell};
-use crate::output::print;
-use crate::shell::quote;
+use crate::files;
+use crate::output::print_code;
+use crate::strategy::refuse_repeating_points;
 
 /// What every engine is told.
 struct Farm {
@@ -24,51 +26,67 @@ struct Farm {
     /// Where the jobs run: the folder that relative names in `render` start from.
     cwd: String,
     /// Where the files are, and the folder `parts` in it.
-    folder: PathBuf,
-    /// The arguments of `domelight render`, quoted for a shell.
-    render: String,
+    folder: String,
+    /// The arguments of `domelight render`; they stand last.
+    render: Code<Shell>,
     n_shards: u32,
     /// Threads of each shard.
     threads: u32,
     /// The merged picture.
-    picture: PathBuf,
+    picture: String,
     /// A name that every engine accepts: lower case letters, digits and hyphens.
     name: String,
     /// The container image for Kubernetes.
     image: String,
 }
 
-/// A file to write, and whether it can be run.
+/// A file to write.
 struct File {
     name: &'static str,
     text: String,
 }
 
+impl File {
+    fn script(name: &'static str, text: Code<Shell>) -> Self {
+        Self { name, text: text.into_string() }
+    }
+
+    fn template(name: &'static str, text: Code<Yaml>) -> Self {
+        Self { name, text: text.into_string() }
+    }
+}
+
 /// Files and the command that submits them.
 struct Submission {
     files: Vec<File>,
-    command: String,
+    command: Code<Shell>,
 }
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &FarmArguments, quiet: bool) -> Result<()> {
-    arguments.strategy.plan()?.refuse_repeating_points(arguments.samples.spp)?;
+    refuse_repeating_points(arguments.strategy.spec()?, arguments.samples.spp)?;
     let farm = Farm::new(arguments)?;
     let Submission { files, command } = match arguments.engine {
         Engine::Slurm => slurm::submission(&farm),
         Engine::Openjd => openjd::submission(&farm),
         Engine::Kubernetes => kubernetes::submission(&farm),
-        Engine::Parallel => parallel::submission(&farm),
+        Engine::Parallel => parallel::submission(&farm)?,
     };
-    fs::create_dir_all(farm.parts()).with_context(|| farm.parts().display().to_string())?;
+    // Jobs read these, and write the picture.
+    arguments.scene.declare()?;
+    for path in files.iter().map(|file| farm.path(file.name)).chain([farm.picture.clone()]) {
+        files::declare(Path::new(&path))?;
+    }
+    let parts = farm.path("parts");
+    fs::create_dir_all(&parts).with_context(|| parts.clone())?;
     for file in &files {
-        let path = farm.folder.join(file.name);
-        write_atomically(&path, |out| out.write_all(file.text.as_bytes()))?;
+        let path = farm.path(file.name);
+        files::write(Path::new(&path), |out| out.write_all(file.text.as_bytes()))?;
         if !quiet {
-            tell(&format!("wrote {}", path.display()));
+            tell(&format!("wrote {path}"));
         }
     }
-    print(&command)?;
+    print_code(&command)?;
     Ok(())
 }
 
@@ -78,57 +96,57 @@ impl Farm {
         let program = std::env::current_exe().context("the path of this program")?;
         let folder = cwd.join(&arguments.output);
         let stem = Path::new(&arguments.scene.scene).file_stem().unwrap_or_default();
-        let picture = arguments.picture.clone().unwrap_or_else(|| folder.join("picture.exr"));
+        let picture = match &arguments.picture {
+            Some(picture) if picture.is_standard_output() => {
+                return Err(UsageError("--picture -: a farm's picture is a file".into()).into());
+            }
+            Some(picture) => cwd.join(&picture.path),
+            None => folder.join("picture.exr"),
+        };
+        let words = &arguments.render.words;
+        let words = words.iter().map(|word| utf8(Path::new(word))).collect::<Result<Vec<_>>>()?;
         Ok(Self {
             program: utf8(&program)?,
             cwd: utf8(&cwd)?,
-            render: render_arguments(std::env::args().skip(1)),
+            render: shell::words(words),
             n_shards: arguments.shards,
             threads: arguments.pixel.threads.unwrap_or(arguments.cpus),
-            picture: cwd.join(picture),
+            picture: utf8(&picture)?,
             name: job_name(&stem.to_string_lossy()),
             image: arguments.image.clone(),
-            folder,
+            folder: utf8(&folder)?,
         })
     }
 
-    fn parts(&self) -> PathBuf {
-        self.folder.join("parts")
+    /// The path of a file in the folder.
+    fn path(&self, name: &str) -> String {
+        // Both are UTF-8.
+        Path::new(&self.folder).join(name).to_string_lossy().into_owned()
     }
 
-    /// The command of shard `k`, a shell expression, but for the program.
-    fn shard(&self, k: &str) -> String {
-        let Self { render, n_shards, threads, .. } = self;
-        let part = format!("{}/part-{k}.exr", text(&self.parts()));
-        format!("render {render} --shard {k}/{n_shards} --threads {threads} -o \"{part}\"")
+    /// The same as a word.
+    fn file(&self, name: &str) -> Code<Shell> {
+        shell::word(&self.path(name))
+    }
+
+    /// The command of shard `k`, a word that the shell makes, but for the program.
+    fn shard(&self, k: &'static str) -> Code<Shell> {
+        code!(
+            Shell,
+            "render --shard {k}/{n_shards} --threads {threads} --quiet -o {part}{k}.exr {render}",
+            k = k,
+            n_shards = self.n_shards,
+            threads = self.threads,
+            part = shell::word(&self.path("parts/part-")),
+            render = self.render,
+        )
     }
 
     /// The command that merges, but for the program.
-    fn merge(&self) -> String {
-        format!("merge {} -o {}", quote(&text(&self.parts())), quote(&text(&self.picture)))
+    fn merge(&self) -> Code<Shell> {
+        let picture = shell::word(&self.picture);
+        code!(Shell, "merge {parts} -o {picture}", parts = self.file("parts"), picture = picture)
     }
-}
-
-/// The arguments that belong to `render`: those after `farm ENGINE` without farm's own.
-fn render_arguments(all: impl Iterator<Item = String>) -> String {
-    const OWN: [&str; 6] = ["--shards", "--output", "-o", "--picture", "--cpus", "--image"];
-    let mut rest = Vec::new();
-    let mut all =
-        all.filter(|a| !matches!(a.as_str(), "-q" | "--quiet")).skip_while(|a| a != "farm");
-    // `farm` and the engine.
-    all.by_ref().take(2).for_each(drop);
-    while let Some(argument) = all.next() {
-        let flag = argument.split('=').next().unwrap_or_default();
-        let glued = argument.starts_with("-o") && !argument.starts_with("--") && argument.len() > 2;
-        match () {
-            () if OWN.contains(&argument.as_str()) => drop(all.next()),
-            // Threads are each engine's to set.
-            () if argument == "--threads" => drop(all.next()),
-            () if OWN.contains(&flag) || flag == "--threads" || glued => {}
-            () => rest.push(quote(&argument)),
-        }
-    }
-    rest.join(" ")
 }
 
 fn job_name(stem: &str) -> String {
@@ -142,28 +160,9 @@ fn utf8(path: &Path) -> Result<String> {
     Ok(path.to_str().map(str::to_owned).ok_or_else(refuse)?)
 }
 
-fn text(path: &Path) -> String {
-    path.to_string_lossy().into_owned()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn of(arguments: &[&str]) -> String {
-        render_arguments(arguments.iter().map(|a| (*a).to_owned()))
-    }
-
-    #[test]
-    fn renders_arguments_are_kept_and_farms_own_are_not() {
-        let all = ["-q", "farm", "slurm", "a scene.toml", "--spp", "9", "--shards", "8", "-o", "x"];
-        assert_eq!(of(&all), "'a scene.toml' --spp 9");
-        let glued =
-            ["farm", "openjd", "--shards=8", "-ox", "--threads=3", "statue", "--env=it's.hdr"];
-        assert_eq!(of(&glued), r"statue '--env=it'\''s.hdr'");
-        let origin = ["farm", "parallel", "--cpus", "2", "--origin", "-1,2,3", "--threads", "4"];
-        assert_eq!(of(&origin), "--origin -1,2,3");
-    }
 
     #[test]
     fn names_suit_every_engine() {

@@ -1,13 +1,33 @@
 //! Open Job Description: a job template for Deadline Cloud and others.
+//!
+//! What stands in double braces is replaced wherever it stands, also within the quotes of a script. So scripts get
+//! values as arguments, and what they hold of names has no two braces side by side ([`shell::word`]).
 
-use super::{Farm, File, Submission, text};
-use crate::shell::quote;
+use domelight::code;
+use domelight::quote::{Shell, Yaml, shell, yaml};
+
+use super::{Farm, File, Submission};
+
+/// The column of the scripts in the template.
+const SCRIPT: usize = 12;
 
 /// `job.yaml`. A default of a path must be relative to the template's folder, so that what lies elsewhere is given
 /// on the command line.
 pub(super) fn submission(farm: &Farm) -> Submission {
-    let Farm { program, cwd, render, n_shards, threads, name, .. } = farm;
-    let template = format!(
+    let render = code!(
+        Shell,
+        "set -eu\n\
+         program=$1 work=$2 parts=$3 shard=$4 shards=$5\n\
+         cd \"$work\"\n\
+         mkdir -p \"$parts\"\n\
+         k=$((shard - 1))\n\
+         exec \"$program\" render --shard \"$k/$shards\" --threads {threads} --progress openjd -o \"$parts/part-$k.exr\" {render}\n",
+        threads = farm.threads,
+        render = farm.render,
+    );
+    let merge = code!(Shell, "set -eu\nexec \"$1\" merge -o \"$3\" -- \"$2\"\n");
+    let template = code!(
+        Yaml,
         r#"specificationVersion: jobtemplate-2023-09
 name: {name}
 parameterDefinitions:
@@ -25,39 +45,49 @@ steps:
       actions:
         onRun:
           command: sh
-          args: ["{{{{Task.File.Run}}}}"]
+          args:
+            - "{{{{Task.File.Run}}}}"
+            - "{{{{Param.Program}}}}"
+            - "{{{{Param.WorkDir}}}}"
+            - "{{{{Param.PartsDir}}}}"
+            - "{{{{Task.Param.Shard}}}}"
+            - "{{{{Param.Shards}}}}"
           # A shard that is run again goes on with its part.
           cancelation: {{ mode: NOTIFY_THEN_TERMINATE, notifyPeriodInSeconds: 30 }}
       embeddedFiles:
         - name: Run
           type: TEXT
-          data: |
-            set -eu
-            cd '{{{{Param.WorkDir}}}}'
-            mkdir -p '{{{{Param.PartsDir}}}}'
-            k=$(( {{{{Task.Param.Shard}}}} - 1 ))
-            exec '{{{{Param.Program}}}}' render {render} --shard "$k/{{{{Param.Shards}}}}" --threads {threads} --progress openjd -o '{{{{Param.PartsDir}}}}'/part-"$k".exr
+          data: {render}
     hostRequirements:
       amounts: [{{ name: amount.worker.vcpu, min: {threads} }}]
   - name: Merge
     dependencies: [{{ dependsOn: Render }}]
     script:
       actions:
-        onRun: {{ command: sh, args: ["{{{{Task.File.Run}}}}"] }}
+        onRun:
+          command: sh
+          args: ["{{{{Task.File.Run}}}}", "{{{{Param.Program}}}}", "{{{{Param.PartsDir}}}}", "{{{{Param.Picture}}}}"]
       embeddedFiles:
         - name: Run
           type: TEXT
-          data: |
-            set -eu
-            exec '{{{{Param.Program}}}}' merge '{{{{Param.PartsDir}}}}' -o '{{{{Param.Picture}}}}'
+          data: {merge}
 "#,
-        program = serde_json::Value::from(program.as_str()),
+        name = yaml::string(&farm.name),
+        program = yaml::string(&farm.program),
+        n_shards = farm.n_shards,
+        threads = farm.threads,
+        render = yaml::script(&render, SCRIPT),
+        merge = yaml::script(&merge, SCRIPT),
     );
-    let job = quote(&text(&farm.folder.join("job.yaml")));
-    let mut command = format!("openjd run {job} -p {}", quote(&format!("WorkDir={cwd}")));
-    if farm.picture != farm.folder.join("picture.exr") {
-        let picture = format!("Picture={}", text(&farm.picture));
-        command = format!("{command} -p {}", quote(&picture));
+    let mut command = code!(
+        Shell,
+        "openjd run {job} -p {work}",
+        job = farm.file("job.yaml"),
+        work = shell::word(&format!("WorkDir={}", farm.cwd)),
+    );
+    if farm.picture != farm.path("picture.exr") {
+        let picture = format!("Picture={}", farm.picture);
+        command += code!(Shell, " -p {picture}", picture = shell::word(&picture));
     }
-    Submission { files: vec![File { name: "job.yaml", text: template }], command }
+    Submission { files: vec![File::template("job.yaml", template)], command }
 }

@@ -1,15 +1,15 @@
 //! Slurm: an array job and a merge after it.
 
-use super::{Farm, File, Submission, text};
-use crate::shell::quote;
+use domelight::code;
+use domelight::quote::{Shell, shell};
+
+use super::{Farm, File, Submission};
 
 /// `render.sbatch`, `merge.sbatch` and `submit.sh`.
 pub(super) fn submission(farm: &Farm) -> Submission {
-    let Farm { program, cwd, n_shards, threads, name, .. } = farm;
-    let (cwd, program, folder) = (quote(cwd), quote(program), text(&farm.folder));
-    // The bare index and the number in the text: the engine's own counts change when single tasks run again.
-    let shard = farm.shard("${SLURM_ARRAY_TASK_ID}");
-    let render = format!(
+    let Farm { name, threads, .. } = farm;
+    let render = code!(
+        Shell,
         "#!/bin/bash\n\
          #SBATCH --job-name={name}\n\
          #SBATCH --array=0-{last}\n\
@@ -23,10 +23,17 @@ pub(super) fn submission(farm: &Farm) -> Submission {
          # a shard that is run again goes on with its part, and leaves a finished one as it is.\n\
          set -eu\n\
          cd {cwd}\n\
-         exec {program} {shard} --quiet\n",
-        last = n_shards - 1
+         exec {program} {shard}\n",
+        name = shell::word(name),
+        last = farm.n_shards - 1,
+        threads = *threads,
+        cwd = shell::word(&farm.cwd),
+        program = shell::word(&farm.program),
+        // The bare index and the number in the text: the engine's own counts change when single tasks run again.
+        shard = farm.shard("\"${SLURM_ARRAY_TASK_ID}\""),
     );
-    let merge = format!(
+    let merge = code!(
+        Shell,
         "#!/bin/bash\n\
          #SBATCH --job-name={name}-merge\n\
          #SBATCH --ntasks=1\n\
@@ -36,9 +43,13 @@ pub(super) fn submission(farm: &Farm) -> Submission {
          set -eu\n\
          cd {cwd}\n\
          exec {program} {merge}\n",
-        merge = farm.merge()
+        name = shell::word(name),
+        cwd = shell::word(&farm.cwd),
+        program = shell::word(&farm.program),
+        merge = farm.merge(),
     );
-    let submit = format!(
+    let submit = code!(
+        Shell,
         "#!/bin/sh\n\
          # Submits the array and the merge that waits for it; arguments go to both sbatch commands.\n\
          set -eu\n\
@@ -47,12 +58,12 @@ pub(super) fn submission(farm: &Farm) -> Submission {
          array=${{array%%;*}}\n\
          merge=$(sbatch --parsable --dependency=afterany:\"$array\" \"$@\" merge.sbatch)\n\
          echo \"array $array, merge ${{merge%%;*}}\"\n",
-        folder = quote(&folder)
+        folder = shell::word(&farm.folder)
     );
     let files = vec![
-        File { name: "render.sbatch", text: render },
-        File { name: "merge.sbatch", text: merge },
-        File { name: "submit.sh", text: submit },
+        File::script("render.sbatch", render),
+        File::script("merge.sbatch", merge),
+        File::script("submit.sh", submit),
     ];
-    Submission { files, command: format!("sh {}", quote(&format!("{folder}/submit.sh"))) }
+    Submission { files, command: code!(Shell, "sh {submit}", submit = farm.file("submit.sh")) }
 }

@@ -1,14 +1,15 @@
 //! Figure 8: bias against variance, every method's error over its rays.
 
 use anyhow::Result;
+use domelight::code;
+use domelight::quote::Html;
 use domelight::sampling::SamplerKind;
-use domelight::strategy::{Proposal, Stop};
+use domelight::strategy::{Proposal, Stop, StrategySpec};
 
 use super::figure::{Figure, Row, Table, number, plot_panel};
 use super::formulas;
 use super::four_ways::{mis, sir};
 use super::studio::{Studio, Subject};
-use crate::strategy::Plan;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE};
 
@@ -18,20 +19,20 @@ const CANDIDATES: u32 = 4;
 const TRIES: u32 = 8;
 
 /// A plan for a number of rays or lights.
-type PlanFor = fn(u32) -> Plan;
+type PlanFor = fn(u32) -> StrategySpec;
 
 /// What is compared, by name.
 const METHODS: [(&str, PlanFor); 7] = [
-    ("EM", |n| Plan::Environment { n }),
-    ("BRDF", |n| Plan::Brdf { n }),
+    ("EM", |n| StrategySpec::Environment { n_samples: n }),
+    ("BRDF", |n| StrategySpec::Brdf { n_samples: n }),
     ("MIS", |n| mis(n.div_ceil(2))),
     ("SIR, M = 4 N", |n| sir(n, Some(CANDIDATES * n))),
-    ("rejection", |n| Plan::Rejection {
+    ("rejection", |n| StrategySpec::Rejection {
         proposal: Proposal::Tighter,
         stop: Stop::Tries(TRIES * n),
     }),
-    ("median cut", |n| Plan::MedianCut { n_lights: n as usize }),
-    ("variance minimization", |n| Plan::VarianceMinimization { n_lights: n as usize }),
+    ("median cut", |n| StrategySpec::MedianCut { n_lights: n }),
+    ("variance minimization", |n| StrategySpec::VarianceMinimization { n_lights: n }),
 ];
 
 /// A method at one count, over all seeds.
@@ -129,12 +130,15 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         number: 8,
         title: "Bias against variance",
         slides: "slides 3 and 30",
-        caption: format!(
+        caption: code!(
+            Html,
             "<p>Error of every method over its shadow rays or lights at each point, for the statue of {MATERIAL}; bars are \
              the standard deviation over {n_seeds} seeds. Sampling is right on average, and its error falls \
              with 1/√N: a slope of −½ for independent numbers, whatever the method (the variance falls with \
              1/N, not with 1/N²). Stratified points fall faster. Fixed lights have no noise; what they have instead is \
-             bias, which falls as lights are added, but which no average over pictures takes away.</p>"
+             bias, which falls as lights are added, but which no average over pictures takes away.</p>",
+            MATERIAL = MATERIAL,
+            n_seeds = n_seeds,
         ),
         formulas: formulas::convergence(),
         rows: vec![Row::new("", plots), Row::new("", vec![over_time])],

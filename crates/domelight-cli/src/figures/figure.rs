@@ -8,9 +8,10 @@ use domelight::RgbImage;
 use domelight::picture::exr::ExrLayers;
 use domelight::picture::png::{self, Depth};
 use domelight::picture::tone::ToneMapping;
-use domelight::picture::write_atomically;
+use domelight::quote::{Code, Html};
 use serde_json::{Map, Value};
 
+use crate::files;
 use crate::svg::plot::Plot;
 use crate::svg::{Anchor, Color, Document, Pixels, Rect, Style, TextStyle, rasterise, superscript};
 
@@ -21,7 +22,7 @@ pub(crate) struct Figure {
     /// The slides that it is about.
     pub(crate) slides: &'static str,
     /// What is to be seen, as HTML.
-    pub(crate) caption: String,
+    pub(crate) caption: Code<Html>,
     /// What is computed, as MathML.
     pub(crate) formulas: Vec<String>,
     pub(crate) rows: Vec<Row>,
@@ -86,7 +87,7 @@ impl Table {
 
 /// A CSV cell (RFC 4180).
 fn quoted(text: &str) -> String {
-    if text.contains(['"', ',', '\n']) {
+    if text.contains(['"', ',', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {
         text.to_owned()
@@ -165,7 +166,7 @@ impl Figure {
 
 /// Puts bytes into a file that is either the old one or the whole new one.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    Ok(write_atomically(path, |out| out.write_all(bytes))?)
+    files::write(path, |out| out.write_all(bytes))
 }
 
 /// The picture as it is shown.

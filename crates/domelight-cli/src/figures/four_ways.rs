@@ -2,18 +2,17 @@
 //! in equal time.
 
 use anyhow::Result;
+use domelight::quote::Code;
 use domelight::sampling::Heuristic;
-use domelight::strategy::{Candidates, Resampling};
+use domelight::strategy::{Candidates, Resampling, StrategySpec};
 
 use super::figure::{
     Figure, Picture, Radiance, Row, Table, count, number, picture_panel, plot_panel, png_bytes,
 };
 use super::formulas;
 use super::studio::{Measured, Shot, Studio, Subject};
-use crate::strategy::Plan;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE, Pixels};
-use crate::values::Split;
 
 /// The lecture's picture.
 const SIZE: (usize, usize) = (176, 248);
@@ -33,15 +32,19 @@ const MORE: [(&str, &str); 2] =
     [("Ward, α = 0.15 × 0.5", "ward:0.15:0.5"), ("Gold, GGX, α = 0.2", "ggx:0.2:gold")];
 
 /// The product by resampling, from candidates of both factors.
-pub(super) fn sir(n: u32, n_candidates: Option<u32>) -> Plan {
+pub(super) fn sir(n: u32, n_candidates: Option<u32>) -> StrategySpec {
     let (candidates, resampling) = (Candidates::Mixture, Resampling::SystematicSorted);
-    Plan::Sir { n_candidates, n, candidates, resampling }
+    StrategySpec::Sir { n_candidates, n_samples: n, candidates, resampling }
 }
 
 /// As many samples of the environment as of the BRDF, weighed as the program does by default.
-pub(super) fn mis(each: u32) -> Plan {
-    let split = Split { environment: each, brdf: each };
-    Plan::Mis { split, heuristic: Heuristic::Power, compensation: true }
+pub(super) fn mis(each: u32) -> StrategySpec {
+    StrategySpec::Mis {
+        n_environment: each,
+        n_brdf: each,
+        heuristic: Heuristic::Power,
+        compensation: true,
+    }
 }
 
 pub(crate) fn make(studio: &Studio) -> Result<Figure> {
@@ -50,7 +53,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         number: 4,
         title: "Environment, BRDF, both, and their product",
         slides: "slides 15, 19–20, 28–29",
-        caption: CAPTION.to_owned(),
+        caption: Code::literal(CAPTION),
         formulas: formulas::four_ways(),
         rows: Vec::new(),
         tables: vec![Table::new(&[
@@ -80,7 +83,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     figure.rows.push(Row::new("Error over time, at the lecture's counts and at equal time", plots));
     for (name, material) in MORE {
         let shot = studio.shot(Subject::Alone(material), width, height)?;
-        let em = Shown::new("EM", &shot, Plan::Environment { n: EM })?;
+        let em = Shown::new("EM", &shot, StrategySpec::Environment { n_samples: EM })?;
         let seconds = em.measured.taken.seconds;
         let resampled = equal_time(&shot, seconds, SIR.0, tuned_sir(&shot))?;
         let heading =
@@ -107,17 +110,23 @@ const CAPTION: &str = "<p>One camera ray a pixel, the same in all pictures; what
 /// A picture with its name.
 struct Shown {
     title: String,
-    plan: Plan,
+    plan: StrategySpec,
     measured: Measured,
 }
 
 impl Shown {
-    fn new(name: &str, shot: &Shot, plan: Plan) -> Result<Self> {
+    fn new(name: &str, shot: &Shot, plan: StrategySpec) -> Result<Self> {
         let plan = shot.complete(plan);
         let counts = match plan {
-            Plan::Brdf { n } | Plan::Environment { n } => n.to_string(),
-            Plan::Mis { split, .. } => format!("{} + {}", split.environment, split.brdf),
-            Plan::Sir { n, n_candidates, .. } => format!("{n}/{}", n_candidates.unwrap_or(n)),
+            StrategySpec::Brdf { n_samples } | StrategySpec::Environment { n_samples } => {
+                n_samples.to_string()
+            }
+            StrategySpec::Mis { n_environment, n_brdf, .. } => {
+                format!("{n_environment} + {n_brdf}")
+            }
+            StrategySpec::Sir { n_samples: n, n_candidates, .. } => {
+                format!("{n}/{}", n_candidates.unwrap_or(n))
+            }
             _ => String::new(),
         };
         Ok(Self { title: format!("{name} {counts}"), plan, measured: shot.measure(plan)? })
@@ -126,10 +135,14 @@ impl Shown {
     /// What the plot and the colours know it by.
     fn kind(&self) -> usize {
         match self.plan {
-            Plan::Environment { .. } => 0,
-            Plan::Brdf { .. } => 1,
-            Plan::Mis { .. } => 2,
-            Plan::Sir { n, n_candidates, .. } if n_candidates == Some(scaled_candidates(n)) => 3,
+            StrategySpec::Environment { .. } => 0,
+            StrategySpec::Brdf { .. } => 1,
+            StrategySpec::Mis { .. } => 2,
+            StrategySpec::Sir { n_samples: n, n_candidates, .. }
+                if n_candidates == Some(scaled_candidates(n)) =>
+            {
+                3
+            }
             _ => 4,
         }
     }
@@ -141,10 +154,10 @@ fn scaled_candidates(n: u32) -> u32 {
 }
 
 /// Resampling by the ratio of candidates to rays that a pilot finds best here.
-fn tuned_sir(shot: &Shot) -> impl Fn(u32) -> Plan + use<> {
+fn tuned_sir(shot: &Shot) -> impl Fn(u32) -> StrategySpec + use<> {
     const PILOT: u32 = 64;
     let ratio = match shot.complete(sir(PILOT, None)) {
-        Plan::Sir { n_candidates: Some(m), .. } => m / PILOT,
+        StrategySpec::Sir { n_candidates: Some(m), .. } => m / PILOT,
         _ => 1,
     };
     move |n| sir(n, Some(n * ratio.max(1)))
@@ -153,8 +166,8 @@ fn tuned_sir(shot: &Shot) -> impl Fn(u32) -> Plan + use<> {
 /// The lecture's four, and how far both factors come in the time of the last.
 fn at_lectures_counts(shot: &Shot) -> Result<Vec<Shown>> {
     let mut shown = vec![
-        Shown::new("EM", shot, Plan::Environment { n: EM })?,
-        Shown::new("BRDF", shot, Plan::Brdf { n: BRDF })?,
+        Shown::new("EM", shot, StrategySpec::Environment { n_samples: EM })?,
+        Shown::new("BRDF", shot, StrategySpec::Brdf { n_samples: BRDF })?,
         Shown::new("MIS", shot, mis(MIS))?,
         Shown::new("SIR", shot, sir(SIR.0, Some(SIR.1)))?,
     ];
@@ -167,8 +180,16 @@ fn at_lectures_counts(shot: &Shot) -> Result<Vec<Shown>> {
 fn in_equal_time(shot: &Shot, seconds: f64) -> Result<Vec<Shown>> {
     let lectures_ratio = |n: u32| sir(n, Some(scaled_candidates(n)));
     Ok(vec![
-        Shown::new("EM", shot, equal_time(shot, seconds, EM, |n| Plan::Environment { n })?)?,
-        Shown::new("BRDF", shot, equal_time(shot, seconds, BRDF, |n| Plan::Brdf { n })?)?,
+        Shown::new(
+            "EM",
+            shot,
+            equal_time(shot, seconds, EM, |n| StrategySpec::Environment { n_samples: n })?,
+        )?,
+        Shown::new(
+            "BRDF",
+            shot,
+            equal_time(shot, seconds, BRDF, |n| StrategySpec::Brdf { n_samples: n })?,
+        )?,
         Shown::new("MIS", shot, equal_time(shot, seconds, MIS, mis)?)?,
         Shown::new("SIR", shot, equal_time(shot, seconds, 2, lectures_ratio)?)?,
         Shown::new("SIR", shot, equal_time(shot, seconds, SIR.0, tuned_sir(shot))?)?,
@@ -178,7 +199,12 @@ fn in_equal_time(shot: &Shot, seconds: f64) -> Result<Vec<Shown>> {
 /// The plan with the count that takes `seconds`, by measurement from `start` on.
 ///
 /// A picture costs a + b·n; the part a, camera rays and shading points, is measured with one sample.
-fn equal_time(shot: &Shot, seconds: f64, start: u32, plan: impl Fn(u32) -> Plan) -> Result<Plan> {
+fn equal_time(
+    shot: &Shot,
+    seconds: f64,
+    start: u32,
+    plan: impl Fn(u32) -> StrategySpec,
+) -> Result<StrategySpec> {
     let start = start.max(2);
     let least = shot.take(plan(1))?.seconds;
     let some = shot.take(plan(start))?.seconds;

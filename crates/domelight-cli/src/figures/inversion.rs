@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use domelight::math::vec2;
+use domelight::quote::Code;
 use domelight::sampling::{Dimension, SamplerKind, Stream, Table1d, Table2d};
 
 use super::figure::{Figure, Row, Table, count, plot_panel};
@@ -79,17 +80,21 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         number: 2,
         title: "Inverting a distribution function; sampling the environment",
         slides: "slides 10–11",
-        caption: "<p>Equally spaced numbers on the axis of the distribution function find values in proportion to \
+        caption: Code::literal(
+            "<p>Equally spaced numbers on the axis of the distribution function find values in proportion to \
             the density: steep where there is much, flat where there is little. A map takes two such steps: first a \
             row, by the energy of each scan line times sin θ, for rows near the poles cover little of the sphere; \
             then a column of that row. The samples are drawn as the course's marks of 5 × 5 pixels, as \
             dots, and alone in the colours that remain when luminance is divided by the density: an estimate \
-            of a coloured integral keeps that factor.</p>"
-            .to_owned(),
+            of a coloured integral keeps that factor.</p>",
+        ),
         formulas: formulas::inversion(),
         rows: vec![
             Row::new("One dimension", vec![density_plot(&example), cdf_plot(&example)?]),
-            Row::new("The map: rows, then columns", vec![row_plot(studio, &table), column_plot(&table, brightest)]),
+            Row::new(
+                "The map: rows, then columns",
+                vec![row_plot(studio, &table), column_plot(&table, brightest)],
+            ),
             Row::new("Samples as marks", with_marks),
             Row::new("Samples as dots", with_dots),
             Row::new("Samples alone, in their colours", alone),

@@ -2,7 +2,9 @@
 
 use anyhow::Result;
 use domelight::bsdf::{Brdf, Material};
+use domelight::code;
 use domelight::math::{Vec3, from_spherical};
+use domelight::quote::Html;
 use domelight::sampling::{Dimension, SamplerKind, Stream};
 use std::f64::consts::{PI, TAU};
 
@@ -47,14 +49,16 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         number: 1,
         title: "Directions drawn from lobes",
         slides: "slides 5–9",
-        caption: format!(
+        caption: code!(
+            Html,
             "<p>{n} directions of each lobe, drawn by inverting its distribution function with the viewer \
              along the normal: a thousand of them as dots (the centre is the normal, the rim the horizon), \
              and all of them as histograms over the density that the program divides by. If the histogram \
              follows the curve, sampler and density agree; χ² near its degrees of freedom says so in a number.</p>\
              <p>Three traps: the density of Ward's half-vector needs cos³θ<sub>h</sub> below the exponential; a \
              plain arctan for φ<sub>h</sub> reaches half of the lobe only, atan2 all of it; and \
-             p(ω<sub>i</sub>) = p(ω<sub>h</sub>) / 4(ω<sub>h</sub>·ω<sub>i</sub>), for it is ω<sub>i</sub> that is traced.</p>"
+             p(ω<sub>i</sub>) = p(ω<sub>h</sub>) / 4(ω<sub>h</sub>·ω<sub>i</sub>), for it is ω<sub>i</sub> that is traced.</p>",
+            n = n,
         ),
         formulas: formulas::lobes(),
         rows,

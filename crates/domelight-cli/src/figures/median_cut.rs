@@ -2,13 +2,14 @@
 
 use anyhow::Result;
 use domelight::picture::tone::ToneMapping;
+use domelight::quote::Code;
 use domelight::rig::{LightPosition, MedianCut, Rig, ShadingReference, median_cut};
+use domelight::strategy::StrategySpec;
 
 use super::figure::{Figure, Picture, Radiance, Row, Table, number, picture_panel, png_bytes};
 use super::formulas;
 use super::maps::{black_panel, borders, map_panel, mark, on_map, shown_color};
 use super::studio::{Measured, Shot, Studio, Subject};
-use crate::strategy::Plan;
 use crate::svg::{Document, Pixels, Rect, Style};
 
 /// The lecture's numbers of regions.
@@ -42,7 +43,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     for n in LIGHTS {
         let mut cells = vec![n.into()];
         for (row, (shot, name)) in rows.iter_mut().zip([(&scene, "scene"), (&sphere, "sphere")]) {
-            let plan = Plan::MedianCut { n_lights: n };
+            let plan = StrategySpec::MedianCut { n_lights: n as u32 };
             let measured = shot.measure(plan)?;
             cells.push(measured.rel_mse.into());
             row.push(lit_panel(&format!("{n} lights"), &measured, shot.tone()?)?);
@@ -76,13 +77,14 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         number: 6,
         title: "Median cut",
         slides: "slides 31–41",
-        caption: "<p>The map is one region; each region is cut along its longer side, its width scaled by \
+        caption: Code::literal(
+            "<p>The map is one region; each region is cut along its longer side, its width scaled by \
             sin θ, so that both halves have the same energy; after n rounds each of 2<sup>n</sup> regions \
             becomes a light with the region's energy. It stands at the centroid of that <em>energy</em> (blue); at the \
             middle of the rectangle instead, errors are several times as large, as the table shows: RMS error of \
             unoccluded matt shading over all normals.</p><p>Fixed lights have no noise but bias: shadows are \
-            sums of hard ones, and narrow lobes would see separate lights. The bias falls as lights are added.</p>"
-            .to_owned(),
+            sums of hard ones, and narrow lobes would see separate lights. The bias falls as lights are added.</p>",
+        ),
         formulas: vec![formulas::region_light()],
         rows: vec![
             Row::new("", early),

@@ -1,14 +1,15 @@
 //! The page: all figures of a run in the lecture's order, in one file that needs no other.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
+use domelight::code;
+use domelight::quote::{Code, Html, html};
 use serde_json::Value;
 
 use super::figure::{Figure, Row, Table, count, number};
 use super::studio::Studio;
-use crate::svg::{Document, data_uri, escape, font_face_css};
+use crate::svg::{Document, data_uri, font_face_css};
 
 /// For formulas: signs that grow, which fonts for text have not.
 const MATH_FONT: &[u8] = include_bytes!("../../assets/math-subset.otf");
@@ -18,127 +19,148 @@ pub(crate) const NAME: &str = "index.html";
 
 /// Writes the page.
 pub(crate) fn write(studio: &Studio, folder: &Path, figures: &[Figure]) -> Result<()> {
-    super::figure::write(&folder.join(NAME), page(studio, figures).as_bytes())
+    super::figure::write(&folder.join(NAME), page(studio, figures).as_str().as_bytes())
 }
 
-fn page(studio: &Studio, figures: &[Figure]) -> String {
-    let mut contents = String::new();
-    let mut sections = String::new();
+fn page(studio: &Studio, figures: &[Figure]) -> Code<Html> {
+    let mut contents = Code::default();
+    let mut sections = Code::default();
     for figure in figures {
-        let (n, title) = (figure.number, escape(figure.title));
-        let _ = write!(contents, "<li value=\"{n}\"><a href=\"#figure-{n}\">{title}</a></li>");
-        sections += &section(studio, figure);
+        contents += code!(
+            Html,
+            "<li value=\"{n}\"><a href=\"#figure-{n}\">{title}</a></li>",
+            n = figure.number,
+            title = html::text(figure.title),
+        );
+        sections += section(studio, figure);
     }
-    let (scene, probe) = (escape(&studio.scene), escape(&studio.probe));
     let map = studio.environment.map();
     let quick = studio.choose("", " This is a quick run: pictures are small and references poor.");
-    format!(
+    code!(
+        Html,
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <title>Sampling direct illumination</title>\n<style>{}{}{STYLE}</style>\n</head>\n<body>\n\
+         <title>Sampling direct illumination</title>\n<style>{font}{math_font}{style}</style>\n</head>\n<body>\n\
          <header><h1>Sampling direct illumination</h1>\
-         <p>The figures of the lecture, computed: <b>{scene}</b> in the light of <b>{probe}</b> ({}×{} texels), \
-         by domelight {}.{quick}</p>\
-         <p class=\"command\"><code>domelight figures{}</code></p></header>\n\
+         <p>The figures of the lecture, computed: <b>{scene}</b> in the light of <b>{probe}</b> ({width}×{height} texels), \
+         by domelight {version}.{quick}</p>\
+         <p class=\"command\"><code>domelight figures{arguments}</code></p></header>\n\
          <nav aria-label=\"Figures\"><h2>Figures</h2><ol>{contents}</ol></nav>\n<main>\n{sections}</main>\n</body>\n</html>\n",
-        font_face_css(),
-        math_font_css(),
-        map.width,
-        map.height,
-        env!("CARGO_PKG_VERSION"),
-        escape(&studio.arguments),
+        font = Code::<Html>::generated(font_face_css()),
+        math_font = math_font_css(),
+        style = STYLE,
+        scene = html::text(&studio.scene),
+        probe = html::text(&studio.probe),
+        width = map.width,
+        height = map.height,
+        version = env!("CARGO_PKG_VERSION"),
+        quick = quick,
+        arguments = html::text(studio.arguments.as_str()),
+        contents = contents,
+        sections = sections,
     )
 }
 
-fn math_font_css() -> String {
+fn math_font_css() -> Code<Html> {
     let source = data_uri("font/otf", MATH_FONT);
-    format!("@font-face{{font-family:'Domelight Math';src:url({source})}}")
+    let rule = format!("@font-face{{font-family:'Domelight Math';src:url({source})}}");
+    Code::generated(rule)
 }
 
-fn section(studio: &Studio, figure: &Figure) -> String {
+fn section(studio: &Studio, figure: &Figure) -> Code<Html> {
     let n = figure.number;
-    let mut html = format!(
-        "<section id=\"figure-{n}\"><h2><span>Figure {n}</span> {}</h2><p class=\"slides\">{}</p>{}",
-        escape(figure.title),
-        escape(figure.slides),
-        figure.caption
+    let mut html = code!(
+        Html,
+        "<section id=\"figure-{n}\"><h2><span>Figure {n}</span> {title}</h2><p class=\"slides\">{slides}</p>{caption}",
+        n = n,
+        title = html::text(figure.title),
+        slides = html::text(figure.slides),
+        caption = figure.caption.clone(),
     );
     for formula in &figure.formulas {
-        let _ = write!(html, "<div class=\"formula\">{formula}</div>");
+        let formula = Code::<Html>::generated(formula.clone());
+        html += code!(Html, "<div class=\"formula\">{formula}</div>", formula = formula);
     }
-    figure.rows.iter().for_each(|row| html += &panels(row));
-    figure.tables.iter().for_each(|table| html += &numbers(table));
-    let files = figure.files().into_iter().map(|f| format!("<a href=\"{f}\">{f}</a>"));
-    let files = files.collect::<Vec<_>>().join(", ");
+    figure.rows.iter().for_each(|row| html += panels(row));
+    figure.tables.iter().for_each(|table| html += numbers(table));
+    let link = |file: String| code!(Html, "<a href=\"{f}\">{f}</a>", f = html::text(&file));
+    let files = Code::join(figure.files().into_iter().map(link), ", ");
     let more = if figure.pictures.is_empty() {
-        String::new()
+        Code::default()
     } else {
-        format!("; radiance in <a href=\"figure-{n}/\">figure-{n}/</a> (OpenEXR, PNG)")
+        code!(Html, "; radiance in <a href=\"figure-{n}/\">figure-{n}/</a> (OpenEXR, PNG)", n = n)
     };
-    let arguments = escape(&studio.arguments);
-    let _ = writeln!(
-        html,
+    html += code!(
+        Html,
         "<p class=\"command\"><code>domelight figures --only {n}{arguments}</code></p>\
-         <p class=\"files\">{files}{more}</p></section>"
+         <p class=\"files\">{files}{more}</p></section>\n",
+        n = n,
+        arguments = html::text(studio.arguments.as_str()),
+        files = files,
+        more = more,
     );
     html
 }
 
-fn panels(row: &Row) -> String {
-    let mut html = String::new();
+fn panels(row: &Row) -> Code<Html> {
+    let mut html = Code::default();
     if !row.heading.is_empty() {
-        let _ = write!(html, "<h3>{}</h3>", escape(&row.heading));
+        html += code!(Html, "<h3>{heading}</h3>", heading = html::text(&row.heading));
     }
     let widths = || row.panels.iter().map(Document::width);
     let columns: Vec<String> = widths().map(|w| format!("{w:.0}fr")).collect();
     // On a phone two small panels stand side by side.
     let least = widths().fold(0.0, f64::max).min(480.0) * 0.68;
-    let _ = write!(
-        html,
-        "<div class=\"row\" style=\"--columns:{};--width:{:.0}px;--least:{least:.0}px\">",
-        columns.join(" "),
-        1.25 * widths().sum::<f64>()
+    html += code!(
+        Html,
+        "<div class=\"row\" style=\"--columns:{columns};--width:{width:.0}px;--least:{least:.0}px\">",
+        columns = Code::<Html>::generated(columns.join(" ")),
+        width = 1.25 * widths().sum::<f64>(),
+        least = least,
     );
     for panel in &row.panels {
-        let _ = write!(html, "<figure>{}</figure>", panel.to_svg());
+        let drawing = Code::<Html>::generated(panel.to_svg());
+        html += code!(Html, "<figure>{drawing}</figure>", drawing = drawing);
     }
     html + "</div>"
 }
 
-fn cell(value: &Value) -> String {
+fn cell(value: &Value) -> Code<Html> {
     match value {
         Value::Number(n) => {
             let text = n.as_u64().map_or_else(|| number(n.as_f64().unwrap_or(f64::NAN)), count);
-            format!("<td class=\"n\">{text}</td>")
+            code!(Html, "<td class=\"n\">{number}</td>", number = html::text(&text))
         }
-        Value::String(text) => format!("<td>{}</td>", escape(text)),
-        _ => "<td>–</td>".to_owned(),
+        Value::String(text) => code!(Html, "<td>{text}</td>", text = html::text(text)),
+        _ => Code::literal("<td>–</td>"),
     }
 }
 
-fn numbers(table: &Table) -> String {
-    let mut body = "<table><thead><tr>".to_owned();
+fn numbers(table: &Table) -> Code<Html> {
+    let mut body = Code::literal("<table><thead><tr>");
     for column in &table.columns {
-        let _ = write!(body, "<th>{}</th>", escape(column));
+        body += code!(Html, "<th>{column}</th>", column = html::text(column));
     }
     body += "</tr></thead><tbody>";
     for row in &table.rows {
         body += "<tr>";
         for value in row {
-            body += &cell(value);
+            body += cell(value);
         }
         body += "</tr>";
     }
     body += "</tbody></table>";
     // A long table would hide the next figure.
     if table.rows.len() > 14 {
-        format!(
-            "<details><summary>All {} measurements</summary><div class=\"table\">{body}</div></details>",
-            table.rows.len()
+        code!(
+            Html,
+            "<details><summary>All {n} measurements</summary><div class=\"table\">{body}</div></details>",
+            n = table.rows.len(),
+            body = body,
         )
     } else {
-        format!("<div class=\"table\">{body}</div>")
+        code!(Html, "<div class=\"table\">{body}</div>", body = body)
     }
 }
 

@@ -2,11 +2,13 @@
 
 use anyhow::Result;
 use domelight::bsdf::Material;
+use domelight::code;
 use domelight::environment::Environment;
 use domelight::environment::mapping::Mapping;
 use domelight::math::{Frame, Vec2, Vec3, reflect, vec2};
 use domelight::picture::compare::ColorScale;
 use domelight::picture::tone::{ToneCurve, ToneMapping};
+use domelight::quote::Html;
 use domelight::sampling::{Dimension, SamplerKind, Stream};
 use domelight::strategy::{
     PointStrategy as _, Proposal, RejectionSampling, RejectionScratch, SampleNumbers, ShadingPoint,
@@ -66,12 +68,14 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         number: 3,
         title: "Importance of light, of reflectance, and of both",
         slides: "slides 17–18",
-        caption: format!(
+        caption: code!(
+            Html,
             "<p>The sphere of directions as a light probe: its centre looks toward where the lobe points, the rim is behind. A Phong lobe of \
              exponent 50 leans {OFF_AXIS:.0}° past the brightest light. Samples of the environment find lights \
              that the surface does not reflect, samples of the BRDF find directions from where little light comes; \
              samples of the product do neither. They are drawn by rejection, which follows the product exactly. \
-             (BRDF and product are shown in a colour scale over value<sup>0.4</sup>, so that faint parts are seen.)</p>"
+             (BRDF and product are shown in a colour scale over value<sup>0.4</sup>, so that faint parts are seen.)</p>",
+            OFF_AXIS = OFF_AXIS,
         ),
         formulas: formulas::product(),
         rows: vec![

@@ -1,8 +1,10 @@
 //! Figure 5: rejection, what is accepted and how long it takes.
 
 use anyhow::Result;
+use domelight::code;
 use domelight::picture::compare::ColorScale;
 use domelight::picture::tone::{ToneCurve, ToneMapping};
+use domelight::quote::Html;
 use domelight::sampling::Pcg32;
 use domelight::strategy::{Proposal, RejectionSampling, RejectionStatistics, ShadingPoint, Stop};
 use domelight::{Rgb, RgbImage};
@@ -86,7 +88,8 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         number: 5,
         title: "Rejection sampling",
         slides: "slides 24–25",
-        caption: format!(
+        caption: code!(
+            Html,
             "<p>A direction drawn from one factor of the product is kept with a probability in proportion to the other. \
              What is kept follows the product exactly, and the tighter the bound, the more is kept. Above: uniform \
              tries under a bound on cos<sup>50</sup>θ, tight, and three times too high. Below: a statue of {MATERIAL}, \
@@ -94,7 +97,10 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
              on light loose everywhere; the bound on the BRDF is loose where lobes are narrow.</p>\
              <p>To accept, the unshadowed integral need not be known; to estimate it must. N accepted out of T tries is a \
              biased estimate when the N-th ends the tries; (N − 1)/(T − 1) is not (Haldane 1945). Where the tries run out, the \
-             estimate is the number accepted over the number tried, and the whole is still unbiased.</p>"
+             estimate is the number accepted over the number tried, and the whole is still unbiased.</p>",
+            MATERIAL = MATERIAL,
+            ACCEPT = ACCEPT,
+            MAX_TRIES = MAX_TRIES,
         ),
         formulas: formulas::rejection(),
         rows: vec![

@@ -2,7 +2,6 @@
 
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::fmt::Write as _;
 use std::rc::Rc;
 use std::str::FromStr as _;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,23 +9,26 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context as _, Result, bail};
 use domelight::RgbImage;
 use domelight::bsdf::Material;
+use domelight::code;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::mapping::{Mapping, to_lat_long};
 use domelight::environment::{Environment, Orientation};
 use domelight::math::{Vec3, vec2};
 use domelight::picture::compare::compare;
 use domelight::picture::tone::{ToneCurve, ToneMapping};
+use domelight::quote::{Code, Shell, shell};
 use domelight::render::{Layers, RenderSettings, survey};
 use domelight::sampling::{Heuristic, SamplerKind};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{Camera, EnvironmentSettings, EnvironmentSource, Scene, SceneDescription};
+use domelight::strategy::{PreparedStrategy, StrategySpec};
 
 use crate::args::figures::FiguresArguments;
-use crate::args::scene::BUILTIN_ROWS;
+use crate::args::scene::{BUILTIN_ROWS, FileArguments};
 use crate::interrupt;
 use crate::progress::RenderProgress;
 use crate::scene::{close_up, load_scene, probe_name, view_of};
-use crate::strategy::{Job, Plan};
+use crate::strategy::Job;
 use crate::usage::Stopwatch;
 use crate::values::Split;
 
@@ -39,7 +41,7 @@ pub(crate) struct Studio {
     /// The map, small enough to be shown.
     pub(crate) map: RgbImage,
     /// The arguments that all figures of this run have in common, for the commands on the page.
-    pub(crate) arguments: String,
+    pub(crate) arguments: Code<Shell>,
     pub(crate) probe: String,
     pub(crate) scene: String,
     pub(crate) quick: bool,
@@ -66,7 +68,8 @@ impl Studio {
     pub(crate) fn new(arguments: &FiguresArguments, quiet: bool) -> Result<Self> {
         let interrupted = interrupt::flag();
         let _loading = interrupt::nothing_to_keep(interrupt::ENDED);
-        let mut description = load_scene(&arguments.scene, quiet)?;
+        let (mut description, _) =
+            load_scene(&arguments.scene, &FileArguments::default(), false, quiet)?;
         let is_builtin = BuiltinScene::from_str(&arguments.scene).is_ok();
         if is_builtin || description.environment.is_none() {
             description.environment = Some(EnvironmentSettings {
@@ -143,7 +146,7 @@ impl Studio {
             _ => self.description.clone(),
         };
         let aspect = width as f32 / height as f32;
-        let view = if let Subject::Alone(material) = subject {
+        let mut view = if let Subject::Alone(material) = subject {
             let text = material;
             let material: Material = text.parse().with_context(|| format!("material {text}"))?;
             description.set_subject_material(material);
@@ -152,6 +155,7 @@ impl Studio {
         } else {
             view_of(&description, aspect, self.up)
         };
+        description.rescale(&mut view);
         Ok(Shot {
             studio: self,
             name: format!("{subject:?} {width}x{height}"),
@@ -174,12 +178,10 @@ impl Studio {
 }
 
 /// The flags that a command on the page repeats.
-fn common_arguments(arguments: &FiguresArguments) -> String {
-    let mut text = String::new();
-    let mut add = |flag: &str, value: String| {
-        let quoted = value.chars().any(|c| !(c.is_alphanumeric() || "-_./:".contains(c)));
-        let quote = if quoted { "'" } else { "" };
-        let _ = write!(text, " {flag} {quote}{value}{quote}");
+fn common_arguments(arguments: &FiguresArguments) -> Code<Shell> {
+    let mut text = Code::default();
+    let mut add = |flag: &'static str, value: String| {
+        text += code!(Shell, " {flag} {value}", flag = flag, value = shell::word(&value));
     };
     let environment = &arguments.environment;
     if arguments.scene != BuiltinScene::Statue.name() {
@@ -213,7 +215,7 @@ fn common_arguments(arguments: &FiguresArguments) -> String {
     if arguments.seed != 0 {
         add("--seed", arguments.seed.to_string());
     }
-    for (flag, given) in [(" --sanitize", environment.sanitize), (" --quick", arguments.quick)] {
+    for (flag, given) in [(" --strict", environment.strict), (" --quick", arguments.quick)] {
         text += if given { flag } else { "" };
     }
     text
@@ -258,34 +260,39 @@ impl Shot<'_> {
     }
 
     /// Fills in what a plan leaves to the scene.
-    pub(crate) fn complete(&self, plan: Plan) -> Plan {
+    pub(crate) fn complete(&self, plan: StrategySpec) -> StrategySpec {
         let points = || survey(&self.scene, &self.camera, &self.settings);
         plan.for_scene(points, &self.studio.environment, self.settings.seed)
     }
 
     /// Takes the picture.
-    pub(crate) fn take(&self, plan: Plan) -> Result<Taken> {
+    pub(crate) fn take(&self, plan: StrategySpec) -> Result<Taken> {
         self.take_with(plan, self.settings.seed, SamplerKind::Sobol)
     }
 
     /// Takes the picture with numbers of another seed or kind.
-    pub(crate) fn take_with(&self, plan: Plan, seed: u64, sampler: SamplerKind) -> Result<Taken> {
+    pub(crate) fn take_with(
+        &self,
+        plan: StrategySpec,
+        seed: u64,
+        sampler: SamplerKind,
+    ) -> Result<Taken> {
         let Studio { environment, quiet, interrupted, .. } = self.studio;
         let settings = RenderSettings { seed, sampler, ..self.settings };
         let plan = self.complete(plan);
-        let renderer = plan.prepare(environment)?;
+        let strategy = PreparedStrategy::new(plan, environment)?;
         let n_rays = (settings.width * settings.height) as u64 * u64::from(settings.n_samples);
         let progress = &RenderProgress::new("", n_rays, *quiet, interrupted);
         let (scene, camera, settings) = (&self.scene, &self.camera, &settings);
         let job = Job { scene, camera, environment, settings, progress, course: None };
         let mut watch = Stopwatch::start();
-        let rendering = renderer(&job)?;
+        let rendering = job.render(&strategy)?;
         let seconds = watch.lap();
         progress.finish();
         self.studio.check_interrupted()?;
         Ok(Taken {
             layers: rendering.layers,
-            strategy: plan.describe(),
+            strategy: plan.description(),
             shadow_rays: rendering.counts.shadow_rays,
             points: rendering.counts.shading_points,
             seconds: seconds.cpu.unwrap_or(seconds.wall),
@@ -293,14 +300,14 @@ impl Shot<'_> {
     }
 
     /// Takes the picture and compares it with the converged one.
-    pub(crate) fn measure(&self, plan: Plan) -> Result<Measured> {
+    pub(crate) fn measure(&self, plan: StrategySpec) -> Result<Measured> {
         self.measure_with(plan, self.settings.seed, SamplerKind::Sobol)
     }
 
     /// As [`Shot::measure`], with numbers of another seed or kind.
     pub(crate) fn measure_with(
         &self,
-        plan: Plan,
+        plan: StrategySpec,
         seed: u64,
         sampler: SamplerKind,
     ) -> Result<Measured> {
@@ -320,8 +327,12 @@ impl Shot<'_> {
             return Ok(made.clone());
         }
         let Split { environment, brdf } = self.reference;
-        let split = split(environment.div_ceil(n_samples), brdf.div_ceil(n_samples));
-        let plan = Plan::Mis { split, heuristic: Heuristic::Power, compensation: true };
+        let plan = StrategySpec::Mis {
+            n_environment: environment.div_ceil(n_samples),
+            n_brdf: brdf.div_ceil(n_samples),
+            heuristic: Heuristic::Power,
+            compensation: true,
+        };
         let made = Rc::new(self.take_with(plan, seed, sampler)?.layers);
         self.studio.references.borrow_mut().insert(key, made.clone());
         Ok(made)

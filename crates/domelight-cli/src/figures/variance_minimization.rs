@@ -2,17 +2,18 @@
 
 use anyhow::Result;
 use domelight::RgbImage;
+use domelight::quote::Code;
 use domelight::rig::{
     LightPosition, MedianCut, Rig, RigError, ShadingReference, VarianceMinimization, median_cut,
     variance_minimization,
 };
+use domelight::strategy::StrategySpec;
 
 use super::figure::{Figure, Picture, Radiance, Row, Table, picture_panel, png_bytes};
 use super::formulas;
 use super::maps::{borders, mark};
 use super::median_cut::{converged_panel, lit_panel, regions_panel, scene_shot, sphere_shot};
 use super::studio::Studio;
-use crate::strategy::Plan;
 use crate::svg::{Document, Pixels, Rect};
 
 /// The poster's numbers of regions.
@@ -43,9 +44,9 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     let mut pictures = Vec::new();
     for (shot, name) in [(scene_shot(studio)?, "scene"), (sphere_shot(studio)?, "sphere")] {
         for (plan, title, file) in [
-            (Plan::MedianCut { n_lights: LIGHTS }, "Median cut, 64", "median-cut"),
+            (StrategySpec::MedianCut { n_lights: LIGHTS as u32 }, "Median cut, 64", "median-cut"),
             (
-                Plan::VarianceMinimization { n_lights: LIGHTS },
+                StrategySpec::VarianceMinimization { n_lights: LIGHTS as u32 },
                 "Variance min., 64",
                 "variance-minimization",
             ),
@@ -61,15 +62,16 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         number: 7,
         title: "Variance minimization",
         slides: "slides 42–45",
-        caption: "<p>Equal energy is not what shading asks for: light that lies close together may share a light, \
+        caption: Code::literal(
+            "<p>Equal energy is not what shading asks for: light that lies close together may share a light, \
             light that is spread out may not. Here a cut minimises the greater of the two halves’ variances, the \
             energy times the squared distance to the centroid (not the variance of the pixels’ values). The first row is the \
             poster’s rule, with distances on the map; the second the program’s default: distances on the sphere, where no pole \
             or seam matters, the worst region cut first, then joined and refined into cells about their lights. \
             The detail shows the surroundings of the brightest light: lights (blue) sit on what shines.</p>\
             <p>The table has the RMS error of unoccluded shading over all normals, in per cent of the RMS shading: matt, \
-            and of a lobe cos<sup>20</sup>.</p>"
-            .to_owned(),
+            and of a lobe cos<sup>20</sup>.</p>",
+        ),
         formulas: vec![formulas::region_variance()],
         rows: vec![
             Row::new("The poster's rule", by_poster),

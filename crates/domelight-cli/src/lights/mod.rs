@@ -10,7 +10,6 @@ use domelight::RgbImage;
 use domelight::environment::mapping::{Mapping, from_lat_long};
 use domelight::environment::{Environment, Orientation};
 use domelight::picture::tone::ToneCurve;
-use domelight::picture::{require_writable, write_atomically};
 use domelight::rig::export::{Dome, DomePicture, Format, RigExport};
 use domelight::rig::{
     Extraction, ExtractionSettings, ShadingError, ShadingReference, SphericalHarmonics, extract,
@@ -20,8 +19,9 @@ use domelight::scene::SceneDescription;
 
 use crate::args::lights::{LightsArguments, PngPath, RigPath};
 use crate::failure::UsageError;
+use crate::files;
 use crate::memory;
-use crate::output::{PictureFormat, PicturePath, print};
+use crate::output::{PictureFormat, PicturePath, print, print_json};
 use crate::usage::Stopwatch;
 use preview::Preview;
 use report::{LightsReport, Stages};
@@ -32,7 +32,7 @@ const N_LIGHTS: usize = 64;
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
     let outputs = arguments.outputs()?;
-    arguments.require_writable(&outputs)?;
+    let dome_path = arguments.declare(&outputs)?;
     let mut watch = Stopwatch::start();
 
     let (environment, probe) = arguments.load(quiet)?;
@@ -40,14 +40,13 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
     let found = arguments.find(&environment).with_context(|| probe.clone())?;
     let extract = watch.lap();
 
-    let dome_file = arguments.dome_file(&outputs, &found.extraction)?;
-    let dome_files = match (&dome_file, &found.extraction.residual) {
+    let dome_files = match (&dome_path, &found.extraction.residual) {
         (Some(path), Some(dome)) => arguments.write_dome(path, dome.map(), &outputs)?,
         _ => vec![None; outputs.len()],
     };
     let harmonics = found.extraction.residual.as_ref().map(SphericalHarmonics::project);
     for (output, dome_file) in outputs.iter().zip(&dome_files) {
-        let file = dome_file.as_ref().map(|dome| refer(output.path, &dome.path));
+        let file = dome_file.as_ref().map(|dome| refer(output.path, &dome.path)).transpose()?;
         let rig = RigExport {
             probe: &probe,
             orientation: environment.orientation(),
@@ -57,18 +56,18 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
             ),
         };
         let bytes = output.format.encode(&rig).with_context(|| probe.clone())?;
-        write_atomically(output.path, |out| out.write_all(&bytes))?;
+        files::write(output.path, |out| out.write_all(&bytes))?;
     }
     if let Some(path) = &arguments.preview {
         let tone = arguments.tone.mapping(ToneCurve::Aces);
         let preview = Preview { environment: &environment, found: &found, probe: &probe, tone };
         let bytes = preview.png()?;
-        write_atomically(&path.0, |out| out.write_all(&bytes))?;
+        files::write(&path.0, |out| out.write_all(&bytes))?;
     }
     let stages = Stages { load, extract, write: watch.lap() };
     let report = LightsReport { arguments, probe: &probe, found: &found, stages, dome: harmonics };
     if arguments.json {
-        print(&serde_json::to_string_pretty(&report.json())?)?;
+        print_json(&report.json())?;
     } else if !quiet && arguments.n_on_standard_output() == 0 {
         print(&report.table())?;
     }
@@ -156,11 +155,20 @@ impl LightsArguments {
         rigs + [residual, preview, self.json].map(usize::from).iter().sum::<usize>()
     }
 
-    fn require_writable(&self, outputs: &[Output]) -> Result<()> {
-        outputs.iter().try_for_each(|o| require_writable(o.path))?;
-        self.keep_residual.as_ref().map_or(Ok(()), PicturePath::require_writable)?;
-        self.preview.as_ref().map_or(Ok(()), |p| require_writable(&p.0))?;
-        Ok(())
+    /// Declares all that may be written; the file of the dome's map, if there may be one.
+    fn declare(&self, outputs: &[Output]) -> Result<Option<PicturePath>> {
+        outputs.iter().try_for_each(|o| files::writes(o.path))?;
+        self.preview.as_ref().map_or(Ok(()), |p| files::writes(&p.0))?;
+        let Some(dome) = self.dome_path(outputs)? else { return Ok(None) };
+        let mut pictures = vec![dome.path.clone()];
+        for picture in outputs.iter().filter_map(|output| output.format.dome_picture()) {
+            pictures.push(picture_path(&dome, picture)?.path);
+        }
+        // Several rigs may name the same picture.
+        pictures.sort();
+        pictures.dedup();
+        pictures.iter().try_for_each(|path| files::writes(path))?;
+        Ok(Some(dome))
     }
 
     fn load(&self, quiet: bool) -> Result<(Environment, String)> {
@@ -190,9 +198,9 @@ impl LightsArguments {
         Ok(Found { extraction, errors })
     }
 
-    /// The file of the dome: as asked for, or beside the first rig that refers to it.
-    fn dome_file(&self, outputs: &[Output], found: &Extraction) -> Result<Option<PicturePath>> {
-        if found.residual.is_none() {
+    /// The file of the dome's map, if light may be left on it: as asked for, or beside the first rig that refers to it.
+    fn dome_path(&self, outputs: &[Output]) -> Result<Option<PicturePath>> {
+        if self.has_regions() && self.min_energy.is_none() {
             return Ok(None);
         }
         if let Some(path) = &self.keep_residual {
@@ -203,9 +211,7 @@ impl LightsArguments {
         let Some(output) = needs else { return Ok(None) };
         let stem = output.path.file_stem().unwrap_or_default().to_string_lossy();
         let path = output.path.with_file_name(format!("{stem}_dome.exr"));
-        let path = path.to_string_lossy().parse::<PicturePath>().map_err(UsageError)?;
-        path.require_writable()?;
-        Ok(Some(path))
+        Ok(Some(path.to_string_lossy().parse::<PicturePath>().map_err(UsageError)?))
     }
 }
 
@@ -261,11 +267,14 @@ fn measure(environment: &Environment, found: &Extraction) -> ShadingError {
 }
 
 /// How a rig's file refers to the dome's: by its name in the same folder, else by its whole path.
-fn refer(rig: &Path, dome: &Path) -> String {
+fn refer(rig: &Path, dome: &Path) -> Result<String, UsageError> {
     let folder = |path: &Path| path.parent().map(Path::to_path_buf);
     let name = match (folder(rig) == folder(dome), dome.file_name()) {
         (true, Some(name)) => PathBuf::from(name),
         _ => std::path::absolute(dome).unwrap_or_else(|_| dome.to_path_buf()),
     };
-    name.to_string_lossy().replace('\\', "/")
+    let refuse = || UsageError(format!("{}: its name is not UTF-8", name.display()));
+    let text = name.to_str().ok_or_else(refuse)?;
+    // Elsewhere a backslash is a letter like others.
+    Ok(if cfg!(windows) { text.replace('\\', "/") } else { text.to_owned() })
 }

@@ -7,9 +7,9 @@ use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
+use domelight::files::{remove_abandoned, write_atomically};
 use domelight::fingerprint::{Fingerprint, Fingerprinter};
-use domelight::picture::write_atomically;
 use etcetera::base_strategy::{BaseStrategy as _, choose_native_strategy};
 
 use crate::failure::warn;
@@ -21,16 +21,21 @@ pub(crate) struct Cache {
 }
 
 impl Cache {
-    /// The folder that was asked for, else that of the platform.
-    pub(crate) fn new(folder: Option<&Path>) -> Result<Self> {
-        let folder = match folder {
-            Some(folder) => folder.to_path_buf(),
-            None => match choose_native_strategy() {
-                Ok(places) => places.cache_dir().join("domelight"),
-                Err(_) => bail!("this user has no home; use --cache FOLDER or --no-cache"),
-            },
-        };
-        Ok(Self { folder })
+    /// The folder that was asked for, else that of the platform; none, with a warning, where there is none.
+    pub(crate) fn unless(no_cache: bool, folder: Option<&Path>, quiet: bool) -> Option<Self> {
+        if no_cache {
+            return None;
+        }
+        let folder = folder
+            .map(Path::to_path_buf)
+            .or_else(|| Some(choose_native_strategy().ok()?.cache_dir().join("domelight")));
+        if folder.is_none() {
+            warn(
+                quiet,
+                "this user has no home to keep references in; --cache FOLDER names a place",
+            );
+        }
+        Some(Self { folder: folder? })
     }
 
     /// The entry and its bytes, if it is there and sound; a damaged one is removed.
@@ -38,6 +43,10 @@ impl Cache {
         let entries = fs::read_dir(&self.folder).ok()?.flatten().map(|entry| entry.path());
         for path in entries {
             let Some(sum) = key.sum_in(&path) else { continue };
+            // A pipe might never end.
+            if !fs::metadata(&path).is_ok_and(|there| there.is_file()) {
+                continue;
+            }
             match fs::read(&path) {
                 Ok(bytes) if of(&bytes).to_string() == sum => return Some((path, bytes)),
                 _ => {
@@ -49,12 +58,18 @@ impl Cache {
         None
     }
 
-    /// Keeps the bytes.
-    pub(crate) fn put(&self, key: &Key, bytes: &[u8]) -> Result<PathBuf> {
+    /// Keeps the bytes, if that is possible; else warns, for what was rendered is there all the same.
+    pub(crate) fn put(&self, key: &Key, bytes: &[u8], quiet: bool) -> Option<PathBuf> {
+        let kept = self.try_put(key, bytes);
+        kept.inspect_err(|error| warn(quiet, &format!("the reference is not kept: {error:#}"))).ok()
+    }
+
+    fn try_put(&self, key: &Key, bytes: &[u8]) -> Result<PathBuf> {
         let folder = &self.folder;
         fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the cache folder {}", folder.display()))?;
         let path = folder.join(format!("{}-{}.exr", key.0, of(bytes)));
+        remove_abandoned(folder);
         write_atomically(&path, |out| out.write_all(bytes))?;
         Ok(path)
     }

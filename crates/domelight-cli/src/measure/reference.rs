@@ -2,25 +2,26 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use domelight::picture::compare::{SizeMismatch, compare};
 use domelight::picture::exr::{ExrLayers, text_attributes};
 use domelight::picture::{ReadOptions, read, read_bytes};
 use domelight::render::{Layers, RenderSettings};
 use domelight::sampling::Heuristic;
+use domelight::strategy::{PreparedStrategy, StrategySpec};
 use domelight::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
 use super::cache::{Cache, Key};
 use super::shot::Studio;
+use crate::files;
 use crate::memory;
 use crate::scene::View;
-use crate::strategy::Plan;
-use crate::values::Split;
 
 /// How a reference is rendered.
-pub(crate) const PLAN: Plan = Plan::Mis {
-    split: Split { environment: 4, brdf: 4 },
+pub(crate) const STRATEGY: StrategySpec = StrategySpec::Mis {
+    n_environment: 4,
+    n_brdf: 4,
     heuristic: Heuristic::Power,
     compensation: true,
 };
@@ -30,6 +31,7 @@ const SEEDS: [u64; 2] = [0x7265_6665_7265_6e63, 0x6365_6e65_7265_6665];
 
 /// The attributes that keep the noise and the samples.
 const NOISE: &str = "domelight.reference.noise";
+const COVERED_NOISE: &str = "domelight.reference.noise-covered";
 const SAMPLES: &str = "domelight.reference.samples";
 
 /// The layer that keeps the picture without shadows.
@@ -60,6 +62,8 @@ pub(crate) struct ReferenceReport {
     pub(crate) spp: Option<u32>,
     /// relMSE of the reference itself, estimated from its halves; null for files.
     pub(crate) rel_mse: Option<f64>,
+    /// The same over the pixels that the scene fills; null for files and without coverage.
+    pub(crate) rel_mse_covered: Option<f64>,
 }
 
 /// Where the reference comes from.
@@ -76,8 +80,17 @@ pub(crate) enum Source {
 pub(crate) enum Goal {
     /// With so many camera samples a pixel.
     Samples(u32),
-    /// When the relMSE of the covered pixels is no greater than `noise`, or after `most` camera samples a pixel.
+    /// When the relMSE of the pixels that show any of the scene is no greater than `noise`, or after `most` camera samples a pixel.
     Noise { noise: f64, most: u32 },
+}
+
+/// relMSE of a reference.
+#[derive(Clone, Copy, Debug)]
+struct Noise {
+    /// Of all pixels, or of those that show any of the scene where that was the goal.
+    all: f64,
+    /// Of those that the scene fills.
+    covered: Option<f64>,
 }
 
 /// Camera samples of a pilot's halves.
@@ -96,6 +109,11 @@ impl Picture {
         Some(self.alpha.as_ref()?.iter().map(|&alpha| alpha > 0.999).collect())
     }
 
+    /// Which pixels show any of the scene.
+    pub(crate) fn touched(&self) -> Option<Vec<bool>> {
+        Some(self.alpha.as_ref()?.iter().map(|&alpha| alpha > 0.0).collect())
+    }
+
     /// The mean m of two halves.
     fn mean(&self, other: &Self) -> Self {
         let alpha = self.alpha.iter().flatten().zip(other.alpha.iter().flatten());
@@ -107,25 +125,29 @@ impl Picture {
         }
     }
 
-    fn encode(&self, noise: f64, spp: u32) -> Result<Vec<u8>> {
+    fn encode(&self, noise: Noise, spp: u32) -> Result<Vec<u8>> {
         let mut layers = ExrLayers::from_image(&self.image, self.alpha.as_deref());
         if let Some(unoccluded) = &self.unoccluded {
             layers.push_rgb(UNOCCLUDED, unoccluded, None);
         }
         let attribute = |name: &str, value: String| (name.to_owned(), value);
         layers.attributes =
-            vec![attribute(NOISE, noise.to_string()), attribute(SAMPLES, spp.to_string())];
+            vec![attribute(NOISE, noise.all.to_string()), attribute(SAMPLES, spp.to_string())];
+        let covered = noise.covered.map(|noise| attribute(COVERED_NOISE, noise.to_string()));
+        layers.attributes.extend(covered);
         Ok(layers.encode()?)
     }
 
     /// The picture, its noise and its samples.
-    fn decode(bytes: &[u8], file: &str) -> Option<(Self, f64, u32)> {
+    fn decode(bytes: &[u8], file: &str) -> Option<(Self, Noise, u32)> {
         let main = read_bytes(bytes, file, &ReadOptions::default()).ok()?;
         let layer = ReadOptions { layer: Some(UNOCCLUDED.to_owned()), max_memory: memory::left() };
         let unoccluded = read_bytes(bytes, file, &layer).ok().map(|read| read.image);
         let attributes = text_attributes(bytes).ok()?;
         let attribute = |key| attributes.iter().find(|(name, _)| name == key).map(|(_, text)| text);
-        let (noise, spp) = (attribute(NOISE)?.parse().ok()?, attribute(SAMPLES)?.parse().ok()?);
+        let (all, spp) = (attribute(NOISE)?.parse().ok()?, attribute(SAMPLES)?.parse().ok()?);
+        let covered = attribute(COVERED_NOISE).and_then(|noise| noise.parse().ok());
+        let noise = Noise { all, covered };
         Some((Self { image: main.image, alpha: main.alpha, unoccluded }, noise, spp))
     }
 }
@@ -139,6 +161,7 @@ impl Reference {
     /// Reads a reference of the wanted size.
     pub(crate) fn read(path: &Path, size: [usize; 2]) -> Result<Self> {
         let name = path.display().to_string();
+        files::reads(path)?;
         let options = ReadOptions { max_memory: memory::left(), ..Default::default() };
         let image = read(path, &options)?.image;
         if [image.width, image.height] != size {
@@ -156,6 +179,7 @@ impl Reference {
             strategy: None,
             spp: None,
             rel_mse: None,
+            rel_mse_covered: None,
         };
         Ok(Self { picture: Picture { image, alpha: None, unoccluded: None }, report })
     }
@@ -170,12 +194,13 @@ impl Reference {
         quiet: bool,
         shoot: impl FnMut(u32, usize) -> Result<Picture>,
     ) -> Result<Self> {
-        let report = |source, file: Option<&Path>, noise, spp| ReferenceReport {
+        let report = |source, file: Option<&Path>, noise: Noise, spp| ReferenceReport {
             source,
             file: file.map(|path| path.display().to_string()),
             strategy: Some(strategy.to_owned()),
             spp: Some(spp),
-            rel_mse: Some(noise),
+            rel_mse: Some(noise.all),
+            rel_mse_covered: noise.covered,
         };
         let kept = cache.and_then(|cache| cache.get(key, quiet));
         if let Some((path, bytes)) = kept
@@ -186,15 +211,12 @@ impl Reference {
         let (picture, noise, spp) = goal.reach(shoot)?;
         let path = match cache {
             None => None,
-            Some(cache) => {
-                let path = cache.put(key, &picture.encode(noise, spp)?);
-                Some(path.context("cannot keep the reference; --no-cache does without")?)
-            }
+            Some(cache) => cache.put(key, &picture.encode(noise, spp)?, quiet),
         };
         Ok(Self { picture, report: report(Source::Rendered, path.as_deref(), noise, spp) })
     }
 
-    /// Of a view, by [`PLAN`].
+    /// Of a view, by [`STRATEGY`].
     pub(crate) fn of_view(
         cache: Option<&Cache>,
         view: &View,
@@ -203,10 +225,10 @@ impl Reference {
         quiet: bool,
     ) -> Result<Self> {
         let settings = RenderSettings { n_samples: 0, seed: SEEDS[0], ..settings };
-        let key = Key::of_program(view, format_args!("{settings:?}{PLAN:?}{goal:?}"));
-        let renderer = PLAN.prepare(&view.environment)?;
-        let studio = Studio { view, settings, renderer: &renderer, quiet };
-        Self::get(cache, &key, goal, &PLAN.describe(), quiet, |n_samples, half| {
+        let key = Key::of_program(view, format_args!("{settings:?}{STRATEGY}{goal:?}"));
+        let strategy = PreparedStrategy::new(STRATEGY, &view.environment)?;
+        let studio = Studio { view, settings, strategy: &strategy, quiet };
+        Self::get(cache, &key, goal, &STRATEGY.description(), quiet, |n_samples, half| {
             let label = format!("reference, half {} of 2", half + 1);
             Ok(studio.shoot(&label, n_samples, SEEDS[half])?.layers.into())
         })
@@ -218,13 +240,18 @@ impl Goal {
     fn reach(
         self,
         mut shoot: impl FnMut(u32, usize) -> Result<Picture>,
-    ) -> Result<(Picture, f64, u32)> {
-        let mut take = |each: u32| -> Result<(Picture, f64)> {
+    ) -> Result<(Picture, Noise, u32)> {
+        let mut take = |each: u32| -> Result<(Picture, Noise)> {
             let [a, b] = [shoot(each, 0)?, shoot(each, 1)?];
             let mean = a.mean(&b);
-            let mask = mean.covered().filter(|_| matches!(self, Self::Noise { .. }));
             // (a − m)² = ((a − b) / 2)², whose expected value is the variance of m.
-            let noise = compare(&a.image, &mean.image, mask.as_deref())?.rel_mse;
+            let noise = |mask: Option<&[bool]>| -> Result<f64> {
+                Ok(compare(&a.image, &mean.image, mask)?.rel_mse)
+            };
+            let touched = mean.touched().filter(|_| matches!(self, Self::Noise { .. }));
+            let covered = mean.covered().filter(|covered| covered.contains(&true));
+            let covered = covered.map(|covered| noise(Some(&covered))).transpose()?;
+            let noise = Noise { all: noise(touched.as_deref())?, covered };
             Ok((mean, noise))
         };
         match self {
@@ -238,10 +265,10 @@ impl Goal {
                 let mut each = PILOT.min(most);
                 loop {
                     let (picture, noise) = take(each)?;
-                    if noise <= goal || each == most {
+                    if noise.all <= goal || each == most {
                         return Ok((picture, noise, 2 * each));
                     }
-                    each = next_samples(each, noise / goal).min(most);
+                    each = next_samples(each, noise.all / goal).min(most);
                 }
             }
         }

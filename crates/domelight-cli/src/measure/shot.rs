@@ -2,11 +2,12 @@
 
 use anyhow::{Result, bail};
 use domelight::render::{Counts, Layers, RenderSettings};
+use domelight::strategy::PreparedStrategy;
 
 use crate::interrupt;
 use crate::progress::RenderProgress;
 use crate::scene::View;
-use crate::strategy::{Job, Renderer};
+use crate::strategy::Job;
 use crate::usage::{Seconds, Stopwatch};
 
 /// Where a strategy's pictures are taken.
@@ -15,7 +16,7 @@ pub(crate) struct Studio<'a> {
     pub(crate) view: &'a View,
     /// But for the number of samples and the seed.
     pub(crate) settings: RenderSettings,
-    pub(crate) renderer: &'a Renderer<'a>,
+    pub(crate) strategy: &'a PreparedStrategy<'a>,
     pub(crate) quiet: bool,
 }
 
@@ -25,7 +26,6 @@ pub(crate) struct Shot {
     pub(crate) counts: Counts,
     /// Of rendering alone.
     pub(crate) time: Seconds,
-    n_samples: u32,
 }
 
 impl Shot {
@@ -36,8 +36,12 @@ impl Shot {
 
     /// Shadow rays of a pixel that the scene covers.
     pub(crate) fn rays(&self) -> f64 {
-        let points_of_a_sample = self.counts.shading_points as f64 / f64::from(self.n_samples);
-        self.counts.shadow_rays as f64 / points_of_a_sample
+        self.counts.shadow_rays as f64 / self.layers.covered_pixels()
+    }
+
+    /// Camera samples of a pixel, which not all strategies have as many of as asked for.
+    pub(crate) fn camera_samples(&self) -> f64 {
+        self.counts.camera_rays as f64 / self.layers.n_samples.len() as f64
     }
 }
 
@@ -52,7 +56,7 @@ impl Studio<'_> {
         let mut watch = Stopwatch::start();
         let course = None;
         let job = Job { scene, camera, environment, settings, progress, course };
-        let rendering = (self.renderer)(&job)?;
+        let rendering = job.render(self.strategy)?;
         let time = watch.lap();
         progress.finish();
         if !rendering.complete {
@@ -61,6 +65,6 @@ impl Studio<'_> {
         if rendering.counts.shading_points == 0 {
             bail!("the camera sees nothing of the scene: there is nothing to compare");
         }
-        Ok(Shot { layers: rendering.layers, counts: rendering.counts, time, n_samples })
+        Ok(Shot { layers: rendering.layers, counts: rendering.counts, time })
     }
 }

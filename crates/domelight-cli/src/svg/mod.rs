@@ -12,6 +12,7 @@ pub(crate) use ticks::superscript;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use domelight::quote::xml;
 use std::fmt::{self, Display, Write as _};
 
 /// A place on the sheet.
@@ -234,7 +235,7 @@ impl Document {
 
     /// The path of SVG's path data.
     pub(crate) fn path(&mut self, data: &str, style: Style) {
-        self.push(format_args!("<path d=\"{}\"{style}/>", escape(data)));
+        self.push(format_args!("<path d=\"{}\"{style}/>", xml::text(data)));
     }
 
     /// A line of text.
@@ -263,7 +264,7 @@ impl Document {
         self.push(format_args!(
             "<text x=\"{x}\" y=\"{y}\" font-family=\"{FONT}, sans-serif\" font-size=\"{}\" fill=\"{color}\"{more}>{}</text>",
             Number(style.size),
-            escape(text)
+            xml::text(text)
         ));
     }
 
@@ -319,23 +320,6 @@ pub(crate) fn data_uri(media_type: &str, bytes: &[u8]) -> String {
     format!("data:{media_type};base64,{}", STANDARD.encode(bytes))
 }
 
-/// Text for XML or HTML, in elements and in attributes. What XML cannot hold is left out.
-pub(crate) fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            c if c.is_control() && !matches!(c, '\n' | '\t') => {}
-            c => escaped.push(c),
-        }
-    }
-    escaped
-}
-
 /// The attributes of a rectangle.
 struct Place(Rect);
 
@@ -365,7 +349,7 @@ mod tests {
     fn text_is_escaped() {
         let mut sheet = Document::new(10.0, 10.0);
         sheet.text((0.0, 0.0), "a<b & \"c\" 'd'\u{1}", TextStyle::new(12.0));
-        assert!(sheet.to_svg().contains(">a&lt;b &amp; &quot;c&quot; &#39;d&#39;</text>"));
+        assert!(sheet.to_svg().contains(">a&lt;b &amp; &quot;c&quot; &#39;d&#39;\u{fffd}</text>"));
     }
 
     #[test]

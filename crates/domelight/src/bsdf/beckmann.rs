@@ -8,8 +8,8 @@
 //! comparison with published pictures, where the simple sampler is what was used. Its weights grow
 //! without bound at grazing angles: [`super::Ggx`] is the lobe to render with.
 
-use super::Fresnel;
-use super::microfacet::{Masking, Microfacet, NormalDistribution, clamp_alpha, gaussian_slopes};
+use super::microfacet::{Masking, Microfacet, NormalDistribution, gaussian_slopes};
+use super::{Fresnel, range};
 use crate::math::{FRAC_1_PI, sqr};
 use crate::simd::{Real, Vectors};
 
@@ -17,8 +17,8 @@ use crate::simd::{Real, Vectors};
 pub type Beckmann = Microfacet<BeckmannNormals>;
 
 impl Beckmann {
-    /// Of the roughness α along x and y (equal for an isotropic lobe), raised to at least
-    /// [`super::MIN_ALPHA`].
+    /// Of the roughness α along x and y (equal for an isotropic lobe), clamped to [`super::MIN_ALPHA`] to
+    /// [`super::MAX_ALPHA`].
     pub fn new(alpha: [f32; 2], fresnel: Fresnel, masking: Masking) -> Self {
         Self::with_normals(BeckmannNormals::new(alpha), fresnel, masking)
     }
@@ -31,9 +31,9 @@ pub struct BeckmannNormals {
 }
 
 impl BeckmannNormals {
-    /// Of the roughness along x and y.
+    /// Of the roughness along x and y, clamped to [`super::MIN_ALPHA`] to [`super::MAX_ALPHA`].
     pub fn new(alpha: [f32; 2]) -> Self {
-        Self { alpha: clamp_alpha(alpha) }
+        Self { alpha: range::alpha(alpha) }
     }
 }
 

@@ -4,6 +4,7 @@
 //! - The exact unpolarised reflectance of a conductor of complex refractive index η + ik, per
 //!   colour channel; for its arithmetic see Lagarde 2013, "Memo on Fresnel equations".
 
+use super::range;
 use crate::Rgb;
 use crate::simd::{Colors, Real};
 
@@ -23,6 +24,17 @@ pub enum Fresnel {
 }
 
 impl Fresnel {
+    /// The same with its parameters clamped to the range that the formulas bear.
+    pub(super) fn in_range(self) -> Self {
+        match self {
+            Self::One => Self::One,
+            Self::Schlick { f0 } => Self::Schlick { f0: range::reflectance(f0) },
+            Self::Conductor(Conductor { eta, k }) => {
+                Self::Conductor(Conductor { eta: range::eta(eta), k: range::k(k) })
+            }
+        }
+    }
+
     /// F at the cosine between direction and microfacet normal, in [0, 1].
     #[inline(always)]
     pub fn eval(&self, cos_theta: f32) -> Rgb {

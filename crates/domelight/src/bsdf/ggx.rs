@@ -5,8 +5,8 @@
 //! Spherical Caps"), which has the density of Heitz 2018 with less arithmetic; drawing from D cos θ
 //! instead has weights without bound at grazing angles.
 
-use super::Fresnel;
-use super::microfacet::{Masking, Microfacet, NormalDistribution, clamp_alpha};
+use super::microfacet::{Masking, Microfacet, NormalDistribution};
+use super::{Fresnel, range};
 use crate::math::{FRAC_1_PI, sin_cos_turns, sqr};
 use crate::simd::{Real, Vectors};
 
@@ -14,8 +14,8 @@ use crate::simd::{Real, Vectors};
 pub type Ggx = Microfacet<GgxNormals>;
 
 impl Ggx {
-    /// Of the roughness α along x and y (equal for an isotropic lobe), raised to at least
-    /// [`super::MIN_ALPHA`].
+    /// Of the roughness α along x and y (equal for an isotropic lobe), clamped to [`super::MIN_ALPHA`] to
+    /// [`super::MAX_ALPHA`].
     pub fn new(alpha: [f32; 2], fresnel: Fresnel, masking: Masking) -> Self {
         Self::with_normals(GgxNormals::new(alpha), fresnel, masking)
     }
@@ -28,9 +28,9 @@ pub struct GgxNormals {
 }
 
 impl GgxNormals {
-    /// Of the roughness along x and y.
+    /// Of the roughness along x and y, clamped to [`super::MIN_ALPHA`] to [`super::MAX_ALPHA`].
     pub fn new(alpha: [f32; 2]) -> Self {
-        Self { alpha: clamp_alpha(alpha) }
+        Self { alpha: range::alpha(alpha) }
     }
 }
 

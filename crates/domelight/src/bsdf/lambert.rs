@@ -1,6 +1,6 @@
 //! Lambert's law: f_r = ρ/π.
 
-use super::{Brdf, where_above};
+use super::{Brdf, range, where_above};
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3};
 use crate::sampling::warp;
@@ -9,14 +9,13 @@ use crate::simd::{Colors, Real, Vectors};
 /// Ideal diffuse reflection, sampled by the cosine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lambert {
-    /// Albedo ρ in [0, 1].
-    pub albedo: Rgb,
+    albedo: Rgb,
 }
 
 impl Lambert {
-    /// Of an albedo in [0, 1].
+    /// Of the albedo ρ, clamped to [0, 1].
     pub const fn new(albedo: Rgb) -> Self {
-        Self { albedo }
+        Self { albedo: range::reflectance(albedo) }
     }
 }
 

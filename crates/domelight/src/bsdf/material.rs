@@ -3,27 +3,47 @@
 //! A material is sampled by choosing one lobe and drawing from it; its density is that of the
 //! mixture, so no sample is worse than the chosen lobes' own by more than the choice.
 
-use super::{Beckmann, Brdf, Ggx, Lambert, MetallicRoughness, Phong, Ward};
+use super::{Beckmann, Brdf, CustomLobe, Ggx, Lambert, MetallicRoughness, Phong, Ward, range};
 use crate::Rgb;
 use crate::math::Vec3;
 use crate::sampling::ONE_MINUS_EPSILON;
 use crate::simd::{Colors, Mask as _, Real, Vectors};
 
-/// One reflectance lobe.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Lobe {
+macro_rules! lobes {
+    ($($(#[$doc:meta])* $model:ident),*) => {
+        /// One reflectance lobe.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Lobe {
+            $($(#[$doc])* $model($model),)*
+            /// A lobe of the caller's own.
+            Custom(CustomLobe),
+        }
+
+        impl Lobe {
+            /// The names of the library's models, for tests that must not forget one.
+            pub const MODELS: &[&str] = &[$(stringify!($model)),*];
+        }
+
+        $(impl From<$model> for Lobe {
+            fn from(lobe: $model) -> Self {
+                Self::$model(lobe)
+            }
+        })*
+    };
+}
+lobes! {
     /// Ideal diffuse.
-    Lambert(Lambert),
+    Lambert,
     /// About the mirror direction.
-    Phong(Phong),
+    Phong,
     /// Anisotropic Gaussian.
-    Ward(Ward),
+    Ward,
     /// Microfacets, Trowbridge–Reitz.
-    Ggx(Ggx),
+    Ggx,
     /// Microfacets, Gaussian slopes.
-    Beckmann(Beckmann),
+    Beckmann,
     /// glTF's coupled diffuse and GGX.
-    MetallicRoughness(MetallicRoughness),
+    MetallicRoughness
 }
 
 /// The same expression for the lobe inside, whatever it is.
@@ -36,6 +56,7 @@ macro_rules! each {
             Lobe::Ggx($l) => $body,
             Lobe::Beckmann($l) => $body,
             Lobe::MetallicRoughness($l) => $body,
+            Lobe::Custom($l) => $body,
         }
     };
 }
@@ -61,16 +82,11 @@ impl Brdf for Lobe {
     }
 }
 
-macro_rules! lobe_from {
-    ($($model:ident),*) => {$(
-        impl From<$model> for Lobe {
-            fn from(lobe: $model) -> Self {
-                Self::$model(lobe)
-            }
-        }
-    )*};
+impl From<CustomLobe> for Lobe {
+    fn from(lobe: CustomLobe) -> Self {
+        Self::Custom(lobe)
+    }
 }
-lobe_from!(Lambert, Phong, Ward, Ggx, Beckmann, MetallicRoughness);
 
 /// The most lobes of a [`Material`].
 pub const MAX_LOBES: usize = 3;
@@ -126,7 +142,8 @@ impl Material {
         Self::checked(lobes.iter().map(|&lobe| (1.0, lobe)))
     }
 
-    /// The sum of lobes times weights ≥ 0; a weight that is not positive drops its lobe.
+    /// The sum of lobes times weights in [0, 1000]; greater ones are clamped, and a weight that is not positive
+    /// drops its lobe.
     ///
     /// # Errors
     /// [`TooManyLobes`] when more than [`MAX_LOBES`] are not black.
@@ -144,7 +161,7 @@ impl Material {
         for (slot, (weight, lobe)) in
             material.terms.iter_mut().zip(lobes.into_iter().filter(reflects))
         {
-            *slot = Term { lobe, weight, probability: 0.0 };
+            *slot = Term { lobe, weight: range::weight(weight), probability: 0.0 };
             material.n_terms += 1;
         }
         material.choose_by_albedo(TYPICAL_COSINE);
@@ -195,7 +212,8 @@ impl Material {
     /// Whether samples choose among lobes or parts of them: if not, `u_lobe` does not matter.
     pub(crate) fn has_choice(&self) -> bool {
         let mut terms = self.terms().iter();
-        self.n_terms > 1 || terms.any(|t| matches!(t.lobe, Lobe::MetallicRoughness(_)))
+        self.n_terms > 1
+            || terms.any(|t| matches!(t.lobe, Lobe::MetallicRoughness(_) | Lobe::Custom(_)))
     }
 
     /// The lobes with their weights.

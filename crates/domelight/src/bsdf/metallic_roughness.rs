@@ -13,7 +13,7 @@
 
 use super::ggx::{Ggx, GgxNormals};
 use super::microfacet::{Masking, reflect_about};
-use super::{Brdf, Fresnel, HORIZON, NormalDistribution as _, fresnel, where_above};
+use super::{Brdf, Fresnel, HORIZON, NormalDistribution as _, fresnel, range, where_above};
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3, sqr};
 use crate::sampling::warp;
@@ -32,20 +32,26 @@ pub struct MetallicRoughness {
 
 impl MetallicRoughness {
     /// Of the base colour, metalness and perceptual roughness; all are clamped to [0, 1], as glTF
-    /// has it for products of factors and textures.
+    /// has it for products of factors and textures, and α = roughness² to at least [`super::MIN_ALPHA`].
     pub fn new(base_color: Rgb, metallic: f32, roughness: f32) -> Self {
-        // NaN is zero.
-        let unit = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
-        let (base, metallic) = (base_color.map(unit), unit(metallic));
+        let (base, metallic) = (range::reflectance(base_color), range::unit(metallic));
+        let [alpha, _] = range::alpha([sqr(range::unit(roughness)); 2]);
         let diffuse = base * (1.0 - metallic);
         let f0 = Rgb::splat(0.04).lerp(base, metallic);
-        Self {
-            diffuse,
-            f0,
-            alpha: sqr(unit(roughness)),
-            diffuse_mean: diffuse.mean(),
-            f0_mean: f0.mean(),
-        }
+        Self { diffuse, f0, alpha, diffuse_mean: diffuse.mean(), f0_mean: f0.mean() }
+    }
+
+    /// The same lobe by glTF's older parameters (`KHR_materials_pbrSpecularGlossiness`): diffuse color,
+    /// reflectance at normal incidence and 1 − perceptual roughness, all clamped to \[0, 1\].
+    ///
+    /// The diffuse color is scaled by 1 − max(specular).
+    pub fn specular_glossiness(diffuse: Rgb, specular: Rgb, glossiness: f32) -> Self {
+        let unit = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
+        let f0 = specular.map(unit);
+        let diffuse = diffuse.map(unit) * (1.0 - f0.max_component());
+        let (diffuse_mean, f0_mean) = (diffuse.mean(), f0.mean());
+        let of_roughness = Self::new(Rgb::BLACK, 0.0, 1.0 - unit(glossiness));
+        Self { diffuse, f0, diffuse_mean, f0_mean, ..of_roughness }
     }
 
     pub(super) fn alpha(&self) -> [f32; 2] {
@@ -136,6 +142,18 @@ mod tests {
     }
 
     #[test]
+    fn specular_and_gloss_are_the_same_lobe() {
+        let base = Rgb::new(0.9, 0.5, 0.1);
+        let plastic = MetallicRoughness::new(base, 0.0, 0.3);
+        let same = MetallicRoughness::specular_glossiness(base / 0.96, Rgb::splat(0.04), 0.7);
+        assert!((plastic.diffuse.r - same.diffuse.r).abs() < 1e-6);
+        assert!((plastic.alpha - same.alpha).abs() < 1e-6 && plastic.f0 == same.f0);
+        let metal = MetallicRoughness::specular_glossiness(base, Rgb::WHITE, 0.5);
+        check_lobe(&metal);
+        check_lobe(&MetallicRoughness::specular_glossiness(base, Rgb::splat(0.2), 0.4));
+    }
+
+    #[test]
     fn a_metal_is_a_ggx_lobe() {
         let base = Rgb::new(0.9, 0.6, 0.2);
         let lobe = MetallicRoughness::new(base, 1.0, 0.5);
@@ -156,6 +174,16 @@ mod tests {
         assert!(albedo[0] > 0.8 * 0.9 && albedo[0] < 0.85, "{albedo:?}");
         let wi = toward(20.0, 2.0);
         assert!(lobe.eval(wo, wi).b > Lambert::new(base).eval(wo, wi).b * 0.9);
+    }
+
+    /// Mirrors are lobes of the least roughness, for whoever asks for it: not only where they are evaluated.
+    #[test]
+    fn the_narrowest_lobe_is_finite() {
+        for roughness in [0.0, 1e-30, 1e-5, 0.01] {
+            let lobe = MetallicRoughness::new(Rgb::WHITE, 1.0, roughness);
+            assert_eq!(lobe.alpha(), [crate::bsdf::MIN_ALPHA; 2]);
+            check_lobe(&lobe);
+        }
     }
 
     #[test]

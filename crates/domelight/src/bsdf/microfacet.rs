@@ -21,14 +21,6 @@ use crate::Rgb;
 use crate::math::{Vec3, sin_cos_turns, sqr, vec3};
 use crate::simd::{Colors, Real, Vectors};
 
-/// The least roughness of a lobe; f32 directions resolve no narrower one.
-pub const MIN_ALPHA: f32 = 1e-4;
-
-/// Raises both to [`MIN_ALPHA`] (and NaN too).
-pub(super) fn clamp_alpha(alpha: [f32; 2]) -> [f32; 2] {
-    alpha.map(|a| a.max(MIN_ALPHA))
-}
-
 /// How masking toward the viewer and shadowing from the light are combined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Masking {
@@ -70,9 +62,9 @@ pub struct Microfacet<D> {
 }
 
 impl<D: NormalDistribution> Microfacet<D> {
-    /// Of a distribution of normals.
+    /// Of a distribution of normals; the reflectance is clamped to the range that Fresnel's formulas bear.
     pub fn with_normals(normals: D, fresnel: Fresnel, masking: Masking) -> Self {
-        Self { normals, fresnel, masking }
+        Self { normals, fresnel: fresnel.in_range(), masking }
     }
 
     pub(super) fn alpha(&self) -> [f32; 2] {

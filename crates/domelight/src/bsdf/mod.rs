@@ -18,12 +18,14 @@
 //! # Ok::<(), domelight::bsdf::ParseMaterialError>(())
 //! ```
 //!
-//! All lobes here are reciprocal: f_r(wo, wi) = f_r(wi, wo).
+//! All lobes here are reciprocal: f_r(wo, wi) = f_r(wi, wo). Their constructors clamp every parameter to the
+//! range that the formulas bear, so no lobe evaluates to NaN or infinity.
 //!
 //! Rejected: trait objects (the set is closed, and the sample loop should inline); tabulated
 //! energy compensation (its tables would have to enter the bounds of [`Brdf::max_eval`]).
 
 mod beckmann;
+mod custom;
 mod fresnel;
 mod ggx;
 mod lambert;
@@ -33,20 +35,23 @@ mod microfacet;
 mod outline;
 mod parse;
 mod phong;
+mod range;
 #[cfg(test)]
 mod test_support;
 mod ward;
 
 pub use beckmann::{Beckmann, BeckmannNormals};
+pub use custom::{Bxdf, CustomLobe};
 pub use fresnel::{Conductor, Fresnel};
 pub use ggx::{Ggx, GgxNormals};
 pub use lambert::Lambert;
 pub use material::{Lobe, MAX_LOBES, Material, TooManyLobes};
 pub use metallic_roughness::MetallicRoughness;
-pub use microfacet::{MIN_ALPHA, Masking, Microfacet, NormalDistribution};
+pub use microfacet::{Masking, Microfacet, NormalDistribution};
 pub use outline::{Gloss, Outline};
 pub use parse::{MaterialSpec, ParseMaterialError};
 pub use phong::Phong;
+pub use range::{MAX_ALPHA, MAX_EXPONENT, MIN_ALPHA};
 pub use ward::{Ward, WardForm};
 
 use crate::Rgb;

@@ -1,6 +1,6 @@
 //! What a material looks like from afar: the least that a density needs to follow it roughly.
 
-use super::{Brdf as _, Lobe, Material};
+use super::{Brdf as _, Lobe, MIN_ALPHA, Material};
 use crate::Rgb;
 use crate::math::Vec3;
 
@@ -57,6 +57,7 @@ impl Material {
             Lobe::Ggx(l) => l.alpha()[0] == l.alpha()[1],
             Lobe::Beckmann(l) => l.alpha()[0] == l.alpha()[1],
             Lobe::Lambert(_) | Lobe::Phong(_) | Lobe::MetallicRoughness(_) => true,
+            Lobe::Custom(_) => false,
         })
     }
 
@@ -73,6 +74,13 @@ impl Material {
             let albedo = lobe.directional_albedo(wo.z) * weight;
             match lobe {
                 Lobe::Lambert(_) => diffuse += albedo,
+                Lobe::Custom(l) => match l.bxdf().roughness() {
+                    None => diffuse += albedo,
+                    Some(alpha) => {
+                        let alpha = [alpha.clamp(MIN_ALPHA, 1.0); 2];
+                        add(albedo, Gloss::Slopes { alpha, gaussian: false });
+                    }
+                },
                 Lobe::Phong(l) => add(albedo, Gloss::Mirror { exponent: l.exponent() }),
                 Lobe::Ward(l) => add(albedo, Gloss::Slopes { alpha: l.alpha(), gaussian: true }),
                 Lobe::Ggx(l) => add(albedo, Gloss::Slopes { alpha: l.alpha(), gaussian: false }),

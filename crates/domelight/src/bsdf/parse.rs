@@ -20,8 +20,8 @@
 //! `ggx:0.2` is the same surface as in renderers that it is compared with.
 
 use super::{
-    Beckmann, Conductor, Fresnel, Ggx, Lambert, Lobe, MIN_ALPHA, Masking, Material,
-    MetallicRoughness, Phong, Ward, WardForm,
+    Beckmann, Conductor, Fresnel, Ggx, Lambert, Lobe, MAX_ALPHA, MAX_EXPONENT, MIN_ALPHA, Masking,
+    Material, MetallicRoughness, Phong, Ward, WardForm,
 };
 use crate::Rgb;
 use std::str::FromStr;
@@ -175,7 +175,7 @@ impl Parts<'_> {
     fn phong(&self) -> Result<MaterialSpec, ParseMaterialError> {
         self.count(1..=3, "an exponent and up to two colours", "phong:50:1:0.5")?;
         Ok(MaterialSpec::Phong {
-            exponent: self.number(0, "exponent", [0.0, 1e5], EXPONENT)?,
+            exponent: self.number(0, "exponent", [0.0, MAX_EXPONENT], EXPONENT)?,
             specular: self.color(1, "specular reflectance", 1.0)?,
             diffuse: self.color(2, "diffuse reflectance", 0.0)?,
         })
@@ -183,7 +183,7 @@ impl Parts<'_> {
 
     fn ward(&self) -> Result<MaterialSpec, ParseMaterialError> {
         self.count(1..=4, "one or two roughnesses, a colour and a form", "ward:0.15:0.5:0.9:1992")?;
-        let range = [MIN_ALPHA, 10.0];
+        let range = [MIN_ALPHA, MAX_ALPHA];
         let x = self.number(0, "roughness along x", range, ALPHA)?;
         let y = match self.parts.get(1) {
             Some(_) => self.number(1, "roughness along y", range, ALPHA)?,
@@ -204,7 +204,7 @@ impl Parts<'_> {
     ) -> Result<([f32; 2], Fresnel, Masking), ParseMaterialError> {
         self.count(1..=3, "a roughness, a reflectance and a kind of masking", example)?;
         let wrong = || self.wrong(0, "roughness", ALPHAS);
-        let alpha = match *numbers(self.parts[0], [MIN_ALPHA, 10.0]).ok_or_else(wrong)? {
+        let alpha = match *numbers(self.parts[0], [MIN_ALPHA, MAX_ALPHA]).ok_or_else(wrong)? {
             [a] => [a, a],
             [x, y] => [x, y],
             _ => return Err(wrong()),

@@ -8,7 +8,7 @@
 //! Those samples are lost and counted; redrawing them would need their fraction in the density,
 //! which has no closed form for real n.
 
-use super::{Brdf, HORIZON, ROUNDING, where_above};
+use super::{Brdf, HORIZON, ROUNDING, range, where_above};
 use crate::Rgb;
 use crate::math::{TAU, Vec3, tangents};
 use crate::sampling::warp;
@@ -22,9 +22,9 @@ pub struct Phong {
 }
 
 impl Phong {
-    /// Of the reflectance k_s in [0, 1] and the exponent n, which is clamped to [0, 10⁵].
+    /// Of the reflectance k_s in [0, 1] and the exponent n in [0, [`super::MAX_EXPONENT`]]; both are clamped.
     pub fn new(specular: Rgb, exponent: f32) -> Self {
-        Self { specular, exponent: exponent.clamp(0.0, 1e5) }
+        Self { specular: range::reflectance(specular), exponent: range::exponent(exponent) }
     }
 
     pub(super) fn exponent(&self) -> f32 {

@@ -19,8 +19,8 @@
 //! the paper of 1992 has it: it is ρ (h·wi) cos³ θ_h √(cos θ_i / cos θ_o) for that form, and
 //! 2ρ cos θ_i / (cos θ_i + cos θ_o) for the bounded one.
 
-use super::microfacet::{clamp_alpha, gaussian_slopes, reflect_about, rings};
-use super::{Brdf, HORIZON, ROUNDING, where_above};
+use super::microfacet::{gaussian_slopes, reflect_about, rings};
+use super::{Brdf, HORIZON, ROUNDING, range, where_above};
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3, sqr};
 use crate::simd::{Colors, Real, Vectors};
@@ -47,9 +47,9 @@ pub struct Ward {
 
 impl Ward {
     /// Of the reflectance ρ in [0, 1] and the root-mean-square slopes `alpha` along x and y (equal
-    /// for an isotropic lobe), raised to at least [`super::MIN_ALPHA`].
+    /// for an isotropic lobe), clamped to [`super::MIN_ALPHA`] to [`super::MAX_ALPHA`]; ρ is clamped, too.
     pub fn new(rho: Rgb, alpha: [f32; 2], form: WardForm) -> Self {
-        Self { rho, alpha: clamp_alpha(alpha), form }
+        Self { rho: range::reflectance(rho), alpha: range::alpha(alpha), form }
     }
 
     pub(super) fn alpha(&self) -> [f32; 2] {

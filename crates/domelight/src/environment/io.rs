@@ -1,12 +1,13 @@
 //! Light probes from files: any picture format, any mapping, brought to the lat-long working map.
 //!
-//! Radiance must be finite and not negative before any sampling table is made from it. A probe that breaks this is an
-//! error that shows the first bad texel; repairing it is the user's decision ([`ProbeOptions::sanitize`]), because a
-//! NaN is often where the sun was.
+//! Radiance must be finite and not negative before any sampling table is made from it. Lossy compression leaves negative
+//! texels in most maps, and stitching NaN in some: they are repaired and counted in a warning, for a NaN may be where
+//! the sun was; with [`ProbeOptions::strict`] they are an error that shows the first bad texel.
 
 use super::mapping::{Mapping, ShapeError, to_lat_long};
 use crate::math::{Vec2, vec2};
-use crate::picture::{self, PictureError, ReadOptions};
+use crate::memory;
+use crate::picture::{self, DataWindow, Format, PictureError, ReadOptions};
 use crate::{Rgb, RgbImage};
 use std::path::Path;
 
@@ -17,8 +18,8 @@ pub struct ProbeOptions {
     pub mapping: Option<Mapping>,
     /// The OpenEXR layer, see [`ReadOptions::layer`].
     pub layer: Option<String>,
-    /// Repair negative and non-finite values instead of refusing them.
-    pub sanitize: bool,
+    /// Refuse negative and non-finite values instead of repairing them.
+    pub strict: bool,
     /// The most memory that reading may take, see [`ReadOptions::max_memory`].
     pub max_memory: Option<u64>,
 }
@@ -34,6 +35,8 @@ pub struct LoadedProbe {
     pub file_size: (usize, usize),
     /// What was repaired.
     pub sanitized: SanitizeReport,
+    /// How the map differs from the light that was there, one sentence each.
+    pub warnings: Vec<String>,
 }
 
 /// Numbers of repaired values (channels of texels).
@@ -62,7 +65,7 @@ pub enum ProbeError {
     /// Some values are no radiance.
     #[error(
         "{file}: texel ({x}, {y}) has {channel} = {value}, and {count} value(s) in all are negative, NaN or infinite; \
-         --sanitize repairs them"
+         without --strict they are repaired"
     )]
     BadTexel {
         /// The file.
@@ -85,8 +88,8 @@ pub enum ProbeError {
 /// Lat-long maps keep their texels bit for bit; other mappings are converted at the height that keeps their detail.
 ///
 /// # Errors
-/// If the picture cannot be read, has not the mapping's shape, or has values that are no radiance and `sanitize` is
-/// not set.
+/// If the picture cannot be read, has not the mapping's shape, or, with [`ProbeOptions::strict`], has values that are
+/// no radiance.
 pub fn load_probe(path: &Path, options: &ProbeOptions) -> Result<LoadedProbe, ProbeError> {
     let read = ReadOptions { layer: options.layer.clone(), max_memory: options.max_memory };
     let picture = picture::read(path, &read)?;
@@ -104,7 +107,25 @@ pub fn probe_from_picture(
     file: &str,
     options: &ProbeOptions,
 ) -> Result<LoadedProbe, ProbeError> {
+    let mut warnings = Vec::new();
     let mut image = picture.image;
+    if let Some(window) = picture.window
+        && let Some(framed) =
+            in_display_window(&image, window, options).map_err(|problem| problem.in_file(file))?
+    {
+        warnings.push(format!(
+            "{file}: the data window of {}x{} texels is shown in the display window of {}x{}; what lies outside the \
+             one is black, outside the other is cut off",
+            image.width, image.height, framed.width, framed.height
+        ));
+        image = framed;
+    }
+    if matches!(picture.format, Format::Png | Format::Jpeg) {
+        warnings.push(format!(
+            "{file}: {} holds nothing brighter than white, so that suns and lamps are cut off; use .exr or .hdr",
+            if picture.format == Format::Png { "PNG" } else { "JPEG" }
+        ));
+    }
     let mapping = options.mapping.unwrap_or_else(|| {
         match Mapping::guess(image.width, image.height, picture.envmap) {
             Mapping::Angular => guess_of_square(&image),
@@ -114,19 +135,58 @@ pub fn probe_from_picture(
     mapping
         .check_shape(image.width, image.height)
         .map_err(|shape| ProbeError::Shape { file: file.to_owned(), shape })?;
-    let sanitized = if options.sanitize {
-        sanitize(&mut image)
-    } else {
+    if options.strict {
         require_radiance(&image, file)?;
-        SanitizeReport::default()
-    };
+    }
+    let sanitized = sanitize(&mut image);
+    if sanitized != SanitizeReport::default() {
+        let SanitizeReport { negative, non_finite } = sanitized;
+        warnings.push(format!(
+            "{file}: repaired {negative} negative and {non_finite} NaN or infinite values; --strict refuses them"
+        ));
+    }
     let file_size = (image.width, image.height);
     let height = mapping.lat_long_height(image.width, image.height);
     let image = match mapping {
         Mapping::LatLong => image,
         _ => to_lat_long(&image, mapping, height),
     };
-    Ok(LoadedProbe { image, mapping, file_size, sanitized })
+    Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings })
+}
+
+/// The display window's picture, if that has the shape of a map and the data window has not.
+///
+/// Cropped maps and those with borders beyond the frame keep their directions so. But the display windows of many
+/// files are whatever their makers had open, so a data window that looks like a map is one.
+fn in_display_window(
+    image: &RgbImage,
+    window: DataWindow,
+    options: &ProbeOptions,
+) -> Result<Option<RgbImage>, picture::Problem> {
+    let looks_like_map = |width: usize, height: usize| match options.mapping {
+        Some(Mapping::LatLong | Mapping::LatLongExr) => width == 2 * height,
+        Some(mapping) => mapping.check_shape(width, height).is_ok(),
+        None => width == 2 * height || Mapping::guess(width, height, None) != Mapping::LatLong,
+    };
+    let (width, height) = window.display;
+    if looks_like_map(image.width, image.height) || !looks_like_map(width, height) {
+        return Ok(None);
+    }
+    let texels = picture::checked_area(width, height)?;
+    memory::require(12 * texels as u64, options.max_memory)?;
+    let mut framed = RgbImage::new(width, height, picture::allocate(Rgb::BLACK, width, height)?);
+    for (y, row) in image.pixels.chunks_exact(image.width).enumerate() {
+        let at = |i: usize, origin: i64, size: usize| {
+            usize::try_from(i as i64 + origin).ok().filter(|&i| i < size)
+        };
+        let Some(to) = at(y, window.position.1, height) else { continue };
+        for (x, &pixel) in row.iter().enumerate() {
+            if let Some(x) = at(x, window.position.0, width) {
+                framed.pixels[to * width + x] = pixel;
+            }
+        }
+    }
+    Ok(Some(framed))
 }
 
 /// An angular map is black outside its disc; a square that is not is taken as octahedral.

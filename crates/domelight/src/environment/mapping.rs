@@ -4,8 +4,9 @@
 //! Every mapping is a pair of inverse functions between picture coordinates (u, v) ∈ \[0, 1\]² (u right, v down)
 //! and directions in the world frame (right-handed, +Y up), with its Jacobian dω / (du dv). A texel's value is
 //! constant over the texel, so conversion is an area average: each target texel is the mean of the source over
-//! the texel's solid angle, by regular supersampling with nearest look-up, finer where a small light is. Bilinear look-up was rejected: it
-//! smears a one-texel sun over its neighbours and disagrees with the constant texels of the importance table.
+//! the texel's solid angle, by the exact areas that two texels share (`overlap.rs`). Supersampling was rejected: it
+//! loses or doubles lights of a texel's size. Bilinear look-up was, too: it smears a one-texel sun over its neighbours
+//! and disagrees with the constant texels of the importance table.
 //!
 //! Sources: Debevec 1998, "Rendering Synthetic Objects into Real Scenes", and his light-probe gallery (angular
 //! map); Reinhard et al. 2010, "High Dynamic Range Imaging", ch. 11 (angular map, mirrored sphere, vertical
@@ -14,6 +15,7 @@
 
 mod convert;
 mod cube;
+mod overlap;
 
 pub use convert::{from_lat_long, to_lat_long};
 

@@ -164,6 +164,49 @@ impl Environment {
         fingerprinter.finish()
     }
 
+    /// Loads a light probe of any known format and mapping.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is damaged, or holds negative or non-finite values;
+    /// [`io::load_probe`] takes options for these.
+    #[cfg(feature = "io")]
+    pub fn load(path: impl AsRef<std::path::Path>) -> Result<Self, crate::Error> {
+        let probe = io::load_probe(path.as_ref(), &io::ProbeOptions::default())?;
+        Ok(Self::from_image(probe.image)?)
+    }
+
+    /// A built-in probe with 512 rows.
+    pub fn builtin(probe: builtin::BuiltinProbe) -> Self {
+        const ROWS: usize = 512;
+        Self::from_image(probe.image(ROWS))
+            .unwrap_or_else(|_| unreachable!("built-in probes are valid"))
+    }
+
+    /// From a lat-long map that stands upright: [`Environment::new`] without rotation and scale.
+    ///
+    /// # Errors
+    /// The first bad texel in row order, or an empty map.
+    pub fn from_image(map: RgbImage) -> Result<Self, EnvironmentError> {
+        Self::new(map, Orientation::default(), 1.0)
+    }
+
+    /// The same environment rotated further about its up axis \[degrees\]; see [`Orientation::rotation`].
+    ///
+    /// # Errors
+    /// If the angle is not finite.
+    pub fn rotated(self, degrees: f32) -> Result<Self, EnvironmentError> {
+        let rotation = self.orientation.rotation + degrees;
+        Self::new(self.map, Orientation { rotation, ..self.orientation }, 1.0)
+    }
+
+    /// The same environment with its radiance multiplied by `scale` ≥ 0.
+    ///
+    /// # Errors
+    /// If the scale is negative or not finite, or the result is too bright.
+    pub fn scaled(self, scale: f32) -> Result<Self, EnvironmentError> {
+        Self::new(self.map, self.orientation, scale)
+    }
+
     /// From a lat-long map: row 0 up, texel centres at +½, every texel finite and not negative;
     /// radiance is multiplied by `scale`.
     ///

@@ -2,7 +2,7 @@
 
 use super::Aabb;
 use crate::color::Rgb;
-use crate::math::{Mat4, Vec2, Vec3, Vec4};
+use crate::math::{Mat3, Mat4, Vec2, Vec3, Vec4};
 
 /// An indexed triangle mesh. Every attribute array is empty or has one entry a vertex.
 #[derive(Clone, Debug, Default)]
@@ -13,10 +13,14 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, (0, 0) the first texel of the first row as in glTF.
     pub uvs: Vec<Vec2>,
+    /// A second set of texture coordinates.
+    pub uvs2: Vec<Vec2>,
     /// Unit tangents with the bitangent's sign in w, as in glTF.
     pub tangents: Vec<Vec4>,
     /// Linear vertex colours, a factor on the base colour.
     pub colors: Vec<Rgb>,
+    /// Vertex opacity in \[0, 1\], a factor on the surface's.
+    pub alphas: Vec<f32>,
     /// Triangles as counter-clockwise vertex indices.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -64,8 +68,10 @@ impl Mesh {
         let counts = [
             ("normals", self.normals.len()),
             ("uvs", self.uvs.len()),
+            ("uvs of the second set", self.uvs2.len()),
             ("tangents", self.tangents.len()),
             ("colors", self.colors.len()),
+            ("alphas", self.alphas.len()),
         ];
         for (attribute, count) in counts {
             if count != 0 && count != vertices {
@@ -87,6 +93,21 @@ impl Mesh {
         Ok(())
     }
 
+    /// Bytes that the mesh takes.
+    #[cfg(feature = "io")]
+    pub(crate) fn memory(&self) -> u64 {
+        let Self { positions, normals, uvs, uvs2, tangents, colors, alphas, triangles } = self;
+        let bytes = size_of_val(&positions[..])
+            + size_of_val(&normals[..])
+            + size_of_val(&uvs[..])
+            + size_of_val(&uvs2[..])
+            + size_of_val(&alphas[..])
+            + size_of_val(&tangents[..])
+            + size_of_val(&colors[..])
+            + size_of_val(&triangles[..]);
+        bytes as u64
+    }
+
     /// The bounds of all vertices.
     pub fn bounds(&self) -> Aabb {
         Aabb::around(self.positions.iter().copied())
@@ -95,8 +116,9 @@ impl Mesh {
     /// Moves the mesh by an affine matrix: normals by the inverse transpose, tangents by the matrix;
     /// a reflection also turns the triangles round.
     pub fn transform(&mut self, m: &Mat4) {
-        let normal_matrix = glam::Mat3::from_mat4(*m).inverse().transpose();
-        let flipped = m.determinant() < 0.0;
+        let linear = linear_part(m);
+        let normal_matrix = linear.inverse().transpose();
+        let flipped = linear.determinant() < 0.0;
         for p in &mut self.positions {
             *p = m.transform_point3(*p);
         }
@@ -114,11 +136,19 @@ impl Mesh {
         }
     }
 
+    /// Scales the mesh by a factor > 0.
+    pub(crate) fn scale(&mut self, factor: f32) {
+        for p in &mut self.positions {
+            *p *= factor;
+        }
+    }
+
     /// Replaces the normals by the area-weighted mean of the faces round each vertex.
     pub fn compute_normals(&mut self) {
         let mut normals = vec![Vec3::ZERO; self.positions.len()];
+        let unit = power_of_two(self.bounds().size().max_element());
         for &[a, b, c] in &self.triangles {
-            let [pa, pb, pc] = [a, b, c].map(|i| self.positions[i as usize]);
+            let [pa, pb, pc] = [a, b, c].map(|i| self.positions[i as usize] / unit);
             let area = (pb - pa).cross(pc - pa);
             for i in [a, b, c] {
                 normals[i as usize] += area;
@@ -133,4 +163,19 @@ impl Mesh {
         let scale = if scale.is_finite() { scale } else { 1.0 };
         Mat4::from_scale(Vec3::splat(scale)) * Mat4::from_translation(-bounds.center())
     }
+}
+
+/// The linear part of an affine matrix, divided by a power of two so that its greatest entry is in [1, 2): products of
+/// its entries neither overflow nor vanish, and all digits stay.
+pub(crate) fn linear_part(m: &Mat4) -> Mat3 {
+    let linear = Mat3::from_mat4(*m);
+    let greatest = linear.to_cols_array().into_iter().fold(0.0, |a: f32, b| a.max(b.abs()));
+    let unit = power_of_two(greatest);
+    Mat3::from_cols_array(&linear.to_cols_array().map(|entry| entry / unit))
+}
+
+/// The greatest power of two that is not greater than a size; 1 of 0 and of what is not finite. Nothing that is finite
+/// leaves the range of numbers when it is divided by it, as long as it is no greater than the size.
+pub(crate) fn power_of_two(size: f32) -> f32 {
+    if size.is_normal() && size > 0.0 { f32::from_bits(size.to_bits() & (0xff << 23)) } else { 1.0 }
 }

@@ -26,12 +26,9 @@ pub enum Problem {
     NoBytes,
     /// The first bytes belong to no known format.
     #[error(
-        "not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG): it starts with {start:02x?}"
+        "not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG, JPEG), by its first bytes"
     )]
-    UnknownFormat {
-        /// The first bytes, at most eight.
-        start: Vec<u8>,
-    },
+    UnknownFormat,
     /// A line of the header makes no sense.
     #[error("header line {line}: {found:?} is not {expected}")]
     Header {

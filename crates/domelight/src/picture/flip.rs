@@ -76,7 +76,11 @@ pub fn ldr_flip(
     Ok((0..reference.lab.len()).into_par_iter().map(difference).collect())
 }
 
-/// HDR-ꟻLIP of two pictures of linear radiance; negative and non-finite values count as 0.
+/// HDR-ꟻLIP of two pictures of linear radiance, as the authors' program flip-evaluator 1.7 computes it; non-finite
+/// values count as 0.
+///
+/// Negative values go through the tone curve as they are, which shows those below −0.02 as *light*: repair them first
+/// where that is not wanted.
 ///
 /// # Errors
 /// If the pictures differ in size.
@@ -109,35 +113,28 @@ const ACES: [f32; 5] = [0.6 * 0.6 * 2.51, 0.6 * 0.03, 0.6 * 0.6 * 2.43, 0.6 * 0.
 fn tone_map(radiance: Rgb) -> Rgb {
     let [k0, k1, k3, k4, k5] = ACES;
     radiance.map(|c| {
-        let x = c.clamp(0.0, 1e15).max(0.0);
+        // Squares stay finite; NaN is shown as black.
+        let x = if c.is_nan() { 0.0 } else { c.clamp(-1e15, 1e15) };
         ((k0 * x + k1) * x / ((k3 * x + k4) * x + k5)).clamp(0.0, 1.0)
     })
 }
 
 /// From where the greatest to where the median luminance is shown at 85 % \[stops\].
 ///
-/// The median of a picture that is mostly black is 0, which would ask for infinite exposure: it is then
-/// taken over what is not black. A black picture is shown as it is.
+/// The median is at least [`f32::EPSILON`], as in the authors' program: where most of the picture is black it is shown
+/// at up to 24 stops. A picture without any light is shown as it is.
 fn exposure_range(reference: &RgbImage) -> (f32, f32) {
     const SHOWN: f32 = 0.85;
     let [k0, k1, k3, k4, k5] = ACES;
     let (a, b, c) = (k0 - SHOWN * k3, k1 - SHOWN * k4, -SHOWN * k5);
     let x = (-b + (b * b - 4.0 * a * c).sqrt()) / (2.0 * a);
-    let positive = |l: f32| if l.is_finite() { l.max(0.0) } else { 0.0 };
-    let mut luminance: Vec<f32> =
-        reference.pixels.iter().map(|p| positive(p.luminance())).collect();
+    let finite = |l: f32| if l.is_finite() { l } else { 0.0 };
+    let mut luminance: Vec<f32> = reference.pixels.iter().map(|p| finite(p.luminance())).collect();
     luminance.sort_unstable_by(f32::total_cmp);
     let Some(&greatest) = luminance.last().filter(|&&l| l > 0.0) else { return (0.0, 0.0) };
-    let median = match median_of_sorted(&luminance) {
-        0.0 => median_of_sorted(&luminance[luminance.partition_point(|&l| l <= 0.0)..]),
-        median => median,
-    };
+    // The upper median; a picture dimmer than the least median is shown at one exposure.
+    let median = luminance[luminance.len() / 2].max(f32::EPSILON).min(greatest);
     ((x / greatest).log2(), (x / median).log2())
-}
-
-/// The upper median, as the authors' program takes it.
-fn median_of_sorted(values: &[f32]) -> f32 {
-    values[values.len() / 2]
 }
 
 /// What arrives of a picture behind the eye.
@@ -412,6 +409,32 @@ mod tests {
         );
     }
 
+    /// As above, of pictures that are mostly black or have negative pixels: also the exposures that it takes.
+    #[test]
+    fn agrees_with_the_authors_program_on_black_and_negative_pixels() {
+        let bright = with_noise(&pattern(96, 64), |p, _| p * p * p * 20.0);
+        let disc = RgbImage::from_fn(96, 64, |x, y| {
+            let (u, v) = (x as f32 / 96.0, y as f32 / 64.0);
+            if (u - 0.4).hypot(v - 0.5) < 0.3 { bright.get(x, y) } else { Rgb::BLACK }
+        });
+        let noisy = with_noise(&disc, |p, n| p * (0.8 + 0.4 * n));
+        let lifted = with_noise(&disc, |p, n| p * (0.8 + 0.4 * n) + Rgb::splat(0.001 * n));
+        let negative = with_noise(&bright, |p, n| p + Rgb::splat(4.0 * (n - 0.5)));
+        for (name, reference, test, expected, stop, n) in [
+            ("a lit disc", &disc, &noisy, 0.015_866_4, 24.083_298, 26),
+            ("noise on black", &disc, &lifted, 0.752_156_4, 24.083_298, 26),
+            ("negative test", &bright, &negative, 0.903_493_5, 1.136_892, 3),
+            ("negative reference", &negative, &bright, 0.902_597_2, 1.023_542, 3),
+        ] {
+            let hdr = hdr_flip(reference, test, PIXELS_PER_DEGREE).unwrap();
+            let ours = mean(&hdr.map);
+            println!("{name}: {ours:.7} {expected}");
+            assert!((ours - expected).abs() < 1e-5, "{name}: {ours}");
+            assert!((hdr.stop_exposure - stop).abs() < 1e-4, "{name}: {}", hdr.stop_exposure);
+            assert_eq!(hdr.n_exposures, n, "{name}");
+        }
+    }
+
     #[test]
     fn one_pixel_and_thin_pictures_work() {
         for (width, height) in [(1, 1), (1, 9), (30, 1)] {
@@ -434,6 +457,14 @@ mod tests {
         picture.pixels[20] = Rgb::splat(3.0);
         let flip =
             hdr_flip(&picture, &RgbImage::filled(8, 8, Rgb::BLACK), PIXELS_PER_DEGREE).unwrap();
-        assert!(flip.start_exposure.is_finite() && flip.n_exposures == 2 && flip.map[20] > 0.0);
+        assert!(flip.start_exposure.is_finite() && flip.stop_exposure.is_finite());
+        assert!(flip.map[20] > 0.0);
+        // Dimmer than the least median, and no light at all.
+        for light in [1e-9, 0.0, -1.0] {
+            let dim = RgbImage::filled(8, 8, Rgb::splat(light));
+            let flip = hdr_flip(&dim, &picture, PIXELS_PER_DEGREE).unwrap();
+            assert!(flip.start_exposure.is_finite() && flip.n_exposures == 2, "{light}");
+            assert!(flip.map.iter().all(|e| (0.0..=1.0).contains(e)), "{light}");
+        }
     }
 }

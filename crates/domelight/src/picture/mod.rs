@@ -1,4 +1,4 @@
-//! Pictures in files: Radiance `.hdr`, OpenEXR, `.pfm`, PNG; and what a tone curve makes of them.
+//! Pictures in files: Radiance `.hdr`, OpenEXR, `.pfm`, PNG, JPEG (read only); and what a tone curve makes of them.
 //!
 //! The format is told from the first bytes, never from the name. What comes out is linear Rec. 709, top row first.
 //! A header that promises more texels than its file can hold is refused before memory is taken for them; truncated
@@ -12,14 +12,13 @@ mod error;
 pub mod exr;
 pub mod flip;
 pub mod hdr;
-mod output;
 pub mod pfm;
 pub mod png;
 mod primaries;
 pub mod tone;
 
+pub use crate::files::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};
 pub use error::{PictureError, Problem};
-pub use output::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};
 
 use crate::RgbImage;
 use crate::environment::mapping::EnvmapKind;
@@ -42,6 +41,17 @@ pub enum Format {
     Pfm,
     /// PNG, taken as sRGB.
     Png,
+    /// JPEG, taken as sRGB.
+    Jpeg,
+}
+
+/// Where OpenEXR's data window, which is the picture, lies in the display window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DataWindow {
+    /// Of its top left texel, in texels right and down from the display window's.
+    pub position: (i64, i64),
+    /// Width and height of the display window \[texels\].
+    pub display: (usize, usize),
 }
 
 /// A picture as read from a file.
@@ -53,13 +63,15 @@ pub struct Picture {
     pub alpha: Option<Vec<f32>>,
     /// What OpenEXR's `envmap` attribute says.
     pub envmap: Option<EnvmapKind>,
+    /// Where the picture lies in OpenEXR's display window, if it is not the same.
+    pub window: Option<DataWindow>,
     /// The format it was read from.
     pub format: Format,
 }
 
 impl Picture {
     fn opaque(image: RgbImage, format: Format) -> Self {
-        Self { image, alpha: None, envmap: None, format }
+        Self { image, alpha: None, envmap: None, window: None, format }
     }
 }
 
@@ -100,9 +112,11 @@ pub fn read_bytes(
         Some(Format::Hdr) => hdr::decode(bytes).map(|image| Picture::opaque(image, Format::Hdr)),
         Some(Format::Exr) => exr::decode(bytes, options.layer.as_deref()),
         Some(Format::Pfm) => pfm::decode(bytes).map(|image| Picture::opaque(image, Format::Pfm)),
-        Some(Format::Png) => png::decode(bytes),
+        Some(format @ (Format::Png | Format::Jpeg)) => {
+            png::decode_within(bytes, format, options.max_memory)
+        }
         None if bytes.is_empty() => Err(Problem::NoBytes),
-        None => Err(Problem::UnknownFormat { start: bytes[..bytes.len().min(8)].to_vec() }),
+        None => Err(Problem::UnknownFormat),
     };
     decoded.map_err(|problem| problem.in_file(name))
 }
@@ -117,7 +131,7 @@ pub fn memory_to_read(bytes: &[u8]) -> Result<u64, Problem> {
         Some(Format::Hdr) => (hdr::texels(bytes)?, 24),
         Some(Format::Exr) => (exr::texels(bytes)?, 24),
         Some(Format::Pfm) => (pfm::texels(bytes)?, 12),
-        Some(Format::Png) => (png::texels(bytes)?, 40),
+        Some(format @ (Format::Png | Format::Jpeg)) => (png::texels(bytes, format)?, 40),
         None => (0, 0),
     };
     Ok(bytes.len() as u64 + texels as u64 * per_texel)
@@ -130,6 +144,7 @@ pub fn format_of(bytes: &[u8]) -> Option<Format> {
         [0x76, 0x2f, 0x31, 0x01, ..] => Some(Format::Exr),
         [b'P', b'F' | b'f', b' ' | b'\t' | b'\r' | b'\n', ..] => Some(Format::Pfm),
         [0x89, b'P', b'N', b'G', ..] => Some(Format::Png),
+        [0xff, 0xd8, 0xff, ..] => Some(Format::Jpeg),
         _ => None,
     }
 }
@@ -158,7 +173,7 @@ fn read_to_end(from: impl Read, max_memory: Option<u64>) -> Result<Vec<u8>, Prob
 }
 
 /// The number of texels of a size that is neither empty nor beyond [`MAX_TEXELS`].
-fn checked_area(width: usize, height: usize) -> Result<usize, Problem> {
+pub(crate) fn checked_area(width: usize, height: usize) -> Result<usize, Problem> {
     match width.checked_mul(height) {
         Some(0) => Err(Problem::Empty { width, height }),
         Some(area) if area <= MAX_TEXELS => Ok(area),
@@ -167,7 +182,7 @@ fn checked_area(width: usize, height: usize) -> Result<usize, Problem> {
 }
 
 /// `n` copies of `value`, or an error where the memory is not there.
-fn allocate<T: Clone>(value: T, width: usize, height: usize) -> Result<Vec<T>, Problem> {
+pub(crate) fn allocate<T: Clone>(value: T, width: usize, height: usize) -> Result<Vec<T>, Problem> {
     let n = width * height;
     let mut values = Vec::new();
     values.try_reserve_exact(n).map_err(|_| Problem::TooLarge { width, height })?;

@@ -1,4 +1,4 @@
-//! PNG: writes sRGB in 8 or 16 bits a channel, reads it back as linear colour.
+//! PNG: writes sRGB in 8 or 16 bits a channel, reads it back as linear colour; reads JPEG likewise.
 //!
 //! PNG keeps colour and alpha apart (straight, unassociated); pictures here are premultiplied. The writer divides by
 //! alpha before the tone curve, so that what a viewer composes over black is the tone-mapped object; light that does
@@ -7,7 +7,7 @@
 use super::tone::{ToneMapping, linear_from_srgb, srgb_from_linear};
 use super::{Format, Picture, Problem, checked_area};
 use crate::{Rgb, RgbImage};
-use image::{ImageDecoder, ImageFormat, ImageReader};
+use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::{self, Cursor, Write};
 
 /// Bits a channel.
@@ -69,10 +69,19 @@ fn quantize(value: f32, depth: Depth, bytes: &mut Vec<u8>) {
 }
 
 /// How many texels the header promises.
-pub(super) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
-    let reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
-    let (width, height) = reader.into_dimensions().map_err(Problem::Image)?;
-    checked_area(width as usize, height as usize)
+pub(crate) fn texels(bytes: &[u8], format: Format) -> Result<usize, Problem> {
+    if format == Format::Jpeg {
+        let reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Jpeg);
+        let (width, height) = reader.into_dimensions().map_err(Problem::Image)?;
+        return checked_area(width as usize, height as usize);
+    }
+    // By hand: the decoder unpacks a color profile before it tells the size.
+    let at = |i: usize| bytes.get(i..i + 4).and_then(|b| b.try_into().ok()).map(u32::from_be_bytes);
+    if let (Some(b"IHDR"), Some(width), Some(height)) = (bytes.get(12..16), at(16), at(20)) {
+        return checked_area(width as usize, height as usize);
+    }
+    let (found, expected) = ("its beginning".to_owned(), "the header of a PNG");
+    Err(Problem::Header { line: 1, found, expected })
 }
 
 /// Decodes a PNG as sRGB (whatever it says of its colours) into linear, premultiplied colour.
@@ -80,15 +89,52 @@ pub(super) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
 /// # Errors
 /// If the file is damaged or incomplete.
 pub fn decode(bytes: &[u8]) -> Result<Picture, Problem> {
-    let reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
+    decode_within(bytes, Format::Png, None)
+}
+
+/// Whether the marker of an end comes after that of the last scan: the decoder makes up what is cut off.
+fn is_whole_jpeg(bytes: &[u8]) -> bool {
+    let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xff, marker]);
+    last(0xd9) > last(0xda)
+}
+
+fn of_crate(format: Format) -> ImageFormat {
+    if format == Format::Jpeg { ImageFormat::Jpeg } else { ImageFormat::Png }
+}
+
+/// What the decoder may take: as much as the texels need, so that a color profile, which is not used, takes no more.
+pub(crate) fn limits(
+    bytes: &[u8],
+    format: Format,
+    max_memory: Option<u64>,
+) -> Result<Limits, Problem> {
+    const TEXEL: u64 = 16;
+    const HEADER: u64 = 1 << 24;
+    let needed = TEXEL * texels(bytes, format)? as u64 + HEADER;
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(max_memory.unwrap_or(u64::MAX).min(needed));
+    Ok(limits)
+}
+
+/// As [`decode`], of PNG or JPEG, with a limit on what its color profile and its rows take of the memory \[bytes\].
+pub(super) fn decode_within(
+    bytes: &[u8],
+    format: Format,
+    max_memory: Option<u64>,
+) -> Result<Picture, Problem> {
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), of_crate(format));
+    reader.limits(limits(bytes, format, max_memory)?);
     let decoder = reader.into_decoder().map_err(Problem::Image)?;
     let (width, height) = decoder.dimensions();
     checked_area(width as usize, height as usize)?;
-    // Deflate makes at most 1032 bytes of one; a texel may be a single bit.
+    // Deflate makes at most 1032 bytes of one, and a texel may be a single bit; JPEG takes more.
     let (needed, held) = (u64::from(width) * u64::from(height) / (8 * 1032), bytes.len() as u64);
     if held < needed {
         let (width, height) = (width as usize, height as usize);
         return Err(Problem::Promises { width, height, needed, held });
+    }
+    if format == Format::Jpeg && !is_whole_jpeg(bytes) {
+        return Err(Problem::Truncated { place: "the JPEG's data".into(), offset: bytes.len() });
     }
     let has_alpha = decoder.color_type().has_alpha();
     let decoded = image::DynamicImage::from_decoder(decoder).map_err(Problem::Image)?;
@@ -100,5 +146,6 @@ pub fn decode(bytes: &[u8]) -> Result<Picture, Problem> {
         Rgb::new(r, g, b).map(linear_from_srgb) * if has_alpha { a } else { 1.0 }
     });
     let image = RgbImage::new(width as usize, height as usize, pixels.collect());
-    Ok(Picture { image, alpha: has_alpha.then_some(alpha), envmap: None, format: Format::Png })
+    let alpha = has_alpha.then_some(alpha);
+    Ok(Picture { alpha, ..Picture::opaque(image, format) })
 }

@@ -38,6 +38,12 @@ impl Primaries {
         Some(columns * Mat3::from_diagonal(scale))
     }
 
+    /// The weights of red, green and blue in luminance, their sum 1; Rec. 709's where there are none.
+    pub(super) fn luminance(self) -> [f32; 3] {
+        let row = |matrix: Mat3| matrix.row(1).to_array();
+        self.to_xyz().map_or(Rgb::LUMINANCE, row)
+    }
+
     fn white(self) -> Vec3 {
         xyz_of(self.0[3])
     }

@@ -1,7 +1,7 @@
 //! From scene-linear radiance to what a screen shows: exposure, tone curve, sRGB encoding.
 
-use crate::Rgb;
 use crate::math::{Mat3, Vec3};
+use crate::{Rgb, RgbImage};
 use std::str::FromStr;
 
 /// How radiance beyond the screen's range is brought into it. All curves take and give linear Rec. 709.
@@ -72,6 +72,37 @@ impl FromStr for ToneCurve {
 impl std::fmt::Display for ToneCurve {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())
+    }
+}
+
+/// How exposure is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Exposure {
+    /// The median luminance of what is covered becomes middle gray, 0.18.
+    Auto,
+    /// In stops: radiance times 2^stops.
+    Stops(f32),
+}
+
+impl Exposure {
+    /// The exposure of a picture \[stops\]; `alpha` says what is covered, everything if `None`. A black picture
+    /// has 0.
+    pub fn stops(self, image: &RgbImage, alpha: Option<&[f32]>) -> f32 {
+        const MIDDLE_GRAY: f32 = 0.18;
+        const RANGE: f32 = 30.0;
+        if let Self::Stops(stops) = self {
+            return stops;
+        }
+        let is_covered = |i: usize| alpha.is_none_or(|alpha| alpha[i] > 0.0);
+        let lit = image.pixels.iter().enumerate().filter(|(i, _)| is_covered(*i));
+        let mut luminances: Vec<f32> = lit.map(|(_, pixel)| pixel.luminance()).collect();
+        luminances.retain(|luminance| luminance.is_finite() && *luminance > 0.0);
+        if luminances.is_empty() {
+            return 0.0;
+        }
+        let middle = luminances.len() / 2;
+        let (_, median, _) = luminances.select_nth_unstable_by(middle, f32::total_cmp);
+        (MIDDLE_GRAY / *median).log2().clamp(-RANGE, RANGE)
     }
 }
 

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::RenderSettings;
 use super::tiling::Window;
+use super::variance::{Contrast, VarianceSums};
 use crate::math::Vec3;
 use crate::{Rgb, RgbImage};
 
@@ -25,6 +26,14 @@ pub(super) struct SurfaceSample {
     pub(super) depth: f32,
 }
 
+/// One of two independent sets of a pixel's samples; most pixels have the first alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum SampleSet {
+    #[default]
+    First,
+    Second,
+}
+
 /// The sums of one pixel. Samples are added one by one in their order, whatever the passes: the
 /// same samples give the same bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,12 +41,18 @@ pub(super) struct PixelSums {
     color: [f64; 3],
     color_squared: [f64; 3],
     unoccluded: [f64; 3],
+    /// The part of `color` that is of the second set.
+    second: [f64; 3],
+    /// `color` after the first n and n/2 samples, with n the greatest power of two so far.
+    prefixes: [Rgb; 2],
     albedo: Rgb,
     normal: Vec3,
     depth: f64,
     alpha: f32,
     n_hits: u32,
     n_samples: u32,
+    /// Those of the second set.
+    n_second: u32,
 }
 
 impl PixelSums {
@@ -46,8 +61,8 @@ impl PixelSums {
         Self { n_samples, ..Self::default() }
     }
 
-    /// Adds a sample. A sample that is not finite counts as black and is reported: it returns false.
-    pub(super) fn add(&mut self, sample: &CameraSample) -> bool {
+    /// Adds a sample of a set. A sample that is not finite counts as black and is reported: it returns false.
+    pub(super) fn add(&mut self, sample: &CameraSample, set: SampleSet) -> bool {
         let finite = sample.color.is_finite() && sample.unoccluded.is_finite();
         if finite {
             for (c, x) in sample.color.to_array().into_iter().enumerate() {
@@ -60,6 +75,16 @@ impl PixelSums {
         }
         self.alpha += sample.alpha;
         self.n_samples += 1;
+        if set == SampleSet::Second {
+            self.n_second += 1;
+            let color = if finite { sample.color } else { Rgb::BLACK };
+            for (sum, x) in self.second.iter_mut().zip(color.to_array()) {
+                *sum += f64::from(x);
+            }
+        }
+        if self.n_samples.is_power_of_two() {
+            self.prefixes = [Rgb::from(self.color.map(|c| c as f32)), self.prefixes[0]];
+        }
         if let Some(surface) = sample.surface {
             self.albedo += surface.albedo;
             self.normal += surface.normal;
@@ -69,19 +94,66 @@ impl PixelSums {
         finite
     }
 
-    /// Adds `n` samples that saw nothing, before no background.
-    pub(super) fn add_misses(&mut self, n: u32) {
+    /// Adds `n` samples of a set that saw nothing, before no background, to a pixel that never saw anything.
+    pub(super) fn add_misses(&mut self, n: u32, set: SampleSet) {
         self.n_samples += n;
+        self.n_second += if set == SampleSet::Second { n } else { 0 };
     }
 
     pub(super) fn n_samples(&self) -> u32 {
         self.n_samples
     }
 
-    /// Error² of the mean's luminance over its own square, by the spread of the samples.
+    /// Samples of a set.
+    pub(super) fn n_of(&self, set: SampleSet) -> u32 {
+        match set {
+            SampleSet::First => self.n_samples - self.n_second,
+            SampleSet::Second => self.n_second,
+        }
+    }
+
+    /// Error² of the mean's luminance over its own square, by the difference of the two sets; 0 without a second.
     pub(super) fn relative_variance(&self) -> f32 {
         let mean = self.mean(self.color).luminance();
-        self.variance().luminance() / (mean * mean + 0.01)
+        let difference = Rgb::from(self.difference().map(|d| d as f32)).luminance();
+        self.balance() as f32 * difference * difference / (mean * mean + 0.01)
+    }
+
+    /// The mean of the first set less that of the second; 0 if either is empty.
+    fn difference(&self) -> [f64; 3] {
+        let [first, second] =
+            [SampleSet::First, SampleSet::Second].map(|set| f64::from(self.n_of(set)));
+        if first == 0.0 || second == 0.0 {
+            return [0.0; 3];
+        }
+        std::array::from_fn(|c| (self.color[c] - self.second[c]) / first - self.second[c] / second)
+    }
+
+    /// The variance of the mean over that of the difference of the sets, for sets that err alike: a b / (a + b)².
+    fn balance(&self) -> f64 {
+        let [first, second] =
+            [SampleSet::First, SampleSet::Second].map(|set| f64::from(self.n_of(set)));
+        first * second / (first + second).powi(2).max(1.0)
+    }
+
+    /// What the pixel shows of how much less than independent samples its samples err.
+    pub(super) fn contrast(&self) -> Option<Contrast> {
+        if self.n_samples < 2 {
+            return None;
+        }
+        let independent: f64 = self.independent_variance().into_iter().sum();
+        let squares = |x: [f64; 3]| x.into_iter().map(|x| x * x).sum::<f64>();
+        if self.n_second > 0 {
+            return Some(Contrast::Sets([
+                independent,
+                self.balance() * squares(self.difference()),
+            ]));
+        }
+        let [whole, half] = self.prefixes.map(|sum| sum.to_array().map(f64::from));
+        let prefix = f64::from(1u32 << self.n_samples.ilog2());
+        let halves = std::array::from_fn(|c| (2.0 * half[c] - whole[c]) * 2.0 / prefix);
+        let independent = independent * f64::from(self.n_samples) / prefix;
+        Some(Contrast::Halves([independent, squares(halves)]))
     }
 
     fn scale(&self) -> f32 {
@@ -101,17 +173,22 @@ impl PixelSums {
         (self.depth / f64::from(self.n_hits.max(1))) as f32
     }
 
-    /// Of the mean, by the spread of the samples; stratified samples err less than it says.
-    fn variance(&self) -> Rgb {
+    /// s²/n: the variance of the mean if the samples were independent.
+    fn independent_variance(&self) -> [f64; 3] {
         let n = f64::from(self.n_samples);
         if n < 2.0 {
-            return Rgb::BLACK;
+            return [0.0; 3];
         }
-        let variance = |c: usize| {
+        std::array::from_fn(|c| {
             let mean = self.color[c] / n;
-            ((self.color_squared[c] / n - mean * mean).max(0.0) / (n - 1.0)) as f32
-        };
-        Rgb::new(variance(0), variance(1), variance(2))
+            (self.color_squared[c] / n - mean * mean).max(0.0) / (n - 1.0)
+        })
+    }
+
+    /// Of the mean.
+    fn variance(&self, sums: &VarianceSums) -> Rgb {
+        let scale = sums.scale(self.n_samples);
+        Rgb::from(self.independent_variance().map(|v| (scale * v) as f32))
     }
 }
 
@@ -130,10 +207,13 @@ pub struct Layers {
     pub normal: Vec<Vec3>,
     /// Mean distance from the camera plane over the samples that hit; 0 where none did.
     pub depth: Vec<f32>,
-    /// Variance of each pixel's mean, estimated from the spread of its samples.
+    /// Variance of each pixel's mean: that of independent samples of the same spread, scaled to what the samples of
+    /// the whole picture err.
     pub variance: RgbImage,
     /// Camera samples of each pixel.
     pub n_samples: Vec<u32>,
+    /// Those that hit the scene.
+    pub n_hits: Vec<u32>,
 }
 
 impl Layers {
@@ -160,17 +240,25 @@ impl Layers {
             depth: vec![0.0; n],
             variance: image(),
             n_samples: vec![0; n],
+            n_hits: vec![0; n],
         }
     }
 
     /// Takes the pixels that have samples in a part of the picture over; `self` is a band of its rows, of which row `y` is
-    /// the first.
+    /// the first, and `variance` the sum over all parts of the picture.
     ///
     /// # Panics
     /// If a pixel lies beside the picture.
-    pub fn merge(&mut self, part: &Film, y: usize) {
+    pub fn merge(&mut self, part: &Film, y: usize, variance: &VarianceSums) {
         let (width, height) = (self.width(), self.height());
-        self.put(&part.pixels, part.window, Window { x: 0, y, width, height });
+        self.put(&part.pixels, part.window, Window { x: 0, y, width, height }, variance);
+    }
+
+    /// The part of the picture that the scene covers \[pixels\]: the sum over all pixels of the share of camera samples
+    /// that hit it.
+    pub fn covered_pixels(&self) -> f64 {
+        let coverage = |(&hits, &n): (&u32, &u32)| f64::from(hits) / f64::from(n.max(1));
+        self.n_hits.iter().zip(&self.n_samples).map(coverage).sum()
     }
 
     /// Some of the rows.
@@ -191,7 +279,8 @@ impl Layers {
             normal: self.normal[range.clone()].to_vec(),
             depth: self.depth[range.clone()].to_vec(),
             variance: image(&self.variance),
-            n_samples: self.n_samples[range].to_vec(),
+            n_samples: self.n_samples[range.clone()].to_vec(),
+            n_hits: self.n_hits[range].to_vec(),
         }
     }
 
@@ -205,7 +294,13 @@ impl Layers {
 
     /// Takes the pixels over that have samples, of the rows of `from` that are in `window`; `pixels` are those of `from`,
     /// or none, and `self` is of the pixels of `window`.
-    pub(super) fn put(&mut self, pixels: &[PixelSums], from: Window, window: Window) {
+    pub(super) fn put(
+        &mut self,
+        pixels: &[PixelSums],
+        from: Window,
+        window: Window,
+        variance: &VarianceSums,
+    ) {
         let start = from.y.max(window.y);
         let end = (from.y + from.height).min(window.y + window.height).max(start);
         let inside = (start - from.y) * from.width..(end - from.y) * from.width;
@@ -220,8 +315,9 @@ impl Layers {
             self.albedo.pixels[i] = p.albedo * p.scale();
             self.normal[i] = p.normal * p.scale();
             self.depth[i] = p.depth();
-            self.variance.pixels[i] = p.variance();
+            self.variance.pixels[i] = p.variance(variance);
             self.n_samples[i] = p.n_samples;
+            self.n_hits[i] = p.n_hits;
         }
     }
 }
@@ -268,8 +364,13 @@ impl Film {
     /// The picture of the window.
     pub fn layers(&self) -> Layers {
         let mut layers = Layers::new(self.window.width, self.window.height);
-        layers.put(&self.pixels, self.window, self.window);
+        layers.put(&self.pixels, self.window, self.window, &self.variance_sums());
         layers
+    }
+
+    /// What the variance of the pixels is estimated from.
+    pub fn variance_sums(&self) -> VarianceSums {
+        VarianceSums::of(&self.pixels)
     }
 
     /// Colour and alpha of the window.
@@ -340,7 +441,7 @@ impl Film {
 #[cfg(feature = "io")]
 impl PixelSums {
     /// What the words of [`PixelSums::to_words`] are; doubles are the upper and the lower half of their bits.
-    pub(super) const WORDS: [&'static str; 29] = [
+    pub(super) const WORDS: [&'static str; 42] = [
         "color.R.high",
         "color.R.low",
         "color.G.high",
@@ -359,8 +460,20 @@ impl PixelSums {
         "unoccluded.G.low",
         "unoccluded.B.high",
         "unoccluded.B.low",
+        "second.R.high",
+        "second.R.low",
+        "second.G.high",
+        "second.G.low",
+        "second.B.high",
+        "second.B.low",
         "depth.Z.high",
         "depth.Z.low",
+        "whole.R",
+        "whole.G",
+        "whole.B",
+        "half.R",
+        "half.G",
+        "half.B",
         "albedo.R",
         "albedo.G",
         "albedo.B",
@@ -370,39 +483,45 @@ impl PixelSums {
         "alpha.A",
         "hits.Y",
         "samples.Y",
+        "second.samples.Y",
     ];
 
-    fn to_words(self) -> [u32; 29] {
-        let mut words = [0; 29];
-        let doubles = [self.color, self.color_squared, self.unoccluded];
+    fn to_words(self) -> [u32; 42] {
+        let mut words = [0; 42];
+        let doubles = [self.color, self.color_squared, self.unoccluded, self.second];
         let doubles = doubles.as_flattened().iter().chain([&self.depth]);
         for (pair, double) in words.chunks_exact_mut(2).zip(doubles) {
             let bits = double.to_bits();
             pair.copy_from_slice(&[(bits >> 32) as u32, bits as u32]);
         }
-        let floats = self.albedo.to_array().into_iter().chain(self.normal.to_array());
-        for (word, float) in words[20..27].iter_mut().zip(floats.chain([self.alpha])) {
+        let colors = self.prefixes.into_iter().chain([self.albedo]).flat_map(Rgb::to_array);
+        let floats = colors.chain(self.normal.to_array()).chain([self.alpha]);
+        for (word, float) in words[26..39].iter_mut().zip(floats) {
             *word = float.to_bits();
         }
-        words[27..].copy_from_slice(&[self.n_hits, self.n_samples]);
+        words[39..].copy_from_slice(&[self.n_hits, self.n_samples, self.n_second]);
         words
     }
 
-    fn from_words(words: [u32; 29]) -> Self {
+    fn from_words(words: [u32; 42]) -> Self {
         let double =
             |i: usize| f64::from_bits(u64::from(words[2 * i]) << 32 | u64::from(words[2 * i + 1]));
         let three = |i: usize| [double(i), double(i + 1), double(i + 2)];
         let float = |i: usize| f32::from_bits(words[i]);
+        let color = |i: usize| Rgb::new(float(i), float(i + 1), float(i + 2));
         Self {
             color: three(0),
             color_squared: three(3),
             unoccluded: three(6),
-            depth: double(9),
-            albedo: Rgb::new(float(20), float(21), float(22)),
-            normal: Vec3::new(float(23), float(24), float(25)),
-            alpha: float(26),
-            n_hits: words[27],
-            n_samples: words[28],
+            second: three(9),
+            depth: double(12),
+            prefixes: [26, 29].map(color),
+            albedo: color(32),
+            normal: Vec3::new(float(35), float(36), float(37)),
+            alpha: float(38),
+            n_hits: words[39],
+            n_samples: words[40],
+            n_second: words[41],
         }
     }
 }
@@ -422,7 +541,8 @@ mod tests {
                 let surface = SurfaceSample { albedo: color, normal: Vec3::splat(x), depth: -x };
                 let sample =
                     CameraSample { color, unoccluded: -color, alpha: x, surface: Some(surface) };
-                pixel.add(&sample);
+                let set = if j % 2 == 1 { SampleSet::Second } else { SampleSet::First };
+                pixel.add(&sample, set);
             }
         }
         let words: Vec<_> = film.words().collect();
@@ -432,7 +552,7 @@ mod tests {
         assert_eq!(Film::from_words(9, 9, window, without), None);
 
         let mut whole = Layers::new(9, 9);
-        whole.merge(&film, 0);
+        whole.merge(&film, 0, &film.variance_sums());
         let part = film.layers();
         assert_eq!(whole.n_samples[10..14], [0, 1, 2, 0]);
         assert_eq!(whole.color.pixels[11..13], part.color.pixels);

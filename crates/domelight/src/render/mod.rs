@@ -10,10 +10,11 @@ mod film;
 mod filter;
 #[cfg(feature = "io")]
 mod output;
-mod session;
+mod renderer;
 mod spread;
 mod tile;
 mod tiling;
+mod variance;
 mod visibility;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,10 +23,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub use checkpoint::{Checkpoint, CheckpointError, Difference};
 pub use film::{Film, Layers, Misfit};
 pub use filter::{Filter, FilterSampler, UnknownFilter};
-pub use session::Session;
+#[cfg(feature = "io")]
+pub use output::Developed;
+pub use renderer::{Mark, Renderer};
 pub use tile::Counts;
 pub use tiling::{Tiling, Window};
-pub use visibility::Visibility;
+pub use variance::VarianceSums;
 
 use crate::environment::Environment;
 use crate::sampling::SamplerKind;
@@ -51,11 +54,11 @@ pub struct RenderSettings {
     pub height: usize,
     /// Camera samples of each pixel, at least 1.
     pub n_samples: u32,
-    /// Of strategies that render a tile in rounds, pixels whose samples spread more get more of them:
-    /// `n_samples` are then the usual number, not each pixel's.
+    /// Of strategies that render a tile in rounds, noisier pixels get more samples: `n_samples` are then the mean over
+    /// the pixels of a tile, not each pixel's.
     pub adaptive: bool,
-    /// A tile is finished before its samples are, but not before 16, when the spread of its samples
-    /// suggests this relMSE or less: mean of variance over (luminance² + 0.01). To stop on what was
+    /// A tile is finished before its samples are, but not before 16, when two independent sets of them differ no more
+    /// than this relMSE suggests: mean of variance over (luminance² + 0.01). To stop on what was
     /// drawn biases a picture by far less than the error.
     pub target_error: Option<f32>,
     /// Names the whole set of random numbers.
@@ -152,7 +155,7 @@ struct Frame<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
     environment: &'a Environment,
-    settings: &'a RenderSettings,
+    settings: RenderSettings,
     filter: FilterSampler,
     /// The longest extent of the scene.
     extent: f32,
@@ -173,9 +176,9 @@ pub fn render<S: Strategy>(
     settings: &RenderSettings,
     observer: &impl Observer,
 ) -> Rendering {
-    let mut session = Session::new(scene, camera, environment, strategy, settings);
-    session.run(observer);
-    session.rendering()
+    let mut renderer = Renderer::with_strategy(scene, camera, environment, strategy, *settings);
+    renderer.run(observer);
+    renderer.rendering()
 }
 
 /// The shading points of up to 256 pixels' centres, spread over the picture: for pilots.

@@ -1,11 +1,72 @@
 //! A rendered picture as the layers of an OpenEXR file.
 
 use std::io::{Seek, Write};
+use std::path::Path;
 
-use super::Layers;
-use crate::picture::Problem;
+use super::{Film, Layers};
 use crate::picture::exr::ExrLayers;
 use crate::picture::exr::bands::{self, BAND_ROWS};
+use crate::picture::png::{self, Depth};
+use crate::picture::tone::{Exposure, ToneCurve, ToneMapping};
+use crate::picture::{Problem, write_atomically, write_atomically_seeking};
+use crate::{Error, RgbImage};
+
+/// A film developed to what a screen shows.
+#[derive(Clone, Debug)]
+pub struct Developed {
+    color: RgbImage,
+    alpha: Option<Vec<f32>>,
+    tone: ToneMapping,
+}
+
+impl Developed {
+    /// The exposure that was used \[stops\], and the curve.
+    pub fn tone(&self) -> ToneMapping {
+        self.tone
+    }
+
+    /// Writes a PNG file of 8 bits; `-` is standard output.
+    ///
+    /// # Errors
+    /// If the file cannot be written; no half-written file is left.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let alpha = self.alpha.as_deref();
+        let write =
+            |out: &mut dyn Write| png::encode(&self.color, alpha, &self.tone, Depth::Eight, out);
+        Ok(write_atomically(path.as_ref(), |out| write(out))?)
+    }
+
+    /// The bytes of a PNG file of 8 bits.
+    ///
+    /// # Errors
+    /// If the picture is empty.
+    pub fn to_png(&self) -> Result<Vec<u8>, std::io::Error> {
+        let mut bytes = Vec::new();
+        png::encode(&self.color, self.alpha.as_deref(), &self.tone, Depth::Eight, &mut bytes)?;
+        Ok(bytes)
+    }
+}
+
+impl Film {
+    /// Writes an OpenEXR file with all layers ([`Layers::to_exr`]); `-` is standard output.
+    ///
+    /// # Errors
+    /// If the file cannot be written; no half-written file is left.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let layers = self.layers();
+        Ok(write_atomically_seeking(path.as_ref(), |out| {
+            layers.write_exr(&[], out).map_err(std::io::Error::other)
+        })?)
+    }
+
+    /// The picture for a screen. Where the background is hidden, alpha goes along.
+    pub fn develop(&self, exposure: Exposure, curve: ToneCurve) -> Developed {
+        let Layers { color, alpha, .. } = self.layers();
+        let alpha = alpha.iter().any(|&a| a < 1.0).then_some(alpha);
+        let tone = ToneMapping { exposure: exposure.stops(&color, alpha.as_deref()), curve };
+        Developed { color, alpha, tone }
+    }
+}
 
 impl Layers {
     /// All layers in one part: the picture itself as R, G, B, A; `unoccluded`, `albedo` and

@@ -1,142 +1,342 @@
-//! How the camera samples of a pass are divided among pixels: more for those whose samples spread more.
+//! How the camera samples of a pass are divided among pixels: more for noisier pixels, about as many altogether as
+//! were asked for.
 //!
-//! The spread of a pixel is the variance of its camera samples' luminance over its squared mean (and a hundredth: a
-//! black pixel needs no care), over the samples that hit: silhouettes get no more than other pixels. What is left of it in
-//! the mean of n stratified samples falls like n⁻² for a smooth integrand and n⁻¹ for a rough one, so the least sum over
-//! all pixels of spread · n⁻ᵏ asks for n in proportion to spread^(1/(k+1)), with an exponent between 1/3 and 1/2; for a spread that is estimated from a few samples a little less is best.
+//! The relative variance of a pixel is the variance of its camera samples' luminance, hits and misses alike, over
+//! their squared mean (and a hundredth: a black pixel needs no care). The mean of n stratified samples keeps a part
+//! of it that falls like n⁻² for a smooth integrand and n⁻¹ for a rough one, so the least sum over all pixels of
+//! variance · n⁻ᵏ asks for n in proportion to variance^(1/(k+1)), with an exponent between 1/3 and 1/2; a little
+//! less is best for a variance that is estimated from a few samples.
 //!
-//! A pixel's number follows from the spread of pixels of lower levels and from what is usual in the picture, which a
-//! few pixels with random numbers of their own tell: never from its own samples. So the mean of its samples
-//! stays unbiased. (A number that grows with the pixel's own samples would prefer what it saw: Kirk & Arvo 1991,
-//! "Unbiased Sampling Techniques for Image Synthesis".)
+//! A pixel's number follows from the samples of pixels of lower levels, never from its own, so the mean of its
+//! samples stays unbiased. (A number that grows with the pixel's own samples would prefer what it saw: Kirk & Arvo
+//! 1991, "Unbiased Sampling Techniques for Image Synthesis".) Pixels of lower levels find silhouettes by what their
+//! samples saw of the background, and by the difference of their means where one is covered more than another.
+//!
+//! One scale serves the whole picture, so that samples move from quiet tiles to noisy ones: a few scout pixels, with
+//! random numbers of their own, say where it lies. Exact budgets for tiles would cost a quarter to three quarters more
+//! error at equal rays (docs/experiments.md).
 
 use rayon::prelude::*;
 
 use super::tile::{Pass, Scratch, Tile};
 use super::tiling::Window;
 use super::{Frame, RenderSettings};
-use crate::Rgb;
 use crate::strategy::Strategy;
 use crate::strategy::levels::{N_LEVELS, coarser, level};
 
-/// Of the spread, what the number of samples grows with.
+/// The power of the relative variance that the number of samples is proportional to.
 const EXPONENT: f32 = 0.3;
 
 /// No pixel gets fewer than a fourth of the usual samples, nor more than eight times as many.
-const OCTAVES: [f32; 2] = [-2.0, 3.0];
+const OCTAVES: [i32; 2] = [-2, 3];
 
-/// The spreads of a tile's pixels, as far as they are known.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Spreads {
-    width: usize,
-    pixels: Vec<Option<f32>>,
+/// Relative variances below this count as this.
+const LEAST_VARIANCE: f32 = 1e-6;
+
+/// Coverages that differ by more belong to a silhouette.
+const SILHOUETTE: f32 = 0.02;
+
+/// What the camera samples of a pixel in a pass saw: sums over their luminance.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PassSums {
+    pub(super) n: u32,
+    pub(super) n_hits: u32,
+    pub(super) luminance: f64,
+    pub(super) luminance_squared: f64,
 }
 
-impl Spreads {
-    /// Forgets all.
-    pub(super) fn reset(&mut self, width: usize, n_pixels: usize) {
-        self.width = width;
-        self.pixels.clear();
-        self.pixels.resize(n_pixels, None);
-    }
-
-    /// Learns a pixel's spread from what its camera samples saw.
-    pub(super) fn learn(&mut self, pixel: usize, samples: &[Rgb]) {
-        if samples.len() < 2 {
-            return;
+impl PassSums {
+    /// Adds a camera sample.
+    #[inline]
+    pub(super) fn add(&mut self, luminance: f32, hit: bool) {
+        if luminance.is_finite() {
+            self.luminance += f64::from(luminance);
+            self.luminance_squared += f64::from(luminance) * f64::from(luminance);
         }
-        let n = samples.len() as f32;
-        let mean = samples.iter().copied().sum::<Rgb>().luminance() / n;
-        let squares: f32 = samples.iter().map(|s| (s.luminance() - mean).powi(2)).sum();
-        let spread = squares / (n - 1.0) / (mean * mean + 0.01);
-        self.pixels[pixel] = spread.is_finite().then_some(spread);
-    }
-
-    /// The spread of a pixel.
-    fn get(&self, pixel: usize) -> Option<f32> {
-        self.pixels[pixel]
-    }
-
-    /// Camera samples for a pixel where `n` are usual, and the `usual` [`growth`]: n times a power of two, as digital
-    /// nets want it.
-    pub(super) fn samples(&self, pixel: usize, n: u32, usual: Option<f32>) -> u32 {
-        let known = || coarser(pixel, self.width, self.pixels.len()).filter_map(|i| self.get(i));
-        let (Some(usual), count @ 1..) = (usual, known().count()) else { return n };
-        let mean = known().sum::<f32>() / count as f32;
-        let [fewest, most] = OCTAVES;
-        let fewest = if teaches(pixel, self.width) { 0.0 } else { fewest };
-        let octaves = (growth(mean) - usual).round().clamp(fewest, most) as i32;
-        let n = if octaves < 0 { n >> -octaves } else { n << octaves };
-        n.max(1)
+        self.n += 1;
+        self.n_hits += u32::from(hit);
     }
 }
 
-/// Whether two more levels build on what the pixel tells: then it has the usual samples at least, for their sake.
-fn teaches(pixel: usize, width: usize) -> bool {
-    level(pixel % width, pixel / width) + 2 < N_LEVELS
+/// A pixel of a lower level, as far as others learn from it.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    mean: f32,
+    /// None of fewer than two samples, and of pixels that see nothing of the scene.
+    relative_variance: Option<f32>,
+    coverage: f32,
 }
 
-/// What the number of samples is proportional to, in octaves.
-fn growth(spread: f32) -> f32 {
-    EXPONENT * spread.log2()
+/// The camera samples of a tile's pixels in a pass.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Allocation {
+    width: usize,
+    /// Camera samples of each pixel, as asked for.
+    n_samples: u32,
+    /// The logarithm at which a pixel has the usual number; `None` if all pixels have as many.
+    usual: Option<f32>,
+    seen: Vec<Option<Seen>>,
+    counts: Vec<u32>,
 }
 
-/// The mean [`growth`] over the picture, from a few of its pixels: of the numbers, not of their octaves.
-pub(super) fn usual_growth<S: Strategy>(
-    frame: &Frame,
-    strategy: &S,
-    pass: &Pass<S>,
-) -> Option<f32> {
-    /// Pixels across the picture.
+impl Allocation {
+    /// Begins a pass: `n_samples` for each pixel on average, or for each if `usual` is `None`.
+    pub(super) fn reset(
+        &mut self,
+        width: usize,
+        n_pixels: usize,
+        n_samples: u32,
+        usual: Option<f32>,
+    ) {
+        self.width = width;
+        self.n_samples = n_samples;
+        self.usual = usual;
+        self.seen.clear();
+        self.seen.resize(n_pixels, None);
+        self.counts.clear();
+        self.counts.resize(n_pixels, n_samples);
+    }
+
+    /// Camera samples of a set of a pixel, once its round is assigned.
+    pub(super) fn get(&self, pixel: usize) -> u32 {
+        self.counts[pixel]
+    }
+
+    /// Learns what the samples of a pixel saw; `in_sight` is false where nothing was to be seen.
+    pub(super) fn learn(&mut self, pixel: usize, sums: &PassSums, in_sight: bool) {
+        let n = f64::from(sums.n.max(1));
+        let mean = sums.luminance / n;
+        let variance = (sums.luminance_squared - mean * sums.luminance).max(0.0) / (n - 1.0);
+        let relative_variance = (variance / (mean * mean + 0.01)) as f32;
+        let known = in_sight && sums.n >= 2 && relative_variance.is_finite();
+        self.seen[pixel] = Some(Seen {
+            mean: mean as f32,
+            relative_variance: known.then_some(relative_variance),
+            coverage: sums.n_hits as f32 / n as f32,
+        });
+    }
+
+    /// The relative variance that pixels of lower levels predict.
+    fn predicted(&self, pixel: usize) -> Option<f32> {
+        let around = || coarser(pixel, self.width, self.seen.len()).filter_map(|i| self.seen[i]);
+        let variances = || around().filter_map(|seen| seen.relative_variance);
+        let n_variances = variances().count();
+        if n_variances == 0 {
+            return None;
+        }
+        let within = variances().sum::<f32>() / n_variances as f32;
+        // Between a covered and an uncovered pixel lies a silhouette.
+        let coverage =
+            |(low, high): (f32, f32), seen: Seen| (low.min(seen.coverage), high.max(seen.coverage));
+        let (low, high) = around().fold((1.0, 0.0), coverage);
+        if high - low <= SILHOUETTE {
+            return Some(within);
+        }
+        let n = around().count() as f32;
+        let mean = around().map(|seen| seen.mean).sum::<f32>() / n;
+        let variance = around().map(|seen| (seen.mean - mean).powi(2)).sum::<f32>() / n;
+        let between = variance / (mean * mean + 0.01);
+        Some(if between.is_finite() { within.max(between) } else { within })
+    }
+
+    /// Assigns the samples of the pixels of a round.
+    pub(super) fn assign(&mut self, round: u32) {
+        let Some(usual) = self.usual else { return };
+        for i in 0..self.counts.len() {
+            if self.level(i) == round
+                && let Some(variance) = self.predicted(i)
+            {
+                self.counts[i] =
+                    count(self.n_samples, log(variance) + dither(i) - usual, self.fewest(i));
+            }
+        }
+    }
+
+    /// The relative variance that a pixel has shown.
+    pub(super) fn relative_variance(&self, pixel: usize) -> Option<f32> {
+        self.seen[pixel]?.relative_variance
+    }
+
+    fn level(&self, pixel: usize) -> u32 {
+        level(pixel % self.width, pixel / self.width)
+    }
+
+    /// The fewest octaves of a pixel. Where two more levels build on what it sees, it has the usual number at least.
+    fn fewest(&self, pixel: usize) -> i32 {
+        if self.level(pixel) + 2 < N_LEVELS { 0 } else { OCTAVES[0] }
+    }
+}
+
+/// log₂ of what the number of samples is proportional to.
+fn log(relative_variance: f32) -> f32 {
+    EXPONENT * relative_variance.max(LEAST_VARIANCE).log2()
+}
+
+/// The usual number n times a power of two, as digital nets want it, within `fewest` and the most octaves.
+fn count(n: u32, octaves: f32, fewest: i32) -> u32 {
+    let octaves = (octaves.round() as i32).clamp(fewest, OCTAVES[1]);
+    let count = if octaves < 0 { n >> -octaves } else { n.saturating_mul(1 << octaves) };
+    count.max(1)
+}
+
+/// The logarithm at which a pixel of the picture has the usual number, from scout pixels with random numbers of their
+/// own; `None` if they see no scene.
+pub(super) fn usual<S: Strategy>(frame: &Frame, strategy: &S, pass: &Pass<S>) -> Option<f32> {
+    /// Scouts across the picture.
     const ACROSS: usize = 12;
-    let RenderSettings { width, height, seed, .. } = *frame.settings;
-    let settings = RenderSettings { seed: !seed, ..*frame.settings };
-    let frame = &Frame { settings: &settings, filter: frame.filter.clone(), ..*frame };
+    let RenderSettings { width, height, seed, .. } = frame.settings;
+    let settings = RenderSettings { seed: !seed, ..frame.settings };
+    let frame = &Frame { settings, filter: frame.filter.clone(), ..*frame };
     let at = |i: usize, n: usize| (2 * i + 1) * n / (2 * ACROSS);
-    let grows: Vec<Option<f32>> = (0..ACROSS * ACROSS)
+    let logs: Vec<Option<f32>> = (0..ACROSS * ACROSS)
         .into_par_iter()
         .map_init(Scratch::<S>::default, |scratch, i| {
             let (x, y) = (at(i % ACROSS, width), at(i / ACROSS, height));
             let mut tile = Tile::new(Window { x, y, width: 1, height: 1 });
             tile.render(frame, strategy, pass, scratch, &());
-            scratch.spreads().get(0).map(|spread| growth(spread).exp2())
+            let sees_scene = tile.counts.shading_points > 0;
+            sees_scene.then(|| scratch.allocation().relative_variance(0)).flatten().map(log)
         })
         .collect();
-    let (sum, n) = grows.iter().flatten().fold((0.0, 0.0), |(sum, n), g| (sum + g, n + 1.0));
-    (sum > 0.0).then(|| f32::log2(sum / n))
+    let logs: Vec<f32> = logs.into_iter().flatten().collect();
+    (!logs.is_empty()).then(|| scale(&logs, pass.n_samples))
+}
+
+/// The logarithm at which a pixel has `n` samples, if pixels like these have `n` on average.
+fn scale(logs: &[f32], n: u32) -> f32 {
+    /// The range is halved as often.
+    const STEPS: usize = 20;
+    /// The share of the pixels that two more levels build on.
+    const PREDICTORS: f64 = 0.25;
+    let [fewest, most] = OCTAVES;
+    let spent = |usual: f32| {
+        let cost = |&log: &f32| {
+            let [predictor, other] = [0, fewest].map(|fewest| count(n, log - usual, fewest));
+            PREDICTORS * f64::from(predictor) + (1.0 - PREDICTORS) * f64::from(other)
+        };
+        logs.iter().map(cost).sum::<f64>() / logs.len() as f64
+    };
+    // `low` spends too much, `high` does not.
+    let bounds = logs
+        .iter()
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |b, &log| (b.0.min(log), b.1.max(log)));
+    let (mut low, mut high) = (bounds.0 - most as f32 - 1.0, bounds.1 - fewest as f32 + 1.0);
+    for _ in 0..STEPS {
+        let middle = 0.5 * (low + high);
+        if spent(middle) > f64::from(n) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+/// An eighth of an octave more or less, so that pixels of equal variance do not all jump to another power of two at once.
+fn dither(pixel: usize) -> f32 {
+    /// The fractional part of the golden ratio, times 2³².
+    const GOLDEN: u32 = 0x9e37_79b9;
+    0.25 * ((pixel as u32).wrapping_mul(GOLDEN) as f32 / 4_294_967_296.0 - 0.5)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::Pcg32;
 
+    const WIDTH: usize = 16;
+
+    fn sums(n: u32, n_hits: u32, luminance: f32) -> PassSums {
+        let mut sums = PassSums::default();
+        (0..n).for_each(|i| sums.add(if i < n_hits { luminance } else { 0.0 }, i < n_hits));
+        sums
+    }
+
+    /// Runs a pass over a tile; `see` gives what n samples of a pixel see. Returns how many each pixel had.
+    fn pass(
+        n_samples: u32,
+        in_sight: impl Fn(usize) -> bool,
+        mut see: impl FnMut(usize, u32) -> PassSums,
+    ) -> Vec<u32> {
+        let mut allocation = Allocation::default();
+        // As if the relative variance of the picture were 1e-3.
+        allocation.reset(WIDTH, WIDTH * WIDTH, n_samples, Some(log(1e-3)));
+        for round in 0..N_LEVELS {
+            allocation.assign(round);
+            for i in (0..WIDTH * WIDTH).filter(|i| level(i % WIDTH, i / WIDTH) == round) {
+                let sums = see(i, allocation.get(i));
+                allocation.learn(i, &sums, in_sight(i));
+            }
+        }
+        (0..WIDTH * WIDTH).map(|i| allocation.get(i)).collect()
+    }
+
+    fn noisy(deviation: f32, n: u32, pcg: &mut Pcg32) -> PassSums {
+        let mut sums = PassSums::default();
+        (0..n).for_each(|_| sums.add(1.0 + deviation * (2.0 * pcg.next_f32() - 1.0), true));
+        sums
+    }
+
+    /// Pixels like the scouts have as many samples on average as were asked for.
     #[test]
-    fn noisy_pixels_get_more_samples() {
-        let mut spreads = Spreads::default();
-        spreads.reset(5, 25);
-        // Pixels 0 and 4 are of the first level, 2 between them is of one that teaches, and 1 of the last.
-        let samples = |spread: f32| [1.0 - spread, 1.0 + spread].map(Rgb::splat);
-        assert_eq!(spreads.samples(1, 8, Some(-1.0)), 8);
-        spreads.learn(0, &samples(0.9));
-        spreads.learn(4, &[Rgb::WHITE]);
-        assert_eq!(spreads.get(4), None);
-        let growth = growth(spreads.get(0).unwrap());
-        assert_eq!(spreads.samples(1, 8, None), 8);
-        assert_eq!(spreads.samples(1, 8, Some(growth)), 8);
-        assert_eq!(spreads.samples(1, 8, Some(growth - 1.1)), 16);
-        assert_eq!(spreads.samples(1, 8, Some(growth - 10.0)), 64);
-        assert_eq!(spreads.samples(1, 8, Some(growth + 10.0)), 2);
-        assert_eq!(spreads.samples(1, 1, Some(growth + 10.0)), 1);
-        assert_eq!(spreads.samples(2, 8, Some(growth - 1.1)), 16);
-        assert_eq!(spreads.samples(2, 8, Some(growth + 10.0)), 8);
-        assert_eq!(spreads.samples(0, 8, Some(growth - 10.0)), 8);
+    fn the_scale_spends_what_was_asked_for() {
+        let mut pcg = Pcg32::new(1, 2);
+        for n in [8, 16, 64] {
+            for spread in [0.0, 1.0, 4.0] {
+                let logs: Vec<f32> =
+                    (0..1000).map(|_| -3.0 + spread * (pcg.next_f32() - 0.5)).collect();
+                let usual = scale(&logs, n);
+                let number = |(i, &log): (usize, &f32)| {
+                    f64::from(count(n, log - usual, if i % 4 == 0 { 0 } else { OCTAVES[0] }))
+                };
+                let mean = logs.iter().enumerate().map(number).sum::<f64>() / 1000.0;
+                assert!((mean / f64::from(n) - 1.0).abs() < 0.06, "{n} {spread}: {mean}");
+            }
+        }
     }
 
     #[test]
-    fn black_pixels_and_equal_samples_need_nothing() {
-        let mut spreads = Spreads::default();
-        spreads.reset(5, 25);
-        spreads.learn(0, &[Rgb::BLACK; 4]);
-        assert_eq!(spreads.samples(1, 8, Some(-1.0)), 2);
+    fn noisy_pixels_get_more_samples() {
+        let mut pcg = Pcg32::new(3, 4);
+        let is_noisy = |i: usize| i % WIDTH >= 8;
+        let counts =
+            pass(16, |_| true, |i, n| noisy(if is_noisy(i) { 0.9 } else { 0.02 }, n, &mut pcg));
+        let mean = |noisy: bool| {
+            let of = counts.iter().enumerate().filter(|&(i, _)| is_noisy(i) == noisy);
+            of.map(|(_, &n)| f64::from(n)).sum::<f64>() / 128.0
+        };
+        assert!(mean(true) > 2.0 * mean(false), "{} {}", mean(true), mean(false));
+    }
+
+    /// A pixel between a covered one and an empty one is worth more than the usual samples, even if neither of
+    /// them has any variance, or nothing is in sight of the empty ones.
+    #[test]
+    fn silhouettes_are_found_between_pixels() {
+        for in_sight in [false, true] {
+            let mut pcg = Pcg32::new(5, 6);
+            let counts = pass(
+                16,
+                |i| in_sight || i % WIDTH <= 9,
+                |i, n| {
+                    if i % WIDTH < 9 { noisy(0.05, n, &mut pcg) } else { sums(n, 0, 0.0) }
+                },
+            );
+            for y in 1..15 {
+                for x in 8..=9 {
+                    let i = y * WIDTH + x;
+                    assert!(level(x, y) == 0 || counts[i] >= 16, "{x} {y}: {}", counts[i]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn equal_samples_leave_the_numbers_even() {
+        let counts = pass(8, |_| true, |_, _| PassSums::default());
+        assert!(counts.iter().all(|n| counts[..].contains(n) && (2..=8).contains(n)));
+        let mut even = Allocation::default();
+        even.reset(WIDTH, WIDTH * WIDTH, 8, None);
+        even.assign(3);
+        assert_eq!(even.get(3), 8);
     }
 }

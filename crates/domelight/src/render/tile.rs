@@ -4,18 +4,20 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::film::{CameraSample, Layers, PixelSums, SurfaceSample};
-use super::spread::Spreads;
+use super::film::{CameraSample, Layers, PixelSums, SampleSet, SurfaceSample};
+use super::spread::{Allocation, PassSums};
 use super::tiling::Window;
-use super::{Background, Frame, Observer, RenderSettings, Stage, Visibility};
+use super::variance::VarianceSums;
+use super::{Background, Frame, Mark, Observer, RenderSettings, Stage, visibility};
 use crate::Rgb;
 use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
 use crate::math::{Vec3, vec2};
+use crate::sampling::rng::hash2;
 use crate::sampling::{Dimension, NumberSet, Stream};
-use crate::strategy::levels::level;
+use crate::strategy::levels::{N_LEVELS, level};
 use crate::strategy::{Contributions, PixelPoints, ShadingPoint, Strategy, TileShading};
 
-/// Camera samples below which a spread says nothing.
+/// Camera samples below which the difference of two sets says nothing.
 const FEWEST_SAMPLES: u32 = 16;
 
 /// A rectangle of the picture and the sums of its pixels.
@@ -28,6 +30,8 @@ pub(super) struct Tile {
     /// Camera samples of each pixel while `pixels` are empty.
     n_missed: u32,
     pub(super) counts: Counts,
+    /// When it last got samples.
+    pub(super) changed: Mark,
 }
 
 /// What was done, for the statistics.
@@ -67,25 +71,28 @@ pub(super) struct Scratch<S: Strategy> {
     of_strategy: S::Scratch,
 }
 
+impl<S: Strategy> Scratch<S> {
+    /// What the last tile has shown of its pixels.
+    pub(super) fn allocation(&self) -> &Allocation {
+        &self.batch.allocation
+    }
+}
+
 impl<S: Strategy> Default for Scratch<S> {
     fn default() -> Self {
         Self { batch: Batch::default(), of_strategy: S::Scratch::default() }
     }
 }
 
-impl<S: Strategy> Scratch<S> {
-    /// What the last tile has shown of the spread of its samples.
-    pub(super) fn spreads(&self) -> &Spreads {
-        &self.batch.spreads
-    }
-}
-
 /// A pass over the picture.
 pub(super) struct Pass<S: Strategy> {
-    /// Its camera samples of each pixel, as a rule.
+    /// Its camera samples of each pixel; about the mean over the picture where they are divided unevenly.
     pub(super) n_samples: u32,
-    /// The mean [growth](super::spread) of the picture's pixels; if none, all get as many samples.
-    pub(super) usual_growth: Option<f32>,
+    pub(super) set: SampleSet,
+    /// Divides its samples unevenly, or will when `usual` is known.
+    pub(super) adaptive: bool,
+    /// The logarithm at which a pixel has the usual number; see [`super::spread`].
+    pub(super) usual: Option<f32>,
     pub(super) shared: S::Pass,
 }
 
@@ -94,7 +101,13 @@ pub(super) struct Pass<S: Strategy> {
 struct Batch {
     /// Of each pixel of the tile, whether it may see anything.
     seen: Vec<bool>,
-    spreads: Spreads,
+    /// Whether it takes a second set of samples in the pass.
+    has_second: Vec<bool>,
+    /// Its pixels learn from one another how many samples they need.
+    adaptive: bool,
+    /// Whether it takes part in the round.
+    chosen: Vec<bool>,
+    allocation: Allocation,
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
     /// Of each pixel.
@@ -130,13 +143,16 @@ impl CameraRays {
 struct ShadowRays {
     asked: Contributions,
     traced: RayBatch,
-    free: Vec<bool>,
+    occluded: Vec<bool>,
+    /// V of each ray, in [0, 1].
+    visibility: Vec<f32>,
 }
 
 impl Tile {
     /// Without samples.
     pub(super) fn new(window: Window) -> Self {
-        Self { window, pixels: Vec::new(), n_missed: 0, counts: Counts::default() }
+        let counts = Counts::default();
+        Self { window, pixels: Vec::new(), n_missed: 0, counts, changed: Mark::default() }
     }
 
     /// Camera samples of each pixel.
@@ -154,12 +170,17 @@ impl Tile {
     }
 
     /// Adds its pixels to `layers` of the pixels of `window`.
-    pub(super) fn put_into(&self, layers: &mut Layers, window: Window) {
+    pub(super) fn put_into(&self, layers: &mut Layers, window: Window, variance: &VarianceSums) {
         if self.pixels.is_empty() {
             layers.set_misses(self.n_missed, self.window, window);
         } else {
-            layers.put(&self.pixels, self.window, window);
+            layers.put(&self.pixels, self.window, window, variance);
         }
+    }
+
+    /// What the variance of its pixels is estimated from.
+    pub(super) fn variance_sums(&self) -> VarianceSums {
+        VarianceSums::of(&self.pixels)
     }
 
     /// Takes over the sums of a tile whose work is not counted here.
@@ -170,11 +191,18 @@ impl Tile {
     /// Has all samples, or as few as the error allows: a decision that no other tile has a part in.
     pub(super) fn is_finished(&self, settings: &RenderSettings) -> bool {
         let n_samples = self.n_samples();
-        let precise = |error| n_samples >= FEWEST_SAMPLES && self.error() <= error;
+        let precise =
+            |error| n_samples >= FEWEST_SAMPLES && self.has_even_sets() && self.error() <= error;
         n_samples >= settings.n_samples || settings.target_error.is_some_and(precise)
     }
 
-    /// The relMSE that the spread of the samples suggests.
+    /// Its second set is as large as the first.
+    fn has_even_sets(&self) -> bool {
+        let even = |p: &PixelSums| p.n_of(SampleSet::First) == p.n_of(SampleSet::Second);
+        self.pixels.first().map_or(self.n_missed.is_multiple_of(2), even)
+    }
+
+    /// The relMSE that the difference of the two sets suggests.
     fn error(&self) -> f32 {
         let sum: f32 = self.pixels.iter().map(PixelSums::relative_variance).sum();
         sum / self.window.area() as f32
@@ -196,7 +224,6 @@ impl Tile {
         batch.seen.clear();
         batch.seen.resize(n_pixels, false);
         self.find_seen(frame, self.window, &mut batch.seen);
-        batch.spreads.reset(width, n_pixels);
         let hidden = frame.settings.background == Background::Hidden;
         if self.pixels.is_empty() && hidden && !batch.seen.contains(&true) {
             self.n_missed += pass.n_samples;
@@ -209,52 +236,83 @@ impl Tile {
         let asked = Asked { frame, strategy, pass: &pass.shared, width };
         let mut counts = Counts::default();
         // Where nothing is seen there is nothing to learn.
-        let n_rounds = if batch.seen.contains(&true) { S::N_ROUNDS } else { 1 };
+        let n_rounds = if batch.seen.contains(&true) { strategy.n_rounds() } else { 1 };
+        let learns = n_rounds > 1;
+        // Renders with a target error have a second set in every pixel.
+        let one_in_many = learns && frame.settings.target_error.is_none();
+        self.choose_second_sets(frame, one_in_many, batch);
+        batch.adaptive = learns && pass.adaptive;
+        let usual = pass.usual.filter(|_| batch.adaptive);
+        batch.allocation.reset(width, n_pixels, pass.n_samples, usual);
         for round in 0..n_rounds {
-            observer.stage_started(Stage::CameraRays);
-            let of_round = |x, y| n_rounds == 1 || level(x, y) == round;
-            counts.camera_rays += self.trace_camera_rays(frame, pass, of_round, batch);
-            observer.stage_started(Stage::Surfaces);
-            batch.gather_points(frame);
-            counts.shading_points += batch.points.len() as u64;
-            counts.shadow_rays += batch.trace_strategy(&asked, round, of_strategy, observer);
+            batch.allocation.assign(round);
+            let of_round = |i: usize| !learns || level(i % width, i / width) == round;
+            // First, as what the strategy keeps for learning is that of its last rays.
+            batch.choose(|i, batch| batch.has_second[i] && of_round(i));
+            if batch.chosen.contains(&true) {
+                counts +=
+                    self.sample(&asked, round, SampleSet::Second, batch, of_strategy, observer);
+                counts.non_finite += self.add_samples(frame, SampleSet::Second, batch);
+            }
+            batch.choose(|i, _| of_round(i));
+            counts += self.sample(&asked, round, pass.set, batch, of_strategy, observer);
             if round + 1 < n_rounds {
                 batch.learn(&asked, of_strategy);
             }
             observer.stage_started(Stage::Sums);
-            counts.non_finite += self.add_samples(frame, batch);
+            counts.non_finite += self.add_samples(frame, pass.set, batch);
         }
         self.counts += counts;
         counts
     }
 
-    /// Those of the pixels of a round; returns how many.
-    fn trace_camera_rays<S: Strategy>(
+    /// Marks the pixels that take a second set of samples in a pass: none, or four of the 256 of a square.
+    fn choose_second_sets(&self, frame: &Frame, one_in_many: bool, batch: &mut Batch) {
+        batch.has_second.clear();
+        let second = |(i, &seen): (usize, &bool)| {
+            let (x, y) = self.position(i);
+            // The number of samples of a tile is that of its first pixel.
+            one_in_many && seen && i > 0 && has_second_set(frame.settings.seed, x, y)
+        };
+        batch.has_second.extend(batch.seen.iter().enumerate().map(second));
+    }
+
+    /// Traces a set of samples of the chosen pixels of a round.
+    fn sample<S: Strategy>(
         &self,
-        frame: &Frame,
-        pass: &Pass<S>,
-        of_round: impl Fn(usize, usize) -> bool,
+        asked: &Asked<S>,
+        round: u32,
+        set: SampleSet,
         batch: &mut Batch,
-    ) -> u64 {
-        let Batch { seen, spreads, rays, hits, camera_rays, pixels, .. } = batch;
+        scratch: &mut S::Scratch,
+        observer: &impl Observer,
+    ) -> Counts {
+        observer.stage_started(Stage::CameraRays);
+        let camera_rays = self.trace_camera_rays(asked.frame, set, batch);
+        observer.stage_started(Stage::Surfaces);
+        batch.gather_points(asked.frame);
+        let shading_points = batch.points.len() as u64;
+        let shadow_rays = batch.trace_strategy(asked, round, scratch, observer);
+        Counts { camera_rays, shading_points, shadow_rays, non_finite: 0 }
+    }
+
+    /// Those of a set of the chosen pixels; returns how many.
+    fn trace_camera_rays(&self, frame: &Frame, set: SampleSet, batch: &mut Batch) -> u64 {
+        let Batch { seen, chosen, allocation, rays, hits, camera_rays, pixels, .. } = batch;
         rays.clear();
         pixels.clear();
         camera_rays.clear();
         let mut count = 0;
-        for (i, &seen) in seen.iter().enumerate() {
-            let start = self.pixels[i].n_samples();
-            if !of_round(i % self.window.width, i / self.window.width) {
+        for (i, (&seen, &chosen)) in seen.iter().zip(&*chosen).enumerate() {
+            let start = self.pixels[i].n_of(set);
+            if !chosen {
                 camera_rays.push(CameraRays { samples: start..start, first: None });
                 pixels.push(PixelPoints::NONE);
                 continue;
             }
             let (x, y) = self.position(i);
-            let stream = self.stream(frame, i);
-            let n_samples = if seen {
-                spreads.samples(i, pass.n_samples, pass.usual_growth)
-            } else {
-                pass.n_samples
-            };
+            let stream = self.stream(frame, i, set);
+            let n_samples = allocation.get(i);
             let samples = start..start + n_samples;
             let first = seen.then_some(rays.len());
             if first.is_some() {
@@ -296,27 +354,37 @@ impl Tile {
         (x + i % width, y + i / width)
     }
 
-    /// The uniform numbers of pixel `i`.
-    fn stream(&self, frame: &Frame, i: usize) -> Stream {
+    /// The uniform numbers of a set of pixel `i`.
+    fn stream(&self, frame: &Frame, i: usize, set: SampleSet) -> Stream {
         let (x, y) = self.position(i);
         let pixel = (y * frame.settings.width + x) as u64;
-        Stream::new(frame.settings.sampler, frame.settings.seed, pixel)
+        let stream = Stream::new(frame.settings.sampler, frame.settings.seed, pixel);
+        match set {
+            SampleSet::First => stream,
+            // No pass begins with this sample.
+            SampleSet::Second => stream.part(u32::MAX),
+        }
     }
 
-    /// Adds each camera sample to its pixel, in order; returns how many are not finite.
-    fn add_samples(&mut self, frame: &Frame, batch: &Batch) -> u64 {
+    /// Adds each camera sample to its pixel, in order, and lets the other pixels learn from them; returns how many are
+    /// not finite.
+    fn add_samples(&mut self, frame: &Frame, set: SampleSet, batch: &mut Batch) -> u64 {
         let mut non_finite = 0;
         let mut point = 0;
-        for (i, CameraRays { samples, first }) in batch.camera_rays.iter().enumerate() {
+        let adaptive = batch.adaptive;
+        for i in 0..batch.camera_rays.len() {
+            let CameraRays { samples, first } = batch.camera_rays[i].clone();
             if samples.is_empty() {
                 continue;
             }
             let (x, y) = self.position(i);
             let shown = frame.settings.background == Background::Shown;
             if first.is_none() && !shown {
-                self.pixels[i].add_misses(samples.len() as u32);
+                self.pixels[i].add_misses(samples.len() as u32, set);
+                batch.allocation.learn(i, &PassSums::default(), false);
                 continue;
             }
+            let mut sums = PassSums::default();
             for (s, sample) in samples.clone().enumerate() {
                 let ray = first.map(|first| first + s);
                 let sample = match ray.map(|ray| (&batch.rays[ray], batch.hits[ray])) {
@@ -331,11 +399,39 @@ impl Tile {
                         background_sample(frame, ray.direction)
                     }
                 };
-                non_finite += u64::from(!self.pixels[i].add(&sample));
+                if adaptive {
+                    sums.add(sample.color.luminance(), sample.surface.is_some());
+                }
+                non_finite += u64::from(!self.pixels[i].add(&sample, set));
+            }
+            if adaptive {
+                batch.allocation.learn(i, &sums, first.is_some());
             }
         }
         non_finite
     }
+}
+
+/// Whether a pixel of the picture has a second set of samples in strategies that place the rays of a pixel together:
+/// four pixels in a square of 16 by 16, all of one [`level`], which is each level's as often as it has pixels.
+fn has_second_set(seed: u64, x: usize, y: usize) -> bool {
+    let hash = hash2(hash2(!seed, (x / 16) as u64), (y / 16) as u64);
+    // 1, 1, 2, 4 and 8 pixels of 16 are of levels 0 to 4.
+    let of_square = match hash % 16 {
+        0 => 0,
+        rest => rest.ilog2() + 1,
+    };
+    debug_assert!(of_square < N_LEVELS, "level {of_square}");
+    let cell = (hash >> 4) as usize;
+    if level(x, y) != of_square || (x / 4) % 2 != cell % 2 || (y / 4) % 2 != cell / 2 % 2 {
+        return false;
+    }
+    // One of those of its level in a square of 4 by 4.
+    let place = |x: usize, y: usize| {
+        (0..16).filter(|i| level(i % 4, i / 4) == of_square).position(|i| i == y % 4 * 4 + x % 4)
+    };
+    let n = (0..16).filter(|i| level(i % 4, i / 4) == of_square).count();
+    place(x, y) == Some((hash >> 8) as usize % n)
 }
 
 /// Camera sample `sample` of the pixel at (`x`, `y`), by its numbers for the film.
@@ -357,6 +453,14 @@ fn background_sample(frame: &Frame, direction: Vec3) -> CameraSample {
 }
 
 impl Batch {
+    /// Chooses the pixels of a round.
+    fn choose(&mut self, is_chosen: impl Fn(usize, &Self) -> bool) {
+        let mut chosen = std::mem::take(&mut self.chosen);
+        chosen.clear();
+        chosen.extend((0..self.seen.len()).map(|i| is_chosen(i, self)));
+        self.chosen = chosen;
+    }
+
     /// Turns hits into shading points, grouped by pixel.
     fn gather_points(&mut self, frame: &Frame) {
         self.origins.clear();
@@ -405,24 +509,22 @@ impl Batch {
         self.radiance.clone_from(&rays.asked.base);
         self.unoccluded.clone_from(&rays.asked.base);
         let pairs = rays.asked.point.iter().zip(&rays.asked.weight);
-        for ((&point, &weight), &free) in pairs.zip(&rays.free) {
+        for ((&point, &weight), &visibility) in pairs.zip(&rays.visibility) {
             self.unoccluded[point as usize] += weight;
-            if free {
-                self.radiance[point as usize] += weight;
+            if visibility > 0.0 {
+                self.radiance[point as usize] += weight * visibility;
             }
         }
         rays.asked.len() as u64
     }
 
-    /// Lets the strategy learn from the round, and how the samples of its pixels spread.
+    /// Lets the strategy learn from the round.
     fn learn<S: Strategy>(&mut self, asked: &Asked<S>, scratch: &mut S::Scratch) {
-        let Self { points, samples, pixels, round: ShadowRays { asked: rays, free, .. }, .. } =
-            self;
+        let Self {
+            points, samples, pixels, round: ShadowRays { asked: rays, visibility, .. }, ..
+        } = self;
         let tile = TileShading { points, samples, pixels, width: asked.width };
-        asked.strategy.learn(&tile, rays, free, scratch);
-        for (i, pixel) in self.pixels.iter().enumerate() {
-            self.spreads.learn(i, &self.radiance[pixel.points.clone()]);
-        }
+        asked.strategy.learn(&tile, rays, visibility, scratch);
     }
 
     fn surface_sample(&self, frame: &Frame, point: usize, ray: &Ray, hit: &Hit) -> CameraSample {
@@ -462,7 +564,11 @@ impl ShadowRays {
         self.traced.clear();
         self.traced.origins.extend(wi.iter().zip(point).map(origin));
         self.traced.directions.extend_from_slice(wi);
-        Visibility::occluded(frame.scene.bvh(), &self.traced, &mut self.free);
-        self.free.iter_mut().for_each(|answer| *answer = !*answer);
+        visibility::trace(
+            frame.scene.bvh(),
+            &self.traced,
+            &mut self.occluded,
+            &mut self.visibility,
+        );
     }
 }

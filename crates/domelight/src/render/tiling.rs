@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::Range;
 
 use super::RenderSettings;
+use super::film::SampleSet;
 use crate::strategy::Strategy;
 
 /// A rectangle of pixels.
@@ -136,6 +137,33 @@ impl Tiling {
     }
 }
 
+/// The pass that begins at sample `start` of a render with a target error, and its set: two passes of the same length,
+/// one for each set, then two of a quarter of what was spent by the last power of two, so that a tile ends near its
+/// target.
+pub(super) fn paired_pass(start: u32, n_samples: u32) -> (Range<u32>, SampleSet) {
+    /// Passes of a set.
+    const SHORTEST: u32 = 4;
+    const FIRST: u32 = 8;
+    const LONGEST: u32 = 64;
+    let mut pair = 0;
+    loop {
+        let length = match u32::checked_ilog2(pair) {
+            None => FIRST,
+            Some(log) => ((1 << log) / 4).clamp(SHORTEST, LONGEST),
+        };
+        let length = length.min(n_samples.saturating_sub(pair).div_ceil(2)).max(1);
+        let middle = pair.saturating_add(length);
+        if start < middle {
+            return (start..middle, SampleSet::First);
+        }
+        let end = middle.saturating_add(length).min(n_samples.max(start + 1));
+        if start < end {
+            return (start..end, SampleSet::Second);
+        }
+        pair = end;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -190,6 +218,25 @@ mod tests {
                 cover(&tiling, &ProductSampling::new(environment, n), n_samples);
             }
         }
+    }
+
+    #[test]
+    fn sets_have_equal_passes() {
+        for n_samples in [1, 2, 3, 16, 20, 64, 1000] {
+            let (mut next, mut sums) = (0, [0; 2]);
+            while next < n_samples {
+                let (pass, set) = paired_pass(next, n_samples);
+                assert_eq!(pass.start, next);
+                assert!(pass.end > next && pass.end <= n_samples, "{pass:?} of {n_samples}");
+                sums[usize::from(set == SampleSet::Second)] += pass.len() as u32;
+                next = pass.end;
+                if set == SampleSet::Second && next < n_samples {
+                    assert_eq!(sums[0], sums[1], "{next} of {n_samples}");
+                }
+            }
+            assert!(sums[0] - sums[1] <= 1, "{sums:?}");
+        }
+        assert_eq!([0, 8, 16, 20, 24].map(|s| paired_pass(s, 99).0.end), [8, 16, 20, 24, 28]);
     }
 
     fn cover(tiling: &Tiling, strategy: &impl Strategy, n_samples: u32) {

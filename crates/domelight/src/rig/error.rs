@@ -15,6 +15,8 @@ use crate::parallel::in_order;
 const N_NORMALS: usize = 600;
 /// Parts of the map that the reference sums over, at the most.
 const MAX_BLOCKS: usize = 1 << 17;
+/// Columns and rows of cells that the reference sums over, at least.
+const CELLS: [usize; 2] = [512, 256];
 
 /// The root mean square error of a rig's shading, relative to the root mean square of the map's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,16 +58,12 @@ impl Shading {
 }
 
 impl ShadingReference {
-    /// Sums over all texels; on maps of more than 2¹⁷ over the energy centroids of blocks.
+    /// Sums over cells of 0.7° or less, for a texel's light comes from all of it; on maps of more than 2¹⁷ texels over
+    /// the energy centroids of blocks.
     pub fn new(environment: &Environment) -> Self {
         let texels = Texels::new(environment);
         let blocks = Blocks::at_most(MAX_BLOCKS, texels.width(), texels.height());
-        let lights: Vec<(Vec3, f64)> = blocks
-            .moments(&texels, Metric::Sphere)
-            .iter()
-            .filter(|m| m.energy > 0.0)
-            .filter_map(|m| unit(m.first).map(|_| (texels.to_world(m.first), m.energy)))
-            .collect();
+        let lights = if blocks.step > 1 { of_blocks(&texels, &blocks) } else { of_cells(&texels) };
         Self { exact: in_order(N_NORMALS, |i| shade(normal(i), &lights)) }
     }
 
@@ -101,6 +99,36 @@ impl ShadingReference {
     }
 }
 
+/// Direction and luminance \[times sr\] of each block's energy.
+fn of_blocks(texels: &Texels, blocks: &Blocks) -> Vec<(Vec3, f64)> {
+    let moments = blocks.moments(texels, Metric::Sphere);
+    let lit = moments.iter().filter(|m| m.energy > 0.0);
+    lit.filter_map(|m| unit(m.first).map(|_| (texels.to_world(m.first), m.energy))).collect()
+}
+
+/// The same of cells, into which texels are cut until the map is [`CELLS`].
+fn of_cells(texels: &Texels) -> Vec<(Vec3, f64)> {
+    let (width, height) = (texels.width(), texels.height());
+    let (across, down) = (CELLS[0].div_ceil(width), CELLS[1].div_ceil(height));
+    let middle = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
+    let step = std::f64::consts::PI / (height * down) as f64;
+    let mut lights = Vec::new();
+    for row in 0..height * down {
+        // cos θ₀ − cos θ₁ as a product.
+        let band = 2.0 * (step * (row as f64 + 0.5)).sin() * (0.5 * step).sin();
+        let solid_angle = band * std::f64::consts::TAU / (width * across) as f64;
+        let radiance = texels.row(row / down);
+        for column in 0..width * across {
+            let luminance = f64::from(radiance[column / across].luminance());
+            if luminance > 0.0 {
+                let d = texels.direction(middle(column, across), middle(row, down));
+                lights.push((texels.to_world(d), luminance * solid_angle));
+            }
+        }
+    }
+    lights
+}
+
 fn shade(normal: Vec3, lights: &[(Vec3, f64)]) -> Shading {
     let mut sum = Shading::default();
     for &(direction, energy) in lights {
@@ -116,4 +144,30 @@ fn normal(i: usize) -> Vec3 {
     let (sin_phi, cos_phi) = (TAU * (GOLDEN * i as f32).fract()).sin_cos();
     let sin_theta = (1.0 - y * y).sqrt();
     vec3(sin_phi * sin_theta, y, cos_phi * sin_theta)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::Orientation;
+    use crate::rig::{MedianCut, median_cut};
+    use crate::{Rgb, RgbImage};
+
+    /// A coarse map, and the same radiance on fine texels: the rigs of the one have the same error on both.
+    #[test]
+    fn errors_do_not_depend_on_the_size_of_texels() {
+        let noise = |i: usize| ((i as u32).wrapping_mul(2_654_435_761) >> 8) as f32 / 16_777_216.0;
+        let coarse =
+            RgbImage::from_fn(24, 12, |x, y| Rgb::splat(8.0 * noise(y * 24 + x).powi(6) + 0.2));
+        let fine = RgbImage::from_fn(24 * 40, 12 * 40, |x, y| coarse.get(x / 40, y / 40));
+        let environment = |map| Environment::new(map, Orientation::default(), 1.0).unwrap();
+        let (coarse, fine) = (environment(coarse), environment(fine));
+        let references = [ShadingReference::new(&coarse), ShadingReference::new(&fine)];
+        for n in [4, 16, 64] {
+            let rig = median_cut(&coarse, n, MedianCut::default()).unwrap();
+            let [a, b] = [references[0].error(&rig), references[1].error(&rig)];
+            assert!((a.glossy / b.glossy - 1.0).abs() < 0.01, "{n}: {a:?} {b:?}");
+            assert!((a.diffuse / b.diffuse - 1.0).abs() < 0.01, "{n}: {a:?} {b:?}");
+        }
+    }
 }

@@ -77,13 +77,18 @@ pub enum RigError {
     #[error("no light holds the least share of the map's light that was asked for")]
     TooDim,
     /// No rig is good enough.
-    #[error("even {n_lights} lights have a shading error of {percent:.2} %")]
+    #[error("even {n_lights} lights have a shading error of {} %", digits(*percent))]
     ErrorNotReached {
         /// The most lights that were tried.
         n_lights: usize,
         /// Their error \[%\].
         percent: f32,
     },
+}
+
+/// A number in per cent that is not 0.00 unless it is 0.
+fn digits(percent: f32) -> String {
+    if percent < 0.01 && percent > 0.0 { format!("{percent:.1e}") } else { format!("{percent:.2}") }
 }
 
 impl RigError {

@@ -9,8 +9,9 @@
 //! so pixel centres lie at +½, pixels are square and `fov` is the vertical field of view. The
 //! orthographic camera moves the origin instead, with height/2 in the place of tan(fov/2).
 
+use super::Scene;
 use crate::bvh::Frustum;
-use crate::geometry::{Aabb, Ray};
+use crate::geometry::{Aabb, Ray, power_of_two};
 use crate::math::{Mat4, Vec3};
 
 /// A camera before the size of its picture is known.
@@ -132,6 +133,15 @@ impl CameraSettings {
         basis(self).and(half_height(self.projection)).map(|_| ())
     }
 
+    /// Scales the camera's place and, of an orthographic one, the height of its picture by a factor > 0.
+    pub fn scale(&mut self, factor: f32) {
+        self.origin *= factor;
+        self.target *= factor;
+        if let Projection::Orthographic { height } = &mut self.projection {
+            *height *= factor;
+        }
+    }
+
     /// Moves the camera by an affine matrix; an orthographic height grows with its scale.
     pub fn transform(&mut self, m: &Mat4) {
         self.origin = m.transform_point3(self.origin);
@@ -160,6 +170,21 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// The scene's own camera, or one that frames the scene, for a picture of `width` × `height` pixels, each at
+    /// least 1. A camera of the file that makes no picture gives way to the framing one.
+    ///
+    /// # Panics
+    /// If width or height are zero.
+    pub fn framing(scene: &Scene, width: usize, height: usize) -> Self {
+        assert!(width > 0 && height > 0, "a picture of {width} x {height} has no pixels");
+        let aspect = width as f32 / height as f32;
+        let up = scene.up_axis().vector();
+        let framed = || CameraSettings::framing(&scene.subject_bounds(), aspect, up);
+        Self::new(&scene.camera(aspect), width, height)
+            .or_else(|_| Self::new(&framed(), width, height))
+            .expect("framing settings make a picture")
+    }
+
     /// The camera of a picture of `width` × `height` pixels.
     ///
     /// # Errors
@@ -230,6 +255,11 @@ impl Camera {
     }
 }
 
+/// The unit vector along a vector of any length but 0, whose square may overflow or vanish.
+fn direction(v: Vec3) -> Option<Vec3> {
+    (v / power_of_two(v.abs().max_element())).try_normalize()
+}
+
 /// Forward, right and up as an orthonormal basis.
 fn basis(settings: &CameraSettings) -> Result<[Vec3; 3], CameraError> {
     let CameraSettings { origin, target, up, .. } = *settings;
@@ -238,8 +268,9 @@ fn basis(settings: &CameraSettings) -> Result<[Vec3; 3], CameraError> {
             return Err(CameraError::NotFinite { name, value });
         }
     }
-    let forward = (target - origin).try_normalize().ok_or(CameraError::NoDirection { origin })?;
-    let unit_up = up.try_normalize().ok_or(CameraError::Up { up, forward })?;
+    let forward =
+        direction(target / 2.0 - origin / 2.0).ok_or(CameraError::NoDirection { origin })?;
+    let unit_up = direction(up).ok_or(CameraError::Up { up, forward })?;
     let right = forward.cross(unit_up);
     if right.length() < 1e-6 {
         return Err(CameraError::Up { up, forward });

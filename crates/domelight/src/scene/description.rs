@@ -20,6 +20,8 @@ pub struct SceneDescription {
     pub textures: Vec<Texture>,
     /// The camera, if the scene brings one.
     pub camera: Option<CameraSettings>,
+    /// All cameras of the file, of which `camera` is one, in the file's order.
+    pub cameras: Vec<NamedCamera>,
     /// The environment, if the scene names one.
     pub environment: Option<EnvironmentSettings>,
     /// Parts that are scenery, such as floors and plinths, by index: the camera is not framed to
@@ -40,6 +42,15 @@ pub struct Part {
     pub mesh: Mesh,
     /// Index into [`SceneDescription::surfaces`].
     pub surface: usize,
+}
+
+/// One of a file's cameras.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedCamera {
+    /// Its name, which may be empty.
+    pub name: String,
+    /// What it sees.
+    pub settings: CameraSettings,
 }
 
 /// The light around a scene.
@@ -72,12 +83,19 @@ impl SceneDescription {
         self.parts.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()))
     }
 
+    /// Bytes that its meshes take.
+    #[cfg(feature = "io")]
+    pub(crate) fn memory(&self) -> u64 {
+        self.parts.iter().map(|part| part.mesh.memory()).sum()
+    }
+
     /// Moves the parts and the camera by an affine matrix.
     pub fn transform(&mut self, m: &Mat4) {
         for part in &mut self.parts {
             part.mesh.transform(m);
         }
-        if let Some(camera) = &mut self.camera {
+        let all = self.cameras.iter_mut().map(|c| &mut c.settings);
+        for camera in self.camera.iter_mut().chain(all) {
             camera.transform(m);
         }
     }
@@ -96,6 +114,7 @@ impl SceneDescription {
         self.surfaces.append(&mut other.surfaces);
         self.textures.append(&mut other.textures);
         self.camera = self.camera.take().or(other.camera);
+        self.cameras.append(&mut other.cameras);
         self.environment = self.environment.take().or(other.environment);
         self.up = self.up.or(other.up);
     }

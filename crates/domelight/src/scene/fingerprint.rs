@@ -1,6 +1,6 @@
 //! The fingerprint of a scene: geometry, surfaces and textures to the bit; names and files do not count.
 
-use super::Scene;
+use super::{Scene, Surface};
 use crate::fingerprint::{Fingerprint, Fingerprinter};
 use crate::math::{Vec2, Vec3, Vec4};
 
@@ -15,11 +15,24 @@ impl Scene {
             f.numbers(mesh.positions.iter().flat_map(Vec3::to_array));
             f.numbers(mesh.normals.iter().flat_map(Vec3::to_array));
             f.numbers(mesh.uvs.iter().flat_map(Vec2::to_array));
+            f.numbers(mesh.uvs2.iter().flat_map(Vec2::to_array));
+            f.numbers(mesh.alphas.iter().copied());
             f.numbers(mesh.tangents.iter().flat_map(Vec4::to_array));
             f.numbers(mesh.colors.iter().flat_map(|c| c.to_array()));
         }
         for surface in &self.surfaces {
-            f.text(format_args!("{:?} {:?}", surface.model, surface.normal_map));
+            let Surface {
+                name: _,
+                model,
+                normal_map,
+                coverage,
+                double_sided,
+                emission,
+                unlit,
+                layers,
+            } = surface;
+            f.text(format_args!("{model:?} {normal_map:?} {coverage:?} {double_sided}"));
+            f.text(format_args!("{emission:?} {unlit} {layers:?}"));
         }
         self.textures.iter().for_each(|texture| texture.add_to(&mut f));
         f.finish()

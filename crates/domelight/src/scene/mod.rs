@@ -9,6 +9,7 @@ mod camera;
 mod description;
 #[cfg(feature = "io")]
 mod fingerprint;
+mod layers;
 #[cfg(feature = "io")]
 pub mod load;
 mod shading;
@@ -18,14 +19,24 @@ mod texture;
 
 pub use crate::environment::UpAxis;
 pub use camera::{Camera, CameraError, CameraSettings, Projection};
-pub use description::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription};
+pub use description::{
+    EnvironmentSettings, EnvironmentSource, NamedCamera, Part, SceneDescription,
+};
+pub use layers::{
+    AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers, Sheen,
+    Specular, Volume,
+};
 #[cfg(feature = "io")]
-pub use load::{LoadError, Loaded, load, load_within};
-pub use surface::{MetallicRoughnessSurface, NormalMap, PhongSurface, Surface, SurfaceModel};
-pub use texture::{Encoding, Texture, TextureError, TextureRef, UvTransform, Wrap};
+pub use load::{AnimationTime, LoadError, LoadOptions, Loaded, Reach, load, load_with};
+pub use surface::{
+    MetallicRoughnessSurface, NormalMap, PhongSurface, SpecularGlossinessSurface, Surface,
+    SurfaceModel,
+};
+pub use texture::{Encoding, Texture, TextureError, TextureFilter, TextureRef, UvTransform, Wrap};
 
+use crate::bsdf::Material;
 use crate::bvh::{Bvh, BvhError};
-use crate::geometry::{Aabb, MeshError};
+use crate::geometry::{Aabb, Mesh, MeshError};
 
 /// A scene ready for rays.
 #[derive(Debug)]
@@ -37,6 +48,11 @@ pub struct Scene {
     first_triangle: Vec<u32>,
     bvh: Bvh,
     bounds: Aabb,
+    /// The bounds of what is not scenery.
+    subject_bounds: Aabb,
+    /// The camera and the up axis of the file, if it has them.
+    camera: Option<CameraSettings>,
+    up: UpAxis,
 }
 
 /// A description that makes no scene.
@@ -76,6 +92,14 @@ pub enum SceneError {
         /// How many there are.
         vertices: usize,
     },
+    /// Rays are traced well between the two alone; [`SceneDescription::rescale`] brings others there.
+    #[error("the scene is {size:e} across, {farthest:e} at its farthest: not between 1e-6 and 1e7")]
+    Size {
+        /// The longest edge of the bounds.
+        size: f32,
+        /// The greatest coordinate.
+        farthest: f32,
+    },
     /// The hierarchy cannot be built.
     #[error(transparent)]
     Bvh(#[from] BvhError),
@@ -88,15 +112,73 @@ impl Scene {
     /// The first [`SceneError`] found. A scene without triangles is not an error: nothing is hit.
     pub fn new(description: SceneDescription) -> Result<Self, SceneError> {
         check(&description)?;
-        let SceneDescription { parts, surfaces, textures, .. } = description;
+        let subject_bounds = description.subject_bounds();
+        let SceneDescription { parts, surfaces, textures, camera, up, .. } = description;
+        let up = up.unwrap_or_default();
         let bounds = parts.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()));
+        check_size(&bounds)?;
         let (bvh, first_triangle) = build(&parts)?;
-        Ok(Self { parts, surfaces, textures, first_triangle, bvh, bounds })
+        Ok(Self {
+            parts,
+            surfaces,
+            textures,
+            first_triangle,
+            bvh,
+            bounds,
+            subject_bounds,
+            camera,
+            up,
+        })
+    }
+
+    /// Loads a mesh or a scene file of any known format and builds it.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is damaged, or makes no scene. [`load()`] gives the loader's warnings as well, and
+    /// a description to change before it is built.
+    #[cfg(feature = "io")]
+    pub fn load(path: impl AsRef<std::path::Path>) -> Result<Self, crate::Error> {
+        Ok(Self::new(load(path)?.description)?)
+    }
+
+    /// A built-in scene: `sphere`, `spheres`, `statue` and others.
+    pub fn builtin(scene: builtin::BuiltinScene) -> Self {
+        Self::new(scene.description()).unwrap_or_else(|_| unreachable!("built-in scenes are valid"))
+    }
+
+    /// A single mesh of one material.
+    ///
+    /// # Errors
+    /// If the mesh is invalid.
+    pub fn from_mesh(mesh: Mesh, material: Material) -> Result<Self, SceneError> {
+        let surface = Surface::fixed("mesh", material);
+        Self::new(SceneDescription {
+            parts: vec![Part { name: "mesh".to_owned(), mesh, surface: 0 }],
+            surfaces: vec![surface],
+            ..SceneDescription::default()
+        })
+    }
+
+    /// The camera of the file, or else one that frames what is not scenery in a picture of
+    /// `aspect` = width / height.
+    pub fn camera(&self, aspect: f32) -> CameraSettings {
+        let framed = || CameraSettings::framing(&self.subject_bounds, aspect, self.up.vector());
+        self.camera.unwrap_or_else(framed)
     }
 
     /// The least box around all vertices; empty without any.
     pub fn bounds(&self) -> Aabb {
         self.bounds
+    }
+
+    /// The least box around what is not scenery; around everything if there is nothing else.
+    pub fn subject_bounds(&self) -> Aabb {
+        self.subject_bounds
+    }
+
+    /// The axis that points up; +Y if the file does not say.
+    pub fn up_axis(&self) -> UpAxis {
+        self.up
     }
 
     /// The ray-tracing hierarchy over all triangles.
@@ -125,6 +207,15 @@ impl Scene {
         let part = self.first_triangle.partition_point(|&first| first <= triangle) - 1;
         (&self.parts[part], (triangle - self.first_triangle[part]) as usize)
     }
+}
+
+/// Refuses what is so small or so large that rays would hit the surface that they leave.
+fn check_size(bounds: &Aabb) -> Result<(), SceneError> {
+    let size = bounds.size().max_element();
+    let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    // What has no size is not seen.
+    let usable = bounds.is_empty() || size == 0.0 || size >= 1e-6 && farthest <= 1e7;
+    if usable { Ok(()) } else { Err(SceneError::Size { size, farthest }) }
 }
 
 fn check(description: &SceneDescription) -> Result<(), SceneError> {

@@ -13,6 +13,7 @@ use super::{Part, Scene, Surface};
 use crate::Rgb;
 use crate::geometry::{Hit, Mesh, Ray};
 use crate::math::{Frame, Vec2, Vec3, Vec4};
+use crate::scene::texture::Uvs;
 use crate::strategy::ShadingPoint;
 
 /// The least cosine between the shading normal and the direction to the viewer.
@@ -39,10 +40,10 @@ impl Scene {
 
         let [p0, p1, p2] = corner.of(&part.mesh.positions);
         let ng = (p1 - p0).cross(p2 - p0).try_normalize().unwrap_or(viewer);
-        let uv = corner.mix(&part.mesh.uvs).unwrap_or_default();
+        let uvs = [&part.mesh.uvs, &part.mesh.uvs2].map(|set| corner.mix(set).unwrap_or_default());
         let smooth = corner.mix(&part.mesh.normals).and_then(Vec3::try_normalize).unwrap_or(ng);
         let (normal, tangent) = if surface.has_grain() {
-            self.normal_and_tangent(part, surface, &corner, smooth, uv)
+            self.normal_and_tangent(part, surface, &corner, smooth, &uvs)
         } else {
             (smooth, None)
         };
@@ -56,7 +57,7 @@ impl Scene {
         );
         let wo = frame.to_local(viewer).normalize();
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
-        surface.set_material(&self.textures, uv, tint, wo, &mut point.material);
+        surface.set_material(&self.textures, &uvs, tint, wo, &mut point.material);
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
         (point.position, point.ng, point.frame, point.wo) = (position, ng, frame, wo);
     }
@@ -65,8 +66,8 @@ impl Scene {
     #[inline]
     pub(crate) fn plain_surface(&self, hit: &Hit) -> Option<usize> {
         let (part, _) = self.locate(hit.triangle);
-        let is_plain =
-            part.mesh.colors.is_empty() && self.surfaces[part.surface].textures().next().is_none();
+        let is_plain = part.mesh.colors.is_empty()
+            && self.surfaces[part.surface].shading_textures().next().is_none();
         is_plain.then_some(part.surface)
     }
 
@@ -78,13 +79,18 @@ impl Scene {
         surface: &Surface,
         corner: &Corners,
         normal: Vec3,
-        uv: Vec2,
+        uvs: &Uvs,
     ) -> (Vec3, Option<Vec4>) {
         let mesh = &part.mesh;
-        let tangent = corner.mix(&mesh.tangents).or_else(|| corner.uv_tangent(mesh, normal));
+        let set = match surface.normal_map {
+            Some(map) if map.texture.uv_set == 1 => &mesh.uvs2,
+            _ => &mesh.uvs,
+        };
+        let tangent = corner.mix(&mesh.tangents);
+        let tangent = tangent.or_else(|| corner.uv_tangent(&mesh.positions, set, normal));
         let mapped = surface.normal_map.zip(tangent).and_then(|(map, tangent)| {
             let frame = Frame::from_z_and_tangent(normal, tangent.truncate());
-            let n = map.normal(&self.textures, uv);
+            let n = map.normal(&self.textures, uvs);
             let bitangent = frame.y * 1f32.copysign(tangent.w);
             (frame.x * n.x + bitangent * n.y + frame.z * n.z).try_normalize()
         });
@@ -145,12 +151,12 @@ impl Corners {
     /// The tangent ∂p/∂u with the bitangent's sign as glTF defines it: the bitangent points toward
     /// falling v, which is up in the image.
     #[inline]
-    fn uv_tangent(&self, mesh: &Mesh, normal: Vec3) -> Option<Vec4> {
-        if mesh.uvs.is_empty() {
+    fn uv_tangent(&self, positions: &[Vec3], uvs: &[Vec2], normal: Vec3) -> Option<Vec4> {
+        if uvs.is_empty() {
             return None;
         }
-        let [p0, p1, p2] = self.of(&mesh.positions);
-        let [t0, t1, t2] = self.of(&mesh.uvs);
+        let [p0, p1, p2] = self.of(positions);
+        let [t0, t1, t2] = self.of(uvs);
         let (e1, e2, d1, d2) = (p1 - p0, p2 - p0, t1 - t0, t2 - t0);
         let sign = 1f32.copysign(d1.perp_dot(d2));
         let along_u = (sign * (d2.y * e1 - d1.y * e2)).try_normalize()?;

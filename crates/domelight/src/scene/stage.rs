@@ -1,11 +1,14 @@
 //! Setting a scene up for a picture: scale, ground, another material.
 
 use super::builtin::shapes;
-use super::{Part, SceneDescription, Surface, SurfaceModel};
+use super::{CameraSettings, Part, SceneDescription, Surface};
 use crate::Rgb;
 use crate::bsdf::Material;
-use crate::geometry::{Aabb, Mesh};
+use crate::geometry::{Aabb, Mesh, power_of_two};
 use crate::math::{Frame, Mat4, Vec3};
+
+/// Sizes of scenes that are traced as they are: from the one, and no coordinate beyond the other.
+const USUAL: [f32; 2] = [1.0 / 16.0, 65536.0];
 
 /// The radius of the ground, in half-extents of the scene.
 const GROUND_RADIUS: f32 = 5.0;
@@ -16,6 +19,32 @@ impl SceneDescription {
         let subject = self.parts.iter().enumerate().filter(|(i, _)| !self.scenery.contains(i));
         let bounds = subject.fold(Aabb::EMPTY, |b, (_, p)| b.union(p.mesh.bounds()));
         if bounds.is_empty() { self.bounds() } else { bounds }
+    }
+
+    /// Scales scenes that are very small or very large to a usual size, with `view` and the scene's own camera; returns
+    /// the factor, a power of two, which is 1 for scenes from 1/16 to 65536. The picture stays the same, for the light is
+    /// infinitely far; the distance that rays keep from surfaces is made for usual sizes.
+    pub fn rescale(&mut self, view: &mut CameraSettings) -> f32 {
+        let bounds = self.bounds();
+        let size = bounds.size().max_element();
+        let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
+        if bounds.is_empty() || !farthest.is_finite() || size == 0.0 {
+            return 1.0;
+        }
+        let unit = match () {
+            () if farthest > USUAL[1] => power_of_two(farthest),
+            // What is far from the origin cannot grow.
+            () if size < USUAL[0] => {
+                (0.5 * power_of_two(size)).max(power_of_two(farthest) / USUAL[1])
+            }
+            () => 1.0,
+        };
+        let factor = 1.0 / unit;
+        if factor != 1.0 {
+            self.parts.iter_mut().for_each(|part| part.mesh.scale(factor));
+            self.camera.iter_mut().chain([view]).for_each(|camera| camera.scale(factor));
+        }
+        factor
     }
 
     /// Moves the centre of the subject's bounds to the origin and scales its longest half-extent
@@ -30,8 +59,7 @@ impl SceneDescription {
     /// Gives one material to every part that is not scenery.
     pub fn set_subject_material(&mut self, material: Material) {
         let surface = self.surfaces.len();
-        let model = SurfaceModel::Fixed(material);
-        self.surfaces.push(Surface { name: "subject".to_owned(), model, normal_map: None });
+        self.surfaces.push(Surface::fixed("subject", material));
         for (i, part) in self.parts.iter_mut().enumerate() {
             if !self.scenery.contains(&i) {
                 part.surface = surface;
@@ -97,6 +125,25 @@ mod tests {
         let bounds = scene.bounds();
         assert!(bounds.center().length() < 1e-5);
         assert!((bounds.size().max_element() - 2.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn unusual_sizes_become_usual_without_a_lost_digit() {
+        for factor in [1e-18, 1e-9, 1e-3, 1.0, 100.0, 1e5, 1e10, 1e18] {
+            let mut scene = ball();
+            let factor = power_of_two(factor);
+            scene.parts[0].mesh.scale(factor);
+            let mut view = CameraSettings::framing(&scene.bounds(), 1.0, Vec3::Y);
+            let (old, old_view) = (scene.clone(), view);
+            let undo = scene.rescale(&mut view);
+            let size = scene.bounds().size().max_element();
+            assert!((USUAL[0]..=USUAL[1]).contains(&size), "{factor:e}: {size}");
+            let old_size = old.bounds().size().max_element();
+            assert_eq!(undo == 1.0, (USUAL[0]..=USUAL[1]).contains(&old_size));
+            assert_eq!((view.origin / undo, view.up), (old_view.origin, old_view.up));
+            let (new, old) = (&scene.parts[0].mesh, &old.parts[0].mesh);
+            assert!(new.positions.iter().zip(&old.positions).all(|(new, old)| new / undo == *old));
+        }
     }
 
     #[test]

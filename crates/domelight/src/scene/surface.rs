@@ -4,10 +4,11 @@
 //! textures are looked up there and vertex colours multiplied in. All surfaces are opaque and
 //! two-sided.
 
-use super::texture::{Texture, TextureRef};
+use super::layers::{AlphaMode, Coverage, Emission, Layers};
+use super::texture::{Texture, TextureRef, Uvs};
 use crate::Rgb;
 use crate::bsdf::{Lambert, Material, MetallicRoughness, Phong};
-use crate::math::{Vec2, Vec3};
+use crate::math::Vec3;
 
 /// What a part of a scene is made of.
 #[derive(Clone, Debug)]
@@ -18,6 +19,16 @@ pub struct Surface {
     pub model: SurfaceModel,
     /// Its fine relief.
     pub normal_map: Option<NormalMap>,
+    /// What lies behind it and shows.
+    pub coverage: Coverage,
+    /// Whether it is seen from behind, too.
+    pub double_sided: bool,
+    /// Light of its own.
+    pub emission: Option<Emission>,
+    /// Whether its color is shown as it is, whatever the light (`KHR_materials_unlit`).
+    pub unlit: bool,
+    /// What glTF's extensions add.
+    pub layers: Layers,
 }
 
 /// How a surface reflects.
@@ -29,6 +40,8 @@ pub enum SurfaceModel {
     Phong(PhongSurface),
     /// The metallic-roughness model of glTF.
     MetallicRoughness(MetallicRoughnessSurface),
+    /// glTF's older model, `KHR_materials_pbrSpecularGlossiness`.
+    SpecularGlossiness(SpecularGlossinessSurface),
 }
 
 /// Parameters of [`SurfaceModel::Phong`], as in a Wavefront MTL file.
@@ -59,6 +72,21 @@ pub struct MetallicRoughnessSurface {
     pub metallic_roughness_texture: Option<TextureRef>,
 }
 
+/// Parameters of [`SurfaceModel::SpecularGlossiness`], as in glTF.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpecularGlossinessSurface {
+    /// Diffuse color in \[0, 1\]; multiplied by the texture and the vertex color.
+    pub diffuse: Rgb,
+    /// A color texture, a factor on `diffuse`.
+    pub diffuse_texture: Option<TextureRef>,
+    /// Reflectance at normal incidence in \[0, 1\].
+    pub specular: Rgb,
+    /// Glossiness in \[0, 1\], 1 − perceptual roughness.
+    pub glossiness: f32,
+    /// A texture: its color is a factor on `specular`, its alpha on `glossiness`.
+    pub specular_glossiness_texture: Option<TextureRef>,
+}
+
 /// A tangent-space normal map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalMap {
@@ -70,23 +98,73 @@ pub struct NormalMap {
 }
 
 impl Surface {
+    /// An opaque, two-sided surface.
+    pub fn new(name: impl Into<String>, model: SurfaceModel) -> Self {
+        Self {
+            name: name.into(),
+            model,
+            normal_map: None,
+            coverage: Coverage::default(),
+            double_sided: true,
+            emission: None,
+            unlit: false,
+            layers: Layers::default(),
+        }
+    }
+
     /// A diffuse surface of one colour.
     pub fn diffuse(name: impl Into<String>, albedo: Rgb) -> Self {
-        Self { name: name.into(), model: SurfaceModel::diffuse(albedo), normal_map: None }
+        Self::new(name, SurfaceModel::diffuse(albedo))
     }
 
     /// A surface of one material.
     pub fn fixed(name: impl Into<String>, material: Material) -> Self {
-        Self { name: name.into(), model: SurfaceModel::Fixed(material), normal_map: None }
+        Self::new(name, SurfaceModel::Fixed(material))
+    }
+
+    /// What of this surface a picture lacks, in glTF's terms; whoever draws a feature deletes its line.
+    ///
+    /// Single-sided surfaces are not among them: nearly all of glTF are, and nearly none is seen from
+    /// behind.
+    pub fn undrawn_features(&self) -> impl Iterator<Item = &'static str> {
+        let Self { coverage, emission, unlit, layers, .. } = self;
+        let Layers { ior, specular, clearcoat, sheen, anisotropy, transmission, volume } = layers;
+        [
+            (matches!(coverage.mode, AlphaMode::Mask { .. }), "alphaMode MASK"),
+            (coverage.mode == AlphaMode::Blend, "alphaMode BLEND"),
+            (emission.is_some(), "emission"),
+            (*unlit, "KHR_materials_unlit"),
+            (ior.is_some_and(|ior| ior != 1.5), "KHR_materials_ior"),
+            (specular.is_some(), "KHR_materials_specular"),
+            (clearcoat.is_some(), "KHR_materials_clearcoat"),
+            (sheen.is_some(), "KHR_materials_sheen"),
+            (anisotropy.is_some(), "KHR_materials_anisotropy"),
+            (transmission.is_some(), "KHR_materials_transmission"),
+            (volume.is_some(), "KHR_materials_volume"),
+        ]
+        .into_iter()
+        .filter_map(|(is_used, feature)| is_used.then_some(feature))
     }
 
     /// The textures that it refers to.
     pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
+        self.shading_textures()
+            .chain(&self.coverage.texture)
+            .chain(self.emission.iter().filter_map(|e| e.texture.as_ref()))
+            .chain(self.layers.textures())
+    }
+
+    /// The textures that its material depends on.
+    #[inline]
+    pub(crate) fn shading_textures(&self) -> impl Iterator<Item = &TextureRef> {
         let of_model = match &self.model {
             SurfaceModel::Fixed(_) => [None, None],
             SurfaceModel::Phong(p) => [p.diffuse_texture.as_ref(), None],
             SurfaceModel::MetallicRoughness(m) => {
                 [m.base_color_texture.as_ref(), m.metallic_roughness_texture.as_ref()]
+            }
+            SurfaceModel::SpecularGlossiness(s) => {
+                [s.diffuse_texture.as_ref(), s.specular_glossiness_texture.as_ref()]
             }
         };
         of_model.into_iter().flatten().chain(self.normal_map.as_ref().map(|n| &n.texture))
@@ -97,7 +175,9 @@ impl Surface {
     pub(crate) fn has_grain(&self) -> bool {
         let fixed = match &self.model {
             SurfaceModel::Fixed(material) => !material.is_isotropic(),
-            SurfaceModel::Phong(_) | SurfaceModel::MetallicRoughness(_) => false,
+            SurfaceModel::Phong(_)
+            | SurfaceModel::MetallicRoughness(_)
+            | SurfaceModel::SpecularGlossiness(_) => false,
         };
         fixed || self.normal_map.is_some()
     }
@@ -112,22 +192,29 @@ impl Surface {
                 m.base_color_texture.iter_mut().for_each(shift);
                 m.metallic_roughness_texture.iter_mut().for_each(shift);
             }
+            SurfaceModel::SpecularGlossiness(s) => {
+                s.diffuse_texture.iter_mut().for_each(shift);
+                s.specular_glossiness_texture.iter_mut().for_each(shift);
+            }
         }
         self.normal_map.iter_mut().for_each(|n| shift(&mut n.texture));
+        self.coverage.texture.iter_mut().for_each(shift);
+        self.emission.iter_mut().filter_map(|e| e.texture.as_mut()).for_each(shift);
+        self.layers.textures_mut().for_each(shift);
     }
 
-    /// Sets `material` to that at texture coordinates `uv` under the vertex colour `tint`, seen from `wo`.
+    /// Sets `material` to that at texture coordinates `uvs` under the vertex colour `tint`, seen from `wo`.
     #[inline]
     pub(crate) fn set_material(
         &self,
         textures: &[Texture],
-        uv: Vec2,
+        uvs: &Uvs,
         tint: Rgb,
         wo: Vec3,
         material: &mut Material,
     ) {
         let look_up =
-            |t: &Option<TextureRef>| t.as_ref().map_or(Rgb::WHITE, |t| t.at(textures, uv));
+            |t: &Option<TextureRef>| t.as_ref().map_or(Rgb::WHITE, |t| t.at(textures, uvs));
         match &self.model {
             SurfaceModel::Fixed(fixed) => material.set(fixed, wo),
             SurfaceModel::Phong(p) => {
@@ -139,6 +226,14 @@ impl Surface {
                 let factors = look_up(&m.metallic_roughness_texture);
                 let (metallic, roughness) = (m.metallic * factors.b, m.roughness * factors.g);
                 *material = Material::single(MetallicRoughness::new(base, metallic, roughness));
+            }
+            SurfaceModel::SpecularGlossiness(s) => {
+                let diffuse = s.diffuse * look_up(&s.diffuse_texture) * tint;
+                let specular = s.specular * look_up(&s.specular_glossiness_texture);
+                let alpha = s.specular_glossiness_texture.as_ref();
+                let glossiness = s.glossiness * alpha.map_or(1.0, |t| t.alpha_at(textures, uvs));
+                let lobe = MetallicRoughness::specular_glossiness(diffuse, specular, glossiness);
+                *material = Material::single(lobe);
             }
         }
     }
@@ -159,17 +254,25 @@ impl SurfaceModel {
 impl NormalMap {
     /// The normal in the frame (tangent, bitangent, normal), not of unit length.
     #[inline]
-    pub(crate) fn normal(&self, textures: &[Texture], uv: Vec2) -> Vec3 {
-        let c = self.texture.at(textures, uv).map(|c| 2.0 * c - 1.0);
+    pub(crate) fn normal(&self, textures: &[Texture], uvs: &Uvs) -> Vec3 {
+        let c = self.texture.at(textures, uvs).map(|c| 2.0 * c - 1.0);
         Vec3::new(self.scale * c.r, self.scale * c.g, c.b)
     }
 }
 
 impl TextureRef {
-    /// The look-up at the mesh's texture coordinates `uv`.
+    /// The look-up at the mesh's texture coordinates.
     #[inline]
-    pub(crate) fn at(&self, textures: &[Texture], uv: Vec2) -> Rgb {
-        textures[self.texture].sample(self.transform.apply(uv), self.wrap)
+    pub(crate) fn at(&self, textures: &[Texture], uvs: &Uvs) -> Rgb {
+        let uv = self.transform.apply(uvs[self.uv_set]);
+        textures[self.texture].sample_by(uv, self.wrap, self.filter)
+    }
+
+    /// The alpha there; 1 if the texture has none.
+    #[inline]
+    pub(crate) fn alpha_at(&self, textures: &[Texture], uvs: &Uvs) -> f32 {
+        let uv = self.transform.apply(uvs[self.uv_set]);
+        textures[self.texture].sample_alpha(uv, self.wrap, self.filter)
     }
 }
 

@@ -1,8 +1,8 @@
 //! Textures: images on surfaces, of reflectance, roughness or normals.
 //!
 //! Texels are kept as the file has them, 8 or 16 bits a channel, and decoded through a table of the
-//! 2⁸ or 2¹⁶ values; alpha is dropped, for all surfaces are opaque. Look-ups are bilinear between
-//! texel centres. There are no mip maps: a renderer that takes many samples a pixel averages the
+//! 2⁸ or 2¹⁶ values; alpha has 8 bits, and is kept where a surface needs it. Look-ups are bilinear
+//! between texel centres, or take the nearest one. There are no mip maps: a renderer that takes many samples a pixel averages the
 //! texture by itself, and without ray differentials a mip level would be a guess.
 
 use crate::Rgb;
@@ -26,6 +26,8 @@ pub struct Texture {
     texels: Texels,
     /// The number for each texel value.
     decode: Vec<f32>,
+    /// 0 to 255 from transparent to opaque; empty: opaque.
+    alpha: Vec<u8>,
 }
 
 #[derive(Clone, Debug)]
@@ -47,13 +49,31 @@ pub enum Wrap {
     Mirror,
 }
 
+/// What a look-up between texel centers gives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TextureFilter {
+    /// The bilinear mean of the four nearest texels.
+    #[default]
+    Linear,
+    /// The nearest texel.
+    Nearest,
+}
+
+/// A point's texture coordinates: the first set and the second.
+pub(crate) type Uvs = [Vec2; 2];
+
 /// A texture as one use of it sees it: which one, and where on the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureRef {
     /// Index into the scene's textures.
     pub texture: usize,
+    /// The mesh's set of texture coordinates: 0 for [`Mesh::uvs`](crate::geometry::Mesh::uvs), 1 for
+    /// [`Mesh::uvs2`](crate::geometry::Mesh::uvs2).
+    pub uv_set: usize,
     /// Wrapping in u and in v.
     pub wrap: [Wrap; 2],
+    /// Between texel centers.
+    pub filter: TextureFilter,
     /// From the mesh's texture coordinates to the image's.
     pub transform: UvTransform,
 }
@@ -61,7 +81,13 @@ pub struct TextureRef {
 impl TextureRef {
     /// The texture as it is, repeated.
     pub fn new(texture: usize) -> Self {
-        Self { texture, wrap: [Wrap::Repeat; 2], transform: UvTransform::IDENTITY }
+        Self {
+            texture,
+            uv_set: 0,
+            wrap: [Wrap::Repeat; 2],
+            filter: TextureFilter::Linear,
+            transform: UvTransform::IDENTITY,
+        }
     }
 }
 
@@ -140,7 +166,8 @@ impl Texture {
     /// The texels as they are kept, byte by byte, and everything else in words.
     #[cfg(feature = "io")]
     pub(crate) fn add_to(&self, fingerprinter: &mut crate::fingerprint::Fingerprinter) {
-        let Self { width, height, texels, decode, .. } = self;
+        let Self { name: _, width, height, texels, decode, alpha } = self;
+        fingerprinter.bytes(alpha.iter().copied());
         fingerprinter.text(format_args!("{width}x{height}"));
         fingerprinter.numbers(decode.iter().copied());
         match texels {
@@ -168,7 +195,24 @@ impl Texture {
         }
         let decode =
             (0..levels).map(|i| decode(i as f32 / (levels - 1) as f32, encoding)).collect();
-        Ok(Self { name, width, height, texels, decode })
+        Ok(Self { name, width, height, texels, decode, alpha: Vec::new() })
+    }
+
+    /// With an alpha for each texel.
+    ///
+    /// # Errors
+    /// The number of alphas is not that of the texels.
+    pub fn with_alpha(self, alpha: Vec<u8>) -> Result<Self, TextureError> {
+        let Self { width, height, .. } = self;
+        if alpha.len() as u64 != u64::from(width) * u64::from(height) {
+            return Err(TextureError { name: self.name, width, height, count: alpha.len() });
+        }
+        Ok(Self { alpha, ..self })
+    }
+
+    /// Whether it has an alpha for each texel.
+    pub fn has_alpha(&self) -> bool {
+        !self.alpha.is_empty()
     }
 
     /// Its name, for messages.
@@ -195,6 +239,23 @@ impl Texture {
         Rgb::new(self.decode[r], self.decode[g], self.decode[b])
     }
 
+    /// Whether it is, going by its mean, a normal map in the tangents' space: half red, half green, all blue.
+    #[cfg(feature = "io")]
+    pub(crate) fn looks_like_normals(&self) -> bool {
+        // Enough texels for a mean, in all parts of the image.
+        const SIDE: u32 = 64;
+        let (columns, rows) = (self.width.min(SIDE), self.height.min(SIDE));
+        let at = |i: u32, n: u32, size: u32| (u64::from(i) * u64::from(size) / u64::from(n)) as u32;
+        let mut sum = Rgb::BLACK;
+        for i in 0..columns * rows {
+            let (x, y) = (at(i % columns, columns, self.width), at(i / columns, rows, self.height));
+            sum += self.texel(x, y);
+        }
+        let mean = sum / (columns * rows) as f32;
+        let half = 0.35..0.65;
+        half.contains(&mean.r) && half.contains(&mean.g) && mean.b > mean.r.max(mean.g) + 0.15
+    }
+
     /// The bilinear look-up at `uv`, (0, 0) the top left corner of the image and (1, 1) the bottom
     /// right one; coordinates that are not finite count as 0.
     #[inline]
@@ -204,6 +265,50 @@ impl Texture {
         let top = self.texel(x0, y0).lerp(self.texel(x1, y0), fx);
         let bottom = self.texel(x0, y1).lerp(self.texel(x1, y1), fx);
         top.lerp(bottom, fy)
+    }
+}
+
+impl Texture {
+    /// The look-up at `uv` by a filter, otherwise as [`Texture::sample`].
+    #[inline]
+    pub fn sample_by(&self, uv: Vec2, wrap: [Wrap; 2], filter: TextureFilter) -> Rgb {
+        match filter {
+            TextureFilter::Linear => self.sample(uv, wrap),
+            TextureFilter::Nearest => {
+                let (x, y) = self.nearest(uv, wrap);
+                self.texel(x, y)
+            }
+        }
+    }
+
+    /// The alpha at `uv` in \[0, 1\], looked up as [`Texture::sample_by`]; 1 without any.
+    #[inline]
+    pub fn sample_alpha(&self, uv: Vec2, wrap: [Wrap; 2], filter: TextureFilter) -> f32 {
+        if self.alpha.is_empty() {
+            return 1.0;
+        }
+        let alpha = |x: u32, y: u32| {
+            f32::from(self.alpha[y as usize * self.width as usize + x as usize]) / 255.0
+        };
+        if filter == TextureFilter::Nearest {
+            let (x, y) = self.nearest(uv, wrap);
+            return alpha(x, y);
+        }
+        let (x0, x1, fx) = neighbours(uv.x, self.width, wrap[0]);
+        let (y0, y1, fy) = neighbours(uv.y, self.height, wrap[1]);
+        let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
+        let top = mix(alpha(x0, y0), alpha(x1, y0), fx);
+        mix(top, mix(alpha(x0, y1), alpha(x1, y1), fx), fy)
+    }
+
+    /// The texel nearest to `uv`.
+    #[inline]
+    fn nearest(&self, uv: Vec2, wrap: [Wrap; 2]) -> (u32, u32) {
+        let along = |t, n, wrap| {
+            let (a, b, f) = neighbours(t, n, wrap);
+            if f < 0.5 { a } else { b }
+        };
+        (along(uv.x, self.width, wrap[0]), along(uv.y, self.height, wrap[1]))
     }
 }
 
@@ -293,6 +398,30 @@ mod tests {
         let t = UvTransform::new(vec2(0.5, 0.0), std::f32::consts::FRAC_PI_2, vec2(2.0, 1.0));
         assert!((t.apply(vec2(1.0, 0.0)) - vec2(0.5, -2.0)).length() < 1e-6);
         assert!((t.apply(vec2(0.0, 1.0)) - vec2(1.5, 0.0)).length() < 1e-6);
+    }
+
+    #[test]
+    fn the_nearest_texel_is_its_own_square() {
+        let t = two_by_two();
+        let at = |u, v| t.sample_by(vec2(u, v), [Wrap::Clamp; 2], TextureFilter::Nearest);
+        for (u, v, x, y) in
+            [(0.01, 0.01, 0, 0), (0.49, 0.2, 0, 0), (0.51, 0.49, 1, 0), (1.0, 0.51, 1, 1)]
+        {
+            assert_eq!(at(u, v), t.texel(x, y), "{u}, {v}");
+        }
+    }
+
+    #[test]
+    fn alpha_is_looked_up_as_color_is() {
+        let t = two_by_two();
+        let by = |t: &Texture, u, filter| t.sample_alpha(vec2(u, 0.25), [Wrap::Clamp; 2], filter);
+        assert_eq!(by(&t, 0.5, TextureFilter::Linear), 1.0);
+        let t = t.with_alpha(vec![0, 255, 0, 0]).unwrap();
+        assert!(t.has_alpha());
+        assert_eq!(by(&t, 0.5, TextureFilter::Linear), 0.5);
+        assert_eq!(by(&t, 0.45, TextureFilter::Nearest), 0.0);
+        assert_eq!(by(&t, 0.55, TextureFilter::Nearest), 1.0);
+        assert!(t.with_alpha(vec![0; 3]).is_err());
     }
 
     #[test]

@@ -8,13 +8,13 @@ use crate::rig::Rig;
 /// Σ f_r cos θ · E over the lights of a rig, E their irradiance: the same rays at every point.
 ///
 /// Biased: shadows are sums of hard ones and narrow lobes see separate lights.
-#[derive(Clone, Copy, Debug)]
-pub struct LightSet<'a> {
+#[derive(Clone, Debug)]
+pub struct LightSet {
     /// The lights.
-    pub rig: &'a Rig,
+    pub rig: Rig,
 }
 
-impl PointStrategy for LightSet<'_> {
+impl PointStrategy for LightSet {
     type Scratch = ();
 
     const UNBIASED: bool = false;

@@ -8,19 +8,19 @@ use crate::math::{Vec2, Vec3};
 use crate::sampling::{Dimension, Heuristic};
 
 /// The density that directions toward the light are drawn from.
-#[derive(Clone, Copy, Debug)]
-pub enum LightTable<'a> {
+#[derive(Clone, Debug)]
+pub enum LightTable {
     /// In proportion to luminance.
     Full,
     /// In proportion to what exceeds the mean; needs BRDF samples beside it.
-    Compensated(&'a CompensatedTable),
+    Compensated(CompensatedTable),
 }
 
 /// M samples of the environment and N of the BRDF at each point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct MultipleImportanceSampling<'a> {
     environment: &'a Environment,
-    table: LightTable<'a>,
+    table: LightTable,
     heuristic: Heuristic,
     n_environment: u32,
     n_brdf: u32,
@@ -38,7 +38,7 @@ impl<'a> MultipleImportanceSampling<'a> {
     /// A compensated table with `n_brdf` = 0.
     pub fn new(
         environment: &'a Environment,
-        table: LightTable<'a>,
+        table: LightTable,
         heuristic: Heuristic,
         n_environment: u32,
         n_brdf: u32,
@@ -50,14 +50,14 @@ impl<'a> MultipleImportanceSampling<'a> {
     }
 
     fn sample_light(&self, u: Vec2) -> Option<EnvironmentSample> {
-        match self.table {
+        match &self.table {
             LightTable::Full => self.environment.sample(u),
             LightTable::Compensated(table) => table.sample(self.environment, u),
         }
     }
 
     fn le_pdf(&self, wi: Vec3) -> (Rgb, f32) {
-        match self.table {
+        match &self.table {
             LightTable::Full => self.environment.le_pdf(wi),
             LightTable::Compensated(table) => table.le_pdf(self.environment, wi),
         }

@@ -15,17 +15,22 @@
 
 mod brdf;
 mod environment;
+mod estimator;
 pub mod levels;
 mod light_set;
 mod mis;
+mod prepared;
 pub mod product;
 mod rejection;
 mod sir;
+mod spec;
 
 pub use brdf::BrdfSampling;
 pub use environment::EnvironmentSampling;
+pub use estimator::Estimator;
 pub use light_set::LightSet;
 pub use mis::{CompensationNeedsBrdf, LightTable, MultipleImportanceSampling};
+pub use prepared::{PrepareError, PreparedStrategy};
 pub use product::ProductSampling;
 pub use rejection::{
     Proposal, RejectionError, RejectionSampling, RejectionScratch, RejectionStatistics, Stop,
@@ -33,6 +38,7 @@ pub use rejection::{
 pub use sir::{
     Candidates, RAY_COST, Resampling, SamplingImportanceResampling, SirScratch, optimal_candidates,
 };
+pub use spec::{StrategyError, StrategyKind, StrategyOptions, StrategySpec};
 
 use crate::Rgb;
 use crate::bsdf::{Brdf, Material};
@@ -229,9 +235,15 @@ pub struct PixelPoints {
     pub one_material: bool,
 }
 
-#[cfg(feature = "render")]
 impl PixelPoints {
+    /// The points of a pixel, of any materials, with its camera samples in this round, hits and misses, and its
+    /// uniform numbers.
+    pub fn new(points: std::ops::Range<usize>, n_samples: u32, stream: Stream) -> Self {
+        Self { points, n_samples, stream, one_material: false }
+    }
+
     /// Of a pixel of another round.
+    #[cfg(feature = "render")]
     pub(crate) const NONE: Self =
         Self { points: 0..0, n_samples: 0, stream: Stream::NONE, one_material: true };
 }
@@ -241,14 +253,16 @@ impl PixelPoints {
 pub trait Strategy: Sync {
     /// What all tiles of a pass share.
     type Pass: Sync;
-    /// Rounds of a tile: 1, or [`levels::N_LEVELS`].
-    const N_ROUNDS: u32 = 1;
-
     /// Memory that a thread keeps. It carries what is learned from round to round of a tile, and nothing
     /// from tile to tile: passes are independent, so a render may be interrupted between them.
     type Scratch: Default;
 
-    /// Shadow rays asked for at each point at the most: for sizing batches.
+    /// Rounds of a tile: 1, or [`levels::N_LEVELS`].
+    fn n_rounds(&self) -> u32 {
+        1
+    }
+
+    /// The most shadow rays at a point, for sizing batches.
     fn n_rays(&self) -> u32;
 
     /// Camera samples of each pixel that a pass should have, for strategies that place the rays of
@@ -271,12 +285,12 @@ pub trait Strategy: Sync {
         out: &mut Contributions,
     );
 
-    /// Is told which rays of a round were free, but for the last round.
+    /// Learns from the rays of a round, unless it was the last: `visibility` has V in [0, 1] of each pushed ray.
     fn learn(
         &self,
         _tile: &TileShading,
         _pushed: &Contributions,
-        _free: &[bool],
+        _visibility: &[f32],
         _scratch: &mut Self::Scratch,
     ) {
     }

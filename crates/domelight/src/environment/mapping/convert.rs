@@ -1,9 +1,17 @@
 //! Conversion between mappings: area averages of constant texels.
+//!
+//! What a texel of the one picture and one of the other share of the sphere is computed exactly
+//! ([`super::overlap`]), so each texel's light goes somewhere, however small it is: a sun of one texel keeps its flux
+//! to about 10⁻⁶, and a constant map stays constant.
 
-use super::{Mapping, lat_long_uv};
+use super::Mapping;
+use super::overlap::{Grid, Overlap};
 use crate::color::Rgb;
 use crate::image::RgbImage;
-use crate::math::{TAU, Vec2, vec2, vec3};
+use crate::parallel::in_order;
+
+/// Rows of the source whose shares are computed before they are added up.
+const BAND: usize = 64;
 
 /// The lat-long map of `2 · height` × `height` texels of what `image` shows in `mapping`.
 ///
@@ -22,18 +30,24 @@ pub fn to_lat_long(image: &RgbImage, mapping: Mapping, height: usize) -> RgbImag
         return turned_by_half(image);
     }
     let width = 2 * height;
-    let longitudes = [COARSE, FINE].map(|n| longitudes(width, n));
-    let latitudes = [COARSE, FINE].map(|n| latitudes(height, n));
-    resample(image, width, height, |x, y, n| {
-        let fine = usize::from(n == FINE);
-        let (latitudes, longitudes) = (&latitudes[fine][y * n..], &longitudes[fine][x * n..]);
-        (0..n * n).map(move |i| {
-            let ((sin_theta, cos_theta), (sin_phi, cos_phi)) =
-                (latitudes[i / n], longitudes[i % n]);
-            let d = vec3(sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta);
-            (nearest(image, mapping.uv(d)), 1.0)
-        })
-    })
+    let grid = Grid::new(width, height);
+    let mut sums = vec![Mean::default(); width * height];
+    for band in (0..image.height).step_by(BAND) {
+        let rows = in_order(BAND.min(image.height - band), |i| {
+            let mut overlap = Overlap::new(&grid, mapping, image.width, image.height);
+            let mut shares = Vec::new();
+            for (x, &pixel) in image.row(band + i).iter().enumerate() {
+                overlap.texel(x, band + i);
+                shares.extend(overlap.shares.iter().map(|&(j, share)| (j, share, pixel)));
+            }
+            shares
+        });
+        for (j, share, pixel) in rows.into_iter().flatten() {
+            sums[j].add(pixel, share);
+        }
+    }
+    let pixels = sums.iter().map(Mean::value).collect();
+    RgbImage::new(width, height, pixels)
 }
 
 /// What a lat-long map shows, as a picture of `size` (width, height) in `mapping`; black where the picture shows
@@ -54,105 +68,45 @@ pub fn from_lat_long(image: &RgbImage, mapping: Mapping, size: (usize, usize)) -
     if turned && width.is_multiple_of(2) {
         return turned_by_half(image);
     }
-    resample(image, width, height, |x, y, n| {
-        (0..n * n).filter_map(move |i| {
-            let u = (x as f32 + ((i % n) as f32 + 0.5) / n as f32) / width as f32;
-            let v = (y as f32 + ((i / n) as f32 + 0.5) / n as f32) / height as f32;
-            let d = mapping.direction(vec2(u, v))?;
-            Some((nearest(image, lat_long_uv(d)), mapping.density_at(vec2(u, v), d)))
-        })
-    })
-}
-
-/// Subsamples along each side of a texel, and of a texel at the edge of a light.
-const COARSE: usize = 4;
-const FINE: usize = 32;
-
-/// The weighted mean of the samples (value, weight) of each texel (x, y), on a grid of n × n.
-///
-/// Texels are first sampled coarsely. Where that finds the edge of something bright, and in the eight texels around,
-/// a fine grid is used, so that a sun of a texel's size keeps its energy to about one per cent.
-fn resample<I: Iterator<Item = (Rgb, f32)>>(
-    source: &RgbImage,
-    width: usize,
-    height: usize,
-    samples: impl Fn(usize, usize, usize) -> I + Sync,
-) -> RgbImage {
-    let mean = source.pixels.iter().map(|c| f64::from(c.max_component())).sum::<f64>();
-    let bright = 2.0 * (mean / source.pixels.len() as f64) as f32;
-    let mut texels = vec![(Rgb::BLACK, false); width * height];
-    by_rows(&mut texels, width, |y, row| {
-        for (x, texel) in row.iter_mut().enumerate() {
-            *texel = coarse_mean(samples(x, y, COARSE), bright);
-        }
-    });
-    let is_near_edge = |x: usize, y: usize| {
-        let columns = x.saturating_sub(1)..(x + 2).min(width);
-        let mut rows = y.saturating_sub(1)..(y + 2).min(height);
-        rows.any(|y| texels[y * width..][columns.clone()].iter().any(|texel| texel.1))
-    };
-    let mut pixels: Vec<Rgb> = texels.iter().map(|texel| texel.0).collect();
-    by_rows(&mut pixels, width, |y, row| {
+    let grid = Grid::new(image.width, image.height);
+    let rows = in_order(height, |y| {
+        let mut overlap = Overlap::new(&grid, mapping, width, height);
+        let mut row = vec![Rgb::BLACK; width];
         for (x, pixel) in row.iter_mut().enumerate() {
-            if is_near_edge(x, y) {
-                *pixel = coarse_mean(samples(x, y, FINE), bright).0;
-            }
+            overlap.texel(x, y);
+            let mut mean = Mean::default();
+            overlap.shares.iter().for_each(|&(i, share)| mean.add(image.pixels[i], share));
+            *pixel = mean.value();
         }
+        row
     });
-    RgbImage::new(width, height, pixels)
+    RgbImage::new(width, height, rows.concat())
 }
 
-/// The weighted mean, black where nothing weighs; and whether a `bright` value is eight times another.
-fn coarse_mean(samples: impl Iterator<Item = (Rgb, f32)>, bright: f32) -> (Rgb, bool) {
-    let (mut sum, mut total) = (Rgb::BLACK, 0.0);
-    let (mut least, mut greatest) = (f32::INFINITY, 0.0f32);
-    for (value, weight) in samples {
-        sum += value * weight;
-        total += weight;
-        least = least.min(value.max_component());
-        greatest = greatest.max(value.max_component());
+/// A weighted mean of colors.
+#[derive(Clone, Copy, Default)]
+struct Mean {
+    sum: [f64; 3],
+    weight: f64,
+}
+
+impl Mean {
+    fn add(&mut self, color: Rgb, weight: f64) {
+        for (sum, c) in self.sum.iter_mut().zip(color.to_array()) {
+            *sum += f64::from(c) * weight;
+        }
+        self.weight += weight;
     }
-    let mean = if total > 0.0 { sum / total } else { Rgb::BLACK };
-    (mean, greatest > bright && greatest > 8.0 * least)
-}
 
-/// (sin φ, cos φ) of `n` longitudes in each column.
-fn longitudes(width: usize, n: usize) -> Vec<(f32, f32)> {
-    let columns = width * n;
-    let phi = |i: usize| TAU * ((i as f32 + 0.5) / columns as f32 - 0.5);
-    (0..columns).map(|i| phi(i).sin_cos()).collect()
-}
-
-/// (sin θ, cos θ) of `n` rings of equal solid angle in each row.
-fn latitudes(height: usize, n: usize) -> Vec<(f32, f32)> {
-    let cos_at = |row: usize| (std::f64::consts::PI * row as f64 / height as f64).cos();
-    let ring = |i: usize| {
-        let (top, bottom) = (cos_at(i / n), cos_at(i / n + 1));
-        let cos_theta = top + (bottom - top) * (((i % n) as f64 + 0.5) / n as f64);
-        ((1.0 - cos_theta * cos_theta).max(0.0).sqrt() as f32, cos_theta as f32)
-    };
-    (0..height * n).map(ring).collect()
-}
-
-fn nearest(image: &RgbImage, uv: Vec2) -> Rgb {
-    let x = ((uv.x * image.width as f32) as usize).min(image.width - 1);
-    let y = ((uv.y * image.height as f32) as usize).min(image.height - 1);
-    image.pixels[y * image.width + x]
+    /// Black where nothing weighs.
+    fn value(&self) -> Rgb {
+        let mean = |sum: f64| if self.weight > 0.0 { (sum / self.weight) as f32 } else { 0.0 };
+        Rgb::from(self.sum.map(mean))
+    }
 }
 
 fn turned_by_half(image: &RgbImage) -> RgbImage {
     let mut turned = image.clone();
     turned.pixels.chunks_exact_mut(image.width).for_each(|row| row.rotate_left(image.width / 2));
     turned
-}
-
-/// Fills rows independently of each other, in parallel where threads are compiled in.
-fn by_rows<T: Send>(texels: &mut [T], width: usize, fill: impl Fn(usize, &mut [T]) + Sync) {
-    #[cfg(feature = "render")]
-    {
-        use rayon::prelude::*;
-        texels.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| fill(y, row));
-    }
-    #[cfg(not(feature = "render"))]
-    texels.chunks_exact_mut(width).enumerate().for_each(|(y, row)| fill(y, row));
 }

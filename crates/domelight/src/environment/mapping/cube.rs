@@ -3,19 +3,19 @@
 use crate::math::{Vec2, Vec3, vec2};
 
 /// One face as seen from inside: where it looks, what is up in its picture, and its cell.
-struct Face {
-    forward: Vec3,
-    up: Vec3,
-    right: Vec3,
-    column: usize,
-    row: usize,
+pub(super) struct Face {
+    pub(super) forward: Vec3,
+    pub(super) up: Vec3,
+    pub(super) right: Vec3,
+    pub(super) column: usize,
+    pub(super) row: usize,
 }
 
 pub(super) struct Cube {
-    columns: usize,
-    rows: usize,
+    pub(super) columns: usize,
+    pub(super) rows: usize,
     /// Those that look toward +X, −X, +Y, −Y, +Z, −Z.
-    faces: [Face; 6],
+    pub(super) faces: [Face; 6],
 }
 
 const fn face(forward: Vec3, up: Vec3, right: Vec3, column: usize, row: usize) -> Face {

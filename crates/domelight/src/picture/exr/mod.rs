@@ -1,6 +1,7 @@
 //! OpenEXR: reads one layer of any flat file, writes several layers into one part.
 
 pub mod bands;
+mod luminance_chroma;
 mod read;
 mod read_layers;
 mod write;

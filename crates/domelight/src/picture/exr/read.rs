@@ -2,16 +2,17 @@
 //!
 //! The `exr` crate parses and decompresses: scanlines and tiles, half, float and uint, every compression
 //! it knows (none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB). Of mip- and rip-mapped files the largest
-//! level is read. The picture is the data window, wherever it lies; the display window is ignored. A
+//! level is read. The picture is the data window, wherever it lies in the display window ([`DataWindow`]). A
 //! `chromaticities` attribute other than Rec. 709's is converted, white point included.
 //!
 //! Blocks are decompressed in batches on the program's own threads: the crate's parallel reader starts a pool of its
 //! own for each file, in which a panic over a corrupt block would abort the process. What the crate asserts instead
 //! of returning an error is caught here and becomes [`Problem::ExrPanic`].
 
+use super::luminance_chroma::LuminanceChroma;
 use crate::environment::mapping::EnvmapKind;
 use crate::picture::primaries::{Primaries, transform};
-use crate::picture::{Format, MAX_TEXELS, Picture, Problem, allocate, checked_area};
+use crate::picture::{DataWindow, Format, MAX_TEXELS, Picture, Problem, allocate, checked_area};
 use crate::{Rgb, RgbImage};
 use ::exr::block::UncompressedBlock;
 use ::exr::block::chunk::{Chunk, CompressedBlock};
@@ -28,7 +29,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Decodes one layer of a whole file.
 ///
-/// By default that is the unnamed R, G, B channels, else the first layer with R, G, B, else one with Y alone. `layer`
+/// By default that is the unnamed R, G, B channels, else the first layer with R, G, B, else one with Y alone, else the
+/// only channel that there is, whatever its name but for depth and coverage. `layer`
 /// names another: a part, the part of the channel names before the last dot, or both joined by a dot, in any case
 /// of letters; X, Y, Z or a single channel of any name then count as colour too.
 ///
@@ -53,6 +55,9 @@ pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, Problem>) -> Result<T,
 const BATCH: usize = 32;
 
 fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Problem> {
+    if let Some(file) = LuminanceChroma::of(bytes).filter(|_| layer.is_none()) {
+        return file.decode(bytes);
+    }
     let reader = open(bytes)?;
     let selected = select(reader.headers(), layer)?;
     let header = &reader.headers()[selected.header];
@@ -75,12 +80,27 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Proble
     })?;
     let planes = planes.map_or_else(|| Planes::new(&header, channels), Ok)?;
     let image = planes.into_image(matrix.filter(|_| is_color));
-    Ok(Picture { image: image.0, alpha: image.1, envmap, format: Format::Exr })
+    let window = window(&header);
+    Ok(Picture { alpha: image.1, envmap, window, ..Picture::opaque(image.0, Format::Exr) })
+}
+
+/// Where the data window lies in the display window, if they differ.
+pub(super) fn window(header: &Header) -> Option<DataWindow> {
+    let (data, display) = (header.data_window(), header.shared_attributes.display_window);
+    let step = |from: i32, to: i32| i64::from(to) - i64::from(from);
+    let position =
+        (step(display.position.0, data.position.0), step(display.position.1, data.position.1));
+    let display = (display.size.0, display.size.1);
+    let same = position == (0, 0) && display == (data.size.0, data.size.1);
+    (!same).then_some(DataWindow { position, display })
 }
 
 /// How many texels the largest part has.
 pub(crate) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
     guarded(|| {
+        if let Some(file) = LuminanceChroma::of(bytes) {
+            return file.texels();
+        }
         let reader = open(bytes)?;
         let areas = reader.headers().iter().map(|header| header.layer_size.area());
         Ok(areas.max().unwrap_or(0))
@@ -164,8 +184,12 @@ fn check_dwa_sizes(chunk: &Chunk, meta: &MetaData) -> Result<(), Problem> {
     Ok(())
 }
 
-fn to_rec709(c: &Chromaticities) -> Option<crate::math::Mat3> {
-    Primaries([c.red, c.green, c.blue, c.white].map(|xy| [xy.0, xy.1])).to_rec709()
+pub(super) fn to_rec709(c: &Chromaticities) -> Option<crate::math::Mat3> {
+    primaries(c).to_rec709()
+}
+
+pub(super) fn primaries(c: &Chromaticities) -> Primaries {
+    Primaries([c.red, c.green, c.blue, c.white].map(|xy| [xy.0, xy.1]))
 }
 
 /// Refuses a header whose blocks cannot all be in a file of `held` bytes.
@@ -284,6 +308,13 @@ impl Candidate {
         vector.or(single).map(|channels| self.selected(channels, false))
     }
 
+    /// A single channel that may be light.
+    fn only(&self) -> Option<Selected> {
+        let [(name, index)] = &self.channels[..] else { return None };
+        let is_light = !matches!(name.as_str(), "A" | "a" | "Z" | "z" | "ZBack");
+        is_light.then(|| self.selected([*index; 3], false))
+    }
+
     fn selected(&self, [r, g, b]: [usize; 3], is_color: bool) -> Selected {
         let alpha = self.channel("A").or_else(|| self.channel("a"));
         Selected { header: self.header, channels: [Some(r), Some(g), Some(b), alpha], is_color }
@@ -308,7 +339,8 @@ fn select(headers: &[Header], layer: Option<&str>) -> Result<Selected, Problem> 
             .find_map(Candidate::rgb)
             .or_else(|| all.iter().find_map(Candidate::rgb))
             .or_else(|| unnamed().find_map(Candidate::luminance))
-            .or_else(|| all.iter().find_map(Candidate::luminance));
+            .or_else(|| all.iter().find_map(Candidate::luminance))
+            .or_else(|| unnamed().find_map(Candidate::only));
         found.ok_or_else(|| no_color(headers, &all))?
     };
     let list = &headers[selected.header].channels.list;
@@ -321,7 +353,9 @@ fn select(headers: &[Header], layer: Option<&str>) -> Result<Selected, Problem> 
 
 fn no_color(headers: &[Header], all: &[Candidate]) -> Problem {
     if all.iter().any(|c| c.channel("RY").is_some()) {
-        return Problem::ExrUnsupported("luminance-chroma pictures (Y, RY, BY)");
+        return Problem::ExrUnsupported(
+            "tiles, parts or layers of luminance and chroma (Y, RY, BY)",
+        );
     }
     let channels = headers.iter().flat_map(|header| &header.channels.list);
     Problem::NoColor { present: channels.map(|channel| channel.name.to_string()).collect() }

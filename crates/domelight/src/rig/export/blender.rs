@@ -8,13 +8,14 @@
 //! The console runs a line at a time: blocks have no empty lines within, and one after them.
 
 use std::f32::consts::FRAC_PI_2;
-use std::fmt::Write;
 
 use super::RigExport;
 use super::axes::Axes;
 use super::disc::{Disc, color_and_strength};
-use super::text::{numbers, one_line, quoted, vector};
+use super::text::{numbers, vector};
+use crate::code;
 use crate::environment::UpAxis;
+use crate::quote::{Code, Python, python};
 
 const ADD_LIGHTS: &str = r#"
 def add_lights():
@@ -62,25 +63,29 @@ def set_world():
 set_world()
 "#;
 
-pub(super) fn encode(rig: &RigExport) -> String {
+pub(super) fn encode(rig: &RigExport) -> Code<Python> {
     let axes = Axes::with_up(rig, UpAxis::Z);
-    let mut text = format!(
-        "# The lights of {}, by domelight, for Blender 4.2 or later.\n\
+    // The first line says how the file is encoded, which no comment can say after it.
+    let mut text = code!(
+        Python,
+        "# -*- coding: utf-8 -*-\n\
+         # The lights of {probe}, by domelight, for Blender 4.2 or later.\n\
          import os\nimport bpy\nfrom mathutils import Vector\n\n\
          # Name, toward the light, color, strength in W/m2, angle in radians\n\
          LIGHTS = [\n",
-        one_line(rig.probe)
+        probe = python::comment(rig.probe)
     );
     for (light, name) in rig.lights.iter().zip(rig.names()) {
         let Disc { radius, facing } = Disc::of(light);
         let (color, strength) = color_and_strength(facing);
-        let _ = writeln!(
-            text,
-            "    ({}, ({}), ({}), {strength}, {}),",
-            quoted(&name),
-            numbers(vector(axes.world * light.direction), ", "),
-            numbers(color.to_array(), ", "),
-            2.0 * radius,
+        text += code!(
+            Python,
+            "    ({name}, ({toward}), ({color}), {strength}, {angle}),\n",
+            name = python::string(&name),
+            toward = numbers(vector(axes.world * light.direction), ", "),
+            color = numbers(color.to_array(), ", "),
+            strength = strength,
+            angle = 2.0 * radius,
         );
     }
     text += "]\n";
@@ -88,10 +93,11 @@ pub(super) fn encode(rig: &RigExport) -> String {
     if let Some(file) = rig.dome_file() {
         // Blender looks a direction up at the place that the mapping turns it to.
         let rotation = -rig.orientation.rotation.to_radians() - FRAC_PI_2;
-        let _ = write!(
-            text,
-            "\n# The map without the light of these lights\nDOME = {}\nDOME_ROTATION = {rotation}\n",
-            quoted(file)
+        text += code!(
+            Python,
+            "\n# The map without the light of these lights\nDOME = {file}\nDOME_ROTATION = {rotation}\n",
+            file = python::string(file),
+            rotation = rotation,
         );
         text += SET_WORLD;
     }
@@ -106,7 +112,7 @@ mod tests {
     #[test]
     fn suns_face_surfaces_with_their_discs() {
         with_example(|rig| {
-            let text = encode(rig);
+            let text = encode(rig).into_string();
             let line = text.lines().find(|line| line.contains("\"sun\"")).unwrap();
             // Y-up (0, 0.6, −0.8) is Z-up (0, 0.8, 0.6).
             assert!(line.contains("(0, 0.8, 0.6)"), "{line}");
@@ -126,7 +132,7 @@ mod tests {
     #[test]
     fn blocks_can_be_pasted_into_the_console() {
         with_example(|rig| {
-            let text = encode(rig);
+            let text = encode(rig).into_string();
             let lines: Vec<&str> = text.lines().collect();
             for pair in lines.windows(2) {
                 let indented = |line: &str| line.starts_with("    ");
@@ -141,10 +147,11 @@ mod tests {
     #[test]
     fn names_are_escaped() {
         with_dome_file("C:\\maps\\\"r\".exr", |rig| {
-            let text = encode(&RigExport { probe: "a\nimport os", ..*rig });
+            let text = encode(&RigExport { probe: "a\nimport os", ..*rig }).into_string();
             assert!(text.contains(r#"DOME = "C:\\maps\\\"r\".exr""#), "{text}");
-            assert!(text.starts_with("# The lights of a import os, by domelight"));
-            assert!(!encode(&RigExport { dome: None, ..*rig }).contains("set_world"));
+            assert!(text.lines().nth(1).unwrap().starts_with("# The lights of a import os, by"));
+            let without = encode(&RigExport { dome: None, ..*rig });
+            assert!(!without.as_str().contains("set_world"));
         });
     }
 }

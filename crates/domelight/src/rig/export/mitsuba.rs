@@ -7,65 +7,59 @@
 //! half a turn about +Y. Axes are those of the rig's world.
 
 use std::f32::consts::PI;
-use std::fmt::Write;
 
 use super::RigExport;
 use super::axes::Axes;
-use super::text::{numbers, one_line, vector};
+use super::text::{numbers, vector};
+use super::{ExportError, Format};
+use crate::code;
 use crate::math::{Mat3, Mat4};
+use crate::quote::{Code, Xml, xml};
 
-pub(super) fn encode(rig: &RigExport) -> String {
-    let mut text = String::from("<?xml version=\"1.0\" encoding=\"utf-8\"?>\n");
-    let _ = writeln!(text, "<!-- The lights of {}, by domelight. -->", comment(rig.probe));
-    text += "<scene version=\"3.0.0\">\n";
+pub(super) fn encode(rig: &RigExport) -> Result<Code<Xml>, ExportError> {
+    let mut text = code!(
+        Xml,
+        "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n\
+         <!-- The lights of {probe}, by domelight. -->\n\
+         <scene version=\"3.0.0\">\n",
+        probe = xml::comment(rig.probe)
+    );
     for (light, name) in rig.lights.iter().zip(rig.names()) {
-        let direction = numbers(vector(-light.direction), ", ");
-        let irradiance = numbers(light.irradiance.to_array(), ", ");
-        let _ = write!(
-            text,
+        text += code!(
+            Xml,
             r#"    <emitter type="directional" id="{name}">
         <vector name="direction" value="{direction}"/>
         <rgb name="irradiance" value="{irradiance}"/>
     </emitter>
-"#
+"#,
+            name = xml::text(&name),
+            direction = numbers(vector(-light.direction), ", "),
+            irradiance = numbers(light.irradiance.to_array(), ", "),
         );
     }
     if let Some(file) = rig.dome_file() {
         let to_world = Axes::of_world(rig).dome * Mat3::from_rotation_y(PI);
         let rows = Mat4::from_mat3(to_world).transpose().to_cols_array();
-        let matrix = rows.map(|value| (value + 0.0).to_string()).join(" ");
-        let file = attribute(file);
-        let _ = write!(
-            text,
+        text += code!(
+            Xml,
             r#"    <emitter type="envmap" id="dome">
         <string name="filename" value="{file}"/>
         <transform name="to_world">
             <matrix value="{matrix}"/>
         </transform>
     </emitter>
-"#
+"#,
+            file = filename(file)?,
+            matrix = Code::generated(rows.map(|value| (value + 0.0).to_string()).join(" ")),
         );
     }
-    text + "</scene>\n"
+    Ok(text + "</scene>\n")
 }
 
-/// Within a comment: XML forbids two hyphens in a row, and one at the end.
-fn comment(text: &str) -> String {
-    one_line(text).replace('-', "\u{2010}")
-}
-
-/// Within an attribute in double quotes.
-fn attribute(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in one_line(text).chars() {
-        match c {
-            '&' => escaped += "&amp;",
-            '<' => escaped += "&lt;",
-            '"' => escaped += "&quot;",
-            c => escaped.push(c),
-        }
-    }
-    escaped
+/// Mitsuba takes what follows a dollar for the name of a parameter, and has no other way to write one.
+fn filename(file: &str) -> Result<Code<Xml>, ExportError> {
+    let holds = xml::holds(file) && !file.contains(|c: char| c == '$' || c.is_control());
+    if holds { Ok(xml::text(file)) } else { Err(Format::Mitsuba.cannot_name(file)) }
 }
 
 #[cfg(test)]
@@ -76,7 +70,7 @@ mod tests {
     #[test]
     fn light_travels_away_from_the_light() {
         with_example(|rig| {
-            let text = encode(rig);
+            let text = encode(rig).unwrap().into_string();
             assert_eq!(text.matches("type=\"directional\"").count(), rig.lights.len());
             assert!(text.contains(r#"id="sun""#) && text.contains(r#"value="0, -0.6, 0.8""#));
             assert!(text.contains(r#"<rgb name="irradiance" value="3, 0.1, 0"/>"#));
@@ -86,16 +80,22 @@ mod tests {
     #[test]
     fn without_a_dome_there_is_no_map() {
         with_example(|rig| {
-            assert!(encode(rig).contains(r#"<string name="filename" value="residual.exr"/>"#));
-            assert!(!encode(&RigExport { dome: None, ..*rig }).contains("envmap"));
+            assert!(
+                encode(rig)
+                    .unwrap()
+                    .as_str()
+                    .contains(r#"<string name="filename" value="residual.exr"/>"#)
+            );
+            let without = encode(&RigExport { dome: None, ..*rig }).unwrap();
+            assert!(!without.as_str().contains("envmap"));
         });
     }
 
     #[test]
     fn names_are_escaped() {
         with_dome_file("a\"<&>.exr", |rig| {
-            let text = encode(&RigExport { probe: "-->\n<bsdf/>", ..*rig });
-            assert!(text.contains("value=\"a&quot;&lt;&amp;>.exr\""), "{text}");
+            let text = encode(&RigExport { probe: "-->\n<bsdf/>", ..*rig }).unwrap().into_string();
+            assert!(text.contains("value=\"a&quot;&lt;&amp;&gt;.exr\""), "{text}");
             assert_eq!(text.matches("-->").count(), 1);
         });
     }

@@ -135,9 +135,7 @@ pub enum ExportError {
         light: RigLight,
     },
     /// A file name that the format has no way to write.
-    #[error(
-        "{format} files cannot name the file {file:?}: choose a name without '\"' and control characters"
-    )]
+    #[error("{format} files cannot name the file {file:?}: choose a name without {}", format.unquotable())]
     BadFileName {
         /// The format.
         format: Format,
@@ -226,39 +224,46 @@ impl Format {
     /// A light that is not a direction with light of finite amount, or a name of the dome's file
     /// that the format cannot hold.
     pub fn encode(self, rig: &RigExport) -> Result<Vec<u8>, ExportError> {
-        self.check(rig)?;
+        check(rig)?;
         Ok(match self {
             Self::Json => json::encode(rig).into_bytes(),
             Self::Csv => csv::encode(rig).into_bytes(),
             Self::Gltf => gltf::encode_text(rig).into_bytes(),
             Self::Glb => gltf::encode_binary(rig),
-            Self::Usd => usd::encode(rig).into_bytes(),
-            Self::Blender => blender::encode(rig).into_bytes(),
-            Self::Mitsuba => mitsuba::encode(rig).into_bytes(),
-            Self::Pbrt => pbrt::encode(rig).into_bytes(),
-            Self::Three => three::encode(rig).into_bytes(),
-            Self::Radiance => radiance::encode(rig).into_bytes(),
-            Self::Sibl => sibl::encode(rig).into_bytes(),
+            Self::Usd => usd::encode(rig)?.into_string().into_bytes(),
+            Self::Blender => blender::encode(rig).into_string().into_bytes(),
+            Self::Mitsuba => mitsuba::encode(rig)?.into_string().into_bytes(),
+            Self::Pbrt => pbrt::encode(rig)?.into_string().into_bytes(),
+            Self::Three => three::encode(rig).into_string().into_bytes(),
+            Self::Radiance => radiance::encode(rig)?.into_string().into_bytes(),
+            Self::Sibl => sibl::encode(rig)?.into_string().into_bytes(),
         })
     }
 
-    fn check(self, rig: &RigExport) -> Result<(), ExportError> {
-        for (light, name) in rig.lights.iter().zip(rig.names()) {
-            let e = light.irradiance;
-            let directed = light.direction.is_normalized() && light.angular_radius.is_finite();
-            if !directed || !e.is_finite() || e.min_component() < 0.0 {
-                return Err(ExportError::BadLight { name, light: *light });
-            }
-        }
-        let unquotable = matches!(self, Self::Sibl | Self::Radiance);
-        let bad = |c: char| c.is_control() || unquotable && c == '"';
-        match rig.dome_file() {
-            Some(file) if self.dome_picture().is_some() && file.contains(bad) => {
-                Err(ExportError::BadFileName { format: self, file: file.to_owned() })
-            }
-            _ => Ok(()),
+    /// What names of files must not have in files of this format.
+    fn unquotable(self) -> &'static str {
+        match self {
+            Self::Mitsuba => "'$' and control characters",
+            Self::Sibl => "'\"' and control characters",
+            Self::Radiance => "control characters and with quotes of one kind at the most",
+            _ => "control characters",
         }
     }
+
+    fn cannot_name(self, file: &str) -> ExportError {
+        ExportError::BadFileName { format: self, file: file.to_owned() }
+    }
+}
+
+fn check(rig: &RigExport) -> Result<(), ExportError> {
+    for (light, name) in rig.lights.iter().zip(rig.names()) {
+        let e = light.irradiance;
+        let directed = light.direction.is_normalized() && light.angular_radius.is_finite();
+        if !directed || !e.is_finite() || e.min_component() < 0.0 {
+            return Err(ExportError::BadLight { name, light: *light });
+        }
+    }
+    Ok(())
 }
 
 impl std::fmt::Display for Format {

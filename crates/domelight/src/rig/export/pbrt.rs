@@ -8,36 +8,40 @@
 //!
 //! [`Mapping::Octahedral`]: crate::environment::mapping::Mapping::Octahedral
 
-use std::fmt::Write;
-
 use super::RigExport;
 use super::axes::Axes;
-use super::text::{numbers, one_line, quoted, vector};
+use super::text::{numbers, vector};
+use super::{ExportError, Format};
+use crate::code;
 use crate::math::{Mat3, Mat4, Vec3};
+use crate::quote::{Code, Pbrt, pbrt};
 
-pub(super) fn encode(rig: &RigExport) -> String {
-    let mut text = format!("# The lights of {}, by domelight.\n", one_line(rig.probe));
-    text += "# Include them after WorldBegin.\n";
+pub(super) fn encode(rig: &RigExport) -> Result<Code<Pbrt>, ExportError> {
+    let mut text = code!(
+        Pbrt,
+        "# The lights of {probe}, by domelight.\n# Include them after WorldBegin.\n",
+        probe = pbrt::comment(rig.probe)
+    );
     for (light, name) in rig.lights.iter().zip(rig.names()) {
-        let from = numbers(vector(light.direction), " ");
-        let irradiance = numbers(light.irradiance.to_array(), " ");
-        let _ = write!(
-            text,
+        text += code!(
+            Pbrt,
             r#"
 # {name}
 LightSource "distant"
     "rgb L" [ {irradiance} ]
     "point3 from" [ {from} ]
     "point3 to" [ 0 0 0 ]
-"#
+"#,
+            name = pbrt::comment(&name),
+            irradiance = numbers(light.irradiance.to_array(), " "),
+            from = numbers(vector(light.direction), " "),
         );
     }
     if let Some(file) = rig.dome_file() {
         let to_world = Mat4::from_mat3(Axes::of_world(rig).dome * octahedral_to_map());
         let columns = to_world.to_cols_array().map(|value| (value + 0.0).to_string()).join(" ");
-        let file = quoted(file);
-        let _ = write!(
-            text,
+        text += code!(
+            Pbrt,
             r#"
 # The probe without the light of these lights, as an octahedral map
 AttributeBegin
@@ -45,10 +49,12 @@ AttributeBegin
     LightSource "infinite"
         "string filename" [ {file} ]
 AttributeEnd
-"#
+"#,
+            columns = Code::generated(columns),
+            file = pbrt::string(file).ok_or_else(|| Format::Pbrt.cannot_name(file))?,
         );
     }
-    text
+    Ok(text)
 }
 
 /// From pbrt's axes of an octahedral picture to the map's own frame: its (x, y, z) is our
@@ -67,11 +73,12 @@ mod tests {
     #[test]
     fn lights_come_from_their_direction() {
         with_example(|rig| {
-            let text = encode(rig);
+            let text = encode(rig).unwrap().into_string();
             assert_eq!(text.matches("LightSource \"distant\"").count(), rig.lights.len());
             assert!(text.contains(r#""point3 from" [ 0 0.6 -0.8 ]"#));
             assert!(text.contains(r#""rgb L" [ 3 0.1 0 ]"#));
-            assert!(!encode(&RigExport { dome: None, ..*rig }).contains("infinite"));
+            let without = encode(&RigExport { dome: None, ..*rig }).unwrap();
+            assert!(!without.as_str().contains("infinite"));
         });
     }
 
@@ -89,7 +96,8 @@ mod tests {
     #[test]
     fn names_are_escaped() {
         with_dome_file("a\".exr", |rig| {
-            let text = encode(&RigExport { probe: "x\nMakeNamedMedium", ..*rig });
+            let rig = RigExport { probe: "x\nMakeNamedMedium", ..*rig };
+            let text = encode(&rig).unwrap().into_string();
             assert!(text.contains(r#"[ "a\".exr" ]"#));
             assert!(!text.contains("\nMakeNamedMedium"));
         });

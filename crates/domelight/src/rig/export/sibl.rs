@@ -9,29 +9,36 @@
 //! Source: <http://www.hdrlabs.com/sibl/formatspecs.html>.
 
 use std::f32::consts::PI;
-use std::fmt::Write;
 
 use super::RigExport;
 use super::disc::color_and_strength;
-use super::text::one_line;
+use super::{ExportError, Format};
+use crate::code;
 use crate::environment::mapping::Mapping;
+use crate::quote::{Code, Sibl, sibl};
 
-pub(super) fn encode(rig: &RigExport) -> String {
-    let mut text = String::from("[Header]\n");
-    let _ = writeln!(text, "Name = {}", quoted(rig.probe));
-    text += "Author = \"domelight\"\n";
-    let _ = writeln!(text, "Comment = {}", quoted(&format!("The lights of {}", rig.probe)));
+pub(super) fn encode(rig: &RigExport) -> Result<Code<Sibl>, ExportError> {
+    let mut text = code!(
+        Sibl,
+        "[Header]\nName = {probe}\nAuthor = \"domelight\"\nComment = {comment}\n",
+        probe = sibl::caption(rig.probe),
+        comment = sibl::caption(&format!("The lights of {}", rig.probe)),
+    );
     if let (Some(file), Some(dome)) = (rig.dome_file(), rig.dome) {
-        let (file, height) = (quoted(file), dome.environment.map().height);
+        let file = sibl::value(file).ok_or_else(|| Format::Sibl.cannot_name(file))?;
         for (section, group) in [("Background", "BG"), ("Enviroment", "EV"), ("Reflection", "REF")]
         {
-            let _ = write!(
-                text,
+            text += code!(
+                Sibl,
                 "\n[{section}]\n{group}file = {file}\n{group}map = 1\n{group}u = 0\n{group}v = 0\n\
-                 {group}height = {height}\n"
+                 {group}height = {height}\n",
+                section = section,
+                group = group,
+                file = file,
+                height = dome.environment.map().height,
             );
             if group != "BG" {
-                let _ = write!(text, "{group}multi = 1\n{group}gamma = 1\n");
+                text += code!(Sibl, "{group}multi = 1\n{group}gamma = 1\n", group = group);
             }
         }
     }
@@ -41,24 +48,26 @@ pub(super) fn encode(rig: &RigExport) -> String {
         let (color, strength) = color_and_strength(light.irradiance / PI);
         let [r, g, b] = color.to_array().map(|c| (255.0 * c).round());
         let (section, group) = match i {
-            0 => ("Sun".to_owned(), "SUN"),
-            i => (format!("Light{i}"), "LIGHT"),
+            0 => (Code::literal("Sun"), "SUN"),
+            i => (code!(Sibl, "Light{i}", i = i), "LIGHT"),
         };
-        let _ = writeln!(text, "\n[{section}]");
+        text += code!(Sibl, "\n[{section}]\n", section = section);
         if group == "LIGHT" {
-            let _ = writeln!(text, "LIGHTname = {}", quoted(&name));
+            text += code!(Sibl, "LIGHTname = {name}\n", name = sibl::caption(&name));
         }
-        let _ = write!(
-            text,
-            "{group}color = {r},{g},{b}\n{group}multi = {strength}\n{group}u = {u}\n{group}v = {v}\n"
+        text += code!(
+            Sibl,
+            "{group}color = {r},{g},{b}\n{group}multi = {strength}\n{group}u = {u}\n{group}v = {v}\n",
+            group = group,
+            r = r,
+            g = g,
+            b = b,
+            strength = strength,
+            u = u,
+            v = v,
         );
     }
-    text
-}
-
-/// In double quotes; the format has no way to write one within them.
-fn quoted(text: &str) -> String {
-    format!("\"{}\"", one_line(text).replace('"', "'"))
+    Ok(text)
 }
 
 #[cfg(test)]
@@ -77,7 +86,7 @@ mod tests {
     #[test]
     fn lights_are_where_the_panorama_looks_toward_them() {
         with_example(|rig| {
-            let text = encode(rig);
+            let text = encode(rig).unwrap().into_string();
             let environment: &Environment = rig.dome.unwrap().environment;
             for (light, name) in rig.lights.iter().zip(["Sun", "Light1", "Light2"]) {
                 let values = section(&text, name);
@@ -96,10 +105,11 @@ mod tests {
     #[test]
     fn the_panorama_is_the_dome() {
         with_example(|rig| {
-            let text = encode(rig);
+            let text = encode(rig).unwrap().into_string();
             assert_eq!(section(&text, "Enviroment")["EVfile"], "\"residual.exr\"");
             assert_eq!(section(&text, "Reflection")["REFheight"], "8");
-            let without = encode(&RigExport { dome: None, probe: "a \"b\"\n[Sun]", ..*rig });
+            let rig = RigExport { dome: None, probe: "a \"b\"\n[Sun]", ..*rig };
+            let without = encode(&rig).unwrap().into_string();
             assert!(!without.contains("EVfile"));
             assert!(without.starts_with("[Header]\nName = \"a 'b' [Sun]\"\n"));
         });

@@ -6,13 +6,13 @@
 //! surfaces. `setDome(scene, texture)` lights by a picture of the dome instead, reflections
 //! included, whose middle three.js expects at +X where ours is at −Z. +Y is up.
 
-use std::fmt::Write;
-
 use super::RigExport;
 use super::axes::Axes;
 use super::disc::color_and_strength;
-use super::text::{numbers, one_line, quoted, vector};
+use super::text::{numbers, vector};
+use crate::code;
 use crate::environment::UpAxis;
+use crate::quote::{Code, JavaScript, javascript};
 
 const FUNCTIONS: &str = r#"
 /**
@@ -48,24 +48,26 @@ export function setDome(scene, texture) {
 }
 "#;
 
-pub(super) fn encode(rig: &RigExport) -> String {
+pub(super) fn encode(rig: &RigExport) -> Code<JavaScript> {
     let axes = Axes::with_up(rig, UpAxis::Y);
-    let mut text = format!(
-        "// The lights of {}, by domelight.\n\
+    let mut text = code!(
+        JavaScript,
+        "// The lights of {probe}, by domelight.\n\
          // import {{ addLights }} from \"./rig.js\"; addLights(scene);\n\
          import * as THREE from \"three\";\n\n\
          // Toward the light; linear colour times intensity is irradiance.\n\
          export const lights = [\n",
-        one_line(rig.probe)
+        probe = javascript::comment(rig.probe)
     );
     for (light, name) in rig.lights.iter().zip(rig.names()) {
         let (color, intensity) = color_and_strength(light.irradiance);
-        let _ = writeln!(
-            text,
-            "  {{ name: {}, direction: [{}], color: [{}], intensity: {intensity} }},",
-            quoted(&name),
-            numbers(vector(axes.world * light.direction), ", "),
-            numbers(color.to_array(), ", "),
+        text += code!(
+            JavaScript,
+            "  {{ name: {name}, direction: [{toward}], color: [{color}], intensity: {intensity} }},\n",
+            name = javascript::string(&name),
+            toward = numbers(vector(axes.world * light.direction), ", "),
+            color = numbers(color.to_array(), ", "),
+            intensity = intensity,
         );
     }
     text += "];\n\n";
@@ -75,16 +77,18 @@ pub(super) fn encode(rig: &RigExport) -> String {
             text += "// Radiance of the residual map, in the order of SphericalHarmonics3.\n\
                      export const harmonics = [\n";
             for coefficient in dome.harmonics.turned(axes.world).coefficients {
-                let _ = writeln!(text, "  [{}],", numbers(coefficient.to_array(), ", "));
+                let row = numbers(coefficient.to_array(), ", ");
+                text += code!(JavaScript, "  [{row}],\n", row = row);
             }
             text += "];\n";
         }
     }
     let turn = rig.orientation.rotation.to_radians() + std::f32::consts::FRAC_PI_2;
-    let _ = writeln!(
-        text,
+    text += code!(
+        JavaScript,
         "\n// About +Y: the middle of the map is where three.js looks for it at +X.\n\
-         const domeRotation = {turn};"
+         const domeRotation = {turn};\n",
+        turn = turn,
     );
     text + FUNCTIONS
 }
@@ -99,7 +103,7 @@ mod tests {
     #[test]
     fn lights_have_colour_times_intensity() {
         with_example(|rig| {
-            let text = encode(rig);
+            let text = encode(rig).into_string();
             let sun = r#"{ name: "sun", direction: [0, 0.6, -0.8], color: [1, 0.033333335, 0], intensity: 3 },"#;
             assert!(text.contains(sun), "{text}");
             assert_eq!(text.matches("{ name: ").count(), rig.lights.len());
@@ -114,7 +118,8 @@ mod tests {
             // Light from above is first order in z of the Z-up world, in y of three.js.
             dome.harmonics = SphericalHarmonics { coefficients: [crate::Rgb::BLACK; 9] };
             dome.harmonics.coefficients[2] = crate::Rgb::WHITE;
-            let text = encode(&RigExport { orientation, dome: Some(dome), ..*rig });
+            let rig = RigExport { orientation, dome: Some(dome), ..*rig };
+            let text = encode(&rig).into_string();
             assert!(text.contains("direction: [0, -0.8, -0.6]"), "{text}");
             let start = text.find("harmonics = [\n").unwrap();
             let rows: Vec<&str> = text[start..].lines().skip(1).take(9).collect();
@@ -128,8 +133,9 @@ mod tests {
     #[test]
     fn names_are_escaped() {
         with_example(|rig| {
-            let text = encode(&RigExport { probe: "a\n}*/b", dome: None, ..*rig });
-            assert!(text.starts_with("// The lights of a }*/b, by domelight.\n"));
+            let probe = "a\n}*/b\u{2028}alert(1)";
+            let text = encode(&RigExport { probe, dome: None, ..*rig }).into_string();
+            assert!(text.starts_with("// The lights of a }*/b alert(1), by domelight.\n"));
             assert!(text.contains("export const harmonics = null;"));
         });
     }

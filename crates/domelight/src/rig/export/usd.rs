@@ -8,22 +8,24 @@
 //! a Z-up stage. Axes are those of the rig's world, its up axis the stage's.
 
 use std::f32::consts::PI;
-use std::fmt::Write;
 
 use super::RigExport;
 use super::axes::Axes;
 use super::disc::{Disc, color_and_strength};
-use super::text::{numbers, one_line, quoted};
+use super::text::numbers;
+use super::{ExportError, Format};
+use crate::code;
 use crate::environment::UpAxis;
 use crate::math::{Mat3, Quat, Vec3};
+use crate::quote::{Code, Usd, usd};
 
-pub(super) fn encode(rig: &RigExport) -> String {
+pub(super) fn encode(rig: &RigExport) -> Result<Code<Usd>, ExportError> {
     let up = match rig.orientation.up {
         UpAxis::Y => "Y",
         UpAxis::Z => "Z",
     };
-    let doc = quoted(&one_line(&format!("The lights of {}, by domelight.", rig.probe)));
-    let mut text = format!(
+    let mut text = code!(
+        Usd,
         r#"#usda 1.0
 (
     defaultPrim = "rig"
@@ -33,62 +35,68 @@ pub(super) fn encode(rig: &RigExport) -> String {
 
 def Xform "rig"
 {{
-"#
+"#,
+        doc = usd::string(&format!("The lights of {}, by domelight.", rig.probe)),
+        up = up,
     );
     for (light, name) in rig.lights.iter().zip(rig.names()) {
         let Disc { radius, facing } = Disc::of(light);
         let (color, intensity) = color_and_strength(facing);
-        let (angle, color) = (2.0 * radius.to_degrees(), numbers(color.to_array(), ", "));
-        let rotation = orient(Quat::from_rotation_arc(Vec3::Z, light.direction));
-        let _ = write!(
-            text,
-            r#"    def DistantLight "{name}"
+        text += code!(
+            Usd,
+            r#"    def DistantLight {name}
     {{
         float inputs:angle = {angle}
         color3f inputs:color = ({color})
         float inputs:intensity = {intensity}
         bool inputs:normalize = 1
 {rotation}    }}
-"#
+"#,
+            name = usd::string(&name),
+            angle = 2.0 * radius.to_degrees(),
+            color = numbers(color.to_array(), ", "),
+            intensity = intensity,
+            rotation = orient(Quat::from_rotation_arc(Vec3::Z, light.direction)),
         );
     }
     if let Some(file) = rig.dome_file() {
         let turn = Axes::of_world(rig).dome * Mat3::from_rotation_y(PI);
-        let (file, rotation) = (asset(file), orient(Quat::from_mat3(&turn)));
-        let _ = write!(
-            text,
+        text += code!(
+            Usd,
             r#"    def DomeLight "dome"
     {{
         float inputs:intensity = 1
         asset inputs:texture:file = {file}
         token inputs:texture:format = "latlong"
 {rotation}    }}
-"#
+"#,
+            file = asset(file).ok_or_else(|| Format::Usd.cannot_name(file))?,
+            rotation = orient(Quat::from_mat3(&turn)),
         );
     }
-    text + "}\n"
+    Ok(text + "}\n")
 }
 
 /// The rotation of a prim.
-fn orient(rotation: Quat) -> String {
+fn orient(rotation: Quat) -> Code<Usd> {
     let [x, y, z, w] = rotation.to_array().map(|value| value + 0.0);
-    format!(
+    code!(
+        Usd,
         r#"        quatf xformOp:orient = ({w}, {x}, {y}, {z})
         uniform token[] xformOpOrder = ["xformOp:orient"]
-"#
+"#,
+        w = w,
+        x = x,
+        y = y,
+        z = z,
     )
 }
 
 /// An asset path; one that is relative is anchored to the file that names it.
-fn asset(file: &str) -> String {
-    let file = file.replace('\\', "/");
+fn asset(file: &str) -> Option<Code<Usd>> {
     let anchored = file.starts_with(['/', '.']) || file.contains(':');
     let anchor = if anchored { "" } else { "./" };
-    if file.contains('@') {
-        format!("@@@{anchor}{}@@@", file.replace("@@@", "\\@@@"))
-    } else {
-        format!("@{anchor}{file}@")
-    }
+    usd::asset(&format!("{anchor}{file}"))
 }
 
 #[cfg(test)]
@@ -107,7 +115,7 @@ mod tests {
     #[test]
     fn lights_turn_their_back_to_their_direction() {
         with_example(|rig| {
-            let text = encode(rig);
+            let text = encode(rig).unwrap().into_string();
             for (light, name) in rig.lights.iter().zip(rig.names()) {
                 let start = format!("DistantLight \"{name}\"");
                 let q = values(&text, &start, "xformOp:orient");
@@ -130,9 +138,9 @@ mod tests {
     #[test]
     fn the_stage_has_the_axes_of_the_world() {
         with_example(|rig| {
-            assert!(encode(rig).contains("upAxis = \"Y\""));
+            assert!(encode(rig).unwrap().as_str().contains("upAxis = \"Y\""));
             let orientation = crate::environment::Orientation { up: UpAxis::Z, rotation: 0.0 };
-            let text = encode(&RigExport { orientation, ..*rig });
+            let text = encode(&RigExport { orientation, ..*rig }).unwrap().into_string();
             assert!(text.contains("upAxis = \"Z\""));
             // The pole, +Y of the DomeLight, is up; its +Z looks at the middle of the map, +Y.
             let q = values(&text, "DomeLight", "xformOp:orient");
@@ -147,13 +155,13 @@ mod tests {
         for (file, written) in [
             ("residual.exr", "@./residual.exr@"),
             ("../a b.exr", "@../a b.exr@"),
-            ("C:\\maps\\r.exr", "@C:/maps/r.exr@"),
+            ("C:/maps/r.exr", "@C:/maps/r.exr@"),
             ("r@1.exr", "@@@./r@1.exr@@@"),
         ] {
             with_dome_file(file, |rig| {
-                let text = encode(&RigExport { probe: "a\"\nb", ..*rig });
+                let text = encode(&RigExport { probe: "a\"\nb", ..*rig }).unwrap().into_string();
                 assert!(text.contains(&format!("texture:file = {written}\n")), "{text}");
-                assert!(text.contains(r#"doc = "The lights of a\" b, by domelight.""#));
+                assert!(text.contains(r#"doc = "The lights of a\"\nb, by domelight.""#));
             });
         }
     }

@@ -236,8 +236,7 @@ fn glossy(name: &str, base_color: Rgb, metallic: f32, roughness: f32) -> Surface
         roughness,
         metallic_roughness_texture: None,
     };
-    let model = SurfaceModel::MetallicRoughness(model);
-    Surface { name: name.to_owned(), model, normal_map: None }
+    Surface::new(name, SurfaceModel::MetallicRoughness(model))
 }
 
 #[cfg(test)]

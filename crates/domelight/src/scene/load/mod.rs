@@ -2,30 +2,42 @@
 //!
 //! | format | geometry | materials | camera |
 //! |---|---|---|---|
-//! | PLY | yes | vertex colours | no |
-//! | OBJ + MTL | yes | `Kd Ks Ns Pr Pm map_Kd norm` | no |
-//! | glTF, GLB | triangles | metallic-roughness, normal maps | perspective, orthographic |
+//! | PLY | yes, with triangle strips | colours of vertices and faces | no |
+//! | OBJ + MTL | yes | `Kd Ks Ns Pr Pm map_Kd`, normal maps | no |
+//! | STL | ASCII and binary | no | no |
+//! | OFF | also COFF, NOFF, STOFF, 4OFF | colours of vertices and faces | no |
+//! | glTF, GLB | triangles, skins, morph targets | all of the standard's extensions as data | all |
 //! | TOML | the above and built-in meshes | by text or table | yes |
 //!
-//! The format is told by the first bytes where they are telling (PLY, GLB), else by the extension.
+//! The format is told by the first bytes where they are telling (PLY, GLB), else by the extension, else by the first
+//! word (`OFF`, `solid`).
 //! Every loader checks what it reads before it takes memory for it; bad input is a [`LoadError`]
 //! that names the file and the place, never a panic.
 
 mod budget;
+mod faces;
 mod gltf;
 mod mtl;
+mod notes;
 mod obj;
+mod off;
 mod ply;
+mod polygon;
+mod stl;
 mod textures;
 mod toml;
 
+use std::borrow::Cow;
+use std::collections::HashSet;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use self::gltf::GltfProblem;
+pub use self::gltf::{GltfProblem, Ktx2Error, MeshoptError};
 pub use obj::ObjProblem;
+pub use off::OffProblem;
 pub use ply::{PlyPlace, PlyProblem};
+pub use stl::StlProblem;
 pub use toml::TomlProblem;
 
 use super::SceneDescription;
@@ -41,6 +53,43 @@ pub struct Loaded {
     pub warnings: Vec<String>,
     /// An estimate of the memory that loading took, in bytes.
     pub memory: u64,
+    /// The files that were read beside the one that was asked for.
+    pub files: Vec<PathBuf>,
+}
+
+/// Where the files may be that a scene refers to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reach {
+    /// Anywhere; files outside of the scene's folder are read with one warning.
+    #[default]
+    Anywhere,
+    /// In the scene's folder and the folders in it, links followed: for programs that serve others.
+    OwnFolder,
+}
+
+/// How a file is read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LoadOptions {
+    /// The most that meshes and textures together take of the memory \[bytes\]; by default there is no limit.
+    pub max_memory: Option<u64>,
+    /// Where files may be that the scene refers to.
+    pub reach: Reach,
+    /// Whether a file is refused that requires an extension which is not known, or lacks one of its images
+    /// (glTF); else what can be drawn is drawn, with a warning.
+    pub strict: bool,
+    /// The scene of a file with several (glTF), by name or by number from 0.
+    pub scene: Option<String>,
+    /// The moment of an animation (glTF); without one, nodes are as the file has them at rest.
+    pub animation: Option<AnimationTime>,
+}
+
+/// A moment of an animation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AnimationTime {
+    /// The animation's name, or its number from 0.
+    pub name: String,
+    /// Time since its beginning \[s\]; before the first key and after the last one nothing moves.
+    pub seconds: f32,
 }
 
 /// Why a file makes no scene.
@@ -64,6 +113,14 @@ pub enum LoadError {
         /// What the system says.
         source: io::Error,
     },
+    /// A file outside of the scene's folder, where [`Reach`] does not allow it.
+    #[error("{}, which {referrer} refers to, is outside of the scene's folder", path.display())]
+    Outside {
+        /// The file.
+        path: PathBuf,
+        /// Which file and what in it.
+        referrer: String,
+    },
     /// A texture that is no image.
     #[error(
         "texture {image}, which {referrer} refers to, cannot be decoded: {source}; use PNG, JPEG, TGA or WebP"
@@ -86,11 +143,19 @@ pub enum LoadError {
     },
     /// Neither content nor extension is known.
     #[error(
-        "{} is none of the scene formats known: .ply, .obj, .gltf, .glb and .toml", path.display()
+        "{} is none of the scene formats known: .ply, .obj, .stl, .off, .gltf, .glb and .toml", path.display()
     )]
     UnknownFormat {
         /// The file.
         path: PathBuf,
+    },
+    /// A scene or an animation asked of a format that has none.
+    #[error("{} is no glTF file and has no {what} to choose", path.display())]
+    NoChoice {
+        /// The file.
+        path: PathBuf,
+        /// `scenes` or `animations`.
+        what: &'static str,
     },
     /// Nothing to render.
     #[error("{} holds no triangles", path.display())]
@@ -118,6 +183,24 @@ pub enum LoadError {
         /// What is wrong.
         problem: ObjProblem,
     },
+    /// A broken OFF file.
+    #[error("{}, line {line}: {problem}", path.display())]
+    Off {
+        /// The file.
+        path: PathBuf,
+        /// Its line, from 1.
+        line: usize,
+        /// What is wrong.
+        problem: OffProblem,
+    },
+    /// A broken STL file.
+    #[error("{}: {problem}", path.display())]
+    Stl {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where.
+        problem: StlProblem,
+    },
     /// A broken glTF file.
     #[error("{}: {problem}", path.display())]
     Gltf {
@@ -138,28 +221,55 @@ pub enum LoadError {
     },
 }
 
+impl LoadError {
+    /// Whether a file that another one refers to is not there.
+    fn is_missing_file(&self) -> bool {
+        matches!(self, Self::ReadReferenced { source, .. } if source.kind() == io::ErrorKind::NotFound)
+    }
+}
+
 /// Loads a mesh or a scene file.
 ///
 /// # Errors
 /// A [`LoadError`] that names the file and the place.
 pub fn load(path: impl AsRef<Path>) -> Result<Loaded, LoadError> {
-    load_within(path, None)
+    load_with(path, &LoadOptions::default())
 }
 
-/// As [`load`], with a limit on what its meshes and textures together take of the memory \[bytes\].
+/// As [`load`], within limits.
 ///
 /// # Errors
-/// As [`load`]; a file that would exceed the limit is refused before the memory is taken.
-pub fn load_within(path: impl AsRef<Path>, max_memory: Option<u64>) -> Result<Loaded, LoadError> {
+/// As [`load`]; what would exceed the memory allowed is refused before it is taken, and a file before it is read. Also
+/// what the options refuse, and a scene or an animation that the file does not have.
+pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let path = path.as_ref();
-    let budget = &Budget::new(max_memory);
-    let loaded = load_bytes(path, &read(path, budget)?, false, budget)?;
-    Ok(Loaded { memory: budget.taken(), ..loaded })
+    let budget = &Budget::new(path, options.max_memory, options.reach);
+    let mut loaded = load_bytes(path, &read(path, budget)?, false, budget, options)?;
+    loaded.warnings.extend(budget.warning(path));
+    once(&mut loaded.warnings);
+    Ok(Loaded { memory: budget.taken(), files: budget.files(), ..loaded })
+}
+
+/// Leaves each warning once, and no more than anybody reads.
+fn once(warnings: &mut Vec<String>) {
+    const MOST: usize = 30;
+    let mut told = HashSet::new();
+    warnings.retain(|warning| told.insert(warning.clone()));
+    if warnings.len() > MOST {
+        let more = warnings.len() - (MOST - 1);
+        warnings.truncate(MOST - 1);
+        warnings.push(format!("{more} more warnings like these"));
+    }
 }
 
 /// Loads what is no scene file, for a scene file that refers to it.
-fn load_mesh(path: &Path, referrer: &str, budget: &Budget) -> Result<Loaded, LoadError> {
-    load_bytes(path, &read_referenced(path, referrer, budget)?, true, budget)
+fn load_mesh(
+    path: &Path,
+    referrer: &str,
+    budget: &Budget,
+    options: &LoadOptions,
+) -> Result<Loaded, LoadError> {
+    load_bytes(path, &read_referenced(path, referrer, budget)?, true, budget, options)
 }
 
 fn load_bytes(
@@ -167,15 +277,26 @@ fn load_bytes(
     bytes: &[u8],
     mesh_only: bool,
     budget: &Budget,
+    options: &LoadOptions,
 ) -> Result<Loaded, LoadError> {
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    let is_gltf = bytes.starts_with(b"glTF") || extension == "gltf" || extension == "glb";
+    let chosen = [("scenes", options.scene.is_some()), ("animations", options.animation.is_some())];
+    if let (false, Some((what, _))) = (is_gltf, chosen.into_iter().find(|(_, chosen)| *chosen)) {
+        return Err(LoadError::NoChoice { path: path.into(), what });
+    }
     let loaded = match extension.to_str() {
         _ if bytes.starts_with(b"ply") => ply::load(path, bytes, budget)?,
-        _ if bytes.starts_with(b"glTF") => gltf::load(path, bytes, budget)?,
-        Some("ply") => ply::load(path, bytes, budget)?,
-        Some("gltf" | "glb") => gltf::load(path, bytes, budget)?,
+        _ if bytes.starts_with(b"glTF") => gltf::load(path, bytes, budget, options)?,
+        // Another file's content is nobody's business.
+        Some("ply") if !mesh_only => ply::load(path, bytes, budget)?,
+        Some("gltf" | "glb") => gltf::load(path, bytes, budget, options)?,
         Some("obj") => obj::load(path, bytes, budget)?,
-        Some("toml") if !mesh_only => toml::load(path, bytes, budget)?,
+        Some("stl") => stl::load(path, bytes, budget)?,
+        Some("off") => off::load(path, bytes, budget)?,
+        Some("toml") if !mesh_only => toml::load(path, bytes, budget, options)?,
+        _ if off::is_off(bytes) => off::load(path, bytes, budget)?,
+        _ if stl::is_stl(bytes) => stl::load(path, bytes, budget)?,
         _ => return Err(LoadError::UnknownFormat { path: path.into() }),
     };
     if loaded.description.parts.iter().all(|p| p.mesh.triangles.is_empty()) {
@@ -189,6 +310,7 @@ fn read(path: &Path, budget: &Budget) -> Result<Vec<u8>, LoadError> {
 }
 
 fn read_referenced(path: &Path, referrer: &str, budget: &Budget) -> Result<Vec<u8>, LoadError> {
+    budget.refer(path, referrer)?;
     read_plain(path, budget, |source| LoadError::ReadReferenced {
         path: path.into(),
         referrer: referrer.into(),
@@ -211,6 +333,40 @@ fn read_plain(
     }
     budget.take(&path.display().to_string(), metadata.len())?;
     fs::read(path).map_err(error)
+}
+
+/// Text that may be of before UTF-8.
+fn text_of(bytes: &[u8]) -> Cow<'_, str> {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => Cow::Borrowed(text),
+        // Latin-1 is the first 256 characters of Unicode.
+        Err(_) => Cow::Owned(bytes.iter().map(|&b| char::from(b)).collect()),
+    }
+}
+
+/// The lines of an OBJ or MTL file with their numbers from 1; one that ends in a backslash goes on in the next.
+fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut rest = bytes.split(|&b| b == b'\n').enumerate();
+    std::iter::from_fn(move || {
+        let (index, first) = rest.next()?;
+        let Some(begin) = continued(first) else { return Some((index + 1, text_of(first))) };
+        let mut whole = begin.to_vec();
+        for (_, next) in rest.by_ref() {
+            whole.push(b' ');
+            let Some(part) = continued(next) else {
+                whole.extend(next);
+                break;
+            };
+            whole.extend(part);
+        }
+        Some((index + 1, Cow::Owned(text_of(&whole).into_owned())))
+    })
+}
+
+/// What stands before the backslash at the end of a line.
+fn continued(line: &[u8]) -> Option<&[u8]> {
+    line.trim_ascii_end().strip_suffix(b"\\")
 }
 
 /// The name of a file without folder and extension.

@@ -1,20 +1,23 @@
 //! Wavefront OBJ.
 //!
-//! Read are `v` (with colours), `vt` (v upward), `vn`, `f` (polygons cut into fans, relative
+//! Read are `v` (with colours), `vt` (v upward), `vn`, `f` (polygons of any shape, relative
 //! indices), `o`, `g`, `usemtl` and `mtllib` ([`super::mtl`]); lines, points, curves and smoothing
-//! groups are passed over. Every object or group and material makes a part of its own. A corner
-//! without normal gets the smooth one of its position, computed over the whole file, so that seams
-//! of texture coordinates and materials do not show.
+//! groups are passed over. A line may go on after a backslash; text that is not UTF-8 is Latin-1.
+//! Every object or group and material makes a part of its own, wherever in the file its faces are.
+//! A corner without normal gets the smooth one of its position, computed over the whole file, so
+//! that seams of texture coordinates and materials do not show.
 //!
 //! Written for this program: the crate tobj tells no line numbers, and its arithmetic overflows on
 //! relative indices out of range.
 
-use std::collections::HashMap;
-use std::path::Path;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
 
+use super::notes::Notes;
 use super::ply::DEFAULT_ALBEDO;
+use super::polygon::Triangulator;
 use super::textures::Textures;
-use super::{Budget, LoadError, Loaded, mtl, stem};
+use super::{Budget, LoadError, Loaded, lines, mtl, stem};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
@@ -82,9 +85,8 @@ const MEMORY_PER_BYTE: u64 = 8;
 pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
     budget.take(&path.display().to_string(), MEMORY_PER_BYTE * bytes.len() as u64)?;
     let mut reader = Reader::new(path, budget);
-    for (index, line) in bytes.split(|&b| b == b'\n').enumerate() {
-        let text = String::from_utf8_lossy(line);
-        reader.line(index + 1, &text)?;
+    for (number, line) in lines(bytes) {
+        reader.line(number, &line)?;
     }
     Ok(reader.finish())
 }
@@ -98,11 +100,17 @@ struct Corner {
 }
 
 /// The faces of one object and one material.
-#[derive(Default)]
 struct Group {
     name: String,
     material: Option<String>,
     triangles: Vec<[Corner; 3]>,
+}
+
+/// What faces belong to until the next line that says so.
+#[derive(Clone, Default, PartialEq, Eq, Hash)]
+struct Label {
+    name: String,
+    material: Option<String>,
 }
 
 struct Reader<'a> {
@@ -112,9 +120,21 @@ struct Reader<'a> {
     colors: Vec<Rgb>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
+    /// In the order of their first faces.
     groups: Vec<Group>,
+    group_of: HashMap<Label, usize>,
+    label: Label,
+    /// The group of `label`, once it has faces.
+    group: Option<usize>,
     surfaces: Vec<Surface>,
+    /// Material libraries that were read.
+    libraries: HashSet<PathBuf>,
+    surface_of: HashMap<String, usize>,
     textures: Textures<'a>,
+    triangulator: Triangulator,
+    /// The corners of the face that is read.
+    corners: Vec<Corner>,
+    notes: Notes,
     warnings: Vec<String>,
 }
 
@@ -126,9 +146,17 @@ impl<'a> Reader<'a> {
             colors: Vec::new(),
             uvs: Vec::new(),
             normals: Vec::new(),
-            groups: vec![Group { name: stem(path), ..Group::default() }],
+            groups: Vec::new(),
+            group_of: HashMap::new(),
+            label: Label { name: stem(path), material: None },
+            group: None,
             surfaces: Vec::new(),
+            libraries: HashSet::new(),
+            surface_of: HashMap::new(),
             textures: Textures::new(budget),
+            triangulator: Triangulator::default(),
+            corners: Vec::new(),
+            notes: Notes::default(),
             warnings: Vec::new(),
         }
     }
@@ -144,27 +172,22 @@ impl<'a> Reader<'a> {
                 self.vertex(&numbers);
             }
             "vt" => {
-                let n = numbers(keyword, rest, 1).map_err(at)?;
+                let n = numbers_or_nan(keyword, rest, 1).map_err(at)?;
                 self.uvs.push(Vec2::new(n[0], 1.0 - n.get(1).unwrap_or(&0.0)));
             }
             "vn" => {
-                let n = numbers(keyword, rest, 3).map_err(at)?;
+                let n = numbers_or_nan(keyword, rest, 3).map_err(at)?;
                 self.normals.push(Vec3::new(n[0], n[1], n[2]).normalize_or_zero());
             }
-            "f" => {
-                let corners: Result<Vec<Corner>, _> =
-                    rest.split_whitespace().map(|word| self.corner(word)).collect();
-                let triangles = corners.and_then(|c| fan(&c)).map_err(at)?;
-                self.group_mut().triangles.extend(triangles);
-            }
+            // `fo` was the keyword of old.
+            "f" | "fo" => self.face(rest).map_err(at)?,
             "o" | "g" => {
-                let name = if rest.is_empty() { stem(self.path) } else { rest.into() };
-                let material = self.group_mut().material.clone();
-                self.start_group(name, material);
+                self.label.name = if rest.is_empty() { stem(self.path) } else { rest.into() };
+                self.group = None;
             }
             "usemtl" => {
-                let name = self.group_mut().name.clone();
-                self.start_group(name, Some(rest.to_owned()));
+                self.label.material = (!rest.is_empty()).then(|| rest.to_owned());
+                self.group = None;
             }
             "mtllib" if rest.is_empty() => {
                 return Err(at(ObjProblem::Name { keyword: keyword.into() }));
@@ -200,40 +223,65 @@ impl<'a> Reader<'a> {
         Ok(Corner { position, uv, normal })
     }
 
-    /// The group that faces go to.
-    fn group_mut(&mut self) -> &mut Group {
-        if self.groups.is_empty() {
-            self.groups.push(Group::default());
+    fn face(&mut self, text: &str) -> Result<(), ObjProblem> {
+        let mut corners = std::mem::take(&mut self.corners);
+        corners.clear();
+        for word in words(text) {
+            corners.push(self.corner(word)?);
         }
-        let last = self.groups.len() - 1;
-        &mut self.groups[last]
+        if corners.len() < 3 {
+            return Err(ObjProblem::Face { corners: corners.len() });
+        }
+        let position = |i: usize| self.positions[corners[i].position as usize];
+        let triangles = self.triangulator.triangulate(corners.len(), position);
+        let triangles = triangles.iter().map(|t| t.map(|i| corners[i as usize]));
+        let (groups, label) = (&mut self.groups, &self.label);
+        let group = *self.group.get_or_insert_with(|| {
+            *self.group_of.entry(label.clone()).or_insert_with(|| {
+                let Label { name, material } = label.clone();
+                groups.push(Group { name, material, triangles: Vec::new() });
+                groups.len() - 1
+            })
+        });
+        groups[group].triangles.extend(triangles);
+        self.corners = corners;
+        Ok(())
     }
 
-    fn start_group(&mut self, name: String, material: Option<String>) {
-        let group = self.group_mut();
-        if group.triangles.is_empty() {
-            (group.name, group.material) = (name, material);
-        } else {
-            self.groups.push(Group { name, material, triangles: Vec::new() });
+    /// Reads a material library, or several; one that is missing is a warning.
+    fn library(&mut self, line: usize, names: &str) -> Result<(), LoadError> {
+        // A name may hold spaces.
+        let path = super::relative(self.path, names);
+        if names.contains(char::is_whitespace) && !path.exists() {
+            return words(names).try_for_each(|name| self.one_library(line, name));
         }
+        self.one_library(line, names)
     }
 
-    /// Reads a material library; one that is missing is a warning.
-    fn library(&mut self, line: usize, name: &str) -> Result<(), LoadError> {
+    fn one_library(&mut self, line: usize, name: &str) -> Result<(), LoadError> {
         let path = super::relative(self.path, name);
-        match super::read(&path, self.textures.budget) {
-            Ok(bytes) => {
-                let mut surfaces =
-                    mtl::parse(&path, &bytes, &mut self.textures, &mut self.warnings)?;
-                self.surfaces.append(&mut surfaces);
-            }
-            Err(LoadError::Read { source, .. }) => self.warnings.push(format!(
-                "{}, line {line}: cannot read the material library {}: {source}; its materials are grey",
-                self.path.display(),
-                path.display()
-            )),
-            Err(error) => return Err(error),
+        if !self.libraries.insert(path.clone()) {
+            return Ok(());
         }
+        let place = format!("{}, line {line}", self.path.display());
+        let why = match super::read_referenced(&path, &place, self.textures.budget) {
+            // What is no library is nobody's business.
+            Ok(bytes) if !mtl::is_library(&bytes) => "it is no material library (MTL)".to_owned(),
+            Ok(bytes) => {
+                for surface in mtl::parse(&path, &bytes, &mut self.textures, &mut self.warnings)? {
+                    // Of two of a name, the first.
+                    let next = self.surfaces.len();
+                    self.surface_of.entry(surface.name.clone()).or_insert(next);
+                    self.surfaces.push(surface);
+                }
+                return Ok(());
+            }
+            Err(LoadError::ReadReferenced { source, .. }) => source.to_string(),
+            Err(error) => return Err(error),
+        };
+        let before = format!("{}: cannot read the material library ", self.path.display());
+        let after = format!(" (line {line}: {why}); its materials are gray");
+        self.notes.add(&before, &path.display().to_string(), &after);
         Ok(())
     }
 
@@ -255,22 +303,29 @@ impl<'a> Reader<'a> {
             textures: self.textures.loaded,
             ..SceneDescription::default()
         };
-        Loaded { description, warnings: self.warnings, memory: 0 }
+        self.warnings.extend(self.notes.sentences());
+        Loaded { description, warnings: self.warnings, ..Loaded::default() }
     }
 
-    /// The surface of a name; an unknown one becomes a new grey one.
+    /// The surface of a name; all unknown ones are one grey.
     fn surface(&mut self, name: Option<&str>) -> usize {
-        let wanted = name.unwrap_or("default");
-        if let Some(index) = self.surfaces.iter().position(|s| s.name == wanted) {
+        const DEFAULT: &str = "default";
+        let known = self.surface_of.get(name.unwrap_or(DEFAULT));
+        if let Some(&index) = known {
             return index;
         }
         if let Some(name) = name {
-            let path = self.path.display();
-            self.warnings.push(format!("{path}: material '{name}' is not defined; it is grey"));
+            let before = format!("{}: without definition and grey: material ", self.path.display());
+            self.notes.add(&before, name, "");
         }
-        let albedo = if self.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
-        self.surfaces.push(Surface::diffuse(wanted, albedo));
-        self.surfaces.len() - 1
+        let grey = self.surface_of.get(DEFAULT).copied().unwrap_or_else(|| {
+            let albedo = if self.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
+            self.surfaces.push(Surface::diffuse(DEFAULT, albedo));
+            self.surfaces.len() - 1
+        });
+        self.surface_of.insert(DEFAULT.into(), grey);
+        self.surface_of.insert(name.unwrap_or(DEFAULT).into(), grey);
+        grey
     }
 
     /// Smooth normals of all positions; empty if every corner brings its own.
@@ -319,13 +374,30 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// The words of a line before its comment.
+pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split_whitespace().take_while(|word| !word.starts_with('#'))
+}
+
 /// All numbers after a keyword, at least `needed`.
 pub(super) fn numbers(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjProblem> {
-    let numbers: Vec<f32> = rest
-        .split_whitespace()
-        .take_while(|word| !word.starts_with('#'))
-        .map(number)
-        .collect::<Result<_, _>>()?;
+    enough(keyword, words(rest).map(number).collect::<Result<_, _>>()?, needed)
+}
+
+/// As [`numbers`]; what exporters write of NaN and infinities (`nan`, `-1.#IND`) is 0.
+fn numbers_or_nan(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjProblem> {
+    // `nan`, `-nan(ind)`, `1.#QNAN`, `inf`, and what is too large for a number.
+    let is_none = |word: &str| {
+        let digits = word.trim_start_matches(['+', '-']).to_ascii_lowercase();
+        digits.starts_with("nan")
+            || digits.contains('#')
+            || word.parse().is_ok_and(|v: f32| !v.is_finite())
+    };
+    let value = |word| if is_none(word) { Ok(0.0) } else { number(word) };
+    enough(keyword, words(rest).map(value).collect::<Result<_, _>>()?, needed)
+}
+
+fn enough(keyword: &str, numbers: Vec<f32>, needed: usize) -> Result<Vec<f32>, ObjProblem> {
     if numbers.len() < needed {
         let found = numbers.len();
         return Err(ObjProblem::TooFew { keyword: keyword.into(), needed, found });
@@ -345,12 +417,4 @@ fn resolve(index: i64, what: &'static str, count: usize) -> Result<u32, ObjProbl
         .filter(|i| (0..count as i64).contains(i))
         .and_then(|i| u32::try_from(i).ok())
         .ok_or(ObjProblem::Index { index, what, count })
-}
-
-/// A polygon as triangles round its first corner.
-fn fan(corners: &[Corner]) -> Result<Vec<[Corner; 3]>, ObjProblem> {
-    if corners.len() < 3 {
-        return Err(ObjProblem::Face { corners: corners.len() });
-    }
-    Ok(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]).collect())
 }

@@ -2,14 +2,16 @@
 //!
 //! Read are, of the element `vertex`, the properties `x y z`, `nx ny nz`, texture coordinates
 //! (`s t`, `u v` or `texture_u texture_v`, v upward) and `red green blue` (integers: sRGB, floats:
-//! linear); of the element `face` the list `vertex_indices` or `vertex_index`, polygons cut into
-//! fans. All else is passed over. A file without normals gets smooth ones.
+//! linear); of the element `face` the list `vertex_indices` or `vertex_index`, polygons of any shape, and colours as of
+//! vertices, which count where vertices have none; of `tristrips` that list, a strip ending at −1. Elements and
+//! properties may stand in any order. All else is passed over. A file without normals gets smooth ones.
 //!
 //! Written for this program: the crates that read PLY build a map of properties for every row.
 
 use std::fmt;
 use std::path::Path;
 
+use super::faces::{Polygons, color_triangles};
 use super::{Budget, LoadError, Loaded, stem};
 use crate::Rgb;
 use crate::geometry::Mesh;
@@ -121,7 +123,7 @@ pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded,
         |(place, problem)| LoadError::Ply { path: path.into(), place, problem: Box::new(problem) };
     let header = Header::parse(bytes).map_err(error)?;
     header.check_size(bytes.len() - header.length).map_err(error)?;
-    budget.take(&path.display().to_string(), header.memory())?;
+    budget.take(&path.display().to_string(), header.memory(bytes.len() - header.length))?;
     let mesh = parse(&header, bytes).map_err(error)?;
     let albedo = if mesh.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
     let description = SceneDescription {
@@ -135,19 +137,15 @@ pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded,
 fn parse(header: &Header, bytes: &[u8]) -> Located<Mesh> {
     let body = &bytes[header.length..];
     let at = header.length;
-    let mut mesh = match header.format {
-        Format::Ascii => read_body(header, &mut Ascii { data: body, position: 0, start: at })?,
+    match header.format {
+        Format::Ascii => read_body(header, &mut Ascii { data: body, position: 0, start: at }),
         Format::Little => {
-            read_body(header, &mut Binary::<false> { data: body, start: at, position: 0 })?
+            read_body(header, &mut Binary::<false> { data: body, start: at, position: 0 })
         }
         Format::Big => {
-            read_body(header, &mut Binary::<true> { data: body, start: at, position: 0 })?
+            read_body(header, &mut Binary::<true> { data: body, start: at, position: 0 })
         }
-    };
-    if mesh.normals.is_empty() {
-        mesh.compute_normals();
     }
-    Ok(mesh)
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -275,16 +273,33 @@ impl Header {
         Err((PlyPlace::Byte(bytes.len()), PlyProblem::NoEndOfHeader))
     }
 
+    /// How many vertices are promised.
+    fn vertices(&self) -> u64 {
+        self.elements.iter().filter(|e| e.name == "vertex").map(|e| e.count).sum()
+    }
+
     /// An estimate of what the mesh takes, of triangles and quadrilaterals; greater polygons are longer in the file too.
-    fn memory(&self) -> u64 {
-        let row = |element: &Element| match element.name.as_str() {
+    /// Strips take what the `left` bytes of the file can hold.
+    fn memory(&self, left: usize) -> u64 {
+        let size = |element: &Element| match element.name.as_str() {
             // Position, normal, texture coordinate, colour.
-            "vertex" => 12 + 12 + 8 + 12,
-            // Where it ends, its indices as they are read, and two triangles.
-            "face" => 8 + 4 * 8 + 2 * 12,
+            "vertex" => element.count.saturating_mul(12 + 12 + 8 + 12),
+            // Where it ends, its indices, and two triangles; with a colour, six vertices of their own.
+            "face" => {
+                let colors = if Colors::of(element).is_some() { 12 + 6 * 44 } else { 0 };
+                element.count.saturating_mul(8 + 4 * 4 + 2 * 12 + colors)
+            }
+            "tristrips" => {
+                let least = element.properties.iter().filter(|p| is_indices(p));
+                let least = match self.format {
+                    Format::Ascii => 2,
+                    _ => least.map(|p| p.scalar.size()).min().unwrap_or(1),
+                };
+                12 * (left / least) as u64
+            }
             _ => 0,
         };
-        self.elements.iter().map(|element| element.count.saturating_mul(row(element))).sum()
+        self.elements.iter().map(size).fold(0, u64::saturating_add)
     }
 
     /// Refuses a header that promises more rows than `left` bytes can hold.
@@ -391,8 +406,9 @@ impl<const BIG: bool> Numbers for Binary<'_, BIG> {
 
 fn read_body(header: &Header, numbers: &mut impl Numbers) -> Located<Mesh> {
     let mut mesh = Mesh::default();
-    let mut polygons = Polygons::default();
+    let mut faces = Faces::default();
     let (mut has_vertices, mut has_faces) = (false, false);
+    let vertices = header.vertices();
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => {
@@ -401,7 +417,11 @@ fn read_body(header: &Header, numbers: &mut impl Numbers) -> Located<Mesh> {
             }
             "face" => {
                 has_faces = true;
-                read_faces(element, numbers, &mut polygons)?;
+                read_faces(element, numbers, vertices, &mut faces)?;
+            }
+            "tristrips" => {
+                has_faces = true;
+                read_strips(element, numbers, vertices, &mut faces.strips)?;
             }
             _ => skip(element, numbers)?,
         }
@@ -416,8 +436,7 @@ fn read_body(header: &Header, numbers: &mut impl Numbers) -> Located<Mesh> {
             PlyProblem::Missing { what: "element face; points alone cannot be rendered" },
         ));
     }
-    mesh.triangles = polygons.triangles(mesh.positions.len())?;
-    Ok(mesh)
+    Ok(faces.finish(mesh))
 }
 
 /// What is read of a vertex, each with its names; the number is the slot in a row of values.
@@ -435,23 +454,42 @@ const SLOTS: [&[&str]; 11] = [
     &["blue", "b", "diffuse_blue"],
 ];
 
+fn slot_of(property: &Property) -> Option<usize> {
+    let name = property.name.as_str();
+    SLOTS.iter().position(|names| property.list.is_none() && names.contains(&name))
+}
+
+/// How an element's red, green and blue are written.
+#[derive(Clone, Copy)]
+struct Colors {
+    /// The greatest value of an integer type.
+    max: Option<f32>,
+}
+
+impl Colors {
+    const RED: usize = 8;
+
+    /// None if the element lacks one of the three.
+    fn of(element: &Element) -> Option<Self> {
+        let of_slot = |slot| element.properties.iter().find(|p| slot_of(p) == Some(slot));
+        let [red, ..] = [of_slot(Self::RED)?, of_slot(Self::RED + 1)?, of_slot(Self::RED + 2)?];
+        Some(Self { max: red.scalar.max() })
+    }
+
+    fn linear(self, rgb: [f32; 3]) -> Rgb {
+        let linear = |c: f32| self.max.map_or(c, |max| decode(c / max, Encoding::Srgb));
+        Rgb::from(rgb).map(linear)
+    }
+}
+
 fn read_vertices(element: &Element, numbers: &mut impl Numbers, mesh: &mut Mesh) -> Located<()> {
-    let slot_of = |p: &Property| {
-        SLOTS.iter().position(|names| p.list.is_none() && names.contains(&p.name.as_str()))
-    };
     let slots: Vec<Option<usize>> = element.properties.iter().map(slot_of).collect();
     let has = |wanted: std::ops::Range<usize>| wanted.into_iter().all(|s| slots.contains(&Some(s)));
     let place = PlyPlace::Line(element.line);
     if !has(0..3) {
         return Err((place, PlyProblem::Missing { what: "vertex properties x, y and z" }));
     }
-    let (normals, uvs, colors) = (has(3..6), has(6..8), has(8..11));
-    let color_max = element
-        .properties
-        .iter()
-        .zip(&slots)
-        .find(|(_, s)| **s == Some(8))
-        .and_then(|(p, _)| p.scalar.max());
+    let (normals, uvs, colors) = (has(3..6), has(6..8), Colors::of(element));
 
     mesh.positions.reserve(element.count as usize);
     for row in 0..element.count as usize {
@@ -475,61 +513,118 @@ fn read_vertices(element: &Element, numbers: &mut impl Numbers, mesh: &mut Mesh)
         if uvs {
             mesh.uvs.push(Vec2::new(u, 1.0 - v));
         }
-        if colors {
-            let linear = |c: f32| color_max.map_or(c, |max| decode(c / max, Encoding::Srgb));
-            mesh.colors.push(Rgb::new(r, g, b).map(linear));
-        }
+        mesh.colors.extend(colors.map(|colors| colors.linear([r, g, b])));
     }
     Ok(())
 }
 
-/// Faces as the file has them.
+/// What the triangles are made of.
 #[derive(Default)]
-struct Polygons {
-    indices: Vec<f64>,
-    /// Where each face's indices end.
-    ends: Vec<usize>,
+struct Faces {
+    polygons: Polygons,
+    /// One a polygon, or none.
+    colors: Vec<Rgb>,
+    /// Triangles of strips.
+    strips: Vec<[u32; 3]>,
 }
 
-impl Polygons {
-    /// Each polygon as a fan round its first vertex.
-    fn triangles(&self, vertices: usize) -> Located<Vec<[u32; 3]>> {
-        let mut triangles = Vec::with_capacity(self.ends.len());
-        let mut begin = 0;
-        for (row, &end) in self.ends.iter().enumerate() {
-            let polygon = &self.indices[begin..end];
-            begin = end;
-            let usable = |i: f64| i >= 0.0 && i < vertices as f64 && i.fract() == 0.0;
-            if let Some(&value) = polygon.iter().find(|&&i| !usable(i)) {
-                let place = PlyPlace::Row { element: "face".into(), row };
-                return Err((place, PlyProblem::Index { value, vertices }));
-            }
-            for pair in polygon.get(1..).unwrap_or_default().windows(2) {
-                triangles.push([polygon[0] as u32, pair[0] as u32, pair[1] as u32]);
-            }
+impl Faces {
+    fn finish(self, mut mesh: Mesh) -> Mesh {
+        let polygons = self.polygons.triangles(&mesh.positions);
+        mesh.triangles = polygons.iter().map(|(triangle, _)| *triangle).collect();
+        mesh.triangles.extend(&self.strips);
+        if mesh.normals.is_empty() {
+            mesh.compute_normals();
         }
-        Ok(triangles)
+        if mesh.colors.is_empty() && !self.colors.is_empty() {
+            let colors = polygons.iter().map(|&(_, face)| self.colors[face]);
+            mesh = color_triangles(&mesh, colors.chain(self.strips.iter().map(|_| DEFAULT_ALBEDO)));
+        }
+        mesh
     }
 }
 
-fn read_faces(element: &Element, numbers: &mut impl Numbers, out: &mut Polygons) -> Located<()> {
-    let is_indices = |p: &Property| {
-        p.list.is_some() && matches!(p.name.as_str(), "vertex_indices" | "vertex_index")
+fn is_indices(p: &Property) -> bool {
+    p.list.is_some() && matches!(p.name.as_str(), "vertex_indices" | "vertex_index")
+}
+
+/// Refuses an element without a list of vertices.
+fn require_indices(element: &Element) -> Located<()> {
+    let what = match element.name.as_str() {
+        "face" => "face property list vertex_indices",
+        _ => "tristrips property list vertex_indices",
     };
-    if !element.properties.iter().any(is_indices) {
-        let what = "face property list vertex_indices";
-        return Err((PlyPlace::Line(element.line), PlyProblem::Missing { what }));
+    let missing = (PlyPlace::Line(element.line), PlyProblem::Missing { what });
+    if element.properties.iter().any(is_indices) { Ok(()) } else { Err(missing) }
+}
+
+/// A vertex that is there.
+fn index(value: f64, vertices: u64, element: &Element, row: usize) -> Located<u32> {
+    if value >= 0.0 && value < vertices as f64 && value.fract() == 0.0 {
+        return Ok(value as u32);
     }
+    let place = PlyPlace::Row { element: element.name.clone(), row };
+    Err((place, PlyProblem::Index { value, vertices: vertices as usize }))
+}
+
+fn read_faces(
+    element: &Element,
+    numbers: &mut impl Numbers,
+    vertices: u64,
+    out: &mut Faces,
+) -> Located<()> {
+    require_indices(element)?;
+    let colors = Colors::of(element);
     for row in 0..element.count as usize {
+        let mut rgb = [0.0; 3];
         for property in &element.properties {
+            let color = slot_of(property).and_then(|slot| slot.checked_sub(Colors::RED));
             if is_indices(property) {
-                let length = list_length(property, numbers, &element.name, row)?;
-                for _ in 0..length {
-                    out.indices.push(numbers.next(property.scalar)?);
+                for _ in 0..list_length(property, numbers, &element.name, row)? {
+                    let value = numbers.next(property.scalar)?;
+                    out.polygons.push(index(value, vertices, element, row)?);
                 }
-                out.ends.push(out.indices.len());
+            } else if let Some(channel) = color {
+                rgb[channel] = numbers.next(property.scalar)? as f32;
             } else {
                 skip_property(property, numbers)?;
+            }
+        }
+        out.polygons.end();
+        out.colors.extend(colors.map(|colors| colors.linear(rgb)));
+    }
+    Ok(())
+}
+
+/// Every corner after the second of a strip makes a triangle with the two before it, every other one turned.
+fn read_strips(
+    element: &Element,
+    numbers: &mut impl Numbers,
+    vertices: u64,
+    out: &mut Vec<[u32; 3]>,
+) -> Located<()> {
+    require_indices(element)?;
+    for row in 0..element.count as usize {
+        for property in &element.properties {
+            if !is_indices(property) {
+                skip_property(property, numbers)?;
+                continue;
+            }
+            let (mut before, mut n) = ([0; 2], 0);
+            for _ in 0..list_length(property, numbers, &element.name, row)? {
+                let value = numbers.next(property.scalar)?;
+                if value == -1.0 {
+                    n = 0;
+                    continue;
+                }
+                let corner = index(value, vertices, element, row)?;
+                let [a, b] = before;
+                // A corner twice in a row joins strips.
+                let is_triangle = n >= 2 && a != b && b != corner && a != corner;
+                if is_triangle {
+                    out.push(if n % 2 == 0 { [a, b, corner] } else { [b, a, corner] });
+                }
+                (before, n) = ([b, corner], n + 1);
             }
         }
     }

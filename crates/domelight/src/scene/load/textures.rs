@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits};
 
 use super::{Budget, LoadError, read_referenced};
+use crate::picture;
 use crate::scene::texture::{Encoding, Texture};
 
 /// The textures of one scene while it is loaded.
@@ -38,6 +39,14 @@ impl<'b> Textures<'b> {
         Ok(index)
     }
 
+    /// Lets go of a texture that nothing refers to, if it is the last.
+    pub(super) fn forget(&mut self, index: usize) {
+        if index + 1 == self.loaded.len() {
+            self.loaded.pop();
+            self.files.retain(|_, known| *known != index);
+        }
+    }
+
     /// The index of a new texture from the bytes of an image file.
     pub(super) fn bytes(
         &mut self,
@@ -46,30 +55,54 @@ impl<'b> Textures<'b> {
         encoding: Encoding,
         referrer: &str,
     ) -> Result<usize, LoadError> {
+        let texture = self.decode(name, bytes, encoding, false, referrer)?;
+        self.loaded.push(texture);
+        Ok(self.loaded.len() - 1)
+    }
+
+    /// A texture from the bytes of an image file, with its alpha if that is asked for and not all opaque.
+    pub(super) fn decode(
+        &self,
+        name: &str,
+        bytes: &[u8],
+        encoding: Encoding,
+        alpha: bool,
+        referrer: &str,
+    ) -> Result<Texture, LoadError> {
         let error =
             |source| LoadError::Image { image: name.into(), referrer: referrer.into(), source };
-        let mut decoder = reader(name, bytes).and_then(ImageReader::into_decoder).map_err(error)?;
+        // Where nothing else limits it, as much as the crate thinks right. A colour profile is unpacked with the header.
+        let mut limits = Limits::default();
+        limits.max_alloc = self.budget.left().or(limits.max_alloc);
+        if picture::format_of(bytes) == Some(picture::Format::Png) {
+            limits = picture::png::limits(bytes, picture::Format::Png, limits.max_alloc)
+                .unwrap_or(limits);
+        }
+        let mut decoder =
+            reader(name, bytes, limits).and_then(ImageReader::into_decoder).map_err(error)?;
         // What the decoder makes, what it becomes as RGB, and what is kept.
         let (width, height) = decoder.dimensions();
         let rgb = if is_deep(decoder.color_type()) { 6 } else { 3 };
+        let converted = if alpha { rgb + rgb / 3 } else { rgb };
         let texels = u64::from(width) * u64::from(height);
-        self.budget.take(name, decoder.total_bytes().saturating_add(2 * rgb * texels))?;
-        // Where nothing else limits it, as much as the crate thinks right.
+        let kept = converted + rgb + u64::from(alpha);
+        self.budget
+            .take(name, decoder.total_bytes().saturating_add(kept.saturating_mul(texels)))?;
         let mut limits = Limits::default();
         limits.max_alloc = self.budget.left().or(limits.max_alloc);
         limits.reserve(decoder.total_bytes()).map_err(error)?;
         decoder.set_limits(limits).map_err(error)?;
-        let texture = decode(decoder, name, encoding).map_err(error)?;
-        self.loaded.push(texture);
-        Ok(self.loaded.len() - 1)
+        decode(decoder, name, encoding, alpha).map_err(error)
     }
 }
 
 fn reader<'a>(
     name: &str,
     bytes: &'a [u8],
+    limits: Limits,
 ) -> Result<ImageReader<Cursor<&'a [u8]>>, image::ImageError> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+    reader.limits(limits);
     if reader.format().is_none()
         && let Ok(format) = image::ImageFormat::from_path(name)
     {
@@ -87,17 +120,34 @@ fn decode(
     decoder: impl ImageDecoder,
     name: &str,
     encoding: Encoding,
+    alpha: bool,
 ) -> Result<Texture, image::ImageError> {
     let deep = is_deep(decoder.color_type());
     let image = DynamicImage::from_decoder(decoder)?;
     let (width, height) = (image.width(), image.height());
+    let mut alphas: Vec<u8> = Vec::new();
+    let keep_alpha = alpha && image.color().has_alpha();
     let texture = if deep {
-        let texels = image.into_rgb16().pixels().map(|p| p.0).collect();
+        let texels = if keep_alpha {
+            let image = image.into_rgba16();
+            alphas = image.pixels().map(|p| (p.0[3] / 257) as u8).collect();
+            image.pixels().map(|p| [p.0[0], p.0[1], p.0[2]]).collect()
+        } else {
+            image.into_rgb16().pixels().map(|p| p.0).collect()
+        };
         Texture::from_rgb16(name, width, height, texels, encoding)
     } else {
-        let texels = image.into_rgb8().pixels().map(|p| p.0).collect();
+        let texels = if keep_alpha {
+            let image = image.into_rgba8();
+            alphas = image.pixels().map(|p| p.0[3]).collect();
+            image.pixels().map(|p| [p.0[0], p.0[1], p.0[2]]).collect()
+        } else {
+            image.into_rgb8().pixels().map(|p| p.0).collect()
+        };
         Texture::from_rgb8(name, width, height, texels, encoding)
     };
+    let is_opaque = alphas.iter().all(|&a| a == 255);
+    let texture = if is_opaque { texture } else { texture.and_then(|t| t.with_alpha(alphas)) };
     texture.map_err(|e| {
         let hint = image::error::ImageFormatHint::Unknown;
         image::ImageError::Decoding(image::error::DecodingError::new(hint, e))

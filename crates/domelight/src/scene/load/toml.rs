@@ -52,9 +52,10 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::textures::Textures;
-use super::{Budget, LoadError, Loaded, load_mesh, relative};
+use super::{Budget, LoadError, LoadOptions, Loaded, load_mesh, relative};
 use crate::Rgb;
 use crate::bsdf::{Material, ParseMaterialError};
+use crate::geometry::linear_part;
 use crate::math::{Mat4, Vec2, Vec3, Vec4};
 use crate::scene::builtin::{BuiltinScene, UnknownScene};
 use crate::scene::camera::{CameraError, CameraSettings, Projection};
@@ -220,45 +221,67 @@ fn white() -> [f32; 3] {
     [1.0; 3]
 }
 
-pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
+pub(super) fn load(
+    path: &Path,
+    bytes: &[u8],
+    budget: &Budget,
+    options: &LoadOptions,
+) -> Result<Loaded, LoadError> {
     let failed =
         |line, problem| LoadError::Toml { path: path.into(), line, problem: Box::new(problem) };
     let text = std::str::from_utf8(bytes)
         .map_err(|e| failed(None, TomlProblem::Encoding { byte: e.valid_up_to() }))?;
+    let lines = Lines::new(text);
     let file: SceneFile = toml::from_str(text).map_err(|e| {
-        let line = e.span().map(|span| line_of(text, span.start));
+        let line = e.span().map(|span| lines.of(span.start));
         failed(line, TomlProblem::Syntax(e.message().into()))
     })?;
     let mut reader = Reader {
         path,
-        text,
+        lines,
         named: BTreeMap::new(),
+        builtin: BTreeMap::new(),
         textures: Textures::new(budget),
         budget,
+        options,
         loaded: Loaded::default(),
     };
     reader.scene(file)?;
     Ok(reader.finish())
 }
 
-fn line_of(text: &str, byte: usize) -> usize {
-    1 + text.as_bytes().iter().take(byte).filter(|&&b| b == b'\n').count()
+/// Where the lines of a text begin.
+struct Lines(Vec<usize>);
+
+impl Lines {
+    fn new(text: &str) -> Self {
+        let after = text.match_indices('\n').map(|(byte, _)| byte + 1);
+        Self(std::iter::once(0).chain(after).collect())
+    }
+
+    /// The line of a byte, from 1.
+    fn of(&self, byte: usize) -> usize {
+        self.0.partition_point(|&begin| begin <= byte)
+    }
 }
 
 struct Reader<'a> {
     path: &'a Path,
-    text: &'a str,
+    lines: Lines,
     /// Surfaces by the name or notation of their material.
     named: BTreeMap<String, usize>,
+    /// Built-in scenes that were made.
+    builtin: BTreeMap<&'static str, SceneDescription>,
     textures: Textures<'a>,
     budget: &'a Budget,
+    options: &'a LoadOptions,
     loaded: Loaded,
 }
 
 impl Reader<'_> {
     /// An error in the table that begins at a byte of the text.
     fn error(&self, byte: usize, problem: TomlProblem) -> LoadError {
-        let line = Some(line_of(self.text, byte));
+        let line = Some(self.lines.of(byte));
         LoadError::Toml { path: self.path.into(), line, problem: Box::new(problem) }
     }
 
@@ -279,9 +302,7 @@ impl Reader<'_> {
         }
         if let Some(environment) = file.environment {
             let at = environment.span().start;
-            let settings = self
-                .environment(environment.into_inner())
-                .map_err(|problem| self.error(at, problem))?;
+            let settings = self.environment(environment.into_inner(), at)?;
             self.loaded.description.environment = Some(settings);
         }
         for object in file.objects {
@@ -331,12 +352,13 @@ impl Reader<'_> {
             }
         }
         let referrer =
-            format!("{}, line {}, material '{name}',", self.path.display(), line_of(self.text, at));
+            format!("{}, line {}, material '{name}',", self.path.display(), self.lines.of(at));
         let transform = UvTransform::new(Vec2::ZERO, 0.0, Vec2::splat(table.uv_scale));
         let mut texture = |file: &Option<String>, encoding| {
             let Some(file) = file else { return Ok(None) };
             let texture = self.textures.file(&relative(self.path, file), encoding, &referrer)?;
-            Ok(Some(TextureRef { texture, wrap: [table.wrap; 2], transform }))
+            let wrap = [table.wrap; 2];
+            Ok(Some(TextureRef { wrap, transform, ..TextureRef::new(texture) }))
         };
         let base_color_texture = texture(&table.base_color_texture, Encoding::Srgb)?;
         let metallic_roughness_texture =
@@ -350,7 +372,7 @@ impl Reader<'_> {
             roughness: table.roughness,
             metallic_roughness_texture,
         });
-        Ok(Surface { name: name.into(), model, normal_map })
+        Ok(Surface { normal_map, ..Surface::new(name, model) })
     }
 
     fn notation(&self, name: &str, text: &str, at: usize) -> Result<Surface, LoadError> {
@@ -360,11 +382,19 @@ impl Reader<'_> {
         Ok(Surface::fixed(name, material))
     }
 
-    fn environment(&self, table: EnvironmentTable) -> Result<EnvironmentSettings, TomlProblem> {
+    fn environment(
+        &self,
+        table: EnvironmentTable,
+        at: usize,
+    ) -> Result<EnvironmentSettings, LoadError> {
         let source = match (table.file, table.builtin) {
-            (Some(file), None) => EnvironmentSource::File(relative(self.path, &file)),
+            (Some(file), None) => {
+                let file = relative(self.path, &file);
+                self.budget.refer(&file, &format!("{}, [environment],", self.path.display()))?;
+                EnvironmentSource::File(file)
+            }
             (None, Some(name)) => EnvironmentSource::Builtin(name),
-            _ => return Err(one_of("[environment]")),
+            _ => return Err(self.error(at, one_of("[environment]"))),
         };
         let finite = "the finite numbers";
         let ranges = [
@@ -374,7 +404,7 @@ impl Reader<'_> {
         ];
         for (what, value, range, least) in ranges {
             if !(value.is_finite() && value >= least) {
-                return Err(TomlProblem::Range { what, value, range });
+                return Err(self.error(at, TomlProblem::Range { what, value, range }));
             }
         }
         Ok(EnvironmentSettings {
@@ -390,15 +420,17 @@ impl Reader<'_> {
         let matrix = matrix(table).map_err(|problem| self.error(at, problem))?;
         let mut loaded = match (&table.file, &table.builtin) {
             (Some(file), None) => {
-                let line = line_of(self.text, at);
+                let line = self.lines.of(at);
                 let referrer = format!("{}, line {line}, an object,", self.path.display());
-                load_mesh(&relative(self.path, file), &referrer, self.budget)?
+                load_mesh(&relative(self.path, file), &referrer, self.budget, self.options)?
             }
             (None, Some(name)) => {
                 let scene = name.parse::<BuiltinScene>();
                 let scene = scene.map_err(|unknown| self.error(at, unknown.into()))?;
-                let description = scene.description();
-                Loaded { description, ..Loaded::default() }
+                let made = self.builtin.entry(scene.name()).or_insert_with(|| scene.description());
+                let name = format!("{}: object {name}", self.path.display());
+                self.budget.take(&name, made.memory())?;
+                Loaded { description: made.clone(), ..Loaded::default() }
             }
             _ => return Err(self.error(at, one_of("an object"))),
         };
@@ -482,8 +514,6 @@ fn matrix(table: &ObjectTable) -> Result<Mat4, TomlProblem> {
         }
     };
     let columns: [Vec4; 4] = [m.x_axis, m.y_axis, m.z_axis, m.w_axis];
-    let usable = columns.iter().all(|c| c.is_finite())
-        && m.determinant() != 0.0
-        && m.determinant().is_finite();
+    let usable = columns.iter().all(|c| c.is_finite()) && linear_part(&m).determinant() != 0.0;
     if usable { Ok(m) } else { Err(TomlProblem::Singular) }
 }

@@ -164,9 +164,12 @@ pub struct ProductScratch {
 }
 
 impl Strategy for ProductSampling<'_> {
-    const N_ROUNDS: u32 = N_LEVELS;
     type Pass = Pool;
     type Scratch = ProductScratch;
+
+    fn n_rounds(&self) -> u32 {
+        N_LEVELS
+    }
 
     fn n_rays(&self) -> u32 {
         self.n_rays
@@ -207,7 +210,7 @@ impl Strategy for ProductSampling<'_> {
         &self,
         tile: &TileShading,
         pushed: &Contributions,
-        free: &[bool],
+        visibility: &[f32],
         scratch: &mut ProductScratch,
     ) {
         let blocks = tile.blocks();
@@ -218,8 +221,9 @@ impl Strategy for ProductSampling<'_> {
             let block = blocks.of(i % tile.width, i / tile.width);
             let mut sum: Rgb = pushed.base[points.clone()].iter().copied().sum();
             while pushed.point.get(ray).is_some_and(|&point| (point as usize) < points.end) {
-                learned.count(block, usize::from(targets[ray]), free[ray]);
-                sum += if free[ray] { pushed.weight[ray] } else { Rgb::BLACK };
+                let v = visibility[ray];
+                learned.count(block, usize::from(targets[ray]), v);
+                sum += if v > 0.0 { pushed.weight[ray] * v } else { Rgb::BLACK };
                 ray += 1;
             }
             learned.set_luminance(i, sum.luminance().max(0.0) / *n_samples as f32);

@@ -82,11 +82,11 @@ impl Learned {
         self.luminance.resize(n_pixels, None);
     }
 
-    /// Counts a ray from a block to the cell in a slot.
+    /// Counts a ray from a block to the cell in a slot, and its visibility in [0, 1].
     #[inline(always)]
-    pub(super) fn count(&mut self, block: usize, slot: usize, free: bool) {
+    pub(super) fn count(&mut self, block: usize, slot: usize, visibility: f32) {
         *at_mut(&mut self.rays[block], slot) += 1.0;
-        *at_mut(&mut self.free[block], slot) += if free { 1.0 } else { 0.0 };
+        *at_mut(&mut self.free[block], slot) += visibility;
     }
 
     /// Sets the mean luminance of a pixel.
@@ -233,7 +233,8 @@ mod tests {
         for _ in 0..200_000 {
             let (block, cell) = (pcg.next_u32() as usize % 8, pcg.next_u32() as usize % 100);
             // Cell c is free c times of 100.
-            learned.count(block, cell, pcg.next_f32() * 100.0 < cell as f32);
+            let is_free = pcg.next_f32() * 100.0 < cell as f32;
+            learned.count(block, cell, if is_free { 1.0 } else { 0.0 });
         }
         let visibility = estimate(&learned, blocks);
         for block in 0..blocks.len() {

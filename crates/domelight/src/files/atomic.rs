@@ -1,16 +1,18 @@
 //! Files that are whole or not there.
 
-use super::{PictureError, Problem};
-use std::fs::{self, File};
+use super::temporary::{Temporary, remove_abandoned};
+use crate::picture::{PictureError, Problem};
+use std::fs::{self, File, Metadata};
 use std::io::{self, BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// Runs `write` on a new file beside `path` and renames it to `path` when all of it is on the disk, so
 /// that a crash never leaves half a file; `-` is standard output. What is not a plain file (a device, a pipe) is
-/// written to directly, and a symbolic link keeps pointing where it points.
+/// written to directly, and a symbolic link keeps pointing where it points. A file that is replaced keeps its
+/// permissions and, where that is allowed, its owner.
 ///
 /// # Errors
-/// If the file cannot be created, written or renamed; the old file is then untouched.
+/// If the file cannot be created, written or renamed, or the one there is read-only; the old file is then untouched.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -49,8 +51,8 @@ pub fn write_atomically_seeking(
     })
 }
 
-/// Whether [`write_atomically`] can make a file at `path` now: to be asked before hours of work. Leaves nothing behind
-/// and does not open devices and pipes.
+/// Whether [`write_atomically`] can make a file at `path` now: to be asked before hours of work. Leaves nothing behind,
+/// not even what killed runs left in the folder ([`remove_abandoned`]), and does not open devices and pipes.
 ///
 /// # Errors
 /// If a file cannot be created there.
@@ -66,24 +68,62 @@ fn try_place(path: &Path) -> io::Result<()> {
     match fs::metadata(&path) {
         Ok(there) if there.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
         Ok(there) if !there.is_file() => Ok(()),
-        _ => {
-            let temporary = beside(&path)?;
-            File::create_new(&temporary)?;
-            fs::remove_file(&temporary)
+        there => {
+            there.map_or(Ok(()), |there| require_replaceable(&path, &there))?;
+            remove_abandoned(folder_of(&path));
+            name_fits(&path)?;
+            Temporary::beside(&path).map(drop)
         }
     }
+}
+
+/// The folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
+}
+
+/// Asks the file system whether it can hold the name, which is longer than that of the temporary file.
+fn name_fits(path: &Path) -> io::Result<()> {
+    match fs::symlink_metadata(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses what is not to be written to: the folder would let it be replaced all the same.
+fn require_replaceable(path: &Path, there: &Metadata) -> io::Result<()> {
+    if there.permissions().readonly() {
+        let text = "it is read-only: make it writable, or choose another name";
+        return Err(io::Error::new(io::ErrorKind::PermissionDenied, text));
+    }
+    File::options().write(true).open(path).map(drop)
+}
+
+/// Gives the new file what the old one has beside its content.
+fn take_after(old: &Metadata, new: &File) -> io::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::{MetadataExt as _, fchown};
+        // Others than root may only give a file to groups that they are in.
+        let owner = fchown(new, Some(old.uid()), Some(old.gid()));
+        if owner.is_err() {
+            let _ = fchown(new, None, Some(old.gid()));
+        }
+    }
+    new.set_permissions(old.permissions())
 }
 
 fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let path = target(path)?;
     if fs::metadata(&path).is_ok_and(|there| !there.is_file()) {
-        return finish(File::options().write(true).open(&path)?, |out| write(out)).map(drop);
+        return finish(File::options().write(true).open(&path)?, |out| write(out));
     }
     replace_plain(&path, |out| write(out))
 }
 
 /// The file itself, at the end of symbolic links, also where it is not there yet.
-fn target(path: &Path) -> io::Result<PathBuf> {
+pub(super) fn target(path: &Path) -> io::Result<PathBuf> {
     match fs::canonicalize(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => match fs::read_link(path) {
             // A circle of links is another error.
@@ -96,32 +136,23 @@ fn target(path: &Path) -> io::Result<PathBuf> {
 
 fn replace_plain(
     path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    write: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
 ) -> io::Result<()> {
-    let temporary = beside(path)?;
-    finish(File::create_new(&temporary)?, write)
-        .and_then(|file| file.sync_all())
-        .and_then(|()| fs::rename(&temporary, path))
-        .inspect_err(|_| drop(fs::remove_file(&temporary)))
+    let old = fs::metadata(path).ok();
+    old.as_ref().map_or(Ok(()), |old| require_replaceable(path, old))?;
+    let mut temporary = Temporary::beside(path)?;
+    temporary.write(|file| {
+        finish(&mut *file, write)?;
+        old.map_or(Ok(()), |old| take_after(&old, file))
+    })?;
+    temporary.keep(path)
 }
 
-fn finish(
-    file: File,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> io::Result<File> {
+fn finish<F: Write>(
+    file: F,
+    write: impl FnOnce(&mut BufWriter<F>) -> io::Result<()>,
+) -> io::Result<()> {
     let mut out = BufWriter::new(file);
     write(&mut out)?;
-    Ok(out.into_inner()?)
-}
-
-/// A name in the same folder that nothing else has.
-fn beside(path: &Path) -> io::Result<PathBuf> {
-    let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
-    let free = (0..u32::MAX).map(|i| {
-        let mut hidden = std::ffi::OsString::from(".");
-        hidden.push(name);
-        hidden.push(format!(".{}-{i}.part", std::process::id()));
-        path.with_file_name(hidden)
-    });
-    free.into_iter().find(|name| !name.exists()).ok_or_else(|| io::ErrorKind::AlreadyExists.into())
+    out.flush()
 }

@@ -1,0 +1,103 @@
+//! The files that the program reads and writes: a command declares them here before its work, so that no result takes
+//! the place of what is read, or of another result.
+
+use std::io::{self, Write};
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use anyhow::Result;
+use domelight::files::{self, FileConflict, FileLedger, WriteSeek};
+use domelight::picture::PictureError;
+
+use crate::failure::UsageError;
+use crate::interrupt;
+
+static LEDGER: Mutex<Option<FileLedger>> = Mutex::new(None);
+
+fn with_ledger<T>(f: impl FnOnce(&mut FileLedger) -> T) -> T {
+    let mut ledger: MutexGuard<Option<FileLedger>> =
+        LEDGER.lock().unwrap_or_else(PoisonError::into_inner);
+    f(ledger.get_or_insert_default())
+}
+
+/// Declares a file that is read; to be called before it is.
+///
+/// # Errors
+/// If it is to be written.
+pub(crate) fn reads(path: &Path) -> Result<(), FileConflict> {
+    with_ledger(|ledger| ledger.read(path))
+}
+
+/// Declares a result of other runs.
+///
+/// # Errors
+/// If it is read or written already.
+pub(crate) fn declare(path: &Path) -> Result<(), FileConflict> {
+    with_ledger(|ledger| ledger.write(path))
+}
+
+/// Declares a result, and asks whether it can be written.
+///
+/// # Errors
+/// If it is read or written already, or cannot be written.
+pub(crate) fn writes(path: &Path) -> Result<()> {
+    if path == Path::new("-") && standard_output_is_closed() {
+        return Err(UsageError("-: standard output is closed; give a file name".into()).into());
+    }
+    with_ledger(|ledger| ledger.write(path))?;
+    Ok(files::require_writable(path)?)
+}
+
+/// Writes a result, whole or not at all.
+///
+/// # Errors
+/// If the file was read, or what [`files::write_atomically`] says.
+pub(crate) fn write(path: &Path, f: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
+    with_waiting(path, || files::write_atomically(path, f))
+}
+
+/// As [`write`], for what is not written from beginning to end.
+///
+/// # Errors
+/// As [`write`].
+pub(crate) fn write_seeking(
+    path: &Path,
+    f: impl FnOnce(&mut dyn WriteSeek) -> io::Result<()>,
+) -> Result<()> {
+    with_waiting(path, || files::write_atomically_seeking(path, f))
+}
+
+fn with_waiting(path: &Path, write: impl FnOnce() -> Result<(), PictureError>) -> Result<()> {
+    with_ledger(|ledger| ledger.check_unread(path))?;
+    // A pipe may wait for its reader for ever.
+    let _waiting = waits(path).then(interrupt::while_waiting);
+    Ok(write()?)
+}
+
+/// Whether reading or writing may take for ever: standard streams, pipes, devices.
+pub(crate) fn waits(path: &Path) -> bool {
+    path == Path::new("-") || std::fs::metadata(path).is_ok_and(|there| !there.is_file())
+}
+
+/// Rust opens /dev/null, for reading and writing, where the standard output is closed when the program starts; a shell
+/// opens it for writing alone.
+#[cfg(unix)]
+fn standard_output_is_closed() -> bool {
+    use nix::fcntl::{FcntlArg, OFlag, fcntl};
+    use std::os::unix::fs::MetadataExt as _;
+    let stdout = io::stdout();
+    let is_null = || {
+        use std::os::fd::AsFd as _;
+        let there =
+            std::fs::File::from(stdout.as_fd().try_clone_to_owned().ok()?).metadata().ok()?;
+        let null = std::fs::metadata("/dev/null").ok()?;
+        Some((there.dev(), there.ino()) == (null.dev(), null.ino()))
+    };
+    let flags = fcntl(&stdout, FcntlArg::F_GETFL).map(OFlag::from_bits_truncate);
+    flags.is_ok_and(|flags| flags & OFlag::O_ACCMODE == OFlag::O_RDWR) && is_null() == Some(true)
+}
+
+#[cfg(not(unix))]
+fn standard_output_is_closed() -> bool {
+    false
+}

@@ -1,0 +1,9 @@
+//! Files that are whole or not there, and which file is which.
+
+mod atomic;
+mod ledger;
+mod temporary;
+
+pub use atomic::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};
+pub use ledger::{FileConflict, FileLedger};
+pub use temporary::remove_abandoned;

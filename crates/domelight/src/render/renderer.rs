@@ -1,0 +1,354 @@
+//! The progressive renderer: a picture on its way to all its samples, pass by pass. It can be watched, interrupted,
+//! saved and resumed, and rendered in shards.
+
+use std::ops::{Deref, Range};
+
+use rayon::prelude::*;
+
+use super::film::{Film, Layers, Misfit, PixelSums, SampleSet};
+use super::filter::FilterSampler;
+use super::spread::usual;
+use super::tile::{Counts, Pass, Scratch, Tile};
+use super::tiling::{Tiling, Window, paired_pass};
+use super::variance::VarianceSums;
+use super::{Frame, Observer, RenderSettings, Rendering};
+use crate::environment::Environment;
+use crate::sampling::Stream;
+use crate::scene::{Camera, Scene};
+use crate::strategy::{PrepareError, PreparedStrategy, Strategy, StrategySpec};
+
+/// A picture on its way to all its samples.
+///
+/// Passes go over all tiles that lack samples; between passes, or when an [`Observer`] ends one early, the caller
+/// may look at the film, save it, or leave and resume later. A tile depends on nothing but the scene, the settings,
+/// the seed and its own place, so none of this changes a bit of the finished picture.
+///
+/// ```
+/// use domelight::environment::{Environment, builtin::BuiltinProbe};
+/// use domelight::render::{RenderSettings, Renderer};
+/// use domelight::scene::{Camera, CameraSettings, Scene, builtin::BuiltinScene};
+///
+/// let scene = Scene::new(BuiltinScene::Sphere.description())?;
+/// let environment = Environment::new(BuiltinProbe::Sky.image(32), Default::default(), 1.0)?;
+/// let settings = RenderSettings { width: 32, height: 32, n_samples: 4, ..Default::default() };
+/// let camera = Camera::framing(&scene, settings.width, settings.height);
+/// let strategy = "mis:1:1".parse()?;
+/// let mut renderer = Renderer::new(&scene, &camera, &environment, strategy, settings)?;
+/// while renderer.step() {
+///     println!("{:.0} %", 100.0 * renderer.progress());
+/// }
+/// let layers = renderer.film().layers();
+/// assert!(layers.color.pixels.iter().all(|c| c.is_finite()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Renderer<'a, S: Strategy = PreparedStrategy<'a>> {
+    frame: Frame<'a>,
+    strategy: Held<'a, S>,
+    spec: Option<StrategySpec>,
+    tiling: Tiling,
+    /// The tiles to render.
+    range: Range<usize>,
+    tiles: Vec<Tile>,
+    /// What was done before the renderer was restored.
+    before: Counts,
+    /// Passes begun so far.
+    mark: Mark,
+}
+
+/// A strategy of the renderer's own, or the caller's.
+enum Held<'a, S> {
+    Own(Box<S>),
+    Lent(&'a S),
+}
+
+impl<S> Deref for Held<'_, S> {
+    type Target = S;
+
+    fn deref(&self) -> &S {
+        match self {
+            Self::Own(strategy) => strategy,
+            Self::Lent(strategy) => strategy,
+        }
+    }
+}
+
+/// A moment between passes; see [`Renderer::changed_since`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Mark(u64);
+
+/// How a pass ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum PassEnd {
+    /// All tiles that it was to render have its samples.
+    Complete,
+    /// The observer ended it.
+    Cancelled,
+    /// There was nothing to render.
+    NothingLeft,
+}
+
+impl<'a> Renderer<'a> {
+    /// Renders with a strategy of the library, for whose open choices a pilot looks at the scene.
+    ///
+    /// The camera must have been made for the settings' width and height.
+    ///
+    /// # Errors
+    /// If the strategy does not suit the environment.
+    ///
+    /// # Panics
+    /// If width, height or tile size are zero.
+    pub fn new(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        environment: &'a Environment,
+        strategy: StrategySpec,
+        settings: RenderSettings,
+    ) -> Result<Self, PrepareError> {
+        let points = || super::survey(scene, camera, &settings);
+        let spec = strategy.for_scene(points, environment, settings.seed);
+        let prepared = Held::Own(Box::new(PreparedStrategy::new(spec, environment)?));
+        let renderer = Self::hold(scene, camera, environment, prepared, settings);
+        Ok(Self { spec: Some(spec), ..renderer })
+    }
+
+    /// The strategy that renders, with the pilot's choices; `None` of a strategy that the caller holds.
+    pub fn spec(&self) -> Option<StrategySpec> {
+        self.spec
+    }
+}
+
+impl<'a, S: Strategy> Renderer<'a, S> {
+    /// Renders with any strategy.
+    ///
+    /// The camera must have been made for the settings' width and height. The strategy brings its own
+    /// reference to the light that it samples; `environment` is what camera rays see.
+    ///
+    /// # Panics
+    /// If width, height or tile size are zero.
+    pub fn with_strategy(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        environment: &'a Environment,
+        strategy: &'a S,
+        settings: RenderSettings,
+    ) -> Self {
+        Self::hold(scene, camera, environment, Held::Lent(strategy), settings)
+    }
+
+    fn hold(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        environment: &'a Environment,
+        strategy: Held<'a, S>,
+        settings: RenderSettings,
+    ) -> Self {
+        let filter = FilterSampler::new(settings.filter);
+        let extent = scene.bounds().size().max_element();
+        let tiling = Tiling::new(&settings, strategy.n_rays());
+        let frame = Frame { scene, camera, environment, settings, filter, extent };
+        let empty = Self {
+            frame,
+            strategy,
+            spec: None,
+            tiling,
+            range: 0..0,
+            tiles: Vec::new(),
+            before: Counts::default(),
+            mark: Mark::default(),
+        };
+        empty.only(0..tiling.n_tiles())
+    }
+
+    /// The same renderer for `tiles` only, without samples.
+    ///
+    /// # Panics
+    /// If there are no such tiles.
+    #[must_use]
+    pub fn only(mut self, tiles: Range<usize>) -> Self {
+        self.tiles = tiles.clone().map(|t| Tile::new(self.tiling.tile(t))).collect();
+        self.range = tiles;
+        self
+    }
+
+    /// The same renderer for shard `k` of `n` only, without samples.
+    ///
+    /// # Panics
+    /// Unless k < n.
+    #[must_use]
+    pub fn shard(self, k: usize, n: usize) -> Self {
+        let tiles = self.tiling.shard(k, n);
+        self.only(tiles)
+    }
+
+    /// How to render.
+    pub fn settings(&self) -> &RenderSettings {
+        &self.frame.settings
+    }
+
+    /// How the picture is divided.
+    pub fn tiling(&self) -> Tiling {
+        self.tiling
+    }
+
+    /// The tiles that are rendered.
+    pub fn tiles(&self) -> Range<usize> {
+        self.range.clone()
+    }
+
+    /// Renders the next pass. Returns false when there was nothing left to render.
+    pub fn step(&mut self) -> bool {
+        self.pass(&()) != PassEnd::NothingLeft
+    }
+
+    /// Renders all that is missing and returns the film.
+    pub fn finish(&mut self) -> Film {
+        self.run(&());
+        self.film()
+    }
+
+    /// Renders what is missing, on rayon's current pool of threads, until the observer ends it: a later run goes on
+    /// from there. Returns whether all samples of all pixels are there.
+    pub fn run(&mut self, observer: &impl Observer) -> bool {
+        loop {
+            match self.pass(observer) {
+                PassEnd::Complete => {}
+                PassEnd::Cancelled => return false,
+                PassEnd::NothingLeft => return true,
+            }
+        }
+    }
+
+    /// Renders one pass over the tiles that are behind.
+    fn pass(&mut self, observer: &impl Observer) -> PassEnd {
+        let Some(start) = self.unfinished().map(Tile::n_samples).min() else {
+            return PassEnd::NothingLeft;
+        };
+        if observer.cancelled() {
+            return PassEnd::Cancelled;
+        }
+        self.mark.0 += 1;
+        let Self { frame, strategy, tiling, tiles, mark, .. } = self;
+        let (strategy, settings): (&S, _) = (strategy, &frame.settings);
+        let (samples, set) = match settings.target_error {
+            None => (tiling.pass(strategy, start, settings.n_samples - start), SampleSet::First),
+            Some(_) => paired_pass(start, settings.n_samples),
+        };
+        observer.pass_started(samples.clone());
+        let stream = Stream::of_pass(settings.sampler, settings.seed, start);
+        let n_samples = samples.len() as u32;
+        let shared = strategy.begin_pass(stream, n_samples);
+        let adaptive = settings.adaptive && strategy.n_rounds() > 1;
+        let mut pass = Pass { n_samples, set, adaptive, usual: None, shared };
+        if adaptive {
+            pass.usual = usual(frame, strategy, &pass);
+        }
+        let behind = |tile: &Tile| tile.n_samples() == start && !tile.is_finished(settings);
+        let complete = tiles
+            .par_iter_mut()
+            .filter(|tile| behind(tile))
+            .map_init(Scratch::<S>::default, |scratch, tile| {
+                if observer.cancelled() {
+                    return false;
+                }
+                let counts = tile.render(frame, strategy, &pass, scratch, observer);
+                tile.changed = *mark;
+                observer.tile_finished(&counts);
+                true
+            })
+            .reduce(|| true, |a, b| a & b);
+        if complete { PassEnd::Complete } else { PassEnd::Cancelled }
+    }
+
+    /// Whether all samples of all pixels are there.
+    pub fn is_complete(&self) -> bool {
+        self.unfinished().next().is_none()
+    }
+
+    fn unfinished(&self) -> impl Iterator<Item = &Tile> {
+        self.tiles.iter().filter(|tile| !tile.is_finished(&self.frame.settings))
+    }
+
+    /// The share of the camera samples that is done, in [0, 1].
+    pub fn progress(&self) -> f64 {
+        let n_samples = f64::from(self.frame.settings.n_samples);
+        let done = |tile: &Tile| {
+            let is_finished = tile.is_finished(&self.frame.settings);
+            let share = if is_finished { 1.0 } else { f64::from(tile.n_samples()) / n_samples };
+            share * tile.window.area() as f64
+        };
+        let area: usize = self.tiles.iter().map(|tile| tile.window.area()).sum();
+        if area == 0 { 1.0 } else { self.tiles.iter().map(done).sum::<f64>() / area as f64 }
+    }
+
+    /// This moment, to ask later which tiles have changed since.
+    pub fn mark(&self) -> Mark {
+        self.mark
+    }
+
+    /// The pixels of the tiles that have got samples since a mark.
+    pub fn changed_since(&self, mark: Mark) -> impl Iterator<Item = Window> {
+        self.tiles.iter().filter(move |tile| tile.changed > mark).map(|tile| tile.window)
+    }
+
+    /// What was done, including what was done before the renderer was restored.
+    pub fn counts(&self) -> Counts {
+        self.tiles.iter().fold(self.before, |sum, tile| sum + tile.counts)
+    }
+
+    /// The sums of all pixels so far.
+    pub fn film(&self) -> Film {
+        let RenderSettings { width, height, .. } = self.frame.settings;
+        let window = self.tiling.window(&self.range);
+        let mut film = Film::new(width, height, window);
+        for tile in &self.tiles {
+            film.put(tile.window, &tile.sums());
+        }
+        film
+    }
+
+    /// The film of one tile's pixels, for instance of those that have changed.
+    ///
+    /// # Panics
+    /// If the window is none of the renderer's tiles.
+    pub fn film_of(&self, window: Window) -> Film {
+        let RenderSettings { width, height, .. } = self.frame.settings;
+        let tile = self.tiles.iter().find(|tile| tile.window == window);
+        let tile = tile.unwrap_or_else(|| panic!("{window} is no tile of this renderer"));
+        let mut film = Film::new(width, height, window);
+        film.put(window, &tile.sums());
+        film
+    }
+
+    /// Takes over the sums that another renderer of the same picture had.
+    ///
+    /// # Errors
+    /// If they are of another part or size of picture, or of no whole number of passes.
+    pub fn restore(&mut self, film: &Film, counts: Counts) -> Result<(), Misfit> {
+        film.require_window(&self.frame.settings, self.tiling.window(&self.range))?;
+        self.mark.0 += 1;
+        for tile in &mut self.tiles {
+            let pixels: Vec<PixelSums> = film.get(tile.window);
+            let n_samples = pixels[0].n_samples();
+            if pixels.iter().any(|p| (p.n_samples() == 0) != (n_samples == 0)) {
+                let Window { x, y, .. } = tile.window;
+                return Err(Misfit::Samples { x, y });
+            }
+            tile.restore(pixels);
+            tile.changed = self.mark;
+        }
+        self.before = counts;
+        Ok(())
+    }
+
+    /// The picture of all tiles so far.
+    pub fn rendering(&self) -> Rendering {
+        let window = self.tiling.window(&self.range);
+        let mut layers = Layers::new(window.width, window.height);
+        let mut variance = VarianceSums::default();
+        self.tiles.iter().for_each(|tile| variance.add(&tile.variance_sums()));
+        for tile in &self.tiles {
+            tile.put_into(&mut layers, window, &variance);
+        }
+        Rendering { layers, counts: self.counts(), complete: self.is_complete() }
+    }
+}

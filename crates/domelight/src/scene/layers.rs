@@ -1,0 +1,191 @@
+//! What glTF's material extensions add to metallic-roughness, as a file states it.
+//!
+//! A loader fills these in whole; [`Surface::undrawn_features`](super::Surface::undrawn_features) says
+//! which of them a picture lacks. Where a number has a texture, the two are multiplied.
+
+use super::texture::TextureRef;
+use crate::Rgb;
+
+/// How much of what lies behind a surface shows through it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coverage {
+    /// What the opacity means.
+    pub mode: AlphaMode,
+    /// Opacity in \[0, 1\]; multiplied by the texture's alpha and by the vertices'.
+    pub opacity: f32,
+    /// A texture whose alpha counts.
+    pub texture: Option<TextureRef>,
+}
+
+/// What the opacity of a surface means.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaMode {
+    /// Nothing: the surface is opaque.
+    #[default]
+    Opaque,
+    /// The surface is there where opacity reaches the cutoff.
+    Mask {
+        /// The cutoff, ≥ 0.
+        cutoff: f32,
+    },
+    /// The share of the surface in what is seen.
+    Blend,
+}
+
+impl Default for Coverage {
+    fn default() -> Self {
+        Self { mode: AlphaMode::Opaque, opacity: 1.0, texture: None }
+    }
+}
+
+/// Light that a surface sends out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emission {
+    /// Radiance ≥ 0, the strength of `KHR_materials_emissive_strength` included.
+    pub radiance: Rgb,
+    /// A colour texture.
+    pub texture: Option<TextureRef>,
+}
+
+/// A number with a linear texture that holds it in one of its channels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Factor {
+    /// The number.
+    pub value: f32,
+    /// The texture; which channel counts is the parameter's to say.
+    pub texture: Option<TextureRef>,
+}
+
+/// A colour with a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColorFactor {
+    /// The linear colour.
+    pub value: Rgb,
+    /// The texture, in sRGB.
+    pub texture: Option<TextureRef>,
+}
+
+/// What lies on, in and behind the metallic-roughness layer; nothing by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Layers {
+    /// The index of refraction ≥ 1, or 0 for a reflectance of 1; `None`: 1.5
+    /// (`KHR_materials_ior`).
+    pub ior: Option<f32>,
+    /// The strength and color of the dielectric's reflection.
+    pub specular: Option<Specular>,
+    /// A clear varnish.
+    pub clearcoat: Option<Clearcoat>,
+    /// Fibers that glow at grazing angles.
+    pub sheen: Option<Sheen>,
+    /// A highlight that is longer in one direction.
+    pub anisotropy: Option<Anisotropy>,
+    /// Light that goes through the surface.
+    pub transmission: Option<Factor>,
+    /// What lies behind a surface that transmits.
+    pub volume: Option<Volume>,
+}
+
+/// `KHR_materials_specular`: factors on the reflectance of a dielectric.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Specular {
+    /// Strength in \[0, 1\]; the texture's alpha channel.
+    pub strength: Factor,
+    /// Color ≥ 0 of the reflection at normal incidence.
+    pub color: ColorFactor,
+}
+
+/// `KHR_materials_clearcoat`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clearcoat {
+    /// Strength in \[0, 1\]; the texture's red channel.
+    pub strength: Factor,
+    /// Perceptual roughness in \[0, 1\]; the texture's green channel.
+    pub roughness: Factor,
+    /// The coat's own relief.
+    pub normal_map: Option<super::NormalMap>,
+}
+
+/// `KHR_materials_sheen`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sheen {
+    /// Color in \[0, 1\].
+    pub color: ColorFactor,
+    /// Perceptual roughness in \[0, 1\]; the texture's alpha channel.
+    pub roughness: Factor,
+}
+
+/// `KHR_materials_anisotropy`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Anisotropy {
+    /// Strength in \[0, 1\]; the texture's blue channel.
+    pub strength: f32,
+    /// The longer direction, counter-clockwise from the tangent \[rad\].
+    pub rotation: f32,
+    /// A linear texture: a direction in red and green from −1 at 0 to 1 at 1, and the strength.
+    pub texture: Option<TextureRef>,
+}
+
+/// `KHR_materials_volume`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Volume {
+    /// Thickness ≥ 0 in the mesh's units, 0 for a thin wall; the texture's green channel.
+    pub thickness: Factor,
+    /// The distance at which white light has the attenuation's color, in world units; may be infinite.
+    pub attenuation_distance: f32,
+    /// The color at that distance, in \[0, 1\].
+    pub attenuation_color: Rgb,
+}
+
+impl Layers {
+    /// Every use of a texture.
+    pub(super) fn textures(&self) -> impl Iterator<Item = &TextureRef> {
+        let Self { ior: _, specular, clearcoat, sheen, anisotropy, transmission, volume } = self;
+        let normal_map = clearcoat.as_ref().and_then(|c| c.normal_map.as_ref());
+        [
+            specular.as_ref().and_then(|s| s.strength.texture.as_ref()),
+            specular.as_ref().and_then(|s| s.color.texture.as_ref()),
+            clearcoat.as_ref().and_then(|c| c.strength.texture.as_ref()),
+            clearcoat.as_ref().and_then(|c| c.roughness.texture.as_ref()),
+            normal_map.map(|n| &n.texture),
+            sheen.as_ref().and_then(|s| s.color.texture.as_ref()),
+            sheen.as_ref().and_then(|s| s.roughness.texture.as_ref()),
+            anisotropy.as_ref().and_then(|a| a.texture.as_ref()),
+            transmission.as_ref().and_then(|t| t.texture.as_ref()),
+            volume.as_ref().and_then(|v| v.thickness.texture.as_ref()),
+        ]
+        .into_iter()
+        .flatten()
+    }
+
+    /// Every use of a texture, to change it.
+    pub(super) fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
+        let Self { ior: _, specular, clearcoat, sheen, anisotropy, transmission, volume } = self;
+        let [mut strength, mut color] = [None, None];
+        if let Some(s) = specular {
+            (strength, color) = (s.strength.texture.as_mut(), s.color.texture.as_mut());
+        }
+        let [mut coat, mut coat_roughness, mut coat_normal] = [None, None, None];
+        if let Some(c) = clearcoat {
+            (coat, coat_roughness) = (c.strength.texture.as_mut(), c.roughness.texture.as_mut());
+            coat_normal = c.normal_map.as_mut().map(|n| &mut n.texture);
+        }
+        let [mut fibers, mut fiber_roughness] = [None, None];
+        if let Some(s) = sheen {
+            (fibers, fiber_roughness) = (s.color.texture.as_mut(), s.roughness.texture.as_mut());
+        }
+        [
+            strength,
+            color,
+            coat,
+            coat_roughness,
+            coat_normal,
+            fibers,
+            fiber_roughness,
+            anisotropy.as_mut().and_then(|a| a.texture.as_mut()),
+            transmission.as_mut().and_then(|t| t.texture.as_mut()),
+            volume.as_mut().and_then(|v| v.thickness.texture.as_mut()),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}

@@ -1,0 +1,195 @@
+//! Animations at one moment: what they set of nodes.
+
+use std::collections::HashMap;
+
+use super::error::{Failure, GltfProblem};
+use super::json::{self, Interpolation};
+use super::source::Source;
+use crate::math::{Quat, Vec4};
+use crate::scene::load::AnimationTime;
+
+/// What an animation sets of a node.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct NodePose {
+    pub(super) translation: Option<[f32; 3]>,
+    pub(super) rotation: Option<[f32; 4]>,
+    pub(super) scale: Option<[f32; 3]>,
+    pub(super) weights: Option<Vec<f32>>,
+}
+
+/// The index of a choice: by name, else by number.
+pub(super) fn choose(
+    what: &'static str,
+    asked: &str,
+    known: Vec<String>,
+) -> Result<usize, GltfProblem> {
+    let by_name = known.iter().position(|name| name == asked);
+    let by_number = || asked.parse().ok().filter(|&i| i < known.len());
+    by_name.or_else(by_number).ok_or_else(|| {
+        let asked = asked.to_owned();
+        GltfProblem::NoChoice { what, asked, known }
+    })
+}
+
+/// The nodes as an animation has them at a moment.
+pub(super) fn at(
+    source: &Source<'_>,
+    time: &AnimationTime,
+) -> Result<HashMap<usize, NodePose>, Failure> {
+    let count = source.document.count::<json::Animation>();
+    let all = (0..count).map(|i| source.document.get::<json::Animation>(i));
+    let names = all.map(|a| a.map(|a| a.name).unwrap_or_default()).collect();
+    let index = choose("animation", &time.name, names)?;
+    let animation: json::Animation = source.document.get(index)?;
+    let mut poses: HashMap<usize, NodePose> = HashMap::new();
+    for (i, channel) in animation.channels.iter().enumerate() {
+        let Some(node) = channel.target.node else { continue };
+        let pose = poses.entry(node).or_default();
+        channel_at(source, &animation, channel, time.seconds, pose)
+            .map_err(|e| e.within(|| format!("animation {index}, channel {i}")))?;
+    }
+    Ok(poses)
+}
+
+fn channel_at(
+    source: &Source<'_>,
+    animation: &json::Animation,
+    channel: &json::Channel,
+    seconds: f32,
+    pose: &mut NodePose,
+) -> Result<(), Failure> {
+    let sampler = animation.samplers.get(channel.sampler).ok_or_else(|| {
+        let (index, count) = (channel.sampler, animation.samplers.len());
+        GltfProblem::NoSuch { what: "animation sampler", index, count }
+    })?;
+    let times = source.floats::<1>(sampler.input, "SCALAR", "times of an animation")?;
+    let times: Vec<f32> = times.into_iter().map(|[t]| t).collect();
+    let shape = match &*channel.target.path {
+        "translation" | "scale" => "VEC3",
+        "rotation" => "VEC4",
+        "weights" => "SCALAR",
+        other => {
+            source.warn(&format!("the animation of '{other}' is not known; it stays at rest"));
+            return Ok(());
+        }
+    };
+    let values = source.floats::<4>(sampler.output, shape, "values of an animation")?;
+    let n = match shape {
+        "VEC3" => 3,
+        "VEC4" => 4,
+        _ => 1,
+    };
+    let flat: Vec<f32> = values.iter().flat_map(|v| v[..n].iter().copied()).collect();
+    let curve = Curve { times: &times, values: &flat, interpolation: sampler.interpolation };
+    let Some(mut value) = curve.at(seconds, &channel.target.path) else { return Ok(()) };
+    match &*channel.target.path {
+        "translation" => pose.translation = value.try_into().ok(),
+        "scale" => pose.scale = value.try_into().ok(),
+        "rotation" => {
+            let q: [f32; 4] = std::array::from_fn(|i| value.get(i).copied().unwrap_or_default());
+            pose.rotation = Some(Vec4::from(q).normalize_or(Vec4::W).to_array());
+        }
+        _ => {
+            value.truncate(MAX_WEIGHTS);
+            pose.weights = Some(value);
+        }
+    }
+    Ok(())
+}
+
+/// More morph targets than any mesh has.
+const MAX_WEIGHTS: usize = 1 << 16;
+
+/// Values at times, as many numbers a time as there are more values than times.
+struct Curve<'c> {
+    times: &'c [f32],
+    values: &'c [f32],
+    interpolation: Interpolation,
+}
+
+impl Curve<'_> {
+    /// The value at a time; before the first and after the last it stays as it is there. `None` if there
+    /// are none, or too few.
+    fn at(&self, seconds: f32, path: &str) -> Option<Vec<f32>> {
+        let cubic = self.interpolation == Interpolation::CubicSpline;
+        let per_key = if cubic { 3 } else { 1 };
+        let n = self.values.len() / (self.times.len() * per_key).max(1);
+        if self.times.is_empty() || n == 0 {
+            return None;
+        }
+        // Of a key: in-tangent, value and out-tangent of a spline, else the value.
+        let of_key = |key: usize, part: usize| {
+            let begin = (key * per_key + part) * n;
+            &self.values[begin..begin + n]
+        };
+        let value = |key| of_key(key, usize::from(cubic));
+        let next = self.times.partition_point(|&t| t <= seconds);
+        if next == 0 || next == self.times.len() {
+            return Some(value(next.saturating_sub(1)).to_vec());
+        }
+        let key = next - 1;
+        let interval = self.times[next] - self.times[key];
+        let t = ((seconds - self.times[key]) / interval).clamp(0.0, 1.0);
+        let mix = |i: usize| {
+            let (a, b) = (value(key)[i], value(next)[i]);
+            match self.interpolation {
+                Interpolation::Step => a,
+                Interpolation::Linear => a + (b - a) * t,
+                Interpolation::CubicSpline => {
+                    let (out, into) = (interval * of_key(key, 2)[i], interval * of_key(next, 0)[i]);
+                    let (t2, t3) = (t * t, t * t * t);
+                    (2.0 * t3 - 3.0 * t2 + 1.0) * a
+                        + (t3 - 2.0 * t2 + t) * out
+                        + (3.0 * t2 - 2.0 * t3) * b
+                        + (t3 - t2) * into
+                }
+            }
+        };
+        if path == "rotation" && self.interpolation == Interpolation::Linear && n == 4 {
+            let q = |key| Quat::from_slice(value(key)).normalize();
+            return Some(q(key).slerp(q(next), t).to_array().to_vec());
+        }
+        Some((0..n).map(mix).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_interpolate_and_stay_at_their_ends() {
+        let curve = |interpolation, values| Curve { times: &[1.0, 3.0], values, interpolation };
+        let linear = curve(Interpolation::Linear, &[10.0, 0.0, 20.0, 2.0]);
+        for (t, expected) in [(0.0, [10.0, 0.0]), (2.0, [15.0, 1.0]), (9.0, [20.0, 2.0])] {
+            assert_eq!(linear.at(t, "translation").unwrap(), expected);
+        }
+        let step = curve(Interpolation::Step, &[10.0, 20.0]);
+        assert_eq!(step.at(2.9, "weights").unwrap(), [10.0]);
+        // In the middle of an interval of 2 s: the mean, and an eighth of the tangents' difference each.
+        let spline = curve(Interpolation::CubicSpline, &[9.0, 10.0, 4.0, 0.0, 20.0, 9.0]);
+        assert_eq!(spline.at(2.0, "translation").unwrap(), [16.0]);
+        assert_eq!(spline.at(3.0, "translation").unwrap(), [20.0]);
+        assert_eq!(curve(Interpolation::Linear, &[]).at(2.0, "scale"), None);
+    }
+
+    #[test]
+    fn rotations_turn_at_one_speed() {
+        let (a, b) = (Quat::IDENTITY, Quat::from_rotation_z(2.0));
+        let values = [a.to_array(), (-b).to_array()].concat();
+        let curve =
+            Curve { times: &[0.0, 1.0], values: &values, interpolation: Interpolation::Linear };
+        let quarter = Quat::from_slice(&curve.at(0.25, "rotation").unwrap());
+        assert!(quarter.dot(Quat::from_rotation_z(0.5)).abs() > 0.999_999);
+    }
+
+    #[test]
+    fn choices_are_names_before_numbers() {
+        let known = || vec!["walk".to_owned(), "0".to_owned()];
+        assert_eq!(choose("animation", "walk", known()).unwrap(), 0);
+        assert_eq!(choose("animation", "0", known()).unwrap(), 1);
+        assert_eq!(choose("animation", "1", known()).unwrap(), 1);
+        let error = choose("animation", "run", known()).unwrap_err().to_string();
+        assert!(error.contains("run") && error.contains("0 'walk', 1 '0'"), "{error}");
+    }
+}

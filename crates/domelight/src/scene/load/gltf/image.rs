@@ -1,0 +1,196 @@
+//! Textures: which of its images a texture takes, and their decoding.
+
+use std::collections::HashMap;
+
+use super::error::{Failure, GltfProblem};
+use super::json;
+use super::ktx2::{Ktx2, is_ktx2};
+use super::source::{Source, View, percent_decoded};
+use crate::scene::load::textures::Textures;
+use crate::scene::load::{read_referenced, relative};
+use crate::scene::{Encoding, Texture, TextureFilter, TextureRef, UvTransform, Wrap};
+
+/// What a use of an image needs of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Channels {
+    pub(super) encoding: Encoding,
+    /// Whether alpha counts.
+    pub(super) alpha: bool,
+}
+
+/// A color.
+pub(super) const COLOR: Channels = Channels { encoding: Encoding::Srgb, alpha: false };
+/// A color, and a number in the alpha channel.
+pub(super) const COLOR_AND_ALPHA: Channels = Channels { encoding: Encoding::Srgb, alpha: true };
+/// Numbers.
+pub(super) const LINEAR: Channels = Channels { encoding: Encoding::Linear, alpha: false };
+/// A number in the alpha channel.
+pub(super) const ALPHA: Channels = Channels { encoding: Encoding::Linear, alpha: true };
+
+/// The images that were decoded.
+pub(super) struct Images<'a> {
+    pub(super) textures: Textures<'a>,
+    /// The texture of an image, and whether its alpha was read.
+    known: HashMap<(usize, Encoding), (usize, bool)>,
+}
+
+impl<'a> Images<'a> {
+    pub(super) fn new(textures: Textures<'a>) -> Self {
+        Self { textures, known: HashMap::new() }
+    }
+
+    /// A use of a texture, its image decoded; `None`, with a warning, if the texture has no image.
+    pub(super) fn texture(
+        &mut self,
+        source: &Source<'_>,
+        info: &json::TextureInfo,
+        uv_set: usize,
+        channels: Channels,
+    ) -> Result<Option<TextureRef>, Failure> {
+        let texture: json::Texture = source.document.get(info.index)?;
+        let Some(image) = image_of(&texture)? else {
+            source
+                .warn(&format!("texture {} has no image that is read and is ignored", info.index));
+            return Ok(None);
+        };
+        let sampler: json::Sampler = match texture.sampler {
+            Some(sampler) => source.document.get(sampler)?,
+            None => json::Sampler::default(),
+        };
+        let wrap = [sampler.wrap_s, sampler.wrap_t].map(|mode| match mode {
+            Some(33071) => Wrap::Clamp,
+            Some(33648) => Wrap::Mirror,
+            _ => Wrap::Repeat,
+        });
+        let filter = match sampler.mag_filter {
+            Some(9728) => TextureFilter::Nearest,
+            _ => TextureFilter::Linear,
+        };
+        let transform = info.extensions.transform.as_ref().map_or(UvTransform::IDENTITY, |t| {
+            UvTransform::new(t.offset.into(), t.rotation, t.scale.into())
+        });
+        let texture = match self.image(source, image, channels) {
+            Err(Failure::Load(error)) if error.is_missing_file() && !source.strict => {
+                source.warn(&format!("{error}; its textures are left out"));
+                return Ok(None);
+            }
+            texture => texture?,
+        };
+        Ok(Some(TextureRef { texture, uv_set, wrap, filter, transform }))
+    }
+
+    /// The texture of an image.
+    fn image(
+        &mut self,
+        source: &Source<'_>,
+        index: usize,
+        channels: Channels,
+    ) -> Result<usize, Failure> {
+        let known = self.known.get(&(index, channels.encoding)).copied();
+        match known {
+            Some((texture, has_alpha)) if has_alpha || !channels.alpha => return Ok(texture),
+            _ => {}
+        }
+        let texture = self.decode(source, index, channels)?;
+        let loaded = &mut self.textures.loaded;
+        // Read again for its alpha, an image takes its own place.
+        let place = known.map_or(loaded.len(), |(place, _)| place);
+        if place == loaded.len() {
+            loaded.push(texture);
+        } else {
+            loaded[place] = texture;
+        }
+        self.known.insert((index, channels.encoding), (place, channels.alpha));
+        Ok(place)
+    }
+
+    fn decode(
+        &self,
+        source: &Source<'_>,
+        index: usize,
+        channels: Channels,
+    ) -> Result<Texture, Failure> {
+        let image: json::Image = source.document.get(index)?;
+        let referrer = source.referrer(&format!("image {index}"));
+        let in_file = |uri: &String| !uri.starts_with("data:") && !uri.contains("://");
+        let (name, bytes) = match (&image.uri, image.buffer_view) {
+            (Some(uri), _) if in_file(uri) => {
+                let path = relative(source.path, &percent_decoded(uri));
+                let bytes = read_referenced(&path, &referrer, source.budget)?;
+                (path.display().to_string(), View::Decoded(bytes.into()))
+            }
+            (Some(uri), _) => {
+                let bytes = source.uri("image", index, uri)?;
+                (format!("image {index}"), View::Decoded(bytes.into()))
+            }
+            (None, Some(view)) => (format!("image {index}"), source.view(view)?.0),
+            (None, None) => {
+                return Err(GltfProblem::NoSource { what: "image", index }.into());
+            }
+        };
+        if bytes.get(4..12).is_some_and(|kind| kind == b"ftypavif" || kind == b"ftypavis") {
+            return Err(GltfProblem::Avif { image: index }.into());
+        }
+        if is_ktx2(&bytes) {
+            return ktx2(source, &name, &bytes, index, channels);
+        }
+        let Channels { encoding, alpha } = channels;
+        Ok(self.textures.decode(&name, &bytes, encoding, alpha, &referrer)?)
+    }
+}
+
+/// The texture of a KTX2 image.
+fn ktx2(
+    source: &Source<'_>,
+    name: &str,
+    bytes: &[u8],
+    index: usize,
+    channels: Channels,
+) -> Result<Texture, Failure> {
+    let problem = |source| GltfProblem::Ktx2 { image: index, source };
+    let image = Ktx2::new(bytes).map_err(problem)?;
+    let (width, height) = (image.width, image.height);
+    // Decoded, once more as they are kept, and their alpha.
+    let place = format!("{}, image {index}", source.path.display());
+    source.budget.take(&place, 12 * u64::from(width) * u64::from(height))?;
+    let (texels, has_alpha) = image.decode().map_err(problem)?;
+    let colors = texels.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+    let texture = Texture::from_rgb8(name, width, height, colors, channels.encoding);
+    let texture = texture.map_err(GltfProblem::from)?;
+    let alpha = texels.iter().map(|&[.., a]| a);
+    let needs_alpha = channels.alpha && has_alpha && alpha.clone().any(|a| a != 255);
+    if needs_alpha {
+        return Ok(texture.with_alpha(alpha.collect()).map_err(GltfProblem::from)?);
+    }
+    Ok(texture)
+}
+
+/// The image that a texture takes: Basis Universal or WebP before the one that all programs read, which
+/// is also what stands in for AVIF.
+fn image_of(texture: &json::Texture) -> Result<Option<usize>, GltfProblem> {
+    let json::TextureExtensions { basisu, webp, avif } = &texture.extensions;
+    let of = |source: &Option<json::TextureSource>| source.as_ref().and_then(|s| s.source);
+    let image = of(basisu).or(of(webp)).or(texture.source);
+    match (image, of(avif)) {
+        (None, Some(image)) => Err(GltfProblem::Avif { image }),
+        _ => Ok(image),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn avif_needs_a_fallback() {
+        let image = |json: &str| image_of(&serde_json::from_str(json).unwrap());
+        assert_eq!(image(r#"{"source":3}"#).unwrap(), Some(3));
+        let both = r#"{"source":3,"extensions":{"EXT_texture_avif":{"source":1}}}"#;
+        assert_eq!(image(both).unwrap(), Some(3));
+        let webp = r#"{"source":3,"extensions":{"EXT_texture_webp":{"source":1}}}"#;
+        assert_eq!(image(webp).unwrap(), Some(1));
+        let error = image(r#"{"extensions":{"EXT_texture_avif":{"source":1}}}"#).unwrap_err();
+        assert!(error.to_string().contains("image 1 is AVIF"));
+        assert_eq!(image(r#"{"extensions":{"MSFT_texture_dds":{"source":1}}}"#).unwrap(), None);
+    }
+}

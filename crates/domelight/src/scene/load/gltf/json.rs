@@ -1,0 +1,666 @@
+//! The document, parsed as far as it is used.
+//!
+//! The arrays are kept as text and their items parsed one by one when something refers to them, so
+//! that a broken item that nothing shows ends no load, and one that matters is named.
+
+// Fields are called as the format calls them.
+#![allow(clippy::struct_field_names)]
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::value::RawValue;
+
+use super::error::GltfProblem;
+use super::meshopt::Compression;
+
+/// The top of the document.
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Document<'a> {
+    #[serde(borrow)]
+    asset: Option<&'a RawValue>,
+    pub(super) extensions_used: Vec<String>,
+    pub(super) extensions_required: Vec<String>,
+    pub(super) scene: Option<usize>,
+    #[serde(borrow)]
+    accessors: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    animations: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    buffers: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    buffer_views: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    cameras: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    images: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    materials: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    meshes: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    nodes: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    samplers: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    scenes: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    skins: Vec<&'a RawValue>,
+    #[serde(borrow)]
+    textures: Vec<&'a RawValue>,
+}
+
+/// What is enough to know a file's version.
+#[derive(Deserialize)]
+struct Header<'a> {
+    #[serde(borrow)]
+    asset: Option<&'a RawValue>,
+    #[serde(borrow)]
+    meshes: Option<&'a RawValue>,
+    #[serde(borrow)]
+    nodes: Option<&'a RawValue>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Asset {
+    version: Option<serde_json::Value>,
+    min_version: Option<serde_json::Value>,
+}
+
+impl<'a> Document<'a> {
+    /// Parses a document's top.
+    pub(super) fn new(json: &'a [u8]) -> Result<Self, GltfProblem> {
+        let invalid = |source| GltfProblem::Json { place: "the JSON".into(), source };
+        check_version(&serde_json::from_slice(json).map_err(invalid)?)?;
+        serde_json::from_slice(json).map_err(invalid)
+    }
+
+    /// The item of an index.
+    pub(super) fn get<T: Item>(&self, index: usize) -> Result<T, GltfProblem> {
+        let items = T::items(self);
+        let text = items.get(index).ok_or_else(|| {
+            let (what, count) = (T::NAME, items.len());
+            GltfProblem::NoSuch { what, index, count }
+        })?;
+        serde_json::from_str(text.get()).map_err(|source| {
+            let place = format!("{} {index}", T::NAME);
+            GltfProblem::Json { place, source }
+        })
+    }
+
+    /// How many items there are.
+    pub(super) fn count<T: Item>(&self) -> usize {
+        T::items(self).len()
+    }
+}
+
+/// Refuses what is not version 2: there, arrays were objects.
+fn check_version(header: &Header<'_>) -> Result<(), GltfProblem> {
+    let is_object = |raw: Option<&RawValue>| raw.is_some_and(|raw| raw.get().starts_with('{'));
+    if is_object(header.meshes) || is_object(header.nodes) {
+        return Err(GltfProblem::Version1);
+    }
+    let asset = header.asset.and_then(|raw| serde_json::from_str::<Asset>(raw.get()).ok());
+    let Some(Asset { version, min_version }) = asset else { return Ok(()) };
+    // A later version that version 2 suffices for may be named beside it; numbers are no strings, but meant.
+    let text = |value: serde_json::Value| match value {
+        serde_json::Value::String(text) => text,
+        other => other.to_string(),
+    };
+    match min_version.or(version).map(text) {
+        Some(version) if version.starts_with('1') => Err(GltfProblem::Version1),
+        Some(version) if !version.starts_with('2') => Err(GltfProblem::Version { version }),
+        _ => Ok(()),
+    }
+}
+
+/// An item of one of the document's arrays.
+pub(super) trait Item: DeserializeOwned {
+    /// What messages call it.
+    const NAME: &'static str;
+
+    /// The array.
+    fn items<'d>(document: &'d Document<'_>) -> &'d [&'d RawValue];
+}
+
+macro_rules! items {
+    ($($field:ident: $item:ident = $name:literal),*) => {$(
+        impl Item for $item {
+            const NAME: &'static str = $name;
+
+            fn items<'d>(document: &'d Document<'_>) -> &'d [&'d RawValue] {
+                &document.$field
+            }
+        }
+    )*};
+}
+
+items! {
+    accessors: Accessor = "accessor",
+    animations: Animation = "animation",
+    buffers: Buffer = "buffer",
+    buffer_views: BufferView = "buffer view",
+    cameras: Camera = "camera",
+    images: Image = "image",
+    materials: Material = "material",
+    meshes: Mesh = "mesh",
+    nodes: Node = "node",
+    samplers: Sampler = "sampler",
+    scenes: Scene = "scene",
+    skins: Skin = "skin",
+    textures: Texture = "texture"
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Accessor {
+    pub(super) buffer_view: Option<usize>,
+    #[serde(default)]
+    pub(super) byte_offset: u64,
+    pub(super) component_type: u32,
+    #[serde(default)]
+    pub(super) normalized: bool,
+    pub(super) count: usize,
+    #[serde(rename = "type")]
+    pub(super) shape: String,
+    pub(super) sparse: Option<Sparse>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Sparse {
+    pub(super) count: usize,
+    pub(super) indices: SparseData,
+    pub(super) values: SparseData,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct SparseData {
+    pub(super) buffer_view: usize,
+    #[serde(default)]
+    pub(super) byte_offset: u64,
+    /// Of the indices; values are of their accessor's type.
+    pub(super) component_type: Option<u32>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Buffer {
+    pub(super) uri: Option<String>,
+    #[serde(default)]
+    pub(super) byte_length: u64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct BufferView {
+    pub(super) buffer: usize,
+    #[serde(default)]
+    pub(super) byte_offset: u64,
+    pub(super) byte_length: u64,
+    pub(super) byte_stride: Option<usize>,
+    #[serde(default)]
+    pub(super) extensions: BufferViewExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct BufferViewExtensions {
+    #[serde(rename = "KHR_meshopt_compression")]
+    khr_meshopt: Option<Compression>,
+    #[serde(rename = "EXT_meshopt_compression")]
+    ext_meshopt: Option<Compression>,
+}
+
+impl BufferViewExtensions {
+    pub(super) fn compression(&self) -> Option<&Compression> {
+        self.khr_meshopt.as_ref().or(self.ext_meshopt.as_ref())
+    }
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Scene {
+    #[serde(default)]
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) nodes: Vec<usize>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Node {
+    pub(super) name: String,
+    pub(super) children: Vec<usize>,
+    pub(super) matrix: Option<[f32; 16]>,
+    pub(super) translation: Option<[f32; 3]>,
+    pub(super) rotation: Option<[f32; 4]>,
+    pub(super) scale: Option<[f32; 3]>,
+    pub(super) mesh: Option<usize>,
+    pub(super) skin: Option<usize>,
+    pub(super) camera: Option<usize>,
+    pub(super) weights: Option<Vec<f32>>,
+    pub(super) extensions: NodeExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct NodeExtensions {
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    pub(super) instancing: Option<Instancing>,
+    #[serde(rename = "KHR_node_visibility")]
+    pub(super) visibility: Option<Visibility>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct Instancing {
+    #[serde(default)]
+    pub(super) attributes: BTreeMap<String, usize>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Visibility {
+    #[serde(default = "yes")]
+    pub(super) visible: bool,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Mesh {
+    #[serde(default)]
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) primitives: Vec<Primitive>,
+    pub(super) weights: Option<Vec<f32>>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Primitive {
+    #[serde(default)]
+    pub(super) attributes: BTreeMap<String, usize>,
+    pub(super) indices: Option<usize>,
+    pub(super) material: Option<usize>,
+    #[serde(default = "triangles")]
+    pub(super) mode: u32,
+    #[serde(default)]
+    pub(super) targets: Vec<BTreeMap<String, usize>>,
+    #[serde(default)]
+    pub(super) extensions: PrimitiveExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct PrimitiveExtensions {
+    #[serde(rename = "KHR_draco_mesh_compression")]
+    pub(super) draco: Option<Draco>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Draco {
+    pub(super) buffer_view: usize,
+    /// Draco's numbers of the attributes.
+    #[serde(default)]
+    pub(super) attributes: BTreeMap<String, u32>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Skin {
+    pub(super) inverse_bind_matrices: Option<usize>,
+    pub(super) joints: Vec<usize>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Animation {
+    #[serde(default)]
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) channels: Vec<Channel>,
+    #[serde(default)]
+    pub(super) samplers: Vec<AnimationSampler>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Channel {
+    pub(super) sampler: usize,
+    pub(super) target: ChannelTarget,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct ChannelTarget {
+    pub(super) node: Option<usize>,
+    pub(super) path: String,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct AnimationSampler {
+    pub(super) input: usize,
+    pub(super) output: usize,
+    #[serde(default)]
+    pub(super) interpolation: Interpolation,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub(super) enum Interpolation {
+    #[default]
+    Linear,
+    Step,
+    CubicSpline,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Camera {
+    #[serde(default)]
+    pub(super) name: String,
+    pub(super) perspective: Option<Perspective>,
+    pub(super) orthographic: Option<Orthographic>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Perspective {
+    pub(super) yfov: f32,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Orthographic {
+    pub(super) ymag: f32,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Image {
+    pub(super) uri: Option<String>,
+    pub(super) buffer_view: Option<usize>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Texture {
+    pub(super) sampler: Option<usize>,
+    pub(super) source: Option<usize>,
+    pub(super) extensions: TextureExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct TextureExtensions {
+    #[serde(rename = "KHR_texture_basisu")]
+    pub(super) basisu: Option<TextureSource>,
+    #[serde(rename = "EXT_texture_webp")]
+    pub(super) webp: Option<TextureSource>,
+    #[serde(rename = "EXT_texture_avif")]
+    pub(super) avif: Option<TextureSource>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct TextureSource {
+    pub(super) source: Option<usize>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Sampler {
+    pub(super) mag_filter: Option<u32>,
+    pub(super) wrap_s: Option<u32>,
+    pub(super) wrap_t: Option<u32>,
+}
+
+/// A use of a texture, with what normal and occlusion maps add.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct TextureInfo {
+    pub(super) index: usize,
+    #[serde(default)]
+    pub(super) tex_coord: u32,
+    /// Of a normal map.
+    #[serde(default = "one")]
+    pub(super) scale: f32,
+    #[serde(default)]
+    pub(super) extensions: TextureInfoExtensions,
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+pub(super) struct TextureInfoExtensions {
+    #[serde(rename = "KHR_texture_transform")]
+    pub(super) transform: Option<TextureTransform>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct TextureTransform {
+    #[serde(default)]
+    pub(super) offset: [f32; 2],
+    #[serde(default)]
+    pub(super) rotation: f32,
+    #[serde(default = "one_by_one")]
+    pub(super) scale: [f32; 2],
+    pub(super) tex_coord: Option<u32>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Material {
+    pub(super) name: String,
+    pub(super) pbr_metallic_roughness: MetallicRoughness,
+    pub(super) normal_texture: Option<TextureInfo>,
+    pub(super) emissive_texture: Option<TextureInfo>,
+    pub(super) emissive_factor: [f32; 3],
+    pub(super) alpha_mode: AlphaMode,
+    pub(super) alpha_cutoff: Option<f32>,
+    pub(super) double_sided: bool,
+    pub(super) extensions: MaterialExtensions,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub(super) enum AlphaMode {
+    #[default]
+    Opaque,
+    Mask,
+    Blend,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct MetallicRoughness {
+    pub(super) base_color_factor: [f32; 4],
+    pub(super) base_color_texture: Option<TextureInfo>,
+    pub(super) metallic_factor: f32,
+    pub(super) roughness_factor: f32,
+    pub(super) metallic_roughness_texture: Option<TextureInfo>,
+}
+
+impl Default for MetallicRoughness {
+    fn default() -> Self {
+        Self {
+            base_color_factor: [1.0; 4],
+            base_color_texture: None,
+            metallic_factor: 1.0,
+            roughness_factor: 1.0,
+            metallic_roughness_texture: None,
+        }
+    }
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct MaterialExtensions {
+    #[serde(rename = "KHR_materials_emissive_strength")]
+    pub(super) emissive_strength: Option<EmissiveStrength>,
+    #[serde(rename = "KHR_materials_unlit")]
+    pub(super) unlit: Option<Unlit>,
+    #[serde(rename = "KHR_materials_pbrSpecularGlossiness")]
+    pub(super) specular_glossiness: Option<SpecularGlossiness>,
+    #[serde(rename = "KHR_materials_ior")]
+    pub(super) ior: Option<Ior>,
+    #[serde(rename = "KHR_materials_specular")]
+    pub(super) specular: Option<Specular>,
+    #[serde(rename = "KHR_materials_clearcoat")]
+    pub(super) clearcoat: Option<Clearcoat>,
+    #[serde(rename = "KHR_materials_sheen")]
+    pub(super) sheen: Option<Sheen>,
+    #[serde(rename = "KHR_materials_anisotropy")]
+    pub(super) anisotropy: Option<Anisotropy>,
+    #[serde(rename = "KHR_materials_transmission")]
+    pub(super) transmission: Option<Transmission>,
+    #[serde(rename = "KHR_materials_volume")]
+    pub(super) volume: Option<Volume>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct EmissiveStrength {
+    #[serde(default = "one")]
+    pub(super) emissive_strength: f32,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Unlit {}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct SpecularGlossiness {
+    #[serde(default = "opaque_white")]
+    pub(super) diffuse_factor: [f32; 4],
+    pub(super) diffuse_texture: Option<TextureInfo>,
+    #[serde(default = "white")]
+    pub(super) specular_factor: [f32; 3],
+    #[serde(default = "one")]
+    pub(super) glossiness_factor: f32,
+    pub(super) specular_glossiness_texture: Option<TextureInfo>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Ior {
+    pub(super) ior: Option<f32>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Specular {
+    #[serde(default = "one")]
+    pub(super) specular_factor: f32,
+    pub(super) specular_texture: Option<TextureInfo>,
+    #[serde(default = "white")]
+    pub(super) specular_color_factor: [f32; 3],
+    pub(super) specular_color_texture: Option<TextureInfo>,
+}
+
+impl Specular {
+    /// Whether it is more than the default, which many exporters write.
+    pub(super) fn changes_anything(&self) -> bool {
+        let Self {
+            specular_factor,
+            specular_texture,
+            specular_color_factor,
+            specular_color_texture,
+        } = self;
+        *specular_factor != 1.0
+            || *specular_color_factor != [1.0; 3]
+            || specular_texture.is_some()
+            || specular_color_texture.is_some()
+    }
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Clearcoat {
+    pub(super) clearcoat_factor: f32,
+    pub(super) clearcoat_texture: Option<TextureInfo>,
+    pub(super) clearcoat_roughness_factor: f32,
+    pub(super) clearcoat_roughness_texture: Option<TextureInfo>,
+    pub(super) clearcoat_normal_texture: Option<TextureInfo>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Sheen {
+    pub(super) sheen_color_factor: [f32; 3],
+    pub(super) sheen_color_texture: Option<TextureInfo>,
+    pub(super) sheen_roughness_factor: f32,
+    pub(super) sheen_roughness_texture: Option<TextureInfo>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Anisotropy {
+    pub(super) anisotropy_strength: f32,
+    pub(super) anisotropy_rotation: f32,
+    pub(super) anisotropy_texture: Option<TextureInfo>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Transmission {
+    pub(super) transmission_factor: f32,
+    pub(super) transmission_texture: Option<TextureInfo>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Volume {
+    #[serde(default)]
+    pub(super) thickness_factor: f32,
+    pub(super) thickness_texture: Option<TextureInfo>,
+    pub(super) attenuation_distance: Option<f32>,
+    #[serde(default = "white")]
+    pub(super) attenuation_color: [f32; 3],
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn triangles() -> u32 {
+    4
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn one_by_one() -> [f32; 2] {
+    [1.0; 2]
+}
+
+fn white() -> [f32; 3] {
+    [1.0; 3]
+}
+
+fn opaque_white() -> [f32; 4] {
+    [1.0; 4]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn broken_items_matter_when_they_are_used() {
+        let json = br#"{"asset":{"version":"2.0"},"nodes":[{"mesh":"cube"},{"mesh":3}]}"#;
+        let document = Document::new(json).unwrap();
+        assert_eq!(document.get::<Node>(1).unwrap().mesh, Some(3));
+        let error = document.get::<Node>(0).unwrap_err().to_string();
+        assert!(error.contains("node 0"), "{error}");
+        let error = document.get::<Node>(2).unwrap_err().to_string();
+        assert!(error.contains("node 2") && error.contains("only 2"), "{error}");
+    }
+
+    #[test]
+    fn versions_are_told_apart() {
+        let error = |json: &str| match Document::new(json.as_bytes()) {
+            Ok(_) => "none".to_owned(),
+            Err(e) => e.to_string(),
+        };
+        assert_eq!(error(r#"{"asset":{"version":"2.0"}}"#), "none");
+        assert_eq!(error(r#"{"asset":{"version":2}}"#), "none");
+        assert_eq!(error(r#"{"asset":{"version":"2.1","minVersion":"2.0"}}"#), "none");
+        assert_eq!(error("{}"), "none");
+        assert!(error(r#"{"asset":{"version":"1.0"}}"#).contains("1.0"));
+        assert!(error(r#"{"meshes":{"a":{}}}"#).contains("gltf-pipeline"));
+        assert!(error(r#"{"asset":{"version":"3.0"}}"#).contains("glTF 3.0"));
+        assert!(error("{").contains("the JSON is not valid"));
+        assert!(error("[1]").contains("the JSON is not valid"));
+    }
+}

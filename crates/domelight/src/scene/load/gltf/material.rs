@@ -1,0 +1,306 @@
+//! Materials: from the document to surfaces, with all that the extensions say.
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::error::Failure;
+use super::image::{ALPHA, COLOR, COLOR_AND_ALPHA, Channels, Images, LINEAR};
+use super::json;
+use super::source::Source;
+use crate::Rgb;
+use crate::scene::load::textures::Textures;
+use crate::scene::{
+    AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers,
+    MetallicRoughnessSurface, NormalMap, Sheen, Specular, SpecularGlossinessSurface, Surface,
+    SurfaceModel, Texture, TextureRef, Volume,
+};
+
+/// What a primitive needs to know of its material.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Slot {
+    /// The index of the surface.
+    pub(super) surface: usize,
+    /// The file's sets of texture coordinates that become a mesh's first and second; `None` if unused.
+    pub(super) uv_sets: [Option<u32>; 2],
+    /// The one of the two that tangents follow, if any need to.
+    pub(super) tangent_set: Option<usize>,
+    /// Whether the vertices' opacity counts.
+    pub(super) alpha: bool,
+}
+
+/// The surfaces of the materials that are used.
+pub(super) struct Materials<'a> {
+    images: Images<'a>,
+    surfaces: Vec<Surface>,
+    slots: HashMap<Option<usize>, Slot>,
+}
+
+impl<'a> Materials<'a> {
+    pub(super) fn new(source: &Source<'a>) -> Self {
+        let images = Images::new(Textures::new(source.budget));
+        Self { images, surfaces: Vec::new(), slots: HashMap::new() }
+    }
+
+    /// The surface of a material, or of the default one.
+    pub(super) fn slot(
+        &mut self,
+        source: &Source<'_>,
+        index: Option<usize>,
+    ) -> Result<Slot, Failure> {
+        if let Some(&slot) = self.slots.get(&index) {
+            return Ok(slot);
+        }
+        let material: json::Material = match index {
+            Some(index) => source.document.get(index)?,
+            None => json::Material::default(),
+        };
+        let name = match (&*material.name, index) {
+            ("", Some(index)) => format!("material {index}"),
+            ("", None) => "default".into(),
+            (name, _) => name.into(),
+        };
+        let mut reader =
+            Reader { source, images: &mut self.images, name: &name, uv_sets: [None; 2] };
+        let surface = reader.surface(&material);
+        let uv_sets = reader.uv_sets;
+        let surface = surface.map_err(|e| e.within(|| format!("material '{name}'")))?;
+        let follows = surface.normal_map.as_ref().map(|n| n.texture.uv_set);
+        let anisotropy = surface.layers.anisotropy;
+        let follows = follows.or(anisotropy.map(|a| a.texture.map_or(0, |t| t.uv_set)));
+        let slot = Slot {
+            surface: self.surfaces.len(),
+            uv_sets,
+            tangent_set: follows,
+            alpha: surface.coverage.mode != AlphaMode::Opaque,
+        };
+        self.surfaces.push(surface);
+        self.slots.insert(index, slot);
+        Ok(slot)
+    }
+
+    /// All surfaces and textures; what of them is not drawn is said once a feature.
+    pub(super) fn finish(self, mut warn: impl FnMut(&str)) -> (Vec<Surface>, Vec<Texture>) {
+        let mut undrawn: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        for surface in &self.surfaces {
+            for feature in surface.undrawn_features() {
+                undrawn.entry(feature).or_default().push(&surface.name);
+            }
+        }
+        for (feature, names) in undrawn {
+            let others = match names.len() {
+                1 => String::new(),
+                n => format!(" and of {} more", n - 1),
+            };
+            warn(&format!("{feature} is not drawn, of material '{}'{others}", names[0]));
+        }
+        (self.surfaces, self.images.textures.loaded)
+    }
+}
+
+/// Reads one material.
+struct Reader<'r, 's, 'a> {
+    source: &'r Source<'s>,
+    images: &'r mut Images<'a>,
+    name: &'r str,
+    uv_sets: [Option<u32>; 2],
+}
+
+impl Reader<'_, '_, '_> {
+    fn surface(&mut self, material: &json::Material) -> Result<Surface, Failure> {
+        let extensions = &material.extensions;
+        let alpha = material.alpha_mode != json::AlphaMode::Opaque;
+        let (model, color_texture, opacity) = match &extensions.specular_glossiness {
+            Some(s) => self.specular_glossiness(s, alpha)?,
+            None => self.metallic_roughness(&material.pbr_metallic_roughness, alpha)?,
+        };
+        let normal_map = self.normal_map(material.normal_texture.as_ref())?;
+        let has_alpha = |t: &TextureRef| self.images.textures.loaded[t.texture].has_alpha();
+        let mode = match material.alpha_mode {
+            json::AlphaMode::Opaque => AlphaMode::Opaque,
+            json::AlphaMode::Mask => {
+                AlphaMode::Mask { cutoff: not_negative(material.alpha_cutoff.unwrap_or(0.5)) }
+            }
+            json::AlphaMode::Blend => AlphaMode::Blend,
+        };
+        let coverage = if alpha {
+            Coverage { mode, opacity: unit(opacity), texture: color_texture.filter(has_alpha) }
+        } else {
+            Coverage::default()
+        };
+        Ok(Surface {
+            normal_map,
+            coverage,
+            double_sided: material.double_sided,
+            emission: self.emission(material)?,
+            unlit: extensions.unlit.is_some(),
+            layers: self.layers(extensions)?,
+            ..Surface::new(self.name, model)
+        })
+    }
+
+    /// The model, its color texture and its opacity.
+    fn metallic_roughness(
+        &mut self,
+        m: &json::MetallicRoughness,
+        alpha: bool,
+    ) -> Result<(SurfaceModel, Option<TextureRef>, f32), Failure> {
+        let channels = if alpha { COLOR_AND_ALPHA } else { COLOR };
+        let base_color_texture = self.texture(m.base_color_texture.as_ref(), channels)?;
+        let [r, g, b, opacity] = m.base_color_factor;
+        let model = SurfaceModel::MetallicRoughness(MetallicRoughnessSurface {
+            base_color: Rgb::new(r, g, b),
+            base_color_texture,
+            metallic: m.metallic_factor,
+            roughness: m.roughness_factor,
+            metallic_roughness_texture: self
+                .texture(m.metallic_roughness_texture.as_ref(), LINEAR)?,
+        });
+        Ok((model, base_color_texture, opacity))
+    }
+
+    fn specular_glossiness(
+        &mut self,
+        s: &json::SpecularGlossiness,
+        alpha: bool,
+    ) -> Result<(SurfaceModel, Option<TextureRef>, f32), Failure> {
+        let channels = if alpha { COLOR_AND_ALPHA } else { COLOR };
+        let diffuse_texture = self.texture(s.diffuse_texture.as_ref(), channels)?;
+        let [r, g, b, opacity] = s.diffuse_factor;
+        let model = SurfaceModel::SpecularGlossiness(SpecularGlossinessSurface {
+            diffuse: Rgb::new(r, g, b),
+            diffuse_texture,
+            specular: Rgb::from(s.specular_factor),
+            glossiness: s.glossiness_factor,
+            specular_glossiness_texture: self
+                .texture(s.specular_glossiness_texture.as_ref(), COLOR_AND_ALPHA)?,
+        });
+        Ok((model, diffuse_texture, opacity))
+    }
+
+    fn emission(&mut self, material: &json::Material) -> Result<Option<Emission>, Failure> {
+        let strength = &material.extensions.emissive_strength;
+        let strength = strength.as_ref().map_or(1.0, |s| s.emissive_strength);
+        let radiance = (Rgb::from(material.emissive_factor) * strength).map(not_negative);
+        if radiance.is_black() {
+            return Ok(None);
+        }
+        let texture = self.texture(material.emissive_texture.as_ref(), COLOR)?;
+        Ok(Some(Emission { radiance, texture }))
+    }
+
+    fn layers(&mut self, e: &json::MaterialExtensions) -> Result<Layers, Failure> {
+        let mut layers = Layers { ior: e.ior.as_ref().and_then(|i| i.ior), ..Layers::default() };
+        layers.ior = layers.ior.map(|ior| if ior >= 1.0 { ior } else { 0.0 });
+        if let Some(s) = e.specular.as_ref().filter(|s| s.changes_anything()) {
+            layers.specular = Some(Specular {
+                strength: self.factor(s.specular_factor, s.specular_texture.as_ref(), ALPHA)?,
+                color: ColorFactor {
+                    value: Rgb::from(s.specular_color_factor).map(not_negative),
+                    texture: self.texture(s.specular_color_texture.as_ref(), COLOR)?,
+                },
+            });
+        }
+        // A factor of zero is the extension's way to say no.
+        if let Some(c) = e.clearcoat.as_ref().filter(|c| c.clearcoat_factor > 0.0) {
+            layers.clearcoat = Some(Clearcoat {
+                strength: self.factor(c.clearcoat_factor, c.clearcoat_texture.as_ref(), LINEAR)?,
+                roughness: self.factor(
+                    c.clearcoat_roughness_factor,
+                    c.clearcoat_roughness_texture.as_ref(),
+                    LINEAR,
+                )?,
+                normal_map: self.normal_map(c.clearcoat_normal_texture.as_ref())?,
+            });
+        }
+        if let Some(s) = e.sheen.as_ref().filter(|s| s.sheen_color_factor != [0.0; 3]) {
+            layers.sheen = Some(Sheen {
+                color: ColorFactor {
+                    value: Rgb::from(s.sheen_color_factor).map(unit),
+                    texture: self.texture(s.sheen_color_texture.as_ref(), COLOR)?,
+                },
+                roughness: self.factor(
+                    s.sheen_roughness_factor,
+                    s.sheen_roughness_texture.as_ref(),
+                    ALPHA,
+                )?,
+            });
+        }
+        if let Some(a) = e.anisotropy.as_ref().filter(|a| a.anisotropy_strength > 0.0) {
+            layers.anisotropy = Some(Anisotropy {
+                strength: unit(a.anisotropy_strength),
+                rotation: if a.anisotropy_rotation.is_finite() {
+                    a.anisotropy_rotation
+                } else {
+                    0.0
+                },
+                texture: self.texture(a.anisotropy_texture.as_ref(), LINEAR)?,
+            });
+        }
+        if let Some(t) = e.transmission.as_ref().filter(|t| t.transmission_factor > 0.0) {
+            let texture = t.transmission_texture.as_ref();
+            layers.transmission = Some(self.factor(t.transmission_factor, texture, LINEAR)?);
+        }
+        if let Some(v) = e.volume.as_ref().filter(|v| v.thickness_factor > 0.0) {
+            let texture = self.texture(v.thickness_texture.as_ref(), LINEAR)?;
+            layers.volume = Some(Volume {
+                thickness: Factor { value: not_negative(v.thickness_factor), texture },
+                attenuation_distance: v
+                    .attenuation_distance
+                    .filter(|&d| d > 0.0)
+                    .unwrap_or(f32::INFINITY),
+                attenuation_color: Rgb::from(v.attenuation_color).map(unit),
+            });
+        }
+        Ok(layers)
+    }
+
+    fn factor(
+        &mut self,
+        value: f32,
+        texture: Option<&json::TextureInfo>,
+        channels: Channels,
+    ) -> Result<Factor, Failure> {
+        Ok(Factor { value: unit(value), texture: self.texture(texture, channels)? })
+    }
+
+    fn normal_map(
+        &mut self,
+        info: Option<&json::TextureInfo>,
+    ) -> Result<Option<NormalMap>, Failure> {
+        let scale = info.map_or(1.0, |info| info.scale);
+        Ok(self.texture(info, LINEAR)?.map(|texture| NormalMap { texture, scale }))
+    }
+
+    /// A use of a texture; `None`, with a warning, if it needs a third set of texture coordinates.
+    fn texture(
+        &mut self,
+        info: Option<&json::TextureInfo>,
+        channels: Channels,
+    ) -> Result<Option<TextureRef>, Failure> {
+        let Some(info) = info else { return Ok(None) };
+        let set = info.extensions.transform.as_ref().and_then(|t| t.tex_coord);
+        let set = set.unwrap_or(info.tex_coord);
+        let places = &mut self.uv_sets;
+        let Some(place) = places.iter().position(|&s| s.is_none_or(|s| s == set)) else {
+            let name = self.name;
+            self.source.warn(&format!(
+                "material '{name}' uses more than two sets of texture coordinates; textures of the others are ignored"
+            ));
+            return Ok(None);
+        };
+        let texture = self.images.texture(self.source, info, place, channels)?;
+        if texture.is_some() {
+            self.uv_sets[place] = Some(set);
+        }
+        Ok(texture)
+    }
+}
+
+/// Clamps to \[0, 1\]; NaN becomes 0.
+fn unit(v: f32) -> f32 {
+    not_negative(v).min(1.0)
+}
+
+/// Clamps to \[0, the greatest number\]; NaN becomes 0.
+fn not_negative(v: f32) -> f32 {
+    if v > 0.0 { v.min(f32::MAX) } else { 0.0 }
+}

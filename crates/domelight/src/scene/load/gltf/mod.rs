@@ -1,0 +1,164 @@
+//! glTF 2.0, as JSON with files beside it or as one GLB file.
+//!
+//! | read | by |
+//! |---|---|
+//! | container and document, item by item as something refers to it | [`container`], [`json`] |
+//! | buffers, views, `EXT_meshopt_compression`, `KHR_meshopt_compression` | [`source`], [`meshopt`] |
+//! | accessors, sparse ones, `KHR_mesh_quantization` | [`accessor`] |
+//! | `KHR_draco_mesh_compression` | [`draco`] |
+//! | triangle lists, strips and fans, two sets of texture coordinates, vertex colors | [`geometry`] |
+//! | tangents where a normal map needs them and the file has none | [`tangents`] |
+//! | skins and morph targets, at rest or at a moment of an animation | [`deform`], [`animation`] |
+//! | nodes, `EXT_mesh_gpu_instancing`, `KHR_node_visibility`, scenes, cameras | [`graph`], [`instancing`] |
+//! | materials and their extensions, `KHR_texture_transform` | [`material`] |
+//! | PNG, JPEG, WebP (`EXT_texture_webp`), KTX2 (`KHR_texture_basisu`) | [`image`](mod@image), [`ktx2`] |
+//!
+//! What is read but not drawn, or not read at all, is said in a warning, once a feature. Occlusion
+//! textures are not needed: rays find out what is hidden. Points and lines are left out.
+//!
+//! Only what the picture needs is looked at and checked: a broken item that nothing shows, an attribute
+//! with a name of its own, an unknown extension do not end a load.
+
+mod accessor;
+mod animation;
+mod container;
+mod deform;
+mod draco;
+mod error;
+mod extensions;
+mod geometry;
+mod graph;
+mod image;
+mod instancing;
+mod json;
+mod ktx2;
+mod material;
+mod meshopt;
+mod source;
+mod tangents;
+
+use std::collections::HashMap;
+use std::path::Path;
+
+pub use error::GltfProblem;
+pub use ktx2::Ktx2Error;
+pub use meshopt::MeshoptError;
+
+use self::deform::Pose;
+use self::error::Failure;
+use self::geometry::{Deformations, TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES};
+use self::graph::{Graph, Placement};
+use self::material::Materials;
+use self::source::Source;
+use super::{Budget, LoadError, LoadOptions, Loaded};
+use crate::scene::{Part, SceneDescription, UpAxis};
+
+pub(super) fn load(
+    path: &Path,
+    bytes: &[u8],
+    budget: &Budget,
+    options: &LoadOptions,
+) -> Result<Loaded, LoadError> {
+    read(path, bytes, budget, options).map_err(|failure| match failure {
+        Failure::Problem(problem) => {
+            LoadError::Gltf { path: path.into(), problem: Box::new(problem) }
+        }
+        Failure::Load(error) => error,
+    })
+}
+
+fn read(
+    path: &Path,
+    bytes: &[u8],
+    budget: &Budget,
+    options: &LoadOptions,
+) -> Result<Loaded, Failure> {
+    let mut source = Source::new(path, bytes, budget)?;
+    source.strict = options.strict;
+    extensions::check(&source.document, options.strict, |text| source.warn(text))?;
+    let poses = match &options.animation {
+        Some(time) => animation::at(&source, time)?,
+        None => HashMap::new(),
+    };
+    let graph = Graph::new(&source, options.scene.as_deref(), poses)?;
+    let mut materials = Materials::new(&source);
+    let mut parts = Vec::new();
+    for (&mesh, placements) in &graph.placements {
+        read_mesh(&source, &graph, &mut materials, mesh, placements, &mut parts)?;
+    }
+    let (surfaces, textures) = materials.finish(|text| source.warn(text));
+    let cameras = graph.cameras;
+    let description = SceneDescription {
+        parts,
+        surfaces,
+        textures,
+        camera: cameras.first().map(|camera| camera.settings),
+        cameras,
+        environment: None,
+        up: Some(UpAxis::Y),
+        scenery: Vec::new(),
+    };
+    Ok(Loaded { description, warnings: source.into_warnings(), ..Loaded::default() })
+}
+
+/// Reads a mesh once, and adds a part for each primitive and place.
+fn read_mesh(
+    source: &Source<'_>,
+    graph: &Graph<'_, '_>,
+    materials: &mut Materials<'_>,
+    index: usize,
+    placements: &[Placement],
+    parts: &mut Vec<Part>,
+) -> Result<(), Failure> {
+    let mesh: json::Mesh = source.document.get(index)?;
+    let own_weights = mesh.weights.unwrap_or_default();
+    let weights_of = |placement: &Placement| {
+        if placement.weights.is_empty() { own_weights.clone() } else { placement.weights.clone() }
+    };
+    let mut deformations = Deformations::default();
+    let mut poses = Vec::with_capacity(placements.len());
+    for placement in placements {
+        let weights = weights_of(placement);
+        for (target, _) in weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+            deformations.targets.insert(target);
+        }
+        let pose = match placement.skin {
+            Some(skin) => {
+                deformations.skin = true;
+                Pose::Skinned(graph.joints(skin).map_err(|e| e.within(|| format!("skin {skin}")))?)
+            }
+            None => Pose::Rigid(placement.world),
+        };
+        poses.push((pose, placement.world, weights));
+    }
+    let name = if mesh.name.is_empty() { format!("mesh {index}") } else { mesh.name };
+    let memory_place = format!("{}, mesh {index}", source.path.display());
+    for (i, primitive) in mesh.primitives.iter().enumerate() {
+        let place = || format!("mesh {index}, primitive {i}");
+        if !matches!(primitive.mode, TRIANGLES | TRIANGLE_STRIP | TRIANGLE_FAN) {
+            source.warn("points and lines are not rendered");
+            continue;
+        }
+        if !primitive.attributes.contains_key("POSITION") {
+            source.warn(&format!("{} has no positions and is left out", place()));
+            continue;
+        }
+        let bytes = geometry::memory(source, primitive, &deformations, placements.len() as u64)
+            .map_err(|e| e.within(place()))?;
+        source.budget.take(&memory_place, bytes)?;
+        let slot = materials.slot(source, primitive.material)?;
+        let geometry = geometry::read(source, primitive, slot, &deformations, &memory_place)
+            .map_err(|e| e.within(place))?;
+        // A primitive without joints stays where its node is.
+        let has_joints = !geometry.vertices.joints.is_empty();
+        let surface = geometry.slot.surface;
+        let copies = std::iter::repeat_n(geometry, poses.len());
+        for ((pose, world, weights), geometry) in poses.iter().zip(copies) {
+            let rigid = Pose::Rigid(*world);
+            let pose = if has_joints { pose } else { &rigid };
+            let mesh = deform::place(geometry, pose, weights);
+            parts.push(Part { name: name.clone(), mesh, surface });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,173 @@
+//! Tangents by MikkTSpace where a file has none, as the format asks for.
+//!
+//! Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited". The algorithm gives a tangent a
+//! corner; a vertex whose corners differ is split.
+
+use std::collections::HashMap;
+
+use bevy_mikktspace::{Geometry as MikkGeometry, TangentSpace, generate_tangents};
+
+use super::geometry::{Geometry, Vertices};
+use crate::math::Vec3;
+
+/// Gives `geometry` the tangents of texture coordinates `set`, splitting vertices.
+///
+/// Without texture coordinates nothing changes.
+pub(super) fn generate(geometry: &mut Geometry, set: usize) {
+    let Geometry { vertices, triangles, .. } = geometry;
+    if vertices.uvs[set].is_empty() {
+        return;
+    }
+    let mut corners =
+        Corners { vertices, triangles, set, tangents: vec![[0.0; 4]; 3 * triangles.len()] };
+    // Its errors are an empty type.
+    let Ok(()) = generate_tangents::<_, bevy_mikktspace::StdOps>(&mut corners) else { return };
+    let tangents = corners.tangents;
+
+    // Which tangent each vertex has, and the vertices split off of it.
+    let n_vertices = vertices.positions.len();
+    let mut of_vertex: Vec<Option<[f32; 4]>> = vec![None; n_vertices];
+    let mut split: HashMap<(u32, [u32; 4]), u32> = HashMap::new();
+    let mut origins = Vec::new();
+    for (triangle, tangents) in triangles.iter_mut().zip(tangents.as_chunks::<3>().0) {
+        for (index, tangent) in triangle.iter_mut().zip(tangents) {
+            let known = of_vertex[*index as usize].get_or_insert(*tangent);
+            if known != tangent {
+                *index = *split.entry((*index, tangent.map(f32::to_bits))).or_insert_with(|| {
+                    origins.push((*index, *tangent));
+                    (n_vertices + origins.len() - 1) as u32
+                });
+            }
+        }
+    }
+    vertices.append_copies(&origins.iter().map(|&(index, _)| index as usize));
+    let split = origins.into_iter().map(|(_, tangent)| tangent);
+    vertices.tangents = of_vertex.into_iter().map(Option::unwrap_or_default).chain(split).collect();
+}
+
+struct Corners<'g> {
+    vertices: &'g Vertices,
+    triangles: &'g [[u32; 3]],
+    set: usize,
+    tangents: Vec<[f32; 4]>,
+}
+
+impl Corners<'_> {
+    fn vertex(&self, face: usize, corner: usize) -> usize {
+        self.triangles[face][corner] as usize
+    }
+}
+
+impl MikkGeometry for Corners<'_> {
+    fn num_faces(&self) -> usize {
+        self.triangles.len()
+    }
+
+    fn num_vertices_of_face(&self, _face: usize) -> usize {
+        3
+    }
+
+    fn position(&self, face: usize, corner: usize) -> [f32; 3] {
+        self.vertices.positions[self.vertex(face, corner)]
+    }
+
+    fn normal(&self, face: usize, corner: usize) -> [f32; 3] {
+        if let Some(&normal) = self.vertices.normals.get(self.vertex(face, corner)) {
+            return normal;
+        }
+        // Flat, as the format has it for meshes without normals.
+        let [a, b, c] = [0, 1, 2].map(|i| Vec3::from(self.position(face, i)));
+        (b - a).cross(c - a).normalize_or_zero().to_array()
+    }
+
+    fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
+        self.vertices.uvs[self.set][self.vertex(face, corner)]
+    }
+
+    fn set_tangent(&mut self, tangent: Option<TangentSpace>, face: usize, corner: usize) {
+        // The image's second axis points down in glTF, where the algorithm has it point up.
+        let [x, y, z, w] = tangent.unwrap_or_default().tangent_encoded();
+        self.tangents[3 * face + corner] = [x, y, z, -w];
+    }
+}
+
+impl Vertices {
+    /// Appends copies of vertices.
+    fn append_copies(&mut self, of: &(impl Iterator<Item = usize> + Clone)) {
+        fn append<T: Copy>(values: &mut Vec<T>, of: impl Iterator<Item = usize>) {
+            if !values.is_empty() {
+                let copies: Vec<T> = of.map(|i| values[i]).collect();
+                values.extend(copies);
+            }
+        }
+        append(&mut self.positions, of.clone());
+        append(&mut self.normals, of.clone());
+        for uvs in &mut self.uvs {
+            append(uvs, of.clone());
+        }
+        append(&mut self.colors, of.clone());
+        for joints in &mut self.joints {
+            append(joints, of.clone());
+        }
+        for weights in &mut self.weights {
+            append(weights, of.clone());
+        }
+        for target in self.targets.values_mut() {
+            append(&mut target.positions, of.clone());
+            append(&mut target.normals, of.clone());
+            append(&mut target.tangents, of.clone());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load::gltf::material::Slot;
+
+    /// Two triangles of a square in z = 0, u along x, v down; the second's texture is mirrored if asked for.
+    fn square(mirrored: bool) -> Geometry {
+        let positions = vec![[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
+        let mut uvs: Vec<[f32; 2]> =
+            positions.iter().map(|p: &[f32; 3]| [p[0], 1.0 - p[1]]).collect();
+        if mirrored {
+            uvs[3] = [2.0, 0.0];
+        }
+        let normals = vec![[0., 0., 1.]; 4];
+        let vertices =
+            Vertices { positions, normals, uvs: [uvs, Vec::new()], ..Vertices::default() };
+        let slot =
+            Slot { surface: 0, uv_sets: [Some(0), None], tangent_set: Some(0), alpha: false };
+        Geometry { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]], slot }
+    }
+
+    #[test]
+    fn tangents_follow_u_and_bitangents_point_up_in_the_image() {
+        let mut geometry = square(false);
+        generate(&mut geometry, 0);
+        assert_eq!(geometry.vertices.tangents, [[1.0, 0.0, 0.0, 1.0]; 4]);
+        assert_eq!(geometry.triangles, [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn mirrored_textures_split_vertices() {
+        let mut geometry = square(true);
+        generate(&mut geometry, 0);
+        let Vertices { positions, normals, uvs, tangents, .. } = &geometry.vertices;
+        assert_eq!([positions.len(), normals.len(), uvs[0].len(), tangents.len()], [6; 4]);
+        for &[a, b, c] in &geometry.triangles {
+            let signs = [a, b, c].map(|i| tangents[i as usize][3]);
+            assert!(signs[0] == signs[1] && signs[1] == signs[2]);
+        }
+        assert_eq!(tangents[geometry.triangles[0][0] as usize][3], 1.0);
+        assert_eq!(tangents[geometry.triangles[1][0] as usize][3], -1.0);
+    }
+
+    #[test]
+    fn without_texture_coordinates_there_are_none() {
+        let mut geometry = square(false);
+        geometry.vertices.uvs = [const { Vec::new() }; 2];
+        generate(&mut geometry, 0);
+        assert!(geometry.vertices.tangents.is_empty());
+    }
+}

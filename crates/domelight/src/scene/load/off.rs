@@ -1,0 +1,345 @@
+//! OFF, the Object File Format of Geomview and of collections of meshes.
+//!
+//! Read are the header words `OFF`, `COFF` (colors of vertices), `NOFF` (normals), `STOFF` (texture coordinates),
+//! `4OFF` (homogeneous coordinates) and their compounds, or none; the counts on the same line or even in the same
+//! word; comments after `#`; polygons of any shape; and of each face the color after its indices, of one number for
+//! grey, three or four. Colors are sRGB from 0 to 255 if all of a file's are whole numbers and some exceed 1, else
+//! linear from 0 to 1; opacity and indices into color maps are passed over. Vertices without normals get smooth ones.
+//!
+//! <http://www.geomview.org/docs/html/OFF.html>. Binary files and those of other dimensions are refused by name.
+
+use std::path::Path;
+
+use super::faces::{Polygons, color_triangles};
+use super::ply::DEFAULT_ALBEDO;
+use super::{Budget, LoadError, Loaded, stem};
+use crate::Rgb;
+use crate::geometry::Mesh;
+use crate::math::{Vec2, Vec3};
+use crate::scene::texture::{Encoding, decode};
+use crate::scene::{Part, SceneDescription, Surface};
+
+/// What is wrong with an OFF file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OffProblem {
+    /// A kind of OFF file that is not read.
+    #[error("{kind} files are not read; write it as plain OFF or as PLY")]
+    Unsupported {
+        /// The header word.
+        kind: String,
+    },
+    /// No numbers of vertices and faces.
+    #[error("'{text}' are no numbers of vertices, faces and edges")]
+    Counts {
+        /// What stands there.
+        text: String,
+    },
+    /// The file ends too early.
+    #[error(
+        "the file ends after {found} of {promised} {what}; it is cut short or its header wrong"
+    )]
+    EndOfFile {
+        /// Vertices or faces.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many the header promises.
+        promised: usize,
+    },
+    /// A word that is not a finite number.
+    #[error("'{text}' is not a finite number")]
+    NotANumber {
+        /// The word.
+        text: String,
+    },
+    /// An index that names no vertex.
+    #[error("index {text} names no vertex; there are {vertices}")]
+    Index {
+        /// The index.
+        text: String,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+}
+
+type Located<T> = Result<T, (usize, OffProblem)>;
+
+/// Memory of a mesh for each byte of its text: a vertex is 6 bytes or more and takes 44, a triangle with a color 14 and
+/// takes up to 144.
+const MEMORY_PER_BYTE: u64 = 12;
+
+/// Whether the first word says so, whatever the file's name.
+pub(super) fn is_off(bytes: &[u8]) -> bool {
+    let start = &bytes[..bytes.len().min(64)];
+    let word = start.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+    std::str::from_utf8(word).is_ok_and(|word| Kind::parse(word).is_some())
+}
+
+pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
+    budget.take(&path.display().to_string(), MEMORY_PER_BYTE * bytes.len() as u64)?;
+    let error = |(line, problem)| LoadError::Off { path: path.into(), line, problem };
+    let mesh = read(bytes).map_err(error)?;
+    let albedo = if mesh.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
+    let description = SceneDescription {
+        parts: vec![Part { name: stem(path), mesh, surface: 0 }],
+        surfaces: vec![Surface::diffuse("default", albedo)],
+        ..SceneDescription::default()
+    };
+    Ok(Loaded { description, ..Loaded::default() })
+}
+
+/// What the header word says of vertices.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Kind {
+    uvs: bool,
+    colors: bool,
+    normals: bool,
+    coordinates: Coordinates,
+}
+
+/// Of a position.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum Coordinates {
+    #[default]
+    Three,
+    /// With a divisor.
+    Homogeneous,
+    /// As many as the file says.
+    Any,
+}
+
+impl Kind {
+    /// `[ST][C][N][4][n]OFF`, and what stands after it in the word.
+    fn parse(word: &str) -> Option<(Self, &str)> {
+        let mut kind = Self::default();
+        let (mut letters, after) = word.split_once("OFF")?;
+        let mut take = |prefix: &str| {
+            let rest = letters.strip_prefix(prefix);
+            letters = rest.unwrap_or(letters);
+            rest.is_some()
+        };
+        kind.uvs = take("ST");
+        kind.colors = take("C");
+        kind.normals = take("N");
+        if take("4") {
+            kind.coordinates = Coordinates::Homogeneous;
+        }
+        if take("n") {
+            kind.coordinates = Coordinates::Any;
+        }
+        letters.is_empty().then_some((kind, after))
+    }
+}
+
+type Lines<'a> = std::iter::Enumerate<std::slice::Split<'a, u8, fn(&u8) -> bool>>;
+
+/// A file's words, line by line, without comments.
+struct Words<'a> {
+    lines: Lines<'a>,
+    /// The line, from 1.
+    line: usize,
+    /// What is left of it.
+    rest: std::str::SplitWhitespace<'a>,
+    /// Every vertex and every face has a line of its own, which may hold more than is read.
+    by_line: bool,
+}
+
+impl<'a> Words<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        let is_end: fn(&u8) -> bool = |&b| b == b'\n';
+        let rest = "".split_whitespace();
+        Self { lines: bytes.split(is_end).enumerate(), line: 0, rest, by_line: true }
+    }
+
+    /// The next word of this line or of the next.
+    fn next(&mut self) -> Option<&'a str> {
+        loop {
+            if let Some(word) = self.rest.next() {
+                return Some(word);
+            }
+            let (index, line) = self.lines.next()?;
+            self.line = index + 1;
+            let text = line.split(|&b| b == b'#').next().unwrap_or_default();
+            // What is no text is no number either.
+            self.rest = std::str::from_utf8(text).unwrap_or("\u{fffd}").split_whitespace();
+        }
+    }
+
+    fn number(&mut self, ended: &impl Fn() -> OffProblem) -> Located<f32> {
+        let word = self.next().ok_or_else(|| (self.line, ended()))?;
+        number(word).map_err(|problem| (self.line, problem))
+    }
+
+    fn vector(&mut self, ended: &impl Fn() -> OffProblem) -> Located<Vec3> {
+        Ok(Vec3::new(self.number(ended)?, self.number(ended)?, self.number(ended)?))
+    }
+
+    /// The words that are left of a line, none where lines mean nothing.
+    fn rest_of_line(&mut self) -> Vec<&'a str> {
+        if self.by_line { self.rest.by_ref().collect() } else { Vec::new() }
+    }
+}
+
+fn number(word: &str) -> Result<f32, OffProblem> {
+    let value = word.parse().ok().filter(|v: &f32| v.is_finite());
+    value.ok_or_else(|| OffProblem::NotANumber { text: word.chars().take(40).collect() })
+}
+
+fn read(bytes: &[u8]) -> Located<Mesh> {
+    let mut words = Words::new(bytes);
+    let lines = bytes.split(|&b| b == b'\n').count();
+    let (kind, vertices, faces) = header(&mut words, lines)?;
+    let mut mesh = Mesh::default();
+    let mut colors = Colors::default();
+    for found in 0..vertices {
+        let ended = || OffProblem::EndOfFile { what: "vertices", found, promised: vertices };
+        read_vertex(&mut words, kind, &mut mesh, &mut colors, &ended)?;
+    }
+    let mut polygons = Polygons::default();
+    let mut face_colors = Colors::default();
+    for found in 0..faces {
+        let ended = || OffProblem::EndOfFile { what: "faces", found, promised: faces };
+        read_face(&mut words, vertices, &mut polygons, &ended)?;
+        let color = words.rest_of_line();
+        face_colors.add(&color).map_err(|problem| (words.line, problem))?;
+    }
+    if kind.colors {
+        mesh.colors = colors.linear().into_iter().map(|c| c.unwrap_or(Rgb::WHITE)).collect();
+    }
+    let triangles = polygons.triangles(&mesh.positions);
+    mesh.triangles = triangles.iter().map(|(triangle, _)| *triangle).collect();
+    if mesh.normals.is_empty() {
+        mesh.compute_normals();
+    }
+    let face_colors = face_colors.linear();
+    if mesh.colors.is_empty() && face_colors.iter().any(Option::is_some) {
+        let of = |&(_, face): &([u32; 3], usize)| face_colors[face].unwrap_or(DEFAULT_ALBEDO);
+        mesh = color_triangles(&mesh, triangles.iter().map(of));
+    }
+    Ok(mesh)
+}
+
+/// The kind, and how many vertices and faces are promised, in a file of so many lines.
+fn header(words: &mut Words, lines: usize) -> Located<(Kind, usize, usize)> {
+    let mut next = || (words.next().unwrap_or_default(), words.line);
+    let (first, line) = next();
+    let (kind, count) = match Kind::parse(first) {
+        // Counts may stand in the same word: OFF8 6 12.
+        Some((kind, "")) => (kind, next().0),
+        Some((kind, count)) => (kind, count),
+        // Geomview takes a file without the word.
+        None => (Kind::default(), first),
+    };
+    let unsupported = |kind: &str| (line, OffProblem::Unsupported { kind: kind.into() });
+    if count == "BINARY" {
+        return Err(unsupported("binary OFF"));
+    }
+    if kind.coordinates == Coordinates::Any {
+        return Err(unsupported("nOFF"));
+    }
+    let parse = |text: &str, line: usize| {
+        let wrong = |_| (line, OffProblem::Counts { text: text.chars().take(40).collect() });
+        text.parse::<usize>().map_err(wrong)
+    };
+    let vertices = parse(count, line)?;
+    let (second, line) = next();
+    let faces = parse(second, line)?;
+    words.by_line = vertices.saturating_add(faces) < lines;
+    // The number of edges counts for nothing; where lines mean something, some leave it out.
+    if words.by_line {
+        let _ = words.rest_of_line();
+    } else {
+        let _ = words.next();
+    }
+    Ok((kind, vertices, faces))
+}
+
+fn read_vertex(
+    words: &mut Words,
+    kind: Kind,
+    mesh: &mut Mesh,
+    colors: &mut Colors,
+    ended: &impl Fn() -> OffProblem,
+) -> Located<()> {
+    let mut position = words.vector(ended)?;
+    if kind.coordinates == Coordinates::Homogeneous {
+        let w = words.number(ended)?;
+        position /= if w == 0.0 { 1.0 } else { w };
+    }
+    if !position.is_finite() {
+        return Err((words.line, OffProblem::NotANumber { text: position.to_string() }));
+    }
+    mesh.positions.push(position);
+    if kind.normals {
+        mesh.normals.push(words.vector(ended)?.normalize_or_zero());
+    }
+    if kind.colors {
+        let uvs = 2 * usize::from(kind.uvs);
+        // Three numbers or four: opacity is left out at times.
+        let left = if words.by_line { words.rest.clone().count() } else { 4 + uvs };
+        let n = left.saturating_sub(uvs).clamp(3, 4);
+        let mut color = Vec::with_capacity(n);
+        for _ in 0..n {
+            color.push(words.next().ok_or_else(|| (words.line, ended()))?);
+        }
+        colors.add(&color).map_err(|problem| (words.line, problem))?;
+    }
+    if kind.uvs {
+        mesh.uvs.push(Vec2::new(words.number(ended)?, 1.0 - words.number(ended)?));
+    }
+    // What the header word does not name.
+    let _ = words.rest_of_line();
+    Ok(())
+}
+
+fn read_face(
+    words: &mut Words,
+    vertices: usize,
+    polygons: &mut Polygons,
+    ended: &impl Fn() -> OffProblem,
+) -> Located<()> {
+    let short = |word: &str| word.chars().take(40).collect();
+    let word = words.next().ok_or_else(|| (words.line, ended()))?;
+    let wrong = |_| (words.line, OffProblem::NotANumber { text: short(word) });
+    let n: usize = word.parse().map_err(wrong)?;
+    for _ in 0..n {
+        let word = words.next().ok_or_else(|| (words.line, ended()))?;
+        let index = word.parse().ok().filter(|&i: &u32| (i as usize) < vertices);
+        let wrong = || (words.line, OffProblem::Index { text: short(word), vertices });
+        polygons.push(index.ok_or_else(wrong)?);
+    }
+    polygons.end();
+    Ok(())
+}
+
+/// Colors as they are written.
+#[derive(Default)]
+struct Colors {
+    values: Vec<Option<Rgb>>,
+    has_fractions: bool,
+    greatest: f32,
+}
+
+impl Colors {
+    /// One number is an index into a color map that nobody has, three or four are a color.
+    fn add(&mut self, words: &[&str]) -> Result<(), OffProblem> {
+        if words.len() < 3 {
+            self.values.push(None);
+            return Ok(());
+        }
+        let [r, g, b] = [number(words[0])?, number(words[1])?, number(words[2])?];
+        self.has_fractions |= words[..3].iter().any(|word| word.parse::<i64>().is_err());
+        self.greatest = self.greatest.max(r).max(g).max(b);
+        self.values.push(Some(Rgb::new(r, g, b)));
+        Ok(())
+    }
+
+    fn linear(self) -> Vec<Option<Rgb>> {
+        let bytes = !self.has_fractions && self.greatest > 1.0;
+        let linear = |c: f32| {
+            if bytes { decode((c / 255.0).clamp(0.0, 1.0), Encoding::Srgb) } else { c.max(0.0) }
+        };
+        self.values.into_iter().map(|color| color.map(|color| color.map(linear))).collect()
+    }
+}

@@ -1,0 +1,173 @@
+//! STL, the format of 3D printers: ASCII, one part a solid, and binary.
+//!
+//! Facets share no vertices and shade flat; their normals are those of their corners' order, as most programs take
+//! them, for files often have others or none. Colors in the two bytes after a binary facet mean different things to
+//! different programs and are passed over.
+//!
+//! 3D Systems 1989, "StereoLithography Interface Specification". A binary file may begin with `solid`, too: a file is
+//! binary if it is as long as its count of facets says.
+//!
+//! Written for this program: the crate stl_io reads one solid and takes memory for as many facets as a header says.
+
+use std::path::Path;
+
+use super::ply::DEFAULT_ALBEDO;
+use super::{Budget, LoadError, Loaded, stem, text_of};
+use crate::geometry::Mesh;
+use crate::math::Vec3;
+use crate::scene::{Part, SceneDescription, Surface};
+
+/// What is wrong with an STL file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StlProblem {
+    /// Neither text nor a binary file of the right length.
+    #[error(
+        "neither text that begins with 'solid' nor a binary file: its header promises {facets} facets, \
+         {needed} bytes, but it has {held}; the file is cut short or not STL"
+    )]
+    Length {
+        /// The count in the header.
+        facets: u32,
+        /// The bytes that these take, with the header.
+        needed: u64,
+        /// The bytes there are.
+        held: usize,
+    },
+    /// A vertex that cannot be read.
+    #[error("line {line}: '{text}' is no vertex; it needs three finite numbers")]
+    Vertex {
+        /// The line, from 1.
+        line: usize,
+        /// What stands there.
+        text: String,
+    },
+    /// A facet that is no triangle.
+    #[error("line {line}: a facet of {corners} vertices; it needs three")]
+    Facet {
+        /// The line at which the facet ends, from 1.
+        line: usize,
+        /// How many it has.
+        corners: usize,
+    },
+    /// A vertex of a binary file at no place.
+    #[error("facet {facet}: the position is not finite: {position}")]
+    NotFinite {
+        /// The facet, from 0.
+        facet: usize,
+        /// The position.
+        position: Vec3,
+    },
+}
+
+/// The header and the count of facets.
+const HEADER: usize = 84;
+/// A facet: normal, three vertices and two bytes.
+const FACET: usize = 50;
+/// Memory of a mesh for each byte of text: a vertex line is some 15 bytes or more and takes 12, a third of a facet's
+/// indices 4.
+const MEMORY_PER_BYTE: u64 = 2;
+
+/// Whether the bytes are an STL file, whatever its name.
+pub(super) fn is_stl(bytes: &[u8]) -> bool {
+    facets(bytes).is_some() || is_text(bytes)
+}
+
+pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
+    let error = |problem| LoadError::Stl { path: path.into(), problem };
+    let name = path.display().to_string();
+    let parts = if let Some(facets) = facets(bytes) {
+        budget.take(&name, facets as u64 * (3 * 12 + 12))?;
+        vec![(stem(path), binary(&bytes[HEADER..]).map_err(error)?)]
+    } else if is_text(bytes) {
+        budget.take(&name, MEMORY_PER_BYTE * bytes.len() as u64)?;
+        ascii(path, bytes).map_err(error)?
+    } else {
+        let count = bytes.get(80..HEADER).and_then(|b| b.try_into().ok());
+        let facets = count.map_or(0, u32::from_le_bytes);
+        let needed = HEADER as u64 + FACET as u64 * u64::from(facets);
+        return Err(error(StlProblem::Length { facets, needed, held: bytes.len() }));
+    };
+    let parts = parts.into_iter().filter(|(_, mesh)| !mesh.triangles.is_empty());
+    let description = SceneDescription {
+        parts: parts.map(|(name, mesh)| Part { name, mesh, surface: 0 }).collect(),
+        surfaces: vec![Surface::diffuse("default", DEFAULT_ALBEDO)],
+        ..SceneDescription::default()
+    };
+    Ok(Loaded { description, ..Loaded::default() })
+}
+
+fn is_text(bytes: &[u8]) -> bool {
+    let start = bytes.trim_ascii_start();
+    start.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+}
+
+/// How many facets a binary file has; none if it is no binary file. Some programs append bytes of their own.
+fn facets(bytes: &[u8]) -> Option<usize> {
+    let count = u32::from_le_bytes(*bytes.get(80..)?.first_chunk()?) as usize;
+    let needed = count.checked_mul(FACET)?.checked_add(HEADER)?;
+    let fits = bytes.len() == needed || (bytes.len() > needed && count > 0 && !is_text(bytes));
+    fits.then_some(count)
+}
+
+fn binary(bytes: &[u8]) -> Result<Mesh, StlProblem> {
+    let mut mesh = Mesh::default();
+    for (facet, bytes) in bytes.as_chunks::<FACET>().0.iter().enumerate() {
+        let number = |i: usize| f32::from_le_bytes([0, 1, 2, 3].map(|k| bytes[4 * i + k]));
+        for i in [3, 6, 9] {
+            let position = Vec3::new(number(i), number(i + 1), number(i + 2));
+            if !position.is_finite() {
+                return Err(StlProblem::NotFinite { facet, position });
+            }
+            mesh.positions.push(position);
+        }
+        add_facet(&mut mesh);
+    }
+    Ok(mesh)
+}
+
+fn ascii(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Mesh)>, StlProblem> {
+    let mut solids: Vec<(String, Mesh)> = Vec::new();
+    let mut corners = 0;
+    for (index, line) in bytes.split(|&b| b == b'\n' || b == b'\r').enumerate() {
+        let text = text_of(line);
+        let text = text.trim();
+        let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+        let line = index + 1;
+        if keyword.eq_ignore_ascii_case("solid") {
+            let name = if rest.trim().is_empty() { stem(path) } else { rest.trim().to_owned() };
+            solids.push((name, Mesh::default()));
+        } else if keyword.eq_ignore_ascii_case("vertex") {
+            let Some((_, mesh)) = solids.last_mut() else { continue };
+            mesh.positions.push(vertex(rest).ok_or_else(|| StlProblem::Vertex {
+                line,
+                text: text.chars().take(60).collect(),
+            })?);
+            corners += 1;
+        } else if keyword.eq_ignore_ascii_case("endfacet") {
+            let Some((_, mesh)) = solids.last_mut() else { continue };
+            if corners != 3 {
+                return Err(StlProblem::Facet { line, corners });
+            }
+            add_facet(mesh);
+            corners = 0;
+        }
+    }
+    // A facet without its end belongs to a file that was cut short.
+    if corners > 0 {
+        let line = bytes.split(|&b| b == b'\n' || b == b'\r').count();
+        return Err(StlProblem::Facet { line, corners });
+    }
+    Ok(solids)
+}
+
+fn vertex(text: &str) -> Option<Vec3> {
+    let mut numbers = text.split_whitespace().map(str::parse::<f32>);
+    let position = Vec3::new(numbers.next()?.ok()?, numbers.next()?.ok()?, numbers.next()?.ok()?);
+    position.is_finite().then_some(position)
+}
+
+/// The last three vertices as a triangle.
+fn add_facet(mesh: &mut Mesh) {
+    let end = mesh.positions.len() as u32;
+    mesh.triangles.push([end - 3, end - 2, end - 1]);
+}

@@ -1,0 +1,204 @@
+//! A running strategy of any kind: the tables and lights that a [`StrategySpec`] needs of an environment.
+
+use super::{
+    BrdfSampling, CompensationNeedsBrdf, Contributions, EnvironmentSampling, LightSet, LightTable,
+    MultipleImportanceSampling, ProductSampling, RAY_COST, RejectionError, RejectionSampling,
+    SamplingImportanceResampling, ShadingPoint, Strategy, StrategySpec, TileShading,
+    optimal_candidates, product, rejection, sir,
+};
+use crate::environment::{CompensatedTable, Environment};
+use crate::rig::{MedianCut, RigError, VarianceMinimization, median_cut, variance_minimization};
+use crate::sampling::Stream;
+
+/// A strategy that runs: a closed set, so that the choice costs one branch a tile.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+#[expect(clippy::large_enum_variant, reason = "there is one for each picture")]
+pub enum PreparedStrategy<'e> {
+    /// BRDF sampling.
+    Brdf(BrdfSampling<'e>),
+    /// Environment sampling.
+    Environment(EnvironmentSampling<'e>),
+    /// Multiple importance sampling.
+    Mis(MultipleImportanceSampling<'e>),
+    /// Product sampling.
+    Product(ProductSampling<'e>),
+    /// Rejection sampling.
+    Rejection(RejectionSampling<'e>),
+    /// Sampling importance resampling.
+    Sir(SamplingImportanceResampling<'e>),
+    /// The directional lights of a rig.
+    Lights(LightSet),
+}
+
+/// A strategy that an environment does not go with.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PrepareError {
+    /// Rejection with a stopping rule that has no estimate.
+    #[error(transparent)]
+    Rejection(#[from] RejectionError),
+    /// MIS compensation without BRDF samples.
+    #[error(transparent)]
+    Compensation(#[from] CompensationNeedsBrdf),
+    /// Lights that cannot be extracted.
+    #[error(transparent)]
+    Lights(#[from] RigError),
+}
+
+impl StrategySpec {
+    /// Chooses what is left open, by a pilot over some of the scene's points: the number of SIR's candidates with
+    /// the least error for its cost. `points` is called only where it matters.
+    #[must_use]
+    pub fn for_scene(
+        self,
+        points: impl FnOnce() -> Vec<ShadingPoint>,
+        environment: &Environment,
+        seed: u64,
+    ) -> Self {
+        match self {
+            Self::Sir { n_candidates: None, n_samples, candidates, resampling } => {
+                let variance = candidates.relative_variance(environment, &points(), seed);
+                let n_candidates = Some(optimal_candidates(n_samples, variance, RAY_COST));
+                Self::Sir { n_candidates, n_samples, candidates, resampling }
+            }
+            spec => spec,
+        }
+    }
+}
+
+impl<'e> PreparedStrategy<'e> {
+    /// Makes the tables and lights that all pictures under the environment share. SIR whose candidates are left open
+    /// ([`StrategySpec::for_scene`]) has as many candidates as rays.
+    ///
+    /// # Errors
+    /// If the environment or the counts do not suit the strategy.
+    pub fn new(spec: StrategySpec, environment: &'e Environment) -> Result<Self, PrepareError> {
+        Ok(match spec {
+            StrategySpec::Brdf { n_samples } => Self::Brdf(BrdfSampling { environment, n_samples }),
+            StrategySpec::Environment { n_samples } => {
+                Self::Environment(EnvironmentSampling { environment, n_samples })
+            }
+            StrategySpec::Mis { n_environment, n_brdf, heuristic, compensation } => {
+                let table = if compensation {
+                    LightTable::Compensated(CompensatedTable::new(environment))
+                } else {
+                    LightTable::Full
+                };
+                Self::Mis(MultipleImportanceSampling::new(
+                    environment,
+                    table,
+                    heuristic,
+                    n_environment,
+                    n_brdf,
+                )?)
+            }
+            StrategySpec::Product { n_rays } => {
+                Self::Product(ProductSampling::new(environment, n_rays))
+            }
+            StrategySpec::Rejection { proposal, stop } => {
+                Self::Rejection(RejectionSampling::new(environment, proposal, stop)?)
+            }
+            StrategySpec::Sir { n_candidates, n_samples, candidates, resampling } => {
+                Self::Sir(SamplingImportanceResampling {
+                    environment,
+                    n_candidates: n_candidates.unwrap_or(n_samples),
+                    n_samples,
+                    candidates,
+                    resampling,
+                })
+            }
+            StrategySpec::MedianCut { n_lights } => {
+                let rig = median_cut(environment, n_lights as usize, MedianCut::default())?;
+                Self::Lights(LightSet { rig })
+            }
+            StrategySpec::VarianceMinimization { n_lights } => {
+                let settings = VarianceMinimization::default();
+                let rig = variance_minimization(environment, n_lights as usize, settings)?;
+                Self::Lights(LightSet { rig })
+            }
+        })
+    }
+}
+
+/// The same expression for the strategy inside, whichever it is.
+macro_rules! each {
+    ($strategy:expr, $s:ident => $body:expr) => {
+        match $strategy {
+            PreparedStrategy::Brdf($s) => $body,
+            PreparedStrategy::Environment($s) => $body,
+            PreparedStrategy::Mis($s) => $body,
+            PreparedStrategy::Product($s) => $body,
+            PreparedStrategy::Rejection($s) => $body,
+            PreparedStrategy::Sir($s) => $body,
+            PreparedStrategy::Lights($s) => $body,
+        }
+    };
+}
+
+/// Scratch memory of [`PreparedStrategy`]; only that of the running strategy takes any.
+#[derive(Debug, Default)]
+pub struct PreparedScratch {
+    product: product::ProductScratch,
+    rejection: rejection::RejectionScratch,
+    sir: sir::SirScratch,
+}
+
+impl Strategy for PreparedStrategy<'_> {
+    /// The pool of `product`; the other strategies share nothing.
+    type Pass = Option<product::Pool>;
+    type Scratch = PreparedScratch;
+
+    fn n_rounds(&self) -> u32 {
+        each!(self, s => s.n_rounds())
+    }
+
+    fn n_rays(&self) -> u32 {
+        each!(self, s => Strategy::n_rays(s))
+    }
+
+    fn samples_per_pass(&self) -> Option<u32> {
+        each!(self, s => s.samples_per_pass())
+    }
+
+    fn begin_pass(&self, stream: Stream, n_samples: u32) -> Self::Pass {
+        match self {
+            Self::Product(product) => Some(product.begin_pass(stream, n_samples)),
+            _ => None,
+        }
+    }
+
+    fn push(
+        &self,
+        pass: &Self::Pass,
+        tile: &TileShading,
+        round: u32,
+        scratch: &mut PreparedScratch,
+        out: &mut Contributions,
+    ) {
+        match self {
+            Self::Brdf(s) => s.push(&(), tile, round, &mut (), out),
+            Self::Environment(s) => s.push(&(), tile, round, &mut (), out),
+            Self::Mis(s) => s.push(&(), tile, round, &mut (), out),
+            Self::Product(s) => {
+                let pool = pass.as_ref().expect("product draws a pool for each pass");
+                s.push(pool, tile, round, &mut scratch.product, out);
+            }
+            Self::Rejection(s) => s.push(&(), tile, round, &mut scratch.rejection, out),
+            Self::Sir(s) => s.push(&(), tile, round, &mut scratch.sir, out),
+            Self::Lights(s) => s.push(&(), tile, round, &mut (), out),
+        }
+    }
+
+    fn learn(
+        &self,
+        tile: &TileShading,
+        pushed: &Contributions,
+        visibility: &[f32],
+        scratch: &mut PreparedScratch,
+    ) {
+        if let Self::Product(product) = self {
+            product.learn(tile, pushed, visibility, &mut scratch.product);
+        }
+    }
+}

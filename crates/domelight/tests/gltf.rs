@@ -1,0 +1,401 @@
+//! glTF as the world writes it: extensions, animations, cameras, and files that are odd but meant.
+#![cfg(feature = "io")]
+
+use std::fs;
+use std::path::PathBuf;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use domelight::Rgb;
+use domelight::math::{Vec2, Vec3, vec2, vec3};
+use domelight::scene::{
+    AlphaMode, AnimationTime, Coverage, LoadOptions, Loaded, Scene, Surface, SurfaceModel,
+    TextureFilter, Wrap, load_with,
+};
+use tempfile::TempDir;
+
+/// Bytes that accessors look into: a triangle's positions, and three times two, four and one number.
+fn data() -> Vec<u8> {
+    let floats: [f32; 30] = [
+        0., 0., 0., 1., 0., 0., 0., 1., 0., // 0: positions
+        0., 1., 1., 1., 0., 0., // 36: texture coordinates
+        1., 0.5, 0.25, 1., 1., 0.5, 0.25, 0.5, 1., 0.5, 0.25, 0., // 60: colors
+        0., 1., 2., // 108: times
+    ];
+    floats.iter().flat_map(|f| f.to_le_bytes()).collect()
+}
+
+/// A document of one triangle, with more in its JSON and in its primitive; `data` as a view of bytes 0 to 120.
+fn document(more: &str, primitive: &str) -> String {
+    let data = STANDARD.encode(data());
+    let scene = if more.contains("\"nodes\"") {
+        ""
+    } else {
+        r#""scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"#
+    };
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},{scene}{more}
+"meshes":[{{"name":"tri","primitives":[{{"attributes":{{"POSITION":0,"TEXCOORD_0":1,"TEXCOORD_1":1,"COLOR_0":2{primitive}}}]}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}},
+ {{"bufferView":0,"byteOffset":36,"componentType":5126,"count":3,"type":"VEC2"}},
+ {{"bufferView":0,"byteOffset":60,"componentType":5126,"count":3,"type":"VEC4"}},
+ {{"bufferView":0,"byteOffset":108,"componentType":5126,"count":3,"type":"SCALAR"}}],
+"bufferViews":[{{"buffer":0,"byteLength":120}}],
+"buffers":[{{"byteLength":120,"uri":"data:;base64,{data}"}}]}}"#
+    )
+}
+
+struct File {
+    _folder: TempDir,
+    path: PathBuf,
+}
+
+fn file(json: &str) -> File {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    fs::write(&path, json).unwrap();
+    File { _folder: folder, path }
+}
+
+fn loaded_with(json: &str, options: &LoadOptions) -> Loaded {
+    let loaded = load_with(&file(json).path, options).unwrap_or_else(|e| panic!("{e}"));
+    Scene::new(loaded.description.clone()).unwrap();
+    loaded
+}
+
+fn loaded(json: &str) -> Loaded {
+    loaded_with(json, &LoadOptions::default())
+}
+
+fn error_with(json: &str, options: &LoadOptions) -> String {
+    load_with(&file(json).path, options).unwrap_err().to_string()
+}
+
+fn error(json: &str) -> String {
+    error_with(json, &LoadOptions::default())
+}
+
+fn has(text: &str, words: &[&str]) {
+    for word in words {
+        assert!(text.contains(word), "'{word}' is not in: {text}");
+    }
+}
+
+/// A picture of 2 × 2 texels, as a data URI.
+fn image(format: image::ImageFormat, rgba: [u8; 4]) -> String {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let image = image::RgbaImage::from_pixel(2, 2, image::Rgba(rgba));
+    image.write_to(&mut bytes, format).unwrap();
+    format!("data:image/x;base64,{}", STANDARD.encode(bytes.into_inner()))
+}
+
+fn png(rgba: [u8; 4]) -> String {
+    image(image::ImageFormat::Png, rgba)
+}
+
+/// The surface of a material, with images that are textures of their own.
+fn surface(material: &str, images: &[String]) -> (Surface, Loaded) {
+    let uris: Vec<_> = images.iter().map(|uri| format!(r#"{{"uri":"{uri}"}}"#)).collect();
+    let textures: Vec<_> =
+        (0..images.len()).map(|i| format!(r#"{{"source":{i},"sampler":0}}"#)).collect();
+    let more = format!(
+        r#""materials":[{material}],"images":[{}],"textures":[{}],"samplers":[{{"magFilter":9728,"wrapT":33071}}],"#,
+        uris.join(","),
+        textures.join(",")
+    );
+    let loaded = loaded(&document(&more, r#"},"material":0"#));
+    (loaded.description.surfaces[0].clone(), loaded)
+}
+
+#[test]
+fn coverage_comes_from_factor_texture_and_vertices() {
+    let material = r#"{"alphaMode":"MASK","alphaCutoff":0.25,"doubleSided":true,"pbrMetallicRoughness":
+{"baseColorFactor":[1,1,1,0.75],"baseColorTexture":{"index":0,"texCoord":1}}}"#;
+    let (surface, of_mask) = surface(material, &[png([255, 0, 0, 51])]);
+    assert_eq!(surface.coverage.mode, AlphaMode::Mask { cutoff: 0.25 });
+    assert_eq!(surface.coverage.opacity, 0.75);
+    assert!(surface.double_sided);
+    let texture = surface.coverage.texture.unwrap();
+    assert_eq!(
+        (texture.filter, texture.wrap),
+        (TextureFilter::Nearest, [Wrap::Repeat, Wrap::Clamp])
+    );
+    let image = &of_mask.description.textures[texture.texture];
+    let alpha = image.sample_alpha(vec2(0.5, 0.5), texture.wrap, texture.filter);
+    assert!((alpha - 0.2).abs() < 1e-6);
+    assert_eq!(of_mask.description.parts[0].mesh.alphas, [1.0, 0.5, 0.0]);
+    has(&of_mask.warnings.join("\n"), &["alphaMode MASK"]);
+
+    // Opaque, alpha does not count.
+    let (surface, opaque) =
+        self::surface(&material.replace("MASK", "OPAQUE"), &[png([255, 0, 0, 51])]);
+    assert_eq!(surface.coverage, Coverage::default());
+    assert!(opaque.description.parts[0].mesh.alphas.is_empty());
+    assert!(!opaque.description.textures[0].has_alpha());
+    assert!(opaque.warnings.is_empty(), "{:?}", opaque.warnings);
+}
+
+#[test]
+fn two_sets_of_texture_coordinates_and_no_third() {
+    let white = || png([255; 4]);
+    let material = r#"{"name":"m","normalTexture":{"index":1,"texCoord":1,"extensions":
+{"KHR_texture_transform":{"texCoord":0,"offset":[0.5,0]}}},"emissiveFactor":[1,1,1],"emissiveTexture":{"index":1,"texCoord":7},
+"pbrMetallicRoughness":{"baseColorTexture":{"index":0,"texCoord":1}}}"#;
+    let (surface, loaded) = surface(material, &[white(), white()]);
+    let SurfaceModel::MetallicRoughness(m) = &surface.model else { panic!() };
+    assert_eq!(m.base_color_texture.unwrap().uv_set, 0, "the first that is used");
+    let normal = surface.normal_map.unwrap().texture;
+    assert_eq!((normal.uv_set, normal.transform.offset), (1, vec2(0.5, 0.0)));
+    assert_eq!(surface.emission.unwrap().texture, None);
+    let mesh = &loaded.description.parts[0].mesh;
+    assert_eq!((mesh.uvs.len(), mesh.uvs2.len(), mesh.tangents.len()), (3, 3, 3));
+    assert_eq!(mesh.uvs2[0], Vec2::Y);
+    has(&loaded.warnings.join("\n"), &["'m'", "more than two sets"]);
+}
+
+#[test]
+fn extensions_of_materials_are_kept_and_named_once_if_not_drawn() {
+    let material = r#"{"name":"all","emissiveFactor":[1,0.5,0],"extensions":{
+"KHR_materials_emissive_strength":{"emissiveStrength":4},"KHR_materials_unlit":{},"KHR_materials_ior":{"ior":1.3},
+"KHR_materials_specular":{"specularFactor":0.5,"specularColorFactor":[2,1,0]},
+"KHR_materials_clearcoat":{"clearcoatFactor":0.5,"clearcoatRoughnessFactor":0.25,"clearcoatNormalTexture":{"index":0,"scale":2}},
+"KHR_materials_sheen":{"sheenColorFactor":[0.5,0.5,0.5],"sheenRoughnessFactor":0.3},
+"KHR_materials_anisotropy":{"anisotropyStrength":0.6,"anisotropyRotation":1.5},
+"KHR_materials_transmission":{"transmissionFactor":0.9},
+"KHR_materials_volume":{"thicknessFactor":2,"attenuationColor":[0.5,0.6,0.7]}}}"#;
+    let (surface, loaded) = surface(material, &[png([255; 4])]);
+    assert_eq!(surface.emission.unwrap().radiance, Rgb::new(4.0, 2.0, 0.0));
+    assert!(surface.unlit && !surface.double_sided);
+    let layers = &surface.layers;
+    assert_eq!(layers.ior, Some(1.3));
+    let specular = layers.specular.unwrap();
+    assert_eq!((specular.strength.value, specular.color.value), (0.5, Rgb::new(2.0, 1.0, 0.0)));
+    let coat = layers.clearcoat.unwrap();
+    assert_eq!((coat.strength.value, coat.roughness.value), (0.5, 0.25));
+    assert_eq!(coat.normal_map.unwrap().scale, 2.0);
+    assert_eq!(layers.sheen.unwrap().roughness.value, 0.3);
+    assert_eq!(layers.anisotropy.unwrap().rotation, 1.5);
+    assert_eq!(layers.transmission.unwrap().value, 0.9);
+    let volume = layers.volume.unwrap();
+    assert_eq!((volume.thickness.value, volume.attenuation_distance), (2.0, f32::INFINITY));
+    assert_eq!(surface.textures().count(), 1);
+    let features: Vec<_> = surface.undrawn_features().collect();
+    assert_eq!(loaded.warnings.len(), features.len(), "{:?}", loaded.warnings);
+    for feature in features {
+        has(&loaded.warnings.join("\n"), &[feature, "'all'"]);
+    }
+    // What an extension leaves as it is, is not named.
+    let plain = r#"{"extensions":{"KHR_materials_ior":{"ior":1.5},"KHR_materials_specular":{},"KHR_materials_clearcoat":{}}}"#;
+    let (surface, loaded) = self::surface(plain, &[]);
+    assert_eq!(surface.undrawn_features().count(), 0);
+    assert!(loaded.warnings.is_empty());
+}
+
+#[test]
+fn specular_and_glossiness_are_drawn() {
+    let material = r#"{"extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[0.5,0.5,0.5,1],
+"specularFactor":[0.2,0.2,0.2],"glossinessFactor":0.8,"specularGlossinessTexture":{"index":0}}}}"#;
+    let (surface, loaded) = surface(material, &[png([255, 255, 255, 128])]);
+    let SurfaceModel::SpecularGlossiness(s) = &surface.model else { panic!() };
+    assert_eq!((s.diffuse, s.specular, s.glossiness), (Rgb::splat(0.5), Rgb::splat(0.2), 0.8));
+    assert!(loaded.description.textures[0].has_alpha() && loaded.warnings.is_empty());
+}
+
+#[test]
+fn images_of_webp_are_read_and_avif_is_named() {
+    let webp = image(image::ImageFormat::WebP, [0, 255, 0, 255]);
+    let more = |texture: &str, uri: &str| {
+        let material = r#"{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}"#;
+        let more = format!(
+            r#""materials":[{material}],"images":[{{"uri":"{uri}"}}],"textures":[{texture}],"#
+        );
+        document(&more, r#"},"material":0"#)
+    };
+    let by_extension = r#"{"extensions":{"EXT_texture_webp":{"source":0}}}"#;
+    let loaded = loaded(&more(by_extension, &webp));
+    assert_eq!(loaded.description.textures[0].texel(1, 1), Rgb::new(0.0, 1.0, 0.0));
+    let avif = r#"{"extensions":{"EXT_texture_avif":{"source":0}}}"#;
+    has(&error(&more(avif, &webp)), &["image 0 is AVIF", "gltf-transform"]);
+    let disguised = "data:;base64,AAAAIGZ0eXBhdmlmAAAAAA==";
+    has(&error(&more(r#"{"source":0}"#, disguised)), &["material 0", "image 0 is AVIF"]);
+}
+
+/// An image too large for the memory allowed is refused by its header.
+#[test]
+fn huge_images_are_refused_before_they_are_decoded() {
+    let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".to_vec();
+    png.extend(30_000u32.to_be_bytes());
+    png.extend(30_000u32.to_be_bytes());
+    png.extend([8, 2, 0, 0, 0, 0x1b, 0x2d, 0xa2, 0x9d]);
+    // The checksum of that header, and some data.
+    let crc = {
+        let mut crc = u32::MAX;
+        for &byte in &png[12..29] {
+            crc ^= u32::from(byte);
+            for _ in 0..8 {
+                crc = if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 };
+            }
+        }
+        !crc
+    };
+    png.truncate(29);
+    png.extend(crc.to_be_bytes());
+    png.extend(b"\0\0\0\0IDAT");
+    let more = format!(
+        r#""materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
+"textures":[{{"source":0}}],"images":[{{"uri":"data:;base64,{}"}}],"#,
+        STANDARD.encode(&png)
+    );
+    let json = document(&more, r#"},"material":0"#);
+    let options = LoadOptions { max_memory: Some(1 << 30), ..LoadOptions::default() };
+    has(&error_with(&json, &options), &["image 0", "GiB", "1.0 GiB"]);
+}
+
+#[test]
+fn extensions_end_a_load_only_if_that_is_asked_for() {
+    let strict = LoadOptions { strict: true, ..LoadOptions::default() };
+    let with = |extension: &str| {
+        let list = format!(r#"["{extension}"]"#);
+        document(&format!(r#""extensionsUsed":{list},"extensionsRequired":{list},"#), "}")
+    };
+    for options in [&LoadOptions::default(), &strict] {
+        let loaded = loaded_with(&with("KHR_lights_punctual"), options);
+        has(&loaded.warnings.join("\n"), &["KHR_lights_punctual", "lamps"]);
+    }
+    let loaded = loaded(&with("ACME_shape"));
+    assert_eq!(loaded.warnings.len(), 1);
+    has(&loaded.warnings[0], &["requires the extension ACME_shape"]);
+    has(&error_with(&with("ACME_shape"), &strict), &["ACME_shape", "--strict"]);
+}
+
+#[test]
+fn what_nothing_shows_is_not_checked() {
+    // Attributes with names of their own, broken animations, skins and materials, and text beside it all.
+    let more = r#""animations":[7],"skins":[{}],"materials":["wood"],"extras":{"a":[1]},"textures":[{"source":99}],"#;
+    let loaded = loaded(&document(more, r#","_WEIRD":3,"BATCHID":1}"#));
+    assert_eq!(loaded.description.parts[0].mesh.positions.len(), 3);
+    assert!(loaded.warnings.is_empty());
+}
+
+#[test]
+fn accessors_without_data_are_zeros() {
+    let json = document("", "}").replace(
+        r#"{"bufferView":0,"byteOffset":36,"componentType":5126,"count":3,"type":"VEC2"}"#,
+        r#"{"componentType":5126,"count":3,"type":"VEC2"}"#,
+    );
+    assert_eq!(loaded(&json).description.parts[0].mesh.uvs, [Vec2::ZERO; 3]);
+}
+
+#[test]
+fn short_buffers_are_a_warning_where_nothing_is_missing() {
+    let json = document("", "}").replacen(
+        r#""buffers":[{"byteLength":120"#,
+        r#""buffers":[{"byteLength":121"#,
+        1,
+    );
+    has(&loaded(&json).warnings.join("\n"), &["buffer 0", "120 of its 121"]);
+}
+
+#[test]
+fn the_first_version_is_named() {
+    has(
+        &error(r#"{"meshes":{"cube":{"primitives":[]}},"nodes":{}}"#),
+        &["glTF 1.0", "gltf-pipeline"],
+    );
+}
+
+#[test]
+fn cameras_scenes_and_hidden_nodes() {
+    let more = r#""scene":1,"scenes":[{"name":"a","nodes":[0]},{"name":"b","nodes":[1,2]}],"nodes":[
+{"mesh":0,"translation":[5,0,0]},{"mesh":0,"children":[3]},{"camera":0,"name":"left"},
+{"mesh":0,"extensions":{"KHR_node_visibility":{"visible":false}},"children":[4]},{"camera":1,"translation":[0,0,9]}],
+"cameras":[{"type":"perspective","perspective":{"yfov":0.5}},{"name":"top","type":"orthographic","orthographic":{"ymag":2}}],"#;
+    let json = document(more, "}");
+    let d = loaded(&json).description;
+    assert_eq!((d.parts.len(), d.cameras.len()), (1, 1));
+    assert_eq!(d.cameras[0].name, "left");
+    assert_eq!(d.camera, Some(d.cameras[0].settings));
+    let scene = |name: &str| LoadOptions { scene: Some(name.into()), ..LoadOptions::default() };
+    for name in ["a", "0"] {
+        let d = loaded_with(&json, &scene(name)).description;
+        assert_eq!(d.parts[0].mesh.positions[0], vec3(5.0, 0.0, 0.0));
+        assert!(d.camera.is_none());
+    }
+    has(&error_with(&json, &scene("c")), &["no scene 'c'", "0 'a', 1 'b'"]);
+    let visible = json.replace(r#""visible":false"#, r#""visible":true"#);
+    let d = loaded(&visible).description;
+    assert_eq!(d.cameras.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["top", "left"]);
+}
+
+#[test]
+fn animations_move_nodes_at_a_moment() {
+    // The positions' accessor as a path.
+    let more = r#""scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"scale":[2,2,2],"rotation":[0,0,0,2]}],"animations":[{"name":"go","samplers":
+[{"input":3,"output":0}],"channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}]}],"#;
+    let json = document(more, "}");
+    let first =
+        |options: &LoadOptions| loaded_with(&json, options).description.parts[0].mesh.positions[1];
+    let at = |name: &str, seconds| {
+        let animation = Some(AnimationTime { name: name.into(), seconds });
+        LoadOptions { animation, ..LoadOptions::default() }
+    };
+    assert_eq!(first(&LoadOptions::default()), vec3(2.0, 0.0, 0.0));
+    assert_eq!(first(&at("go", 0.5)), vec3(2.5, 0.0, 0.0));
+    assert_eq!(first(&at("0", 1.5)), vec3(2.5, 0.5, 0.0));
+    assert_eq!(first(&at("go", 99.0)), vec3(2.0, 1.0, 0.0));
+    has(&error_with(&json, &at("stop", 0.0)), &["no animation 'stop'", "0 'go'"]);
+    let broken = json.replace(r#""sampler":0,"target""#, r#""sampler":4,"target""#);
+    has(&error_with(&broken, &at("go", 0.0)), &["animation 0, channel 0", "sampler 4"]);
+}
+
+#[test]
+fn skins_place_vertices_by_their_joints_and_not_by_their_node() {
+    // All joints are 0: an accessor without data. Weights are the colors' first numbers, scaled to one.
+    let more = r#""scenes":[{"nodes":[0,1]}],"nodes":[{"mesh":0,"skin":0,"translation":[99,0,0]},{"translation":[0,0,3]}],
+"skins":[{"joints":[1]}],"#;
+    // As the fifth accessor.
+    let json = document(more, r#","JOINTS_0":4,"WEIGHTS_0":2}"#).replace(
+        r#""count":3,"type":"SCALAR"}]"#,
+        r#""count":3,"type":"SCALAR"},{"componentType":5121,"count":3,"type":"VEC4"}]"#,
+    );
+    let d = loaded(&json).description;
+    assert!((d.parts[0].mesh.positions[1] - vec3(1.0, 0.0, 3.0)).length() < 1e-5);
+    has(&error(&json.replace(r#""joints":[1]"#, r#""joints":[8]"#)), &["skin 0", "node 8"]);
+}
+
+#[test]
+fn instances_are_parts_of_their_own() {
+    let more = r#""scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"translation":[0,0,1],"extensions":
+{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":0,"_COLOR":1}}}}],"#;
+    let d = loaded(&document(more, "}")).description;
+    let first: Vec<Vec3> = d.parts.iter().map(|p| p.mesh.positions[0]).collect();
+    assert_eq!(first, [vec3(0., 0., 1.), vec3(1., 0., 1.), vec3(0., 1., 1.)]);
+    let uneven = more.replace(r#""_COLOR":1"#, r#""ROTATION":4"#);
+    let json = document(&uneven, "}").replace(
+        r#""count":3,"type":"SCALAR"}]"#,
+        r#""count":3,"type":"SCALAR"},{"componentType":5126,"count":2,"type":"VEC4"}]"#,
+    );
+    has(&error(&json), &["node 0", "2 values", "3"]);
+}
+
+#[test]
+fn choices_of_formats_without_them_are_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.obj");
+    fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let options = LoadOptions { scene: Some("0".into()), ..LoadOptions::default() };
+    has(&load_with(&path, &options).unwrap_err().to_string(), &["a.obj", "no scenes"]);
+}
+
+#[test]
+fn missing_images_are_left_out_unless_that_is_refused() {
+    let more = r#""materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],
+"textures":[{"source":0}],"images":[{"uri":"gone.png"}],"#;
+    let json = document(more, r#"},"material":0"#);
+    let loaded = loaded(&json);
+    assert_eq!(loaded.description.surfaces[0].textures().count(), 0);
+    assert_eq!(loaded.warnings.len(), 1);
+    has(&loaded.warnings[0], &["gone.png", "image 0", "left out"]);
+    let strict = LoadOptions { strict: true, ..LoadOptions::default() };
+    has(&error_with(&json, &strict), &["gone.png", "image 0"]);
+}

@@ -1,0 +1,7 @@
+#![no_main]
+use libfuzzer_sys::fuzz_target;
+
+#[path = "../file.rs"]
+mod file;
+
+fuzz_target!(|bytes: &[u8]| file::load("mesh.stl", bytes));
