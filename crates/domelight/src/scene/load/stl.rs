@@ -134,6 +134,9 @@ fn ascii(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Mesh)>, StlProblem> {
         let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
         let line = index + 1;
         if keyword.eq_ignore_ascii_case("solid") {
+            if corners > 0 {
+                return Err(StlProblem::Facet { line, corners });
+            }
             let name = if rest.trim().is_empty() { stem(path) } else { rest.trim().to_owned() };
             solids.push((name, Mesh::default()));
         } else if keyword.eq_ignore_ascii_case("vertex") {

@@ -33,7 +33,13 @@ impl<'p> DracoMesh<'p> {
         MeshDecoder::new()
             .decode(&mut DecoderBuffer::new(&stream).with_limits(limits), &mut mesh)
             .map_err(|e| GltfProblem::Draco { problem: e.to_string() })?;
-        let values: u64 = extension.attributes.len() as u64 * mesh.num_points() as u64 * 16;
+        // The decoder checks the number of faces, but not of points.
+        let points = mesh.num_points() as u64;
+        if points > limits.max_points {
+            let problem = format!("{points} points, more than the limit of {}", limits.max_points);
+            return Err(GltfProblem::Draco { problem }.into());
+        }
+        let values = extension.attributes.len() as u64 * points * 16;
         source.budget.take(place, values + 24 * mesh.num_faces() as u64)?;
         Ok(Self { mesh, extension })
     }
