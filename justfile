@@ -22,6 +22,6 @@ bench *ARGS:
 doc:
     cargo doc --workspace --no-deps --open
 
-# Licences and advisories of the dependencies (needs cargo-deny).
+# Licenses and advisories of the dependencies (needs cargo-deny).
 deny:
     cargo deny check

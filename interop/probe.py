@@ -35,7 +35,7 @@ Q = np.array(
 
 
 def directions(width, height, sub=1):
-    """World directions of (sub-)texel centres, (height·sub, width·sub, 3), and their solid angles."""
+    """World directions of (sub-)texel centers, (height·sub, width·sub, 3), and their solid angles."""
     theta_edges = np.pi * np.arange(height * sub + 1) / (height * sub)
     cos = np.cos(theta_edges)
     omega = (cos[:-1] - cos[1:]) * 2 * np.pi / (width * sub)
@@ -82,7 +82,7 @@ def write_pfm(path, picture):
 def read_pfm(path):
     with open(path, "rb") as file:
         kind, size, scale = (file.readline().split() for _ in range(3))
-        assert kind == [b"PF"], f"{path} has no colour"
+        assert kind == [b"PF"], f"{path} has no color"
         width, height = map(int, size)
         order = "<f4" if float(scale[0]) < 0 else ">f4"
         return np.frombuffer(file.read(), order).reshape(height, width, 3)[::-1].astype(float)

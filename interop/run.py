@@ -341,7 +341,7 @@ def check_readers(table, rigs):
             worst = max(worst, angle(rig.map_to_world @ np.array(toward), light["world"]))
             strength = max(strength, abs(color * np.pi - light["irradiance"]).max() / light["irradiance"].max())
         table.check(name, f"{rig.name}: places of the lights", worst, 1e-3, 0.01, "{:.5f}°")
-        table.check(name, f"{rig.name}: colours, of 8 bits", strength, 0.5 / 255 + 1e-6)
+        table.check(name, f"{rig.name}: colors, of 8 bits", strength, 0.5 / 255 + 1e-6)
         if rig.residual is not None:
             table.count(name, f"{rig.name}: panorama not found", int(not (rig.folder / file).is_file()))
 

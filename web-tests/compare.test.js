@@ -69,17 +69,17 @@ function bytesOf(canvas) {
   return context.getImageData(0, 0, width, height).data;
 }
 
-/** A hash (FNV-1a) of every picture that is seen, the stage's first. */
+/** A hash (FNV-1a) of every picture that is seen, the pair viewer's first. */
 async function canvases(page) {
   await painted(page);
   return page.$$eval(".viewer canvas", (all) => all.map((canvas) =>
     window.bytesOf(canvas).reduce((hash, byte) => Math.imul(hash ^ byte, 16777619), 2166136261)));
 }
 
-/** The mean of the stage's bytes between the fractions `from` and `to` of its width. */
+/** The mean of the pair viewer's bytes between the fractions `from` and `to` of its width. */
 async function brightness(page, from = 0, to = 1) {
   await painted(page);
-  return page.$eval("#stage canvas", (canvas, [from, to]) => {
+  return page.$eval("#pair-viewer canvas", (canvas, [from, to]) => {
     const inside = window.bytesOf(canvas).filter((_, i) => {
       const x = ((i >> 2) % canvas.width + 0.5) / canvas.width;
       return from <= x && x < to;
@@ -114,10 +114,10 @@ test("the divider moves by mouse and keyboard", async () => {
   await painted(page);
   assert.equal(await value(), 50);
   const half = (await canvases(page))[0];
-  const handle = await divider.boundingBox(), stage = await page.locator("#stage").boundingBox();
+  const handle = await divider.boundingBox(), pairViewer = await page.locator("#pair-viewer").boundingBox();
   await page.mouse.move(handle.x + handle.width / 2, handle.y + handle.height / 2);
   await page.mouse.down();
-  await page.mouse.move(stage.x + 0.8 * stage.width, handle.y + handle.height / 2, { steps: 4 });
+  await page.mouse.move(pairViewer.x + 0.8 * pairViewer.width, handle.y + handle.height / 2, { steps: 4 });
   await page.mouse.up();
   await painted(page);
   assert.equal(await value(), 80);
@@ -139,18 +139,18 @@ test("the divider moves by mouse and keyboard", async () => {
 test("wheel, buttons, drag and keys move all pictures together", async () => {
   const { page, done } = await open();
   const whole = await canvases(page);
-  const stage = await page.locator("#stage").boundingBox();
-  await page.mouse.move(stage.x + 0.3 * stage.width, stage.y + 0.4 * stage.height);
+  const pairViewer = await page.locator("#pair-viewer").boundingBox();
+  await page.mouse.move(pairViewer.x + 0.3 * pairViewer.width, pairViewer.y + 0.4 * pairViewer.height);
   await page.mouse.wheel(0, -600);
   const zoomed = await canvases(page);
   assert.ok(all(changed(whole, zoomed)), "the wheel zooms all");
   assert.ok(parseFloat(await text(page, "#zoom-value")) > 2);
   await page.mouse.down();
-  await page.mouse.move(stage.x + 0.4 * stage.width, stage.y + 0.5 * stage.height, { steps: 3 });
+  await page.mouse.move(pairViewer.x + 0.4 * pairViewer.width, pairViewer.y + 0.5 * pairViewer.height, { steps: 3 });
   await page.mouse.up();
   const dragged = await canvases(page);
   assert.ok(all(changed(zoomed, dragged)), "dragging moves all");
-  await page.focus("#stage");
+  await page.focus("#pair-viewer");
   await page.keyboard.press("ArrowRight");
   assert.ok(all(changed(dragged, await canvases(page))), "keys move all");
   await page.keyboard.press("0");
@@ -167,7 +167,7 @@ test("wheel, buttons, drag and keys move all pictures together", async () => {
 test("two fingers zoom", async () => {
   const { page, done } = await open({ viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
   const whole = await canvases(page);
-  const { x, y, width, height } = await page.locator("#stage").boundingBox();
+  const { x, y, width, height } = await page.locator("#pair-viewer").boundingBox();
   const touch = await page.context().newCDPSession(page);
   const fingers = (apart) => [-1, 1].map((side, id) => ({
     id, x: x + width * (0.25 + side * apart), y: y + 0.3 * height,

@@ -18,7 +18,7 @@ VERSION = subprocess.run(
     ["rtrace", "-version"], env=ENVIRONMENT, capture_output=True, text=True, check=True
 ).stdout.split()[1]
 
-# White and matt; Z-up.
+# White and matte; Z-up.
 SPHERE = "void plastic white 0 0 5 1 1 1 0 0\nwhite sphere ball 0 0 4 0 0 0 1\n"
 
 

@@ -67,7 +67,7 @@ def equal_area_square(w):
 
 
 def sibl(path):
-    """Lights (u, v, colour times multiplier) and the panorama's file."""
+    """Lights (u, v, color times multiplier) and the panorama's file."""
     ibl = configparser.ConfigParser(inline_comment_prefixes=None, comment_prefixes=("--",))
     ibl.read_string(path.read_text())
     lights = []

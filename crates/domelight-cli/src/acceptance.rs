@@ -1,8 +1,8 @@
 //! What rejection accepts and how long it takes, over some points.
 
-use domelight::sampling::{SamplerKind, Stream};
+use domelight::sampling::{Sampler, SamplerKind};
 use domelight::strategy::{
-    RejectionSampling, RejectionScratch, RejectionStatistics, SampleNumbers, ShadingPoint,
+    RejectionSampling, RejectionScratch, RejectionStatistics, SampleIndex, ShadingPoint,
 };
 use rayon::prelude::*;
 
@@ -13,8 +13,8 @@ pub(crate) fn count_tries(
     seed: u64,
 ) -> Vec<RejectionStatistics> {
     let count = |(i, at): (usize, &ShadingPoint)| {
-        let stream = Stream::new(SamplerKind::Independent, seed, i as u64);
-        let numbers = SampleNumbers { stream, sample: 0 };
+        let sampler = Sampler::new(SamplerKind::Independent, seed, i as u64);
+        let numbers = SampleIndex { sampler, sample: 0 };
         rejection.sample_counted(at, numbers, &mut RejectionScratch::default(), |_, _| {})
     };
     points.par_iter().enumerate().map(count).collect()

@@ -1,7 +1,7 @@
 //! `domelight diff`: a picture against its reference.
 
 use crate::args::{DiffArguments, Metric};
-use crate::failure::UsageError;
+use crate::error::UsageError;
 use crate::files;
 use crate::memory;
 use crate::output::{
@@ -17,7 +17,7 @@ use domelight::picture::{ReadOptions, read};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Memory of a texel of a picture: colour and alpha.
+/// Memory of a texel of a picture: color and alpha.
 const PICTURE_TEXEL: u64 = 16;
 
 /// Memory of a texel while two pictures are compared, beside the pictures.
@@ -148,7 +148,7 @@ impl Difference {
         if let Some((white, metric)) = picture {
             row(
                 "error picture",
-                format!("{metric:?}, brightest colour at {white:.4}").to_lowercase(),
+                format!("{metric:?}, brightest color at {white:.4}").to_lowercase(),
             );
         }
         text

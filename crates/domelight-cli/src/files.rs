@@ -9,7 +9,7 @@ use anyhow::Result;
 use domelight::files::{self, FileConflict, FileLedger, WriteSeek};
 use domelight::picture::PictureError;
 
-use crate::failure::UsageError;
+use crate::error::UsageError;
 use crate::interrupt;
 
 static LEDGER: Mutex<Option<FileLedger>> = Mutex::new(None);

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 
-use crate::failure::tell;
+use crate::error::status;
 
 /// The shell's code for what Ctrl-C has ended.
 pub(crate) const ENDED: i32 = 130;
@@ -35,7 +35,7 @@ pub(crate) fn flag() -> &'static AtomicBool {
             }
             let ends = *ENDS.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some((code, why)) = ends {
-                tell(&format!("error: interrupted {why}"));
+                status(&format!("error: interrupted {why}"));
                 exit(code);
             }
         })

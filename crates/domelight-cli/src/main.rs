@@ -8,10 +8,10 @@
 mod acceptance;
 mod args;
 mod bench;
+mod command_line;
 mod compare;
-mod course;
 mod diff;
-mod failure;
+mod error;
 mod farm;
 mod figures;
 mod files;
@@ -21,18 +21,18 @@ mod measure;
 mod memory;
 mod merge;
 mod output;
+mod parse;
 mod preview;
 mod probe;
 mod profile;
 mod progress;
 mod render;
+mod render_run;
 mod report;
 mod scene;
 mod strategy;
 mod svg;
-mod typed;
 mod usage;
-mod values;
 
 use args::{Arguments, Command};
 use clap::Parser;
@@ -41,7 +41,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let Arguments { command, quiet, memory } = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) => return failure::report_usage(&error),
+        Err(error) => return error::report_usage(&error),
     };
     memory::limit(memory.max_memory);
     let done = match command {
@@ -57,6 +57,6 @@ fn main() -> ExitCode {
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => failure::report(&error),
+        Err(error) => error::report(&error),
     }
 }

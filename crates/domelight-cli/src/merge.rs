@@ -17,15 +17,15 @@ use domelight::{Rgb, RgbImage};
 use serde::Serialize;
 
 use crate::args::MergeArguments;
-use crate::course::read;
-use crate::failure::{tell, warn_of_non_finite};
+use crate::error::{status, warn_of_non_finite};
 use crate::memory;
 use crate::output::{PicturePath, print_json, require_one_on_standard_output};
+use crate::render_run::read;
 
 /// Memory of a pixel of a band: its layers, as channels, and compressed.
 const BAND_PIXEL: u64 = 300;
 
-/// Memory of a pixel of which colour and alpha are kept: themselves, and as PNG.
+/// Memory of a pixel of which color and alpha are kept: themselves, and as PNG.
 const FLAT_PIXEL: u64 = 20;
 
 /// Why parts make no picture.
@@ -219,7 +219,7 @@ impl Merged {
         if text.is_empty() { Ok(()) } else { Err(MergeError::Missing(text.join("; "))) }
     }
 
-    /// Writes all outputs; what is no OpenEXR needs all of the picture's colours in memory.
+    /// Writes all outputs; what is no OpenEXR needs all of the picture's colors in memory.
     fn write(&self, arguments: &MergeArguments) -> Result<()> {
         let mut attributes = self.provenance.clone();
         attributes.push(("domelight.complete".into(), "true".into()));
@@ -287,7 +287,7 @@ impl Merged {
         } else if !quiet {
             let Report { parts, size: [w, h], spp, outputs, .. } = report;
             let outputs = outputs.join(", ");
-            tell(&format!("{parts} parts: {w}x{h}, {spp} samples a pixel -> {outputs}"));
+            status(&format!("{parts} parts: {w}x{h}, {spp} samples a pixel -> {outputs}"));
         }
         Ok(())
     }
@@ -322,7 +322,7 @@ impl<'m> Bands<'m> {
     }
 }
 
-/// Colour and alpha alone, row by row.
+/// Color and alpha alone, row by row.
 #[derive(Default)]
 struct Flat {
     color: Vec<Rgb>,

@@ -1,6 +1,6 @@
 //! Where results go: pictures by their file's extension, reports to standard output.
 
-use crate::failure::UsageError;
+use crate::error::UsageError;
 use crate::files;
 use crate::interrupt;
 use domelight::RgbImage;
@@ -9,7 +9,7 @@ use domelight::picture::exr::ExrLayers;
 use domelight::picture::exr::bands::{self, BAND_ROWS};
 use domelight::picture::png::Depth;
 use domelight::picture::tone::ToneMapping;
-use domelight::picture::{Problem, hdr, pfm, png};
+use domelight::picture::{PictureErrorKind, hdr, pfm, png};
 use domelight::quote::{Code, Shell, terminal};
 use domelight::render::Layers;
 use serde::Serialize;
@@ -146,7 +146,7 @@ impl PicturePath {
         let mut failed = None;
         let written = files::write_seeking(&self.path, |out| {
             bands::write(height, out, band).map_err(|error| match error.downcast() {
-                Ok(problem) => into_io(problem),
+                Ok(kind) => into_io(kind),
                 Err(error) => {
                     failed = Some(error);
                     io::Error::other("a band is missing")
@@ -162,7 +162,7 @@ impl PicturePath {
         self.format.unwrap_or(PictureFormat::Exr) == PictureFormat::Exr
     }
 
-    /// Writes colour alone, into PNG with alpha if there is one.
+    /// Writes color alone, into PNG with alpha if there is one.
     pub(crate) fn write_color(
         &self,
         color: &RgbImage,
@@ -184,10 +184,10 @@ impl fmt::Display for PicturePath {
 }
 
 /// What the system says stays what the system says.
-pub(crate) fn into_io(problem: Problem) -> io::Error {
-    match problem {
-        Problem::Io(error) => error,
-        problem => io::Error::other(problem),
+pub(crate) fn into_io(kind: PictureErrorKind) -> io::Error {
+    match kind {
+        PictureErrorKind::Io(error) => error,
+        kind => io::Error::other(kind),
     }
 }
 

@@ -11,12 +11,12 @@ use domelight::strategy::PreparedStrategy;
 
 use crate::output::PicturePath;
 use crate::progress::RenderProgress;
-use crate::scene::View;
+use crate::scene::PreparedScene;
 use crate::strategy::Job;
 
 /// Writes PNG output after one sample of each square of 2 × 2 pixels.
 pub(crate) fn write(
-    view: &View,
+    view: &PreparedScene,
     settings: &RenderSettings,
     strategy: &PreparedStrategy,
     outputs: &[PicturePath],
@@ -28,8 +28,8 @@ pub(crate) fn write(
     let settings = &RenderSettings { width, height, n_samples: 1, target_error: None, ..*settings };
     let camera = &Camera::new(&view.camera_settings, width, height)?;
     let progress = &RenderProgress::new("", 1, true, interrupted);
-    let View { scene, environment, .. } = view;
-    let job = Job { scene, camera, environment, settings, progress, course: None };
+    let PreparedScene { scene, environment, .. } = view;
+    let job = Job { scene, camera, environment, settings, progress, render_run: None };
     let layers = job.render(strategy)?.layers;
 
     let at = |x: usize, y: usize| y / 2 * width + x / 2;

@@ -1,7 +1,7 @@
 //! `domelight probe`: what a light probe is like, and its conversion.
 
 use crate::args::ProbeArguments;
-use crate::failure::warn;
+use crate::error::warn;
 use crate::files;
 use crate::memory;
 use crate::output::{

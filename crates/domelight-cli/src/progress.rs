@@ -22,7 +22,7 @@ pub(crate) struct RenderProgress {
     label: String,
     interrupted: &'static AtomicBool,
     rays: AtomicU64,
-    /// Whole per cent told last.
+    /// Whole percent told last.
     told: Mutex<Option<u64>>,
     started: Instant,
     profile: Option<Profile>,
@@ -93,7 +93,7 @@ impl RenderProgress {
         self.bar.finish_and_clear();
     }
 
-    /// Says on standard output, at each whole per cent, how much is done; nobody may be listening.
+    /// Says on standard output, at each whole percent, how much is done; nobody may be listening.
     fn tell_farm(&self) {
         if !self.openjd {
             return;
@@ -140,7 +140,7 @@ impl Observer for RenderProgress {
         self.tell_farm();
     }
 
-    fn cancelled(&self) -> bool {
+    fn canceled(&self) -> bool {
         self.interrupted.load(Ordering::Relaxed)
     }
 }

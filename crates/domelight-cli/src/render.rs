@@ -5,22 +5,22 @@ use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, bail};
 use domelight::picture::tone::ToneCurve;
-use domelight::render::{RenderSettings, survey};
+use domelight::render::{RenderSettings, pilot_points};
 use domelight::strategy::PreparedStrategy;
 
 use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
-use crate::course::Course;
-use crate::failure::UsageError;
+use crate::error::UsageError;
 use crate::interrupt;
 use crate::memory;
 use crate::output::{PicturePath, print_progress, require_one_on_standard_output};
+use crate::parse::Size;
 use crate::preview;
 use crate::progress::RenderProgress;
-use crate::report::{RenderReport, Settings, Stages, Stop};
-use crate::scene::{View, start_threads};
+use crate::render_run::RenderRun;
+use crate::report::{RenderReport, Settings, StopReason, Timings};
+use crate::scene::{PreparedScene, start_threads};
 use crate::strategy::{Job, acceptance, refuse_repeating_points};
 use crate::usage::Stopwatch;
-use crate::values::Size;
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
@@ -36,29 +36,29 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let spec = arguments.strategy.spec()?;
     refuse_repeating_points(spec, arguments.samples.spp)?;
     let outputs = arguments.output.paths()?;
-    arguments.course.check(&outputs)?;
+    arguments.render_run.check(&outputs)?;
     outputs.iter().try_for_each(PicturePath::declare)?;
-    if !arguments.course.is_part() {
+    if !arguments.render_run.is_part() {
         // Before anything is loaded; again, with what the render is known to save, when all is.
         let Size { width, height } = arguments.scene.camera.size;
         memory::allow_picture(width, height, memory::PIXEL)?;
     }
     start_threads(arguments.pixel.threads)?;
     let interrupted = interrupt::flag();
-    let loading = interrupt::nothing_to_keep(arguments.course.code_of_an_early_end());
+    let loading = interrupt::nothing_to_keep(arguments.render_run.code_of_an_early_end());
     let mut watch = Stopwatch::start();
 
     let loaded = arguments.scene.load(quiet)?;
     let load = watch.lap();
 
     let view = &arguments.scene.build(loaded)?;
-    let View { scene, camera, environment, probe, report, .. } = view;
+    let PreparedScene { scene, camera, environment, probe, report, .. } = view;
     let settings = &RenderSettings {
         adaptive: !arguments.samples.no_adaptive,
         target_error: arguments.samples.target_error,
         ..arguments.scene.render_settings(&arguments.pixel, arguments.samples.spp)
     };
-    let points = || survey(scene, camera, settings);
+    let points = || pilot_points(scene, camera, settings);
     let spec = spec.for_scene(points, environment, settings.seed);
     let strategy = &PreparedStrategy::new(spec, environment).with_context(|| probe.clone())?;
     let described = Settings {
@@ -70,8 +70,9 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         seed: settings.seed,
         threads: rayon::current_num_threads(),
     };
-    let course = &arguments.course;
-    let course = course.course(view, settings, &described, &outputs, interrupted, quiet)?;
+    let render_run = &arguments.render_run;
+    let render_run =
+        render_run.render_run(view, settings, &described, &outputs, interrupted, quiet)?;
     let build = watch.lap();
     drop(loading);
 
@@ -85,16 +86,16 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let openjd = arguments.output.progress == ProgressKind::Openjd;
     let progress = RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
     let progress = &progress.profiled(arguments.output.profile);
-    let course = Some(&course);
-    let job = Job { scene, camera, environment, settings, progress, course };
+    let render_run = Some(&render_run);
+    let job = Job { scene, camera, environment, settings, progress, render_run };
     let rendering = job.render(strategy)?;
     progress.finish();
     let stopped = match () {
         () if rendering.complete => None,
-        () if interrupted.load(Ordering::Relaxed) => Some(Stop::Interrupted),
-        () => Some(Stop::Time),
+        () if interrupted.load(Ordering::Relaxed) => Some(StopReason::Interrupted),
+        () => Some(StopReason::Time),
     };
-    let saved = course.and_then(Course::saved);
+    let saved = render_run.and_then(RenderRun::saved);
     if rendering.counts.camera_rays == 0 && saved.is_none() {
         bail!("ended before the first sample; nothing was written");
     }
@@ -108,10 +109,10 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         path.write_layers(&rendering.layers, &tone, report.hide_env, &attributes)
     };
     // A part is its own checkpoint, and written.
-    if !arguments.course.is_part() {
+    if !arguments.render_run.is_part() {
         outputs.iter().map(write).fold(Ok(()), Result::and)?;
     }
-    let stages = Stages { load, build, render, write: watch.lap() };
+    let stages = Timings { load, build, render, write: watch.lap() };
     let rejection = acceptance(spec, points, environment, settings.seed)?;
     let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
     report.profile = progress.profile();
@@ -120,7 +121,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     } else if !quiet {
         report.print_summary();
     }
-    report.check(saved, arguments.course.is_part(), quiet)
+    report.check(saved, arguments.render_run.is_part(), quiet)
 }
 
 impl OutputArguments {

@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::path::Path;
 
 use crate::acceptance::Acceptance;
-use crate::failure::{InterruptedAndSaved, tell, tell_lines, warn_of_non_finite};
+use crate::error::{InterruptedAndSaved, status, tell_lines, warn_of_non_finite};
 use crate::output::{self, PicturePath};
 use crate::profile::{self, StageSeconds};
 use crate::usage::{Seconds, peak_memory};
@@ -121,7 +121,7 @@ impl Settings {
 
 /// Where the time went.
 #[derive(Serialize)]
-pub(crate) struct Stages {
+pub(crate) struct Timings {
     /// Reading or making scene and probe.
     pub(crate) load: Seconds,
     /// The BVH and the environment's table.
@@ -134,7 +134,7 @@ pub(crate) struct Stages {
 /// What ended a render before all samples were there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Stop {
+pub(crate) enum StopReason {
     Interrupted,
     Time,
 }
@@ -144,17 +144,17 @@ pub(crate) enum Stop {
 pub(crate) struct RenderReport {
     version: &'static str,
     settings: Settings,
-    seconds: Stages,
+    seconds: Timings,
     camera_rays: u64,
     shading_points: u64,
     shadow_rays: u64,
     rays_per_second: f64,
     peak_memory_bytes: Option<u64>,
     non_finite_samples: u64,
-    /// Of the strategy rejection, at the centres of pixels spread over the picture.
+    /// Of the strategy rejection, at the centers of pixels spread over the picture.
     rejection: Option<Acceptance>,
     complete: bool,
-    stopped: Option<Stop>,
+    stopped: Option<StopReason>,
     outputs: Vec<String>,
     /// CPU seconds by stage of the render, if they were asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -165,10 +165,10 @@ impl RenderReport {
     pub(crate) fn new(
         settings: Settings,
         rendering: &Rendering,
-        seconds: Stages,
+        seconds: Timings,
         rejection: Option<Acceptance>,
         outputs: &[PicturePath],
-        stopped: Option<Stop>,
+        stopped: Option<StopReason>,
     ) -> Self {
         let counts = rendering.counts;
         let rays = (counts.camera_rays + counts.shadow_rays) as f64;
@@ -199,10 +199,10 @@ impl RenderReport {
         let Settings { scene, strategy, spp, .. } = &self.settings;
         let SceneReport { scene, environment, size: [w, h], .. } = scene;
         let environment = &environment.probe;
-        let Stages { load, build, render, .. } = &self.seconds;
+        let Timings { load, build, render, .. } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
-        tell(&format!("{scene} under {environment}: {w}x{h}, {spp} samples a pixel, {strategy}"));
-        tell(&format!(
+        status(&format!("{scene} under {environment}: {w}x{h}, {spp} samples a pixel, {strategy}"));
+        status(&format!(
             "loaded in {:.2} s, built in {:.2} s, rendered in {:.2} s{cpu}, {:.1} Mrays/s -> {}",
             load.wall,
             build.wall,
@@ -222,20 +222,20 @@ impl RenderReport {
     pub(crate) fn check(&self, saved: Option<&Path>, is_part: bool, quiet: bool) -> Result<()> {
         warn_of_non_finite(quiet, "", self.non_finite_samples);
         match (self.stopped, saved) {
-            (Some(Stop::Interrupted), None) => {
+            (Some(StopReason::Interrupted), None) => {
                 bail!("interrupted; what was done so far is in {}", self.outputs.join(", "))
             }
-            (Some(Stop::Interrupted), Some(saved)) => Err(InterruptedAndSaved(format!(
+            (Some(StopReason::Interrupted), Some(saved)) => Err(InterruptedAndSaved(format!(
                 "interrupted; {} holds the state to go on from",
                 saved.display()
             ))
             .into()),
-            (Some(Stop::Time), Some(part)) if is_part => Err(InterruptedAndSaved(format!(
+            (Some(StopReason::Time), Some(part)) if is_part => Err(InterruptedAndSaved(format!(
                 "the time is over; {} holds the state to go on from",
                 part.display()
             ))
             .into()),
-            (Some(Stop::Time) | None, _) => Ok(()),
+            (Some(StopReason::Time) | None, _) => Ok(()),
         }
     }
 }

@@ -5,7 +5,7 @@ use std::str::FromStr as _;
 
 use anyhow::{Context as _, Result};
 use domelight::RgbImage;
-use domelight::bsdf::Material;
+use domelight::bsdf::Bsdf;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{ProbeOptions, load_probe};
 use domelight::environment::{Environment, Orientation, UpAxis};
@@ -20,14 +20,14 @@ use domelight::scene::{
 
 use crate::args::sampling::PixelArguments;
 use crate::args::scene::{
-    CameraArguments, EnvironmentArguments, FileArguments, SceneArguments, StageArguments,
+    CameraArguments, EnvironmentArguments, FileArguments, SceneArguments, SubjectArguments,
 };
-use crate::failure::{UsageError, warn};
+use crate::error::{UsageError, warn};
 use crate::files;
 use crate::interrupt;
 use crate::memory;
+use crate::parse::{Size, Triple};
 use crate::report::{CameraReport, EnvironmentReport, SceneReport};
-use crate::values::{Size, Triple};
 
 /// What was read, changed as the flags say; nothing is built yet.
 pub(crate) struct LoadedScene {
@@ -39,7 +39,7 @@ pub(crate) struct LoadedScene {
 }
 
 /// A scene under its light, seen by a camera.
-pub(crate) struct View {
+pub(crate) struct PreparedScene {
     pub(crate) scene: Scene,
     pub(crate) camera: Camera,
     pub(crate) camera_settings: CameraSettings,
@@ -83,12 +83,12 @@ impl SceneArguments {
             (description, light, map, warnings)
         };
         self.camera.choose(&self.scene, &mut description)?;
-        let view = self.stage(&mut description, light.up.vector())?;
+        let view = self.subject(&mut description, light.up.vector())?;
         Ok(LoadedScene { description, light, map, view, warnings })
     }
 
     /// Builds what was loaded.
-    pub(crate) fn build(&self, loaded: LoadedScene) -> Result<View> {
+    pub(crate) fn build(&self, loaded: LoadedScene) -> Result<PreparedScene> {
         let LoadedScene { mut description, light, map, mut view, warnings } = loaded;
         let Size { width, height } = self.camera.size;
         let camera_report = CameraReport::new(&view);
@@ -110,21 +110,21 @@ impl SceneArguments {
             scene: self.scene.clone(),
             triangles: scene.triangle_count(),
             warnings,
-            material: self.stage.material.as_ref().map(|m| m.text.clone()),
-            normalize: self.stage.normalize,
-            ground: self.stage.ground,
-            hide_env: self.stage.hide_env,
+            material: self.subject.material.as_ref().map(|m| m.text.clone()),
+            normalize: self.subject.normalize,
+            ground: self.subject.ground,
+            hide_env: self.subject.hide_env,
             environment: EnvironmentReport::new(probe.clone(), &light, &environment),
             camera: camera_report,
             size: [width, height],
         };
-        Ok(View { scene, camera, camera_settings: view, environment, probe, report })
+        Ok(PreparedScene { scene, camera, camera_settings: view, environment, probe, report })
     }
 
     /// Changes the scene as the flags say; the camera frames what is not scenery.
-    fn stage(&self, scene: &mut SceneDescription, up: Vec3) -> Result<CameraSettings> {
+    fn subject(&self, scene: &mut SceneDescription, up: Vec3) -> Result<CameraSettings> {
         let Size { width, height } = self.camera.size;
-        let bounds = self.stage.apply(scene, up);
+        let bounds = self.subject.apply(scene, up);
         // Squares of lengths must be finite.
         let extent = bounds.size().max_element();
         if extent > 1e18 || extent > 0.0 && extent < 1e-18 {
@@ -146,7 +146,7 @@ impl SceneArguments {
             seed: pixel.seed,
             filter: pixel.filter,
             sampler: pixel.sampler.into(),
-            background: if self.stage.hide_env { Background::Hidden } else { Background::Shown },
+            background: if self.subject.hide_env { Background::Hidden } else { Background::Shown },
             ..RenderSettings::default()
         }
     }
@@ -303,14 +303,14 @@ fn allow_environment(name: &str, texels: u64) -> Result<()> {
     Ok(())
 }
 
-impl StageArguments {
+impl SubjectArguments {
     /// Changes the scene as the flags say; returns the bounds of what the camera should frame.
     fn apply(&self, scene: &mut SceneDescription, up: Vec3) -> Aabb {
         if self.normalize {
             scene.normalize();
         }
         if let Some(material) = &self.material {
-            scene.set_subject_material(Material::from(material.spec));
+            scene.set_subject_material(Bsdf::from(material.spec));
         }
         let bounds = scene.subject_bounds();
         if self.ground {

@@ -13,9 +13,9 @@ use domelight::strategy::{
 
 use crate::acceptance::{Acceptance, count_tries};
 use crate::args::sampling::StrategyArguments;
-use crate::course::Course;
-use crate::failure::UsageError;
+use crate::error::UsageError;
 use crate::progress::RenderProgress;
+use crate::render_run::RenderRun;
 
 /// A strategy and the text that it was given as.
 #[derive(Clone, Debug)]
@@ -116,16 +116,16 @@ pub(crate) struct Job<'a> {
     pub(crate) settings: &'a RenderSettings,
     pub(crate) progress: &'a RenderProgress,
     /// From the first sample to the last, unless it says otherwise.
-    pub(crate) course: Option<&'a Course>,
+    pub(crate) render_run: Option<&'a RenderRun>,
 }
 
 impl Job<'_> {
     /// Renders with a strategy.
     pub(crate) fn render(&self, strategy: &PreparedStrategy) -> Result<Rendering> {
-        let Self { scene, camera, environment, settings, progress, course } = *self;
+        let Self { scene, camera, environment, settings, progress, render_run } = *self;
         let mut renderer = Renderer::with_strategy(scene, camera, environment, strategy, *settings);
-        if let Some(course) = course {
-            return course.run(renderer, settings, progress);
+        if let Some(render_run) = render_run {
+            return render_run.run(renderer, settings, progress);
         }
         renderer.run(progress);
         Ok(renderer.rendering())

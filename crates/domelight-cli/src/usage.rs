@@ -48,7 +48,7 @@ pub(crate) struct Seconds {
     pub(crate) cpu: Option<f64>,
 }
 
-/// Measures one stage after another.
+/// Measures one phase after another.
 pub(crate) struct Stopwatch {
     wall: std::time::Instant,
     cpu: Option<f64>,

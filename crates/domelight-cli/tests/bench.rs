@@ -49,9 +49,9 @@ fn results_hold_what_was_measured_and_become_tables() {
         for reached in ["reached", "reached_covered"] {
             assert_eq!(strategy[reached].as_array().unwrap().len(), 2);
         }
-        for rung in strategy["rungs"].as_array().unwrap() {
+        for budget_point in strategy["budget_points"].as_array().unwrap() {
             for values in ["cpu_seconds", "wall_seconds", "rel_mse", "rel_mse_covered"] {
-                assert_eq!(rung[values].as_array().unwrap().len(), 2, "one a seed");
+                assert_eq!(budget_point[values].as_array().unwrap().len(), 2, "one a seed");
             }
         }
     }
@@ -91,8 +91,8 @@ done
     let results = fs::read_to_string(folder.path().join("results.json")).unwrap();
     let results: Value = serde_json::from_str(&results).unwrap();
     let peer = &results["rows"][0]["peer"];
-    assert_eq!(peer["rungs"][0]["cpu_seconds"][1], 0.5);
-    assert_eq!(peer["reached"][0]["how"], "at_most");
+    assert_eq!(peer["budget_points"][0]["cpu_seconds"][1], 0.5);
+    assert_eq!(peer["reached"][0]["fit"], "at_most");
     // What it does not have is left out, and said.
     let phong = ["bench", "--suite", "probes", "--case", "sphere", "studio", "phong:50", "-q"];
     let quick = ["--size", "8x8", "--seeds", "1", "--most", "0.01", "--cache", "cache", "--json"];

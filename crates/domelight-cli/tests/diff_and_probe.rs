@@ -8,11 +8,11 @@ use serde_json::Value;
 use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
 
-/// `grey.exr`, `brighter.exr` (by a tenth), `half.exr` (covered left half, wrong right half), `small.exr`.
+/// `gray.exr`, `brighter.exr` (by a tenth), `half.exr` (covered left half, wrong right half), `small.exr`.
 fn pictures() -> TempDir {
     let folder = TempDir::new().expect("a temporary folder");
     let at = |name: &str| folder.path().join(name);
-    write_exr(&at("grey.exr"), &RgbImage::filled(20, 10, Rgb::splat(0.5)), None);
+    write_exr(&at("gray.exr"), &RgbImage::filled(20, 10, Rgb::splat(0.5)), None);
     write_exr(&at("brighter.exr"), &RgbImage::filled(20, 10, Rgb::splat(0.55)), None);
     let half = |x: usize| if x < 10 { Rgb::splat(0.5) } else { Rgb::BLACK };
     let alpha: Vec<f32> = (0..200).map(|i| if i % 20 < 10 { 1.0 } else { 0.0 }).collect();
@@ -25,7 +25,7 @@ fn pictures() -> TempDir {
 fn equal_pictures_have_no_difference() {
     let folder = pictures();
     let report =
-        json(&domelight(&folder, &["diff", "grey.exr", "grey.exr", "--json", "--hdr-flip"]));
+        json(&domelight(&folder, &["diff", "gray.exr", "gray.exr", "--json", "--hdr-flip"]));
     for zero in ["mse", "rel_mse", "rel_mse_trimmed", "flip"] {
         assert_eq!(report[zero], 0.0, "{zero}");
     }
@@ -36,27 +36,27 @@ fn equal_pictures_have_no_difference() {
 #[test]
 fn a_known_difference_is_reported_as_json_and_as_a_table() {
     let folder = pictures();
-    let report = json(&domelight(&folder, &["diff", "brighter.exr", "grey.exr", "--json"]));
+    let report = json(&domelight(&folder, &["diff", "brighter.exr", "gray.exr", "--json"]));
     let value = |name: &str| report[name].as_f64().expect("a number");
     assert!((value("mse") - 0.0025).abs() < 1e-8);
     assert!((value("rel_mse") - 0.0025 / 0.26).abs() < 1e-7);
     assert!((report["mean_ratio"][1].as_f64().expect("a ratio") - 1.1).abs() < 1e-6);
-    let table = domelight(&folder, &["diff", "brighter.exr", "grey.exr"]);
+    let table = domelight(&folder, &["diff", "brighter.exr", "gray.exr"]);
     for name in ["MSE", "relMSE trimmed", "PSNR", "mean ratio", "ꟻLIP"] {
         assert!(done(&table).contains(name), "{name}");
     }
-    assert_eq!(done(&domelight(&folder, &["diff", "brighter.exr", "grey.exr", "-q"])), "");
+    assert_eq!(done(&domelight(&folder, &["diff", "brighter.exr", "gray.exr", "-q"])), "");
 }
 
 #[test]
 fn covered_compares_what_the_reference_covers() {
     let folder = pictures();
-    let arguments = ["diff", "grey.exr", "half.exr", "--covered", "--json"];
+    let arguments = ["diff", "gray.exr", "half.exr", "--covered", "--json"];
     let report = json(&domelight(&folder, &arguments));
     assert_eq!((&report["pixels"], &report["mse"]), (&100.into(), &0.0.into()));
-    let refused = domelight(&folder, &["diff", "half.exr", "grey.exr", "--covered"]);
+    let refused = domelight(&folder, &["diff", "half.exr", "gray.exr", "--covered"]);
     assert_eq!(refused.status.code(), Some(1));
-    assert!(stderr(&refused).contains("grey.exr") && stderr(&refused).contains("alpha"));
+    assert!(stderr(&refused).contains("gray.exr") && stderr(&refused).contains("alpha"));
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn every_metric_draws_a_picture() {
     let folder = pictures();
     for metric in ["rel", "abs", "flip"] {
         let name = format!("{metric}.png");
-        let arguments = ["diff", "grey.exr", "half.exr", "--metric", metric, "-o", &name];
+        let arguments = ["diff", "gray.exr", "half.exr", "--metric", metric, "-o", &name];
         assert!(done(&domelight(&folder, &arguments)).contains(metric));
         let picture = load(&folder, &name);
         assert_eq!((picture.width, picture.height), (20, 10));
@@ -75,7 +75,7 @@ fn every_metric_draws_a_picture() {
 #[test]
 fn sizes_that_differ_are_an_error_with_a_hint() {
     let folder = pictures();
-    let output = domelight(&folder, &["diff", "grey.exr", "small.exr", "-o", "error.png"]);
+    let output = domelight(&folder, &["diff", "gray.exr", "small.exr", "-o", "error.png"]);
     assert_eq!((output.status.code(), stdout(&output)), (Some(1), ""));
     let expected = "error: the pictures differ in size: 20x10 against 10x10 of the reference\n\
                     hint: render both with the same --size\n";
@@ -87,11 +87,11 @@ fn sizes_that_differ_are_an_error_with_a_hint() {
 fn bad_usage_is_exit_code_2() {
     let folder = pictures();
     for arguments in [
-        &["diff", "grey.exr"][..],
+        &["diff", "gray.exr"][..],
         &["diff", "-", "-"],
-        &["diff", "grey.exr", "grey.exr", "-o", "error.tiff"],
-        &["diff", "grey.exr", "grey.exr", "-o", "-", "--json"],
-        &["diff", "grey.exr", "grey.exr", "--exposure", "nan"],
+        &["diff", "gray.exr", "gray.exr", "-o", "error.tiff"],
+        &["diff", "gray.exr", "gray.exr", "-o", "-", "--json"],
+        &["diff", "gray.exr", "gray.exr", "--exposure", "nan"],
         &["probe", "sky", "--to", "octahedral"],
         &["probe", "sky", "--to", "sphere", "-o", "sky.exr"],
         &["probe", "sky", "--size", "0"],

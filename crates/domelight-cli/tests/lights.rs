@@ -8,13 +8,13 @@ use serde_json::Value;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// `sun.exr`, a small sun and a lamp under a grey sky; `grey.exr`; `black.exr`.
+/// `sun.exr`, a small sun and a lamp under a gray sky; `gray.exr`; `black.exr`.
 fn probes() -> TempDir {
     let folder = TempDir::new().expect("a temporary folder");
-    let grey = RgbImage::filled(64, 32, Rgb::splat(0.5));
-    write_exr(&folder.path().join("grey.exr"), &grey, None);
+    let gray = RgbImage::filled(64, 32, Rgb::splat(0.5));
+    write_exr(&folder.path().join("gray.exr"), &gray, None);
     write_exr(&folder.path().join("black.exr"), &RgbImage::filled(8, 4, Rgb::BLACK), None);
-    let mut sun = grey;
+    let mut sun = gray;
     sun.pixels[10 * 64 + 40] = Rgb::new(4000.0, 3000.0, 2000.0);
     for i in [20 * 64 + 9, 20 * 64 + 10, 21 * 64 + 9, 21 * 64 + 10] {
         sun.pixels[i] = Rgb::new(20.0, 40.0, 60.0);
@@ -127,10 +127,10 @@ fn nothing_to_extract_is_exit_code_1_and_writes_nothing() {
     let before = files(&folder);
     for (arguments, message) in [
         (&["black.exr"][..], "black.exr: the map is black; there is no light to extract"),
-        (&["grey.exr", "--sun"], "grey.exr: there is no sun: "),
-        (&["grey.exr", "--lamps", "3"], "grey.exr: there is no lamp: "),
-        (&["grey.exr", "-n", "5000"], "5000 lights were asked for, but only 2048 texels"),
-        (&["grey.exr", "-n", "4", "--min-energy", "90"], "no light holds the least share"),
+        (&["gray.exr", "--sun"], "gray.exr: there is no sun: "),
+        (&["gray.exr", "--lamps", "3"], "gray.exr: there is no lamp: "),
+        (&["gray.exr", "-n", "5000"], "5000 lights were asked for, but only 2048 texels"),
+        (&["gray.exr", "-n", "4", "--min-energy", "90"], "no light holds the least share"),
         (&["sun.exr", "-o", "no/folder/rig.json"], "no/folder/rig.json: "),
         (&["sun.exr", "--preview", "no/rig.png"], "no/rig.png: "),
         (&["sun.exr", "--sun", "--keep-residual", "no/dome.exr"], "no/dome.exr: "),

@@ -71,8 +71,8 @@ fn every_strategy_renders_and_json_tells_all() {
         assert_eq!(report["settings"]["size"], serde_json::json!([24, 18]));
         assert_eq!(report["settings"]["environment"]["probe"], "studio");
         assert!(report["settings"]["camera"]["fov"].as_f64().unwrap() > 0.0);
-        for stage in ["load", "build", "render", "write"] {
-            assert!(report["seconds"][stage]["wall"].as_f64().unwrap() >= 0.0);
+        for phase in ["load", "build", "render", "write"] {
+            assert!(report["seconds"][phase]["wall"].as_f64().unwrap() >= 0.0);
         }
         assert!(report["rays_per_second"].as_f64().unwrap() > 0.0);
         assert!(report["shadow_rays"].as_u64().unwrap() > 0, "{strategy:?}");
@@ -223,10 +223,10 @@ fn an_unwritable_place_is_an_error_that_names_it() {
 #[test]
 fn a_full_standard_error_does_no_harm() {
     let folder = folder();
-    fs::write(folder.path().join("grey.obj"), format!("usemtl gone\n{TRIANGLE}")).unwrap();
+    fs::write(folder.path().join("gray.obj"), format!("usemtl gone\n{TRIANGLE}")).unwrap();
     let full = fs::File::options().write(true).open("/dev/full").unwrap();
     let status = std::process::Command::new(env!("CARGO_BIN_EXE_domelight"))
-        .args(["render", "grey.obj", "--size", "8x8", "--spp", "1", "--env-rows", "8"])
+        .args(["render", "gray.obj", "--size", "8x8", "--spp", "1", "--env-rows", "8"])
         .current_dir(&folder)
         .stderr(full)
         .status()

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use domelight::bsdf::{Brdf as _, Material, MaterialSpec};
+use domelight::bsdf::{Brdf as _, Bsdf, MaterialSpec};
 use domelight::math::{Vec3, vec2, vec3};
 use domelight::sampling::warp::uniform_hemisphere;
 
@@ -26,17 +26,16 @@ fn bsdf(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("bsdf");
     group.throughput(Throughput::Elements(N.into()));
     for name in MATERIALS {
-        let material = Material::from(name.parse::<MaterialSpec>().expect("a material"));
+        let bsdf = Bsdf::from(name.parse::<MaterialSpec>().expect("a material"));
         group.bench_function(format!("{name}, value and density"), |bencher| {
             bencher.iter(|| {
-                let eval = |&wi| material.eval_pdf(black_box(wo), wi).1;
+                let eval = |&wi| bsdf.eval_pdf(black_box(wo), wi).1;
                 directions.iter().map(eval).sum::<f32>()
             });
         });
         group.bench_function(format!("{name}, sample"), |bencher| {
             bencher.iter(|| {
-                let draw =
-                    |i| material.sample(black_box(wo), (i as f32 * 0.75).fract(), numbers(i));
+                let draw = |i| bsdf.sample(black_box(wo), (i as f32 * 0.75).fract(), numbers(i));
                 (0..N).filter_map(draw).map(|s| s.pdf).sum::<f32>()
             });
         });

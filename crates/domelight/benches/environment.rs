@@ -7,7 +7,7 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::{Environment, Orientation};
 use domelight::math::{Vec2, Vec3, vec2};
 use domelight::sampling::warp::uniform_sphere;
-use domelight::sampling::{Dimension, SamplerKind, Stream};
+use domelight::sampling::{Dimension, Sampler, SamplerKind};
 
 const N: u32 = 4096;
 
@@ -35,9 +35,9 @@ fn environment(criterion: &mut Criterion) {
         });
     });
     group.bench_function("scrambled numbers", |bencher| {
-        let stream = Stream::new(SamplerKind::Sobol, 1, 2);
+        let sampler = Sampler::new(SamplerKind::Sobol, 1, 2);
         bencher.iter(|| {
-            (0..N).map(|i| stream.numbers(black_box(Dimension::Film), i).u().x).sum::<f32>()
+            (0..N).map(|i| sampler.numbers(black_box(Dimension::Film), i).u().x).sum::<f32>()
         });
     });
     group.finish();

@@ -2,7 +2,7 @@
 //!
 //! First a table of shading errors, of the built-in cathedral or of the probes whose paths the
 //! variable `DOMELIGHT_PROBES` lists, separated by colons; then times. Errors are root mean squares
-//! over 600 normals in per cent of the root mean square of what the map shades: a matt surface in the
+//! over 600 normals in percent of the root mean square of what the map shades: a matte surface in the
 //! open, the same behind two occluders of 50 degrees across, and a lobe cos²⁰ in the open.
 
 use std::hint::black_box;
@@ -23,8 +23,8 @@ use domelight::sampling::Pcg32;
 type Method = fn(&Environment, usize) -> Result<Rig, RigError>;
 
 const METHODS: [(&str, Method); 8] = [
-    ("median cut, geometric centre", |env, n| {
-        let position = LightPosition::GeometricCentre;
+    ("median cut, geometric center", |env, n| {
+        let position = LightPosition::GeometricCenter;
         median_cut(env, n, MedianCut { position, ..MedianCut::default() })
     }),
     ("median cut", |env, n| median_cut(env, n, MedianCut::default())),
@@ -91,7 +91,7 @@ impl Place {
         Self { normal, occluders }
     }
 
-    /// What light of luminance `energy` [times sr] from there adds to a matt surface.
+    /// What light of luminance `energy` [times sr] from there adds to a matte surface.
     fn shade(&self, direction: Vec3, energy: f64) -> f64 {
         let cos_theta = self.normal.dot(direction);
         let hidden = self.occluders.iter().any(|o| o.dot(direction) > Self::COS_RADIUS);
@@ -174,16 +174,16 @@ fn three(open: &ShadingError, occluded: f64) -> [f64; 3] {
     [open.diffuse, occluded, open.glossy]
 }
 
-/// RMS error in per cent of RMS shading for each count.
+/// RMS error in percent of RMS shading for each count.
 fn errors(_: &mut Criterion) {
     for (name, env) in probes() {
-        println!("{name}: RMS error [%], matt / behind occluders / glossy, at {COUNTS:?} lights");
+        println!("{name}: RMS error [%], matte / behind occluders / glossy, at {COUNTS:?} lights");
         let (open, behind) = (ShadingReference::new(&env), Occluded::new(&env));
         let line = |method: &str, errors: &dyn Fn(usize) -> [f64; 3]| {
             print!("{method:34}");
             for n in COUNTS {
-                let [matt, occluded, glossy] = errors(n).map(|e| 100.0 * e);
-                print!(" | {matt:6.2} {occluded:6.2} {glossy:6.2}");
+                let [matte, occluded, glossy] = errors(n).map(|e| 100.0 * e);
+                print!(" | {matte:6.2} {occluded:6.2} {glossy:6.2}");
             }
             println!();
         };

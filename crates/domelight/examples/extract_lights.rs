@@ -20,7 +20,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let rig = variance_minimization(&environment, 8, VarianceMinimization::default())?;
     rig.lights.iter().for_each(print);
     let error = reference.error(&rig);
-    println!("They shade a matt surface with an error of {:.2} % (RMS).\n", 100.0 * error.diffuse);
+    println!("They shade a matte surface with an error of {:.2} % (RMS).\n", 100.0 * error.diffuse);
 
     println!("The sun, taken out of the probe:");
     let settings = ExtractionSettings { sun: true, ..ExtractionSettings::default() };

@@ -1,12 +1,12 @@
 //! Direct light at one shading point by three strategies, no renderer: the sampling core alone.
 
-use domelight::bsdf::{Lambert, Lobe, Material, Phong};
+use domelight::bsdf::{Bsdf, Lambert, Lobe, Phong};
 use domelight::environment::{Environment, Orientation, builtin::BuiltinProbe};
 use domelight::math::{Frame, Vec3, vec3};
-use domelight::sampling::{Heuristic, SamplerKind, Stream};
+use domelight::sampling::{Heuristic, Sampler, SamplerKind};
 use domelight::strategy::{
     BrdfSampling, EnvironmentSampling, LightTable, MultipleImportanceSampling, PointStrategy,
-    SampleNumbers, ShadingPoint,
+    SampleIndex, ShadingPoint,
 };
 use domelight::{Rgb, RgbImage};
 
@@ -17,10 +17,10 @@ fn visible(wi: Vec3) -> bool {
 
 /// The mean of (Σ weight · V) over `n` camera samples.
 fn estimate<S: PointStrategy>(strategy: &S, at: &ShadingPoint, n: u32) -> Rgb {
-    let stream = Stream::new(SamplerKind::Sobol, 0, 0);
+    let sampler = Sampler::new(SamplerKind::Sobol, 0, 0);
     let (mut sum, mut scratch) = (Rgb::BLACK, S::Scratch::default());
     for sample in 0..n {
-        strategy.sample(at, SampleNumbers { stream, sample }, &mut scratch, |wi, weight| {
+        strategy.sample(at, SampleIndex { sampler, sample }, &mut scratch, |wi, weight| {
             if visible(wi) {
                 sum += weight;
             }
@@ -38,8 +38,8 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let wo = frame.to_local(vec3(0.3, 0.6, 0.7).normalize());
     let diffuse = Lambert::new(Rgb::splat(0.5));
     let gloss = Phong::new(Rgb::splat(0.3), 50.0);
-    let material = Material::new(&[Lobe::from(diffuse), Lobe::from(gloss)])?.for_view(wo);
-    let at = ShadingPoint { position: Vec3::ZERO, ng: normal, frame, wo, material };
+    let bsdf = Bsdf::new(&[Lobe::from(diffuse), Lobe::from(gloss)])?.for_view(wo);
+    let at = ShadingPoint { position: Vec3::ZERO, ng: normal, frame, wo, bsdf };
 
     let n = 1 << 14;
     let brdf = estimate(&BrdfSampling { environment, n_samples: 1 }, &at, n);

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use domelight::bsdf::{Lambert, Material};
+use domelight::bsdf::{Bsdf, Lambert};
 use domelight::math::{Frame, Vec3, vec3};
 use domelight::prelude::*;
-use domelight::sampling::{SamplerKind, Stream};
+use domelight::sampling::{Sampler, SamplerKind};
 use domelight::strategy::{
     Estimator, PixelPoints, ProductSampling, ShadingPoint, Strategy, TileShading,
 };
@@ -28,7 +28,7 @@ pub(crate) fn main() {
     triangles.extend(PLANE);
     let timer = &mut Duration::default();
     let bvh = build_cwbvh_from_tris(&triangles, BvhBuildParams::medium_build(), timer);
-    let bsdf = Material::single(Lambert::new(Rgb::splat(0.7)));
+    let bsdf = Bsdf::single(Lambert::new(Rgb::splat(0.7)));
 
     // A tile of 16 × 16 pixels with one shading point for each hit.
     let (mut points, mut samples, mut pixels) = (Vec::new(), Vec::new(), Vec::new());
@@ -41,17 +41,17 @@ pub(crate) fn main() {
             let ng = if normal.dot(toward) > 0.0 { -normal } else { normal };
             let frame = Frame::from_z(ng);
             let wo = frame.to_local(-toward.normalize());
-            points.push(ShadingPoint { position, ng, frame, wo, material: bsdf.for_view(wo) });
+            points.push(ShadingPoint { position, ng, frame, wo, bsdf: bsdf.for_view(wo) });
             samples.push(0);
         }
-        let stream = Stream::new(SamplerKind::Sobol, 0, i);
-        pixels.push(PixelPoints::new(start..points.len(), 1, stream));
+        let sampler = Sampler::new(SamplerKind::Sobol, 0, i);
+        pixels.push(PixelPoints::new(start..points.len(), 1, sampler));
     }
     let tile = TileShading { points: &points, samples: &samples, pixels: &pixels, width: 16 };
 
     let environment = Environment::builtin(BuiltinProbe::Sky);
     let product = ProductSampling::new(&environment, 16);
-    let pass = product.begin_pass(Stream::of_pass(SamplerKind::Sobol, 0, 0), 1);
+    let pass = product.begin_pass(Sampler::for_pass(SamplerKind::Sobol, 0, 0), 1);
     let mut estimator = Estimator::new(&product);
     let radiance = estimator.estimate(&pass, &tile, |rays, visibility| {
         for ((v, &point), &wi) in visibility.iter_mut().zip(&rays.point).zip(&rays.wi) {

@@ -1,6 +1,6 @@
 //! A BSDF of one's own under every strategy: retroreflective tape, a lobe back toward the viewer.
 
-use domelight::bsdf::{Bxdf, CustomLobe, Lambert, Material};
+use domelight::bsdf::{Bsdf, Bxdf, CustomLobe, Lambert};
 use domelight::geometry::Mesh;
 use domelight::math::{Frame, PI, Vec2, Vec3};
 use domelight::prelude::*;
@@ -38,11 +38,11 @@ impl Bxdf for Retroreflector {
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let tape = CustomLobe::leak(Retroreflector { rho: Rgb::splat(0.7), n: 30.0 });
-    let material = Material::new(&[Lambert::new(Rgb::splat(0.1)).into(), tape.into()])?;
+    let bsdf = Bsdf::new(&[Lambert::new(Rgb::splat(0.1)).into(), tape.into()])?;
     let quad = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     let positions = quad.map(|(x, y)| Vec3::new(x, y, 0.0)).to_vec();
     let mesh = Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
-    let scene = Scene::from_mesh(mesh, material)?;
+    let scene = Scene::from_mesh(mesh, bsdf)?;
     let environment = Environment::builtin(BuiltinProbe::Studio);
     let settings = RenderSettings { width: 48, height: 48, n_samples: 16, ..Default::default() };
     let camera = Camera::framing(&scene, settings.width, settings.height);

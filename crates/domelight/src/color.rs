@@ -1,4 +1,4 @@
-//! Linear Rec. 709 colour.
+//! Linear Rec. 709 color.
 
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub};
@@ -26,7 +26,7 @@ impl Rgb {
         Self { r, g, b }
     }
 
-    /// A grey.
+    /// A gray.
     pub const fn splat(v: f32) -> Self {
         Self { r: v, g: v, b: v }
     }

@@ -15,7 +15,7 @@ pub enum Error {
     Prepare(#[from] crate::strategy::PrepareError),
     /// A text that names no material.
     #[error(transparent)]
-    Material(#[from] crate::bsdf::ParseMaterialError),
+    Bsdf(#[from] crate::bsdf::ParseMaterialError),
     /// Lights that cannot be extracted.
     #[error(transparent)]
     Rig(#[from] crate::rig::RigError),
@@ -30,7 +30,7 @@ pub enum Error {
     /// A film that does not belong to a render.
     #[cfg(feature = "render")]
     #[error(transparent)]
-    Film(#[from] crate::render::Misfit),
+    Film(#[from] crate::render::FilmMismatch),
     /// A file that makes no scene.
     #[cfg(feature = "io")]
     #[error(transparent)]

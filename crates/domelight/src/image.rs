@@ -23,7 +23,7 @@ impl RgbImage {
         Self { width, height, pixels }
     }
 
-    /// One colour everywhere.
+    /// One color everywhere.
     pub fn filled(width: usize, height: usize, color: Rgb) -> Self {
         Self { width, height, pixels: vec![color; width * height] }
     }

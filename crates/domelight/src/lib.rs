@@ -6,7 +6,7 @@
 //!   BRDFs work in the local frame with z the shading normal.
 //! - `eval` is f_r · max(0, cos θ_i): the cosine is inside. `pdf` is per solid angle \[sr⁻¹\].
 //! - Radiance `le` is in W·m⁻²·sr⁻¹, linear Rec. 709.
-//! - The world is right-handed, +Y up. On a lat-long map row 0 is +Y, the centre column looks toward
+//! - The world is right-handed, +Y up. On a lat-long map row 0 is +Y, the center column looks toward
 //!   −Z and u grows to the right as seen from inside.
 //! - Uniform numbers lie in [0, 1), never 1. A sampler is a pure function of them.
 //!
@@ -14,23 +14,23 @@
 //! A strategy turns a shading point into pairs (wi, weight); the estimate is Σ weight · V(wi).
 //!
 //! ```
-//! use domelight::bsdf::{Lambert, Material};
+//! use domelight::bsdf::{Lambert, Bsdf};
 //! use domelight::environment::{Environment, Orientation, builtin::BuiltinProbe};
 //! use domelight::math::{Frame, Vec3};
-//! use domelight::sampling::{SamplerKind, Stream};
-//! use domelight::strategy::{EnvironmentSampling, PointStrategy, SampleNumbers, ShadingPoint};
+//! use domelight::sampling::{SamplerKind, Sampler};
+//! use domelight::strategy::{EnvironmentSampling, PointStrategy, SampleIndex, ShadingPoint};
 //! use domelight::Rgb;
 //!
 //! let map = BuiltinProbe::Sky.image(64);
 //! let environment = &Environment::new(map, Orientation::default(), 1.0)?;
-//! let material = Material::single(Lambert::new(Rgb::splat(0.5)));
+//! let bsdf = Bsdf::single(Lambert::new(Rgb::splat(0.5)));
 //! let (ng, frame) = (Vec3::Y, Frame::from_z(Vec3::Y));
-//! let at = ShadingPoint { position: Vec3::ZERO, ng, frame, wo: Vec3::Z, material };
+//! let at = ShadingPoint { position: Vec3::ZERO, ng, frame, wo: Vec3::Z, bsdf };
 //!
 //! let strategy = EnvironmentSampling { environment, n_samples: 16 };
-//! let stream = Stream::new(SamplerKind::Sobol, 0, 0);
+//! let sampler = Sampler::new(SamplerKind::Sobol, 0, 0);
 //! let mut unoccluded = Rgb::BLACK;
-//! let numbers = SampleNumbers { stream, sample: 0 };
+//! let numbers = SampleIndex { sampler, sample: 0 };
 //! strategy.sample(&at, numbers, &mut (), |_wi, weight| unoccluded += weight);
 //! assert!(unoccluded.luminance() > 0.0);
 //! # Ok::<(), domelight::environment::EnvironmentError>(())

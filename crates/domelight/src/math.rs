@@ -6,14 +6,14 @@ pub use glam::{Mat3, Mat4, Quat, Vec2, Vec3, Vec4, vec2, vec3};
 
 pub use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 
-use crate::simd::{Real, Vectors};
+use crate::simd::{SimdFloat, Vectors};
 
 /// The angle of (x, y) from the x axis in [−π, π], to 5·10⁻⁷.
 ///
 /// arctan t = t P(t²) on [0, 1], P a minimax polynomial of relative error 2·10⁻⁸; the other octants by
 /// reflection.
 #[inline(always)]
-pub(crate) fn atan2<F: Real>(y: F, x: F) -> F {
+pub(crate) fn atan2<F: SimdFloat>(y: F, x: F) -> F {
     const P: [f32; 9] = [
         1.0,
         -0.333_330_72,
@@ -38,7 +38,7 @@ pub(crate) fn atan2<F: Real>(y: F, x: F) -> F {
 ///
 /// sin 2πt = t P(t²) on [0, ¼], P a minimax polynomial; the other quadrants by reflection.
 #[inline(always)]
-pub(crate) fn sin_cos_turns<F: Real>(u: F) -> [F; 2] {
+pub(crate) fn sin_cos_turns<F: SimdFloat>(u: F) -> [F; 2] {
     let (zero, quarter) = (u.splat(0.0), u.splat(0.25));
     // Half a turn less, which changes both signs.
     let x = u - u.splat(0.5);
@@ -51,21 +51,21 @@ pub(crate) fn sin_cos_turns<F: Real>(u: F) -> [F; 2] {
 
 /// Sine and cosine of `t` eighths of a turn for t in [−1, 1], to 2·10⁻⁷.
 #[inline(always)]
-pub(crate) fn sin_cos_eighth<F: Real>(t: F) -> [F; 2] {
+pub(crate) fn sin_cos_eighth<F: SimdFloat>(t: F) -> [F; 2] {
     let t = t * t.splat(0.125);
     [sine_of_quarter(t), sine_of_quarter(t.splat(0.25) - t.abs())]
 }
 
 /// sin 2πt on [−¼, ¼].
 #[inline(always)]
-fn sine_of_quarter<F: Real>(t: F) -> F {
+fn sine_of_quarter<F: SimdFloat>(t: F) -> F {
     const P: [f32; 5] = [6.283_185_5, -41.341_68, 81.602_234, -76.574_99, 39.710_92];
     t * polynomial(t.squared(), &P)
 }
 
 /// Σ cₖ xᵏ by Horner's rule.
 #[inline(always)]
-fn polynomial<F: Real, const N: usize>(x: F, c: &[f32; N]) -> F {
+fn polynomial<F: SimdFloat, const N: usize>(x: F, c: &[f32; N]) -> F {
     let mut sum = x.splat(c[N - 1]);
     for &c in c[..N - 1].iter().rev() {
         sum = sum * x + x.splat(c);
@@ -122,7 +122,7 @@ impl Frame {
 ///
 /// Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
 #[inline(always)]
-pub(crate) fn tangents<F: Real>(n: Vectors<F>) -> [Vectors<F>; 2] {
+pub(crate) fn tangents<F: SimdFloat>(n: Vectors<F>) -> [Vectors<F>; 2] {
     let (zero, one) = (n.z.splat(0.0), n.z.splat(1.0));
     let sign = F::select(n.z.lt(zero), zero - one, one);
     let a = (zero - one) / (sign + n.z);

@@ -2,7 +2,7 @@
 
 use domelight::Rgb;
 use domelight::bsdf::{
-    Beckmann, Brdf, Conductor, Fresnel, Ggx, Lambert, Lobe, Masking, Material, MetallicRoughness,
+    Beckmann, Brdf, Bsdf, Conductor, Fresnel, Ggx, Lambert, Lobe, Masking, MetallicRoughness,
     Phong, Ward, WardForm,
 };
 use domelight::math::{Vec2, Vec3, from_spherical};
@@ -115,13 +115,13 @@ fn mixtures() {
         Phong::new(Rgb::splat(0.2), 50.0).into(),
         Ggx::new([0.05; 2], Fresnel::Conductor(Conductor::GOLD), Masking::Correlated).into(),
     ];
-    check("three lobes", &Material::new(&three).unwrap());
-    let refined = Material::new(&three).unwrap().for_view(from_spherical(0.2, 0.0));
+    check("three lobes", &Bsdf::new(&three).unwrap());
+    let refined = Bsdf::new(&three).unwrap().for_view(from_spherical(0.2, 0.0));
     check("three lobes for a view", &refined);
-    check("mix", &"mix".parse::<Material>().unwrap());
+    check("mix", &"mix".parse::<Bsdf>().unwrap());
     let coupled: [Lobe; 2] = [
         MetallicRoughness::new(Rgb::splat(0.8), 0.0, 0.3).into(),
         Ward::new(Rgb::splat(0.1), [0.1, 0.3], WardForm::default()).into(),
     ];
-    check("a mixture of a mixture", &Material::new(&coupled).unwrap());
+    check("a mixture of a mixture", &Bsdf::new(&coupled).unwrap());
 }

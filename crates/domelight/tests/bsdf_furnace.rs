@@ -3,7 +3,7 @@
 
 use domelight::Rgb;
 use domelight::bsdf::{
-    Beckmann, Brdf, Conductor, Fresnel, Ggx, Lambert, Lobe, Masking, Material, MetallicRoughness,
+    Beckmann, Brdf, Bsdf, Conductor, Fresnel, Ggx, Lambert, Lobe, Masking, MetallicRoughness,
     Phong, Ward, WardForm,
 };
 use domelight::math::{Vec2, Vec3, from_spherical};
@@ -85,12 +85,12 @@ fn sampling_agrees_with_quadrature_and_conserves_energy() {
 fn mixtures_agree_with_quadrature() {
     let test = ZTest::in_suite_of(SUITE);
     for text in ["mix", "phong:50:0.5:0.5"] {
-        let material: Material = text.parse().unwrap();
+        let bsdf: Bsdf = text.parse().unwrap();
         for degrees in ANGLES {
             let wo = view(degrees);
-            let refined = material.for_view(wo);
-            let reference = reflected(&material, wo);
-            test.against(text, &estimates(&material, wo, 3), reference).unwrap();
+            let refined = bsdf.for_view(wo);
+            let reference = reflected(&bsdf, wo);
+            test.against(text, &estimates(&bsdf, wo, 3), reference).unwrap();
             test.against(text, &estimates(&refined, wo, 4), reference).unwrap();
             assert!(reference[0] <= 1.0 + 1e-4, "{text} reflects {reference:?}");
         }

@@ -7,7 +7,7 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::{Environment, Orientation};
 use domelight::picture::exr::ExrLayers;
 use domelight::render::{
-    Background, Checkpoint, CheckpointError, Counts, Film, Layers, Misfit, Observer,
+    Background, Checkpoint, CheckpointError, Counts, Film, FilmMismatch, Layers, Observer,
     RenderSettings, Renderer, Rendering, VarianceSums, Window, render,
 };
 use domelight::sampling::{Heuristic, Pcg32};
@@ -18,7 +18,7 @@ use domelight::strategy::{LightTable, MultipleImportanceSampling, ProductSamplin
 type Mis<'a> = MultipleImportanceSampling<'a>;
 
 /// What a render needs.
-struct Stage {
+struct TestScene {
     scene: Scene,
     camera: Camera,
     environment: Environment,
@@ -28,34 +28,44 @@ fn settings() -> RenderSettings {
     RenderSettings { width: 53, height: 38, n_samples: 9, tile_size: 8, ..Default::default() }
 }
 
-fn stage() -> Stage {
+fn test_scene() -> TestScene {
     let description = BuiltinScene::Spheres.description();
     let bounds = description.subject_bounds();
     let RenderSettings { width, height, .. } = settings();
     let view =
         CameraSettings::framing(&bounds, width as f32 / height as f32, domelight::math::Vec3::Y);
     let map = BuiltinProbe::Sky.image(32);
-    Stage {
+    TestScene {
         scene: Scene::new(description).unwrap(),
         camera: Camera::new(&view, width, height).unwrap(),
         environment: Environment::new(map, Orientation::default(), 1.0).unwrap(),
     }
 }
 
-fn mis(stage: &Stage) -> Mis<'_> {
-    Mis::new(&stage.environment, LightTable::Full, Heuristic::Balance, 1, 1).unwrap()
+fn mis(test_scene: &TestScene) -> Mis<'_> {
+    Mis::new(&test_scene.environment, LightTable::Full, Heuristic::Balance, 1, 1).unwrap()
 }
 
 fn renderer<'a, S: Strategy>(
-    stage: &'a Stage,
+    test_scene: &'a TestScene,
     strategy: &'a S,
     settings: &RenderSettings,
 ) -> Renderer<'a, S> {
-    Renderer::with_strategy(&stage.scene, &stage.camera, &stage.environment, strategy, *settings)
+    Renderer::with_strategy(
+        &test_scene.scene,
+        &test_scene.camera,
+        &test_scene.environment,
+        strategy,
+        *settings,
+    )
 }
 
-fn uninterrupted(stage: &Stage, strategy: &impl Strategy, settings: &RenderSettings) -> Rendering {
-    render(&stage.scene, &stage.camera, &stage.environment, strategy, settings, &())
+fn uninterrupted(
+    test_scene: &TestScene,
+    strategy: &impl Strategy,
+    settings: &RenderSettings,
+) -> Rendering {
+    render(&test_scene.scene, &test_scene.camera, &test_scene.environment, strategy, settings, &())
 }
 
 fn checkpoint<S: Strategy>(renderer: &Renderer<S>, n_samples: u32) -> Checkpoint {
@@ -85,7 +95,7 @@ impl Observer for After {
         let _ = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1));
     }
 
-    fn cancelled(&self) -> bool {
+    fn canceled(&self) -> bool {
         self.0.load(Ordering::Relaxed) == 0
     }
 }
@@ -96,45 +106,49 @@ fn pool(n_threads: usize) -> rayon::ThreadPool {
 
 #[test]
 fn a_resumed_render_has_the_bits_of_the_uninterrupted_one() {
-    let (stage, settings) = (stage(), settings());
-    interrupt_and_resume(&stage, &mis(&stage), &settings);
+    let (test_scene, settings) = (test_scene(), settings());
+    interrupt_and_resume(&test_scene, &mis(&test_scene), &settings);
 }
 
 #[test]
 fn a_strategy_that_learns_can_be_interrupted() {
-    let stage = stage();
+    let test_scene = test_scene();
     let settings = RenderSettings { n_samples: 80, tile_size: 16, ..settings() };
-    interrupt_and_resume(&stage, &ProductSampling::new(&stage.environment, 2), &settings);
+    interrupt_and_resume(&test_scene, &ProductSampling::new(&test_scene.environment, 2), &settings);
 }
 
 /// Before no background tiles that see nothing keep no sums.
 #[test]
 fn tiles_that_see_nothing_can_be_interrupted() {
-    let mut stage = stage();
+    let mut test_scene = test_scene();
     let RenderSettings { width, height, .. } = settings();
     let fov_y_degrees = 120.0;
     let projection = domelight::scene::Projection::Perspective { fov_y_degrees };
     let [origin, target, up] = [[0.0, 1.0, 9.0], [0.0; 3], [0.0, 1.0, 0.0]].map(Into::into);
     let view = CameraSettings { projection, origin, target, up };
-    stage.camera = Camera::new(&view, width, height).unwrap();
+    test_scene.camera = Camera::new(&view, width, height).unwrap();
     let settings = RenderSettings { background: Background::Hidden, n_samples: 7, ..settings() };
-    interrupt_and_resume(&stage, &mis(&stage), &settings);
-    let rendering = uninterrupted(&stage, &mis(&stage), &settings);
+    interrupt_and_resume(&test_scene, &mis(&test_scene), &settings);
+    let rendering = uninterrupted(&test_scene, &mis(&test_scene), &settings);
     let corners = [0, width - 1, width * height - 1];
     assert!(corners.into_iter().all(|i| rendering.layers.n_samples[i] == 7));
     assert!(rendering.layers.alpha.contains(&0.0) && rendering.layers.alpha.contains(&1.0));
     assert_eq!(rendering.counts.camera_rays, (7 * width * height) as u64);
 }
 
-fn interrupt_and_resume<S: Strategy>(stage: &Stage, strategy: &S, settings: &RenderSettings) {
-    let expected = uninterrupted(stage, strategy, settings);
+fn interrupt_and_resume<S: Strategy>(
+    test_scene: &TestScene,
+    strategy: &S,
+    settings: &RenderSettings,
+) {
+    let expected = uninterrupted(test_scene, strategy, settings);
     let mut random = Pcg32::new(1, 1);
     for n_threads in [1, 2] {
         pool(n_threads).install(|| {
             let mut saved: Option<Vec<u8>> = None;
             let mut interruptions = 0;
             let rendering = loop {
-                let mut renderer = renderer(stage, strategy, settings);
+                let mut renderer = renderer(test_scene, strategy, settings);
                 if let Some(bytes) = &saved {
                     let checkpoint = Checkpoint::decode(bytes).unwrap();
                     renderer.restore(&checkpoint.film, checkpoint.counts).unwrap();
@@ -161,30 +175,30 @@ fn assert_same(a: &Rendering, b: &Rendering) {
 
 #[test]
 fn more_samples_than_before_go_on_from_what_is_there() {
-    let (stage, few) = (stage(), settings());
+    let (test_scene, few) = (test_scene(), settings());
     let many = RenderSettings { n_samples: 20, ..few };
-    let mis = mis(&stage);
-    let mut first = renderer(&stage, &mis, &few);
+    let mis = mis(&test_scene);
+    let mut first = renderer(&test_scene, &mis, &few);
     assert!(first.run(&()));
-    let mut second = renderer(&stage, &mis, &many);
+    let mut second = renderer(&test_scene, &mis, &many);
     second.restore(&first.film(), first.counts()).unwrap();
     assert!(!second.is_complete());
     assert!(second.run(&()));
-    assert_same(&second.rendering(), &uninterrupted(&stage, &mis, &many));
+    assert_same(&second.rendering(), &uninterrupted(&test_scene, &mis, &many));
 }
 
 #[test]
 fn merged_shards_are_the_single_run() {
-    let (stage, settings) = (stage(), settings());
-    let mis = mis(&stage);
-    let expected = uninterrupted(&stage, &mis, &settings);
+    let (test_scene, settings) = (test_scene(), settings());
+    let mis = mis(&test_scene);
+    let expected = uninterrupted(&test_scene, &mis, &settings);
     let RenderSettings { width, height, .. } = settings;
     for n in [1, 2, 3, 8, 64] {
         let mut counts = Counts::default();
         let mut variance = VarianceSums::default();
         let mut films = Vec::new();
         for k in (0..n).rev() {
-            let whole = renderer(&stage, &mis, &settings);
+            let whole = renderer(&test_scene, &mis, &settings);
             let tiles = whole.tiling().shard(k, n);
             let mut shard = whole.only(tiles);
             pool(1 + k % 3).install(|| shard.run(&()));
@@ -206,9 +220,9 @@ fn merged_shards_are_the_single_run() {
 
 #[test]
 fn a_checkpoint_is_a_picture_and_keeps_everything() {
-    let (stage, settings) = (stage(), settings());
-    let mis = mis(&stage);
-    let mut shard = renderer(&stage, &mis, &settings).only(9..12);
+    let (test_scene, settings) = (test_scene(), settings());
+    let mis = mis(&test_scene);
+    let mut shard = renderer(&test_scene, &mis, &settings).only(9..12);
     shard.run(&After::tiles(4));
     let saved = checkpoint(&shard, settings.n_samples);
     let bytes = saved.encode().unwrap();
@@ -231,9 +245,9 @@ fn a_checkpoint_is_a_picture_and_keeps_everything() {
 
 #[test]
 fn foreign_and_damaged_files_are_refused() {
-    let (stage, settings) = (stage(), settings());
-    let mis = mis(&stage);
-    let mut shard = renderer(&stage, &mis, &settings).only(0..3);
+    let (test_scene, settings) = (test_scene(), settings());
+    let mis = mis(&test_scene);
+    let mut shard = renderer(&test_scene, &mis, &settings).only(0..3);
     shard.run(&());
     let saved = checkpoint(&shard, settings.n_samples);
     let bytes = saved.encode().unwrap();
@@ -258,23 +272,23 @@ fn foreign_and_damaged_files_are_refused() {
 
 #[test]
 fn sums_of_another_render_are_refused() {
-    let (stage, settings) = (stage(), settings());
-    let mis = mis(&stage);
-    let mut whole = renderer(&stage, &mis, &settings);
-    let shard = renderer(&stage, &mis, &settings).only(0..3);
+    let (test_scene, settings) = (test_scene(), settings());
+    let mis = mis(&test_scene);
+    let mut whole = renderer(&test_scene, &mis, &settings);
+    let shard = renderer(&test_scene, &mis, &settings).only(0..3);
     let refused = whole.restore(&shard.film(), Counts::default());
-    assert!(matches!(refused, Err(Misfit::Window { .. })), "{refused:?}");
+    assert!(matches!(refused, Err(FilmMismatch::Window { .. })), "{refused:?}");
     let other_size = Film::new(99, 38, whole.film().window);
     assert!(whole.restore(&other_size, Counts::default()).is_err());
 }
 
-/// A tile stops by its own samples: the same with its neighbours or without.
+/// A tile stops by its own samples: the same with its neighbors or without.
 #[test]
 fn tiles_decide_for_themselves_when_the_error_is_reached() {
-    let stage = stage();
+    let test_scene = test_scene();
     let settings = RenderSettings { n_samples: 256, target_error: Some(8e-3), ..settings() };
-    let mis = mis(&stage);
-    let mut whole = renderer(&stage, &mis, &settings);
+    let mis = mis(&test_scene);
+    let mut whole = renderer(&test_scene, &mis, &settings);
     assert!(whole.run(&()));
     let layers = whole.film().layers();
     let least = layers.n_samples.iter().min().copied();
@@ -283,7 +297,7 @@ fn tiles_decide_for_themselves_when_the_error_is_reached() {
     let mut films = Vec::new();
     let mut variance = VarianceSums::default();
     for k in 0..3 {
-        let mut shard = renderer(&stage, &mis, &settings);
+        let mut shard = renderer(&test_scene, &mis, &settings);
         let tiles = shard.tiling().shard(k, 3);
         shard = shard.only(tiles);
         assert!(shard.run(&()));

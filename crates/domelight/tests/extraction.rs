@@ -55,18 +55,18 @@ fn map_of(width: usize, height: usize, f: impl Fn(Vec3) -> Rgb) -> RgbImage {
 /// A disc of radiance `le` beside what `behind` says.
 #[derive(Clone, Copy)]
 struct Disc {
-    centre: Vec3,
+    center: Vec3,
     radius: f32,
     le: Rgb,
 }
 
 impl Disc {
-    fn new(centre: Vec3, radius: f32, le: f32) -> Self {
-        Self { centre: centre.normalize(), radius, le: Rgb::new(le, 0.8 * le, 0.6 * le) }
+    fn new(center: Vec3, radius: f32, le: f32) -> Self {
+        Self { center: center.normalize(), radius, le: Rgb::new(le, 0.8 * le, 0.6 * le) }
     }
 
     fn covers(&self, w: Vec3) -> bool {
-        w.distance(self.centre) < 2.0 * (0.5 * self.radius).sin()
+        w.distance(self.center) < 2.0 * (0.5 * self.radius).sin()
     }
 }
 
@@ -114,7 +114,7 @@ fn assert_conserved(env: &Environment, found: &Extraction) {
 /// exceeds the one without the disc.
 #[track_caller]
 fn assert_is_disc(light: &RigLight, disc: &Disc, env: &Environment, without: &Environment) {
-    let off = light.direction.angle_between(disc.centre);
+    let off = light.direction.angle_between(disc.center);
     assert!(off < TEXEL, "{off} rad off");
     let irradiance = light.irradiance.to_array().map(f64::from);
     for (c, (with, without)) in integral(env).into_iter().zip(integral(without)).enumerate() {
@@ -136,9 +136,9 @@ fn suns_of_many_sizes_and_places_are_found_whole() {
         vec3(1.0, 0.0, 0.0),
     ];
     let plain = environment(discs_on(sky, &[]));
-    for centre in places {
+    for center in places {
         for radius in [0.02, 0.05, 0.1] {
-            let disc = Disc::new(centre, radius, 2000.0);
+            let disc = Disc::new(center, radius, 2000.0);
             let env = environment(discs_on(sky, &[disc]));
             let found = extract(&env, SUN).unwrap();
             assert_eq!(found.rig.lights.len(), 1);
@@ -146,16 +146,16 @@ fn suns_of_many_sizes_and_places_are_found_whole() {
             assert_eq!(light.region, Region::Sun);
             assert_is_disc(light, &disc, &env, &plain);
             let spread = light.angular_radius.to_degrees() - radius.to_degrees();
-            assert!(spread.abs() < 0.5 * TEXEL.to_degrees(), "{spread}° at {centre}");
+            assert!(spread.abs() < 0.5 * TEXEL.to_degrees(), "{spread}° at {center}");
             assert_conserved(&env, &found);
             // Neither hole nor halo: what is left is like the sky without the sun; where the sun
             // hid the horizon, between sky and ground.
-            let on_horizon = centre.y.abs() < 0.2;
+            let on_horizon = center.y.abs() < 0.2;
             let residual = found.residual.unwrap();
             for (r, p) in residual.map().pixels.iter().zip(&plain.map().pixels) {
                 let off = (*r - *p).map(f32::abs).max_component();
                 let between = (0.1..0.91).contains(&r.b) && (0.15..0.51).contains(&r.g);
-                assert!(off < 0.2 || (on_horizon && between), "{r:?} for {p:?}, {centre}");
+                assert!(off < 0.2 || (on_horizon && between), "{r:?} for {p:?}, {center}");
             }
         }
     }
@@ -163,11 +163,11 @@ fn suns_of_many_sizes_and_places_are_found_whole() {
 
 #[test]
 fn a_sun_with_a_glow_is_found() {
-    let centre = vec3(-0.4, 0.6, 0.7).normalize();
-    let angle = |w: Vec3| w.angle_between(centre).max(0.01);
+    let center = vec3(-0.4, 0.6, 0.7).normalize();
+    let angle = |w: Vec3| w.angle_between(center).max(0.01);
     let veil = |w: Vec3| sky(w) + Rgb::WHITE * (0.05 / angle(w));
     let glow = |w: Vec3| veil(w) + Rgb::WHITE * (2e-4 / angle(w).powi(3));
-    let disc = Disc::new(centre, 0.03, 5000.0);
+    let disc = Disc::new(center, 0.03, 5000.0);
     let env = environment(discs_on(glow, &[disc]));
     let found = extract(&env, SUN).unwrap();
     // What falls off faster than 1/r² is the sun's, as far as it stands out.
@@ -175,11 +175,11 @@ fn a_sun_with_a_glow_is_found() {
         [integral(&environment(discs_on(glow, &[]))), integral(&environment(discs_on(veil, &[])))];
     let (taken, all) = (f64::from(found.rig.lights[0].irradiance.g), integral(&env));
     assert!(all[1] - least[1] < taken && taken < all[1] - most[1], "{taken}");
-    assert!(found.rig.lights[0].direction.angle_between(centre) < 0.1 * TEXEL);
+    assert!(found.rig.lights[0].direction.angle_between(center) < 0.1 * TEXEL);
     let residual = found.residual.as_ref().unwrap();
     // What falls off slower than 1/r² stays, without the peak.
     assert!(residual.max_luminance() < 30.0, "{}", residual.max_luminance());
-    assert!(residual.le(centre).luminance() > 0.5);
+    assert!(residual.le(center).luminance() > 0.5);
     assert_conserved(&env, &found);
 }
 
@@ -187,7 +187,7 @@ fn a_sun_with_a_glow_is_found() {
 fn two_suns_near_each_other_are_two() {
     let a = Disc::new(vec3(0.3, 0.5, -0.8), 0.06, 3000.0);
     let b =
-        Disc { centre: Mat3::from_rotation_y(0.2) * a.centre, ..Disc::new(a.centre, 0.05, 1500.0) };
+        Disc { center: Mat3::from_rotation_y(0.2) * a.center, ..Disc::new(a.center, 0.05, 1500.0) };
     let env = environment(discs_on(sky, &[a, b]));
     let found = extract(&env, ExtractionSettings { sun: true, ..lamps(3) }).unwrap();
     assert_eq!(found.rig.lights.len(), 2);
@@ -207,8 +207,8 @@ fn a_sun_beside_and_in_a_bright_window() {
     let window = |w: Vec3| {
         if w.x.abs() < 0.25 && w.y.abs() < 0.25 && w.z < 0.0 { Rgb::splat(20.0) } else { sky(w) }
     };
-    for centre in [vec3(0.29, 0.0, -1.0), vec3(0.1, 0.05, -1.0)] {
-        let disc = Disc::new(centre, 0.03, 20_000.0);
+    for center in [vec3(0.29, 0.0, -1.0), vec3(0.1, 0.05, -1.0)] {
+        let disc = Disc::new(center, 0.03, 20_000.0);
         let env = environment(discs_on(window, &[disc]));
         let found = extract(&env, SUN).unwrap();
         let without = environment(discs_on(window, &[]));
@@ -242,7 +242,7 @@ fn noise_hides_no_sun_and_makes_none() {
     let disc = Disc::new(vec3(0.3, 0.5, -0.8), 0.05, 500.0);
     let (with_sun, without) = (noise(discs_on(sky, &[disc])), noise(discs_on(sky, &[])));
     let light = extract(&with_sun, SUN).unwrap().rig.lights[0];
-    assert!(light.direction.angle_between(disc.centre) < TEXEL);
+    assert!(light.direction.angle_between(disc.center) < TEXEL);
     assert_eq!(extract(&without, SUN).unwrap_err(), RigError::NoSun);
     assert_eq!(extract(&without, lamps(9)).unwrap_err(), RigError::NoLamp);
 }
@@ -314,8 +314,8 @@ fn lights_are_counted_with_the_sun() {
             let (x, y) = ((uv.x * WIDTH as f32) as usize, (uv.y * HEIGHT as f32) as usize);
             found.rig.labels[y * WIDTH + x]
         };
-        assert_eq!(label(disc.centre), 0);
-        assert!(n < 2 || label(lamp.centre) == 1);
+        assert_eq!(label(disc.center), 0);
+        assert!(n < 2 || label(lamp.center) == 1);
     }
 }
 

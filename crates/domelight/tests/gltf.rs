@@ -9,7 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 use domelight::Rgb;
 use domelight::math::{Vec2, Vec3, vec2, vec3};
 use domelight::scene::{
-    AlphaMode, AnimationTime, Coverage, LoadOptions, Loaded, Scene, Surface, SurfaceModel,
+    AlphaMode, AnimationTime, Coverage, LoadOptions, Loaded, Material, MaterialModel, Scene,
     TextureFilter, Wrap, load_with,
 };
 use tempfile::TempDir;
@@ -94,28 +94,28 @@ fn png(rgba: [u8; 4]) -> String {
 }
 
 /// The surface of a material, with images that are textures of their own.
-fn surface(material: &str, images: &[String]) -> (Surface, Loaded) {
+fn material(bsdf: &str, images: &[String]) -> (Material, Loaded) {
     let uris: Vec<_> = images.iter().map(|uri| format!(r#"{{"uri":"{uri}"}}"#)).collect();
     let textures: Vec<_> =
         (0..images.len()).map(|i| format!(r#"{{"source":{i},"sampler":0}}"#)).collect();
     let more = format!(
-        r#""materials":[{material}],"images":[{}],"textures":[{}],"samplers":[{{"magFilter":9728,"wrapT":33071}}],"#,
+        r#""materials":[{bsdf}],"images":[{}],"textures":[{}],"samplers":[{{"magFilter":9728,"wrapT":33071}}],"#,
         uris.join(","),
         textures.join(",")
     );
     let loaded = loaded(&document(&more, r#"},"material":0"#));
-    (loaded.description.surfaces[0].clone(), loaded)
+    (loaded.description.materials[0].clone(), loaded)
 }
 
 #[test]
 fn coverage_comes_from_factor_texture_and_vertices() {
-    let material = r#"{"alphaMode":"MASK","alphaCutoff":0.25,"doubleSided":true,"pbrMetallicRoughness":
+    let bsdf = r#"{"alphaMode":"MASK","alphaCutoff":0.25,"doubleSided":true,"pbrMetallicRoughness":
 {"baseColorFactor":[1,1,1,0.75],"baseColorTexture":{"index":0,"texCoord":1}}}"#;
-    let (surface, of_mask) = surface(material, &[png([255, 0, 0, 51])]);
-    assert_eq!(surface.coverage.mode, AlphaMode::Mask { cutoff: 0.25 });
-    assert_eq!(surface.coverage.opacity, 0.75);
-    assert!(surface.double_sided);
-    let texture = surface.coverage.texture.unwrap();
+    let (material, of_mask) = material(bsdf, &[png([255, 0, 0, 51])]);
+    assert_eq!(material.coverage.mode, AlphaMode::Mask { cutoff: 0.25 });
+    assert_eq!(material.coverage.opacity, 0.75);
+    assert!(material.double_sided);
+    let texture = material.coverage.texture.unwrap();
     assert_eq!(
         (texture.filter, texture.wrap),
         (TextureFilter::Nearest, [Wrap::Repeat, Wrap::Clamp])
@@ -127,9 +127,9 @@ fn coverage_comes_from_factor_texture_and_vertices() {
     has(&of_mask.warnings.join("\n"), &["alphaMode MASK"]);
 
     // Opaque, alpha does not count.
-    let (surface, opaque) =
-        self::surface(&material.replace("MASK", "OPAQUE"), &[png([255, 0, 0, 51])]);
-    assert_eq!(surface.coverage, Coverage::default());
+    let (material, opaque) =
+        self::material(&bsdf.replace("MASK", "OPAQUE"), &[png([255, 0, 0, 51])]);
+    assert_eq!(material.coverage, Coverage::default());
     assert!(opaque.description.parts[0].mesh.alphas.is_empty());
     assert!(!opaque.description.textures[0].has_alpha());
     assert!(opaque.warnings.is_empty(), "{:?}", opaque.warnings);
@@ -138,15 +138,15 @@ fn coverage_comes_from_factor_texture_and_vertices() {
 #[test]
 fn two_sets_of_texture_coordinates_and_no_third() {
     let white = || png([255; 4]);
-    let material = r#"{"name":"m","normalTexture":{"index":1,"texCoord":1,"extensions":
+    let bsdf = r#"{"name":"m","normalTexture":{"index":1,"texCoord":1,"extensions":
 {"KHR_texture_transform":{"texCoord":0,"offset":[0.5,0]}}},"emissiveFactor":[1,1,1],"emissiveTexture":{"index":1,"texCoord":7},
 "pbrMetallicRoughness":{"baseColorTexture":{"index":0,"texCoord":1}}}"#;
-    let (surface, loaded) = surface(material, &[white(), white()]);
-    let SurfaceModel::MetallicRoughness(m) = &surface.model else { panic!() };
+    let (material, loaded) = material(bsdf, &[white(), white()]);
+    let MaterialModel::MetallicRoughness(m) = &material.model else { panic!() };
     assert_eq!(m.base_color_texture.unwrap().uv_set, 0, "the first that is used");
-    let normal = surface.normal_map.unwrap().texture;
+    let normal = material.normal_map.unwrap().texture;
     assert_eq!((normal.uv_set, normal.transform.offset), (1, vec2(0.5, 0.0)));
-    assert_eq!(surface.emission.unwrap().texture, None);
+    assert_eq!(material.emission.unwrap().texture, None);
     let mesh = &loaded.description.parts[0].mesh;
     assert_eq!((mesh.uvs.len(), mesh.uvs2.len(), mesh.tangents.len()), (3, 3, 3));
     assert_eq!(mesh.uvs2[0], Vec2::Y);
@@ -155,7 +155,7 @@ fn two_sets_of_texture_coordinates_and_no_third() {
 
 #[test]
 fn extensions_of_materials_are_kept_and_named_once_if_not_drawn() {
-    let material = r#"{"name":"all","emissiveFactor":[1,0.5,0],"extensions":{
+    let bsdf = r#"{"name":"all","emissiveFactor":[1,0.5,0],"extensions":{
 "KHR_materials_emissive_strength":{"emissiveStrength":4},"KHR_materials_unlit":{},"KHR_materials_ior":{"ior":1.3},
 "KHR_materials_specular":{"specularFactor":0.5,"specularColorFactor":[2,1,0]},
 "KHR_materials_clearcoat":{"clearcoatFactor":0.5,"clearcoatRoughnessFactor":0.25,"clearcoatNormalTexture":{"index":0,"scale":2}},
@@ -163,10 +163,10 @@ fn extensions_of_materials_are_kept_and_named_once_if_not_drawn() {
 "KHR_materials_anisotropy":{"anisotropyStrength":0.6,"anisotropyRotation":1.5},
 "KHR_materials_transmission":{"transmissionFactor":0.9},
 "KHR_materials_volume":{"thicknessFactor":2,"attenuationColor":[0.5,0.6,0.7]}}}"#;
-    let (surface, loaded) = surface(material, &[png([255; 4])]);
-    assert_eq!(surface.emission.unwrap().radiance, Rgb::new(4.0, 2.0, 0.0));
-    assert!(surface.unlit && !surface.double_sided);
-    let layers = &surface.layers;
+    let (material, loaded) = material(bsdf, &[png([255; 4])]);
+    assert_eq!(material.emission.unwrap().radiance, Rgb::new(4.0, 2.0, 0.0));
+    assert!(material.unlit && !material.double_sided);
+    let layers = &material.layers;
     assert_eq!(layers.ior, Some(1.3));
     let specular = layers.specular.unwrap();
     assert_eq!((specular.strength.value, specular.color.value), (0.5, Rgb::new(2.0, 1.0, 0.0)));
@@ -178,25 +178,25 @@ fn extensions_of_materials_are_kept_and_named_once_if_not_drawn() {
     assert_eq!(layers.transmission.unwrap().value, 0.9);
     let volume = layers.volume.unwrap();
     assert_eq!((volume.thickness.value, volume.attenuation_distance), (2.0, f32::INFINITY));
-    assert_eq!(surface.textures().count(), 1);
-    let features: Vec<_> = surface.undrawn_features().collect();
+    assert_eq!(material.textures().count(), 1);
+    let features: Vec<_> = material.undrawn_features().collect();
     assert_eq!(loaded.warnings.len(), features.len(), "{:?}", loaded.warnings);
     for feature in features {
         has(&loaded.warnings.join("\n"), &[feature, "'all'"]);
     }
     // What an extension leaves as it is, is not named.
     let plain = r#"{"extensions":{"KHR_materials_ior":{"ior":1.5},"KHR_materials_specular":{},"KHR_materials_clearcoat":{}}}"#;
-    let (surface, loaded) = self::surface(plain, &[]);
-    assert_eq!(surface.undrawn_features().count(), 0);
+    let (material, loaded) = self::material(plain, &[]);
+    assert_eq!(material.undrawn_features().count(), 0);
     assert!(loaded.warnings.is_empty());
 }
 
 #[test]
 fn specular_and_glossiness_are_drawn() {
-    let material = r#"{"extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[0.5,0.5,0.5,1],
+    let bsdf = r#"{"extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[0.5,0.5,0.5,1],
 "specularFactor":[0.2,0.2,0.2],"glossinessFactor":0.8,"specularGlossinessTexture":{"index":0}}}}"#;
-    let (surface, loaded) = surface(material, &[png([255, 255, 255, 128])]);
-    let SurfaceModel::SpecularGlossiness(s) = &surface.model else { panic!() };
+    let (material, loaded) = material(bsdf, &[png([255, 255, 255, 128])]);
+    let MaterialModel::SpecularGlossiness(s) = &material.model else { panic!() };
     assert_eq!((s.diffuse, s.specular, s.glossiness), (Rgb::splat(0.5), Rgb::splat(0.2), 0.8));
     assert!(loaded.description.textures[0].has_alpha() && loaded.warnings.is_empty());
 }
@@ -205,10 +205,9 @@ fn specular_and_glossiness_are_drawn() {
 fn images_of_webp_are_read_and_avif_is_named() {
     let webp = image(image::ImageFormat::WebP, [0, 255, 0, 255]);
     let more = |texture: &str, uri: &str| {
-        let material = r#"{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}"#;
-        let more = format!(
-            r#""materials":[{material}],"images":[{{"uri":"{uri}"}}],"textures":[{texture}],"#
-        );
+        let bsdf = r#"{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}"#;
+        let more =
+            format!(r#""materials":[{bsdf}],"images":[{{"uri":"{uri}"}}],"textures":[{texture}],"#);
         document(&more, r#"},"material":0"#)
     };
     let by_extension = r#"{"extensions":{"EXT_texture_webp":{"source":0}}}"#;
@@ -393,7 +392,7 @@ fn missing_images_are_left_out_unless_that_is_refused() {
 "textures":[{"source":0}],"images":[{"uri":"gone.png"}],"#;
     let json = document(more, r#"},"material":0"#);
     let loaded = loaded(&json);
-    assert_eq!(loaded.description.surfaces[0].textures().count(), 0);
+    assert_eq!(loaded.description.materials[0].textures().count(), 0);
     assert_eq!(loaded.warnings.len(), 1);
     has(&loaded.warnings[0], &["gone.png", "image 0", "left out"]);
     let strict = LoadOptions { strict: true, ..LoadOptions::default() };

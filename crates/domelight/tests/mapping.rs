@@ -106,7 +106,7 @@ fn conventions() {
     is(at(Mapping::Angular, 0.5, 0.5), Vec3::NEG_Z);
     is(at(Mapping::Angular, 0.75, 0.5), Vec3::X);
     is(at(Mapping::Angular, 0.5, 0.25), Vec3::Y);
-    // The ball's centre reflects the camera; what is right of the camera, which looks along +Z, is −X.
+    // The ball's center reflects the camera; what is right of the camera, which looks along +Z, is −X.
     is(at(Mapping::MirrorBall, 0.5, 0.5), Vec3::NEG_Z);
     is(at(Mapping::MirrorBall, 0.5 + 0.5 * 0.5f32.sqrt(), 0.5), Vec3::NEG_X);
     is(at(Mapping::MirrorBall, 0.5, 0.5 - 0.5 * 0.5f32.sqrt()), Vec3::Y);
@@ -152,7 +152,7 @@ fn cube_strips_are_openexr_cube_maps() {
     }
 }
 
-/// Neighbouring texels of a cross that share an edge look in neighbouring directions.
+/// Neighboring texels of a cross that share an edge look in neighboring directions.
 #[test]
 fn crosses_have_no_seams_inside() {
     for mapping in [Mapping::CubeCrossHorizontal, Mapping::CubeCrossVertical] {
@@ -303,7 +303,7 @@ fn the_flux_of_every_texel_goes_somewhere() {
                 assert!(flux <= expected + 1e-2, "{mapping} ({x}, {y})");
                 continue;
             }
-            // The cells resolve a texel on the disc's rim to a few per cent, others well.
+            // The cells resolve a texel on the disc's rim to a few percent, others well.
             let rim = matches!(mapping, Mapping::Angular | Mapping::MirrorBall);
             let tolerance = if rim { 0.05 } else { 2e-3 };
             assert!(

@@ -6,7 +6,7 @@ use domelight::environment::mapping::{EnvmapKind, Mapping};
 use domelight::picture::exr::{ExrLayers, text_attributes};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::picture::{
-    Format, Picture, PictureError, Problem, ReadOptions, hdr, pfm, png, read, read_bytes,
+    Format, Picture, PictureError, PictureErrorKind, ReadOptions, hdr, pfm, png, read, read_bytes,
     write_atomically,
 };
 use domelight::{Rgb, RgbImage};
@@ -56,8 +56,8 @@ fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
     read_bytes(bytes, "test", &ReadOptions::default())
 }
 
-fn problem(bytes: &[u8]) -> Problem {
-    decode(bytes).expect_err("a damaged file").problem
+fn kind(bytes: &[u8]) -> PictureErrorKind {
+    decode(bytes).expect_err("a damaged file").kind
 }
 
 fn hdr_bytes(image: &RgbImage) -> Vec<u8> {
@@ -146,8 +146,8 @@ fn hdr_with_old_run_lengths() {
     for runs in
         [&[1u8, 1, 1, 3, 0, 0, 0, 0, 0, 0, 0, 0][..], &[1, 2, 3, 4, 1, 1, 1, 99, 1, 1, 1, 99]]
     {
-        let scanline = problem(&[header, runs].concat());
-        assert!(matches!(scanline, Problem::Scanline { scanline: 0, .. }), "{scanline}");
+        let scanline = kind(&[header, runs].concat());
+        assert!(matches!(scanline, PictureErrorKind::Scanline { scanline: 0, .. }), "{scanline}");
     }
 }
 
@@ -202,12 +202,12 @@ fn pfm_keeps_every_bit() {
 }
 
 #[test]
-fn pfm_in_both_byte_orders_and_grey() {
+fn pfm_in_both_byte_orders_and_gray() {
     let values = [1.0f32, 2.0, 3.0, 4.0, 5.0, 6.0];
     let big: Vec<u8> = values.iter().flat_map(|v| v.to_be_bytes()).collect();
-    let grey = decode(&[&b"Pf # grey\n3 2\n0.5\n"[..], &big].concat()).unwrap().image;
+    let gray = decode(&[&b"Pf # gray\n3 2\n0.5\n"[..], &big].concat()).unwrap().image;
     // Bottom row first; the scale's magnitude multiplies.
-    assert_eq!(grey.pixels, [2.0, 2.5, 3.0, 0.5, 1.0, 1.5].map(Rgb::splat));
+    assert_eq!(gray.pixels, [2.0, 2.5, 3.0, 0.5, 1.0, 1.5].map(Rgb::splat));
     let little: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
     let color = decode(&[&b"PF\r\n1 2\r\n-1\r\n"[..], &little].concat()).unwrap().image;
     assert_eq!(color.pixels, [Rgb::new(4.0, 5.0, 6.0), Rgb::new(1.0, 2.0, 3.0)]);
@@ -230,7 +230,7 @@ fn png_round_trip_with_straight_alpha() {
             assert!((a - b).abs() <= 0.501 * step);
         }
         for (a, b) in back.image.pixels.iter().zip(&premultiplied.pixels) {
-            // The encoding's derivative is at most 2.3 at white; alpha and colour are rounded.
+            // The encoding's derivative is at most 2.3 at white; alpha and color are rounded.
             assert!((*a - *b).map(f32::abs).max_component() < 2.5 * step, "{a:?} {b:?}");
         }
     }
@@ -463,7 +463,7 @@ fn exr_of_luminance_and_chroma() {
 }
 
 #[test]
-fn exr_of_one_channel_of_any_name_is_grey() {
+fn exr_of_one_channel_of_any_name_is_gray() {
     for name in ["R", "luminance", "Y"] {
         let mut layers = ExrLayers::new(4, 2);
         layers.push_channel("", name, vec![2.5; 8]);
@@ -471,7 +471,7 @@ fn exr_of_one_channel_of_any_name_is_grey() {
     }
     let mut layers = ExrLayers::new(4, 2);
     layers.push_channel("", "Z", vec![2.5; 8]);
-    assert!(matches!(problem(&layers.encode().unwrap()), Problem::NoColor { .. }));
+    assert!(matches!(kind(&layers.encode().unwrap()), PictureErrorKind::NoColor { .. }));
 }
 
 #[test]
@@ -504,13 +504,13 @@ fn exr_layers_are_written_and_found_again() {
     assert_eq!(layer(Some("depth")).unwrap().image.pixels[9], Rgb::splat(3.5));
     assert_eq!(
         layer(Some("shadow")).unwrap_err().to_string(),
-        "test: there is no layer \"shadow\" with colour channels; the file has albedo, depth, normal"
+        "test: there is no layer \"shadow\" with color channels; the file has albedo, depth, normal"
     );
     // Without unnamed channels the first with R, G and B is the picture.
     let mut only = ExrLayers::new(33, 17);
     only.push_channel("a", "Z", vec![1.0; 561]);
-    let none = problem(&only.encode().unwrap()).to_string();
-    assert_eq!(none, "there are no colour channels (R, G, B or Y); the file has a.Z");
+    let none = kind(&only.encode().unwrap()).to_string();
+    assert_eq!(none, "there are no color channels (R, G, B or Y); the file has a.Z");
     only.push_rgb("b", &albedo, None);
     assert_eq!(decode(&only.encode().unwrap()).unwrap().image, albedo);
 }
@@ -520,12 +520,16 @@ fn exr_layers_that_cannot_be_written_are_refused() {
     let image = smooth(4, 4);
     let mut twice = ExrLayers::from_image(&image, None);
     twice.push_channel("", "R", vec![0.0; 16]);
-    assert!(matches!(twice.encode(), Err(Problem::Channel { channel, .. }) if channel == "R"));
+    assert!(
+        matches!(twice.encode(), Err(PictureErrorKind::Channel { channel, .. }) if channel == "R")
+    );
     let mut short = ExrLayers::new(4, 4);
     short.push_channel("x", "Y", vec![0.0; 15]);
-    assert!(matches!(short.encode(), Err(Problem::Channel { channel, .. }) if channel == "x.Y"));
-    assert!(matches!(ExrLayers::new(0, 4).encode(), Err(Problem::Empty { .. })));
-    assert!(matches!(ExrLayers::new(4, 4).encode(), Err(Problem::NoColor { .. })));
+    assert!(
+        matches!(short.encode(), Err(PictureErrorKind::Channel { channel, .. }) if channel == "x.Y")
+    );
+    assert!(matches!(ExrLayers::new(0, 4).encode(), Err(PictureErrorKind::Empty { .. })));
+    assert!(matches!(ExrLayers::new(4, 4).encode(), Err(PictureErrorKind::NoColor { .. })));
 }
 
 // ---- Damaged files -------------------------------------------------------------------------------------------------
@@ -543,8 +547,8 @@ fn samples() -> Vec<(String, Vec<u8>)> {
     png::encode(&image, None, &ToneMapping::default(), png::Depth::Eight, &mut bytes).unwrap();
     files.push(("png".to_owned(), bytes));
     let mut bytes = Cursor::new(Vec::new());
-    let grey = image::RgbImage::from_fn(37, 11, |x, y| image::Rgb([x as u8 * 6, y as u8 * 20, 99]));
-    grey.write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
+    let gray = image::RgbImage::from_fn(37, 11, |x, y| image::Rgb([x as u8 * 6, y as u8 * 20, 99]));
+    gray.write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
     files.push(("jpeg".to_owned(), bytes.into_inner()));
     for encoding in encodings() {
         let channels = rgb_channels(&image, "", SampleType::F16);
@@ -593,19 +597,19 @@ fn corrupt_files_do_no_harm() {
 fn promises_beyond_the_file_are_refused_before_memory_is_taken() {
     for size in ["-Y 30000 +X 17000", "-Y 500000 +X 1000", "+X 1000 -Y 500000"] {
         let bytes = [format!("#?RADIANCE\n\n{size}\n").as_bytes(), &[2, 2, 66, 104]].concat();
-        assert!(matches!(problem(&bytes), Problem::Promises { held: 4, .. }), "{size}");
+        assert!(matches!(kind(&bytes), PictureErrorKind::Promises { held: 4, .. }), "{size}");
     }
     assert!(matches!(
-        problem(b"PF\n20000 20000\n-1\n1234"),
-        Problem::Promises { needed: 4_800_000_000, .. }
+        kind(b"PF\n20000 20000\n-1\n1234"),
+        PictureErrorKind::Promises { needed: 4_800_000_000, .. }
     ));
     assert!(matches!(
-        problem(b"#?RADIANCE\n\n-Y 99999999 +X 99999999\n"),
-        Problem::TooLarge { .. }
+        kind(b"#?RADIANCE\n\n-Y 99999999 +X 99999999\n"),
+        PictureErrorKind::TooLarge { .. }
     ));
-    assert!(matches!(problem(b"PF\n18446744073709551615 3\n-1\n"), Problem::TooLarge { .. }));
+    assert!(matches!(kind(b"PF\n18446744073709551615 3\n-1\n"), PictureErrorKind::TooLarge { .. }));
     for empty in [&b"#?RADIANCE\n\n-Y 0 +X 10\n"[..], b"PF\n0 0\n-1\n"] {
-        assert!(matches!(problem(empty), Problem::Empty { .. }));
+        assert!(matches!(kind(empty), PictureErrorKind::Empty { .. }));
     }
     for encoding in encodings() {
         let image = smooth(24, 24);
@@ -626,8 +630,8 @@ fn promises_beyond_the_file_are_refused_before_memory_is_taken() {
         }
         promising[at..at + 4].copy_from_slice(&22_000i32.to_le_bytes());
         promising[at + 4..at + 8].copy_from_slice(&22_000i32.to_le_bytes());
-        let refused = problem(&promising);
-        assert!(matches!(refused, Problem::Promises { .. }), "{encoding:?}: {refused}");
+        let refused = kind(&promising);
+        assert!(matches!(refused, PictureErrorKind::Promises { .. }), "{encoding:?}: {refused}");
     }
     // A PNG whose header promises 20000 × 20000.
     let mut bytes = Vec::new();
@@ -814,7 +818,7 @@ fn openexr_probes_turn_to_the_working_map() {
     std::fs::write(&path, layers.encode().unwrap()).unwrap();
     let probe = load_probe(&path, &ProbeOptions::default()).unwrap();
     assert_eq!(probe.mapping, Mapping::LatLongExr);
-    // OpenEXR's −Z, the middle of the border, comes to the centre.
+    // OpenEXR's −Z, the middle of the border, comes to the center.
     assert_eq!(probe.image.get(8, 4), image.get(0, 4));
     let as_is = ProbeOptions { mapping: Some(Mapping::LatLong), ..Default::default() };
     assert_eq!(load_probe(&path, &as_is).unwrap().image, image);

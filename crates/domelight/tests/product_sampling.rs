@@ -9,14 +9,14 @@ use common::{
     HEIGHT, MATERIALS, WIDTH, batches, environment, hidden, integral, point, quadrature,
     texel_integrals, white_environment,
 };
-use domelight::bsdf::{Brdf, Material, MaterialSpec};
+use domelight::bsdf::{Brdf, Bsdf, MaterialSpec};
 use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::{Vec2, Vec3};
-use domelight::sampling::{Heuristic, SamplerKind, Stream};
+use domelight::sampling::{Heuristic, Sampler, SamplerKind};
 use domelight::strategy::{
     Candidates, LightTable, MultipleImportanceSampling, PointStrategy, Proposal, RejectionSampling,
-    RejectionScratch, Resampling, SampleNumbers, SamplingImportanceResampling, ShadingPoint,
-    SirScratch, Stop,
+    RejectionScratch, Resampling, SampleIndex, SamplingImportanceResampling, ShadingPoint,
+    SirScratch, StoppingRule,
 };
 use domelight::{Rgb, RgbImage};
 use rayon::prelude::*;
@@ -33,11 +33,11 @@ const RESAMPLINGS: [Resampling; 4] = [
     Resampling::Reservoir,
 ];
 
-fn material(name: &str) -> Material {
+fn bsdf(name: &str) -> Bsdf {
     name.parse::<MaterialSpec>().unwrap().into()
 }
 
-fn rejection(env: &Environment, proposal: Proposal, stop: Stop) -> RejectionSampling<'_> {
+fn rejection(env: &Environment, proposal: Proposal, stop: StoppingRule) -> RejectionSampling<'_> {
     RejectionSampling::new(env, proposal, stop).unwrap()
 }
 
@@ -57,14 +57,14 @@ fn sir(
     }
 }
 
-/// Every material, seen steeply and flatly, under coloured noise with a bright spot and under even light.
+/// Every material, seen steeply and flatly, under colored noise with a bright spot and under even light.
 fn each_case(check: impl Fn(&Environment, &ShadingPoint, [f64; 3], &str) + Sync) {
     let environments = [environment(true, UpAxis::Z), white_environment()];
     let views = [0.2, 1.1, 1.48];
     for (i, env) in environments.iter().enumerate() {
         MATERIALS.par_iter().for_each(|name| {
             for theta in views {
-                let at = point(material(name), theta);
+                let at = point(bsdf(name), theta);
                 let label = format!("{name}, view {theta}, map {i}");
                 check(env, &at, quadrature(env, &at), &label);
             }
@@ -77,14 +77,14 @@ const N_CASES: usize = 2 * 3 * MATERIALS.len();
 #[test]
 fn rejection_is_unbiased() {
     let variants = [
-        (Proposal::Environment, Stop::Tries(8), SamplerKind::Sobol),
-        (Proposal::Brdf, Stop::Tries(8), SamplerKind::Sobol),
-        (Proposal::Tighter, Stop::Tries(8), SamplerKind::Independent),
+        (Proposal::Environment, StoppingRule::Tries(8), SamplerKind::Sobol),
+        (Proposal::Brdf, StoppingRule::Tries(8), SamplerKind::Sobol),
+        (Proposal::Tighter, StoppingRule::Tries(8), SamplerKind::Independent),
         // Limits that bind often.
-        (Proposal::Tighter, Stop::Accepted { n: 2, max_tries: 3 }, SamplerKind::Sobol),
-        (Proposal::Brdf, Stop::Accepted { n: 3, max_tries: 16 }, SamplerKind::Sobol),
+        (Proposal::Tighter, StoppingRule::Accepted { n: 2, max_tries: 3 }, SamplerKind::Sobol),
+        (Proposal::Brdf, StoppingRule::Accepted { n: 3, max_tries: 16 }, SamplerKind::Sobol),
         // A limit that hardly ever does.
-        (Proposal::Tighter, Stop::Accepted { n: 2, max_tries: 200 }, SamplerKind::Sobol),
+        (Proposal::Tighter, StoppingRule::Accepted { n: 2, max_tries: 200 }, SamplerKind::Sobol),
     ];
     let suite = Suite::of(N_CASES * variants.len());
     let test = ZTest { suite, ..ZTest::default() };
@@ -126,7 +126,7 @@ fn resampling_is_unbiased() {
 #[test]
 fn mirror_like_lobes_agree_with_multiple_importance_sampling() {
     let env = environment(true, UpAxis::Y);
-    let at = point(material("ggx:0.001"), 0.7);
+    let at = point(bsdf("ggx:0.001"), 0.7);
     let kind = SamplerKind::Sobol;
     let mis =
         MultipleImportanceSampling::new(&env, LightTable::Full, Heuristic::Balance, 1, 1).unwrap();
@@ -135,7 +135,7 @@ fn mirror_like_lobes_agree_with_multiple_importance_sampling() {
     let check = |label: &str, batches: Vec<[f64; 3]>| {
         test.two_sample(label, &batches, &expected).unwrap();
     };
-    let tighter = rejection(&env, Proposal::Tighter, Stop::Tries(8));
+    let tighter = rejection(&env, Proposal::Tighter, StoppingRule::Tries(8));
     check("rejection", batches(&tighter, &env, &at, kind, 1024));
     for resampling in [Resampling::Multinomial, Resampling::SystematicSorted, Resampling::Reservoir]
     {
@@ -166,17 +166,18 @@ fn what_rejection_keeps_follows_the_product() {
         ..Chi2::in_suite_of(cases.len())
     };
     cases.into_par_iter().for_each(|(name, proposal)| {
-        let at = point(material(name), 0.7);
+        let at = point(bsdf(name), 0.7);
         let which = usize::from(proposal == Proposal::Brdf);
         let rule = Adaptive { tolerance: 1e-4, min_depth: 2, max_depth: 9 };
         let total = integral(&env, rule, |wi, le, _| products(&at, wi, le))[which];
-        let strategy = rejection(&env, proposal, Stop::Accepted { n: 2, max_tries: 1_000_000 });
-        let stream = Stream::new(SamplerKind::Independent, 3, which as u64);
+        let strategy =
+            rejection(&env, proposal, StoppingRule::Accepted { n: 2, max_tries: 1_000_000 });
+        let sampler = Sampler::new(SamplerKind::Independent, 3, which as u64);
         let (mut sample, mut scratch) = (0, RejectionScratch::default());
         let draw = |_: [f32; 2], _: f32| {
             sample += 1;
             let mut first = None;
-            strategy.sample(&at, SampleNumbers { stream, sample }, &mut scratch, |wi, _| {
+            strategy.sample(&at, SampleIndex { sampler, sample }, &mut scratch, |wi, _| {
                 first = first.or(Some(wi.to_array()));
             });
             first
@@ -197,15 +198,15 @@ fn the_acceptance_is_the_share_of_the_envelope() {
     let rule = Adaptive { tolerance: 1e-4, min_depth: 2, max_depth: 9 };
     let test = ZTest::in_suite_of(6);
     for name in ["diffuse:0.8", "phong:50:0.5:0.5", "ggx:0.2"] {
-        let at = point(material(name), 0.7);
+        let at = point(bsdf(name), 0.7);
         let [product, density] = integral(&env, rule, |wi, le, _| products(&at, wi, le));
-        let light = env.power() * f64::from(at.material.max_eval(at.wo));
+        let light = env.power() * f64::from(at.bsdf.max_eval(at.wo));
         let expected = [product / light, density / f64::from(env.max_luminance())];
         let scratch = RefCell::new(RejectionScratch::default());
         let acceptance = |proposal, sample| {
-            let stream = Stream::new(SamplerKind::Independent, 4, 4);
-            let strategy = rejection(&env, proposal, Stop::Tries(1000));
-            let numbers = SampleNumbers { stream, sample };
+            let sampler = Sampler::new(SamplerKind::Independent, 4, 4);
+            let strategy = rejection(&env, proposal, StoppingRule::Tries(1000));
+            let numbers = SampleIndex { sampler, sample };
             strategy.sample_counted(&at, numbers, &mut scratch.borrow_mut(), |_, _| {})
         };
         for (proposal, expected) in
@@ -226,7 +227,7 @@ fn the_acceptance_is_the_share_of_the_envelope() {
 #[test]
 fn picks_approach_the_product() {
     let env = environment(true, UpAxis::Y);
-    let at = point(material("phong:50:0.5:0.5"), 0.7);
+    let at = point(bsdf("phong:50:0.5:0.5"), 0.7);
     let rule = Adaptive { tolerance: 1e-4, min_depth: 2, max_depth: 9 };
     let product = texel_integrals(&env, rule, |wi, le, _| products(&at, wi, le));
     let total: f64 = product.iter().map(|p| p[0]).sum();
@@ -234,9 +235,9 @@ fn picks_approach_the_product() {
         let strategy = sir(&env, (n_candidates, 1), Candidates::Mixture, resampling);
         let mut scratch = SirScratch::default();
         let mut counts = [0.0; WIDTH * HEIGHT];
-        let stream = Stream::new(SamplerKind::Independent, 6, u64::from(n_candidates));
+        let sampler = Sampler::new(SamplerKind::Independent, 6, u64::from(n_candidates));
         for sample in 0..20_000 {
-            strategy.sample(&at, SampleNumbers { stream, sample }, &mut scratch, |wi, _| {
+            strategy.sample(&at, SampleIndex { sampler, sample }, &mut scratch, |wi, _| {
                 let uv = env.uv(wi);
                 let column = ((uv.x * WIDTH as f32) as usize).min(WIDTH - 1);
                 let row = ((uv.y * HEIGHT as f32) as usize).min(HEIGHT - 1);
@@ -305,12 +306,12 @@ fn squares<S: PointStrategy>(
     mean: f64,
 ) -> Vec<[f64; 2]> {
     let batch = |b: u64| {
-        let stream = Stream::new(SamplerKind::Independent, 8, b);
+        let sampler = Sampler::new(SamplerKind::Independent, 8, b);
         let (mut sums, mut scratch) = ([0.0; 2], S::Scratch::default());
         let n = 1000;
         for sample in 0..n {
             let mut x = 0.0;
-            strategy.sample(at, SampleNumbers { stream, sample }, &mut scratch, |wi, weight| {
+            strategy.sample(at, SampleIndex { sampler, sample }, &mut scratch, |wi, weight| {
                 x += if hidden(env, wi) { 0.0 } else { f64::from(weight.luminance()) };
             });
             sums = [sums[0] + x, sums[1] + (x - mean).powi(2)];
@@ -325,7 +326,7 @@ fn squares<S: PointStrategy>(
 #[test]
 fn the_variance_of_resampling_is_the_sum_of_two() {
     let env = environment(true, UpAxis::Y);
-    let at = point(material("phong:20:0.5:0.5"), 0.7);
+    let at = point(bsdf("phong:20:0.5:0.5"), 0.7);
     let counts = [(8, 1), (8, 4), (32, 4)];
     let test = ZTest::in_suite_of(2 * 3 * counts.len());
     for (m, n) in counts {
@@ -359,11 +360,11 @@ fn the_variance_of_rejection_is_that_of_its_envelope() {
     let env = environment(true, UpAxis::Y);
     let test = ZTest::in_suite_of(4);
     for name in ["diffuse:0.8,0.5,0.2", "phong:20:0.5:0.5"] {
-        let at = point(material(name), 0.7);
+        let at = point(bsdf(name), 0.7);
         let mean = moments(&env, &at, [1.0, 0.0]).mean;
-        let mass = env.power() * f64::from(at.material.max_eval(at.wo));
+        let mass = env.power() * f64::from(at.bsdf.max_eval(at.wo));
         for tries in [1, 16] {
-            let strategy = rejection(&env, Proposal::Environment, Stop::Tries(tries));
+            let strategy = rejection(&env, Proposal::Environment, StoppingRule::Tries(tries));
             let measured = squares(&strategy, &env, &at, mean);
             let variance = mean * (mass - mean) / f64::from(tries);
             test.against(&format!("{name} {tries}"), &measured, [mean, variance]).unwrap();
@@ -379,7 +380,7 @@ fn unoccluded(env: &Environment, at: &ShadingPoint) -> Vec<Rgb> {
             sums.push(sum_of_weights(&sir(env, (8, 3), candidates, resampling), at));
         }
     }
-    for stop in [Stop::Tries(16), Stop::Accepted { n: 2, max_tries: 16 }] {
+    for stop in [StoppingRule::Tries(16), StoppingRule::Accepted { n: 2, max_tries: 16 }] {
         for proposal in [Proposal::Environment, Proposal::Brdf, Proposal::Tighter] {
             sums.push(sum_of_weights(&rejection(env, proposal, stop), at));
         }
@@ -388,10 +389,10 @@ fn unoccluded(env: &Environment, at: &ShadingPoint) -> Vec<Rgb> {
 }
 
 fn sum_of_weights<S: PointStrategy>(strategy: &S, at: &ShadingPoint) -> Rgb {
-    let stream = Stream::new(SamplerKind::Sobol, 1, 1);
+    let sampler = Sampler::new(SamplerKind::Sobol, 1, 1);
     let (mut sum, mut scratch) = (Rgb::BLACK, S::Scratch::default());
     for sample in 0..64 {
-        strategy.sample(at, SampleNumbers { stream, sample }, &mut scratch, |_, w| sum += w);
+        strategy.sample(at, SampleIndex { sampler, sample }, &mut scratch, |_, w| sum += w);
     }
     sum
 }
@@ -403,7 +404,7 @@ fn darkness_is_dark() {
     let map = RgbImage::from_fn(8, 6, |_, y| if y == 5 { Rgb::splat(9.0) } else { Rgb::BLACK });
     let below = Environment::new(map, Orientation::default(), 1.0).unwrap();
     for name in MATERIALS.into_iter().chain(["diffuse:0"]) {
-        let at = point(material(name), 0.7);
+        let at = point(bsdf(name), 0.7);
         for env in [&black, &below] {
             assert!(unoccluded(env, &at).iter().all(|sum| sum.is_black()), "{name}");
         }
@@ -412,7 +413,7 @@ fn darkness_is_dark() {
         let env = environment(true, UpAxis::Y);
         assert!(unoccluded(&env, &behind).iter().all(|sum| sum.is_black()), "{name}");
     }
-    let black_surface = point(material("diffuse:0"), 0.7);
+    let black_surface = point(bsdf("diffuse:0"), 0.7);
     let env = environment(true, UpAxis::Y);
     assert!(unoccluded(&env, &black_surface).iter().all(|sum| sum.is_black()));
 }
@@ -424,9 +425,9 @@ fn one_lit_texel() {
     let mut map = RgbImage::filled(512, 256, Rgb::BLACK);
     map.pixels[40 * 512 + 300] = Rgb::new(3e5, 2e5, 1e5);
     let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
-    let at = point(material("diffuse:0.8,0.5,0.2"), 0.7);
+    let at = point(bsdf("diffuse:0.8,0.5,0.2"), 0.7);
     let le = env.sample(Vec2::splat(0.5)).unwrap();
-    // The texel is so small that its centre stands for all of it.
+    // The texel is so small that its center stands for all of it.
     let expected = at.eval(env.direction([300.5 / 512.0, 40.5 / 256.0].into())) * le.le / le.pdf;
     let close = |strategy: &str, sum: Rgb, samples: f32, tolerance: f32| {
         let difference = sum / samples - expected;
@@ -445,8 +446,8 @@ fn one_lit_texel() {
 #[test]
 fn the_sum_of_the_weights_is_the_unshadowed_estimate() {
     let env = environment(true, UpAxis::Y);
-    let at = point(material("phong:50:0.5,0.2,0.1:0.5"), 0.7);
-    let numbers = SampleNumbers { stream: Stream::new(SamplerKind::Sobol, 1, 7), sample: 5 };
+    let at = point(bsdf("phong:50:0.5,0.2,0.1:0.5"), 0.7);
+    let numbers = SampleIndex { sampler: Sampler::new(SamplerKind::Sobol, 1, 7), sample: 5 };
     for candidates in CANDIDATES {
         let luminances: Vec<f32> = RESAMPLINGS
             .into_iter()
@@ -469,7 +470,7 @@ fn the_sum_of_the_weights_is_the_unshadowed_estimate() {
 /// The pilot knows where candidates are poor, and looks away from points without light.
 #[test]
 fn the_pilot_tells_smooth_from_spotted() {
-    let at = point(material("diffuse:0.8"), 0.7);
+    let at = point(bsdf("diffuse:0.8"), 0.7);
     let spread =
         |env: &Environment, candidates: Candidates| candidates.relative_variance(env, [&at], 1);
     let (even, spotted) = (white_environment(), environment(true, UpAxis::Y));

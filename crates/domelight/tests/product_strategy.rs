@@ -7,11 +7,11 @@ use common::{
     HEIGHT, MATERIALS, WIDTH, batches, environment, hidden, integral, point, quadrature,
     white_environment,
 };
-use domelight::bsdf::{Material, MaterialSpec};
+use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::bvh::InstructionSet;
 use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::{Frame, Vec3};
-use domelight::sampling::{Heuristic, SamplerKind, Stream};
+use domelight::sampling::{Heuristic, Sampler, SamplerKind};
 use domelight::strategy::levels::{N_LEVELS, level};
 use domelight::strategy::product::ProductScratch;
 use domelight::strategy::{
@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use testkit::quadrature::Adaptive;
 use testkit::{Suite, ZTest};
 
-fn material(name: &str) -> Material {
+fn bsdf(name: &str) -> Bsdf {
     name.parse::<MaterialSpec>().unwrap().into()
 }
 
@@ -47,7 +47,7 @@ fn estimates(
     let (mut sums, mut counts) = ([[0.0; 3]; KINDS.len()], [0.0; KINDS.len()]);
     for pass in 0..N_PASSES {
         let shared =
-            strategy.begin_pass(Stream::of_pass(sampler, seed, (pass * n) as u32), n as u32);
+            strategy.begin_pass(Sampler::for_pass(sampler, seed, (pass * n) as u32), n as u32);
         let mut out = Contributions::default();
         for round in 0..strategy.n_rounds() {
             let (mut points, mut samples) = (Vec::new(), Vec::new());
@@ -62,8 +62,8 @@ fn estimates(
                     PixelPoints {
                         points: start..points.len(),
                         n_samples: (points.len() - start) as u32,
-                        stream: Stream::new(sampler, seed, i as u64),
-                        one_material: hits.iter().all(|h| h.material == hits[0].material),
+                        sampler: Sampler::new(sampler, seed, i as u64),
+                        one_material: hits.iter().all(|h| h.bsdf == hits[0].bsdf),
                     }
                 })
                 .collect();
@@ -112,7 +112,7 @@ fn every_instruction_set_gives_the_same_bits() {
     for (name, sampler) in
         MATERIALS.iter().zip([SamplerKind::Sobol, SamplerKind::Independent].iter().cycle())
     {
-        let hits = [0.2, 0.7, 1.3].map(|theta| point(material(name), theta));
+        let hits = [0.2, 0.7, 1.3].map(|theta| point(bsdf(name), theta));
         // In a short pass and in a long one.
         for (hits, n_rays) in [(hits.to_vec(), 7), (hits.repeat(3), 2)] {
             let [scalar, best] = [InstructionSet::Scalar, InstructionSet::best()].map(|set| {
@@ -135,7 +135,7 @@ fn every_round_is_unbiased_on_every_material() {
     for env in &environments {
         MATERIALS.par_iter().for_each(|name| {
             for (theta, n_rays, n_hits) in cases {
-                let at = point(material(name), theta);
+                let at = point(bsdf(name), theta);
                 let expected = quadrature(env, &at);
                 let strategy = ProductSampling::new(env, n_rays);
                 let label = format!("{name}, view {theta}, {n_rays} rays, {n_hits} hits");
@@ -150,7 +150,7 @@ fn every_round_is_unbiased_on_every_material() {
 fn pixels_of_many_surfaces_are_unbiased() {
     let env = environment(false, UpAxis::Y);
     let turned = |i: usize| {
-        let mut at = point(material(MATERIALS[i]), 0.3 + 0.1 * i as f32);
+        let mut at = point(bsdf(MATERIALS[i]), 0.3 + 0.1 * i as f32);
         let normal = (at.frame.z + 0.4 * i as f32 * Vec3::X).normalize();
         at.frame = Frame::from_z(normal);
         at
@@ -176,7 +176,7 @@ fn pixels_of_many_surfaces_are_unbiased() {
 #[test]
 fn mirror_like_lobes_agree_with_multiple_importance_sampling() {
     let env = environment(true, UpAxis::Y);
-    let at = point(material("ggx:0.001"), 0.7);
+    let at = point(bsdf("ggx:0.001"), 0.7);
     let mis =
         MultipleImportanceSampling::new(&env, LightTable::Full, Heuristic::Balance, 1, 1).unwrap();
     let expected = batches(&mis, &env, &at, SamplerKind::Sobol, 1024);
@@ -208,7 +208,7 @@ fn odd_maps_are_unbiased() {
     for (i, map) in maps.into_iter().enumerate() {
         let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
         for name in ["diffuse:0.8", "ggx:0.4"] {
-            let at = point(material(name), 0.7);
+            let at = point(bsdf(name), 0.7);
             let strategy = ProductSampling::new(&env, 6);
             let label = format!("map {i}, {name}");
             check(test, &label, &strategy, &env, &[at; 2], quadrature(&env, &at));
@@ -217,23 +217,23 @@ fn odd_maps_are_unbiased() {
     for (width, height) in [(1, 1), (1, 7), (300, 1), (5, 1000)] {
         let map = RgbImage::filled(width, height, Rgb::WHITE);
         let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
-        let at = point(material("diffuse:1"), 0.7);
+        let at = point(bsdf("diffuse:1"), 0.7);
         let strategy = ProductSampling::new(&env, 6);
         let batches: Vec<[f64; 3]> = (0..40)
             .map(|seed| {
-                let stream = Stream::new(SamplerKind::Sobol, seed, 0);
+                let sampler = Sampler::new(SamplerKind::Sobol, seed, 0);
                 let tile = TileShading {
                     points: &[at],
                     samples: &[0],
                     pixels: &[PixelPoints {
                         points: 0..1,
                         n_samples: 1,
-                        stream,
+                        sampler,
                         one_material: true,
                     }],
                     width: 1,
                 };
-                let pass = strategy.begin_pass(Stream::of_pass(SamplerKind::Sobol, seed, 0), 32);
+                let pass = strategy.begin_pass(Sampler::for_pass(SamplerKind::Sobol, seed, 0), 32);
                 let mut out = Contributions::default();
                 out.reset(1);
                 let mut scratch = ProductScratch::default();

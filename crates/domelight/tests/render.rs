@@ -1,7 +1,7 @@
 //! The renderer: the same bits however the work is divided, strategies that agree pixel by pixel,
 //! and layers that mean what they say.
 
-use domelight::bsdf::{Material, MaterialSpec};
+use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::environment::{CompensatedTable, Environment, Orientation};
 use domelight::geometry::Mesh;
 use domelight::math::{Mat4, Vec3, vec3};
@@ -10,17 +10,17 @@ use domelight::rig::{VarianceMinimization, variance_minimization};
 use domelight::sampling::{Heuristic, Pcg32, SamplerKind};
 use domelight::scene::builtin::shapes;
 use domelight::scene::{
-    Camera, CameraSettings, Part, Projection, Scene, SceneDescription, Surface,
+    Camera, CameraSettings, Material, Part, Projection, Scene, SceneDescription,
 };
 use domelight::strategy::{
     BrdfSampling, Candidates, EnvironmentSampling, LightSet, LightTable,
     MultipleImportanceSampling, ProductSampling, Proposal, RejectionSampling, Resampling,
-    SamplingImportanceResampling, Stop, Strategy,
+    SamplingImportanceResampling, StoppingRule, Strategy,
 };
 use domelight::{Rgb, RgbImage};
 use testkit::{Suite, ZTest};
 
-fn material(text: &str) -> Material {
+fn bsdf(text: &str) -> Bsdf {
     text.parse::<MaterialSpec>().unwrap().into()
 }
 
@@ -38,15 +38,15 @@ fn description(ball: &str) -> SceneDescription {
         let m = Mat4::from_translation(vec3(x, r, 0.0)) * Mat4::from_scale(Vec3::splat(r));
         place(shapes::icosphere(3), m)
     };
-    let part = |name: &str, mesh, surface| Part { name: name.into(), mesh, surface };
-    let surface = |name: &str, text| Surface::fixed(name, material(text));
+    let part = |name: &str, mesh, material| Part { name: name.into(), mesh, material };
+    let material = |name: &str, text| Material::fixed(name, bsdf(text));
     SceneDescription {
         parts: vec![
             part("left", sphere(-0.8, 0.8), 0),
             part("right", sphere(0.7, 0.5), 0),
             part("floor", shapes::disc(4.0, 48), 1),
         ],
-        surfaces: vec![surface("ball", ball), surface("grey", "diffuse:0.5")],
+        materials: vec![material("ball", ball), material("gray", "diffuse:0.5")],
         ..SceneDescription::default()
     }
 }
@@ -116,7 +116,7 @@ fn the_same_bits_for_any_threads_and_tiles() {
         resampling: Resampling::default(),
     };
     same_bits("sir", &environment, &sir);
-    let stop = Stop::Accepted { n: 2, max_tries: 20 };
+    let stop = StoppingRule::Accepted { n: 2, max_tries: 20 };
     let rejection = RejectionSampling::new(&environment, Proposal::Tighter, stop).unwrap();
     same_bits("rejection", &environment, &rejection);
     let rig = variance_minimization(&environment, 8, VarianceMinimization::default()).unwrap();
@@ -359,10 +359,10 @@ fn rel_mse(picture: &RgbImage, reference: &RgbImage) -> f64 {
 #[test]
 fn a_white_sphere_in_a_white_furnace_vanishes() {
     let environment = Environment::constant(Rgb::WHITE).unwrap();
-    let sphere = Part { name: "sphere".into(), mesh: shapes::icosphere(4), surface: 0 };
+    let sphere = Part { name: "sphere".into(), mesh: shapes::icosphere(4), material: 0 };
     let scene = Scene::new(SceneDescription {
         parts: vec![sphere],
-        surfaces: vec![Surface::fixed("white", material("diffuse:1"))],
+        materials: vec![Material::fixed("white", bsdf("diffuse:1"))],
         ..SceneDescription::default()
     })
     .unwrap();
@@ -404,7 +404,7 @@ fn layers_mean_what_they_say() {
             assert!((2.0..9.0).contains(&layers.depth[i]), "{}", layers.depth[i]);
         }
     }
-    // The upper corners look past the scene, the middle of the lower edge at the grey floor.
+    // The upper corners look past the scene, the middle of the lower edge at the gray floor.
     assert_eq!(layers.alpha[0], 0.0);
     let floor = 36 * 45 + 22;
     assert_eq!(layers.alpha[floor], 1.0);
@@ -443,14 +443,14 @@ fn tiny_and_huge_scenes_are_shadowed_alike() {
 }
 
 #[test]
-fn a_cancelled_render_keeps_what_is_done() {
+fn a_canceled_render_keeps_what_is_done() {
     use std::sync::atomic::{AtomicUsize, Ordering};
     struct After(AtomicUsize);
     impl Observer for After {
         fn tile_finished(&self, _: &domelight::render::Counts) {
             self.0.fetch_add(1, Ordering::Relaxed);
         }
-        fn cancelled(&self) -> bool {
+        fn canceled(&self) -> bool {
             self.0.load(Ordering::Relaxed) >= 20
         }
     }

@@ -7,8 +7,8 @@ use domelight::rig::{
     LightPosition, MedianCut, Order, Region, Rig, RigError, Rule, ShadingReference,
     VarianceMinimization, median_cut, variance_minimization,
 };
-use domelight::sampling::{Pcg32, SamplerKind, Stream};
-use domelight::strategy::{LightSet, PointStrategy, SampleNumbers, ShadingPoint};
+use domelight::sampling::{Pcg32, Sampler, SamplerKind};
+use domelight::strategy::{LightSet, PointStrategy, SampleIndex, ShadingPoint};
 use domelight::{Rgb, RgbImage};
 
 /// A way to make a rig.
@@ -33,7 +33,7 @@ impl Method {
         vec![
             Self::MedianCut(cut),
             Self::MedianCut(MedianCut { scale_width: false, order: Order::WorstFirst, ..cut }),
-            Self::MedianCut(MedianCut { position: LightPosition::GeometricCentre, ..cut }),
+            Self::MedianCut(MedianCut { position: LightPosition::GeometricCenter, ..cut }),
             Self::Variance(poster),
             Self::Variance(VarianceMinimization { lloyd_steps: 3, ..poster }),
             Self::Variance(VarianceMinimization { lloyd_steps: 0, ..vm }),
@@ -47,7 +47,7 @@ fn environment(map: RgbImage) -> Environment {
     Environment::new(map, Orientation::default(), 1.0).unwrap()
 }
 
-/// Log-normal noise, a coloured sky, a lamp, and darkness below.
+/// Log-normal noise, a colored sky, a lamp, and darkness below.
 fn interior(width: usize, height: usize) -> RgbImage {
     let mut pcg = Pcg32::new(7, 1);
     RgbImage::from_fn(width, height, |x, y| {
@@ -68,12 +68,12 @@ fn interior(width: usize, height: usize) -> RgbImage {
     })
 }
 
-/// A uniform disc of radius `radius` around `centre` on a sky of radiance `sky`.
-fn sun(width: usize, height: usize, centre: Vec3, radius: f32, sky: f32) -> RgbImage {
+/// A uniform disc of radius `radius` around `center` on a sky of radiance `sky`.
+fn sun(width: usize, height: usize, center: Vec3, radius: f32, sky: f32) -> RgbImage {
     let env = environment(RgbImage::filled(width, height, Rgb::BLACK));
     RgbImage::from_fn(width, height, |x, y| {
         let uv = [(x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32];
-        let inside = env.direction(uv.into()).distance(centre) < 2.0 * (0.5 * radius).sin();
+        let inside = env.direction(uv.into()).distance(center) < 2.0 * (0.5 * radius).sin();
         if inside { Rgb::new(1e4, 8e3, 6e3) } else { Rgb::splat(sky) }
     })
 }
@@ -215,15 +215,15 @@ fn no_light_is_an_error() {
 
 #[test]
 fn a_light_that_is_alone_has_its_own_size_and_place() {
-    let centres = [Vec3::X, Vec3::Z, Vec3::Y, -Vec3::Y, Vec3::new(0.6, 0.8, 0.0)];
-    for centre in centres {
+    let centers = [Vec3::X, Vec3::Z, Vec3::Y, -Vec3::Y, Vec3::new(0.6, 0.8, 0.0)];
+    for center in centers {
         let (width, height) = (512, 256);
-        let env = environment(sun(width, height, centre, 0.2, 0.0));
+        let env = environment(sun(width, height, center, 0.2, 0.0));
         let rig = variance_minimization(&env, 1, VarianceMinimization::default()).unwrap();
         let light = rig.lights[0];
         let texel = PI / height as f32;
-        assert!(light.direction.distance(centre) < texel, "{centre}: {light:?}");
-        assert!((light.angular_radius - 0.2).abs() < texel, "{centre}: {light:?}");
+        assert!(light.direction.distance(center) < texel, "{center}: {light:?}");
+        assert!((light.angular_radius - 0.2).abs() < texel, "{center}: {light:?}");
     }
 }
 
@@ -231,13 +231,13 @@ fn a_light_that_is_alone_has_its_own_size_and_place() {
 #[test]
 fn a_sun_across_the_seam_or_a_pole_is_one_light() {
     let seam = [Vec3::Z, Vec3::new(0.002, 0.6, 0.8).normalize()];
-    for centre in seam.into_iter().chain([Vec3::Y, -Vec3::Y]) {
-        let env = environment(sun(512, 256, centre, 0.03, 2.0));
+    for center in seam.into_iter().chain([Vec3::Y, -Vec3::Y]) {
+        let env = environment(sun(512, 256, center, 0.03, 2.0));
         for n in [4, 16, 32] {
             let rig = variance_minimization(&env, n, VarianceMinimization::default()).unwrap();
             let sun = env.map().pixels.iter().zip(&rig.labels).filter(|(p, _)| p.r > 1e3);
             let labels: std::collections::BTreeSet<u32> = sun.map(|(_, &l)| l).collect();
-            assert_eq!(labels.len(), 1, "{centre}, {n} lights");
+            assert_eq!(labels.len(), 1, "{center}, {n} lights");
         }
     }
 }
@@ -306,7 +306,7 @@ fn better_methods_have_smaller_errors() {
     let reference = ShadingReference::new(&env);
     let (cut, vm) = (MedianCut::default(), VarianceMinimization::default());
     let methods = [
-        Method::MedianCut(MedianCut { position: LightPosition::GeometricCentre, ..cut }),
+        Method::MedianCut(MedianCut { position: LightPosition::GeometricCenter, ..cut }),
         Method::MedianCut(cut),
         Method::Variance(VarianceMinimization { lloyd_steps: 0, ..vm }),
         Method::Variance(vm),
@@ -334,10 +334,10 @@ fn a_light_set_asks_for_one_ray_a_light() {
         ng: normal,
         frame: Frame::from_z(normal),
         wo: Vec3::Z,
-        material: "diffuse:0.8,0.5,0.2".parse::<MaterialSpec>().unwrap().into(),
+        bsdf: "diffuse:0.8,0.5,0.2".parse::<MaterialSpec>().unwrap().into(),
     };
     let mut shaded = Rgb::BLACK;
-    let numbers = SampleNumbers { stream: Stream::new(SamplerKind::Sobol, 0, 0), sample: 0 };
+    let numbers = SampleIndex { sampler: Sampler::new(SamplerKind::Sobol, 0, 0), sample: 0 };
     lights.sample(&at, numbers, &mut (), |_, weight| shaded += weight);
     let exact = rig.lights.iter().map(|l| {
         let cos_theta = l.direction.dot(normal).max(0.0);

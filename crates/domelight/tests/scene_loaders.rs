@@ -8,7 +8,7 @@ use base64::Engine;
 use domelight::Rgb;
 use domelight::math::{Vec2, Vec3, vec2, vec3};
 use domelight::scene::{
-    EnvironmentSource, LoadOptions, Loaded, Projection, Reach, Scene, SurfaceModel, UpAxis, Wrap,
+    EnvironmentSource, LoadOptions, Loaded, MaterialModel, Projection, Reach, Scene, UpAxis, Wrap,
     load, load_with,
 };
 use tempfile::TempDir;
@@ -26,7 +26,7 @@ impl Folder {
         self
     }
 
-    /// With a picture of one colour.
+    /// With a picture of one color.
     fn with_image(self, name: &str, color: [u8; 3]) -> Self {
         image::RgbImage::from_pixel(2, 2, image::Rgb(color)).save(self.path(name)).unwrap();
         self
@@ -247,11 +247,11 @@ fn obj_with_materials_polygons_and_relative_indices() {
     assert_eq!(first.normals, [Vec3::Z; 4]);
     assert_eq!(d.parts[1].mesh.positions[0], Vec3::Z);
 
-    let SurfaceModel::Phong(red) = &d.surfaces[d.parts[0].surface].model else { panic!() };
+    let MaterialModel::Phong(red) = &d.materials[d.parts[0].material].model else { panic!() };
     assert_eq!((red.diffuse, red.exponent), (Rgb::new(0.8, 0.1, 0.1), 40.0));
     assert_eq!(red.specular, Rgb::splat(0.5));
-    let metal = &d.surfaces[d.parts[1].surface];
-    let SurfaceModel::MetallicRoughness(m) = &metal.model else { panic!() };
+    let metal = &d.materials[d.parts[1].material];
+    let MaterialModel::MetallicRoughness(m) = &metal.model else { panic!() };
     assert_eq!((m.metallic, m.roughness), (1.0, 0.3));
     let texture = m.base_color_texture.unwrap();
     assert_eq!(texture.wrap, [Wrap::Clamp; 2]);
@@ -266,7 +266,7 @@ fn obj_with_materials_polygons_and_relative_indices() {
 }
 
 #[test]
-fn an_obj_without_its_library_is_grey_with_a_warning() {
+fn an_obj_without_its_library_is_gray_with_a_warning() {
     let loaded = one("a.obj", OBJ);
     assert_eq!(loaded.description.parts.len(), 3);
     assert!(loaded.warnings[0].contains("things.mtl") && loaded.warnings[0].contains("line 2"));
@@ -363,13 +363,13 @@ fn obj_as_exporters_write_it() {
     let areas: Vec<f32> = mesh.triangles.iter().map(area).collect();
     assert_eq!(areas.len(), 3);
     assert!(areas.iter().all(|&a| a > 0.0) && close_f(areas[0] + areas[1], 1.5), "{areas:?}");
-    let SurfaceModel::Phong(red) = &d.surfaces[d.parts[0].surface].model else { panic!() };
+    let MaterialModel::Phong(red) = &d.materials[d.parts[0].material].model else { panic!() };
     assert_eq!(
         (red.diffuse, d.parts[0].name.as_str()),
         (Rgb::new(1.0, 0.0, 0.0), "wall  left # two names")
     );
-    assert_eq!(d.surfaces[0].normal_map.map(|map| map.scale), Some(0.5));
-    assert!(d.surfaces[1].normal_map.is_none());
+    assert_eq!(d.materials[0].normal_map.map(|map| map.scale), Some(0.5));
+    assert!(d.materials[1].normal_map.is_none());
     assert_eq!(d.textures.len(), 1);
     for word in [
         "emission (Ke) is ignored, of material 'r\u{f6}t', 'b'",
@@ -400,7 +400,7 @@ fn many_materials_are_neither_slow_nor_loud() {
     let loaded = Folder::new().with("a.obj", &text).load("a.obj");
     // 44 s when every change searched all before it.
     assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
-    assert_eq!((loaded.description.surfaces.len(), loaded.description.parts.len()), (1, 30_000));
+    assert_eq!((loaded.description.materials.len(), loaded.description.parts.len()), (1, 30_000));
     let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings.len()) };
     assert!(warning.contains("'m0', 'm1', 'm2' and 29997 more"), "{warning}");
     let material = |i: usize| format!("newmtl m{i}\nKe 1 1 1\nmap_Kd no{i}.png\n");
@@ -688,16 +688,16 @@ fn check_triangles(loaded: &Loaded) {
     assert_eq!(mirrored.mesh.positions[1], vec3(9.0, 0.0, 0.0));
     assert_eq!(mirrored.mesh.triangles, [[0, 2, 1]]);
     assert!(close(mirrored.mesh.normals[0], Vec3::Z));
-    assert_eq!(d.surfaces.len(), 1);
-    let surface = &d.surfaces[0];
-    let SurfaceModel::MetallicRoughness(m) = &surface.model else { panic!() };
+    assert_eq!(d.materials.len(), 1);
+    let material = &d.materials[0];
+    let MaterialModel::MetallicRoughness(m) = &material.model else { panic!() };
     assert_eq!((m.metallic, m.roughness), (0.25, 0.75));
     assert_eq!(m.base_color, Rgb::new(0.5, 1.0, 1.0));
     let texture = m.base_color_texture.unwrap();
     assert_eq!(texture.wrap, [Wrap::Clamp, Wrap::Mirror]);
     assert_eq!(texture.transform.apply(Vec2::ONE), vec2(2.0, 2.0));
-    assert_eq!(surface.normal_map.unwrap().scale, 0.5);
-    assert_eq!(d.textures.len(), 2, "one image as colour and as numbers");
+    assert_eq!(material.normal_map.unwrap().scale, 0.5);
+    assert_eq!(d.textures.len(), 2, "one image as color and as numbers");
     let camera = d.camera.unwrap();
     assert_eq!((camera.origin, camera.up), (vec3(0.0, 0.0, 5.0), Vec3::Y));
     assert_eq!(camera.target, vec3(0.0, 0.0, 4.0));
@@ -866,13 +866,13 @@ fn a_scene_file_combines_everything() {
     assert!(close(d.parts[0].mesh.positions[1], vec3(10.0, 2.0, 0.0)));
     assert_eq!(d.parts[1].name, "second");
     assert_eq!(d.parts[1].mesh.positions[1], vec3(6.0, 0.0, 0.0));
-    let brass = &d.surfaces[d.parts[0].surface];
+    let brass = &d.materials[d.parts[0].material];
     assert_eq!(brass.name, "brass");
     assert_eq!(brass.textures().count(), 2);
-    let SurfaceModel::MetallicRoughness(m) = &brass.model else { panic!() };
+    let MaterialModel::MetallicRoughness(m) = &brass.model else { panic!() };
     assert_eq!(m.base_color_texture.unwrap().transform.apply(Vec2::ONE), vec2(4.0, 4.0));
-    assert!(matches!(d.surfaces[d.parts[1].surface].model, SurfaceModel::Fixed(_)));
-    assert_eq!(d.surfaces[d.parts[2].surface].name, "default");
+    assert!(matches!(d.materials[d.parts[1].material].model, MaterialModel::Fixed(_)));
+    assert_eq!(d.materials[d.parts[2].material].name, "default");
 }
 
 #[test]
@@ -881,7 +881,7 @@ fn built_in_scenes_are_objects_with_a_camera() {
     let d = one("scene.toml", text).description;
     assert!(close(d.parts[0].mesh.bounds().center(), vec3(7.0, 0.0, 0.0)));
     assert!(close(d.camera.unwrap().target, vec3(7.0, 0.0, 0.0)));
-    assert!(matches!(d.surfaces[d.parts[0].surface].model, SurfaceModel::Fixed(_)));
+    assert!(matches!(d.materials[d.parts[0].material].model, MaterialModel::Fixed(_)));
 }
 
 /// A material is the subject's; floor, probe and camera of the scene stay as they are.
@@ -891,7 +891,7 @@ fn a_material_changes_nothing_but_the_subject() {
     let d = one("scene.toml", text).description;
     assert!(d.environment.is_some() && d.camera.is_some() && !d.scenery.is_empty());
     for (i, part) in d.parts.iter().enumerate() {
-        let fixed = matches!(d.surfaces[part.surface].model, SurfaceModel::Fixed(_));
+        let fixed = matches!(d.materials[part.material].model, MaterialModel::Fixed(_));
         assert_eq!(fixed, !d.scenery.contains(&i), "{}", part.name);
     }
 }
@@ -945,7 +945,7 @@ fn files_that_are_none() {
 }
 
 #[test]
-fn sixteen_bit_and_grey_textures_load() {
+fn sixteen_bit_and_gray_textures_load() {
     let folder = toml_folder().with("scene.toml", TOML);
     let deep = image::ImageBuffer::from_pixel(1, 1, image::Luma([65535u16]));
     deep.save(folder.path("brass.png")).unwrap();

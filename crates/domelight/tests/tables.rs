@@ -2,7 +2,7 @@
 
 use domelight::math::{Vec2, vec2};
 use domelight::sampling::{
-    AliasTable, Dimension, HierarchicalTable, Pcg32, SamplerKind, Stream, Table1d, Table2d,
+    AliasTable, Dimension, HierarchicalTable, Pcg32, Sampler, SamplerKind, Table1d, Table2d,
     TableSample,
 };
 use testkit::Chi2;
@@ -103,8 +103,8 @@ fn the_hierarchy_keeps_strata_together() {
         };
         let mut of_means = testkit::Welford::default();
         for pixel in 0..400 {
-            let stream = Stream::new(SamplerKind::Sobol, 1, pixel);
-            let point = |i| value(sample(stream.numbers(Dimension::Environment, i).u()));
+            let sampler = Sampler::new(SamplerKind::Sobol, 1, pixel);
+            let point = |i| value(sample(sampler.numbers(Dimension::Environment, i).u()));
             of_means.push((0..64).map(point).sum::<f64>() / 64.0);
         }
         of_means.variance()

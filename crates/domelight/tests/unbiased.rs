@@ -8,7 +8,7 @@ use common::{
 };
 use domelight::bsdf::MaterialSpec;
 use domelight::environment::{CompensatedTable, Environment, Orientation, UpAxis};
-use domelight::sampling::{Heuristic, SamplerKind, Stream};
+use domelight::sampling::{Heuristic, Sampler, SamplerKind};
 use domelight::strategy::{
     BrdfSampling, EnvironmentSampling, LightTable, MultipleImportanceSampling,
 };
@@ -26,9 +26,9 @@ fn strategies_agree_with_quadrature() {
     for env in &environments {
         let table = CompensatedTable::new(env);
         MATERIALS.par_iter().for_each(|name| {
-            let material = name.parse::<MaterialSpec>().unwrap().into();
+            let bsdf = name.parse::<MaterialSpec>().unwrap().into();
             for theta in views {
-                let at = point(material, theta);
+                let at = point(bsdf, theta);
                 let reference = quadrature(env, &at);
                 let check = |what: &str, batches: Vec<[f64; 3]>| {
                     let label = format!("{what}, {name}, view {theta}");
@@ -68,11 +68,11 @@ fn strategies_agree_with_quadrature() {
 #[test]
 fn weights_that_sum_to_one_go_with_their_own_counts() {
     let env = environment(true, UpAxis::Y);
-    let material = "diffuse:0.8".parse::<MaterialSpec>().unwrap().into();
-    let at = point(material, 0.5);
+    let bsdf = "diffuse:0.8".parse::<MaterialSpec>().unwrap().into();
+    let at = point(bsdf, 0.5);
     let mis =
         MultipleImportanceSampling::new(&env, LightTable::Full, Heuristic::Balance, 1, 1).unwrap();
-    let mean = estimate(&mis, &env, &at, Stream::new(SamplerKind::Sobol, 1, 1), 1 << 16)[1];
+    let mean = estimate(&mis, &env, &at, Sampler::new(SamplerKind::Sobol, 1, 1), 1 << 16)[1];
     let expected = quadrature(&env, &at)[1];
     assert!((mean / expected - 1.0).abs() < 0.01, "{mean} {expected}");
     assert!(mean > 1.9 * 0.5 * expected);
@@ -80,7 +80,7 @@ fn weights_that_sum_to_one_go_with_their_own_counts() {
 
 /// One channel keeps its own value although directions follow luminance.
 #[test]
-fn colours_are_not_lost_in_luminance() {
+fn colors_are_not_lost_in_luminance() {
     let map = RgbImage::from_fn(WIDTH, HEIGHT, |x, _| match x % 3 {
         0 => Rgb::new(1.0, 0.0, 0.0),
         1 => Rgb::new(0.0, 1.0, 0.0),
@@ -91,5 +91,5 @@ fn colours_are_not_lost_in_luminance() {
     let light = EnvironmentSampling { environment: &env, n_samples: 1 };
     let reference = quadrature(&env, &at);
     let batches = batches(&light, &env, &at, SamplerKind::Independent, 1024);
-    ZTest::default().against("coloured map", &batches, reference).unwrap();
+    ZTest::default().against("colored map", &batches, reference).unwrap();
 }

@@ -3,10 +3,10 @@
 //!
 //! Samples are counted in cells; the density is integrated over each by adaptive quadrature. Cells
 //! that expect few samples are pooled. Samples that the sampler declines (`None`) are a cell of
-//! their own, whose expectation is 1 − ∫ pdf, so a sampler that redraws them without renormalising
+//! their own, whose expectation is 1 − ∫ pdf, so a sampler that redraws them without renormalizing
 //! its density fails. A sample where the density is zero fails at once. When samplers draw from a
 //! table, choose cells finer than its texels (and an odd number of them), or a sampler that returns
-//! texel centres passes.
+//! texel centers passes.
 //!
 //! The layout of the test follows the one that Nori and Mitsuba ship (Wenzel Jakob).
 
@@ -356,11 +356,11 @@ mod tests {
     }
 
     #[test]
-    fn texel_centres_fail_when_the_cells_are_finer() {
-        let centres = |u: [f32; 2], _: f32| Some(u.map(|x| ((x * 8.0).floor() + 0.5) / 8.0));
+    fn texel_centers_fail_when_the_cells_are_finer() {
+        let centers = |u: [f32; 2], _: f32| Some(u.map(|x| ((x * 8.0).floor() + 0.5) / 8.0));
         let test = Chi2 { cells: [31, 31], ..Chi2::default() };
-        let failure = test.square("texel centres", centres, |_| 1.0).unwrap_err();
-        assert!(failure.to_string().contains("texel_centres-observed.pfm"), "{failure}");
+        let failure = test.square("texel centers", centers, |_| 1.0).unwrap_err();
+        assert!(failure.to_string().contains("texel_centers-observed.pfm"), "{failure}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Gauss–Legendre quadrature over rectangles, spheres and hemispheres: composite with a fixed
 //! number of panels, and adaptive for narrow peaks and jumps.
 //!
-//! Integrands return `[f64; N]` so that colour channels share the work; a scalar is `[x]`.
+//! Integrands return `[f64; N]` so that color channels share the work; a scalar is `[x]`.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

@@ -10,7 +10,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Writes a grey PFM (rows from the bottom up, little endian).
+    /// Writes a gray PFM (rows from the bottom up, little endian).
     fn write_pfm(&self, path: &Path) -> io::Result<()> {
         let rows = self.cells.len() / self.columns;
         let mut bytes = Vec::new();

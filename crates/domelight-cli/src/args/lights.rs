@@ -39,7 +39,7 @@ pub(crate) struct LightsArguments {
     #[arg(short = 'n', long = "lights", value_name = "N", help_heading = "Lights",
           conflicts_with = "error", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub(crate) n_lights: Option<u32>,
-    /// The fewest lights whose shading, matt and glossy, is off by this much at the most [%]
+    /// The fewest lights whose shading, matte and glossy, is off by this much at the most [%]
     #[arg(long, value_name = "PERCENT", help_heading = "Lights", value_parser = percent)]
     pub(crate) error: Option<f64>,
     /// Take the sun out first: the brightest compact source no wider than 14°

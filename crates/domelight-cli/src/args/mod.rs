@@ -2,11 +2,11 @@
 
 pub(crate) mod bench;
 pub(crate) mod compare;
-pub(crate) mod course;
 pub(crate) mod farm;
 pub(crate) mod figures;
 pub(crate) mod lights;
 pub(crate) mod render;
+pub(crate) mod render_run;
 pub(crate) mod sampling;
 pub(crate) mod scene;
 
@@ -133,13 +133,13 @@ pub(crate) struct DiffArguments {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write a false-colour picture of the error.
+    /// Write a false-color picture of the error.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PicturePath>,
     /// What the error picture shows.
     #[arg(long, value_enum, default_value_t = Metric::Rel, requires = "output")]
     pub(crate) metric: Metric,
-    /// Error at the upper end of the error picture's colours [default: 99.9th percentile; flip: 1].
+    /// Error at the upper end of the error picture's colors [default: 99.9th percentile; flip: 1].
     #[arg(long, value_name = "ERROR", value_parser = positive, requires = "output")]
     pub(crate) scale: Option<f32>,
     /// Compare only pixels that the reference covers (alpha > 0.999).

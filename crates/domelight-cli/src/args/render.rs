@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 
 use super::Tone;
-use super::course::CourseArguments;
+use super::render_run::RenderRunArguments;
 use super::sampling::{PixelArguments, SampleArguments, StrategyArguments};
 use super::scene::SceneArguments;
 use crate::output::PicturePath;
@@ -36,7 +36,7 @@ pub(crate) struct RenderArguments {
     #[command(flatten)]
     pub(crate) pixel: PixelArguments,
     #[command(flatten)]
-    pub(crate) course: CourseArguments,
+    pub(crate) render_run: RenderRunArguments,
     #[command(flatten)]
     pub(crate) output: OutputArguments,
 }

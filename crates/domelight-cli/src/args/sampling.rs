@@ -6,8 +6,8 @@ use domelight::sampling::{Heuristic, SamplerKind};
 use domelight::strategy::{Candidates, Proposal, Resampling, StrategyKind};
 
 use super::{one_of, positive};
+use crate::parse::Split;
 use crate::strategy::StrategyText;
-use crate::values::Split;
 
 /// A strategy, and what it may be told.
 #[derive(Args, Debug)]

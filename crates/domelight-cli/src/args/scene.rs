@@ -5,7 +5,7 @@ use domelight::environment::UpAxis;
 use domelight::environment::mapping::Mapping;
 
 use super::{finite, mapping};
-use crate::values::{NamedMaterial, Size, Triple, not_negative};
+use crate::parse::{NamedMaterial, Size, Triple, not_negative};
 
 /// Rows of a built-in probe unless told otherwise.
 pub(crate) const BUILTIN_ROWS: u32 = 1024;
@@ -25,7 +25,7 @@ pub(crate) struct SceneArguments {
     #[command(flatten)]
     pub(crate) camera: CameraArguments,
     #[command(flatten)]
-    pub(crate) stage: StageArguments,
+    pub(crate) subject: SubjectArguments,
 }
 
 /// What of a file is shown.
@@ -110,11 +110,11 @@ pub(crate) struct CameraArguments {
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Scene")]
-pub(crate) struct StageArguments {
+pub(crate) struct SubjectArguments {
     /// Material of the subject: diffuse:0.8, phong:50:1:0.5, ward:0.15:0.5, ggx:0.2, mix, …
     #[arg(long, value_name = "M")]
     pub(crate) material: Option<NamedMaterial>,
-    /// Move and scale the scene: centre of the bounds to 0, longest half-extent to 1
+    /// Move and scale the scene: center of the bounds to 0, longest half-extent to 1
     #[arg(long)]
     pub(crate) normalize: bool,
     /// Put a diffuse disk (reflectance 0.5) under the scene

@@ -7,16 +7,16 @@ use domelight::picture::compare::REGULARIZER;
 use domelight::sampling::Pcg32;
 use serde::{Deserialize, Serialize};
 
-use crate::scene::View;
+use crate::scene::PreparedScene;
 use crate::usage::Stopwatch;
 use domelight::math::vec2;
-use domelight::render::{RenderSettings, survey};
+use domelight::render::{RenderSettings, pilot_points};
 
 /// The lecture's optimum on a case.
 ///
 /// Directions with density p = f L cos θ / L_ns leave N-th of the variance of the visibility:
 /// I (L_ns − I) / N at a pixel with the light I and, without shadows, L_ns. (The same holds for points of
-/// the pixel and directions together, and channel by channel where the light has one colour.)
+/// the pixel and directions together, and channel by channel where the light has one color.)
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Bound {
     /// Of one thread's CPU time, by the ray kernel on the case.
@@ -60,7 +60,7 @@ const DIRECTIONS: usize = 256;
 const ROUNDS: usize = 9;
 
 /// Occlusion rays a CPU second of this thread, from points all over the picture toward the light.
-pub(super) fn occlusion_rate(view: &View, settings: &RenderSettings) -> f64 {
+pub(super) fn occlusion_rate(view: &PreparedScene, settings: &RenderSettings) -> f64 {
     let rays = rays(view, settings);
     let mut occluded = Vec::new();
     let mut rates: Vec<f64> = (0..ROUNDS)
@@ -76,11 +76,11 @@ pub(super) fn occlusion_rate(view: &View, settings: &RenderSettings) -> f64 {
     rates[ROUNDS / 2]
 }
 
-fn rays(view: &View, settings: &RenderSettings) -> RayBatch {
+fn rays(view: &PreparedScene, settings: &RenderSettings) -> RayBatch {
     let mut rng = Pcg32::new(1, 1);
     let extent = view.scene.bounds().size().max_element();
     let mut rays = RayBatch::default();
-    for point in survey(&view.scene, &view.camera, settings) {
+    for point in pilot_points(&view.scene, &view.camera, settings) {
         let origin = offset_origin(point.position, point.ng, extent);
         for _ in 0..DIRECTIONS {
             let u = vec2(rng.next_f32(), rng.next_f32());

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::str::FromStr as _;
 
 use anyhow::{Context as _, Result};
-use domelight::bsdf::{Material, MaterialSpec};
+use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::{Environment, Orientation};
 use domelight::math::{Vec3, vec3};
@@ -15,12 +15,12 @@ use domelight::scene::{CameraSettings, SceneDescription};
 
 use crate::args::bench::BenchArguments;
 use crate::args::scene::{
-    CameraArguments, EnvironmentArguments, FileArguments, SceneArguments, StageArguments,
+    CameraArguments, EnvironmentArguments, FileArguments, SceneArguments, SubjectArguments,
 };
-use crate::failure::UsageError;
-use crate::scene::{View, close_up};
+use crate::error::UsageError;
+use crate::parse::{Size, Triple};
+use crate::scene::{PreparedScene, close_up};
 use crate::usage::{Seconds, Stopwatch};
-use crate::values::{Size, Triple};
 
 /// The lecture's picture.
 const LECTURE_SIZE: Size = Size { width: 176, height: 248 };
@@ -45,13 +45,13 @@ pub(super) struct Case {
     pub(super) scene: String,
     /// A built-in probe or a file.
     pub(super) probe: String,
-    pub(super) look: Look,
-    stand: Stand,
+    pub(super) material: CaseMaterial,
+    placement: CameraPlacement,
 }
 
 /// What the scene is made of.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Look {
+pub(super) enum CaseMaterial {
     /// As it is, with floor and plinth.
     Own,
     /// Its subject alone, of one material.
@@ -60,16 +60,16 @@ pub(super) enum Look {
 
 /// Where the camera is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Stand {
+enum CameraPlacement {
     /// In front of the normalized mesh; in front of scenes of their own look as they say.
-    Usual,
+    Standard,
     /// As near as the picture allows.
     CloseUp,
 }
 
 /// A case that can be rendered.
-pub(super) struct Built {
-    pub(super) view: View,
+pub(super) struct BuiltCase {
+    pub(super) view: PreparedScene,
     pub(super) camera: CameraSettings,
     pub(super) settings: RenderSettings,
     /// For the BVH and the environment's table.
@@ -81,7 +81,12 @@ pub(super) fn of_lecture() -> Result<Vec<Case>> {
     let case = |text: &&str| {
         let scene = BuiltinScene::Statue.name().to_owned();
         let probe = BuiltinProbe::Cathedral.name().to_owned();
-        Ok(Case { scene, probe, look: look(text)?, stand: Stand::CloseUp })
+        Ok(Case {
+            scene,
+            probe,
+            material: case_material(text)?,
+            placement: CameraPlacement::CloseUp,
+        })
     };
     LECTURE_MATERIALS.iter().map(case).collect()
 }
@@ -109,13 +114,17 @@ fn product(meshes: &[String], probes: &[String], materials: Option<&str>) -> Res
     let probes = probes.iter().map(|probe| files(probe)).collect::<Result<Vec<_>>>()?.concat();
     let mut cases = Vec::new();
     for scene in meshes {
-        let looks = looks(materials.unwrap_or(if has_own_look(scene) { OWN } else { MATERIALS }))?;
+        let case_materials = case_materials(materials.unwrap_or(if has_own_material(scene) {
+            OWN
+        } else {
+            MATERIALS
+        }))?;
         for probe in &probes {
-            cases.extend(looks.iter().map(|look| Case {
+            cases.extend(case_materials.iter().map(|case_material| Case {
                 scene: scene.clone(),
                 probe: probe.clone(),
-                look: look.clone(),
-                stand: Stand::Usual,
+                material: case_material.clone(),
+                placement: CameraPlacement::Standard,
             }));
         }
     }
@@ -138,7 +147,7 @@ pub(super) fn declare(arguments: &BenchArguments) -> Result<()> {
 }
 
 /// Formats that say what their parts are made of.
-fn has_own_look(scene: &str) -> bool {
+fn has_own_material(scene: &str) -> bool {
     let extension = Path::new(scene).extension();
     extension.is_some_and(|e| ["gltf", "glb", "toml"].iter().any(|own| e.eq_ignore_ascii_case(own)))
 }
@@ -167,8 +176,8 @@ fn files(probe: &str) -> Result<Vec<String>> {
     Ok(files)
 }
 
-/// Materials begin with a letter, further numbers of a colour do not.
-fn looks(list: &str) -> Result<Vec<Look>> {
+/// Materials begin with a letter, further numbers of a color do not.
+fn case_materials(list: &str) -> Result<Vec<CaseMaterial>> {
     let mut texts: Vec<String> = Vec::new();
     for part in list.split(',') {
         match texts.last_mut() {
@@ -179,18 +188,18 @@ fn looks(list: &str) -> Result<Vec<Look>> {
             _ => texts.push(part.trim().to_owned()),
         }
     }
-    texts.iter().map(|text| look(text)).collect()
+    texts.iter().map(|text| case_material(text)).collect()
 }
 
-fn look(text: &str) -> Result<Look> {
+fn case_material(text: &str) -> Result<CaseMaterial> {
     if text == OWN {
-        return Ok(Look::Own);
+        return Ok(CaseMaterial::Own);
     }
     let material = text.parse().map_err(|e| UsageError(format!("material '{text}': {e}")))?;
-    Ok(Look::Of { text: text.to_owned(), material })
+    Ok(CaseMaterial::Of { text: text.to_owned(), material })
 }
 
-impl fmt::Display for Look {
+impl fmt::Display for CaseMaterial {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Own => OWN,
@@ -207,24 +216,24 @@ pub(super) fn short(name: &str) -> &str {
 
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} / {} / {}", short(&self.scene), short(&self.probe), self.look)
+        write!(f, "{} / {} / {}", short(&self.scene), short(&self.probe), self.material)
     }
 }
 
 impl Case {
     /// Reads scene and probe and builds them.
-    pub(super) fn build(&self, arguments: &BenchArguments, quiet: bool) -> Result<Built> {
-        let size = arguments.size.unwrap_or(match self.stand {
-            Stand::Usual => SIZE,
-            Stand::CloseUp => LECTURE_SIZE,
+    pub(super) fn build(&self, arguments: &BenchArguments, quiet: bool) -> Result<BuiltCase> {
+        let size = arguments.size.unwrap_or(match self.placement {
+            CameraPlacement::Standard => SIZE,
+            CameraPlacement::CloseUp => LECTURE_SIZE,
         });
         let scene = self.arguments(arguments, size);
         let mut loaded = scene.load(quiet)?;
-        if let Look::Of { material, .. } = self.look {
-            loaded.description.set_subject_material(Material::from(material));
+        if let CaseMaterial::Of { material, .. } = self.material {
+            loaded.description.set_subject_material(Bsdf::from(material));
             loaded.description.remove_scenery();
         }
-        if self.stand == Stand::CloseUp {
+        if self.placement == CameraPlacement::CloseUp {
             let aspect = size.width as f32 / size.height as f32;
             loaded.view = close_up(&loaded.description, aspect, loaded.light.up.vector());
         }
@@ -238,13 +247,13 @@ impl Case {
             background: Background::Hidden,
             ..RenderSettings::default()
         };
-        Ok(Built { view, camera, settings, time: watch.lap() })
+        Ok(BuiltCase { view, camera, settings, time: watch.lap() })
     }
 
     /// As `render` would be told.
     fn arguments(&self, arguments: &BenchArguments, size: Size) -> SceneArguments {
-        let normalize = self.look != Look::Own;
-        let usual = normalize && self.stand == Stand::Usual;
+        let normalize = self.material != CaseMaterial::Own;
+        let usual = normalize && self.placement == CameraPlacement::Standard;
         SceneArguments {
             scene: self.scene.clone(),
             file: FileArguments::default(),
@@ -258,7 +267,7 @@ impl Case {
                 fov: usual.then_some(FOV),
                 ortho: None,
             },
-            stage: StageArguments { material: None, normalize, ground: false, hide_env: true },
+            subject: SubjectArguments { material: None, normalize, ground: false, hide_env: true },
         }
     }
 }
@@ -309,12 +318,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn materials_may_have_colours() {
-        let texts = |list| looks(list).unwrap().iter().map(Look::to_string).collect::<Vec<_>>();
+    fn materials_may_have_colors() {
+        let texts = |list| {
+            case_materials(list).unwrap().iter().map(CaseMaterial::to_string).collect::<Vec<_>>()
+        };
         assert_eq!(texts("diffuse:0.8,ggx:0.2"), ["diffuse:0.8", "ggx:0.2"]);
         assert_eq!(texts("diffuse:0.1,0.2,0.3, own"), ["diffuse:0.1,0.2,0.3", "own"]);
-        assert!(looks("velvet").unwrap_err().to_string().contains("velvet"));
-        assert!(looks("").is_err());
+        assert!(case_materials("velvet").unwrap_err().to_string().contains("velvet"));
+        assert!(case_materials("").is_err());
     }
 
     #[test]

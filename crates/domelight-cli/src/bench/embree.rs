@@ -15,7 +15,7 @@ use domelight::geometry::{Hit, Mesh, Ray, RayBatch};
 use domelight::math::Vec3;
 use libloading::Library;
 
-use crate::failure::UsageError;
+use crate::error::UsageError;
 
 /// Where the library comes from.
 pub(super) const HOW_TO_GET: &str = "pip download --no-deps embreex && unzip embreex-*.whl 'embreex.libs/*', \
@@ -236,7 +236,7 @@ impl Embree {
     /// Loads the library; what is wrong with it is a usage error.
     pub(super) fn load(path: &Path) -> Result<Self> {
         let usage = |why: String| UsageError(format!("--embree {}: {why}", path.display()));
-        // SAFETY: the user names Embree's library, whose initialisers have no preconditions.
+        // SAFETY: the user names Embree's library, whose initializers have no preconditions.
         let library = unsafe { Library::new(path) }
             .map_err(|error| usage(format!("{error}; to get the library: {HOW_TO_GET}")))?;
         let functions = Functions::find(&library)

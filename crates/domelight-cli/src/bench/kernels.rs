@@ -50,9 +50,9 @@ pub(super) struct Row {
 #[derive(Serialize, Deserialize)]
 struct Build {
     engine: String,
-    cpu_seconds: Spread,
+    cpu_seconds: MedianAndRange,
     /// To Embree's seconds.
-    ratio: Option<Spread>,
+    ratio: Option<MedianAndRange>,
     bytes_per_triangle: f64,
 }
 
@@ -63,9 +63,9 @@ struct Trace {
     rays: usize,
     /// Rays that hit.
     hits: usize,
-    million_rays_per_cpu_second: Spread,
+    million_rays_per_cpu_second: MedianAndRange,
     /// To the rate of Embree, one ray at a time.
-    ratio: Option<Spread>,
+    ratio: Option<MedianAndRange>,
     /// Rays of which Embree thinks otherwise.
     differing: Option<usize>,
 }
@@ -74,20 +74,20 @@ struct Trace {
 #[derive(Serialize, Deserialize)]
 struct Scaling {
     /// CPU time of one thread over that of both together.
-    cpu: Spread,
+    cpu: MedianAndRange,
     /// Wall-clock time of one thread over that of two.
-    wall: Spread,
+    wall: MedianAndRange,
 }
 
 /// Of the rounds.
 #[derive(Clone, Copy, Serialize, Deserialize)]
-struct Spread {
+struct MedianAndRange {
     median: f64,
     min: f64,
     max: f64,
 }
 
-impl Spread {
+impl MedianAndRange {
     fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut values: Vec<f64> = values.into_iter().collect();
         values.sort_by(f64::total_cmp);
@@ -165,7 +165,7 @@ fn clutter() -> Mesh {
     mesh
 }
 
-/// Through the middles of all pixels, tile by tile, towards the origin.
+/// Through the middles of all pixels, tile by tile, toward the origin.
 fn camera_rays(eye: Vec3) -> Vec<Ray> {
     let z = eye.normalize();
     let x = Vec3::Y.cross(z).normalize();
@@ -226,14 +226,16 @@ fn build<'a>(mesh: &Mesh, embree: Option<&'a Embree>) -> Result<Tree<'a>> {
     let per_triangle = |bytes: usize| bytes as f64 / mesh.triangles.len() as f64;
     let mut builds = vec![Build {
         engine: "domelight".to_owned(),
-        cpu_seconds: Spread::of(seconds.iter().copied()),
-        ratio: peer.as_ref().map(|_| Spread::of(seconds.iter().zip(&of_peer).map(|(a, b)| a / b))),
+        cpu_seconds: MedianAndRange::of(seconds.iter().copied()),
+        ratio: peer
+            .as_ref()
+            .map(|_| MedianAndRange::of(seconds.iter().zip(&of_peer).map(|(a, b)| a / b))),
         bytes_per_triangle: per_triangle(bvh.bytes()),
     }];
     builds.extend(peer.as_ref().map(|peer| Build {
         engine: "Embree".to_owned(),
-        cpu_seconds: Spread::of(of_peer),
-        ratio: Some(Spread::of([1.0])),
+        cpu_seconds: MedianAndRange::of(of_peer),
+        ratio: Some(MedianAndRange::of([1.0])),
         bytes_per_triangle: per_triangle(peer.bytes()),
     }));
     Ok((builds, bvh, peer))
@@ -307,7 +309,8 @@ fn race<Rays: ?Sized, Answer>(
     let reference = engines.iter().position(|(name, _)| *name == REFERENCE);
     let trace = |i: usize| {
         let (own, count) = (&seconds[i], answers[i].len());
-        let ratio = |r: usize| Spread::of(seconds[r].iter().zip(own).map(|(r, own)| r / own));
+        let ratio =
+            |r: usize| MedianAndRange::of(seconds[r].iter().zip(own).map(|(r, own)| r / own));
         let differing = |r: usize| {
             answers[i].iter().zip(&answers[r]).filter(|(own, other)| differ(own, other)).count()
         };
@@ -315,7 +318,9 @@ fn race<Rays: ?Sized, Answer>(
             engine: engines[i].0.to_owned(),
             rays: count,
             hits: answers[i].iter().filter(|answer| is_hit(answer)).count(),
-            million_rays_per_cpu_second: Spread::of(own.iter().map(|s| count as f64 / s / 1e6)),
+            million_rays_per_cpu_second: MedianAndRange::of(
+                own.iter().map(|s| count as f64 / s / 1e6),
+            ),
             ratio: reference.map(ratio),
             differing: reference.map(differing),
         }
@@ -335,7 +340,7 @@ fn scaling(bvh: &Bvh, rays: &RayBatch) -> Scaling {
         cpu.push(one.0 / two.0);
         wall.push(one.1 / two.1);
     }
-    Scaling { cpu: Spread::of(cpu), wall: Spread::of(wall) }
+    Scaling { cpu: MedianAndRange::of(cpu), wall: MedianAndRange::of(wall) }
 }
 
 /// CPU seconds of all threads together and wall-clock seconds.

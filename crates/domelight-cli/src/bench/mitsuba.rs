@@ -19,9 +19,9 @@ use domelight::{Rgb, RgbImage};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::cases::{Built, Look};
+use super::cases::{BuiltCase, CaseMaterial};
 use super::ply;
-use crate::failure::UsageError;
+use crate::error::UsageError;
 use crate::measure::cache::{Cache, Key};
 use crate::measure::reference::{Goal, Picture, Reference};
 use crate::usage::Seconds;
@@ -111,8 +111,12 @@ impl Mitsuba {
     }
 
     /// Hands a case over; why not, if it cannot show the same.
-    pub(super) fn load(&mut self, built: &Built, look: &Look) -> Result<Option<String>> {
-        let scene = match self.scene(built, look) {
+    pub(super) fn load(
+        &mut self,
+        built: &BuiltCase,
+        case_material: &CaseMaterial,
+    ) -> Result<Option<String>> {
+        let scene = match self.scene(built, case_material) {
             Ok(scene) => scene,
             Err(why) => return Ok(Some(why)),
         };
@@ -129,8 +133,8 @@ impl Mitsuba {
     }
 
     /// The scene as the script takes it; else why it cannot be said.
-    fn scene(&self, built: &Built, look: &Look) -> Result<Value, String> {
-        let Look::Of { material, text } = look else {
+    fn scene(&self, built: &BuiltCase, case_material: &CaseMaterial) -> Result<Value, String> {
+        let CaseMaterial::Of { material, text } = case_material else {
             return Err("the scene's own materials are not handed over".to_owned());
         };
         let bsdf = bsdf(material).ok_or_else(|| format!("it has no {text}"))?;
@@ -187,13 +191,13 @@ impl Mitsuba {
     pub(super) fn reference(
         &mut self,
         cache: Option<&Cache>,
-        built: &Built,
-        look: &Look,
+        built: &BuiltCase,
+        case_material: &CaseMaterial,
         goal: Goal,
         quiet: bool,
     ) -> Result<Reference> {
         let settings = self.describe();
-        let key = format_args!("{settings}{look}{:?}{goal:?}{SCRIPT}", built.settings);
+        let key = format_args!("{settings}{case_material}{:?}{goal:?}{SCRIPT}", built.settings);
         let key = Key::of_other(&built.view, key);
         Reference::get(cache, &key, goal, &settings, quiet, |n_samples, half| {
             Ok(self.render(n_samples, REFERENCE_SEEDS[half])?.0)

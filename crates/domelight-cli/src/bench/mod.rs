@@ -2,16 +2,16 @@
 
 mod bound;
 mod cases;
-mod contestant;
 mod embree;
+mod fit;
 mod kernels;
-mod ladder;
 mod machine;
 mod mitsuba;
 mod ply;
 mod renders;
 mod results;
 mod rigs;
+mod strategy_run;
 mod table;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Result, bail};
 
 use crate::args::bench::{BenchArguments, Suite};
-use crate::failure::{UsageError, tell};
+use crate::error::{UsageError, status};
 use crate::files;
 use crate::interrupt;
 use crate::output::{print, print_json};
@@ -105,7 +105,7 @@ impl Bench<'_> {
     /// Says what is measured now, on standard error.
     fn progress(&self, text: &str) {
         if !self.quiet {
-            tell(text);
+            status(text);
         }
     }
 

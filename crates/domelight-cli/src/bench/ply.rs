@@ -55,7 +55,7 @@ mod tests {
     use super::*;
     use domelight::Rgb;
     use domelight::math::vec3;
-    use domelight::scene::{Part, SceneDescription, Surface, load};
+    use domelight::scene::{Material, Part, SceneDescription, load};
 
     #[test]
     fn what_is_written_is_read_again() {
@@ -66,10 +66,10 @@ mod tests {
             ..Mesh::default()
         };
         let tilted = vec3(0.6, 0.0, 0.8);
-        let part = |mesh| Part { name: String::new(), mesh, surface: 0 };
+        let part = |mesh| Part { name: String::new(), mesh, material: 0 };
         let scene = Scene::new(SceneDescription {
             parts: vec![part(square(vec![tilted; 4])), part(square(Vec::new()))],
-            surfaces: vec![Surface::diffuse("", Rgb::WHITE)],
+            materials: vec![Material::diffuse("", Rgb::WHITE)],
             ..SceneDescription::default()
         });
         let folder = tempfile::TempDir::new().unwrap();

@@ -7,13 +7,16 @@ use serde::{Deserialize, Serialize};
 
 use super::Bench;
 use super::bound::{Bound, occlusion_rate};
-use super::cases::{self, Built, Case, short};
-use super::contestant::{Contestant, Entry, HEADLINE, Judge, Limits, Prepared, Reached, Rung};
-use super::ladder::How;
+use super::cases::{self, BuiltCase, Case, short};
+use super::fit::Fit;
 use super::mitsuba::Mitsuba;
+use super::strategy_run::{
+    BenchStrategy, BudgetPoint, CostAtError, ErrorMetric, HEADLINE, Limits, StrategyEntry,
+    StrategyRun,
+};
 use super::table::{Table, number};
 use crate::args::bench::Peer;
-use crate::failure::warn;
+use crate::error::warn;
 use crate::measure::cache::Cache;
 use crate::measure::reference::{Goal, Reference, ReferenceReport};
 use crate::strategy::NamedStrategy;
@@ -59,7 +62,7 @@ pub(super) struct Row {
     bound: Bound,
     /// That are to be reached, the greatest first; in the suite `lecture` after that of SIR's picture.
     errors: Vec<f64>,
-    strategies: Vec<Entry>,
+    strategies: Vec<StrategyEntry>,
     /// Null if none was asked for, or it cannot show the case.
     peer: Option<PeerEntry>,
     peer_left_out: Option<String>,
@@ -72,7 +75,7 @@ struct PeerEntry {
     /// The mean of its converged picture over that of ours, luminance.
     mean_ratio: f64,
     #[serde(flatten)]
-    entry: Entry,
+    entry: StrategyEntry,
 }
 
 /// The lecture's statue at its counts.
@@ -116,18 +119,18 @@ fn run(
     let least = errors.last().copied().unwrap_or_default();
     let reference_error = arguments.reference_error;
     let reference_error = reference_error.unwrap_or(REFERENCE_ERROR.max(REFERENCE_PART * least));
-    let round = Round { bench, strategies, quality_of, errors, reference_error, cache, peer };
+    let runner = CaseRunner { bench, strategies, quality_of, errors, reference_error, cache, peer };
     for (i, case) in cases.iter().enumerate() {
         bench.progress(&format!("case {} of {}: {case}", i + 1, cases.len()));
-        let row = round.measure(case).with_context(|| case.to_string())?;
-        round.tell(&row);
+        let row = runner.measure(case).with_context(|| case.to_string())?;
+        runner.status(&row);
         rows.push(row);
     }
     Ok(())
 }
 
 /// What all cases share.
-struct Round<'a> {
+struct CaseRunner<'a> {
     bench: &'a Bench<'a>,
     strategies: Vec<NamedStrategy>,
     quality_of: Option<&'a str>,
@@ -138,63 +141,64 @@ struct Round<'a> {
     peer: Option<RefCell<Mitsuba>>,
 }
 
-impl Round<'_> {
+impl CaseRunner<'_> {
     fn measure(&self, case: &Case) -> Result<Row> {
         let quiet = self.bench.quiet;
         let arguments = self.bench.arguments;
         let cache = self.cache.as_ref();
         let built = case.build(arguments, quiet)?;
-        let Built { view, settings, time, .. } = &built;
+        let BuiltCase { view, settings, time, .. } = &built;
         let goal = |most| Goal::Noise { noise: self.reference_error, most };
-        let judge = Judge::new(Reference::of_view(
+        let metric = ErrorMetric::new(Reference::of_view(
             cache,
             view,
             *settings,
             goal(MOST_REFERENCE_SAMPLES),
             quiet,
         )?);
-        if judge.covered_pixels() == 0 {
+        if metric.covered_pixels() == 0 {
             bail!("the scene fills no pixel: there is nothing to compare");
         }
-        let bound = bound(&built, &judge);
-        let (mut peer_judge, mut peer_left_out) = (None, None);
+        let bound = bound(&built, &metric);
+        let (mut peer_metric, mut peer_left_out) = (None, None);
         if let Some(peer) = &self.peer {
             let mut mitsuba = peer.borrow_mut();
-            peer_left_out = mitsuba.load(&built, &case.look)?;
+            peer_left_out = mitsuba.load(&built, &case.material)?;
             if peer_left_out.is_none() {
                 let goal = goal(MOST_PEER_SAMPLES);
-                let reference = mitsuba.reference(cache, &built, &case.look, goal, quiet)?;
-                peer_judge = Some(Judge::new(reference));
+                let reference = mitsuba.reference(cache, &built, &case.material, goal, quiet)?;
+                peer_metric = Some(ErrorMetric::new(reference));
             }
         }
-        let prepared = self.strategies.iter().map(|s| Prepared::new(s, &built, arguments.seed));
+        let prepared =
+            self.strategies.iter().map(|s| BenchStrategy::new(s, &built, arguments.seed));
         let prepared = prepared.collect::<Result<Vec<_>>>()?;
-        let mut contestants: Vec<Contestant> =
-            prepared.iter().map(|p| Contestant::ours(p, &built, &judge)).collect();
-        if let (Some(peer), Some(judge)) = (&self.peer, &peer_judge) {
-            contestants.push(Contestant::mitsuba(peer, judge));
+        let mut runs: Vec<StrategyRun> =
+            prepared.iter().map(|p| StrategyRun::ours(p, &built, &metric)).collect();
+        if let (Some(peer), Some(metric)) = (&self.peer, &peer_metric) {
+            runs.push(StrategyRun::mitsuba(peer, metric));
         }
-        let errors = self.take_pictures(&mut contestants)?;
-        let mut entries: Vec<Entry> = Vec::new();
-        for (i, contestant) in contestants.into_iter().enumerate() {
+        let errors = self.measure_all(&mut runs)?;
+        let mut entries: Vec<StrategyEntry> = Vec::new();
+        for (i, run) in runs.into_iter().enumerate() {
             let is_ours = i < self.strategies.len();
-            entries.push(contestant.entry(&errors, is_ours.then_some(bound)));
+            entries.push(run.entry(&errors, is_ours.then_some(bound)));
         }
         let of_peer = entries.split_off(self.strategies.len()).pop();
-        let peer = of_peer.zip(peer_judge).map(|(entry, of_peer)| PeerEntry {
-            mean_ratio: mean(&of_peer) / mean(&judge),
+        let peer = of_peer.zip(peer_metric).map(|(entry, of_peer)| PeerEntry {
+            mean_ratio: mean(&of_peer) / mean(&metric),
             reference: of_peer.reference.report,
             entry,
         });
         Ok(Row {
             scene: case.scene.clone(),
             probe: case.probe.clone(),
-            material: case.look.to_string(),
+            material: case.material.to_string(),
             size: [settings.width, settings.height],
             triangles: view.scene.triangle_count(),
-            covered_pixels: judge.covered_pixels(),
+            covered_pixels: metric.covered_pixels(),
             build: *time,
-            reference: judge.reference.report,
+            reference: metric.reference.report,
             bound,
             errors,
             strategies: entries,
@@ -204,41 +208,41 @@ impl Round<'_> {
     }
 
     /// All pictures of all, seed by seed in turn; the errors that are to be reached.
-    fn take_pictures(&self, contestants: &mut [Contestant]) -> Result<Vec<f64>> {
+    fn measure_all(&self, runs: &mut [StrategyRun]) -> Result<Vec<f64>> {
         let arguments = self.bench.arguments;
         let seeds = || (0..u64::from(arguments.seeds)).map(|i| arguments.seed.wrapping_add(i));
         let mut errors = self.errors.clone();
         let optimum = self.strategies.iter().position(|s| Some(&s.text[..]) == self.quality_of);
         if let Some(optimum) = optimum {
-            errors.insert(0, contestants[optimum].error_at(1, seeds())?);
+            errors.insert(0, runs[optimum].error_at(1, seeds())?);
         }
         let limits = Limits {
             errors: errors.iter().fold((f64::INFINITY, 0.0), |(a, b), &e| (a.min(e), b.max(e))),
             most: arguments.most.into(),
             n_seeds: arguments.seeds,
         };
-        for contestant in &mut *contestants {
+        for run in &mut *runs {
             self.bench.check_interrupted()?;
-            contestant.choose_budgets(&limits)?;
+            run.choose_budgets(&limits)?;
         }
         for seed in seeds() {
-            for contestant in &mut *contestants {
+            for run in &mut *runs {
                 self.bench.check_interrupted()?;
-                contestant.take_all(seed)?;
+                run.measure_all(seed)?;
             }
         }
         Ok(errors)
     }
 
     /// What was found, in a line for each.
-    fn tell(&self, row: &Row) {
+    fn status(&self, row: &Row) {
         for entry in row.entries() {
             let cells: Vec<String> = entry.reached.iter().map(|r| cell(r.as_ref())).collect();
             self.bench.progress(&format!("  {:<12} CPU-s {}", entry.name, cells.join(", ")));
         }
         let quiet = self.bench.quiet;
-        let rungs = row.strategies.iter().filter_map(|entry| entry.rungs.last());
-        let least = rungs.map(Rung::error).fold(f64::INFINITY, f64::min);
+        let budget_points = row.strategies.iter().filter_map(|entry| entry.budget_points.last());
+        let least = budget_points.map(BudgetPoint::error).fold(f64::INFINITY, f64::min);
         if let Some(noise) = row.reference.rel_mse.filter(|&noise| noise > least) {
             let text = format!(
                 "the reference's own error (relMSE {noise:.1e}), which was taken off, is above the least one \
@@ -256,36 +260,36 @@ impl Round<'_> {
     }
 }
 
-fn bound(built: &Built, judge: &Judge) -> Bound {
+fn bound(built: &BuiltCase, metric: &ErrorMetric) -> Bound {
     let rate = occlusion_rate(&built.view, &built.settings);
-    let picture = &judge.reference.picture;
+    let picture = &metric.reference.picture;
     let unoccluded = picture.unoccluded.as_ref().unwrap_or(&picture.image);
-    Bound::new(&picture.image, unoccluded, &judge.covered, rate)
+    Bound::new(&picture.image, unoccluded, &metric.covered, rate)
 }
 
 /// Of the luminance of the covered pixels.
-fn mean(judge: &Judge) -> f64 {
-    let pixels = judge.reference.picture.image.pixels.iter().zip(&judge.covered);
+fn mean(metric: &ErrorMetric) -> f64 {
+    let pixels = metric.reference.picture.image.pixels.iter().zip(&metric.covered);
     let covered = pixels.filter(|(_, covered)| **covered);
     covered.map(|(pixel, _)| f64::from(pixel.luminance())).sum::<f64>()
-        / judge.covered_pixels() as f64
+        / metric.covered_pixels() as f64
 }
 
 /// CPU seconds, marked where they were not interpolated, and their range.
-fn cell(reached: Option<&Reached>) -> String {
+fn cell(reached: Option<&CostAtError>) -> String {
     let Some(reached) = reached else { return "–".to_owned() };
-    let range = match reached.range.filter(|_| reached.how == How::Interpolated) {
+    let range = match reached.range.filter(|_| reached.fit == Fit::Interpolated) {
         Some((low, high)) => format!(" ({}–{})", number(low), number(high)),
         None => String::new(),
     };
-    format!("{}{}{range}", mark(reached.how), number(reached.cpu_seconds))
+    format!("{}{}{range}", mark(reached.fit), number(reached.cpu_seconds))
 }
 
-fn mark(how: How) -> &'static str {
-    match how {
-        How::Interpolated => "",
-        How::Extrapolated => "~",
-        How::AtMost => "≤",
+fn mark(fit: Fit) -> &'static str {
+    match fit {
+        Fit::Interpolated => "",
+        Fit::Extrapolated => "~",
+        Fit::AtMost => "≤",
     }
 }
 
@@ -299,7 +303,7 @@ pub(super) fn lecture_tables(rows: &[Row]) -> Vec<Table> {
         for (i, entry) in row.strategies.iter().enumerate() {
             let Some(reached) = entry.reached.first() else { continue };
             let wall = reached
-                .map_or("–".to_owned(), |r| mark(r.how).to_owned() + &number(r.wall_seconds));
+                .map_or("–".to_owned(), |r| mark(r.fit).to_owned() + &number(r.wall_seconds));
             let error = row.errors.first().copied().unwrap_or(f64::NAN);
             table.rows.push(vec![
                 if i == 0 { row.name() } else { String::new() },
@@ -337,11 +341,14 @@ fn costs(rows: &[Row], first_error: usize) -> Table {
                 vec![if i == 0 { row.name() } else { String::new() }, entry.name.clone()];
             let inside = &entry.reached_covered[first_error..];
             cells.extend(reached.iter().chain(inside).map(|r| cell(r.as_ref())));
-            let near = |r: &&Reached| r.rel_mse <= HEADLINE;
+            let near = |r: &&CostAtError| r.rel_mse <= HEADLINE;
             let at = inside.iter().flatten().find(near).or(inside.iter().flatten().last());
             let of_bound = at.and_then(|reached| reached.efficiency_of_bound);
             cells.push(number(of_bound.unwrap_or(f64::NAN)));
-            let rate = entry.rungs.last().and_then(|rung| rung.rays_per_cpu_second);
+            let rate = entry
+                .budget_points
+                .last()
+                .and_then(|budget_point| budget_point.rays_per_cpu_second);
             cells.push(number(1e-6 * rate.unwrap_or(f64::NAN)));
             table.rows.push(cells);
         }
@@ -398,11 +405,11 @@ struct Ratio {
 }
 
 impl Ratio {
-    fn new(peer: &Reached, ours: &Reached) -> Self {
-        let mark = match (peer.how, ours.how) {
-            (How::Interpolated, How::Interpolated) => "",
-            (How::Interpolated, How::AtMost) => "≥",
-            (How::AtMost, How::Interpolated) => "≤",
+    fn new(peer: &CostAtError, ours: &CostAtError) -> Self {
+        let mark = match (peer.fit, ours.fit) {
+            (Fit::Interpolated, Fit::Interpolated) => "",
+            (Fit::Interpolated, Fit::AtMost) => "≥",
+            (Fit::AtMost, Fit::Interpolated) => "≤",
             _ => "~",
         };
         Self { value: peer.cpu_seconds / ours.cpu_seconds, mark }
@@ -429,13 +436,13 @@ impl Row {
     }
 
     /// All who took part.
-    fn entries(&self) -> impl Iterator<Item = &Entry> {
+    fn entries(&self) -> impl Iterator<Item = &StrategyEntry> {
         self.strategies.iter().chain(self.peer.iter().map(|peer| &peer.entry))
     }
 
     /// Who the other program is compared with: our product sampling, else the first strategy.
-    fn ours(&self) -> Option<&Entry> {
-        let is_product = |entry: &&Entry| entry.name.starts_with(OURS);
+    fn ours(&self) -> Option<&StrategyEntry> {
+        let is_product = |entry: &&StrategyEntry| entry.name.starts_with(OURS);
         self.strategies.iter().find(is_product).or_else(|| self.strategies.first())
     }
 }
@@ -444,12 +451,12 @@ impl Row {
 mod tests {
     use super::*;
 
-    fn reached(cpu_seconds: f64, how: How) -> Reached {
+    fn reached(cpu_seconds: f64, fit: Fit) -> CostAtError {
         let efficiency = 1e3 / cpu_seconds;
-        Reached {
+        CostAtError {
             rel_mse: 1e-3,
             cpu_seconds,
-            how,
+            fit,
             range: None,
             wall_seconds: cpu_seconds,
             efficiency,
@@ -459,7 +466,7 @@ mod tests {
 
     #[test]
     fn ratios_say_what_they_are() {
-        use How::{AtMost, Extrapolated, Interpolated};
+        use Fit::{AtMost, Extrapolated, Interpolated};
         let text = |peer, ours| Ratio::new(&reached(3.0, peer), &reached(0.2, ours)).text();
         assert_eq!(text(Interpolated, Interpolated), "15.0");
         assert_eq!(text(Interpolated, AtMost), "≥15.0");

@@ -11,9 +11,9 @@ use super::machine::Machine;
 use super::table::Table;
 use super::{kernels, renders, rigs};
 use crate::args::bench::Suite;
-use crate::failure::UsageError;
+use crate::command_line;
+use crate::error::UsageError;
 use crate::files;
-use crate::typed;
 
 /// Raised when a file of before can no longer be read.
 const SCHEMA: u32 = 1;
@@ -53,7 +53,7 @@ impl Results {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
-            command: typed::command(),
+            command: command_line::command(),
             machine: Machine::this(),
             threads: rayon::current_num_threads(),
             complete: false,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Bench;
 use super::cases::{self, short};
-use super::contestant::median;
+use super::strategy_run::median;
 use super::table::{Table, number};
 use crate::usage::Stopwatch;
 
@@ -29,7 +29,7 @@ pub(super) struct Row {
     cpu_seconds: Vec<f64>,
     /// The irradiance of all lights against that of the map, the greatest difference of a channel relative to it.
     flux_error: f64,
-    /// Root mean square of the shading relative to that of the map's: a matt surface, and the lobe cos²⁰.
+    /// Root mean square of the shading relative to that of the map's: a matte surface, and the lobe cos²⁰.
     diffuse_error: f64,
     glossy_error: f64,
 }
@@ -108,7 +108,7 @@ fn flux_error(environment: &Environment, rig: &Rig) -> f64 {
 }
 
 pub(super) fn tables(rows: &[Row]) -> Vec<Table> {
-    let head = ["probe", "map", "method", "lights", "CPU-s", "flux error", "matt %", "glossy %"];
+    let head = ["probe", "map", "method", "lights", "CPU-s", "flux error", "matte %", "glossy %"];
     let mut table = Table::new("Rigs of lights", &head);
     for row in rows {
         table.rows.push(vec![
@@ -122,8 +122,8 @@ pub(super) fn tables(rows: &[Row]) -> Vec<Table> {
             number(100.0 * row.glossy_error),
         ]);
     }
-    let note = "CPU-s: the median of repetitions. Errors: of the flux, relative; of what a matt surface and a lobe \
-                cos²⁰ see over 600 normals, root mean squares in per cent.";
+    let note = "CPU-s: the median of repetitions. Errors: of the flux, relative; of what a matte surface and a lobe \
+                cos²⁰ see over 600 normals, root mean squares in percent.";
     table.notes.push(note.to_owned());
     vec![table]
 }

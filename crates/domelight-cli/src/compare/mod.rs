@@ -1,11 +1,11 @@
 //! `domelight compare`: strategies on one scene at equal samples, rays or time.
 
 mod budget;
-mod entrant;
 mod page;
 mod pixels;
 mod plots;
 mod report;
+mod strategy_run;
 
 use std::path::Path;
 
@@ -14,27 +14,27 @@ use domelight::RgbImage;
 use domelight::picture::compare::relative_error_map;
 use domelight::picture::flip::{PIXELS_PER_DEGREE, ldr_flip};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
-use domelight::render::{RenderSettings, survey};
+use domelight::render::{RenderSettings, pilot_points};
 use domelight::strategy::{PreparedStrategy, StrategyKind};
 
 pub(crate) use budget::Budget;
 
 use crate::args::compare::CompareArguments;
-use crate::failure::{UsageError, tell, warn, warn_of_non_finite};
+use crate::command_line;
+use crate::error::{UsageError, status, warn, warn_of_non_finite};
 use crate::files;
 use crate::interrupt;
 use crate::measure::cache::Cache;
 use crate::measure::reference::{Goal, Reference, Source};
-use crate::measure::shot::Studio;
+use crate::measure::render::RenderSetup;
 use crate::memory;
 use crate::output::print_json;
-use crate::scene::{View, start_threads};
+use crate::parse::Size;
+use crate::scene::{PreparedScene, start_threads};
 use crate::strategy::{NamedStrategy, refuse_repeating_points};
-use crate::typed;
 use crate::usage::Stopwatch;
-use crate::values::Size;
-use entrant::{Entrant, Measured, Purchase};
 use report::{CompareReport, ResultReport, StrategyReport};
+use strategy_run::{SampleCount, StrategyMeasurement, StrategyRun};
 
 /// The relMSE of the reference should be this far below the least that is measured against it.
 const CONVERGED: f64 = 0.2;
@@ -61,18 +61,18 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
         Some(reference) => reference,
         None => converged(arguments, &view, quiet)?,
     };
-    let competition = Competition { arguments, view: &view, reference: &reference, quiet };
-    let (report, pictures) = competition.run()?;
+    let comparison = Comparison { arguments, view: &view, reference: &reference, quiet };
+    let (report, pictures) = comparison.run()?;
     report.warn(quiet);
     write(arguments, &report, &pictures, &reference.picture.image)?;
     if !quiet {
-        report.summarise(&arguments.output);
+        report.summarize(&arguments.output);
     }
     Ok(())
 }
 
 /// The reference that the cache may have.
-fn converged(arguments: &CompareArguments, view: &View, quiet: bool) -> Result<Reference> {
+fn converged(arguments: &CompareArguments, view: &PreparedScene, quiet: bool) -> Result<Reference> {
     let cache = Cache::unless(arguments.no_cache, arguments.cache.as_deref(), quiet);
     let settings = arguments.scene.render_settings(&arguments.pixel, 1);
     let goal = Goal::Samples(arguments.reference_spp);
@@ -117,14 +117,14 @@ struct Picture {
 }
 
 /// All that the strategies share.
-struct Competition<'a> {
+struct Comparison<'a> {
     arguments: &'a CompareArguments,
-    view: &'a View,
+    view: &'a PreparedScene,
     reference: &'a Reference,
     quiet: bool,
 }
 
-impl Competition<'_> {
+impl Comparison<'_> {
     /// Measures all strategies; a picture for each that took part.
     fn run(&self) -> Result<(CompareReport, Vec<Option<Picture>>)> {
         let arguments = self.arguments;
@@ -133,7 +133,7 @@ impl Competition<'_> {
         let mut pictures = Vec::new();
         for strategy in &arguments.strategies {
             let (report, picture) = self
-                .enter(strategy, settings)
+                .measure(strategy, settings)
                 .with_context(|| format!("strategy {}", strategy.text))?;
             strategies.push(report);
             pictures.push(picture);
@@ -142,7 +142,7 @@ impl Competition<'_> {
         compare_with(of_mis, &mut strategies);
         let report = CompareReport {
             version: env!("CARGO_PKG_VERSION"),
-            command: typed::command(),
+            command: command_line::command(),
             budget: arguments.budget,
             scene: self.view.report.clone(),
             sampler: format!("{:?}", settings.sampler).to_lowercase(),
@@ -157,20 +157,21 @@ impl Competition<'_> {
         Ok((report, pictures))
     }
 
-    fn enter(
+    fn measure(
         &self,
         strategy: &NamedStrategy,
         settings: RenderSettings,
     ) -> Result<(StrategyReport, Option<Picture>)> {
-        let View { scene, camera, environment, .. } = self.view;
+        let PreparedScene { scene, camera, environment, .. } = self.view;
         let mut watch = Stopwatch::start();
-        let points = || survey(scene, camera, &settings);
+        let points = || pilot_points(scene, camera, &settings);
         let spec = strategy.spec.for_scene(points, environment, settings.seed);
         let prepared = PreparedStrategy::new(spec, environment)?;
         let setup = watch.lap();
-        let studio = Studio { view: self.view, settings, strategy: &prepared, quiet: self.quiet };
-        let entrant = Entrant {
-            studio,
+        let render_setup =
+            RenderSetup { view: self.view, settings, strategy: &prepared, quiet: self.quiet };
+        let run = StrategyRun {
+            render_setup,
             label: strategy.text.clone(),
             reference: &self.reference.picture.image,
             reference_noise: self.reference.report.rel_mse.unwrap_or(0.0),
@@ -184,14 +185,14 @@ impl Competition<'_> {
             left_out: None,
             result: None,
         };
-        match entrant.calibrate(self.arguments.budget)? {
-            Purchase::TooDear(why) => {
+        match run.calibrate(self.arguments.budget)? {
+            SampleCount::OverBudget(why) => {
                 report.left_out = Some(why);
                 Ok((report, None))
             }
-            Purchase::Samples(n) => {
+            SampleCount::Samples(n) => {
                 refuse_repeating_points(spec, n)?;
-                let measured = entrant.measure(n)?;
+                let measured = run.measure(n)?;
                 let picture = self.picture(&measured)?;
                 report.result = ResultReport::new(&measured, &picture.flip);
                 Ok((report, Some(picture)))
@@ -199,7 +200,7 @@ impl Competition<'_> {
         }
     }
 
-    fn picture(&self, measured: &Measured) -> Result<Picture> {
+    fn picture(&self, measured: &StrategyMeasurement) -> Result<Picture> {
         let reference = &self.reference.picture.image;
         let tone = ToneMapping { exposure: self.arguments.exposure, curve: ToneCurve::Srgb };
         let shown = |image: &RgbImage| {
@@ -216,7 +217,7 @@ impl Competition<'_> {
 }
 
 impl ResultReport {
-    fn new(measured: &Measured, flip: &[f32]) -> Option<Self> {
+    fn new(measured: &StrategyMeasurement, flip: &[f32]) -> Option<Self> {
         let last = measured.steps.last()?;
         Some(Self {
             spp: last.spp,
@@ -298,7 +299,7 @@ impl CompareReport {
     }
 
     /// A line a strategy on standard error.
-    fn summarise(&self, output: &Path) {
+    fn summarize(&self, output: &Path) {
         let width = self.strategies.iter().map(|s| s.name.chars().count()).max().unwrap_or(0);
         for StrategyReport { name, result, unbiased, .. } in &self.strategies {
             let Some(r) = result else { continue };
@@ -306,11 +307,11 @@ impl CompareReport {
             let bias = if *unbiased { "" } else { ", biased" };
             let ratio = r.efficiency_ratio_to_mis;
             let ratio = ratio.map_or(String::new(), |x| format!(", efficiency {x:.2} of mis"));
-            tell(&format!(
+            status(&format!(
                 "{name:width$}  {:>6} spp  {:>7.1} rays  {:>7.3} CPU-s  relMSE {:.2e}{sd}{ratio}{bias}",
                 r.spp, r.rays, r.cpu_seconds.mean, r.rel_mse.mean
             ));
         }
-        tell(&format!("-> {}", output.display()));
+        status(&format!("-> {}", output.display()));
     }
 }

@@ -49,18 +49,18 @@
 
   const state = { mode: "radiance", exposure: report.exposure, tone: "srgb", zoom: 1, x: 0.5, y: 0.5, divider: 0.5, left: 1, right: 0 };
   const best = bestOf((result) => -result.rel_mse.mean);
-  if (shown.length > 1) state.left = 1 + entrants().findIndex((s) => s.name === "mis" || s.name.startsWith("mis:"));
+  if (shown.length > 1) state.left = 1 + measured().findIndex((s) => s.name === "mis" || s.name.startsWith("mis:"));
   if (state.left < 1) state.left = Math.min(1, shown.length - 1);
-  if (best && shown.length > 2) state.right = 1 + entrants().indexOf(best);
+  if (best && shown.length > 2) state.right = 1 + measured().indexOf(best);
   if (state.right === state.left) state.right = 0;
 
-  function entrants() { return report.strategies.filter((s) => s.result); }
-  function bestOf(merit, among = entrants()) {
+  function measured() { return report.strategies.filter((s) => s.result); }
+  function bestOf(merit, among = measured()) {
     return among.reduce((a, b) => (a && merit(a.result) >= merit(b.result) ? a : b), null);
   }
   // A biased strategy is as quick as it is wrong.
   function mostEfficient() {
-    return bestOf((result) => result.efficiency, entrants().filter((s) => s.unbiased));
+    return bestOf((result) => result.efficiency, measured().filter((s) => s.unbiased));
   }
 
   // ---- From radiance to the screen. A value is mantissa · 2^(exponent − 136): one byte of each, so a
@@ -115,12 +115,12 @@
     entry.stale = false;
   }
 
-  // ---- Viewers: the stage with two pictures, the grid with all; one zoom and place for all.
+  // ---- Viewers: the pair of two pictures, the grid with all; one zoom and place for all.
 
-  const stage = { box: $("stage"), canvas: $("stage").querySelector("canvas") };
+  const pairViewer = { box: $("pair-viewer"), canvas: $("pair-viewer").querySelector("canvas") };
   const cards = shown.map((entry, i) => card(entry, i));
-  const viewers = [stage, ...cards];
-  document.documentElement.style.setProperty("--stage", `min(100%, calc(86vh * ${width / height}))`);
+  const viewers = [pairViewer, ...cards];
+  document.documentElement.style.setProperty("--viewer-width", `min(100%, calc(86vh * ${width / height}))`);
 
   function card(entry, i) {
     const figure = document.createElement("figure");
@@ -183,7 +183,7 @@
     state.x = Math.min(Math.max(state.x, half), 1 - half);
     state.y = Math.min(Math.max(state.y, half), 1 - half);
     const [left, right] = [shown[state.left], shown[state.right]];
-    draw(stage.canvas, (context, put, w, h) => {
+    draw(pairViewer.canvas, (context, put, w, h) => {
       put(right);
       context.save();
       context.beginPath();
@@ -192,7 +192,7 @@
       put(left);
       context.restore();
     });
-    stage.canvas.setAttribute("aria-label", `${left.name} on the left, ${right.name} on the right`);
+    pairViewer.canvas.setAttribute("aria-label", `${left.name} on the left, ${right.name} on the right`);
     for (const card of cards) {
       draw(card.canvas, (_, put) => put(card.entry));
       card.canvas.setAttribute("aria-label", card.entry.name);
@@ -247,7 +247,7 @@
     const pointers = new Map();
     box.addEventListener("wheel", (event) => {
       // Over the grid the wheel scrolls the page until a picture has the focus.
-      const takes = box === stage.box || event.ctrlKey || box.contains(document.activeElement);
+      const takes = box === pairViewer.box || event.ctrlKey || box.contains(document.activeElement);
       if (!takes || (state.zoom === 1 && event.deltaY > 0 && !event.ctrlKey)) return;
       event.preventDefault();
       const lines = event.deltaMode === 1 ? 24 : event.deltaMode === 2 ? 240 : 1;
@@ -319,7 +319,7 @@
     divider.focus({ preventScroll: true });
   });
   divider.addEventListener("pointermove", (event) => {
-    if (divider.hasPointerCapture(event.pointerId)) divide(fraction(stage.box, event)[0]);
+    if (divider.hasPointerCapture(event.pointerId)) divide(fraction(pairViewer.box, event)[0]);
   });
   divider.addEventListener("keydown", (event) => {
     const step = event.shiftKey ? 0.1 : 0.02;
@@ -374,7 +374,7 @@
       : [0, 0.25, 0.5, 0.75, 1].map((v) => [v, String(v)]);
     if (relative) { ticks[0][1] = "≤ " + ticks[0][1]; ticks[decades][1] = "≥ " + ticks[decades][1]; }
     $("scale-name").textContent = relative ? "Relative error of each pixel" : "ꟻLIP: difference that the eye sees";
-    $("scale-bar").setAttribute("aria-label", `Colours from ${ticks[0][1]} to ${ticks[ticks.length - 1][1]}`);
+    $("scale-bar").setAttribute("aria-label", `Colors from ${ticks[0][1]} to ${ticks[ticks.length - 1][1]}`);
     $("scale-ticks").replaceChildren(...ticks.map(([at, text]) => {
       const tick = element("span", "", text);
       tick.style.left = `${100 * at}%`;
@@ -474,7 +474,7 @@
     if (kind === "spp") add("Equal camera samples: rays and time differ.");
     const biased = report.strategies.filter((s) => !s.unbiased).map((s) => s.name);
     if (biased.length) add(`Biased: ${biased.join(", ")}. Fixed lights leave an error that more samples do not take away (what does fall is that of edges within pixels); their efficiency says little.`);
-    if (entrants().every((s) => s.result.error_ratio_to_mis === null)) add("Without mis in the list there is nothing to take ratios to.");
+    if (measured().every((s) => s.result.error_ratio_to_mis === null)) add("Without mis in the list there is nothing to take ratios to.");
   }
 
   function settings() {
@@ -501,7 +501,7 @@
   notes();
   settings();
   legend();
-  new ResizeObserver(refresh).observe(stage.box);
+  new ResizeObserver(refresh).observe(pairViewer.box);
   for (const { box } of cards) new ResizeObserver(refresh).observe(box);
   paintAll();
   document.documentElement.dataset.ready = "true";

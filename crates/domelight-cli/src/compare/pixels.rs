@@ -1,4 +1,4 @@
-//! Pictures as text for a page: planes of bytes, each the difference from its left neighbour,
+//! Pictures as text for a page: planes of bytes, each the difference from its left neighbor,
 //! compressed (zlib) and in base64. A page needs no canvas to read them, so no browser's protection
 //! against fingerprinting touches them.
 
@@ -36,7 +36,7 @@ pub(super) fn unit(values: &[f32], width: usize) -> Result<String> {
     pack(values.iter().map(|&v| byte(v)), width)
 }
 
-/// The 256 colours of a scale, sRGB bytes.
+/// The 256 colors of a scale, sRGB bytes.
 pub(super) fn colors(scale: ColorScale) -> String {
     let colors = (0..256)
         .flat_map(|i| scale.color(i as f32 / 255.0).map(srgb_from_linear).to_array().map(byte));

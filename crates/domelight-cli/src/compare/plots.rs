@@ -1,7 +1,7 @@
 //! Error over rays and over time.
 
-use super::entrant::Step;
 use super::report::{CompareReport, ResultReport};
+use super::strategy_run::ConvergencePoint;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE, Rect};
 
@@ -15,7 +15,7 @@ pub(super) enum Cost {
 /// relMSE of every strategy on its way to the budget, both axes logarithmic; bars are ± one standard
 /// deviation over the seeds.
 pub(super) fn convergence(report: &CompareReport, cost: Cost) -> String {
-    let x = |step: &Step| match cost {
+    let x = |step: &ConvergencePoint| match cost {
         Cost::Rays => step.rays,
         Cost::Seconds => step.cpu_seconds.mean,
     };
@@ -45,8 +45,8 @@ pub(super) fn convergence(report: &CompareReport, cost: Cost) -> String {
     sheet.to_svg()
 }
 
-fn points(result: &ResultReport, x: impl Fn(&Step) -> f64) -> Vec<Datum> {
-    let datum = |step: &Step| Datum {
+fn points(result: &ResultReport, x: impl Fn(&ConvergencePoint) -> f64) -> Vec<Datum> {
+    let datum = |step: &ConvergencePoint| Datum {
         error: step.rel_mse.sd.is_some().then(|| ends(step)),
         ..Datum::new(x(step), step.rel_mse.mean)
     };
@@ -54,7 +54,7 @@ fn points(result: &ResultReport, x: impl Fn(&Step) -> f64) -> Vec<Datum> {
 }
 
 /// The ends of the error bar; where it would reach 0, a fifth of the mean is as low as it goes.
-fn ends(step: &Step) -> (f64, f64) {
+fn ends(step: &ConvergencePoint) -> (f64, f64) {
     let mean = step.rel_mse.mean;
     let sd = step.rel_mse.sd.unwrap_or(0.0);
     ((mean - sd).max(0.2 * mean), mean + sd)

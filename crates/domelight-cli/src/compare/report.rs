@@ -3,7 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use super::budget::Budget;
-use super::entrant::{Spread, Step};
+use super::strategy_run::{ConvergencePoint, MeanAndDeviation};
 use crate::measure::reference::ReferenceReport;
 use crate::report::SceneReport;
 
@@ -53,8 +53,8 @@ pub(super) struct ResultReport {
     pub(super) camera_samples: f64,
     /// Shadow rays of a pixel that the scene covers, as counted; the mean over seeds.
     pub(super) rays: f64,
-    pub(super) cpu_seconds: Spread,
-    pub(super) rel_mse: Spread,
+    pub(super) cpu_seconds: MeanAndDeviation,
+    pub(super) rel_mse: MeanAndDeviation,
     /// Mean ꟻLIP of the first seed's picture.
     pub(super) flip: f64,
     /// The part of relMSE that more samples do not take away: an estimate, which may be below 0, without the reference's
@@ -70,7 +70,7 @@ pub(super) struct ResultReport {
     pub(super) efficiency_ratio_to_mis: Option<f64>,
     /// Camera samples that were NaN or infinite, over all seeds.
     pub(super) non_finite_samples: u64,
-    pub(super) convergence: Vec<Step>,
+    pub(super) convergence: Vec<ConvergencePoint>,
 }
 
 fn as_text<S: Serializer>(budget: &Budget, serializer: S) -> Result<S::Ok, S::Error> {

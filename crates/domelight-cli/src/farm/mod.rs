@@ -14,7 +14,7 @@ use domelight::code;
 use domelight::quote::{Code, Shell, Yaml, shell};
 
 use crate::args::farm::{Engine, FarmArguments};
-use crate::failure::{UsageError, tell};
+use crate::error::{UsageError, status};
 use crate::files;
 use crate::output::print_code;
 use crate::strategy::refuse_repeating_points;
@@ -83,7 +83,7 @@ pub(crate) fn run(arguments: &FarmArguments, quiet: bool) -> Result<()> {
         let path = farm.path(file.name);
         files::write(Path::new(&path), |out| out.write_all(file.text.as_bytes()))?;
         if !quiet {
-            tell(&format!("wrote {path}"));
+            status(&format!("wrote {path}"));
         }
     }
     print_code(&command)?;

@@ -4,7 +4,7 @@ use domelight::code;
 use domelight::quote::{Shell, shell};
 
 use super::{Farm, File, Submission};
-use crate::failure::UsageError;
+use crate::error::UsageError;
 
 /// `render.sh`, which can be run again until all is there.
 ///

@@ -4,12 +4,12 @@ use anyhow::Result;
 use domelight::code;
 use domelight::quote::Html;
 use domelight::sampling::SamplerKind;
-use domelight::strategy::{Proposal, Stop, StrategySpec};
+use domelight::strategy::{Proposal, StoppingRule, StrategySpec};
 
+use super::context::{FigureContext, Subject};
 use super::figure::{Figure, Row, Table, number, plot_panel};
 use super::formulas;
 use super::four_ways::{mis, sir};
-use super::studio::{Studio, Subject};
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE};
 
@@ -18,18 +18,18 @@ const MATERIAL: &str = "phong:50:1:0.5";
 const CANDIDATES: u32 = 4;
 const TRIES: u32 = 8;
 
-/// A plan for a number of rays or lights.
-type PlanFor = fn(u32) -> StrategySpec;
+/// The strategy for a number of rays or lights.
+type SpecFor = fn(u32) -> StrategySpec;
 
 /// What is compared, by name.
-const METHODS: [(&str, PlanFor); 7] = [
+const METHODS: [(&str, SpecFor); 7] = [
     ("EM", |n| StrategySpec::Environment { n_samples: n }),
     ("BRDF", |n| StrategySpec::Brdf { n_samples: n }),
     ("MIS", |n| mis(n.div_ceil(2))),
     ("SIR, M = 4 N", |n| sir(n, Some(CANDIDATES * n))),
     ("rejection", |n| StrategySpec::Rejection {
         proposal: Proposal::Tighter,
-        stop: Stop::Tries(TRIES * n),
+        stop: StoppingRule::Tries(TRIES * n),
     }),
     ("median cut", |n| StrategySpec::MedianCut { n_lights: n }),
     ("variance minimization", |n| StrategySpec::VarianceMinimization { n_lights: n }),
@@ -84,9 +84,9 @@ impl Curve {
     }
 }
 
-pub(crate) fn make(studio: &Studio) -> Result<Figure> {
-    let counts: &[u32] = studio.choose(&[1, 4, 16, 64, 256], &[1, 4, 16]);
-    let n_seeds = studio.choose(3, 2);
+pub(crate) fn make(context: &FigureContext) -> Result<Figure> {
+    let counts: &[u32] = context.choose(&[1, 4, 16, 64, 256], &[1, 4, 16]);
+    let n_seeds = context.choose(3, 2);
     let mut table = Table::new(&[
         "numbers",
         "method",
@@ -99,8 +99,8 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     ]);
     let mut slopes =
         Table::new(&["method", "slope, independent numbers", "slope, Owen-scrambled Sobol’"]);
-    let independent = curves(studio, counts, n_seeds, SamplerKind::Independent)?;
-    let sobol = curves(studio, counts, n_seeds, SamplerKind::Sobol)?;
+    let independent = curves(context, counts, n_seeds, SamplerKind::Independent)?;
+    let sobol = curves(context, counts, n_seeds, SamplerKind::Sobol)?;
     for (name, curves) in [("independent", &independent), ("sobol", &sobol)] {
         for curve in curves {
             for p in &curve.points {
@@ -149,25 +149,25 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
 }
 
 fn curves(
-    studio: &Studio,
+    context: &FigureContext,
     counts: &[u32],
     n_seeds: u64,
     sampler: SamplerKind,
 ) -> Result<Vec<Curve>> {
-    let (width, height) = studio.choose((88, 124), (11, 16));
-    let shot = studio.shot(Subject::Alone(MATERIAL), width, height)?;
+    let (width, height) = context.choose((88, 124), (11, 16));
+    let figure_scene = context.scene(Subject::Alone(MATERIAL), width, height)?;
     let mut curves = Vec::new();
-    for (name, plan) in METHODS {
+    for (name, spec) in METHODS {
         let mut points = Vec::new();
         for &n in counts {
             let (mut errors, mut rays, mut seconds) = (Vec::new(), 0.0, 0.0);
             for seed in 0..n_seeds {
                 let measured =
-                    shot.measure_with(plan(n), studio.seed.wrapping_add(seed), sampler)?;
-                let taken = measured.taken;
+                    figure_scene.measure_with(spec(n), context.seed.wrapping_add(seed), sampler)?;
+                let render = measured.render;
                 errors.push(measured.rel_mse.sqrt());
-                rays += taken.shadow_rays as f64 / taken.points.max(1) as f64 / n_seeds as f64;
-                seconds += taken.seconds / n_seeds as f64;
+                rays += render.shadow_rays as f64 / render.points.max(1) as f64 / n_seeds as f64;
+                seconds += render.seconds / n_seeds as f64;
             }
             points.push(Point { n, rays, seconds, errors });
         }

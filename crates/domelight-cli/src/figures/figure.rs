@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 
 use crate::files;
 use crate::svg::plot::Plot;
-use crate::svg::{Anchor, Color, Document, Pixels, Rect, Style, TextStyle, rasterise, superscript};
+use crate::svg::{Anchor, Color, Document, Pixels, Rect, Style, TextStyle, rasterize, superscript};
 
 /// One of the lecture's figures.
 pub(crate) struct Figure {
@@ -109,7 +109,7 @@ impl Figure {
     pub(crate) fn write(&self, folder: &Path, scale: f32) -> Result<()> {
         let n = self.number;
         let sheet = self.sheet();
-        write(&folder.join(format!("figure-{n}.png")), &rasterise(&sheet.to_svg(), scale)?)?;
+        write(&folder.join(format!("figure-{n}.png")), &rasterize(&sheet.to_svg(), scale)?)?;
         if let (true, Some(table)) = (self.has_data, self.tables.first()) {
             write(&folder.join(format!("figure-{n}.csv")), table.csv().as_bytes())?;
             write(&folder.join(format!("figure-{n}.json")), table.json()?.as_bytes())?;
@@ -201,7 +201,7 @@ pub(crate) fn picture_panel(picture: &Picture, over: impl FnOnce(&mut Document, 
     panel.clipped(place, |panel| over(panel, place));
     for (i, note) in notes.iter().enumerate() {
         let y = place.y + height + (i + 1) as f64 * (NOTE + 5.0);
-        panel.text((0.0, y), note, TextStyle::new(NOTE).color(Color::GREY));
+        panel.text((0.0, y), note, TextStyle::new(NOTE).color(Color::GRAY));
     }
     panel
 }
@@ -213,13 +213,13 @@ pub(crate) fn plot_panel(plot: &Plot, width: f64, height: f64) -> Document {
     panel
 }
 
-/// A colour scale as a strip, with numbers at its ends and middle.
+/// A color scale as a strip, with numbers at its ends and middle.
 pub(crate) fn scale_panel(height: f64, png: &[u8], labels: &[String; 3], title: &str) -> Document {
     let mut panel = Document::new(120.0, height);
     let place = Rect::new(6.0, 44.0, 22.0, height - 60.0);
     panel.text((0.0, 19.0), title, TextStyle::new(16.0));
     panel.image(place, png, Pixels::Smooth);
-    panel.rect(place, Style::stroke(Color::GREY, 1.0));
+    panel.rect(place, Style::stroke(Color::GRAY, 1.0));
     for (label, y) in
         labels.iter().zip([place.y + place.height, place.y + 0.5 * place.height, place.y])
     {

@@ -6,11 +6,11 @@ use domelight::quote::Code;
 use domelight::sampling::Heuristic;
 use domelight::strategy::{Candidates, Resampling, StrategySpec};
 
+use super::context::{FigureContext, FigureScene, Measurement, Subject};
 use super::figure::{
     Figure, Picture, Radiance, Row, Table, count, number, picture_panel, plot_panel, png_bytes,
 };
 use super::formulas;
-use super::studio::{Measured, Shot, Studio, Subject};
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE, Pixels};
 
@@ -47,8 +47,8 @@ pub(super) fn mis(each: u32) -> StrategySpec {
     }
 }
 
-pub(crate) fn make(studio: &Studio) -> Result<Figure> {
-    let (width, height) = studio.choose(SIZE, (SIZE.0 / 8, SIZE.1 / 8));
+pub(crate) fn make(context: &FigureContext) -> Result<Figure> {
+    let (width, height) = context.choose(SIZE, (SIZE.0 / 8, SIZE.1 / 8));
     let mut figure = Figure {
         number: 4,
         title: "Environment, BRDF, both, and their product",
@@ -70,26 +70,27 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     };
     let mut plots = Vec::new();
     for (name, material) in MATERIALS {
-        let shot = studio.shot(Subject::Alone(material), width, height)?;
-        let lecture = at_lectures_counts(&shot)?;
-        let seconds = lecture[0].measured.taken.seconds;
-        let equal = in_equal_time(&shot, seconds)?;
+        let figure_scene = context.scene(Subject::Alone(material), width, height)?;
+        let lecture = at_lectures_counts(&figure_scene)?;
+        let seconds = lecture[0].measured.render.seconds;
+        let equal = in_equal_time(&figure_scene, seconds)?;
         plots.push(plot(name, &lecture, &equal));
         let heading = format!("{name}: the lecture's counts, and MIS in the time of SIR");
-        add(&mut figure, &shot, name, "lecture", &heading, lecture)?;
+        add(&mut figure, &figure_scene, name, "lecture", &heading, lecture)?;
         let heading = format!("{name}: equal time, {} CPU s each", number(seconds));
-        add(&mut figure, &shot, name, "equal time", &heading, equal)?;
+        add(&mut figure, &figure_scene, name, "equal time", &heading, equal)?;
     }
     figure.rows.push(Row::new("Error over time, at the lecture's counts and at equal time", plots));
     for (name, material) in MORE {
-        let shot = studio.shot(Subject::Alone(material), width, height)?;
-        let em = Shown::new("EM", &shot, StrategySpec::Environment { n_samples: EM })?;
-        let seconds = em.measured.taken.seconds;
-        let resampled = equal_time(&shot, seconds, SIR.0, tuned_sir(&shot))?;
+        let figure_scene = context.scene(Subject::Alone(material), width, height)?;
+        let em =
+            ShownStrategy::new("EM", &figure_scene, StrategySpec::Environment { n_samples: EM })?;
+        let seconds = em.measured.render.seconds;
+        let resampled = equal_time(&figure_scene, seconds, SIR.0, tuned_sir(&figure_scene))?;
         let heading =
             format!("{name}: environment against product, {} CPU s each", number(seconds));
-        let resampled = Shown::new("Bidirectional: SIR", &shot, resampled)?;
-        add(&mut figure, &shot, name, "equal time", &heading, vec![em, resampled])?;
+        let resampled = ShownStrategy::new("Bidirectional: SIR", &figure_scene, resampled)?;
+        add(&mut figure, &figure_scene, name, "equal time", &heading, vec![em, resampled])?;
     }
     Ok(figure)
 }
@@ -108,16 +109,16 @@ const CAPTION: &str = "<p>One camera ray a pixel, the same in all pictures; what
     give half the answer.</p>";
 
 /// A picture with its name.
-struct Shown {
+struct ShownStrategy {
     title: String,
-    plan: StrategySpec,
-    measured: Measured,
+    spec: StrategySpec,
+    measured: Measurement,
 }
 
-impl Shown {
-    fn new(name: &str, shot: &Shot, plan: StrategySpec) -> Result<Self> {
-        let plan = shot.complete(plan);
-        let counts = match plan {
+impl ShownStrategy {
+    fn new(name: &str, figure_scene: &FigureScene, spec: StrategySpec) -> Result<Self> {
+        let spec = figure_scene.complete(spec);
+        let counts = match spec {
             StrategySpec::Brdf { n_samples } | StrategySpec::Environment { n_samples } => {
                 n_samples.to_string()
             }
@@ -129,12 +130,12 @@ impl Shown {
             }
             _ => String::new(),
         };
-        Ok(Self { title: format!("{name} {counts}"), plan, measured: shot.measure(plan)? })
+        Ok(Self { title: format!("{name} {counts}"), spec, measured: figure_scene.measure(spec)? })
     }
 
-    /// What the plot and the colours know it by.
+    /// What the plot and the colors know it by.
     fn kind(&self) -> usize {
-        match self.plan {
+        match self.spec {
             StrategySpec::Environment { .. } => 0,
             StrategySpec::Brdf { .. } => 1,
             StrategySpec::Mis { .. } => 2,
@@ -154,9 +155,9 @@ fn scaled_candidates(n: u32) -> u32 {
 }
 
 /// Resampling by the ratio of candidates to rays that a pilot finds best here.
-fn tuned_sir(shot: &Shot) -> impl Fn(u32) -> StrategySpec + use<> {
+fn tuned_sir(figure_scene: &FigureScene) -> impl Fn(u32) -> StrategySpec + use<> {
     const PILOT: u32 = 64;
-    let ratio = match shot.complete(sir(PILOT, None)) {
+    let ratio = match figure_scene.complete(sir(PILOT, None)) {
         StrategySpec::Sir { n_candidates: Some(m), .. } => m / PILOT,
         _ => 1,
     };
@@ -164,66 +165,78 @@ fn tuned_sir(shot: &Shot) -> impl Fn(u32) -> StrategySpec + use<> {
 }
 
 /// The lecture's four, and how far both factors come in the time of the last.
-fn at_lectures_counts(shot: &Shot) -> Result<Vec<Shown>> {
+fn at_lectures_counts(figure_scene: &FigureScene) -> Result<Vec<ShownStrategy>> {
     let mut shown = vec![
-        Shown::new("EM", shot, StrategySpec::Environment { n_samples: EM })?,
-        Shown::new("BRDF", shot, StrategySpec::Brdf { n_samples: BRDF })?,
-        Shown::new("MIS", shot, mis(MIS))?,
-        Shown::new("SIR", shot, sir(SIR.0, Some(SIR.1)))?,
+        ShownStrategy::new("EM", figure_scene, StrategySpec::Environment { n_samples: EM })?,
+        ShownStrategy::new("BRDF", figure_scene, StrategySpec::Brdf { n_samples: BRDF })?,
+        ShownStrategy::new("MIS", figure_scene, mis(MIS))?,
+        ShownStrategy::new("SIR", figure_scene, sir(SIR.0, Some(SIR.1)))?,
     ];
-    let seconds = shown[3].measured.taken.seconds;
-    shown.push(Shown::new("MIS", shot, equal_time(shot, seconds, MIS, mis)?)?);
+    let seconds = shown[3].measured.render.seconds;
+    shown.push(ShownStrategy::new(
+        "MIS",
+        figure_scene,
+        equal_time(figure_scene, seconds, MIS, mis)?,
+    )?);
     Ok(shown)
 }
 
 /// The four again with `seconds` for each, and resampling with the ratio that suits.
-fn in_equal_time(shot: &Shot, seconds: f64) -> Result<Vec<Shown>> {
+fn in_equal_time(figure_scene: &FigureScene, seconds: f64) -> Result<Vec<ShownStrategy>> {
     let lectures_ratio = |n: u32| sir(n, Some(scaled_candidates(n)));
     Ok(vec![
-        Shown::new(
+        ShownStrategy::new(
             "EM",
-            shot,
-            equal_time(shot, seconds, EM, |n| StrategySpec::Environment { n_samples: n })?,
+            figure_scene,
+            equal_time(figure_scene, seconds, EM, |n| StrategySpec::Environment { n_samples: n })?,
         )?,
-        Shown::new(
+        ShownStrategy::new(
             "BRDF",
-            shot,
-            equal_time(shot, seconds, BRDF, |n| StrategySpec::Brdf { n_samples: n })?,
+            figure_scene,
+            equal_time(figure_scene, seconds, BRDF, |n| StrategySpec::Brdf { n_samples: n })?,
         )?,
-        Shown::new("MIS", shot, equal_time(shot, seconds, MIS, mis)?)?,
-        Shown::new("SIR", shot, equal_time(shot, seconds, 2, lectures_ratio)?)?,
-        Shown::new("SIR", shot, equal_time(shot, seconds, SIR.0, tuned_sir(shot))?)?,
+        ShownStrategy::new("MIS", figure_scene, equal_time(figure_scene, seconds, MIS, mis)?)?,
+        ShownStrategy::new(
+            "SIR",
+            figure_scene,
+            equal_time(figure_scene, seconds, 2, lectures_ratio)?,
+        )?,
+        ShownStrategy::new(
+            "SIR",
+            figure_scene,
+            equal_time(figure_scene, seconds, SIR.0, tuned_sir(figure_scene))?,
+        )?,
     ])
 }
 
-/// The plan with the count that takes `seconds`, by measurement from `start` on.
+/// The strategy with the count that takes `seconds`, by measurement from `start` on.
 ///
 /// A picture costs a + b·n; the part a, camera rays and shading points, is measured with one sample.
 fn equal_time(
-    shot: &Shot,
+    figure_scene: &FigureScene,
     seconds: f64,
     start: u32,
-    plan: impl Fn(u32) -> StrategySpec,
+    spec: impl Fn(u32) -> StrategySpec,
 ) -> Result<StrategySpec> {
     let start = start.max(2);
-    let least = shot.take(plan(1))?.seconds;
-    let some = shot.take(plan(start))?.seconds;
+    let least = figure_scene.render(spec(1))?.seconds;
+    let some = figure_scene.render(spec(start))?.seconds;
     let each = ((some - least) / f64::from(start - 1)).max(1e-9);
     let n = 1.0 + (seconds - least) / each;
-    Ok(plan(n.round().clamp(1.0, 30_000.0) as u32))
+    Ok(spec(n.round().clamp(1.0, 30_000.0) as u32))
 }
 
 /// Puts a row of pictures into the figure, the converged one last.
 fn add(
     figure: &mut Figure,
-    shot: &Shot,
+    figure_scene: &FigureScene,
     material: &str,
     budget: &str,
     heading: &str,
-    shown: Vec<Shown>,
+    shown: Vec<ShownStrategy>,
 ) -> Result<()> {
-    let tone = shot.tone()?;
-    let (width, height) = (shot.settings.width, shot.settings.height);
+    let tone = figure_scene.tone()?;
+    let (width, height) = (figure_scene.settings.width, figure_scene.settings.height);
     // With the scale of the file a whole number of pixels for each.
     let enlarged = (4.0 / 3.0) * SIZE.0 as f64 / width as f64;
     let (w, h) = (width as f64 * enlarged, height as f64 * enlarged);
@@ -235,29 +248,30 @@ fn add(
         Ok(())
     };
     for s in shown {
-        let Measured { taken, rel_mse } = s.measured;
+        let Measurement { render, rel_mse } = s.measured;
         let notes = [
             format!("relMSE {}", number(rel_mse)),
-            format!("{} shadow rays", count(taken.shadow_rays)),
-            format!("{} CPU s", number(taken.seconds)),
+            format!("{} shadow rays", count(render.shadow_rays)),
+            format!("{} CPU s", number(render.seconds)),
         ];
-        push(&s.title, &taken.layers.color, &notes)?;
+        push(&s.title, &render.layers.color, &notes)?;
         figure.tables[0].rows.push(vec![
             material.into(),
             budget.into(),
-            taken.strategy.into(),
-            taken.shadow_rays.into(),
-            taken.seconds.into(),
+            render.strategy.into(),
+            render.shadow_rays.into(),
+            render.seconds.into(),
             rel_mse.into(),
-            (rel_mse * taken.seconds).into(),
+            (rel_mse * render.seconds).into(),
         ]);
         figure.pictures.push(Radiance {
             name: file_name(&format!("{material} {budget} {}", s.title)),
-            image: taken.layers.color,
+            image: render.layers.color,
             tone,
         });
     }
-    let reference = shot.reference(shot.settings.seed, shot.settings.sampler)?;
+    let reference =
+        figure_scene.reference(figure_scene.settings.seed, figure_scene.settings.sampler)?;
     push("Converged", &reference.color, &[])?;
     let name = file_name(&format!("{material} converged"));
     if figure.pictures.iter().all(|p| p.name != name) {
@@ -279,12 +293,12 @@ pub(super) fn file_name(text: &str) -> String {
 }
 
 /// Error over CPU seconds, at the lecture's counts and at equal time.
-fn plot(name: &str, lecture: &[Shown], equal: &[Shown]) -> Document {
+fn plot(name: &str, lecture: &[ShownStrategy], equal: &[ShownStrategy]) -> Document {
     const KINDS: [&str; 5] =
         ["EM", "BRDF", "MIS", "SIR, the lecture's ratio", "SIR, measured ratio"];
     let all = || lecture.iter().chain(equal);
     let series = KINDS.iter().enumerate().map(|(kind, name)| {
-        let datum = |s: &Shown| Datum::new(s.measured.taken.seconds, s.measured.rel_mse);
+        let datum = |s: &ShownStrategy| Datum::new(s.measured.render.seconds, s.measured.rel_mse);
         let mut points: Vec<Datum> = all().filter(|s| s.kind() == kind).map(datum).collect();
         points.sort_by(|a, b| a.x.total_cmp(&b.x));
         Series {
@@ -297,7 +311,7 @@ fn plot(name: &str, lecture: &[Shown], equal: &[Shown]) -> Document {
     });
     let plot = Plot {
         title: name.to_owned(),
-        x: Axis::around("CPU seconds", Scale::Log, all().map(|s| s.measured.taken.seconds)),
+        x: Axis::around("CPU seconds", Scale::Log, all().map(|s| s.measured.render.seconds)),
         y: Axis::around("relMSE", Scale::Log, all().map(|s| s.measured.rel_mse)),
         series: series.collect(),
         legend: Legend::Above,

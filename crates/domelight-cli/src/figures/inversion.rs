@@ -3,12 +3,12 @@
 use anyhow::Result;
 use domelight::math::vec2;
 use domelight::quote::Code;
-use domelight::sampling::{Dimension, SamplerKind, Stream, Table1d, Table2d};
+use domelight::sampling::{Dimension, Sampler, SamplerKind, Table1d, Table2d};
 
+use super::context::FigureContext;
 use super::figure::{Figure, Row, Table, count, plot_panel};
 use super::formulas;
 use super::maps::{black_panel, map_panel, mark, shown_color};
-use super::studio::Studio;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Plot, Scale, Series};
 use crate::svg::{Color, Document, PALETTE, Rect, Style};
 
@@ -19,8 +19,8 @@ const NUMBERS: usize = 12;
 /// The course's numbers of samples.
 const COUNTS: [usize; 3] = [64, 256, 1024];
 
-pub(crate) fn make(studio: &Studio) -> Result<Figure> {
-    let environment = &studio.environment;
+pub(crate) fn make(context: &FigureContext) -> Result<Figure> {
+    let environment = &context.environment;
     let map = environment.map();
     let table = Table2d::from_rows(map.width, map.height, |row, out| {
         let solid_angle = environment.texel_solid_angle(row);
@@ -28,7 +28,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
             *o = f64::from(le.luminance()) * solid_angle;
         }
     })?;
-    let samples = draw(studio, &table, COUNTS[2]);
+    let samples = draw(context, &table, COUNTS[2]);
     let brightest = (0..table.height())
         .max_by(|&a, &b| table.rows().pmf(a).total_cmp(&table.rows().pmf(b)))
         .unwrap_or(0);
@@ -39,13 +39,13 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     for n in COUNTS {
         let shown = &samples[..n];
         let title = format!("{n} samples");
-        with_marks.push(map_panel(studio, &title, &[], |sheet, r| {
+        with_marks.push(map_panel(context, &title, &[], |sheet, r| {
             for s in shown {
                 mark(sheet, s.place(r));
             }
         })?);
         let radius = if n > 500 { 1.5 } else { 2.4 };
-        with_dots.push(map_panel(studio, &title, &[], |sheet, r| {
+        with_dots.push(map_panel(context, &title, &[], |sheet, r| {
             for s in shown {
                 sheet.circle(
                     s.place(r),
@@ -54,7 +54,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
                 );
             }
         })?);
-        alone.push(black_panel(studio, &title, &[], |sheet, r| {
+        alone.push(black_panel(context, &title, &[], |sheet, r| {
             for s in shown {
                 sheet.circle(s.place(r), radius, Style::fill(s.color));
             }
@@ -85,19 +85,19 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
             the density: steep where there is much, flat where there is little. A map takes two such steps: first a \
             row, by the energy of each scan line times sin θ, for rows near the poles cover little of the sphere; \
             then a column of that row. The samples are drawn as the course's marks of 5 × 5 pixels, as \
-            dots, and alone in the colours that remain when luminance is divided by the density: an estimate \
-            of a coloured integral keeps that factor.</p>",
+            dots, and alone in the colors that remain when luminance is divided by the density: an estimate \
+            of a colored integral keeps that factor.</p>",
         ),
         formulas: formulas::inversion(),
         rows: vec![
             Row::new("One dimension", vec![density_plot(&example), cdf_plot(&example)?]),
             Row::new(
                 "The map: rows, then columns",
-                vec![row_plot(studio, &table), column_plot(&table, brightest)],
+                vec![row_plot(context, &table), column_plot(&table, brightest)],
             ),
             Row::new("Samples as marks", with_marks),
             Row::new("Samples as dots", with_dots),
-            Row::new("Samples alone, in their colours", alone),
+            Row::new("Samples alone, in their colors", alone),
         ],
         tables: vec![numbers],
         has_data: false,
@@ -118,11 +118,11 @@ impl Sample {
     }
 }
 
-fn draw(studio: &Studio, table: &Table2d, n: usize) -> Vec<Sample> {
-    let map = studio.environment.map();
-    let stream = Stream::new(SamplerKind::Independent, studio.seed, 0);
+fn draw(context: &FigureContext, table: &Table2d, n: usize) -> Vec<Sample> {
+    let map = context.environment.map();
+    let sampler = Sampler::new(SamplerKind::Independent, context.seed, 0);
     let sample = |i: usize| {
-        let u = stream.numbers(Dimension::Environment, i as u32);
+        let u = sampler.numbers(Dimension::Environment, i as u32);
         let s = table.sample(vec2(u.0[0], u.0[1]));
         let le = map.get(s.column, s.row);
         Sample {
@@ -145,7 +145,7 @@ fn degrees(row: usize, height: usize) -> f64 {
     180.0 * (row as f64 + 0.5) / height as f64
 }
 
-/// Energy in the tenth of the rows that has most of it, in per cent.
+/// Energy in the tenth of the rows that has most of it, in percent.
 fn share(table: &Table2d) -> f64 {
     let mut rows: Vec<f64> = (0..table.height()).map(|y| table.rows().pmf(y)).collect();
     rows.sort_by(|a, b| b.total_cmp(a));
@@ -217,11 +217,11 @@ fn cdf_plot(weights: &[f64]) -> Result<Document> {
 }
 
 /// The marginal over rows, and what it would be without sin θ.
-fn row_plot(studio: &Studio, table: &Table2d) -> Document {
+fn row_plot(context: &FigureContext, table: &Table2d) -> Document {
     let h = table.height();
     let with: Vec<f64> = (0..h).map(|y| table.rows().pmf(y)).collect();
     let without: Vec<f64> =
-        (0..h).map(|y| with[y] / studio.environment.texel_solid_angle(y)).collect();
+        (0..h).map(|y| with[y] / context.environment.texel_solid_angle(y)).collect();
     let total: f64 = without.iter().sum();
     let points = |weights: &[f64], total: f64| -> Vec<Datum> {
         let at = |y: usize| Datum::new(degrees(y, h), weights[y] / total * h as f64 / 180.0);

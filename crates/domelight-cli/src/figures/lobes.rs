@@ -1,16 +1,16 @@
 //! Figure 1: directions drawn from lobes; their histogram against their density.
 
 use anyhow::Result;
-use domelight::bsdf::{Brdf, Material};
+use domelight::bsdf::{Brdf, Bsdf};
 use domelight::code;
 use domelight::math::{Vec3, from_spherical};
 use domelight::quote::Html;
-use domelight::sampling::{Dimension, SamplerKind, Stream};
+use domelight::sampling::{Dimension, Sampler, SamplerKind};
 use std::f64::consts::{PI, TAU};
 
+use super::context::FigureContext;
 use super::figure::{Figure, Row, Table, number, plot_panel};
 use super::formulas;
-use super::studio::Studio;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Plot, Scale, Series};
 use crate::svg::{Anchor, Color, Document, PALETTE, Style, TextStyle};
 
@@ -28,13 +28,13 @@ const QUADRATURE: usize = 256;
 /// Directions that are drawn as dots.
 const DOTS: usize = 1000;
 
-pub(crate) fn make(studio: &Studio) -> Result<Figure> {
-    let n = studio.choose(100_000, 2_000);
+pub(crate) fn make(context: &FigureContext) -> Result<Figure> {
+    let n = context.choose(100_000, 2_000);
     let mut rows = Vec::new();
     let mut table =
         Table::new(&["lobe", "drawn", "lost below the horizon", "χ² of θ", "degrees of freedom"]);
     for (name, notation) in LOBES {
-        let lobe = Lobe::new(notation, n, studio.seed)?;
+        let lobe = Lobe::new(notation, n, context.seed)?;
         let (chi2, freedom) = lobe.chi2();
         table.rows.push(vec![
             name.into(),
@@ -52,7 +52,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         caption: code!(
             Html,
             "<p>{n} directions of each lobe, drawn by inverting its distribution function with the viewer \
-             along the normal: a thousand of them as dots (the centre is the normal, the rim the horizon), \
+             along the normal: a thousand of them as dots (the center is the normal, the rim the horizon), \
              and all of them as histograms over the density that the program divides by. If the histogram \
              follows the curve, sampler and density agree; χ² near its degrees of freedom says so in a number.</p>\
              <p>Three traps: the density of Ward's half-vector needs cos³θ<sub>h</sub> below the exponential; a \
@@ -75,7 +75,7 @@ fn rounded(x: f64) -> serde_json::Value {
 
 /// A lobe seen along the normal, and directions drawn from it.
 struct Lobe {
-    material: Material,
+    bsdf: Bsdf,
     /// Polar angle and azimuth [degrees], azimuth in [−180, 180).
     drawn: Vec<(f64, f64)>,
     n: usize,
@@ -83,21 +83,21 @@ struct Lobe {
 
 impl Lobe {
     fn new(notation: &str, n: usize, seed: u64) -> Result<Self> {
-        let material = notation.parse::<Material>()?.for_view(Vec3::Z);
-        let stream = Stream::new(SamplerKind::Independent, seed, 0);
+        let bsdf = notation.parse::<Bsdf>()?.for_view(Vec3::Z);
+        let sampler = Sampler::new(SamplerKind::Independent, seed, 0);
         let draw = |i: usize| {
-            let u = stream.numbers(Dimension::Brdf, i as u32);
-            let wi = material.sample(Vec3::Z, u.u_lobe(), u.u())?.wi;
+            let u = sampler.numbers(Dimension::Brdf, i as u32);
+            let wi = bsdf.sample(Vec3::Z, u.u_lobe(), u.u())?.wi;
             let theta = f64::from(wi.x.hypot(wi.y)).atan2(f64::from(wi.z));
             Some((theta.to_degrees(), f64::from(wi.y.atan2(wi.x)).to_degrees()))
         };
-        Ok(Self { material, drawn: (0..n).filter_map(draw).collect(), n })
+        Ok(Self { bsdf, drawn: (0..n).filter_map(draw).collect(), n })
     }
 
     /// Density over the hemisphere's angles [rad⁻²].
     fn density(&self, theta: f64, phi: f64) -> f64 {
         let wi = from_spherical(theta.cos() as f32, phi as f32);
-        f64::from(self.material.pdf(Vec3::Z, wi)) * theta.sin()
+        f64::from(self.bsdf.pdf(Vec3::Z, wi)) * theta.sin()
     }
 
     /// Marginal density of θ [1/degree].
@@ -214,7 +214,7 @@ impl Lobe {
         }
         for (degrees, r) in rings {
             let at = (center + 0.707 * r, center + 0.707 * r + 5.0);
-            let style = TextStyle::new(14.0).color(Color::GREY).anchor(Anchor::Middle).halo();
+            let style = TextStyle::new(14.0).color(Color::GRAY).anchor(Anchor::Middle).halo();
             panel.text(at, &format!("{degrees}°"), style);
         }
         panel

@@ -8,8 +8,8 @@ use domelight::picture::tone::srgb_from_linear;
 use domelight::rig::Rig;
 use domelight::{Rgb, RgbImage};
 
+use super::context::FigureContext;
 use super::figure::{Picture, picture_panel, png_bytes};
-use super::studio::Studio;
 use crate::svg::{Color, Document, Pixels, Rect, Style};
 
 /// Width of a map on the sheet.
@@ -19,25 +19,25 @@ const BLUE: Color = Color(0x1f, 0x4b, 0xff);
 
 /// A panel with the map, and what `over` draws on it.
 pub(crate) fn map_panel(
-    studio: &Studio,
+    context: &FigureContext,
     title: &str,
     notes: &[String],
     over: impl FnOnce(&mut Document, Rect),
 ) -> Result<Document> {
-    let png = png_bytes(&studio.map, studio.map_tone())?;
-    Ok(panel_of(&studio.map, png, title, notes, over))
+    let png = png_bytes(&context.map, context.map_tone())?;
+    Ok(panel_of(&context.map, png, title, notes, over))
 }
 
 /// A panel of the size of the map, in black.
 pub(crate) fn black_panel(
-    studio: &Studio,
+    context: &FigureContext,
     title: &str,
     notes: &[String],
     over: impl FnOnce(&mut Document, Rect),
 ) -> Result<Document> {
     let black = RgbImage::filled(2, 1, Rgb::BLACK);
-    let png = png_bytes(&black, studio.map_tone())?;
-    Ok(panel_of(&studio.map, png, title, notes, over))
+    let png = png_bytes(&black, context.map_tone())?;
+    Ok(panel_of(&context.map, png, title, notes, over))
 }
 
 fn panel_of(
@@ -59,8 +59,8 @@ pub(crate) fn shown_color(color: Rgb) -> Color {
 }
 
 /// Where a direction lies on a map that is drawn into `r`.
-pub(crate) fn on_map(studio: &Studio, r: Rect, direction: Vec3) -> (f64, f64) {
-    let uv = studio.environment.uv(direction);
+pub(crate) fn on_map(context: &FigureContext, r: Rect, direction: Vec3) -> (f64, f64) {
+    let uv = context.environment.uv(direction);
     (r.x + f64::from(uv.x) * r.width, r.y + f64::from(uv.y) * r.height)
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn mark(sheet: &mut Document, (x, y): (f64, f64)) {
 
 /// White lines between the regions of a rig, which are drawn for `part` of the map in [0, 1]².
 pub(crate) fn borders(sheet: &mut Document, r: Rect, rig: &Rig, part: Rect) {
-    // A line for each run of texels whose neighbour belongs to another light.
+    // A line for each run of texels whose neighbor belongs to another light.
     let (w, h) = (rig.width, rig.height);
     // Finer than the sheet's pixels no border is seen.
     let step = ((w as f64 * part.width / r.width) as usize).max(1);

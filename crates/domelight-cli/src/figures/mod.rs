@@ -1,6 +1,7 @@
 //! `domelight figures`: the figures of a lecture on sampling direct illumination, one a file, and a
 //! page that shows them.
 
+mod context;
 mod convergence;
 mod figure;
 mod formulas;
@@ -12,7 +13,6 @@ mod median_cut;
 mod page;
 mod product;
 mod rejection;
-mod studio;
 mod variance_minimization;
 
 use std::fs;
@@ -21,9 +21,9 @@ use std::time::Instant;
 use anyhow::{Context as _, Result};
 
 use crate::args::figures::FiguresArguments;
-use crate::failure::tell;
+use crate::error::status;
+use context::FigureContext;
 use figure::Figure;
-use studio::Studio;
 
 /// How many figures there are.
 const N_FIGURES: u8 = 8;
@@ -32,47 +32,47 @@ const N_FIGURES: u8 = 8;
 pub(crate) fn run(arguments: &FiguresArguments, quiet: bool) -> Result<()> {
     let folder = &arguments.output;
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let studio = Studio::new(arguments, quiet)?;
+    let context = FigureContext::new(arguments, quiet)?;
     let mut figures = Vec::new();
     for number in
         (1..=N_FIGURES).filter(|n| arguments.only.is_empty() || arguments.only.contains(n))
     {
         let start = Instant::now();
-        let made = make(&studio, number).and_then(|figure| {
-            figure.write(folder, studio.choose(1.5, 0.75))?;
+        let made = make(&context, number).and_then(|figure| {
+            figure.write(folder, context.choose(1.5, 0.75))?;
             Ok(figure)
         });
         match made {
             Ok(figure) => {
                 let seconds = start.elapsed().as_secs_f64();
                 if !quiet {
-                    tell(&format!("figure {number}: {} ({seconds:.1} s)", figure.title));
+                    status(&format!("figure {number}: {} ({seconds:.1} s)", figure.title));
                 }
                 figures.push(figure);
             }
             // What is done stays, on the page as well.
             Err(error) => {
-                page::write(&studio, folder, &figures)?;
+                page::write(&context, folder, &figures)?;
                 return Err(error.context(format!("figure {number}")));
             }
         }
     }
-    page::write(&studio, folder, &figures)?;
+    page::write(&context, folder, &figures)?;
     if !quiet {
-        tell(&format!("-> {}", folder.join(page::NAME).display()));
+        status(&format!("-> {}", folder.join(page::NAME).display()));
     }
     Ok(())
 }
 
-fn make(studio: &Studio, number: u8) -> Result<Figure> {
+fn make(context: &FigureContext, number: u8) -> Result<Figure> {
     match number {
-        1 => lobes::make(studio),
-        2 => inversion::make(studio),
-        3 => product::make(studio),
-        4 => four_ways::make(studio),
-        5 => rejection::make(studio),
-        6 => median_cut::make(studio),
-        7 => variance_minimization::make(studio),
-        _ => convergence::make(studio),
+        1 => lobes::make(context),
+        2 => inversion::make(context),
+        3 => product::make(context),
+        4 => four_ways::make(context),
+        5 => rejection::make(context),
+        6 => median_cut::make(context),
+        7 => variance_minimization::make(context),
+        _ => convergence::make(context),
     }
 }

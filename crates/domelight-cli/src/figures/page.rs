@@ -7,8 +7,8 @@ use domelight::code;
 use domelight::quote::{Code, Html, html};
 use serde_json::Value;
 
+use super::context::FigureContext;
 use super::figure::{Figure, Row, Table, count, number};
-use super::studio::Studio;
 use crate::svg::{Document, data_uri, font_face_css};
 
 /// For formulas: signs that grow, which fonts for text have not.
@@ -18,11 +18,11 @@ const MATH_FONT: &[u8] = include_bytes!("../../assets/math-subset.otf");
 pub(crate) const NAME: &str = "index.html";
 
 /// Writes the page.
-pub(crate) fn write(studio: &Studio, folder: &Path, figures: &[Figure]) -> Result<()> {
-    super::figure::write(&folder.join(NAME), page(studio, figures).as_str().as_bytes())
+pub(crate) fn write(context: &FigureContext, folder: &Path, figures: &[Figure]) -> Result<()> {
+    super::figure::write(&folder.join(NAME), page(context, figures).as_str().as_bytes())
 }
 
-fn page(studio: &Studio, figures: &[Figure]) -> Code<Html> {
+fn page(context: &FigureContext, figures: &[Figure]) -> Code<Html> {
     let mut contents = Code::default();
     let mut sections = Code::default();
     for figure in figures {
@@ -32,10 +32,10 @@ fn page(studio: &Studio, figures: &[Figure]) -> Code<Html> {
             n = figure.number,
             title = html::text(figure.title),
         );
-        sections += section(studio, figure);
+        sections += section(context, figure);
     }
-    let map = studio.environment.map();
-    let quick = studio.choose("", " This is a quick run: pictures are small and references poor.");
+    let map = context.environment.map();
+    let quick = context.choose("", " This is a quick run: pictures are small and references poor.");
     code!(
         Html,
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -50,13 +50,13 @@ fn page(studio: &Studio, figures: &[Figure]) -> Code<Html> {
         font = Code::<Html>::generated(font_face_css()),
         math_font = math_font_css(),
         style = STYLE,
-        scene = html::text(&studio.scene),
-        probe = html::text(&studio.probe),
+        scene = html::text(&context.scene),
+        probe = html::text(&context.probe),
         width = map.width,
         height = map.height,
         version = env!("CARGO_PKG_VERSION"),
         quick = quick,
-        arguments = html::text(studio.arguments.as_str()),
+        arguments = html::text(context.arguments.as_str()),
         contents = contents,
         sections = sections,
     )
@@ -68,7 +68,7 @@ fn math_font_css() -> Code<Html> {
     Code::generated(rule)
 }
 
-fn section(studio: &Studio, figure: &Figure) -> Code<Html> {
+fn section(context: &FigureContext, figure: &Figure) -> Code<Html> {
     let n = figure.number;
     let mut html = code!(
         Html,
@@ -96,7 +96,7 @@ fn section(studio: &Studio, figure: &Figure) -> Code<Html> {
         "<p class=\"command\"><code>domelight figures --only {n}{arguments}</code></p>\
          <p class=\"files\">{files}{more}</p></section>\n",
         n = n,
-        arguments = html::text(studio.arguments.as_str()),
+        arguments = html::text(context.arguments.as_str()),
         files = files,
         more = more,
     );

@@ -1,7 +1,7 @@
 //! Figure 3: what the environment, the BRDF and their product say about where to look.
 
 use anyhow::Result;
-use domelight::bsdf::Material;
+use domelight::bsdf::Bsdf;
 use domelight::code;
 use domelight::environment::Environment;
 use domelight::environment::mapping::Mapping;
@@ -9,16 +9,16 @@ use domelight::math::{Frame, Vec2, Vec3, reflect, vec2};
 use domelight::picture::compare::ColorScale;
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::quote::Html;
-use domelight::sampling::{Dimension, SamplerKind, Stream};
+use domelight::sampling::{Dimension, Sampler, SamplerKind};
 use domelight::strategy::{
-    PointStrategy as _, Proposal, RejectionSampling, RejectionScratch, SampleNumbers, ShadingPoint,
-    Stop,
+    PointStrategy as _, Proposal, RejectionSampling, RejectionScratch, SampleIndex, ShadingPoint,
+    StoppingRule,
 };
 use domelight::{Rgb, RgbImage};
 
+use super::context::FigureContext;
 use super::figure::{Figure, Picture, Radiance, Row, Table, picture_panel, png_bytes};
 use super::formulas;
-use super::studio::Studio;
 use crate::svg::{Color, Document, Pixels, Style};
 
 /// Samples of each kind.
@@ -30,18 +30,19 @@ const OFF_AXIS: f32 = 14.0;
 /// Angle between the axis and the normal [degrees].
 const TILT: f32 = 35.0;
 
-pub(crate) fn make(studio: &Studio) -> Result<Figure> {
-    let point = shading_point(studio)?;
-    let environment = &studio.environment;
+pub(crate) fn make(context: &FigureContext) -> Result<Figure> {
+    let point = shading_point(context)?;
+    let environment = &context.environment;
     let ahead = environment.uv(point.frame.to_world(reflect(point.wo, Vec3::Z)));
-    let view = SphereView { environment, turn: ahead.x - 0.5, n: studio.choose(SIZE as usize, 64) };
+    let view =
+        SphereView { environment, turn: ahead.x - 0.5, n: context.choose(SIZE as usize, 64) };
     let light = view.picture(|wi| environment.le(wi));
     let product = view.picture(|wi| point.eval(wi) * environment.le(wi));
     let product_peak = peak(&product);
-    let tone = studio.map_tone();
+    let tone = context.map_tone();
 
     let directions =
-        [from_environment(studio), from_brdf(studio, &point), from_product(studio, &point)?];
+        [from_environment(context), from_brdf(context, &point), from_product(context, &point)?];
     let [light_png, brdf_png, product_png] = [
         png_bytes(&light, tone)?,
         view.scaled(|wi| point.eval(wi).luminance())?,
@@ -70,11 +71,11 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         slides: "slides 17–18",
         caption: code!(
             Html,
-            "<p>The sphere of directions as a light probe: its centre looks toward where the lobe points, the rim is behind. A Phong lobe of \
+            "<p>The sphere of directions as a light probe: its center looks toward where the lobe points, the rim is behind. A Phong lobe of \
              exponent 50 leans {OFF_AXIS:.0}° past the brightest light. Samples of the environment find lights \
              that the surface does not reflect, samples of the BRDF find directions from where little light comes; \
              samples of the product do neither. They are drawn by rejection, which follows the product exactly. \
-             (BRDF and product are shown in a colour scale over value<sup>0.4</sup>, so that faint parts are seen.)</p>",
+             (BRDF and product are shown in a color scale over value<sup>0.4</sup>, so that faint parts are seen.)</p>",
             OFF_AXIS = OFF_AXIS,
         ),
         formulas: formulas::product(),
@@ -91,27 +92,27 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     })
 }
 
-/// The stream of this figure's numbers.
-fn stream(studio: &Studio) -> Stream {
-    Stream::new(SamplerKind::Independent, studio.seed, 3)
+/// The sampler of this figure.
+fn sampler(context: &FigureContext) -> Sampler {
+    Sampler::new(SamplerKind::Independent, context.seed, 3)
 }
 
-fn from_environment(studio: &Studio) -> Vec<Vec3> {
-    let u = |i| stream(studio).numbers(Dimension::Environment, i).u();
-    (0..SAMPLES).filter_map(|i| Some(studio.environment.sample(u(i))?.wi)).collect()
+fn from_environment(context: &FigureContext) -> Vec<Vec3> {
+    let u = |i| sampler(context).numbers(Dimension::Environment, i).u();
+    (0..SAMPLES).filter_map(|i| Some(context.environment.sample(u(i))?.wi)).collect()
 }
 
-fn from_brdf(studio: &Studio, point: &ShadingPoint) -> Vec<Vec3> {
-    let numbers = |i| stream(studio).numbers(Dimension::Brdf, i);
+fn from_brdf(context: &FigureContext, point: &ShadingPoint) -> Vec<Vec3> {
+    let numbers = |i| sampler(context).numbers(Dimension::Brdf, i);
     let sample = |i| Some(point.sample(numbers(i).u_lobe(), numbers(i).u())?.wi);
     (0..SAMPLES).filter_map(sample).collect()
 }
 
 /// By rejection, which follows the product exactly.
-fn from_product(studio: &Studio, point: &ShadingPoint) -> Result<Vec<Vec3>> {
-    let stop = Stop::Accepted { n: SAMPLES, max_tries: 10_000_000 };
-    let rejection = RejectionSampling::new(&studio.environment, Proposal::Tighter, stop)?;
-    let numbers = SampleNumbers { stream: stream(studio), sample: 0 };
+fn from_product(context: &FigureContext, point: &ShadingPoint) -> Result<Vec<Vec3>> {
+    let stop = StoppingRule::Accepted { n: SAMPLES, max_tries: 10_000_000 };
+    let rejection = RejectionSampling::new(&context.environment, Proposal::Tighter, stop)?;
+    let numbers = SampleIndex { sampler: sampler(context), sample: 0 };
     let mut accepted = Vec::new();
     rejection.sample(point, numbers, &mut RejectionScratch::default(), |wi, _| accepted.push(wi));
     Ok(accepted)
@@ -127,7 +128,7 @@ fn peak(picture: &RgbImage) -> f32 {
 /// The sphere of directions as an angular map of n × n pixels.
 struct SphereView<'a> {
     environment: &'a Environment,
-    /// Where across the map the centre looks, from the middle on.
+    /// Where across the map the center looks, from the middle on.
     turn: f32,
     n: usize,
 }
@@ -143,7 +144,7 @@ impl SphereView<'_> {
         })
     }
 
-    /// A picture of values in a colour scale, as PNG.
+    /// A picture of values in a color scale, as PNG.
     fn scaled(&self, value: impl Fn(Vec3) -> f32) -> Result<Vec<u8>> {
         let values = self.picture(|wi| Rgb::splat(value(wi)));
         let top = peak(&values);
@@ -171,7 +172,7 @@ impl SphereView<'_> {
         let picture = Picture { png, width: SIZE, height: SIZE, pixels, title, notes };
         picture_panel(&picture, |sheet, r| {
             let center = (r.x + 0.5 * r.width, r.y + 0.5 * r.height);
-            sheet.circle(center, 0.5 * r.width - 0.5, Style::stroke(Color::GREY, 1.0));
+            sheet.circle(center, 0.5 * r.width - 0.5, Style::stroke(Color::GRAY, 1.0));
             for &wi in directions {
                 let uv = self.uv(wi);
                 let at = (r.x + f64::from(uv.x) * r.width, r.y + f64::from(uv.y) * r.height);
@@ -183,14 +184,14 @@ impl SphereView<'_> {
 }
 
 /// A point that reflects toward the viewer what is near the brightest light of the map.
-fn shading_point(studio: &Studio) -> Result<ShadingPoint> {
-    let light = Frame::from_z(studio.brightest());
+fn shading_point(context: &FigureContext) -> Result<ShadingPoint> {
+    let light = Frame::from_z(context.brightest());
     let (sin, cos) = OFF_AXIS.to_radians().sin_cos();
     let axis = Frame::from_z(light.z * cos + light.x * sin);
     let (sin, cos) = TILT.to_radians().sin_cos();
     let normal = axis.z * cos + axis.y * sin;
     let frame = Frame::from_z(normal);
     let wo = frame.to_local(reflect(axis.z, normal));
-    let material = "phong:50".parse::<Material>()?.for_view(wo);
-    Ok(ShadingPoint { position: Vec3::ZERO, ng: normal, frame, wo, material })
+    let bsdf = "phong:50".parse::<Bsdf>()?.for_view(wo);
+    Ok(ShadingPoint { position: Vec3::ZERO, ng: normal, frame, wo, bsdf })
 }

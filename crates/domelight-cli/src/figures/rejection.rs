@@ -6,14 +6,16 @@ use domelight::picture::compare::ColorScale;
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::quote::Html;
 use domelight::sampling::Pcg32;
-use domelight::strategy::{Proposal, RejectionSampling, RejectionStatistics, ShadingPoint, Stop};
+use domelight::strategy::{
+    Proposal, RejectionSampling, RejectionStatistics, ShadingPoint, StoppingRule,
+};
 use domelight::{Rgb, RgbImage};
 
+use super::context::{FigureContext, FigureScene, Subject};
 use super::figure::{
     Figure, Picture, Row, Table, number, picture_panel, plot_panel, png_bytes, scale_panel,
 };
 use super::formulas;
-use super::studio::{Shot, Studio, Subject};
 use crate::acceptance::{Acceptance, count_tries};
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE, Pixels, superscript};
@@ -31,19 +33,19 @@ const PROPOSALS: [(Proposal, &str); 3] = [
 /// Decades of the acceptance map.
 const DECADES: f32 = 4.0;
 
-pub(crate) fn make(studio: &Studio) -> Result<Figure> {
-    let (width, height) = studio.choose((176, 248), (22, 31));
-    let shot = studio.shot(Subject::Alone(MATERIAL), width, height)?;
-    let points = points(&shot);
+pub(crate) fn make(context: &FigureContext) -> Result<Figure> {
+    let (width, height) = context.choose((176, 248), (22, 31));
+    let figure_scene = context.scene(Subject::Alone(MATERIAL), width, height)?;
+    let points = points(&figure_scene);
     let seen: Vec<ShadingPoint> = points.iter().flatten().copied().collect();
     let mut table =
         Table::new(&["proposal", "mean acceptance", "median tries", "gave up [% of points]"]);
     let (mut acceptance, mut tries) = (Vec::new(), Vec::new());
     for (proposal, name) in PROPOSALS {
-        studio.check_interrupted()?;
-        let stop = Stop::Accepted { n: ACCEPT, max_tries: MAX_TRIES };
-        let rejection = RejectionSampling::new(&studio.environment, proposal, stop)?;
-        let statistics = count_tries(&rejection, &seen, studio.seed);
+        context.check_interrupted()?;
+        let stop = StoppingRule::Accepted { n: ACCEPT, max_tries: MAX_TRIES };
+        let rejection = RejectionSampling::new(&context.environment, proposal, stop)?;
+        let statistics = count_tries(&rejection, &seen, context.seed);
         let summary = Acceptance::of(&statistics);
         table.rows.push(vec![
             name.into(),
@@ -106,7 +108,7 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         rows: vec![
             Row::new(
                 "Accepted and rejected",
-                vec![bound(1.0, studio.seed), bound(3.0, studio.seed)],
+                vec![bound(1.0, context.seed), bound(3.0, context.seed)],
             ),
             Row::new("Share of the tries that is accepted", acceptance),
             Row::new("Tries until enough are accepted", tries),
@@ -117,18 +119,18 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
     })
 }
 
-/// What the centre of each pixel sees.
-fn points(shot: &Shot) -> Vec<Option<ShadingPoint>> {
-    let (width, height) = (shot.settings.width, shot.settings.height);
+/// What the center of each pixel sees.
+fn points(figure_scene: &FigureScene) -> Vec<Option<ShadingPoint>> {
+    let (width, height) = (figure_scene.settings.width, figure_scene.settings.height);
     let point = |i: usize| {
-        let ray = shot.camera.ray((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
-        let hit = shot.scene.bvh().closest_hit(&ray)?;
-        Some(shot.scene.shading_point(&ray, &hit))
+        let ray = figure_scene.camera.ray((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+        let hit = figure_scene.scene.bvh().closest_hit(&ray)?;
+        Some(figure_scene.scene.shading_point(&ray, &hit))
     };
     (0..width * height).map(point).collect()
 }
 
-/// Colours are already what is to be seen.
+/// Colors are already what is to be seen.
 const AS_IT_IS: ToneMapping = ToneMapping { exposure: 0.0, curve: ToneCurve::Srgb };
 
 fn map(

@@ -9,11 +9,11 @@ use domelight::rig::{
 };
 use domelight::strategy::StrategySpec;
 
+use super::context::FigureContext;
 use super::figure::{Figure, Picture, Radiance, Row, Table, picture_panel, png_bytes};
 use super::formulas;
 use super::maps::{borders, mark};
-use super::median_cut::{converged_panel, lit_panel, regions_panel, scene_shot, sphere_shot};
-use super::studio::Studio;
+use super::median_cut::{converged_panel, full_scene, lit_panel, regions_panel, sphere_scene};
 use crate::svg::{Document, Pixels, Rect};
 
 /// The poster's numbers of regions.
@@ -21,18 +21,18 @@ const REGIONS: [usize; 4] = [4, 16, 64, 256];
 /// Lights of the renders and of the detail.
 const LIGHTS: usize = 64;
 
-pub(crate) fn make(studio: &Studio) -> Result<Figure> {
-    let environment = &studio.environment;
+pub(crate) fn make(context: &FigureContext) -> Result<Figure> {
+    let environment = &context.environment;
     let poster = |n| variance_minimization(environment, n, VarianceMinimization::poster());
     let refined = |n| variance_minimization(environment, n, VarianceMinimization::default());
     let cut = |n| median_cut(environment, n, MedianCut::default());
     let (mut by_poster, mut by_default) = (Vec::new(), Vec::new());
     for n in REGIONS {
         let title = format!("{n} regions");
-        by_poster.push(regions_panel(studio, &poster(n)?, &title)?);
-        by_default.push(regions_panel(studio, &refined(n)?, &title)?);
+        by_poster.push(regions_panel(context, &poster(n)?, &title)?);
+        by_default.push(regions_panel(context, &refined(n)?, &title)?);
     }
-    let detail = Detail::new(studio);
+    let detail = Detail::new(context);
     let details = vec![
         detail.panel("Part of the map", None)?,
         detail.panel("Median cut, 64", Some(&cut(LIGHTS)?))?,
@@ -42,8 +42,10 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
 
     let mut renders = Vec::new();
     let mut pictures = Vec::new();
-    for (shot, name) in [(scene_shot(studio)?, "scene"), (sphere_shot(studio)?, "sphere")] {
-        for (plan, title, file) in [
+    for (figure_scene, name) in
+        [(full_scene(context)?, "scene"), (sphere_scene(context)?, "sphere")]
+    {
+        for (spec, title, file) in [
             (StrategySpec::MedianCut { n_lights: LIGHTS as u32 }, "Median cut, 64", "median-cut"),
             (
                 StrategySpec::VarianceMinimization { n_lights: LIGHTS as u32 },
@@ -51,12 +53,16 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
                 "variance-minimization",
             ),
         ] {
-            let measured = shot.measure(plan)?;
-            renders.push(lit_panel(title, &measured, shot.tone()?)?);
-            let image = measured.taken.layers.color;
-            pictures.push(Radiance { name: format!("{name}-{file}"), image, tone: shot.tone()? });
+            let measured = figure_scene.measure(spec)?;
+            renders.push(lit_panel(title, &measured, figure_scene.tone()?)?);
+            let image = measured.render.layers.color;
+            pictures.push(Radiance {
+                name: format!("{name}-{file}"),
+                image,
+                tone: figure_scene.tone()?,
+            });
         }
-        renders.push(converged_panel(&shot)?);
+        renders.push(converged_panel(&figure_scene)?);
     }
     Ok(Figure {
         number: 7,
@@ -64,12 +70,12 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
         slides: "slides 42–45",
         caption: Code::literal(
             "<p>Equal energy is not what shading asks for: light that lies close together may share a light, \
-            light that is spread out may not. Here a cut minimises the greater of the two halves’ variances, the \
+            light that is spread out may not. Here a cut minimizes the greater of the two halves’ variances, the \
             energy times the squared distance to the centroid (not the variance of the pixels’ values). The first row is the \
             poster’s rule, with distances on the map; the second the program’s default: distances on the sphere, where no pole \
             or seam matters, the worst region cut first, then joined and refined into cells about their lights. \
             The detail shows the surroundings of the brightest light: lights (blue) sit on what shines.</p>\
-            <p>The table has the RMS error of unoccluded shading over all normals, in per cent of the RMS shading: matt, \
+            <p>The table has the RMS error of unoccluded shading over all normals, in percent of the RMS shading: matte, \
             and of a lobe cos<sup>20</sup>.</p>",
         ),
         formulas: vec![formulas::region_variance()],
@@ -77,9 +83,9 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
             Row::new("The poster's rule", by_poster),
             Row::new("On the sphere, worst region first, refined", by_default),
             Row::new("One region in detail", details),
-            Row::new("The scene and a matt sphere, lit by 64 lights", renders),
+            Row::new("The scene and a matte sphere, lit by 64 lights", renders),
         ],
-        tables: vec![errors(studio)?],
+        tables: vec![errors(context)?],
         has_data: false,
         pictures,
     })
@@ -89,23 +95,23 @@ pub(crate) fn make(studio: &Studio) -> Result<Figure> {
 type Method<'a> = Box<dyn Fn(usize) -> Result<Rig, RigError> + 'a>;
 
 /// RMS shading errors of every method.
-fn errors(studio: &Studio) -> Result<Table> {
-    let environment = &studio.environment;
+fn errors(context: &FigureContext) -> Result<Table> {
+    let environment = &context.environment;
     let reference = ShadingReference::new(environment);
     let mut table = Table::new(&[
         "method",
-        "16 matt",
+        "16 matte",
         "16 glossy",
-        "64 matt",
+        "64 matte",
         "64 glossy",
-        "256 matt",
+        "256 matte",
         "256 glossy",
     ]);
-    let centre = MedianCut { position: LightPosition::GeometricCentre, ..MedianCut::default() };
+    let center = MedianCut { position: LightPosition::GeometricCenter, ..MedianCut::default() };
     let flat = MedianCut { scale_width: false, ..MedianCut::default() };
     let sphere = VarianceMinimization { lloyd_steps: 0, ..VarianceMinimization::default() };
     let methods: [(&str, Method); 6] = [
-        ("median cut, geometric centre", Box::new(move |n| median_cut(environment, n, centre))),
+        ("median cut, geometric center", Box::new(move |n| median_cut(environment, n, center))),
         ("median cut", Box::new(|n| median_cut(environment, n, MedianCut::default()))),
         ("median cut, widths not scaled", Box::new(move |n| median_cut(environment, n, flat))),
         (
@@ -134,7 +140,7 @@ fn errors(studio: &Studio) -> Result<Table> {
 
 /// The surroundings of the map's brightest texel.
 struct Detail<'a> {
-    studio: &'a Studio,
+    context: &'a FigureContext,
     /// In [0, 1]² of the map.
     part: Rect,
     image: RgbImage,
@@ -144,9 +150,9 @@ impl<'a> Detail<'a> {
     /// Share of the map's width.
     const WIDTH: f64 = 0.14;
 
-    fn new(studio: &'a Studio) -> Self {
-        let map = studio.environment.map();
-        let uv = studio.environment.uv(studio.brightest());
+    fn new(context: &'a FigureContext) -> Self {
+        let map = context.environment.map();
+        let uv = context.environment.uv(context.brightest());
         // A square of whole texels.
         let side = ((Self::WIDTH * map.width as f64) as usize).clamp(1, map.height);
         let corner = |at: f32, n: usize| {
@@ -156,11 +162,11 @@ impl<'a> Detail<'a> {
         let (w, h) = (map.width as f64, map.height as f64);
         let part = Rect::new(x0 as f64 / w, y0 as f64 / h, side as f64 / w, side as f64 / h);
         let image = RgbImage::from_fn(side, side, |x, y| map.get(x0 + x, y0 + y));
-        Self { studio, part, image }
+        Self { context, part, image }
     }
 
     fn panel(&self, title: &str, rig: Option<&Rig>) -> Result<Document> {
-        let mut tone = self.studio.map_tone();
+        let mut tone = self.context.map_tone();
         tone.exposure -= 3.0;
         let picture = Picture {
             png: png_bytes(&self.image, tone)?,
@@ -174,7 +180,7 @@ impl<'a> Detail<'a> {
             let Some(rig) = rig else { return };
             borders(sheet, r, rig, self.part);
             for light in &rig.lights {
-                let uv = self.studio.environment.uv(light.direction);
+                let uv = self.context.environment.uv(light.direction);
                 let x = r.x + (f64::from(uv.x) - self.part.x) / self.part.width * r.width;
                 let y = r.y + (f64::from(uv.y) - self.part.y) / self.part.height * r.height;
                 mark(sheet, (x, y));

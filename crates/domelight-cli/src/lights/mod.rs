@@ -18,13 +18,13 @@ use domelight::rig::{
 use domelight::scene::SceneDescription;
 
 use crate::args::lights::{LightsArguments, PngPath, RigPath};
-use crate::failure::UsageError;
+use crate::error::UsageError;
 use crate::files;
 use crate::memory;
 use crate::output::{PictureFormat, PicturePath, print, print_json};
 use crate::usage::Stopwatch;
 use preview::Preview;
-use report::{LightsReport, Stages};
+use report::{LightsReport, Timings};
 
 /// Lights where nothing else is said.
 const N_LIGHTS: usize = 64;
@@ -64,8 +64,8 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
         let bytes = preview.png()?;
         files::write(&path.0, |out| out.write_all(&bytes))?;
     }
-    let stages = Stages { load, extract, write: watch.lap() };
-    let report = LightsReport { arguments, probe: &probe, found: &found, stages, dome: harmonics };
+    let timings = Timings { load, extract, write: watch.lap() };
+    let report = LightsReport { arguments, probe: &probe, found: &found, timings, dome: harmonics };
     if arguments.json {
         print_json(&report.json())?;
     } else if !quiet && arguments.n_on_standard_output() == 0 {
@@ -75,14 +75,14 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
 }
 
 /// A rig and what is known of its error.
-pub(crate) struct Found {
+pub(crate) struct ExtractedRig {
     pub(crate) extraction: Extraction,
     /// Numbers of lights that were tried for `--error`, rising; else the rig's alone, if it was
     /// measured.
     pub(crate) errors: Vec<(usize, ShadingError)>,
 }
 
-impl Found {
+impl ExtractedRig {
     /// The rig's own error.
     pub(crate) fn error(&self) -> Option<ShadingError> {
         let n = self.extraction.rig.lights.len();
@@ -184,18 +184,18 @@ impl LightsArguments {
         Ok((environment, probe))
     }
 
-    fn find(&self, environment: &Environment) -> Result<Found> {
+    fn find(&self, environment: &Environment) -> Result<ExtractedRig> {
         let settings = self.settings();
         if let Some(percent) = self.error {
             let found = smallest_rig(environment, settings, 0.01 * percent)?;
-            return Ok(Found { extraction: found.extraction, errors: found.tried });
+            return Ok(ExtractedRig { extraction: found.extraction, errors: found.tried });
         }
         let extraction = extract(environment, settings)?;
         let mut errors = Vec::new();
         if self.preview.is_some() || self.json {
             errors.push((extraction.rig.lights.len(), measure(environment, &extraction)));
         }
-        Ok(Found { extraction, errors })
+        Ok(ExtractedRig { extraction, errors })
     }
 
     /// The file of the dome's map, if light may be left on it: as asked for, or beside the first rig that refers to it.

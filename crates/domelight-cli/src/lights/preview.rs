@@ -11,10 +11,10 @@ use domelight::rig::{Rig, RigLight, quadrature};
 use domelight::{Rgb, RgbImage};
 use rayon::prelude::*;
 
-use super::Found;
+use super::ExtractedRig;
 use super::report::error_text;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
-use crate::svg::{Anchor, Color, Document, PALETTE, Pixels, Rect, Style, TextStyle, rasterise};
+use crate::svg::{Anchor, Color, Document, PALETTE, Pixels, Rect, Style, TextStyle, rasterize};
 
 const WIDTH: f64 = 1320.0;
 const MARGIN: f64 = 20.0;
@@ -34,7 +34,7 @@ const MAX_NUMBERS: usize = 128;
 
 pub(super) struct Preview<'a> {
     pub(super) environment: &'a Environment,
-    pub(super) found: &'a Found,
+    pub(super) found: &'a ExtractedRig,
     pub(super) probe: &'a str,
     pub(super) tone: ToneMapping,
 }
@@ -54,7 +54,7 @@ impl Preview<'_> {
             let left = MARGIN + 3.0 * (edge + GAP);
             self.draw_errors(&mut sheet, Rect::new(left, below, WIDTH - left - MARGIN, 340.0));
         }
-        rasterise(&sheet.to_svg(), 1.0)
+        rasterize(&sheet.to_svg(), 1.0)
     }
 
     fn rig(&self) -> &Rig {
@@ -70,7 +70,7 @@ impl Preview<'_> {
         let title = format!("{probe}: {n} {lights}{beside}");
         sheet.text((MARGIN, 32.0), &title, TextStyle::new(24.0).bold());
         if let Some(error) = self.found.error() {
-            let style = TextStyle::new(17.0).color(Color::GREY);
+            let style = TextStyle::new(17.0).color(Color::GRAY);
             sheet.text((MARGIN, 54.0), &error_text(error), style);
         }
     }
@@ -113,7 +113,7 @@ impl Preview<'_> {
         sum / n
     }
 
-    /// Each light as the outline of its disc, and a point in its colour with its number.
+    /// Each light as the outline of its disc, and a point in its color with its number.
     fn draw_lights(&self, sheet: &mut Document, map: Rect) {
         let lights = &self.rig().lights;
         // The brightest on top.
@@ -156,7 +156,7 @@ impl Preview<'_> {
         runs
     }
 
-    /// A white matt sphere under the probe and under the rig, and how much they differ.
+    /// A white matte sphere under the probe and under the rig, and how much they differ.
     fn draw_spheres(&self, sheet: &mut Document, top: f64, edge: f64) -> Result<()> {
         let lights = quadrature(self.environment, QUADRATURE).lights;
         let probe = sphere(self.environment, &lights);
@@ -188,11 +188,11 @@ impl Preview<'_> {
             sheet.text((r.x + 0.5 * edge, top + edge + 24.0), title, style);
         }
         let note = format!(
-            "a white matt sphere without shadows; the greatest difference is {:.2} % of its \
+            "a white matte sphere without shadows; the greatest difference is {:.2} % of its \
              brightest point",
             100.0 * worst
         );
-        let style = TextStyle::new(15.0).color(Color::GREY);
+        let style = TextStyle::new(15.0).color(Color::GRAY);
         sheet.text((MARGIN, top + edge + 52.0), &note, style);
         Ok(())
     }
@@ -211,7 +211,7 @@ impl Preview<'_> {
                     .map(|(n, e)| Datum::new(*n as f64, 100.0 * value(e)))
                     .collect(),
             };
-        let series = vec![series("matt", 0, |e| e.diffuse), series("glossy", 1, |e| e.glossy)];
+        let series = vec![series("matte", 0, |e| e.diffuse), series("glossy", 1, |e| e.glossy)];
         let y = series.iter().flat_map(|s| &s.points).map(|p| p.y);
         let plot = Plot {
             title: String::new(),
@@ -230,7 +230,7 @@ fn place(environment: &Environment, direction: Vec3, map: Rect) -> (f64, f64) {
     (map.x + f64::from(uv.x) * map.width, map.y + f64::from(uv.y) * map.height)
 }
 
-/// The colour of light at full brightness, not darker than can be seen.
+/// The color of light at full brightness, not darker than can be seen.
 fn hue(light: Rgb) -> Color {
     let shown = light / light.max_component().max(f32::MIN_POSITIVE);
     let encoded = shown.map(srgb_from_linear).to_array();
@@ -243,7 +243,7 @@ fn magnification(worst: f32) -> f32 {
     (0.5 / worst.clamp(1e-6, 0.5)).log2().floor().exp2()
 }
 
-/// Irradiance over π of a sphere, seen along the map's centre column, slightly from above.
+/// Irradiance over π of a sphere, seen along the map's center column, slightly from above.
 fn sphere(environment: &Environment, lights: &[RigLight]) -> RgbImage {
     let view = -environment.direction(vec2(0.5, 0.55));
     let right = environment.orientation().up.vector().cross(view).normalize();

@@ -8,13 +8,13 @@ use domelight::rig::export::RigExport;
 use domelight::rig::{RigLight, ShadingError, SphericalHarmonics};
 use serde_json::{Value, json};
 
-use super::Found;
+use super::ExtractedRig;
 use crate::args::lights::LightsArguments;
 use crate::usage::{Seconds, peak_memory};
 
-/// Seconds of each stage.
+/// Seconds of each phase of the work.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
-pub(super) struct Stages {
+pub(super) struct Timings {
     pub(super) load: Seconds,
     pub(super) extract: Seconds,
     pub(super) write: Seconds,
@@ -23,8 +23,8 @@ pub(super) struct Stages {
 pub(super) struct LightsReport<'a> {
     pub(super) arguments: &'a LightsArguments,
     pub(super) probe: &'a str,
-    pub(super) found: &'a Found,
-    pub(super) stages: Stages,
+    pub(super) found: &'a ExtractedRig,
+    pub(super) timings: Timings,
     pub(super) dome: Option<SphericalHarmonics>,
 }
 
@@ -101,7 +101,7 @@ impl LightsReport<'_> {
             "error": self.found.error().map(error),
             "tried": tried.collect::<Vec<_>>(),
             "dome": self.dome.map(|h| h.coefficients.map(domelight::Rgb::to_array)),
-            "seconds": self.stages,
+            "seconds": self.timings,
             "peak_memory": peak_memory(),
         })
     }
@@ -109,5 +109,5 @@ impl LightsReport<'_> {
 
 pub(super) fn error_text(error: ShadingError) -> String {
     let ShadingError { diffuse, glossy } = error;
-    format!("shading error {:.2} % matt, {:.2} % glossy", 100.0 * diffuse, 100.0 * glossy)
+    format!("shading error {:.2} % matte, {:.2} % glossy", 100.0 * diffuse, 100.0 * glossy)
 }

@@ -12,8 +12,8 @@ use domelight::files::{remove_abandoned, write_atomically};
 use domelight::fingerprint::{Fingerprint, Fingerprinter};
 use etcetera::base_strategy::{BaseStrategy as _, choose_native_strategy};
 
-use crate::failure::warn;
-use crate::scene::View;
+use crate::error::warn;
+use crate::scene::PreparedScene;
 
 /// A folder of references.
 pub(crate) struct Cache {
@@ -80,7 +80,7 @@ pub(crate) struct Key(String);
 
 impl Key {
     /// Of what this program makes: scene, light and view, the program itself, and what `settings` say.
-    pub(crate) fn of_program(view: &View, settings: impl Display) -> Self {
+    pub(crate) fn of_program(view: &PreparedScene, settings: impl Display) -> Self {
         let mut key = Fingerprinter::default();
         key.text(env!("CARGO_PKG_VERSION"));
         if let Ok(program) = std::env::current_exe().and_then(fs::read) {
@@ -90,12 +90,12 @@ impl Key {
     }
 
     /// Of what another program makes, which `settings` name.
-    pub(crate) fn of_other(view: &View, settings: impl Display) -> Self {
+    pub(crate) fn of_other(view: &PreparedScene, settings: impl Display) -> Self {
         Self::of(Fingerprinter::default(), view, settings)
     }
 
-    fn of(mut key: Fingerprinter, view: &View, settings: impl Display) -> Self {
-        let View { scene, camera, environment, .. } = view;
+    fn of(mut key: Fingerprinter, view: &PreparedScene, settings: impl Display) -> Self {
+        let PreparedScene { scene, camera, environment, .. } = view;
         key.text(scene.fingerprint());
         key.text(environment.fingerprint());
         // Debug's text of a number is exact.

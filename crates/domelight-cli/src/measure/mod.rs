@@ -3,4 +3,4 @@
 
 pub(crate) mod cache;
 pub(crate) mod reference;
-pub(crate) mod shot;
+pub(crate) mod render;

@@ -13,10 +13,10 @@ use domelight::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
 use super::cache::{Cache, Key};
-use super::shot::Studio;
+use super::render::RenderSetup;
 use crate::files;
 use crate::memory;
-use crate::scene::View;
+use crate::scene::PreparedScene;
 
 /// How a reference is rendered.
 pub(crate) const STRATEGY: StrategySpec = StrategySpec::Mis {
@@ -184,7 +184,7 @@ impl Reference {
         Ok(Self { picture: Picture { image, alpha: None, unoccluded: None }, report })
     }
 
-    /// From the cache, else taken half by half by `shoot`, which is given camera samples a pixel and 0 or 1,
+    /// From the cache, else taken half by half by `render`, which is given camera samples a pixel and 0 or 1,
     /// and kept.
     pub(crate) fn get(
         cache: Option<&Cache>,
@@ -192,7 +192,7 @@ impl Reference {
         goal: Goal,
         strategy: &str,
         quiet: bool,
-        shoot: impl FnMut(u32, usize) -> Result<Picture>,
+        render: impl FnMut(u32, usize) -> Result<Picture>,
     ) -> Result<Self> {
         let report = |source, file: Option<&Path>, noise: Noise, spp| ReferenceReport {
             source,
@@ -208,7 +208,7 @@ impl Reference {
         {
             return Ok(Self { picture, report: report(Source::Cache, Some(&path), noise, spp) });
         }
-        let (picture, noise, spp) = goal.reach(shoot)?;
+        let (picture, noise, spp) = goal.reach(render)?;
         let path = match cache {
             None => None,
             Some(cache) => cache.put(key, &picture.encode(noise, spp)?, quiet),
@@ -219,7 +219,7 @@ impl Reference {
     /// Of a view, by [`STRATEGY`].
     pub(crate) fn of_view(
         cache: Option<&Cache>,
-        view: &View,
+        view: &PreparedScene,
         settings: RenderSettings,
         goal: Goal,
         quiet: bool,
@@ -227,10 +227,10 @@ impl Reference {
         let settings = RenderSettings { n_samples: 0, seed: SEEDS[0], ..settings };
         let key = Key::of_program(view, format_args!("{settings:?}{STRATEGY}{goal:?}"));
         let strategy = PreparedStrategy::new(STRATEGY, &view.environment)?;
-        let studio = Studio { view, settings, strategy: &strategy, quiet };
+        let render_setup = RenderSetup { view, settings, strategy: &strategy, quiet };
         Self::get(cache, &key, goal, &STRATEGY.description(), quiet, |n_samples, half| {
             let label = format!("reference, half {} of 2", half + 1);
-            Ok(studio.shoot(&label, n_samples, SEEDS[half])?.layers.into())
+            Ok(render_setup.render(&label, n_samples, SEEDS[half])?.layers.into())
         })
     }
 }
@@ -239,10 +239,10 @@ impl Goal {
     /// The mean of two halves, its relMSE and its camera samples a pixel.
     fn reach(
         self,
-        mut shoot: impl FnMut(u32, usize) -> Result<Picture>,
+        mut render: impl FnMut(u32, usize) -> Result<Picture>,
     ) -> Result<(Picture, Noise, u32)> {
         let mut take = |each: u32| -> Result<(Picture, Noise)> {
-            let [a, b] = [shoot(each, 0)?, shoot(each, 1)?];
+            let [a, b] = [render(each, 0)?, render(each, 1)?];
             let mean = a.mean(&b);
             // (a − m)² = ((a − b) / 2)², whose expected value is the variance of m.
             let noise = |mask: Option<&[bool]>| -> Result<f64> {

@@ -1,13 +1,13 @@
 //! Drawings as SVG text: shapes, text and pictures on a white sheet, and [`plot`]s.
 //!
-//! Lengths are in pixels of the sheet, x to the right, y down. [`rasterise`] makes a PNG of a sheet; a
+//! Lengths are in pixels of the sheet, x to the right, y down. [`rasterize`] makes a PNG of a sheet; a
 //! page shows the same sheet in the same font with [`font_face_css`].
 
 pub(crate) mod plot;
 mod raster;
 mod ticks;
 
-pub(crate) use raster::{font_face_css, rasterise};
+pub(crate) use raster::{font_face_css, rasterize};
 pub(crate) use ticks::superscript;
 
 use base64::Engine as _;
@@ -33,7 +33,7 @@ impl Rect {
     }
 }
 
-/// An sRGB colour.
+/// An sRGB color.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Color(pub(crate) u8, pub(crate) u8, pub(crate) u8);
 
@@ -42,7 +42,7 @@ impl Color {
     /// Of text and axes.
     pub(crate) const INK: Self = Self(0x1c, 0x1f, 0x24);
     /// Of what should stand back.
-    pub(crate) const GREY: Self = Self(0x6b, 0x72, 0x7c);
+    pub(crate) const GRAY: Self = Self(0x6b, 0x72, 0x7c);
     /// Of grid lines.
     pub(crate) const FAINT: Self = Self(0xe0, 0xe3, 0xe8);
 }
@@ -53,7 +53,7 @@ impl Display for Color {
     }
 }
 
-/// Colours that the colour-blind tell apart, on white: Okabe & Ito 2008, "Color Universal Design",
+/// Colors that the color-blind tell apart, on white: Okabe & Ito 2008, "Color Universal Design",
 /// without the yellow, the sky blue a little darker; then black and a brown.
 pub(crate) const PALETTE: [Color; 8] = [
     Color(0x00, 0x72, 0xb2),
@@ -271,7 +271,7 @@ impl Document {
     /// A PNG, stretched over the rectangle.
     pub(crate) fn image(&mut self, r: Rect, png: &[u8], pixels: Pixels) {
         let rendering = match pixels {
-            // The attribute is for rasterise, the property for browsers.
+            // The attribute is for rasterize, the property for browsers.
             Pixels::Sharp => {
                 " image-rendering=\"optimizeSpeed\" style=\"image-rendering:pixelated\""
             }

@@ -92,7 +92,7 @@ pub(crate) enum Marker {
 }
 
 impl Marker {
-    /// To be gone through with the palette: colour is not the only difference.
+    /// To be gone through with the palette: color is not the only difference.
     pub(crate) const ALL: [Self; 4] = [Self::Disc, Self::Square, Self::Diamond, Self::Triangle];
 }
 
@@ -180,7 +180,7 @@ impl Plot {
 
     fn draw_axes(&self, sheet: &mut Document, area: Rect, left: f64, y_ticks: &[Tick]) {
         let (right, bottom) = (area.x + area.width, area.y + area.height);
-        let grid = |labelled: bool| Style::stroke(Color::FAINT, if labelled { 1.4 } else { 0.5 });
+        let grid = |labeled: bool| Style::stroke(Color::FAINT, if labeled { 1.4 } else { 0.5 });
         let number = TextStyle::new(NUMBER);
         for tick in y_ticks {
             let Some(place) = self.y.place(tick.value) else { continue };
@@ -198,7 +198,7 @@ impl Plot {
                 sheet.text((x, bottom + NUMBER + 6.0), label, number.anchor(Anchor::Middle));
             }
         }
-        sheet.rect(area, Style::stroke(Color::GREY, 1.2));
+        sheet.rect(area, Style::stroke(Color::GRAY, 1.2));
         let label = TextStyle::new(LABEL).anchor(Anchor::Middle);
         let (middle_x, middle_y) = (area.x + 0.5 * area.width, area.y + 0.5 * area.height);
         sheet.text((middle_x, bottom + NUMBER + LABEL + 14.0), &self.x.label, label);

@@ -17,7 +17,7 @@ const MOST: f32 = 20_000.0;
 ///
 /// # Errors
 /// If the text is no drawing, or the picture would be empty or too large.
-pub(crate) fn rasterise(svg: &str, scale: f32) -> Result<Vec<u8>> {
+pub(crate) fn rasterize(svg: &str, scale: f32) -> Result<Vec<u8>> {
     static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
         let mut fonts = fontdb::Database::new();
         fonts.load_font_data(FONT_FILE.to_vec());
@@ -47,14 +47,14 @@ mod tests {
     use domelight::picture::png;
 
     fn pixels(sheet: &Document, scale: f32) -> domelight::RgbImage {
-        png::decode(&rasterise(&sheet.to_svg(), scale).unwrap()).unwrap().image
+        png::decode(&rasterize(&sheet.to_svg(), scale).unwrap()).unwrap().image
     }
 
     #[test]
     fn shapes_text_and_pictures_arrive() {
         let mut inner = Document::new(4.0, 4.0);
         inner.rect(Rect::new(0.0, 0.0, 2.0, 4.0), Style::fill(Color(255, 0, 0)));
-        let red_and_white = rasterise(&inner.to_svg(), 1.0).unwrap();
+        let red_and_white = rasterize(&inner.to_svg(), 1.0).unwrap();
 
         let mut sheet = Document::new(60.0, 20.0);
         sheet.image(Rect::new(0.0, 0.0, 20.0, 20.0), &red_and_white, Pixels::Sharp);
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn what_is_no_drawing_is_refused() {
-        assert!(rasterise("<svg", 1.0).is_err());
-        assert!(rasterise(&Document::new(30_000.0, 1.0).to_svg(), 1.0).is_err());
+        assert!(rasterize("<svg", 1.0).is_err());
+        assert!(rasterize(&Document::new(30_000.0, 1.0).to_svg(), 1.0).is_err());
     }
 }

@@ -42,13 +42,13 @@ pub(super) fn logarithmic(min: f64, max: f64) -> Vec<Tick> {
     for k in first..=last {
         for digit in 1..10 {
             let value = f64::from(digit) * 10f64.powi(k);
-            let labelled = match digit {
+            let labeled = match digit {
                 1 => k.rem_euclid(every as i32) == 0,
                 2 | 5 => n_powers < 2,
                 _ => false,
             };
             if inside(value) && (digit == 1 || last - first <= 8) {
-                ticks.push(Tick { value, label: labelled.then(|| power(digit, k, plain)) });
+                ticks.push(Tick { value, label: labeled.then(|| power(digit, k, plain)) });
             }
         }
     }

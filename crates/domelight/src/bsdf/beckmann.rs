@@ -11,7 +11,7 @@
 use super::microfacet::{Masking, Microfacet, NormalDistribution, gaussian_slopes};
 use super::{Fresnel, range};
 use crate::math::{FRAC_1_PI, sqr};
-use crate::simd::{Real, Vectors};
+use crate::simd::{SimdFloat, Vectors};
 
 /// A Beckmann lobe.
 pub type Beckmann = Microfacet<BeckmannNormals>;
@@ -43,7 +43,7 @@ impl NormalDistribution for BeckmannNormals {
     }
 
     #[inline(always)]
-    fn d<F: Real>(&self, h: Vectors<F>) -> F {
+    fn d<F: SimdFloat>(&self, h: Vectors<F>) -> F {
         let one = |x| h.z.splat(x);
         let [ax, ay] = self.alpha;
         let z2 = h.z.squared();
@@ -63,7 +63,7 @@ impl NormalDistribution for BeckmannNormals {
     /// cos θ (1 + Λ), with the fit Λ(a) = (1 − 1.259 a + 0.396 a²)/(3.535 a + 2.181 a²) below
     /// a = cos θ/√(α_x² w_x² + α_y² w_y²) = 1.6 and zero above (Walter et al. 2007, eq. 27).
     #[inline(always)]
-    fn sigma<F: Real>(&self, w: Vectors<F>) -> F {
+    fn sigma<F: SimdFloat>(&self, w: Vectors<F>) -> F {
         let one = |x| w.z.splat(x);
         let [ax, ay] = self.alpha;
         let spread = ((one(ax) * w.x).squared() + (one(ay) * w.y).squared()).sqrt();
@@ -73,13 +73,13 @@ impl NormalDistribution for BeckmannNormals {
     }
 
     #[inline(always)]
-    fn sample_normals<F: Real>(&self, _wo: Vectors<F>, u: [F; 2]) -> Vectors<F> {
+    fn sample_normals<F: SimdFloat>(&self, _wo: Vectors<F>, u: [F; 2]) -> Vectors<F> {
         gaussian_slopes(u, self.alpha)
     }
 
     /// D cos θ_h/(4 h·wo) = D H_z/(2|H|²).
     #[inline(always)]
-    fn reflected_pdf<F: Real>(&self, h: Vectors<F>, d: F, _sigma_o: F) -> F {
+    fn reflected_pdf<F: SimdFloat>(&self, h: Vectors<F>, d: F, _sigma_o: F) -> F {
         d.splat(0.5) * d * h.z / h.length_squared()
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use super::{Brdf, ROUNDING, above};
 use crate::Rgb;
 use crate::math::{Vec2, Vec3};
-use crate::simd::{Colors, Real, Vectors};
+use crate::simd::{Colors, SimdFloat, Vectors};
 
 /// A reflectance lobe for programs that bring their own; one implementation serves every strategy.
 ///
@@ -74,7 +74,7 @@ impl Debug for CustomLobe {
 }
 
 impl Brdf for CustomLobe {
-    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+    fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
         let bxdf = self.bxdf();
         let arguments = [wo.x, wo.y, wo.z, wi.x, wi.y, wi.z];
         let [r, g, b, pdf] = F::each(arguments, |[ox, oy, oz, ix, iy, iz]| {
@@ -88,7 +88,7 @@ impl Brdf for CustomLobe {
         (Colors([r, g, b]), pdf)
     }
 
-    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, u_lobe: F, [u, v]: [F; 2]) -> Vectors<F> {
+    fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, [u, v]: [F; 2]) -> Vectors<F> {
         let bxdf = self.bxdf();
         let arguments = [wo.x, wo.y, wo.z, u_lobe, u, v];
         let [x, y, z] = F::each(arguments, |[x, y, z, u_lobe, u, v]| {
@@ -111,7 +111,7 @@ impl Brdf for CustomLobe {
 mod tests {
     use super::*;
     use crate::bsdf::test_support::{check_bound, check_lobe, toward};
-    use crate::bsdf::{Lambert, Lobe, Material};
+    use crate::bsdf::{Bsdf, Lambert, Lobe};
     use crate::math::{PI, vec2};
 
     /// Lambert's law, written as a caller would.
@@ -138,7 +138,7 @@ mod tests {
         let custom = CustomLobe::leak(Diffuse(albedo));
         check_lobe(&custom);
         check_bound(&custom, 1.1);
-        let (mine, theirs) = (Material::single(custom), Material::single(Lambert::new(albedo)));
+        let (mine, theirs) = (Bsdf::single(custom), Bsdf::single(Lambert::new(albedo)));
         for view in [0.0, 50.0, 89.0] {
             let (wo, wi) = (toward(view, 0.3), toward(40.0, 2.0));
             let (a, b) = (mine.eval_pdf(wo, wi), theirs.eval_pdf(wo, wi));

@@ -1,12 +1,12 @@
 //! Fresnel reflectance as a function of the angle of incidence on a microfacet.
 //!
 //! - Schlick 1994, "An Inexpensive BRDF Model for Physically-based Rendering", eq. 15.
-//! - The exact unpolarised reflectance of a conductor of complex refractive index η + ik, per
-//!   colour channel; for its arithmetic see Lagarde 2013, "Memo on Fresnel equations".
+//! - The exact unpolarized reflectance of a conductor of complex refractive index η + ik, per
+//!   color channel; for its arithmetic see Lagarde 2013, "Memo on Fresnel equations".
 
 use super::range;
 use crate::Rgb;
-use crate::simd::{Colors, Real};
+use crate::simd::{Colors, SimdFloat};
 
 /// What a microfacet reflects.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,7 +19,7 @@ pub enum Fresnel {
         /// Reflectance at normal incidence, in [0, 1].
         f0: Rgb,
     },
-    /// The exact unpolarised reflectance of a conductor.
+    /// The exact unpolarized reflectance of a conductor.
     Conductor(Conductor),
 }
 
@@ -43,7 +43,7 @@ impl Fresnel {
 
     /// [`Fresnel::eval`] of several cosines side by side.
     #[inline(always)]
-    pub(super) fn eval_lanes<F: Real>(&self, cos_theta: F) -> Colors<F> {
+    pub(super) fn eval_lanes<F: SimdFloat>(&self, cos_theta: F) -> Colors<F> {
         match self {
             Self::One => Colors::splat(cos_theta, Rgb::WHITE),
             Self::Schlick { f0 } => schlick(*f0, cos_theta),
@@ -60,7 +60,7 @@ impl Fresnel {
 
 /// Schlick's approximation.
 #[inline(always)]
-pub(super) fn schlick<F: Real>(f0: Rgb, cos_theta: F) -> Colors<F> {
+pub(super) fn schlick<F: SimdFloat>(f0: Rgb, cos_theta: F) -> Colors<F> {
     let weight = schlick_weight(cos_theta);
     let rest = Colors::splat(weight, Rgb::WHITE - f0).scaled(weight);
     Colors::splat(weight, f0).zip(rest, |f0, rest| f0 + rest)
@@ -68,18 +68,18 @@ pub(super) fn schlick<F: Real>(f0: Rgb, cos_theta: F) -> Colors<F> {
 
 /// (1 − cos θ)⁵, how far F is from f0 to 1.
 #[inline(always)]
-pub(super) fn schlick_weight<F: Real>(cos_theta: F) -> F {
+pub(super) fn schlick_weight<F: SimdFloat>(cos_theta: F) -> F {
     let x = unit(cos_theta.splat(1.0) - cos_theta);
     x.squared().squared() * x
 }
 
 /// Clamped to [0, 1].
 #[inline(always)]
-fn unit<F: Real>(x: F) -> F {
+fn unit<F: SimdFloat>(x: F) -> F {
     x.max(x.splat(0.0)).min(x.splat(1.0))
 }
 
-/// A complex refractive index per colour channel.
+/// A complex refractive index per color channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conductor {
     /// Real part.
@@ -131,14 +131,14 @@ impl Conductor {
         ("tungsten", Self::TUNGSTEN),
     ];
 
-    /// Unpolarised reflectance per channel at the cosine of incidence in [0, 1].
+    /// Unpolarized reflectance per channel at the cosine of incidence in [0, 1].
     #[inline]
     pub fn reflectance(&self, cos_theta: f32) -> Rgb {
         self.reflectance_lanes(cos_theta).single()
     }
 
     #[inline(always)]
-    fn reflectance_lanes<F: Real>(&self, cos_theta: F) -> Colors<F> {
+    fn reflectance_lanes<F: SimdFloat>(&self, cos_theta: F) -> Colors<F> {
         let c = unit(cos_theta);
         let (eta, k) = (Colors::splat(c, self.eta), Colors::splat(c, self.k));
         eta.zip(k, |eta, k| conductor(c, eta, k))
@@ -147,7 +147,7 @@ impl Conductor {
 
 /// (R_s + R_p)/2, with a² + b² = |√((η + ik)² − sin² θ)|².
 #[inline(always)]
-fn conductor<F: Real>(cos: F, eta: F, k: F) -> F {
+fn conductor<F: SimdFloat>(cos: F, eta: F, k: F) -> F {
     let one = |x| cos.splat(x);
     let (cos2, eta2, k2) = (cos * cos, eta * eta, k * k);
     let sin2 = one(1.0) - cos2;
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn metals_have_their_colours() {
+    fn metals_have_their_colors() {
         let gold = Conductor::GOLD.reflectance(1.0);
         assert!(gold.r > 0.9 && gold.r > gold.g && gold.g > gold.b, "{gold:?}");
         let copper = Conductor::COPPER.reflectance(1.0);

@@ -8,7 +8,7 @@
 use super::microfacet::{Masking, Microfacet, NormalDistribution};
 use super::{Fresnel, range};
 use crate::math::{FRAC_1_PI, sin_cos_turns, sqr};
-use crate::simd::{Real, Vectors};
+use crate::simd::{SimdFloat, Vectors};
 
 /// A GGX lobe.
 pub type Ggx = Microfacet<GgxNormals>;
@@ -40,7 +40,7 @@ impl NormalDistribution for GgxNormals {
     }
 
     #[inline(always)]
-    fn d<F: Real>(&self, h: Vectors<F>) -> F {
+    fn d<F: SimdFloat>(&self, h: Vectors<F>) -> F {
         let one = |x| h.z.splat(x);
         let [ax, ay] = self.alpha;
         let stretched =
@@ -58,7 +58,7 @@ impl NormalDistribution for GgxNormals {
 
     /// (cos θ + √(cos² θ + α_x² w_x² + α_y² w_y²))/2.
     #[inline(always)]
-    fn sigma<F: Real>(&self, w: Vectors<F>) -> F {
+    fn sigma<F: SimdFloat>(&self, w: Vectors<F>) -> F {
         let one = |x| w.z.splat(x);
         let [ax, ay] = self.alpha;
         let stretched = w.z.squared() + (one(ax) * w.x).squared() + (one(ay) * w.y).squared();
@@ -67,7 +67,7 @@ impl NormalDistribution for GgxNormals {
 
     /// Dupuy & Benyoub 2023, listing 3.
     #[inline(always)]
-    fn sample_normals<F: Real>(&self, wo: Vectors<F>, u: [F; 2]) -> Vectors<F> {
+    fn sample_normals<F: SimdFloat>(&self, wo: Vectors<F>, u: [F; 2]) -> Vectors<F> {
         let (zero, one) = (wo.z.splat(0.0), wo.z.splat(1.0));
         let [ax, ay] = [wo.z.splat(self.alpha[0]), wo.z.splat(self.alpha[1])];
         // Stretch to the configuration of unit roughness.
@@ -84,7 +84,7 @@ impl NormalDistribution for GgxNormals {
 
     /// D G₁(wo)/(4 cos θ_o) = D/(4 σ_o).
     #[inline(always)]
-    fn reflected_pdf<F: Real>(&self, _h: Vectors<F>, d: F, sigma_o: F) -> F {
+    fn reflected_pdf<F: SimdFloat>(&self, _h: Vectors<F>, d: F, sigma_o: F) -> F {
         d.splat(0.25) * d / sigma_o
     }
 }

@@ -4,7 +4,7 @@ use super::{Brdf, range, where_above};
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3};
 use crate::sampling::warp;
-use crate::simd::{Colors, Real, Vectors};
+use crate::simd::{Colors, SimdFloat, Vectors};
 
 /// Ideal diffuse reflection, sampled by the cosine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,13 +21,13 @@ impl Lambert {
 
 impl Brdf for Lambert {
     #[inline(always)]
-    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+    fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
         let pdf = where_above(wo, wi, wi.z * wi.z.splat(FRAC_1_PI));
         (Colors::splat(pdf, self.albedo).scaled(pdf), pdf)
     }
 
     #[inline(always)]
-    fn sample_lanes<F: Real>(&self, _wo: Vectors<F>, _u_lobe: F, u: [F; 2]) -> Vectors<F> {
+    fn sample_lanes<F: SimdFloat>(&self, _wo: Vectors<F>, _u_lobe: F, u: [F; 2]) -> Vectors<F> {
         warp::cosine_lanes(u)
     }
 

@@ -17,7 +17,7 @@ use super::{Brdf, Fresnel, HORIZON, NormalDistribution as _, fresnel, range, whe
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3, sqr};
 use crate::sampling::warp;
-use crate::simd::{Colors, Mask as _, Real, Vectors};
+use crate::simd::{Colors, LaneMask as _, SimdFloat, Vectors};
 
 /// glTF's metallic-roughness lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub struct MetallicRoughness {
 }
 
 impl MetallicRoughness {
-    /// Of the base colour, metalness and perceptual roughness; all are clamped to [0, 1], as glTF
+    /// Of the base color, metalness and perceptual roughness; all are clamped to [0, 1], as glTF
     /// has it for products of factors and textures, and α = roughness² to at least [`super::MIN_ALPHA`].
     pub fn new(base_color: Rgb, metallic: f32, roughness: f32) -> Self {
         let (base, metallic) = (range::reflectance(base_color), range::unit(metallic));
@@ -65,7 +65,7 @@ impl MetallicRoughness {
 
     /// The probability of drawing from the specular part.
     #[inline]
-    pub(super) fn specular_share<F: Real>(&self, cos_theta_o: F) -> F {
+    pub(super) fn specular_share<F: SimdFloat>(&self, cos_theta_o: F) -> F {
         let one = |x| cos_theta_o.splat(x);
         let grazing = fresnel::schlick_weight(cos_theta_o);
         let specular = one(self.f0_mean) + one(1.0 - self.f0_mean) * grazing;
@@ -77,7 +77,7 @@ impl MetallicRoughness {
 
 impl Brdf for MetallicRoughness {
     #[inline(always)]
-    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+    fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
         let one = |x| wi.z.splat(x);
         let h = wi.plus(wo);
         let (geometry, pdf_specular) = self.specular().geometry_pdf(wo, wi, h);
@@ -92,7 +92,7 @@ impl Brdf for MetallicRoughness {
     }
 
     #[inline(always)]
-    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
+    fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
         let share = self.specular_share(wo.z);
         let (specular, diffuse) = (u_lobe.lt(share), share.le(u_lobe));
         let mut wi = wo;
@@ -164,7 +164,7 @@ mod tests {
         }
     }
 
-    /// A rough dielectric looks like its base colour and shines like glass of index 1.5.
+    /// A rough dielectric looks like its base color and shines like glass of index 1.5.
     #[test]
     fn a_dielectric_is_diffuse_under_a_coat() {
         let base = Rgb::new(0.8, 0.4, 0.2);

@@ -11,7 +11,7 @@
 //! - separable: G₂ cos θ_i/(4 cos θ_i cos θ_o) = cos θ_i / (4 σ_o σ_i);
 //! - height-correlated: = cos θ_i / (4 (σ_o cos θ_i + σ_i cos θ_o − cos θ_i cos θ_o)).
 //!
-//! The half vector stays unnormalised, H = wo + wi with |H| = 2 h·wi, so that neither a square root
+//! The half vector stays unnormalized, H = wo + wi with |H| = 2 h·wi, so that neither a square root
 //! nor 1 − cos² appears where a lobe is narrow.
 //!
 //! Single scattering only: rough lobes lose the light that bounces twice.
@@ -19,7 +19,7 @@
 use super::{Brdf, Fresnel, HORIZON, ROUNDING, where_above};
 use crate::Rgb;
 use crate::math::{Vec3, sin_cos_turns, sqr, vec3};
-use crate::simd::{Colors, Real, Vectors};
+use crate::simd::{Colors, SimdFloat, Vectors};
 
 /// How masking toward the viewer and shadowing from the light are combined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,20 +37,20 @@ pub trait NormalDistribution: Copy + Send + Sync {
     fn alpha(&self) -> [f32; 2];
 
     /// D(h/|h|) \[sr⁻¹\] for an `h` of any length.
-    fn d<F: Real>(&self, h: Vectors<F>) -> F;
+    fn d<F: SimdFloat>(&self, h: Vectors<F>) -> F;
 
     /// The greatest D where tan² θ_h lies in a closed range, which may end at infinity.
     fn max_d(&self, tan2: [f32; 2]) -> f32;
 
     /// σ(w) = cos θ (1 + Λ(w)), the projected area of the microfacets facing `w`.
-    fn sigma<F: Real>(&self, w: Vectors<F>) -> F;
+    fn sigma<F: SimdFloat>(&self, w: Vectors<F>) -> F;
 
     /// Draws a normal, of any length, for each viewer `wo`.
-    fn sample_normals<F: Real>(&self, wo: Vectors<F>, u: [F; 2]) -> Vectors<F>;
+    fn sample_normals<F: SimdFloat>(&self, wo: Vectors<F>, u: [F; 2]) -> Vectors<F>;
 
     /// Density \[sr⁻¹\] of `wo` reflected about the drawn normal, where `h` = wo + wi, `d` = D(h) and
     /// `sigma_o` = σ(wo).
-    fn reflected_pdf<F: Real>(&self, h: Vectors<F>, d: F, sigma_o: F) -> F;
+    fn reflected_pdf<F: SimdFloat>(&self, h: Vectors<F>, d: F, sigma_o: F) -> F;
 }
 
 /// A microfacet lobe over a distribution of normals.
@@ -73,7 +73,7 @@ impl<D: NormalDistribution> Microfacet<D> {
 
     /// D G₂/(4 cos θ_o), the lobe without Fresnel's factor, and the density.
     #[inline(always)]
-    pub(super) fn geometry_pdf<F: Real>(
+    pub(super) fn geometry_pdf<F: SimdFloat>(
         &self,
         wo: Vectors<F>,
         wi: Vectors<F>,
@@ -88,7 +88,7 @@ impl<D: NormalDistribution> Microfacet<D> {
 
 /// G₂ cos θ_i / (4 cos θ_i cos θ_o) of the cosines and projected areas of `wo` and `wi`.
 #[inline(always)]
-fn masked<F: Real>(masking: Masking, [cos_o, sigma_o]: [F; 2], [cos_i, sigma_i]: [F; 2]) -> F {
+fn masked<F: SimdFloat>(masking: Masking, [cos_o, sigma_o]: [F; 2], [cos_i, sigma_i]: [F; 2]) -> F {
     let below = match masking {
         Masking::Separable => sigma_o * sigma_i,
         Masking::Correlated => sigma_o * cos_i + sigma_i * cos_o - cos_i * cos_o,
@@ -98,7 +98,7 @@ fn masked<F: Real>(masking: Masking, [cos_o, sigma_o]: [F; 2], [cos_i, sigma_i]:
 
 impl<D: NormalDistribution> Brdf for Microfacet<D> {
     #[inline(always)]
-    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+    fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
         let h = wi.plus(wo);
         let (geometry, pdf) = self.geometry_pdf(wo, wi, h);
         let cos_d = pdf.splat(0.5) * h.length_squared().sqrt();
@@ -107,7 +107,7 @@ impl<D: NormalDistribution> Brdf for Microfacet<D> {
     }
 
     #[inline(always)]
-    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, _u_lobe: F, u: [F; 2]) -> Vectors<F> {
+    fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, _u_lobe: F, u: [F; 2]) -> Vectors<F> {
         reflect_about(wo, self.normals.sample_normals(wo, u))
     }
 
@@ -140,7 +140,7 @@ impl<D: NormalDistribution> Brdf for Microfacet<D> {
 
 /// The mirror direction of `wo` about an `h` of any length but zero.
 #[inline(always)]
-pub(super) fn reflect_about<F: Real>(wo: Vectors<F>, h: Vectors<F>) -> Vectors<F> {
+pub(super) fn reflect_about<F: SimdFloat>(wo: Vectors<F>, h: Vectors<F>) -> Vectors<F> {
     let along = wo.dot_each(h) / h.length_squared();
     h.times(along + along).minus(wo)
 }
@@ -148,7 +148,7 @@ pub(super) fn reflect_about<F: Real>(wo: Vectors<F>, h: Vectors<F>) -> Vectors<F
 /// A normal, z = 1, whose slopes are Gaussian of variance α²/2: density per solid angle
 /// exp(−tan² θ_h (cos² φ_h/α_x² + sin² φ_h/α_y²)) / (π α_x α_y cos³ θ_h).
 #[inline(always)]
-pub(super) fn gaussian_slopes<F: Real>([u, v]: [F; 2], [ax, ay]: [f32; 2]) -> Vectors<F> {
+pub(super) fn gaussian_slopes<F: SimdFloat>([u, v]: [F; 2], [ax, ay]: [f32; 2]) -> Vectors<F> {
     let radius = u.map(|u| -f32::ln_1p(-u)).sqrt();
     let [sin, cos] = sin_cos_turns(v);
     Vectors { x: u.splat(ax) * radius * cos, y: u.splat(ay) * radius * sin, z: u.splat(1.0) }
@@ -221,7 +221,7 @@ mod tests {
         }
     }
 
-    /// Smith's normalisation: ∫ D(h) max(0, h·w) dω = σ(w).
+    /// Smith's normalization: ∫ D(h) max(0, h·w) dω = σ(w).
     #[test]
     fn sigma_is_the_projected_area() {
         for alpha in [[0.3, 0.6], [0.5, 0.5], [0.9, 0.2]] {

@@ -1,17 +1,17 @@
 //! Reflectance: lobes and the materials that they add up to.
 //!
-//! A [`Material`] is a small sum of [`Lobe`]s: [`Lambert`], [`Phong`], [`Ward`], [`Ggx`],
+//! A [`Bsdf`] is a small sum of [`Lobe`]s: [`Lambert`], [`Phong`], [`Ward`], [`Ggx`],
 //! [`Beckmann`] and glTF's [`MetallicRoughness`], one model a file. All work in the local frame,
 //! are plain `Copy` data and evaluate value and density together, because multiple importance
 //! sampling always needs both.
 //!
 //! ```
-//! use domelight::bsdf::{Brdf, Material};
+//! use domelight::bsdf::{Brdf, Bsdf};
 //! use domelight::math::{vec2, vec3};
 //!
-//! let material: Material = "phong:50:0.5:0.3".parse()?;
+//! let bsdf: Bsdf = "phong:50:0.5:0.3".parse()?;
 //! let wo = vec3(0.6, 0.0, 0.8);
-//! if let Some(sample) = material.for_view(wo).sample(wo, 0.2, vec2(0.3, 0.7)) {
+//! if let Some(sample) = bsdf.for_view(wo).sample(wo, 0.2, vec2(0.3, 0.7)) {
 //!     let weight = sample.value / sample.pdf;
 //!     assert!(weight.is_finite() && sample.wi.z > 0.0);
 //! }
@@ -29,10 +29,10 @@ mod custom;
 mod fresnel;
 mod ggx;
 mod lambert;
-mod material;
+mod lobe_summary;
+mod lobes;
 mod metallic_roughness;
 mod microfacet;
-mod outline;
 mod parse;
 mod phong;
 mod range;
@@ -45,10 +45,10 @@ pub use custom::{Bxdf, CustomLobe};
 pub use fresnel::{Conductor, Fresnel};
 pub use ggx::{Ggx, GgxNormals};
 pub use lambert::Lambert;
-pub use material::{Lobe, MAX_LOBES, Material, TooManyLobes};
+pub use lobe_summary::{GlossyLobe, LobeSummary};
+pub use lobes::{Bsdf, Lobe, MAX_LOBES, TooManyLobes};
 pub use metallic_roughness::MetallicRoughness;
 pub use microfacet::{Masking, Microfacet, NormalDistribution};
-pub use outline::{Gloss, Outline};
 pub use parse::{MaterialSpec, ParseMaterialError};
 pub use phong::Phong;
 pub use range::{MAX_ALPHA, MAX_EXPONENT, MIN_ALPHA};
@@ -56,23 +56,23 @@ pub use ward::{Ward, WardForm};
 
 use crate::Rgb;
 use crate::math::{Vec2, Vec3};
-use crate::simd::{Colors, Real, Vectors};
+use crate::simd::{Colors, SimdFloat, Vectors};
 
 /// A reflectance lobe in the local frame (z the shading normal).
 pub trait Brdf: Copy + Send + Sync {
     /// [`Brdf::eval`] and [`Brdf::pdf`] of one pair of directions or of several side by side: the
     /// lobe's formula.
-    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F);
+    fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F);
 
     /// The directions of [`Brdf::sample`], of one sample or of several side by side. One that lies below the surface
     /// or is not finite is the sample of value zero.
-    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F>;
+    fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F>;
 
     /// An upper bound over all `wi` of the greatest channel of [`Brdf::eval`] \[sr⁻¹\].
     fn max_eval(&self, wo: Vec3) -> f32;
 
     /// The fraction of light toward `wo` = (·, ·, `cos_theta_o`) under uniform light, roughly: what
-    /// chooses between lobes and colours previews. Never negative.
+    /// chooses between lobes and colors previews. Never negative.
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb;
 
     /// [`Brdf::eval`] and [`Brdf::pdf`] at once.
@@ -135,7 +135,7 @@ fn above(wo: Vec3, wi: Vec3) -> bool {
 
 /// `x` where both directions lie above the surface, else zero.
 #[inline(always)]
-fn where_above<F: Real>(wo: Vectors<F>, wi: Vectors<F>, x: F) -> F {
+fn where_above<F: SimdFloat>(wo: Vectors<F>, wi: Vectors<F>, x: F) -> F {
     let horizon = x.splat(HORIZON);
     F::select(horizon.lt(wo.z) & horizon.lt(wi.z), x, x.splat(0.0))
 }

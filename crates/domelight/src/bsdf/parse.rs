@@ -20,13 +20,13 @@
 //! `ggx:0.2` is the same surface as in renderers that it is compared with.
 
 use super::{
-    Beckmann, Conductor, Fresnel, Ggx, Lambert, Lobe, MAX_ALPHA, MAX_EXPONENT, MIN_ALPHA, Masking,
-    Material, MetallicRoughness, Phong, Ward, WardForm,
+    Beckmann, Bsdf, Conductor, Fresnel, Ggx, Lambert, Lobe, MAX_ALPHA, MAX_EXPONENT, MIN_ALPHA,
+    Masking, MetallicRoughness, Phong, Ward, WardForm,
 };
 use crate::Rgb;
 use std::str::FromStr;
 
-/// A material as a user names it; [`Material::from`] makes it.
+/// A material as a user names it; [`Bsdf::from`] makes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MaterialSpec {
     /// `diffuse:0.8` or `diffuse:R,G,B`.
@@ -49,7 +49,7 @@ pub enum MaterialSpec {
         alpha: [f32; 2],
         /// ρ.
         rho: Rgb,
-        /// The normalisation.
+        /// The normalization.
         form: WardForm,
     },
     /// `ggx:0.2`, `ggx:0.2,0.4:gold`.
@@ -72,7 +72,7 @@ pub enum MaterialSpec {
     },
     /// `gltf:R,G,B:metallic:roughness`.
     Gltf {
-        /// Base colour.
+        /// Base color.
         base_color: Rgb,
         /// Metalness.
         metallic: f32,
@@ -168,12 +168,12 @@ struct Parts<'a> {
 
 impl Parts<'_> {
     fn diffuse(&self) -> Result<MaterialSpec, ParseMaterialError> {
-        self.count(1..=1, "one colour", "diffuse:0.8")?;
+        self.count(1..=1, "one color", "diffuse:0.8")?;
         Ok(MaterialSpec::Diffuse { albedo: self.color(0, "albedo", 0.0)? })
     }
 
     fn phong(&self) -> Result<MaterialSpec, ParseMaterialError> {
-        self.count(1..=3, "an exponent and up to two colours", "phong:50:1:0.5")?;
+        self.count(1..=3, "an exponent and up to two colors", "phong:50:1:0.5")?;
         Ok(MaterialSpec::Phong {
             exponent: self.number(0, "exponent", [0.0, MAX_EXPONENT], EXPONENT)?,
             specular: self.color(1, "specular reflectance", 1.0)?,
@@ -182,7 +182,7 @@ impl Parts<'_> {
     }
 
     fn ward(&self) -> Result<MaterialSpec, ParseMaterialError> {
-        self.count(1..=4, "one or two roughnesses, a colour and a form", "ward:0.15:0.5:0.9:1992")?;
+        self.count(1..=4, "one or two roughnesses, a color and a form", "ward:0.15:0.5:0.9:1992")?;
         let range = [MIN_ALPHA, MAX_ALPHA];
         let x = self.number(0, "roughness along x", range, ALPHA)?;
         let y = match self.parts.get(1) {
@@ -213,9 +213,9 @@ impl Parts<'_> {
     }
 
     fn gltf(&self) -> Result<MaterialSpec, ParseMaterialError> {
-        self.count(3..=3, "a colour and two numbers", "gltf:1,0.8,0.6:0:0.5")?;
+        self.count(3..=3, "a color and two numbers", "gltf:1,0.8,0.6:0:0.5")?;
         Ok(MaterialSpec::Gltf {
-            base_color: self.color(0, "base colour", 0.0)?,
+            base_color: self.color(0, "base color", 0.0)?,
             metallic: self.number(1, "metalness", [0.0, 1.0], UNIT)?,
             roughness: self.number(2, "roughness", [0.0, 1.0], UNIT)?,
         })
@@ -258,7 +258,7 @@ impl Parts<'_> {
         number(self.parts[i], range).ok_or_else(|| self.wrong(i, parameter, expected))
     }
 
-    /// The colour at `i`, a grey if there is none.
+    /// The color at `i`, a gray if there is none.
     fn color(
         &self,
         i: usize,
@@ -303,13 +303,13 @@ fn numbers(text: &str, range: [f32; 2]) -> Option<Vec<f32>> {
 
 fn color(text: &str) -> Option<Rgb> {
     match *numbers(text, [0.0, 1.0])? {
-        [grey] => Some(Rgb::splat(grey)),
+        [gray] => Some(Rgb::splat(gray)),
         [r, g, b] => Some(Rgb::new(r, g, b)),
         _ => None,
     }
 }
 
-impl From<MaterialSpec> for Material {
+impl From<MaterialSpec> for Bsdf {
     fn from(spec: MaterialSpec) -> Self {
         let one = |lobe: Lobe| vec![(1.0, lobe)];
         let lobes = match spec {
@@ -337,7 +337,7 @@ impl From<MaterialSpec> for Material {
     }
 }
 
-impl FromStr for Material {
+impl FromStr for Bsdf {
     type Err = ParseMaterialError;
 
     /// As [`MaterialSpec`].
@@ -360,29 +360,29 @@ mod tests {
 
     #[test]
     fn every_model_is_understood() {
-        let grey = Rgb::splat;
-        assert_eq!(parse("diffuse:0.8"), MaterialSpec::Diffuse { albedo: grey(0.8) });
+        let gray = Rgb::splat;
+        assert_eq!(parse("diffuse:0.8"), MaterialSpec::Diffuse { albedo: gray(0.8) });
         let albedo = Rgb::new(0.1, 0.2, 0.3);
         assert_eq!(parse(" diffuse : 0.1, .2,0.3 "), MaterialSpec::Diffuse { albedo });
-        let (exponent, specular, diffuse) = (50.0, grey(1.0), grey(0.5));
+        let (exponent, specular, diffuse) = (50.0, gray(1.0), gray(0.5));
         assert_eq!(parse("phong:50:1:0.5"), MaterialSpec::Phong { exponent, specular, diffuse });
-        let diffuse = grey(0.0);
+        let diffuse = gray(0.0);
         assert_eq!(parse("phong:50"), MaterialSpec::Phong { exponent, specular, diffuse });
         let alpha = [0.15, 0.5];
         let form = WardForm::default();
-        assert_eq!(parse("ward:0.15:0.5"), MaterialSpec::Ward { alpha, rho: grey(1.0), form });
+        assert_eq!(parse("ward:0.15:0.5"), MaterialSpec::Ward { alpha, rho: gray(1.0), form });
         let rho = Rgb::new(1.0, 0.5, 0.0);
         assert_eq!(parse("ward:0.15:0.5:1,0.5,0"), MaterialSpec::Ward { alpha, rho, form });
         let duer = MaterialSpec::Ward { alpha, rho, form: WardForm::Duer };
         assert_eq!(parse("ward:0.15:0.5:1,0.5,0:duer"), duer);
-        assert_eq!(parse("ward:0.2"), MaterialSpec::Ward { alpha: [0.2; 2], rho: grey(1.0), form });
+        assert_eq!(parse("ward:0.2"), MaterialSpec::Ward { alpha: [0.2; 2], rho: gray(1.0), form });
         let (alpha, masking) = ([0.2; 2], Masking::Separable);
         let fresnel = Fresnel::One;
         assert_eq!(parse("ggx:0.2"), MaterialSpec::Ggx { alpha, fresnel, masking });
         assert_eq!(parse("beckmann:0.2"), MaterialSpec::Beckmann { alpha, fresnel, masking });
         let fresnel = Fresnel::Conductor(Conductor::GOLD);
         assert_eq!(parse("ggx:0.2:gold"), MaterialSpec::Ggx { alpha, fresnel, masking });
-        let (fresnel, alpha) = (Fresnel::Schlick { f0: grey(0.04) }, [0.2, 0.4]);
+        let (fresnel, alpha) = (Fresnel::Schlick { f0: gray(0.04) }, [0.2, 0.4]);
         let masking = Masking::Correlated;
         assert_eq!(
             parse("ggx:0.2,0.4:0.04:correlated"),
@@ -398,11 +398,11 @@ mod tests {
 
     #[test]
     fn mix_is_half_and_half() {
-        let mix = Material::from(MaterialSpec::Mix);
+        let mix = Bsdf::from(MaterialSpec::Mix);
         let weights: Vec<f32> = mix.lobes().map(|(weight, _)| weight).collect();
         assert_eq!(weights, [0.5, 0.5]);
-        assert_eq!("phong:50:1:0.5".parse::<Material>().unwrap().lobes().count(), 2);
-        assert_eq!("phong:50".parse::<Material>().unwrap().lobes().count(), 1);
+        assert_eq!("phong:50:1:0.5".parse::<Bsdf>().unwrap().lobes().count(), 2);
+        assert_eq!("phong:50".parse::<Bsdf>().unwrap().lobes().count(), 1);
     }
 
     #[test]
@@ -413,7 +413,7 @@ mod tests {
         );
         assert_eq!(
             error("gltf:1:0"),
-            "«gltf» takes a colour and two numbers after colons, not 2; for instance gltf:1,0.8,0.6:0:0.5"
+            "«gltf» takes a color and two numbers after colons, not 2; for instance gltf:1,0.8,0.6:0:0.5"
         );
         assert!(error("velvet:1").contains("«velvet»; write diffuse:COLOR, phong:"));
         assert!(error("ggx:0.1:unobtainium").contains("aluminium, chromium"));
@@ -448,7 +448,7 @@ mod tests {
             "Diffuse:0.5",
         ];
         for text in texts {
-            assert!(text.parse::<Material>().is_err(), "{text}");
+            assert!(text.parse::<Bsdf>().is_err(), "{text}");
         }
     }
 }

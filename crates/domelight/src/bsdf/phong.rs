@@ -1,4 +1,4 @@
-//! Phong's lobe about the mirror direction, normalised:
+//! Phong's lobe about the mirror direction, normalized:
 //! f_r = k_s (n + 2)/(2π) max(0, cos α)ⁿ with α the angle between `wi` and the mirror of `wo`.
 //!
 //! Lafortune & Willems 1994, "Using the Modified Phong Reflectance Model for Physically Based
@@ -12,9 +12,9 @@ use super::{Brdf, HORIZON, ROUNDING, range, where_above};
 use crate::Rgb;
 use crate::math::{TAU, Vec3, tangents};
 use crate::sampling::warp;
-use crate::simd::{Colors, Real, Vectors};
+use crate::simd::{Colors, SimdFloat, Vectors};
 
-/// A normalised Phong lobe.
+/// A normalized Phong lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phong {
     specular: Rgb,
@@ -34,7 +34,7 @@ impl Phong {
 
 impl Brdf for Phong {
     #[inline(always)]
-    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+    fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
         let n = self.exponent;
         // cos α = 1 − |wi − mirror|²/2: a scalar product would carry the rounding of the vectors'
         // lengths, which the power multiplies by n.
@@ -47,7 +47,7 @@ impl Brdf for Phong {
     }
 
     #[inline(always)]
-    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, _u_lobe: F, u: [F; 2]) -> Vectors<F> {
+    fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, _u_lobe: F, u: [F; 2]) -> Vectors<F> {
         let lobe = warp::phong_lanes(u, self.exponent);
         let zero = wo.z.splat(0.0);
         let mirror = Vectors { x: zero - wo.x, y: zero - wo.y, z: wo.z };

@@ -23,9 +23,9 @@ use super::microfacet::{gaussian_slopes, reflect_about, rings};
 use super::{Brdf, HORIZON, ROUNDING, range, where_above};
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3, sqr};
-use crate::simd::{Colors, Real, Vectors};
+use crate::simd::{Colors, SimdFloat, Vectors};
 
-/// Which normalisation of Ward's model.
+/// Which normalization of Ward's model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WardForm {
     /// Ward 1992: loses energy at grazing angles.
@@ -59,7 +59,7 @@ impl Ward {
 
 impl Brdf for Ward {
     #[inline(always)]
-    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+    fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
         let one = |x| wi.z.splat(x);
         let [ax, ay] = self.alpha;
         let h = wi.plus(wo);
@@ -77,7 +77,7 @@ impl Brdf for Ward {
     }
 
     #[inline(always)]
-    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, _u_lobe: F, u: [F; 2]) -> Vectors<F> {
+    fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, _u_lobe: F, u: [F; 2]) -> Vectors<F> {
         reflect_about(wo, gaussian_slopes(u, self.alpha))
     }
 

@@ -1,7 +1,7 @@
 //! Top-down construction with the binned surface area heuristic, eight children at once.
 //!
 //! A node starts as one range of triangles; the range of the largest surface is split in two until
-//! there are eight. A split minimises area × blocks over equal bins of the centroids on each axis
+//! there are eight. A split minimizes area × blocks over equal bins of the centroids on each axis
 //! (Wald 2007). Boxes are four-wide vectors, of which x, y and z count. Past a certain depth ranges are halved instead, which bounds the depth of the tree
 //! and with it the traversal's stack, whatever the input.
 

@@ -4,7 +4,7 @@ use super::traverse::STACK;
 use super::{Bvh, Node};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
-use crate::simd::{Kernel, Mask, Real, Simd, set_bits};
+use crate::simd::{Kernel, LaneMask, Simd, SimdFloat, set_bits};
 
 /// The points on the inner side of four planes: the view of a rectangle of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! One ray against eight boxes or eight triangles.
 //!
 //! The triangle test moves the ray's origin to 0 and shears its direction to the axis along which
-//! it is longest (Woop, Benthin & Wald 2013). Each vertex is sheared on its own, so neighbours see
+//! it is longest (Woop, Benthin & Wald 2013). Each vertex is sheared on its own, so neighbors see
 //! the same corners, and what remains is whether the origin lies in a triangle of the plane. The
 //! sign of an edge function is that of the exact one or it is zero, because rounding is monotone;
 //! where it is zero it is computed again in f64, which holds a product of two f32 exactly. So the
@@ -15,13 +15,13 @@
 
 use super::prepare::PreparedRays;
 use super::{Block, Lanes, Node, WIDTH};
-use crate::simd::{Floats, Mask, Real, Simd};
+use crate::simd::{LaneMask, Simd, SimdF32x8, SimdFloat};
 
 /// A node's planes in the order in which rays of one octant cross them.
 #[derive(Clone, Copy)]
 pub(super) struct Slabs<S: Simd> {
-    near: [S::Floats; 3],
-    far: [S::Floats; 3],
+    near: [S::F32x8; 3],
+    far: [S::F32x8; 3],
 }
 
 impl<S: Simd> Slabs<S> {
@@ -46,18 +46,18 @@ impl<S: Simd> Slabs<S> {
         simd: S,
         rays: &PreparedRays<N>,
         i: usize,
-    ) -> [S::Floats; 2] {
+    ) -> [S::F32x8; 2] {
         let one = |numbers: &[[f32; N]; 3], k: usize| simd.splat(numbers[k][i]);
         let [near, far] = [&rays.near_origins, &rays.far_origins];
         let x = one(&rays.inverse_directions, 0);
         let y = one(&rays.inverse_directions, 1);
         let z = one(&rays.inverse_directions, 2);
-        let enter_x = self.near[0].times_minus(x, one(near, 0));
-        let enter_y = self.near[1].times_minus(y, one(near, 1));
-        let enter_z = self.near[2].times_minus(z, one(near, 2));
-        let leave_x = self.far[0].times_minus(x, one(far, 0));
-        let leave_y = self.far[1].times_minus(y, one(far, 1));
-        let leave_z = self.far[2].times_minus(z, one(far, 2));
+        let enter_x = self.near[0].mul_sub(x, one(near, 0));
+        let enter_y = self.near[1].mul_sub(y, one(near, 1));
+        let enter_z = self.near[2].mul_sub(z, one(near, 2));
+        let leave_x = self.far[0].mul_sub(x, one(far, 0));
+        let leave_y = self.far[1].mul_sub(y, one(far, 1));
+        let leave_z = self.far[2].mul_sub(z, one(far, 2));
         [enter_x.max(enter_y).max(enter_z.max(simd.splat(0.0))), leave_x.min(leave_y).min(leave_z)]
     }
 
@@ -69,7 +69,7 @@ impl<S: Simd> Slabs<S> {
         rays: &PreparedRays<N>,
         i: usize,
         limit: f32,
-    ) -> (<S::Floats as Real>::Mask, S::Floats) {
+    ) -> (<S::F32x8 as SimdFloat>::Mask, S::F32x8) {
         let [enter, leave] = self.cross(simd, rays, i);
         (enter.le(leave.min(simd.splat(limit))), enter)
     }
@@ -90,15 +90,15 @@ struct Points<F> {
     z: F,
 }
 
-impl<F: Floats> Points<F> {
+impl<F: SimdF32x8> Points<F> {
     #[inline(always)]
-    fn load<S: Simd<Floats = F>>(simd: S, lanes: &[Lanes; 3]) -> Self {
+    fn load<S: Simd<F32x8 = F>>(simd: S, lanes: &[Lanes; 3]) -> Self {
         Self { x: simd.load(&lanes[0]), y: simd.load(&lanes[1]), z: simd.load(&lanes[2]) }
     }
 
     /// Of numbers of ray `i`.
     #[inline(always)]
-    fn of_ray<S: Simd<Floats = F>, const N: usize>(
+    fn of_ray<S: Simd<F32x8 = F>, const N: usize>(
         simd: S,
         numbers: &[[f32; N]; 3],
         i: usize,
@@ -109,7 +109,7 @@ impl<F: Floats> Points<F> {
 
     /// Of three rows of numbers, those of the axes x, y and z.
     #[inline(always)]
-    fn along<S: Simd<Floats = F>>(simd: S, lanes: &[Lanes; 3], [x, y, z]: [usize; 3]) -> Self {
+    fn along<S: Simd<F32x8 = F>>(simd: S, lanes: &[Lanes; 3], [x, y, z]: [usize; 3]) -> Self {
         Self { x: simd.load(&lanes[x]), y: simd.load(&lanes[y]), z: simd.load(&lanes[z]) }
     }
 
@@ -135,15 +135,15 @@ impl<F: Floats> Points<F> {
 
 /// A ray and the triangles of a block, in the plane across the ray's longest axis.
 pub(super) struct Sheared<S: Simd> {
-    frame: ShearedFrame<S::Floats>,
+    frame: ShearedFrame<S::F32x8>,
     /// From the origin to the first corner, not sheared.
-    to_corner: Points<S::Floats>,
+    to_corner: Points<S::F32x8>,
     /// The depths of the corners: how far they are along z.
-    depths: [S::Floats; 3],
+    depths: [S::F32x8; 3],
     /// Barycentric weights, scaled alike.
-    weights: [S::Floats; 3],
+    weights: [S::F32x8; 3],
     /// Where the ray's line goes through the triangle.
-    inside: <S::Floats as Real>::Mask,
+    inside: <S::F32x8 as SimdFloat>::Mask,
 }
 
 /// The triangles of a block that a ray hits.
@@ -151,10 +151,10 @@ pub(super) struct BlockHits<S: Simd> {
     /// Bit i: triangle i is hit; the rest of its lane means nothing otherwise.
     pub(super) mask: u32,
     /// Distances in units of the direction's length.
-    pub(super) t: S::Floats,
+    pub(super) t: S::F32x8,
     /// Barycentric weights of the second and third vertices, times `determinant`.
-    weights: [S::Floats; 2],
-    determinant: S::Floats,
+    weights: [S::F32x8; 2],
+    determinant: S::F32x8,
 }
 
 impl<S: Simd> BlockHits<S> {
@@ -235,9 +235,9 @@ struct ShearedFrame<F> {
     scale: F,
 }
 
-impl<F: Floats> ShearedFrame<F> {
+impl<F: SimdF32x8> ShearedFrame<F> {
     #[inline(always)]
-    fn new<S: Simd<Floats = F>, const N: usize>(simd: S, rays: &PreparedRays<N>, i: usize) -> Self {
+    fn new<S: Simd<F32x8 = F>, const N: usize>(simd: S, rays: &PreparedRays<N>, i: usize) -> Self {
         let shears = Points::of_ray(simd, &rays.shears, i);
         Self {
             axes: rays.axes(i),
@@ -249,7 +249,7 @@ impl<F: Floats> ShearedFrame<F> {
 
     /// From the origin to a vertex, not sheared.
     #[inline(always)]
-    fn to<S: Simd<Floats = F>>(&self, simd: S, vertex: &[Lanes; 3]) -> Points<F> {
+    fn to<S: Simd<F32x8 = F>>(&self, simd: S, vertex: &[Lanes; 3]) -> Points<F> {
         Points::along(simd, vertex, self.axes).sub(self.origin)
     }
 
@@ -261,7 +261,7 @@ impl<F: Floats> ShearedFrame<F> {
 
 /// Twice the signed area of 0, p, q in the sheared plane; exactly opposite for q, p.
 #[inline(always)]
-fn edge<F: Floats>(p: Points<F>, q: Points<F>) -> F {
+fn edge<F: SimdF32x8>(p: Points<F>, q: Points<F>) -> F {
     p.x * q.y - p.y * q.x
 }
 
@@ -292,9 +292,9 @@ impl Planes {
     fn depth<S: Simd>(
         &self,
         simd: S,
-        frame: &ShearedFrame<S::Floats>,
-        to_corner: Points<S::Floats>,
-    ) -> S::Floats {
+        frame: &ShearedFrame<S::F32x8>,
+        to_corner: Points<S::F32x8>,
+    ) -> S::F32x8 {
         let n = Points::along(simd, &self.normals, frame.axes);
         let along = n.z + n.x * frame.shear[0] + n.y * frame.shear[1];
         n.dot(to_corner) / along

@@ -29,7 +29,7 @@
 //!
 //! # Alternatives
 //! Möller–Trumbore makes rays 3 to 7 % quicker and leaks along shared edges. Fused multiply-adds
-//! in the edge functions would make those of two neighbours differ.
+//! in the edge functions would make those of two neighbors differ.
 //! Sorting shadow rays more finely than by octant loses more coherence of the origins than it wins.
 //! Clustering from below (PLOC) with reinsertion gives trees of similar quality, but of no bounded
 //! depth. Packets of camera rays, 16 to a vector, are quicker than streams where the tree fits the
@@ -193,7 +193,7 @@ impl Bvh {
         simd::dispatch(self.instruction_set, traverse::ClosestHit { bvh: self, ray })
     }
 
-    /// [`Bvh::closest_hit`] of many rays; quickest for neighbours, such as a tile's camera rays.
+    /// [`Bvh::closest_hit`] of many rays; quickest for neighbors, such as a tile's camera rays.
     ///
     /// `hits` is overwritten, one entry a ray.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {

@@ -3,7 +3,7 @@
 use super::{Lanes, WIDTH};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
-use crate::simd::{Floats, Mask, Real, Simd};
+use crate::simd::{LaneMask, Simd, SimdF32x8, SimdFloat};
 
 /// Up to `N` rays of one octant, `N` a multiple of eight, with what both tests need of them.
 pub(super) struct PreparedRays<const N: usize> {
@@ -141,7 +141,7 @@ impl<const N: usize> PreparedRays<N> {
 }
 
 #[inline(always)]
-fn load<S: Simd, const N: usize>(simd: S, numbers: &[[f32; N]; 3], first: usize) -> [S::Floats; 3] {
+fn load<S: Simd, const N: usize>(simd: S, numbers: &[[f32; N]; 3], first: usize) -> [S::F32x8; 3] {
     [
         simd.load(eight(&numbers[0], first)),
         simd.load(eight(&numbers[1], first)),
@@ -155,18 +155,18 @@ fn eight(numbers: &[f32], first: usize) -> &Lanes {
 }
 
 #[inline(always)]
-fn store<F: Floats>(x: F, numbers: &mut [f32], first: usize) {
+fn store<F: SimdF32x8>(x: F, numbers: &mut [f32], first: usize) {
     *numbers[first..].first_chunk_mut().expect("a multiple of eight") = x.store();
 }
 
 /// By the axes of the sheared space: z is x where that is the longest, y where it is, else z.
 #[inline(always)]
-fn turned<F: Floats>(is_x: F::Mask, is_y: F::Mask, [x, y, z]: [F; 3]) -> [F; 3] {
+fn turned<F: SimdF32x8>(is_x: F::Mask, is_y: F::Mask, [x, y, z]: [F; 3]) -> [F; 3] {
     [pick(is_x, is_y, [y, z, x]), pick(is_x, is_y, [z, x, y]), pick(is_x, is_y, [x, y, z])]
 }
 
 /// The first where the longest axis is x, the second where it is y, else the third.
 #[inline(always)]
-fn pick<F: Floats>(is_x: F::Mask, is_y: F::Mask, of: [F; 3]) -> F {
+fn pick<F: SimdF32x8>(is_x: F::Mask, is_y: F::Mask, of: [F; 3]) -> F {
     F::select(is_x, of[0], F::select(is_y, of[1], of[2]))
 }

@@ -11,7 +11,7 @@ use super::prepare::{PreparedRays, octant};
 use super::{Bvh, Child, WIDTH};
 use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
-use crate::simd::{Floats, Kernel, Mask, Real, Sets, Simd, set_bits};
+use crate::simd::{Kernel, LaneMask, Simd, SimdBitSets, SimdF32x8, SimdFloat, set_bits};
 
 /// A node leaves at most seven children behind on the way down, and pushes eight.
 pub(super) const STACK: usize = 256;
@@ -334,7 +334,7 @@ static BITS: [[u32; 2]; STREAM] = {
 
 /// The rays that enter each child of a node, in two halves.
 #[derive(Clone, Copy)]
-struct Entering<S: Simd>([S::Sets; 2]);
+struct Entering<S: Simd>([S::BitSets; 2]);
 
 impl<S: Simd> Entering<S> {
     #[inline(always)]
@@ -344,7 +344,7 @@ impl<S: Simd> Entering<S> {
 
     /// Adds ray `i` to the sets of the children in `crossed`.
     #[inline(always)]
-    fn insert(&mut self, i: usize, crossed: <S::Floats as Real>::Mask) {
+    fn insert(&mut self, i: usize, crossed: <S::F32x8 as SimdFloat>::Mask) {
         let [low, high] = self.0;
         let [in_low, in_high] = BITS[i % STREAM];
         self.0 = [low.insert(crossed, in_low), high.insert(crossed, in_high)];
@@ -373,7 +373,7 @@ impl StreamStack {
     /// Pushes the children that any ray enters, the last on top.
     #[inline(always)]
     fn push_entered<S: Simd>(&mut self, children: &[Child; WIDTH], rays: Entering<S>) {
-        let (rays, children, count) = Sets::pack(rays.0, children.map(|child| child.0));
+        let (rays, children, count) = SimdBitSets::pack(rays.0, children.map(|child| child.0));
         // What lies beyond `count` is overwritten by the next.
         self.children[self.len..self.len + WIDTH].copy_from_slice(&children);
         for (stack, rays) in self.rays.iter_mut().zip(&rays) {
@@ -466,8 +466,8 @@ impl Stream for ClosestStream {
                 entering.insert(i, crossed);
                 enter = entered;
             }
-            let not_empty = entering.0.map(Sets::not_empty);
-            let (halves, enter) = (entering.0.map(Sets::store), enter.store());
+            let not_empty = entering.0.map(SimdBitSets::not_empty);
+            let (halves, enter) = (entering.0.map(SimdBitSets::store), enter.store());
             // The nearest child of the last ray on top.
             let stack = &mut self.stack;
             let base = stack.len;

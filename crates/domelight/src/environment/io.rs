@@ -44,7 +44,7 @@ pub struct LoadedProbe {
 pub struct SanitizeReport {
     /// Negative values, now 0.
     pub negative: usize,
-    /// NaN and infinities, now the mean of their neighbours.
+    /// NaN and infinities, now the mean of their neighbors.
     pub non_finite: usize,
 }
 
@@ -162,7 +162,7 @@ fn in_display_window(
     image: &RgbImage,
     window: DataWindow,
     options: &ProbeOptions,
-) -> Result<Option<RgbImage>, picture::Problem> {
+) -> Result<Option<RgbImage>, picture::PictureErrorKind> {
     let looks_like_map = |width: usize, height: usize| match options.mapping {
         Some(Mapping::LatLong | Mapping::LatLongExr) => width == 2 * height,
         Some(mapping) => mapping.check_shape(width, height).is_ok(),
@@ -223,7 +223,7 @@ fn require_radiance(image: &RgbImage, file: &str) -> Result<(), ProbeError> {
     })
 }
 
-/// Makes every value finite and ≥ 0: negative ones become 0, NaN and infinities the mean of their finite neighbours
+/// Makes every value finite and ≥ 0: negative ones become 0, NaN and infinities the mean of their finite neighbors
 /// among the eight around, from the border of a bad region inward. A channel without any finite value becomes 0.
 pub fn sanitize(image: &mut RgbImage) -> SanitizeReport {
     let mut report = SanitizeReport::default();
@@ -248,7 +248,7 @@ fn fill_channel(image: &mut RgbImage, channel: fn(&mut Rgb) -> &mut f32) {
     let (width, height) = (image.width, image.height);
     let mut values: Vec<f32> = image.pixels.iter_mut().map(|pixel| *channel(pixel)).collect();
     let mut queued: Vec<bool> = values.iter().map(|value| value.is_finite()).collect();
-    let borders_known = |&i: &usize| neighbours(i, width, height).any(|j| values[j].is_finite());
+    let borders_known = |&i: &usize| neighbors(i, width, height).any(|j| values[j].is_finite());
     let mut ring: Vec<usize> =
         (0..values.len()).filter(|&i| !queued[i]).filter(borders_known).collect();
     while !ring.is_empty() {
@@ -259,7 +259,7 @@ fn fill_channel(image: &mut RgbImage, channel: fn(&mut Rgb) -> &mut f32) {
             ring.iter().map(|&i| mean_around(&values, i, width, height)).collect();
         ring.iter().zip(means).for_each(|(&i, mean)| values[i] = mean);
         let mut next = Vec::new();
-        for j in ring.iter().flat_map(|&i| neighbours(i, width, height)) {
+        for j in ring.iter().flat_map(|&i| neighbors(i, width, height)) {
             if !std::mem::replace(&mut queued[j], true) {
                 next.push(j);
             }
@@ -273,14 +273,14 @@ fn fill_channel(image: &mut RgbImage, channel: fn(&mut Rgb) -> &mut f32) {
 
 fn mean_around(values: &[f32], i: usize, width: usize, height: usize) -> f32 {
     let (mut sum, mut count) = (0.0, 0);
-    for value in neighbours(i, width, height).map(|j| values[j]).filter(|value| value.is_finite()) {
+    for value in neighbors(i, width, height).map(|j| values[j]).filter(|value| value.is_finite()) {
         sum += f64::from(value);
         count += 1;
     }
     (sum / f64::from(count)) as f32
 }
 
-fn neighbours(i: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
+fn neighbors(i: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
     let (x, y) = (i % width, i / width);
     let rows = y.saturating_sub(1)..(y + 2).min(height);
     rows.flat_map(move |row| {

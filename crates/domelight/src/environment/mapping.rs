@@ -5,7 +5,7 @@
 //! and directions in the world frame (right-handed, +Y up), with its Jacobian dω / (du dv). A texel's value is
 //! constant over the texel, so conversion is an area average: each target texel is the mean of the source over
 //! the texel's solid angle, by the exact areas that two texels share (`overlap.rs`). Supersampling was rejected: it
-//! loses or doubles lights of a texel's size. Bilinear look-up was, too: it smears a one-texel sun over its neighbours
+//! loses or doubles lights of a texel's size. Bilinear look-up was, too: it smears a one-texel sun over its neighbors
 //! and disagrees with the constant texels of the importance table.
 //!
 //! Sources: Debevec 1998, "Rendering Synthetic Objects into Real Scenes", and his light-probe gallery (angular
@@ -25,7 +25,7 @@ use std::str::FromStr;
 /// What the `envmap` attribute of an OpenEXR file says about its picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EnvmapKind {
-    /// Latitude and longitude, the centre toward +Z.
+    /// Latitude and longitude, the center toward +Z.
     LatLong,
     /// Six faces of a cube, one above the other.
     Cube,
@@ -34,18 +34,18 @@ pub enum EnvmapKind {
 /// A mapping between picture coordinates and directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mapping {
-    /// Latitude and longitude, the working map: row 0 is +Y, the centre column looks toward −Z and u grows to
+    /// Latitude and longitude, the working map: row 0 is +Y, the center column looks toward −Z and u grows to
     /// the right as seen from inside.
     LatLong,
-    /// Latitude and longitude as OpenEXR's `envmap` attribute defines it: as [`Mapping::LatLong`], but the centre
-    /// column looks toward +Z. OpenEXR puts the centres of the border texels on the border (texel 0 at longitude
+    /// Latitude and longitude as OpenEXR's `envmap` attribute defines it: as [`Mapping::LatLong`], but the center
+    /// column looks toward +Z. OpenEXR puts the centers of the border texels on the border (texel 0 at longitude
     /// π exactly); here, as in all other mappings, texels are areas, which moves a texel by less than its half.
     LatLongExr,
-    /// Debevec's light probe: a disc whose radius is the angle to −Z over π; the centre looks toward −Z, the
+    /// Debevec's light probe: a disc whose radius is the angle to −Z over π; the center looks toward −Z, the
     /// circumference is +Z, right is +X, up is +Y.
     Angular,
     /// An orthographic photograph of a mirror ball that touches the picture's borders. The camera stands at −Z of
-    /// the ball, so the centre, which reflects the camera, looks toward −Z like that of the angular map, and the
+    /// the ball, so the center, which reflects the camera, looks toward −Z like that of the angular map, and the
     /// circumference grazes +Z. It is a reflection: u grows to the *left* as seen from inside, and a plain
     /// photograph gives an environment in which text reads the right way round. (pfstools and the book of Reinhard
     /// et al. take ball pictures that were mirrored beforehand.)
@@ -58,7 +58,7 @@ pub enum Mapping {
     CubeStripHorizontal,
     /// Faces +X, −X, +Y, −Y, +Z, −Z from top to bottom, each seen from inside: OpenEXR's cube map.
     CubeStripVertical,
-    /// Equal-area octahedral square with +Y at its centre and −Y at its corners, as in pbrt-v4. Rotated such that
+    /// Equal-area octahedral square with +Y at its center and −Y at its corners, as in pbrt-v4. Rotated such that
     /// what pbrt's `imgtool makeequiarea` makes of a lat-long map comes back as that map.
     Octahedral,
 }
@@ -219,7 +219,7 @@ impl Mapping {
 
     /// The height of a lat-long map that keeps the finest detail of a picture of this mapping.
     ///
-    /// The lat-long texel π / height is as wide as the source's texel where that is widest in the picture's centre.
+    /// The lat-long texel π / height is as wide as the source's texel where that is widest in the picture's center.
     pub fn lat_long_height(self, width: usize, height: usize) -> usize {
         let edge = height as f32 / self.aspect().1 as f32;
         let keeps = match self {
@@ -321,8 +321,8 @@ fn angular_uv(d: Vec3) -> Vec2 {
 fn mirror_ball_direction(uv: Vec2) -> Option<Vec3> {
     let p = disc(uv);
     let r2 = p.length_squared();
-    let towards = 2.0 * (1.0 - r2).max(0.0).sqrt();
-    (r2 <= 1.0).then(|| vec3(-p.x * towards, p.y * towards, 2.0 * r2 - 1.0))
+    let toward = 2.0 * (1.0 - r2).max(0.0).sqrt();
+    (r2 <= 1.0).then(|| vec3(-p.x * toward, p.y * toward, 2.0 * r2 - 1.0))
 }
 
 /// r = sin(θ/2) with θ the angle to −Z.

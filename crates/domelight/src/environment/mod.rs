@@ -17,17 +17,17 @@ pub use compensation::CompensatedTable;
 
 use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, vec3};
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
-use crate::simd::{Floats, Ints as _, LANES, Real, Vectors};
+use crate::simd::{LANES, SimdF32x8, SimdFloat, SimdI32x8 as _, Vectors};
 use crate::{Rgb, RgbImage};
 
 /// A world axis that points up; the top row of a map faces it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "io", derive(serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum UpAxis {
-    /// +Y up; the map's centre column looks toward −Z.
+    /// +Y up; the map's center column looks toward −Z.
     #[default]
     Y,
-    /// +Z up; the map's centre column looks toward +Y.
+    /// +Z up; the map's center column looks toward +Y.
     Z,
 }
 
@@ -40,7 +40,7 @@ impl UpAxis {
         }
     }
 
-    /// The rotation from a world in which +Y is up to one in which this axis is; what the centre of
+    /// The rotation from a world in which +Y is up to one in which this axis is; what the center of
     /// a map looks toward stays in front.
     pub fn from_y_up(self) -> Mat3 {
         Mat3::from_cols(self.to_world(Vec3::X), self.to_world(Vec3::Y), self.to_world(Vec3::Z))
@@ -48,7 +48,7 @@ impl UpAxis {
 
     /// World to the map's own frame, where +Y is up.
     #[inline(always)]
-    pub(crate) fn to_map<F: Real>(self, w: Vectors<F>) -> Vectors<F> {
+    pub(crate) fn to_map<F: SimdFloat>(self, w: Vectors<F>) -> Vectors<F> {
         match self {
             Self::Y => w,
             Self::Z => Vectors { x: w.x, y: w.z, z: w.y.splat(0.0) - w.y },
@@ -75,7 +75,7 @@ pub struct Orientation {
 }
 
 impl Orientation {
-    /// The rotation from the map's own frame, +Y up and the centre column toward −Z, to the world.
+    /// The rotation from the map's own frame, +Y up and the center column toward −Z, to the world.
     pub fn map_to_world(self) -> Mat3 {
         self.up.from_y_up() * Mat3::from_rotation_y(self.rotation.to_radians())
     }
@@ -207,7 +207,7 @@ impl Environment {
         Self::new(self.map, self.orientation, scale)
     }
 
-    /// From a lat-long map: row 0 up, texel centres at +½, every texel finite and not negative;
+    /// From a lat-long map: row 0 up, texel centers at +½, every texel finite and not negative;
     /// radiance is multiplied by `scale`.
     ///
     /// # Errors
@@ -311,9 +311,9 @@ impl Environment {
         self.map.get(t.column, t.row)
     }
 
-    /// Radiance from `wi` interpolated between texel centres: for what the camera sees behind the
+    /// Radiance from `wi` interpolated between texel centers: for what the camera sees behind the
     /// scene, where texels would show. It lights nothing, for the table does not match it.
-    pub fn backdrop(&self, wi: Vec3) -> Rgb {
+    pub fn le_interpolated(&self, wi: Vec3) -> Rgb {
         let (w, h) = (self.map.width, self.map.height);
         let uv = self.uv(wi);
         let (x, y) = (uv.x * w as f32 - 0.5, (uv.y * h as f32 - 0.5).clamp(0.0, (h - 1) as f32));
@@ -381,13 +381,13 @@ impl Environment {
 
     /// The columns and the rows that directions look at; of one that is not finite anything.
     #[inline(always)]
-    pub(crate) fn texels_at<F: Floats>(&self, wi: Vectors<F>) -> [[i32; LANES]; 2] {
+    pub(crate) fn texels_at<F: SimdF32x8>(&self, wi: Vectors<F>) -> [[i32; LANES]; 2] {
         let [u, v] = self.grid.uv(self.orientation.up.to_map(wi));
         // What is rounded up to the edge is of the last texel; these are exact.
         let [width, height] = [self.map.width as f32, self.map.height as f32];
         let column = (u * u.splat(width)).min(u.splat(width - 1.0));
         let row = (v * v.splat(height)).min(v.splat(height - 1.0));
-        [column.truncated().store(), row.truncated().store()]
+        [column.to_i32().store(), row.to_i32().store()]
     }
 
     /// The column and the row that `wi` looks at.
@@ -482,7 +482,7 @@ impl Grid {
         self.direction(u, top + f64::from(inside.y) * (bottom - top))
     }
 
-    /// As [`Grid::direction_in`], but never rounded into a neighbour: the look-up of the direction
+    /// As [`Grid::direction_in`], but never rounded into a neighbor: the look-up of the direction
     /// is the texel that was drawn.
     fn direction_inside(&self, t: Texel, inside: Vec2) -> Vec3 {
         let wi = self.direction_in(t, inside);
@@ -492,7 +492,7 @@ impl Grid {
     }
 
     #[inline(always)]
-    fn uv<F: Real>(&self, d: Vectors<F>) -> [F; 2] {
+    fn uv<F: SimdFloat>(&self, d: Vectors<F>) -> [F; 2] {
         let (zero, one) = (d.x.splat(0.0), d.x.splat(1.0));
         // Between 0 and 2.
         let turn = atan2(d.x, zero - d.z) * d.x.splat(1.0 / TAU) + d.x.splat(0.5 + self.turn);
@@ -538,7 +538,7 @@ mod tests {
             env.sample(vec2(0.5, 0.5)).unwrap().wi
         };
         let o = Orientation::default();
-        // Right of the centre column lies +X, left −X; the first row is up.
+        // Right of the center column lies +X, left −X; the first row is up.
         let w = looks_at(2, 0, o);
         assert!(w.x > 0.4 && w.y > 0.4 && w.z < -0.4, "{w}");
         let w = looks_at(1, 1, o);
@@ -548,7 +548,7 @@ mod tests {
         // Turned by 90 degrees what was right in front is left in front.
         let w = looks_at(2, 0, Orientation { rotation: 90.0, ..o });
         assert!(w.x < -0.4 && w.z < -0.4, "{w}");
-        // With +Z up the centre looks toward +Y.
+        // With +Z up the center looks toward +Y.
         let w = looks_at(2, 0, Orientation { up: UpAxis::Z, ..o });
         assert!(w.x > 0.4 && w.z > 0.4 && w.y > 0.4, "{w}");
     }
@@ -602,7 +602,7 @@ mod tests {
             let env = Environment::new(map.clone(), orientation, 2.0).unwrap();
             for y in 0..32 {
                 for x in 0..64 {
-                    // The centre of every texel, the poles' rows included.
+                    // The center of every texel, the poles' rows included.
                     let uv = vec2((x as f32 + 0.5) / 64.0, (y as f32 + 0.5) / 32.0);
                     let d = env.direction(uv);
                     assert!((env.uv(d) - uv).length() < 1e-5, "{uv}");
@@ -613,21 +613,21 @@ mod tests {
     }
 
     #[test]
-    fn the_backdrop_passes_through_texel_centres_and_is_continuous() {
+    fn interpolated_radiance_passes_through_texel_centers_and_is_continuous() {
         let value = |x: usize, y: usize| ((3 * x + 5 * y) % 7) as f32;
         let map = RgbImage::from_fn(16, 9, |x, y| Rgb::splat(value(x, y)));
         let env = Environment::new(map, Orientation::default(), 1.0).unwrap();
         for (x, y) in [(0, 0), (15, 8), (7, 4), (0, 5)] {
             let center = env.direction(vec2((x as f32 + 0.5) / 16.0, (y as f32 + 0.5) / 9.0));
-            assert!((env.backdrop(center).g - value(x, y)).abs() < 1e-3);
+            assert!((env.le_interpolated(center).g - value(x, y)).abs() < 1e-3);
         }
         // Across the seam and a texel's edge: the slope is at most 6 a texel.
         for u in [0.0, 0.25] {
-            let at = |du: f32| env.backdrop(env.direction(vec2(u + du, 0.4))).g;
+            let at = |du: f32| env.le_interpolated(env.direction(vec2(u + du, 0.4))).g;
             assert!((at(1e-5) - at(-1e-5)).abs() < 6.0 * 16.0 * 2e-5 + 1e-3);
         }
         let single = Environment::constant(Rgb::WHITE).unwrap();
-        assert_eq!(single.backdrop(Vec3::Y), Rgb::WHITE);
+        assert_eq!(single.le_interpolated(Vec3::Y), Rgb::WHITE);
     }
 
     #[test]

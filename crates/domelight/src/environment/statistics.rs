@@ -5,7 +5,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::compact::{Wanted, compact_sources};
+use super::compact::{SourceCriteria, compact_sources};
 use super::mapping::Mapping;
 use crate::color::Rgb;
 use crate::image::RgbImage;
@@ -36,7 +36,7 @@ pub struct ProbeStatistics {
 /// The compact source that is taken for the sun: what exceeds the radiance around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sun {
-    /// Its centre of energy, a unit vector.
+    /// Its center of energy, a unit vector.
     pub direction: Vec3,
     /// Solid angle of its texels \[sr\].
     pub solid_angle: f64,
@@ -90,7 +90,7 @@ impl Sun {
         (self.direction.y as f64).clamp(-1.0, 1.0).asin().to_degrees()
     }
 
-    /// Angle around +Y from −Z toward +X \[°\], in (−180, 180]; 0 is the centre column of the map.
+    /// Angle around +Y from −Z toward +X \[°\], in (−180, 180]; 0 is the center column of the map.
     pub fn azimuth(&self) -> f64 {
         (self.direction.x as f64).atan2(-self.direction.z as f64).to_degrees()
     }
@@ -153,7 +153,7 @@ fn brightest_share(map: &RgbImage, luminance: &[f32], weights: &Weights) -> f64 
 
 /// What is taken out of the map as its sun.
 fn sun(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Sun> {
-    let source = compact_sources(map, Wanted::SUN).pop()?;
+    let source = compact_sources(map, SourceCriteria::SUN).pop()?;
     let [mut moment, mut irradiance] = [[0.0f64; 3]; 2];
     let [mut energy, mut solid_angle] = [0.0; 2];
     for (&i, rest) in source.texels.iter().zip(&source.residual) {

@@ -1,7 +1,7 @@
 //! Files that are whole or not there.
 
 use super::temporary::{Temporary, remove_abandoned};
-use crate::picture::{PictureError, Problem};
+use crate::picture::{PictureError, PictureErrorKind};
 use std::fs::{self, File, Metadata};
 use std::io::{self, BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -21,9 +21,10 @@ pub fn write_atomically(
         let mut out = io::stdout().lock();
         return write(&mut out)
             .and_then(|()| out.flush())
-            .map_err(|error| Problem::Io(error).in_file("standard output"));
+            .map_err(|error| PictureErrorKind::Io(error).in_file("standard output"));
     }
-    replace(path, write).map_err(|error| Problem::Io(error).in_file(&path.display().to_string()))
+    replace(path, write)
+        .map_err(|error| PictureErrorKind::Io(error).in_file(&path.display().to_string()))
 }
 
 /// A file that is written in any order.
@@ -42,7 +43,8 @@ pub fn write_atomically_seeking(
 ) -> Result<(), PictureError> {
     if path != Path::new("-") && !fs::metadata(path).is_ok_and(|there| !there.is_file()) {
         let replaced = target(path).and_then(|path| replace_plain(&path, |out| write(out)));
-        return replaced.map_err(|error| Problem::Io(error).in_file(&path.display().to_string()));
+        return replaced
+            .map_err(|error| PictureErrorKind::Io(error).in_file(&path.display().to_string()));
     }
     write_atomically(path, |out| {
         let mut bytes = Cursor::new(Vec::new());
@@ -60,7 +62,8 @@ pub fn require_writable(path: &Path) -> Result<(), PictureError> {
     if path == Path::new("-") {
         return Ok(());
     }
-    try_place(path).map_err(|error| Problem::Io(error).in_file(&path.display().to_string()))
+    try_place(path)
+        .map_err(|error| PictureErrorKind::Io(error).in_file(&path.display().to_string()))
 }
 
 fn try_place(path: &Path) -> io::Result<()> {

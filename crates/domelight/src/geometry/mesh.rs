@@ -17,7 +17,7 @@ pub struct Mesh {
     pub uvs2: Vec<Vec2>,
     /// Unit tangents with the bitangent's sign in w, as in glTF.
     pub tangents: Vec<Vec4>,
-    /// Linear vertex colours, a factor on the base colour.
+    /// Linear vertex colors, a factor on the base color.
     pub colors: Vec<Rgb>,
     /// Vertex opacity in \[0, 1\], a factor on the surface's.
     pub alphas: Vec<f32>,
@@ -157,7 +157,7 @@ impl Mesh {
         self.normals = normals.into_iter().map(Vec3::normalize_or_zero).collect();
     }
 
-    /// Puts the centre of the bounds at the origin and scales the longest half-extent to 1.
+    /// Puts the center of the bounds at the origin and scales the longest half-extent to 1.
     pub fn normalization(bounds: &Aabb) -> Mat4 {
         let scale = 2.0 / bounds.size().max_element();
         let scale = if scale.is_finite() { scale } else { 1.0 };

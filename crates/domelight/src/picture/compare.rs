@@ -1,6 +1,6 @@
-//! How far a picture is from its reference, in numbers and as a false-colour picture.
+//! How far a picture is from its reference, in numbers and as a false-color picture.
 //!
-//! All sums are in f64 over linear radiance. relMSE divides by R² + 0.01, the regulariser that most
+//! All sums are in f64 over linear radiance. relMSE divides by R² + 0.01, the regularizer that most
 //! papers on sampling use, so that dark pixels do not decide alone; the trimmed relMSE leaves out the
 //! worst 0.1 % of the pixels, so that a few fireflies do not.
 
@@ -145,9 +145,9 @@ fn error_map(
     Ok(pairs.map(|(&i, &r)| error(i, r).sqrt() as f32).collect())
 }
 
-/// A perceptually uniform colour scale: equal steps look equal, and its grey version still rises.
+/// A perceptually uniform color scale: equal steps look equal, and its gray version still rises.
 ///
-/// Van der Walt and Smith 2015, matplotlib's default colour maps (their tables are CC0), here as lines
+/// Van der Walt and Smith 2015, matplotlib's default color maps (their tables are CC0), here as lines
 /// between every fifth entry, off by at most 0.004. Rainbow scales, which show edges where there are
 /// none, are not offered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,19 +5,19 @@ use std::io;
 
 /// A picture file could not be read or written.
 #[derive(Debug, thiserror::Error)]
-#[error("{file}: {problem}")]
+#[error("{file}: {kind}")]
 pub struct PictureError {
     /// The file's name as the user gave it.
     pub file: String,
     /// What is wrong with it.
     #[source]
-    pub problem: Problem,
+    pub kind: PictureErrorKind,
 }
 
 /// What is wrong with a picture file. Offsets are in bytes from the file's start.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Problem {
+pub enum PictureErrorKind {
     /// The system says so.
     #[error("{0}")]
     Io(io::Error),
@@ -103,7 +103,7 @@ pub enum Problem {
     #[error("OpenEXR: {0} are not supported")]
     ExrUnsupported(&'static str),
     /// The layer that was asked for is not there.
-    #[error("there is no layer {asked:?} with colour channels; the file has {}", list(.present))]
+    #[error("there is no layer {asked:?} with color channels; the file has {}", list(.present))]
     NoSuchLayer {
         /// Its name.
         asked: String,
@@ -111,7 +111,7 @@ pub enum Problem {
         present: Vec<String>,
     },
     /// No layer has R, G and B, or Y.
-    #[error("there are no colour channels (R, G, B or Y); the file has {}", list(.present))]
+    #[error("there are no color channels (R, G, B or Y); the file has {}", list(.present))]
     NoColor {
         /// The channels there are.
         present: Vec<String>,
@@ -132,10 +132,10 @@ pub enum Problem {
     },
 }
 
-impl Problem {
+impl PictureErrorKind {
     /// Names the file.
     pub fn in_file(self, file: &str) -> PictureError {
-        PictureError { file: file.to_owned(), problem: self }
+        PictureError { file: file.to_owned(), kind: self }
     }
 }
 

@@ -10,7 +10,7 @@
 //! is exact, also at the border, which repeats the outermost pixels.
 //!
 //! SSIM was considered for the same place: it is older and better known, but judges Monte Carlo noise
-//! on dark ground far too hard, and says nothing about colour.
+//! on dark ground far too hard, and says nothing about color.
 
 use super::compare::{SizeMismatch, check_sizes};
 use crate::color::Rgb;
@@ -20,11 +20,11 @@ use rayon::prelude::*;
 /// Pixels per degree of a 0.7 m wide 4K screen seen from 0.7 m: 3840 π / 180.
 pub const PIXELS_PER_DEGREE: f32 = 67.020_64;
 
-/// Exponent of the colour difference.
+/// Exponent of the color difference.
 const Q_COLOR: f32 = 0.7;
 /// Exponent of the feature difference.
 const Q_FEATURE: f32 = 0.5;
-/// Colour differences up to this part of the greatest ...
+/// Color differences up to this part of the greatest ...
 const P_COLOR: f32 = 0.4;
 /// ... are spread over this part of the scale.
 const P_TOP: f32 = 0.95;
@@ -295,7 +295,7 @@ fn rgb_of_opponent([l, cx, cz]: [f32; 3]) -> [f32; 3] {
     .map(|c| c.clamp(0.0, 1.0))
 }
 
-/// CIE L*a*b*, the chroma scaled by 0.01 L* (Hunt 1952: colours fade in the dark).
+/// CIE L*a*b*, the chroma scaled by 0.01 L* (Hunt 1952: colors fade in the dark).
 fn hunt_lab(rgb: [f32; 3]) -> [f32; 3] {
     const DELTA: f32 = 6.0 / 29.0;
     let [x, y, z] = relative_xyz(rgb).map(|t| {
@@ -305,7 +305,7 @@ fn hunt_lab(rgb: [f32; 3]) -> [f32; 3] {
     [l, 0.01 * l * 500.0 * (x - y), 0.01 * l * 200.0 * (y - z)]
 }
 
-/// Distance of large colour differences: |ΔL| + √(Δa² + Δb²) (Abasi et al. 2020).
+/// Distance of large color differences: |ΔL| + √(Δa² + Δb²) (Abasi et al. 2020).
 fn hyab(p: [f32; 3], q: [f32; 3]) -> f32 {
     (p[0] - q[0]).abs() + (p[1] - q[1]).hypot(p[2] - q[2])
 }
@@ -439,8 +439,8 @@ mod tests {
     fn one_pixel_and_thin_pictures_work() {
         for (width, height) in [(1, 1), (1, 9), (30, 1)] {
             let black = RgbImage::filled(width, height, Rgb::BLACK);
-            let grey = RgbImage::filled(width, height, Rgb::splat(0.5));
-            let map = ldr_flip(&grey, &black, PIXELS_PER_DEGREE).unwrap();
+            let gray = RgbImage::filled(width, height, Rgb::splat(0.5));
+            let map = ldr_flip(&gray, &black, PIXELS_PER_DEGREE).unwrap();
             assert!(map.iter().all(|e| (0.5..=1.0).contains(e)));
         }
     }

@@ -1,12 +1,12 @@
 //! Radiance pictures (`.hdr`, `.pic`): RGBE and XYZE, flat and both kinds of run lengths, all eight orientations.
 //!
-//! Ward 1991, "Real Pixels", Graphics Gems II; the *Radiance* reference manual, "File Formats". A colour is three
+//! Ward 1991, "Real Pixels", Graphics Gems II; the *Radiance* reference manual, "File Formats". A color is three
 //! mantissas and one exponent, c = m · 2^(e−136). No half is added to the mantissa (Ward's own reader adds ½; stb,
 //! OpenImageIO and most others do not): the writer rounds to nearest, so that what is read is written again
 //! unchanged.
 //!
 //! EXPOSURE and COLORCORR are divided out (all of them, as they accumulate), PRIMARIES other than Rec. 709's are
-//! converted. XYZE goes to Rec. 709 by the D65 matrix; colours outside the gamut are clipped at zero, since a
+//! converted. XYZE goes to Rec. 709 by the D65 matrix; colors outside the gamut are clipped at zero, since a
 //! mantissa step in XYZ is enough to cross it.
 //!
 //! Reading goes in two passes: the first walks along the runs of all scanlines and so proves that the file holds
@@ -14,7 +14,7 @@
 //! `image` crate's decoder knows one orientation and drops EXPOSURE.
 
 use super::primaries::{Primaries, transform, xyz_to_rec709};
-use super::{Problem, allocate, checked_area};
+use super::{PictureErrorKind, allocate, checked_area};
 use crate::{Rgb, RgbImage};
 use rayon::prelude::*;
 use std::io::{self, Write};
@@ -23,7 +23,7 @@ use std::io::{self, Write};
 ///
 /// # Errors
 /// If header or data are damaged or incomplete.
-pub fn decode(bytes: &[u8]) -> Result<RgbImage, Problem> {
+pub fn decode(bytes: &[u8]) -> Result<RgbImage, PictureErrorKind> {
     let header = Header::parse(bytes)?;
     let (lines, length) = (header.lines, header.length);
     let area = checked_area(length, lines)?;
@@ -31,7 +31,7 @@ pub fn decode(bytes: &[u8]) -> Result<RgbImage, Problem> {
     // Before a table of scanlines is made: no scanline takes fewer bytes than this.
     let (needed, held) = (lines as u64 * least_bytes(length), (bytes.len() - header.end) as u64);
     if held < needed {
-        return Err(Problem::Promises { width, height, needed, held });
+        return Err(PictureErrorKind::Promises { width, height, needed, held });
     }
     let starts = scanline_starts(bytes, &header)?;
     let color = ColorTable::new(&header);
@@ -50,7 +50,7 @@ pub fn decode(bytes: &[u8]) -> Result<RgbImage, Problem> {
 }
 
 /// How many texels the header promises.
-pub(super) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
+pub(super) fn texels(bytes: &[u8]) -> Result<usize, PictureErrorKind> {
     let header = Header::parse(bytes)?;
     checked_area(header.length, header.lines)
 }
@@ -78,7 +78,7 @@ struct Header {
 }
 
 impl Header {
-    fn parse(bytes: &[u8]) -> Result<Self, Problem> {
+    fn parse(bytes: &[u8]) -> Result<Self, PictureErrorKind> {
         let mut lines = Lines { bytes, at: 0, number: 0 };
         let mut header = Self {
             is_xyz: false,
@@ -100,7 +100,7 @@ impl Header {
         }
         let resolution = lines.next()?;
         (header.slow, header.fast) =
-            parse_resolution(resolution).ok_or_else(|| Problem::Header {
+            parse_resolution(resolution).ok_or_else(|| PictureErrorKind::Header {
                 line: lines.number,
                 found: lossy(resolution),
                 expected: "a resolution such as \"-Y 512 +X 1024\"",
@@ -110,12 +110,13 @@ impl Header {
         Ok(header)
     }
 
-    fn read_variable(&mut self, line: &[u8], number: usize) -> Result<(), Problem> {
+    fn read_variable(&mut self, line: &[u8], number: usize) -> Result<(), PictureErrorKind> {
         let line = String::from_utf8_lossy(line);
         let Some((name, value)) = line.split_once('=').filter(|_| !line.starts_with('#')) else {
             return Ok(());
         };
-        let bad = |expected| Problem::Header { line: number, found: line.to_string(), expected };
+        let bad =
+            |expected| PictureErrorKind::Header { line: number, found: line.to_string(), expected };
         let value = value.trim();
         match name.trim() {
             "FORMAT" => {
@@ -197,12 +198,13 @@ struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    fn next(&mut self) -> Result<&'a [u8], Problem> {
+    fn next(&mut self) -> Result<&'a [u8], PictureErrorKind> {
         let rest = &self.bytes[self.at..];
-        let length = rest.iter().position(|&b| b == b'\n').ok_or_else(|| Problem::Truncated {
-            place: format!("header line {}", self.number + 1),
-            offset: self.bytes.len(),
-        })?;
+        let length =
+            rest.iter().position(|&b| b == b'\n').ok_or_else(|| PictureErrorKind::Truncated {
+                place: format!("header line {}", self.number + 1),
+                offset: self.bytes.len(),
+            })?;
         self.at += length + 1;
         self.number += 1;
         let line = &rest[..length];
@@ -231,7 +233,7 @@ fn is_new(bytes: &[u8], at: usize, length: usize) -> bool {
 }
 
 /// Where each scanline begins, having walked through all of them.
-fn scanline_starts(bytes: &[u8], header: &Header) -> Result<Vec<usize>, Problem> {
+fn scanline_starts(bytes: &[u8], header: &Header) -> Result<Vec<usize>, PictureErrorKind> {
     let mut at = header.end;
     let mut starts = Vec::with_capacity(header.lines);
     for scanline in 0..header.lines {
@@ -245,12 +247,17 @@ fn scanline_starts(bytes: &[u8], header: &Header) -> Result<Vec<usize>, Problem>
     Ok(starts)
 }
 
-fn truncated(bytes: &[u8], scanline: usize) -> Problem {
-    Problem::Truncated { place: format!("scanline {scanline}"), offset: bytes.len() }
+fn truncated(bytes: &[u8], scanline: usize) -> PictureErrorKind {
+    PictureErrorKind::Truncated { place: format!("scanline {scanline}"), offset: bytes.len() }
 }
 
 /// The end of a scanline in the new encoding: per component, runs of 128 + n equal bytes or n literal ones.
-fn skip_new(bytes: &[u8], mut at: usize, length: usize, scanline: usize) -> Result<usize, Problem> {
+fn skip_new(
+    bytes: &[u8],
+    mut at: usize,
+    length: usize,
+    scanline: usize,
+) -> Result<usize, PictureErrorKind> {
     for _ in 0..4 {
         let mut filled = 0;
         while filled < length {
@@ -263,7 +270,7 @@ fn skip_new(bytes: &[u8], mut at: usize, length: usize, scanline: usize) -> Resu
                 } else {
                     "a run past the scanline's end"
                 };
-                return Err(Problem::Scanline { scanline, offset: at, what });
+                return Err(PictureErrorKind::Scanline { scanline, offset: at, what });
             }
             at += 1 + taken;
         }
@@ -275,11 +282,16 @@ fn skip_new(bytes: &[u8], mut at: usize, length: usize, scanline: usize) -> Resu
 }
 
 /// The end of a scanline of plain pixels, among which (1, 1, 1, n) repeats the one before n times.
-fn skip_old(bytes: &[u8], mut at: usize, length: usize, scanline: usize) -> Result<usize, Problem> {
+fn skip_old(
+    bytes: &[u8],
+    mut at: usize,
+    length: usize,
+    scanline: usize,
+) -> Result<usize, PictureErrorKind> {
     let (mut filled, mut shift) = (0usize, 0u32);
     while filled < length {
         let pixel = bytes.get(at..at + 4).ok_or_else(|| truncated(bytes, scanline))?;
-        let bad = |what| Problem::Scanline { scanline, offset: at, what };
+        let bad = |what| PictureErrorKind::Scanline { scanline, offset: at, what };
         if pixel[..3] == [1, 1, 1] {
             if filled == 0 {
                 return Err(bad("a repetition before the first pixel"));
@@ -385,7 +397,7 @@ impl ColorTable {
 
 /// Writes an RGBE picture with run lengths of the new kind.
 ///
-/// Each colour is rounded to the nearest that the format holds. It holds no negative and no non-finite values:
+/// Each color is rounded to the nearest that the format holds. It holds no negative and no non-finite values:
 /// negative and NaN become 0, infinity the greatest value, 255 · 2^119.
 ///
 /// # Errors

@@ -18,7 +18,7 @@ mod primaries;
 pub mod tone;
 
 pub use crate::files::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};
-pub use error::{PictureError, Problem};
+pub use error::{PictureError, PictureErrorKind};
 
 use crate::RgbImage;
 use crate::environment::mapping::EnvmapKind;
@@ -90,7 +90,7 @@ pub struct ReadOptions {
 /// If the file cannot be read or is not a whole, valid picture in one of the known formats.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Picture, PictureError> {
     let name = display_name(path);
-    let bytes = read_all(path, options.max_memory).map_err(|problem| problem.in_file(&name))?;
+    let bytes = read_all(path, options.max_memory).map_err(|kind| kind.in_file(&name))?;
     read_bytes(&bytes, &name, options)
 }
 
@@ -107,7 +107,7 @@ pub fn read_bytes(
         Some(_) => Ok(memory::require(memory_to_read(bytes)?, options.max_memory)?),
         None => Ok(()),
     };
-    allowed().map_err(|problem: Problem| problem.in_file(name))?;
+    allowed().map_err(|kind: PictureErrorKind| kind.in_file(name))?;
     let decoded = match format_of(bytes) {
         Some(Format::Hdr) => hdr::decode(bytes).map(|image| Picture::opaque(image, Format::Hdr)),
         Some(Format::Exr) => exr::decode(bytes, options.layer.as_deref()),
@@ -115,17 +115,17 @@ pub fn read_bytes(
         Some(format @ (Format::Png | Format::Jpeg)) => {
             png::decode_within(bytes, format, options.max_memory)
         }
-        None if bytes.is_empty() => Err(Problem::NoBytes),
-        None => Err(Problem::UnknownFormat),
+        None if bytes.is_empty() => Err(PictureErrorKind::NoBytes),
+        None => Err(PictureErrorKind::UnknownFormat),
     };
-    decoded.map_err(|problem| problem.in_file(name))
+    decoded.map_err(|kind| kind.in_file(name))
 }
 
 /// An estimate of the memory that the file and its picture take while it is read, from the header alone.
 ///
 /// # Errors
 /// If the header is damaged.
-pub fn memory_to_read(bytes: &[u8]) -> Result<u64, Problem> {
+pub fn memory_to_read(bytes: &[u8]) -> Result<u64, PictureErrorKind> {
     // Bytes for a texel: what the decoder makes, and the picture made of it.
     let (texels, per_texel) = match format_of(bytes) {
         Some(Format::Hdr) => (hdr::texels(bytes)?, 24),
@@ -154,38 +154,42 @@ fn display_name(path: &Path) -> String {
 }
 
 /// All bytes; of a pipe or device, which might never end, no more than are allowed.
-fn read_all(path: &Path, max_memory: Option<u64>) -> Result<Vec<u8>, Problem> {
+fn read_all(path: &Path, max_memory: Option<u64>) -> Result<Vec<u8>, PictureErrorKind> {
     if path == Path::new("-") {
         return read_to_end(io::stdin().lock(), max_memory);
     }
-    let file = File::open(path).map_err(Problem::Io)?;
-    let length = file.metadata().map_err(Problem::Io)?.len();
+    let file = File::open(path).map_err(PictureErrorKind::Io)?;
+    let length = file.metadata().map_err(PictureErrorKind::Io)?.len();
     memory::require(length, max_memory)?;
     read_to_end(file, max_memory)
 }
 
-fn read_to_end(from: impl Read, max_memory: Option<u64>) -> Result<Vec<u8>, Problem> {
+fn read_to_end(from: impl Read, max_memory: Option<u64>) -> Result<Vec<u8>, PictureErrorKind> {
     let limit = max_memory.unwrap_or(u64::MAX);
     let mut bytes = Vec::new();
-    from.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(Problem::Io)?;
+    from.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(PictureErrorKind::Io)?;
     memory::require(bytes.len() as u64, max_memory)?;
     Ok(bytes)
 }
 
 /// The number of texels of a size that is neither empty nor beyond [`MAX_TEXELS`].
-pub(crate) fn checked_area(width: usize, height: usize) -> Result<usize, Problem> {
+pub(crate) fn checked_area(width: usize, height: usize) -> Result<usize, PictureErrorKind> {
     match width.checked_mul(height) {
-        Some(0) => Err(Problem::Empty { width, height }),
+        Some(0) => Err(PictureErrorKind::Empty { width, height }),
         Some(area) if area <= MAX_TEXELS => Ok(area),
-        _ => Err(Problem::TooLarge { width, height }),
+        _ => Err(PictureErrorKind::TooLarge { width, height }),
     }
 }
 
 /// `n` copies of `value`, or an error where the memory is not there.
-pub(crate) fn allocate<T: Clone>(value: T, width: usize, height: usize) -> Result<Vec<T>, Problem> {
+pub(crate) fn allocate<T: Clone>(
+    value: T,
+    width: usize,
+    height: usize,
+) -> Result<Vec<T>, PictureErrorKind> {
     let n = width * height;
     let mut values = Vec::new();
-    values.try_reserve_exact(n).map_err(|_| Problem::TooLarge { width, height })?;
+    values.try_reserve_exact(n).map_err(|_| PictureErrorKind::TooLarge { width, height })?;
     values.resize(n, value);
     Ok(values)
 }

@@ -1,14 +1,14 @@
-//! Portable float maps (`.pfm`): `PF` (RGB) and `Pf` (grey), bottom row first, either byte order.
+//! Portable float maps (`.pfm`): `PF` (RGB) and `Pf` (gray), bottom row first, either byte order.
 //!
 //! Debevec's format. The sign of the scale tells the byte order (negative: little endian), its magnitude is
 //! multiplied in.
 
-use super::{Problem, allocate, checked_area};
+use super::{PictureErrorKind, allocate, checked_area};
 use crate::{Rgb, RgbImage};
 use std::io::{self, Write};
 
 /// How many texels the header promises.
-pub(super) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
+pub(super) fn texels(bytes: &[u8]) -> Result<usize, PictureErrorKind> {
     let mut header = Words { bytes, at: 0, line: 1 };
     header.next()?;
     checked_area(header.number("a width")?, header.number("a height")?)
@@ -18,7 +18,7 @@ pub(super) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
 ///
 /// # Errors
 /// If header or data are damaged or incomplete.
-pub fn decode(bytes: &[u8]) -> Result<RgbImage, Problem> {
+pub fn decode(bytes: &[u8]) -> Result<RgbImage, PictureErrorKind> {
     let mut header = Words { bytes, at: 0, line: 1 };
     let channels = if header.next()? == b"PF" { 3 } else { 1 };
     let width: usize = header.number("a width")?;
@@ -26,14 +26,18 @@ pub fn decode(bytes: &[u8]) -> Result<RgbImage, Problem> {
     let scale: f32 = header.number("a scale")?;
     if scale == 0.0 || !scale.is_finite() {
         let found = scale.to_string();
-        return Err(Problem::Header { line: header.line, found, expected: "a scale other than 0" });
+        return Err(PictureErrorKind::Header {
+            line: header.line,
+            found,
+            expected: "a scale other than 0",
+        });
     }
     checked_area(width, height)?;
     let needed = width as u64 * height as u64 * channels as u64 * 4;
     let start = header.data_start(needed);
     let held = (bytes.len() - start.min(bytes.len())) as u64;
     if held < needed {
-        return Err(Problem::Promises { width, height, needed, held });
+        return Err(PictureErrorKind::Promises { width, height, needed, held });
     }
     let value = |at: usize| {
         let four = [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
@@ -54,7 +58,7 @@ pub fn decode(bytes: &[u8]) -> Result<RgbImage, Problem> {
     Ok(RgbImage::new(width, height, pixels))
 }
 
-/// Writes a little-endian colour map of scale 1: every value bit for bit.
+/// Writes a little-endian color map of scale 1: every value bit for bit.
 ///
 /// # Errors
 /// If `out` does not take it.
@@ -77,7 +81,7 @@ struct Words<'a> {
 
 impl<'a> Words<'a> {
     /// The next word, with `at` on the byte after it.
-    fn next(&mut self) -> Result<&'a [u8], Problem> {
+    fn next(&mut self) -> Result<&'a [u8], PictureErrorKind> {
         let bytes = self.bytes;
         let mut in_comment = false;
         while let Some(&byte) = bytes.get(self.at) {
@@ -90,16 +94,22 @@ impl<'a> Words<'a> {
         }
         let word = &bytes[self.at..];
         let end = word.iter().position(u8::is_ascii_whitespace).ok_or_else(|| {
-            Problem::Truncated { place: format!("header line {}", self.line), offset: bytes.len() }
+            PictureErrorKind::Truncated {
+                place: format!("header line {}", self.line),
+                offset: bytes.len(),
+            }
         })?;
         self.at += end;
         Ok(&word[..end])
     }
 
-    fn number<T: std::str::FromStr>(&mut self, expected: &'static str) -> Result<T, Problem> {
+    fn number<T: std::str::FromStr>(
+        &mut self,
+        expected: &'static str,
+    ) -> Result<T, PictureErrorKind> {
         let word = self.next()?;
         let number = std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
-        number.ok_or_else(|| Problem::Header {
+        number.ok_or_else(|| PictureErrorKind::Header {
             line: self.line,
             found: String::from_utf8_lossy(&word[..word.len().min(40)]).into_owned(),
             expected,

@@ -1,11 +1,11 @@
-//! PNG: writes sRGB in 8 or 16 bits a channel, reads it back as linear colour; reads JPEG likewise.
+//! PNG: writes sRGB in 8 or 16 bits a channel, reads it back as linear color; reads JPEG likewise.
 //!
-//! PNG keeps colour and alpha apart (straight, unassociated); pictures here are premultiplied. The writer divides by
+//! PNG keeps color and alpha apart (straight, unassociated); pictures here are premultiplied. The writer divides by
 //! alpha before the tone curve, so that what a viewer composes over black is the tone-mapped object; light that does
-//! not cover (alpha 0) cannot be kept. No dithering: the same colour is the same byte everywhere.
+//! not cover (alpha 0) cannot be kept. No dithering: the same color is the same byte everywhere.
 
 use super::tone::{ToneMapping, linear_from_srgb, srgb_from_linear};
-use super::{Format, Picture, Problem, checked_area};
+use super::{Format, Picture, PictureErrorKind, checked_area};
 use crate::{Rgb, RgbImage};
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::{self, Cursor, Write};
@@ -69,10 +69,10 @@ fn quantize(value: f32, depth: Depth, bytes: &mut Vec<u8>) {
 }
 
 /// How many texels the header promises.
-pub(crate) fn texels(bytes: &[u8], format: Format) -> Result<usize, Problem> {
+pub(crate) fn texels(bytes: &[u8], format: Format) -> Result<usize, PictureErrorKind> {
     if format == Format::Jpeg {
         let reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Jpeg);
-        let (width, height) = reader.into_dimensions().map_err(Problem::Image)?;
+        let (width, height) = reader.into_dimensions().map_err(PictureErrorKind::Image)?;
         return checked_area(width as usize, height as usize);
     }
     // By hand: the decoder unpacks a color profile before it tells the size.
@@ -81,14 +81,14 @@ pub(crate) fn texels(bytes: &[u8], format: Format) -> Result<usize, Problem> {
         return checked_area(width as usize, height as usize);
     }
     let (found, expected) = ("its beginning".to_owned(), "the header of a PNG");
-    Err(Problem::Header { line: 1, found, expected })
+    Err(PictureErrorKind::Header { line: 1, found, expected })
 }
 
-/// Decodes a PNG as sRGB (whatever it says of its colours) into linear, premultiplied colour.
+/// Decodes a PNG as sRGB (whatever it says of its colors) into linear, premultiplied color.
 ///
 /// # Errors
 /// If the file is damaged or incomplete.
-pub fn decode(bytes: &[u8]) -> Result<Picture, Problem> {
+pub fn decode(bytes: &[u8]) -> Result<Picture, PictureErrorKind> {
     decode_within(bytes, Format::Png, None)
 }
 
@@ -107,7 +107,7 @@ pub(crate) fn limits(
     bytes: &[u8],
     format: Format,
     max_memory: Option<u64>,
-) -> Result<Limits, Problem> {
+) -> Result<Limits, PictureErrorKind> {
     const TEXEL: u64 = 16;
     const HEADER: u64 = 1 << 24;
     let needed = TEXEL * texels(bytes, format)? as u64 + HEADER;
@@ -121,23 +121,26 @@ pub(super) fn decode_within(
     bytes: &[u8],
     format: Format,
     max_memory: Option<u64>,
-) -> Result<Picture, Problem> {
+) -> Result<Picture, PictureErrorKind> {
     let mut reader = ImageReader::with_format(Cursor::new(bytes), of_crate(format));
     reader.limits(limits(bytes, format, max_memory)?);
-    let decoder = reader.into_decoder().map_err(Problem::Image)?;
+    let decoder = reader.into_decoder().map_err(PictureErrorKind::Image)?;
     let (width, height) = decoder.dimensions();
     checked_area(width as usize, height as usize)?;
     // Deflate makes at most 1032 bytes of one, and a texel may be a single bit; JPEG takes more.
     let (needed, held) = (u64::from(width) * u64::from(height) / (8 * 1032), bytes.len() as u64);
     if held < needed {
         let (width, height) = (width as usize, height as usize);
-        return Err(Problem::Promises { width, height, needed, held });
+        return Err(PictureErrorKind::Promises { width, height, needed, held });
     }
     if format == Format::Jpeg && !is_whole_jpeg(bytes) {
-        return Err(Problem::Truncated { place: "the JPEG's data".into(), offset: bytes.len() });
+        return Err(PictureErrorKind::Truncated {
+            place: "the JPEG's data".into(),
+            offset: bytes.len(),
+        });
     }
     let has_alpha = decoder.color_type().has_alpha();
-    let decoded = image::DynamicImage::from_decoder(decoder).map_err(Problem::Image)?;
+    let decoded = image::DynamicImage::from_decoder(decoder).map_err(PictureErrorKind::Image)?;
     let texels = decoded.into_rgba32f();
     let mut alpha = Vec::with_capacity(if has_alpha { texels.len() / 4 } else { 0 });
     let pixels = texels.pixels().map(|texel| {

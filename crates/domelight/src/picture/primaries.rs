@@ -1,4 +1,4 @@
-//! Colour spaces of RGB primaries, brought to Rec. 709.
+//! Color spaces of RGB primaries, brought to Rec. 709.
 //!
 //! Matrices from chromaticities: SMPTE RP 177-1993. White points are adapted by Bradford's cone responses.
 
@@ -16,7 +16,7 @@ impl Primaries {
         Self([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]]);
 
     /// The matrix to linear Rec. 709; `None` where it is that already (to the three digits that files keep) or
-    /// where the chromaticities span no colour space.
+    /// where the chromaticities span no color space.
     pub(super) fn to_rec709(self) -> Option<Mat3> {
         let same =
             |a: &[f32; 2], b: &[f32; 2]| (a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3;
@@ -51,10 +51,10 @@ impl Primaries {
 
 /// XYZ (relative to Y = 1 of D65 white, no adaptation) to linear Rec. 709.
 pub(super) fn xyz_to_rec709() -> Mat3 {
-    Primaries::REC709.to_xyz().expect("Rec. 709 spans a colour space").inverse()
+    Primaries::REC709.to_xyz().expect("Rec. 709 spans a color space").inverse()
 }
 
-/// `matrix` on a colour.
+/// `matrix` on a color.
 pub(super) fn transform(matrix: &Mat3, c: Rgb) -> Rgb {
     Rgb::from((*matrix * vec3(c.r, c.g, c.b)).to_array())
 }

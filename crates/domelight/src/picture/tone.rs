@@ -19,7 +19,7 @@ pub enum ToneCurve {
     /// AgX (Sobotka 2022), the base look, with the sigmoid as the polynomial of Wrensch 2023, "Minimal AgX
     /// Implementation".
     Agx,
-    /// Khronos PBR Neutral (2024): colours up to 0.8 as they are, for true-to-life base colours.
+    /// Khronos PBR Neutral (2024): colors up to 0.8 as they are, for true-to-life base colors.
     Neutral,
 }
 
@@ -224,12 +224,12 @@ mod tests {
 
     #[test]
     fn published_values() {
-        // PBR Neutral: base colours pass through with the reflection of 4 % added.
+        // PBR Neutral: base colors pass through with the reflection of 4 % added.
         let neutral = ToneCurve::Neutral.apply(Rgb::new(0.54, 0.34, 0.14));
         assert!((neutral - Rgb::new(0.5, 0.3, 0.1)).map(f32::abs).max_component() < 1e-6);
-        // Middle grey of AgX stays near middle grey.
-        let grey = ToneCurve::Agx.apply(Rgb::splat(0.18)).g;
-        assert!((0.16..0.24).contains(&grey), "{grey}");
+        // Middle gray of AgX stays near middle gray.
+        let gray = ToneCurve::Agx.apply(Rgb::splat(0.18)).g;
+        assert!((0.16..0.24).contains(&gray), "{gray}");
         assert_eq!(ToneCurve::Reinhard.apply(Rgb::splat(1.0)).g, 0.5);
     }
 

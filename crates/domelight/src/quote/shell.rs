@@ -4,7 +4,7 @@ use super::{Code, Shell};
 
 /// A word as it is where that is plain, else in single quotes.
 ///
-/// No two braces are neighbours in it: templates of Open Job Description replace what stands in double ones, wherever.
+/// No two braces are neighbors in it: templates of Open Job Description replace what stands in double ones, wherever.
 pub fn word(word: &str) -> Code<Shell> {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

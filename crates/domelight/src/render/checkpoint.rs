@@ -9,7 +9,7 @@ use std::ops::Range;
 use super::film::PixelSums;
 use super::{Counts, Film, Window};
 use crate::fingerprint::Fingerprinter;
-use crate::picture::Problem;
+use crate::picture::PictureErrorKind;
 use crate::picture::exr::{Compression, ExrLayers, Plane};
 
 /// The state of a render, or of a shard of it.
@@ -39,7 +39,7 @@ pub struct Checkpoint {
 pub enum CheckpointError {
     /// It is no whole OpenEXR file.
     #[error(transparent)]
-    Picture(#[from] Problem),
+    Picture(#[from] PictureErrorKind),
     /// It is a picture of something else.
     #[error("it is not a checkpoint or part of a render by domelight")]
     Foreign,
@@ -68,7 +68,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// If the picture is too large, or a name of the provenance cannot be one of OpenEXR.
-    pub fn encode(&self) -> Result<Vec<u8>, Problem> {
+    pub fn encode(&self) -> Result<Vec<u8>, PictureErrorKind> {
         let Film { width, height, window, .. } = self.film;
         let (color, alpha) = self.film.picture();
         let mut exr = ExrLayers::from_image(&color, Some(&alpha));

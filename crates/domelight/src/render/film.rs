@@ -144,7 +144,7 @@ impl PixelSums {
         let independent: f64 = self.independent_variance().into_iter().sum();
         let squares = |x: [f64; 3]| x.into_iter().map(|x| x * x).sum::<f64>();
         if self.n_second > 0 {
-            return Some(Contrast::Sets([
+            return Some(Contrast::SimdBitSets([
                 independent,
                 self.balance() * squares(self.difference()),
             ]));
@@ -192,7 +192,7 @@ impl PixelSums {
     }
 }
 
-/// A rendered picture in layers. Colours are premultiplied by alpha.
+/// A rendered picture in layers. Colors are premultiplied by alpha.
 #[derive(Clone, Debug)]
 pub struct Layers {
     /// Direct light, and the background where it is shown.
@@ -203,7 +203,7 @@ pub struct Layers {
     pub unoccluded: RgbImage,
     /// Reflectance of the surfaces seen.
     pub albedo: RgbImage,
-    /// Mean world shading normal, not normalised; zero where nothing was hit.
+    /// Mean world shading normal, not normalized; zero where nothing was hit.
     pub normal: Vec<Vec3>,
     /// Mean distance from the camera plane over the samples that hit; 0 where none did.
     pub depth: Vec<f32>,
@@ -336,7 +336,7 @@ pub struct Film {
 
 /// Sums that do not belong to a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Misfit {
+pub enum FilmMismatch {
     /// Another picture or part of it.
     #[error("it is window {found} of the picture, not {expected}")]
     Window {
@@ -373,7 +373,7 @@ impl Film {
         VarianceSums::of(&self.pixels)
     }
 
-    /// Colour and alpha of the window.
+    /// Color and alpha of the window.
     #[cfg(feature = "io")]
     pub(super) fn picture(&self) -> (RgbImage, Vec<f32>) {
         let color = self.pixels.iter().map(|p| p.mean(p.color)).collect();
@@ -400,13 +400,13 @@ impl Film {
         &self,
         settings: &RenderSettings,
         expected: Window,
-    ) -> Result<(), Misfit> {
+    ) -> Result<(), FilmMismatch> {
         let same_size = (self.width, self.height) == (settings.width, settings.height);
         let found = self.window;
         if same_size && found == expected {
             return Ok(());
         }
-        Err(Misfit::Window { found, expected })
+        Err(FilmMismatch::Window { found, expected })
     }
 
     /// The bits of the sums: for each of [`PixelSums::WORDS`] one word a pixel.

@@ -1,7 +1,7 @@
 //! Pixel filters, by importance sampling: Ernst et al. 2006, "Filter Importance Sampling".
 //!
 //! Camera samples are placed with the density of the filter and all count the same. No sample is
-//! splatted into a neighbour, so a tile depends on nothing but itself and pixels keep independent
+//! splatted into a neighbor, so a tile depends on nothing but itself and pixels keep independent
 //! noise. Only filters without negative lobes can be had this way.
 
 use std::str::FromStr;
@@ -9,7 +9,7 @@ use std::str::FromStr;
 use crate::math::{Vec2, vec2};
 use crate::sampling::Table1d;
 
-/// A reconstruction filter, separable, centred on the pixel.
+/// A reconstruction filter, separable, centered on the pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Filter {
     /// The plain mean over the pixel's square.
@@ -46,7 +46,7 @@ impl Filter {
         }
     }
 
-    /// The filter, not normalised, at `x` pixels from the centre.
+    /// The filter, not normalized, at `x` pixels from the center.
     pub fn eval(self, x: f32) -> f32 {
         let r = self.radius();
         if x.abs() > r {
@@ -98,7 +98,7 @@ impl FilterSampler {
     }
 
     /// How far positions lie outside of their pixel at the most \[pixels\].
-    pub(super) fn reach(&self) -> f32 {
+    pub(super) fn overhang(&self) -> f32 {
         self.radius - 0.5
     }
 

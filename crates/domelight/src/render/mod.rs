@@ -4,6 +4,7 @@
 //! sums are added in the order of its samples. So the picture has the same bits for any number of
 //! threads; with strategies that learn nothing, also for any tile size and division into passes.
 
+mod allocation;
 #[cfg(feature = "io")]
 mod checkpoint;
 mod film;
@@ -11,7 +12,6 @@ mod filter;
 #[cfg(feature = "io")]
 mod output;
 mod renderer;
-mod spread;
 mod tile;
 mod tiling;
 mod variance;
@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 #[cfg(feature = "io")]
 pub use checkpoint::{Checkpoint, CheckpointError, Difference};
-pub use film::{Film, Layers, Misfit};
+pub use film::{Film, FilmMismatch, Layers};
 pub use filter::{Filter, FilterSampler, UnknownFilter};
 #[cfg(feature = "io")]
 pub use output::Developed;
@@ -124,7 +124,7 @@ pub trait Observer: Sync {
     fn tile_finished(&self, _counts: &Counts) {}
 
     /// True ends the render: running tiles are finished, the others keep what they have.
-    fn cancelled(&self) -> bool {
+    fn canceled(&self) -> bool {
         false
     }
 }
@@ -134,7 +134,7 @@ impl Observer for () {}
 
 /// An observer that ends the render when the flag is raised.
 impl Observer for AtomicBool {
-    fn cancelled(&self) -> bool {
+    fn canceled(&self) -> bool {
         self.load(Ordering::Relaxed)
     }
 }
@@ -151,7 +151,7 @@ pub struct Rendering {
 }
 
 /// All that tiles share.
-struct Frame<'a> {
+struct RenderContext<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
     environment: &'a Environment,
@@ -181,8 +181,12 @@ pub fn render<S: Strategy>(
     renderer.rendering()
 }
 
-/// The shading points of up to 256 pixels' centres, spread over the picture: for pilots.
-pub fn survey(scene: &Scene, camera: &Camera, settings: &RenderSettings) -> Vec<ShadingPoint> {
+/// The shading points of up to 256 pixels' centers, spread over the picture: for pilots.
+pub fn pilot_points(
+    scene: &Scene,
+    camera: &Camera,
+    settings: &RenderSettings,
+) -> Vec<ShadingPoint> {
     const ACROSS: usize = 16;
     let at = |i: usize, n: usize| ((2 * i + 1) * n) as f32 / (2 * ACROSS) as f32;
     let rays = (0..ACROSS * ACROSS)

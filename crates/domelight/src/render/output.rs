@@ -8,7 +8,7 @@ use crate::picture::exr::ExrLayers;
 use crate::picture::exr::bands::{self, BAND_ROWS};
 use crate::picture::png::{self, Depth};
 use crate::picture::tone::{Exposure, ToneCurve, ToneMapping};
-use crate::picture::{Problem, write_atomically, write_atomically_seeking};
+use crate::picture::{PictureErrorKind, write_atomically, write_atomically_seeking};
 use crate::{Error, RgbImage};
 
 /// A film developed to what a screen shows.
@@ -94,7 +94,7 @@ impl Layers {
         &self,
         attributes: &[(String, String)],
         out: &mut (impl Write + Seek + ?Sized),
-    ) -> Result<(), Problem> {
+    ) -> Result<(), PictureErrorKind> {
         bands::write(self.height(), out, |y| {
             let rows = y..self.height().min(y + BAND_ROWS);
             Ok(self.rows(rows).to_exr(attributes.to_vec()))

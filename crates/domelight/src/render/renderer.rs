@@ -5,15 +5,15 @@ use std::ops::{Deref, Range};
 
 use rayon::prelude::*;
 
-use super::film::{Film, Layers, Misfit, PixelSums, SampleSet};
+use super::allocation::mean_log;
+use super::film::{Film, FilmMismatch, Layers, PixelSums, SampleSet};
 use super::filter::FilterSampler;
-use super::spread::usual;
 use super::tile::{Counts, Pass, Scratch, Tile};
 use super::tiling::{Tiling, Window, paired_pass};
 use super::variance::VarianceSums;
-use super::{Frame, Observer, RenderSettings, Rendering};
+use super::{Observer, RenderContext, RenderSettings, Rendering};
 use crate::environment::Environment;
-use crate::sampling::Stream;
+use crate::sampling::Sampler;
 use crate::scene::{Camera, Scene};
 use crate::strategy::{PrepareError, PreparedStrategy, Strategy, StrategySpec};
 
@@ -42,7 +42,7 @@ use crate::strategy::{PrepareError, PreparedStrategy, Strategy, StrategySpec};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Renderer<'a, S: Strategy = PreparedStrategy<'a>> {
-    frame: Frame<'a>,
+    context: RenderContext<'a>,
     strategy: Held<'a, S>,
     spec: Option<StrategySpec>,
     tiling: Tiling,
@@ -82,7 +82,7 @@ enum PassEnd {
     /// All tiles that it was to render have its samples.
     Complete,
     /// The observer ended it.
-    Cancelled,
+    Canceled,
     /// There was nothing to render.
     NothingLeft,
 }
@@ -104,7 +104,7 @@ impl<'a> Renderer<'a> {
         strategy: StrategySpec,
         settings: RenderSettings,
     ) -> Result<Self, PrepareError> {
-        let points = || super::survey(scene, camera, &settings);
+        let points = || super::pilot_points(scene, camera, &settings);
         let spec = strategy.for_scene(points, environment, settings.seed);
         let prepared = Held::Own(Box::new(PreparedStrategy::new(spec, environment)?));
         let renderer = Self::hold(scene, camera, environment, prepared, settings);
@@ -145,9 +145,9 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let filter = FilterSampler::new(settings.filter);
         let extent = scene.bounds().size().max_element();
         let tiling = Tiling::new(&settings, strategy.n_rays());
-        let frame = Frame { scene, camera, environment, settings, filter, extent };
+        let context = RenderContext { scene, camera, environment, settings, filter, extent };
         let empty = Self {
-            frame,
+            context,
             strategy,
             spec: None,
             tiling,
@@ -182,7 +182,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
 
     /// How to render.
     pub fn settings(&self) -> &RenderSettings {
-        &self.frame.settings
+        &self.context.settings
     }
 
     /// How the picture is divided.
@@ -212,7 +212,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         loop {
             match self.pass(observer) {
                 PassEnd::Complete => {}
-                PassEnd::Cancelled => return false,
+                PassEnd::Canceled => return false,
                 PassEnd::NothingLeft => return true,
             }
         }
@@ -223,40 +223,40 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let Some(start) = self.unfinished().map(Tile::n_samples).min() else {
             return PassEnd::NothingLeft;
         };
-        if observer.cancelled() {
-            return PassEnd::Cancelled;
+        if observer.canceled() {
+            return PassEnd::Canceled;
         }
         self.mark.0 += 1;
-        let Self { frame, strategy, tiling, tiles, mark, .. } = self;
-        let (strategy, settings): (&S, _) = (strategy, &frame.settings);
+        let Self { context, strategy, tiling, tiles, mark, .. } = self;
+        let (strategy, settings): (&S, _) = (strategy, &context.settings);
         let (samples, set) = match settings.target_error {
             None => (tiling.pass(strategy, start, settings.n_samples - start), SampleSet::First),
             Some(_) => paired_pass(start, settings.n_samples),
         };
         observer.pass_started(samples.clone());
-        let stream = Stream::of_pass(settings.sampler, settings.seed, start);
+        let sampler = Sampler::for_pass(settings.sampler, settings.seed, start);
         let n_samples = samples.len() as u32;
-        let shared = strategy.begin_pass(stream, n_samples);
+        let shared = strategy.begin_pass(sampler, n_samples);
         let adaptive = settings.adaptive && strategy.n_rounds() > 1;
-        let mut pass = Pass { n_samples, set, adaptive, usual: None, shared };
+        let mut pass = Pass { n_samples, set, adaptive, mean_log: None, shared };
         if adaptive {
-            pass.usual = usual(frame, strategy, &pass);
+            pass.mean_log = mean_log(context, strategy, &pass);
         }
         let behind = |tile: &Tile| tile.n_samples() == start && !tile.is_finished(settings);
         let complete = tiles
             .par_iter_mut()
             .filter(|tile| behind(tile))
             .map_init(Scratch::<S>::default, |scratch, tile| {
-                if observer.cancelled() {
+                if observer.canceled() {
                     return false;
                 }
-                let counts = tile.render(frame, strategy, &pass, scratch, observer);
+                let counts = tile.render(context, strategy, &pass, scratch, observer);
                 tile.changed = *mark;
                 observer.tile_finished(&counts);
                 true
             })
             .reduce(|| true, |a, b| a & b);
-        if complete { PassEnd::Complete } else { PassEnd::Cancelled }
+        if complete { PassEnd::Complete } else { PassEnd::Canceled }
     }
 
     /// Whether all samples of all pixels are there.
@@ -265,14 +265,14 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     }
 
     fn unfinished(&self) -> impl Iterator<Item = &Tile> {
-        self.tiles.iter().filter(|tile| !tile.is_finished(&self.frame.settings))
+        self.tiles.iter().filter(|tile| !tile.is_finished(&self.context.settings))
     }
 
     /// The share of the camera samples that is done, in [0, 1].
     pub fn progress(&self) -> f64 {
-        let n_samples = f64::from(self.frame.settings.n_samples);
+        let n_samples = f64::from(self.context.settings.n_samples);
         let done = |tile: &Tile| {
-            let is_finished = tile.is_finished(&self.frame.settings);
+            let is_finished = tile.is_finished(&self.context.settings);
             let share = if is_finished { 1.0 } else { f64::from(tile.n_samples()) / n_samples };
             share * tile.window.area() as f64
         };
@@ -297,7 +297,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
 
     /// The sums of all pixels so far.
     pub fn film(&self) -> Film {
-        let RenderSettings { width, height, .. } = self.frame.settings;
+        let RenderSettings { width, height, .. } = self.context.settings;
         let window = self.tiling.window(&self.range);
         let mut film = Film::new(width, height, window);
         for tile in &self.tiles {
@@ -311,7 +311,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     /// # Panics
     /// If the window is none of the renderer's tiles.
     pub fn film_of(&self, window: Window) -> Film {
-        let RenderSettings { width, height, .. } = self.frame.settings;
+        let RenderSettings { width, height, .. } = self.context.settings;
         let tile = self.tiles.iter().find(|tile| tile.window == window);
         let tile = tile.unwrap_or_else(|| panic!("{window} is no tile of this renderer"));
         let mut film = Film::new(width, height, window);
@@ -323,15 +323,15 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     ///
     /// # Errors
     /// If they are of another part or size of picture, or of no whole number of passes.
-    pub fn restore(&mut self, film: &Film, counts: Counts) -> Result<(), Misfit> {
-        film.require_window(&self.frame.settings, self.tiling.window(&self.range))?;
+    pub fn restore(&mut self, film: &Film, counts: Counts) -> Result<(), FilmMismatch> {
+        film.require_window(&self.context.settings, self.tiling.window(&self.range))?;
         self.mark.0 += 1;
         for tile in &mut self.tiles {
             let pixels: Vec<PixelSums> = film.get(tile.window);
             let n_samples = pixels[0].n_samples();
             if pixels.iter().any(|p| (p.n_samples() == 0) != (n_samples == 0)) {
                 let Window { x, y, .. } = tile.window;
-                return Err(Misfit::Samples { x, y });
+                return Err(FilmMismatch::Samples { x, y });
             }
             tile.restore(pixels);
             tile.changed = self.mark;

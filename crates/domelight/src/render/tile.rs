@@ -4,16 +4,16 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use super::allocation::{Allocation, PassSums};
 use super::film::{CameraSample, Layers, PixelSums, SampleSet, SurfaceSample};
-use super::spread::{Allocation, PassSums};
 use super::tiling::Window;
 use super::variance::VarianceSums;
-use super::{Background, Frame, Mark, Observer, RenderSettings, Stage, visibility};
+use super::{Background, Mark, Observer, RenderContext, RenderSettings, Stage, visibility};
 use crate::Rgb;
 use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
 use crate::math::{Vec3, vec2};
 use crate::sampling::rng::hash2;
-use crate::sampling::{Dimension, NumberSet, Stream};
+use crate::sampling::{Dimension, SampleSequence, Sampler};
 use crate::strategy::levels::{N_LEVELS, level};
 use crate::strategy::{Contributions, PixelPoints, ShadingPoint, Strategy, TileShading};
 
@@ -89,10 +89,10 @@ pub(super) struct Pass<S: Strategy> {
     /// Its camera samples of each pixel; about the mean over the picture where they are divided unevenly.
     pub(super) n_samples: u32,
     pub(super) set: SampleSet,
-    /// Divides its samples unevenly, or will when `usual` is known.
+    /// Divides its samples unevenly, or will when `mean_log` is known.
     pub(super) adaptive: bool,
-    /// The logarithm at which a pixel has the usual number; see [`super::spread`].
-    pub(super) usual: Option<f32>,
+    /// The logarithm at which a pixel has the usual number; see [`super::allocation`].
+    pub(super) mean_log: Option<f32>,
     pub(super) shared: S::Pass,
 }
 
@@ -141,7 +141,7 @@ impl CameraRays {
 /// The shadow rays of a round.
 #[derive(Default)]
 struct ShadowRays {
-    asked: Contributions,
+    contributions: Contributions,
     traced: RayBatch,
     occluded: Vec<bool>,
     /// V of each ray, in [0, 1].
@@ -211,7 +211,7 @@ impl Tile {
     /// Adds the samples of a pass to each pixel.
     pub(super) fn render<S: Strategy>(
         &mut self,
-        frame: &Frame,
+        context: &RenderContext,
         strategy: &S,
         pass: &Pass<S>,
         scratch: &mut Scratch<S>,
@@ -223,8 +223,8 @@ impl Tile {
         let n_pixels = self.window.area();
         batch.seen.clear();
         batch.seen.resize(n_pixels, false);
-        self.find_seen(frame, self.window, &mut batch.seen);
-        let hidden = frame.settings.background == Background::Hidden;
+        self.find_seen(context, self.window, &mut batch.seen);
+        let hidden = context.settings.background == Background::Hidden;
         if self.pixels.is_empty() && hidden && !batch.seen.contains(&true) {
             self.n_missed += pass.n_samples;
             let camera_rays = u64::from(pass.n_samples) * n_pixels as u64;
@@ -233,46 +233,52 @@ impl Tile {
             return counts;
         }
         self.pixels.resize(n_pixels, PixelSums::missed(self.n_missed));
-        let asked = Asked { frame, strategy, pass: &pass.shared, width };
+        let strategy_context = StrategyContext { context, strategy, pass: &pass.shared, width };
         let mut counts = Counts::default();
         // Where nothing is seen there is nothing to learn.
         let n_rounds = if batch.seen.contains(&true) { strategy.n_rounds() } else { 1 };
         let learns = n_rounds > 1;
         // Renders with a target error have a second set in every pixel.
-        let one_in_many = learns && frame.settings.target_error.is_none();
-        self.choose_second_sets(frame, one_in_many, batch);
+        let one_in_many = learns && context.settings.target_error.is_none();
+        self.choose_second_sets(context, one_in_many, batch);
         batch.adaptive = learns && pass.adaptive;
-        let usual = pass.usual.filter(|_| batch.adaptive);
-        batch.allocation.reset(width, n_pixels, pass.n_samples, usual);
+        let mean_log = pass.mean_log.filter(|_| batch.adaptive);
+        batch.allocation.reset(width, n_pixels, pass.n_samples, mean_log);
         for round in 0..n_rounds {
             batch.allocation.assign(round);
             let of_round = |i: usize| !learns || level(i % width, i / width) == round;
             // First, as what the strategy keeps for learning is that of its last rays.
             batch.choose(|i, batch| batch.has_second[i] && of_round(i));
             if batch.chosen.contains(&true) {
-                counts +=
-                    self.sample(&asked, round, SampleSet::Second, batch, of_strategy, observer);
-                counts.non_finite += self.add_samples(frame, SampleSet::Second, batch);
+                counts += self.sample(
+                    &strategy_context,
+                    round,
+                    SampleSet::Second,
+                    batch,
+                    of_strategy,
+                    observer,
+                );
+                counts.non_finite += self.add_samples(context, SampleSet::Second, batch);
             }
             batch.choose(|i, _| of_round(i));
-            counts += self.sample(&asked, round, pass.set, batch, of_strategy, observer);
+            counts += self.sample(&strategy_context, round, pass.set, batch, of_strategy, observer);
             if round + 1 < n_rounds {
-                batch.learn(&asked, of_strategy);
+                batch.learn(&strategy_context, of_strategy);
             }
             observer.stage_started(Stage::Sums);
-            counts.non_finite += self.add_samples(frame, pass.set, batch);
+            counts.non_finite += self.add_samples(context, pass.set, batch);
         }
         self.counts += counts;
         counts
     }
 
     /// Marks the pixels that take a second set of samples in a pass: none, or four of the 256 of a square.
-    fn choose_second_sets(&self, frame: &Frame, one_in_many: bool, batch: &mut Batch) {
+    fn choose_second_sets(&self, context: &RenderContext, one_in_many: bool, batch: &mut Batch) {
         batch.has_second.clear();
         let second = |(i, &seen): (usize, &bool)| {
             let (x, y) = self.position(i);
             // The number of samples of a tile is that of its first pixel.
-            one_in_many && seen && i > 0 && has_second_set(frame.settings.seed, x, y)
+            one_in_many && seen && i > 0 && has_second_set(context.settings.seed, x, y)
         };
         batch.has_second.extend(batch.seen.iter().enumerate().map(second));
     }
@@ -280,7 +286,7 @@ impl Tile {
     /// Traces a set of samples of the chosen pixels of a round.
     fn sample<S: Strategy>(
         &self,
-        asked: &Asked<S>,
+        strategy_context: &StrategyContext<S>,
         round: u32,
         set: SampleSet,
         batch: &mut Batch,
@@ -288,16 +294,16 @@ impl Tile {
         observer: &impl Observer,
     ) -> Counts {
         observer.stage_started(Stage::CameraRays);
-        let camera_rays = self.trace_camera_rays(asked.frame, set, batch);
+        let camera_rays = self.trace_camera_rays(strategy_context.context, set, batch);
         observer.stage_started(Stage::Surfaces);
-        batch.gather_points(asked.frame);
+        batch.gather_points(strategy_context.context);
         let shading_points = batch.points.len() as u64;
-        let shadow_rays = batch.trace_strategy(asked, round, scratch, observer);
+        let shadow_rays = batch.trace_strategy(strategy_context, round, scratch, observer);
         Counts { camera_rays, shading_points, shadow_rays, non_finite: 0 }
     }
 
     /// Those of a set of the chosen pixels; returns how many.
-    fn trace_camera_rays(&self, frame: &Frame, set: SampleSet, batch: &mut Batch) -> u64 {
+    fn trace_camera_rays(&self, context: &RenderContext, set: SampleSet, batch: &mut Batch) -> u64 {
         let Batch { seen, chosen, allocation, rays, hits, camera_rays, pixels, .. } = batch;
         rays.clear();
         pixels.clear();
@@ -311,35 +317,35 @@ impl Tile {
                 continue;
             }
             let (x, y) = self.position(i);
-            let stream = self.stream(frame, i, set);
+            let sampler = self.sampler(context, i, set);
             let n_samples = allocation.get(i);
             let samples = start..start + n_samples;
             let first = seen.then_some(rays.len());
             if first.is_some() {
-                let set = stream.set(Dimension::Film);
-                rays.extend(samples.clone().map(|sample| camera_ray(frame, x, y, &set, sample)));
+                let set = sampler.set(Dimension::Film);
+                rays.extend(samples.clone().map(|sample| camera_ray(context, x, y, &set, sample)));
             }
             camera_rays.push(CameraRays { samples, first });
-            pixels.push(PixelPoints { points: 0..0, n_samples, stream, one_material: true });
+            pixels.push(PixelPoints { points: 0..0, n_samples, sampler, one_material: true });
             count += u64::from(n_samples);
         }
-        frame.scene.bvh().closest_hits(rays, hits);
+        context.scene.bvh().closest_hits(rays, hits);
         count
     }
 
     /// Marks the pixels of a part of the tile that may see something.
-    fn find_seen(&self, frame: &Frame, part: Window, seen: &mut [bool]) {
+    fn find_seen(&self, context: &RenderContext, part: Window, seen: &mut [bool]) {
         /// Parts no larger than this are not divided further \[pixels\].
         const SMALL: usize = 4;
-        let reach = frame.filter.reach() + 0.01;
-        let span = |start: usize, n: usize| [start as f32 - reach, (start + n) as f32 + reach];
+        let margin = context.filter.overhang() + 0.01;
+        let span = |start: usize, n: usize| [start as f32 - margin, (start + n) as f32 + margin];
         let Window { x, y, width, height } = part;
-        let frustum = frame.camera.frustum(span(x, width), span(y, height));
-        if !frame.scene.bvh().may_hit(&frustum) {
+        let frustum = context.camera.frustum(span(x, width), span(y, height));
+        if !context.scene.bvh().may_hit(&frustum) {
             return;
         }
         if width.max(height) > SMALL {
-            part.quarters().for_each(|quarter| self.find_seen(frame, quarter, seen));
+            part.quarters().for_each(|quarter| self.find_seen(context, quarter, seen));
             return;
         }
         for y in y - self.window.y..y - self.window.y + height {
@@ -355,20 +361,20 @@ impl Tile {
     }
 
     /// The uniform numbers of a set of pixel `i`.
-    fn stream(&self, frame: &Frame, i: usize, set: SampleSet) -> Stream {
+    fn sampler(&self, context: &RenderContext, i: usize, set: SampleSet) -> Sampler {
         let (x, y) = self.position(i);
-        let pixel = (y * frame.settings.width + x) as u64;
-        let stream = Stream::new(frame.settings.sampler, frame.settings.seed, pixel);
+        let pixel = (y * context.settings.width + x) as u64;
+        let sampler = Sampler::new(context.settings.sampler, context.settings.seed, pixel);
         match set {
-            SampleSet::First => stream,
+            SampleSet::First => sampler,
             // No pass begins with this sample.
-            SampleSet::Second => stream.part(u32::MAX),
+            SampleSet::Second => sampler.part(u32::MAX),
         }
     }
 
     /// Adds each camera sample to its pixel, in order, and lets the other pixels learn from them; returns how many are
     /// not finite.
-    fn add_samples(&mut self, frame: &Frame, set: SampleSet, batch: &mut Batch) -> u64 {
+    fn add_samples(&mut self, context: &RenderContext, set: SampleSet, batch: &mut Batch) -> u64 {
         let mut non_finite = 0;
         let mut point = 0;
         let adaptive = batch.adaptive;
@@ -378,7 +384,7 @@ impl Tile {
                 continue;
             }
             let (x, y) = self.position(i);
-            let shown = frame.settings.background == Background::Shown;
+            let shown = context.settings.background == Background::Shown;
             if first.is_none() && !shown {
                 self.pixels[i].add_misses(samples.len() as u32, set);
                 batch.allocation.learn(i, &PassSums::default(), false);
@@ -390,13 +396,13 @@ impl Tile {
                 let sample = match ray.map(|ray| (&batch.rays[ray], batch.hits[ray])) {
                     Some((ray, Some(hit))) => {
                         point += 1;
-                        batch.surface_sample(frame, point - 1, ray, &hit)
+                        batch.surface_sample(context, point - 1, ray, &hit)
                     }
-                    Some((ray, None)) => background_sample(frame, ray.direction),
+                    Some((ray, None)) => background_sample(context, ray.direction),
                     None => {
-                        let set = batch.pixels[i].stream.set(Dimension::Film);
-                        let ray = camera_ray(frame, x, y, &set, sample);
-                        background_sample(frame, ray.direction)
+                        let set = batch.pixels[i].sampler.set(Dimension::Film);
+                        let ray = camera_ray(context, x, y, &set, sample);
+                        background_sample(context, ray.direction)
                     }
                 };
                 if adaptive {
@@ -436,17 +442,23 @@ fn has_second_set(seed: u64, x: usize, y: usize) -> bool {
 
 /// Camera sample `sample` of the pixel at (`x`, `y`), by its numbers for the film.
 #[inline]
-fn camera_ray(frame: &Frame, x: usize, y: usize, set: &NumberSet, sample: u32) -> Ray {
+fn camera_ray(
+    context: &RenderContext,
+    x: usize,
+    y: usize,
+    set: &SampleSequence,
+    sample: u32,
+) -> Ray {
     let [[u], [v]] = set.u(sample);
-    let at = frame.filter.sample(vec2(u, v));
-    frame.camera.ray(x as f32 + at.x, y as f32 + at.y)
+    let at = context.filter.sample(vec2(u, v));
+    context.camera.ray(x as f32 + at.x, y as f32 + at.y)
 }
 
-fn background_sample(frame: &Frame, direction: Vec3) -> CameraSample {
-    match frame.settings.background {
+fn background_sample(context: &RenderContext, direction: Vec3) -> CameraSample {
+    match context.settings.background {
         Background::Hidden => CameraSample::default(),
         Background::Shown => {
-            let le = frame.environment.backdrop(direction);
+            let le = context.environment.le_interpolated(direction);
             CameraSample { color: le, unoccluded: le, alpha: 1.0, surface: None }
         }
     }
@@ -462,22 +474,22 @@ impl Batch {
     }
 
     /// Turns hits into shading points, grouped by pixel.
-    fn gather_points(&mut self, frame: &Frame) {
+    fn gather_points(&mut self, context: &RenderContext) {
         self.origins.clear();
         self.samples.clear();
         self.points.resize(self.hits.iter().flatten().count(), ShadingPoint::UNSET);
         for (pixel, of_pixel) in self.pixels.iter_mut().zip(&self.camera_rays) {
             let start = self.samples.len();
-            let (mut surface, mut one_material) = (None, true);
+            let (mut material, mut one_material) = (None, true);
             for (ray, sample) in of_pixel.range().zip(of_pixel.samples.clone()) {
                 let Some(hit) = &self.hits[ray] else { continue };
-                let plain = frame.scene.plain_surface(hit);
-                let known = self.samples.len() == start || plain == surface;
-                one_material &= known && plain.is_some();
-                surface = plain;
+                let constant = context.scene.constant_material(hit);
+                let known = self.samples.len() == start || constant == material;
+                one_material &= known && constant.is_some();
+                material = constant;
                 let point = &mut self.points[self.samples.len()];
-                frame.scene.shade(&self.rays[ray], hit, point);
-                self.origins.push(offset_origin(point.position, point.ng, frame.extent));
+                context.scene.shade(&self.rays[ray], hit, point);
+                self.origins.push(offset_origin(point.position, point.ng, context.extent));
                 self.samples.push(sample);
             }
             pixel.points = start..self.samples.len();
@@ -489,62 +501,76 @@ impl Batch {
     /// Runs a round of the strategy; returns the number of shadow rays.
     fn trace_strategy<S: Strategy>(
         &mut self,
-        asked: &Asked<S>,
+        strategy_context: &StrategyContext<S>,
         round: u32,
         scratch: &mut S::Scratch,
         observer: &impl Observer,
     ) -> u64 {
-        let &Asked { frame, strategy, pass, width } = asked;
+        let &StrategyContext { context, strategy, pass, width } = strategy_context;
         observer.stage_started(Stage::Strategy);
         let Self { points, samples, pixels, origins, round: rays, .. } = self;
         let tile = TileShading { points, samples, pixels, width };
-        rays.asked.reset(points.len());
-        strategy.push(pass, &tile, round, scratch, &mut rays.asked);
+        rays.contributions.reset(points.len());
+        strategy.push(pass, &tile, round, scratch, &mut rays.contributions);
 
         observer.stage_started(Stage::ShadowRays);
-        rays.trace(frame, points, origins);
+        rays.trace(context, points, origins);
         observer.stage_started(Stage::Strategy);
 
         // base + Σ weight · V
-        self.radiance.clone_from(&rays.asked.base);
-        self.unoccluded.clone_from(&rays.asked.base);
-        let pairs = rays.asked.point.iter().zip(&rays.asked.weight);
+        self.radiance.clone_from(&rays.contributions.base);
+        self.unoccluded.clone_from(&rays.contributions.base);
+        let pairs = rays.contributions.point.iter().zip(&rays.contributions.weight);
         for ((&point, &weight), &visibility) in pairs.zip(&rays.visibility) {
             self.unoccluded[point as usize] += weight;
             if visibility > 0.0 {
                 self.radiance[point as usize] += weight * visibility;
             }
         }
-        rays.asked.len() as u64
+        rays.contributions.len() as u64
     }
 
     /// Lets the strategy learn from the round.
-    fn learn<S: Strategy>(&mut self, asked: &Asked<S>, scratch: &mut S::Scratch) {
+    fn learn<S: Strategy>(
+        &mut self,
+        strategy_context: &StrategyContext<S>,
+        scratch: &mut S::Scratch,
+    ) {
         let Self {
-            points, samples, pixels, round: ShadowRays { asked: rays, visibility, .. }, ..
+            points,
+            samples,
+            pixels,
+            round: ShadowRays { contributions: rays, visibility, .. },
+            ..
         } = self;
-        let tile = TileShading { points, samples, pixels, width: asked.width };
-        asked.strategy.learn(&tile, rays, visibility, scratch);
+        let tile = TileShading { points, samples, pixels, width: strategy_context.width };
+        strategy_context.strategy.learn(&tile, rays, visibility, scratch);
     }
 
-    fn surface_sample(&self, frame: &Frame, point: usize, ray: &Ray, hit: &Hit) -> CameraSample {
+    fn surface_sample(
+        &self,
+        context: &RenderContext,
+        point: usize,
+        ray: &Ray,
+        hit: &Hit,
+    ) -> CameraSample {
         let p = &self.points[point];
         CameraSample {
             color: self.radiance[point],
             unoccluded: self.unoccluded[point],
             alpha: 1.0,
             surface: Some(SurfaceSample {
-                albedo: p.material.albedo(),
+                albedo: p.bsdf.albedo(),
                 normal: p.frame.z,
-                depth: frame.camera.depth(ray.at(hit.t)),
+                depth: context.camera.depth(ray.at(hit.t)),
             }),
         }
     }
 }
 
-/// Of whom a tile's shadow rays are asked.
-struct Asked<'a, S: Strategy> {
-    frame: &'a Frame<'a>,
+/// What a tile needs to run its strategy.
+struct StrategyContext<'a, S: Strategy> {
+    context: &'a RenderContext<'a>,
     strategy: &'a S,
     pass: &'a S::Pass,
     /// Pixels in a row of the tile.
@@ -553,19 +579,19 @@ struct Asked<'a, S: Strategy> {
 
 impl ShadowRays {
     /// Tests the visibility of all rays asked for at once.
-    fn trace(&mut self, frame: &Frame, points: &[ShadingPoint], origins: &[Vec3]) {
+    fn trace(&mut self, context: &RenderContext, points: &[ShadingPoint], origins: &[Vec3]) {
         let origin = |(&wi, &point): (&Vec3, &u32)| {
             let p = &points[point as usize];
             let behind = p.ng.dot(wi) < 0.0;
-            let other_side = || offset_origin(p.position, -p.ng, frame.extent);
+            let other_side = || offset_origin(p.position, -p.ng, context.extent);
             if behind { other_side() } else { origins[point as usize] }
         };
-        let Contributions { wi, point, .. } = &self.asked;
+        let Contributions { wi, point, .. } = &self.contributions;
         self.traced.clear();
         self.traced.origins.extend(wi.iter().zip(point).map(origin));
         self.traced.directions.extend_from_slice(wi);
         visibility::trace(
-            frame.scene.bvh(),
+            context.scene.bvh(),
             &self.traced,
             &mut self.occluded,
             &mut self.visibility,

@@ -133,7 +133,7 @@ pub(super) fn assign(texels: &Texels, lights: &[Vec3]) -> Vec<u32> {
                     continue;
                 }
                 for x in tile.columns.clone() {
-                    row[x] = search.nearest(candidates, texels.centre(x, y));
+                    row[x] = search.nearest(candidates, texels.center(x, y));
                 }
             }
         });
@@ -222,8 +222,8 @@ mod tests {
         let mut pcg = Pcg32::new(n as u64, 2);
         let random =
             |pcg: &mut Pcg32| from_spherical(2.0 * pcg.next_f32() - 1.0, 7.0 * pcg.next_f32());
-        let centre = random(&mut pcg);
-        (0..n).map(|_| (centre + spread * random(&mut pcg)).normalize()).collect()
+        let center = random(&mut pcg);
+        (0..n).map(|_| (center + spread * random(&mut pcg)).normalize()).collect()
     }
 
     fn env(width: usize, height: usize) -> Environment {
@@ -245,7 +245,7 @@ mod tests {
                 let search = Search { texels: &texels, blocks, lights: &lights };
                 let all: Vec<u32> = (0..lights.len() as u32).collect();
                 for (i, label) in assign(&texels, &lights).into_iter().enumerate() {
-                    let expected = search.nearest(&all, texels.centre(i % width, i / width));
+                    let expected = search.nearest(&all, texels.center(i % width, i / width));
                     assert_eq!(label, expected, "{width}x{height}, {n} lights, texel {i}");
                 }
             }

@@ -1,6 +1,6 @@
 //! How well a rig shades.
 //!
-//! Without occluders, over normals spread evenly on the sphere: the irradiance of a matt surface,
+//! Without occluders, over normals spread evenly on the sphere: the irradiance of a matte surface,
 //! ∫ L max(0, n·ω) dω, and a glossy lobe, ∫ L max(0, n·ω)²⁰ dω, both of luminance. Shadows are not
 //! part of it: there point lights stay hard, and the error falls slowly with any method.
 
@@ -21,7 +21,7 @@ const CELLS: [usize; 2] = [512, 256];
 /// The root mean square error of a rig's shading, relative to the root mean square of the map's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadingError {
-    /// Of a matt surface; 0.01 is one per cent.
+    /// Of a matte surface; 0.01 is one percent.
     pub diffuse: f64,
     /// Of the lobe cos²⁰.
     pub glossy: f64,

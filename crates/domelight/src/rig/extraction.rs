@@ -11,7 +11,7 @@ use super::texels::Texels;
 use super::variance_minimization::{VarianceMinimization, variance_minimization};
 use super::{Region, RegionSums, Rig, RigError, RigLight};
 use crate::environment::Environment;
-use crate::environment::compact::{CompactSource, Wanted, compact_sources};
+use crate::environment::compact::{CompactSource, SourceCriteria, compact_sources};
 use crate::{Rgb, RgbImage};
 
 /// How a map is divided into regions.
@@ -117,8 +117,9 @@ impl<'a> CompactExtraction<'a> {
             return Err(RigError::Black);
         }
         let n_lamps = n_lights.map_or(n_lamps, |n| n_lamps.min(n - usize::from(sun)));
-        let min_share = min_share.map_or(Wanted::MIN_SHARE, f64::from);
-        let sources = compact_sources(environment.map(), Wanted { sun, n_lamps, min_share });
+        let min_share = min_share.map_or(SourceCriteria::MIN_SHARE, f64::from);
+        let sources =
+            compact_sources(environment.map(), SourceCriteria { sun, n_lamps, min_share });
         if sun && !sources.first().is_some_and(|s| s.is_sun) {
             return Err(RigError::NoSun);
         }

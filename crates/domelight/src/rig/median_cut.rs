@@ -17,7 +17,7 @@ pub enum LightPosition {
     #[default]
     EnergyCentroid,
     /// The middle of the rectangle on the map: a common mistake, several times worse.
-    GeometricCentre,
+    GeometricCenter,
 }
 
 /// Settings of [`median_cut`].
@@ -58,7 +58,7 @@ pub fn median_cut(
     let regions = split(&table, root, criterion, settings.order, n_lights);
     drop(table);
     let mut rig = Rig::from_rectangles(&texels, &regions);
-    if settings.position == LightPosition::GeometricCentre {
+    if settings.position == LightPosition::GeometricCenter {
         for light in &mut rig.lights {
             if let Region::Rectangle(r) = light.region {
                 let (x, y) = (0.5 * (r.x0 + r.x1) as f64, 0.5 * (r.y0 + r.y1) as f64);

@@ -86,7 +86,7 @@ pub enum RigError {
     },
 }
 
-/// A number in per cent that is not 0.00 unless it is 0.
+/// A number in percent that is not 0.00 unless it is 0.
 fn digits(percent: f32) -> String {
     if percent < 0.01 && percent > 0.0 { format!("{percent:.1e}") } else { format!("{percent:.2}") }
 }

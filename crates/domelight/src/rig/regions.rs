@@ -259,7 +259,7 @@ impl<'a> SummedArea<'a> {
         self.corner(self.blocks.columns, self.blocks.rows)
     }
 
-    /// The block column that starts opposite the centre of light, as seen from above: a seam there
+    /// The block column that starts opposite the center of light, as seen from above: a seam there
     /// turns with the map.
     pub(super) fn darkest_column(&self) -> usize {
         let [x, _, z] = self.total().first;

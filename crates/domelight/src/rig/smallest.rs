@@ -19,7 +19,7 @@ pub struct SmallestRig {
     pub tried: Vec<(usize, ShadingError)>,
 }
 
-/// The rig of the fewest lights whose error, matt and glossy, is `target` or less.
+/// The rig of the fewest lights whose error, matte and glossy, is `target` or less.
 ///
 /// The error falls with the number of lights but for small ripples. Numbers are doubled until one
 /// is good enough and the interval before it is halved, so that the rig of one light fewer is not;

@@ -51,14 +51,14 @@ impl SphericalHarmonics {
 
     /// Those of the radiance that `rotation` turns.
     ///
-    /// By the rule of 14 points, the corners and the faces' centres of a cube, which integrates
+    /// By the rule of 14 points, the corners and the faces' centers of a cube, which integrates
     /// polynomials of degree 5 over the sphere exactly.
     #[must_use]
     pub fn turned(&self, rotation: Mat3) -> Self {
-        let (inverse, centres) = (rotation.transpose(), [Vec3::X, Vec3::Y, Vec3::Z]);
+        let (inverse, centers) = (rotation.transpose(), [Vec3::X, Vec3::Y, Vec3::Z]);
         let sign = |bit: usize| if bit == 0 { 1.0 } else { -1.0 };
         let corner = |i: usize| vec3(sign(i & 1), sign(i & 2), sign(i & 4)).normalize();
-        let faces = centres.into_iter().flat_map(|w| [w, -w]).map(|w| (w, 1.0 / 15.0));
+        let faces = centers.into_iter().flat_map(|w| [w, -w]).map(|w| (w, 1.0 / 15.0));
         let mut coefficients = [Rgb::BLACK; 9];
         for (w, weight) in faces.chain((0..8).map(|i| (corner(i), 3.0 / 40.0))) {
             let le = self.radiance(inverse * w) * (weight * 4.0 * PI as f32);

@@ -38,14 +38,14 @@ struct Cut {
 }
 
 /// A region that waits to be cut.
-struct Waiting {
+struct SplitCandidate {
     region: TexelRect,
     /// Regions nearer to the root come first, if levels count.
     depth: u32,
     badness: f64,
 }
 
-impl Ord for Waiting {
+impl Ord for SplitCandidate {
     fn cmp(&self, o: &Self) -> Ordering {
         o.depth
             .cmp(&self.depth)
@@ -55,19 +55,19 @@ impl Ord for Waiting {
     }
 }
 
-impl PartialOrd for Waiting {
+impl PartialOrd for SplitCandidate {
     fn partial_cmp(&self, o: &Self) -> Option<Ordering> {
         Some(self.cmp(o))
     }
 }
 
-impl PartialEq for Waiting {
+impl PartialEq for SplitCandidate {
     fn eq(&self, o: &Self) -> bool {
         self.cmp(o).is_eq()
     }
 }
 
-impl Eq for Waiting {}
+impl Eq for SplitCandidate {}
 
 /// Cuts `root` into `n` regions, each with light.
 ///
@@ -100,7 +100,7 @@ pub(super) fn split(
 struct Queue<'a> {
     table: &'a SummedArea<'a>,
     criterion: Criterion,
-    waiting: BinaryHeap<Waiting>,
+    waiting: BinaryHeap<SplitCandidate>,
     /// Those with a single lit texel, which cannot be cut.
     whole: Vec<TexelRect>,
 }
@@ -115,7 +115,7 @@ impl Queue<'_> {
             Criterion::EvenEnergy { .. } => moments.energy,
             _ => self.table.metric().variance(&moments),
         };
-        self.waiting.push(Waiting { region, depth, badness });
+        self.waiting.push(SplitCandidate { region, depth, badness });
     }
 }
 

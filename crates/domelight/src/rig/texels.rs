@@ -18,7 +18,7 @@ pub(super) struct Row {
     pub(super) horizontal: f64,
 }
 
-/// A map in its own frame: +Y up, the centre column toward −Z, whatever its orientation.
+/// A map in its own frame: +Y up, the center column toward −Z, whatever its orientation.
 pub(super) struct Texels<'a> {
     environment: &'a Environment,
     /// ∫ sin φ dφ and −∫ cos φ dφ over each column.
@@ -78,7 +78,7 @@ impl<'a> Texels<'a> {
     }
 
     /// The middle of a texel, unit vector in the map's frame.
-    pub(super) fn centre(&self, x: usize, y: usize) -> Vec3 {
+    pub(super) fn center(&self, x: usize, y: usize) -> Vec3 {
         self.half(2 * x + 1, 2 * y + 1)
     }
 

@@ -23,14 +23,14 @@ const PARTS_PER_LIGHT: usize = 2;
 /// Lights above which no parts are joined: joining takes time in proportion to their square.
 const MAX_JOINED: usize = 4096;
 
-/// What a cut minimises.
+/// What a cut minimizes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rule {
     /// The greater of the two halves' variances; distance in texels of the map, where the seam
     /// divides. The poster's.
     Poster,
     /// The sum of the two halves' variances; distance on the sphere. The first cut starts
-    /// opposite the map's centre of light, so turning the map turns the rig.
+    /// opposite the map's center of light, so turning the map turns the rig.
     #[default]
     Spherical,
 }
@@ -47,7 +47,7 @@ impl Rule {
 /// Settings of [`variance_minimization`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VarianceMinimization {
-    /// What a cut minimises.
+    /// What a cut minimizes.
     pub rule: Rule,
     /// Which region is cut next.
     pub order: Order,

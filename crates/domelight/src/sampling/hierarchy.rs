@@ -10,7 +10,7 @@
 //! diffuse estimate is 1.8 times lower.
 //!
 //! Four sums of one choice lie together: a level costs a cache line. Sums are in single precision,
-//! for only ratios of neighbours matter; the probability of a cell differs from its weight over the
+//! for only ratios of neighbors matter; the probability of a cell differs from its weight over the
 //! total by some 10⁻⁶ of itself.
 
 use super::ONE_MINUS_EPSILON;

@@ -1,4 +1,4 @@
-//! Hilbert's curve over the hemisphere: neighbours along it are neighbours in space, so a stratified
+//! Hilbert's curve over the hemisphere: neighbors along it are neighbors in space, so a stratified
 //! choice from what is sorted along it is stratified in space.
 //!
 //! Rejected: Morton's curve, which jumps across the square at every power of two and so groups
@@ -39,12 +39,12 @@ const fn steps() -> [u8; 64] {
 
 /// Which of its four turns the curve takes through a square.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Turn {
+pub struct HilbertState {
     swap: bool,
     reverse: bool,
 }
 
-impl Turn {
+impl HilbertState {
     /// The turn that visits the quadrants (0, 0), (1, 0), (1, 1), (0, 1); the default one visits
     /// (0, 0), (0, 1), (1, 1), (1, 0).
     pub const SWAPPED: Self = Self { swap: true, reverse: false };
@@ -64,14 +64,14 @@ impl Turn {
 
 /// Where along the curve the cell (`x`, `y`) of a square of 4096² cells lies, from 0 to 4096² − 1.
 pub fn index(x: u32, y: u32) -> u32 {
-    let (mut turn, mut index) = (0, 0);
+    let (mut state, mut index) = (0, 0);
     let mut shift = BITS;
     while shift > 0 {
         shift -= 2;
         let cell = (x >> shift & 3) << 2 | (y >> shift & 3);
-        let step = STEPS[(turn | cell) as usize];
+        let step = STEPS[(state | cell) as usize];
         index = index << 4 | u32::from(step & 15);
-        turn = u32::from(step & 0x30);
+        state = u32::from(step & 0x30);
     }
     index
 }
@@ -113,10 +113,10 @@ mod tests {
     #[test]
     fn quadrants_follow_the_curve() {
         for expected in [0, 1, 77, 0x00ab_cdef, (1 << 24) - 1] {
-            let (mut x, mut y, mut turn) = (0, 0, Turn::default());
+            let (mut x, mut y, mut state) = (0, 0, HilbertState::default());
             for level in (0..BITS).rev() {
-                let (dx, dy, inner) = turn.quadrant((expected >> (2 * level) & 3) as usize);
-                (x, y, turn) = (2 * x + dx as u32, 2 * y + dy as u32, inner);
+                let (dx, dy, inner) = state.quadrant((expected >> (2 * level) & 3) as usize);
+                (x, y, state) = (2 * x + dx as u32, 2 * y + dy as u32, inner);
             }
             assert_eq!(index(x, y), expected);
         }

@@ -6,8 +6,8 @@ pub mod hilbert;
 pub mod mis;
 pub mod reservoir;
 pub mod rng;
+pub mod sampler;
 pub mod sobol;
-pub mod stream;
 pub mod table;
 pub mod warp;
 
@@ -16,7 +16,7 @@ pub use hierarchy::HierarchicalTable;
 pub use mis::Heuristic;
 pub use reservoir::WeightedReservoirs;
 pub use rng::Pcg32;
-pub use stream::{Dimension, NumberSet, SamplerKind, Stream};
+pub use sampler::{Dimension, SampleSequence, Sampler, SamplerKind};
 pub use table::{Table1d, Table2d, TableError, TableSample};
 
 /// The greatest number below 1 in single precision.

@@ -41,9 +41,9 @@ impl<T: Copy> WeightedReservoirs<T> {
         self.total = 0.0;
     }
 
-    /// Offers the next item to each of `n` reservoirs, the same `n` for the whole stream; an item
+    /// Adds the next item to each of `n` reservoirs, the same `n` for the whole stream; an item
     /// without weight is not one. `numbers` must be independent of the items.
-    pub fn offer(&mut self, item: T, weight: f64, n: usize, numbers: &mut Pcg32) {
+    pub fn add(&mut self, item: T, weight: f64, n: usize, numbers: &mut Pcg32) {
         if weight == 0.0 {
             return;
         }
@@ -93,7 +93,7 @@ mod tests {
                 reservoirs.clear();
                 for k in 0..6 {
                     let i = if reversed { 5 - k } else { k };
-                    reservoirs.offer(i, WEIGHTS[i], 2, &mut numbers);
+                    reservoirs.add(i, WEIGHTS[i], 2, &mut numbers);
                 }
                 assert_eq!(reservoirs.total(), total);
                 let kept: Vec<usize> = reservoirs.items().copied().collect();
@@ -118,9 +118,9 @@ mod tests {
     #[test]
     fn an_empty_stream_keeps_nothing() {
         let mut reservoirs = WeightedReservoirs::default();
-        reservoirs.offer(1, 0.0, 3, &mut Pcg32::new(1, 1));
+        reservoirs.add(1, 0.0, 3, &mut Pcg32::new(1, 1));
         assert_eq!((reservoirs.total(), reservoirs.items().len()), (0.0, 0));
-        reservoirs.offer(1, 2.0, 3, &mut Pcg32::new(1, 1));
+        reservoirs.add(1, 2.0, 3, &mut Pcg32::new(1, 1));
         assert_eq!((reservoirs.total(), reservoirs.items().len()), (2.0, 3));
     }
 }

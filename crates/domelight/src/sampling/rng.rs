@@ -15,7 +15,7 @@ impl Pcg32 {
 
     /// The generator of the given stream, seeded.
     ///
-    /// Neighbouring streams of one seed start alike: for many short sequences, hash the index into the seed instead.
+    /// Neighboring streams of one seed start alike: for many short sequences, hash the index into the seed instead.
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut pcg = Self { state: 0, increment: (stream << 1) | 1 };
         pcg.next_u32();
@@ -38,7 +38,7 @@ impl Pcg32 {
     }
 }
 
-/// Mixes 64 bits: the finaliser of Steele, Lea & Flood 2014, "Fast Splittable Pseudorandom Number
+/// Mixes 64 bits: the finalizer of Steele, Lea & Flood 2014, "Fast Splittable Pseudorandom Number
 /// Generators", with Stafford's variant 13 of the constants.
 pub fn mix64(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

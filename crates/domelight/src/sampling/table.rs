@@ -1,7 +1,7 @@
 //! Tabulated densities: one and two dimensions by inversion of the cumulative sum.
 //!
-//! Prefix sums are kept in double precision, un-normalised: the probability of a cell *is* the
-//! difference of its two neighbours over the total, so what [`Table2d::sample`] draws and what
+//! Prefix sums are kept in double precision, un-normalized: the probability of a cell *is* the
+//! difference of its two neighbors over the total, so what [`Table2d::sample`] draws and what
 //! [`Table2d::pmf`] says agree exactly, on maps of any size. Inversion keeps the order of the
 //! uniform numbers, so stratified points stay stratified (an alias table would be faster and lose
 //! the strata). A guide (Chen & Asau 1974's cutpoints) tells where to begin the search.
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn one_bright_texel_among_millions_keeps_its_neighbours_right() {
+    fn one_bright_texel_among_millions_keeps_its_neighbors_right() {
         // Sums in single precision would lose the dim cells behind the bright one.
         let mut weights = vec![1e-6f32; 1 << 20];
         weights[7] = 1e6;

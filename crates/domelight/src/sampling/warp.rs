@@ -8,7 +8,7 @@
 use crate::math::{
     FRAC_1_4PI, FRAC_1_PI, TAU, Vec2, Vec3, from_spherical, sin_cos_eighth, sin_cos_turns,
 };
-use crate::simd::{Real, Vectors};
+use crate::simd::{SimdFloat, Vectors};
 
 /// Uniform over the unit disk: density 1/π.
 pub fn concentric_disk(u: Vec2) -> Vec2 {
@@ -17,7 +17,7 @@ pub fn concentric_disk(u: Vec2) -> Vec2 {
 
 /// [`concentric_disk`] of several side by side.
 #[inline(always)]
-fn disk_lanes<F: Real>([u, v]: [F; 2]) -> [F; 2] {
+fn disk_lanes<F: SimdFloat>([u, v]: [F; 2]) -> [F; 2] {
     let (zero, one) = (u.splat(0.0), u.splat(1.0));
     let (x, y) = (u + u - one, v + v - one);
     // |x| is the radius and y/x the part of an eighth of a turn, or the other way round.
@@ -36,7 +36,7 @@ pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
 
 /// [`cosine_hemisphere`] of several side by side.
 #[inline(always)]
-pub(crate) fn cosine_lanes<F: Real>(u: [F; 2]) -> Vectors<F> {
+pub(crate) fn cosine_lanes<F: SimdFloat>(u: [F; 2]) -> Vectors<F> {
     let [x, y] = disk_lanes(u);
     let (zero, one) = (x.splat(0.0), x.splat(1.0));
     Vectors { x, y, z: (one - (x * x + y * y)).max(zero).sqrt() }
@@ -76,7 +76,7 @@ pub fn phong_lobe(u: Vec2, exponent: f32) -> Vec3 {
 
 /// [`phong_lobe`] of several side by side.
 #[inline(always)]
-pub(crate) fn phong_lanes<F: Real>([u, v]: [F; 2], exponent: f32) -> Vectors<F> {
+pub(crate) fn phong_lanes<F: SimdFloat>([u, v]: [F; 2], exponent: f32) -> Vectors<F> {
     // cos θ = (1 − u)^(1/(n + 1))
     let versine = u.map(|u| -f32::exp_m1(f32::ln_1p(-u) / (exponent + 1.0)));
     let sin_theta = (versine * (u.splat(2.0) - versine)).max(u.splat(0.0)).sqrt();

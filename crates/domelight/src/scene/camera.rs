@@ -6,7 +6,7 @@
 //!
 //! normalize(f + tan(fov/2) · ((2 px/W − 1) · W/H · r + (1 − 2 py/H) · u)),
 //!
-//! so pixel centres lie at +½, pixels are square and `fov` is the vertical field of view. The
+//! so pixel centers lie at +½, pixels are square and `fov` is the vertical field of view. The
 //! orthographic camera moves the origin instead, with height/2 in the place of tan(fov/2).
 
 use super::Scene;

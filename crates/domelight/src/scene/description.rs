@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::camera::CameraSettings;
-use super::surface::Surface;
+use super::material::Material;
 use super::texture::Texture;
 use crate::environment::UpAxis;
 use crate::geometry::{Aabb, Mesh};
@@ -15,8 +15,8 @@ pub struct SceneDescription {
     /// The meshes.
     pub parts: Vec<Part>,
     /// What the parts are made of.
-    pub surfaces: Vec<Surface>,
-    /// The images that the surfaces refer to.
+    pub materials: Vec<Material>,
+    /// The images that the materials refer to.
     pub textures: Vec<Texture>,
     /// The camera, if the scene brings one.
     pub camera: Option<CameraSettings>,
@@ -40,8 +40,8 @@ pub struct Part {
     pub name: String,
     /// The mesh in world space.
     pub mesh: Mesh,
-    /// Index into [`SceneDescription::surfaces`].
-    pub surface: usize,
+    /// Index into [`SceneDescription::materials`].
+    pub material: usize,
 }
 
 /// One of a file's cameras.
@@ -102,16 +102,16 @@ impl SceneDescription {
 
     /// Appends another scene's parts; its camera and environment are taken where this one has none.
     pub fn append(&mut self, mut other: Self) {
-        let (surfaces, textures) = (self.surfaces.len(), self.textures.len());
+        let (materials, textures) = (self.materials.len(), self.textures.len());
         self.scenery.extend(other.scenery.iter().map(|part| part + self.parts.len()));
         for part in &mut other.parts {
-            part.surface += surfaces;
+            part.material += materials;
         }
-        for surface in &mut other.surfaces {
-            surface.shift_textures(textures);
+        for material in &mut other.materials {
+            material.shift_textures(textures);
         }
         self.parts.append(&mut other.parts);
-        self.surfaces.append(&mut other.surfaces);
+        self.materials.append(&mut other.materials);
         self.textures.append(&mut other.textures);
         self.camera = self.camera.take().or(other.camera);
         self.cameras.append(&mut other.cameras);

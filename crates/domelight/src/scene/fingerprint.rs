@@ -1,6 +1,6 @@
-//! The fingerprint of a scene: geometry, surfaces and textures to the bit; names and files do not count.
+//! The fingerprint of a scene: geometry, materials and textures to the bit; names and files do not count.
 
-use super::{Scene, Surface};
+use super::{Material, Scene};
 use crate::fingerprint::{Fingerprint, Fingerprinter};
 use crate::math::{Vec2, Vec3, Vec4};
 
@@ -10,7 +10,7 @@ impl Scene {
         let mut f = Fingerprinter::default();
         for part in &self.parts {
             let mesh = &part.mesh;
-            f.words([part.surface as u32]);
+            f.words([part.material as u32]);
             f.words(mesh.triangles.as_flattened().iter().copied());
             f.numbers(mesh.positions.iter().flat_map(Vec3::to_array));
             f.numbers(mesh.normals.iter().flat_map(Vec3::to_array));
@@ -20,8 +20,8 @@ impl Scene {
             f.numbers(mesh.tangents.iter().flat_map(Vec4::to_array));
             f.numbers(mesh.colors.iter().flat_map(|c| c.to_array()));
         }
-        for surface in &self.surfaces {
-            let Surface {
+        for material in &self.materials {
+            let Material {
                 name: _,
                 model,
                 normal_map,
@@ -30,7 +30,7 @@ impl Scene {
                 emission,
                 unlit,
                 layers,
-            } = surface;
+            } = material;
             f.text(format_args!("{model:?} {normal_map:?} {coverage:?} {double_sided}"));
             f.text(format_args!("{emission:?} {unlit} {layers:?}"));
         }
@@ -56,7 +56,7 @@ mod tests {
         moved.parts[0].mesh.positions[0].x += 1e-3;
         assert_ne!(fingerprint(moved), original);
         let mut other = description();
-        other.surfaces.reverse();
+        other.materials.reverse();
         assert_ne!(fingerprint(other), original);
     }
 }

@@ -1,6 +1,6 @@
 //! What glTF's material extensions add to metallic-roughness, as a file states it.
 //!
-//! A loader fills these in whole; [`Surface::undrawn_features`](super::Surface::undrawn_features) says
+//! A loader fills these in whole; [`Material::undrawn_features`](super::Material::undrawn_features) says
 //! which of them a picture lacks. Where a number has a texture, the two are multiplied.
 
 use super::texture::TextureRef;
@@ -43,7 +43,7 @@ impl Default for Coverage {
 pub struct Emission {
     /// Radiance ≥ 0, the strength of `KHR_materials_emissive_strength` included.
     pub radiance: Rgb,
-    /// A colour texture.
+    /// A color texture.
     pub texture: Option<TextureRef>,
 }
 
@@ -56,10 +56,10 @@ pub struct Factor {
     pub texture: Option<TextureRef>,
 }
 
-/// A colour with a texture.
+/// A color with a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColorFactor {
-    /// The linear colour.
+    /// The linear color.
     pub value: Rgb,
     /// The texture, in sRGB.
     pub texture: Option<TextureRef>,

@@ -12,9 +12,9 @@ mod fingerprint;
 mod layers;
 #[cfg(feature = "io")]
 pub mod load;
+mod material;
 mod shading;
-mod stage;
-mod surface;
+mod subject;
 mod texture;
 
 pub use crate::environment::UpAxis;
@@ -28,13 +28,13 @@ pub use layers::{
 };
 #[cfg(feature = "io")]
 pub use load::{AnimationTime, LoadError, LoadOptions, Loaded, Reach, load, load_with};
-pub use surface::{
-    MetallicRoughnessSurface, NormalMap, PhongSurface, SpecularGlossinessSurface, Surface,
-    SurfaceModel,
+pub use material::{
+    Material, MaterialModel, MetallicRoughnessMaterial, NormalMap, PhongMaterial,
+    SpecularGlossinessMaterial,
 };
 pub use texture::{Encoding, Texture, TextureError, TextureFilter, TextureRef, UvTransform, Wrap};
 
-use crate::bsdf::Material;
+use crate::bsdf::Bsdf;
 use crate::bvh::{Bvh, BvhError};
 use crate::geometry::{Aabb, Mesh, MeshError};
 
@@ -42,7 +42,7 @@ use crate::geometry::{Aabb, Mesh, MeshError};
 #[derive(Debug)]
 pub struct Scene {
     parts: Vec<Part>,
-    surfaces: Vec<Surface>,
+    materials: Vec<Material>,
     textures: Vec<Texture>,
     /// Of each part its first triangle in the hierarchy.
     first_triangle: Vec<u32>,
@@ -67,20 +67,20 @@ pub enum SceneError {
         source: MeshError,
     },
     /// A part of a surface that does not exist.
-    #[error("mesh {part} is made of surface {surface}, but there are only {surfaces}")]
+    #[error("mesh {part} is made of surface {material}, but there are only {materials}")]
     NoSurface {
         /// The part's name.
         part: String,
         /// The surface's index.
-        surface: usize,
+        material: usize,
         /// How many there are.
-        surfaces: usize,
+        materials: usize,
     },
     /// A surface with a texture that does not exist.
-    #[error("surface {surface} refers to texture {texture}, but there are only {textures}")]
+    #[error("surface {material} refers to texture {texture}, but there are only {textures}")]
     NoTexture {
         /// The surface's name.
-        surface: String,
+        material: String,
         /// The texture's index.
         texture: usize,
         /// How many there are.
@@ -113,14 +113,14 @@ impl Scene {
     pub fn new(description: SceneDescription) -> Result<Self, SceneError> {
         check(&description)?;
         let subject_bounds = description.subject_bounds();
-        let SceneDescription { parts, surfaces, textures, camera, up, .. } = description;
+        let SceneDescription { parts, materials, textures, camera, up, .. } = description;
         let up = up.unwrap_or_default();
         let bounds = parts.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()));
         check_size(&bounds)?;
         let (bvh, first_triangle) = build(&parts)?;
         Ok(Self {
             parts,
-            surfaces,
+            materials,
             textures,
             first_triangle,
             bvh,
@@ -150,11 +150,11 @@ impl Scene {
     ///
     /// # Errors
     /// If the mesh is invalid.
-    pub fn from_mesh(mesh: Mesh, material: Material) -> Result<Self, SceneError> {
-        let surface = Surface::fixed("mesh", material);
+    pub fn from_mesh(mesh: Mesh, bsdf: Bsdf) -> Result<Self, SceneError> {
+        let material = Material::fixed("mesh", bsdf);
         Self::new(SceneDescription {
-            parts: vec![Part { name: "mesh".to_owned(), mesh, surface: 0 }],
-            surfaces: vec![surface],
+            parts: vec![Part { name: "mesh".to_owned(), mesh, material: 0 }],
+            materials: vec![material],
             ..SceneDescription::default()
         })
     }
@@ -192,8 +192,8 @@ impl Scene {
     }
 
     /// What they are made of.
-    pub fn surfaces(&self) -> &[Surface] {
-        &self.surfaces
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
     }
 
     /// How many triangles all meshes have together.
@@ -219,18 +219,18 @@ fn check_size(bounds: &Aabb) -> Result<(), SceneError> {
 }
 
 fn check(description: &SceneDescription) -> Result<(), SceneError> {
-    let SceneDescription { parts, surfaces, textures, .. } = description;
-    for Part { name, mesh, surface } in parts {
+    let SceneDescription { parts, materials, textures, .. } = description;
+    for Part { name, mesh, material } in parts {
         mesh.validate().map_err(|source| SceneError::Mesh { part: name.clone(), source })?;
-        if *surface >= surfaces.len() {
-            let (surface, surfaces) = (*surface, surfaces.len());
-            return Err(SceneError::NoSurface { part: name.clone(), surface, surfaces });
+        if *material >= materials.len() {
+            let (material, materials) = (*material, materials.len());
+            return Err(SceneError::NoSurface { part: name.clone(), material, materials });
         }
     }
-    for surface in surfaces {
-        if let Some(t) = surface.textures().find(|t| t.texture >= textures.len()) {
-            let (surface, texture) = (surface.name.clone(), t.texture);
-            return Err(SceneError::NoTexture { surface, texture, textures: textures.len() });
+    for material in materials {
+        if let Some(t) = material.textures().find(|t| t.texture >= textures.len()) {
+            let (material, texture) = (material.name.clone(), t.texture);
+            return Err(SceneError::NoTexture { material, texture, textures: textures.len() });
         }
     }
     Ok(())

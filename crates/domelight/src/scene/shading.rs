@@ -1,4 +1,4 @@
-//! From a hit to what shading needs: position, normals, frame and material.
+//! From a hit to what shading needs: position, normals, frame and BSDF.
 //!
 //! Surfaces are two-sided: both normals are turned to the viewer's side. The position comes from
 //! the barycentric coordinates, whose error is that of the vertices, rather than from
@@ -9,7 +9,7 @@
 //! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Black pixels
 //! along silhouettes would be the alternative.
 
-use super::{Part, Scene, Surface};
+use super::{Material, Part, Scene};
 use crate::Rgb;
 use crate::geometry::{Hit, Mesh, Ray};
 use crate::math::{Frame, Vec2, Vec3, Vec4};
@@ -34,7 +34,7 @@ impl Scene {
     #[inline]
     pub(crate) fn shade(&self, ray: &Ray, hit: &Hit, point: &mut ShadingPoint) {
         let (part, triangle) = self.locate(hit.triangle);
-        let surface = &self.surfaces[part.surface];
+        let material = &self.materials[part.material];
         let corner = Corners::new(&part.mesh, triangle, hit);
         let viewer = -ray.direction.normalize();
 
@@ -42,8 +42,8 @@ impl Scene {
         let ng = (p1 - p0).cross(p2 - p0).try_normalize().unwrap_or(viewer);
         let uvs = [&part.mesh.uvs, &part.mesh.uvs2].map(|set| corner.mix(set).unwrap_or_default());
         let smooth = corner.mix(&part.mesh.normals).and_then(Vec3::try_normalize).unwrap_or(ng);
-        let (normal, tangent) = if surface.has_grain() {
-            self.normal_and_tangent(part, surface, &corner, smooth, &uvs)
+        let (normal, tangent) = if material.needs_tangent() {
+            self.normal_and_tangent(part, material, &corner, smooth, &uvs)
         } else {
             (smooth, None)
         };
@@ -57,18 +57,18 @@ impl Scene {
         );
         let wo = frame.to_local(viewer).normalize();
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
-        surface.set_material(&self.textures, &uvs, tint, wo, &mut point.material);
+        material.set_bsdf(&self.textures, &uvs, tint, wo, &mut point.bsdf);
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
         (point.position, point.ng, point.frame, point.wo) = (position, ng, frame, wo);
     }
 
-    /// The surface of a hit, if its material is the same all over.
+    /// The material of a hit, if its BSDF is the same all over.
     #[inline]
-    pub(crate) fn plain_surface(&self, hit: &Hit) -> Option<usize> {
+    pub(crate) fn constant_material(&self, hit: &Hit) -> Option<usize> {
         let (part, _) = self.locate(hit.triangle);
         let is_plain = part.mesh.colors.is_empty()
-            && self.surfaces[part.surface].shading_textures().next().is_none();
-        is_plain.then_some(part.surface)
+            && self.materials[part.material].shading_textures().next().is_none();
+        is_plain.then_some(part.material)
     }
 
     /// On the front side: the interpolated normal with the normal map applied, and the tangent. Which side the viewer is
@@ -76,19 +76,19 @@ impl Scene {
     fn normal_and_tangent(
         &self,
         part: &Part,
-        surface: &Surface,
+        material: &Material,
         corner: &Corners,
         normal: Vec3,
         uvs: &Uvs,
     ) -> (Vec3, Option<Vec4>) {
         let mesh = &part.mesh;
-        let set = match surface.normal_map {
+        let set = match material.normal_map {
             Some(map) if map.texture.uv_set == 1 => &mesh.uvs2,
             _ => &mesh.uvs,
         };
         let tangent = corner.mix(&mesh.tangents);
         let tangent = tangent.or_else(|| corner.uv_tangent(&mesh.positions, set, normal));
-        let mapped = surface.normal_map.zip(tangent).and_then(|(map, tangent)| {
+        let mapped = material.normal_map.zip(tangent).and_then(|(map, tangent)| {
             let frame = Frame::from_z_and_tangent(normal, tangent.truncate());
             let n = map.normal(&self.textures, uvs);
             let bitangent = frame.y * 1f32.copysign(tangent.w);
@@ -170,7 +170,7 @@ impl Corners {
 mod tests {
     use super::*;
     use crate::math::{vec2, vec3};
-    use crate::scene::{Encoding, NormalMap, SceneDescription, SurfaceModel, Texture, TextureRef};
+    use crate::scene::{Encoding, MaterialModel, NormalMap, SceneDescription, Texture, TextureRef};
 
     /// The triangle (0,0,0), (1,0,0), (0,1,0) with its image's v axis pointing down.
     fn triangle() -> Mesh {
@@ -183,16 +183,16 @@ mod tests {
     }
 
     fn scene(mesh: Mesh, normal_texel: Option<[u8; 3]>) -> Scene {
-        let mut surface = Surface::diffuse("grey", Rgb::splat(0.5));
+        let mut material = Material::diffuse("gray", Rgb::splat(0.5));
         let mut textures = Vec::new();
         if let Some(texel) = normal_texel {
             textures.push(Texture::from_rgb8("n", 1, 1, vec![texel], Encoding::Linear).unwrap());
-            surface.normal_map = Some(NormalMap { texture: TextureRef::new(0), scale: 1.0 });
+            material.normal_map = Some(NormalMap { texture: TextureRef::new(0), scale: 1.0 });
         }
-        let part = Part { name: "triangle".into(), mesh, surface: 0 };
+        let part = Part { name: "triangle".into(), mesh, material: 0 };
         let description = SceneDescription {
             parts: vec![part],
-            surfaces: vec![surface],
+            materials: vec![material],
             textures,
             ..SceneDescription::default()
         };
@@ -218,7 +218,7 @@ mod tests {
             assert!(p.wo.z > 0.0);
             let toward = (vec3(0.5, 1.0, z) - p.position).normalize();
             assert!((p.frame.to_world(p.wo) - toward).length() < 1e-5);
-            assert_eq!(p.material.albedo(), Rgb::splat(0.5));
+            assert_eq!(p.bsdf.albedo(), Rgb::splat(0.5));
         }
     }
 
@@ -267,23 +267,23 @@ mod tests {
         let mut mesh = triangle();
         mesh.colors = vec![Rgb::new(1.0, 0.5, 0.0); 3];
         let mut description = SceneDescription {
-            parts: vec![Part { name: "t".into(), mesh, surface: 0 }],
-            surfaces: vec![Surface::diffuse("s", Rgb::splat(0.5))],
+            parts: vec![Part { name: "t".into(), mesh, material: 0 }],
+            materials: vec![Material::diffuse("s", Rgb::splat(0.5))],
             textures: vec![
                 Texture::from_rgb8("t", 1, 1, vec![[255, 255, 51]], Encoding::Linear).unwrap(),
             ],
             ..SceneDescription::default()
         };
-        if let SurfaceModel::Phong(p) = &mut description.surfaces[0].model {
+        if let MaterialModel::Phong(p) = &mut description.materials[0].model {
             p.diffuse_texture = Some(TextureRef::new(0));
         }
         let p = look(&Scene::new(description).unwrap(), vec3(0.25, 0.25, 3.0));
-        assert_eq!(p.material.albedo(), Rgb::new(0.5, 0.25, 0.0));
+        assert_eq!(p.bsdf.albedo(), Rgb::new(0.5, 0.25, 0.0));
     }
 
     #[test]
     fn triangles_find_their_part_past_empty_ones() {
-        let part = |name: &str, mesh| Part { name: name.into(), mesh, surface: 0 };
+        let part = |name: &str, mesh| Part { name: name.into(), mesh, material: 0 };
         let mut moved = triangle();
         moved.transform(&crate::math::Mat4::from_translation(vec3(5.0, 0.0, 0.0)));
         let description = SceneDescription {
@@ -293,7 +293,7 @@ mod tests {
                 part("empty", Mesh::default()),
                 part("b", moved),
             ],
-            surfaces: vec![Surface::diffuse("s", Rgb::splat(0.5))],
+            materials: vec![Material::diffuse("s", Rgb::splat(0.5))],
             ..SceneDescription::default()
         };
         let scene = Scene::new(description).unwrap();
@@ -307,8 +307,8 @@ mod tests {
     fn broken_descriptions_are_refused_by_name() {
         let broken = |edit: fn(&mut SceneDescription)| {
             let mut d = SceneDescription {
-                parts: vec![Part { name: "vase".into(), mesh: triangle(), surface: 0 }],
-                surfaces: vec![Surface::diffuse("clay", Rgb::splat(0.5))],
+                parts: vec![Part { name: "vase".into(), mesh: triangle(), material: 0 }],
+                materials: vec![Material::diffuse("clay", Rgb::splat(0.5))],
                 ..SceneDescription::default()
             };
             edit(&mut d);
@@ -316,9 +316,9 @@ mod tests {
         };
         assert!(broken(|d| d.parts[0].mesh.triangles[0][1] = 7).contains("vase"));
         assert!(broken(|d| d.parts[0].mesh.positions[2].y = f32::NAN).contains("vase"));
-        assert!(broken(|d| d.parts[0].surface = 3).contains("surface 3"));
+        assert!(broken(|d| d.parts[0].material = 3).contains("surface 3"));
         let texture = |d: &mut SceneDescription| {
-            d.surfaces[0].normal_map = Some(NormalMap { texture: TextureRef::new(2), scale: 1.0 });
+            d.materials[0].normal_map = Some(NormalMap { texture: TextureRef::new(2), scale: 1.0 });
         };
         assert!(broken(texture).contains("clay"));
     }

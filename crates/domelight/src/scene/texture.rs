@@ -2,7 +2,7 @@
 //!
 //! Texels are kept as the file has them, 8 or 16 bits a channel, and decoded through a table of the
 //! 2⁸ or 2¹⁶ values; alpha has 8 bits, and is kept where a surface needs it. Look-ups are bilinear
-//! between texel centres, or take the nearest one. There are no mip maps: a renderer that takes many samples a pixel averages the
+//! between texel centers, or take the nearest one. There are no mip maps: a renderer that takes many samples a pixel averages the
 //! texture by itself, and without ray differentials a mip level would be a guess.
 
 use crate::Rgb;
@@ -11,13 +11,13 @@ use crate::math::{Vec2, vec2};
 /// How texel values map to numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Encoding {
-    /// Colour with the transfer curve of IEC 61966-2-1.
+    /// Color with the transfer curve of IEC 61966-2-1.
     Srgb,
     /// Numbers in \[0, 1\]: roughness, metalness, normals.
     Linear,
 }
 
-/// An image that surfaces refer to.
+/// An image that materials refer to.
 #[derive(Clone, Debug)]
 pub struct Texture {
     name: String,
@@ -260,8 +260,8 @@ impl Texture {
     /// right one; coordinates that are not finite count as 0.
     #[inline]
     pub fn sample(&self, uv: Vec2, wrap: [Wrap; 2]) -> Rgb {
-        let (x0, x1, fx) = neighbours(uv.x, self.width, wrap[0]);
-        let (y0, y1, fy) = neighbours(uv.y, self.height, wrap[1]);
+        let (x0, x1, fx) = neighbors(uv.x, self.width, wrap[0]);
+        let (y0, y1, fy) = neighbors(uv.y, self.height, wrap[1]);
         let top = self.texel(x0, y0).lerp(self.texel(x1, y0), fx);
         let bottom = self.texel(x0, y1).lerp(self.texel(x1, y1), fx);
         top.lerp(bottom, fy)
@@ -294,8 +294,8 @@ impl Texture {
             let (x, y) = self.nearest(uv, wrap);
             return alpha(x, y);
         }
-        let (x0, x1, fx) = neighbours(uv.x, self.width, wrap[0]);
-        let (y0, y1, fy) = neighbours(uv.y, self.height, wrap[1]);
+        let (x0, x1, fx) = neighbors(uv.x, self.width, wrap[0]);
+        let (y0, y1, fy) = neighbors(uv.y, self.height, wrap[1]);
         let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
         let top = mix(alpha(x0, y0), alpha(x1, y0), fx);
         mix(top, mix(alpha(x0, y1), alpha(x1, y1), fx), fy)
@@ -305,7 +305,7 @@ impl Texture {
     #[inline]
     fn nearest(&self, uv: Vec2, wrap: [Wrap; 2]) -> (u32, u32) {
         let along = |t, n, wrap| {
-            let (a, b, f) = neighbours(t, n, wrap);
+            let (a, b, f) = neighbors(t, n, wrap);
             if f < 0.5 { a } else { b }
         };
         (along(uv.x, self.width, wrap[0]), along(uv.y, self.height, wrap[1]))
@@ -323,7 +323,7 @@ pub(crate) fn decode(v: f32, encoding: Encoding) -> f32 {
 
 /// The two texels nearest to the coordinate `t` along an axis of `n` texels, and the second's weight.
 #[inline]
-fn neighbours(t: f32, n: u32, wrap: Wrap) -> (u32, u32, f32) {
+fn neighbors(t: f32, n: u32, wrap: Wrap) -> (u32, u32, f32) {
     let t = if t.is_finite() { t } else { 0.0 };
     let t = match wrap {
         Wrap::Repeat => t - t.floor(),
@@ -355,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn texel_centres_give_the_texels_under_every_wrap() {
+    fn texel_centers_give_the_texels_under_every_wrap() {
         let t = two_by_two();
         for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
             for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {

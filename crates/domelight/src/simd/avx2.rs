@@ -6,7 +6,9 @@ use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 use super::pair::Pair;
-use super::{Floats, Ints, Kernel, LANES, Lanes, Mask, Real, Sets, Simd, last_of};
+use super::{
+    Kernel, LANES, LaneMask, Lanes, Simd, SimdBitSets, SimdF32x8, SimdFloat, SimdI32x8, last_of,
+};
 
 /// Exists only where the processor has AVX2, and FMA and the bit instructions that came with it.
 #[derive(Clone, Copy)]
@@ -26,7 +28,7 @@ pub(crate) struct Mask8(__m256);
 
 /// Made only by an [`Avx2`], so it proves the same.
 #[derive(Clone, Copy)]
-pub(crate) struct Sets8(__m256i);
+pub(crate) struct BitSets8(__m256i);
 
 impl Avx2 {
     #[inline]
@@ -52,10 +54,10 @@ impl Avx2 {
 }
 
 impl Simd for Avx2 {
-    type Floats = F32x8;
-    type Ints = I32x8;
-    type Wide = Pair<F32x8>;
-    type Sets = Sets8;
+    type F32x8 = F32x8;
+    type I32x8 = I32x8;
+    type F32x16 = Pair<F32x8>;
+    type BitSets = BitSets8;
 
     #[inline(always)]
     fn splat(self, x: f32) -> F32x8 {
@@ -76,22 +78,22 @@ impl Simd for Avx2 {
         }
     }
     #[inline(always)]
-    fn splat_int(self, x: i32) -> I32x8 {
+    fn splat_i32(self, x: i32) -> I32x8 {
         // SAFETY: `self` proves AVX2.
         I32x8(unsafe { _mm256_set1_epi32(x) })
     }
     #[inline(always)]
-    fn load_ints(self, x: &[i32; LANES]) -> I32x8 {
+    fn load_i32(self, x: &[i32; LANES]) -> I32x8 {
         // SAFETY: `self` proves AVX2; `x` is 32 readable bytes, and the load needs no alignment.
         I32x8(unsafe { _mm256_loadu_si256(x.as_ptr().cast()) })
     }
     #[inline(always)]
-    fn counting(self) -> I32x8 {
+    fn iota(self) -> I32x8 {
         // SAFETY: `self` proves AVX2.
         I32x8(unsafe { _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7) })
     }
     #[inline(always)]
-    fn transposed(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
+    fn transpose(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
         let r = rows.map(|row| self.load(row).0);
         // SAFETY: `self` proves AVX2.
         unsafe {
@@ -118,9 +120,9 @@ impl Simd for Avx2 {
         }
     }
     #[inline(always)]
-    fn empty(self) -> Sets8 {
+    fn empty(self) -> BitSets8 {
         // SAFETY: `self` proves AVX2.
-        Sets8(unsafe { _mm256_setzero_si256() })
+        BitSets8(unsafe { _mm256_setzero_si256() })
     }
 }
 
@@ -145,7 +147,7 @@ operator!(Add, add, I32x8, _mm256_add_epi32);
 operator!(BitAnd, bitand, Mask8, _mm256_and_ps);
 operator!(BitOr, bitor, Mask8, _mm256_or_ps);
 
-impl Real for F32x8 {
+impl SimdFloat for F32x8 {
     type Mask = Mask8;
 
     #[inline(always)]
@@ -207,11 +209,11 @@ impl Real for F32x8 {
     }
 }
 
-impl Floats for F32x8 {
-    type Ints = I32x8;
+impl SimdF32x8 for F32x8 {
+    type I32x8 = I32x8;
 
     #[inline(always)]
-    fn times_minus(self, b: Self, c: Self) -> Self {
+    fn mul_sub(self, b: Self, c: Self) -> Self {
         // SAFETY: `self` proves AVX2 and FMA.
         Self(unsafe { _mm256_fmsub_ps(self.0, b.0, c.0) })
     }
@@ -223,7 +225,7 @@ impl Floats for F32x8 {
         lanes
     }
     #[inline(always)]
-    fn truncated(self) -> I32x8 {
+    fn to_i32(self) -> I32x8 {
         // SAFETY: `self` proves AVX2.
         I32x8(unsafe { _mm256_cvttps_epi32(self.0) })
     }
@@ -237,11 +239,11 @@ impl Floats for F32x8 {
     }
 }
 
-impl Ints for I32x8 {
-    type Floats = F32x8;
+impl SimdI32x8 for I32x8 {
+    type F32x8 = F32x8;
 
     #[inline(always)]
-    fn shifted<const N: i32>(self) -> Self {
+    fn shl<const N: i32>(self) -> Self {
         // SAFETY: `self` proves AVX2.
         Self(unsafe { _mm256_slli_epi32::<N>(self.0) })
     }
@@ -256,7 +258,7 @@ impl Ints for I32x8 {
         Mask8(unsafe { _mm256_castsi256_ps(_mm256_cmpgt_epi32(b.0, self.0)) })
     }
     #[inline(always)]
-    fn to_floats(self) -> F32x8 {
+    fn to_f32(self) -> F32x8 {
         // SAFETY: `self` proves AVX2.
         F32x8(unsafe { _mm256_cvtepi32_ps(self.0) })
     }
@@ -266,8 +268,8 @@ impl Ints for I32x8 {
         Self(unsafe { _mm256_blendv_epi8(b.0, a.0, _mm256_castps_si256(mask.0)) })
     }
     #[inline(always)]
-    fn packed(self, keep: Mask8) -> [i32; 8] {
-        let lanes = &super::PACKED_LANES[keep.bits() as usize % 256];
+    fn compress(self, keep: Mask8) -> [i32; 8] {
+        let lanes = &super::COMPRESSED_LANES[keep.bits() as usize % 256];
         // SAFETY: `self` proves AVX2; `lanes` is 32 readable bytes, the load needs no alignment.
         Self(unsafe {
             let lanes = _mm256_loadu_si256(lanes.as_ptr().cast());
@@ -284,7 +286,7 @@ impl Ints for I32x8 {
     }
 }
 
-impl Mask for Mask8 {
+impl LaneMask for Mask8 {
     #[inline(always)]
     fn bits(self) -> u32 {
         // SAFETY: `self` proves AVX2.
@@ -292,7 +294,7 @@ impl Mask for Mask8 {
     }
 }
 
-impl Sets for Sets8 {
+impl SimdBitSets for BitSets8 {
     type Mask = Mask8;
 
     #[inline(always)]
@@ -315,7 +317,7 @@ impl Sets for Sets8 {
     fn pack([a, b]: [Self; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
         // SAFETY: `a` proves AVX2.
         let not_empty = Self(unsafe { _mm256_or_si256(a.0, b.0) }).not_empty();
-        let lanes = &super::PACKED_LANES[not_empty as usize % 256];
+        let lanes = &super::COMPRESSED_LANES[not_empty as usize % 256];
         // SAFETY: `a` proves AVX2; both arrays are 32 readable bytes, the loads need no alignment.
         let (pair, numbers) = unsafe {
             let lanes = _mm256_loadu_si256(lanes.as_ptr().cast());

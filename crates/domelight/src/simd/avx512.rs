@@ -6,7 +6,10 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-use super::{Floats, Ints, Kernel, LANES, Lanes, Mask, Real, Sets, Simd, Wide, last_of};
+use super::{
+    Kernel, LANES, LaneMask, Lanes, Simd, SimdBitSets, SimdF32x8, SimdF32x16, SimdFloat, SimdI32x8,
+    last_of,
+};
 
 /// Exists only where the processor has AVX-512 F and VL, and FMA and the bit instructions of AVX2's time.
 #[derive(Clone, Copy)]
@@ -34,7 +37,7 @@ pub(crate) struct Mask16(__mmask16);
 
 /// Made only by an [`Avx512`], so it proves the same.
 #[derive(Clone, Copy)]
-pub(crate) struct Sets8(__m256i);
+pub(crate) struct BitSets8(__m256i);
 
 impl Avx512 {
     #[inline]
@@ -61,10 +64,10 @@ impl Avx512 {
 }
 
 impl Simd for Avx512 {
-    type Floats = F32x8;
-    type Ints = I32x8;
-    type Wide = F32x16;
-    type Sets = Sets8;
+    type F32x8 = F32x8;
+    type I32x8 = I32x8;
+    type F32x16 = F32x16;
+    type BitSets = BitSets8;
 
     #[inline(always)]
     fn splat(self, x: f32) -> F32x8 {
@@ -85,22 +88,22 @@ impl Simd for Avx512 {
         }
     }
     #[inline(always)]
-    fn splat_int(self, x: i32) -> I32x8 {
+    fn splat_i32(self, x: i32) -> I32x8 {
         // SAFETY: `self` proves AVX-512.
         I32x8(unsafe { _mm256_set1_epi32(x) })
     }
     #[inline(always)]
-    fn load_ints(self, x: &[i32; LANES]) -> I32x8 {
+    fn load_i32(self, x: &[i32; LANES]) -> I32x8 {
         // SAFETY: `self` proves AVX-512; `x` is 32 readable bytes, and the load needs no alignment.
         I32x8(unsafe { _mm256_loadu_si256(x.as_ptr().cast()) })
     }
     #[inline(always)]
-    fn counting(self) -> I32x8 {
+    fn iota(self) -> I32x8 {
         // SAFETY: `self` proves AVX-512.
         I32x8(unsafe { _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7) })
     }
     #[inline(always)]
-    fn transposed(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
+    fn transpose(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
         let r = rows.map(|row| self.load(row).0);
         // SAFETY: `self` proves AVX-512.
         unsafe {
@@ -127,9 +130,9 @@ impl Simd for Avx512 {
         }
     }
     #[inline(always)]
-    fn empty(self) -> Sets8 {
+    fn empty(self) -> BitSets8 {
         // SAFETY: `self` proves AVX-512.
-        Sets8(unsafe { _mm256_setzero_si256() })
+        BitSets8(unsafe { _mm256_setzero_si256() })
     }
 }
 
@@ -176,7 +179,7 @@ macro_rules! mask {
             }
         }
 
-        impl Mask for $mask {
+        impl LaneMask for $mask {
             #[inline(always)]
             fn bits(self) -> u32 {
                 u32::from(self.0)
@@ -189,7 +192,7 @@ mask!(Mask16);
 
 macro_rules! real {
     ($type:ident, $mask:ident, $set1:ident, $min:ident, $max:ident, $cmp:ident, $sqrt:ident, $blend:ident, $loadu:ident) => {
-        impl Real for $type {
+        impl SimdFloat for $type {
             type Mask = $mask;
 
             #[inline(always)]
@@ -297,7 +300,7 @@ impl F32x16 {
     }
 }
 
-impl Wide for F32x16 {
+impl SimdF32x16 for F32x16 {
     type Half = F32x8;
 
     #[inline(always)]
@@ -325,11 +328,11 @@ impl Wide for F32x16 {
     }
 }
 
-impl Floats for F32x8 {
-    type Ints = I32x8;
+impl SimdF32x8 for F32x8 {
+    type I32x8 = I32x8;
 
     #[inline(always)]
-    fn times_minus(self, b: Self, c: Self) -> Self {
+    fn mul_sub(self, b: Self, c: Self) -> Self {
         // SAFETY: `self` proves AVX-512.
         Self(unsafe { _mm256_fmsub_ps(self.0, b.0, c.0) })
     }
@@ -339,7 +342,7 @@ impl Floats for F32x8 {
         self.to_array()
     }
     #[inline(always)]
-    fn truncated(self) -> I32x8 {
+    fn to_i32(self) -> I32x8 {
         // SAFETY: `self` proves AVX-512.
         I32x8(unsafe { _mm256_cvttps_epi32(self.0) })
     }
@@ -353,11 +356,11 @@ impl Floats for F32x8 {
     }
 }
 
-impl Ints for I32x8 {
-    type Floats = F32x8;
+impl SimdI32x8 for I32x8 {
+    type F32x8 = F32x8;
 
     #[inline(always)]
-    fn shifted<const N: i32>(self) -> Self {
+    fn shl<const N: i32>(self) -> Self {
         // SAFETY: `self` proves AVX-512.
         Self(unsafe { _mm256_slli_epi32::<N>(self.0) })
     }
@@ -372,7 +375,7 @@ impl Ints for I32x8 {
         Mask8(unsafe { _mm256_cmplt_epi32_mask(self.0, b.0) })
     }
     #[inline(always)]
-    fn to_floats(self) -> F32x8 {
+    fn to_f32(self) -> F32x8 {
         // SAFETY: `self` proves AVX-512.
         F32x8(unsafe { _mm256_cvtepi32_ps(self.0) })
     }
@@ -382,7 +385,7 @@ impl Ints for I32x8 {
         Self(unsafe { _mm256_mask_blend_epi32(mask.0, b.0, a.0) })
     }
     #[inline(always)]
-    fn packed(self, keep: Mask8) -> [i32; 8] {
+    fn compress(self, keep: Mask8) -> [i32; 8] {
         // SAFETY: `self` proves AVX-512.
         Self(unsafe { _mm256_maskz_compress_epi32(keep.0, self.0) }).store()
     }
@@ -395,7 +398,7 @@ impl Ints for I32x8 {
     }
 }
 
-impl Sets for Sets8 {
+impl SimdBitSets for BitSets8 {
     type Mask = Mask8;
 
     #[inline(always)]

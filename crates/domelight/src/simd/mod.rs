@@ -6,7 +6,7 @@
 //! binary traces as fast as one built for the machine. Another instruction set is one more file like
 //! `avx2.rs`, or `neon.rs` of half the width, and one more line in [`InstructionSet`] and [`dispatch`].
 //!
-//! Formulas are written over [`Real`], which is one number or a vector of them.
+//! Formulas are written over [`SimdFloat`], which is one number or a vector of them.
 #![cfg_attr(not(feature = "render"), allow(dead_code))] // Some of it serves rays alone.
 
 #[cfg(target_arch = "x86_64")]
@@ -111,40 +111,40 @@ pub(crate) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) ->
 /// An instruction set. A value of it, and any vector made with one, proves that the processor has
 /// the instructions.
 pub(crate) trait Simd: Copy {
-    type Floats: Floats<Ints = Self::Ints>;
-    type Ints: Ints<Floats = Self::Floats>;
-    type Wide: Wide<Half = Self::Floats>;
-    type Sets: Sets<Mask = <Self::Floats as Real>::Mask>;
+    type F32x8: SimdF32x8<I32x8 = Self::I32x8>;
+    type I32x8: SimdI32x8<F32x8 = Self::F32x8>;
+    type F32x16: SimdF32x16<Half = Self::F32x8>;
+    type BitSets: SimdBitSets<Mask = <Self::F32x8 as SimdFloat>::Mask>;
 
-    fn splat(self, x: f32) -> Self::Floats;
-    fn load(self, x: &Lanes) -> Self::Floats;
+    fn splat(self, x: f32) -> Self::F32x8;
+    fn load(self, x: &Lanes) -> Self::F32x8;
     /// Asks for memory that will be read soon.
     fn prefetch<T>(self, x: &T);
-    fn splat_int(self, x: i32) -> Self::Ints;
-    fn load_ints(self, x: &[i32; LANES]) -> Self::Ints;
+    fn splat_i32(self, x: i32) -> Self::I32x8;
+    fn load_i32(self, x: &[i32; LANES]) -> Self::I32x8;
     /// 0, 1, … 7.
-    fn counting(self) -> Self::Ints;
-    /// Eight empty sets.
-    fn empty(self) -> Self::Sets;
+    fn iota(self) -> Self::I32x8;
+    /// Eight empty bit sets.
+    fn empty(self) -> Self::BitSets;
     /// Component j of eight rows, for each j.
-    fn transposed(self, rows: [&Lanes; LANES]) -> [Self::Floats; LANES];
+    fn transpose(self, rows: [&Lanes; LANES]) -> [Self::F32x8; LANES];
 
     /// `x` in all sixteen lanes.
     #[inline(always)]
-    fn splat_wide(self, x: f32) -> Self::Wide {
-        Wide::of([self.splat(x), self.splat(x)])
+    fn splat_f32x16(self, x: f32) -> Self::F32x16 {
+        SimdF32x16::of([self.splat(x), self.splat(x)])
     }
     #[inline(always)]
-    fn load_wide(self, [first, others]: [&Lanes; 2]) -> Self::Wide {
-        Wide::of([self.load(first), self.load(others)])
+    fn load_f32x16(self, [first, others]: [&Lanes; 2]) -> Self::F32x16 {
+        SimdF32x16::of([self.load(first), self.load(others)])
     }
 }
 
 /// A number, or some side by side: what a formula is written for once.
-pub trait Real:
+pub trait SimdFloat:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
-    type Mask: Mask;
+    type Mask: LaneMask;
 
     /// `x` in every lane.
     fn splat(self, x: f32) -> Self;
@@ -186,17 +186,17 @@ pub trait Real:
 }
 
 /// Eight f32.
-pub trait Floats: Real {
-    type Ints: Ints<Floats = Self>;
+pub trait SimdF32x8: SimdFloat {
+    type I32x8: SimdI32x8<F32x8 = Self>;
 
     fn store(self) -> Lanes;
     /// Toward zero; of numbers beyond 2³¹ and NaN anything.
-    fn truncated(self) -> Self::Ints;
+    fn to_i32(self) -> Self::I32x8;
     /// a b − c, rounded once.
     #[must_use]
-    fn times_minus(self, b: Self, c: Self) -> Self;
+    fn mul_sub(self, b: Self, c: Self) -> Self;
     /// Numbers of a table of N rows, a power of two, at `at` modulo 8 N.
-    fn gather<const N: usize>(table: &[Lanes; N], at: Self::Ints) -> Self;
+    fn gather<const N: usize>(table: &[Lanes; N], at: Self::I32x8) -> Self;
 
     /// The sum of all lanes, from the first to the last.
     #[inline(always)]
@@ -206,8 +206,8 @@ pub trait Floats: Real {
 }
 
 /// Sixteen f32.
-pub(crate) trait Wide: Real {
-    type Half: Floats;
+pub(crate) trait SimdF32x16: SimdFloat {
+    type Half: SimdF32x8;
 
     /// The first eight, and the others.
     fn of(halves: [Self::Half; 2]) -> Self;
@@ -224,29 +224,29 @@ pub(crate) trait Wide: Real {
 }
 
 /// Eight i32.
-pub trait Ints: Copy + Add<Output = Self> {
-    type Floats: Floats<Ints = Self>;
+pub trait SimdI32x8: Copy + Add<Output = Self> {
+    type F32x8: SimdF32x8<I32x8 = Self>;
 
     /// Times 2ⁿ.
-    fn shifted<const N: i32>(self) -> Self;
+    fn shl<const N: i32>(self) -> Self;
     fn min(self, b: Self) -> Self;
-    fn lt(self, b: Self) -> <Self::Floats as Real>::Mask;
-    fn to_floats(self) -> Self::Floats;
-    fn select(mask: <Self::Floats as Real>::Mask, a: Self, b: Self) -> Self;
+    fn lt(self, b: Self) -> <Self::F32x8 as SimdFloat>::Mask;
+    fn to_f32(self) -> Self::F32x8;
+    fn select(mask: <Self::F32x8 as SimdFloat>::Mask, a: Self, b: Self) -> Self;
     /// The lanes that are kept at the front, then anything.
-    fn packed(self, keep: <Self::Floats as Real>::Mask) -> [i32; LANES];
+    fn compress(self, keep: <Self::F32x8 as SimdFloat>::Mask) -> [i32; LANES];
     fn store(self) -> [i32; LANES];
 }
 
 /// Truth values.
-pub trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
+pub trait LaneMask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
     /// Bit i is lane i.
     fn bits(self) -> u32;
 }
 
 /// For each set of lanes its members from the lowest, then anything.
 #[cfg(target_arch = "x86_64")]
-static PACKED_LANES: [[u32; 8]; 256] = {
+static COMPRESSED_LANES: [[u32; 8]; 256] = {
     let mut table = [[0; 8]; 256];
     let mut set = 0;
     while set < 256 {
@@ -263,9 +263,9 @@ static PACKED_LANES: [[u32; 8]; 256] = {
     table
 };
 
-/// [`Ints::packed`], one lane after the other.
+/// [`SimdI32x8::compress`], one lane after the other.
 #[inline(always)]
-fn packed<T: Copy + Default>(lanes: [T; LANES], keep: u32) -> [T; LANES] {
+fn compress<T: Copy + Default>(lanes: [T; LANES], keep: u32) -> [T; LANES] {
     let (mut packed, mut len) = ([T::default(); LANES], 0);
     for (i, lane) in lanes.into_iter().enumerate() {
         // Overwritten by the next if it is not kept; in bounds, for the compiler.
@@ -275,17 +275,17 @@ fn packed<T: Copy + Default>(lanes: [T; LANES], keep: u32) -> [T; LANES] {
     packed
 }
 
-/// [`Sets::pack`], one lane after the other.
+/// [`SimdBitSets::pack`], one lane after the other.
 #[inline(always)]
 fn pack(pair: [[u32; 8]; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
     let [a, b] = pair;
     let not_empty = (0..LANES).fold(0, |bits, i| bits | u32::from(a[i] | b[i] != 0) << i);
-    let pair = pair.map(|sets| packed(sets, not_empty));
-    (pair, packed(numbers, not_empty), not_empty.count_ones() as usize)
+    let pair = pair.map(|sets| compress(sets, not_empty));
+    (pair, compress(numbers, not_empty), not_empty.count_ones() as usize)
 }
 
 /// Eight sets of the numbers 0 to 31.
-pub(crate) trait Sets: Copy {
+pub(crate) trait SimdBitSets: Copy {
     type Mask;
 
     /// Adds `bit` to the sets of the lanes in `m`.

@@ -10,7 +10,9 @@ use std::arch::aarch64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 use super::pair::Pair;
-use super::{Floats, Ints, Kernel, LANES, Lanes, Mask, Real, Sets, Simd, last_of};
+use super::{
+    Kernel, LANES, LaneMask, Lanes, Simd, SimdBitSets, SimdF32x8, SimdFloat, SimdI32x8, last_of,
+};
 
 /// Exists only where the processor has NEON.
 #[derive(Clone, Copy)]
@@ -30,7 +32,7 @@ pub(crate) struct Mask8(uint32x4_t, uint32x4_t);
 
 /// Made only by a [`Neon`], so it proves the same.
 #[derive(Clone, Copy)]
-pub(crate) struct Sets8(uint32x4_t, uint32x4_t);
+pub(crate) struct BitSets8(uint32x4_t, uint32x4_t);
 
 impl Neon {
     #[inline]
@@ -54,10 +56,10 @@ impl Neon {
 }
 
 impl Simd for Neon {
-    type Floats = F32x8;
-    type Ints = I32x8;
-    type Wide = Pair<F32x8>;
-    type Sets = Sets8;
+    type F32x8 = F32x8;
+    type I32x8 = I32x8;
+    type F32x16 = Pair<F32x8>;
+    type BitSets = BitSets8;
 
     #[inline(always)]
     fn splat(self, x: f32) -> F32x8 {
@@ -90,29 +92,29 @@ impl Simd for Neon {
         }
     }
     #[inline(always)]
-    fn splat_int(self, x: i32) -> I32x8 {
+    fn splat_i32(self, x: i32) -> I32x8 {
         // SAFETY: `self` proves NEON.
         let x = unsafe { vdupq_n_s32(x) };
         I32x8(x, x)
     }
     #[inline(always)]
-    fn load_ints(self, x: &[i32; LANES]) -> I32x8 {
+    fn load_i32(self, x: &[i32; LANES]) -> I32x8 {
         // SAFETY: `self` proves NEON; `x` is 8 readable i32, and the loads need no alignment.
         unsafe { I32x8(vld1q_s32(x.as_ptr()), vld1q_s32(x.as_ptr().add(4))) }
     }
     #[inline(always)]
-    fn counting(self) -> I32x8 {
-        self.load_ints(&[0, 1, 2, 3, 4, 5, 6, 7])
+    fn iota(self) -> I32x8 {
+        self.load_i32(&[0, 1, 2, 3, 4, 5, 6, 7])
     }
     #[inline(always)]
-    fn transposed(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
+    fn transpose(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
         std::array::from_fn(|column| self.load(&rows.map(|row| row[column])))
     }
     #[inline(always)]
-    fn empty(self) -> Sets8 {
+    fn empty(self) -> BitSets8 {
         // SAFETY: `self` proves NEON.
         let none = unsafe { vdupq_n_u32(0) };
-        Sets8(none, none)
+        BitSets8(none, none)
     }
 }
 
@@ -137,7 +139,7 @@ operator!(Add, add, I32x8, vaddq_s32);
 operator!(BitAnd, bitand, Mask8, vandq_u32);
 operator!(BitOr, bitor, Mask8, vorrq_u32);
 
-impl Real for F32x8 {
+impl SimdFloat for F32x8 {
     type Mask = Mask8;
 
     #[inline(always)]
@@ -199,11 +201,11 @@ impl Real for F32x8 {
     }
 }
 
-impl Floats for F32x8 {
-    type Ints = I32x8;
+impl SimdF32x8 for F32x8 {
+    type I32x8 = I32x8;
 
     #[inline(always)]
-    fn times_minus(self, b: Self, c: Self) -> Self {
+    fn mul_sub(self, b: Self, c: Self) -> Self {
         // SAFETY: `self` proves NEON.
         unsafe {
             Self(vfmaq_f32(vnegq_f32(c.0), self.0, b.0), vfmaq_f32(vnegq_f32(c.1), self.1, b.1))
@@ -220,7 +222,7 @@ impl Floats for F32x8 {
         lanes
     }
     #[inline(always)]
-    fn truncated(self) -> I32x8 {
+    fn to_i32(self) -> I32x8 {
         // SAFETY: `self` proves NEON.
         unsafe { I32x8(vcvtq_s32_f32(self.0), vcvtq_s32_f32(self.1)) }
     }
@@ -235,11 +237,11 @@ impl Floats for F32x8 {
     }
 }
 
-impl Ints for I32x8 {
-    type Floats = F32x8;
+impl SimdI32x8 for I32x8 {
+    type F32x8 = F32x8;
 
     #[inline(always)]
-    fn shifted<const N: i32>(self) -> Self {
+    fn shl<const N: i32>(self) -> Self {
         // SAFETY: `self` proves NEON.
         unsafe { Self(vshlq_n_s32::<N>(self.0), vshlq_n_s32::<N>(self.1)) }
     }
@@ -254,7 +256,7 @@ impl Ints for I32x8 {
         unsafe { Mask8(vcltq_s32(self.0, b.0), vcltq_s32(self.1, b.1)) }
     }
     #[inline(always)]
-    fn to_floats(self) -> F32x8 {
+    fn to_f32(self) -> F32x8 {
         // SAFETY: `self` proves NEON.
         unsafe { F32x8(vcvtq_f32_s32(self.0), vcvtq_f32_s32(self.1)) }
     }
@@ -264,8 +266,8 @@ impl Ints for I32x8 {
         unsafe { Self(vbslq_s32(m.0, a.0, b.0), vbslq_s32(m.1, a.1, b.1)) }
     }
     #[inline(always)]
-    fn packed(self, keep: Mask8) -> [i32; 8] {
-        super::packed(self.store(), keep.bits())
+    fn compress(self, keep: Mask8) -> [i32; 8] {
+        super::compress(self.store(), keep.bits())
     }
     #[inline(always)]
     fn store(self) -> [i32; 8] {
@@ -279,7 +281,7 @@ impl Ints for I32x8 {
     }
 }
 
-impl Mask for Mask8 {
+impl LaneMask for Mask8 {
     #[inline(always)]
     fn bits(self) -> u32 {
         const LOWER: [u32; 4] = [1, 2, 4, 8];
@@ -293,7 +295,7 @@ impl Mask for Mask8 {
     }
 }
 
-impl Sets for Sets8 {
+impl SimdBitSets for BitSets8 {
     type Mask = Mask8;
 
     #[inline(always)]

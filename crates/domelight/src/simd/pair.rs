@@ -2,7 +2,7 @@
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-use super::{Floats, Lanes, Mask, Real, Wide};
+use super::{LaneMask, Lanes, SimdF32x8, SimdF32x16, SimdFloat};
 
 /// The first eight, and the others.
 #[derive(Clone, Copy)]
@@ -27,7 +27,7 @@ operator!(Div, div);
 operator!(BitAnd, bitand);
 operator!(BitOr, bitor);
 
-impl<F: Real> Real for Pair<F> {
+impl<F: SimdFloat> SimdFloat for Pair<F> {
     type Mask = Pair<F::Mask>;
 
     #[inline(always)]
@@ -73,14 +73,14 @@ impl<F: Real> Real for Pair<F> {
     }
 }
 
-impl<M: Mask> Mask for Pair<M> {
+impl<M: LaneMask> LaneMask for Pair<M> {
     #[inline(always)]
     fn bits(self) -> u32 {
         self.0.bits() | self.1.bits() << 8
     }
 }
 
-impl<F: Floats> Wide for Pair<F> {
+impl<F: SimdF32x8> SimdF32x16 for Pair<F> {
     type Half = F;
 
     #[inline(always)]

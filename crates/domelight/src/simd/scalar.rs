@@ -4,7 +4,7 @@ use std::array::from_fn;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 use super::pair::Pair;
-use super::{Floats, Ints, LANES, Lanes, Mask, Real, Sets, Simd, last_of};
+use super::{LANES, LaneMask, Lanes, Simd, SimdBitSets, SimdF32x8, SimdFloat, SimdI32x8, last_of};
 
 #[derive(Clone, Copy)]
 pub(crate) struct Scalar;
@@ -19,13 +19,13 @@ pub(crate) struct I32x8([i32; 8]);
 pub(crate) struct Mask8([bool; 8]);
 
 #[derive(Clone, Copy)]
-pub(crate) struct Sets8([u32; 8]);
+pub(crate) struct BitSets8([u32; 8]);
 
 impl Simd for Scalar {
-    type Floats = F32x8;
-    type Ints = I32x8;
-    type Wide = Pair<F32x8>;
-    type Sets = Sets8;
+    type F32x8 = F32x8;
+    type I32x8 = I32x8;
+    type F32x16 = Pair<F32x8>;
+    type BitSets = BitSets8;
 
     #[inline(always)]
     fn splat(self, x: f32) -> F32x8 {
@@ -38,23 +38,23 @@ impl Simd for Scalar {
     #[inline(always)]
     fn prefetch<T>(self, _: &T) {}
     #[inline(always)]
-    fn splat_int(self, x: i32) -> I32x8 {
+    fn splat_i32(self, x: i32) -> I32x8 {
         I32x8([x; 8])
     }
     #[inline(always)]
-    fn load_ints(self, x: &[i32; LANES]) -> I32x8 {
+    fn load_i32(self, x: &[i32; LANES]) -> I32x8 {
         I32x8(*x)
     }
     #[inline(always)]
-    fn counting(self) -> I32x8 {
+    fn iota(self) -> I32x8 {
         I32x8([0, 1, 2, 3, 4, 5, 6, 7])
     }
     #[inline(always)]
-    fn empty(self) -> Sets8 {
-        Sets8([0; 8])
+    fn empty(self) -> BitSets8 {
+        BitSets8([0; 8])
     }
     #[inline(always)]
-    fn transposed(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
+    fn transpose(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
         from_fn(|column| F32x8(rows.map(|row| row[column])))
     }
 }
@@ -78,7 +78,7 @@ operator!(Div, div, F32x8, /);
 operator!(BitAnd, bitand, Mask8, &);
 operator!(BitOr, bitor, Mask8, |);
 
-impl Real for F32x8 {
+impl SimdFloat for F32x8 {
     type Mask = Mask8;
 
     #[inline(always)]
@@ -128,11 +128,11 @@ impl Real for F32x8 {
     }
 }
 
-impl Floats for F32x8 {
-    type Ints = I32x8;
+impl SimdF32x8 for F32x8 {
+    type I32x8 = I32x8;
 
     #[inline(always)]
-    fn times_minus(self, b: Self, c: Self) -> Self {
+    fn mul_sub(self, b: Self, c: Self) -> Self {
         Self(from_fn(|i| self.0[i].mul_add(b.0[i], -c.0[i])))
     }
     #[inline(always)]
@@ -140,7 +140,7 @@ impl Floats for F32x8 {
         self.0
     }
     #[inline(always)]
-    fn truncated(self) -> I32x8 {
+    fn to_i32(self) -> I32x8 {
         I32x8(self.0.map(|x| x as i32))
     }
     #[inline(always)]
@@ -161,11 +161,11 @@ impl Add for I32x8 {
     }
 }
 
-impl Ints for I32x8 {
-    type Floats = F32x8;
+impl SimdI32x8 for I32x8 {
+    type F32x8 = F32x8;
 
     #[inline(always)]
-    fn shifted<const N: i32>(self) -> Self {
+    fn shl<const N: i32>(self) -> Self {
         Self(self.0.map(|x| x << N))
     }
     #[inline(always)]
@@ -177,7 +177,7 @@ impl Ints for I32x8 {
         Mask8(from_fn(|i| self.0[i] < b.0[i]))
     }
     #[inline(always)]
-    fn to_floats(self) -> F32x8 {
+    fn to_f32(self) -> F32x8 {
         F32x8(self.0.map(|x| x as f32))
     }
     #[inline(always)]
@@ -185,8 +185,8 @@ impl Ints for I32x8 {
         Self(from_fn(|i| if mask.0[i] { a.0[i] } else { b.0[i] }))
     }
     #[inline(always)]
-    fn packed(self, keep: Mask8) -> [i32; 8] {
-        super::packed(self.store(), keep.bits())
+    fn compress(self, keep: Mask8) -> [i32; 8] {
+        super::compress(self.store(), keep.bits())
     }
     #[inline(always)]
     fn store(self) -> [i32; 8] {
@@ -194,14 +194,14 @@ impl Ints for I32x8 {
     }
 }
 
-impl Mask for Mask8 {
+impl LaneMask for Mask8 {
     #[inline(always)]
     fn bits(self) -> u32 {
         (0..8).fold(0, |bits, i| bits | u32::from(self.0[i]) << i)
     }
 }
 
-impl Sets for Sets8 {
+impl SimdBitSets for BitSets8 {
     type Mask = Mask8;
 
     #[inline(always)]

@@ -1,8 +1,8 @@
 //! One number: the same formulas where vectors do not pay.
 
-use super::{Mask, Real};
+use super::{LaneMask, SimdFloat};
 
-impl Real for f32 {
+impl SimdFloat for f32 {
     type Mask = bool;
 
     #[inline(always)]
@@ -46,7 +46,7 @@ impl Real for f32 {
     }
 }
 
-impl Mask for bool {
+impl LaneMask for bool {
     #[inline(always)]
     fn bits(self) -> u32 {
         u32::from(self)

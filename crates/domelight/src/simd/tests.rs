@@ -4,13 +4,13 @@ use super::*;
 use crate::sampling::Pcg32;
 
 #[inline(always)]
-fn masks<F: Real>(a: F, b: F) -> [F::Mask; 5] {
+fn masks<F: SimdFloat>(a: F, b: F) -> [F::Mask; 5] {
     [a.le(b), a.lt(b), a.eq(b), a.le(b) & b.le(a), a.lt(b) | b.lt(a)]
 }
 
 #[inline(always)]
-fn operations<F: Real>(a: F, b: F) -> [F; 12] {
-    let [each] = Real::each([a, b], |[a, b]| [a.atan2(b)]);
+fn operations<F: SimdFloat>(a: F, b: F) -> [F; 12] {
+    let [each] = SimdFloat::each([a, b], |[a, b]| [a.atan2(b)]);
     [
         a + b,
         a - b,
@@ -23,7 +23,7 @@ fn operations<F: Real>(a: F, b: F) -> [F; 12] {
         a.splat(3.0),
         a.map(|x| 2.0 * x),
         each,
-        Real::select(a.lt(b), a, b),
+        SimdFloat::select(a.lt(b), a, b),
     ]
 }
 
@@ -40,9 +40,9 @@ impl Kernel for All {
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let (a, b) = (simd.load(&self.a), simd.load(&self.b));
         let (masks, floats) = (masks(a, b), operations(a, b));
-        let floats = floats.into_iter().chain([simd.splat(self.a[3]), a.times_minus(b, a)]);
+        let floats = floats.into_iter().chain([simd.splat(self.a[3]), a.mul_sub(b, a)]);
         let rows: [Lanes; LANES] = std::array::from_fn(|i| self.a.map(|x| x * i as f32));
-        let columns = simd.transposed(rows.each_ref());
+        let columns = simd.transpose(rows.each_ref());
         let bits = |x: f32| if x.is_nan() { u32::MAX } else { x.to_bits() };
         let mut all: Vec<[u32; LANES]> =
             floats.chain(columns).map(|x| x.store().map(bits)).collect();
@@ -55,7 +55,7 @@ impl Kernel for All {
         all.push(sets.store());
         all.push([sets.not_empty(); LANES]);
         let first = simd.empty().insert(masks[0], 1 << 31);
-        let (packed, numbers, n) = Sets::pack([sets, first], [0, 1, 2, 3, 4, 5, 6, 7]);
+        let (packed, numbers, n) = SimdBitSets::pack([sets, first], [0, 1, 2, 3, 4, 5, 6, 7]);
         let number = |i| packed[0][i] | packed[1][i] | numbers[i] << 16;
         all.push(std::array::from_fn(|i| if i < n { number(i) } else { 0 }));
         all
@@ -73,9 +73,9 @@ impl Kernel for Sixteen {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let (a, b) = (simd.load_wide(self.a.each_ref()), simd.load_wide(self.b.each_ref()));
+        let (a, b) = (simd.load_f32x16(self.a.each_ref()), simd.load_f32x16(self.b.each_ref()));
         let (masks, floats) = (masks(a, b), operations(a, b));
-        let floats = floats.into_iter().chain([simd.splat_wide(self.a[1][3])]);
+        let floats = floats.into_iter().chain([simd.splat_f32x16(self.a[1][3])]);
         let bits = |x: f32| if x.is_nan() { u32::MAX } else { x.to_bits() };
         let mut all: Vec<_> = floats.map(|x| x.store().map(|half| half.map(bits))).collect();
         all.push([std::array::from_fn(|i| masks.get(i).map_or(0, |m| m.bits())); 2]);
@@ -95,23 +95,23 @@ impl Kernel for Whole {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let (a, b) = (simd.load_ints(&self.a), simd.load_ints(&self.b));
+        let (a, b) = (simd.load_i32(&self.a), simd.load_i32(&self.b));
         let table: [Lanes; 4] =
             std::array::from_fn(|row| std::array::from_fn(|lane| (row * LANES + lane) as f32));
-        let gathered = S::Floats::gather(&table, a);
+        let gathered = S::F32x8::gather(&table, a);
         let ints = [
             a + b,
-            a.shifted::<3>(),
+            a.shl::<3>(),
             a.min(b),
-            Ints::select(a.lt(b), a, b),
-            a.to_floats().truncated(),
-            gathered.truncated(),
-            simd.counting(),
-            simd.splat_int(self.a[5]),
+            SimdI32x8::select(a.lt(b), a, b),
+            a.to_f32().to_i32(),
+            gathered.to_i32(),
+            simd.iota(),
+            simd.splat_i32(self.a[5]),
         ];
         let keep = a.lt(b);
-        let (packed, n) = (a.packed(keep), keep.bits().count_ones() as usize);
-        let mut all = ints.map(Ints::store).to_vec();
+        let (packed, n) = (a.compress(keep), keep.bits().count_ones() as usize);
+        let mut all = ints.map(SimdI32x8::store).to_vec();
         all.push(std::array::from_fn(|i| if i < n { packed[i] } else { 0 }));
         all
     }

@@ -1,6 +1,6 @@
-//! Directions and colours side by side.
+//! Directions and colors side by side.
 
-use super::{Floats, Lanes, Real, Simd};
+use super::{Lanes, Simd, SimdF32x8, SimdFloat};
 use crate::Rgb;
 use crate::math::Vec3;
 
@@ -12,7 +12,7 @@ pub struct Vectors<F> {
     pub(crate) z: F,
 }
 
-impl<F: Real> Vectors<F> {
+impl<F: SimdFloat> Vectors<F> {
     /// The scalar products with one vector.
     #[inline(always)]
     pub(crate) fn dot(self, v: Vec3) -> F {
@@ -60,10 +60,10 @@ impl<F: Real> Vectors<F> {
     }
 }
 
-impl<F: Floats> Vectors<F> {
+impl<F: SimdF32x8> Vectors<F> {
     /// By component.
     #[inline(always)]
-    pub(crate) fn load<S: Simd<Floats = F>>(simd: S, v: &[Lanes; 3]) -> Self {
+    pub(crate) fn load<S: Simd<F32x8 = F>>(simd: S, v: &[Lanes; 3]) -> Self {
         let [x, y, z] = v;
         Self { x: simd.load(x), y: simd.load(y), z: simd.load(z) }
     }
@@ -89,11 +89,11 @@ impl From<Vec3> for Vectors<f32> {
     }
 }
 
-/// Colours by channel.
+/// Colors by channel.
 #[derive(Clone, Copy, Debug)]
 pub struct Colors<F>(pub(crate) [F; 3]);
 
-impl<F: Real> Colors<F> {
+impl<F: SimdFloat> Colors<F> {
     /// `color` in every lane, beside numbers that prove the instructions.
     #[inline(always)]
     pub(crate) fn splat(like: F, color: Rgb) -> Self {
@@ -130,10 +130,10 @@ impl<F: Real> Colors<F> {
 }
 
 // Arrays of vectors are spelled out: `map` is too large to be inlined for certain.
-impl<F: Floats> Colors<F> {
+impl<F: SimdF32x8> Colors<F> {
     /// By channel.
     #[inline(always)]
-    pub(crate) fn load<S: Simd<Floats = F>>(simd: S, color: &[Lanes; 3]) -> Self {
+    pub(crate) fn load<S: Simd<F32x8 = F>>(simd: S, color: &[Lanes; 3]) -> Self {
         let [r, g, b] = color;
         Self([simd.load(r), simd.load(g), simd.load(b)])
     }

@@ -1,6 +1,6 @@
 //! Sampling the BRDF: directions where the surface reflects, whatever light there is.
 
-use super::{PointStrategy, SampleNumbers, ShadingPoint};
+use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::Vec3;
@@ -27,13 +27,13 @@ impl PointStrategy for BrdfSampling<'_> {
     fn sample(
         &self,
         at: &ShadingPoint,
-        numbers: SampleNumbers,
+        sample_index: SampleIndex,
         (): &mut (),
         mut push: impl FnMut(Vec3, Rgb),
     ) {
         let n = self.n_samples;
         for j in 0..n {
-            let u = numbers.get(Dimension::Brdf, j, n);
+            let u = sample_index.get(Dimension::Brdf, j, n);
             if let Some(s) = at.sample(u.u_lobe(), u.u()) {
                 push(s.wi, s.value * self.environment.le(s.wi) / (s.pdf * n as f32));
             }

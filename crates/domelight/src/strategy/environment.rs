@@ -1,6 +1,6 @@
 //! Sampling the environment: directions where light comes from, whatever the surface does.
 
-use super::{PointStrategy, SampleNumbers, ShadingPoint};
+use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::Vec3;
@@ -8,7 +8,7 @@ use crate::sampling::Dimension;
 
 /// (1/N) Σ f_r cos θ · L / p_env: best for wide lobes under small bright lights.
 ///
-/// The density follows luminance, so the colour of each sample stays in its weight as L_rgb / L_y.
+/// The density follows luminance, so the color of each sample stays in its weight as L_rgb / L_y.
 #[derive(Clone, Copy, Debug)]
 pub struct EnvironmentSampling<'a> {
     /// The light.
@@ -29,13 +29,13 @@ impl PointStrategy for EnvironmentSampling<'_> {
     fn sample(
         &self,
         at: &ShadingPoint,
-        numbers: SampleNumbers,
+        sample_index: SampleIndex,
         (): &mut (),
         mut push: impl FnMut(Vec3, Rgb),
     ) {
         let n = self.n_samples;
         for j in 0..n {
-            let u = numbers.get(Dimension::Environment, j, n);
+            let u = sample_index.get(Dimension::Environment, j, n);
             if let Some(s) = self.environment.sample(u.u()) {
                 push(s.wi, at.eval(s.wi) * s.le / (s.pdf * n as f32));
             }

@@ -1,6 +1,6 @@
 //! A fixed set of lights: no noise, but the light of each region comes from a single direction.
 
-use super::{PointStrategy, SampleNumbers, ShadingPoint};
+use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
 use crate::math::Vec3;
 use crate::rig::Rig;
@@ -26,7 +26,7 @@ impl PointStrategy for LightSet {
     fn sample(
         &self,
         at: &ShadingPoint,
-        _: SampleNumbers,
+        _: SampleIndex,
         (): &mut (),
         mut push: impl FnMut(Vec3, Rgb),
     ) {

@@ -1,7 +1,7 @@
 //! Sampling both the environment and the BRDF, combined by multiple importance sampling: Veach &
 //! Guibas 1995, equation 10 (the multi-sample model; weights sum to one for each direction).
 
-use super::{PointStrategy, SampleNumbers, ShadingPoint};
+use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
 use crate::environment::{CompensatedTable, Environment, EnvironmentSample};
 use crate::math::{Vec2, Vec3};
@@ -76,20 +76,20 @@ impl PointStrategy for MultipleImportanceSampling<'_> {
     fn sample(
         &self,
         at: &ShadingPoint,
-        numbers: SampleNumbers,
+        sample_index: SampleIndex,
         (): &mut (),
         mut push: impl FnMut(Vec3, Rgb),
     ) {
         let (m, n) = (self.n_environment, self.n_brdf);
         for j in 0..m {
-            let u = numbers.get(Dimension::Environment, j, m);
+            let u = sample_index.get(Dimension::Environment, j, m);
             let Some(s) = self.sample_light(u.u()) else { continue };
             let (value, pdf_brdf) = at.eval_pdf(s.wi);
             let w = self.heuristic.weight(m as f32 * s.pdf, n as f32 * pdf_brdf);
             push(s.wi, value * s.le * (w / (m as f32 * s.pdf)));
         }
         for j in 0..n {
-            let u = numbers.get(Dimension::Brdf, j, n);
+            let u = sample_index.get(Dimension::Brdf, j, n);
             let Some(s) = at.sample(u.u_lobe(), u.u()) else { continue };
             let (le, pdf_light) = self.le_pdf(s.wi);
             let w = self.heuristic.weight(n as f32 * s.pdf, m as f32 * pdf_light);

@@ -33,7 +33,8 @@ pub use mis::{CompensationNeedsBrdf, LightTable, MultipleImportanceSampling};
 pub use prepared::{PrepareError, PreparedStrategy};
 pub use product::ProductSampling;
 pub use rejection::{
-    Proposal, RejectionError, RejectionSampling, RejectionScratch, RejectionStatistics, Stop,
+    Proposal, RejectionError, RejectionSampling, RejectionScratch, RejectionStatistics,
+    StoppingRule,
 };
 pub use sir::{
     Candidates, RAY_COST, Resampling, SamplingImportanceResampling, SirScratch, optimal_candidates,
@@ -41,11 +42,11 @@ pub use sir::{
 pub use spec::{StrategyError, StrategyKind, StrategyOptions, StrategySpec};
 
 use crate::Rgb;
-use crate::bsdf::{Brdf, Material};
+use crate::bsdf::{Brdf, Bsdf};
 use crate::math::{Frame, Vec2, Vec3};
-use crate::sampling::stream::Numbers;
-use crate::sampling::{Dimension, Pcg32, Stream};
-use crate::simd::{Colors, Real, Vectors};
+use crate::sampling::sampler::SamplePoint;
+use crate::sampling::{Dimension, Pcg32, Sampler};
+use crate::simd::{Colors, SimdFloat, Vectors};
 
 /// Where a camera ray met an opaque surface.
 #[derive(Clone, Copy, Debug)]
@@ -58,8 +59,8 @@ pub struct ShadingPoint {
     pub frame: Frame,
     /// Toward the viewer, in the shading frame.
     pub wo: Vec3,
-    /// Reflectance, in the shading frame.
-    pub material: Material,
+    /// The BSDF, in the shading frame.
+    pub bsdf: Bsdf,
 }
 
 impl ShadingPoint {
@@ -68,7 +69,7 @@ impl ShadingPoint {
     pub(crate) const UNSET: Self = {
         let frame = Frame { x: Vec3::X, y: Vec3::Y, z: Vec3::Z };
         let (position, ng, wo) = (Vec3::ZERO, Vec3::Z, Vec3::Z);
-        Self { position, ng, frame, wo, material: Material::BLACK }
+        Self { position, ng, frame, wo, bsdf: Bsdf::BLACK }
     };
 
     /// f_r · max(0, cos θ_i) for the world direction `wi` \[sr⁻¹\].
@@ -78,7 +79,7 @@ impl ShadingPoint {
         if self.ng.dot(wi) <= 0.0 {
             return Rgb::BLACK;
         }
-        self.material.eval(self.wo, self.frame.to_local(wi))
+        self.bsdf.eval(self.wo, self.frame.to_local(wi))
     }
 
     /// [`ShadingPoint::eval`] and the density of [`ShadingPoint::sample`] \[sr⁻¹\].
@@ -86,33 +87,29 @@ impl ShadingPoint {
         if self.ng.dot(wi) <= 0.0 {
             return (Rgb::BLACK, 0.0);
         }
-        self.material.eval_pdf(self.wo, self.frame.to_local(wi))
+        self.bsdf.eval_pdf(self.wo, self.frame.to_local(wi))
     }
 
-    /// [`ShadingPoint::eval_pdf`] of world directions side by side, of another material.
+    /// [`ShadingPoint::eval_pdf`] of world directions side by side, of another BSDF.
     #[inline(always)]
-    pub(crate) fn eval_lanes<F: Real>(
-        &self,
-        material: &Material,
-        wi: Vectors<F>,
-    ) -> (Colors<F>, F) {
+    pub(crate) fn eval_lanes<F: SimdFloat>(&self, bsdf: &Bsdf, wi: Vectors<F>) -> (Colors<F>, F) {
         let Frame { x, y, z } = self.frame;
         let local = Vectors { x: wi.dot(x), y: wi.dot(y), z: wi.dot(z) };
-        let (value, pdf) = material.eval_lanes(Vectors::splat(wi.x, self.wo), local);
+        let (value, pdf) = bsdf.eval_lanes(Vectors::splat(wi.x, self.wo), local);
         let zero = pdf.splat(0.0);
         let above = zero.lt(wi.dot(self.ng));
         (value.map(|c| F::select(above, c, zero)), F::select(above, pdf, zero))
     }
 
-    /// Draws a world direction from the material; none is a sample of value zero.
+    /// Draws a world direction from the BSDF; none is a sample of value zero.
     pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<DirectionSample> {
-        let s = self.material.sample(self.wo, u_lobe, u)?;
+        let s = self.bsdf.sample(self.wo, u_lobe, u)?;
         let wi = self.frame.to_world(s.wi);
         (self.ng.dot(wi) > 0.0).then_some(DirectionSample { wi, value: s.value, pdf: s.pdf })
     }
 }
 
-/// A world direction drawn from the material of a point.
+/// A world direction drawn from the BSDF of a point.
 #[derive(Clone, Copy, Debug)]
 pub struct DirectionSample {
     /// Toward the light.
@@ -123,24 +120,24 @@ pub struct DirectionSample {
     pub pdf: f32,
 }
 
-/// The uniform numbers of one camera sample: a stream, and where in it.
+/// Addresses the uniform numbers of one camera sample: a sampler, and the index in it.
 #[derive(Clone, Copy, Debug)]
-pub struct SampleNumbers {
-    /// The pixel's stream.
-    pub stream: Stream,
+pub struct SampleIndex {
+    /// The pixel's sampler.
+    pub sampler: Sampler,
     /// Index of the camera sample in its pixel.
     pub sample: u32,
 }
 
-impl SampleNumbers {
+impl SampleIndex {
     /// Numbers j of n for one purpose: those of all camera samples of a pixel form one sequence.
-    pub fn get(&self, dimension: Dimension, j: u32, n: u32) -> Numbers {
-        self.stream.numbers(dimension, self.sample.wrapping_mul(n).wrapping_add(j))
+    pub fn get(&self, dimension: Dimension, j: u32, n: u32) -> SamplePoint {
+        self.sampler.numbers(dimension, self.sample.wrapping_mul(n).wrapping_add(j))
     }
 
     /// Independent numbers without end.
     pub fn generator(&self) -> Pcg32 {
-        self.stream.generator(self.sample)
+        self.sampler.generator(self.sample)
     }
 }
 
@@ -202,7 +199,7 @@ pub trait PointStrategy: Sync {
     fn sample(
         &self,
         at: &ShadingPoint,
-        numbers: SampleNumbers,
+        sample_index: SampleIndex,
         scratch: &mut Self::Scratch,
         push: impl FnMut(Vec3, Rgb),
     );
@@ -229,23 +226,23 @@ pub struct PixelPoints {
     /// Camera samples of the pixel in this round, hits and misses.
     pub n_samples: u32,
     /// The pixel's uniform numbers.
-    pub stream: Stream,
-    /// All show one surface without textures: their materials differ in no more than what
-    /// [`Material::for_view`] makes of them.
+    pub sampler: Sampler,
+    /// All show one material without textures: their BSDFs differ in no more than what
+    /// [`Bsdf::for_view`] makes of them.
     pub one_material: bool,
 }
 
 impl PixelPoints {
     /// The points of a pixel, of any materials, with its camera samples in this round, hits and misses, and its
     /// uniform numbers.
-    pub fn new(points: std::ops::Range<usize>, n_samples: u32, stream: Stream) -> Self {
-        Self { points, n_samples, stream, one_material: false }
+    pub fn new(points: std::ops::Range<usize>, n_samples: u32, sampler: Sampler) -> Self {
+        Self { points, n_samples, sampler, one_material: false }
     }
 
     /// Of a pixel of another round.
     #[cfg(feature = "render")]
     pub(crate) const NONE: Self =
-        Self { points: 0..0, n_samples: 0, stream: Stream::NONE, one_material: true };
+        Self { points: 0..0, n_samples: 0, sampler: Sampler::NONE, one_material: true };
 }
 
 /// A strategy that looks at a tile at a time, in rounds: all its pixels, or one of their [`levels`] after the other.
@@ -271,9 +268,9 @@ pub trait Strategy: Sync {
         None
     }
 
-    /// Prepares a pass of `n_samples` camera samples a pixel, as a rule; `stream` is its own, independent of those of
+    /// Prepares a pass of `n_samples` camera samples a pixel, as a rule; `sampler` is its own, independent of those of
     /// pixels and other passes.
-    fn begin_pass(&self, stream: Stream, n_samples: u32) -> Self::Pass;
+    fn begin_pass(&self, sampler: Sampler, n_samples: u32) -> Self::Pass;
 
     /// Asks for the shadow rays of a round; `out` comes reset. Pixels of other rounds have no points.
     fn push(
@@ -304,7 +301,7 @@ impl<S: PointStrategy> Strategy for S {
         PointStrategy::n_rays(self)
     }
 
-    fn begin_pass(&self, _: Stream, _: u32) {}
+    fn begin_pass(&self, _: Sampler, _: u32) {}
 
     fn push(
         &self,
@@ -316,9 +313,9 @@ impl<S: PointStrategy> Strategy for S {
     ) {
         for pixel in tile.pixels {
             for i in pixel.points.clone() {
-                let numbers = SampleNumbers { stream: pixel.stream, sample: tile.samples[i] };
+                let sample_index = SampleIndex { sampler: pixel.sampler, sample: tile.samples[i] };
                 let push = |wi, weight| out.push(i as u32, wi, weight);
-                self.sample(&tile.points[i], numbers, scratch, push);
+                self.sample(&tile.points[i], sample_index, scratch, push);
             }
         }
     }

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::environment::{CompensatedTable, Environment};
 use crate::rig::{MedianCut, RigError, VarianceMinimization, median_cut, variance_minimization};
-use crate::sampling::Stream;
+use crate::sampling::Sampler;
 
 /// A strategy that runs: a closed set, so that the choice costs one branch a tile.
 #[derive(Clone, Debug)]
@@ -146,7 +146,7 @@ pub struct PreparedScratch {
 
 impl Strategy for PreparedStrategy<'_> {
     /// The pool of `product`; the other strategies share nothing.
-    type Pass = Option<product::Pool>;
+    type Pass = Option<product::LightSamplePool>;
     type Scratch = PreparedScratch;
 
     fn n_rounds(&self) -> u32 {
@@ -161,9 +161,9 @@ impl Strategy for PreparedStrategy<'_> {
         each!(self, s => s.samples_per_pass())
     }
 
-    fn begin_pass(&self, stream: Stream, n_samples: u32) -> Self::Pass {
+    fn begin_pass(&self, sampler: Sampler, n_samples: u32) -> Self::Pass {
         match self {
-            Self::Product(product) => Some(product.begin_pass(stream, n_samples)),
+            Self::Product(product) => Some(product.begin_pass(sampler, n_samples)),
             _ => None,
         }
     }

@@ -11,17 +11,17 @@
 //! ```
 //!
 //! Here y is luminance, Q = ∫ L_y dω and g_max bounds the greatest channel of f_r cos θ
-//! ([`Brdf::max_eval`]), hence (g · L)_y ≤ g_max · L_y for any colours. The first keeps directions in
+//! ([`Brdf::max_eval`]), hence (g · L)_y ≤ g_max · L_y for any colors. The first keeps directions in
 //! proportion to the luminance of the product; the second, since f_r cos θ / p_brdf has no bound in
-//! general, in proportion to p_brdf · L_y, and that quotient stays in the weight. So does colour.
+//! general, in proportion to p_brdf · L_y, and that quotient stays in the weight. So does color.
 //!
 //! To divide by the probability of keeping, one has to know a, and an estimate of 1 / a or of a from
 //! the same tries is a trap: N kept over T tries is biased upward when one stops at the N-th. Two
 //! stopping rules with an unbiased estimate, each with its limit on tries *inside* the estimate:
 //!
-//! * [`Stop::Tries`]: always M tries, C/M · Σ kept: plain importance sampling by the envelope, in which
+//! * [`StoppingRule::Tries`]: always M tries, C/M · Σ kept: plain importance sampling by the envelope, in which
 //!   most values are known to be zero without a ray. The points may be stratified.
-//! * [`Stop::Accepted`]: stop at the N-th kept or the M-th try. The unbiased estimate of a is the
+//! * [`StoppingRule::Accepted`]: stop at the N-th kept or the M-th try. The unbiased estimate of a is the
 //!   probability that the *first* try was kept given how it ended (Girshick, Mosteller & Savage
 //!   1946, "Unbiased Estimates for Certain Binomial Sampling Problems with Applications"): the share
 //!   of the paths to the end that begin so. That is (N − 1)/(T − 1) at the N-th (Haldane 1945, "On a
@@ -34,12 +34,12 @@
 //! without a limit (a point that sees no light would never end), and redrawing at the limit from
 //! something else (a bias, if a small one).
 
-use super::{PointStrategy, SampleNumbers, ShadingPoint};
+use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
 use crate::bsdf::Brdf;
 use crate::environment::Environment;
 use crate::math::Vec3;
-use crate::sampling::stream::Numbers;
+use crate::sampling::sampler::SamplePoint;
 use crate::sampling::{Dimension, Pcg32};
 
 /// Which factor of the product directions are drawn from.
@@ -60,7 +60,7 @@ pub enum Proposal {
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stop {
+pub enum StoppingRule {
     /// After this many tries, at least 1. As many shadow rays as are kept.
     Tries(u32),
     /// When enough are kept, or after a number of tries. Tries are independent numbers.
@@ -110,7 +110,7 @@ impl RejectionStatistics {
 
 /// A shadow ray to be weighed when the number of tries is known.
 #[derive(Clone, Copy, Debug)]
-struct Kept {
+struct AcceptedSample {
     wi: Vec3,
     /// Its value over that of the envelope.
     value: Rgb,
@@ -118,14 +118,14 @@ struct Kept {
 
 /// Memory of [`RejectionSampling`].
 #[derive(Clone, Debug, Default)]
-pub struct RejectionScratch(Vec<Kept>);
+pub struct RejectionScratch(Vec<AcceptedSample>);
 
 /// Directions from the product of light and reflectance by rejection.
 #[derive(Clone, Copy, Debug)]
 pub struct RejectionSampling<'a> {
     environment: &'a Environment,
     proposal: Proposal,
-    stop: Stop,
+    stop: StoppingRule,
 }
 
 /// What tries at a point are made under.
@@ -147,11 +147,15 @@ impl<'a> RejectionSampling<'a> {
     pub fn new(
         environment: &'a Environment,
         proposal: Proposal,
-        stop: Stop,
+        stop: StoppingRule,
     ) -> Result<Self, RejectionError> {
         match stop {
-            Stop::Tries(0) | Stop::Accepted { max_tries: 0, .. } => Err(RejectionError::NoTries),
-            Stop::Accepted { n: n @ (0 | 1), .. } => Err(RejectionError::TooFewAccepted { n }),
+            StoppingRule::Tries(0) | StoppingRule::Accepted { max_tries: 0, .. } => {
+                Err(RejectionError::NoTries)
+            }
+            StoppingRule::Accepted { n: n @ (0 | 1), .. } => {
+                Err(RejectionError::TooFewAccepted { n })
+            }
             _ => Ok(Self { environment, proposal, stop }),
         }
     }
@@ -160,25 +164,25 @@ impl<'a> RejectionSampling<'a> {
     pub fn sample_counted(
         &self,
         at: &ShadingPoint,
-        numbers: SampleNumbers,
+        sample_index: SampleIndex,
         scratch: &mut RejectionScratch,
         mut push: impl FnMut(Vec3, Rgb),
     ) -> RejectionStatistics {
         let envelope = self.envelope(at);
         let kept = &mut scratch.0;
         kept.clear();
-        let tries = self.draw(at, envelope, numbers, kept);
+        let tries = self.draw(at, envelope, sample_index, kept);
         let accepted = kept.len() as u32;
         let weight = envelope.mass * self.stop.share(tries, accepted);
         for k in &*kept {
             push(k.wi, k.value * weight);
         }
-        let ran_out = matches!(self.stop, Stop::Accepted { n, .. } if accepted < n);
+        let ran_out = matches!(self.stop, StoppingRule::Accepted { n, .. } if accepted < n);
         RejectionStatistics { proposal: envelope.proposal, tries, accepted, ran_out }
     }
 
     fn envelope(&self, at: &ShadingPoint) -> Envelope {
-        let g_max = at.material.max_eval(at.wo);
+        let g_max = at.bsdf.max_eval(at.wo);
         let l_max = self.environment.max_luminance();
         let light = Envelope {
             proposal: Proposal::Environment,
@@ -190,7 +194,7 @@ impl<'a> RejectionSampling<'a> {
             Proposal::Environment => light,
             Proposal::Brdf => brdf,
             Proposal::Tighter => {
-                let albedo = at.material.directional_albedo(at.wo.z.clamp(0.0, 1.0)).luminance();
+                let albedo = at.bsdf.directional_albedo(at.wo.z.clamp(0.0, 1.0)).luminance();
                 if light.mass <= albedo * brdf.mass { light } else { brdf }
             }
         }
@@ -201,23 +205,25 @@ impl<'a> RejectionSampling<'a> {
         &self,
         at: &ShadingPoint,
         envelope: Envelope,
-        numbers: SampleNumbers,
-        kept: &mut Vec<Kept>,
+        sample_index: SampleIndex,
+        kept: &mut Vec<AcceptedSample>,
     ) -> u32 {
         if envelope.mass == 0.0 {
             return 0;
         }
         match self.stop {
-            Stop::Tries(n) => {
+            StoppingRule::Tries(n) => {
                 let from_brdf = envelope.proposal == Proposal::Brdf;
                 let dimension = if from_brdf { Dimension::Brdf } else { Dimension::Environment };
                 kept.extend(
-                    (0..n).filter_map(|j| self.attempt(at, envelope, numbers.get(dimension, j, n))),
+                    (0..n).filter_map(|j| {
+                        self.attempt(at, envelope, sample_index.get(dimension, j, n))
+                    }),
                 );
                 n
             }
-            Stop::Accepted { n, max_tries } => {
-                let mut generator = numbers.generator();
+            StoppingRule::Accepted { n, max_tries } => {
+                let mut generator = sample_index.generator();
                 let mut tries = 0;
                 while tries < max_tries && kept.len() < n as usize {
                     kept.extend(self.attempt(at, envelope, four(&mut generator)));
@@ -228,24 +234,29 @@ impl<'a> RejectionSampling<'a> {
         }
     }
 
-    fn attempt(&self, at: &ShadingPoint, envelope: Envelope, u: Numbers) -> Option<Kept> {
+    fn attempt(
+        &self,
+        at: &ShadingPoint,
+        envelope: Envelope,
+        u: SamplePoint,
+    ) -> Option<AcceptedSample> {
         if envelope.proposal == Proposal::Brdf {
             let s = at.sample(u.u_lobe(), u.u())?;
             let le = self.environment.le(s.wi);
             let y = le.luminance();
             let keep = u.u_accept() * envelope.bound < y;
-            keep.then(|| Kept { wi: s.wi, value: s.value / s.pdf * (le / y) })
+            keep.then(|| AcceptedSample { wi: s.wi, value: s.value / s.pdf * (le / y) })
         } else {
             let s = self.environment.sample(u.u())?;
             let product = at.eval(s.wi) * s.le;
             let y = product.luminance();
             let keep = u.u_accept() * envelope.bound * s.le.luminance() < y;
-            keep.then(|| Kept { wi: s.wi, value: product / y })
+            keep.then(|| AcceptedSample { wi: s.wi, value: product / y })
         }
     }
 }
 
-impl Stop {
+impl StoppingRule {
     /// What each of the `accepted` directions weighs: the estimate of the probability to be kept,
     /// over their number.
     fn share(self, tries: u32, accepted: u32) -> f32 {
@@ -258,8 +269,8 @@ impl Stop {
     }
 }
 
-fn four(generator: &mut Pcg32) -> Numbers {
-    Numbers([(); 4].map(|()| generator.next_f32()))
+fn four(generator: &mut Pcg32) -> SamplePoint {
+    SamplePoint([(); 4].map(|()| generator.next_f32()))
 }
 
 impl PointStrategy for RejectionSampling<'_> {
@@ -269,18 +280,18 @@ impl PointStrategy for RejectionSampling<'_> {
 
     fn n_rays(&self) -> u32 {
         match self.stop {
-            Stop::Tries(n) | Stop::Accepted { n, .. } => n,
+            StoppingRule::Tries(n) | StoppingRule::Accepted { n, .. } => n,
         }
     }
 
     fn sample(
         &self,
         at: &ShadingPoint,
-        numbers: SampleNumbers,
+        sample_index: SampleIndex,
         scratch: &mut RejectionScratch,
         push: impl FnMut(Vec3, Rgb),
     ) {
-        self.sample_counted(at, numbers, scratch, push);
+        self.sample_counted(at, sample_index, scratch, push);
     }
 }
 
@@ -295,7 +306,7 @@ mod tests {
         for a in [0.01, 0.2, 0.5, 0.9, 1.0] {
             for n in [2, 3, 5] {
                 for max_tries in [1, 2, 3, 4, 7, 40] {
-                    let stop = Stop::Accepted { n, max_tries };
+                    let stop = StoppingRule::Accepted { n, max_tries };
                     // Probability of k kept after t tries, not yet stopped.
                     let mut walk = vec![0.0; n as usize];
                     walk[0] = 1.0;
@@ -324,9 +335,9 @@ mod tests {
     fn stops_without_an_estimate_are_refused() {
         let env = Environment::constant(Rgb::WHITE).unwrap();
         let new = |stop| RejectionSampling::new(&env, Proposal::Tighter, stop);
-        assert_eq!(new(Stop::Tries(0)).unwrap_err(), RejectionError::NoTries);
-        let one = new(Stop::Accepted { n: 1, max_tries: 10 }).unwrap_err();
+        assert_eq!(new(StoppingRule::Tries(0)).unwrap_err(), RejectionError::NoTries);
+        let one = new(StoppingRule::Accepted { n: 1, max_tries: 10 }).unwrap_err();
         assert_eq!(one, RejectionError::TooFewAccepted { n: 1 });
-        assert!(new(Stop::Accepted { n: 2, max_tries: 1 }).is_ok());
+        assert!(new(StoppingRule::Accepted { n: 2, max_tries: 1 }).is_ok());
     }
 }

@@ -21,8 +21,8 @@
 //! visibility: no better than tracing all candidates, but a candidate costs less than a ray. See
 //! [`optimal_candidates`].
 //!
-//! Weights are luminances, and a pick carries its colour over its luminance: the luminance of the
-//! weights adds up to Σ W exactly, colours do in expectation. A candidate picked k times is one ray
+//! Weights are luminances, and a pick carries its color over its luminance: the luminance of the
+//! weights adds up to Σ W exactly, colors do in expectation. A candidate picked k times is one ray
 //! of k times the weight.
 //!
 //! Candidates from both factors are weighed by Veach's balance heuristic: the density is the mixture
@@ -32,13 +32,13 @@
 //! Rejected: a number of candidates that adapts to the estimate itself (a bias, for when to stop
 //! would know the values), or from pixel to pixel (their points would no longer form one sequence).
 
-use super::{PointStrategy, SampleNumbers, ShadingPoint};
+use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::Vec3;
 use crate::sampling::hilbert::hemisphere_index;
 use crate::sampling::rng::hash2;
-use crate::sampling::{Dimension, ONE_MINUS_EPSILON, SamplerKind, Stream, WeightedReservoirs};
+use crate::sampling::{Dimension, ONE_MINUS_EPSILON, Sampler, SamplerKind, WeightedReservoirs};
 
 /// Where candidates come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -119,32 +119,32 @@ pub struct SirScratch {
 
 impl SamplingImportanceResampling<'_> {
     /// Offers each candidate with a positive weight.
-    fn draw(&self, at: &ShadingPoint, numbers: SampleNumbers, mut offer: impl FnMut(Candidate)) {
+    fn draw(&self, at: &ShadingPoint, sample_index: SampleIndex, mut add: impl FnMut(Candidate)) {
         let (m, n) = self.candidates.split(self.n_candidates);
-        let mut offer = |wi, value: Rgb, density: f32, index| {
+        let mut add = |wi, value: Rgb, density: f32, index| {
             let value = value / density;
             let weight = value.luminance();
             if weight != 0.0 {
-                offer(Candidate { wi, value, weight, index });
+                add(Candidate { wi, value, weight, index });
             }
         };
         for j in 0..m {
-            let u = numbers.get(Dimension::Environment, j, m);
+            let u = sample_index.get(Dimension::Environment, j, m);
             let Some(s) = self.environment.sample(u.u()) else { continue };
             let (value, pdf) = if n > 0 { at.eval_pdf(s.wi) } else { (at.eval(s.wi), 0.0) };
-            offer(s.wi, value * s.le, m as f32 * s.pdf + n as f32 * pdf, j);
+            add(s.wi, value * s.le, m as f32 * s.pdf + n as f32 * pdf, j);
         }
         for j in 0..n {
-            let u = numbers.get(Dimension::Brdf, j, n);
+            let u = sample_index.get(Dimension::Brdf, j, n);
             let Some(s) = at.sample(u.u_lobe(), u.u()) else { continue };
             let (le, pdf) = self.environment.le_pdf(s.wi);
-            offer(s.wi, s.value * le, m as f32 * pdf + n as f32 * s.pdf, m + j);
+            add(s.wi, s.value * le, m as f32 * pdf + n as f32 * s.pdf, m + j);
         }
     }
 
-    fn fill_ticks(&self, numbers: SampleNumbers, ticks: &mut Vec<f32>) {
+    fn fill_ticks(&self, sample_index: SampleIndex, ticks: &mut Vec<f32>) {
         let n = self.n_samples;
-        let number = |j, n| numbers.get(Dimension::Resampling, j, n).0[0];
+        let number = |j, n| sample_index.get(Dimension::Resampling, j, n).0[0];
         ticks.clear();
         if self.resampling == Resampling::Multinomial {
             ticks.extend((0..n).map(|j| number(j, n)));
@@ -159,20 +159,20 @@ impl SamplingImportanceResampling<'_> {
     fn pick_stored(
         &self,
         at: &ShadingPoint,
-        numbers: SampleNumbers,
+        sample_index: SampleIndex,
         scratch: &mut SirScratch,
         mut push: impl FnMut(Vec3, Rgb),
     ) {
         let SirScratch { candidates, order, ticks, .. } = scratch;
         candidates.clear();
-        self.draw(at, numbers, |c| candidates.push(c));
+        self.draw(at, sample_index, |c| candidates.push(c));
         let total = candidates.iter().map(|c| f64::from(c.weight)).sum();
         if !f64::is_finite(total) {
             // Overflow is handed on, for the film to count.
             candidates.iter().take(1).for_each(|c| push(c.wi, c.value * f32::INFINITY));
             return;
         }
-        self.fill_ticks(numbers, ticks);
+        self.fill_ticks(sample_index, ticks);
         if self.resampling == Resampling::SystematicSorted {
             order.clear();
             order.extend(
@@ -191,15 +191,15 @@ impl SamplingImportanceResampling<'_> {
     fn pick_streaming(
         &self,
         at: &ShadingPoint,
-        numbers: SampleNumbers,
+        sample_index: SampleIndex,
         scratch: &mut SirScratch,
         mut push: impl FnMut(Vec3, Rgb),
     ) {
         let SirScratch { candidates: picked, reservoirs, .. } = scratch;
         let n = self.n_samples as usize;
-        let mut generator = numbers.generator();
+        let mut generator = sample_index.generator();
         reservoirs.clear();
-        self.draw(at, numbers, |c| reservoirs.offer(c, f64::from(c.weight), n, &mut generator));
+        self.draw(at, sample_index, |c| reservoirs.add(c, f64::from(c.weight), n, &mut generator));
         picked.clear();
         picked.extend(reservoirs.items());
         picked.sort_unstable_by_key(|c| c.index);
@@ -252,13 +252,13 @@ impl PointStrategy for SamplingImportanceResampling<'_> {
     fn sample(
         &self,
         at: &ShadingPoint,
-        numbers: SampleNumbers,
+        sample_index: SampleIndex,
         scratch: &mut SirScratch,
         push: impl FnMut(Vec3, Rgb),
     ) {
         match self.resampling {
-            Resampling::Reservoir => self.pick_streaming(at, numbers, scratch, push),
-            _ => self.pick_stored(at, numbers, scratch, push),
+            Resampling::Reservoir => self.pick_streaming(at, sample_index, scratch, push),
+            _ => self.pick_stored(at, sample_index, scratch, push),
         }
     }
 }
@@ -286,9 +286,9 @@ impl Candidates {
         };
         let (mut sum, mut n_points) = (0.0, 0.0);
         for (i, at) in (0u64..).zip(points) {
-            let stream = Stream::new(SamplerKind::Sobol, hash2(seed, PILOT), i);
+            let sampler = Sampler::new(SamplerKind::Sobol, hash2(seed, PILOT), i);
             let (mut first, mut second) = (0.0, 0.0);
-            sir.draw(at, SampleNumbers { stream, sample: 0 }, |c| {
+            sir.draw(at, SampleIndex { sampler, sample: 0 }, |c| {
                 first += f64::from(c.weight);
                 second += f64::from(c.weight).powi(2);
             });

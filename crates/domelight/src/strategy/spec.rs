@@ -17,7 +17,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{Candidates, Proposal, Resampling, Stop};
+use super::{Candidates, Proposal, Resampling, StoppingRule};
 use crate::sampling::Heuristic;
 
 /// A strategy with its parameters, independent of scene and environment.
@@ -57,7 +57,7 @@ pub enum StrategySpec {
         /// The factor of the product that tries are drawn from.
         proposal: Proposal,
         /// When to stop.
-        stop: Stop,
+        stop: StoppingRule,
     },
     /// Sampling importance resampling of the product.
     Sir {
@@ -483,14 +483,14 @@ impl StrategySpec {
 
     fn rejection(options: &StrategyOptions) -> Result<Self, StrategyError> {
         let stop = match (options.rays, options.tries) {
-            (None, tries) => Stop::Tries(tries.unwrap_or(16)),
+            (None, tries) => StoppingRule::Tries(tries.unwrap_or(16)),
             (Some(1), _) => {
                 return Err(StrategyError::Contradiction(
                     "rejection estimates from at least two accepted samples: use 2 rays or more, or tries for \
                      a fixed number of tries",
                 ));
             }
-            (Some(n), tries) => Stop::Accepted { n, max_tries: tries.unwrap_or(64 * n) },
+            (Some(n), tries) => StoppingRule::Accepted { n, max_tries: tries.unwrap_or(64 * n) },
         };
         Ok(Self::Rejection { proposal: options.proposal.unwrap_or_default(), stop })
     }
@@ -531,11 +531,11 @@ impl StrategySpec {
         match self {
             Self::Brdf { n_samples } | Self::Environment { n_samples } => n_samples,
             Self::Product { n_rays } => n_rays,
-            Self::Rejection { stop: Stop::Tries(n), .. } => n,
+            Self::Rejection { stop: StoppingRule::Tries(n), .. } => n,
             Self::Mis { n_environment, n_brdf, .. } => n_environment.max(n_brdf),
             Self::Sir { n_candidates, n_samples, .. } => n_candidates.unwrap_or(n_samples),
             // These draw independent numbers, or none.
-            Self::Rejection { stop: Stop::Accepted { .. }, .. }
+            Self::Rejection { stop: StoppingRule::Accepted { .. }, .. }
             | Self::MedianCut { .. }
             | Self::VarianceMinimization { .. } => 1,
         }
@@ -561,8 +561,8 @@ impl StrategySpec {
                     Proposal::Tighter => "the tighter envelope",
                 };
                 match stop {
-                    Stop::Tries(m) => format!("rejection from {from}, {m} tries"),
-                    Stop::Accepted { n, max_tries } => format!(
+                    StoppingRule::Tries(m) => format!("rejection from {from}, {m} tries"),
+                    StoppingRule::Accepted { n, max_tries } => format!(
                         "rejection from {from}, until {n} are accepted or {max_tries} tried"
                     ),
                 }
@@ -618,8 +618,10 @@ impl fmt::Display for StrategySpec {
             }
             Self::Rejection { proposal, stop } => {
                 match stop {
-                    Stop::Tries(m) => write!(f, ":{m}")?,
-                    Stop::Accepted { n, max_tries } => write!(f, ":rays={n}:tries={max_tries}")?,
+                    StoppingRule::Tries(m) => write!(f, ":{m}")?,
+                    StoppingRule::Accepted { n, max_tries } => {
+                        write!(f, ":rays={n}:tries={max_tries}")?;
+                    }
                 }
                 if proposal == Proposal::default() {
                     return Ok(());
@@ -712,9 +714,9 @@ mod tests {
             StrategyKind::Rejection => StrategySpec::Rejection {
                 proposal: pick(pcg, PROPOSALS),
                 stop: if coin {
-                    Stop::Tries(tries)
+                    StoppingRule::Tries(tries)
                 } else {
-                    Stop::Accepted { n: n.max(2), max_tries: tries }
+                    StoppingRule::Accepted { n: n.max(2), max_tries: tries }
                 },
             },
             StrategyKind::Sir => StrategySpec::Sir {

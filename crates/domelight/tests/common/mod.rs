@@ -1,10 +1,10 @@
 //! Points under coarse maps with some texels hidden, and their integrals by quadrature.
 
-use domelight::bsdf::Material;
+use domelight::bsdf::Bsdf;
 use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::{Frame, Vec3, from_spherical, vec2, vec3};
-use domelight::sampling::{Pcg32, SamplerKind, Stream};
-use domelight::strategy::{PointStrategy, SampleNumbers, ShadingPoint};
+use domelight::sampling::{Pcg32, Sampler, SamplerKind};
+use domelight::strategy::{PointStrategy, SampleIndex, ShadingPoint};
 use domelight::{Rgb, RgbImage};
 use testkit::quadrature::{Adaptive, Rect};
 
@@ -44,12 +44,12 @@ pub(crate) fn hidden(env: &Environment, wi: Vec3) -> bool {
 }
 
 /// A point whose shading normal is tilted against the surface, seen at `theta` from the former.
-pub(crate) fn point(material: Material, theta: f32) -> ShadingPoint {
+pub(crate) fn point(bsdf: Bsdf, theta: f32) -> ShadingPoint {
     let ng = vec3(0.3, 0.9, -0.2).normalize();
     let normal = vec3(0.4, 0.8, 0.1).normalize();
     let frame = Frame::from_z_and_tangent(normal, vec3(1.0, 0.2, 0.4));
     let wo = from_spherical(theta.cos(), 2.5);
-    ShadingPoint { position: Vec3::ZERO, ng, frame, wo, material: material.for_view(wo) }
+    ShadingPoint { position: Vec3::ZERO, ng, frame, wo, bsdf: bsdf.for_view(wo) }
 }
 
 /// ∫ f dω over each texel in row order, `f` of the direction, its radiance and whether it is hidden.
@@ -96,13 +96,13 @@ pub(crate) fn estimate<S: PointStrategy>(
     strategy: &S,
     env: &Environment,
     at: &ShadingPoint,
-    stream: Stream,
+    sampler: Sampler,
     n: u32,
 ) -> [f64; 3] {
     let mut sum = [0.0; 3];
     let mut scratch = S::Scratch::default();
     for sample in 0..n {
-        strategy.sample(at, SampleNumbers { stream, sample }, &mut scratch, |wi, weight| {
+        strategy.sample(at, SampleIndex { sampler, sample }, &mut scratch, |wi, weight| {
             if !hidden(env, wi) {
                 for (s, w) in sum.iter_mut().zip(weight.to_array()) {
                     *s += f64::from(w);
@@ -122,7 +122,7 @@ pub(crate) fn batches<S: PointStrategy>(
     n: u32,
 ) -> Vec<[f64; 3]> {
     assert!(S::UNBIASED);
-    (0..40).map(|b| estimate(strategy, env, at, Stream::new(kind, 5, b), n)).collect()
+    (0..40).map(|b| estimate(strategy, env, at, Sampler::new(kind, 5, b), n)).collect()
 }
 
 /// The same light from everywhere.

@@ -103,14 +103,14 @@ fn masonry(u: f32, v: f32, light: f32) -> Rgb {
     STONE.lerp(Rgb::new(0.072, 0.067, 0.062), hash(row, column + 7.0)) * (shade * light)
 }
 
-/// Warm light of the lamps and coloured spill of the windows on a point of the stone.
+/// Warm light of the lamps and colored spill of the windows on a point of the stone.
 fn glow(p: Vec3) -> f32 {
     let row = |x: f32| 1.0 / (1.0 + 0.16 * (sqr(p.x - x) + sqr(p.y - 3.1)));
     let far = 0.55 + 0.45 * smoothstep(30.0, 8.0, p.z.abs());
     (0.28 + 1.5 * row(-2.6) + 1.5 * row(2.6)) * far
 }
 
-/// Flagstones in two colours with a worn middle, under the reflection of the east window.
+/// Flagstones in two colors with a worn middle, under the reflection of the east window.
 fn floor(p: Vec3) -> Rgb {
     let (i, j) = ((p.x / 1.1).floor(), (p.z / 1.1).floor());
     let dark = (i + j).rem_euclid(2.0);
@@ -216,7 +216,7 @@ fn glass(g: Vec2, seed: f32) -> Rgb {
     pane(hue) * (0.04 + 0.96 * smoothstep(0.015, 0.05, lead) * mullion)
 }
 
-/// A round window of eight petals about a centre.
+/// A round window of eight petals about a center.
 fn roundel(q: Vec2, seed: f32) -> Rgb {
     let r = q.length();
     let turn = q.y.atan2(q.x) / std::f32::consts::TAU * 8.0;

@@ -5,7 +5,7 @@
 //! lamp. The sun alone is smaller than any such grid and is laid in by its exact solid angle.
 //!
 //! A stored picture would have fixed the resolution and weighed megabytes; a fit to a measured probe
-//! would carry somebody else's licence. Random placement is avoided: light that matters has a
+//! would carry somebody else's license. Random placement is avoided: light that matters has a
 //! position that was chosen by eye.
 
 mod cathedral;

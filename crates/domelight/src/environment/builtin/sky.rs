@@ -9,7 +9,7 @@
 //!
 //! Hošek and Wilkie 2012 is more accurate at high turbidity and low sun, but needs tables of some
 //! thousand coefficients; at the turbidity and sun height used here the two differ little. The CIE
-//! standard skies have no colour. Single scattering in the manner of Nishita loses the
+//! standard skies have no color. Single scattering in the manner of Nishita loses the
 //! multiply scattered third of the light.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -46,7 +46,7 @@ pub(super) fn image(height: usize) -> RgbImage {
     image
 }
 
-/// Perez's distribution for Y, x and y, normalised to the zenith.
+/// Perez's distribution for Y, x and y, normalized to the zenith.
 struct Sky {
     sun: Vec3,
     sun_theta: f64,
@@ -103,7 +103,7 @@ impl Sky {
         rgb_of_chromaticity(luminance / UNIT, x, y)
     }
 
-    /// The ground seen along `d` through the air, which takes the colour of the horizon above it.
+    /// The ground seen along `d` through the air, which takes the color of the horizon above it.
     fn hazy(&self, ground: Rgb, d: Vec3) -> Rgb {
         let horizon = self.radiance(vec3(d.x, 0.02, d.z).normalize());
         horizon.lerp(ground, (HAZE / d.y.min(-1e-6)).exp())

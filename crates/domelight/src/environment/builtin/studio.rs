@@ -9,7 +9,7 @@ use crate::math::{Vec3, vec3};
 
 /// A rectangle that faces the origin.
 struct SoftBox {
-    /// Centre \[m\].
+    /// Center \[m\].
     center: Vec3,
     /// Half width and half height \[m\].
     half: [f32; 2],

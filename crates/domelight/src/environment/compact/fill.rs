@@ -45,7 +45,7 @@ impl RimCell {
     fn new(grid: &Grid, cell: usize, is_outside: impl Fn(usize) -> bool) -> Self {
         let (direction, radiance) = (grid.direction(cell), grid.mean(cell));
         let (mut rise, mut distance) = (0.0, 0.0);
-        for n in grid.neighbours(cell).into_iter().filter(|&n| is_outside(n)) {
+        for n in grid.neighbors(cell).into_iter().filter(|&n| is_outside(n)) {
             rise += grid.luminance[cell] - grid.luminance[n];
             distance += direction.distance(grid.direction(n));
         }
@@ -68,7 +68,7 @@ fn thin_plate(at: Vec3, rim: &[RimCell]) -> Rgb {
     }
     let membrane = radiance / weights;
     let bulge = slope * (PI / (weights * weights));
-    // The glow has the membrane's colour. At 1/r², the steepest that is not the source's, it doubles
+    // The glow has the membrane's color. At 1/r², the steepest that is not the source's, it doubles
     // in the middle. Where nothing rises, or all is black, there is none.
     let share = bulge / membrane.luminance();
     if share > 0.0 { membrane * (1.0 + share.min(1.0)) } else { membrane }

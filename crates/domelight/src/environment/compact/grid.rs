@@ -97,7 +97,7 @@ impl<'a> Grid<'a> {
 
     /// The cells around a cell, sides and corners, across the seam and over the poles; on narrow
     /// maps some twice, or the cell itself.
-    pub(super) fn neighbours(&self, cell: usize) -> [usize; 8] {
+    pub(super) fn neighbors(&self, cell: usize) -> [usize; 8] {
         let (columns, last) = (self.columns, self.rows - 1);
         let (x, y) = (cell % columns, cell / columns);
         let left = if x == 0 { columns - 1 } else { x - 1 };

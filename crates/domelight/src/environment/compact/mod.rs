@@ -28,7 +28,7 @@ const SHELL: f64 = 16.0;
 
 /// Which compact sources are taken out of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Wanted {
+pub(crate) struct SourceCriteria {
     /// The sun: of the sources no wider than 7° the one with the most light.
     pub(crate) sun: bool,
     /// Up to so many others, those with the most light.
@@ -37,7 +37,7 @@ pub(crate) struct Wanted {
     pub(crate) min_share: f64,
 }
 
-impl Wanted {
+impl SourceCriteria {
     /// Share of the map's luminance below which nothing is a source unless asked for.
     pub(crate) const MIN_SHARE: f64 = 1e-3;
 
@@ -59,15 +59,15 @@ pub(crate) struct CompactSource {
 
 /// The wanted sources of a lat-long map of finite radiance ≥ 0: the sun first, then those of the
 /// most light.
-pub(crate) fn compact_sources(map: &RgbImage, wanted: Wanted) -> Vec<CompactSource> {
-    if !wanted.sun && wanted.n_lamps == 0 {
+pub(crate) fn compact_sources(map: &RgbImage, criteria: SourceCriteria) -> Vec<CompactSource> {
+    if !criteria.sun && criteria.n_lamps == 0 {
         return Vec::new();
     }
     let grid = Grid::new(map);
     let mut peaks: Vec<Option<Peak>> = Vec::new();
-    peaks.extend(find_peaks(&grid, wanted.min_share * grid.total()).into_iter().map(Some));
+    peaks.extend(find_peaks(&grid, criteria.min_share * grid.total()).into_iter().map(Some));
     let mut chosen = Vec::new();
-    if wanted.sun {
+    if criteria.sun {
         let suns = whole_sources(&peaks, WIDEST_SUN);
         if let Some(sun) = brightest(&suns, 1).pop() {
             remove(&mut peaks, sun);
@@ -76,7 +76,7 @@ pub(crate) fn compact_sources(map: &RgbImage, wanted: Wanted) -> Vec<CompactSour
     }
     let has_sun = !chosen.is_empty();
     let lamps = whole_sources(&peaks, WIDEST_LAMP);
-    chosen.extend(brightest(&lamps, wanted.n_lamps).into_iter().filter_map(|i| lamps[i]));
+    chosen.extend(brightest(&lamps, criteria.n_lamps).into_iter().filter_map(|i| lamps[i]));
     let mut sources = take_out(map, &grid, &chosen);
     sources.iter_mut().take(1).for_each(|first| first.is_sun = has_sun);
     sources
@@ -119,7 +119,7 @@ fn remove(peaks: &mut [Option<Peak>], i: usize) {
 /// Separates the peaks from what is behind them.
 fn take_out(map: &RgbImage, grid: &Grid, peaks: &[Peak]) -> Vec<CompactSource> {
     let owner = owners(grid, peaks);
-    let behind = Behind::new(grid, &owner);
+    let background = BackgroundEstimate::new(grid, &owner);
     let nothing = CompactSource { is_sun: false, texels: Vec::new(), residual: Vec::new() };
     let mut sources = vec![nothing; peaks.len()];
     for y in 0..map.height {
@@ -128,9 +128,9 @@ fn take_out(map: &RgbImage, grid: &Grid, peaks: &[Peak]) -> Vec<CompactSource> {
         while x < map.width {
             let cell = row + x / grid.step;
             let [columns, _] = grid.texels(cell);
-            if owner[cell] != NOBODY {
+            if owner[cell] != NO_OWNER {
                 let source = &mut sources[owner[cell] as usize];
-                columns.clone().for_each(|x| source.take(map, x, y, behind.at(x, y)));
+                columns.clone().for_each(|x| source.take(map, x, y, background.at(x, y)));
             }
             x = columns.end;
         }
@@ -139,10 +139,10 @@ fn take_out(map: &RgbImage, grid: &Grid, peaks: &[Peak]) -> Vec<CompactSource> {
 }
 
 impl CompactSource {
-    /// Takes what exceeds `behind` out of a texel.
-    fn take(&mut self, map: &RgbImage, x: usize, y: usize, behind: Rgb) {
+    /// Takes what exceeds `background` out of a texel.
+    fn take(&mut self, map: &RgbImage, x: usize, y: usize, background: Rgb) {
         let le = map.row(y)[x];
-        let rest = Rgb::new(le.r.min(behind.r), le.g.min(behind.g), le.b.min(behind.b));
+        let rest = Rgb::new(le.r.min(background.r), le.g.min(background.g), le.b.min(background.b));
         if rest != le {
             self.texels.push((y * map.width + x) as u32);
             self.residual.push(rest);
@@ -151,12 +151,12 @@ impl CompactSource {
 }
 
 /// The owner of a cell outside of all sources.
-const NOBODY: u32 = u32::MAX;
+const NO_OWNER: u32 = u32::MAX;
 
 /// The peak that each cell belongs to. Each is grown by a cell, for the source's edge may pass
 /// through it.
 fn owners(grid: &Grid, peaks: &[Peak]) -> Vec<u32> {
-    let mut owner = vec![NOBODY; grid.luminance.len()];
+    let mut owner = vec![NO_OWNER; grid.luminance.len()];
     let mut order: Vec<usize> = (0..peaks.len()).collect();
     // What lies within another has the higher level.
     order.sort_by(|&a, &b| peaks[a].level.total_cmp(&peaks[b].level));
@@ -169,8 +169,8 @@ fn owners(grid: &Grid, peaks: &[Peak]) -> Vec<u32> {
         }));
     }
     for cell in inside {
-        for n in grid.neighbours(cell as usize) {
-            if owner[n] == NOBODY {
+        for n in grid.neighbors(cell as usize) {
+            if owner[n] == NO_OWNER {
                 owner[n] = owner[cell as usize];
             }
         }
@@ -187,35 +187,35 @@ fn flood(grid: &Grid, seed: u32, mut enter: impl FnMut(usize) -> bool) -> Vec<u3
     let mut next = 0;
     while let Some(&cell) = cells.get(next) {
         next += 1;
-        let entered = grid.neighbours(cell as usize).into_iter().filter(|&n| enter(n));
+        let entered = grid.neighbors(cell as usize).into_iter().filter(|&n| enter(n));
         cells.extend(entered.map(|n| n as u32));
     }
     cells
 }
 
 /// The map without its sources: cells of sources continued from around them.
-struct Behind<'a> {
+struct BackgroundEstimate<'a> {
     grid: &'a Grid<'a>,
-    /// Where in `radiance` a cell is, [`NOBODY`] for cells outside of sources.
+    /// Where in `radiance` a cell is, [`NO_OWNER`] for cells outside of sources.
     index: Vec<u32>,
     radiance: Vec<Rgb>,
 }
 
-impl<'a> Behind<'a> {
+impl<'a> BackgroundEstimate<'a> {
     fn new(grid: &'a Grid<'a>, owner: &[u32]) -> Self {
-        let mut index = vec![NOBODY; owner.len()];
+        let mut index = vec![NO_OWNER; owner.len()];
         let mut radiance = Vec::new();
         for seed in 0..owner.len() {
-            if owner[seed] == NOBODY || index[seed] != NOBODY {
+            if owner[seed] == NO_OWNER || index[seed] != NO_OWNER {
                 continue;
             }
             let mut rim = Vec::new();
             let group = flood(grid, seed as u32, |cell| {
-                if owner[cell] == NOBODY {
+                if owner[cell] == NO_OWNER {
                     rim.push(cell as u32);
                     return false;
                 }
-                std::mem::replace(&mut index[cell], 0) == NOBODY
+                std::mem::replace(&mut index[cell], 0) == NO_OWNER
             });
             rim.sort_unstable();
             rim.dedup();
@@ -223,7 +223,7 @@ impl<'a> Behind<'a> {
                 index[cell as usize] = (radiance.len() + i) as u32;
             }
             let is_outside =
-                |cell: usize| owner[cell] == NOBODY && rim.binary_search(&(cell as u32)).is_err();
+                |cell: usize| owner[cell] == NO_OWNER && rim.binary_search(&(cell as u32)).is_err();
             radiance.extend(continue_rim(grid, &group, &rim, is_outside));
         }
         Self { grid, index, radiance }
@@ -232,7 +232,7 @@ impl<'a> Behind<'a> {
     fn cell(&self, column: usize, row: usize) -> Rgb {
         let cell = row * self.grid.columns + column;
         match self.index[cell] {
-            NOBODY => self.grid.mean(cell),
+            NO_OWNER => self.grid.mean(cell),
             i => self.radiance[i as usize],
         }
     }

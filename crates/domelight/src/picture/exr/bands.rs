@@ -2,7 +2,7 @@
 
 use super::write::sort_attributes;
 use super::{Compression, ExrLayers, Plane};
-use crate::picture::Problem;
+use crate::picture::PictureErrorKind;
 use ::exr::block::chunk::Chunk;
 use ::exr::block::writer::ChunksWriter;
 use ::exr::block::{self, BlockIndex, UncompressedBlock};
@@ -29,7 +29,7 @@ const BATCH: usize = 32;
 ///
 /// # Errors
 /// As [`ExrLayers::encode`], or if `out` does not take it or `band` fails.
-pub fn write<B: Borrow<ExrLayers>, E: From<Problem>>(
+pub fn write<B: Borrow<ExrLayers>, E: From<PictureErrorKind>>(
     height: usize,
     out: &mut (impl Write + Seek + ?Sized),
     mut band: impl FnMut(usize) -> Result<B, E>,
@@ -57,20 +57,20 @@ pub fn write<B: Borrow<ExrLayers>, E: From<Problem>>(
     });
     match failed {
         Some(error) => return Err(error),
-        None => written.map_err(problem)?,
+        None => written.map_err(error_kind)?,
     }
-    rewrite_header(headers, out).map_err(problem)?;
+    rewrite_header(headers, out).map_err(error_kind)?;
     Ok(())
 }
 
-fn problem(error: Error) -> Problem {
+fn error_kind(error: Error) -> PictureErrorKind {
     match error {
-        Error::Io(error) => Problem::Io(error),
-        error => Problem::Exr(error),
+        Error::Io(error) => PictureErrorKind::Io(error),
+        error => PictureErrorKind::Exr(error),
     }
 }
 
-fn header(band: &ExrLayers, height: usize) -> Result<Header, Problem> {
+fn header(band: &ExrLayers, height: usize) -> Result<Header, PictureErrorKind> {
     let channel = |(name, plane): (String, &Plane)| {
         let kind = match plane {
             Plane::Float(_) => SampleType::F32,
@@ -95,12 +95,15 @@ fn write_rows(
     y: usize,
     headers: &[Header],
     writer: &mut impl ChunksWriter,
-) -> Result<(), Problem> {
+) -> Result<(), PictureErrorKind> {
     let planes = band.sorted_planes()?;
     let names = headers[0].channels.list.iter().map(|channel| channel.name.to_string());
     if !names.eq(planes.iter().map(|(name, _)| name.as_str())) {
         let channel = planes[0].0.clone();
-        return Err(Problem::Channel { channel, why: "the bands have different channels" });
+        return Err(PictureErrorKind::Channel {
+            channel,
+            why: "the bands have different channels",
+        });
     }
     let rows = headers[0].max_block_pixel_size().height();
     let compress = |start: usize| {
@@ -117,13 +120,13 @@ fn write_rows(
             pixel_size: Vec2(band.width, end - start),
             level: Vec2(0, 0),
         };
-        UncompressedBlock { index, data }.compress_to_chunk(headers).map_err(problem)
+        UncompressedBlock { index, data }.compress_to_chunk(headers).map_err(error_kind)
     };
     let starts: Vec<usize> = (0..band.height).step_by(rows).collect();
     for batch in starts.chunks(BATCH) {
         let chunks = batch.par_iter().map(|&start| compress(start));
         for (&start, chunk) in batch.iter().zip(chunks.collect::<Result<Vec<Chunk>, _>>()?) {
-            writer.write_chunk((y + start) / rows, chunk).map_err(problem)?;
+            writer.write_chunk((y + start) / rows, chunk).map_err(error_kind)?;
         }
     }
     Ok(())

@@ -8,7 +8,7 @@
 
 use super::read::{to_rec709, window};
 use crate::picture::primaries::{Primaries, transform};
-use crate::picture::{Format, Picture, Problem, allocate, checked_area};
+use crate::picture::{Format, Picture, PictureErrorKind, allocate, checked_area};
 use crate::{Rgb, RgbImage};
 use ::exr::math::Vec2;
 use ::exr::meta::attribute::{ChannelDescription, IntegerBounds, SampleType};
@@ -45,11 +45,11 @@ impl LuminanceChroma {
         fits.then_some(Self { header, table: cursor.position() as usize })
     }
 
-    pub(super) fn texels(&self) -> Result<usize, Problem> {
+    pub(super) fn texels(&self) -> Result<usize, PictureErrorKind> {
         checked_area(self.header.layer_size.0, self.header.layer_size.1)
     }
 
-    pub(super) fn decode(self, bytes: &[u8]) -> Result<Picture, Problem> {
+    pub(super) fn decode(self, bytes: &[u8]) -> Result<Picture, PictureErrorKind> {
         let (width, height) = (self.header.layer_size.0, self.header.layer_size.1);
         self.texels()?;
         // The crate's decoder of B44 miscounts subsampled blocks, and DWA's is not checked for its promises here.
@@ -63,7 +63,9 @@ impl LuminanceChroma {
                 | Compression::PXR24
         );
         if !is_read {
-            return Err(Problem::ExrUnsupported("luminance and chroma compressed by B44 or DWA"));
+            return Err(PictureErrorKind::ExrUnsupported(
+                "luminance and chroma compressed by B44 or DWA",
+            ));
         }
         let blocks = self.blocks(bytes)?;
         let mut planes = self.planes(bytes.len())?;
@@ -75,7 +77,7 @@ impl LuminanceChroma {
             index.map(|index| &planes[index])
         };
         let (Some(luminance), Some(ry), Some(by)) = (of("Y"), of("RY"), of("BY")) else {
-            return Err(Problem::ExrUnsupported("luminance without chroma"));
+            return Err(PictureErrorKind::ExrUnsupported("luminance without chroma"));
         };
         let chromaticities = self.header.shared_attributes.chromaticities.as_ref();
         let weights = chromaticities.map_or(Primaries::REC709, super::read::primaries).luminance();
@@ -97,10 +99,11 @@ impl LuminanceChroma {
     }
 
     /// The first line of each block, from 0, and its compressed bytes.
-    fn blocks<'b>(&self, bytes: &'b [u8]) -> Result<Vec<(usize, &'b [u8])>, Problem> {
+    fn blocks<'b>(&self, bytes: &'b [u8]) -> Result<Vec<(usize, &'b [u8])>, PictureErrorKind> {
         let lines = self.header.compression.scan_lines_per_block();
         let count = self.header.layer_size.1.div_ceil(lines);
-        let truncated = |offset| Problem::Truncated { place: "the table of blocks".into(), offset };
+        let truncated =
+            |offset| PictureErrorKind::Truncated { place: "the table of blocks".into(), offset };
         let table = bytes.get(self.table..).and_then(|rest| rest.get(..8 * count));
         let table = table.ok_or_else(|| truncated(bytes.len()))?;
         let block = |entry: &[u8; 8]| {
@@ -118,13 +121,13 @@ impl LuminanceChroma {
     }
 
     /// Zeros, where the sampling divides the picture.
-    fn planes(&self, held: usize) -> Result<Vec<Plane>, Problem> {
+    fn planes(&self, held: usize) -> Result<Vec<Plane>, PictureErrorKind> {
         let (width, height) = (self.header.layer_size.0, self.header.layer_size.1);
         let corner = self.header.own_attributes.layer_position;
         // As of whole pictures: 65536 lets a black map of any size through.
         let needed = (width * height / 65536) as u64;
         if (held as u64) < needed {
-            return Err(Problem::Promises { width, height, needed, held: held as u64 });
+            return Err(PictureErrorKind::Promises { width, height, needed, held: held as u64 });
         }
         let plane = |channel: &ChannelDescription| {
             let [sx, sy] = sampling(channel);
@@ -132,7 +135,7 @@ impl LuminanceChroma {
                 by > 0 && size.is_multiple_of(by) && at.rem_euclid(by as i32) == 0
             };
             if !(divides(width, corner.0, sx) && divides(height, corner.1, sy)) {
-                return Err(Problem::ExrUnsupported(
+                return Err(PictureErrorKind::ExrUnsupported(
                     "channels whose sampling does not divide the picture",
                 ));
             }
@@ -142,7 +145,12 @@ impl LuminanceChroma {
         self.header.channels.list.iter().map(plane).collect()
     }
 
-    fn decode_block(&self, first: usize, data: &[u8], planes: &mut [Plane]) -> Result<(), Problem> {
+    fn decode_block(
+        &self,
+        first: usize,
+        data: &[u8],
+        planes: &mut [Plane],
+    ) -> Result<(), PictureErrorKind> {
         let (width, height) = (self.header.layer_size.0, self.header.layer_size.1);
         let lines = self.header.compression.scan_lines_per_block().min(height - first);
         let list = &self.header.channels.list;
@@ -160,7 +168,7 @@ impl LuminanceChroma {
         let mut header = self.header.clone();
         header.channels.bytes_per_pixel = expected / (width * lines);
         if header.channels.bytes_per_pixel * width * lines != expected {
-            return Err(Problem::ExrUnsupported("channels of such sampling"));
+            return Err(PictureErrorKind::ExrUnsupported("channels of such sampling"));
         }
         let corner = header.own_attributes.layer_position;
         let bounds =
@@ -168,7 +176,7 @@ impl LuminanceChroma {
         let compression = header.compression;
         let bytes = compression
             .decompress_image_section_from_le(&header, data.to_vec(), bounds, false)
-            .map_err(Problem::Exr)?;
+            .map_err(PictureErrorKind::Exr)?;
         let mut rest = &bytes[..];
         for line in first..first + lines {
             for (channel, plane) in list.iter().zip(planes.iter_mut()) {

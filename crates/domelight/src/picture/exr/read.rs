@@ -7,12 +7,14 @@
 //!
 //! Blocks are decompressed in batches on the program's own threads: the crate's parallel reader starts a pool of its
 //! own for each file, in which a panic over a corrupt block would abort the process. What the crate asserts instead
-//! of returning an error is caught here and becomes [`Problem::ExrPanic`].
+//! of returning an error is caught here and becomes [`PictureErrorKind::ExrPanic`].
 
 use super::luminance_chroma::LuminanceChroma;
 use crate::environment::mapping::EnvmapKind;
 use crate::picture::primaries::{Primaries, transform};
-use crate::picture::{DataWindow, Format, MAX_TEXELS, Picture, Problem, allocate, checked_area};
+use crate::picture::{
+    DataWindow, Format, MAX_TEXELS, Picture, PictureErrorKind, allocate, checked_area,
+};
 use crate::{Rgb, RgbImage};
 use ::exr::block::UncompressedBlock;
 use ::exr::block::chunk::{Chunk, CompressedBlock};
@@ -32,29 +34,31 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// By default that is the unnamed R, G, B channels, else the first layer with R, G, B, else one with Y alone, else the
 /// only channel that there is, whatever its name but for depth and coverage. `layer`
 /// names another: a part, the part of the channel names before the last dot, or both joined by a dot, in any case
-/// of letters; X, Y, Z or a single channel of any name then count as colour too.
+/// of letters; X, Y, Z or a single channel of any name then count as color too.
 ///
 /// # Errors
 /// If the file is damaged, incomplete or deep, or has no such layer.
-pub fn decode(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Problem> {
+pub fn decode(bytes: &[u8], layer: Option<&str>) -> Result<Picture, PictureErrorKind> {
     guarded(|| decode_unguarded(bytes, layer))
 }
 
 /// Turns the crate's panics into errors: it asserts in places where only a corrupt file can lead. Nothing of what
 /// it touched is used afterwards.
-pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, Problem>) -> Result<T, Problem> {
+pub(super) fn guarded<T>(
+    read: impl FnOnce() -> Result<T, PictureErrorKind>,
+) -> Result<T, PictureErrorKind> {
     let decoded = catch_unwind(AssertUnwindSafe(read));
     decoded.unwrap_or_else(|panic| {
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let message = words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("unknown");
-        Err(Problem::ExrPanic { message: message.to_owned() })
+        Err(PictureErrorKind::ExrPanic { message: message.to_owned() })
     })
 }
 
 /// Blocks decompressed together: enough for all cores, few enough to need little memory.
 const BATCH: usize = 32;
 
-fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Problem> {
+fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, PictureErrorKind> {
     if let Some(file) = LuminanceChroma::of(bytes).filter(|_| layer.is_none()) {
         return file.decode(bytes);
     }
@@ -96,7 +100,7 @@ pub(super) fn window(header: &Header) -> Option<DataWindow> {
 }
 
 /// How many texels the largest part has.
-pub(crate) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
+pub(crate) fn texels(bytes: &[u8]) -> Result<usize, PictureErrorKind> {
     guarded(|| {
         if let Some(file) = LuminanceChroma::of(bytes) {
             return file.texels();
@@ -107,11 +111,12 @@ pub(crate) fn texels(bytes: &[u8]) -> Result<usize, Problem> {
     })
 }
 
-pub(super) fn open(bytes: &[u8]) -> Result<Reader<Cursor<&[u8]>>, Problem> {
+pub(super) fn open(bytes: &[u8]) -> Result<Reader<Cursor<&[u8]>>, PictureErrorKind> {
     if bytes.is_empty() {
-        return Err(Problem::NoBytes);
+        return Err(PictureErrorKind::NoBytes);
     }
-    let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(Problem::Exr)?;
+    let reader =
+        Reader::read_from_buffered(Cursor::new(bytes), false).map_err(PictureErrorKind::Exr)?;
     for header in reader.headers() {
         check_promises(header, bytes.len() as u64)?;
     }
@@ -122,17 +127,17 @@ pub(super) fn open(bytes: &[u8]) -> Result<Reader<Cursor<&[u8]>>, Problem> {
 pub(super) fn for_each_block(
     reader: Reader<Cursor<&[u8]>>,
     part: usize,
-    mut each: impl FnMut(&UncompressedBlock) -> Result<(), Problem>,
-) -> Result<(), Problem> {
+    mut each: impl FnMut(&UncompressedBlock) -> Result<(), PictureErrorKind>,
+) -> Result<(), PictureErrorKind> {
     let mut chunks = reader
         .filter_chunks(false, |_, tile, block| {
             block.layer == part && tile.is_largest_resolution_level()
         })
-        .map_err(Problem::Exr)?;
+        .map_err(PictureErrorKind::Exr)?;
     let meta = chunks.meta_data().clone();
     loop {
         let batch: Vec<Chunk> =
-            chunks.by_ref().take(BATCH).collect::<Result<_, _>>().map_err(Problem::Exr)?;
+            chunks.by_ref().take(BATCH).collect::<Result<_, _>>().map_err(PictureErrorKind::Exr)?;
         if batch.is_empty() {
             return Ok(());
         }
@@ -142,10 +147,13 @@ pub(super) fn for_each_block(
     }
 }
 
-fn decompress(batch: Vec<Chunk>, meta: &MetaData) -> Result<Vec<UncompressedBlock>, Problem> {
+fn decompress(
+    batch: Vec<Chunk>,
+    meta: &MetaData,
+) -> Result<Vec<UncompressedBlock>, PictureErrorKind> {
     let blocks = batch.into_par_iter().map(|chunk| {
         check_dwa_sizes(&chunk, meta)?;
-        UncompressedBlock::decompress_chunk(chunk, meta, false).map_err(Problem::Exr)
+        UncompressedBlock::decompress_chunk(chunk, meta, false).map_err(PictureErrorKind::Exr)
     });
     blocks.collect()
 }
@@ -155,7 +163,7 @@ fn decompress(batch: Vec<Chunk>, meta: &MetaData) -> Result<Vec<UncompressedBloc
 /// The crate takes memory for the promised sizes, and the process dies where there is not so much. The header is 11
 /// little-endian numbers of 8 bytes; those at 1, 6, 7, 8 and 9 are sizes after decompression, none of which is more
 /// than 8 bytes for each sample, padded to whole 8 × 8 blocks.
-fn check_dwa_sizes(chunk: &Chunk, meta: &MetaData) -> Result<(), Problem> {
+fn check_dwa_sizes(chunk: &Chunk, meta: &MetaData) -> Result<(), PictureErrorKind> {
     let Some(header) = meta.headers.get(chunk.layer_index) else { return Ok(()) };
     let data = match &chunk.compressed_block {
         CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
@@ -168,7 +176,7 @@ fn check_dwa_sizes(chunk: &Chunk, meta: &MetaData) -> Result<(), Problem> {
     let place = header
         .get_block_data_indices(&chunk.compressed_block)
         .and_then(|tile| header.get_absolute_block_pixel_coordinates(tile))
-        .map_err(Problem::Exr)?;
+        .map_err(PictureErrorKind::Exr)?;
     let (width, height) = (place.size.0, place.size.1);
     // A block that would not shrink is stored as it is.
     if data.len() == width * height * header.channels.bytes_per_pixel {
@@ -179,7 +187,7 @@ fn check_dwa_sizes(chunk: &Chunk, meta: &MetaData) -> Result<(), Problem> {
     let greatest = [1, 6, 7, 8, 9].into_iter().filter_map(promise).max().unwrap_or(0);
     if greatest > most {
         let held = data.len() as u64;
-        return Err(Problem::Promises { width, height, needed: greatest, held });
+        return Err(PictureErrorKind::Promises { width, height, needed: greatest, held });
     }
     Ok(())
 }
@@ -197,7 +205,7 @@ pub(super) fn primaries(c: &Chromaticities) -> Primaries {
 /// Each block of the largest level has its offset (8 bytes), its place and size (8 at least) and its data in the file.
 /// A byte of data makes at most 1 byte without compression, 64 of RLE and 1032 of deflate (1376 of PXR24). PIZ, B44A
 /// and DWA have no useful bound on what a block can be made from; 65536 lets a black map of any size through.
-fn check_promises(header: &Header, held: u64) -> Result<(), Problem> {
+fn check_promises(header: &Header, held: u64) -> Result<(), PictureErrorKind> {
     let (width, height) = (header.layer_size.0, header.layer_size.1);
     checked_area(width, height)?;
     let block = header.max_block_pixel_size();
@@ -226,7 +234,7 @@ fn check_promises(header: &Header, held: u64) -> Result<(), Problem> {
         BlockDescription::ScanLines => 0,
     };
     if held < needed || tile_area > MAX_TEXELS as u64 {
-        return Err(Problem::Promises { width, height, needed, held });
+        return Err(PictureErrorKind::Promises { width, height, needed, held });
     }
     Ok(())
 }
@@ -236,7 +244,7 @@ struct Selected {
     header: usize,
     /// Indices into the part's channels of red, green, blue and, if there is one, alpha.
     channels: [Option<usize>; 4],
-    /// Red, green and blue, not a grey or something else by its own name.
+    /// Red, green and blue, not a gray or something else by its own name.
     is_color: bool,
 }
 
@@ -321,15 +329,15 @@ impl Candidate {
     }
 }
 
-fn select(headers: &[Header], layer: Option<&str>) -> Result<Selected, Problem> {
+fn select(headers: &[Header], layer: Option<&str>) -> Result<Selected, PictureErrorKind> {
     if headers.iter().all(|header| header.deep) {
-        return Err(Problem::ExrUnsupported("deep pictures"));
+        return Err(PictureErrorKind::ExrUnsupported("deep pictures"));
     }
     let all = candidates(headers);
     let selected = if let Some(asked) = layer {
         let mut called = all.iter().filter(|candidate| candidate.is_called(asked));
         let found = called.find_map(|c| c.rgb().or_else(|| c.anything()).or_else(|| c.luminance()));
-        found.ok_or_else(|| Problem::NoSuchLayer {
+        found.ok_or_else(|| PictureErrorKind::NoSuchLayer {
             asked: asked.to_owned(),
             present: all.iter().map(Candidate::full_name).filter(|name| !name.is_empty()).collect(),
         })?
@@ -346,19 +354,21 @@ fn select(headers: &[Header], layer: Option<&str>) -> Result<Selected, Problem> 
     let list = &headers[selected.header].channels.list;
     let full = |index: usize| (list[index].sampling.0, list[index].sampling.1) == (1, 1);
     if list.iter().enumerate().any(|(index, _)| !full(index)) {
-        return Err(Problem::ExrUnsupported("subsampled channels"));
+        return Err(PictureErrorKind::ExrUnsupported("subsampled channels"));
     }
     Ok(selected)
 }
 
-fn no_color(headers: &[Header], all: &[Candidate]) -> Problem {
+fn no_color(headers: &[Header], all: &[Candidate]) -> PictureErrorKind {
     if all.iter().any(|c| c.channel("RY").is_some()) {
-        return Problem::ExrUnsupported(
+        return PictureErrorKind::ExrUnsupported(
             "tiles, parts or layers of luminance and chroma (Y, RY, BY)",
         );
     }
     let channels = headers.iter().flat_map(|header| &header.channels.list);
-    Problem::NoColor { present: channels.map(|channel| channel.name.to_string()).collect() }
+    PictureErrorKind::NoColor {
+        present: channels.map(|channel| channel.name.to_string()).collect(),
+    }
 }
 
 /// The picture while its blocks arrive.
@@ -371,14 +381,18 @@ struct Planes {
 }
 
 impl Planes {
-    fn new(header: &Header, channels: [Option<usize>; 4]) -> Result<Self, Problem> {
+    fn new(header: &Header, channels: [Option<usize>; 4]) -> Result<Self, PictureErrorKind> {
         let (width, height) = (header.layer_size.0, header.layer_size.1);
         let pixels = allocate(Rgb::BLACK, width, height)?;
         let alpha = channels[3].map(|_| allocate(0.0, width, height)).transpose()?;
         Ok(Self { width, height, pixels, alpha, channels })
     }
 
-    fn insert(&mut self, header: &Header, block: &UncompressedBlock) -> Result<(), Problem> {
+    fn insert(
+        &mut self,
+        header: &Header,
+        block: &UncompressedBlock,
+    ) -> Result<(), PictureErrorKind> {
         let (mut halves, mut values) = (Vec::new(), Vec::new());
         for line in block.lines(&header.channels) {
             let place = line.location;
@@ -390,7 +404,8 @@ impl Planes {
             }
             values.resize(place.sample_count, 0.0);
             let sample_type = header.channels.list[place.channel].sample_type;
-            to_floats(line, sample_type, &mut halves, &mut values).map_err(Problem::Exr)?;
+            to_floats(line, sample_type, &mut halves, &mut values)
+                .map_err(PictureErrorKind::Exr)?;
             let start = place.position.1 * self.width + place.position.0;
             self.put(place.channel, start, &values);
         }
@@ -415,7 +430,7 @@ impl Planes {
         let mut pixels = self.pixels;
         if let Some(matrix) = matrix {
             for pixel in &mut pixels {
-                // A colour outside Rec. 709 is clipped; a negative value of the file is kept to be seen.
+                // A color outside Rec. 709 is clipped; a negative value of the file is kept to be seen.
                 let valid = pixel.min_component() >= 0.0;
                 *pixel = transform(&matrix, *pixel);
                 if valid {

@@ -3,7 +3,7 @@
 use super::read::{for_each_block, guarded, open};
 use super::write::string_attributes;
 use super::{Compression, ExrLayers, Layer, Plane};
-use crate::picture::{Problem, allocate};
+use crate::picture::{PictureErrorKind, allocate};
 use ::exr::block::lines::LineRef;
 use ::exr::meta::attribute::EnvironmentMap;
 use ::exr::prelude::SampleType;
@@ -16,23 +16,23 @@ impl ExrLayers {
     /// # Errors
     /// If the file is damaged or incomplete, or has channels that [`ExrLayers::encode`] does not write: half floats,
     /// subsampled or deep ones.
-    pub fn decode(bytes: &[u8]) -> Result<Self, Problem> {
+    pub fn decode(bytes: &[u8]) -> Result<Self, PictureErrorKind> {
         guarded(|| decode_unguarded(bytes))
     }
 }
 
-fn decode_unguarded(bytes: &[u8]) -> Result<ExrLayers, Problem> {
+fn decode_unguarded(bytes: &[u8]) -> Result<ExrLayers, PictureErrorKind> {
     let reader = open(bytes)?;
     let header = reader.headers()[0].clone();
     let (width, height) = (header.layer_size.0, header.layer_size.1);
     let whole = header.shared_attributes.display_window.size;
     let corner = header.own_attributes.layer_position;
     let (Ok(x), Ok(y)) = (usize::try_from(corner.0), usize::try_from(corner.1)) else {
-        return Err(Problem::ExrUnsupported("a data window with a negative corner"));
+        return Err(PictureErrorKind::ExrUnsupported("a data window with a negative corner"));
     };
     let list = &header.channels.list;
     if header.deep || list.iter().any(|c| (c.sampling.0, c.sampling.1) != (1, 1)) {
-        return Err(Problem::ExrUnsupported("deep or subsampled channels"));
+        return Err(PictureErrorKind::ExrUnsupported("deep or subsampled channels"));
     }
     let mut planes: Vec<Plane> = Vec::new();
     for_each_block(reader, 0, |block| {
@@ -74,18 +74,20 @@ fn decode_unguarded(bytes: &[u8]) -> Result<ExrLayers, Problem> {
 }
 
 /// Zeros; memory is taken when the first block has turned out to be whole.
-fn empty(kind: SampleType, width: usize, height: usize) -> Result<Plane, Problem> {
+fn empty(kind: SampleType, width: usize, height: usize) -> Result<Plane, PictureErrorKind> {
     match kind {
         SampleType::F32 => allocate(0.0, width, height).map(Plane::Float),
         SampleType::U32 => allocate(0, width, height).map(Plane::Uint),
-        SampleType::F16 => Err(Problem::ExrUnsupported("half floats where 32 bits are needed")),
+        SampleType::F16 => {
+            Err(PictureErrorKind::ExrUnsupported("half floats where 32 bits are needed"))
+        }
     }
 }
 
 impl Plane {
-    fn put(&mut self, start: usize, line: LineRef<'_>) -> Result<(), Problem> {
+    fn put(&mut self, start: usize, line: LineRef<'_>) -> Result<(), PictureErrorKind> {
         let range = start..start + line.location.sample_count;
-        let outside = Problem::ExrUnsupported("a block outside the data window");
+        let outside = PictureErrorKind::ExrUnsupported("a block outside the data window");
         match self {
             Self::Float(values) => {
                 line.read_samples_into_slice(values.get_mut(range).ok_or(outside)?)
@@ -94,6 +96,6 @@ impl Plane {
                 line.read_samples_into_slice(values.get_mut(range).ok_or(outside)?)
             }
         }
-        .map_err(Problem::Exr)
+        .map_err(PictureErrorKind::Exr)
     }
 }

@@ -4,7 +4,7 @@
 //! rejected because Blender and older viewers see only the first.
 
 use crate::environment::mapping::EnvmapKind;
-use crate::picture::{Problem, checked_area};
+use crate::picture::{PictureErrorKind, checked_area};
 use crate::{Rgb, RgbImage};
 use ::exr::block;
 use ::exr::meta::attribute::EnvironmentMap;
@@ -134,14 +134,14 @@ impl ExrLayers {
     /// # Errors
     /// If there are no texels or no channels, two channels have one name, a name is not ASCII or too long, or a
     /// channel has not `width · height` values.
-    pub fn encode(&self) -> Result<Vec<u8>, Problem> {
+    pub fn encode(&self) -> Result<Vec<u8>, PictureErrorKind> {
         let mut bytes = Cursor::new(Vec::new());
-        bands::write(self.height, &mut bytes, |_| Ok::<_, Problem>(self))?;
+        bands::write(self.height, &mut bytes, |_| Ok::<_, PictureErrorKind>(self))?;
         Ok(bytes.into_inner())
     }
 
     /// The channels by their full names, in the order of a file: by name.
-    pub(super) fn sorted_planes(&self) -> Result<Vec<(String, &Plane)>, Problem> {
+    pub(super) fn sorted_planes(&self) -> Result<Vec<(String, &Plane)>, PictureErrorKind> {
         let area = checked_area(self.width, self.height)?;
         let full_name = |(layer, channel, values): (&str, &String, _)| {
             let name =
@@ -150,7 +150,8 @@ impl ExrLayers {
         };
         let mut planes: Vec<(String, &Plane)> = self.planes().map(full_name).collect();
         planes.sort_by(|a, b| a.0.cmp(&b.0));
-        let refuse = |channel: &str, why| Err(Problem::Channel { channel: channel.into(), why });
+        let refuse =
+            |channel: &str, why| Err(PictureErrorKind::Channel { channel: channel.into(), why });
         for (name, values) in &planes {
             if !name.is_ascii() || name.is_empty() || name.len() > 255 {
                 return refuse(name, "its name must be ASCII and 1 to 255 characters long");
@@ -162,7 +163,7 @@ impl ExrLayers {
             return refuse(&pair[0].0, "another channel has the same name");
         }
         if planes.is_empty() {
-            return Err(Problem::NoColor { present: Vec::new() });
+            return Err(PictureErrorKind::NoColor { present: Vec::new() });
         }
         Ok(planes)
     }
@@ -226,8 +227,8 @@ fn split_attribute(header: &[u8]) -> Option<(&[u8], &[u8])> {
 ///
 /// # Errors
 /// If the file's headers are damaged.
-pub fn text_attributes(bytes: &[u8]) -> Result<Vec<(String, String)>, Problem> {
-    let reader = block::read(Cursor::new(bytes), false).map_err(Problem::Exr)?;
+pub fn text_attributes(bytes: &[u8]) -> Result<Vec<(String, String)>, PictureErrorKind> {
+    let reader = block::read(Cursor::new(bytes), false).map_err(PictureErrorKind::Exr)?;
     Ok(reader.headers().first().map(string_attributes).unwrap_or_default())
 }
 

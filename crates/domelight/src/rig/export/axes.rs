@@ -11,7 +11,7 @@ use crate::math::Mat3;
 pub(super) struct Axes {
     /// From the rig's world to the target's.
     pub(super) world: Mat3,
-    /// From the dome map's own frame (+Y up, the centre column toward −Z) to the target's world.
+    /// From the dome map's own frame (+Y up, the center column toward −Z) to the target's world.
     pub(super) dome: Mat3,
 }
 

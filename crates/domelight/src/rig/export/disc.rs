@@ -30,7 +30,7 @@ pub(super) fn solid_angle(radius: f32) -> f32 {
     4.0 * std::f32::consts::PI * (0.5 * radius).sin().powi(2)
 }
 
-/// A colour whose greatest channel is 1 and the factor that restores the light; white and 0 for
+/// A color whose greatest channel is 1 and the factor that restores the light; white and 0 for
 /// none.
 pub(super) fn color_and_strength(light: Rgb) -> (Rgb, f32) {
     match light.max_component() {
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn colour_times_strength_is_the_light() {
+    fn color_times_strength_is_the_light() {
         let (color, strength) = color_and_strength(Rgb::new(2.0, 8.0, 0.0));
         assert_eq!((color, strength), (Rgb::new(0.25, 1.0, 0.0), 8.0));
         assert_eq!(color_and_strength(Rgb::BLACK), (Rgb::WHITE, 0.0));

@@ -1,7 +1,7 @@
 //! glTF 2.0, as text with its data within (`.gltf`) and binary (`.glb`).
 //!
 //! A light is a node with a directional light of `KHR_lights_punctual`: it shines along the node's
-//! −Z, colour times intensity is the irradiance of a surface that faces it. glTF's unit is lux; the
+//! −Z, color times intensity is the irradiance of a surface that faces it. glTF's unit is lux; the
 //! number is the probe's own, in W·m⁻² where its radiance is in W·m⁻²·sr⁻¹. It has no size. +Y is
 //! up.
 //!

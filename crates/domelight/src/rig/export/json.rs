@@ -120,7 +120,7 @@ mod tests {
             assert!(refused(|json| json["version"] = 2.into()));
             assert!(refused(|json| json["lights"][0]["share"] = 1.5.into()));
             assert!(refused(|json| json["lights"][0]["irradiance"][1] = (-1.0).into()));
-            assert!(refused(|json| json["lights"][1]["colour"] = "red".into()));
+            assert!(refused(|json| json["lights"][1]["color"] = "red".into()));
             assert!(refused(|json| json["orientation"]["up"] = "x".into()));
             assert!(refused(|json| drop(json.as_object_mut().unwrap().remove("dome"))));
         });

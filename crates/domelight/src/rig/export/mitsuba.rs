@@ -3,7 +3,7 @@
 //!
 //! A light is a `directional` emitter: `irradiance` is that of a surface that faces it \[W·m⁻²\],
 //! `direction` is the way that light travels, away from the light. It has no size. The dome is an
-//! `envmap`, whose centre column looks toward +Z where ours looks toward −Z, so its `to_world` has
+//! `envmap`, whose center column looks toward +Z where ours looks toward −Z, so its `to_world` has
 //! half a turn about +Y. Axes are those of the rig's world.
 
 use std::f32::consts::PI;

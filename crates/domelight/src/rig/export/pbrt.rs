@@ -82,7 +82,7 @@ mod tests {
         });
     }
 
-    /// pbrt-v4, `EqualAreaSquareToSphere`: the centre is +z, the middle of the right edge +x and
+    /// pbrt-v4, `EqualAreaSquareToSphere`: the center is +z, the middle of the right edge +x and
     /// the middle of the lower edge (larger v) +y.
     #[test]
     fn the_octahedral_picture_is_where_pbrt_sees_it() {

@@ -1,8 +1,8 @@
 //! An sIBL set (`.ibl`) of HDR Labs: a file of sections that names a panorama and its lights.
 //!
 //! `u` and `v` are the light's place in the panorama, from its left and top in [0, 1]; the picture
-//! decides where that is in the world. Colours are 0 … 255 with a multiplier: in sIBL's programs a
-//! light of multiplier 1 makes a white matt surface that faces it as bright as white in the
+//! decides where that is in the world. Colors are 0 … 255 with a multiplier: in sIBL's programs a
+//! light of multiplier 1 makes a white matte surface that faces it as bright as white in the
 //! panorama, so the multiplier is irradiance over π. The first light is `[Sun]`; the others are
 //! `[Light1]`, …, which older loaders pass over. Lights have no size. (`[Enviroment]` is spelt so.)
 //!

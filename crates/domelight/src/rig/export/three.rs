@@ -1,8 +1,8 @@
 //! A three.js module: `addLights(scene)` puts the lights into a scene.
 //!
-//! A light is a `DirectionalLight`: colour times intensity is the irradiance of a surface that
+//! A light is a `DirectionalLight`: color times intensity is the irradiance of a surface that
 //! faces it \[W·m⁻²\]; it shines from its position to its target. It has no size. The dome is a
-//! `LightProbe` of nine harmonics of radiance, whose order and signs are ours; it lights matt
+//! `LightProbe` of nine harmonics of radiance, whose order and signs are ours; it lights matte
 //! surfaces. `setDome(scene, texture)` lights by a picture of the dome instead, reflections
 //! included, whose middle three.js expects at +X where ours is at −Z. +Y is up.
 
@@ -55,7 +55,7 @@ pub(super) fn encode(rig: &RigExport) -> Code<JavaScript> {
         "// The lights of {probe}, by domelight.\n\
          // import {{ addLights }} from \"./rig.js\"; addLights(scene);\n\
          import * as THREE from \"three\";\n\n\
-         // Toward the light; linear colour times intensity is irradiance.\n\
+         // Toward the light; linear color times intensity is irradiance.\n\
          export const lights = [\n",
         probe = javascript::comment(rig.probe)
     );
@@ -101,7 +101,7 @@ mod tests {
     use crate::rig::SphericalHarmonics;
 
     #[test]
-    fn lights_have_colour_times_intensity() {
+    fn lights_have_color_times_intensity() {
         with_example(|rig| {
             let text = encode(rig).into_string();
             let sun = r#"{ name: "sun", direction: [0, 0.6, -0.8], color: [1, 0.033333335, 0], intensity: 3 },"#;

@@ -2,7 +2,7 @@
 //!
 //! A light is a `DistantLight`: it shines along its −Z, which a rotation turns away from the
 //! light's direction; `inputs:angle` is the full angle of its disc \[degrees\], and with
-//! `inputs:normalize` intensity times colour is what a surface that faces it receives \[W·m⁻²\],
+//! `inputs:normalize` intensity times color is what a surface that faces it receives \[W·m⁻²\],
 //! whatever the angle. The dome is a `DomeLight` of intensity 1, whose panorama's middle looks
 //! toward +Z where ours looks toward −Z, so it has half a turn about +Y, and its pole is +Y even on
 //! a Z-up stage. Axes are those of the rig's world, its up axis the stage's.

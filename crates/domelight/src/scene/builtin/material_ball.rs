@@ -7,7 +7,7 @@ use super::shapes::{arc, lathe, uv_sphere};
 use crate::geometry::Mesh;
 use crate::math::{FRAC_PI_2, Mat4, PI, Vec2, Vec3, vec2};
 
-/// Height of the ball's centre above the floor; its radius is 1.
+/// Height of the ball's center above the floor; its radius is 1.
 pub const CENTER_HEIGHT: f32 = 1.14;
 
 /// Half the width of the girdle.
@@ -57,7 +57,7 @@ pub fn cradle() -> Mesh {
 
 /// A rounded edge between the sphere and the girdle.
 struct Lip {
-    /// Centre of the edge's arc.
+    /// Center of the edge's arc.
     center: Vec2,
     /// Where the arc leaves the sphere \[rad above the equator\].
     angle: f32,

@@ -12,7 +12,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::camera::{CameraSettings, Projection};
-use super::surface::{MetallicRoughnessSurface, Surface, SurfaceModel};
+use super::material::{Material, MaterialModel, MetallicRoughnessMaterial};
 use super::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription, UpAxis};
 use crate::Rgb;
 use crate::geometry::Mesh;
@@ -22,7 +22,7 @@ use crate::math::{Mat4, Vec3, vec3};
 const SPHERES: usize = 7;
 /// Radius of each.
 const SPHERE_RADIUS: f32 = 0.5;
-/// Distance between their centres.
+/// Distance between their centers.
 const SPHERE_SPACING: f32 = 1.12;
 /// Roughness of the first; the last has 1.
 const LEAST_ROUGHNESS: f32 = 0.1;
@@ -153,7 +153,7 @@ fn statue_scene() -> SceneDescription {
     let mut figure = statue::figure();
     figure.transform(&Mat4::from_translation(statue::PLINTH_HEIGHT * Vec3::Y));
     let marble = glossy("marble", Rgb::new(0.76, 0.71, 0.64), 0.0, 0.42);
-    let stone = Surface::diffuse("stone", Rgb::new(0.33, 0.31, 0.29));
+    let stone = Material::diffuse("stone", Rgb::new(0.33, 0.31, 0.29));
     scene(
         camera(26.0, vec3(7.2, 2.35, -2.6), vec3(0.0, 1.56, 0.0)),
         [("figure", figure, marble), ("plinth", statue::plinth(), stone), floor()],
@@ -180,7 +180,7 @@ fn spheres_scene() -> SceneDescription {
 fn material_ball_scene() -> SceneDescription {
     let glaze = glossy("glaze", Rgb::new(0.62, 0.15, 0.07), 0.0, 0.25);
     let steel = glossy("steel", Rgb::new(0.60, 0.58, 0.55), 1.0, 0.35);
-    let stone = Surface::diffuse("stone", Rgb::new(0.30, 0.30, 0.30));
+    let stone = Material::diffuse("stone", Rgb::new(0.30, 0.30, 0.30));
     scene(
         camera(28.0, vec3(0.0, 3.0, 5.6), vec3(0.0, 1.02, 0.0)),
         [
@@ -193,32 +193,32 @@ fn material_ball_scene() -> SceneDescription {
 }
 
 fn sphere_scene(camera: CameraSettings) -> SceneDescription {
-    let white = Surface::diffuse("white", Rgb::splat(0.8));
+    let white = Material::diffuse("white", Rgb::splat(0.8));
     scene(camera, [("sphere", shapes::icosphere(5), white)])
 }
 
-/// A wide grey disc at y = 0.
-fn floor() -> (&'static str, Mesh, Surface) {
-    let grey = Surface::diffuse("floor", Rgb::new(0.42, 0.41, 0.40));
-    ("floor", shapes::disc(FLOOR_RADIUS, 96), grey)
+/// A wide gray disc at y = 0.
+fn floor() -> (&'static str, Mesh, Material) {
+    let gray = Material::diffuse("floor", Rgb::new(0.42, 0.41, 0.40));
+    ("floor", shapes::disc(FLOOR_RADIUS, 96), gray)
 }
 
 fn scene(
     camera: CameraSettings,
-    things: impl IntoIterator<Item = (&'static str, Mesh, Surface)>,
+    things: impl IntoIterator<Item = (&'static str, Mesh, Material)>,
 ) -> SceneDescription {
     let mut description = SceneDescription {
         camera: Some(camera),
         up: Some(UpAxis::Y),
         ..SceneDescription::default()
     };
-    for (name, mesh, surface) in things {
+    for (name, mesh, material) in things {
         if SCENERY.contains(&name) {
             description.scenery.push(description.parts.len());
         }
-        let part = Part { name: name.to_owned(), mesh, surface: description.surfaces.len() };
+        let part = Part { name: name.to_owned(), mesh, material: description.materials.len() };
         description.parts.push(part);
-        description.surfaces.push(surface);
+        description.materials.push(material);
     }
     description
 }
@@ -228,15 +228,15 @@ fn camera(fov_y_degrees: f32, origin: Vec3, target: Vec3) -> CameraSettings {
     CameraSettings { projection, origin, target, up: Vec3::Y }
 }
 
-fn glossy(name: &str, base_color: Rgb, metallic: f32, roughness: f32) -> Surface {
-    let model = MetallicRoughnessSurface {
+fn glossy(name: &str, base_color: Rgb, metallic: f32, roughness: f32) -> Material {
+    let model = MetallicRoughnessMaterial {
         base_color,
         base_color_texture: None,
         metallic,
         roughness,
         metallic_roughness_texture: None,
     };
-    Surface::new(name, SurfaceModel::MetallicRoughness(model))
+    Material::new(name, MaterialModel::MetallicRoughness(model))
 }
 
 #[cfg(test)]

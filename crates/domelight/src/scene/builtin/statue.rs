@@ -4,7 +4,7 @@
 //! shade one another, with ridges fine enough to show noise and broad enough not to alias at 512².
 //! An implicit surface (smooth unions and differences of ellipsoids in a twisted space, Hart 1996,
 //! "Sphere Tracing"; the ellipsoid's distance and the smooth minimum after Quilez) was chosen over
-//! a scanned mesh: no licence, no file, any resolution.
+//! a scanned mesh: no license, no file, any resolution.
 
 use super::shapes::{arc, lathe};
 use super::surface_nets::surface_nets;

@@ -51,7 +51,7 @@ impl Grid {
         let size = bounds.size().to_array().map(count);
         let values = vec![0.0; size.iter().product()];
         let mut grid = Self { origin: bounds.min, cell, size, values, active: Vec::new() };
-        // Samples of a block whose centre is farther from the surface have no crossed edge.
+        // Samples of a block whose center is farther from the surface have no crossed edge.
         let reach = lipschitz * cell * (3f32.sqrt() * 0.5 * (BLOCK - 1) as f32 + 1.0);
         for block in points(size.map(|n| n / BLOCK)) {
             let first = block.map(|i| i * BLOCK);

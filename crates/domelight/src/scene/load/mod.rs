@@ -2,10 +2,10 @@
 //!
 //! | format | geometry | materials | camera |
 //! |---|---|---|---|
-//! | PLY | yes, with triangle strips | colours of vertices and faces | no |
+//! | PLY | yes, with triangle strips | colors of vertices and faces | no |
 //! | OBJ + MTL | yes | `Kd Ks Ns Pr Pm map_Kd`, normal maps | no |
 //! | STL | ASCII and binary | no | no |
-//! | OFF | also COFF, NOFF, STOFF, 4OFF | colours of vertices and faces | no |
+//! | OFF | also COFF, NOFF, STOFF, 4OFF | colors of vertices and faces | no |
 //! | glTF, GLB | triangles, skins, morph targets | all of the standard's extensions as data | all |
 //! | TOML | the above and built-in meshes | by text or table | yes |
 //!
@@ -33,12 +33,12 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use self::gltf::{GltfProblem, Ktx2Error, MeshoptError};
-pub use obj::ObjProblem;
-pub use off::OffProblem;
-pub use ply::{PlyPlace, PlyProblem};
-pub use stl::StlProblem;
-pub use toml::TomlProblem;
+pub use self::gltf::{GltfErrorKind, Ktx2Error, MeshoptError};
+pub use obj::ObjErrorKind;
+pub use off::OffErrorKind;
+pub use ply::{PlyErrorKind, PlyPlace};
+pub use stl::StlErrorKind;
+pub use toml::TomlErrorKind;
 
 use super::SceneDescription;
 use crate::memory::OverLimit;
@@ -164,60 +164,60 @@ pub enum LoadError {
         path: PathBuf,
     },
     /// A broken PLY file.
-    #[error("{}, {place}: {problem}", path.display())]
+    #[error("{}, {place}: {kind}", path.display())]
     Ply {
         /// The file.
         path: PathBuf,
         /// Where in it.
         place: PlyPlace,
         /// What is wrong.
-        problem: Box<PlyProblem>,
+        kind: Box<PlyErrorKind>,
     },
     /// A broken OBJ or MTL file.
-    #[error("{}, line {line}: {problem}", path.display())]
+    #[error("{}, line {line}: {kind}", path.display())]
     Obj {
         /// The file.
         path: PathBuf,
         /// Its line, from 1.
         line: usize,
         /// What is wrong.
-        problem: ObjProblem,
+        kind: ObjErrorKind,
     },
     /// A broken OFF file.
-    #[error("{}, line {line}: {problem}", path.display())]
+    #[error("{}, line {line}: {kind}", path.display())]
     Off {
         /// The file.
         path: PathBuf,
         /// Its line, from 1.
         line: usize,
         /// What is wrong.
-        problem: OffProblem,
+        kind: OffErrorKind,
     },
     /// A broken STL file.
-    #[error("{}: {problem}", path.display())]
+    #[error("{}: {kind}", path.display())]
     Stl {
         /// The file.
         path: PathBuf,
         /// What is wrong, and where.
-        problem: StlProblem,
+        kind: StlErrorKind,
     },
     /// A broken glTF file.
-    #[error("{}: {problem}", path.display())]
+    #[error("{}: {kind}", path.display())]
     Gltf {
         /// The file.
         path: PathBuf,
         /// What is wrong, and where.
-        problem: Box<GltfProblem>,
+        kind: Box<GltfErrorKind>,
     },
     /// A broken scene file.
-    #[error("{}{}: {problem}", path.display(), line.map(|l| format!(", line {l}")).unwrap_or_default())]
+    #[error("{}{}: {kind}", path.display(), line.map(|l| format!(", line {l}")).unwrap_or_default())]
     Toml {
         /// The file.
         path: PathBuf,
         /// Its line, from 1.
         line: Option<usize>,
         /// What is wrong.
-        problem: Box<TomlProblem>,
+        kind: Box<TomlErrorKind>,
     },
 }
 

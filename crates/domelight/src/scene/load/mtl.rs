@@ -1,7 +1,7 @@
 //! Wavefront MTL, the material libraries of OBJ files.
 //!
 //! `Kd`, `Ks`, `Ns` and `map_Kd` make Lambert with a Phong highlight; where `Pr` or `Pm` stands, the
-//! material is metallic-roughness with `Kd` as the base colour. `norm` is a normal map, and so is `map_Bump` or
+//! material is metallic-roughness with `Kd` as the base color. `norm` is a normal map, and so is `map_Bump` or
 //! `bump` where its picture looks like one, as most exporters write it. Of a texture's options `-s`, `-o`, `-bm` and
 //! `-clamp` count. Emission, opacity, heights, spectra and the other maps are passed over, and so is a texture whose
 //! file is missing, each kind with one warning.
@@ -9,14 +9,14 @@
 use std::path::Path;
 
 use super::notes::Notes;
-use super::obj::{ObjProblem, number, numbers};
+use super::obj::{ObjErrorKind, number, numbers};
 use super::textures::Textures;
 use super::{LoadError, lines};
 use crate::Rgb;
 use crate::math::{Vec2, vec2};
 use crate::scene::{
-    Encoding, MetallicRoughnessSurface, NormalMap, PhongSurface, Surface, SurfaceModel, TextureRef,
-    UvTransform, Wrap,
+    Encoding, Material, MaterialModel, MetallicRoughnessMaterial, NormalMap, PhongMaterial,
+    TextureRef, UvTransform, Wrap,
 };
 
 /// Whether the first statement is one of a material library.
@@ -73,14 +73,14 @@ pub(super) fn parse(
     bytes: &[u8],
     textures: &mut Textures<'_>,
     warnings: &mut Vec<String>,
-) -> Result<Vec<Surface>, LoadError> {
+) -> Result<Vec<Material>, LoadError> {
     let mut entries: Vec<Entry> = Vec::new();
     let mut notes = Notes::default();
     for (number, text) in lines(bytes) {
         let text = text.trim();
         let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
         let rest = rest.trim();
-        let at = |problem| LoadError::Obj { path: path.into(), line: number, problem };
+        let at = |kind| LoadError::Obj { path: path.into(), line: number, kind };
         if keyword.is_empty() || keyword.starts_with('#') {
             continue;
         }
@@ -89,7 +89,7 @@ pub(super) fn parse(
             continue;
         }
         let Some(entry) = entries.last_mut() else {
-            return Err(at(ObjProblem::NoMaterial { keyword: keyword.into() }));
+            return Err(at(ObjErrorKind::NoMaterial { keyword: keyword.into() }));
         };
         let name = entry.name.clone();
         let mut ignored = |what: &str| {
@@ -145,15 +145,15 @@ pub(super) fn parse(
         }
     }
     warnings.extend(notes.sentences());
-    Ok(entries.into_iter().map(Entry::surface).collect())
+    Ok(entries.into_iter().map(Entry::material).collect())
 }
 
 impl Entry {
-    fn surface(self) -> Surface {
+    fn material(self) -> Material {
         let default = if self.diffuse_texture.is_some() { 1.0 } else { 0.8 };
         let diffuse = self.diffuse.unwrap_or(Rgb::splat(default));
         let model = if self.roughness.is_some() || self.metallic.is_some() {
-            SurfaceModel::MetallicRoughness(MetallicRoughnessSurface {
+            MaterialModel::MetallicRoughness(MetallicRoughnessMaterial {
                 base_color: diffuse,
                 base_color_texture: self.diffuse_texture,
                 metallic: self.metallic.unwrap_or(0.0).clamp(0.0, 1.0),
@@ -161,14 +161,14 @@ impl Entry {
                 metallic_roughness_texture: None,
             })
         } else {
-            SurfaceModel::Phong(PhongSurface {
+            MaterialModel::Phong(PhongMaterial {
                 diffuse,
                 diffuse_texture: self.diffuse_texture,
                 specular: self.specular.unwrap_or(Rgb::BLACK),
                 exponent: self.exponent.unwrap_or(0.0).max(0.0),
             })
         };
-        Surface { normal_map: self.normal_map, ..Surface::new(self.name, model) }
+        Material { normal_map: self.normal_map, ..Material::new(self.name, model) }
     }
 }
 
@@ -176,13 +176,19 @@ fn normal_map((texture, scale): (TextureRef, f32)) -> NormalMap {
     NormalMap { texture, scale }
 }
 
-/// A colour in \[0, 1\]: three numbers, or one for all channels.
-fn rgb(keyword: &str, rest: &str) -> Result<Rgb, ObjProblem> {
+/// A color in \[0, 1\]: three numbers, or one for all channels.
+fn rgb(keyword: &str, rest: &str) -> Result<Rgb, ObjErrorKind> {
     let n = numbers(keyword, rest, 1)?;
     let color = match n[..] {
         [r, g, b, ..] => Rgb::new(r, g, b),
         [r] => Rgb::splat(r),
-        _ => return Err(ObjProblem::TooFew { keyword: keyword.into(), needed: 3, found: n.len() }),
+        _ => {
+            return Err(ObjErrorKind::TooFew {
+                keyword: keyword.into(),
+                needed: 3,
+                found: n.len(),
+            });
+        }
     };
     Ok(color.map(|c| c.max(0.0)))
 }
@@ -191,10 +197,13 @@ fn rgb(keyword: &str, rest: &str) -> Result<Rgb, ObjProblem> {
 ///
 /// The options scale and move coordinates with v upward: v' = s v + o. In coordinates w = 1 − v that
 /// is w' = s w + 1 − s − o.
-fn options<'a>(keyword: &str, mut rest: &'a str) -> Result<(&'a str, TextureRef, f32), ObjProblem> {
+fn options<'a>(
+    keyword: &str,
+    mut rest: &'a str,
+) -> Result<(&'a str, TextureRef, f32), ObjErrorKind> {
     let mut bump = 1.0;
     let (mut scale, mut offset, mut wrap) = (Vec2::ONE, Vec2::ZERO, Wrap::Repeat);
-    let no_name = || ObjProblem::Name { keyword: keyword.into() };
+    let no_name = || ObjErrorKind::Name { keyword: keyword.into() };
     while rest.starts_with('-') {
         let (option, after) = rest.split_once(char::is_whitespace).ok_or_else(no_name)?;
         rest = after.trim_start();

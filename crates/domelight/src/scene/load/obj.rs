@@ -1,6 +1,6 @@
 //! Wavefront OBJ.
 //!
-//! Read are `v` (with colours), `vt` (v upward), `vn`, `f` (polygons of any shape, relative
+//! Read are `v` (with colors), `vt` (v upward), `vn`, `f` (polygons of any shape, relative
 //! indices), `o`, `g`, `usemtl` and `mtllib` ([`super::mtl`]); lines, points, curves and smoothing
 //! groups are passed over. A line may go on after a backslash; text that is not UTF-8 is Latin-1.
 //! Every object or group and material makes a part of its own, wherever in the file its faces are.
@@ -21,11 +21,11 @@ use super::{Budget, LoadError, Loaded, lines, mtl, stem};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
-use crate::scene::{Part, SceneDescription, Surface};
+use crate::scene::{Material, Part, SceneDescription};
 
 /// What is wrong with a line of an OBJ or MTL file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ObjProblem {
+pub enum ObjErrorKind {
     /// Not enough numbers.
     #[error("{keyword} needs {needed} numbers, but there are only {found}")]
     TooFew {
@@ -126,10 +126,10 @@ struct Reader<'a> {
     label: Label,
     /// The group of `label`, once it has faces.
     group: Option<usize>,
-    surfaces: Vec<Surface>,
+    materials: Vec<Material>,
     /// Material libraries that were read.
     libraries: HashSet<PathBuf>,
-    surface_of: HashMap<String, usize>,
+    material_of: HashMap<String, usize>,
     textures: Textures<'a>,
     triangulator: Triangulator,
     /// The corners of the face that is read.
@@ -150,9 +150,9 @@ impl<'a> Reader<'a> {
             group_of: HashMap::new(),
             label: Label { name: stem(path), material: None },
             group: None,
-            surfaces: Vec::new(),
+            materials: Vec::new(),
             libraries: HashSet::new(),
-            surface_of: HashMap::new(),
+            material_of: HashMap::new(),
             textures: Textures::new(budget),
             triangulator: Triangulator::default(),
             corners: Vec::new(),
@@ -165,7 +165,7 @@ impl<'a> Reader<'a> {
         let text = text.trim();
         let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
         let rest = rest.trim();
-        let at = |problem| LoadError::Obj { path: self.path.into(), line: number, problem };
+        let at = |kind| LoadError::Obj { path: self.path.into(), line: number, kind };
         match keyword {
             "v" => {
                 let numbers = numbers(keyword, rest, 3).map_err(at)?;
@@ -190,7 +190,7 @@ impl<'a> Reader<'a> {
                 self.group = None;
             }
             "mtllib" if rest.is_empty() => {
-                return Err(at(ObjProblem::Name { keyword: keyword.into() }));
+                return Err(at(ObjErrorKind::Name { keyword: keyword.into() }));
             }
             "mtllib" => self.library(number, rest)?,
             _ => {}
@@ -198,7 +198,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// A position, perhaps with a weight (which rendering ignores) or a colour after it.
+    /// A position, perhaps with a weight (which rendering ignores) or a color after it.
     fn vertex(&mut self, n: &[f32]) {
         if n.len() >= 6 {
             self.colors.resize(self.positions.len(), Rgb::WHITE);
@@ -207,30 +207,30 @@ impl<'a> Reader<'a> {
         self.positions.push(Vec3::new(n[0], n[1], n[2]));
     }
 
-    fn corner(&self, text: &str) -> Result<Corner, ObjProblem> {
+    fn corner(&self, text: &str) -> Result<Corner, ObjErrorKind> {
         let mut words = text.split('/');
         let mut index = |what, count| match words.next() {
             None | Some("") => Ok(None),
             Some(word) => {
-                let malformed = |_| ObjProblem::Corner { text: text.into() };
+                let malformed = |_| ObjErrorKind::Corner { text: text.into() };
                 resolve(word.parse().map_err(malformed)?, what, count).map(Some)
             }
         };
         let position = index("vertex (v)", self.positions.len())?;
         let uv = index("texture coordinate (vt)", self.uvs.len())?;
         let normal = index("normal (vn)", self.normals.len())?;
-        let position = position.ok_or_else(|| ObjProblem::Corner { text: text.into() })?;
+        let position = position.ok_or_else(|| ObjErrorKind::Corner { text: text.into() })?;
         Ok(Corner { position, uv, normal })
     }
 
-    fn face(&mut self, text: &str) -> Result<(), ObjProblem> {
+    fn face(&mut self, text: &str) -> Result<(), ObjErrorKind> {
         let mut corners = std::mem::take(&mut self.corners);
         corners.clear();
         for word in words(text) {
             corners.push(self.corner(word)?);
         }
         if corners.len() < 3 {
-            return Err(ObjProblem::Face { corners: corners.len() });
+            return Err(ObjErrorKind::Face { corners: corners.len() });
         }
         let position = |i: usize| self.positions[corners[i].position as usize];
         let triangles = self.triangulator.triangulate(corners.len(), position);
@@ -268,11 +268,11 @@ impl<'a> Reader<'a> {
             // What is no library is nobody's business.
             Ok(bytes) if !mtl::is_library(&bytes) => "it is no material library (MTL)".to_owned(),
             Ok(bytes) => {
-                for surface in mtl::parse(&path, &bytes, &mut self.textures, &mut self.warnings)? {
+                for material in mtl::parse(&path, &bytes, &mut self.textures, &mut self.warnings)? {
                     // Of two of a name, the first.
-                    let next = self.surfaces.len();
-                    self.surface_of.entry(surface.name.clone()).or_insert(next);
-                    self.surfaces.push(surface);
+                    let next = self.materials.len();
+                    self.material_of.entry(material.name.clone()).or_insert(next);
+                    self.materials.push(material);
                 }
                 return Ok(());
             }
@@ -292,14 +292,14 @@ impl<'a> Reader<'a> {
         let mut parts = Vec::new();
         for group in std::mem::take(&mut self.groups) {
             if !group.triangles.is_empty() {
-                let surface = self.surface(group.material.as_deref());
+                let material = self.material_index(group.material.as_deref());
                 let mesh = self.mesh(&group.triangles, &smooth);
-                parts.push(Part { name: group.name, mesh, surface });
+                parts.push(Part { name: group.name, mesh, material });
             }
         }
         let description = SceneDescription {
             parts,
-            surfaces: self.surfaces,
+            materials: self.materials,
             textures: self.textures.loaded,
             ..SceneDescription::default()
         };
@@ -307,25 +307,25 @@ impl<'a> Reader<'a> {
         Loaded { description, warnings: self.warnings, ..Loaded::default() }
     }
 
-    /// The surface of a name; all unknown ones are one grey.
-    fn surface(&mut self, name: Option<&str>) -> usize {
+    /// The surface of a name; all unknown ones are one gray.
+    fn material_index(&mut self, name: Option<&str>) -> usize {
         const DEFAULT: &str = "default";
-        let known = self.surface_of.get(name.unwrap_or(DEFAULT));
+        let known = self.material_of.get(name.unwrap_or(DEFAULT));
         if let Some(&index) = known {
             return index;
         }
         if let Some(name) = name {
-            let before = format!("{}: without definition and grey: material ", self.path.display());
+            let before = format!("{}: without definition and gray: material ", self.path.display());
             self.notes.add(&before, name, "");
         }
-        let grey = self.surface_of.get(DEFAULT).copied().unwrap_or_else(|| {
+        let gray = self.material_of.get(DEFAULT).copied().unwrap_or_else(|| {
             let albedo = if self.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
-            self.surfaces.push(Surface::diffuse(DEFAULT, albedo));
-            self.surfaces.len() - 1
+            self.materials.push(Material::diffuse(DEFAULT, albedo));
+            self.materials.len() - 1
         });
-        self.surface_of.insert(DEFAULT.into(), grey);
-        self.surface_of.insert(name.unwrap_or(DEFAULT).into(), grey);
-        grey
+        self.material_of.insert(DEFAULT.into(), gray);
+        self.material_of.insert(name.unwrap_or(DEFAULT).into(), gray);
+        gray
     }
 
     /// Smooth normals of all positions; empty if every corner brings its own.
@@ -380,12 +380,12 @@ pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
 }
 
 /// All numbers after a keyword, at least `needed`.
-pub(super) fn numbers(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjProblem> {
+pub(super) fn numbers(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjErrorKind> {
     enough(keyword, words(rest).map(number).collect::<Result<_, _>>()?, needed)
 }
 
 /// As [`numbers`]; what exporters write of NaN and infinities (`nan`, `-1.#IND`) is 0.
-fn numbers_or_nan(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjProblem> {
+fn numbers_or_nan(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjErrorKind> {
     // `nan`, `-nan(ind)`, `1.#QNAN`, `inf`, and what is too large for a number.
     let is_none = |word: &str| {
         let digits = word.trim_start_matches(['+', '-']).to_ascii_lowercase();
@@ -397,24 +397,24 @@ fn numbers_or_nan(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, 
     enough(keyword, words(rest).map(value).collect::<Result<_, _>>()?, needed)
 }
 
-fn enough(keyword: &str, numbers: Vec<f32>, needed: usize) -> Result<Vec<f32>, ObjProblem> {
+fn enough(keyword: &str, numbers: Vec<f32>, needed: usize) -> Result<Vec<f32>, ObjErrorKind> {
     if numbers.len() < needed {
         let found = numbers.len();
-        return Err(ObjProblem::TooFew { keyword: keyword.into(), needed, found });
+        return Err(ObjErrorKind::TooFew { keyword: keyword.into(), needed, found });
     }
     Ok(numbers)
 }
 
-pub(super) fn number(word: &str) -> Result<f32, ObjProblem> {
-    let not_a_number = || ObjProblem::NotANumber { text: word.chars().take(40).collect() };
+pub(super) fn number(word: &str) -> Result<f32, ObjErrorKind> {
+    let not_a_number = || ObjErrorKind::NotANumber { text: word.chars().take(40).collect() };
     word.parse().ok().filter(|v: &f32| v.is_finite()).ok_or_else(not_a_number)
 }
 
 /// An index of a file, from 1 or relative to the end, as one from 0.
-fn resolve(index: i64, what: &'static str, count: usize) -> Result<u32, ObjProblem> {
+fn resolve(index: i64, what: &'static str, count: usize) -> Result<u32, ObjErrorKind> {
     let resolved = if index < 0 { index.checked_add(count as i64) } else { index.checked_sub(1) };
     resolved
         .filter(|i| (0..count as i64).contains(i))
         .and_then(|i| u32::try_from(i).ok())
-        .ok_or(ObjProblem::Index { index, what, count })
+        .ok_or(ObjErrorKind::Index { index, what, count })
 }

@@ -3,7 +3,7 @@
 //! Read are the header words `OFF`, `COFF` (colors of vertices), `NOFF` (normals), `STOFF` (texture coordinates),
 //! `4OFF` (homogeneous coordinates) and their compounds, or none; the counts on the same line or even in the same
 //! word; comments after `#`; polygons of any shape; and of each face the color after its indices, of one number for
-//! grey, three or four. Colors are sRGB from 0 to 255 if all of a file's are whole numbers and some exceed 1, else
+//! gray, three or four. Colors are sRGB from 0 to 255 if all of a file's are whole numbers and some exceed 1, else
 //! linear from 0 to 1; opacity and indices into color maps are passed over. Vertices without normals get smooth ones.
 //!
 //! <http://www.geomview.org/docs/html/OFF.html>. Binary files and those of other dimensions are refused by name.
@@ -17,11 +17,11 @@ use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
 use crate::scene::texture::{Encoding, decode};
-use crate::scene::{Part, SceneDescription, Surface};
+use crate::scene::{Material, Part, SceneDescription};
 
 /// What is wrong with an OFF file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum OffProblem {
+pub enum OffErrorKind {
     /// A kind of OFF file that is not read.
     #[error("{kind} files are not read; write it as plain OFF or as PLY")]
     Unsupported {
@@ -62,7 +62,7 @@ pub enum OffProblem {
     },
 }
 
-type Located<T> = Result<T, (usize, OffProblem)>;
+type Located<T> = Result<T, (usize, OffErrorKind)>;
 
 /// Memory of a mesh for each byte of its text: a vertex is 6 bytes or more and takes 44, a triangle with a color 14 and
 /// takes up to 144.
@@ -77,12 +77,12 @@ pub(super) fn is_off(bytes: &[u8]) -> bool {
 
 pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
     budget.take(&path.display().to_string(), MEMORY_PER_BYTE * bytes.len() as u64)?;
-    let error = |(line, problem)| LoadError::Off { path: path.into(), line, problem };
+    let error = |(line, kind)| LoadError::Off { path: path.into(), line, kind };
     let mesh = read(bytes).map_err(error)?;
     let albedo = if mesh.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
     let description = SceneDescription {
-        parts: vec![Part { name: stem(path), mesh, surface: 0 }],
-        surfaces: vec![Surface::diffuse("default", albedo)],
+        parts: vec![Part { name: stem(path), mesh, material: 0 }],
+        materials: vec![Material::diffuse("default", albedo)],
         ..SceneDescription::default()
     };
     Ok(Loaded { description, ..Loaded::default() })
@@ -166,12 +166,12 @@ impl<'a> Words<'a> {
         }
     }
 
-    fn number(&mut self, ended: &impl Fn() -> OffProblem) -> Located<f32> {
+    fn number(&mut self, ended: &impl Fn() -> OffErrorKind) -> Located<f32> {
         let word = self.next().ok_or_else(|| (self.line, ended()))?;
-        number(word).map_err(|problem| (self.line, problem))
+        number(word).map_err(|kind| (self.line, kind))
     }
 
-    fn vector(&mut self, ended: &impl Fn() -> OffProblem) -> Located<Vec3> {
+    fn vector(&mut self, ended: &impl Fn() -> OffErrorKind) -> Located<Vec3> {
         Ok(Vec3::new(self.number(ended)?, self.number(ended)?, self.number(ended)?))
     }
 
@@ -181,9 +181,9 @@ impl<'a> Words<'a> {
     }
 }
 
-fn number(word: &str) -> Result<f32, OffProblem> {
+fn number(word: &str) -> Result<f32, OffErrorKind> {
     let value = word.parse().ok().filter(|v: &f32| v.is_finite());
-    value.ok_or_else(|| OffProblem::NotANumber { text: word.chars().take(40).collect() })
+    value.ok_or_else(|| OffErrorKind::NotANumber { text: word.chars().take(40).collect() })
 }
 
 fn read(bytes: &[u8]) -> Located<Mesh> {
@@ -193,16 +193,16 @@ fn read(bytes: &[u8]) -> Located<Mesh> {
     let mut mesh = Mesh::default();
     let mut colors = Colors::default();
     for found in 0..vertices {
-        let ended = || OffProblem::EndOfFile { what: "vertices", found, promised: vertices };
+        let ended = || OffErrorKind::EndOfFile { what: "vertices", found, promised: vertices };
         read_vertex(&mut words, kind, &mut mesh, &mut colors, &ended)?;
     }
     let mut polygons = Polygons::default();
     let mut face_colors = Colors::default();
     for found in 0..faces {
-        let ended = || OffProblem::EndOfFile { what: "faces", found, promised: faces };
+        let ended = || OffErrorKind::EndOfFile { what: "faces", found, promised: faces };
         read_face(&mut words, vertices, &mut polygons, &ended)?;
         let color = words.rest_of_line();
-        face_colors.add(&color).map_err(|problem| (words.line, problem))?;
+        face_colors.add(&color).map_err(|kind| (words.line, kind))?;
     }
     if kind.colors {
         mesh.colors = colors.linear().into_iter().map(|c| c.unwrap_or(Rgb::WHITE)).collect();
@@ -231,7 +231,7 @@ fn header(words: &mut Words, lines: usize) -> Located<(Kind, usize, usize)> {
         // Geomview takes a file without the word.
         None => (Kind::default(), first),
     };
-    let unsupported = |kind: &str| (line, OffProblem::Unsupported { kind: kind.into() });
+    let unsupported = |kind: &str| (line, OffErrorKind::Unsupported { kind: kind.into() });
     if count == "BINARY" {
         return Err(unsupported("binary OFF"));
     }
@@ -239,7 +239,7 @@ fn header(words: &mut Words, lines: usize) -> Located<(Kind, usize, usize)> {
         return Err(unsupported("nOFF"));
     }
     let parse = |text: &str, line: usize| {
-        let wrong = |_| (line, OffProblem::Counts { text: text.chars().take(40).collect() });
+        let wrong = |_| (line, OffErrorKind::Counts { text: text.chars().take(40).collect() });
         text.parse::<usize>().map_err(wrong)
     };
     let vertices = parse(count, line)?;
@@ -260,7 +260,7 @@ fn read_vertex(
     kind: Kind,
     mesh: &mut Mesh,
     colors: &mut Colors,
-    ended: &impl Fn() -> OffProblem,
+    ended: &impl Fn() -> OffErrorKind,
 ) -> Located<()> {
     let mut position = words.vector(ended)?;
     if kind.coordinates == Coordinates::Homogeneous {
@@ -268,7 +268,7 @@ fn read_vertex(
         position /= if w == 0.0 { 1.0 } else { w };
     }
     if !position.is_finite() {
-        return Err((words.line, OffProblem::NotANumber { text: position.to_string() }));
+        return Err((words.line, OffErrorKind::NotANumber { text: position.to_string() }));
     }
     mesh.positions.push(position);
     if kind.normals {
@@ -283,7 +283,7 @@ fn read_vertex(
         for _ in 0..n {
             color.push(words.next().ok_or_else(|| (words.line, ended()))?);
         }
-        colors.add(&color).map_err(|problem| (words.line, problem))?;
+        colors.add(&color).map_err(|kind| (words.line, kind))?;
     }
     if kind.uvs {
         mesh.uvs.push(Vec2::new(words.number(ended)?, 1.0 - words.number(ended)?));
@@ -297,16 +297,16 @@ fn read_face(
     words: &mut Words,
     vertices: usize,
     polygons: &mut Polygons,
-    ended: &impl Fn() -> OffProblem,
+    ended: &impl Fn() -> OffErrorKind,
 ) -> Located<()> {
     let short = |word: &str| word.chars().take(40).collect();
     let word = words.next().ok_or_else(|| (words.line, ended()))?;
-    let wrong = |_| (words.line, OffProblem::NotANumber { text: short(word) });
+    let wrong = |_| (words.line, OffErrorKind::NotANumber { text: short(word) });
     let n: usize = word.parse().map_err(wrong)?;
     for _ in 0..n {
         let word = words.next().ok_or_else(|| (words.line, ended()))?;
         let index = word.parse().ok().filter(|&i: &u32| (i as usize) < vertices);
-        let wrong = || (words.line, OffProblem::Index { text: short(word), vertices });
+        let wrong = || (words.line, OffErrorKind::Index { text: short(word), vertices });
         polygons.push(index.ok_or_else(wrong)?);
     }
     polygons.end();
@@ -323,7 +323,7 @@ struct Colors {
 
 impl Colors {
     /// One number is an index into a color map that nobody has, three or four are a color.
-    fn add(&mut self, words: &[&str]) -> Result<(), OffProblem> {
+    fn add(&mut self, words: &[&str]) -> Result<(), OffErrorKind> {
         if words.len() < 3 {
             self.values.push(None);
             return Ok(());

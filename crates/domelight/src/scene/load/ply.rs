@@ -2,7 +2,7 @@
 //!
 //! Read are, of the element `vertex`, the properties `x y z`, `nx ny nz`, texture coordinates
 //! (`s t`, `u v` or `texture_u texture_v`, v upward) and `red green blue` (integers: sRGB, floats:
-//! linear); of the element `face` the list `vertex_indices` or `vertex_index`, polygons of any shape, and colours as of
+//! linear); of the element `face` the list `vertex_indices` or `vertex_index`, polygons of any shape, and colors as of
 //! vertices, which count where vertices have none; of `tristrips` that list, a strip ending at −1. Elements and
 //! properties may stand in any order. All else is passed over. A file without normals gets smooth ones.
 //!
@@ -17,7 +17,7 @@ use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
 use crate::scene::texture::{Encoding, decode};
-use crate::scene::{Part, SceneDescription, Surface};
+use crate::scene::{Material, Part, SceneDescription};
 
 /// The albedo of meshes that come without a material.
 pub(super) const DEFAULT_ALBEDO: Rgb = Rgb::splat(0.6);
@@ -50,7 +50,7 @@ impl fmt::Display for PlyPlace {
 
 /// What is wrong with a PLY file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PlyProblem {
+pub enum PlyErrorKind {
     /// The header does not end.
     #[error("the header has no end_header line; the file is cut short or not PLY")]
     NoEndOfHeader,
@@ -116,19 +116,18 @@ pub enum PlyProblem {
     },
 }
 
-type Located<T> = Result<T, (PlyPlace, PlyProblem)>;
+type Located<T> = Result<T, (PlyPlace, PlyErrorKind)>;
 
 pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
-    let error =
-        |(place, problem)| LoadError::Ply { path: path.into(), place, problem: Box::new(problem) };
+    let error = |(place, kind)| LoadError::Ply { path: path.into(), place, kind: Box::new(kind) };
     let header = Header::parse(bytes).map_err(error)?;
     header.check_size(bytes.len() - header.length).map_err(error)?;
     budget.take(&path.display().to_string(), header.memory(bytes.len() - header.length))?;
     let mesh = parse(&header, bytes).map_err(error)?;
     let albedo = if mesh.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
     let description = SceneDescription {
-        parts: vec![Part { name: stem(path), mesh, surface: 0 }],
-        surfaces: vec![Surface::diffuse("default", albedo)],
+        parts: vec![Part { name: stem(path), mesh, material: 0 }],
+        materials: vec![Material::diffuse("default", albedo)],
         ..SceneDescription::default()
     };
     Ok(Loaded { description, ..Loaded::default() })
@@ -234,7 +233,7 @@ impl Header {
             let words: Vec<&str> = text.split_whitespace().collect();
             let wrong = || {
                 let text = text.trim().chars().take(80).collect();
-                (PlyPlace::Line(index + 1), PlyProblem::HeaderLine { text })
+                (PlyPlace::Line(index + 1), PlyErrorKind::HeaderLine { text })
             };
             match (words.as_slice(), elements.last_mut()) {
                 (["ply"], _) if index == 0 => {}
@@ -264,13 +263,14 @@ impl Header {
                     element.properties.push(Property { name: (*name).into(), list: None, scalar });
                 }
                 (["end_header"], _) => {
-                    let format = format.ok_or((PlyPlace::Line(index + 1), PlyProblem::NoFormat))?;
+                    let format =
+                        format.ok_or((PlyPlace::Line(index + 1), PlyErrorKind::NoFormat))?;
                     return Ok(Self { format, elements, length });
                 }
                 _ => return Err(wrong()),
             }
         }
-        Err((PlyPlace::Byte(bytes.len()), PlyProblem::NoEndOfHeader))
+        Err((PlyPlace::Byte(bytes.len()), PlyErrorKind::NoEndOfHeader))
     }
 
     /// How many vertices are promised.
@@ -282,9 +282,9 @@ impl Header {
     /// Strips take what the `left` bytes of the file can hold.
     fn memory(&self, left: usize) -> u64 {
         let size = |element: &Element| match element.name.as_str() {
-            // Position, normal, texture coordinate, colour.
+            // Position, normal, texture coordinate, color.
             "vertex" => element.count.saturating_mul(12 + 12 + 8 + 12),
-            // Where it ends, its indices, and two triangles; with a colour, six vertices of their own.
+            // Where it ends, its indices, and two triangles; with a color, six vertices of their own.
             "face" => {
                 let colors = if Colors::of(element).is_some() { 12 + 6 * 44 } else { 0 };
                 element.count.saturating_mul(8 + 4 * 4 + 2 * 12 + colors)
@@ -321,13 +321,13 @@ impl Header {
             // Rows without properties take no bytes; one byte a row bounds the loop over them.
             let rows = u128::from(element.count);
             if total > left as u128 + slack || rows > (left as u128 + slack) {
-                let problem = PlyProblem::TooManyRows {
+                let kind = PlyErrorKind::TooManyRows {
                     element: element.name.clone(),
                     count: element.count,
                     needed,
                     left,
                 };
-                return Err((PlyPlace::Line(element.line), problem));
+                return Err((PlyPlace::Line(element.line), kind));
             }
         }
         Ok(())
@@ -355,12 +355,12 @@ impl Numbers for Ascii<'_> {
         let token = &rest[begin..begin + length];
         let place = || PlyPlace::Byte(self.start + self.position + begin);
         if token.is_empty() {
-            return Err((place(), PlyProblem::EndOfFile));
+            return Err((place(), PlyErrorKind::EndOfFile));
         }
         let text = std::str::from_utf8(token).unwrap_or("");
         let value = text.parse().map_err(|_| {
             let text = String::from_utf8_lossy(token).chars().take(40).collect();
-            (place(), PlyProblem::NotANumber { text })
+            (place(), PlyErrorKind::NotANumber { text })
         })?;
         self.position += begin + length;
         Ok(value)
@@ -377,7 +377,7 @@ impl<const BIG: bool> Binary<'_, BIG> {
     #[inline]
     fn bytes<const N: usize>(&mut self) -> Located<[u8; N]> {
         let Some(bytes) = self.data[self.position..].first_chunk::<N>() else {
-            return Err((PlyPlace::Byte(self.start + self.position), PlyProblem::EndOfFile));
+            return Err((PlyPlace::Byte(self.start + self.position), PlyErrorKind::EndOfFile));
         };
         self.position += N;
         let mut bytes = *bytes;
@@ -428,12 +428,12 @@ fn read_body(header: &Header, numbers: &mut impl Numbers) -> Located<Mesh> {
     }
     let end = PlyPlace::Line(header.elements.last().map_or(1, |e| e.line));
     if !has_vertices {
-        return Err((end, PlyProblem::Missing { what: "element vertex" }));
+        return Err((end, PlyErrorKind::Missing { what: "element vertex" }));
     }
     if !has_faces {
         return Err((
             end,
-            PlyProblem::Missing { what: "element face; points alone cannot be rendered" },
+            PlyErrorKind::Missing { what: "element face; points alone cannot be rendered" },
         ));
     }
     Ok(faces.finish(mesh))
@@ -487,7 +487,7 @@ fn read_vertices(element: &Element, numbers: &mut impl Numbers, mesh: &mut Mesh)
     let has = |wanted: std::ops::Range<usize>| wanted.into_iter().all(|s| slots.contains(&Some(s)));
     let place = PlyPlace::Line(element.line);
     if !has(0..3) {
-        return Err((place, PlyProblem::Missing { what: "vertex properties x, y and z" }));
+        return Err((place, PlyErrorKind::Missing { what: "vertex properties x, y and z" }));
     }
     let (normals, uvs, colors) = (has(3..6), has(6..8), Colors::of(element));
 
@@ -504,7 +504,7 @@ fn read_vertices(element: &Element, numbers: &mut impl Numbers, mesh: &mut Mesh)
         let position = Vec3::new(x, y, z);
         if !position.is_finite() {
             let place = PlyPlace::Row { element: element.name.clone(), row };
-            return Err((place, PlyProblem::NotFinite { position }));
+            return Err((place, PlyErrorKind::NotFinite { position }));
         }
         mesh.positions.push(position);
         if normals {
@@ -554,7 +554,7 @@ fn require_indices(element: &Element) -> Located<()> {
         "face" => "face property list vertex_indices",
         _ => "tristrips property list vertex_indices",
     };
-    let missing = (PlyPlace::Line(element.line), PlyProblem::Missing { what });
+    let missing = (PlyPlace::Line(element.line), PlyErrorKind::Missing { what });
     if element.properties.iter().any(is_indices) { Ok(()) } else { Err(missing) }
 }
 
@@ -564,7 +564,7 @@ fn index(value: f64, vertices: u64, element: &Element, row: usize) -> Located<u3
         return Ok(value as u32);
     }
     let place = PlyPlace::Row { element: element.name.clone(), row };
-    Err((place, PlyProblem::Index { value, vertices: vertices as usize }))
+    Err((place, PlyErrorKind::Index { value, vertices: vertices as usize }))
 }
 
 fn read_faces(
@@ -640,7 +640,7 @@ fn list_length(
     let value = property.list.map_or(Ok(1.0), |length| numbers.next(length))?;
     if value < 0.0 || value.fract() != 0.0 || value > f64::from(u32::MAX) {
         let place = PlyPlace::Row { element: element.into(), row };
-        return Err((place, PlyProblem::ListLength { value }));
+        return Err((place, PlyErrorKind::ListLength { value }));
     }
     Ok(value as u64)
 }

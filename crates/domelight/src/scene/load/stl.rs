@@ -15,11 +15,11 @@ use super::ply::DEFAULT_ALBEDO;
 use super::{Budget, LoadError, Loaded, stem, text_of};
 use crate::geometry::Mesh;
 use crate::math::Vec3;
-use crate::scene::{Part, SceneDescription, Surface};
+use crate::scene::{Material, Part, SceneDescription};
 
 /// What is wrong with an STL file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum StlProblem {
+pub enum StlErrorKind {
     /// Neither text nor a binary file of the right length.
     #[error(
         "neither text that begins with 'solid' nor a binary file: its header promises {facets} facets, \
@@ -73,7 +73,7 @@ pub(super) fn is_stl(bytes: &[u8]) -> bool {
 }
 
 pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
-    let error = |problem| LoadError::Stl { path: path.into(), problem };
+    let error = |kind| LoadError::Stl { path: path.into(), kind };
     let name = path.display().to_string();
     let parts = if let Some(facets) = facets(bytes) {
         budget.take(&name, facets as u64 * (3 * 12 + 12))?;
@@ -85,12 +85,12 @@ pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded,
         let count = bytes.get(80..HEADER).and_then(|b| b.try_into().ok());
         let facets = count.map_or(0, u32::from_le_bytes);
         let needed = HEADER as u64 + FACET as u64 * u64::from(facets);
-        return Err(error(StlProblem::Length { facets, needed, held: bytes.len() }));
+        return Err(error(StlErrorKind::Length { facets, needed, held: bytes.len() }));
     };
     let parts = parts.into_iter().filter(|(_, mesh)| !mesh.triangles.is_empty());
     let description = SceneDescription {
-        parts: parts.map(|(name, mesh)| Part { name, mesh, surface: 0 }).collect(),
-        surfaces: vec![Surface::diffuse("default", DEFAULT_ALBEDO)],
+        parts: parts.map(|(name, mesh)| Part { name, mesh, material: 0 }).collect(),
+        materials: vec![Material::diffuse("default", DEFAULT_ALBEDO)],
         ..SceneDescription::default()
     };
     Ok(Loaded { description, ..Loaded::default() })
@@ -109,14 +109,14 @@ fn facets(bytes: &[u8]) -> Option<usize> {
     fits.then_some(count)
 }
 
-fn binary(bytes: &[u8]) -> Result<Mesh, StlProblem> {
+fn binary(bytes: &[u8]) -> Result<Mesh, StlErrorKind> {
     let mut mesh = Mesh::default();
     for (facet, bytes) in bytes.as_chunks::<FACET>().0.iter().enumerate() {
         let number = |i: usize| f32::from_le_bytes([0, 1, 2, 3].map(|k| bytes[4 * i + k]));
         for i in [3, 6, 9] {
             let position = Vec3::new(number(i), number(i + 1), number(i + 2));
             if !position.is_finite() {
-                return Err(StlProblem::NotFinite { facet, position });
+                return Err(StlErrorKind::NotFinite { facet, position });
             }
             mesh.positions.push(position);
         }
@@ -125,7 +125,7 @@ fn binary(bytes: &[u8]) -> Result<Mesh, StlProblem> {
     Ok(mesh)
 }
 
-fn ascii(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Mesh)>, StlProblem> {
+fn ascii(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Mesh)>, StlErrorKind> {
     let mut solids: Vec<(String, Mesh)> = Vec::new();
     let mut corners = 0;
     for (index, line) in bytes.split(|&b| b == b'\n' || b == b'\r').enumerate() {
@@ -135,13 +135,13 @@ fn ascii(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Mesh)>, StlProblem> {
         let line = index + 1;
         if keyword.eq_ignore_ascii_case("solid") {
             if corners > 0 {
-                return Err(StlProblem::Facet { line, corners });
+                return Err(StlErrorKind::Facet { line, corners });
             }
             let name = if rest.trim().is_empty() { stem(path) } else { rest.trim().to_owned() };
             solids.push((name, Mesh::default()));
         } else if keyword.eq_ignore_ascii_case("vertex") {
             let Some((_, mesh)) = solids.last_mut() else { continue };
-            mesh.positions.push(vertex(rest).ok_or_else(|| StlProblem::Vertex {
+            mesh.positions.push(vertex(rest).ok_or_else(|| StlErrorKind::Vertex {
                 line,
                 text: text.chars().take(60).collect(),
             })?);
@@ -149,7 +149,7 @@ fn ascii(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Mesh)>, StlProblem> {
         } else if keyword.eq_ignore_ascii_case("endfacet") {
             let Some((_, mesh)) = solids.last_mut() else { continue };
             if corners != 3 {
-                return Err(StlProblem::Facet { line, corners });
+                return Err(StlErrorKind::Facet { line, corners });
             }
             add_facet(mesh);
             corners = 0;
@@ -158,7 +158,7 @@ fn ascii(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Mesh)>, StlProblem> {
     // A facet without its end belongs to a file that was cut short.
     if corners > 0 {
         let line = bytes.split(|&b| b == b'\n' || b == b'\r').count();
-        return Err(StlProblem::Facet { line, corners });
+        return Err(StlErrorKind::Facet { line, corners });
     }
     Ok(solids)
 }

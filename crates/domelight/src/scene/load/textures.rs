@@ -71,7 +71,7 @@ impl<'b> Textures<'b> {
     ) -> Result<Texture, LoadError> {
         let error =
             |source| LoadError::Image { image: name.into(), referrer: referrer.into(), source };
-        // Where nothing else limits it, as much as the crate thinks right. A colour profile is unpacked with the header.
+        // Where nothing else limits it, as much as the crate thinks right. A color profile is unpacked with the header.
         let mut limits = Limits::default();
         limits.max_alloc = self.budget.left().or(limits.max_alloc);
         if picture::format_of(bytes) == Some(picture::Format::Png) {

@@ -54,19 +54,19 @@ use toml::Spanned;
 use super::textures::Textures;
 use super::{Budget, LoadError, LoadOptions, Loaded, load_mesh, relative};
 use crate::Rgb;
-use crate::bsdf::{Material, ParseMaterialError};
+use crate::bsdf::{Bsdf, ParseMaterialError};
 use crate::geometry::linear_part;
 use crate::math::{Mat4, Vec2, Vec3, Vec4};
 use crate::scene::builtin::{BuiltinScene, UnknownScene};
 use crate::scene::camera::{CameraError, CameraSettings, Projection};
 use crate::scene::{
-    Encoding, EnvironmentSettings, EnvironmentSource, MetallicRoughnessSurface, NormalMap,
-    SceneDescription, Surface, SurfaceModel, TextureRef, UpAxis, UvTransform, Wrap,
+    Encoding, EnvironmentSettings, EnvironmentSource, Material, MaterialModel,
+    MetallicRoughnessMaterial, NormalMap, SceneDescription, TextureRef, UpAxis, UvTransform, Wrap,
 };
 
 /// What is wrong with a scene file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum TomlProblem {
+pub enum TomlErrorKind {
     /// Not UTF-8.
     #[error("not a text in UTF-8; the first bad byte is byte {byte}")]
     Encoding {
@@ -227,14 +227,13 @@ pub(super) fn load(
     budget: &Budget,
     options: &LoadOptions,
 ) -> Result<Loaded, LoadError> {
-    let failed =
-        |line, problem| LoadError::Toml { path: path.into(), line, problem: Box::new(problem) };
+    let failed = |line, kind| LoadError::Toml { path: path.into(), line, kind: Box::new(kind) };
     let text = std::str::from_utf8(bytes)
-        .map_err(|e| failed(None, TomlProblem::Encoding { byte: e.valid_up_to() }))?;
+        .map_err(|e| failed(None, TomlErrorKind::Encoding { byte: e.valid_up_to() }))?;
     let lines = Lines::new(text);
     let file: SceneFile = toml::from_str(text).map_err(|e| {
         let line = e.span().map(|span| lines.of(span.start));
-        failed(line, TomlProblem::Syntax(e.message().into()))
+        failed(line, TomlErrorKind::Syntax(e.message().into()))
     })?;
     let mut reader = Reader {
         path,
@@ -268,7 +267,7 @@ impl Lines {
 struct Reader<'a> {
     path: &'a Path,
     lines: Lines,
-    /// Surfaces by the name or notation of their material.
+    /// Indices of materials by their name or notation.
     named: BTreeMap<String, usize>,
     /// Built-in scenes that were made.
     builtin: BTreeMap<&'static str, SceneDescription>,
@@ -280,24 +279,24 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// An error in the table that begins at a byte of the text.
-    fn error(&self, byte: usize, problem: TomlProblem) -> LoadError {
+    fn error(&self, byte: usize, kind: TomlErrorKind) -> LoadError {
         let line = Some(self.lines.of(byte));
-        LoadError::Toml { path: self.path.into(), line, problem: Box::new(problem) }
+        LoadError::Toml { path: self.path.into(), line, kind: Box::new(kind) }
     }
 
     fn scene(&mut self, file: SceneFile) -> Result<(), LoadError> {
         self.loaded.description.up = Some(file.up);
         for (name, entry) in file.materials {
             let at = entry.span().start;
-            let surface = self.material(&name, entry.into_inner(), at)?;
-            self.add_surface(name, surface);
+            let material = self.material(&name, entry.into_inner(), at)?;
+            self.add_material(name, material);
         }
-        // The surfaces of [materials] come first, and with them the only textures so far.
+        // The materials of [materials] come first, and with them the only textures so far.
         self.loaded.description.textures = std::mem::take(&mut self.textures.loaded);
         if let Some(camera) = file.camera {
             let at = camera.span().start;
             let settings = camera_settings(&camera.into_inner(), file.up)
-                .map_err(|problem| self.error(at, problem))?;
+                .map_err(|kind| self.error(at, kind))?;
             self.loaded.description.camera = Some(settings);
         }
         if let Some(environment) = file.environment {
@@ -316,11 +315,11 @@ impl Reader<'_> {
         self.loaded
     }
 
-    fn add_surface(&mut self, name: String, surface: Surface) -> usize {
-        let surfaces = &mut self.loaded.description.surfaces;
-        surfaces.push(surface);
-        self.named.insert(name, surfaces.len() - 1);
-        surfaces.len() - 1
+    fn add_material(&mut self, name: String, material: Material) -> usize {
+        let materials = &mut self.loaded.description.materials;
+        materials.push(material);
+        self.named.insert(name, materials.len() - 1);
+        materials.len() - 1
     }
 
     fn material(
@@ -328,7 +327,7 @@ impl Reader<'_> {
         name: &str,
         entry: MaterialEntry,
         at: usize,
-    ) -> Result<Surface, LoadError> {
+    ) -> Result<Material, LoadError> {
         let table = match entry {
             MaterialEntry::Notation(text) => return self.notation(name, &text, at),
             MaterialEntry::Table(table) => table,
@@ -342,13 +341,13 @@ impl Reader<'_> {
         ];
         for (what, value) in ranges {
             if !(0.0..=1.0).contains(&value) {
-                return Err(self.error(at, TomlProblem::Range { what, value, range: "[0, 1]" }));
+                return Err(self.error(at, TomlErrorKind::Range { what, value, range: "[0, 1]" }));
             }
         }
         for (what, value) in [("normal_scale", table.normal_scale), ("uv_scale", table.uv_scale)] {
             if !value.is_finite() {
                 let range = "the finite numbers";
-                return Err(self.error(at, TomlProblem::Range { what, value, range }));
+                return Err(self.error(at, TomlErrorKind::Range { what, value, range }));
             }
         }
         let referrer =
@@ -365,21 +364,21 @@ impl Reader<'_> {
             texture(&table.metallic_roughness_texture, Encoding::Linear)?;
         let normal_map = texture(&table.normal_map, Encoding::Linear)?
             .map(|texture| NormalMap { texture, scale: table.normal_scale });
-        let model = SurfaceModel::MetallicRoughness(MetallicRoughnessSurface {
+        let model = MaterialModel::MetallicRoughness(MetallicRoughnessMaterial {
             base_color: Rgb::from(table.base_color),
             base_color_texture,
             metallic: table.metallic,
             roughness: table.roughness,
             metallic_roughness_texture,
         });
-        Ok(Surface { normal_map, ..Surface::new(name, model) })
+        Ok(Material { normal_map, ..Material::new(name, model) })
     }
 
-    fn notation(&self, name: &str, text: &str, at: usize) -> Result<Surface, LoadError> {
-        let material = text.parse::<Material>().map_err(|source| {
-            self.error(at, TomlProblem::Material { text: text.into(), source })
+    fn notation(&self, name: &str, text: &str, at: usize) -> Result<Material, LoadError> {
+        let bsdf = text.parse::<Bsdf>().map_err(|source| {
+            self.error(at, TomlErrorKind::Material { text: text.into(), source })
         })?;
-        Ok(Surface::fixed(name, material))
+        Ok(Material::fixed(name, bsdf))
     }
 
     fn environment(
@@ -404,7 +403,7 @@ impl Reader<'_> {
         ];
         for (what, value, range, least) in ranges {
             if !(value.is_finite() && value >= least) {
-                return Err(self.error(at, TomlProblem::Range { what, value, range }));
+                return Err(self.error(at, TomlErrorKind::Range { what, value, range }));
             }
         }
         Ok(EnvironmentSettings {
@@ -417,7 +416,7 @@ impl Reader<'_> {
     }
 
     fn object(&mut self, table: &ObjectTable, at: usize) -> Result<(), LoadError> {
-        let matrix = matrix(table).map_err(|problem| self.error(at, problem))?;
+        let matrix = matrix(table).map_err(|kind| self.error(at, kind))?;
         let mut loaded = match (&table.file, &table.builtin) {
             (Some(file), None) => {
                 let line = self.lines.of(at);
@@ -444,38 +443,39 @@ impl Reader<'_> {
                 part.name.clone_from(name);
             }
         }
-        let surface = table.material.as_ref().map(|text| self.surface(text, at)).transpose()?;
+        let material =
+            table.material.as_ref().map(|text| self.material_index(text, at)).transpose()?;
         let first = self.loaded.description.parts.len();
         self.loaded.description.append(description);
         // A material is the subject's; floors and plinths keep theirs.
         let SceneDescription { parts, scenery, .. } = &mut self.loaded.description;
         for (i, part) in parts.iter_mut().enumerate().skip(first) {
-            if let (Some(surface), false) = (surface, scenery.contains(&i)) {
-                part.surface = surface;
+            if let (Some(material), false) = (material, scenery.contains(&i)) {
+                part.material = material;
             }
         }
         Ok(())
     }
 
-    /// The surface of a material's name, or of notation.
-    fn surface(&mut self, text: &str, at: usize) -> Result<usize, LoadError> {
-        if let Some(&surface) = self.named.get(text) {
-            return Ok(surface);
+    /// The index of the material of that name, or of that notation.
+    fn material_index(&mut self, text: &str, at: usize) -> Result<usize, LoadError> {
+        if let Some(&material) = self.named.get(text) {
+            return Ok(material);
         }
-        let surface = self.notation(text, text, at)?;
-        Ok(self.add_surface(text.into(), surface))
+        let material = self.notation(text, text, at)?;
+        Ok(self.add_material(text.into(), material))
     }
 }
 
-fn one_of(what: &str) -> TomlProblem {
-    TomlProblem::OneOf { what: what.into(), first: "file", second: "builtin" }
+fn one_of(what: &str) -> TomlErrorKind {
+    TomlErrorKind::OneOf { what: what.into(), first: "file", second: "builtin" }
 }
 
-fn camera_settings(table: &CameraTable, up: UpAxis) -> Result<CameraSettings, TomlProblem> {
+fn camera_settings(table: &CameraTable, up: UpAxis) -> Result<CameraSettings, TomlErrorKind> {
     let projection = match (table.fov, table.orthographic) {
         (Some(_), Some(_)) => {
             let (first, second) = ("fov", "orthographic");
-            return Err(TomlProblem::OneOf { what: "[camera]".into(), first, second });
+            return Err(TomlErrorKind::OneOf { what: "[camera]".into(), first, second });
         }
         (None, Some(height)) => Projection::Orthographic { height },
         (fov, None) => Projection::Perspective {
@@ -493,11 +493,11 @@ fn camera_settings(table: &CameraTable, up: UpAxis) -> Result<CameraSettings, To
 }
 
 /// Scale, then rotation about x, y and z, then translation; or the matrix.
-fn matrix(table: &ObjectTable) -> Result<Mat4, TomlProblem> {
+fn matrix(table: &ObjectTable) -> Result<Mat4, TomlErrorKind> {
     let others = table.scale.is_some() || table.rotate.is_some() || table.translate.is_some();
     let m = match table.matrix {
-        Some(_) if others => return Err(TomlProblem::MatrixAndOthers),
-        Some(rows) if rows[3] != [0.0, 0.0, 0.0, 1.0] => return Err(TomlProblem::NotAffine),
+        Some(_) if others => return Err(TomlErrorKind::MatrixAndOthers),
+        Some(rows) if rows[3] != [0.0, 0.0, 0.0, 1.0] => return Err(TomlErrorKind::NotAffine),
         Some(rows) => Mat4::from_cols_array_2d(&rows).transpose(),
         None => {
             let scale = match table.scale {
@@ -515,5 +515,5 @@ fn matrix(table: &ObjectTable) -> Result<Mat4, TomlProblem> {
     };
     let columns: [Vec4; 4] = [m.x_axis, m.y_axis, m.z_axis, m.w_axis];
     let usable = columns.iter().all(|c| c.is_finite()) && linear_part(&m).determinant() != 0.0;
-    if usable { Ok(m) } else { Err(TomlProblem::Singular) }
+    if usable { Ok(m) } else { Err(TomlErrorKind::Singular) }
 }

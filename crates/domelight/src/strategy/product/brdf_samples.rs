@@ -1,12 +1,12 @@
 //! Candidates from the material: samples of several hits side by side.
 
-use super::candidates::{Candidate, Hits, PixelNumbers, Sources};
+use super::candidates::{Candidate, Hits, PixelSamples, Sources};
 use crate::Rgb;
 use crate::bsdf::Brdf as _;
 use crate::math::Vec3;
 use crate::sampling::Dimension;
 use crate::simd::{
-    Colors, Floats as _, LANES, Lanes, Mask as _, Real as _, Simd, Vectors, set_bits,
+    Colors, LANES, LaneMask as _, Lanes, Simd, SimdF32x8 as _, SimdFloat as _, Vectors, set_bits,
 };
 
 /// Samples of the material side by side: where they are drawn, and by which numbers.
@@ -25,15 +25,15 @@ pub(super) struct BrdfSamples {
 impl BrdfSamples {
     /// Samples `which` of the pixel, no more than there are lanes.
     #[inline(always)]
-    pub(super) fn new(hits: Hits, numbers: &PixelNumbers, which: std::ops::Range<usize>) -> Self {
-        let set = numbers.stream.set(Dimension::Brdf);
+    pub(super) fn new(hits: Hits, numbers: &PixelSamples, which: std::ops::Range<usize>) -> Self {
+        let set = numbers.sampler.set(Dimension::Brdf);
         let u = set.u(which.start as u32);
         let mut samples = Self { n: which.len(), u, ..Self::default() };
         for (lane, j) in which.enumerate() {
             let hit = numbers.brdf_hit(j, hits.points.len());
             let at = &hits.points[hit];
             samples.hits[lane] = hit;
-            if hits.material(hit).has_choice() {
+            if hits.bsdf(hit).has_choice() {
                 samples.u_lobe[lane] = set.numbers(j as u32).u_lobe();
             }
             let axes = [at.frame.x, at.frame.y, at.frame.z];
@@ -49,17 +49,17 @@ impl BrdfSamples {
 
     /// Their directions in the local frames.
     #[inline(always)]
-    fn sample<S: Simd>(&self, simd: S, hits: Hits) -> Vectors<S::Floats> {
+    fn sample<S: Simd>(&self, simd: S, hits: Hits) -> Vectors<S::F32x8> {
         if hits.one_material {
             let (wo, u_lobe) = (Vectors::load(simd, &self.wo), simd.load(&self.u_lobe));
             let u = [simd.load(&self.u[0]), simd.load(&self.u[1])];
-            return hits.material(0).sample_lanes(wo, u_lobe, u);
+            return hits.bsdf(0).sample_lanes(wo, u_lobe, u);
         }
         let mut wi = [[0.0; LANES]; 3];
         for lane in 0..self.n {
             let (wo, u) = (Vec3::from(self.wo.map(|c| c[lane])), self.u.map(|u| u[lane]));
-            let material = hits.material(self.hits[lane]);
-            let of_lane = Vec3::from(material.sample_lanes(wo.into(), self.u_lobe[lane], u));
+            let bsdf = hits.bsdf(self.hits[lane]);
+            let of_lane = Vec3::from(bsdf.sample_lanes(wo.into(), self.u_lobe[lane], u));
             (0..3).for_each(|c| wi[c][lane] = of_lane[c]);
         }
         Vectors::load(simd, &wi)
@@ -71,15 +71,15 @@ impl BrdfSamples {
         &self,
         simd: S,
         hits: Hits,
-        wi: Vectors<S::Floats>,
-    ) -> (Colors<S::Floats>, S::Floats) {
+        wi: Vectors<S::F32x8>,
+    ) -> (Colors<S::F32x8>, S::F32x8) {
         if hits.one_material {
-            return hits.material(0).eval_lanes(Vectors::load(simd, &self.wo), wi);
+            return hits.bsdf(0).eval_lanes(Vectors::load(simd, &self.wo), wi);
         }
         let (mut f, mut pdf, wi) = ([[0.0; LANES]; 3], [0.0; LANES], wi.store());
         for lane in 0..self.n {
             let [wo, wi] = [self.wo, wi].map(|v| Vec3::from(v.map(|c| c[lane])));
-            let (value, density) = hits.material(self.hits[lane]).eval_pdf(wo, wi);
+            let (value, density) = hits.bsdf(self.hits[lane]).eval_pdf(wo, wi);
             (f[0][lane], f[1][lane], f[2][lane]) = (value.r, value.g, value.b);
             pdf[lane] = density;
         }
@@ -87,7 +87,7 @@ impl BrdfSamples {
     }
 
     #[inline(always)]
-    fn to_world<S: Simd>(&self, simd: S, v: Vectors<S::Floats>) -> Vectors<S::Floats> {
+    fn to_world<S: Simd>(&self, simd: S, v: Vectors<S::F32x8>) -> Vectors<S::F32x8> {
         let [x, y, z] = &self.frame;
         let (x, y, z) = (Vectors::load(simd, x), Vectors::load(simd, y), Vectors::load(simd, z));
         x.times(v.x).plus(y.times(v.y)).plus(z.times(v.z))
@@ -96,7 +96,7 @@ impl BrdfSamples {
 
 /// Directions of samples of the material and where they look.
 #[derive(Clone, Debug)]
-pub(super) struct Drawn {
+pub(super) struct BrdfSampleBatch {
     /// Bit i: lane i may find light.
     possible: u32,
     hits: [usize; LANES],
@@ -110,14 +110,14 @@ pub(super) struct Drawn {
 
 /// What samples of the material meet on the map.
 #[derive(Default)]
-struct Found {
+struct LightLookup {
     /// Bit i: there is light for lane i.
     lanes: u32,
     slots: [i32; LANES],
     le: [Lanes; 3],
 }
 
-impl Found {
+impl LightLookup {
     #[inline(always)]
     fn push(&mut self, lane: usize, slot: usize, le: Rgb) {
         self.lanes |= 1 << lane;
@@ -134,9 +134,9 @@ impl Sources<'_> {
         &self,
         simd: S,
         hits: Hits,
-        numbers: &PixelNumbers,
+        numbers: &PixelSamples,
         n: usize,
-        drawn: &mut Vec<Drawn>,
+        drawn: &mut Vec<BrdfSampleBatch>,
     ) {
         drawn.clear();
         let map = self.environment.map();
@@ -155,7 +155,7 @@ impl Sources<'_> {
                 simd.prefetch(&map.row(row)[column]);
             }
             let (wi, f, pdf) = (wi.store(), f.store(), pdf.store());
-            drawn.push(Drawn { possible, hits: samples.hits, wi, f, pdf, texels });
+            drawn.push(BrdfSampleBatch { possible, hits: samples.hits, wi, f, pdf, texels });
         }
     }
 
@@ -164,11 +164,11 @@ impl Sources<'_> {
     pub(super) fn weigh_samples<S: Simd>(
         &self,
         simd: S,
-        drawn: &Drawn,
+        drawn: &BrdfSampleBatch,
         counts: [f32; 2],
         candidates: &mut Vec<Candidate>,
     ) {
-        let mut found = Found::default();
+        let mut found = LightLookup::default();
         let at = |lane: usize| Vec3::from(drawn.wi.map(|c| c[lane]));
         for lane in set_bits(drawn.possible) {
             let texel = drawn.texels.map(|i| i[lane] as usize);
@@ -179,8 +179,8 @@ impl Sources<'_> {
             found.push(lane, self.cells.slot(cell), le);
         }
         let (le, f) = (Colors::load(simd, &found.le), Colors::load(simd, &drawn.f));
-        let slots = simd.load_ints(&found.slots);
-        let within = le.luminance() / S::Floats::gather(&self.cells.mass, slots);
+        let slots = simd.load_i32(&found.slots);
+        let within = le.luminance() / S::F32x8::gather(&self.cells.mass, slots);
         let density = simd.splat(counts[0]) * self.table.widths(slots) * within
             + simd.splat(counts[1]) * simd.load(&drawn.pdf);
         let value = f.zip(le, |f, le| f * le).scaled(simd.splat(1.0) / density);
@@ -192,7 +192,7 @@ impl Sources<'_> {
                 luminance: luminance[lane],
                 slot: found.slots[lane] as u32,
                 hit: drawn.hits[lane] as u32,
-                chance: 0,
+                selection_probability: 0,
             });
         }
     }

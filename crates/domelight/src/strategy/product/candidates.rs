@@ -14,17 +14,17 @@
 //! N/n in expectation.
 
 use super::super::ShadingPoint;
-use super::brdf_samples::Drawn;
+use super::brdf_samples::BrdfSampleBatch;
 use super::cells::Cells;
-use super::control::Control;
-use super::pool::{Lights, Pool};
+use super::control_variate::ControlVariate;
+use super::light_samples::{LightSamplePool, LightSamples};
 use super::table::Table;
 use crate::Rgb;
-use crate::bsdf::Material;
+use crate::bsdf::Bsdf;
 use crate::environment::Environment;
 use crate::math::Vec3;
-use crate::sampling::{Dimension, Stream};
-use crate::simd::{Floats, Ints, LANES, Lanes, Real, Simd};
+use crate::sampling::{Dimension, Sampler};
+use crate::simd::{LANES, Lanes, Simd, SimdF32x8, SimdFloat, SimdI32x8};
 
 /// A direction that may become a shadow ray.
 #[derive(Clone, Copy, Debug)]
@@ -39,8 +39,8 @@ pub(super) struct Candidate {
     pub(super) slot: u32,
     /// Which hit of the pixel.
     pub(super) hit: u32,
-    /// π, as [`choose`](super::choose) has it.
-    pub(super) chance: u32,
+    /// π, as [`choose`](super::systematic) has it.
+    pub(super) selection_probability: u32,
 }
 
 /// Candidates of one hit side by side.
@@ -50,11 +50,11 @@ pub(super) struct CandidateBlock {
     /// Black in a lane without a candidate.
     pub(super) value: [Lanes; 3],
     /// W without what the control variate knows of it.
-    pub(super) rest: [Lanes; 3],
+    pub(super) residual: [Lanes; 3],
     pub(super) luminance: Lanes,
     pub(super) slots: [i32; LANES],
     /// π of each.
-    pub(super) chances: [i32; LANES],
+    pub(super) selection_probabilities: [i32; LANES],
 }
 
 impl CandidateBlock {
@@ -67,7 +67,7 @@ impl CandidateBlock {
             luminance: self.luminance[lane],
             slot: self.slots[lane] as u32,
             hit,
-            chance: self.chances[lane] as u32,
+            selection_probability: self.selection_probabilities[lane] as u32,
         }
     }
 }
@@ -79,19 +79,19 @@ pub(super) struct Candidates {
     pub(super) lights: Vec<CandidateBlock>,
     /// From the material.
     pub(super) brdf: Vec<Candidate>,
-    /// How the strata are dealt to the hits.
-    pub(super) deal: Deal,
+    /// Which hit each stratum is assigned to.
+    pub(super) assignment: StratumAssignment,
     /// The slot of each stratum, where its candidate is in `lights`.
     slots: Vec<[i32; LANES]>,
-    /// Memory of [`Table::deal`].
-    marks: Vec<i32>,
+    /// Memory of [`Table::assign_strata`].
+    cell_starts: Vec<i32>,
     /// What those from the material look at.
-    drawn: Vec<Drawn>,
+    drawn: Vec<BrdfSampleBatch>,
 }
 
-/// Stratum k belongs to hit (k − r) mod n: who has which.
+/// The assignment of strata to hits: stratum k belongs to hit (k − r) mod n.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Deal {
+pub(super) struct StratumAssignment {
     /// M.
     n_strata: usize,
     /// n.
@@ -100,7 +100,7 @@ pub(super) struct Deal {
     shift: usize,
 }
 
-impl Deal {
+impl StratumAssignment {
     /// Of M strata to n hits, shifted by a number in [0, 1).
     pub(super) fn new(n_strata: usize, n_hits: usize, shift: f32) -> Self {
         Self { n_strata, n_hits, shift: (shift * n_hits as f32) as usize % n_hits.max(1) }
@@ -120,31 +120,31 @@ impl Deal {
 
     /// The places of strata 0 to M − 1 in blocks of hits that follow each other.
     #[inline(always)]
-    pub(super) fn places(self) -> impl Iterator<Item = Place> {
+    pub(super) fn indices(self) -> impl Iterator<Item = CandidateIndex> {
         let (n, stride) = (self.n_hits, self.blocks() * LANES);
         let start = if self.shift == 0 { 0 } else { n - self.shift };
-        let mut next = Place { hit: start, lane: start * stride };
+        let mut next = CandidateIndex { hit: start, lane: start * stride };
         let mut left = n;
         (0..self.n_strata).map(move |_| {
-            let place = next;
+            let index = next;
             next.hit += 1;
             next.lane += stride;
             if next.hit == n {
-                next = Place { hit: 0, lane: next.lane - n * stride };
+                next = CandidateIndex { hit: 0, lane: next.lane - n * stride };
             }
             left -= 1;
             if left == 0 {
                 next.lane += 1;
                 left = n;
             }
-            place
+            index
         })
     }
 }
 
 /// Where a stratum's candidate is.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Place {
+pub(super) struct CandidateIndex {
     pub(super) hit: usize,
     /// Counted through all blocks.
     pub(super) lane: usize,
@@ -171,8 +171,8 @@ impl Strata {
 
     /// Where strata `first`, `first` + `step`, … fall in the running sum.
     #[inline(always)]
-    pub(super) fn places<S: Simd>(&self, simd: S, first: usize, step: usize) -> S::Floats {
-        let k = simd.counting().to_floats() * simd.splat(step as f32) + simd.splat(first as f32);
+    pub(super) fn positions<S: Simd>(&self, simd: S, first: usize, step: usize) -> S::F32x8 {
+        let k = simd.iota().to_f32() * simd.splat(step as f32) + simd.splat(first as f32);
         let last = simd.splat(self.total * (1.0 - f32::EPSILON));
         ((k + simd.splat(self.offset)) * simd.splat(self.width)).min(last)
     }
@@ -191,29 +191,29 @@ pub(super) struct Counts {
 pub(super) struct Sources<'a> {
     pub(super) environment: &'a Environment,
     pub(super) cells: &'a Cells,
-    pub(super) pool: &'a Pool,
+    pub(super) pool: &'a LightSamplePool,
     pub(super) table: &'a Table,
     /// None if visibility is not known.
-    pub(super) control: Option<&'a Control>,
+    pub(super) control_variate: Option<&'a ControlVariate>,
 }
 
 /// The random numbers of a pixel in a pass.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PixelNumbers {
+pub(super) struct PixelSamples {
     /// The offset of all strata.
     pub(super) strata: f32,
     /// The offset of the choice of rays.
     pub(super) choice: f32,
     /// Shifts of the hits against the strata and against the samples of the material.
     shift: [f32; 2],
-    pub(super) stream: Stream,
+    pub(super) sampler: Sampler,
 }
 
-impl PixelNumbers {
-    /// From a stream that serves this pixel in this pass alone.
-    pub(super) fn new(stream: Stream) -> Self {
-        let [strata, choice, a, b] = stream.numbers(Dimension::Resampling, 0).0;
-        Self { strata, choice, shift: [a, b], stream }
+impl PixelSamples {
+    /// From a sampler that serves this pixel in this pass alone.
+    pub(super) fn new(sampler: Sampler) -> Self {
+        let [strata, choice, a, b] = sampler.numbers(Dimension::Resampling, 0).0;
+        Self { strata, choice, shift: [a, b], sampler }
     }
 
     /// The hit of sample `j` of the material, of `n` hits.
@@ -231,31 +231,31 @@ impl Sources<'_> {
         hits: Hits,
         diffuse: &[Rgb],
         counts: Counts,
-        numbers: &PixelNumbers,
+        numbers: &PixelSamples,
         candidates: &mut Candidates,
     ) {
         let total = self.table.total();
         let n_strata = if total > 0.0 { counts.light } else { 0 };
-        let deal = Deal::new(n_strata, hits.points.len(), numbers.shift[0]);
+        let assignment = StratumAssignment::new(n_strata, hits.points.len(), numbers.shift[0]);
         let strata = Strata::new(n_strata, numbers.strata, total);
         let scale = if n_strata > 0 { n_strata as f32 / total } else { 0.0 };
-        candidates.deal = deal;
+        candidates.assignment = assignment;
         // First, for what they look at comes from far.
         self.draw_samples(simd, hits, numbers, counts.brdf, &mut candidates.drawn);
         candidates.lights.clear();
         if n_strata > 0 {
-            let Candidates { slots, marks, .. } = &mut *candidates;
-            self.table.deal(simd, self.cells, &strata, deal, marks, slots);
+            let Candidates { slots, cell_starts, .. } = &mut *candidates;
+            self.table.assign_strata(simd, self.cells, &strata, assignment, cell_starts, slots);
         }
         for (hit, at) in hits.points.iter().enumerate() {
-            let (material, diffuse) = (hits.material(hit), diffuse[hit]);
-            let of_hit = OfHit { at, material, diffuse, scale, n_brdf: counts.brdf as f32 };
-            for block in 0..deal.blocks() {
-                let first = deal.first(hit) + block * LANES * deal.n_hits;
-                let places = strata.places(simd, first, deal.n_hits);
-                let n = n_strata.saturating_sub(first).div_ceil(deal.n_hits);
-                let slots = simd.load_ints(&candidates.slots[hit * deal.blocks() + block]);
-                candidates.lights.push(self.draw_lights(simd, &of_hit, slots, places, n));
+            let (bsdf, diffuse) = (hits.bsdf(hit), diffuse[hit]);
+            let of_hit = HitContext { at, bsdf, diffuse, scale, n_brdf: counts.brdf as f32 };
+            for block in 0..assignment.blocks() {
+                let first = assignment.first(hit) + block * LANES * assignment.n_hits;
+                let positions = strata.positions(simd, first, assignment.n_hits);
+                let n = n_strata.saturating_sub(first).div_ceil(assignment.n_hits);
+                let slots = simd.load_i32(&candidates.slots[hit * assignment.blocks() + block]);
+                candidates.lights.push(self.draw_lights(simd, &of_hit, slots, positions, n));
             }
         }
         candidates.brdf.clear();
@@ -265,30 +265,30 @@ impl Sources<'_> {
         }
     }
 
-    /// The first `n` lanes of a block of strata that fall at `places`.
+    /// The first `n` lanes of a block of strata that fall at `positions`.
     #[inline(always)]
     fn draw_lights<S: Simd>(
         &self,
         simd: S,
-        of_hit: &OfHit,
-        slots: S::Ints,
-        places: S::Floats,
+        of_hit: &HitContext,
+        slots: S::I32x8,
+        positions: S::F32x8,
         n: usize,
     ) -> CandidateBlock {
         let one = |x| simd.splat(x);
-        let inside = self.table.inside(slots, places);
-        let Lights { wi, le, density } = self.pool.at(simd, slots, inside);
-        let (f, pdf) = of_hit.at.eval_lanes(of_hit.material, wi);
+        let inside = self.table.inside(slots, positions);
+        let LightSamples { wi, le, density } = self.pool.get(simd, slots, inside);
+        let (f, pdf) = of_hit.at.eval_lanes(of_hit.bsdf, wi);
         let density = one(of_hit.scale) * self.table.widths(slots) * density;
         let weight = one(1.0) / (density + one(of_hit.n_brdf) * pdf);
-        let there = simd.counting().to_floats().lt(one(n as f32));
-        let weight = Real::select(there, weight, one(0.0));
+        let there = simd.iota().to_f32().lt(one(n as f32));
+        let weight = SimdFloat::select(there, weight, one(0.0));
         let value = f.zip(le, |f, le| f * le).scaled(weight);
-        let rest = match self.control {
-            Some(control) => {
+        let residual = match self.control_variate {
+            Some(control_variate) => {
                 let cosine = wi.dot(of_hit.at.frame.z);
-                let h = control.at(slots, wi, cosine, of_hit.diffuse);
-                let weight = Real::select(there, one(1.0) / density, one(0.0));
+                let h = control_variate.eval(slots, wi, cosine, of_hit.diffuse);
+                let weight = SimdFloat::select(there, one(1.0) / density, one(0.0));
                 let known = h.zip(le, |h, le| h * le).scaled(weight);
                 value.zip(known, |value, known| value - known)
             }
@@ -297,10 +297,10 @@ impl Sources<'_> {
         CandidateBlock {
             wi: wi.store(),
             value: value.store(),
-            rest: rest.store(),
+            residual: residual.store(),
             luminance: value.luminance().store(),
             slots: slots.store(),
-            chances: [0; LANES],
+            selection_probabilities: [0; LANES],
         }
     }
 }
@@ -315,15 +315,15 @@ pub(super) struct Hits<'a> {
 
 impl<'a> Hits<'a> {
     /// The material that a hit is sampled by.
-    pub(super) fn material(self, hit: usize) -> &'a Material {
-        &self.points[if self.one_material { 0 } else { hit }].material
+    pub(super) fn bsdf(self, hit: usize) -> &'a Bsdf {
+        &self.points[if self.one_material { 0 } else { hit }].bsdf
     }
 }
 
 /// A hit whose candidates are drawn.
-struct OfHit<'a> {
+struct HitContext<'a> {
     at: &'a ShadingPoint,
-    material: &'a Material,
+    bsdf: &'a Bsdf,
     /// What it reflects by the cosine.
     diffuse: Rgb,
     /// M over the total of the table.

@@ -14,7 +14,7 @@
 //! first, with W = ∫ L dω and R = ∫ L ω dω over the cell, W₀ = W of the whole map, a its solid angle
 //! and s = 1 − |∫ ω dω|/a, half the square of its angular radius. The first term is the variance of
 //! directions of Viriyothai & Debevec 2009 on the sphere; the others keep dim cells small enough for
-//! a cosine and a lobe to be looked up at their centres.
+//! a cosine and a lobe to be looked up at their centers.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -24,8 +24,8 @@ use std::ops::{Deref, DerefMut, Range};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::Vec3;
-use crate::sampling::hilbert::Turn;
-use crate::simd::{LANES, Lanes, Simd, Wide};
+use crate::sampling::hilbert::HilbertState;
+use crate::simd::{LANES, Lanes, Simd, SimdF32x16};
 
 /// The most cells of a lane, which has an eighth of the curve.
 pub(super) const MAX_ROWS: usize = 48;
@@ -33,27 +33,27 @@ pub(super) const MAX_ROWS: usize = 48;
 /// Rows of a table: a power of two, so that an index that is masked with it needs no other check.
 pub(super) const TABLE_ROWS: usize = MAX_ROWS.next_power_of_two();
 /// Places in a table; those of rows that the cells do not fill are nobody's.
-pub(super) const SLOTS: usize = TABLE_ROWS * LANES;
+pub(super) const N_SLOTS: usize = TABLE_ROWS * LANES;
 
 /// One number a cell, at [`Cells::slot`], by row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
-pub(super) struct Slots([Lanes; TABLE_ROWS]);
+pub(super) struct CellArray([Lanes; TABLE_ROWS]);
 
-impl Slots {
+impl CellArray {
     /// A pair of rows.
     #[inline(always)]
-    pub(super) fn pair<S: Simd>(&self, simd: S, pair: usize) -> S::Wide {
-        simd.load_wide([&self.0[2 * pair], &self.0[2 * pair + 1]])
+    pub(super) fn pair<S: Simd>(&self, simd: S, pair: usize) -> S::F32x16 {
+        simd.load_f32x16([&self.0[2 * pair], &self.0[2 * pair + 1]])
     }
 
     #[inline(always)]
-    pub(super) fn set_pair(&mut self, pair: usize, numbers: impl Wide) {
+    pub(super) fn set_pair(&mut self, pair: usize, numbers: impl SimdF32x16) {
         [self.0[2 * pair], self.0[2 * pair + 1]] = numbers.store();
     }
 }
 
-impl Deref for Slots {
+impl Deref for CellArray {
     type Target = [Lanes; TABLE_ROWS];
 
     #[inline(always)]
@@ -62,7 +62,7 @@ impl Deref for Slots {
     }
 }
 
-impl DerefMut for Slots {
+impl DerefMut for CellArray {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut Self::Target {
         &mut self.0
@@ -70,17 +70,17 @@ impl DerefMut for Slots {
 }
 
 /// Zero for each cell.
-pub(super) const NO_SLOTS: Slots = Slots([[0.0; LANES]; TABLE_ROWS]);
+pub(super) const ZERO_CELLS: CellArray = CellArray([[0.0; LANES]; TABLE_ROWS]);
 
 /// The number in a slot.
 #[inline(always)]
-pub(super) fn at(slots: &Slots, slot: usize) -> f32 {
+pub(super) fn get(slots: &CellArray, slot: usize) -> f32 {
     slots[slot / LANES % TABLE_ROWS][slot % LANES]
 }
 
 /// The number in a slot, to be changed.
 #[inline(always)]
-pub(super) fn at_mut(slots: &mut Slots, slot: usize) -> &mut f32 {
+pub(super) fn get_mut(slots: &mut CellArray, slot: usize) -> &mut f32 {
     &mut slots[slot / LANES % TABLE_ROWS][slot % LANES]
 }
 
@@ -98,7 +98,7 @@ struct Square {
     /// Counted in such squares.
     column: u32,
     row: u32,
-    turn: Turn,
+    state: HilbertState,
     /// ∫ luminance dω.
     mass: f32,
 }
@@ -106,12 +106,12 @@ struct Square {
 impl Square {
     /// The quarter that the curve visits as number `i` of four, which has the given mass.
     fn quarter(&self, i: usize, mass: f32) -> Self {
-        let (x, y, turn) = self.turn.quadrant(i);
+        let (x, y, state) = self.state.quadrant(i);
         Self {
             size: self.size - 1,
             column: 2 * self.column + x as u32,
             row: 2 * self.row + y as u32,
-            turn,
+            state,
             mass,
         }
     }
@@ -140,30 +140,30 @@ pub(super) struct Cells {
     /// Where the links lead to in the first [`KNOWN_DEPTH`] steps, for each square there, by row.
     known: Vec<Link>,
     /// Unit direction of the light's mean, in the world.
-    pub(super) center: [Box<Slots>; 3],
+    pub(super) center: [Box<CellArray>; 3],
     /// Angular radius.
-    pub(super) radius: Box<Slots>,
-    /// For normals that spread by each of [`SPREADS`].
-    ramps: [Ramp; SPREADS.len()],
-    /// No direction of the cell is further from its centre than this \[rad\].
-    pub(super) reach: Box<Slots>,
+    pub(super) radius: Box<CellArray>,
+    /// For normals that spread by each of [`NORMAL_SPREADS`].
+    ramps: [Ramp; NORMAL_SPREADS.len()],
+    /// No direction of the cell is further from its center than this \[rad\].
+    pub(super) bounding_angle: Box<CellArray>,
     /// ∫ luminance dω; 0 where there is no cell.
-    pub(super) mass: Box<Slots>,
+    pub(super) mass: Box<CellArray>,
     /// The solid angle over it.
-    pub(super) dimness: Box<Slots>,
+    pub(super) inverse_radiance: Box<CellArray>,
 }
 
 /// The soft step of the cosine on a cell: what r and the spread of normals make of it.
 #[derive(Clone, Debug)]
 pub(super) struct Ramp {
     /// s = √(r² + spread²).
-    pub(super) s: Box<Slots>,
+    pub(super) s: Box<CellArray>,
     /// 1/4s.
-    pub(super) scale: Box<Slots>,
+    pub(super) scale: Box<CellArray>,
 }
 
 /// Spreads of normals that ramps are made for \[rad\].
-const SPREADS: [f32; 7] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28];
+const NORMAL_SPREADS: [f32; 7] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28];
 
 impl Cells {
     /// Cuts an environment into as many cells as each of some numbers of rows holds, which are even and at most
@@ -181,7 +181,7 @@ impl Cells {
 
     /// The leaves of the first splits of a tree.
     fn of(map: &Map, tree: &Tree, rows: usize) -> Self {
-        let zeros = || Box::new(NO_SLOTS);
+        let zeros = || Box::new(ZERO_CELLS);
         let mut cells = Self {
             rows,
             squares: Vec::new(),
@@ -190,29 +190,29 @@ impl Cells {
             known: Vec::new(),
             center: [zeros(), zeros(), zeros()],
             radius: zeros(),
-            ramps: SPREADS.map(|_| Ramp { s: zeros(), scale: zeros() }),
-            reach: zeros(),
+            ramps: NORMAL_SPREADS.map(|_| Ramp { s: zeros(), scale: zeros() }),
+            bounding_angle: zeros(),
             mass: zeros(),
-            dimness: zeros(),
+            inverse_radiance: zeros(),
         };
         cells.number(tree, 0, &tree.nodes[0]);
         cells.known = cells.first_steps();
         for cell in 0..cells.squares.len() {
             let square = cells.squares[cell];
-            let (center, radius, reach) = map.extent(&square);
+            let (center, radius, bounding_angle) = map.extent(&square);
             let slot = cells.slot(cell);
             for (c, x) in cells.center.iter_mut().zip(center.to_array()) {
-                *at_mut(c, slot) = x;
+                *get_mut(c, slot) = x;
             }
-            *at_mut(&mut cells.radius, slot) = radius;
-            for (spread, ramp) in SPREADS.iter().zip(&mut cells.ramps) {
+            *get_mut(&mut cells.radius, slot) = radius;
+            for (spread, ramp) in NORMAL_SPREADS.iter().zip(&mut cells.ramps) {
                 let s = radius.hypot(*spread);
-                *at_mut(&mut ramp.s, slot) = s;
-                *at_mut(&mut ramp.scale, slot) = 0.25 / s;
+                *get_mut(&mut ramp.s, slot) = s;
+                *get_mut(&mut ramp.scale, slot) = 0.25 / s;
             }
-            *at_mut(&mut cells.reach, slot) = reach;
-            *at_mut(&mut cells.mass, slot) = square.mass;
-            *at_mut(&mut cells.dimness, slot) =
+            *get_mut(&mut cells.bounding_angle, slot) = bounding_angle;
+            *get_mut(&mut cells.mass, slot) = square.mass;
+            *get_mut(&mut cells.inverse_radiance, slot) =
                 (map.area(&square).0 / f64::from(square.mass)) as f32;
         }
         cells
@@ -222,7 +222,7 @@ impl Cells {
     fn number(&mut self, tree: &Tree, split: usize, node: &Node) {
         let children = tree.links[split];
         for i in 0..4 {
-            let (x, y, _) = node.square.turn.quadrant(i);
+            let (x, y, _) = node.square.state.quadrant(i);
             let Some(child) = children[2 * y + x] else { continue };
             let child = &tree.nodes[child];
             let split_below = child.split.filter(|&below| below < self.links.len());
@@ -257,8 +257,8 @@ impl Cells {
 
     /// The ramps for normals that spread by `spread`, or a little more.
     pub(super) fn ramp(&self, spread: f32) -> &Ramp {
-        let above = SPREADS.partition_point(|&s| s < spread);
-        &self.ramps[above.min(SPREADS.len() - 1)]
+        let above = NORMAL_SPREADS.partition_point(|&s| s < spread);
+        &self.ramps[above.min(NORMAL_SPREADS.len() - 1)]
     }
 
     /// The rows of a table that they fill.
@@ -298,7 +298,7 @@ impl Cells {
 
     /// ∫ luminance dω over a cell.
     pub(super) fn mass_of(&self, cell: usize) -> f32 {
-        at(&self.mass, self.slot(cell))
+        get(&self.mass, self.slot(cell))
     }
 
     /// The cell that `wi` looks at, in this texel (column and row); none where there is no light.
@@ -338,8 +338,8 @@ impl Cells {
         Some((self.at_texel(environment, texel, wi)?, le))
     }
 
-    /// Draws a direction in a cell in proportion to luminance; neighbouring `u` in [0, 1) give
-    /// neighbours along the curve. `jitter` in [0, 1)² places it within what `u` resolves.
+    /// Draws a direction in a cell in proportion to luminance; neighboring `u` in [0, 1) give
+    /// neighbors along the curve. `jitter` in [0, 1)² places it within what `u` resolves.
     ///
     /// Its density within the cell is the luminance of the radiance over the cell's mass \[sr⁻¹\].
     pub(super) fn draw(
@@ -387,9 +387,9 @@ impl Map<'_> {
     fn root(&self) -> Option<Square> {
         let table = self.environment.table()?;
         // A map of two to one is visited from its left to its right half.
-        let turn = Turn::SWAPPED;
+        let state = HilbertState::SWAPPED;
         let (size, mass) = (table.depth() as i32, table.total() as f32);
-        Some(Square { size, column: 0, row: 0, turn, mass })
+        Some(Square { size, column: 0, row: 0, state, mass })
     }
 
     /// Along the curve.
@@ -399,13 +399,13 @@ impl Map<'_> {
     }
 
     /// Those of the quarters.
-    fn masses(&self, &Square { size, column, row, turn, mass }: &Square) -> [f32; 4] {
+    fn masses(&self, &Square { size, column, row, state, mass }: &Square) -> [f32; 4] {
         let masses = match self.environment.table() {
             Some(table) if size > 0 => table.quarters(size as usize, column as usize, row as usize),
             _ => [0.25 * mass; 4],
         };
         std::array::from_fn(|i| {
-            let (x, y, _) = turn.quadrant(i);
+            let (x, y, _) = state.quadrant(i);
             masses[2 * y + x]
         })
     }
@@ -455,24 +455,24 @@ impl Map<'_> {
         scatter + (0.02 * mass / total + 1e-4 * area) * spread + wide
     }
 
-    /// Centre, angular radius and reach of a cell.
+    /// Center, angular radius and bounding angle of a cell.
     fn extent(&self, square: &Square) -> (Vec3, f32, f32) {
         let moment = self.moment(square, 3);
         let [[x0, x1], [y0, y1]] = self.rectangle(square);
         let middle = self.environment.map_direction(0.5 * (x0 + x1), 0.5 * (y0 + y1));
         let center = moment.try_normalize().unwrap_or(middle);
-        let reach = self.farthest(square, center);
+        let bounding_angle = self.farthest(square, center);
         // The light's variance along one axis, and the half side of a square that has it.
         let variance = 0.5 * (1.0 - (moment.length() / square.mass).min(1.0).powi(2));
-        let radius = (3.0 * variance).sqrt().max(0.5 * reach);
+        let radius = (3.0 * variance).sqrt().max(0.5 * bounding_angle);
         let up = self.environment.orientation().up;
         // Directions are in single precision.
-        (up.to_world(center), radius, 1.001 * reach + 1e-4)
+        (up.to_world(center), radius, 1.001 * bounding_angle + 1e-4)
     }
 
     /// The angle from `center` to the farthest point of a square.
     ///
-    /// Along a parallel it is at the column farthest from the centre's. Along that meridian the cosine
+    /// Along a parallel it is at the column farthest from the center's. Along that meridian the cosine
     /// is A sin θ + B cos θ, which is least at an end, or where it has its one minimum.
     fn farthest(&self, square: &Square, center: Vec3) -> f32 {
         let [columns, rows] = self.rectangle(square);
@@ -623,7 +623,7 @@ mod tests {
             for cell in 0..cells.len() {
                 assert_eq!(cells.cell_in(cells.slot(cell)), Some(cell));
             }
-            let slots = (0..SLOTS).filter(|&slot| cells.cell_in(slot).is_some());
+            let slots = (0..N_SLOTS).filter(|&slot| cells.cell_in(slot).is_some());
             assert_eq!(slots.count(), cells.len());
             let total: f64 = cells.mass.iter().flatten().map(|&m| f64::from(m)).sum();
             assert!((total / environment.power() - 1.0).abs() < 1e-5, "{name}");
@@ -643,11 +643,11 @@ mod tests {
                     let (cell, le) = cells.find(&environment, wi).unwrap();
                     assert_eq!(le, *texel, "{name}");
                     found[cell] += f64::from(le.luminance()) * solid_angle;
-                    // No direction lies further from the centre than the reach.
+                    // No direction lies further from the center than the bounding angle.
                     let center =
-                        Vec3::from(cells.center.each_ref().map(|c| super::at(c, cells.slot(cell))));
-                    let reach = super::at(&cells.reach, cells.slot(cell));
-                    assert!(center.angle_between(wi) <= reach, "{name} {cell}");
+                        Vec3::from(cells.center.each_ref().map(|c| get(c, cells.slot(cell))));
+                    let bounding_angle = get(&cells.bounding_angle, cells.slot(cell));
+                    assert!(center.angle_between(wi) <= bounding_angle, "{name} {cell}");
                 }
             }
             for (cell, found) in found.into_iter().enumerate() {
@@ -684,10 +684,10 @@ mod tests {
                     last = Some(wi);
                 }
                 // A curve through n points of a square is some √n sides long.
-                let reach = at(&cells.reach, cells.slot(cell));
+                let bounding_angle = get(&cells.bounding_angle, cells.slot(cell));
                 assert!(
-                    steps < 6.0 * f32::sqrt(n as f32) * reach,
-                    "{name} {cell}: {steps} {reach}"
+                    steps < 6.0 * f32::sqrt(n as f32) * bounding_angle,
+                    "{name} {cell}: {steps} {bounding_angle}"
                 );
             }
         }

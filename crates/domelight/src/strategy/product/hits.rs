@@ -2,7 +2,7 @@
 
 use super::candidates::{Counts, Hits};
 use crate::Rgb;
-use crate::bsdf::{Gloss, Outline};
+use crate::bsdf::{GlossyLobe, LobeSummary};
 use crate::math::{Frame, Vec3};
 
 /// Hits of like normals and materials.
@@ -13,9 +13,9 @@ pub(super) struct Group {
     /// The mean direction to the viewer, in that frame.
     pub(super) wo: Vec3,
     /// No normal of the group is further from the mean than this \[rad\].
-    pub(super) spread: f32,
+    pub(super) normal_spread: f32,
     /// The material of the first hit.
-    pub(super) outline: Outline,
+    pub(super) lobe_summary: LobeSummary,
     /// The share of the pixel's hits.
     pub(super) share: f32,
 }
@@ -26,15 +26,15 @@ const LIKE_NORMALS: f32 = 0.95;
 const LIKE_ROUGHNESS: f32 = 1.5;
 
 /// The spread of normals that hardly turns a lobe, as a share of its roughness.
-const PLAIN_SPREAD: f32 = 0.25;
+const SMALL_NORMAL_SPREAD: f32 = 0.25;
 /// The cosine of the view from which lobes are not drawn out.
-const PLAIN_COSINE: f32 = 0.5;
+const STEEP_COSINE: f32 = 0.5;
 
 /// A group in the making.
 #[derive(Clone, Debug)]
-struct Gathering {
+struct HitCluster {
     first: usize,
-    outline: Outline,
+    lobe_summary: LobeSummary,
     normals: Vec3,
     viewers: Vec3,
     n: usize,
@@ -43,7 +43,7 @@ struct Gathering {
 /// Memory for grouping.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Groups {
-    gatherings: Vec<Gathering>,
+    clusters: Vec<HitCluster>,
     member: Vec<usize>,
     /// What each hit reflects by the cosine.
     pub(super) diffuse: Vec<Rgb>,
@@ -53,33 +53,33 @@ pub(super) struct Groups {
 impl Groups {
     /// Groups the hits of a pixel.
     #[inline(always)]
-    pub(super) fn gather(&mut self, Hits { points, one_material }: Hits) {
-        self.gatherings.clear();
+    pub(super) fn cluster(&mut self, Hits { points, one_material }: Hits) {
+        self.clusters.clear();
         self.member.clear();
         self.diffuse.clear();
-        let mut outline = Outline::default();
+        let mut lobe_summary = LobeSummary::default();
         for (i, p) in points.iter().enumerate() {
             if i == 0 || !one_material {
-                outline = p.material.outline(p.wo);
+                lobe_summary = p.bsdf.lobe_summary(p.wo);
             }
-            let like = |g: &Gathering| {
+            let like = |g: &HitCluster| {
                 points[g.first].frame.z.dot(p.frame.z) > LIKE_NORMALS
-                    && (one_material || alike(&g.outline, &outline))
+                    && (one_material || alike(&g.lobe_summary, &lobe_summary))
             };
-            let group = self.gatherings.iter().position(like).unwrap_or_else(|| {
+            let group = self.clusters.iter().position(like).unwrap_or_else(|| {
                 let (normals, viewers) = (Vec3::ZERO, Vec3::ZERO);
-                self.gatherings.push(Gathering { first: i, outline, normals, viewers, n: 0 });
-                self.gatherings.len() - 1
+                self.clusters.push(HitCluster { first: i, lobe_summary, normals, viewers, n: 0 });
+                self.clusters.len() - 1
             });
-            let gathering = &mut self.gatherings[group];
-            gathering.normals += p.frame.z;
-            gathering.viewers += p.frame.to_world(p.wo);
-            gathering.n += 1;
+            let cluster = &mut self.clusters[group];
+            cluster.normals += p.frame.z;
+            cluster.viewers += p.frame.to_world(p.wo);
+            cluster.n += 1;
             self.member.push(group);
-            self.diffuse.push(outline.diffuse);
+            self.diffuse.push(lobe_summary.diffuse);
         }
         self.all.clear();
-        for g in &self.gatherings {
+        for g in &self.clusters {
             let first = &points[g.first].frame;
             let normal = g.normals.try_normalize().unwrap_or(first.z);
             let frame = Frame::from_z_and_tangent(normal, first.x);
@@ -87,8 +87,8 @@ impl Groups {
             self.all.push(Group {
                 frame,
                 wo: Vec3::new(wo.x, wo.y, wo.z.max(1e-3)),
-                spread: 0.0,
-                outline: g.outline,
+                normal_spread: 0.0,
+                lobe_summary: g.lobe_summary,
                 share: g.n as f32 / points.len() as f32,
             });
         }
@@ -96,7 +96,7 @@ impl Groups {
             let group = &mut self.all[member];
             // The chord is off the angle by less than a twentieth here.
             let angle = 1.05 * p.frame.z.distance(group.frame.z);
-            group.spread = group.spread.max(angle);
+            group.normal_spread = group.normal_spread.max(angle);
         }
     }
 }
@@ -104,14 +104,16 @@ impl Groups {
 impl Groups {
     /// The roughness of the narrowest lobe; none if all is diffuse.
     pub(super) fn narrowest(&self) -> Option<f32> {
-        let lobes = self.all.iter().flat_map(|g| g.outline.lobes());
+        let lobes = self.all.iter().flat_map(|g| g.lobe_summary.lobes());
         lobes.map(|(_, gloss)| gloss.width()).reduce(f32::min)
     }
 
     /// Whether a table follows lobes of this roughness well: the lobe hardly turns within a group, and is not
     /// drawn out along the horizon.
-    pub(super) fn is_plain(&self, roughness: f32) -> bool {
-        self.all.iter().all(|g| g.spread <= PLAIN_SPREAD * roughness && g.wo.z >= PLAIN_COSINE)
+    pub(super) fn is_well_tabulated(&self, roughness: f32) -> bool {
+        self.all
+            .iter()
+            .all(|g| g.normal_spread <= SMALL_NORMAL_SPREAD * roughness && g.wo.z >= STEEP_COSINE)
     }
 
     /// How dense samples of the material are beside strata of a table with this total, where the light of a cell
@@ -119,8 +121,8 @@ impl Groups {
     /// in the mean over its lobes.
     pub(super) fn brdf_share(&self, counts: Counts, total: f32) -> f32 {
         let lobes = self.all.iter().flat_map(|g| {
-            let diffuse = std::iter::once(g.outline.diffuse);
-            diffuse.chain(g.outline.lobes().map(|(c, _)| c)).map(|c| c.luminance() * g.share)
+            let diffuse = std::iter::once(g.lobe_summary.diffuse);
+            diffuse.chain(g.lobe_summary.lobes().map(|(c, _)| c)).map(|c| c.luminance() * g.share)
         });
         let albedo: f32 = lobes.sum();
         if counts.brdf == 0 || counts.light == 0 || albedo <= 0.0 {
@@ -131,18 +133,21 @@ impl Groups {
 }
 
 /// Of the same kinds of lobes, about as rough.
-fn alike(a: &Outline, b: &Outline) -> bool {
+fn alike(a: &LobeSummary, b: &LobeSummary) -> bool {
     let near = |a: f32, b: f32| a < LIKE_ROUGHNESS * b && b < LIKE_ROUGHNESS * a;
     // The width of the lobe falls as the square root of the exponent.
     let near_exponents = |a: f32, b: f32| {
         let factor = LIKE_ROUGHNESS * LIKE_ROUGHNESS;
         a + 1.0 < factor * (b + 1.0) && b + 1.0 < factor * (a + 1.0)
     };
-    let gloss = |a: Gloss, b: Gloss| match (a, b) {
-        (Gloss::Slopes { alpha: a, gaussian: c }, Gloss::Slopes { alpha: b, gaussian: d }) => {
-            c == d && near(a[0], b[0]) && near(a[1], b[1])
+    let gloss = |a: GlossyLobe, b: GlossyLobe| match (a, b) {
+        (
+            GlossyLobe::Slopes { alpha: a, gaussian: c },
+            GlossyLobe::Slopes { alpha: b, gaussian: d },
+        ) => c == d && near(a[0], b[0]) && near(a[1], b[1]),
+        (GlossyLobe::Mirror { exponent: a }, GlossyLobe::Mirror { exponent: b }) => {
+            near_exponents(a, b)
         }
-        (Gloss::Mirror { exponent: a }, Gloss::Mirror { exponent: b }) => near_exponents(a, b),
         _ => false,
     };
     a.diffuse.is_black() == b.diffuse.is_black()

@@ -1,7 +1,7 @@
 //! Product sampling: rays follow light times reflectance, and visibility is learned on the way.
 //!
 //! Once for an environment its map is cut into some hundred `cells` along Hilbert's curve. Each pass draws
-//! a `pool` of directions in every cell. Then, pixel by pixel, all its camera hits together:
+//! `light_samples`, a pool of directions, in every cell. Then, pixel by pixel, all its camera hits together:
 //!
 //! 1. A `table` gives each cell its light times what the pixel reflects of it.
 //! 2. `candidates`: strata along the curve, each with one direction of the pool, and samples of the
@@ -9,17 +9,17 @@
 //! 3. The tile's pixels come in [levels](super::levels). Those of the first, *pilots*, trace all their candidates.
 //!    From the rays of each level the tile learns the `visibility` V̂ of each cell and the brightness of its pixels.
 //! 4. What the next levels reflect of light that is seen through V̂ is known but for its details: the integral of
-//!    a `control` variate h over all cells. They `choose` those candidates whose visibility matters:
+//!    a `control_variate` h over all cells. `systematic` sampling traces those candidates whose visibility matters:
 //!
 //! ```text
 //! base = Σ_c V̂_c ∫ h L + Σ_j V̂_j (W_j − h_j L_j/p_j) − Σ_chosen (W_j/π_j) V̂_j        rays: weight W_j/π_j
 //! ```
 //!
-//!    The table of a diffuse pixel, whose light h knows, follows what is in doubt.
+//!    The table of a diffuse pixel, whose light h knows, is proportional to the uncertainty of visibility.
 //!
 //! The expectation is ∫ f L V dω for every V̂, brightness and pool, given that they do not depend on
 //! the numbers that strata, samples and choice are drawn with: V̂ and brightness come from pixels of lower levels,
-//! and each pixel and pass has a stream of numbers of its own. V̂ has the pool in common with the candidates. That does
+//! and each pixel and pass has a sampler of its own. V̂ has the pool in common with the candidates. That does
 //! no harm: given the pool, strata draw nothing else, and the expectation of their part is a sum over the pool
 //! whatever V̂ and the density made of it are. Samples of the material do not come from the pool, so where there are any
 //! the density depends on the pixel's hits alone.
@@ -31,31 +31,31 @@
 mod brdf_samples;
 mod candidates;
 mod cells;
-mod choose;
-mod control;
+mod control_variate;
 mod hits;
-mod pool;
+mod light_samples;
+mod systematic;
 mod table;
 #[cfg(test)]
 mod test_support;
 mod visibility;
 
-pub use pool::Pool;
+pub use light_samples::LightSamplePool;
 
 use super::levels::{N_LEVELS, coarser};
 use super::{Contributions, PixelPoints, Strategy, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
-use crate::sampling::Stream;
-use crate::simd::{Colors, Floats, InstructionSet, Kernel, LANES, Simd, dispatch};
-use candidates::{Candidate, Candidates, Counts, Hits, PixelNumbers, Place, Sources};
-use cells::{Cells, Slots, at};
-use choose::{Choice, probabilities, probability, weight};
-use control::Control;
+use crate::sampling::Sampler;
+use crate::simd::{Colors, InstructionSet, Kernel, LANES, Simd, SimdF32x8, dispatch};
+use candidates::{Candidate, CandidateIndex, Candidates, Counts, Hits, PixelSamples, Sources};
+use cells::{CellArray, Cells, get};
+use control_variate::ControlVariate;
 use hits::Groups;
-use pool::PassLength;
+use light_samples::PassLength;
+use systematic::{SystematicSampler, probabilities, probability, weight};
 use table::Table;
-use visibility::{Blocks, Learned, Visibility};
+use visibility::{Blocks, VisibilityEstimate, VisibilityStats};
 
 /// Camera samples of a pass: strata that one random offset spreads over all of them are worth more
 /// than the same number in two sets.
@@ -125,7 +125,7 @@ impl<'a> ProductSampling<'a> {
         let all = self.n_rays as usize * n_hits * times;
         let brdf = match groups.narrowest() {
             Some(width) if width < NARROW => all.div_ceil(BRDF_SHARE[1]),
-            Some(width) if !groups.is_plain(width) => all.div_ceil(BRDF_SHARE[0]),
+            Some(width) if !groups.is_well_tabulated(width) => all.div_ceil(BRDF_SHARE[0]),
             _ => 0,
         };
         Counts { light: all - brdf, brdf }
@@ -151,20 +151,20 @@ impl<'a> ProductSampling<'a> {
 pub struct ProductScratch {
     groups: Groups,
     table: Table,
-    control: Control,
+    control_variate: ControlVariate,
     candidates: Candidates,
     /// The chosen strata's candidates.
-    chosen: Vec<Place>,
-    visibility: Visibility,
+    chosen: Vec<CandidateIndex>,
+    visibility: VisibilityEstimate,
     /// Of each ray of the round the slot of the cell that it goes to.
     targets: Vec<u16>,
     /// The pixels of the round that have hits.
-    asked: Vec<usize>,
-    learned: Learned,
+    sampled_pixels: Vec<usize>,
+    visibility_stats: VisibilityStats,
 }
 
 impl Strategy for ProductSampling<'_> {
-    type Pass = Pool;
+    type Pass = LightSamplePool;
     type Scratch = ProductScratch;
 
     fn n_rounds(&self) -> u32 {
@@ -179,15 +179,15 @@ impl Strategy for ProductSampling<'_> {
         Some((MAX_CANDIDATES / self.n_rays).clamp(1, SAMPLES_PER_PASS))
     }
 
-    fn begin_pass(&self, stream: Stream, n_samples: u32) -> Pool {
+    fn begin_pass(&self, sampler: Sampler, n_samples: u32) -> LightSamplePool {
         let length = PassLength::new(n_samples as usize);
-        let draw = |cells| Pool::draw(cells, self.environment, stream, length);
-        self.cells(length).map_or_else(Pool::empty, draw)
+        let draw = |cells| LightSamplePool::draw(cells, self.environment, sampler, length);
+        self.cells(length).map_or_else(LightSamplePool::empty, draw)
     }
 
     fn push(
         &self,
-        pool: &Pool,
+        pool: &LightSamplePool,
         tile: &TileShading,
         round: u32,
         scratch: &mut ProductScratch,
@@ -195,15 +195,15 @@ impl Strategy for ProductSampling<'_> {
     ) {
         let Some(cells) = self.cells(pool.length) else { return };
         if round == 0 {
-            scratch.learned.reset(tile.blocks(), tile.pixels.len());
+            scratch.visibility_stats.reset(tile.blocks(), tile.pixels.len());
         }
         if tile.points.is_empty() {
-            scratch.asked.clear();
+            scratch.sampled_pixels.clear();
             return;
         }
         let pilots = round == 0;
-        let asking = Asking { strategy: self, cells, pool, tile, pilots, scratch, out };
-        dispatch(self.instruction_set, asking);
+        let context = PixelContext { strategy: self, cells, pool, tile, pilots, scratch, out };
+        dispatch(self.instruction_set, context);
     }
 
     fn learn(
@@ -214,118 +214,129 @@ impl Strategy for ProductSampling<'_> {
         scratch: &mut ProductScratch,
     ) {
         let blocks = tile.blocks();
-        let ProductScratch { learned, asked, targets, .. } = scratch;
+        let ProductScratch { visibility_stats, sampled_pixels, targets, .. } = scratch;
         let mut ray = 0;
-        for &i in &*asked {
+        for &i in &*sampled_pixels {
             let PixelPoints { points, n_samples, .. } = &tile.pixels[i];
             let block = blocks.of(i % tile.width, i / tile.width);
             let mut sum: Rgb = pushed.base[points.clone()].iter().copied().sum();
             while pushed.point.get(ray).is_some_and(|&point| (point as usize) < points.end) {
                 let v = visibility[ray];
-                learned.count(block, usize::from(targets[ray]), v);
+                visibility_stats.count(block, usize::from(targets[ray]), v);
                 sum += if v > 0.0 { pushed.weight[ray] * v } else { Rgb::BLACK };
                 ray += 1;
             }
-            learned.set_luminance(i, sum.luminance().max(0.0) / *n_samples as f32);
+            visibility_stats.set_luminance(i, sum.luminance().max(0.0) / *n_samples as f32);
         }
     }
 }
 
 /// A round over a tile.
-struct Asking<'a, 'e> {
+struct PixelContext<'a, 'e> {
     strategy: &'a ProductSampling<'e>,
     cells: &'a Cells,
-    pool: &'a Pool,
+    pool: &'a LightSamplePool,
     tile: &'a TileShading<'a>,
     pilots: bool,
     scratch: &'a mut ProductScratch,
     out: &'a mut Contributions,
 }
 
-impl Kernel for Asking<'_, '_> {
+impl Kernel for PixelContext<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(mut self, simd: S) {
         let Self { tile, pilots, .. } = self;
         let blocks = tile.blocks();
-        let ProductScratch { visibility, learned, .. } = &mut *self.scratch;
+        let ProductScratch { visibility, visibility_stats, .. } = &mut *self.scratch;
         if !pilots {
-            visibility.estimate(simd, self.cells, learned, blocks);
+            visibility.estimate(simd, self.cells, visibility_stats, blocks);
         }
         self.scratch.targets.clear();
-        self.scratch.asked.clear();
+        self.scratch.sampled_pixels.clear();
         for (i, pixel) in tile.pixels.iter().enumerate() {
             if !pixel.points.is_empty() {
                 let block = blocks.of(i % tile.width, i / tile.width);
-                self.ask(simd, i, pixel, block);
+                self.sample_pixel(simd, i, pixel, block);
             }
         }
     }
 }
 
-impl Asking<'_, '_> {
+impl PixelContext<'_, '_> {
     /// Asks for the rays of a pixel.
     #[inline(always)]
-    fn ask<S: Simd>(&mut self, simd: S, i: usize, pixel: &PixelPoints, block: usize) {
+    fn sample_pixel<S: Simd>(&mut self, simd: S, i: usize, pixel: &PixelPoints, block: usize) {
         let Self { strategy, tile, .. } = *self;
         let ProductScratch {
             groups,
             table,
-            control,
+            control_variate,
             candidates,
             chosen,
             visibility,
             targets,
-            asked,
-            learned,
+            sampled_pixels,
+            visibility_stats,
         } = &mut *self.scratch;
-        asked.push(i);
+        sampled_pixels.push(i);
         let points = &tile.points[pixel.points.clone()];
         let hits = Hits { points, one_material: pixel.one_material };
-        groups.gather(hits);
+        groups.cluster(hits);
         let is_glossy = groups.narrowest().is_some();
         let counts = strategy.counts(groups, points.len(), self.pilots);
         if self.pilots {
-            table.fill::<S, false>(simd, self.cells, &groups.all, control);
+            table.fill::<S, false>(simd, self.cells, &groups.all, control_variate);
         } else {
-            table.fill::<S, true>(simd, self.cells, &groups.all, control);
+            table.fill::<S, true>(simd, self.cells, &groups.all, control_variate);
             if !is_glossy {
-                let (visible, doubt) = visibility.of(block);
-                table.attend(simd, self.cells, &control.above, visible, doubt);
+                let (visible, std_dev) = visibility.of(block);
+                table.weight_by_variance(
+                    simd,
+                    self.cells,
+                    &control_variate.above,
+                    visible,
+                    std_dev,
+                );
             }
         }
         table.accumulate(simd, self.cells);
         if !self.pilots {
-            control.balance(simd, self.cells, groups.brdf_share(counts, table.total()));
+            control_variate.balance(simd, self.cells, groups.brdf_share(counts, table.total()));
         }
         // The first camera sample that hits tells passes apart.
-        let stream = pixel.stream.part(tile.samples[pixel.points.start]);
-        let numbers = PixelNumbers::new(stream);
+        let sampler = pixel.sampler.part(tile.samples[pixel.points.start]);
+        let numbers = PixelSamples::new(sampler);
         let (environment, cells, pool) = (strategy.environment, self.cells, self.pool);
-        let control = (!self.pilots).then_some(&*control);
-        let sources = Sources { environment, cells, pool, table, control };
+        let control_variate = (!self.pilots).then_some(&*control_variate);
+        let sources = Sources { environment, cells, pool, table, control_variate };
         sources.draw(simd, hits, &groups.diffuse, counts, &numbers, candidates);
         let mut rays = Rays { pixel, out: self.out, targets };
-        if let Some(control) = control {
+        if let Some(control_variate) = control_variate {
             let visibility = visibility.of(block);
-            let integral = control.integral(simd, cells, pool, visibility.0);
+            let integral = control_variate.integral(simd, cells, pool, visibility.0);
             let mut known = Rgb::BLACK;
             for (hit, (at, &diffuse)) in points.iter().zip(&groups.diffuse).enumerate() {
-                let of_hit = integral.at(at.frame.z, diffuse);
+                let of_hit = integral.eval(at.frame.z, diffuse);
                 *rays.base(hit as u32) += of_hit;
                 known += of_hit;
             }
             // No brighter than what is known of it: it may lie in a shadow or beside a highlight.
             let known = known.luminance().max(0.0) / points.len() as f32;
-            let brightness = strategy.expected_brightness(tile, learned, i);
+            let brightness = strategy.expected_brightness(tile, visibility_stats, i);
             let brightness = brightness.min(strategy.brightness(known));
             let n = (counts.light + counts.brdf) as f32;
             let tolerance = TOLERANCE[usize::from(is_glossy)];
             let covered = points.len() as f32 / pixel.n_samples as f32;
             let scale = covered * n / (tolerance * brightness);
             rays.weigh(simd, candidates, visibility, scale);
-            rays.push_chosen(candidates, visibility.0, Choice::new(numbers.choice), chosen);
+            rays.push_chosen(
+                candidates,
+                visibility.0,
+                SystematicSampler::new(numbers.choice),
+                chosen,
+            );
         } else {
             rays.push_all(candidates);
         }
@@ -341,9 +352,14 @@ impl TileShading<'_> {
 impl ProductSampling<'_> {
     /// How bright a pixel will be: the harmonic mean over those of lower levels about it, for a dark one among
     /// them tells of a shadow's edge.
-    fn expected_brightness(&self, tile: &TileShading, learned: &Learned, pixel: usize) -> f32 {
+    fn expected_brightness(
+        &self,
+        tile: &TileShading,
+        visibility_stats: &VisibilityStats,
+        pixel: usize,
+    ) -> f32 {
         let around = coarser(pixel, tile.width, tile.pixels.len());
-        let known = around.filter_map(|i| learned.luminance(i));
+        let known = around.filter_map(|i| visibility_stats.luminance(i));
         let add = |(n, sum), luminance| (n + 1.0, sum + 1.0 / self.brightness(luminance));
         let (n, sum) = known.fold((0.0, 0.0), add);
         if n > 0.0 { n / sum } else { self.dark }
@@ -382,7 +398,7 @@ impl Rays<'_> {
     #[inline(always)]
     fn push_all(&mut self, candidates: &Candidates) {
         let scale = self.scale();
-        let n_blocks = candidates.deal.blocks().max(1);
+        let n_blocks = candidates.assignment.blocks().max(1);
         for (i, block) in candidates.lights.iter().enumerate() {
             for lane in (0..LANES).filter(|&lane| block.luminance[lane] > 0.0) {
                 let c = block.get(lane, (i / n_blocks) as u32);
@@ -400,29 +416,29 @@ impl Rays<'_> {
         &mut self,
         simd: S,
         candidates: &mut Candidates,
-        (visible, doubt): (&Slots, &Slots),
+        (visible, std_dev): (&CellArray, &CellArray),
         importance: f32,
     ) {
         let scale = self.scale();
-        let Candidates { lights, brdf, deal, .. } = candidates;
-        for (hit, blocks) in lights.chunks_mut(deal.blocks().max(1)).enumerate() {
+        let Candidates { lights, brdf, assignment, .. } = candidates;
+        for (hit, blocks) in lights.chunks_mut(assignment.blocks().max(1)).enumerate() {
             let mut sums = [simd.splat(0.0); 3];
             for c in blocks {
-                let slots = simd.load_ints(&c.slots);
-                let visible = S::Floats::gather(visible, slots);
-                for (sum, rest) in sums.iter_mut().zip(&c.rest) {
-                    *sum = *sum + simd.load(rest) * visible;
+                let slots = simd.load_i32(&c.slots);
+                let visible = S::F32x8::gather(visible, slots);
+                for (sum, residual) in sums.iter_mut().zip(&c.residual) {
+                    *sum = *sum + simd.load(residual) * visible;
                 }
-                let doubt = S::Floats::gather(doubt, slots);
-                let size = simd.load(&c.luminance) * doubt * simd.splat(importance);
-                c.chances = probabilities(simd, size);
+                let std_dev = S::F32x8::gather(std_dev, slots);
+                let size = simd.load(&c.luminance) * std_dev * simd.splat(importance);
+                c.selection_probabilities = probabilities(simd, size);
             }
             *self.base(hit as u32) += Colors(sums).sum() * scale;
         }
         for c in brdf {
             let slot = c.slot as usize;
-            *self.base(c.hit) += c.value * (scale * at(visible, slot));
-            c.chance = probability(c.luminance * at(doubt, slot) * importance);
+            *self.base(c.hit) += c.value * (scale * get(visible, slot));
+            c.selection_probability = probability(c.luminance * get(std_dev, slot) * importance);
         }
     }
 
@@ -431,32 +447,33 @@ impl Rays<'_> {
     fn push_chosen(
         &mut self,
         candidates: &Candidates,
-        visible: &Slots,
-        mut choice: Choice,
-        chosen: &mut Vec<Place>,
+        visible: &CellArray,
+        mut systematic_sampler: SystematicSampler,
+        chosen: &mut Vec<CandidateIndex>,
     ) {
-        let Candidates { lights, brdf, deal, .. } = candidates;
-        chosen.resize(lights.len() * LANES + 1, Place::default());
+        let Candidates { lights, brdf, assignment, .. } = candidates;
+        chosen.resize(lights.len() * LANES + 1, CandidateIndex::default());
         let mut n_chosen = 0;
-        for place in deal.places() {
+        for index in assignment.indices() {
             // Overwritten by the next unless it is chosen.
-            chosen[n_chosen] = place;
-            let chance = lights[place.lane / LANES].chances[place.lane % LANES];
-            n_chosen += usize::from(choice.offer(chance as u32));
+            chosen[n_chosen] = index;
+            let selection_probability =
+                lights[index.lane / LANES].selection_probabilities[index.lane % LANES];
+            n_chosen += usize::from(systematic_sampler.select(selection_probability as u32));
         }
-        for &Place { hit, lane } in &chosen[..n_chosen] {
+        for &CandidateIndex { hit, lane } in &chosen[..n_chosen] {
             self.push_one(&lights[lane / LANES].get(lane % LANES, hit as u32), visible);
         }
-        for c in brdf.iter().filter(|c| choice.offer(c.chance)) {
+        for c in brdf.iter().filter(|c| systematic_sampler.select(c.selection_probability)) {
             self.push_one(c, visible);
         }
     }
 
     /// W (V − V̂)/π of one candidate.
     #[inline(always)]
-    fn push_one(&mut self, c: &Candidate, visible: &Slots) {
-        let value = c.value * (self.scale() * weight(c.chance));
-        *self.base(c.hit) += value * -at(visible, c.slot as usize);
+    fn push_one(&mut self, c: &Candidate, visible: &CellArray) {
+        let value = c.value * (self.scale() * weight(c.selection_probability));
+        *self.base(c.hit) += value * -get(visible, c.slot as usize);
         self.push(c, value);
     }
 }

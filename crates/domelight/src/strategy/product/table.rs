@@ -1,10 +1,10 @@
 //! The product table of a pixel: for each cell its light times how much of it the pixel reflects.
 //!
 //! ```text
-//! t(c) = W(c) · f(n, wo, centre of c)
+//! t(c) = W(c) · f(n, wo, center of c)
 //! ```
 //!
-//! f is the outline of the material, widened by the angular radius r of the cell and the spread of
+//! f is the summary of the BSDF's lobes, widened by the angular radius r of the cell and the spread of
 //! the normals in the pixel: s² = r² + spread² is added to the variance of a lobe, and the cosine x
 //! becomes a ramp (x + s)²/4s where |x| < s. No cell that may hold a direction above the surface has
 //! a diffuse weight of zero, so the table is a density for all that the pixel reflects; the tails of
@@ -14,13 +14,13 @@
 //! The running sum of the table is a distribution along the curve. Its M strata share one random
 //! offset: stratum k falls at u = (k + ξ)/M.
 
-use super::candidates::{Deal, Strata};
-use super::cells::{Cells, MAX_ROWS, NO_SLOTS, Slots, TABLE_ROWS};
-use super::control::Control;
+use super::candidates::{Strata, StratumAssignment};
+use super::cells::{CellArray, Cells, MAX_ROWS, TABLE_ROWS, ZERO_CELLS};
+use super::control_variate::ControlVariate;
 use super::hits::Group;
-use crate::bsdf::Gloss;
+use crate::bsdf::GlossyLobe;
 use crate::math::{FRAC_1_PI, Frame, Vec3, sqr};
-use crate::simd::{Floats, Ints, LANES, Mask, Real, Simd, Vectors};
+use crate::simd::{LANES, LaneMask, Simd, SimdF32x8, SimdFloat, SimdI32x8, Vectors};
 
 /// The least cosine of a cell that is not all below the surface: what the table leaves to chance.
 const LEAST_COSINE: f32 = 0.01;
@@ -29,52 +29,73 @@ const LEAST_COSINE: f32 = 0.01;
 #[derive(Clone, Debug)]
 pub(super) struct Table {
     /// What the cell is worth; after [`Table::accumulate`] its part of the running sum exactly.
-    weight: Slots,
+    weight: CellArray,
     /// The running sum along the curve up to the cell.
-    start: Slots,
+    start: CellArray,
     /// The running sum up to and with it.
-    end: Slots,
+    end: CellArray,
     /// How much light reaches a surface facing the cell, at least [`LEAST_COSINE`]; 0 below it.
-    cosine: Slots,
+    cosine: CellArray,
     /// The sum over all cells.
     total: f32,
 }
 
 impl Default for Table {
     fn default() -> Self {
-        Self { weight: NO_SLOTS, start: NO_SLOTS, end: NO_SLOTS, cosine: NO_SLOTS, total: 0.0 }
+        Self {
+            weight: ZERO_CELLS,
+            start: ZERO_CELLS,
+            end: ZERO_CELLS,
+            cosine: ZERO_CELLS,
+            total: 0.0,
+        }
     }
 }
 
 impl Table {
-    /// Fills the table for groups of hits, with `CONTROL` their control variate as well; [`Table::accumulate`] makes
+    /// Fills the table for groups of hits, with `CONTROL_VARIATE` their control variate as well; [`Table::accumulate`] makes
     /// it a distribution.
     #[inline(always)]
-    pub(super) fn fill<S: Simd, const CONTROL: bool>(
+    pub(super) fn fill<S: Simd, const CONTROL_VARIATE: bool>(
         &mut self,
         simd: S,
         cells: &Cells,
         groups: &[Group],
-        control: &mut Control,
+        control_variate: &mut ControlVariate,
     ) {
-        if CONTROL {
-            control.reset(groups);
+        if CONTROL_VARIATE {
+            control_variate.reset(groups);
         }
         let mut n_lobes = 0;
         for (i, group) in groups.iter().enumerate() {
-            self.face::<S, CONTROL>(simd, cells, group, control, i > 0);
-            for (albedo, gloss) in group.outline.lobes() {
+            self.fill_cosine::<S, CONTROL_VARIATE>(simd, cells, group, control_variate, i > 0);
+            for (albedo, gloss) in group.lobe_summary.lobes() {
                 let share = group.share * albedo.luminance();
-                let lobe = LobeOf { cells, group, share, first: n_lobes == 0 };
+                let lobe = GroupLobe { cells, group, share, first: n_lobes == 0 };
                 match gloss {
-                    Gloss::Slopes { alpha, gaussian: true } => {
-                        self.add_slopes::<S, true, CONTROL>(simd, lobe, alpha, control);
+                    GlossyLobe::Slopes { alpha, gaussian: true } => {
+                        self.add_slopes::<S, true, CONTROL_VARIATE>(
+                            simd,
+                            lobe,
+                            alpha,
+                            control_variate,
+                        );
                     }
-                    Gloss::Slopes { alpha, gaussian: false } => {
-                        self.add_slopes::<S, false, CONTROL>(simd, lobe, alpha, control);
+                    GlossyLobe::Slopes { alpha, gaussian: false } => {
+                        self.add_slopes::<S, false, CONTROL_VARIATE>(
+                            simd,
+                            lobe,
+                            alpha,
+                            control_variate,
+                        );
                     }
-                    Gloss::Mirror { exponent } => {
-                        self.add_mirror::<S, CONTROL>(simd, lobe, exponent, control);
+                    GlossyLobe::Mirror { exponent } => {
+                        self.add_mirror::<S, CONTROL_VARIATE>(
+                            simd,
+                            lobe,
+                            exponent,
+                            control_variate,
+                        );
                     }
                 }
                 n_lobes += 1;
@@ -82,58 +103,59 @@ impl Table {
         }
     }
 
-    /// Turns a table of a diffuse pixel to what is left to chance: visibility, by its `doubt`, and the light of
+    /// Weights the table of a diffuse pixel by what is uncertain: visibility, by its `std_dev`, and the light of
     /// cells across the horizon.
     #[inline(always)]
-    pub(super) fn attend<S: Simd>(
+    pub(super) fn weight_by_variance<S: Simd>(
         &mut self,
         simd: S,
         cells: &Cells,
-        above: &Slots,
-        visible: &Slots,
-        doubt: &Slots,
+        above: &CellArray,
+        visible: &CellArray,
+        std_dev: &CellArray,
     ) {
         /// Of the light of a cell across the horizon, the variance that its control variate leaves.
         const ACROSS: f32 = 0.1;
-        let one = |x| simd.splat_wide(x);
+        let one = |x| simd.splat_f32x16(x);
         for pair in cells.pairs() {
             let across = one(1.0) - above.pair(simd, pair);
             let light = visible.pair(simd, pair).squared() * across * one(ACROSS);
-            let chance = (doubt.pair(simd, pair).squared() + light).sqrt();
-            self.weight.set_pair(pair, self.weight.pair(simd, pair) * chance);
+            let uncertainty = (std_dev.pair(simd, pair).squared() + light).sqrt();
+            self.weight.set_pair(pair, self.weight.pair(simd, pair) * uncertainty);
         }
     }
 
     /// The ramp of the cosine, and the diffuse part, added to what other groups have if there are `others`.
     #[inline(always)]
-    fn face<S: Simd, const CONTROL: bool>(
+    fn fill_cosine<S: Simd, const CONTROL_VARIATE: bool>(
         &mut self,
         simd: S,
         cells: &Cells,
         group: &Group,
-        control: &mut Control,
+        control_variate: &mut ControlVariate,
         others: bool,
     ) {
-        let one = |x| simd.splat_wide(x);
-        let diffuse = FRAC_1_PI * group.share * group.outline.diffuse.luminance();
+        let one = |x| simd.splat_f32x16(x);
+        let diffuse = FRAC_1_PI * group.share * group.lobe_summary.diffuse.luminance();
         let diffuse = one(diffuse);
         let (zero, least) = (one(0.0), one(LEAST_COSINE));
-        let spread = one(group.spread);
-        let ramps = cells.ramp(group.spread);
+        let spread = one(group.normal_spread);
+        let ramps = cells.ramp(group.normal_spread);
         let before = one(if others { 1.0 } else { 0.0 });
         for pair in cells.pairs() {
             let x = center(simd, cells, pair).dot(group.frame.z);
             let s = ramps.s.pair(simd, pair);
             let ramp = (x + s).max(zero).squared() * ramps.scale.pair(simd, pair);
-            let cosine = Real::select(s.lt(x), x, ramp);
-            let reached = zero.lt(x + cells.reach.pair(simd, pair) + spread);
-            let cosine = Real::select(reached, cosine.max(least), zero);
+            let cosine = SimdFloat::select(s.lt(x), x, ramp);
+            let reached = zero.lt(x + cells.bounding_angle.pair(simd, pair) + spread);
+            let cosine = SimdFloat::select(reached, cosine.max(least), zero);
             self.cosine.set_pair(pair, cosine);
             let weight = before * self.weight.pair(simd, pair) + diffuse * cosine;
             self.weight.set_pair(pair, weight);
-            if CONTROL {
-                let by_others = if others { control.above.pair(simd, pair) } else { one(1.0) };
-                control.above.set_pair(pair, Real::select(s.lt(x), by_others, zero));
+            if CONTROL_VARIATE {
+                let by_others =
+                    if others { control_variate.above.pair(simd, pair) } else { one(1.0) };
+                control_variate.above.set_pair(pair, SimdFloat::select(s.lt(x), by_others, zero));
             }
         }
     }
@@ -141,20 +163,20 @@ impl Table {
     /// D(h) cos θ_i/(4 σ_o σ_i), of GGX or with tails (1 + t/3)⁻⁴ that are near to a Gaussian's, where
     /// t = (h_x²/a_x² + h_y²/a_y²)/h_z² for h = ω_i + ω_o.
     #[inline(always)]
-    fn add_slopes<S: Simd, const GAUSSIAN: bool, const CONTROL: bool>(
+    fn add_slopes<S: Simd, const GAUSSIAN: bool, const CONTROL_VARIATE: bool>(
         &mut self,
         simd: S,
-        LobeOf { cells, group, share, first }: LobeOf,
+        GroupLobe { cells, group, share, first }: GroupLobe,
         alpha: [f32; 2],
-        control: &mut Control,
+        control_variate: &mut ControlVariate,
     ) {
-        let one = |x| simd.splat_wide(x);
+        let one = |x| simd.splat_f32x16(x);
         let frame = &group.frame;
         let wo = group.wo;
         let half = Vectors::splat(one(0.0), frame.to_world(wo));
         let [ax2, ay2] = alpha.map(|a| one(sqr(a)));
         let rough2 = one(0.5) * (ax2 + ay2);
-        let spread2 = one(sqr(group.spread));
+        let spread2 = one(sqr(group.normal_spread));
         let scale = one(0.25 * FRAC_1_PI * share) / sigma(one(wo.z), rough2);
         let tail = one(if GAUSSIAN { 1.0 / 3.0 } else { 1.0 });
         for pair in cells.pairs() {
@@ -181,7 +203,7 @@ impl Table {
             }
             let weight = scale * shape * inverse.sqrt() * cosine * (spread * both);
             self.weight.set_pair(pair, self.weight.pair(simd, pair) + weight);
-            if CONTROL {
+            if CONTROL_VARIATE {
                 // ∇ ln of the shape, over 4: along h, and along the axes of the frame; less where h turns much
                 // within the cell.
                 let along = one(1.0) / (h2 + radius2);
@@ -194,7 +216,7 @@ impl Table {
                 let across = [out * x, out * y, up];
                 let slope = h.times(along).plus(frame_vector(frame, across).times(steady));
                 let slope = slope.times(weight * one(4.0));
-                control.add_gloss(simd, pair, [center, slope], weight, first);
+                control_variate.add_glossy_lobe(simd, pair, [center, slope], weight, first);
             }
         }
     }
@@ -202,17 +224,17 @@ impl Table {
     /// (1 + v/3σ²)⁻⁴/(2πσ²) of the versine v to the mirror direction, with σ² = 1/n: near to a
     /// Gaussian of the power's variance.
     #[inline(always)]
-    fn add_mirror<S: Simd, const CONTROL: bool>(
+    fn add_mirror<S: Simd, const CONTROL_VARIATE: bool>(
         &mut self,
         simd: S,
-        LobeOf { cells, group, share, first }: LobeOf,
+        GroupLobe { cells, group, share, first }: GroupLobe,
         exponent: f32,
-        control: &mut Control,
+        control_variate: &mut ControlVariate,
     ) {
-        let one = |x| simd.splat_wide(x);
+        let one = |x| simd.splat_f32x16(x);
         let wo = group.wo;
         let mirror = group.frame.to_world(Vec3::new(-wo.x, -wo.y, wo.z));
-        let narrow = one(1.0 / (exponent + 1.0) + 4.0 * sqr(group.spread));
+        let narrow = one(1.0 / (exponent + 1.0) + 4.0 * sqr(group.normal_spread));
         let scale = one(0.5 * FRAC_1_PI * share);
         for pair in cells.pairs() {
             let center = center(simd, cells, pair);
@@ -222,10 +244,10 @@ impl Table {
             let tail = one(1.0) + versine / wide;
             let weight = scale * self.cosine.pair(simd, pair) / (tail.squared().squared() * sigma2);
             self.weight.set_pair(pair, self.weight.pair(simd, pair) + weight);
-            if CONTROL {
+            if CONTROL_VARIATE {
                 let slope = weight * one(4.0) / (wide * tail);
                 let slope = Vectors::splat(slope, mirror).times(slope);
-                control.add_gloss(simd, pair, [center, slope], weight, first);
+                control_variate.add_glossy_lobe(simd, pair, [center, slope], weight, first);
             }
         }
     }
@@ -263,60 +285,60 @@ impl Table {
 
     /// What the cells in `slots` have of [`Table::total`].
     #[inline(always)]
-    pub(super) fn widths<F: Floats>(&self, slots: F::Ints) -> F {
+    pub(super) fn widths<F: SimdF32x8>(&self, slots: F::I32x8) -> F {
         F::gather(&self.weight, slots)
     }
 
     /// Sets the slot of the cell that each stratum falls into, at the stratum's place.
     ///
     /// Stratum k lies at or after a cell's start s if k ≥ s/w − ξ, so a cell has the strata from the
-    /// first that does to the first that does for the next cell. It marks its first; marks, which rise
+    /// first that does to the first that does for the next cell. It marks its first in `cell_starts`; marks, which rise
     /// along the curve, spread to the right.
     #[inline(always)]
-    pub(super) fn deal<S: Simd>(
+    pub(super) fn assign_strata<S: Simd>(
         &self,
         simd: S,
         cells: &Cells,
         strata: &Strata,
-        deal: Deal,
-        marks: &mut Vec<i32>,
+        assignment: StratumAssignment,
+        cell_starts: &mut Vec<i32>,
         slots: &mut Vec<[i32; LANES]>,
     ) {
-        marks.clear();
-        marks.resize(strata.n, 0);
-        // Of each cell that has strata the first, and its mark.
+        cell_starts.clear();
+        cell_starts.resize(strata.n, 0);
+        // The first stratum of each cell that has any, and the cell's mark.
         let mut firsts = [0; LANES * (MAX_ROWS + 1)];
         let mut n_firsts = 0;
-        let mut mark = simd.counting().shifted::<MARK>();
+        let mut mark = simd.iota().shl::<MARK>();
         let mut from = first(simd, strata, simd.load(&self.start[0]));
         for end in &self.end[cells.rows()] {
             let to = first(simd, strata, simd.load(end));
             let not_empty = from.lt(to);
-            let packed = (from.shifted::<MARKS>() + mark).packed(not_empty);
+            let packed = (from.shl::<MARKS>() + mark).compress(not_empty);
             firsts[n_firsts..n_firsts + LANES].copy_from_slice(&packed);
             n_firsts += not_empty.bits().count_ones() as usize;
-            mark = mark + simd.splat_int(1);
+            mark = mark + simd.splat_i32(1);
             from = to;
         }
         for first in &firsts[..n_firsts] {
-            if let Some(mark) = marks.get_mut((first >> MARKS) as usize) {
+            if let Some(mark) = cell_starts.get_mut((first >> MARKS) as usize) {
                 *mark = first & ((1 << MARKS) - 1);
             }
         }
         // Lanes without a stratum keep any slot.
-        slots.resize(deal.blocks() * deal.n_hits, [0; LANES]);
+        slots.resize(assignment.blocks() * assignment.n_hits, [0; LANES]);
         let mut last = 0;
-        for (mark, place) in marks.iter().zip(deal.places()) {
+        for (mark, index) in cell_starts.iter().zip(assignment.indices()) {
             last = last.max(*mark);
             // Row and lane as they follow each other in memory.
             let slot = (last & ((1 << MARK) - 1)) << ROW | last >> MARK;
-            slots[place.lane / LANES][place.lane % LANES] = slot;
+            slots[index.lane / LANES][index.lane % LANES] = slot;
         }
     }
 
     /// Where in the cells in `slots` the sums `at` lie, in [0, 1].
     #[inline(always)]
-    pub(super) fn inside<F: Floats>(&self, slots: F::Ints, at: F) -> F {
+    pub(super) fn inside<F: SimdF32x8>(&self, slots: F::I32x8, at: F) -> F {
         let start = F::gather(&self.start, slots);
         ((at - start) / self.widths(slots)).max(at.splat(0.0))
     }
@@ -324,12 +346,12 @@ impl Table {
 
 /// The first stratum that does not lie before `start`.
 #[inline(always)]
-fn first<S: Simd>(simd: S, strata: &Strata, start: S::Floats) -> S::Ints {
+fn first<S: Simd>(simd: S, strata: &Strata, start: S::F32x8) -> S::I32x8 {
     let k = start * simd.splat(1.0 / strata.width) - simd.splat(strata.offset);
-    let below = k.truncated();
-    let above = below + simd.splat_int(1);
-    let first = Ints::select(Real::lt(below.to_floats(), k), above, below);
-    first.min(simd.splat_int(strata.n as i32))
+    let below = k.to_i32();
+    let above = below + simd.splat_i32(1);
+    let first = SimdI32x8::select(SimdFloat::lt(below.to_f32(), k), above, below);
+    first.min(simd.splat_i32(strata.n as i32))
 }
 
 /// Bits of a row's number in a mark: marks are ordered by lane, then by row.
@@ -343,7 +365,7 @@ const ROW: i32 = LANES.ilog2() as i32;
 
 /// (cos θ + √(cos² θ + α² sin² θ))/2.
 #[inline(always)]
-fn sigma<F: Real>(cosine: F, alpha2: F) -> F {
+fn sigma<F: SimdFloat>(cosine: F, alpha2: F) -> F {
     let (zero, one) = (cosine.splat(0.0), cosine.splat(1.0));
     let cosine2 = cosine.squared();
     let sine2 = (one - cosine2).max(zero);
@@ -351,7 +373,7 @@ fn sigma<F: Real>(cosine: F, alpha2: F) -> F {
 }
 
 /// A lobe of a group to be added to a table.
-struct LobeOf<'a> {
+struct GroupLobe<'a> {
     cells: &'a Cells,
     group: &'a Group,
     /// Its part of what the pixel reflects.
@@ -362,7 +384,7 @@ struct LobeOf<'a> {
 
 /// Vectors given in a frame.
 #[inline(always)]
-fn frame_vector<F: Real>(frame: &Frame, [x, y, z]: [F; 3]) -> Vectors<F> {
+fn frame_vector<F: SimdFloat>(frame: &Frame, [x, y, z]: [F; 3]) -> Vectors<F> {
     let [x, y, z] = [
         Vectors::splat(x, frame.x).times(x),
         Vectors::splat(y, frame.y).times(y),
@@ -371,9 +393,9 @@ fn frame_vector<F: Real>(frame: &Frame, [x, y, z]: [F; 3]) -> Vectors<F> {
     x.plus(y).plus(z)
 }
 
-/// The centres of a pair of rows of cells.
+/// The centers of a pair of rows of cells.
 #[inline(always)]
-fn center<S: Simd>(simd: S, cells: &Cells, pair: usize) -> Vectors<S::Wide> {
+fn center<S: Simd>(simd: S, cells: &Cells, pair: usize) -> Vectors<S::F32x16> {
     let [x, y, z] = &cells.center;
     Vectors { x: x.pair(simd, pair), y: y.pair(simd, pair), z: z.pair(simd, pair) }
 }
@@ -381,7 +403,7 @@ fn center<S: Simd>(simd: S, cells: &Cells, pair: usize) -> Vectors<S::Wide> {
 #[cfg(test)]
 mod tests {
     use super::super::candidates::Hits;
-    use super::super::cells::{MAX_ROWS, at};
+    use super::super::cells::{MAX_ROWS, get};
     use super::super::hits::Groups;
     use super::super::test_support::{hit, sky};
     use super::*;
@@ -394,7 +416,7 @@ mod tests {
     impl Table {
         /// One of [`Table::widths`].
         fn width(&self, slot: usize) -> f32 {
-            at(&self.weight, slot)
+            get(&self.weight, slot)
         }
     }
 
@@ -403,7 +425,7 @@ mod tests {
 
     fn table(cells: &Cells, hits: &[ShadingPoint]) -> Table {
         let mut groups = Groups::default();
-        groups.gather(Hits { points: hits, one_material: false });
+        groups.cluster(Hits { points: hits, one_material: false });
         dispatch(InstructionSet::best(), Fill { cells, groups: &groups.all })
     }
 
@@ -418,7 +440,7 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Table {
             let mut table = Table::default();
-            table.fill::<S, false>(simd, self.cells, self.groups, &mut Control::default());
+            table.fill::<S, false>(simd, self.cells, self.groups, &mut ControlVariate::default());
             table.accumulate(simd, self.cells);
             table
         }
@@ -437,12 +459,19 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Self::Output {
-            let (mut marks, mut slots) = (Vec::new(), Vec::new());
-            let deal = Deal::new(self.strata.n, 1, 0.0);
-            self.table.deal(simd, self.cells, &self.strata, deal, &mut marks, &mut slots);
-            let at = self.strata.places(simd, self.stratum, 0);
+            let (mut cell_starts, mut slots) = (Vec::new(), Vec::new());
+            let assignment = StratumAssignment::new(self.strata.n, 1, 0.0);
+            self.table.assign_strata(
+                simd,
+                self.cells,
+                &self.strata,
+                assignment,
+                &mut cell_starts,
+                &mut slots,
+            );
+            let at = self.strata.positions(simd, self.stratum, 0);
             let slot = slots[self.stratum / LANES][self.stratum % LANES];
-            (slot as usize, self.table.inside(simd.splat_int(slot), at).store()[0])
+            (slot as usize, self.table.inside(simd.splat_i32(slot), at).store()[0])
         }
     }
 
@@ -516,9 +545,9 @@ mod tests {
         let table = table(&cells, &[hit("diffuse:0.8", Vec3::Y)]);
         let mut sum = 0.0;
         for cell in 0..cells.n_slots() {
-            let end = at(&table.end, cells.slot(cell));
+            let end = get(&table.end, cells.slot(cell));
             assert!((end - table.width(cells.slot(cell)) - sum).abs() <= 1e-6 * table.total());
-            sum = at(&table.end, cells.slot(cell));
+            sum = get(&table.end, cells.slot(cell));
         }
         assert_eq!(table.total(), sum);
         assert!(table.width(cells.slot(cells.len() - 1)) >= 0.0);

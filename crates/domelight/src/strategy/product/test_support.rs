@@ -1,17 +1,17 @@
 //! What the tests of several steps look at.
 
-use crate::bsdf::{Material, MaterialSpec};
+use crate::bsdf::{Bsdf, MaterialSpec};
 use crate::environment::builtin::BuiltinProbe;
 use crate::environment::{Environment, Orientation};
 use crate::math::{Frame, Vec3, vec3};
 use crate::strategy::ShadingPoint;
 
 /// A hit seen from 39° beside its normal, of a material in the notation of the command line.
-pub(super) fn hit(material: &str, normal: Vec3) -> ShadingPoint {
-    let material = Material::from(material.parse::<MaterialSpec>().unwrap());
+pub(super) fn hit(bsdf: &str, normal: Vec3) -> ShadingPoint {
+    let bsdf = Bsdf::from(bsdf.parse::<MaterialSpec>().unwrap());
     let frame = Frame::from_z_and_tangent(normal.normalize(), Vec3::X);
     let wo = vec3(0.5, 0.1, 0.8).normalize();
-    ShadingPoint { position: Vec3::ZERO, ng: frame.z, frame, wo, material }
+    ShadingPoint { position: Vec3::ZERO, ng: frame.z, frame, wo, bsdf }
 }
 
 /// A sky with a sun.

@@ -1,7 +1,7 @@
 //! What shadow rays have taught about a tile: how visible each light cell is from each block of
 //! pixels, and how bright the pixels are.
 //!
-//! With n rays to a cell, k of them free, counted in a block, 0.35 times in its four neighbours, and
+//! With n rays to a cell, k of them free, counted in a block, 0.35 times in its four neighbors, and
 //! 0.25 times to the two cells beside it along the curve,
 //!
 //! ```text
@@ -16,23 +16,23 @@
 //! Σ W (V − V̂)/π, whose expectation does not depend on V̂ as long as V̂ does not depend on the numbers that strata
 //! and choice are drawn with. So V̂ comes from pixels of lower levels alone.
 
-use super::cells::{Cells, MAX_ROWS, NO_SLOTS, Slots, at_mut};
-use crate::simd::{Floats, LANES, Real, Simd};
+use super::cells::{CellArray, Cells, MAX_ROWS, ZERO_CELLS, get_mut};
+use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat};
 
 /// Pixels along the side of a block.
 pub(super) const BLOCK: usize = 4;
-/// What a ray of a neighbouring block counts.
+/// What a ray of a neighboring block counts.
 const NEIGHBOR: f32 = 0.35;
-/// What a ray to a neighbouring cell counts.
+/// What a ray to a neighboring cell counts.
 const BESIDE: f32 = 0.25;
 
 /// What is known of a tile.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Learned {
+pub(super) struct VisibilityStats {
     /// Rays traced from each block to each cell.
-    rays: Vec<Slots>,
+    rays: Vec<CellArray>,
     /// Those that were free.
-    free: Vec<Slots>,
+    free: Vec<CellArray>,
     /// The luminance of each pixel that is known.
     luminance: Vec<Option<f32>>,
 }
@@ -71,12 +71,12 @@ impl Blocks {
     }
 }
 
-impl Learned {
+impl VisibilityStats {
     /// Forgets all.
     pub(super) fn reset(&mut self, blocks: Blocks, n_pixels: usize) {
         for counts in [&mut self.rays, &mut self.free] {
             counts.clear();
-            counts.resize(blocks.len(), NO_SLOTS);
+            counts.resize(blocks.len(), ZERO_CELLS);
         }
         self.luminance.clear();
         self.luminance.resize(n_pixels, None);
@@ -85,8 +85,8 @@ impl Learned {
     /// Counts a ray from a block to the cell in a slot, and its visibility in [0, 1].
     #[inline(always)]
     pub(super) fn count(&mut self, block: usize, slot: usize, visibility: f32) {
-        *at_mut(&mut self.rays[block], slot) += 1.0;
-        *at_mut(&mut self.free[block], slot) += visibility;
+        *get_mut(&mut self.rays[block], slot) += 1.0;
+        *get_mut(&mut self.free[block], slot) += visibility;
     }
 
     /// Sets the mean luminance of a pixel.
@@ -102,24 +102,24 @@ impl Learned {
 
 /// V̂ of each block and cell.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Visibility {
-    visible: Vec<Slots>,
+pub(super) struct VisibilityEstimate {
+    visible: Vec<CellArray>,
     /// g.
-    doubt: Vec<Slots>,
+    std_dev: Vec<CellArray>,
 }
 
-impl Visibility {
+impl VisibilityEstimate {
     /// Estimates all.
     #[inline(always)]
     pub(super) fn estimate<S: Simd>(
         &mut self,
         simd: S,
         cells: &Cells,
-        learned: &Learned,
+        visibility_stats: &VisibilityStats,
         blocks: Blocks,
     ) {
         let one = simd.splat(1.0);
-        let Learned { rays, free, .. } = learned;
+        let VisibilityStats { rays, free, .. } = visibility_stats;
         let n_rows = cells.rows().end;
         let (mut n, mut k) = (simd.splat(0.0), simd.splat(0.0));
         let mut tile = [[[0.0; LANES]; 2]; MAX_ROWS];
@@ -134,11 +134,11 @@ impl Visibility {
             let [n, k] = &tile[row];
             prior[row] = ((simd.load(k) + all) / (simd.load(n) + one)).store();
         }
-        self.visible.resize(blocks.len(), NO_SLOTS);
-        self.doubt.resize(blocks.len(), NO_SLOTS);
+        self.visible.resize(blocks.len(), ZERO_CELLS);
+        self.std_dev.resize(blocks.len(), ZERO_CELLS);
         for block in 0..blocks.len() {
             let neighbors = blocks.neighbors(block);
-            let (visible, doubt) = (&mut self.visible[block], &mut self.doubt[block]);
+            let (visible, std_dev) = (&mut self.visible[block], &mut self.std_dev[block]);
             for row in cells.rows() {
                 let n = around(simd, rays, block, &neighbors, row, n_rows);
                 let k = around(simd, free, block, &neighbors, row, n_rows);
@@ -147,20 +147,20 @@ impl Visibility {
                 visible[row] = v.store();
                 let differ = simd.splat(0.5) * p * (one - p) + simd.splat(0.005);
                 let unsure = simd.splat(0.0003) + differ / (n + one);
-                doubt[row] = (v * (one - v) + unsure).sqrt().store();
+                std_dev[row] = (v * (one - v) + unsure).sqrt().store();
             }
         }
     }
 
-    /// V̂ of the cells from a block, and their doubts, by slot.
-    pub(super) fn of(&self, block: usize) -> (&Slots, &Slots) {
-        (&self.visible[block], &self.doubt[block])
+    /// V̂ of the cells from a block, and their standard deviations, by slot.
+    pub(super) fn of(&self, block: usize) -> (&CellArray, &CellArray) {
+        (&self.visible[block], &self.std_dev[block])
     }
 }
 
 /// The sum of a row's counts over blocks.
 #[inline(always)]
-fn sum<S: Simd>(simd: S, counts: &[Slots], row: usize) -> S::Floats {
+fn sum<S: Simd>(simd: S, counts: &[CellArray], row: usize) -> S::F32x8 {
     let mut sum = simd.splat(0.0);
     for count in counts {
         sum = sum + simd.load(&count[row]);
@@ -172,12 +172,12 @@ fn sum<S: Simd>(simd: S, counts: &[Slots], row: usize) -> S::Floats {
 #[inline(always)]
 fn around<S: Simd>(
     simd: S,
-    counts: &[Slots],
+    counts: &[CellArray],
     block: usize,
     neighbors: &[usize; 4],
     row: usize,
     n_rows: usize,
-) -> S::Floats {
+) -> S::F32x8 {
     let mut sum = simd.load(&counts[block][row]);
     let beside = simd.splat(BESIDE);
     if row > 0 {
@@ -187,7 +187,7 @@ fn around<S: Simd>(
         sum = sum + beside * simd.load(&counts[block][row + 1]);
     }
     for &neighbor in neighbors {
-        // A block without a neighbour on a side is its own there, and counts nothing.
+        // A block without a neighbor on a side is its own there, and counts nothing.
         let share = simd.splat(if neighbor == block { 0.0 } else { NEIGHBOR });
         sum = sum + share * simd.load(&counts[neighbor][row]);
     }
@@ -196,20 +196,20 @@ fn around<S: Simd>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::cells::at;
+    use super::super::cells::get;
     use super::super::test_support::sky;
     use super::*;
     use crate::sampling::Pcg32;
     use crate::simd::{InstructionSet, Kernel, dispatch};
 
-    struct Estimate<'a>(&'a Cells, &'a Learned, Blocks);
+    struct Estimate<'a>(&'a Cells, &'a VisibilityStats, Blocks);
 
     impl Kernel for Estimate<'_> {
-        type Output = Visibility;
+        type Output = VisibilityEstimate;
 
         #[inline(always)]
-        fn run<S: Simd>(self, simd: S) -> Visibility {
-            let mut visibility = Visibility::default();
+        fn run<S: Simd>(self, simd: S) -> VisibilityEstimate {
+            let mut visibility = VisibilityEstimate::default();
             visibility.estimate(simd, self.0, self.1, self.2);
             visibility
         }
@@ -219,14 +219,14 @@ mod tests {
     fn estimates_are_probabilities_and_follow_the_counts() {
         const ROWS: usize = 32;
         let [cells] = Cells::new(&sky(), [ROWS]).unwrap();
-        let estimate = |learned: &Learned, blocks| {
-            dispatch(InstructionSet::best(), Estimate(&cells, learned, blocks))
+        let estimate = |visibility_stats: &VisibilityStats, blocks| {
+            dispatch(InstructionSet::best(), Estimate(&cells, visibility_stats, blocks))
         };
         let blocks = Blocks::new(13, 6);
         assert_eq!((blocks.width, blocks.height, blocks.of(12, 5)), (4, 2, 7));
-        let mut learned = Learned::default();
-        learned.reset(blocks, 13 * 6);
-        let visibility = estimate(&learned, blocks);
+        let mut visibility_stats = VisibilityStats::default();
+        visibility_stats.reset(blocks, 13 * 6);
+        let visibility = estimate(&visibility_stats, blocks);
         assert!(visibility.visible.iter().all(|v| v[..ROWS] == [[0.5; LANES]; ROWS]));
 
         let mut pcg = Pcg32::new(1, 1);
@@ -234,15 +234,15 @@ mod tests {
             let (block, cell) = (pcg.next_u32() as usize % 8, pcg.next_u32() as usize % 100);
             // Cell c is free c times of 100.
             let is_free = pcg.next_f32() * 100.0 < cell as f32;
-            learned.count(block, cell, if is_free { 1.0 } else { 0.0 });
+            visibility_stats.count(block, cell, if is_free { 1.0 } else { 0.0 });
         }
-        let visibility = estimate(&learned, blocks);
+        let visibility = estimate(&visibility_stats, blocks);
         for block in 0..blocks.len() {
-            let (visible, doubt) = visibility.of(block);
+            let (visible, std_dev) = visibility.of(block);
             assert!(visible[..ROWS].iter().flatten().all(|v| (0.0..=1.0).contains(v)));
-            assert!(doubt[..ROWS].iter().flatten().all(|d| (0.017..0.62).contains(d)));
+            assert!(std_dev[..ROWS].iter().flatten().all(|d| (0.017..0.62).contains(d)));
             for cell in 0..100 {
-                assert!((at(visible, cell) - cell as f32 / 100.0).abs() < 0.15);
+                assert!((get(visible, cell) - cell as f32 / 100.0).abs() < 0.15);
             }
         }
     }

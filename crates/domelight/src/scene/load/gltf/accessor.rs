@@ -1,6 +1,6 @@
 //! Accessors: numbers from bytes, sparse ones replaced.
 
-use super::error::{Failure, GltfProblem};
+use super::error::{Failure, GltfErrorKind};
 use super::json::{Accessor, Sparse, SparseData};
 use super::source::{Source, slice};
 
@@ -104,7 +104,7 @@ impl Source<'_> {
         let (Some(component), Some(n), true) = (component, dimensions, allowed) else {
             let found = format!("{} of type {}", accessor.shape, accessor.component_type);
             let used_for = used_for.into();
-            return Err(GltfProblem::AccessorType { index, found, needed, used_for }.into());
+            return Err(GltfErrorKind::AccessorType { index, found, needed, used_for }.into());
         };
         let range = component_range(&accessor);
         let size = component.size();
@@ -135,7 +135,7 @@ impl Source<'_> {
         let Some(component) = component else {
             let found = format!("{} of type {}", accessor.shape, accessor.component_type);
             let used_for = used_for.into();
-            return Err(GltfProblem::AccessorType { index, found, needed, used_for }.into());
+            return Err(GltfErrorKind::AccessorType { index, found, needed, used_for }.into());
         };
         let size = component.size();
         self.values(index, &accessor, N * size, |bytes| {
@@ -167,7 +167,7 @@ impl Source<'_> {
             }
             // Zeros by the format; bounded in all the file, for nothing in it backs them.
             None if self.take_zeros(count) => vec![decode(&vec![0; size]); count],
-            None => return Err(GltfProblem::NoData { index, count }.into()),
+            None => return Err(GltfErrorKind::NoData { index, count }.into()),
         };
         if let Some(sparse) = &accessor.sparse {
             self.replace(index, sparse, size, &mut values, decode)?;
@@ -191,7 +191,7 @@ impl Source<'_> {
         else {
             let found = format!("type {:?}", indices.component_type);
             let (needed, used_for) = ("an unsigned integer", "sparse indices".into());
-            return Err(GltfProblem::AccessorType { index, found, needed, used_for }.into());
+            return Err(GltfErrorKind::AccessorType { index, found, needed, used_for }.into());
         };
         let what = ("sparse accessor", index);
         let (places, _) = self.view(*buffer_view)?;
@@ -200,7 +200,7 @@ impl Source<'_> {
         let replacements = strided(&replacements, new.byte_offset, size, size, *count, what)?;
         for (place, bytes) in places.zip(replacements) {
             let length = values.len();
-            let slot = values.get_mut(place as usize).ok_or(GltfProblem::OutOfRange {
+            let slot = values.get_mut(place as usize).ok_or(GltfErrorKind::OutOfRange {
                 what: what.0,
                 index,
                 begin: place.into(),
@@ -221,7 +221,7 @@ fn strided<'b>(
     size: usize,
     count: usize,
     (what, index): (&'static str, usize),
-) -> Result<impl Iterator<Item = &'b [u8]>, GltfProblem> {
+) -> Result<impl Iterator<Item = &'b [u8]>, GltfErrorKind> {
     let stride = stride.max(size);
     let length = (count as u64)
         .saturating_sub(1)

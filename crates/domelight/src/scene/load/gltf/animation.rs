@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::error::{Failure, GltfProblem};
+use super::error::{Failure, GltfErrorKind};
 use super::json::{self, Interpolation};
 use super::source::Source;
 use crate::math::{Quat, Vec4};
@@ -22,12 +22,12 @@ pub(super) fn choose(
     what: &'static str,
     asked: &str,
     known: Vec<String>,
-) -> Result<usize, GltfProblem> {
+) -> Result<usize, GltfErrorKind> {
     let by_name = known.iter().position(|name| name == asked);
     let by_number = || asked.parse().ok().filter(|&i| i < known.len());
     by_name.or_else(by_number).ok_or_else(|| {
         let asked = asked.to_owned();
-        GltfProblem::NoChoice { what, asked, known }
+        GltfErrorKind::NoChoice { what, asked, known }
     })
 }
 
@@ -60,7 +60,7 @@ fn channel_at(
 ) -> Result<(), Failure> {
     let sampler = animation.samplers.get(channel.sampler).ok_or_else(|| {
         let (index, count) = (channel.sampler, animation.samplers.len());
-        GltfProblem::NoSuch { what: "animation sampler", index, count }
+        GltfErrorKind::NoSuch { what: "animation sampler", index, count }
     })?;
     let times = source.floats::<1>(sampler.input, "SCALAR", "times of an animation")?;
     let times: Vec<f32> = times.into_iter().map(|[t]| t).collect();

@@ -1,6 +1,6 @@
 //! The container: a JSON text, or a GLB file of a JSON chunk and a binary one.
 
-use super::error::GltfProblem;
+use super::error::GltfErrorKind;
 
 /// The document and the binary chunk of a GLB file, without a copy.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,25 +11,25 @@ pub(super) struct Container<'a> {
 
 impl<'a> Container<'a> {
     /// Takes a file apart.
-    pub(super) fn new(file: &'a [u8]) -> Result<Self, GltfProblem> {
+    pub(super) fn new(file: &'a [u8]) -> Result<Self, GltfErrorKind> {
         let Some(header) = file.strip_prefix(b"glTF") else {
             // Some exporters begin a text with the mark of its encoding.
             let json = file.strip_prefix(b"\xef\xbb\xbf").unwrap_or(file);
             return Ok(Self { json, binary: None });
         };
-        let damaged = |problem: &str| GltfProblem::Container { problem: problem.into() };
+        let damaged = |problem: &str| GltfErrorKind::Container { problem: problem.into() };
         let (words, _) = header.as_chunks::<4>();
         let [version, length, ..] = words else { return Err(damaged("it ends in the header")) };
         match u32::from_le_bytes(*version) {
             2 => {}
-            1 => return Err(GltfProblem::Version1),
-            version => return Err(GltfProblem::Version { version: version.to_string() }),
+            1 => return Err(GltfErrorKind::Version1),
+            version => return Err(GltfErrorKind::Version { version: version.to_string() }),
         }
         let length = u32::from_le_bytes(*length);
         let within = usize::try_from(length).ok().and_then(|length| file.get(12..length));
         let Some(mut rest) = within else {
             let problem = format!("the header says {length} bytes, the file has {}", file.len());
-            return Err(GltfProblem::Container { problem });
+            return Err(GltfErrorKind::Container { problem });
         };
         let Some((kind, json)) = chunk(&mut rest)? else { return Err(damaged("it has no chunk")) };
         if &kind != b"JSON" {
@@ -51,14 +51,14 @@ impl<'a> Container<'a> {
 type Chunk<'a> = ([u8; 4], &'a [u8]);
 
 /// Splits off the next chunk: its kind and its data.
-fn chunk<'a>(rest: &mut &'a [u8]) -> Result<Option<Chunk<'a>>, GltfProblem> {
+fn chunk<'a>(rest: &mut &'a [u8]) -> Result<Option<Chunk<'a>>, GltfErrorKind> {
     // Less than a header is padding.
     let Some((header, data)) = rest.split_at_checked(8) else { return Ok(None) };
     let [length, kind] = [0, 4].map(|i| [header[i], header[i + 1], header[i + 2], header[i + 3]]);
     let length = u32::from_le_bytes(length);
     let (data, after) = data.split_at_checked(length as usize).ok_or_else(|| {
         let problem = format!("a chunk of {length} bytes where {} are left", data.len());
-        GltfProblem::Container { problem }
+        GltfErrorKind::Container { problem }
     })?;
     *rest = after;
     Ok(Some((kind, data)))

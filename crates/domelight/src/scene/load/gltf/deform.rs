@@ -134,7 +134,7 @@ mod tests {
             targets: BTreeMap::from([(1, target)]),
             ..Vertices::default()
         };
-        let slot = Slot { surface: 0, uv_sets: [None; 2], tangent_set: None, alpha: false };
+        let slot = Slot { material: 0, uv_sets: [None; 2], tangent_set: None, alpha: false };
         Geometry { vertices, triangles: vec![[0, 1, 2]], slot }
     }
 

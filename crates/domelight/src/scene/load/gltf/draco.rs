@@ -3,7 +3,7 @@
 use draco_core::{DecodeLimits, DecoderBuffer, FaceIndex, Mesh, MeshDecoder};
 
 use super::accessor::normalized;
-use super::error::{Failure, GltfProblem};
+use super::error::{Failure, GltfErrorKind};
 use super::json;
 use super::source::Source;
 
@@ -32,12 +32,12 @@ impl<'p> DracoMesh<'p> {
         let mut mesh = Mesh::new();
         MeshDecoder::new()
             .decode(&mut DecoderBuffer::new(&stream).with_limits(limits), &mut mesh)
-            .map_err(|e| GltfProblem::Draco { problem: e.to_string() })?;
+            .map_err(|e| GltfErrorKind::Draco { problem: e.to_string() })?;
         // The decoder checks the number of faces, but not of points.
         let points = mesh.num_points() as u64;
         if points > limits.max_points {
             let problem = format!("{points} points, more than the limit of {}", limits.max_points);
-            return Err(GltfProblem::Draco { problem }.into());
+            return Err(GltfErrorKind::Draco { problem }.into());
         }
         let values = extension.attributes.len() as u64 * points * 16;
         source.budget.take(place, values + 24 * mesh.num_faces() as u64)?;

@@ -7,7 +7,7 @@ use crate::scene::load::LoadError;
 
 /// What is wrong with a glTF file.
 #[derive(Debug, thiserror::Error)]
-pub enum GltfProblem {
+pub enum GltfErrorKind {
     /// A part of the JSON that is not what the format has there.
     #[error("{place} is not valid: {source}")]
     Json {
@@ -39,7 +39,7 @@ pub enum GltfProblem {
         /// Which part.
         place: String,
         /// What is wrong there.
-        source: Box<GltfProblem>,
+        source: Box<GltfErrorKind>,
     },
     /// An index of something that is not there.
     #[error("it refers to {what} {index}, but there are only {count}")]
@@ -213,7 +213,7 @@ fn list(what: &str, known: &[String]) -> String {
     format!("the {what}s are {}", names.join(", "))
 }
 
-impl GltfProblem {
+impl GltfErrorKind {
     /// The problem with the part of the file where it is.
     pub(super) fn within(self, place: impl Into<String>) -> Self {
         Self::In { place: place.into(), source: Box::new(self) }
@@ -223,7 +223,7 @@ impl GltfProblem {
 /// Why a file cannot be loaded: it is broken, or something around it is wrong.
 pub(super) enum Failure {
     /// In the file.
-    Problem(GltfProblem),
+    Problem(GltfErrorKind),
     /// Memory, or a file beside it.
     Load(LoadError),
 }
@@ -247,8 +247,8 @@ impl std::fmt::Display for Failure {
     }
 }
 
-impl From<GltfProblem> for Failure {
-    fn from(problem: GltfProblem) -> Self {
+impl From<GltfErrorKind> for Failure {
+    fn from(problem: GltfErrorKind) -> Self {
         Self::Problem(problem)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::error::GltfProblem;
+use super::error::GltfErrorKind;
 use super::json::Document;
 
 /// What an extension means to a picture under an environment.
@@ -80,7 +80,7 @@ pub(super) fn check(
     document: &Document<'_>,
     strict: bool,
     mut warn: impl FnMut(&str),
-) -> Result<(), GltfProblem> {
+) -> Result<(), GltfErrorKind> {
     let Document { extensions_used: used, extensions_required: required, .. } = document;
     let required: BTreeSet<_> = required.iter().collect();
     let all: BTreeSet<_> = used.iter().chain(required.iter().copied()).collect();
@@ -92,7 +92,7 @@ pub(super) fn check(
                 warn(&format!("the extension {name} is not known and ignored"));
             }
             Effect::Unknown if strict => {
-                return Err(GltfProblem::RequiredExtension { name: name.clone() });
+                return Err(GltfErrorKind::RequiredExtension { name: name.clone() });
             }
             Effect::Unknown => warn(&format!(
                 "the file requires the extension {name}, which is not known; what can be drawn without it is drawn"

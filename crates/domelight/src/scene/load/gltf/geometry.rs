@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::accessor::component_range;
 use super::draco::DracoMesh;
-use super::error::{Failure, GltfProblem};
+use super::error::{Failure, GltfErrorKind};
 use super::json;
 use super::material::Slot;
 use super::source::Source;
@@ -66,7 +66,7 @@ pub(super) fn read(
         (None, None) => (0..n_vertices as u32).collect(),
     };
     if let Some(&index) = indices.iter().find(|&&i| i as usize >= n_vertices) {
-        return Err(GltfProblem::Index { index, vertices: n_vertices }.into());
+        return Err(GltfErrorKind::Index { index, vertices: n_vertices }.into());
     }
     let mode = if reader.draco.is_some() { TRIANGLES } else { primitive.mode };
     Ok(Geometry { vertices, triangles: triangles(&indices, mode), slot })
@@ -104,7 +104,7 @@ impl Reader<'_, '_> {
         let positions = self.floats("POSITION", "VEC3", None)?;
         if positions.is_empty() {
             let attribute = "positions".into();
-            return Err(GltfProblem::Count { attribute, count: 0, vertices: 0 }.into());
+            return Err(GltfErrorKind::Count { attribute, count: 0, vertices: 0 }.into());
         }
         let n = Some(positions.len());
         let uvs = |set: Option<u32>| match set {
@@ -218,7 +218,7 @@ fn checked<T>(
     match n_vertices {
         Some(vertices) if values.len() != vertices => {
             let (attribute, count) = (format!("values of {semantic}"), values.len());
-            Err(GltfProblem::Count { attribute, count, vertices }.into())
+            Err(GltfErrorKind::Count { attribute, count, vertices }.into())
         }
         _ => Ok(values),
     }
@@ -230,12 +230,12 @@ pub(super) fn memory(
     primitive: &json::Primitive,
     deformations: &Deformations,
     placements: u64,
-) -> Result<u64, GltfProblem> {
+) -> Result<u64, GltfErrorKind> {
     // Values are read as up to four floats, and kept as two to four.
     const VALUE: u64 = 16 + 16;
     // An index, and a triangle for each in a strip.
     const INDEX: u64 = 4 + 12;
-    let count = |&accessor: &usize| -> Result<u64, GltfProblem> {
+    let count = |&accessor: &usize| -> Result<u64, GltfErrorKind> {
         Ok(source.document.get::<json::Accessor>(accessor)?.count as u64)
     };
     let mut bytes = 0u64;

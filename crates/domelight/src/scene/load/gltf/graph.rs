@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
 use super::animation::{NodePose, choose};
-use super::error::{Failure, GltfProblem};
+use super::error::{Failure, GltfErrorKind};
 use super::instancing::{self, unit_quaternion};
 use super::json;
 use super::source::Source;
@@ -83,7 +83,7 @@ impl<'g, 's> Graph<'g, 's> {
         let pose = self.poses.get(&index);
         let world = parent * local(&node, pose);
         if self.worlds[index].replace(world).is_some() || depth > MAX_DEPTH {
-            let problem = GltfProblem::NotATree { node: index, limit: MAX_DEPTH };
+            let problem = GltfErrorKind::NotATree { node: index, limit: MAX_DEPTH };
             return Err(problem.into());
         }
         let is_visible = node.extensions.visibility.is_none_or(|v| v.visible);
@@ -130,8 +130,11 @@ impl<'g, 's> Graph<'g, 's> {
         let mut joints = Vec::with_capacity(skin.joints.len());
         for (i, &joint) in skin.joints.iter().enumerate() {
             let (what, count) = ("node", self.worlds.len());
-            let world =
-                self.worlds.get(joint).ok_or(GltfProblem::NoSuch { what, index: joint, count })?;
+            let world = self.worlds.get(joint).ok_or(GltfErrorKind::NoSuch {
+                what,
+                index: joint,
+                count,
+            })?;
             let world = world.unwrap_or_else(|| {
                 self.source.warn(&format!(
                     "skin {index} uses joints outside of the scene, which stay where they are made"

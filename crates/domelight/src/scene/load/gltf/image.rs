@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::error::{Failure, GltfProblem};
+use super::error::{Failure, GltfErrorKind};
 use super::json;
 use super::ktx2::{Ktx2, is_ktx2};
 use super::source::{Source, View, percent_decoded};
@@ -125,11 +125,11 @@ impl<'a> Images<'a> {
             }
             (None, Some(view)) => (format!("image {index}"), source.view(view)?.0),
             (None, None) => {
-                return Err(GltfProblem::NoSource { what: "image", index }.into());
+                return Err(GltfErrorKind::NoSource { what: "image", index }.into());
             }
         };
         if bytes.get(4..12).is_some_and(|kind| kind == b"ftypavif" || kind == b"ftypavis") {
-            return Err(GltfProblem::Avif { image: index }.into());
+            return Err(GltfErrorKind::Avif { image: index }.into());
         }
         if is_ktx2(&bytes) {
             return ktx2(source, &name, &bytes, index, channels);
@@ -147,7 +147,7 @@ fn ktx2(
     index: usize,
     channels: Channels,
 ) -> Result<Texture, Failure> {
-    let problem = |source| GltfProblem::Ktx2 { image: index, source };
+    let problem = |source| GltfErrorKind::Ktx2 { image: index, source };
     let image = Ktx2::new(bytes).map_err(problem)?;
     let (width, height) = (image.width, image.height);
     // Decoded, once more as they are kept, and their alpha.
@@ -156,23 +156,23 @@ fn ktx2(
     let (texels, has_alpha) = image.decode().map_err(problem)?;
     let colors = texels.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
     let texture = Texture::from_rgb8(name, width, height, colors, channels.encoding);
-    let texture = texture.map_err(GltfProblem::from)?;
+    let texture = texture.map_err(GltfErrorKind::from)?;
     let alpha = texels.iter().map(|&[.., a]| a);
     let needs_alpha = channels.alpha && has_alpha && alpha.clone().any(|a| a != 255);
     if needs_alpha {
-        return Ok(texture.with_alpha(alpha.collect()).map_err(GltfProblem::from)?);
+        return Ok(texture.with_alpha(alpha.collect()).map_err(GltfErrorKind::from)?);
     }
     Ok(texture)
 }
 
 /// The image that a texture takes: Basis Universal or WebP before the one that all programs read, which
 /// is also what stands in for AVIF.
-fn image_of(texture: &json::Texture) -> Result<Option<usize>, GltfProblem> {
+fn image_of(texture: &json::Texture) -> Result<Option<usize>, GltfErrorKind> {
     let json::TextureExtensions { basisu, webp, avif } = &texture.extensions;
     let of = |source: &Option<json::TextureSource>| source.as_ref().and_then(|s| s.source);
     let image = of(basisu).or(of(webp)).or(texture.source);
     match (image, of(avif)) {
-        (None, Some(image)) => Err(GltfProblem::Avif { image }),
+        (None, Some(image)) => Err(GltfErrorKind::Avif { image }),
         _ => Ok(image),
     }
 }

@@ -1,6 +1,6 @@
 //! `EXT_mesh_gpu_instancing`: one node that shows its mesh many times.
 
-use super::error::{Failure, GltfProblem};
+use super::error::{Failure, GltfErrorKind};
 use super::json::Instancing;
 use super::source::Source;
 use crate::math::{Mat4, Quat, Vec3};
@@ -20,7 +20,7 @@ pub(super) fn matrices(source: &Source<'_>, instancing: &Instancing) -> Result<V
     let lengths = [translations.len(), rotations.len(), scales.len()];
     let n = lengths.into_iter().max().unwrap_or_default();
     if let Some(count) = lengths.into_iter().find(|&length| length != 0 && length != n) {
-        return Err(GltfProblem::Instances { count, instances: n }.into());
+        return Err(GltfErrorKind::Instances { count, instances: n }.into());
     }
     // Each has a matrix, and a place in the scene.
     let place = format!("{}, {n} instances", source.path.display());

@@ -12,7 +12,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::value::RawValue;
 
-use super::error::GltfProblem;
+use super::error::GltfErrorKind;
 use super::meshopt::Compression;
 
 /// The top of the document.
@@ -72,22 +72,22 @@ struct Asset {
 
 impl<'a> Document<'a> {
     /// Parses a document's top.
-    pub(super) fn new(json: &'a [u8]) -> Result<Self, GltfProblem> {
-        let invalid = |source| GltfProblem::Json { place: "the JSON".into(), source };
+    pub(super) fn new(json: &'a [u8]) -> Result<Self, GltfErrorKind> {
+        let invalid = |source| GltfErrorKind::Json { place: "the JSON".into(), source };
         check_version(&serde_json::from_slice(json).map_err(invalid)?)?;
         serde_json::from_slice(json).map_err(invalid)
     }
 
     /// The item of an index.
-    pub(super) fn get<T: Item>(&self, index: usize) -> Result<T, GltfProblem> {
+    pub(super) fn get<T: Item>(&self, index: usize) -> Result<T, GltfErrorKind> {
         let items = T::items(self);
         let text = items.get(index).ok_or_else(|| {
             let (what, count) = (T::NAME, items.len());
-            GltfProblem::NoSuch { what, index, count }
+            GltfErrorKind::NoSuch { what, index, count }
         })?;
         serde_json::from_str(text.get()).map_err(|source| {
             let place = format!("{} {index}", T::NAME);
-            GltfProblem::Json { place, source }
+            GltfErrorKind::Json { place, source }
         })
     }
 
@@ -98,10 +98,10 @@ impl<'a> Document<'a> {
 }
 
 /// Refuses what is not version 2: there, arrays were objects.
-fn check_version(header: &Header<'_>) -> Result<(), GltfProblem> {
+fn check_version(header: &Header<'_>) -> Result<(), GltfErrorKind> {
     let is_object = |raw: Option<&RawValue>| raw.is_some_and(|raw| raw.get().starts_with('{'));
     if is_object(header.meshes) || is_object(header.nodes) {
-        return Err(GltfProblem::Version1);
+        return Err(GltfErrorKind::Version1);
     }
     let asset = header.asset.and_then(|raw| serde_json::from_str::<Asset>(raw.get()).ok());
     let Some(Asset { version, min_version }) = asset else { return Ok(()) };
@@ -111,8 +111,8 @@ fn check_version(header: &Header<'_>) -> Result<(), GltfProblem> {
         other => other.to_string(),
     };
     match min_version.or(version).map(text) {
-        Some(version) if version.starts_with('1') => Err(GltfProblem::Version1),
-        Some(version) if !version.starts_with('2') => Err(GltfProblem::Version { version }),
+        Some(version) if version.starts_with('1') => Err(GltfErrorKind::Version1),
+        Some(version) if !version.starts_with('2') => Err(GltfErrorKind::Version { version }),
         _ => Ok(()),
     }
 }

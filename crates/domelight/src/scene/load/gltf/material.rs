@@ -9,16 +9,16 @@ use super::source::Source;
 use crate::Rgb;
 use crate::scene::load::textures::Textures;
 use crate::scene::{
-    AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers,
-    MetallicRoughnessSurface, NormalMap, Sheen, Specular, SpecularGlossinessSurface, Surface,
-    SurfaceModel, Texture, TextureRef, Volume,
+    AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers, Material,
+    MaterialModel, MetallicRoughnessMaterial, NormalMap, Sheen, Specular,
+    SpecularGlossinessMaterial, Texture, TextureRef, Volume,
 };
 
 /// What a primitive needs to know of its material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Slot {
     /// The index of the surface.
-    pub(super) surface: usize,
+    pub(super) material: usize,
     /// The file's sets of texture coordinates that become a mesh's first and second; `None` if unused.
     pub(super) uv_sets: [Option<u32>; 2],
     /// The one of the two that tangents follow, if any need to.
@@ -30,14 +30,14 @@ pub(super) struct Slot {
 /// The surfaces of the materials that are used.
 pub(super) struct Materials<'a> {
     images: Images<'a>,
-    surfaces: Vec<Surface>,
+    materials: Vec<Material>,
     slots: HashMap<Option<usize>, Slot>,
 }
 
 impl<'a> Materials<'a> {
     pub(super) fn new(source: &Source<'a>) -> Self {
         let images = Images::new(Textures::new(source.budget));
-        Self { images, surfaces: Vec::new(), slots: HashMap::new() }
+        Self { images, materials: Vec::new(), slots: HashMap::new() }
     }
 
     /// The surface of a material, or of the default one.
@@ -60,29 +60,29 @@ impl<'a> Materials<'a> {
         };
         let mut reader =
             Reader { source, images: &mut self.images, name: &name, uv_sets: [None; 2] };
-        let surface = reader.surface(&material);
+        let material = reader.material(&material);
         let uv_sets = reader.uv_sets;
-        let surface = surface.map_err(|e| e.within(|| format!("material '{name}'")))?;
-        let follows = surface.normal_map.as_ref().map(|n| n.texture.uv_set);
-        let anisotropy = surface.layers.anisotropy;
+        let material = material.map_err(|e| e.within(|| format!("material '{name}'")))?;
+        let follows = material.normal_map.as_ref().map(|n| n.texture.uv_set);
+        let anisotropy = material.layers.anisotropy;
         let follows = follows.or(anisotropy.map(|a| a.texture.map_or(0, |t| t.uv_set)));
         let slot = Slot {
-            surface: self.surfaces.len(),
+            material: self.materials.len(),
             uv_sets,
             tangent_set: follows,
-            alpha: surface.coverage.mode != AlphaMode::Opaque,
+            alpha: material.coverage.mode != AlphaMode::Opaque,
         };
-        self.surfaces.push(surface);
+        self.materials.push(material);
         self.slots.insert(index, slot);
         Ok(slot)
     }
 
     /// All surfaces and textures; what of them is not drawn is said once a feature.
-    pub(super) fn finish(self, mut warn: impl FnMut(&str)) -> (Vec<Surface>, Vec<Texture>) {
+    pub(super) fn finish(self, mut warn: impl FnMut(&str)) -> (Vec<Material>, Vec<Texture>) {
         let mut undrawn: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-        for surface in &self.surfaces {
-            for feature in surface.undrawn_features() {
-                undrawn.entry(feature).or_default().push(&surface.name);
+        for material in &self.materials {
+            for feature in material.undrawn_features() {
+                undrawn.entry(feature).or_default().push(&material.name);
             }
         }
         for (feature, names) in undrawn {
@@ -92,7 +92,7 @@ impl<'a> Materials<'a> {
             };
             warn(&format!("{feature} is not drawn, of material '{}'{others}", names[0]));
         }
-        (self.surfaces, self.images.textures.loaded)
+        (self.materials, self.images.textures.loaded)
     }
 }
 
@@ -105,7 +105,7 @@ struct Reader<'r, 's, 'a> {
 }
 
 impl Reader<'_, '_, '_> {
-    fn surface(&mut self, material: &json::Material) -> Result<Surface, Failure> {
+    fn material(&mut self, material: &json::Material) -> Result<Material, Failure> {
         let extensions = &material.extensions;
         let alpha = material.alpha_mode != json::AlphaMode::Opaque;
         let (model, color_texture, opacity) = match &extensions.specular_glossiness {
@@ -126,14 +126,14 @@ impl Reader<'_, '_, '_> {
         } else {
             Coverage::default()
         };
-        Ok(Surface {
+        Ok(Material {
             normal_map,
             coverage,
             double_sided: material.double_sided,
             emission: self.emission(material)?,
             unlit: extensions.unlit.is_some(),
             layers: self.layers(extensions)?,
-            ..Surface::new(self.name, model)
+            ..Material::new(self.name, model)
         })
     }
 
@@ -142,11 +142,11 @@ impl Reader<'_, '_, '_> {
         &mut self,
         m: &json::MetallicRoughness,
         alpha: bool,
-    ) -> Result<(SurfaceModel, Option<TextureRef>, f32), Failure> {
+    ) -> Result<(MaterialModel, Option<TextureRef>, f32), Failure> {
         let channels = if alpha { COLOR_AND_ALPHA } else { COLOR };
         let base_color_texture = self.texture(m.base_color_texture.as_ref(), channels)?;
         let [r, g, b, opacity] = m.base_color_factor;
-        let model = SurfaceModel::MetallicRoughness(MetallicRoughnessSurface {
+        let model = MaterialModel::MetallicRoughness(MetallicRoughnessMaterial {
             base_color: Rgb::new(r, g, b),
             base_color_texture,
             metallic: m.metallic_factor,
@@ -161,11 +161,11 @@ impl Reader<'_, '_, '_> {
         &mut self,
         s: &json::SpecularGlossiness,
         alpha: bool,
-    ) -> Result<(SurfaceModel, Option<TextureRef>, f32), Failure> {
+    ) -> Result<(MaterialModel, Option<TextureRef>, f32), Failure> {
         let channels = if alpha { COLOR_AND_ALPHA } else { COLOR };
         let diffuse_texture = self.texture(s.diffuse_texture.as_ref(), channels)?;
         let [r, g, b, opacity] = s.diffuse_factor;
-        let model = SurfaceModel::SpecularGlossiness(SpecularGlossinessSurface {
+        let model = MaterialModel::SpecularGlossiness(SpecularGlossinessMaterial {
             diffuse: Rgb::new(r, g, b),
             diffuse_texture,
             specular: Rgb::from(s.specular_factor),

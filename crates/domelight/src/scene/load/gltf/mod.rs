@@ -40,7 +40,7 @@ mod tangents;
 use std::collections::HashMap;
 use std::path::Path;
 
-pub use error::GltfProblem;
+pub use error::GltfErrorKind;
 pub use ktx2::Ktx2Error;
 pub use meshopt::MeshoptError;
 
@@ -61,7 +61,7 @@ pub(super) fn load(
 ) -> Result<Loaded, LoadError> {
     read(path, bytes, budget, options).map_err(|failure| match failure {
         Failure::Problem(problem) => {
-            LoadError::Gltf { path: path.into(), problem: Box::new(problem) }
+            LoadError::Gltf { path: path.into(), kind: Box::new(problem) }
         }
         Failure::Load(error) => error,
     })
@@ -86,11 +86,11 @@ fn read(
     for (&mesh, placements) in &graph.placements {
         read_mesh(&source, &graph, &mut materials, mesh, placements, &mut parts)?;
     }
-    let (surfaces, textures) = materials.finish(|text| source.warn(text));
+    let (materials, textures) = materials.finish(|text| source.warn(text));
     let cameras = graph.cameras;
     let description = SceneDescription {
         parts,
-        surfaces,
+        materials,
         textures,
         camera: cameras.first().map(|camera| camera.settings),
         cameras,
@@ -151,13 +151,13 @@ fn read_mesh(
             .map_err(|e| e.within(place))?;
         // A primitive without joints stays where its node is.
         let has_joints = !geometry.vertices.joints.is_empty();
-        let surface = geometry.slot.surface;
+        let material = geometry.slot.material;
         let copies = std::iter::repeat_n(geometry, poses.len());
         for ((pose, world, weights), geometry) in poses.iter().zip(copies) {
             let rigid = Pose::Rigid(*world);
             let pose = if has_joints { pose } else { &rigid };
             let mesh = deform::place(geometry, pose, weights);
-            parts.push(Part { name: name.clone(), mesh, surface });
+            parts.push(Part { name: name.clone(), mesh, material });
         }
     }
     Ok(())

@@ -15,7 +15,7 @@ use base64::engine::DecodePaddingMode;
 use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 
 use super::container::Container;
-use super::error::{Failure, GltfProblem};
+use super::error::{Failure, GltfErrorKind};
 use super::json::{Buffer, BufferView, Document};
 use super::meshopt;
 use crate::scene::load::{Budget, read_referenced, relative};
@@ -114,7 +114,7 @@ impl<'a> Source<'a> {
     fn buffer(&self, index: usize) -> Result<&[u8], Failure> {
         let Some(cell) = self.buffers.get(index) else {
             let (what, count) = ("buffer", self.buffers.len());
-            return Err(GltfProblem::NoSuch { what, index, count }.into());
+            return Err(GltfErrorKind::NoSuch { what, index, count }.into());
         };
         if let Some(bytes) = cell.get() {
             return Ok(bytes);
@@ -123,7 +123,7 @@ impl<'a> Source<'a> {
         let bytes = match (&uri, self.binary) {
             (Some(uri), _) => Cow::Owned(self.uri("buffer", index, uri)?),
             (None, Some(binary)) if index == 0 => Cow::Borrowed(binary),
-            (None, _) => return Err(GltfProblem::NoSource { what: "buffer", index }.into()),
+            (None, _) => return Err(GltfErrorKind::NoSource { what: "buffer", index }.into()),
         };
         if (bytes.len() as u64) < byte_length {
             let length = bytes.len();
@@ -141,14 +141,14 @@ impl<'a> Source<'a> {
     ) -> Result<Vec<u8>, Failure> {
         let refused = || {
             let uri = uri.chars().take(60).collect();
-            Failure::from(GltfProblem::Uri { what, index, uri })
+            Failure::from(GltfErrorKind::Uri { what, index, uri })
         };
         if let Some(data) = uri.strip_prefix("data:") {
             let (_, encoded) = data.split_once(";base64,").ok_or_else(refused)?;
             // The padding is often left out.
             let config = GeneralPurposeConfig::new()
                 .with_decode_padding_mode(DecodePaddingMode::Indifferent);
-            let problem = |source| GltfProblem::Base64 { what, index, source };
+            let problem = |source| GltfErrorKind::Base64 { what, index, source };
             let bytes = GeneralPurpose::new(&base64::alphabet::STANDARD, config)
                 .decode(encoded.trim())
                 .map_err(problem)?;
@@ -178,7 +178,7 @@ impl<'a> Source<'a> {
         let stream = slice(stream, c.byte_offset, c.byte_length, "buffer view", index)?;
         let place = format!("{}, buffer view {index}", self.path.display());
         self.budget.take(&place, (c.count as u64).saturating_mul(c.byte_stride as u64))?;
-        let problem = |source| GltfProblem::Meshopt { view: index, source };
+        let problem = |source| GltfErrorKind::Meshopt { view: index, source };
         let bytes: Rc<[u8]> = meshopt::decode(stream, c).map_err(problem)?.into();
         self.decoded.borrow_mut().insert(index, bytes.clone());
         Ok((View::Decoded(bytes), *byte_stride))
@@ -192,10 +192,10 @@ pub(super) fn slice<'b>(
     length: u64,
     what: &'static str,
     index: usize,
-) -> Result<&'b [u8], GltfProblem> {
+) -> Result<&'b [u8], GltfErrorKind> {
     let end = begin.saturating_add(length);
     let range = usize::try_from(begin).ok().zip(usize::try_from(end).ok());
-    range.and_then(|(begin, end)| bytes.get(begin..end)).ok_or(GltfProblem::OutOfRange {
+    range.and_then(|(begin, end)| bytes.get(begin..end)).ok_or(GltfErrorKind::OutOfRange {
         what,
         index,
         begin,

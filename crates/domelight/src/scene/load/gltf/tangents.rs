@@ -137,7 +137,7 @@ mod tests {
         let vertices =
             Vertices { positions, normals, uvs: [uvs, Vec::new()], ..Vertices::default() };
         let slot =
-            Slot { surface: 0, uv_sets: [Some(0), None], tangent_set: Some(0), alpha: false };
+            Slot { material: 0, uv_sets: [Some(0), None], tangent_set: Some(0), alpha: false };
         Geometry { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]], slot }
     }
 

@@ -1,22 +1,22 @@
 //! What a mesh is made of, before textures are looked up.
 //!
-//! A [`Surface`] becomes a [`Material`], a sum of reflectance lobes with numbers in it, at each hit:
-//! textures are looked up there and vertex colours multiplied in. All surfaces are opaque and
+//! A [`Material`] becomes a [`Bsdf`], a sum of reflectance lobes, at each hit:
+//! textures are looked up there and vertex colors multiplied in. All surfaces are opaque and
 //! two-sided.
 
 use super::layers::{AlphaMode, Coverage, Emission, Layers};
 use super::texture::{Texture, TextureRef, Uvs};
 use crate::Rgb;
-use crate::bsdf::{Lambert, Material, MetallicRoughness, Phong};
+use crate::bsdf::{Bsdf, Lambert, MetallicRoughness, Phong};
 use crate::math::Vec3;
 
 /// What a part of a scene is made of.
 #[derive(Clone, Debug)]
-pub struct Surface {
+pub struct Material {
     /// Its name in the file, for messages.
     pub name: String,
     /// How it reflects.
-    pub model: SurfaceModel,
+    pub model: MaterialModel,
     /// Its fine relief.
     pub normal_map: Option<NormalMap>,
     /// What lies behind it and shows.
@@ -31,25 +31,25 @@ pub struct Surface {
     pub layers: Layers,
 }
 
-/// How a surface reflects.
+/// How a material reflects.
 #[derive(Clone, Debug)]
-pub enum SurfaceModel {
-    /// The same material everywhere; vertex colours do not touch it.
-    Fixed(Material),
+pub enum MaterialModel {
+    /// The same BSDF everywhere; vertex colors do not touch it.
+    Fixed(Bsdf),
     /// Lambert, with a Phong highlight where `specular` is not black.
-    Phong(PhongSurface),
+    Phong(PhongMaterial),
     /// The metallic-roughness model of glTF.
-    MetallicRoughness(MetallicRoughnessSurface),
+    MetallicRoughness(MetallicRoughnessMaterial),
     /// glTF's older model, `KHR_materials_pbrSpecularGlossiness`.
-    SpecularGlossiness(SpecularGlossinessSurface),
+    SpecularGlossiness(SpecularGlossinessMaterial),
 }
 
-/// Parameters of [`SurfaceModel::Phong`], as in a Wavefront MTL file.
+/// Parameters of [`MaterialModel::Phong`], as in a Wavefront MTL file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PhongSurface {
-    /// Diffuse albedo k_d in \[0, 1\]; multiplied by the texture and the vertex colour.
+pub struct PhongMaterial {
+    /// Diffuse albedo k_d in \[0, 1\]; multiplied by the texture and the vertex color.
     pub diffuse: Rgb,
-    /// A colour texture, a factor on `diffuse`.
+    /// A color texture, a factor on `diffuse`.
     pub diffuse_texture: Option<TextureRef>,
     /// Specular albedo k_s; cut to 1 − diffuse, so that no energy is made.
     pub specular: Rgb,
@@ -57,12 +57,12 @@ pub struct PhongSurface {
     pub exponent: f32,
 }
 
-/// Parameters of [`SurfaceModel::MetallicRoughness`], as in glTF.
+/// Parameters of [`MaterialModel::MetallicRoughness`], as in glTF.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MetallicRoughnessSurface {
-    /// Base colour in \[0, 1\]; multiplied by the texture and the vertex colour.
+pub struct MetallicRoughnessMaterial {
+    /// Base color in \[0, 1\]; multiplied by the texture and the vertex color.
     pub base_color: Rgb,
-    /// A colour texture, a factor on `base_color`.
+    /// A color texture, a factor on `base_color`.
     pub base_color_texture: Option<TextureRef>,
     /// Metalness in \[0, 1\].
     pub metallic: f32,
@@ -72,9 +72,9 @@ pub struct MetallicRoughnessSurface {
     pub metallic_roughness_texture: Option<TextureRef>,
 }
 
-/// Parameters of [`SurfaceModel::SpecularGlossiness`], as in glTF.
+/// Parameters of [`MaterialModel::SpecularGlossiness`], as in glTF.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SpecularGlossinessSurface {
+pub struct SpecularGlossinessMaterial {
     /// Diffuse color in \[0, 1\]; multiplied by the texture and the vertex color.
     pub diffuse: Rgb,
     /// A color texture, a factor on `diffuse`.
@@ -97,9 +97,9 @@ pub struct NormalMap {
     pub scale: f32,
 }
 
-impl Surface {
+impl Material {
     /// An opaque, two-sided surface.
-    pub fn new(name: impl Into<String>, model: SurfaceModel) -> Self {
+    pub fn new(name: impl Into<String>, model: MaterialModel) -> Self {
         Self {
             name: name.into(),
             model,
@@ -112,14 +112,14 @@ impl Surface {
         }
     }
 
-    /// A diffuse surface of one colour.
+    /// A diffuse material of one color.
     pub fn diffuse(name: impl Into<String>, albedo: Rgb) -> Self {
-        Self::new(name, SurfaceModel::diffuse(albedo))
+        Self::new(name, MaterialModel::diffuse(albedo))
     }
 
-    /// A surface of one material.
-    pub fn fixed(name: impl Into<String>, material: Material) -> Self {
-        Self::new(name, SurfaceModel::Fixed(material))
+    /// A material with the same BSDF everywhere.
+    pub fn fixed(name: impl Into<String>, bsdf: Bsdf) -> Self {
+        Self::new(name, MaterialModel::Fixed(bsdf))
     }
 
     /// What of this surface a picture lacks, in glTF's terms; whoever draws a feature deletes its line.
@@ -158,12 +158,12 @@ impl Surface {
     #[inline]
     pub(crate) fn shading_textures(&self) -> impl Iterator<Item = &TextureRef> {
         let of_model = match &self.model {
-            SurfaceModel::Fixed(_) => [None, None],
-            SurfaceModel::Phong(p) => [p.diffuse_texture.as_ref(), None],
-            SurfaceModel::MetallicRoughness(m) => {
+            MaterialModel::Fixed(_) => [None, None],
+            MaterialModel::Phong(p) => [p.diffuse_texture.as_ref(), None],
+            MaterialModel::MetallicRoughness(m) => {
                 [m.base_color_texture.as_ref(), m.metallic_roughness_texture.as_ref()]
             }
-            SurfaceModel::SpecularGlossiness(s) => {
+            MaterialModel::SpecularGlossiness(s) => {
                 [s.diffuse_texture.as_ref(), s.specular_glossiness_texture.as_ref()]
             }
         };
@@ -172,12 +172,12 @@ impl Surface {
 
     /// Whether it matters which way the tangent points.
     #[inline]
-    pub(crate) fn has_grain(&self) -> bool {
+    pub(crate) fn needs_tangent(&self) -> bool {
         let fixed = match &self.model {
-            SurfaceModel::Fixed(material) => !material.is_isotropic(),
-            SurfaceModel::Phong(_)
-            | SurfaceModel::MetallicRoughness(_)
-            | SurfaceModel::SpecularGlossiness(_) => false,
+            MaterialModel::Fixed(bsdf) => !bsdf.is_isotropic(),
+            MaterialModel::Phong(_)
+            | MaterialModel::MetallicRoughness(_)
+            | MaterialModel::SpecularGlossiness(_) => false,
         };
         fixed || self.normal_map.is_some()
     }
@@ -186,13 +186,13 @@ impl Surface {
     pub(crate) fn shift_textures(&mut self, by: usize) {
         let shift = |t: &mut TextureRef| t.texture += by;
         match &mut self.model {
-            SurfaceModel::Fixed(_) => {}
-            SurfaceModel::Phong(p) => p.diffuse_texture.iter_mut().for_each(shift),
-            SurfaceModel::MetallicRoughness(m) => {
+            MaterialModel::Fixed(_) => {}
+            MaterialModel::Phong(p) => p.diffuse_texture.iter_mut().for_each(shift),
+            MaterialModel::MetallicRoughness(m) => {
                 m.base_color_texture.iter_mut().for_each(shift);
                 m.metallic_roughness_texture.iter_mut().for_each(shift);
             }
-            SurfaceModel::SpecularGlossiness(s) => {
+            MaterialModel::SpecularGlossiness(s) => {
                 s.diffuse_texture.iter_mut().for_each(shift);
                 s.specular_glossiness_texture.iter_mut().for_each(shift);
             }
@@ -203,46 +203,46 @@ impl Surface {
         self.layers.textures_mut().for_each(shift);
     }
 
-    /// Sets `material` to that at texture coordinates `uvs` under the vertex colour `tint`, seen from `wo`.
+    /// Sets `bsdf` to that at texture coordinates `uvs` under the vertex color `tint`, seen from `wo`.
     #[inline]
-    pub(crate) fn set_material(
+    pub(crate) fn set_bsdf(
         &self,
         textures: &[Texture],
         uvs: &Uvs,
         tint: Rgb,
         wo: Vec3,
-        material: &mut Material,
+        bsdf: &mut Bsdf,
     ) {
         let look_up =
             |t: &Option<TextureRef>| t.as_ref().map_or(Rgb::WHITE, |t| t.at(textures, uvs));
         match &self.model {
-            SurfaceModel::Fixed(fixed) => material.set(fixed, wo),
-            SurfaceModel::Phong(p) => {
+            MaterialModel::Fixed(fixed) => bsdf.set(fixed, wo),
+            MaterialModel::Phong(p) => {
                 let diffuse = p.diffuse * look_up(&p.diffuse_texture) * tint;
-                material.set(&lambert_phong(diffuse.map(unit), p.specular, p.exponent), wo);
+                bsdf.set(&lambert_phong(diffuse.map(unit), p.specular, p.exponent), wo);
             }
-            SurfaceModel::MetallicRoughness(m) => {
+            MaterialModel::MetallicRoughness(m) => {
                 let base = m.base_color * look_up(&m.base_color_texture) * tint;
                 let factors = look_up(&m.metallic_roughness_texture);
                 let (metallic, roughness) = (m.metallic * factors.b, m.roughness * factors.g);
-                *material = Material::single(MetallicRoughness::new(base, metallic, roughness));
+                *bsdf = Bsdf::single(MetallicRoughness::new(base, metallic, roughness));
             }
-            SurfaceModel::SpecularGlossiness(s) => {
+            MaterialModel::SpecularGlossiness(s) => {
                 let diffuse = s.diffuse * look_up(&s.diffuse_texture) * tint;
                 let specular = s.specular * look_up(&s.specular_glossiness_texture);
                 let alpha = s.specular_glossiness_texture.as_ref();
                 let glossiness = s.glossiness * alpha.map_or(1.0, |t| t.alpha_at(textures, uvs));
                 let lobe = MetallicRoughness::specular_glossiness(diffuse, specular, glossiness);
-                *material = Material::single(lobe);
+                *bsdf = Bsdf::single(lobe);
             }
         }
     }
 }
 
-impl SurfaceModel {
-    /// Lambert of one colour.
+impl MaterialModel {
+    /// Lambert of one color.
     pub fn diffuse(albedo: Rgb) -> Self {
-        Self::Phong(PhongSurface {
+        Self::Phong(PhongMaterial {
             diffuse: albedo,
             diffuse_texture: None,
             specular: Rgb::BLACK,
@@ -281,13 +281,13 @@ fn unit(v: f32) -> f32 {
     if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) }
 }
 
-fn lambert_phong(diffuse: Rgb, specular: Rgb, exponent: f32) -> Material {
+fn lambert_phong(diffuse: Rgb, specular: Rgb, exponent: f32) -> Bsdf {
     let lambert = Lambert::new(diffuse);
     let room = Rgb::WHITE - diffuse;
     let specular = Rgb::new(specular.r.min(room.r), specular.g.min(room.g), specular.b.min(room.b));
     if specular.is_black() {
-        return Material::single(lambert);
+        return Bsdf::single(lambert);
     }
-    Material::new(&[lambert.into(), Phong::new(specular, exponent).into()])
+    Bsdf::new(&[lambert.into(), Phong::new(specular, exponent).into()])
         .expect("a material holds two lobes")
 }

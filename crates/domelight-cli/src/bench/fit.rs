@@ -9,13 +9,13 @@ pub(super) type Point = (f64, f64);
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cost {
     pub(super) seconds: f64,
-    pub(super) how: How,
+    pub(super) fit: Fit,
 }
 
 /// How a cost was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum How {
+pub(super) enum Fit {
     /// Between two budgets whose errors lie on either side.
     Interpolated,
     /// Beyond the greatest budget.
@@ -36,11 +36,11 @@ const EXPONENTS: (f64, f64) = (-2.0, -0.5);
 pub(super) fn cost_of(error: f64, points: &[Point]) -> Option<Cost> {
     let (&first, &last) = (points.first()?, points.last()?);
     if first.1 <= error {
-        return Some(Cost { seconds: first.0, how: How::AtMost });
+        return Some(Cost { seconds: first.0, fit: Fit::AtMost });
     }
     if let Some(pair) = points.windows(2).find(|pair| pair[1].1 <= error) {
         let seconds = along(pair[0], exponent(pair[0], pair[1]), error);
-        return Some(Cost { seconds, how: How::Interpolated });
+        return Some(Cost { seconds, fit: Fit::Interpolated });
     }
     if last.1 > FARTHEST * error {
         return None;
@@ -52,7 +52,7 @@ pub(super) fn cost_of(error: f64, points: &[Point]) -> Option<Cost> {
     // Noise may even let the error rise.
     let steepness = if steepness.is_finite() { steepness } else { -1.0 };
     let seconds = along(last, steepness.clamp(EXPONENTS.0, EXPONENTS.1), error);
-    Some(Cost { seconds, how: How::Extrapolated })
+    Some(Cost { seconds, fit: Fit::Extrapolated })
 }
 
 /// p of error ∝ seconds^p through two points.
@@ -70,43 +70,43 @@ mod tests {
     use super::*;
 
     #[track_caller]
-    fn check(points: &[Point], error: f64, seconds: f64, how: How) {
+    fn check(points: &[Point], error: f64, seconds: f64, fit: Fit) {
         let cost = cost_of(error, points).expect("a cost");
         assert!((cost.seconds / seconds - 1.0).abs() < 1e-9, "{cost:?}");
-        assert_eq!(cost.how, how);
+        assert_eq!(cost.fit, fit);
     }
 
     #[test]
     fn straight_lines_between_logarithms() {
         // error = 1e-2 / seconds, then 1e-2 / seconds².
         let points = [(1.0, 1e-2), (4.0, 2.5e-3), (8.0, 6.25e-4)];
-        check(&points, 5e-3, 2.0, How::Interpolated);
-        check(&points, 2.5e-3, 4.0, How::Interpolated);
-        check(&points, 1.25e-3, 32f64.sqrt(), How::Interpolated);
-        check(&points, 6.25e-4, 8.0, How::Interpolated);
+        check(&points, 5e-3, 2.0, Fit::Interpolated);
+        check(&points, 2.5e-3, 4.0, Fit::Interpolated);
+        check(&points, 1.25e-3, 32f64.sqrt(), Fit::Interpolated);
+        check(&points, 6.25e-4, 8.0, Fit::Interpolated);
     }
 
     #[test]
     fn what_was_not_measured_is_marked() {
         let points = [(1.0, 1e-2), (4.0, 2.5e-3)];
-        check(&points, 2e-2, 1.0, How::AtMost);
-        check(&points, 1.25e-3, 8.0, How::Extrapolated);
-        check(&points[..1], 5e-3, 2.0, How::Extrapolated);
+        check(&points, 2e-2, 1.0, Fit::AtMost);
+        check(&points, 1.25e-3, 8.0, Fit::Extrapolated);
+        check(&points[..1], 5e-3, 2.0, Fit::Extrapolated);
         assert!(cost_of(1e-4, &points).is_none(), "25 times less");
         assert!(cost_of(1e-4, &[]).is_none());
     }
 
     #[test]
     fn extrapolations_are_neither_steep_nor_flat() {
-        check(&[(1.0, 1e-1), (2.0, 1e-3)], 2.5e-4, 4.0, How::Extrapolated);
-        check(&[(1.0, 1.0), (2.0, 1.0)], 0.5, 8.0, How::Extrapolated);
-        check(&[(1.0, 1.0), (2.0, 1.1)], 0.55, 8.0, How::Extrapolated);
-        check(&[(1.0, 1.0), (1.0, 1.0)], 0.5, 2.0, How::Extrapolated);
+        check(&[(1.0, 1e-1), (2.0, 1e-3)], 2.5e-4, 4.0, Fit::Extrapolated);
+        check(&[(1.0, 1.0), (2.0, 1.0)], 0.5, 8.0, Fit::Extrapolated);
+        check(&[(1.0, 1.0), (2.0, 1.1)], 0.55, 8.0, Fit::Extrapolated);
+        check(&[(1.0, 1.0), (1.0, 1.0)], 0.5, 2.0, Fit::Extrapolated);
     }
 
     #[test]
     fn the_first_crossing_counts() {
         let points = [(1.0, 4.0), (2.0, 1.0), (4.0, 2.0), (8.0, 0.5)];
-        check(&points, 1.0, 2.0, How::Interpolated);
+        check(&points, 1.0, 2.0, Fit::Interpolated);
     }
 }

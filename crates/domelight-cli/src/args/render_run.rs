@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use clap::Args;
 
-use crate::values::{Shard, Tiles, duration};
+use crate::parse::{Shard, Tiles, duration};
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Checkpoints, parts and limits")]
-pub(crate) struct CourseArguments {
+pub(crate) struct RenderRunArguments {
     /// Save the state of the render here (.exr) from time to time, when it is interrupted and when it is done
     #[arg(long, value_name = "FILE", conflicts_with_all = ["shard", "tiles"])]
     pub(crate) checkpoint: Option<PathBuf>,

@@ -6,7 +6,7 @@ use domelight::picture::compare::{REGULARIZER, compare};
 use serde::Serialize;
 
 use super::budget::{Budget, MOST_SAMPLES};
-use crate::measure::shot::{Shot, Studio};
+use crate::measure::render::{Render, RenderSetup};
 
 /// How far beyond its budget a strategy may be where it cannot meet it.
 const MOST_EXCESS: f64 = 1.5;
@@ -15,21 +15,21 @@ const MOST_EXCESS: f64 = 1.5;
 const HALVINGS: u32 = 4;
 
 /// How many camera samples of each pixel a budget buys.
-pub(super) enum Purchase {
+pub(super) enum SampleCount {
     Samples(u32),
     /// Not one, and why.
-    TooDear(String),
+    OverBudget(String),
 }
 
-/// A mean over seeds and its spread.
+/// A mean over seeds and its standard deviation.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct Spread {
+pub(super) struct MeanAndDeviation {
     pub(super) mean: f64,
     /// Standard deviation over seeds; null for a single one.
     pub(super) sd: Option<f64>,
 }
 
-impl Spread {
+impl MeanAndDeviation {
     fn of(values: &[f64]) -> Self {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
@@ -40,15 +40,15 @@ impl Spread {
 
 /// Cost and error at a number of samples.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct Step {
+pub(super) struct ConvergencePoint {
     /// As asked for.
     pub(super) spp: u32,
     /// Camera samples of a pixel, as counted; the mean over seeds.
     pub(super) camera_samples: f64,
     /// Shadow rays of a pixel that the scene covers, as counted; the mean over seeds.
     pub(super) rays: f64,
-    pub(super) cpu_seconds: Spread,
-    pub(super) rel_mse: Spread,
+    pub(super) cpu_seconds: MeanAndDeviation,
+    pub(super) rel_mse: MeanAndDeviation,
 }
 
 /// relMSE that no more samples take away. An estimate, which may be below 0.
@@ -60,9 +60,9 @@ pub(super) struct Bias {
 }
 
 /// All that was measured of a strategy.
-pub(super) struct Measured {
+pub(super) struct StrategyMeasurement {
     /// With few samples first; the last is that of the whole budget.
-    pub(super) steps: Vec<Step>,
+    pub(super) steps: Vec<ConvergencePoint>,
     /// The first seed's picture.
     pub(super) image: RgbImage,
     /// None for one seed.
@@ -70,9 +70,9 @@ pub(super) struct Measured {
     pub(super) non_finite: u64,
 }
 
-/// A strategy in its studio.
-pub(super) struct Entrant<'a> {
-    pub(super) studio: Studio<'a>,
+/// A strategy and how it is rendered.
+pub(super) struct StrategyRun<'a> {
+    pub(super) render_setup: RenderSetup<'a>,
     /// For the progress bar.
     pub(super) label: String,
     pub(super) reference: &'a RgbImage,
@@ -81,17 +81,17 @@ pub(super) struct Entrant<'a> {
     pub(super) n_seeds: u32,
 }
 
-impl Entrant<'_> {
-    fn pilot(&self, n_samples: u32) -> Result<Shot> {
-        // A seed of its own, as calibration must not look at the pictures that are judged.
+impl StrategyRun<'_> {
+    fn pilot(&self, n_samples: u32) -> Result<Render> {
+        // A seed of its own, as calibration must not look at the pictures that are measured.
         let label = format!("{}, calibrating", self.label);
-        self.studio.shoot(&label, n_samples, !self.studio.settings.seed)
+        self.render_setup.render(&label, n_samples, !self.render_setup.settings.seed)
     }
 
     /// What the budget buys.
-    pub(super) fn calibrate(&self, budget: Budget) -> Result<Purchase> {
+    pub(super) fn calibrate(&self, budget: Budget) -> Result<SampleCount> {
         match budget {
-            Budget::Samples(n) => Ok(Purchase::Samples(n)),
+            Budget::Samples(n) => Ok(SampleCount::Samples(n)),
             Budget::Rays(rays) => self.calibrate_rays(rays),
             Budget::Time(seconds) => self.calibrate_time(seconds),
         }
@@ -99,27 +99,27 @@ impl Entrant<'_> {
 
     /// Goes from pilot to pilot, as strategies that learn trace fewer rays for a camera sample the more there are, and
     /// takes the number whose rays came nearest.
-    fn calibrate_rays(&self, rays: f64) -> Result<Purchase> {
+    fn calibrate_rays(&self, rays: f64) -> Result<SampleCount> {
         const MOST_PILOTS: usize = 4;
         let each = self.pilot(4)?.rays() / 4.0;
-        let mut purchase = buy(rays, each, &format!("traces {each:.1} shadow rays"));
+        let mut purchase = sample_count(rays, each, &format!("traces {each:.1} shadow rays"));
         let mut tried: Vec<(u32, f64)> = Vec::new();
-        while let Purchase::Samples(n) = purchase {
+        while let SampleCount::Samples(n) = purchase {
             if tried.len() == MOST_PILOTS || tried.iter().any(|&(m, _)| m == n) {
                 break;
             }
             let traced = self.pilot(n)?.rays();
             tried.push((n, traced));
-            purchase = buy(rays, traced / f64::from(n), "");
+            purchase = sample_count(rays, traced / f64::from(n), "");
         }
         let off = |traced: f64| (traced / rays).ln().abs();
         let nearest = tried.into_iter().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
-        Ok(nearest.map_or(purchase, |(n, _)| Purchase::Samples(n)))
+        Ok(nearest.map_or(purchase, |(n, _)| SampleCount::Samples(n)))
     }
 
     /// Doubles the samples until they take an eighth of the time, then goes along the line through
     /// the last two.
-    fn calibrate_time(&self, seconds: f64) -> Result<Purchase> {
+    fn calibrate_time(&self, seconds: f64) -> Result<SampleCount> {
         self.pilot(1)?; // warms the caches
         let mut last = (1, self.pilot(1)?.seconds());
         let mut before = (0, 0.0);
@@ -130,11 +130,11 @@ impl Entrant<'_> {
         let slope = (last.1 - before.1) / f64::from(last.0 - before.0);
         let each = if slope > 0.0 { slope } else { last.1 / f64::from(last.0) };
         let fixed = (last.1 - each * f64::from(last.0)).max(0.0);
-        Ok(buy(seconds - fixed, each, &format!("takes {:.3} CPU seconds", fixed + each)))
+        Ok(sample_count(seconds - fixed, each, &format!("takes {:.3} CPU seconds", fixed + each)))
     }
 
     /// Renders all seeds at the number of samples and its halves.
-    pub(super) fn measure(&self, n_samples: u32) -> Result<Measured> {
+    pub(super) fn measure(&self, n_samples: u32) -> Result<StrategyMeasurement> {
         let mut steps = Vec::new();
         for halving in (1..=HALVINGS).rev() {
             let n = n_samples >> halving;
@@ -142,45 +142,50 @@ impl Entrant<'_> {
                 steps.push(self.step(n, |_| {})?);
             }
         }
-        let mut pictures = Pictures::default();
-        steps.push(self.step(n_samples, |shot| pictures.add(shot, self.reference))?);
+        let mut pictures = PictureSum::default();
+        steps.push(self.step(n_samples, |render| pictures.add(render, self.reference))?);
         let bias = pictures.bias(self.reference_noise);
-        let Pictures { first, non_finite, .. } = pictures;
+        let PictureSum { first, non_finite, .. } = pictures;
         let image = first.unwrap_or_else(|| RgbImage::new(0, 0, Vec::new()));
-        Ok(Measured { steps, image, bias, non_finite })
+        Ok(StrategyMeasurement { steps, image, bias, non_finite })
     }
 
-    fn step(&self, n_samples: u32, mut see: impl FnMut(&Shot)) -> Result<Step> {
+    fn step(&self, n_samples: u32, mut see: impl FnMut(&Render)) -> Result<ConvergencePoint> {
         let (mut camera_samples, mut rays) = (0.0, 0.0);
         let (mut seconds, mut errors) = (Vec::new(), Vec::new());
         for i in 0..self.n_seeds {
             let of = self.n_seeds;
             let label = format!("{}, {n_samples} spp, seed {} of {of}", self.label, i + 1);
-            let seed = self.studio.settings.seed.wrapping_add(u64::from(i));
-            let shot = self.studio.shoot(&label, n_samples, seed)?;
-            camera_samples += shot.camera_samples() / f64::from(of);
-            rays += shot.rays() / f64::from(of);
-            seconds.push(shot.seconds());
-            errors.push(compare(&shot.layers.color, self.reference, None)?.rel_mse);
-            see(&shot);
+            let seed = self.render_setup.settings.seed.wrapping_add(u64::from(i));
+            let render = self.render_setup.render(&label, n_samples, seed)?;
+            camera_samples += render.camera_samples() / f64::from(of);
+            rays += render.rays() / f64::from(of);
+            seconds.push(render.seconds());
+            errors.push(compare(&render.layers.color, self.reference, None)?.rel_mse);
+            see(&render);
         }
-        let (cpu_seconds, rel_mse) = (Spread::of(&seconds), Spread::of(&errors));
-        Ok(Step { spp: n_samples, camera_samples, rays, cpu_seconds, rel_mse })
+        let (cpu_seconds, rel_mse) =
+            (MeanAndDeviation::of(&seconds), MeanAndDeviation::of(&errors));
+        Ok(ConvergencePoint { spp: n_samples, camera_samples, rays, cpu_seconds, rel_mse })
     }
 }
 
 /// Whole samples for a budget, the nearest number that is not 0.
-fn buy(budget: f64, each: f64, one_sample: &str) -> Purchase {
+fn sample_count(budget: f64, each: f64, one_sample: &str) -> SampleCount {
     if each > MOST_EXCESS * budget {
         let advice = "give the strategy fewer rays or lights, or all a larger budget";
-        return Purchase::TooDear(format!("one camera sample a pixel {one_sample}; {advice}"));
+        return SampleCount::OverBudget(format!(
+            "one camera sample a pixel {one_sample}; {advice}"
+        ));
     }
-    Purchase::Samples((budget / each.max(1e-12)).round().clamp(1.0, f64::from(MOST_SAMPLES)) as u32)
+    SampleCount::Samples(
+        (budget / each.max(1e-12)).round().clamp(1.0, f64::from(MOST_SAMPLES)) as u32
+    )
 }
 
 /// The pictures of all seeds, added up.
 #[derive(Default)]
-struct Pictures {
+struct PictureSum {
     first: Option<RgbImage>,
     /// Of each pixel and channel the differences d from the reference R, over √(R² + 0.01): Σ d and Σ d².
     sums: Vec<[[f64; 2]; 3]>,
@@ -188,10 +193,10 @@ struct Pictures {
     non_finite: u64,
 }
 
-impl Pictures {
-    fn add(&mut self, shot: &Shot, reference: &RgbImage) {
-        self.add_picture(&shot.layers.color, reference);
-        self.non_finite += shot.counts.non_finite;
+impl PictureSum {
+    fn add(&mut self, render: &Render, reference: &RgbImage) {
+        self.add_picture(&render.layers.color, reference);
+        self.non_finite += render.counts.non_finite;
     }
 
     fn add_picture(&mut self, image: &RgbImage, reference: &RgbImage) {
@@ -236,23 +241,23 @@ mod tests {
 
     #[test]
     fn samples_are_whole_and_never_none() {
-        let bought = |budget, each| match buy(budget, each, "") {
-            Purchase::Samples(n) => Some(n),
-            Purchase::TooDear(_) => None,
+        let samples = |budget, each| match sample_count(budget, each, "") {
+            SampleCount::Samples(n) => Some(n),
+            SampleCount::OverBudget(_) => None,
         };
-        assert_eq!(bought(64.0, 1.7), Some(38));
-        assert_eq!(bought(64.0, 45.0), Some(1));
-        assert_eq!(bought(64.0, 80.0), Some(1));
-        assert_eq!(bought(64.0, 97.0), None);
-        assert_eq!(bought(-1.0, 1.0), None);
-        assert_eq!(bought(64.0, 0.0), Some(MOST_SAMPLES));
+        assert_eq!(samples(64.0, 1.7), Some(38));
+        assert_eq!(samples(64.0, 45.0), Some(1));
+        assert_eq!(samples(64.0, 80.0), Some(1));
+        assert_eq!(samples(64.0, 97.0), None);
+        assert_eq!(samples(-1.0, 1.0), None);
+        assert_eq!(samples(64.0, 0.0), Some(MOST_SAMPLES));
     }
 
     #[test]
-    fn the_spread_is_the_standard_deviation() {
-        let spread = Spread::of(&[1.0, 2.0, 3.0]);
-        assert_eq!((spread.mean, spread.sd), (2.0, Some(1.0)));
-        assert!(Spread::of(&[4.0]).sd.is_none());
+    fn the_deviation_is_that_of_a_sample() {
+        let deviation = MeanAndDeviation::of(&[1.0, 2.0, 3.0]);
+        assert_eq!((deviation.mean, deviation.sd), (2.0, Some(1.0)));
+        assert!(MeanAndDeviation::of(&[4.0]).sd.is_none());
     }
 
     /// Of noisy pictures without bias against a noisy reference, and of pictures with bias.
@@ -274,7 +279,7 @@ mod tests {
             let mut n_inside = 0;
             for _ in 0..60 {
                 let reference = noisy(1.0);
-                let mut pictures = Pictures::default();
+                let mut pictures = PictureSum::default();
                 assert_eq!(pictures.bias(of_reference), None);
                 for _ in 0..n_seeds {
                     pictures.add_picture(&noisy(1.0 + bias as f32), &reference);

@@ -1,15 +1,15 @@
-//! A pool of directions toward the light, drawn anew for each pass and shared by its pixels.
+//! The light sample pool: directions toward the light, drawn anew for each pass and shared by its pixels.
 //!
 //! Drawing from the map costs a walk through its pyramid and a direction; a pixel takes some hundred.
 //! Instead each cell has 32 directions ready, or 16, stratified along the curve within the cell, and a
 //! stratum that falls into the cell takes the one where it falls. The estimate of a pixel is unbiased
 //! over the pools; what the pool of one pass has in error, all its pixels share.
 
-use super::cells::{Cells, MAX_ROWS, NO_SLOTS, SLOTS, Slots, at_mut};
+use super::cells::{CellArray, Cells, MAX_ROWS, N_SLOTS, ZERO_CELLS, get_mut};
 use crate::environment::Environment;
 use crate::parallel;
-use crate::sampling::Stream;
-use crate::simd::{Colors, Floats, Ints, LANES, Lanes, Simd, Vectors};
+use crate::sampling::Sampler;
+use crate::simd::{Colors, LANES, Lanes, Simd, SimdF32x8, SimdI32x8, Vectors};
 
 /// Directions of each cell at the most.
 pub(super) const PER_CELL: usize = 32;
@@ -50,35 +50,35 @@ impl PassLength {
 /// nothing.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
-struct Light(Lanes);
+struct LightSample(Lanes);
 
 /// How many all slots have: a power of two.
-const LIGHTS: usize = SLOTS * PER_CELL;
+const N_LIGHT_SAMPLES: usize = N_SLOTS * PER_CELL;
 
 /// The directions of all cells.
 #[derive(Clone, Debug)]
-pub struct Pool {
+pub struct LightSamplePool {
     /// By slot.
-    lights: Box<[Light; LIGHTS]>,
+    lights: Box<[LightSample; N_LIGHT_SAMPLES]>,
     /// Each cell has the first of its places.
     pub(super) length: PassLength,
     /// By channel of the radiance L: ∫ L dω, and ∫ L ω dω by component, as the directions estimate it.
-    pub(super) moments: Box<[[Slots; 4]; 3]>,
+    pub(super) moments: Box<[[CellArray; 4]; 3]>,
 }
 
 /// Lights side by side.
-pub(super) struct Lights<F> {
+pub(super) struct LightSamples<F> {
     pub(super) wi: Vectors<F>,
     pub(super) le: Colors<F>,
     pub(super) density: F,
 }
 
-impl Pool {
+impl LightSamplePool {
     /// Of no light.
     pub(super) fn empty() -> Self {
-        let lights = vec![Light([0.0; LANES]); LIGHTS].into_boxed_slice();
+        let lights = vec![LightSample([0.0; LANES]); N_LIGHT_SAMPLES].into_boxed_slice();
         let lights = lights.try_into().expect("as many as asked for");
-        let moments = vec![[NO_SLOTS; 4]; 3].into_boxed_slice();
+        let moments = vec![[ZERO_CELLS; 4]; 3].into_boxed_slice();
         let moments = moments.try_into().expect("three channels");
         Self { lights, length: PassLength::Short, moments }
     }
@@ -87,7 +87,7 @@ impl Pool {
     pub(super) fn draw(
         cells: &Cells,
         environment: &Environment,
-        stream: Stream,
+        sampler: Sampler,
         length: PassLength,
     ) -> Self {
         let per_cell = length.per_cell();
@@ -95,20 +95,20 @@ impl Pool {
         let lights = &mut pool.lights[..cells.n_slots() * PER_CELL];
         parallel::bands(lights, PER_CELL, |slot, lights| {
             let Some(cell) = cells.cell_in(slot) else { return };
-            let mut numbers = stream.generator(cell as u32);
+            let mut numbers = sampler.generator(cell as u32);
             let mass = cells.mass_of(cell);
             for (j, light) in lights[..per_cell].iter_mut().enumerate() {
                 let u = (j as f64 + f64::from(numbers.next_f32())) / per_cell as f64;
                 let jitter = [numbers.next_f32(), numbers.next_f32()];
                 let (wi, le) = cells.draw(environment, cell, u, jitter);
                 let density = le.luminance() / mass;
-                *light = Light([wi.x, wi.y, wi.z, le.r, le.g, le.b, density, 0.0]);
+                *light = LightSample([wi.x, wi.y, wi.z, le.r, le.g, le.b, density, 0.0]);
             }
         });
         for slot in (0..cells.n_slots()).filter(|&slot| cells.cell_in(slot).is_some()) {
             let moments = moments(&pool.lights[slot * PER_CELL..][..per_cell]);
             for (slots, &moment) in pool.moments.iter_mut().flatten().zip(moments.as_flattened()) {
-                *at_mut(slots, slot) = moment;
+                *get_mut(slots, slot) = moment;
             }
         }
         pool
@@ -116,21 +116,26 @@ impl Pool {
 
     /// The directions of the cells in `slots`, each at `u` in [0, 1) of its part of the curve.
     #[inline(always)]
-    pub(super) fn at<S: Simd>(&self, simd: S, slots: S::Ints, u: S::Floats) -> Lights<S::Floats> {
+    pub(super) fn get<S: Simd>(
+        &self,
+        simd: S,
+        slots: S::I32x8,
+        u: S::F32x8,
+    ) -> LightSamples<S::F32x8> {
         let per_cell = self.length.per_cell();
-        let last = simd.splat_int(per_cell as i32 - 1);
-        let j = (u * simd.splat(per_cell as f32)).truncated().min(last);
-        let index = (slots.shifted::<{ PER_CELL.ilog2() as i32 }>() + j).store();
-        let lights = index.map(|i| &self.lights[i as usize % LIGHTS].0);
-        let [x, y, z, r, g, b, density, _] = simd.transposed(lights);
-        Lights { wi: Vectors { x, y, z }, le: Colors([r, g, b]), density }
+        let last = simd.splat_i32(per_cell as i32 - 1);
+        let j = (u * simd.splat(per_cell as f32)).to_i32().min(last);
+        let index = (slots.shl::<{ PER_CELL.ilog2() as i32 }>() + j).store();
+        let lights = index.map(|i| &self.lights[i as usize % N_LIGHT_SAMPLES].0);
+        let [x, y, z, r, g, b, density, _] = simd.transpose(lights);
+        LightSamples { wi: Vectors { x, y, z }, le: Colors([r, g, b]), density }
     }
 }
 
 /// ∫ L dω and ∫ L ω dω over a cell, by channel of L, as its directions estimate them.
-fn moments(lights: &[Light]) -> [[f32; 4]; 3] {
+fn moments(lights: &[LightSample]) -> [[f32; 4]; 3] {
     let mut moments = [[0.0; 4]; 3];
-    for &Light([x, y, z, r, g, b, density, _]) in lights {
+    for &LightSample([x, y, z, r, g, b, density, _]) in lights {
         let share = 1.0 / (density * lights.len() as f32);
         for (sums, c) in moments.iter_mut().zip([r, g, b]) {
             for (sum, x) in sums.iter_mut().zip([1.0, x, y, z]) {
@@ -151,7 +156,7 @@ mod tests {
     use crate::simd::{InstructionSet, Kernel, dispatch};
 
     struct At<'a> {
-        pool: &'a Pool,
+        pool: &'a LightSamplePool,
         slot: usize,
         u: f32,
     }
@@ -161,16 +166,16 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Self::Output {
-            let slots = simd.splat_int(self.slot as i32);
-            let Lights { wi, le, density } = self.pool.at(simd, slots, simd.splat(self.u));
-            let third = |x: S::Floats| x.store()[3];
+            let slots = simd.splat_i32(self.slot as i32);
+            let LightSamples { wi, le, density } = self.pool.get(simd, slots, simd.splat(self.u));
+            let third = |x: S::F32x8| x.store()[3];
             let wi = vec3(third(wi.x), third(wi.y), third(wi.z));
             (wi, Rgb::from(le.0.map(third)), third(density))
         }
     }
 
     /// The direction of the cell in a slot at `u`, its radiance and its density.
-    fn light(pool: &Pool, slot: usize, u: f32) -> (Vec3, Rgb, f32) {
+    fn light(pool: &LightSamplePool, slot: usize, u: f32) -> (Vec3, Rgb, f32) {
         dispatch(InstructionSet::best(), At { pool, slot, u })
     }
 
@@ -182,8 +187,8 @@ mod tests {
         for length in [PassLength::Short, PassLength::Long] {
             let [cells] = Cells::new(&environment, [length.rows()]).unwrap();
             let draw = |pass| {
-                let stream = Stream::of_pass(SamplerKind::Sobol, 1, pass);
-                Pool::draw(&cells, &environment, stream, length)
+                let sampler = Sampler::for_pass(SamplerKind::Sobol, 1, pass);
+                LightSamplePool::draw(&cells, &environment, sampler, length)
             };
             let pool = draw(0);
             for cell in 0..cells.len() {

@@ -1,4 +1,4 @@
-//! What the user is told when something fails, and the exit code.
+//! Errors as the user sees them, and the exit code.
 
 use crate::interrupt::RUN_AGAIN;
 use crate::memory;
@@ -9,7 +9,7 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::ProbeError;
 use domelight::files::FileConflict;
 use domelight::memory::OverLimit;
-use domelight::picture::Problem;
+use domelight::picture::PictureErrorKind;
 use domelight::picture::compare::SizeMismatch;
 use domelight::quote::terminal;
 use domelight::render::CheckpointError;
@@ -44,13 +44,13 @@ impl std::error::Error for InterruptedAndSaved {}
 
 /// Prints a line to standard error, in which nothing commands the terminal. If that is closed or full, nobody can be
 /// told, and the work goes on.
-pub(crate) fn tell(line: &str) {
+pub(crate) fn status(line: &str) {
     let _ = writeln!(io::stderr(), "{}", terminal::line(line));
 }
 
 /// The same with several lines.
 pub(crate) fn tell_lines(text: &str) {
-    text.lines().for_each(tell);
+    text.lines().for_each(status);
 }
 
 /// Prints a line after a label.
@@ -100,7 +100,7 @@ pub(crate) fn warn(quiet: bool, text: &str) {
 pub(crate) fn report_usage(error: &clap::Error) -> ExitCode {
     let text = error.to_string();
     if terminal::lines(&text) == text {
-        // In colour.
+        // In color.
         let _ = error.print();
     } else {
         tell_lines(text.trim_end());
@@ -123,7 +123,7 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
 
 /// 2 if trying again cannot help: the arguments, the scene or the probe are wrong. 75 if it goes on where it was.
 fn code(error: &anyhow::Error) -> u8 {
-    let hopeless = error.is::<UsageError>()
+    let is_permanent = error.is::<UsageError>()
         || error.is::<LoadError>()
         || error.is::<ProbeError>()
         || error.is::<SceneError>()
@@ -142,7 +142,7 @@ fn code(error: &anyhow::Error) -> u8 {
     }
     match () {
         () if error.is::<InterruptedAndSaved>() => RUN_AGAIN as u8,
-        () if hopeless && !passing => 2,
+        () if is_permanent && !passing => 2,
         () => 1,
     }
 }
@@ -180,19 +180,19 @@ fn hint(error: &anyhow::Error) -> Option<String> {
 /// More memory than is allowed: the same again would not help.
 fn over_limit(error: &anyhow::Error) -> Option<&OverLimit> {
     error.chain().find_map(|cause| match cause.downcast_ref() {
-        Some(Problem::Memory(error)) => Some(error),
+        Some(PictureErrorKind::Memory(error)) => Some(error),
         _ => cause.downcast_ref(),
     })
 }
 
 fn io_kind(error: &anyhow::Error) -> Option<io::ErrorKind> {
     error.chain().find_map(|cause| match cause.downcast_ref() {
-        Some(Problem::Io(error)) => Some(error.kind()),
+        Some(PictureErrorKind::Io(error)) => Some(error.kind()),
         _ => cause.downcast_ref().map(io::Error::kind),
     })
 }
 
-/// <https://no-color.org>: colour on a terminal unless NO_COLOR is set to something.
+/// <https://no-color.org>: color on a terminal unless NO_COLOR is set to something.
 fn colored() -> bool {
     io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

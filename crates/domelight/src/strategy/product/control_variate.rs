@@ -21,27 +21,27 @@
 //! expect is the integral over the map, not over the pool. So h is also weighed as the balance heuristic weighs strata
 //! in the middle of the cell.
 
-use super::cells::{Cells, NO_SLOTS, Slots};
+use super::cells::{CellArray, Cells, ZERO_CELLS};
 use super::hits::Group;
-use super::pool::Pool;
+use super::light_samples::LightSamplePool;
 use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3};
-use crate::simd::{Colors, Floats, Simd, Vectors, Wide};
+use crate::simd::{Colors, Simd, SimdF32x8, SimdF32x16, Vectors};
 
 /// h of a pixel.
 #[derive(Clone, Debug)]
-pub(super) struct Control {
+pub(super) struct ControlVariate {
     /// 1 where a cell is above the horizon of all groups, else 0.
-    pub(super) above: Slots,
+    pub(super) above: CellArray,
     /// a, and b by component, of the glossy lobes together, in luminance.
-    gloss: [Slots; 4],
+    gloss: [CellArray; 4],
     /// k_s, of luminance 1; none without glossy lobes.
     tint: Option<Rgb>,
 }
 
-impl Default for Control {
+impl Default for ControlVariate {
     fn default() -> Self {
-        Self { above: NO_SLOTS, gloss: [NO_SLOTS; 4], tint: None }
+        Self { above: ZERO_CELLS, gloss: [ZERO_CELLS; 4], tint: None }
     }
 }
 
@@ -56,34 +56,34 @@ pub(super) struct Integral {
 impl Integral {
     /// At a hit with the normal `n` that reflects `diffuse`.
     #[inline(always)]
-    pub(super) fn at(&self, n: Vec3, diffuse: Rgb) -> Rgb {
+    pub(super) fn eval(&self, n: Vec3, diffuse: Rgb) -> Rgb {
         let facing = Rgb::from(self.diffuse.map(|r| FRAC_1_PI * n.dot(r)));
         facing * diffuse + self.gloss
     }
 }
 
-impl Control {
+impl ControlVariate {
     /// Forgets the glossy lobes of the pixel before.
     pub(super) fn reset(&mut self, groups: &[Group]) {
-        let lobes = groups.iter().flat_map(|g| g.outline.lobes().map(|(c, _)| c * g.share));
+        let lobes = groups.iter().flat_map(|g| g.lobe_summary.lobes().map(|(c, _)| c * g.share));
         let color: Rgb = lobes.sum();
         let luminance = color.luminance();
         self.tint = (luminance > 0.0).then(|| color / luminance);
     }
 
-    /// Adds w + `slope`·(ω − centre) of a glossy lobe in a pair of rows of cells; sets it if it is the first.
+    /// Adds w + `slope`·(ω − center) of a glossy lobe in a pair of rows of cells; sets it if it is the first.
     #[inline(always)]
-    pub(super) fn add_gloss<S: Simd>(
+    pub(super) fn add_glossy_lobe<S: Simd>(
         &mut self,
         simd: S,
         pair: usize,
-        [center, slope]: [Vectors<S::Wide>; 2],
-        weight: S::Wide,
+        [center, slope]: [Vectors<S::F32x16>; 2],
+        weight: S::F32x16,
         first: bool,
     ) {
         let a = weight - (center.x * slope.x + center.y * slope.y + center.z * slope.z);
         for (sum, x) in self.gloss.iter_mut().zip([a, slope.x, slope.y, slope.z]) {
-            let before = if first { simd.splat_wide(0.0) } else { sum.pair(simd, pair) };
+            let before = if first { simd.splat_f32x16(0.0) } else { sum.pair(simd, pair) };
             sum.set_pair(pair, before + x);
         }
     }
@@ -95,9 +95,9 @@ impl Control {
         if self.tint.is_none() || share == 0.0 {
             return;
         }
-        let (one, share) = (simd.splat_wide(1.0), simd.splat_wide(share));
+        let (one, share) = (simd.splat_f32x16(1.0), simd.splat_f32x16(share));
         for pair in cells.pairs() {
-            let weight = one / (one + share * cells.dimness.pair(simd, pair));
+            let weight = one / (one + share * cells.inverse_radiance.pair(simd, pair));
             for sum in &mut self.gloss {
                 sum.set_pair(pair, sum.pair(simd, pair) * weight);
             }
@@ -110,10 +110,10 @@ impl Control {
         &self,
         simd: S,
         cells: &Cells,
-        pool: &Pool,
-        visible: &Slots,
+        pool: &LightSamplePool,
+        visible: &CellArray,
     ) -> Integral {
-        let zero = simd.splat_wide(0.0);
+        let zero = simd.splat_f32x16(0.0);
         let (mut diffuse, mut gloss) = ([[zero; 3]; 3], [zero; 3]);
         for pair in cells.pairs() {
             let seen = visible.pair(simd, pair);
@@ -149,9 +149,9 @@ impl Control {
 
     /// h toward `wi` in the cells in `slots`, at a hit that reflects `diffuse` and has these cosines.
     #[inline(always)]
-    pub(super) fn at<F: Floats>(
+    pub(super) fn eval<F: SimdF32x8>(
         &self,
-        slots: F::Ints,
+        slots: F::I32x8,
         wi: Vectors<F>,
         cosine: F,
         diffuse: Rgb,
@@ -170,15 +170,15 @@ impl Control {
 
 #[cfg(test)]
 mod tests {
-    use super::super::candidates::{Candidates, Counts, Hits, PixelNumbers, Sources};
+    use super::super::candidates::{Candidates, Counts, Hits, PixelSamples, Sources};
     use super::super::hits::Groups;
-    use super::super::pool::PassLength;
+    use super::super::light_samples::PassLength;
     use super::super::table::Table;
     use super::super::test_support::{hit, sky};
     use super::*;
     use crate::environment::Environment;
     use crate::math::vec3;
-    use crate::sampling::{SamplerKind, Stream};
+    use crate::sampling::{Sampler, SamplerKind};
     use crate::simd::{InstructionSet, Kernel, LANES, dispatch};
     use crate::strategy::ShadingPoint;
     use testkit::ZTest;
@@ -187,9 +187,9 @@ mod tests {
     struct Draw<'a> {
         environment: &'a Environment,
         cells: &'a Cells,
-        pool: &'a Pool,
+        pool: &'a LightSamplePool,
         hits: &'a [ShadingPoint],
-        visible: &'a Slots,
+        visible: &'a CellArray,
         seed: u64,
     }
 
@@ -202,28 +202,34 @@ mod tests {
             let Self { environment, cells, pool, .. } = self;
             let hits = Hits { points: self.hits, one_material: false };
             let (mut groups, mut table) = (Groups::default(), Table::default());
-            let (mut control, mut candidates) = (Control::default(), Candidates::default());
-            groups.gather(hits);
-            table.fill::<S, true>(simd, cells, &groups.all, &mut control);
+            let (mut control_variate, mut candidates) =
+                (ControlVariate::default(), Candidates::default());
+            groups.cluster(hits);
+            table.fill::<S, true>(simd, cells, &groups.all, &mut control_variate);
             table.accumulate(simd, cells);
             let counts = Counts { light: 40, brdf: 4 };
-            control.balance(simd, cells, groups.brdf_share(counts, table.total()));
-            let numbers = PixelNumbers::new(Stream::new(SamplerKind::Independent, self.seed, 0));
-            let sources =
-                Sources { environment, cells, pool, table: &table, control: Some(&control) };
+            control_variate.balance(simd, cells, groups.brdf_share(counts, table.total()));
+            let numbers = PixelSamples::new(Sampler::new(SamplerKind::Independent, self.seed, 0));
+            let sources = Sources {
+                environment,
+                cells,
+                pool,
+                table: &table,
+                control_variate: Some(&control_variate),
+            };
             sources.draw(simd, hits, &groups.diffuse, counts, &numbers, &mut candidates);
             let (mut value, mut known) = (Rgb::BLACK, Rgb::BLACK);
             for block in &candidates.lights {
                 for lane in 0..LANES {
-                    let v = super::super::cells::at(self.visible, block.slots[lane] as usize);
+                    let v = super::super::cells::get(self.visible, block.slots[lane] as usize);
                     let of = |c: &[crate::simd::Lanes; 3]| Rgb::from(c.map(|c| c[lane])) * v;
                     value += of(&block.value);
-                    known += of(&block.value) - of(&block.rest);
+                    known += of(&block.value) - of(&block.residual);
                 }
             }
-            let integral = control.integral(simd, cells, pool, self.visible);
+            let integral = control_variate.integral(simd, cells, pool, self.visible);
             let of_hits = self.hits.iter().zip(&groups.diffuse);
-            let sum: Rgb = of_hits.map(|(at, &diffuse)| integral.at(at.frame.z, diffuse)).sum();
+            let sum: Rgb = of_hits.map(|(at, &diffuse)| integral.eval(at.frame.z, diffuse)).sum();
             [value, known, sum / self.hits.len() as f32]
         }
     }
@@ -234,9 +240,9 @@ mod tests {
     fn what_is_taken_is_added() {
         let environment = sky();
         let [cells] = Cells::new(&environment, [PassLength::Short.rows()]).unwrap();
-        let stream = Stream::of_pass(SamplerKind::Sobol, 1, 0);
-        let pool = Pool::draw(&cells, &environment, stream, PassLength::Short);
-        let mut visible = NO_SLOTS;
+        let sampler = Sampler::for_pass(SamplerKind::Sobol, 1, 0);
+        let pool = LightSamplePool::draw(&cells, &environment, sampler, PassLength::Short);
+        let mut visible = ZERO_CELLS;
         for (i, v) in visible.iter_mut().flatten().enumerate() {
             *v = (i % 7) as f32 / 6.0;
         }
@@ -247,7 +253,7 @@ mod tests {
             let normals = [vec3(0.1, 1.0, 0.2), vec3(0.2, 0.9, 0.1), vec3(0.4, 0.8, -0.1)];
             let hits = normals.map(|normal| hit(name, normal));
             let mut seed = 0;
-            let (mut value, mut rest, mut expected) = (0.0, 0.0, Rgb::BLACK);
+            let (mut value, mut residual, mut expected) = (0.0, 0.0, Rgb::BLACK);
             let batches = testkit::batches(40, 50, || {
                 seed += 1;
                 let (cells, pool) = (&cells, &pool);
@@ -262,12 +268,12 @@ mod tests {
                 let [w, known, integral] = dispatch(InstructionSet::best(), draw);
                 expected = integral;
                 value += f64::from(w.luminance());
-                rest += f64::from((w - known).luminance());
+                residual += f64::from((w - known).luminance());
                 known.to_array().map(f64::from)
             });
             let expected = expected.to_array().map(f64::from);
             test.against(name, &batches, expected).unwrap();
-            assert!(rest.abs() < 0.5 * value, "{name}: {rest} of {value} is left");
+            assert!(residual.abs() < 0.5 * value, "{name}: {residual} of {value} is left");
         }
     }
 }

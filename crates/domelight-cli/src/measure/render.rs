@@ -6,14 +6,14 @@ use domelight::strategy::PreparedStrategy;
 
 use crate::interrupt;
 use crate::progress::RenderProgress;
-use crate::scene::View;
+use crate::scene::PreparedScene;
 use crate::strategy::Job;
 use crate::usage::{Seconds, Stopwatch};
 
-/// Where a strategy's pictures are taken.
+/// What all renders of a strategy share.
 #[derive(Clone, Copy)]
-pub(crate) struct Studio<'a> {
-    pub(crate) view: &'a View,
+pub(crate) struct RenderSetup<'a> {
+    pub(crate) view: &'a PreparedScene,
     /// But for the number of samples and the seed.
     pub(crate) settings: RenderSettings,
     pub(crate) strategy: &'a PreparedStrategy<'a>,
@@ -21,14 +21,14 @@ pub(crate) struct Studio<'a> {
 }
 
 /// A picture and what it cost.
-pub(crate) struct Shot {
+pub(crate) struct Render {
     pub(crate) layers: Layers,
     pub(crate) counts: Counts,
     /// Of rendering alone.
     pub(crate) time: Seconds,
 }
 
-impl Shot {
+impl Render {
     /// CPU seconds of rendering; wall-clock seconds where the system does not tell.
     pub(crate) fn seconds(&self) -> f64 {
         self.time.cpu.unwrap_or(self.time.wall)
@@ -45,17 +45,17 @@ impl Shot {
     }
 }
 
-impl Studio<'_> {
+impl RenderSetup<'_> {
     /// Renders with so many camera samples a pixel; an error if interrupted.
-    pub(crate) fn shoot(&self, label: &str, n_samples: u32, seed: u64) -> Result<Shot> {
-        let View { scene, camera, environment, .. } = self.view;
+    pub(crate) fn render(&self, label: &str, n_samples: u32, seed: u64) -> Result<Render> {
+        let PreparedScene { scene, camera, environment, .. } = self.view;
         let settings = &RenderSettings { n_samples, seed, ..self.settings };
         let n_camera_rays = (settings.width * settings.height) as u64 * u64::from(n_samples);
         let interrupted = interrupt::flag();
         let progress = &RenderProgress::new(label, n_camera_rays, self.quiet, interrupted);
         let mut watch = Stopwatch::start();
-        let course = None;
-        let job = Job { scene, camera, environment, settings, progress, course };
+        let render_run = None;
+        let job = Job { scene, camera, environment, settings, progress, render_run };
         let rendering = job.render(self.strategy)?;
         let time = watch.lap();
         progress.finish();
@@ -65,6 +65,6 @@ impl Studio<'_> {
         if rendering.counts.shading_points == 0 {
             bail!("the camera sees nothing of the scene: there is nothing to compare");
         }
-        Ok(Shot { layers: rendering.layers, counts: rendering.counts, time })
+        Ok(Render { layers: rendering.layers, counts: rendering.counts, time })
     }
 }

@@ -1,13 +1,13 @@
-//! Streams of uniform numbers: one a pixel, addressed by dimension and index.
+//! Samplers: the uniform numbers of each pixel, addressed by dimension and index.
 //!
-//! A stream is a pure function. Nothing depends on the order in which numbers are asked for, so
+//! A sampler is a pure function. Nothing depends on the order in which numbers are asked for, so
 //! pictures do not depend on threads, tiles or passes.
 
 use super::rng::{Pcg32, hash2};
 use super::{sobol, unit_f32};
 use crate::math::{Vec2, vec2};
 
-/// Which points a stream gives.
+/// Which points a sampler gives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SamplerKind {
     /// Owen-scrambled Sobol' points.
@@ -29,17 +29,17 @@ pub enum Dimension {
     Brdf = 2,
     /// Choices among candidates.
     Resampling = 3,
-    /// Sequences without a fixed length, see [`Stream::generator`].
+    /// Sequences without a fixed length, see [`Sampler::generator`].
     Sequence = 4,
-    /// Streams within a stream, see [`Stream::part`].
+    /// Samplers derived from a sampler, see [`Sampler::part`].
     Part = 5,
 }
 
 /// Four uniform numbers of one index of one dimension.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Numbers(pub [f32; 4]);
+pub struct SamplePoint(pub [f32; 4]);
 
-impl Numbers {
+impl SamplePoint {
     /// The first two, for a direction or a position.
     pub fn u(&self) -> Vec2 {
         vec2(self.0[0], self.0[1])
@@ -56,18 +56,18 @@ impl Numbers {
     }
 }
 
-/// All numbers of one dimension of a stream.
+/// The points of one dimension of a sampler.
 #[derive(Clone, Copy, Debug)]
-pub struct NumberSet {
+pub struct SampleSequence {
     kind: SamplerKind,
     seed: u64,
 }
 
-impl NumberSet {
-    /// Point `index`, each number in [0, 1), see [`Stream::numbers`].
+impl SampleSequence {
+    /// Point `index`, each number in [0, 1), see [`Sampler::numbers`].
     #[inline]
-    pub fn numbers(&self, index: u32) -> Numbers {
-        Numbers(match self.kind {
+    pub fn numbers(&self, index: u32) -> SamplePoint {
+        SamplePoint(match self.kind {
             SamplerKind::Sobol => sobol::point(index, self.seed).map(unit_f32),
             SamplerKind::Independent => {
                 let mut pcg = generator(self.seed, index);
@@ -76,7 +76,7 @@ impl NumberSet {
         })
     }
 
-    /// [`Numbers::u`] of N points from `first` on, by coordinate.
+    /// [`SamplePoint::u`] of N points from `first` on, by coordinate.
     #[inline(always)]
     pub fn u<const N: usize>(&self, first: u32) -> [[f32; N]; 2] {
         let (mut x, mut y) = ([0.0; N], [0.0; N]);
@@ -100,28 +100,28 @@ impl NumberSet {
 
 /// All numbers of one pixel.
 #[derive(Clone, Copy, Debug)]
-pub struct Stream {
+pub struct Sampler {
     kind: SamplerKind,
     key: u64,
 }
 
-impl Stream {
+impl Sampler {
     /// Nobody's.
     #[cfg(feature = "render")]
     pub(crate) const NONE: Self = Self { kind: SamplerKind::Sobol, key: 0 };
 
-    /// The stream of a pixel under a seed.
+    /// The sampler of a pixel under a seed.
     pub fn new(kind: SamplerKind, seed: u64, pixel: u64) -> Self {
         Self { kind, key: hash2(seed, pixel) }
     }
 
-    /// The stream of what all pixels share in the pass that begins with camera sample `first`.
-    pub fn of_pass(kind: SamplerKind, seed: u64, first: u32) -> Self {
+    /// The sampler of what all pixels share in the pass that begins with camera sample `first`.
+    pub fn for_pass(kind: SamplerKind, seed: u64, first: u32) -> Self {
         // No pixel has this number.
         Self::new(kind, seed, u64::MAX).part(first)
     }
 
-    /// Stream `index` within this one, independent of it and of the others.
+    /// Sampler `index` derived from this one, independent of it and of the others.
     #[must_use]
     pub fn part(&self, index: u32) -> Self {
         let key = hash2(hash2(self.key, Dimension::Part as u64), u64::from(index));
@@ -132,17 +132,17 @@ impl Stream {
     ///
     /// Consecutive indices are well distributed together: number all samples of a pixel that serve
     /// one purpose in one sequence.
-    pub fn numbers(&self, dimension: Dimension, index: u32) -> Numbers {
+    pub fn numbers(&self, dimension: Dimension, index: u32) -> SamplePoint {
         self.set(dimension).numbers(index)
     }
 
     /// The numbers of one dimension.
     #[inline]
-    pub fn set(&self, dimension: Dimension) -> NumberSet {
-        NumberSet { kind: self.kind, seed: hash2(self.key, dimension as u64) }
+    pub fn set(&self, dimension: Dimension) -> SampleSequence {
+        SampleSequence { kind: self.kind, seed: hash2(self.key, dimension as u64) }
     }
 
-    /// Independent numbers without end, sequence `index` of this stream: for procedures that stop at
+    /// Independent numbers without end, sequence `index` of this sampler: for procedures that stop at
     /// a random time, whose laws hold for independent numbers alone.
     pub fn generator(&self, index: u32) -> Pcg32 {
         generator(hash2(self.key, Dimension::Sequence as u64), index)
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn numbers_lie_in_the_unit_interval_and_streams_differ() {
         for kind in [SamplerKind::Sobol, SamplerKind::Independent] {
-            let (a, b) = (Stream::new(kind, 1, 0), Stream::new(kind, 1, 1));
+            let (a, b) = (Sampler::new(kind, 1, 0), Sampler::new(kind, 1, 1));
             for i in (0..4096).chain([u32::MAX]) {
                 let n = a.numbers(Dimension::Brdf, i);
                 assert!(n.0.iter().all(|x| (0.0..1.0).contains(x)));
@@ -182,7 +182,7 @@ mod tests {
             let n = 1 << 14;
             let mut mean = [0.0f64; 4];
             for i in 0..n {
-                let p = Stream::new(kind, 3, 9).numbers(Dimension::Environment, i);
+                let p = Sampler::new(kind, 3, 9).numbers(Dimension::Environment, i);
                 for d in 0..4 {
                     mean[d] += f64::from(p.0[d]) / f64::from(n);
                 }
@@ -199,10 +199,10 @@ mod tests {
         let (n_streams, n) = (1000u32, 1024u32);
         let mut chi2 = [0.0f64; 4];
         for pixel in 0..n_streams {
-            let stream = Stream::new(SamplerKind::Independent, 5, u64::from(pixel));
+            let sampler = Sampler::new(SamplerKind::Independent, 5, u64::from(pixel));
             let mut sum = [0.0f64; 4];
             for i in 0..n {
-                let numbers = stream.numbers(Dimension::Brdf, i);
+                let numbers = sampler.numbers(Dimension::Brdf, i);
                 (0..4).for_each(|d| sum[d] += f64::from(numbers.0[d]) - 0.5);
             }
             (0..4).for_each(|d| chi2[d] += sum[d] * sum[d] * 12.0 / f64::from(n));

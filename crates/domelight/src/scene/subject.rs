@@ -1,9 +1,9 @@
-//! Setting a scene up for a picture: scale, ground, another material.
+//! The subject of a scene: its bounds, its scale, another BSDF, the ground under it.
 
 use super::builtin::shapes;
-use super::{CameraSettings, Part, SceneDescription, Surface};
+use super::{CameraSettings, Material, Part, SceneDescription};
 use crate::Rgb;
-use crate::bsdf::Material;
+use crate::bsdf::Bsdf;
 use crate::geometry::{Aabb, Mesh, power_of_two};
 use crate::math::{Frame, Mat4, Vec3};
 
@@ -47,7 +47,7 @@ impl SceneDescription {
         factor
     }
 
-    /// Moves the centre of the subject's bounds to the origin and scales its longest half-extent
+    /// Moves the center of the subject's bounds to the origin and scales its longest half-extent
     /// to 1; everything else moves along.
     pub fn normalize(&mut self) {
         let bounds = self.subject_bounds();
@@ -56,13 +56,13 @@ impl SceneDescription {
         }
     }
 
-    /// Gives one material to every part that is not scenery.
-    pub fn set_subject_material(&mut self, material: Material) {
-        let surface = self.surfaces.len();
-        self.surfaces.push(Surface::fixed("subject", material));
+    /// Gives one BSDF to every part that is not scenery.
+    pub fn set_subject_material(&mut self, bsdf: Bsdf) {
+        let material = self.materials.len();
+        self.materials.push(Material::fixed("subject", bsdf));
         for (i, part) in self.parts.iter_mut().enumerate() {
             if !self.scenery.contains(&i) {
-                part.surface = surface;
+                part.material = material;
             }
         }
     }
@@ -97,8 +97,8 @@ impl SceneDescription {
         let mut mesh = shapes::disc(GROUND_RADIUS * half, 512);
         mesh.transform(&turn);
         self.scenery.push(self.parts.len());
-        self.parts.push(Part { name: "ground".to_owned(), mesh, surface: self.surfaces.len() });
-        self.surfaces.push(Surface::diffuse("ground", Rgb::splat(0.5)));
+        self.parts.push(Part { name: "ground".to_owned(), mesh, material: self.materials.len() });
+        self.materials.push(Material::diffuse("ground", Rgb::splat(0.5)));
     }
 }
 
@@ -111,8 +111,8 @@ mod tests {
         let mut mesh = shapes::icosphere(3);
         mesh.transform(&Mat4::from_translation(vec3(7.0, 2.0, -1.0)));
         SceneDescription {
-            parts: vec![Part { name: "ball".to_owned(), mesh, surface: 0 }],
-            surfaces: vec![Surface::diffuse("grey", Rgb::splat(0.5))],
+            parts: vec![Part { name: "ball".to_owned(), mesh, material: 0 }],
+            materials: vec![Material::diffuse("gray", Rgb::splat(0.5))],
             ..SceneDescription::default()
         }
     }
@@ -165,8 +165,8 @@ mod tests {
     fn a_material_reaches_the_subject_alone() {
         let mut scene = ball();
         scene.add_ground(Vec3::Y);
-        scene.set_subject_material(Material::BLACK);
-        assert_eq!((scene.parts[0].surface, scene.parts[1].surface), (2, 1));
+        scene.set_subject_material(Bsdf::BLACK);
+        assert_eq!((scene.parts[0].material, scene.parts[1].material), (2, 1));
     }
 
     #[test]

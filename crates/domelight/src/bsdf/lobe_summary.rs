@@ -1,12 +1,12 @@
-//! What a material looks like from afar: the least that a density needs to follow it roughly.
+//! A summary of a BSDF's lobes: what a sampling density needs to follow it roughly.
 
-use super::{Brdf as _, Lobe, MIN_ALPHA, Material};
+use super::{Brdf as _, Bsdf, Lobe, MIN_ALPHA};
 use crate::Rgb;
 use crate::math::Vec3;
 
 /// The shape of a glossy lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Gloss {
+pub enum GlossyLobe {
     /// Microfacets of roughness α along x and y. Gaussian slopes have short tails, GGX's long ones.
     Slopes {
         /// The roughness.
@@ -21,7 +21,7 @@ pub enum Gloss {
     },
 }
 
-impl Gloss {
+impl GlossyLobe {
     /// The roughness, of a mirror lobe that of the microfacets which reflect as widely: their normals
     /// turn by half the angle.
     pub fn width(&self) -> f32 {
@@ -34,21 +34,21 @@ impl Gloss {
 
 /// A diffuse part and glossy lobes, weighed by the light that they reflect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Outline {
+pub struct LobeSummary {
     /// Albedo of what reflects by the cosine.
     pub diffuse: Rgb,
     /// The glossy lobes with their albedos; the first of none ends them.
-    pub glossy: [Option<(Rgb, Gloss)>; super::MAX_LOBES],
+    pub glossy: [Option<(Rgb, GlossyLobe)>; super::MAX_LOBES],
 }
 
-impl Outline {
+impl LobeSummary {
     /// The glossy lobes with their albedos.
-    pub fn lobes(&self) -> impl Iterator<Item = (Rgb, Gloss)> {
+    pub fn lobes(&self) -> impl Iterator<Item = (Rgb, GlossyLobe)> {
         self.glossy.iter().copied().flatten()
     }
 }
 
-impl Material {
+impl Bsdf {
     /// Whether it looks the same when it turns about the normal.
     #[cfg(feature = "render")]
     pub(crate) fn is_isotropic(&self) -> bool {
@@ -61,12 +61,12 @@ impl Material {
         })
     }
 
-    /// The material seen from `wo`.
-    pub fn outline(&self, wo: Vec3) -> Outline {
-        let mut outline = Outline::default();
+    /// Summarizes the lobes as seen from `wo`.
+    pub fn lobe_summary(&self, wo: Vec3) -> LobeSummary {
+        let mut lobe_summary = LobeSummary::default();
         let mut n = 0;
         let mut add = |albedo: Rgb, gloss| {
-            outline.glossy[n] = Some((albedo, gloss));
+            lobe_summary.glossy[n] = Some((albedo, gloss));
             n += 1;
         };
         let mut diffuse = Rgb::BLACK;
@@ -78,24 +78,28 @@ impl Material {
                     None => diffuse += albedo,
                     Some(alpha) => {
                         let alpha = [alpha.clamp(MIN_ALPHA, 1.0); 2];
-                        add(albedo, Gloss::Slopes { alpha, gaussian: false });
+                        add(albedo, GlossyLobe::Slopes { alpha, gaussian: false });
                     }
                 },
-                Lobe::Phong(l) => add(albedo, Gloss::Mirror { exponent: l.exponent() }),
-                Lobe::Ward(l) => add(albedo, Gloss::Slopes { alpha: l.alpha(), gaussian: true }),
-                Lobe::Ggx(l) => add(albedo, Gloss::Slopes { alpha: l.alpha(), gaussian: false }),
+                Lobe::Phong(l) => add(albedo, GlossyLobe::Mirror { exponent: l.exponent() }),
+                Lobe::Ward(l) => {
+                    add(albedo, GlossyLobe::Slopes { alpha: l.alpha(), gaussian: true });
+                }
+                Lobe::Ggx(l) => {
+                    add(albedo, GlossyLobe::Slopes { alpha: l.alpha(), gaussian: false });
+                }
                 Lobe::Beckmann(l) => {
-                    add(albedo, Gloss::Slopes { alpha: l.alpha(), gaussian: true });
+                    add(albedo, GlossyLobe::Slopes { alpha: l.alpha(), gaussian: true });
                 }
                 Lobe::MetallicRoughness(l) => {
                     let specular = l.specular_share(wo.z);
                     diffuse += albedo * (1.0 - specular);
                     let alpha = l.alpha();
-                    add(albedo * specular, Gloss::Slopes { alpha, gaussian: false });
+                    add(albedo * specular, GlossyLobe::Slopes { alpha, gaussian: false });
                 }
             }
         }
-        outline.diffuse = diffuse;
-        outline
+        lobe_summary.diffuse = diffuse;
+        lobe_summary
     }
 }

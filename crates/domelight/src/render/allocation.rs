@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use super::tile::{Pass, Scratch, Tile};
 use super::tiling::Window;
-use super::{Frame, RenderSettings};
+use super::{RenderContext, RenderSettings};
 use crate::strategy::Strategy;
 use crate::strategy::levels::{N_LEVELS, coarser, level};
 
@@ -74,23 +74,23 @@ pub(super) struct Allocation {
     /// Camera samples of each pixel, as asked for.
     n_samples: u32,
     /// The logarithm at which a pixel has the usual number; `None` if all pixels have as many.
-    usual: Option<f32>,
+    mean_log: Option<f32>,
     seen: Vec<Option<Seen>>,
     counts: Vec<u32>,
 }
 
 impl Allocation {
-    /// Begins a pass: `n_samples` for each pixel on average, or for each if `usual` is `None`.
+    /// Begins a pass: `n_samples` for each pixel on average, or for each if `mean_log` is `None`.
     pub(super) fn reset(
         &mut self,
         width: usize,
         n_pixels: usize,
         n_samples: u32,
-        usual: Option<f32>,
+        mean_log: Option<f32>,
     ) {
         self.width = width;
         self.n_samples = n_samples;
-        self.usual = usual;
+        self.mean_log = mean_log;
         self.seen.clear();
         self.seen.resize(n_pixels, None);
         self.counts.clear();
@@ -141,13 +141,13 @@ impl Allocation {
 
     /// Assigns the samples of the pixels of a round.
     pub(super) fn assign(&mut self, round: u32) {
-        let Some(usual) = self.usual else { return };
+        let Some(mean_log) = self.mean_log else { return };
         for i in 0..self.counts.len() {
             if self.level(i) == round
                 && let Some(variance) = self.predicted(i)
             {
                 self.counts[i] =
-                    count(self.n_samples, log(variance) + dither(i) - usual, self.fewest(i));
+                    count(self.n_samples, log(variance) + dither(i) - mean_log, self.fewest(i));
             }
         }
     }
@@ -181,19 +181,23 @@ fn count(n: u32, octaves: f32, fewest: i32) -> u32 {
 
 /// The logarithm at which a pixel of the picture has the usual number, from scout pixels with random numbers of their
 /// own; `None` if they see no scene.
-pub(super) fn usual<S: Strategy>(frame: &Frame, strategy: &S, pass: &Pass<S>) -> Option<f32> {
+pub(super) fn mean_log<S: Strategy>(
+    context: &RenderContext,
+    strategy: &S,
+    pass: &Pass<S>,
+) -> Option<f32> {
     /// Scouts across the picture.
     const ACROSS: usize = 12;
-    let RenderSettings { width, height, seed, .. } = frame.settings;
-    let settings = RenderSettings { seed: !seed, ..frame.settings };
-    let frame = &Frame { settings, filter: frame.filter.clone(), ..*frame };
+    let RenderSettings { width, height, seed, .. } = context.settings;
+    let settings = RenderSettings { seed: !seed, ..context.settings };
+    let context = &RenderContext { settings, filter: context.filter.clone(), ..*context };
     let at = |i: usize, n: usize| (2 * i + 1) * n / (2 * ACROSS);
     let logs: Vec<Option<f32>> = (0..ACROSS * ACROSS)
         .into_par_iter()
         .map_init(Scratch::<S>::default, |scratch, i| {
             let (x, y) = (at(i % ACROSS, width), at(i / ACROSS, height));
             let mut tile = Tile::new(Window { x, y, width: 1, height: 1 });
-            tile.render(frame, strategy, pass, scratch, &());
+            tile.render(context, strategy, pass, scratch, &());
             let sees_scene = tile.counts.shading_points > 0;
             sees_scene.then(|| scratch.allocation().relative_variance(0)).flatten().map(log)
         })
@@ -209,9 +213,9 @@ fn scale(logs: &[f32], n: u32) -> f32 {
     /// The share of the pixels that two more levels build on.
     const PREDICTORS: f64 = 0.25;
     let [fewest, most] = OCTAVES;
-    let spent = |usual: f32| {
+    let spent = |mean_log: f32| {
         let cost = |&log: &f32| {
-            let [predictor, other] = [0, fewest].map(|fewest| count(n, log - usual, fewest));
+            let [predictor, other] = [0, fewest].map(|fewest| count(n, log - mean_log, fewest));
             PREDICTORS * f64::from(predictor) + (1.0 - PREDICTORS) * f64::from(other)
         };
         logs.iter().map(cost).sum::<f64>() / logs.len() as f64
@@ -282,15 +286,18 @@ mod tests {
     fn the_scale_spends_what_was_asked_for() {
         let mut pcg = Pcg32::new(1, 2);
         for n in [8, 16, 64] {
-            for spread in [0.0, 1.0, 4.0] {
+            for relative_variance in [0.0, 1.0, 4.0] {
                 let logs: Vec<f32> =
-                    (0..1000).map(|_| -3.0 + spread * (pcg.next_f32() - 0.5)).collect();
-                let usual = scale(&logs, n);
+                    (0..1000).map(|_| -3.0 + relative_variance * (pcg.next_f32() - 0.5)).collect();
+                let mean_log = scale(&logs, n);
                 let number = |(i, &log): (usize, &f32)| {
-                    f64::from(count(n, log - usual, if i % 4 == 0 { 0 } else { OCTAVES[0] }))
+                    f64::from(count(n, log - mean_log, if i % 4 == 0 { 0 } else { OCTAVES[0] }))
                 };
                 let mean = logs.iter().enumerate().map(number).sum::<f64>() / 1000.0;
-                assert!((mean / f64::from(n) - 1.0).abs() < 0.06, "{n} {spread}: {mean}");
+                assert!(
+                    (mean / f64::from(n) - 1.0).abs() < 0.06,
+                    "{n} {relative_variance}: {mean}"
+                );
             }
         }
     }

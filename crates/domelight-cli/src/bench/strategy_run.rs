@@ -1,20 +1,20 @@
-//! One who takes pictures of a case at rising budgets: a strategy of this program, or another program.
+//! Measures one renderer at increasing sample counts: a strategy of this program, or another program.
 
 use std::cell::RefCell;
 
 use anyhow::Result;
 use domelight::RgbImage;
 use domelight::picture::compare::compare;
-use domelight::render::survey;
+use domelight::render::pilot_points;
 use domelight::strategy::{PreparedStrategy, StrategySpec};
 use serde::{Deserialize, Serialize};
 
 use super::bound::Bound;
-use super::cases::Built;
-use super::ladder::{Cost, How, Point, cost_of};
+use super::cases::BuiltCase;
+use super::fit::{Cost, Fit, Point, cost_of};
 use super::mitsuba::Mitsuba;
 use crate::measure::reference::Reference;
-use crate::measure::shot::Studio;
+use crate::measure::render::RenderSetup;
 use crate::strategy::NamedStrategy;
 use crate::strategy::refuse_repeating_points;
 use crate::usage::{Seconds, Stopwatch};
@@ -36,7 +36,7 @@ const PILOT_SEED: u64 = 0x7069_6c6f_7473;
 const MOST_SAMPLES: u32 = 1 << 16;
 
 /// What pictures are measured against.
-pub(super) struct Judge {
+pub(super) struct ErrorMetric {
     pub(super) reference: Reference,
     /// Pixels that show any of the scene; all others are exact.
     touched: Vec<bool>,
@@ -52,7 +52,7 @@ struct Errors {
     covered: f64,
 }
 
-impl Judge {
+impl ErrorMetric {
     pub(super) fn new(reference: Reference) -> Self {
         let covered = reference.picture.covered().unwrap_or_default();
         let touched = reference.picture.touched().unwrap_or_default();
@@ -79,19 +79,19 @@ impl Judge {
     }
 }
 
-/// A plan and what it made of the environment.
-pub(super) struct Prepared<'e> {
+/// A strategy and what it made of the environment.
+pub(super) struct BenchStrategy<'e> {
     name: String,
     spec: StrategySpec,
     strategy: PreparedStrategy<'e>,
     setup: Seconds,
 }
 
-impl<'e> Prepared<'e> {
-    pub(super) fn new(strategy: &NamedStrategy, built: &'e Built, seed: u64) -> Result<Self> {
-        let Built { view, settings, .. } = built;
+impl<'e> BenchStrategy<'e> {
+    pub(super) fn new(strategy: &NamedStrategy, built: &'e BuiltCase, seed: u64) -> Result<Self> {
+        let BuiltCase { view, settings, .. } = built;
         let mut watch = Stopwatch::start();
-        let points = || survey(&view.scene, &view.camera, settings);
+        let points = || pilot_points(&view.scene, &view.camera, settings);
         let spec = strategy.spec.for_scene(points, &view.environment, seed);
         let prepared = PreparedStrategy::new(spec, &view.environment)?;
         let name = strategy.text.clone();
@@ -99,25 +99,25 @@ impl<'e> Prepared<'e> {
     }
 }
 
-/// One who takes pictures.
-pub(super) struct Contestant<'a> {
+/// Measures one renderer at increasing sample counts.
+pub(super) struct StrategyRun<'a> {
     source: Source<'a>,
-    judge: &'a Judge,
+    metric: &'a ErrorMetric,
     /// Camera samples of the least budget, and the factor from one to the next.
     first: u32,
     growth: u32,
     /// Rising numbers of camera samples, and the pictures with each.
-    rungs: Vec<Rung>,
+    budget_points: Vec<BudgetPoint>,
 }
 
 enum Source<'a> {
-    Ours { prepared: &'a Prepared<'a>, studio: Studio<'a> },
+    Ours { prepared: &'a BenchStrategy<'a>, render_setup: RenderSetup<'a> },
     Mitsuba(&'a RefCell<Mitsuba>),
 }
 
 /// All pictures with a number of camera samples a pixel; one value a seed.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(super) struct Rung {
+pub(super) struct BudgetPoint {
     pub(super) spp: u32,
     /// Of rendering alone; wall-clock seconds where the system does not tell.
     pub(super) cpu_seconds: Vec<f64>,
@@ -134,7 +134,7 @@ pub(super) struct Rung {
     pub(super) rays_per_cpu_second: Option<f64>,
 }
 
-impl Rung {
+impl BudgetPoint {
     /// With the errors over the pixels that the scene fills.
     fn of_covered(&self) -> Self {
         Self { rel_mse: self.rel_mse_covered.clone(), ..self.clone() }
@@ -162,7 +162,7 @@ pub(super) fn median(values: &[f64]) -> f64 {
 }
 
 /// A picture's cost and error.
-struct Taken {
+struct Measurement {
     cpu: f64,
     wall: f64,
     errors: Errors,
@@ -180,44 +180,48 @@ pub(super) struct Limits {
     pub(super) n_seeds: u32,
 }
 
-impl<'a> Contestant<'a> {
+impl<'a> StrategyRun<'a> {
     pub(super) fn ours(
-        prepared: &'a Prepared<'a>,
-        built: &'a Built,
-        judge: &'a Judge,
-    ) -> Contestant<'a> {
-        let Built { view, settings, .. } = built;
+        prepared: &'a BenchStrategy<'a>,
+        built: &'a BuiltCase,
+        metric: &'a ErrorMetric,
+    ) -> StrategyRun<'a> {
+        let BuiltCase { view, settings, .. } = built;
         let settings = *settings;
-        let studio = Studio { view, settings, strategy: &prepared.strategy, quiet: true };
-        let source = Source::Ours { prepared, studio };
-        Contestant { source, judge, first: 1, growth: 2, rungs: Vec::new() }
+        let render_setup =
+            RenderSetup { view, settings, strategy: &prepared.strategy, quiet: true };
+        let source = Source::Ours { prepared, render_setup };
+        StrategyRun { source, metric, first: 1, growth: 2, budget_points: Vec::new() }
     }
 
     /// Its correlated points are made for square numbers.
-    pub(super) fn mitsuba(mitsuba: &'a RefCell<Mitsuba>, judge: &'a Judge) -> Contestant<'a> {
+    pub(super) fn mitsuba(
+        mitsuba: &'a RefCell<Mitsuba>,
+        metric: &'a ErrorMetric,
+    ) -> StrategyRun<'a> {
         let source = Source::Mitsuba(mitsuba);
-        Contestant { source, judge, first: 4, growth: 4, rungs: Vec::new() }
+        StrategyRun { source, metric, first: 4, growth: 4, budget_points: Vec::new() }
     }
 
-    fn take(&self, n_samples: u32, seed: u64) -> Result<Taken> {
+    fn measure(&self, n_samples: u32, seed: u64) -> Result<Measurement> {
         Ok(match &self.source {
-            Source::Ours { studio, prepared } => {
-                let shot = studio.shoot(&prepared.name, n_samples, seed)?;
-                Taken {
-                    cpu: shot.seconds(),
-                    wall: shot.time.wall,
-                    errors: self.judge.errors(&shot.layers.color)?,
-                    camera_samples: Some(shot.camera_samples()),
-                    shadow_rays: Some(shot.rays()),
-                    rays: Some(shot.counts.camera_rays + shot.counts.shadow_rays),
+            Source::Ours { render_setup, prepared } => {
+                let render = render_setup.render(&prepared.name, n_samples, seed)?;
+                Measurement {
+                    cpu: render.seconds(),
+                    wall: render.time.wall,
+                    errors: self.metric.errors(&render.layers.color)?,
+                    camera_samples: Some(render.camera_samples()),
+                    shadow_rays: Some(render.rays()),
+                    rays: Some(render.counts.camera_rays + render.counts.shadow_rays),
                 }
             }
             Source::Mitsuba(mitsuba) => {
                 let (picture, time) = mitsuba.borrow_mut().render(n_samples, seed)?;
-                Taken {
+                Measurement {
                     cpu: time.cpu.unwrap_or(time.wall),
                     wall: time.wall,
-                    errors: self.judge.errors(&picture.image)?,
+                    errors: self.metric.errors(&picture.image)?,
                     camera_samples: None,
                     shadow_rays: None,
                     rays: None,
@@ -228,7 +232,7 @@ impl<'a> Contestant<'a> {
 
     /// The mean error over seeds at a number of camera samples.
     pub(super) fn error_at(&self, n_samples: u32, seeds: impl Iterator<Item = u64>) -> Result<f64> {
-        let errors = seeds.map(|seed| Ok(self.take(n_samples, seed)?.errors.all));
+        let errors = seeds.map(|seed| Ok(self.measure(n_samples, seed)?.errors.all));
         let errors = errors.collect::<Result<Vec<_>>>()?;
         Ok(errors.iter().sum::<f64>() / errors.len() as f64)
     }
@@ -240,15 +244,15 @@ impl<'a> Contestant<'a> {
         let mut tried: Vec<(u32, f64)> = Vec::new();
         let mut n = self.first;
         // Warms caches; other programs compile what they run.
-        self.take(n, PILOT_SEED)?;
+        self.measure(n, PILOT_SEED)?;
         loop {
-            let taken = self.take(n, PILOT_SEED)?;
-            let error = taken.errors.all;
+            let measurement = self.measure(n, PILOT_SEED)?;
+            let error = measurement.errors.all;
             tried.push((n, error));
             let near = least <= HEADLINE && (HEADLINE..NEAR * HEADLINE).contains(&error);
             let most = limits.most * if near { MORE } else { 1.0 };
             let next = n.saturating_mul(self.growth);
-            let seconds = taken.cpu * f64::from(self.growth * limits.n_seeds);
+            let seconds = measurement.cpu * f64::from(self.growth * limits.n_seeds);
             if error < least / MARGIN || seconds > most || !self.may(next) {
                 break;
             }
@@ -256,7 +260,8 @@ impl<'a> Contestant<'a> {
         }
         let above = tried.iter().take_while(|(_, error)| *error > greatest * MARGIN).count();
         let tried = &tried[above.saturating_sub(1)..];
-        self.rungs = tried.iter().map(|&(spp, _)| Rung { spp, ..Rung::default() }).collect();
+        self.budget_points =
+            tried.iter().map(|&(spp, _)| BudgetPoint { spp, ..BudgetPoint::default() }).collect();
         Ok(())
     }
 
@@ -271,28 +276,31 @@ impl<'a> Contestant<'a> {
     }
 
     /// A picture at each budget.
-    pub(super) fn take_all(&mut self, seed: u64) -> Result<()> {
-        for i in 0..self.rungs.len() {
-            let taken = self.take(self.rungs[i].spp, seed)?;
-            let rung = &mut self.rungs[i];
-            rung.cpu_seconds.push(taken.cpu);
-            rung.wall_seconds.push(taken.wall);
-            rung.rel_mse.push(taken.errors.all);
-            rung.rel_mse_covered.push(taken.errors.covered);
-            rung.camera_samples = taken.camera_samples;
-            rung.shadow_rays = taken.shadow_rays;
-            rung.rays_per_cpu_second = taken.rays.map(|rays| rays as f64 / rung.seconds());
+    pub(super) fn measure_all(&mut self, seed: u64) -> Result<()> {
+        for i in 0..self.budget_points.len() {
+            let measurement = self.measure(self.budget_points[i].spp, seed)?;
+            let budget_point = &mut self.budget_points[i];
+            budget_point.cpu_seconds.push(measurement.cpu);
+            budget_point.wall_seconds.push(measurement.wall);
+            budget_point.rel_mse.push(measurement.errors.all);
+            budget_point.rel_mse_covered.push(measurement.errors.covered);
+            budget_point.camera_samples = measurement.camera_samples;
+            budget_point.shadow_rays = measurement.shadow_rays;
+            budget_point.rays_per_cpu_second =
+                measurement.rays.map(|rays| rays as f64 / budget_point.seconds());
         }
         Ok(())
     }
 
     /// What was measured.
-    pub(super) fn entry(self, errors: &[f64], bound: Option<Bound>) -> Entry {
-        let rungs = self.rungs;
-        let reached = errors.iter().map(|&error| Reached::new(error, &rungs, None)).collect();
-        let of_covered: Vec<Rung> = rungs.iter().map(Rung::of_covered).collect();
+    pub(super) fn entry(self, errors: &[f64], bound: Option<Bound>) -> StrategyEntry {
+        let budget_points = self.budget_points;
+        let reached =
+            errors.iter().map(|&error| CostAtError::new(error, &budget_points, None)).collect();
+        let of_covered: Vec<BudgetPoint> =
+            budget_points.iter().map(BudgetPoint::of_covered).collect();
         let reached_covered =
-            errors.iter().map(|&error| Reached::new(error, &of_covered, bound)).collect();
+            errors.iter().map(|&error| CostAtError::new(error, &of_covered, bound)).collect();
         let (name, settings, setup) = match self.source {
             Source::Ours { prepared, .. } => {
                 (prepared.name.clone(), prepared.spec.description(), prepared.setup)
@@ -302,13 +310,13 @@ impl<'a> Contestant<'a> {
                 ("mitsuba".to_owned(), mitsuba.describe(), mitsuba.setup())
             }
         };
-        Entry { name, settings, setup, reached, reached_covered, rungs }
+        StrategyEntry { name, settings, setup, reached, reached_covered, budget_points }
     }
 }
 
 /// A strategy's pictures of a case.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Entry {
+pub(super) struct StrategyEntry {
     /// As it was given.
     pub(super) name: String,
     /// In full.
@@ -316,18 +324,18 @@ pub(super) struct Entry {
     /// For tables of its own.
     setup: Seconds,
     /// One for each error that was wanted.
-    pub(super) reached: Vec<Option<Reached>>,
+    pub(super) reached: Vec<Option<CostAtError>>,
     /// The same over the pixels that the scene fills, as tables had it before silhouettes counted.
-    pub(super) reached_covered: Vec<Option<Reached>>,
-    pub(super) rungs: Vec<Rung>,
+    pub(super) reached_covered: Vec<Option<CostAtError>>,
+    pub(super) budget_points: Vec<BudgetPoint>,
 }
 
 /// What an error costs.
 #[derive(Clone, Copy, Serialize, Deserialize)]
-pub(super) struct Reached {
+pub(super) struct CostAtError {
     pub(super) rel_mse: f64,
     pub(super) cpu_seconds: f64,
-    pub(super) how: How,
+    pub(super) fit: Fit,
     /// The least and the greatest over the seeds' own errors.
     pub(super) range: Option<(f64, f64)>,
     pub(super) wall_seconds: f64,
@@ -338,24 +346,27 @@ pub(super) struct Reached {
     pub(super) efficiency_of_bound: Option<f64>,
 }
 
-impl Reached {
+impl CostAtError {
     /// `None` where the error is far from all that was measured.
-    fn new(rel_mse: f64, rungs: &[Rung], bound: Option<Bound>) -> Option<Self> {
-        let line = |error: &dyn Fn(&Rung) -> f64, seconds: &dyn Fn(&Rung) -> f64| -> Option<Cost> {
-            let points: Vec<Point> = rungs.iter().map(|r| (seconds(r), error(r))).collect();
+    fn new(rel_mse: f64, budget_points: &[BudgetPoint], bound: Option<Bound>) -> Option<Self> {
+        let line = |error: &dyn Fn(&BudgetPoint) -> f64,
+                    seconds: &dyn Fn(&BudgetPoint) -> f64|
+         -> Option<Cost> {
+            let points: Vec<Point> = budget_points.iter().map(|r| (seconds(r), error(r))).collect();
             cost_of(rel_mse, &points)
         };
-        let Cost { seconds: cpu_seconds, how } = line(&Rung::error, &Rung::seconds)?;
-        let wall = line(&Rung::error, &|rung| median(&rung.wall_seconds))?;
-        let n_seeds = rungs.first().map_or(0, |rung| rung.rel_mse.len());
-        let of_seeds = (0..n_seeds).filter_map(|s| line(&|rung| rung.rel_mse[s], &Rung::seconds));
+        let Cost { seconds: cpu_seconds, fit } = line(&BudgetPoint::error, &BudgetPoint::seconds)?;
+        let wall = line(&BudgetPoint::error, &|budget_point| median(&budget_point.wall_seconds))?;
+        let n_seeds = budget_points.first().map_or(0, |budget_point| budget_point.rel_mse.len());
+        let of_seeds = (0..n_seeds)
+            .filter_map(|s| line(&|budget_point| budget_point.rel_mse[s], &BudgetPoint::seconds));
         let range = of_seeds.map(|cost| (cost.seconds, cost.seconds));
         let range = range.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let efficiency = 1.0 / (rel_mse * cpu_seconds);
         Some(Self {
             rel_mse,
             cpu_seconds,
-            how,
+            fit,
             range: range.filter(|_| n_seeds > 1),
             wall_seconds: wall.seconds,
             efficiency,
@@ -370,13 +381,13 @@ impl Reached {
 mod tests {
     use super::*;
 
-    fn rung(spp: u32, seconds: f64, errors: [f64; 2]) -> Rung {
-        Rung {
+    fn budget_point(spp: u32, seconds: f64, errors: [f64; 2]) -> BudgetPoint {
+        BudgetPoint {
             spp,
             cpu_seconds: vec![seconds; 2],
             wall_seconds: vec![0.5 * seconds; 2],
             rel_mse: errors.to_vec(),
-            ..Rung::default()
+            ..BudgetPoint::default()
         }
     }
 
@@ -389,13 +400,14 @@ mod tests {
 
     #[test]
     fn seeds_make_a_range_around_the_mean() {
-        let rungs = [rung(1, 1.0, [8e-3, 8e-3]), rung(8, 8.0, [0.5e-3, 1.5e-3])];
-        let reached = Reached::new(2e-3, &rungs, None).unwrap();
+        let budget_points =
+            [budget_point(1, 1.0, [8e-3, 8e-3]), budget_point(8, 8.0, [0.5e-3, 1.5e-3])];
+        let reached = CostAtError::new(2e-3, &budget_points, None).unwrap();
         assert!((reached.cpu_seconds - 4.0).abs() < 1e-9);
         assert!((reached.wall_seconds - 2.0).abs() < 1e-9);
         let (low, high) = reached.range.unwrap();
         assert!(low < 4.0 && 4.0 < high, "{low} {high}");
         assert!((reached.efficiency - 125.0).abs() < 1e-6);
-        assert!(Reached::new(1e-5, &rungs, None).is_none());
+        assert!(CostAtError::new(1e-5, &budget_points, None).is_none());
     }
 }

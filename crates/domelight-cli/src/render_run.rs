@@ -13,21 +13,21 @@ use domelight::render::{
 };
 use domelight::strategy::Strategy;
 
-use crate::args::course::CourseArguments;
-use crate::failure::{UsageError, warn};
+use crate::args::render_run::RenderRunArguments;
+use crate::error::{UsageError, warn};
 use crate::files;
 use crate::interrupt;
 use crate::memory;
 use crate::output::{PictureFormat, PicturePath};
+use crate::parse::{Shard, Tiles};
 use crate::progress::RenderProgress;
 use crate::report::Settings;
-use crate::scene::View;
-use crate::values::{Shard, Tiles};
+use crate::scene::PreparedScene;
 
 /// How a render proceeds.
-pub(crate) struct Course {
+pub(crate) struct RenderRun {
     /// Which tiles; all of them make a picture, others a part.
-    tiles: Choice,
+    tiles: TileSelection,
     /// Where its state is saved.
     save: Option<PathBuf>,
     every: Duration,
@@ -41,13 +41,13 @@ pub(crate) struct Course {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Choice {
+enum TileSelection {
     All,
     Shard(Shard),
     Tiles(Tiles),
 }
 
-impl CourseArguments {
+impl RenderRunArguments {
     /// The render makes a part, not pictures.
     pub(crate) fn is_part(&self) -> bool {
         self.shard.is_some() || self.tiles.is_some()
@@ -86,19 +86,19 @@ impl CourseArguments {
     }
 
     /// Reads the checkpoint to go on from, if there is one.
-    pub(crate) fn course(
+    pub(crate) fn render_run(
         &self,
-        view: &View,
+        view: &PreparedScene,
         settings: &RenderSettings,
         report: &Settings,
         outputs: &[PicturePath],
         interrupted: &'static AtomicBool,
         quiet: bool,
-    ) -> Result<Course> {
+    ) -> Result<RenderRun> {
         let tiles = match (self.shard, self.tiles) {
-            (Some(shard), _) => Choice::Shard(shard),
-            (None, Some(tiles)) => Choice::Tiles(tiles),
-            (None, None) => Choice::All,
+            (Some(shard), _) => TileSelection::Shard(shard),
+            (None, Some(tiles)) => TileSelection::Tiles(tiles),
+            (None, None) => TileSelection::All,
         };
         let part = self.is_part().then(|| outputs[0].path.clone());
         let existing = part.clone().filter(|path| path.exists());
@@ -116,7 +116,7 @@ impl CourseArguments {
         };
         let Self { checkpoint_every: every, time, .. } = *self;
         let provenance = report.provenance();
-        Ok(Course { tiles, save, every, from, time, interrupted, quiet, identity, provenance })
+        Ok(RenderRun { tiles, save, every, from, time, interrupted, quiet, identity, provenance })
     }
 }
 
@@ -127,7 +127,11 @@ fn same_file(a: &Path, b: &Path) -> bool {
 }
 
 /// What decides the picture, but for the number of samples; by name.
-fn identity(view: &View, settings: &RenderSettings, report: &Settings) -> Vec<(String, String)> {
+fn identity(
+    view: &PreparedScene,
+    settings: &RenderSettings,
+    report: &Settings,
+) -> Vec<(String, String)> {
     let camera = &view.report.camera;
     let mut identity = vec![
         ("adaptive", settings.adaptive.to_string()),
@@ -203,7 +207,7 @@ fn refuse_to_replace(path: &Path) -> Result<()> {
     Err(UsageError(text).into())
 }
 
-impl Course {
+impl RenderRun {
     /// Renders a session to its end or to the end of the time, or until it is interrupted.
     pub(crate) fn run<S: Strategy>(
         &self,
@@ -241,7 +245,7 @@ impl Course {
             let next_save = self.save.as_ref().map(|_| Instant::now() + self.every);
             let pause = [end, next_save].into_iter().flatten().min();
             let complete =
-                session.run(&Until { progress, pause, advanced: AtomicBool::new(false) });
+                session.run(&Deadline { progress, pause, advanced: AtomicBool::new(false) });
             let interrupted = self.interrupted.load(Ordering::Relaxed);
             if complete || interrupted || end.is_some_and(|end| Instant::now() >= end) {
                 return self.save(session, settings);
@@ -277,10 +281,12 @@ impl Course {
 
     fn range(&self, tiling: Tiling) -> Result<Range<usize>> {
         match self.tiles {
-            Choice::All => Ok(0..tiling.n_tiles()),
-            Choice::Shard(Shard { k, n }) => Ok(tiling.shard(k, n)),
-            Choice::Tiles(Tiles { first, last }) if last < tiling.n_tiles() => Ok(first..last + 1),
-            Choice::Tiles(Tiles { last, .. }) => {
+            TileSelection::All => Ok(0..tiling.n_tiles()),
+            TileSelection::Shard(Shard { k, n }) => Ok(tiling.shard(k, n)),
+            TileSelection::Tiles(Tiles { first, last }) if last < tiling.n_tiles() => {
+                Ok(first..last + 1)
+            }
+            TileSelection::Tiles(Tiles { last, .. }) => {
                 let n = tiling.n_tiles();
                 let text =
                     format!("--tiles: there is no tile {last}; the picture has tiles 0-{}", n - 1);
@@ -320,14 +326,14 @@ fn restore<S: Strategy>(
 }
 
 /// Ends a run at a moment.
-struct Until<'a> {
+struct Deadline<'a> {
     progress: &'a RenderProgress,
     pause: Option<Instant>,
     /// A tile was finished: however short the time, every run gets further.
     advanced: AtomicBool,
 }
 
-impl Observer for Until<'_> {
+impl Observer for Deadline<'_> {
     fn pass_started(&self, samples: Range<u32>) {
         self.progress.pass_started(samples);
     }
@@ -341,8 +347,8 @@ impl Observer for Until<'_> {
         self.advanced.store(true, Ordering::Relaxed);
     }
 
-    fn cancelled(&self) -> bool {
+    fn canceled(&self) -> bool {
         let late = || self.pause.is_some_and(|pause| Instant::now() >= pause);
-        self.progress.cancelled() || (self.advanced.load(Ordering::Relaxed) && late())
+        self.progress.canceled() || (self.advanced.load(Ordering::Relaxed) && late())
     }
 }

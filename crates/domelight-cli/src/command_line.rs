@@ -1,4 +1,4 @@
-//! The command as it was typed, for reports.
+//! The command line as it was typed, for reports.
 
 use domelight::quote::shell;
 

@@ -7,7 +7,7 @@ use super::{Beckmann, Brdf, CustomLobe, Ggx, Lambert, MetallicRoughness, Phong, 
 use crate::Rgb;
 use crate::math::Vec3;
 use crate::sampling::ONE_MINUS_EPSILON;
-use crate::simd::{Colors, Mask as _, Real, Vectors};
+use crate::simd::{Colors, LaneMask as _, SimdFloat, Vectors};
 
 macro_rules! lobes {
     ($($(#[$doc:meta])* $model:ident),*) => {
@@ -63,12 +63,12 @@ macro_rules! each {
 
 impl Brdf for Lobe {
     #[inline(always)]
-    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+    fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
         each!(self, l => l.eval_lanes(wo, wi))
     }
 
     #[inline(always)]
-    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
+    fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
         each!(self, l => l.sample_lanes(wo, u_lobe, u))
     }
 
@@ -88,12 +88,12 @@ impl From<CustomLobe> for Lobe {
     }
 }
 
-/// The most lobes of a [`Material`].
+/// The most lobes of a [`Bsdf`].
 pub const MAX_LOBES: usize = 3;
 
 /// A sum of at most [`MAX_LOBES`] weighted lobes: plain data of 160 bytes, no heap.
 #[derive(Clone, Copy, Debug)]
-pub struct Material {
+pub struct Bsdf {
     terms: [Term; MAX_LOBES],
     n_terms: u32,
 }
@@ -121,7 +121,7 @@ const TYPICAL_COSINE: f32 = 2.0 / 3.0;
 /// The least share of a lobe, relative to the sum of all: its albedo is only an estimate.
 const LEAST_SHARE: f32 = 0.05;
 
-impl Material {
+impl Bsdf {
     /// Reflects nothing.
     pub const BLACK: Self = {
         let lobe = Lobe::Lambert(Lambert::new(Rgb::BLACK));
@@ -157,15 +157,14 @@ impl Material {
     }
 
     fn of_terms(lobes: impl IntoIterator<Item = (f32, Lobe)>) -> Self {
-        let mut material = Self::BLACK;
-        for (slot, (weight, lobe)) in
-            material.terms.iter_mut().zip(lobes.into_iter().filter(reflects))
+        let mut bsdf = Self::BLACK;
+        for (slot, (weight, lobe)) in bsdf.terms.iter_mut().zip(lobes.into_iter().filter(reflects))
         {
             *slot = Term { lobe, weight: range::weight(weight), probability: 0.0 };
-            material.n_terms += 1;
+            bsdf.n_terms += 1;
         }
-        material.choose_by_albedo(TYPICAL_COSINE);
-        material
+        bsdf.choose_by_albedo(TYPICAL_COSINE);
+        bsdf
     }
 
     /// The same material with its lobes chosen in proportion to their albedos toward `wo`: Fresnel's
@@ -178,7 +177,7 @@ impl Material {
         seen
     }
 
-    /// Makes it what [`Material::for_view`] makes of `other`, in place.
+    /// Makes it what [`Bsdf::for_view`] makes of `other`, in place.
     #[inline]
     pub(crate) fn set(&mut self, other: &Self, wo: Vec3) {
         self.n_terms = other.n_terms;
@@ -204,7 +203,7 @@ impl Material {
         }
     }
 
-    /// The colour of the surface, roughly: its albedo seen from above.
+    /// The color of the surface, roughly: its albedo seen from above.
     pub fn albedo(&self) -> Rgb {
         self.directional_albedo(1.0)
     }
@@ -233,28 +232,28 @@ fn reflects(&(weight, lobe): &(f32, Lobe)) -> bool {
     weight > 0.0 && !albedo.is_black()
 }
 
-impl PartialEq for Material {
+impl PartialEq for Bsdf {
     fn eq(&self, other: &Self) -> bool {
         self.terms() == other.terms()
     }
 }
 
-impl Default for Material {
+impl Default for Bsdf {
     /// Black.
     fn default() -> Self {
         Self::BLACK
     }
 }
 
-impl From<Lobe> for Material {
+impl From<Lobe> for Bsdf {
     fn from(lobe: Lobe) -> Self {
         Self::single(lobe)
     }
 }
 
-impl Brdf for Material {
+impl Brdf for Bsdf {
     #[inline(always)]
-    fn eval_lanes<F: Real>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
+    fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
         let one = |x| wi.z.splat(x);
         let (mut value, mut pdf) = (Colors::splat(wi.z, Rgb::BLACK), one(0.0));
         for term in self.terms() {
@@ -267,7 +266,7 @@ impl Brdf for Material {
 
     /// What is left of `u_lobe` after the choice of a lobe is uniform again, and chooses within the lobe.
     #[inline(always)]
-    fn sample_lanes<F: Real>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
+    fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
         let one = |x| wo.z.splat(x);
         let mut wi = Vectors::splat(wo.z, Vec3::ZERO);
         // Lanes whose lobe is this one or a later one, and what is left of their numbers.
@@ -308,16 +307,16 @@ mod tests {
         Ggx::new([0.1; 2], Fresnel::Schlick { f0: Rgb::splat(f0) }, Masking::Correlated).into()
     }
 
-    fn three() -> Material {
+    fn three() -> Bsdf {
         let ward = Ward::new(Rgb::splat(0.2), [0.15, 0.5], WardForm::default());
         let phong = Phong::new(Rgb::new(0.1, 0.2, 0.3), 50.0);
-        Material::new(&[Lambert::new(Rgb::splat(0.3)).into(), ward.into(), phong.into()]).unwrap()
+        Bsdf::new(&[Lambert::new(Rgb::splat(0.3)).into(), ward.into(), phong.into()]).unwrap()
     }
 
     #[test]
     fn is_small() {
         assert_eq!(size_of::<Lobe>(), 44);
-        assert_eq!(size_of::<Material>(), 160);
+        assert_eq!(size_of::<Bsdf>(), 160);
     }
 
     #[test]
@@ -329,14 +328,14 @@ mod tests {
     #[test]
     fn is_the_weighted_sum_of_its_lobes() {
         let (a, b) = (Lobe::from(Lambert::new(Rgb::splat(0.5))), glossy(0.5));
-        let mix = Material::weighted(&[(0.5, a), (0.25, b)]).unwrap();
+        let mix = Bsdf::weighted(&[(0.5, a), (0.25, b)]).unwrap();
         let (wo, wi) = (toward(40.0, 0.0), toward(35.0, 3.0));
         let expected = a.eval(wo, wi) * 0.5 + b.eval(wo, wi) * 0.25;
         assert!((mix.eval(wo, wi) - expected).max_component().abs() < 1e-6);
     }
 
     struct SideBySide<'a> {
-        material: &'a Material,
+        bsdf: &'a Bsdf,
         wo: Vec3,
         wi: [Vec3; LANES],
     }
@@ -348,14 +347,15 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let [x, y, z] = [0, 1, 2].map(|c| simd.load(&self.wi.map(|w| w[c])));
             let (value, pdf) =
-                self.material.eval_lanes(Vectors::splat(x, self.wo), Vectors { x, y, z });
-            let ([r, g, b], pdf) = (value.0.map(simd::Floats::store), simd::Floats::store(pdf));
+                self.bsdf.eval_lanes(Vectors::splat(x, self.wo), Vectors { x, y, z });
+            let ([r, g, b], pdf) =
+                (value.0.map(simd::SimdF32x8::store), simd::SimdF32x8::store(pdf));
             std::array::from_fn(|i| (Rgb::new(r[i], g[i], b[i]), pdf[i]))
         }
     }
 
     struct DrawnSideBySide<'a> {
-        material: &'a Material,
+        bsdf: &'a Bsdf,
         wo: Vec3,
         u: [[f32; LANES]; 3],
     }
@@ -367,7 +367,7 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let [u_lobe, u, v] = self.u.each_ref().map(|u| simd.load(u));
             let wo = Vectors::splat(u, self.wo);
-            self.material.sample_lanes(wo, u_lobe, [u, v]).store()
+            self.bsdf.sample_lanes(wo, u_lobe, [u, v]).store()
         }
     }
 
@@ -377,16 +377,16 @@ mod tests {
         let beckmann = Beckmann::new([0.2, 0.3], Fresnel::One, Masking::Correlated);
         let gltf = MetallicRoughness::new(Rgb::new(0.5, 0.3, 0.1), 0.3, 0.4);
         let lobes = [beckmann.into(), gltf.into(), glossy(0.5)];
-        for material in [three(), Material::new(&lobes).unwrap(), Material::single(gltf)] {
+        for bsdf in [three(), Bsdf::new(&lobes).unwrap(), Bsdf::single(gltf)] {
             for view in [0.0, 50.0, 89.0] {
                 let wo = toward(view, 0.3);
                 let number = |i: usize, step: f32| (0.1 + step * i as f32).fract();
                 let u = [0.137, 0.618, 0.755].map(|step| std::array::from_fn(|i| number(i, step)));
                 let alone = |i: usize| -> Vec3 {
-                    material.sample_lanes(wo.into(), u[0][i], [u[1][i], u[2][i]]).into()
+                    bsdf.sample_lanes(wo.into(), u[0][i], [u[1][i], u[2][i]]).into()
                 };
                 for set in InstructionSet::ALL {
-                    let draw = DrawnSideBySide { material: &material, wo, u };
+                    let draw = DrawnSideBySide { bsdf: &bsdf, wo, u };
                     let drawn = simd::dispatch(set, draw);
                     let drawn: [Vec3; LANES] = std::array::from_fn(|i| drawn.map(|c| c[i]).into());
                     assert_eq!(drawn, std::array::from_fn(alone), "{set:?}");
@@ -401,15 +401,14 @@ mod tests {
         let gltf = MetallicRoughness::new(Rgb::new(0.5, 0.3, 0.1), 0.3, 0.4);
         let silver = Fresnel::Conductor(crate::bsdf::Conductor::SILVER);
         let metal = Ggx::new([0.1, 0.3], silver, Masking::Separable);
-        let materials =
-            [three(), Material::single(gltf), Material::new(&[lambert, metal.into()]).unwrap()];
-        for material in materials {
+        let materials = [three(), Bsdf::single(gltf), Bsdf::new(&[lambert, metal.into()]).unwrap()];
+        for bsdf in materials {
             for view in [0.0, 50.0, 89.0] {
                 let wi = std::array::from_fn(|i| toward(18.0 * i as f32, 0.5 * i as f32));
                 let wo = toward(view, 0.3);
-                let expected = wi.map(|wi| material.eval_pdf(wo, wi));
+                let expected = wi.map(|wi| bsdf.eval_pdf(wo, wi));
                 for set in InstructionSet::ALL {
-                    let values = simd::dispatch(set, SideBySide { material: &material, wo, wi });
+                    let values = simd::dispatch(set, SideBySide { bsdf: &bsdf, wo, wi });
                     assert_eq!(values, expected, "{set:?}");
                 }
             }
@@ -418,19 +417,19 @@ mod tests {
 
     #[test]
     fn one_lobe_is_that_lobe() {
-        let material = Material::single(Lambert::new(Rgb::splat(0.5)));
+        let bsdf = Bsdf::single(Lambert::new(Rgb::splat(0.5)));
         let (wo, u) = (toward(50.0, 1.0), vec2(0.3, 0.8));
         let lobe = Lambert::new(Rgb::splat(0.5));
-        assert_eq!(material.sample(wo, 0.7, u), lobe.sample(wo, 0.7, u));
+        assert_eq!(bsdf.sample(wo, 0.7, u), lobe.sample(wo, 0.7, u));
     }
 
     #[test]
     fn black_lobes_are_dropped_and_black_materials_have_no_samples() {
         let black = Lobe::from(Lambert::new(Rgb::BLACK));
-        let material = Material::new(&[black, black, glossy(0.0), black, black]).unwrap();
-        assert_eq!(material.lobes().count(), 1);
-        let nothing = Material::new(&[black]).unwrap();
-        assert_eq!(nothing, Material::BLACK);
+        let bsdf = Bsdf::new(&[black, black, glossy(0.0), black, black]).unwrap();
+        assert_eq!(bsdf.lobes().count(), 1);
+        let nothing = Bsdf::new(&[black]).unwrap();
+        assert_eq!(nothing, Bsdf::BLACK);
         let (wo, wi) = (toward(50.0, 1.0), toward(10.0, 0.0));
         assert!(nothing.sample(wo, 0.7, vec2(0.3, 0.8)).is_none());
         assert_eq!((nothing.eval(wo, wi), nothing.max_eval(wo)), (Rgb::BLACK, 0.0));
@@ -438,30 +437,29 @@ mod tests {
 
     #[test]
     fn a_fourth_lobe_is_refused() {
-        let error = Material::new(&[glossy(0.5); 4]).unwrap_err();
+        let error = Bsdf::new(&[glossy(0.5); 4]).unwrap_err();
         assert_eq!(error, TooManyLobes { count: 4 });
     }
 
     /// The share of samples drawn from the glossy lobe follows Fresnel's reflectance.
     #[test]
     fn a_view_refines_the_choice() {
-        let material =
-            Material::new(&[Lambert::new(Rgb::splat(0.5)).into(), glossy(0.04)]).unwrap();
+        let bsdf = Bsdf::new(&[Lambert::new(Rgb::splat(0.5)).into(), glossy(0.04)]).unwrap();
         let share = |degrees: f32| {
-            let refined = material.for_view(toward(degrees, 0.0));
+            let refined = bsdf.for_view(toward(degrees, 0.0));
             let shares: Vec<f32> = refined.terms().iter().map(|t| t.probability).collect();
             assert!((shares.iter().sum::<f32>() - 1.0).abs() < 1e-6);
             shares[1]
         };
         assert!(share(0.0) < 0.15 && share(88.0) > 0.5, "{} {}", share(0.0), share(88.0));
-        check_lobe(&material.for_view(toward(80.0, 0.0)));
+        check_lobe(&bsdf.for_view(toward(80.0, 0.0)));
     }
 
     /// Every value is covered by the density: no lobe has a probability of zero.
     #[test]
     fn lobes_that_look_black_head_on_are_still_sampled() {
-        let material = Material::new(&[Lambert::new(Rgb::splat(0.5)).into(), glossy(0.0)]).unwrap();
-        let refined = material.for_view(Vec3::Z);
+        let bsdf = Bsdf::new(&[Lambert::new(Rgb::splat(0.5)).into(), glossy(0.0)]).unwrap();
+        let refined = bsdf.for_view(Vec3::Z);
         assert!(refined.terms().iter().all(|t| t.probability > 0.0));
     }
 }

@@ -1,4 +1,4 @@
-//! What all figures share: the light, the scene, and a camera that measures what it takes.
+//! What all figures share: the light, the scene, and how pictures are rendered and measured.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail};
 use domelight::RgbImage;
-use domelight::bsdf::Material;
+use domelight::bsdf::Bsdf;
 use domelight::code;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::mapping::{Mapping, to_lat_long};
@@ -17,7 +17,7 @@ use domelight::math::{Vec3, vec2};
 use domelight::picture::compare::compare;
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::quote::{Code, Shell, shell};
-use domelight::render::{Layers, RenderSettings, survey};
+use domelight::render::{Layers, RenderSettings, pilot_points};
 use domelight::sampling::{Heuristic, SamplerKind};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{Camera, EnvironmentSettings, EnvironmentSource, Scene, SceneDescription};
@@ -26,17 +26,17 @@ use domelight::strategy::{PreparedStrategy, StrategySpec};
 use crate::args::figures::FiguresArguments;
 use crate::args::scene::{BUILTIN_ROWS, FileArguments};
 use crate::interrupt;
+use crate::parse::Split;
 use crate::progress::RenderProgress;
 use crate::scene::{close_up, load_scene, probe_name, view_of};
 use crate::strategy::Job;
 use crate::usage::Stopwatch;
-use crate::values::Split;
 
 /// Rows of the map as it is shown.
 const SHOWN_ROWS: usize = 240;
 
 /// The light, the scene and the settings of a run.
-pub(crate) struct Studio {
+pub(crate) struct FigureContext {
     pub(crate) environment: Environment,
     /// The map, small enough to be shown.
     pub(crate) map: RgbImage,
@@ -60,11 +60,11 @@ pub(crate) enum Subject<'a> {
     Scene,
     /// What the scene is about, without floor and plinth, of one material: the lecture's statue.
     Alone(&'a str),
-    /// A white matt sphere that fills an orthographic picture.
+    /// A white matte sphere that fills an orthographic picture.
     Sphere,
 }
 
-impl Studio {
+impl FigureContext {
     pub(crate) fn new(arguments: &FiguresArguments, quiet: bool) -> Result<Self> {
         let interrupted = interrupt::flag();
         let _loading = interrupt::nothing_to_keep(interrupt::ENDED);
@@ -121,7 +121,7 @@ impl Studio {
     }
 
     /// How the map is shown: the mean of its logarithms, which lamps and suns hardly move, a little
-    /// below middle grey.
+    /// below middle gray.
     pub(crate) fn map_tone(&self) -> ToneMapping {
         let lit = self.map.pixels.iter().map(|p| p.luminance()).filter(|&y| y > 0.0);
         let (sum, n) = lit.fold((0.0, 0.0f32), |(sum, n), y| (sum + y.ln(), n + 1.0));
@@ -140,7 +140,12 @@ impl Studio {
     }
 
     /// Sets up the camera.
-    pub(crate) fn shot(&self, subject: Subject, width: usize, height: usize) -> Result<Shot<'_>> {
+    pub(crate) fn scene(
+        &self,
+        subject: Subject,
+        width: usize,
+        height: usize,
+    ) -> Result<FigureScene<'_>> {
         let mut description = match subject {
             Subject::Sphere => BuiltinScene::SphereOrthographic.description(),
             _ => self.description.clone(),
@@ -148,20 +153,20 @@ impl Studio {
         let aspect = width as f32 / height as f32;
         let mut view = if let Subject::Alone(material) = subject {
             let text = material;
-            let material: Material = text.parse().with_context(|| format!("material {text}"))?;
-            description.set_subject_material(material);
+            let bsdf: Bsdf = text.parse().with_context(|| format!("material {text}"))?;
+            description.set_subject_material(bsdf);
             description.remove_scenery();
             close_up(&description, aspect, self.up)
         } else {
             view_of(&description, aspect, self.up)
         };
         description.rescale(&mut view);
-        Ok(Shot {
-            studio: self,
+        Ok(FigureScene {
+            context: self,
             name: format!("{subject:?} {width}x{height}"),
             reference: match subject {
                 Subject::Alone(_) => self.choose(split(1024, 1024), split(64, 64)),
-                // Matt for the most part.
+                // Matte for the most part.
                 Subject::Scene | Subject::Sphere => self.choose(split(1536, 128), split(64, 16)),
             },
             camera: Camera::new(&view, width, height)?,
@@ -221,10 +226,10 @@ fn common_arguments(arguments: &FiguresArguments) -> Code<Shell> {
     text
 }
 
-/// A scene in front of a camera. All pictures of a shot have the same camera rays under one seed, one
+/// A scene in front of a camera. All its pictures have the same camera rays under one seed, one
 /// a pixel: what differs between them is the estimate of the light alone.
-pub(crate) struct Shot<'a> {
-    studio: &'a Studio,
+pub(crate) struct FigureScene<'a> {
+    context: &'a FigureContext,
     /// Names what is seen, not how it is sampled.
     name: String,
     /// Samples of each kind in a pixel of the converged picture.
@@ -234,8 +239,8 @@ pub(crate) struct Shot<'a> {
     pub(crate) settings: RenderSettings,
 }
 
-/// A picture and what it took.
-pub(crate) struct Taken {
+/// A picture and its cost.
+pub(crate) struct FigureRender {
     pub(crate) layers: Layers,
     /// What was done, in words.
     pub(crate) strategy: String,
@@ -246,76 +251,76 @@ pub(crate) struct Taken {
 }
 
 /// A picture and how far it is from the converged one.
-pub(crate) struct Measured {
-    pub(crate) taken: Taken,
+pub(crate) struct Measurement {
+    pub(crate) render: FigureRender,
     /// Mean over pixels that show the scene of (I − R)² / (R² + 0.01).
     pub(crate) rel_mse: f64,
 }
 
-impl Shot<'_> {
+impl FigureScene<'_> {
     /// With as many camera samples a pixel.
     pub(crate) fn samples(mut self, n_samples: u32) -> Self {
         self.settings.n_samples = n_samples;
         self
     }
 
-    /// Fills in what a plan leaves to the scene.
-    pub(crate) fn complete(&self, plan: StrategySpec) -> StrategySpec {
-        let points = || survey(&self.scene, &self.camera, &self.settings);
-        plan.for_scene(points, &self.studio.environment, self.settings.seed)
+    /// Fills in what a specification leaves to the scene.
+    pub(crate) fn complete(&self, spec: StrategySpec) -> StrategySpec {
+        let points = || pilot_points(&self.scene, &self.camera, &self.settings);
+        spec.for_scene(points, &self.context.environment, self.settings.seed)
     }
 
-    /// Takes the picture.
-    pub(crate) fn take(&self, plan: StrategySpec) -> Result<Taken> {
-        self.take_with(plan, self.settings.seed, SamplerKind::Sobol)
+    /// Renders the picture.
+    pub(crate) fn render(&self, spec: StrategySpec) -> Result<FigureRender> {
+        self.render_with(spec, self.settings.seed, SamplerKind::Sobol)
     }
 
-    /// Takes the picture with numbers of another seed or kind.
-    pub(crate) fn take_with(
+    /// Renders the picture with numbers of another seed or kind.
+    pub(crate) fn render_with(
         &self,
-        plan: StrategySpec,
+        spec: StrategySpec,
         seed: u64,
         sampler: SamplerKind,
-    ) -> Result<Taken> {
-        let Studio { environment, quiet, interrupted, .. } = self.studio;
+    ) -> Result<FigureRender> {
+        let FigureContext { environment, quiet, interrupted, .. } = self.context;
         let settings = RenderSettings { seed, sampler, ..self.settings };
-        let plan = self.complete(plan);
-        let strategy = PreparedStrategy::new(plan, environment)?;
+        let spec = self.complete(spec);
+        let strategy = PreparedStrategy::new(spec, environment)?;
         let n_rays = (settings.width * settings.height) as u64 * u64::from(settings.n_samples);
         let progress = &RenderProgress::new("", n_rays, *quiet, interrupted);
         let (scene, camera, settings) = (&self.scene, &self.camera, &settings);
-        let job = Job { scene, camera, environment, settings, progress, course: None };
+        let job = Job { scene, camera, environment, settings, progress, render_run: None };
         let mut watch = Stopwatch::start();
         let rendering = job.render(&strategy)?;
         let seconds = watch.lap();
         progress.finish();
-        self.studio.check_interrupted()?;
-        Ok(Taken {
+        self.context.check_interrupted()?;
+        Ok(FigureRender {
             layers: rendering.layers,
-            strategy: plan.description(),
+            strategy: spec.description(),
             shadow_rays: rendering.counts.shadow_rays,
             points: rendering.counts.shading_points,
             seconds: seconds.cpu.unwrap_or(seconds.wall),
         })
     }
 
-    /// Takes the picture and compares it with the converged one.
-    pub(crate) fn measure(&self, plan: StrategySpec) -> Result<Measured> {
-        self.measure_with(plan, self.settings.seed, SamplerKind::Sobol)
+    /// Renders the picture and compares it with the converged one.
+    pub(crate) fn measure(&self, spec: StrategySpec) -> Result<Measurement> {
+        self.measure_with(spec, self.settings.seed, SamplerKind::Sobol)
     }
 
-    /// As [`Shot::measure`], with numbers of another seed or kind.
+    /// As [`FigureScene::measure`], with numbers of another seed or kind.
     pub(crate) fn measure_with(
         &self,
-        plan: StrategySpec,
+        spec: StrategySpec,
         seed: u64,
         sampler: SamplerKind,
-    ) -> Result<Measured> {
+    ) -> Result<Measurement> {
         let reference = self.reference(seed, sampler)?;
-        let taken = self.take_with(plan, seed, sampler)?;
+        let render = self.render_with(spec, seed, sampler)?;
         let covered: Vec<bool> = reference.depth.iter().map(|&d| d > 0.0).collect();
-        let error = compare(&taken.layers.color, &reference.color, Some(&covered))?;
-        Ok(Measured { taken, rel_mse: error.rel_mse })
+        let error = compare(&render.layers.color, &reference.color, Some(&covered))?;
+        Ok(Measurement { render, rel_mse: error.rel_mse })
     }
 
     /// The converged picture with the camera rays of that seed: many samples of both kinds, by
@@ -323,22 +328,22 @@ impl Shot<'_> {
     pub(crate) fn reference(&self, seed: u64, sampler: SamplerKind) -> Result<Rc<Layers>> {
         let n_samples = self.settings.n_samples;
         let key = format!("{} {n_samples} {seed} {sampler:?}", self.name);
-        if let Some(made) = self.studio.references.borrow().get(&key) {
+        if let Some(made) = self.context.references.borrow().get(&key) {
             return Ok(made.clone());
         }
         let Split { environment, brdf } = self.reference;
-        let plan = StrategySpec::Mis {
+        let spec = StrategySpec::Mis {
             n_environment: environment.div_ceil(n_samples),
             n_brdf: brdf.div_ceil(n_samples),
             heuristic: Heuristic::Power,
             compensation: true,
         };
-        let made = Rc::new(self.take_with(plan, seed, sampler)?.layers);
-        self.studio.references.borrow_mut().insert(key, made.clone());
+        let made = Rc::new(self.render_with(spec, seed, sampler)?.layers);
+        self.context.references.borrow_mut().insert(key, made.clone());
         Ok(made)
     }
 
-    /// How pictures of this shot are shown: the scene's mean in the reference at middle grey.
+    /// How pictures of this scene are shown: the scene's mean in the reference at middle gray.
     pub(crate) fn tone(&self) -> Result<ToneMapping> {
         let reference = self.reference(self.settings.seed, SamplerKind::Sobol)?;
         let covered =
@@ -356,8 +361,8 @@ fn split(environment: u32, brdf: u32) -> Split {
     Split { environment, brdf }
 }
 
-/// Exposure that takes `mean` to `grey`, before the curve.
-fn exposed(mean: f32, grey: f32) -> ToneMapping {
-    let exposure = if mean > 0.0 { (grey / mean).log2().clamp(-30.0, 30.0) } else { 0.0 };
+/// Exposure that takes `mean` to `gray`, before the curve.
+fn exposed(mean: f32, gray: f32) -> ToneMapping {
+    let exposure = if mean > 0.0 { (gray / mean).log2().clamp(-30.0, 30.0) } else { 0.0 };
     ToneMapping { exposure, curve: ToneCurve::Agx }
 }

@@ -13,7 +13,7 @@
 //! offset, picks the candidate at which it passes an integer. Each is picked with probability π_j
 //! exactly, and the picks are spread over the sky.
 
-use crate::simd::{Floats, Ints, LANES, Real, Simd};
+use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat, SimdI32x8};
 
 /// π = 1: probabilities are whole numbers of 2⁻²⁴, so that their running sum is exact.
 const ONE: u32 = 1 << 24;
@@ -27,10 +27,10 @@ pub(super) fn probability(size: f32) -> u32 {
 
 /// [`probability`] of candidates side by side.
 #[inline(always)]
-pub(super) fn probabilities<S: Simd>(simd: S, size: S::Floats) -> [i32; LANES] {
-    let rounded = (size.min(simd.splat(1.0)) * simd.splat((ONE - 1) as f32)).truncated();
+pub(super) fn probabilities<S: Simd>(simd: S, size: S::F32x8) -> [i32; LANES] {
+    let rounded = (size.min(simd.splat(1.0)) * simd.splat((ONE - 1) as f32)).to_i32();
     let positive = simd.splat(0.0).lt(size);
-    Ints::select(positive, rounded + simd.splat_int(1), simd.splat_int(0)).store()
+    SimdI32x8::select(positive, rounded + simd.splat_i32(1), simd.splat_i32(0)).store()
 }
 
 /// 1/π.
@@ -39,14 +39,14 @@ pub(super) fn weight(probability: u32) -> f32 {
     ONE as f32 / probability as f32
 }
 
-/// A systematic choice in progress.
+/// A systematic sample in progress.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Choice {
-    /// Modulo 2⁸ choices.
+pub(super) struct SystematicSampler {
+    /// Modulo 2⁸ selections.
     sum: u32,
 }
 
-impl Choice {
+impl SystematicSampler {
     /// From an offset in [0, 1).
     pub(super) fn new(offset: f32) -> Self {
         Self { sum: (offset * ONE as f32) as u32 }
@@ -54,7 +54,7 @@ impl Choice {
 
     /// Whether a candidate of the given probability is chosen.
     #[inline(always)]
-    pub(super) fn offer(&mut self, probability: u32) -> bool {
+    pub(super) fn select(&mut self, probability: u32) -> bool {
         let before = self.sum;
         self.sum = before.wrapping_add(probability);
         (before ^ self.sum) >= ONE
@@ -69,7 +69,7 @@ mod tests {
 
     /// The sum over the chosen of x/π is the sum over all of x, for any x.
     #[test]
-    fn the_choice_is_unbiased() {
+    fn systematic_sampling_is_unbiased() {
         let mut pcg = Pcg32::new(3, 4);
         let sizes: Vec<f32> = (0..40).map(|_| (6.0 * pcg.next_f32() - 3.0).exp()).collect();
         let values: Vec<f32> = (0..40).map(|_| pcg.next_f32()).collect();
@@ -78,10 +78,10 @@ mod tests {
         let test = ZTest::in_suite_of(3);
         for threshold in [0.1, 1.0, 30.0] {
             let batches = testkit::batches(40, 500, || {
-                let mut choice = Choice::new(offsets.next_f32());
+                let mut sampler = SystematicSampler::new(offsets.next_f32());
                 let chosen = sizes.iter().zip(&values).filter_map(|(&size, &value)| {
                     let p = probability(size / threshold);
-                    choice.offer(p).then(|| f64::from(weight(p) * value))
+                    sampler.select(p).then(|| f64::from(weight(p) * value))
                 });
                 [chosen.sum()]
             });
@@ -92,12 +92,12 @@ mod tests {
     /// Of n candidates with π = p, n p are chosen, give or take one.
     #[test]
     fn the_choice_is_systematic() {
-        let mut choice = Choice::new(0.3);
-        let chosen: Vec<usize> = (0..16).filter(|_| choice.offer(probability(0.25))).collect();
+        let mut sampler = SystematicSampler::new(0.3);
+        let chosen: Vec<usize> = (0..16).filter(|_| sampler.select(probability(0.25))).collect();
         assert_eq!(chosen, [2, 6, 10, 14]);
-        let mut choice = Choice::new(0.0);
-        assert!((0..1000).all(|_| choice.offer(probability(2.0))));
-        assert!((0..1000).all(|_| !choice.offer(probability(0.0))));
+        let mut sampler = SystematicSampler::new(0.0);
+        assert!((0..1000).all(|_| sampler.select(probability(2.0))));
+        assert!((0..1000).all(|_| !sampler.select(probability(0.0))));
         assert_eq!((probability(1.0), weight(ONE)), (ONE, 1.0));
         assert_eq!(probability(1e-30), 1);
     }
