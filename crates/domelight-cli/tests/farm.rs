@@ -75,6 +75,11 @@ fn every_engine_gets_its_files() {
             }
         }
     }
+    let named =
+        farm(&folder, "kubernetes", &["--shards=2", "-o", "named", "--picture", "out/a b.exr"]);
+    succeeded(&named);
+    let merge = fs::read_to_string(folder.path().join("named/merge.yaml")).unwrap();
+    assert!(merge.contains("out/a b.exr"), "{merge}");
     let refused = farm(&folder, "slurm", &["--shards", "2", "--time", "1h"]);
     assert_eq!(refused.status.code(), Some(2));
     let refused = farm(&folder, "slurm", &["--rays", "1"]);

@@ -73,7 +73,7 @@ pub(crate) struct BenchArguments {
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = positive,
           help_heading = "Measurement")]
     pub(crate) most: f32,
-    /// The errors (relMSE) that strategies are to reach [default: 4e-3,1e-3,1e-4; of the lecture 4e-3]
+    /// The errors (relMSE) that strategies are to reach [default: 4e-3,1e-3,1e-4; of the lecture 1e-2]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = error,
           help_heading = "Measurement")]
     pub(crate) errors: Vec<f64>,

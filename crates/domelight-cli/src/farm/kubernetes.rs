@@ -64,11 +64,12 @@ spec:
         threads = *threads,
         render = render,
     );
+    let picture = farm.volume_picture.clone().unwrap_or_else(|| format!("{name}.exr"));
     let merge = code!(
         Shell,
         "exec domelight merge {parts} -o {picture}",
         parts = parts,
-        picture = shell::word(&format!("{name}.exr")),
+        picture = shell::word(&picture),
     );
     let merge_spec = Code::literal("  backoffLimit: 3");
     let files = vec![

@@ -16,7 +16,7 @@ use domelight::quote::{Code, Shell, Yaml, shell};
 use crate::args::farm::{Engine, FarmArguments};
 use crate::error::{UsageError, status};
 use crate::files;
-use crate::output::print_code;
+use crate::output::{PicturePath, print_code};
 use crate::strategy::refuse_repeating_points;
 
 /// What every engine is told.
@@ -34,10 +34,18 @@ struct Farm {
     threads: u32,
     /// The merged picture.
     picture: String,
+    /// The merged picture in the cluster's volume, if it was named: the path as typed, or the name of an absolute one.
+    volume_picture: Option<String>,
     /// A name that every engine accepts: lower case letters, digits and hyphens.
     name: String,
     /// The container image for Kubernetes.
     image: String,
+}
+
+/// Where a picture goes in a volume that is mounted as the working folder.
+fn volume_path(picture: &PicturePath) -> Result<String> {
+    let name = picture.path.file_name().map(Path::new);
+    utf8(name.filter(|_| picture.path.is_absolute()).unwrap_or(&picture.path))
 }
 
 /// A file to write.
@@ -112,6 +120,7 @@ impl Farm {
             n_shards: arguments.shards,
             threads: arguments.pixel.threads.unwrap_or(arguments.cpus),
             picture: utf8(&picture)?,
+            volume_picture: arguments.picture.as_ref().map(volume_path).transpose()?,
             name: job_name(&stem.to_string_lossy()),
             image: arguments.image.clone(),
             folder: utf8(&folder)?,
