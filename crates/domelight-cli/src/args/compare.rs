@@ -27,7 +27,7 @@ one sample is far beyond it.
 
 Examples:
   domelight compare
-      the built-in statue under the sky, four strategies at 64 shadow rays, into compare.html
+      the built-in statue under the sky, five strategies at 32 shadow rays, into compare.html
   domelight compare statue --env cathedral --strategies mis,sir:15/800,variance-minimization:64
       your choice of strategies
   domelight compare bunny.ply --env studio.hdr --budget time:2s --seeds 8 -o bunny.html
@@ -37,7 +37,7 @@ Examples:
 
 /// Compare strategies on one scene at equal samples, rays or time.
 #[derive(Args, Debug)]
-#[command(mut_arg("size", |size| size.default_value("400x400")))]
+#[command(mut_arg("size", |size| size.default_value("256x256")))]
 pub(crate) struct CompareArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
@@ -48,11 +48,11 @@ pub(crate) struct CompareArguments {
         value_name = "LIST",
         value_delimiter = ',',
         help_heading = "Comparison",
-        default_value = "brdf,environment,mis,sir"
+        default_value = "product,mis,environment,brdf,sir"
     )]
     pub(crate) strategies: Vec<NamedStrategy>,
     /// What all have in common: rays:N, time:T (2s, 500ms, 1m) or spp:N
-    #[arg(long, value_name = "BUDGET", default_value = "rays:64", help_heading = "Comparison")]
+    #[arg(long, value_name = "BUDGET", default_value = "rays:32", help_heading = "Comparison")]
     pub(crate) budget: Budget,
     /// Pictures of each strategy, from --seed on: the spread of the error is that over them
     #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Comparison",
@@ -61,9 +61,8 @@ pub(crate) struct CompareArguments {
     /// The converged picture [default: rendered once, then kept in the cache]
     #[arg(long, value_name = "FILE", help_heading = "Reference")]
     pub(crate) reference: Option<PathBuf>,
-    /// Camera samples of each pixel of a rendered reference, each of 4 environment and 4 BRDF
-    /// samples
-    #[arg(long, value_name = "N", default_value_t = 256, help_heading = "Reference",
+    /// Camera samples of each pixel of a rendered reference, by product
+    #[arg(long, value_name = "N", default_value_t = 64, help_heading = "Reference",
           conflicts_with = "reference", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
     pub(crate) reference_spp: u32,
     /// Where references are kept [default: domelight in the user's cache folder]

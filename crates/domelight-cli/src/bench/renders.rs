@@ -18,7 +18,7 @@ use super::table::{Table, number};
 use crate::args::bench::Peer;
 use crate::error::warn;
 use crate::measure::cache::Cache;
-use crate::measure::reference::{Goal, Reference, ReferenceReport};
+use crate::measure::reference::{self, Goal, Reference, ReferenceReport};
 use crate::strategy::NamedStrategy;
 use crate::usage::Seconds;
 
@@ -152,6 +152,7 @@ impl CaseRunner<'_> {
         let metric = ErrorMetric::new(Reference::of_view(
             cache,
             view,
+            reference::MIS,
             *settings,
             goal(MOST_REFERENCE_SAMPLES),
             quiet,

@@ -18,8 +18,8 @@ use crate::files;
 use crate::memory;
 use crate::scene::PreparedScene;
 
-/// How a reference is rendered.
-pub(crate) const STRATEGY: StrategySpec = StrategySpec::Mis {
+/// How a reference with a picture without shadows is rendered.
+pub(crate) const MIS: StrategySpec = StrategySpec::Mis {
     n_environment: 4,
     n_brdf: 4,
     heuristic: Heuristic::Power,
@@ -216,19 +216,20 @@ impl Reference {
         Ok(Self { picture, report: report(Source::Rendered, path.as_deref(), noise, spp) })
     }
 
-    /// Of a view, by [`STRATEGY`].
+    /// Of a view, by an unbiased strategy.
     pub(crate) fn of_view(
         cache: Option<&Cache>,
         view: &PreparedScene,
+        strategy: StrategySpec,
         settings: RenderSettings,
         goal: Goal,
         quiet: bool,
     ) -> Result<Self> {
         let settings = RenderSettings { n_samples: 0, seed: SEEDS[0], ..settings };
-        let key = Key::of_program(view, format_args!("{settings:?}{STRATEGY}{goal:?}"));
-        let strategy = PreparedStrategy::new(STRATEGY, &view.environment)?;
-        let render_setup = RenderSetup { view, settings, strategy: &strategy, quiet };
-        Self::get(cache, &key, goal, &STRATEGY.description(), quiet, |n_samples, half| {
+        let key = Key::of_program(view, format_args!("{settings:?}{strategy}{goal:?}"));
+        let prepared = PreparedStrategy::new(strategy, &view.environment)?;
+        let render_setup = RenderSetup { view, settings, strategy: &prepared, quiet };
+        Self::get(cache, &key, goal, &strategy.description(), quiet, |n_samples, half| {
             let label = format!("reference, half {} of 2", half + 1);
             Ok(render_setup.render(&label, n_samples, SEEDS[half])?.layers.into())
         })
