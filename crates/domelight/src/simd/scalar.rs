@@ -133,7 +133,7 @@ impl SimdF32x8 for F32x8 {
 
     #[inline(always)]
     fn mul_sub(self, b: Self, c: Self) -> Self {
-        Self(from_fn(|i| self.0[i].mul_add(b.0[i], -c.0[i])))
+        Self(from_fn(|i| self.0[i] * b.0[i] - c.0[i]))
     }
     #[inline(always)]
     fn store(self) -> Lanes {

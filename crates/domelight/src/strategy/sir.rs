@@ -35,7 +35,7 @@
 use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
 use crate::environment::Environment;
-use crate::math::Vec3;
+use crate::math::{Vec3, functions};
 use crate::sampling::hilbert::hemisphere_index;
 use crate::sampling::rng::hash2;
 use crate::sampling::{Dimension, ONE_MINUS_EPSILON, Sampler, SamplerKind, WeightedReservoirs};
@@ -290,7 +290,7 @@ impl Candidates {
             let (mut first, mut second) = (0.0, 0.0);
             sir.draw(at, SampleIndex { sampler, sample: 0 }, |c| {
                 first += f64::from(c.weight);
-                second += f64::from(c.weight).powi(2);
+                second += functions::powi(f64::from(c.weight), 2);
             });
             if first > 0.0 {
                 sum += f64::from(N_CANDIDATES) * second / (first * first) - 1.0;
@@ -323,7 +323,7 @@ pub const RAY_COST: f64 = 0.3;
 pub fn optimal_candidates(n_samples: u32, relative_variance: f64, ray_cost: f64) -> u32 {
     let ratio = ((1.0 + 2.0 * relative_variance) * ray_cost).sqrt();
     let m = (f64::from(n_samples.max(1)) * ratio).clamp(1.0, f64::from(1u32 << 20));
-    (1u32 << m.log2().round() as u32).max(n_samples)
+    (1u32 << functions::log2(m).round() as u32).max(n_samples)
 }
 
 #[cfg(test)]

@@ -60,9 +60,7 @@ pub(super) fn load(
     options: &LoadOptions,
 ) -> Result<Loaded, LoadError> {
     read(path, bytes, budget, options).map_err(|failure| match failure {
-        Failure::Problem(problem) => {
-            LoadError::Gltf { path: path.into(), kind: Box::new(problem) }
-        }
+        Failure::Problem(problem) => LoadError::Gltf { path: path.into(), kind: Box::new(problem) },
         Failure::Load(error) => error,
     })
 }
