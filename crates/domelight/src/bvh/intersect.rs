@@ -14,8 +14,9 @@
 //! Of the former the shear needs 7, a component of the direction that counts as greater than it is 1, and the box test 4:
 //! of the distance p/d − o/d to a plane p, its own rounding, that of 1/d on two axes that meet, and that of the
 //! product p/d, since |p| ≤ |o| + m. Of the latter o ± margin, its product with 1/d, and p/d again need one each.
-//! So the box test may fuse p/d − o/d, which saves the rounding of p/d, or not: boxes differ, hits do not. Instruction
-//! sets do as they are faster ([`SimdF32x8::mul_sub`]), and the tests compare all of them with a loop over all triangles.
+//! So it does not matter how often p/d − o/d is rounded: which boxes are entered may differ, hits do not. Instruction
+//! sets that fuse do so ([`SimdF32x8::mul_sub`]), the others do not; the tests compare all of them with a loop over all
+//! triangles. The product must not overflow, though, where the difference would not.
 
 use super::prepare::PreparedRays;
 use super::{Block, Lanes, Node, WIDTH};

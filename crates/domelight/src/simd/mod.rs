@@ -192,7 +192,8 @@ pub trait SimdF32x8: SimdFloat {
     fn store(self) -> Lanes;
     /// Toward zero; of numbers beyond 2³¹ and NaN anything.
     fn to_i32(self) -> Self::I32x8;
-    /// a b − c, rounded once or twice, whichever is fast: for what does not depend on the last bit.
+    /// a b − c of an exact product, rounded once where there is an instruction for it, else twice: for what does not
+    /// depend on the last bit.
     #[must_use]
     fn mul_sub(self, b: Self, c: Self) -> Self;
     /// Numbers of a table of N rows, a power of two, at `at` modulo 8 N.

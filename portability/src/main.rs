@@ -1,0 +1,5 @@
+//! Prints the checksums.
+
+fn main() {
+    print!("{}", portability::report());
+}
