@@ -4,10 +4,10 @@
 //! `f32::mul_add` where the processor has no such instruction, and `powi` leaves the order of its products open. Clippy
 //! forbids all of these here (`clippy.toml`). Square roots and rounding are exact everywhere and need no care.
 //!
-//! Functions of f32 that rendering calls by the million are computed in f64 and rounded once: a Taylor polynomial after
-//! a reduction of the argument, without tables or branches, so that loops over them vectorize. All others are those of
-//! the `libm` crate. [`super::atan2`] and its neighbors are for vectors, and less accurate.
-
+//! Exponentials and logarithms of f32 are computed in f64 and rounded once: a Taylor polynomial after a reduction of the
+//! argument, without tables, so that loops over them vectorize. Those that lobes use are kept out of line: of what has no
+//! effects the compiler computes that of all lobes before it asks which. All others are those of the `libm` crate, which
+//! are about as fast as the platform's. [`super::atan2`] and its neighbors are for vectors, and less accurate.
 #![cfg_attr(not(feature = "io"), allow(dead_code))] // Some serve files alone.
 
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2, LOG2_E, LOG10_2};
@@ -90,22 +90,21 @@ impl Real for f32 {
         let (x, y) = (f64::from(self), f64::from(y));
         (x * x + y * y).sqrt() as f32
     }
-    #[inline(always)]
+    #[inline(never)]
     fn exp(self) -> f32 {
-        let Power { scale, excess } = Power::of_two(f64::from(self) * LOG2_E);
-        (scale + scale * excess) as f32
+        Power::of_two(f64::from(self) * LOG2_E).value() as f32
     }
     #[inline(always)]
     fn exp2(self) -> f32 {
-        let Power { scale, excess } = Power::of_two(f64::from(self));
-        (scale + scale * excess) as f32
+        Power::of_two(f64::from(self)).value() as f32
     }
-    #[inline(always)]
+    #[inline(never)]
     fn exp_m1(self) -> f32 {
-        let Power { scale, excess } = Power::of_two(f64::from(self) * LOG2_E);
-        (scale * excess + (scale - 1.0)) as f32
+        let power = Power::of_two(f64::from(self) * LOG2_E);
+        let scale = power.scale();
+        (scale * power.excess + (scale - 1.0)) as f32
     }
-    #[inline(always)]
+    #[inline(never)]
     fn ln_1p(self) -> f32 {
         let x = f64::from(self);
         let y = 1.0 + x;
@@ -128,8 +127,7 @@ impl Real for f32 {
         if exponent == 0.0 || self == 1.0 {
             return 1.0;
         }
-        let Power { scale, excess } = Power::of_two(log2_kernel(self) * f64::from(exponent));
-        (scale + scale * excess) as f32
+        Power::of_two(log2_kernel(self) * f64::from(exponent)).value() as f32
     }
 }
 
@@ -142,7 +140,6 @@ impl Real for f64 {
         acos = libm::acos,
         atan = libm::atan,
         cbrt = libm::cbrt,
-        exp = libm::exp,
         exp2 = libm::exp2,
         exp_m1 = libm::expm1,
         ln_1p = libm::log1p,
@@ -151,6 +148,10 @@ impl Real for f64 {
     );
     powi!();
 
+    #[inline(always)]
+    fn exp(self) -> f64 {
+        Power::of_e(self).wide_value()
+    }
     #[inline]
     fn sin_cos(self) -> (f64, f64) {
         libm::sincos(self)
@@ -169,36 +170,75 @@ impl Real for f64 {
     }
 }
 
-/// 2ˣ as s + s e, s a power of two and e in [1/√2 − 1, √2 − 1].
+/// 2ⁿ (1 + e), n whole and e in [1/√2 − 1, √2 − 1].
 struct Power {
-    scale: f64,
+    /// n + 3·2⁵¹, so that n is in the lowest bits.
+    shifted: f64,
     excess: f64,
 }
 
 impl Power {
-    /// To 10⁻¹¹ of the result; where f32 ends, 0 or ∞ once rounded to f32.
+    /// Adding it rounds to a whole number.
+    const SHIFT: f64 = 1.5 * (1u64 << 52) as f64;
+
+    /// 2ˣ to 10⁻¹¹ of the result; beyond the range of f32 only that it is.
     #[inline(always)]
     fn of_two(x: f64) -> Self {
-        /// Adding it rounds to a whole number, which is then in the lowest bits.
-        const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
-        /// 1/k! for k ≥ 1.
-        const TAYLOR: [f64; 9] = [
-            1.0,
-            1.0 / 2.0,
-            1.0 / 6.0,
-            1.0 / 24.0,
-            1.0 / 120.0,
-            1.0 / 720.0,
-            1.0 / 5040.0,
-            1.0 / 40_320.0,
-            1.0 / 362_880.0,
-        ];
         let x = x.clamp(-300.0, 300.0);
-        let rounded = x + ROUND;
-        let t = (x - (rounded - ROUND)) * LN_2;
-        let scale = f64::from_bits(rounded.to_bits().wrapping_add(1023) << 52);
-        Self { scale, excess: t * polynomial(t, &TAYLOR) }
+        let shifted = x + Self::SHIFT;
+        Self::new::<9>(shifted, (x - (shifted - Self::SHIFT)) * LN_2)
     }
+
+    /// eˣ to 10⁻¹⁵ of the result and 3·10⁻¹⁷ |x| of it.
+    #[inline(always)]
+    fn of_e(x: f64) -> Self {
+        /// ln 2, its lower half zero, so that its multiples are exact, and the rest.
+        const HIGH: f64 = f64::from_bits(LN_2.to_bits() >> 32 << 32);
+        const LOW: f64 = LN_2 - HIGH;
+        let x = x.clamp(-800.0, 800.0);
+        let shifted = x * LOG2_E + Self::SHIFT;
+        let n = shifted - Self::SHIFT;
+        Self::new::<13>(shifted, (x - n * HIGH) - n * LOW)
+    }
+
+    /// e = eᵗ − 1 by `N` terms of the series.
+    #[inline(always)]
+    fn new<const N: usize>(shifted: f64, t: f64) -> Self {
+        Self { shifted, excess: t * polynomial(t, &const { one_over_factorials::<N>() }) }
+    }
+
+    /// 2ⁿ of |n| < 1023.
+    #[inline(always)]
+    fn scale(&self) -> f64 {
+        f64::from_bits(self.shifted.to_bits().wrapping_add(1023) << 52)
+    }
+
+    /// For f32: beyond its range ∞ or 0 once it is rounded.
+    #[inline(always)]
+    fn value(&self) -> f64 {
+        let scale = self.scale();
+        scale + scale * self.excess
+    }
+
+    /// In two steps, for what is less than the least normal number.
+    #[inline(always)]
+    fn wide_value(&self) -> f64 {
+        let n = (self.shifted.to_bits() << 32) as i64 >> 32;
+        let half = n >> 1;
+        let power = |n: i64| f64::from_bits(((n + 1023) as u64) << 52);
+        (1.0 + self.excess) * power(half) * power(n - half)
+    }
+}
+
+/// 1/k! for k ≥ 1.
+const fn one_over_factorials<const N: usize>() -> [f64; N] {
+    let (mut c, mut factorial, mut k) = ([0.0; N], 1.0, 0);
+    while k < N {
+        factorial *= (k + 1) as f64;
+        c[k] = 1.0 / factorial;
+        k += 1;
+    }
+    c
 }
 
 /// log₂ of a number not less than zero, to 10⁻¹³ of the result; NaN of others.
@@ -240,14 +280,15 @@ fn where_positive(x: f64, logarithm: f64) -> f64 {
     }
 }
 
-/// Σ cₖ xᵏ by Horner's rule.
+/// Σ cₖ xᵏ by Horner's rule, of even and odd k side by side.
 #[inline(always)]
 fn polynomial<const N: usize>(x: f64, c: &[f64; N]) -> f64 {
-    let mut sum = c[N - 1];
-    for &c in c[..N - 1].iter().rev() {
-        sum = sum * x + c;
+    let square = x * x;
+    let mut sums = [0.0; 2];
+    for k in (0..N).rev() {
+        sums[k % 2] = sums[k % 2] * square + c[k];
     }
-    sum
+    sums[0] + x * sums[1]
 }
 
 macro_rules! functions {
@@ -350,5 +391,30 @@ mod tests {
             worst(within(0.0, 1.0), |x| powf(x, 1000.0), |x| x.powf(1000.0)),
         ];
         assert!(all.iter().all(|&units| units < 0.501), "{all:?}");
+        let none = [exp(f32::NAN), exp_m1(f32::NAN), ln_1p(f32::NAN), log2(-1.0)];
+        assert!(none.iter().all(|x| x.is_nan()), "{none:?}");
+        let ends = [exp(f32::INFINITY), exp(f32::NEG_INFINITY), ln_1p(-1.0)];
+        assert_eq!(ends, [f32::INFINITY, 0.0, f32::NEG_INFINITY]);
+        assert_eq!([powf(0.0f32, 0.5), powf(0.0f32, 0.0), powf(1.0f32, 9e9)], [0.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn the_exponential_of_doubles_is_that_of_the_platform() {
+        for i in -760_000..720_000 {
+            let x = 1e-3 * f64::from(i);
+            let (own, exact) = (exp(x), x.exp());
+            let close = (own - exact).abs() <= exact * (1e-15 + 3e-17 * x.abs()) + 5e-324;
+            assert!(close || own == exact, "{x}: {own:e}, not {exact:e}");
+        }
+        assert!(exp(f64::NAN).is_nan());
+        assert_eq!([exp(1e9), exp(-1e9), exp(0.0)], [f64::INFINITY, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn powers_of_whole_exponents_are_products() {
+        let powers = [powi(1.1f32, 0), powi(1.1f32, 2), powi(1.1f32, 3)];
+        assert_eq!(powers, [1.0, 1.1 * 1.1, 1.1 * (1.1 * 1.1)]);
+        let powers = [powi(2.0f64, 60), powi(2.0f64, -60), powi(-3.0f64, 3)];
+        assert_eq!(powers, [(1u64 << 60) as f64, 1.0 / (1u64 << 60) as f64, -27.0]);
     }
 }

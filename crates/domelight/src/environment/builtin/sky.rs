@@ -85,7 +85,8 @@ impl Sky {
             ],
         ];
         let [x, y] = zenith_chromaticity(t, sun_theta);
-        let at_zenith = |i: usize| distribution(&perez[i], 1.0, sun_theta);
+        let gamma = (sun_theta, functions::cos(sun_theta));
+        let at_zenith = |i: usize| distribution(&perez[i], 1.0, gamma);
         let scale = [1.0, x / at_zenith(1), y / at_zenith(2)];
         let sun_radiance = sun_radiance(t, sun_theta);
         let sun = direction(sun_theta, sun_phi);
@@ -97,7 +98,8 @@ impl Sky {
 
     /// Radiance of the sky without the sun; `d` above the horizon.
     fn radiance(&self, d: Vec3) -> Rgb {
-        let gamma = functions::acos((d.dot(self.sun) as f64).clamp(-1.0, 1.0));
+        let cos_gamma = (d.dot(self.sun) as f64).clamp(-1.0, 1.0);
+        let gamma = (functions::acos(cos_gamma), cos_gamma);
         let [luminance, x, y] =
             [0, 1, 2].map(|i| self.scale[i] * distribution(&self.perez[i], d.y as f64, gamma));
         rgb_of_chromaticity(luminance / UNIT, x, y)
@@ -169,8 +171,8 @@ impl Sky {
 }
 
 /// Perez 1993 (Preetham et al., equation 3): (1 + A e^{B/cos θ})(1 + C e^{Dγ} + E cos² γ).
-fn distribution([a, b, c, d, e]: &[f64; 5], cos_theta: f64, gamma: f64) -> f64 {
-    let cos_gamma = functions::cos(gamma);
+/// Of γ and its cosine.
+fn distribution([a, b, c, d, e]: &[f64; 5], cos_theta: f64, (gamma, cos_gamma): (f64, f64)) -> f64 {
     (1.0 + a * functions::exp(b / cos_theta.max(1e-3)))
         * (1.0 + c * functions::exp(d * gamma) + e * cos_gamma * cos_gamma)
 }
