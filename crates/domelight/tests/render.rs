@@ -245,7 +245,7 @@ fn noisy_pixels_get_more_camera_samples() {
     assert_eq!(hits, counts.shading_points);
 }
 
-/// With any number asked for, and however the picture is divided; as nearly as a few scout pixels tell.
+/// With any number asked for, and however the picture is divided; as nearly as the scouts of a small picture show.
 #[test]
 fn adaptive_sampling_spends_about_what_was_asked_for() {
     let environment = environment();

@@ -12,9 +12,8 @@
 //! 1991, "Unbiased Sampling Techniques for Image Synthesis".) Pixels of lower levels find silhouettes by what their
 //! samples saw of the background, and by the difference of their means where one is covered more than another.
 //!
-//! One scale serves the whole picture, so that samples move from quiet tiles to noisy ones: a few scout pixels, with
-//! random numbers of their own, say where it lies. Exact budgets for tiles would cost a quarter to three quarters more
-//! error at equal rays (docs/experiments.md).
+//! One scale serves the whole picture, so that samples move from quiet tiles to noisy ones; scouts find it ([`scale`]).
+//! Exact budgets for tiles would cost a quarter to three quarters more error at equal rays (docs/experiments.md).
 
 use crate::math::functions;
 use rayon::prelude::*;
@@ -22,6 +21,7 @@ use rayon::prelude::*;
 use super::tile::{Pass, Scratch, Tile};
 use super::tiling::Window;
 use super::{RenderContext, RenderSettings};
+use crate::sampling::{Pcg32, Sampler};
 use crate::strategy::Strategy;
 use crate::strategy::levels::{N_LEVELS, coarser, level};
 
@@ -33,6 +33,10 @@ const OCTAVES: [i32; 2] = [-2, 3];
 
 /// Relative variances below this count as this.
 const LEAST_VARIANCE: f32 = 1e-6;
+
+/// Columns and rows of a window of scouts: two steps from one pixel of the first level to the next, so that pixels
+/// within the border have all their neighbors.
+const SCOUT_WINDOW: usize = 9;
 
 /// Coverages that differ by more belong to a silhouette.
 const SILHOUETTE: f32 = 0.02;
@@ -148,23 +152,26 @@ impl Allocation {
                 && let Some(variance) = self.predicted(i)
             {
                 self.counts[i] =
-                    count(self.n_samples, log(variance) + dither(i) - mean_log, self.fewest(i));
+                    count(self.n_samples, log(variance) + dither(i) - mean_log, fewest(round));
             }
         }
     }
 
-    /// The relative variance that a pixel has shown.
-    pub(super) fn relative_variance(&self, pixel: usize) -> Option<f32> {
-        self.seen[pixel]?.relative_variance
+    /// The pixels as scouts of others.
+    fn scouts(&self) -> impl Iterator<Item = Scout> {
+        let scout = |pixel: usize| {
+            let level = self.level(pixel);
+            let log = self.predicted(pixel).map(|variance| log(variance) + dither(pixel));
+            Scout { level, log }
+        };
+        let inner = |i: usize, n: usize| n < SCOUT_WINDOW || (1..n - 1).contains(&i);
+        let (width, height) = (self.width, self.counts.len() / self.width);
+        let complete = move |i: &usize| inner(i % width, width) && inner(i / width, height);
+        (0..self.counts.len()).filter(complete).map(scout)
     }
 
     fn level(&self, pixel: usize) -> u32 {
         level(pixel % self.width, pixel / self.width)
-    }
-
-    /// The fewest octaves of a pixel. Where two more levels build on what it sees, it has the usual number at least.
-    fn fewest(&self, pixel: usize) -> i32 {
-        if self.level(pixel) + 2 < N_LEVELS { 0 } else { OCTAVES[0] }
     }
 }
 
@@ -180,61 +187,125 @@ fn count(n: u32, octaves: f32, fewest: i32) -> u32 {
     count.max(1)
 }
 
-/// The logarithm at which a pixel of the picture has the usual number, from scout pixels with random numbers of their
-/// own; `None` if they see no scene.
-pub(super) fn mean_log<S: Strategy>(
-    context: &RenderContext,
-    strategy: &S,
-    pass: &Pass<S>,
-) -> Option<f32> {
-    /// Scouts across the picture.
-    const ACROSS: usize = 12;
-    let RenderSettings { width, height, seed, .. } = context.settings;
-    let settings = RenderSettings { seed: !seed, ..context.settings };
-    let context = &RenderContext { settings, filter: context.filter.clone(), ..*context };
-    let at = |i: usize, n: usize| (2 * i + 1) * n / (2 * ACROSS);
-    let logs: Vec<Option<f32>> = (0..ACROSS * ACROSS)
-        .into_par_iter()
-        .map_init(Scratch::<S>::default, |scratch, i| {
-            let (x, y) = (at(i % ACROSS, width), at(i / ACROSS, height));
-            let mut tile = Tile::new(Window { x, y, width: 1, height: 1 });
-            tile.render(context, strategy, pass, scratch, &());
-            let sees_scene = tile.counts.shading_points > 0;
-            sees_scene.then(|| scratch.allocation().relative_variance(0)).flatten().map(log)
-        })
-        .collect();
-    let logs: Vec<f32> = logs.into_iter().flatten().collect();
-    (!logs.is_empty()).then(|| scale(&logs, pass.n_samples))
+/// The fewest octaves of the pixels of a level. Where two more levels build on what they see, they have the usual
+/// number at least.
+fn fewest(level: u32) -> i32 {
+    if level + 2 < N_LEVELS { 0 } else { OCTAVES[0] }
 }
 
-/// The logarithm at which a pixel has `n` samples, if pixels like these have `n` on average.
-fn scale(logs: &[f32], n: u32) -> f32 {
+/// The share of a tile's pixels that are of a level.
+fn share(level: u32) -> f64 {
+    f64::from(1 << level.saturating_sub(1)) / 16.0
+}
+
+/// A pixel that shows how many samples pixels like it will get.
+#[derive(Clone, Copy, Debug)]
+struct Scout {
+    level: u32,
+    /// What its number of samples follows from; `None` where it is the usual number.
+    log: Option<f32>,
+}
+
+impl Scout {
+    /// Its samples, if a pixel at `mean_log` has `n`.
+    fn count(self, n: u32, mean_log: f32) -> f64 {
+        let octaves = self.log.map(|log| log - mean_log);
+        f64::from(octaves.map_or(n, |octaves| count(n, octaves, fewest(self.level))))
+    }
+}
+
+/// The mean number of samples of a pixel of the picture, over n, if a pixel at `mean_log` has `n`.
+fn spent(scouts: &[Scout], n: u32, mean_log: f32) -> f64 {
+    let (mut sum, mut shares) = (0.0, 0.0);
+    for level in 0..N_LEVELS {
+        let of_level = || scouts.iter().filter(|scout| scout.level == level);
+        let counts: f64 = of_level().map(|scout| scout.count(n, mean_log)).sum();
+        if counts > 0.0 {
+            sum += share(level) * counts / of_level().count() as f64;
+            shares += share(level);
+        }
+    }
+    sum / shares / f64::from(n)
+}
+
+/// The logarithm at which a pixel has `n` samples, if pixels like these have `n` on average; `None` if none of them
+/// sees the scene.
+fn mean_log(scouts: &[Scout], n: u32) -> Option<f32> {
     /// The range is halved as often.
     const STEPS: usize = 20;
-    /// The share of the pixels that two more levels build on.
-    const PREDICTORS: f64 = 0.25;
-    let [fewest, most] = OCTAVES;
-    let spent = |mean_log: f32| {
-        let cost = |&log: &f32| {
-            let [predictor, other] = [0, fewest].map(|fewest| count(n, log - mean_log, fewest));
-            PREDICTORS * f64::from(predictor) + (1.0 - PREDICTORS) * f64::from(other)
-        };
-        logs.iter().map(cost).sum::<f64>() / logs.len() as f64
-    };
+    let [fewest, most] = OCTAVES.map(|octaves| octaves as f32);
+    let logs = || scouts.iter().filter_map(|scout| scout.log);
+    let mut low = logs().reduce(f32::min)? - most - 1.0;
+    let mut high = logs().reduce(f32::max)? - fewest + 1.0;
     // `low` spends too much, `high` does not.
-    let bounds = logs
-        .iter()
-        .fold((f32::INFINITY, f32::NEG_INFINITY), |b, &log| (b.0.min(log), b.1.max(log)));
-    let (mut low, mut high) = (bounds.0 - most as f32 - 1.0, bounds.1 - fewest as f32 + 1.0);
     for _ in 0..STEPS {
         let middle = 0.5 * (low + high);
-        if spent(middle) > f64::from(n) {
+        if spent(scouts, n, middle) > 1.0 {
             low = middle;
         } else {
             high = middle;
         }
     }
-    high
+    Some(high)
+}
+
+/// The logarithm at which a pixel has the usual number of samples, so that those of the picture are about as many as
+/// were asked for; `None` if no scout sees the scene.
+///
+/// Scouts are windows of pixels, spread over the picture, with random numbers of their own: a scale that followed a
+/// pixel's own samples would bias them. They are rendered twice: a few with as many samples in every pixel, which finds
+/// a first scale; then all of them by that scale, since a strategy that learns errs less where more is learned.
+pub(super) fn scale<S: Strategy>(
+    context: &RenderContext,
+    strategy: &S,
+    pass: &Pass<S>,
+) -> Option<f32> {
+    /// A window for so many pixels of the picture: scouts cost a twentieth of the render, less in large pictures.
+    const PIXELS_PER_WINDOW: usize = 20 * SCOUT_WINDOW * SCOUT_WINDOW;
+    /// The fewest and the most.
+    const N_WINDOWS: [usize; 2] = [16, 400];
+    /// Windows for the first scale.
+    const FIRST: usize = 9;
+    let RenderSettings { width, height, seed, .. } = context.settings;
+    let settings = RenderSettings { seed: !seed, ..context.settings };
+    let context = &RenderContext { settings, filter: context.filter.clone(), ..*context };
+    let sampler = Sampler::for_pass(settings.sampler, settings.seed, 0);
+    let render = |n: usize, mean_log: Option<f32>| -> Vec<Scout> {
+        let shared = strategy.begin_pass(sampler, pass.n_samples);
+        let pass = &Pass { mean_log, shared, ..*pass };
+        spread(width, height, SCOUT_WINDOW, n)
+            .into_par_iter()
+            .map_init(Scratch::<S>::default, |scratch, window| {
+                Tile::new(window).render(context, strategy, pass, scratch, &());
+                scratch.allocation().scouts().collect::<Vec<_>>()
+            })
+            .flatten_iter()
+            .collect()
+    };
+    let first = mean_log(&render(FIRST, None), pass.n_samples)?;
+    let [fewest, most] = N_WINDOWS;
+    let n_windows = (width * height / PIXELS_PER_WINDOW).clamp(fewest, most);
+    mean_log(&render(n_windows, Some(first)), pass.n_samples)
+}
+
+/// About `n` windows of `size` × `size` pixels, or what the picture has, one at random in each cell of a grid.
+fn spread(width: usize, height: usize, size: usize, n: usize) -> Vec<Window> {
+    let aspect = (width as f64 / height as f64).sqrt();
+    let cells = |of: f64, extent: usize| ((n as f64).sqrt() * of).round().clamp(1.0, extent as f64);
+    let (across, down) = (cells(aspect, width), cells(1.0 / aspect, height));
+    let mut pcg = Pcg32::new(0, 0);
+    let mut place = |i: usize, cells: f64, extent: usize| {
+        let free = (extent + 1 - size.min(extent)) as f64;
+        ((i as f64 + f64::from(pcg.next_f32())) / cells * free) as usize
+    };
+    let mut windows = Vec::with_capacity((across * down) as usize);
+    for row in 0..down as usize {
+        for column in 0..across as usize {
+            let (x, y) = (place(column, across, width), place(row, down, height));
+            windows.push(Window { x, y, width: size.min(width), height: size.min(height) });
+        }
+    }
+    windows
 }
 
 /// An eighth of an octave more or less, so that pixels of equal variance do not all jump to another power of two at once.
@@ -287,18 +358,29 @@ mod tests {
     fn the_scale_spends_what_was_asked_for() {
         let mut pcg = Pcg32::new(1, 2);
         for n in [8, 16, 64] {
-            for relative_variance in [0.0, 1.0, 4.0] {
-                let logs: Vec<f32> =
-                    (0..1000).map(|_| -3.0 + relative_variance * (pcg.next_f32() - 0.5)).collect();
-                let mean_log = scale(&logs, n);
-                let number = |(i, &log): (usize, &f32)| {
-                    f64::from(count(n, log - mean_log, if i % 4 == 0 { 0 } else { OCTAVES[0] }))
-                };
-                let mean = logs.iter().enumerate().map(number).sum::<f64>() / 1000.0;
-                assert!(
-                    (mean / f64::from(n) - 1.0).abs() < 0.06,
-                    "{n} {relative_variance}: {mean}"
-                );
+            for range in [0.0, 1.0, 4.0] {
+                let scouts: Vec<Scout> = (0..1024)
+                    .map(|i| {
+                        let level = level(i % 32, i / 32);
+                        let log = -3.0 + range * (pcg.next_f32() - 0.5);
+                        Scout { level, log: (level > 0).then_some(log) }
+                    })
+                    .collect();
+                let mean_log = mean_log(&scouts, n).unwrap();
+                let mean = spent(&scouts, n, mean_log);
+                assert!((mean - 1.0).abs() < 0.06, "{n} {range}: {mean}");
+            }
+        }
+        assert_eq!(mean_log(&[Scout { level: 0, log: None }], 8), None);
+    }
+
+    #[test]
+    fn scouts_lie_within_the_picture() {
+        for (width, height) in [(1, 1), (640, 3), (9, 700), (640, 480)] {
+            let windows = spread(width, height, SCOUT_WINDOW, 25);
+            assert!((1..=100).contains(&windows.len()), "{}", windows.len());
+            for w in windows {
+                assert!(w.x + w.width <= width && w.y + w.height <= height, "{w:?}");
             }
         }
     }

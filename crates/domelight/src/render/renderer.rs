@@ -5,7 +5,7 @@ use std::ops::{Deref, Range};
 
 use rayon::prelude::*;
 
-use super::allocation::mean_log;
+use super::allocation::scale;
 use super::film::{Film, FilmMismatch, Layers, PixelSums, SampleSet};
 use super::filter::FilterSampler;
 use super::tile::{Counts, Pass, Scratch, Tile};
@@ -240,7 +240,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let adaptive = settings.adaptive && strategy.n_rounds() > 1;
         let mut pass = Pass { n_samples, set, adaptive, mean_log: None, shared };
         if adaptive {
-            pass.mean_log = mean_log(context, strategy, &pass);
+            pass.mean_log = scale(context, strategy, &pass);
         }
         let behind = |tile: &Tile| tile.n_samples() == start && !tile.is_finished(settings);
         let complete = tiles

@@ -224,6 +224,7 @@ impl Tile {
         batch.seen.clear();
         batch.seen.resize(n_pixels, false);
         self.find_seen(context, self.window, &mut batch.seen);
+        batch.allocation.reset(width, n_pixels, pass.n_samples, pass.mean_log);
         let hidden = context.settings.background == Background::Hidden;
         if self.pixels.is_empty() && hidden && !batch.seen.contains(&true) {
             self.n_missed += pass.n_samples;
@@ -242,8 +243,9 @@ impl Tile {
         let one_in_many = learns && context.settings.target_error.is_none();
         self.choose_second_sets(context, one_in_many, batch);
         batch.adaptive = learns && pass.adaptive;
-        let mean_log = pass.mean_log.filter(|_| batch.adaptive);
-        batch.allocation.reset(width, n_pixels, pass.n_samples, mean_log);
+        if !batch.adaptive {
+            batch.allocation.reset(width, n_pixels, pass.n_samples, None);
+        }
         for round in 0..n_rounds {
             batch.allocation.assign(round);
             let of_round = |i: usize| !learns || level(i % width, i / width) == round;
