@@ -5,10 +5,12 @@ use std::sync::OnceLock;
 
 use domelight::Rgb;
 use domelight::bsdf::{Bsdf, MaterialSpec};
+use domelight::bvh::InstructionSet;
 use domelight::environment::{Environment, Orientation, builtin::BuiltinProbe};
-use domelight::render::{Background, Filter, Layers, RenderSettings, Renderer};
+use domelight::render::{Background, Filter, Layers, RenderSettings, pilot_points, render};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{Camera, EnvironmentSource, Material, Scene};
+use domelight::strategy::{PreparedStrategy, StrategySpec};
 
 /// One for each kind of strategy, and for what differs most within a kind.
 const STRATEGIES: [&str; 14] = [
@@ -55,9 +57,9 @@ const SIZE: usize = 37;
 /// A line for each strategy and each material: its name, a space and sixteen hexadecimal digits.
 ///
 /// # Panics
-/// If a name above is none, or a scene cannot be rendered.
-pub fn report() -> String {
-    let stages: Vec<Stage> = SCENES.into_iter().map(Stage::new).collect();
+/// If a name above is none, a scene cannot be rendered, or the processor lacks the instructions.
+pub fn report(instruction_set: InstructionSet) -> String {
+    let stages = SCENES.map(|scene| Stage::new(scene, instruction_set));
     let mut report = String::new();
     for strategy in STRATEGIES {
         let mut checksum = Checksum::new();
@@ -66,7 +68,7 @@ pub fn report() -> String {
         }
         writeln!(report, "{strategy} {:016x}", checksum.0).expect("text has room");
     }
-    let mut stage = Stage::new(BuiltinScene::Sphere);
+    let mut stage = Stage::new(BuiltinScene::Sphere, instruction_set);
     for material in MATERIALS {
         let spec: MaterialSpec = material.parse().expect("a material");
         stage.replace_materials(Bsdf::from(spec));
@@ -84,16 +86,19 @@ struct Stage {
     builtin: BuiltinScene,
     scene: Scene,
     environment: Environment,
+    instruction_set: InstructionSet,
 }
 
 impl Stage {
-    fn new(builtin: BuiltinScene) -> Self {
+    fn new(builtin: BuiltinScene, instruction_set: InstructionSet) -> Self {
         let light = builtin.environment();
         let EnvironmentSource::Builtin(probe) = &light.source else { panic!("a built-in probe") };
         let map = probe.parse::<BuiltinProbe>().expect("a probe").image(64);
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
         let environment = Environment::new(map, orientation, light.factor()).expect("a map");
-        Self { builtin, scene: Scene::builtin(builtin), environment }
+        let scene =
+            Scene::builtin(builtin).with_instruction_set(instruction_set).expect("instructions");
+        Self { builtin, scene, environment, instruction_set }
     }
 
     fn replace_materials(&mut self, bsdf: Bsdf) {
@@ -101,7 +106,8 @@ impl Stage {
         for material in &mut description.materials {
             *material = Material::fixed("replaced", bsdf);
         }
-        self.scene = Scene::new(description).expect("a scene");
+        let scene = Scene::new(description).expect("a scene");
+        self.scene = scene.with_instruction_set(self.instruction_set).expect("instructions");
     }
 
     fn render(&self, strategy: &str) -> Layers {
@@ -114,9 +120,15 @@ impl Stage {
             ..RenderSettings::default()
         };
         let camera = Camera::framing(&self.scene, SIZE, SIZE);
-        let strategy = strategy.parse().expect("a strategy");
-        let renderer = Renderer::new(&self.scene, &camera, &self.environment, strategy, settings);
-        renderer.expect("a strategy that suits the environment").finish().layers()
+        let Self { scene, environment, .. } = self;
+        let spec: StrategySpec = strategy.parse().expect("a strategy");
+        let points = || pilot_points(scene, &camera, &settings);
+        let spec = spec.for_scene(points, environment, settings.seed);
+        let strategy = PreparedStrategy::new(spec, environment)
+            .expect("a strategy that suits the environment")
+            .with_instruction_set(self.instruction_set)
+            .expect("instructions");
+        render(scene, &camera, environment, &strategy, &settings, &()).layers
     }
 }
 
@@ -154,5 +166,6 @@ impl Checksum {
 #[unsafe(no_mangle)]
 pub extern "C" fn report_byte(i: u32) -> u32 {
     static REPORT: OnceLock<String> = OnceLock::new();
-    REPORT.get_or_init(report).as_bytes().get(i as usize).map_or(256, |&byte| u32::from(byte))
+    let report = REPORT.get_or_init(|| report(InstructionSet::best()));
+    report.as_bytes().get(i as usize).map_or(256, |&byte| u32::from(byte))
 }
