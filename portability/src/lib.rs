@@ -7,7 +7,7 @@ use domelight::Rgb;
 use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::bvh::InstructionSet;
 use domelight::environment::{Environment, Orientation, builtin::BuiltinProbe};
-use domelight::render::{Background, Filter, Layers, RenderSettings, pilot_points, render};
+use domelight::render::{Background, Filter, Layers, RenderSettings, render};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{Camera, EnvironmentSource, Material, Scene};
 use domelight::strategy::{PreparedStrategy, StrategySpec};
@@ -122,8 +122,7 @@ impl Stage {
         let camera = Camera::framing(&self.scene, SIZE, SIZE);
         let Self { scene, environment, .. } = self;
         let spec: StrategySpec = strategy.parse().expect("a strategy");
-        let points = || pilot_points(scene, &camera, &settings);
-        let spec = spec.for_scene(points, environment, settings.seed);
+        let spec = spec.for_picture(scene, &camera, environment, &settings);
         let strategy = PreparedStrategy::new(spec, environment)
             .expect("a strategy that suits the environment")
             .with_instruction_set(self.instruction_set)

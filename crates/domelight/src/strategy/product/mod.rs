@@ -172,6 +172,10 @@ impl Strategy for ProductSampling<'_> {
         N_LEVELS
     }
 
+    fn unit(&self) -> f64 {
+        self.environment.unit()
+    }
+
     fn n_rays(&self) -> u32 {
         self.n_rays
     }
