@@ -189,7 +189,7 @@ impl Power {
         Self::new::<9>(shifted, (x - (shifted - Self::SHIFT)) * LN_2)
     }
 
-    /// eˣ to 10⁻¹⁵ of the result and 3·10⁻¹⁷ |x| of it.
+    /// eˣ to 10⁻¹⁵ + 3.4·10⁻¹⁷ |x| of the result: what f64 leaves of ln 2 is 2.3·10⁻¹⁷.
     #[inline(always)]
     fn of_e(x: f64) -> Self {
         /// ln 2, its lower half zero, so that its multiples are exact, and the rest.
@@ -403,7 +403,7 @@ mod tests {
         for i in -760_000..720_000 {
             let x = 1e-3 * f64::from(i);
             let (own, exact) = (exp(x), x.exp());
-            let close = (own - exact).abs() <= exact * (1e-15 + 3e-17 * x.abs()) + 5e-324;
+            let close = (own - exact).abs() <= exact * (1e-15 + 3.4e-17 * x.abs()) + 5e-324;
             assert!(close || own == exact, "{x}: {own:e}, not {exact:e}");
         }
         assert!(exp(f64::NAN).is_nan());
