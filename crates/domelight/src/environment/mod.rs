@@ -267,6 +267,25 @@ impl Environment {
         Ok(Self { map, unit, orientation, grid, table, inverse_power, max_luminance })
     }
 
+    /// The same radiance of more texels, each divided into columns and rows of equal ones, if the map is much narrower or
+    /// wider than 2:1; else `None`.
+    ///
+    /// Divisions of a map into squares of texels assume that its texels are about as wide as high.
+    pub(crate) fn divided(&self) -> Option<Self> {
+        /// A map beyond is left as it is.
+        const MOST_TEXELS: usize = 1 << 22;
+        let RgbImage { width, height, .. } = self.map;
+        let columns = if width < height { (2 * height).div_ceil(width) } else { 1 };
+        let rows = if width > 4 * height { width.div_ceil(2 * height) } else { 1 };
+        let n_texels = width.checked_mul(height)?.checked_mul(columns)?.checked_mul(rows)?;
+        if columns * rows == 1 || n_texels > MOST_TEXELS {
+            return None;
+        }
+        let texel = |x: usize, y: usize| self.map.get(x / columns, y / rows);
+        let map = RgbImage::from_fn(width * columns, height * rows, texel);
+        Self::in_units(map, self.orientation, self.unit, 1.0).ok()
+    }
+
     /// The same radiance from everywhere.
     ///
     /// # Errors
