@@ -102,7 +102,7 @@ impl SceneArguments {
         memory::keep(memory::TRIANGLE * n_triangles as u64);
         let scene = Scene::new(description).with_context(|| self.scene.clone())?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
-        let scale = light.scale * light.exposure.exp2();
+        let scale = light.factor();
         let probe = probe_name(&light.source);
         let environment =
             Environment::new(map, orientation, scale).with_context(|| probe.clone())?;

@@ -41,6 +41,8 @@
 //! pictures, probes and scenes. Without either the library is the sampling core alone: [`math`],
 //! [`sampling`], [`bsdf`], [`environment`], [`strategy`], [`rig`].
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))] // See `math::functions`.
+
 pub mod bsdf;
 mod color;
 pub mod environment;

@@ -2,6 +2,8 @@
 //!
 //! The world is right-handed with +Y up. Vectors are [`glam`]'s; directions are unit vectors.
 
+pub(crate) mod functions;
+
 pub use glam::{Mat3, Mat4, Quat, Vec2, Vec3, Vec4, vec2, vec3};
 
 pub use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
@@ -133,6 +135,26 @@ pub(crate) fn tangents<F: SimdFloat>(n: Vectors<F>) -> [Vectors<F>; 2] {
     ]
 }
 
+/// The rotation by an angle about the x axis \[rad\].
+#[cfg(feature = "render")]
+pub(crate) fn rotation_x(angle: f32) -> Mat3 {
+    let (sin, cos) = functions::sin_cos(angle);
+    Mat3::from_cols(Vec3::X, vec3(0.0, cos, sin), vec3(0.0, -sin, cos))
+}
+
+/// The rotation by an angle about the y axis \[rad\].
+pub(crate) fn rotation_y(angle: f32) -> Mat3 {
+    let (sin, cos) = functions::sin_cos(angle);
+    Mat3::from_cols(vec3(cos, 0.0, -sin), Vec3::Y, vec3(sin, 0.0, cos))
+}
+
+/// The rotation by an angle about the z axis \[rad\].
+#[cfg(feature = "render")]
+pub(crate) fn rotation_z(angle: f32) -> Mat3 {
+    let (sin, cos) = functions::sin_cos(angle);
+    Mat3::from_cols(vec3(cos, sin, 0.0), vec3(-sin, cos, 0.0), Vec3::Z)
+}
+
 /// The mirror direction of `w` about the unit vector `n`; both point away from the surface.
 pub fn reflect(w: Vec3, n: Vec3) -> Vec3 {
     2.0 * w.dot(n) * n - w
@@ -141,7 +163,7 @@ pub fn reflect(w: Vec3, n: Vec3) -> Vec3 {
 /// A unit vector from spherical angles about +z: cos θ, and φ from +x \[rad\].
 pub fn from_spherical(cos_theta: f32, phi: f32) -> Vec3 {
     let sin_theta = ((1.0 - cos_theta) * (1.0 + cos_theta)).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = phi.sin_cos();
+    let (sin_phi, cos_phi) = functions::sin_cos(phi);
     vec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
 }
 
@@ -180,6 +202,20 @@ mod tests {
             worst = worst.max((s - sin).abs()).max((c - cos).abs());
         }
         assert!(worst < 2.5e-7, "{worst}");
+    }
+
+    #[cfg(feature = "render")]
+    #[test]
+    fn rotations_are_those_of_glam() {
+        for i in -20..20 {
+            let angle = 0.37 * i as f32;
+            let pairs = [
+                (rotation_x(angle), Mat3::from_rotation_x(angle)),
+                (rotation_y(angle), Mat3::from_rotation_y(angle)),
+                (rotation_z(angle), Mat3::from_rotation_z(angle)),
+            ];
+            assert!(pairs.iter().all(|(own, glam)| own.abs_diff_eq(*glam, 1e-6)), "{angle}");
+        }
     }
 
     #[test]

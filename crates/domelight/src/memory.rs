@@ -1,5 +1,6 @@
 //! Memory: amounts as text, and what would exceed a limit.
 
+use crate::math::functions;
 use std::fmt;
 use std::str::FromStr;
 
@@ -46,7 +47,8 @@ impl FromStr for MemorySize {
         };
         let decimal = unit.len() == 2 && unit.ends_with('b');
         let base: f64 = if decimal { 1000.0 } else { 1024.0 };
-        let bytes = number.trim().parse::<f64>().ok().zip(power).map(|(n, p)| n * base.powi(p));
+        let bytes =
+            number.trim().parse::<f64>().ok().zip(power).map(|(n, p)| n * functions::powi(base, p));
         match bytes {
             Some(bytes) if (1.0..1e18).contains(&bytes) => Ok(Self(bytes as u64)),
             _ => Err(ParseMemorySizeError { text: text.to_owned() }),

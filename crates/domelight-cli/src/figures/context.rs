@@ -84,7 +84,7 @@ impl FigureContext {
         let map = arguments.environment.load(&light, quiet)?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
         let probe = probe_name(&light.source);
-        let scale = light.scale * light.exposure.exp2();
+        let scale = light.factor();
         let environment =
             Environment::new(map, orientation, scale).with_context(|| probe.clone())?;
         if environment.power() == 0.0 {

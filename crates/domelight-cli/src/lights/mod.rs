@@ -178,7 +178,7 @@ impl LightsArguments {
         let more = memory::EXTRACTION_TEXEL - memory::ENVIRONMENT_TEXEL;
         memory::allow(&format!("{probe}: its lights"), more * map.pixels.len() as u64)?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
-        let scale = light.scale * light.exposure.exp2();
+        let scale = light.factor();
         let environment =
             Environment::new(map, orientation, scale).with_context(|| probe.clone())?;
         Ok((environment, probe))

@@ -10,7 +10,7 @@
 
 use super::microfacet::{Masking, Microfacet, NormalDistribution, gaussian_slopes};
 use super::{Fresnel, range};
-use crate::math::{FRAC_1_PI, sqr};
+use crate::math::{FRAC_1_PI, functions, sqr};
 use crate::simd::{SimdFloat, Vectors};
 
 /// A Beckmann lobe.
@@ -48,7 +48,7 @@ impl NormalDistribution for BeckmannNormals {
         let [ax, ay] = self.alpha;
         let z2 = h.z.squared();
         let slope2 = ((h.x / one(ax)).squared() + (h.y / one(ay)).squared()) / z2;
-        let gauss = slope2.map(|s| (-s).exp());
+        let gauss = slope2.map(|s| functions::exp(-s));
         one(FRAC_1_PI / (ax * ay)) * gauss * (h.length_squared() / z2).squared()
     }
 
@@ -57,7 +57,7 @@ impl NormalDistribution for BeckmannNormals {
         let [ax, ay] = self.alpha;
         let alpha2 = sqr(ax.max(ay));
         let t = (2.0 * alpha2 - 1.0).clamp(tan2[0], tan2[1]);
-        FRAC_1_PI / (ax * ay) * (-t / alpha2).exp() * sqr(1.0 + t)
+        FRAC_1_PI / (ax * ay) * functions::exp(-t / alpha2) * sqr(1.0 + t)
     }
 
     /// cos θ (1 + Λ), with the fit Λ(a) = (1 − 1.259 a + 0.396 a²)/(3.535 a + 2.181 a²) below

@@ -18,7 +18,7 @@
 
 use super::{Brdf, Fresnel, HORIZON, ROUNDING, where_above};
 use crate::Rgb;
-use crate::math::{Vec3, sin_cos_turns, sqr, vec3};
+use crate::math::{Vec3, functions, sin_cos_turns, sqr, vec3};
 use crate::simd::{Colors, SimdFloat, Vectors};
 
 /// How masking toward the viewer and shadowing from the light are combined.
@@ -149,7 +149,7 @@ pub(super) fn reflect_about<F: SimdFloat>(wo: Vectors<F>, h: Vectors<F>) -> Vect
 /// exp(−tan² θ_h (cos² φ_h/α_x² + sin² φ_h/α_y²)) / (π α_x α_y cos³ θ_h).
 #[inline(always)]
 pub(super) fn gaussian_slopes<F: SimdFloat>([u, v]: [F; 2], [ax, ay]: [f32; 2]) -> Vectors<F> {
-    let radius = u.map(|u| -f32::ln_1p(-u)).sqrt();
+    let radius = u.map(|u| -functions::ln_1p(-u)).sqrt();
     let [sin, cos] = sin_cos_turns(v);
     Vectors { x: u.splat(ax) * radius * cos, y: u.splat(ay) * radius * sin, z: u.splat(1.0) }
 }

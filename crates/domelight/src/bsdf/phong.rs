@@ -10,7 +10,7 @@
 
 use super::{Brdf, HORIZON, ROUNDING, range, where_above};
 use crate::Rgb;
-use crate::math::{TAU, Vec3, tangents};
+use crate::math::{TAU, Vec3, functions, tangents};
 use crate::sampling::warp;
 use crate::simd::{Colors, SimdFloat, Vectors};
 
@@ -40,7 +40,8 @@ impl Brdf for Phong {
         // lengths, which the power multiplies by n.
         let versine = wi.z.splat(0.5)
             * Vectors { x: wi.x + wo.x, y: wi.y + wo.y, z: wi.z - wo.z }.length_squared();
-        let power = versine.map(|v| if v < 1.0 { (n * f32::ln_1p(-v)).exp() / TAU } else { 0.0 });
+        let power = versine
+            .map(|v| if v < 1.0 { functions::exp(n * functions::ln_1p(-v)) / TAU } else { 0.0 });
         let power = where_above(wo, wi, power);
         let value = power.splat(n + 2.0) * power * wi.z;
         (Colors::splat(value, self.specular).scaled(value), power.splat(n + 1.0) * power)
@@ -66,7 +67,7 @@ impl Brdf for Phong {
         let sin_o = wo.truncate().length();
         let b = (n + 1.0) * cos_o;
         let tan_alpha = 2.0 * sin_o / (b + (b * b + 4.0 * n * sin_o * sin_o).sqrt());
-        let cos_alpha_n = (-0.5 * n * f32::ln_1p(tan_alpha * tan_alpha)).exp();
+        let cos_alpha_n = functions::exp(-0.5 * n * functions::ln_1p(tan_alpha * tan_alpha));
         let cos_i = (cos_o + sin_o * tan_alpha) / (1.0 + tan_alpha * tan_alpha).sqrt();
         let peak = (n + 2.0) / TAU * cos_alpha_n * cos_i;
         self.specular.max_component() * peak * ROUNDING

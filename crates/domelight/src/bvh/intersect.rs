@@ -9,9 +9,14 @@
 //! the greatest distance from the origin to the scene along an axis.
 //!
 //! The box test asks about the unsheared ray. To let everything through that the triangle test would
-//! accept, planes move outward by 16·2⁻²⁴·m: the shear's 7, the box test's own 3, 1 for a
-//! component of the direction that counts as greater than it is, and room to spare
-//! (the paper's section on traversal does it axis by axis).
+//! accept, planes move outward by 16·2⁻²⁴·m + 4·2⁻²⁴·|o|, o being the origin's coordinate (after Ize 2013, "Robust BVH
+//! Ray Traversal", and the section on traversal of the paper above).
+//! Of the former the shear needs 7, a component of the direction that counts as greater than it is 1, and the box test 4:
+//! of the distance p/d − o/d to a plane p, its own rounding, that of 1/d on two axes that meet, and that of the
+//! product p/d, since |p| ≤ |o| + m. Of the latter o ± margin, its product with 1/d, and p/d again need one each.
+//! So it does not matter how often p/d − o/d is rounded: which boxes are entered may differ, hits do not. Instruction
+//! sets that fuse do so ([`SimdF32x8::mul_sub`]), the others do not; the tests compare all of them with a loop over all
+//! triangles. The product must not overflow, though, where the difference would not.
 
 use super::prepare::PreparedRays;
 use super::{Block, Lanes, Node, WIDTH};

@@ -76,7 +76,8 @@ impl<const N: usize> PreparedRays<N> {
     #[inline(always)]
     fn prepare_eight<S: Simd>(&mut self, simd: S, first: usize, scene: &Aabb) -> u32 {
         const INFLATION: f32 = 1.0 / (1 << 20) as f32;
-        // The rounding of origin ± inflation and of its product with the inverse direction, twice over.
+        // The rounding of origin ± inflation, of its product with the inverse direction and of the plane's, and room to
+        // spare.
         const ORIGIN_ROUNDING: f32 = 1.0 / (1 << 22) as f32;
         // A component so small moves the ray by less than the inflation while it crosses the scene.
         const NEGLIGIBLE: f32 = 1.0 / (1 << 24) as f32;

@@ -19,7 +19,7 @@ mod overlap;
 
 pub use convert::{from_lat_long, to_lat_long};
 
-use crate::math::{PI, TAU, Vec2, Vec3, sqr, vec2, vec3};
+use crate::math::{PI, TAU, Vec2, Vec3, functions, sqr, vec2, vec3};
 use std::str::FromStr;
 
 /// What the `envmap` attribute of an OpenEXR file says about its picture.
@@ -200,10 +200,10 @@ impl Mapping {
 
     fn density_at(self, uv: Vec2, direction: Vec3) -> f32 {
         match self {
-            Self::LatLong | Self::LatLongExr => PI * TAU * (PI * uv.y).sin().max(0.0),
+            Self::LatLong | Self::LatLongExr => PI * TAU * functions::sin(PI * uv.y).max(0.0),
             Self::Angular => {
                 let r = disc(uv).length();
-                let sinc = if r < 1e-4 { PI } else { (PI * r).sin().max(0.0) / r };
+                let sinc = if r < 1e-4 { PI } else { functions::sin(PI * r).max(0.0) / r };
                 4.0 * PI * sinc
             }
             // sin θ dθ = 4 r dr for θ = 2 asin r: the reflection in a ball preserves area.
@@ -212,7 +212,7 @@ impl Mapping {
             // dω = ds dt / (1 + s² + t²)^{3/2}, and 1/√(1 + s² + t²) is the greatest component.
             _ => {
                 let (columns, rows) = self.aspect();
-                4.0 * (columns * rows) as f32 * direction.abs().max_element().powi(3)
+                4.0 * (columns * rows) as f32 * functions::powi(direction.abs().max_element(), 3)
             }
         }
     }
@@ -275,14 +275,14 @@ impl FromStr for Mapping {
 
 /// d = (sin φ sin θ, cos θ, −cos φ sin θ), φ = 2π(u − ½), θ = π v.
 fn lat_long_direction(uv: Vec2) -> Vec3 {
-    let (sin_phi, cos_phi) = (TAU * (uv.x - 0.5)).sin_cos();
-    let (sin_theta, cos_theta) = (PI * uv.y).sin_cos();
+    let (sin_phi, cos_phi) = functions::sin_cos(TAU * (uv.x - 0.5));
+    let (sin_theta, cos_theta) = functions::sin_cos(PI * uv.y);
     vec3(sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta)
 }
 
 fn lat_long_uv(d: Vec3) -> Vec2 {
-    let phi = d.x.atan2(-d.z);
-    let theta = d.x.hypot(d.z).atan2(d.y);
+    let phi = functions::atan2(d.x, -d.z);
+    let theta = functions::atan2(functions::hypot(d.x, d.z), d.y);
     vec2(phi / TAU + 0.5, theta / PI)
 }
 
@@ -304,14 +304,14 @@ fn disc_uv(p: Vec2) -> Vec2 {
 fn angular_direction(uv: Vec2) -> Option<Vec3> {
     let p = disc(uv);
     let r = p.length();
-    let (sin_theta, cos_theta) = (PI * r).sin_cos();
+    let (sin_theta, cos_theta) = functions::sin_cos(PI * r);
     let xy = p.normalize_or_zero() * sin_theta;
     (r <= 1.0).then(|| vec3(xy.x, xy.y, -cos_theta))
 }
 
 fn angular_uv(d: Vec3) -> Vec2 {
     let xy = vec2(d.x, d.y);
-    let r = xy.length().atan2(-d.z) / PI;
+    let r = functions::atan2(xy.length(), -d.z) / PI;
     // Straight backward every azimuth is right; take the rightmost point.
     let azimuth = xy.try_normalize().unwrap_or(Vec2::X);
     disc_uv(azimuth * r)
@@ -328,7 +328,7 @@ fn mirror_ball_direction(uv: Vec2) -> Option<Vec3> {
 /// r = sin(θ/2) with θ the angle to −Z.
 fn mirror_ball_uv(d: Vec3) -> Vec2 {
     let xy = vec2(-d.x, d.y);
-    let r = (0.5 * xy.length().atan2(-d.z)).sin();
+    let r = functions::sin(0.5 * functions::atan2(xy.length(), -d.z));
     disc_uv(xy.try_normalize().unwrap_or(Vec2::X) * r)
 }
 
@@ -342,7 +342,7 @@ fn octahedral_direction(uv: Vec2) -> Vec3 {
     let phi = if r == 0.0 { 0.25 * PI } else { ((q.y - q.x) / r + 1.0) * 0.25 * PI };
     let up = (1.0 - sqr(r)).copysign(signed_distance);
     let across = r * (2.0 - sqr(r)).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = phi.sin_cos();
+    let (sin_phi, cos_phi) = functions::sin_cos(phi);
     vec3(-(sin_phi * across).copysign(p.y), up, (cos_phi * across).copysign(p.x))
 }
 
@@ -351,7 +351,7 @@ fn octahedral_uv(d: Vec3) -> Vec2 {
     let across = sqr(x) + sqr(y);
     // r = √(1 − |z|), written so that it does not cancel near the poles.
     let r = (across / (1.0 + z.abs())).sqrt();
-    let phi = if across == 0.0 { 0.5 } else { y.abs().atan2(x.abs()) * (2.0 / PI) };
+    let phi = if across == 0.0 { 0.5 } else { functions::atan2(y.abs(), x.abs()) * (2.0 / PI) };
     let folded = vec2(r - phi * r, phi * r);
     let unfolded = if z < 0.0 { vec2(1.0 - folded.y, 1.0 - folded.x) } else { folded };
     0.5 * vec2(unfolded.x.copysign(x), unfolded.y.copysign(y)) + Vec2::splat(0.5)

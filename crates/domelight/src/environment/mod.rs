@@ -15,7 +15,7 @@ pub mod statistics;
 
 pub use compensation::CompensatedTable;
 
-use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, vec3};
+use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, vec3};
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
 use crate::simd::{LANES, SimdF32x8, SimdFloat, SimdI32x8 as _, Vectors};
 use crate::{Rgb, RgbImage};
@@ -77,7 +77,7 @@ pub struct Orientation {
 impl Orientation {
     /// The rotation from the map's own frame, +Y up and the center column toward −Z, to the world.
     pub fn map_to_world(self) -> Mat3 {
-        self.up.from_y_up() * Mat3::from_rotation_y(self.rotation.to_radians())
+        self.up.from_y_up() * rotation_y(self.rotation.to_radians())
     }
 }
 
@@ -444,7 +444,7 @@ impl Environment {
     /// The direction of a point of the map, `uv` in [0, 1]² with (0, 0) the corner of the first texel.
     pub fn direction(&self, uv: Vec2) -> Vec3 {
         let (x, y) = (f64::from(uv.x), f64::from(uv.y));
-        self.orientation.up.to_world(self.grid.direction(x, (f64::from(PI) * y).cos()))
+        self.orientation.up.to_world(self.grid.direction(x, functions::cos(f64::from(PI) * y)))
     }
 
     /// The point of the map that `wi` looks at, in [0, 1]².
@@ -461,7 +461,7 @@ fn unit_of(brightest: f64) -> f64 {
     if brightest == 0.0 || ORDINARY.contains(&brightest) {
         1.0
     } else {
-        2f64.powi(brightest.log2().floor() as i32)
+        functions::powi(2f64, functions::log2(brightest).floor() as i32)
     }
 }
 
@@ -480,7 +480,7 @@ struct Grid {
 
 impl Grid {
     fn new(width: usize, height: usize, rotation: f32) -> Self {
-        let edge = |y: usize| (std::f64::consts::PI * y as f64 / height as f64).cos();
+        let edge = |y: usize| functions::cos(std::f64::consts::PI * y as f64 / height as f64);
         // A direction in single precision is off by no more than a few units in the last place.
         let error = 16.0 * f32::EPSILON;
         let margin = Vec2::new(error * width as f32 / TAU, error * height as f32 / PI);
@@ -517,7 +517,7 @@ impl Grid {
         let turn = u - 0.5 - f64::from(self.turn);
         let phi = ((turn - turn.round()) * std::f64::consts::TAU) as f32;
         let sin_theta = ((1.0 - cos_theta) * (1.0 + cos_theta)).max(0.0).sqrt() as f32;
-        let (sin_phi, cos_phi) = phi.sin_cos();
+        let (sin_phi, cos_phi) = functions::sin_cos(phi);
         vec3(sin_phi * sin_theta, cos_theta as f32, -cos_phi * sin_theta)
     }
 

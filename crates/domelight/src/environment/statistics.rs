@@ -9,7 +9,7 @@ use super::compact::{SourceCriteria, compact_sources};
 use super::mapping::Mapping;
 use crate::color::Rgb;
 use crate::image::RgbImage;
-use crate::math::{Vec3, vec2};
+use crate::math::{Vec3, functions, vec2};
 
 /// A part of this size counts as the brightest texels.
 const BRIGHTEST: f64 = 0.001;
@@ -87,12 +87,12 @@ impl ProbeStatistics {
 impl Sun {
     /// Height above the horizon \[°\].
     pub fn elevation(&self) -> f64 {
-        (self.direction.y as f64).clamp(-1.0, 1.0).asin().to_degrees()
+        functions::asin((self.direction.y as f64).clamp(-1.0, 1.0)).to_degrees()
     }
 
     /// Angle around +Y from −Z toward +X \[°\], in (−180, 180]; 0 is the center column of the map.
     pub fn azimuth(&self) -> f64 {
-        (self.direction.x as f64).atan2(-self.direction.z as f64).to_degrees()
+        functions::atan2(self.direction.x as f64, -self.direction.z as f64).to_degrees()
     }
 }
 
@@ -113,12 +113,14 @@ impl Weights {
 
     /// ∫ dω over a texel \[sr\].
     fn solid_angle(&self, y: usize) -> f64 {
-        TAU / self.width as f64 * (self.theta(y).cos() - self.theta(y + 1).cos())
+        TAU / self.width as f64
+            * (functions::cos(self.theta(y)) - functions::cos(self.theta(y + 1)))
     }
 
     /// ∫ max(0, cos θ) dω over a texel, with ∫ sin θ cos θ dθ = ½ sin² θ.
     fn projected_up(&self, y: usize) -> f64 {
-        let [a, b] = [y, y + 1].map(|row| self.theta(row).min(FRAC_PI_2).sin().powi(2));
+        let [a, b] = [y, y + 1]
+            .map(|row| functions::powi(functions::sin(self.theta(row).min(FRAC_PI_2)), 2));
         TAU / self.width as f64 * 0.5 * (b - a)
     }
 }

@@ -7,6 +7,7 @@
 use super::tone::linear_from_srgb;
 use crate::color::Rgb;
 use crate::image::RgbImage;
+use crate::math::functions;
 
 /// Added to R² in the denominator of the relative error.
 pub const REGULARIZER: f64 = 0.01;
@@ -84,7 +85,7 @@ pub fn compare(
         mse,
         rel_mse,
         rel_mse_trimmed: relative.iter().sum::<f64>() / relative.len() as f64,
-        psnr: 10.0 * (peak * peak / mse).log10(),
+        psnr: 10.0 * functions::log10(peak * peak / mse),
         mean,
         mean_reference,
         mean_ratio: [0, 1, 2].map(|c| mean[c] / mean_reference[c]),
@@ -99,12 +100,12 @@ pub(super) fn check_sizes(test: &RgbImage, reference: &RgbImage) -> Result<(), S
 
 /// Mean over the channels of (I − R)².
 fn squared_error(i: Rgb, r: Rgb) -> f64 {
-    mean_over_channels(i, r, |i, r| (i - r).powi(2))
+    mean_over_channels(i, r, |i, r| functions::powi(i - r, 2))
 }
 
 /// Mean over the channels of (I − R)² / (R² + 0.01).
 fn relative_error(i: Rgb, r: Rgb) -> f64 {
-    mean_over_channels(i, r, |i, r| (i - r).powi(2) / (r * r + REGULARIZER))
+    mean_over_channels(i, r, |i, r| functions::powi(i - r, 2) / (r * r + REGULARIZER))
 }
 
 fn mean_over_channels(i: Rgb, r: Rgb, f: impl Fn(f64, f64) -> f64) -> f64 {

@@ -15,6 +15,7 @@
 use super::compare::{SizeMismatch, check_sizes};
 use crate::color::Rgb;
 use crate::image::RgbImage;
+use crate::math::functions;
 use rayon::prelude::*;
 
 /// Pixels per degree of a 0.7 m wide 4K screen seen from 0.7 m: 3840 π / 180.
@@ -65,13 +66,15 @@ pub fn ldr_flip(
     }
     let eye = Eye::new(pixels_per_degree);
     let (reference, test) = (eye.see(reference), eye.see(test));
-    let c_max = hyab(hunt_lab([0.0, 1.0, 0.0]), hunt_lab([0.0, 0.0, 1.0])).powf(Q_COLOR);
+    let c_max =
+        functions::powf(hyab(hunt_lab([0.0, 1.0, 0.0]), hunt_lab([0.0, 0.0, 1.0])), Q_COLOR);
     let difference = |i: usize| {
-        let color = redistribute(hyab(reference.lab[i], test.lab[i]).powf(Q_COLOR), c_max);
+        let color =
+            redistribute(functions::powf(hyab(reference.lab[i], test.lab[i]), Q_COLOR), c_max);
         let edge = (reference.edge[i] - test.edge[i]).abs();
         let point = (reference.point[i] - test.point[i]).abs();
-        let feature = (edge.max(point) * std::f32::consts::FRAC_1_SQRT_2).powf(Q_FEATURE);
-        color.powf(1.0 - feature)
+        let feature = functions::powf(edge.max(point) * std::f32::consts::FRAC_1_SQRT_2, Q_FEATURE);
+        functions::powf(color, 1.0 - feature)
     };
     Ok((0..reference.lab.len()).into_par_iter().map(difference).collect())
 }
@@ -96,8 +99,11 @@ pub fn hdr_flip(
     for i in 0..n {
         let exposure = start + (stop - start) * i as f32 / (n - 1) as f32;
         let shown = |picture: &RgbImage| {
-            let pixels =
-                picture.pixels.par_iter().map(|&p| tone_map(p * exposure.exp2())).collect();
+            let pixels = picture
+                .pixels
+                .par_iter()
+                .map(|&p| tone_map(p * functions::exp2(exposure)))
+                .collect();
             RgbImage { pixels, ..*picture }
         };
         let at_exposure = ldr_flip(&shown(reference), &shown(test), pixels_per_degree)?;
@@ -134,7 +140,7 @@ fn exposure_range(reference: &RgbImage) -> (f32, f32) {
     let Some(&greatest) = luminance.last().filter(|&&l| l > 0.0) else { return (0.0, 0.0) };
     // The upper median; a picture dimmer than the least median is shown at one exposure.
     let median = luminance[luminance.len() / 2].max(f32::EPSILON).min(greatest);
-    ((x / greatest).log2(), (x / median).log2())
+    (functions::log2(x / greatest), functions::log2(x / median))
 }
 
 /// What arrives of a picture behind the eye.
@@ -174,7 +180,8 @@ impl Eye {
             [&[(1.0, 0.0047)], &[(1.0, 0.0053)], &[(34.1, 0.04), (13.5, 0.025)]];
         let sensitivity = gaussians.map(|pairs| sensitivity(pairs, pixels_per_degree));
         let sigma = 0.5 * FEATURE_WIDTH * pixels_per_degree;
-        let bell = sampled((3.0 * sigma).ceil(), |x| (-x * x / (2.0 * sigma * sigma)).exp());
+        let bell =
+            sampled((3.0 * sigma).ceil(), |x| functions::exp(-x * x / (2.0 * sigma * sigma)));
         let derivative = |f: &dyn Fn(f32) -> f32| {
             let kernel =
                 bell.iter().zip(sampled((3.0 * sigma).ceil(), f)).map(|(g, f)| g * f).collect();
@@ -205,7 +212,7 @@ impl Eye {
         let strength = |kernel: &Separable| -> Vec<f32> {
             let along_x = filter(&achromatic, width, kernel);
             let along_y = filter(&achromatic, width, &kernel.transposed());
-            along_x.iter().zip(along_y).map(|(x, y)| x.hypot(y)).collect()
+            along_x.iter().zip(along_y).map(|(&x, y)| functions::hypot(x, y)).collect()
         };
         Seen { lab, edge: strength(&self.edge), point: strength(&self.point) }
     }
@@ -216,9 +223,14 @@ fn sensitivity(pairs: &[(f32, f32)], pixels_per_degree: f32) -> Vec<Separable> {
     use std::f32::consts::PI;
     // Three standard deviations of the widest Gaussian of all channels.
     let radius = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil();
-    let bell = |b: f32| sampled(radius, |x| (-PI * PI * (x / pixels_per_degree).powi(2) / b).exp());
+    let bell = |b: f32| {
+        sampled(radius, |x| {
+            functions::exp(-PI * PI * functions::powi(x / pixels_per_degree, 2) / b)
+        })
+    };
     let weight = |(a, b): (f32, f32)| a * (PI / b).sqrt();
-    let total: f32 = pairs.iter().map(|&p| weight(p) * bell(p.1).iter().sum::<f32>().powi(2)).sum();
+    let total: f32 =
+        pairs.iter().map(|&p| weight(p) * functions::powi(bell(p.1).iter().sum::<f32>(), 2)).sum();
     pairs
         .iter()
         .map(|&p| Separable { x: scaled(&bell(p.1), weight(p) / total), y: bell(p.1) })
@@ -299,7 +311,11 @@ fn rgb_of_opponent([l, cx, cz]: [f32; 3]) -> [f32; 3] {
 fn hunt_lab(rgb: [f32; 3]) -> [f32; 3] {
     const DELTA: f32 = 6.0 / 29.0;
     let [x, y, z] = relative_xyz(rgb).map(|t| {
-        if t > DELTA * DELTA * DELTA { t.cbrt() } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 }
+        if t > DELTA * DELTA * DELTA {
+            functions::cbrt(t)
+        } else {
+            t / (3.0 * DELTA * DELTA) + 4.0 / 29.0
+        }
     });
     let l = 116.0 * y - 16.0;
     [l, 0.01 * l * 500.0 * (x - y), 0.01 * l * 200.0 * (y - z)]
@@ -307,7 +323,7 @@ fn hunt_lab(rgb: [f32; 3]) -> [f32; 3] {
 
 /// Distance of large color differences: |ΔL| + √(Δa² + Δb²) (Abasi et al. 2020).
 fn hyab(p: [f32; 3], q: [f32; 3]) -> f32 {
-    (p[0] - q[0]).abs() + (p[1] - q[1]).hypot(p[2] - q[2])
+    (p[0] - q[0]).abs() + functions::hypot(p[1] - q[1], p[2] - q[2])
 }
 
 /// Spreads small differences over most of \[0, 1\].

@@ -15,6 +15,7 @@
 
 use super::primaries::{Primaries, transform, xyz_to_rec709};
 use super::{PictureErrorKind, allocate, checked_area};
+use crate::math::functions;
 use crate::{Rgb, RgbImage};
 use rayon::prelude::*;
 use std::io::{self, Write};
@@ -374,7 +375,7 @@ impl ColorTable {
     fn new(header: &Header) -> Self {
         let scale = (0..256).map(|e| match e {
             0 => [0.0; 3],
-            e => header.exposure.map(|exposure| (f64::powi(2.0, e - 136) / exposure) as f32),
+            e => header.exposure.map(|exposure| (functions::powi(2.0, e - 136) / exposure) as f32),
         });
         let matrix = match header.primaries {
             _ if header.is_xyz => Some(xyz_to_rec709()),
@@ -426,15 +427,15 @@ pub fn rgbe(color: Rgb) -> [u8; 4] {
     let color = color.map(|c| f32::min(c.max(0.0), f32::MAX));
     let greatest = f64::from(color.max_component());
     // 2^(e−136) · 127.5 ≤ greatest < 2^(e−136) · 255.5, so that the greatest mantissa rounds to 128 ..= 255.
-    let exponent = |value: f64| ((value / 255.5).log2().floor() as i32 + 137).clamp(0, 255);
+    let exponent = |value: f64| (functions::log2(value / 255.5).floor() as i32 + 137).clamp(0, 255);
     let mut e = if greatest > 0.0 { exponent(greatest) } else { 0 };
-    if e > 0 && e < 255 && greatest / f64::powi(2.0, e - 136) >= 255.5 {
+    if e > 0 && e < 255 && greatest / functions::powi(2.0, e - 136) >= 255.5 {
         e += 1;
     }
     if e == 0 {
         return [0; 4];
     }
-    let scale = f64::powi(2.0, e - 136);
+    let scale = functions::powi(2.0, e - 136);
     let [r, g, b] = color.to_array().map(|c| (f64::from(c) / scale).round().min(255.0) as u8);
     [r, g, b, e as u8]
 }

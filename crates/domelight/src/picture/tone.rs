@@ -1,6 +1,6 @@
 //! From scene-linear radiance to what a screen shows: exposure, tone curve, sRGB encoding.
 
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Vec3, functions};
 use crate::{Rgb, RgbImage};
 use std::str::FromStr;
 
@@ -102,7 +102,7 @@ impl Exposure {
         }
         let middle = luminances.len() / 2;
         let (_, median, _) = luminances.select_nth_unstable_by(middle, f32::total_cmp);
-        (MIDDLE_GRAY / *median).log2().clamp(-RANGE, RANGE)
+        functions::log2(MIDDLE_GRAY / *median).clamp(-RANGE, RANGE)
     }
 }
 
@@ -118,18 +118,26 @@ pub struct ToneMapping {
 impl ToneMapping {
     /// Linear light on the screen, in \[0, 1\].
     pub fn apply(&self, radiance: Rgb) -> Rgb {
-        self.curve.apply(radiance * self.exposure.exp2())
+        self.curve.apply(radiance * functions::exp2(self.exposure))
     }
 }
 
 /// The sRGB encoding of linear light in \[0, 1\] (IEC 61966-2-1).
 pub fn srgb_from_linear(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+    if linear <= 0.003_130_8 {
+        12.92 * linear
+    } else {
+        1.055 * functions::powf(linear, 1.0 / 2.4) - 0.055
+    }
 }
 
 /// The linear light of an sRGB value in \[0, 1\].
 pub fn linear_from_srgb(encoded: f32) -> f32 {
-    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+    if encoded <= 0.040_45 {
+        encoded / 12.92
+    } else {
+        functions::powf((encoded + 0.055) / 1.055, 2.4)
+    }
 }
 
 fn rows(r: [f32; 3], g: [f32; 3], b: [f32; 3]) -> Mat3 {
@@ -165,12 +173,13 @@ fn agx(c: Rgb) -> Rgb {
     // 12.47 stops below and 4.03 above 1 are shown.
     let (least, greatest) = (-12.473_93, 4.026_069);
     let inside = inset * Vec3::from(c.to_array());
-    let encoded =
-        inside.map(|v| (v.max(1e-10).log2().clamp(least, greatest) - least) / (greatest - least));
+    let encoded = inside.map(|v| {
+        (functions::log2(v.max(1e-10)).clamp(least, greatest) - least) / (greatest - least)
+    });
     let shaped = encoded.map(agx_sigmoid);
     let shown = (outset * shaped).max(Vec3::ZERO);
     // The curve gives encoded values; back to linear light for the one encoding at the end.
-    Rgb::from(shown.map(|v| v.powf(2.2)).to_array())
+    Rgb::from(shown.map(|v| functions::powf(v, 2.2)).to_array())
 }
 
 fn agx_sigmoid(x: f32) -> f32 {

@@ -15,6 +15,7 @@
 //! One scale serves the whole picture, so that samples move from quiet tiles to noisy ones; scouts find it ([`scale`]).
 //! Exact budgets for tiles would cost a quarter to three quarters more error at equal rays (docs/experiments.md).
 
+use crate::math::functions;
 use rayon::prelude::*;
 
 use super::tile::{Pass, Scratch, Tile};
@@ -138,7 +139,7 @@ impl Allocation {
         }
         let n = around().count() as f32;
         let mean = around().map(|seen| seen.mean).sum::<f32>() / n;
-        let variance = around().map(|seen| (seen.mean - mean).powi(2)).sum::<f32>() / n;
+        let variance = around().map(|seen| functions::powi(seen.mean - mean, 2)).sum::<f32>() / n;
         let between = variance / (mean * mean + 0.01);
         Some(if between.is_finite() { within.max(between) } else { within })
     }
@@ -176,7 +177,7 @@ impl Allocation {
 
 /// log₂ of what the number of samples is proportional to.
 fn log(relative_variance: f32) -> f32 {
-    EXPONENT * relative_variance.max(LEAST_VARIANCE).log2()
+    EXPONENT * functions::log2(relative_variance.max(LEAST_VARIANCE))
 }
 
 /// The usual number n times a power of two, as digital nets want it, within `fewest` and the most octaves.

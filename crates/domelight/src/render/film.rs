@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::RenderSettings;
 use super::tiling::Window;
 use super::variance::{Contrast, VarianceSums};
-use crate::math::Vec3;
+use crate::math::{Vec3, functions};
 use crate::{Rgb, RgbImage};
 
 /// What one camera sample adds to its pixel.
@@ -135,7 +135,7 @@ impl PixelSums {
     fn balance(&self) -> f64 {
         let [first, second] =
             [SampleSet::First, SampleSet::Second].map(|set| f64::from(self.n_of(set)));
-        first * second / (first + second).powi(2).max(1.0)
+        first * second / functions::powi(first + second, 2).max(1.0)
     }
 
     /// What the pixel shows of how much less than independent samples its samples err.

@@ -6,7 +6,7 @@
 
 use std::str::FromStr;
 
-use crate::math::{Vec2, vec2};
+use crate::math::{Vec2, functions, vec2};
 use crate::sampling::Table1d;
 
 /// A reconstruction filter, separable, centered on the pixel.
@@ -55,10 +55,11 @@ impl Filter {
         match self {
             Self::Box => 1.0,
             Self::Tent => 1.0 - x.abs(),
-            Self::Gaussian => (-2.0 * x * x).exp() - (-2.0 * r * r).exp(),
+            Self::Gaussian => functions::exp(-2.0 * x * x) - functions::exp(-2.0 * r * r),
             Self::BlackmanHarris => {
                 let t = std::f32::consts::PI * (x / r + 1.0);
-                0.35875 - 0.48829 * t.cos() + 0.14128 * (2.0 * t).cos() - 0.01168 * (3.0 * t).cos()
+                0.35875 - 0.48829 * functions::cos(t) + 0.14128 * functions::cos(2.0 * t)
+                    - 0.01168 * functions::cos(3.0 * t)
             }
         }
     }

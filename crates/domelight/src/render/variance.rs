@@ -20,6 +20,7 @@
 //! the picture, scales the s²/n of each.
 
 use super::film::PixelSums;
+use crate::math::functions;
 
 /// Sums over pixels of what their variance is estimated from. In whole numbers, so that the sums of parts of a
 /// picture add up to those of the whole in any order.
@@ -73,22 +74,22 @@ impl VarianceSums {
 
 /// In units of 2⁻⁶⁴.
 fn fixed(x: f64) -> i128 {
-    (x * 2f64.powi(64)) as i128
+    (x * functions::powi(2f64, 64)) as i128
 }
 
 /// The variance of the mean of n samples over s²/n, given D² of the halves of the first N over s²/N.
 fn of_mean(n: u32, halves: f64) -> f64 {
     let last = n.max(2).ilog2() as i32 - 1;
-    let prefix = 2f64.powi(last + 1);
+    let prefix = functions::powi(2f64, last + 1);
     // D² of independent samples is 4 s²/N.
-    let r = 0.5 * (0.25 * halves).powf(1.0 / f64::from(last.max(1)));
+    let r = 0.5 * functions::powf(0.25 * halves, 1.0 / f64::from(last.max(1)));
     let r = if last > 0 { r.clamp(0.125, 0.5) } else { 0.5 };
     let weight = |j: i32| {
         let (block, n) = (2u64 << j, u64::from(n));
         let unbalanced = (n % block).min(block - n % block) as f64 / n as f64;
         unbalanced * unbalanced
     };
-    let inside: f64 = (0..=last).map(|j| weight(j) * r.powi(j - last)).sum();
+    let inside: f64 = (0..=last).map(|j| weight(j) * functions::powi(r, j - last)).sum();
     let (mut sum, mut ratio, mut detail) = (inside, r, 1.0);
     for j in last + 1..=LAST {
         ratio += RISE * (0.5 - ratio);

@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::regions::{Blocks, Moments, SummedArea};
 use super::texels::{Texels, unit};
-use crate::math::{PI, Vec3};
+use crate::math::{PI, Vec3, functions};
 use crate::parallel::{bands, in_order};
 
 /// Rows of a band, which one thread does at a time, and columns of its first tiles.
@@ -90,8 +90,8 @@ impl Search<'_> {
         let chord_squared = |i: u32| middle.distance_squared(self.lights[i as usize]);
         let to = stack.len();
         let nearest = stack[from..].iter().map(|&i| chord_squared(i)).fold(4.0, f32::min);
-        let angle = 2.0 * (0.5 * nearest.sqrt() + SLACK).min(1.0).asin() + 2.0 * radius;
-        let reach = 2.0 * (0.5 * angle.min(PI)).sin() + SLACK;
+        let angle = 2.0 * functions::asin((0.5 * nearest.sqrt() + SLACK).min(1.0)) + 2.0 * radius;
+        let reach = 2.0 * functions::sin(0.5 * angle.min(PI)) + SLACK;
         for k in from..to {
             if chord_squared(stack[k]) <= reach * reach {
                 stack.push(stack[k]);

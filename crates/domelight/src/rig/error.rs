@@ -8,7 +8,7 @@ use super::Rig;
 use super::regions::{Blocks, Metric};
 use super::texels::{Texels, unit};
 use crate::environment::Environment;
-use crate::math::{TAU, Vec3, vec3};
+use crate::math::{TAU, Vec3, functions, vec3};
 use crate::parallel::in_order;
 
 /// Normals that errors are measured over.
@@ -52,7 +52,7 @@ impl Shading {
     fn add(&mut self, cos_theta: f64, energy: f64) {
         if cos_theta > 0.0 {
             self.diffuse += energy * cos_theta;
-            self.glossy += energy * cos_theta.powi(20);
+            self.glossy += energy * functions::powi(cos_theta, 20);
         }
     }
 }
@@ -91,7 +91,7 @@ impl ShadingReference {
     fn error_of(&self, shaded: &[Shading]) -> ShadingError {
         let relative = |channel: fn(&Shading) -> f64| {
             let pairs = self.exact.iter().zip(shaded).map(|(e, s)| (channel(e), channel(s)));
-            let error: f64 = pairs.clone().map(|(e, s)| (e - s).powi(2)).sum();
+            let error: f64 = pairs.clone().map(|(e, s)| functions::powi(e - s, 2)).sum();
             let exact: f64 = pairs.map(|(e, _)| e * e).sum();
             if exact > 0.0 { (error / exact).sqrt() } else { 0.0 }
         };
@@ -115,7 +115,7 @@ fn of_cells(texels: &Texels) -> Vec<(Vec3, f64)> {
     let mut lights = Vec::new();
     for row in 0..height * down {
         // cos θ₀ − cos θ₁ as a product.
-        let band = 2.0 * (step * (row as f64 + 0.5)).sin() * (0.5 * step).sin();
+        let band = 2.0 * functions::sin(step * (row as f64 + 0.5)) * functions::sin(0.5 * step);
         let solid_angle = band * std::f64::consts::TAU / (width * across) as f64;
         let radiance = texels.row(row / down);
         for column in 0..width * across {
@@ -141,7 +141,7 @@ fn shade(normal: Vec3, lights: &[(Vec3, f64)]) -> Shading {
 fn normal(i: usize) -> Vec3 {
     const GOLDEN: f32 = 0.618_034;
     let y = 1.0 - (2 * i + 1) as f32 / N_NORMALS as f32;
-    let (sin_phi, cos_phi) = (TAU * (GOLDEN * i as f32).fract()).sin_cos();
+    let (sin_phi, cos_phi) = functions::sin_cos(TAU * (GOLDEN * i as f32).fract());
     let sin_theta = (1.0 - y * y).sqrt();
     vec3(sin_phi * sin_theta, y, cos_phi * sin_theta)
 }

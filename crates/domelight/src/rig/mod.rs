@@ -40,7 +40,7 @@ pub use split::Order;
 pub use variance_minimization::{Rule, VarianceMinimization, variance_minimization};
 
 use crate::Rgb;
-use crate::math::Vec3;
+use crate::math::{Vec3, functions};
 use crate::parallel::{bands, in_order};
 use texels::Texels;
 
@@ -324,7 +324,7 @@ impl RegionSums {
         RigLight {
             direction: texels.to_world(self.moment),
             irradiance: Rgb::new(r, g, b),
-            angular_radius: (2.0 * concentration - 1.0).acos() as f32,
+            angular_radius: functions::acos(2.0 * concentration - 1.0) as f32,
             share: (self.energy / total) as f32,
             solid_angle: self.solid_angle as f32,
             region,

@@ -5,6 +5,7 @@
 //! cut between blocks; small ones are summed texel by texel, which costs less than the cut of a
 //! large one.
 
+use crate::math::functions;
 use std::f64::consts::TAU;
 use std::ops::{Add, AddAssign, Range, Sub};
 
@@ -263,7 +264,7 @@ impl<'a> SummedArea<'a> {
     /// turns with the map.
     pub(super) fn darkest_column(&self) -> usize {
         let [x, _, z] = self.total().first;
-        let share = (x.atan2(-z) / TAU).rem_euclid(1.0);
+        let share = (functions::atan2(x, -z) / TAU).rem_euclid(1.0);
         // Light that is symmetric about a texel's middle or edge does not fall on a tie.
         let block = (share * self.blocks.columns as f64 + 0.25) as usize % self.blocks.columns;
         self.blocks.x(block)

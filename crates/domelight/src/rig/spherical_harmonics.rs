@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use super::texels::Texels;
 use crate::Rgb;
 use crate::environment::Environment;
-use crate::math::{Mat3, Vec3, vec3};
+use crate::math::{Mat3, Vec3, functions, vec3};
 use crate::parallel::in_order;
 
 /// Radiance as Σ L_i Y_i with the real harmonics up to degree 2, over the world's axes.
@@ -166,18 +166,22 @@ impl RadianceMoments {
 fn twice_azimuth(width: usize) -> Vec<[f64; 2]> {
     let step = 2.0 * PI / width as f64;
     let column = |x: usize| {
-        let (sin, cos) = (2.0 * (step * (x as f64 + 0.5) - PI)).sin_cos();
-        [cos * step.sin(), sin * step.sin()]
+        let (sin, cos) = functions::sin_cos(2.0 * (step * (x as f64 + 0.5) - PI));
+        [cos * functions::sin(step), sin * functions::sin(step)]
     };
     (0..width).map(column).collect()
 }
 
 /// ∫ cos² θ sin θ dθ, ∫ sin³ θ dθ and ∫ sin² θ cos θ dθ over row `y`.
 fn polar_integrals(y: usize, height: usize) -> [f64; 3] {
-    let edge = |y: usize| (PI * y as f64 / height as f64).sin_cos();
+    let edge = |y: usize| functions::sin_cos(PI * y as f64 / height as f64);
     let ((sin_0, cos_0), (sin_1, cos_1)) = (edge(y), edge(y + 1));
-    let cos_cubed = (cos_0.powi(3) - cos_1.powi(3)) / 3.0;
-    [cos_cubed, cos_0 - cos_1 - cos_cubed, (sin_1.powi(3) - sin_0.powi(3)) / 3.0]
+    let cos_cubed = (functions::powi(cos_0, 3) - functions::powi(cos_1, 3)) / 3.0;
+    [
+        cos_cubed,
+        cos_0 - cos_1 - cos_cubed,
+        (functions::powi(sin_1, 3) - functions::powi(sin_0, 3)) / 3.0,
+    ]
 }
 
 impl Moments {

@@ -1,5 +1,6 @@
 //! Dividing the map by cutting rectangles in two, one after the other.
 
+use crate::math::functions;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -167,7 +168,7 @@ fn choose(
 fn is_wide(table: &SummedArea, r: &TexelRect, scale_width: bool) -> bool {
     let (width, height) = (table.texels().width() as f64, table.texels().height() as f64);
     let middle = std::f64::consts::PI * 0.5 * (r.y0 + r.y1) as f64 / height;
-    let scale = if scale_width { middle.sin() } else { 1.0 };
+    let scale = if scale_width { functions::sin(middle) } else { 1.0 };
     scale * 2.0 * (r.x1 - r.x0) as f64 / width >= (r.y1 - r.y0) as f64 / height
 }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::Rgb;
 use crate::environment::Environment;
-use crate::math::{Vec2, Vec3, vec2, vec3};
+use crate::math::{Vec2, Vec3, functions, vec2, vec3};
 
 /// Integrals over one texel of a row; those over φ are in [`Texels::columns`].
 #[derive(Clone, Copy, Debug)]
@@ -38,16 +38,16 @@ impl<'a> Texels<'a> {
         let phi = |x: f64| TAU * (x / width as f64 - 0.5);
         let column = |x: usize| {
             // ∫ sin φ = 2 sin φ_c sin(Δ/2) without the cancellation of cos φ0 − cos φ1.
-            let (sin, cos) = phi(x as f64 + 0.5).sin_cos();
-            let chord = 2.0 * (PI / width as f64).sin();
+            let (sin, cos) = functions::sin_cos(phi(x as f64 + 0.5));
+            let chord = 2.0 * functions::sin(PI / width as f64);
             [sin * chord, -cos * chord]
         };
         let half_column = |i: usize| {
-            let (sin, cos) = phi(0.5 * i as f64).sin_cos();
+            let (sin, cos) = functions::sin_cos(phi(0.5 * i as f64));
             [sin as f32, -cos as f32]
         };
         let half_row = |i: usize| {
-            let (sin, cos) = (PI * 0.5 * i as f64 / height as f64).sin_cos();
+            let (sin, cos) = functions::sin_cos(PI * 0.5 * i as f64 / height as f64);
             [sin as f32, cos as f32]
         };
         Self {
@@ -98,13 +98,13 @@ impl<'a> Texels<'a> {
         let delta_phi = PI as f32 * columns.len() as f32 / self.width() as f32;
         let delta_theta = 0.5 * PI as f32 * rows.len() as f32 / self.height() as f32;
         let equator = (self.height()).clamp(2 * rows.start, 2 * rows.end);
-        (middle, delta_theta.hypot(delta_phi * self.half_rows[equator][0]))
+        (middle, functions::hypot(delta_theta, delta_phi * self.half_rows[equator][0]))
     }
 
     /// The direction at column `x` and row `y`, fractions allowed, in the map's frame.
     pub(super) fn direction(&self, x: f64, y: f64) -> [f64; 3] {
-        let (sin_phi, cos_phi) = (TAU * (x / self.width() as f64 - 0.5)).sin_cos();
-        let (sin_theta, cos_theta) = (PI * y / self.height() as f64).sin_cos();
+        let (sin_phi, cos_phi) = functions::sin_cos(TAU * (x / self.width() as f64 - 0.5));
+        let (sin_theta, cos_theta) = functions::sin_cos(PI * y / self.height() as f64);
         [sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta]
     }
 
@@ -128,11 +128,11 @@ impl Row {
         let half = 0.5 * (bottom - top);
         let middle = top + half;
         // Differences of cos θ, sin² θ / 2 and (2θ − sin 2θ) / 4 as products.
-        let band = 2.0 * middle.sin() * half.sin();
+        let band = 2.0 * functions::sin(middle) * functions::sin(half);
         Self {
             solid_angle: step * band,
-            vertical: step * 0.5 * (2.0 * middle).sin() * (2.0 * half).sin(),
-            horizontal: half - 0.5 * (2.0 * middle).cos() * (2.0 * half).sin(),
+            vertical: step * 0.5 * functions::sin(2.0 * middle) * functions::sin(2.0 * half),
+            horizontal: half - 0.5 * functions::cos(2.0 * middle) * functions::sin(2.0 * half),
         }
     }
 }

@@ -6,7 +6,8 @@
 //! density and distorts more.
 
 use crate::math::{
-    FRAC_1_4PI, FRAC_1_PI, TAU, Vec2, Vec3, from_spherical, sin_cos_eighth, sin_cos_turns,
+    FRAC_1_4PI, FRAC_1_PI, TAU, Vec2, Vec3, from_spherical, functions, sin_cos_eighth,
+    sin_cos_turns,
 };
 use crate::simd::{SimdFloat, Vectors};
 
@@ -78,7 +79,7 @@ pub fn phong_lobe(u: Vec2, exponent: f32) -> Vec3 {
 #[inline(always)]
 pub(crate) fn phong_lanes<F: SimdFloat>([u, v]: [F; 2], exponent: f32) -> Vectors<F> {
     // cos θ = (1 − u)^(1/(n + 1))
-    let versine = u.map(|u| -f32::exp_m1(f32::ln_1p(-u) / (exponent + 1.0)));
+    let versine = u.map(|u| -functions::exp_m1(functions::ln_1p(-u) / (exponent + 1.0)));
     let sin_theta = (versine * (u.splat(2.0) - versine)).max(u.splat(0.0)).sqrt();
     let [sin_phi, cos_phi] = sin_cos_turns(v);
     Vectors { x: sin_theta * cos_phi, y: sin_theta * sin_phi, z: u.splat(1.0) - versine }
@@ -86,7 +87,11 @@ pub(crate) fn phong_lanes<F: SimdFloat>([u, v]: [F; 2], exponent: f32) -> Vector
 
 /// (n + 1)/(2π) cosⁿ θ \[sr⁻¹\], zero below the horizon.
 pub fn phong_lobe_pdf(cos_theta: f32, exponent: f32) -> f32 {
-    if cos_theta > 0.0 { (exponent + 1.0) / TAU * cos_theta.powf(exponent) } else { 0.0 }
+    if cos_theta > 0.0 {
+        (exponent + 1.0) / TAU * functions::powf(cos_theta, exponent)
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@
 use super::Scene;
 use crate::bvh::Frustum;
 use crate::geometry::{Aabb, Ray, power_of_two};
-use crate::math::{Mat4, Vec3};
+use crate::math::{Mat4, Vec3, functions};
 
 /// A camera before the size of its picture is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,14 +109,14 @@ impl CameraSettings {
         let radius = if radius > 0.0 { radius } else { 1.0 };
 
         let half_y = 0.5 * Self::DEFAULT_FOV_Y_DEGREES.to_radians();
-        let half_x = (half_y.tan() * aspect.max(1e-3)).atan();
-        let distance = MARGIN * radius / half_y.min(half_x).sin();
+        let half_x = functions::atan(functions::tan(half_y) * aspect.max(1e-3));
+        let distance = MARGIN * radius / functions::sin(half_y.min(half_x));
 
         let up = up.try_normalize().unwrap_or(Vec3::Y);
         let back = Vec3::Z - up * up.z;
         let back = back.try_normalize().filter(|_| up.z.abs() < 0.9).unwrap_or(-Vec3::Y);
         let back = (back - up * up.dot(back)).normalize();
-        let (sin, cos) = 20f32.to_radians().sin_cos();
+        let (sin, cos) = functions::sin_cos(20f32.to_radians());
         Self {
             projection: Projection::Perspective { fov_y_degrees: Self::DEFAULT_FOV_Y_DEGREES },
             origin: center + distance * (cos * back + sin * up),
@@ -148,7 +148,7 @@ impl CameraSettings {
         self.target = m.transform_point3(self.target);
         self.up = m.transform_vector3(self.up);
         if let Projection::Orthographic { height } = &mut self.projection {
-            *height *= m.determinant().abs().cbrt();
+            *height *= functions::cbrt(m.determinant().abs());
         }
     }
 }
@@ -286,7 +286,7 @@ fn half_height(projection: Projection) -> Result<f32, CameraError> {
             if !(fov_y_degrees > 0.0 && fov_y_degrees < 180.0) {
                 return Err(CameraError::FieldOfView { fov_y_degrees });
             }
-            Ok((0.5 * fov_y_degrees.to_radians()).tan())
+            Ok(functions::tan(0.5 * fov_y_degrees.to_radians()))
         }
         Projection::Orthographic { height } => {
             if !(height > 0.0 && height.is_finite()) {

@@ -7,7 +7,7 @@ use super::material::Material;
 use super::texture::Texture;
 use crate::environment::UpAxis;
 use crate::geometry::{Aabb, Mesh};
-use crate::math::Mat4;
+use crate::math::{Mat4, functions};
 
 /// A scene as loaders and built-in scenes give it; [`Scene::new`](super::Scene::new) checks it.
 #[derive(Clone, Debug, Default)]
@@ -66,6 +66,13 @@ pub struct EnvironmentSettings {
     pub exposure: f32,
     /// The axis of the map that points up.
     pub up: UpAxis,
+}
+
+impl EnvironmentSettings {
+    /// The factor on the radiance: scale · 2^exposure.
+    pub fn factor(&self) -> f32 {
+        self.scale * functions::exp2(self.exposure)
+    }
 }
 
 /// Where a light probe comes from.

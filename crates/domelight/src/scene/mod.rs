@@ -35,7 +35,7 @@ pub use material::{
 pub use texture::{Encoding, Texture, TextureError, TextureFilter, TextureRef, UvTransform, Wrap};
 
 use crate::bsdf::Bsdf;
-use crate::bvh::{Bvh, BvhError};
+use crate::bvh::{Bvh, BvhError, InstructionSet};
 use crate::geometry::{Aabb, Mesh, MeshError};
 
 /// A scene ready for rays.
@@ -139,6 +139,13 @@ impl Scene {
     #[cfg(feature = "io")]
     pub fn load(path: impl AsRef<std::path::Path>) -> Result<Self, crate::Error> {
         Ok(Self::new(load(path)?.description)?)
+    }
+
+    /// The same scene, traced with another instruction set; `None` if this processor lacks it. Pictures are the same.
+    #[must_use]
+    pub fn with_instruction_set(mut self, instruction_set: InstructionSet) -> Option<Self> {
+        self.bvh = self.bvh.with_instruction_set(instruction_set)?;
+        Some(self)
     }
 
     /// A built-in scene: `sphere`, `spheres`, `statue` and others.

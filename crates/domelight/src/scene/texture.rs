@@ -6,7 +6,7 @@
 //! texture by itself, and without ray differentials a mip level would be a guess.
 
 use crate::Rgb;
-use crate::math::{Vec2, vec2};
+use crate::math::{Vec2, functions, vec2};
 
 /// How texel values map to numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -109,7 +109,7 @@ impl UvTransform {
     /// Scale, then rotation \[rad\], then offset, as the glTF extension `KHR_texture_transform`
     /// defines them.
     pub fn new(offset: Vec2, rotation: f32, scale: Vec2) -> Self {
-        let (sin, cos) = rotation.sin_cos();
+        let (sin, cos) = functions::sin_cos(rotation);
         Self { x: scale.x * vec2(cos, -sin), y: scale.y * vec2(sin, cos), offset }
     }
 
@@ -317,7 +317,7 @@ pub(crate) fn decode(v: f32, encoding: Encoding) -> f32 {
     match encoding {
         Encoding::Linear => v,
         Encoding::Srgb if v <= 0.04045 => v / 12.92,
-        Encoding::Srgb => ((v + 0.055) / 1.055).powf(2.4),
+        Encoding::Srgb => functions::powf((v + 0.055) / 1.055, 2.4),
     }
 }
 

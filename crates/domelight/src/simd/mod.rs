@@ -1,8 +1,8 @@
 //! Vectors of eight numbers, and of sixteen, on each instruction set: the only unsafe code of the library.
 //!
 //! A [`Kernel`] is written once over the vectors of a [`Simd`], whose operators are one IEEE
-//! operation a lane; what is fused says so and is so everywhere. Nothing else fuses or reorders them, so a kernel gives the same bits on every
-//! instruction set. [`dispatch`] compiles it for each and picks at run time, so that a portable
+//! operation a lane; nothing fuses or reorders them, so a kernel gives the same bits on every instruction set.
+//! [`SimdF32x8::mul_sub`] alone may differ. [`dispatch`] compiles it for each and picks at run time, so that a portable
 //! binary traces as fast as one built for the machine. Another instruction set is one more file like
 //! `avx2.rs`, or `neon.rs` of half the width, and one more line in [`InstructionSet`] and [`dispatch`].
 //!
@@ -192,7 +192,8 @@ pub trait SimdF32x8: SimdFloat {
     fn store(self) -> Lanes;
     /// Toward zero; of numbers beyond 2³¹ and NaN anything.
     fn to_i32(self) -> Self::I32x8;
-    /// a b − c, rounded once.
+    /// a b − c of an exact product, rounded once where there is an instruction for it, else twice: for what does not
+    /// depend on the last bit.
     #[must_use]
     fn mul_sub(self, b: Self, c: Self) -> Self;
     /// Numbers of a table of N rows, a power of two, at `at` modulo 8 N.

@@ -133,7 +133,10 @@ impl SimdF32x8 for F32x8 {
 
     #[inline(always)]
     fn mul_sub(self, b: Self, c: Self) -> Self {
-        Self(from_fn(|i| self.0[i].mul_add(b.0[i], -c.0[i])))
+        Self(from_fn(|i| {
+            let [a, b, c] = [self.0[i], b.0[i], c.0[i]].map(f64::from);
+            (a * b - c) as f32
+        }))
     }
     #[inline(always)]
     fn store(self) -> Lanes {

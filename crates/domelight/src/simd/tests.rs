@@ -40,7 +40,7 @@ impl Kernel for All {
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let (a, b) = (simd.load(&self.a), simd.load(&self.b));
         let (masks, floats) = (masks(a, b), operations(a, b));
-        let floats = floats.into_iter().chain([simd.splat(self.a[3]), a.mul_sub(b, a)]);
+        let floats = floats.into_iter().chain([simd.splat(self.a[3])]);
         let rows: [Lanes; LANES] = std::array::from_fn(|i| self.a.map(|x| x * i as f32));
         let columns = simd.transpose(rows.each_ref());
         let bits = |x: f32| if x.is_nan() { u32::MAX } else { x.to_bits() };

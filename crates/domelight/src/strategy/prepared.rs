@@ -10,6 +10,7 @@ use crate::environment::{CompensatedTable, Environment};
 use crate::math::Vec3;
 use crate::rig::{MedianCut, RigError, VarianceMinimization, median_cut, variance_minimization};
 use crate::sampling::Sampler;
+use crate::simd::InstructionSet;
 
 /// A strategy that runs: a closed set, so that the choice costs one branch a tile.
 #[derive(Clone, Debug)]
@@ -129,6 +130,20 @@ impl<'e> PreparedStrategy<'e> {
                 Self::Lights(LightSet { rig })
             }
         })
+    }
+}
+
+impl PreparedStrategy<'_> {
+    /// The same strategy, computed with another instruction set where it has a choice; `None` if this processor lacks
+    /// it. Pictures are the same.
+    #[must_use]
+    pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Option<Self> {
+        match self {
+            Self::Product(product) => {
+                product.with_instruction_set(instruction_set).map(Self::Product)
+            }
+            other => instruction_set.is_available().then_some(other),
+        }
     }
 }
 

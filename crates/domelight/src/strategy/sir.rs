@@ -35,7 +35,7 @@
 use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
 use crate::environment::Environment;
-use crate::math::Vec3;
+use crate::math::{Vec3, functions};
 use crate::sampling::hilbert::hemisphere_index;
 use crate::sampling::rng::hash2;
 use crate::sampling::{Dimension, ONE_MINUS_EPSILON, Sampler, SamplerKind, WeightedReservoirs};
@@ -348,7 +348,8 @@ impl<'p, V: Fn(&ShadingPoint, Vec3) -> f32> CandidatePilot<'p, V> {
         let cost = f64::from(sir.n_candidates) + RAY_COST * f64::from(sir.n_samples);
         let mut work = vec![0.0; self.points.len()];
         self.estimate(sir, |i, estimate| {
-            work[i] += (estimate / self.points[i].1 - 1.0).powi(2) * cost / f64::from(REPEATS);
+            work[i] +=
+                functions::powi(estimate / self.points[i].1 - 1.0, 2) * cost / f64::from(REPEATS);
         });
         work
     }

@@ -6,7 +6,7 @@
 
 use super::smoothstep;
 use crate::color::Rgb;
-use crate::math::{Vec2, Vec3, sqr, vec2, vec3};
+use crate::math::{Vec2, Vec3, functions, sqr, vec2, vec3};
 
 /// Half width of the nave, height of the vault's spring, the ends and the floor \[m\]; the eye is at 0.
 const HALF_WIDTH: f32 = 6.0;
@@ -118,19 +118,20 @@ fn floor(p: Vec3) -> Rgb {
     let tile = Rgb::new(0.080, 0.062, 0.047).lerp(Rgb::new(0.030, 0.025, 0.024), dark);
     let worn = 0.8 + 0.4 * hash(i, j);
     let spill = Rgb::new(0.05, 0.06, 0.14)
-        * (-(sqr(p.x + 1.4) / 2.0 + sqr((p.z + 14.0) / 6.0))).exp()
-        + Rgb::new(0.17, 0.055, 0.03) * (-(sqr(p.x - 1.0) / 2.5 + sqr((p.z + 9.0) / 4.0))).exp();
+        * functions::exp(-(sqr(p.x + 1.4) / 2.0 + sqr((p.z + 14.0) / 6.0)))
+        + Rgb::new(0.17, 0.055, 0.03)
+            * functions::exp(-(sqr(p.x - 1.0) / 2.5 + sqr((p.z + 9.0) / 4.0)));
     tile * (worn * glow(p) * (0.5 + 0.5 * smoothstep(0.0, 0.03, joint))) + spill
 }
 
 /// The barrel vault: severies between ribs, darker toward the crown.
 fn vault(p: Vec3) -> Rgb {
-    let angle = p.x.atan2(p.y - SPRING);
+    let angle = functions::atan2(p.x, p.y - SPRING);
     let bay = edge_distance(p.z / BAY) * BAY;
     let diagonal = (((p.z / BAY).rem_euclid(1.0) - 0.5).abs() - angle.abs() / 3.2).abs() * BAY;
     let rib = smoothstep(0.32, 0.22, bay).max(0.8 * smoothstep(0.26, 0.16, diagonal));
     let ridge = 0.8 * smoothstep(0.03, 0.02, angle.abs());
-    let light = glow(p) * (1.15 - 0.55 * angle.cos());
+    let light = glow(p) * (1.15 - 0.55 * functions::cos(angle));
     let blue = masonry(p.z, angle * HALF_WIDTH, light) * Rgb::new(0.66, 0.76, 1.05);
     blue.lerp(STONE * (1.9 * light), rib.max(ridge))
 }
@@ -144,7 +145,7 @@ fn side(p: Vec3) -> Rgb {
     // Piers between the bays stand in front of everything.
     if q.x.abs() > 0.5 * BAY - 0.42 {
         let round = (0.5 * BAY - q.x.abs()) / 0.42;
-        let shafts = 0.75 + 0.25 * (9.0 * round).cos();
+        let shafts = 0.75 + 0.25 * functions::cos(9.0 * round);
         return masonry(3.0, p.y, 1.0).lerp(STONE, 0.6)
             * (glow(p) * shafts * (1.45 - 0.9 * round * round));
     }
@@ -163,7 +164,7 @@ fn side(p: Vec3) -> Rgb {
         return masonry(p.z, p.y, 0.75 * glow(p) * (1.0 - 0.85 * deep))
             + Rgb::new(0.012, 0.007, 0.004) * (1.0 - deep);
     }
-    let moulding = smoothstep(0.32, 0.0, arch) * (0.65 + 0.35 * (40.0 * arch).cos());
+    let moulding = smoothstep(0.32, 0.0, arch) * (0.65 + 0.35 * functions::cos(40.0 * arch));
     let string = smoothstep(0.16, 0.1, (p.y - 3.7).abs());
     masonry(p.z, p.y, glow(p) * (1.0 + 0.6 * moulding + 0.5 * string))
 }
@@ -219,7 +220,7 @@ fn glass(g: Vec2, seed: f32) -> Rgb {
 /// A round window of eight petals about a center.
 fn roundel(q: Vec2, seed: f32) -> Rgb {
     let r = q.length();
-    let turn = q.y.atan2(q.x) / std::f32::consts::TAU * 8.0;
+    let turn = functions::atan2(q.y, q.x) / std::f32::consts::TAU * 8.0;
     let lead = (edge_distance(turn) * r).min((r - 0.38).abs()).min(1.0 - r);
     let hue = if r < 0.38 { 0.95 } else { 0.72 + 0.28 * hash(turn.floor(), seed) };
     pane(hue) * (0.05 + 0.95 * smoothstep(0.02, 0.06, lead))
@@ -228,7 +229,7 @@ fn roundel(q: Vec2, seed: f32) -> Rgb {
 /// A rose of two rings of petals.
 fn rose_window(q: Vec2) -> Rgb {
     let r = q.length();
-    let turn = q.y.atan2(q.x) / std::f32::consts::TAU;
+    let turn = functions::atan2(q.y, q.x) / std::f32::consts::TAU;
     let (count, ring) =
         if r > 0.62 { (24.0, 2.0) } else { (12.0, if r > 0.22 { 1.0 } else { 0.0 }) };
     let petal = turn * count;

@@ -18,7 +18,7 @@ use std::str::FromStr;
 
 use crate::color::Rgb;
 use crate::image::RgbImage;
-use crate::math::{Vec3, vec3};
+use crate::math::{Vec3, functions, vec3};
 
 /// A light probe made in code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -109,14 +109,14 @@ fn averaged(height: usize, fine_rows: usize, radiance: impl Fn(Vec3) -> Rgb + Sy
     let width = 2 * height;
     let grid = fine_rows.div_ceil(height);
     let columns: Vec<(f64, f64)> = (0..width * grid)
-        .map(|x| (TAU * ((x as f64 + 0.5) / (width * grid) as f64 - 0.5)).sin_cos())
+        .map(|x| functions::sin_cos(TAU * ((x as f64 + 0.5) / (width * grid) as f64 - 0.5)))
         .collect();
     let rows = map_rows(height, |y| {
         let mut sums = vec![[0.0f64; 3]; width];
         let mut total = 0.0;
         for fine_y in y * grid..(y + 1) * grid {
             let theta = PI * (fine_y as f64 + 0.5) / (height * grid) as f64;
-            let (sin_theta, cos_theta) = theta.sin_cos();
+            let (sin_theta, cos_theta) = functions::sin_cos(theta);
             total += sin_theta * grid as f64;
             for (sum, columns) in sums.iter_mut().zip(columns.chunks_exact(grid)) {
                 for &(sin_phi, cos_phi) in columns {
@@ -145,7 +145,7 @@ fn map_rows(height: usize, row: impl Fn(usize) -> Vec<Rgb> + Sync) -> Vec<Vec<Rg
 
 /// The unit vector θ from +Y and φ from −Z toward +X \[rad\].
 fn direction(theta: f64, phi: f64) -> Vec3 {
-    toward(theta.sin_cos(), phi.sin_cos())
+    toward(functions::sin_cos(theta), functions::sin_cos(phi))
 }
 
 /// [`direction`] by sine and cosine of its angles.

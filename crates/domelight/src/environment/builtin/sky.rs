@@ -17,7 +17,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use super::{averaged, direction};
 use crate::color::Rgb;
 use crate::image::RgbImage;
-use crate::math::{Vec3, vec3};
+use crate::math::{Vec3, functions, vec3};
 
 /// Haziness: 2 is very clear, 3 clear, 6 warm and moist.
 const TURBIDITY: f64 = 2.3;
@@ -85,7 +85,8 @@ impl Sky {
             ],
         ];
         let [x, y] = zenith_chromaticity(t, sun_theta);
-        let at_zenith = |i: usize| distribution(&perez[i], 1.0, sun_theta);
+        let gamma = (sun_theta, functions::cos(sun_theta));
+        let at_zenith = |i: usize| distribution(&perez[i], 1.0, gamma);
         let scale = [1.0, x / at_zenith(1), y / at_zenith(2)];
         let sun_radiance = sun_radiance(t, sun_theta);
         let sun = direction(sun_theta, sun_phi);
@@ -97,7 +98,8 @@ impl Sky {
 
     /// Radiance of the sky without the sun; `d` above the horizon.
     fn radiance(&self, d: Vec3) -> Rgb {
-        let gamma = (d.dot(self.sun) as f64).clamp(-1.0, 1.0).acos();
+        let cos_gamma = (d.dot(self.sun) as f64).clamp(-1.0, 1.0);
+        let gamma = (functions::acos(cos_gamma), cos_gamma);
         let [luminance, x, y] =
             [0, 1, 2].map(|i| self.scale[i] * distribution(&self.perez[i], d.y as f64, gamma));
         rgb_of_chromaticity(luminance / UNIT, x, y)
@@ -106,7 +108,7 @@ impl Sky {
     /// The ground seen along `d` through the air, which takes the color of the horizon above it.
     fn hazy(&self, ground: Rgb, d: Vec3) -> Rgb {
         let horizon = self.radiance(vec3(d.x, 0.02, d.z).normalize());
-        horizon.lerp(ground, (HAZE / d.y.min(-1e-6)).exp())
+        horizon.lerp(ground, functions::exp(HAZE / d.y.min(-1e-6)))
     }
 
     /// Irradiance of the ground by the sky without the sun.
@@ -117,14 +119,14 @@ impl Sky {
         let ring = |theta: f64| -> Rgb {
             let radiance = |j: usize| self.radiance(direction(theta, d_phi * j as f64));
             (0..4 * N).map(radiance).sum::<Rgb>()
-                * (theta.sin() * theta.cos() * d_theta * d_phi) as f32
+                * (functions::sin(theta) * functions::cos(theta) * d_theta * d_phi) as f32
         };
         (0..N).map(|i| ring(d_theta * (i as f64 + 0.5))).sum()
     }
 
     /// Irradiance of the ground by the sun.
     fn sun_irradiance(&self) -> Rgb {
-        self.sun_radiance * (sun_solid_angle() * self.sun_theta.cos()) as f32
+        self.sun_radiance * (sun_solid_angle() * functions::cos(self.sun_theta)) as f32
     }
 
     /// Radiance of the Lambertian ground: albedo · E / π.
@@ -148,8 +150,9 @@ impl Sky {
         let mut covered: Vec<(usize, f64)> = Vec::new();
         for row in span(self.sun_theta, SUN_RADIUS) {
             let theta = (row as f64 + 0.5) * cell;
-            let solid_angle = theta.sin() * cell * cell;
-            for column in span(self.sun_phi + PI, 1.1 * SUN_RADIUS / self.sun_theta.sin()) {
+            let solid_angle = functions::sin(theta) * cell * cell;
+            for column in span(self.sun_phi + PI, 1.1 * SUN_RADIUS / functions::sin(self.sun_theta))
+            {
                 let phi = (column as f64 + 0.5) * cell - PI;
                 if angle_to(self.sun_theta, self.sun_phi, theta, phi) < SUN_RADIUS {
                     let (x, y) =
@@ -168,16 +171,16 @@ impl Sky {
 }
 
 /// Perez 1993 (Preetham et al., equation 3): (1 + A e^{B/cos θ})(1 + C e^{Dγ} + E cos² γ).
-fn distribution([a, b, c, d, e]: &[f64; 5], cos_theta: f64, gamma: f64) -> f64 {
-    let cos_gamma = gamma.cos();
-    (1.0 + a * (b / cos_theta.max(1e-3)).exp())
-        * (1.0 + c * (d * gamma).exp() + e * cos_gamma * cos_gamma)
+/// Of γ and its cosine.
+fn distribution([a, b, c, d, e]: &[f64; 5], cos_theta: f64, (gamma, cos_gamma): (f64, f64)) -> f64 {
+    (1.0 + a * functions::exp(b / cos_theta.max(1e-3)))
+        * (1.0 + c * functions::exp(d * gamma) + e * cos_gamma * cos_gamma)
 }
 
 /// Illuminance of the ground by a clear sky without its sun \[klx\]: IESNA 2000, The IESNA Lighting
 /// Handbook, 9th edition, chapter 8.
 fn clear_sky_illuminance(sun_theta: f64) -> f64 {
-    0.8 + 15.5 * sun_theta.cos().sqrt()
+    0.8 + 15.5 * functions::cos(sun_theta).sqrt()
 }
 
 /// x and y at the zenith, of appendix A.2.
@@ -200,34 +203,37 @@ fn zenith_chromaticity(t: f64, sun_theta: f64) -> [f64; 2] {
 /// Radiance of the sun's disc through the atmosphere, of appendix A.1, at one wavelength a primary.
 fn sun_radiance(turbidity: f64, theta: f64) -> Rgb {
     let outside = rgb_of_chromaticity(SOLAR_ILLUMINANCE / sun_solid_angle() / UNIT, 0.3266, 0.3359);
-    let air_mass = 1.0 / (theta.cos() + 0.15 * (93.885 - theta.to_degrees()).powf(-1.253));
+    let air_mass =
+        1.0 / (functions::cos(theta) + 0.15 * functions::powf(93.885 - theta.to_degrees(), -1.253));
     let aerosol = 0.04608 * turbidity - 0.04586;
     // Wavelength [µm] and ozone absorption [1/cm] of 0.35 cm of ozone.
     let transmittance =
         [(0.61, 0.12), (0.55, 0.085), (0.465, 0.008)].map(|(wavelength, ozone): (f64, f64)| {
-            let depth =
-                0.008735 * wavelength.powf(-4.08) + aerosol * wavelength.powf(-1.3) + 0.35 * ozone;
-            (-depth * air_mass).exp() as f32
+            let depth = 0.008735 * functions::powf(wavelength, -4.08)
+                + aerosol * functions::powf(wavelength, -1.3)
+                + 0.35 * ozone;
+            functions::exp(-depth * air_mass) as f32
         });
     outside * Rgb::from(transmittance)
 }
 
 /// Solid angle of the sun's disc \[sr\], 2π (1 − cos r), in a form that does not cancel.
 fn sun_solid_angle() -> f64 {
-    4.0 * PI * (0.5 * SUN_RADIUS).sin().powi(2)
+    4.0 * PI * functions::powi(functions::sin(0.5 * SUN_RADIUS), 2)
 }
 
 /// Exact solid angle of a texel of `row` \[sr\].
 fn texel_solid_angle(row: usize, height: usize) -> f64 {
     let step = PI / height as f64;
-    2.0 * (step * (row as f64 + 0.5)).sin() * (0.5 * step).sin() * step
+    2.0 * functions::sin(step * (row as f64 + 0.5)) * functions::sin(0.5 * step) * step
 }
 
 /// Angle between two directions \[rad\], by haversines, which are exact for small angles.
 fn angle_to(theta_a: f64, phi_a: f64, theta_b: f64, phi_b: f64) -> f64 {
-    let haversine = |x: f64| (0.5 * x).sin().powi(2);
-    let h = haversine(theta_a - theta_b) + theta_a.sin() * theta_b.sin() * haversine(phi_a - phi_b);
-    2.0 * h.sqrt().min(1.0).asin()
+    let haversine = |x: f64| functions::powi(functions::sin(0.5 * x), 2);
+    let h = haversine(theta_a - theta_b)
+        + functions::sin(theta_a) * functions::sin(theta_b) * haversine(phi_a - phi_b);
+    2.0 * functions::asin(h.sqrt().min(1.0))
 }
 
 /// Linear Rec. 709 of luminance and CIE 1931 chromaticity; what lies outside the gamut is clipped.

@@ -5,7 +5,7 @@
 
 use super::smoothstep;
 use crate::color::Rgb;
-use crate::math::{Vec3, vec3};
+use crate::math::{Vec3, functions, vec3};
 
 /// A rectangle that faces the origin.
 struct SoftBox {
@@ -84,7 +84,7 @@ fn room(d: Vec3) -> Rgb {
     let floor = Rgb::new(0.085, 0.080, 0.076)
         .lerp(Rgb::new(0.030, 0.029, 0.030), smoothstep(0.9, 0.1, -d.y));
     let glow = |center: Vec3, power: f32, color: Rgb| {
-        color * d.dot(center.normalize()).max(0.0).powf(power)
+        color * functions::powf(d.dot(center.normalize()).max(0.0), power)
     };
     let base = wall.lerp(floor, smoothstep(0.06, -0.10, d.y));
     base + glow(vec3(0.1, 0.12, -1.0), 7.0, Rgb::new(0.10, 0.13, 0.19))
@@ -107,7 +107,7 @@ impl SoftBox {
         let p = d * (self.center.length() / cos);
         let (x, y) = (p.dot(x_axis) / self.half[0], p.dot(y_axis) / self.half[1]);
         // The edge is a rounded square: the fourth-power norm.
-        let r = (x.powi(4) + y.powi(4)).powf(0.25);
+        let r = functions::powf(functions::powi(x, 4) + functions::powi(y, 4), 0.25);
         let hot = 1.0 - 0.45 * smoothstep(0.0, 1.3, (x * x + y * y).sqrt());
         (self.radiance * hot, smoothstep(1.0, 1.0 - self.softness, r))
     }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::math::{Vec3, vec3};
+use crate::math::{Vec3, functions, vec3};
 use crate::parallel::bands;
 use crate::{Rgb, RgbImage};
 
@@ -28,7 +28,7 @@ impl<'a> Grid<'a> {
             step *= 2;
         }
         let (columns, rows) = (map.width.div_ceil(step), map.height.div_ceil(step));
-        let cos = |y: usize| (PI * y as f64 / map.height as f64).cos();
+        let cos = |y: usize| functions::cos(PI * y as f64 / map.height as f64);
         let cos_edges = (0..=map.height).map(cos).collect();
         let mut grid = Self { map, step, columns, rows, cos_edges, luminance: Vec::new() };
         let mut luminance = vec![0.0; columns * rows];
@@ -88,8 +88,10 @@ impl<'a> Grid<'a> {
     pub(super) fn direction(&self, cell: usize) -> Vec3 {
         let [columns, rows] = self.texels(cell);
         let middle = |r: &std::ops::Range<usize>| 0.5 * (r.start + r.end) as f64;
-        let (sin_phi, cos_phi) = (TAU * (middle(&columns) / self.map.width as f64)).sin_cos();
-        let (sin_theta, cos_theta) = (PI * middle(&rows) / self.map.height as f64).sin_cos();
+        let (sin_phi, cos_phi) =
+            functions::sin_cos(TAU * (middle(&columns) / self.map.width as f64));
+        let (sin_theta, cos_theta) =
+            functions::sin_cos(PI * middle(&rows) / self.map.height as f64);
         // φ counts from the map's left edge, which is toward +Z.
         let [x, y, z] = [-sin_phi * sin_theta, cos_theta, cos_phi * sin_theta];
         vec3(x as f32, y as f32, z as f32)

@@ -10,6 +10,7 @@
 
 use super::Mapping;
 use super::cube::Cube;
+use crate::math::functions;
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 type Point = [f64; 2];
@@ -53,13 +54,13 @@ struct Vertex {
 
 impl Grid {
     pub(super) fn new(width: usize, height: usize) -> Self {
-        let line = |row: usize| (PI * row as f64 / height as f64).cos();
+        let line = |row: usize| functions::cos(PI * row as f64 / height as f64);
         Self { width, height, lines: (0..=height).map(line).collect() }
     }
 
     /// The row of a height.
     fn row(&self, y: f64) -> usize {
-        let row = (y.clamp(-1.0, 1.0).acos() / PI * self.height as f64) as usize;
+        let row = (functions::acos(y.clamp(-1.0, 1.0)) / PI * self.height as f64) as usize;
         self.row_near(row.min(self.height - 1), y)
     }
 
@@ -83,9 +84,9 @@ impl Grid {
 impl Vertex {
     fn new(direction: Direction) -> Self {
         let [x, _, z] = direction;
-        let across = x.hypot(z);
+        let across = functions::hypot(x, z);
         // As in `lat_long_uv`, from 0 at the map's left border.
-        let longitude = (across >= POLE).then(|| x.atan2(-z) + PI);
+        let longitude = (across >= POLE).then(|| functions::atan2(x, -z) + PI);
         Self { direction, across, longitude }
     }
 }
@@ -121,7 +122,7 @@ impl<'a> Overlap<'a> {
     /// The outline of a texel of a lat-long map that is turned by so much of a turn.
     fn rectangle(&mut self, x: usize, y: usize, turn: f64) {
         let column = |x: usize| (x as f64 / self.width as f64 + turn) * self.grid.width as f64;
-        let line = |y: usize| (PI * y as f64 / self.height as f64).cos();
+        let line = |y: usize| functions::cos(PI * y as f64 / self.height as f64);
         let (left, right, top, bottom) = (column(x), column(x + 1), line(y), line(y + 1));
         self.outline.extend([[left, top], [right, top], [right, bottom], [left, bottom]]);
     }
@@ -328,7 +329,7 @@ fn arc(a: &Vertex, m: &Vertex, b: &Vertex) -> Option<Vertex> {
 fn is_meridian(longitudes: &[Option<f64>]) -> bool {
     let mut known = longitudes.iter().flatten();
     let Some(first) = known.next() else { return true };
-    known.all(|other| (other - first).sin().abs() < 1e-12)
+    known.all(|other| functions::sin(other - first).abs() < 1e-12)
 }
 
 /// The part of a mapping in which a texel lies, continuous up to and on the texel's outline: [`Mapping::direction`] in
@@ -375,7 +376,7 @@ impl Chart {
 
     /// Whether a line begins inside the disc and ends outside.
     fn leaves_disc(&self, from: Point, to: Point) -> bool {
-        let is_inside = |[u, v]: Point| (2.0 * u - 1.0).hypot(2.0 * v - 1.0) < 1.0;
+        let is_inside = |[u, v]: Point| functions::hypot(2.0 * u - 1.0, 2.0 * v - 1.0) < 1.0;
         matches!(self, Self::Angular | Self::MirrorBall) && is_inside(from) != is_inside(to)
     }
 
@@ -383,7 +384,7 @@ impl Chart {
     fn direction(&self, [u, v]: Point) -> Direction {
         let disc = [2.0 * u - 1.0, 1.0 - 2.0 * v];
         match self {
-            Self::Angular => around_forward(disc, |r| (PI * r).sin_cos()),
+            Self::Angular => around_forward(disc, |r| functions::sin_cos(PI * r)),
             Self::MirrorBall => around_forward([-disc[0], disc[1]], |r| {
                 // θ = 2 asin r.
                 (2.0 * r * (1.0 - r * r).max(0.0).sqrt(), 1.0 - 2.0 * r * r)
@@ -404,7 +405,7 @@ impl Chart {
 
 /// The direction at point `p` of the disc, with (sin, cos) of its angle to −Z as a function of the radius.
 fn around_forward(p: Point, sin_cos: impl Fn(f64) -> (f64, f64)) -> Direction {
-    let r = p[0].hypot(p[1]);
+    let r = functions::hypot(p[0], p[1]);
     if r >= 1.0 {
         return [0.0, 0.0, 1.0];
     }
@@ -426,7 +427,7 @@ fn octahedral(p: Point) -> Direction {
     let phi = ((q[1] - q[0]) / r + 1.0) * FRAC_PI_4;
     let up = (1.0 - r * r).copysign(signed_distance);
     let across = r * (2.0 - r * r).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = phi.sin_cos();
+    let (sin_phi, cos_phi) = functions::sin_cos(phi);
     [-(sin_phi * across).copysign(p[1]), up, (cos_phi * across).copysign(p[0])]
 }
 

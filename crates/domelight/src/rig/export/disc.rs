@@ -5,6 +5,7 @@
 //! less than E because most of the disc is seen at a slant. Formats that cannot hold such a width
 //! get a narrower disc with the same ∫ L dω, which keeps the mean irradiance over all normals.
 
+use crate::math::functions;
 use std::f32::consts::FRAC_PI_2;
 
 use crate::Rgb;
@@ -21,13 +22,13 @@ pub(super) struct Disc {
 impl Disc {
     pub(super) fn of(light: &RigLight) -> Self {
         let radius = light.angular_radius.clamp(0.0, FRAC_PI_2);
-        Self { radius, facing: light.irradiance * (0.5 * (1.0 + radius.cos())) }
+        Self { radius, facing: light.irradiance * (0.5 * (1.0 + functions::cos(radius))) }
     }
 }
 
 /// 2π (1 − cos α), the solid angle of a disc of angular radius α \[sr\], without cancellation.
 pub(super) fn solid_angle(radius: f32) -> f32 {
-    4.0 * std::f32::consts::PI * (0.5 * radius).sin().powi(2)
+    4.0 * std::f32::consts::PI * functions::powi(functions::sin(0.5 * radius), 2)
 }
 
 /// A color whose greatest channel is 1 and the factor that restores the light; white and 0 for

@@ -20,7 +20,7 @@ use super::axes::Axes;
 use super::disc::color_and_strength;
 use crate::Rgb;
 use crate::environment::UpAxis;
-use crate::math::{Mat3, Quat, Vec3, vec3};
+use crate::math::{Mat3, Quat, Vec3, functions, vec3};
 use crate::rig::SphericalHarmonics;
 
 /// Texels along the edge of a face of the reflections.
@@ -177,7 +177,7 @@ fn face_direction(face: usize, right: f32, down: f32) -> Vec3 {
 /// Red, green, blue and divisor: radiance is (rgb/255)^2.2 over d/255.
 fn rgbd(le: Rgb) -> [u8; 4] {
     let divisor = (RGBD_RANGE / le.max_component().max(1.0)).floor().max(1.0);
-    let byte = |c: f32| (255.0 * (c * divisor / 255.0).powf(1.0 / 2.2)).round() as u8;
+    let byte = |c: f32| (255.0 * functions::powf(c * divisor / 255.0, 1.0 / 2.2)).round() as u8;
     [byte(le.r), byte(le.g), byte(le.b), divisor as u8]
 }
 

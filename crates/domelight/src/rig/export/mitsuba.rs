@@ -13,7 +13,7 @@ use super::axes::Axes;
 use super::text::{numbers, vector};
 use super::{ExportError, Format};
 use crate::code;
-use crate::math::{Mat3, Mat4};
+use crate::math::{Mat4, rotation_y};
 use crate::quote::{Code, Xml, xml};
 
 pub(super) fn encode(rig: &RigExport) -> Result<Code<Xml>, ExportError> {
@@ -38,7 +38,7 @@ pub(super) fn encode(rig: &RigExport) -> Result<Code<Xml>, ExportError> {
         );
     }
     if let Some(file) = rig.dome_file() {
-        let to_world = Axes::of_world(rig).dome * Mat3::from_rotation_y(PI);
+        let to_world = Axes::of_world(rig).dome * rotation_y(PI);
         let rows = Mat4::from_mat3(to_world).transpose().to_cols_array();
         text += code!(
             Xml,

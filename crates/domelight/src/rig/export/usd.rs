@@ -16,7 +16,7 @@ use super::text::numbers;
 use super::{ExportError, Format};
 use crate::code;
 use crate::environment::UpAxis;
-use crate::math::{Mat3, Quat, Vec3};
+use crate::math::{Quat, Vec3, rotation_y};
 use crate::quote::{Code, Usd, usd};
 
 pub(super) fn encode(rig: &RigExport) -> Result<Code<Usd>, ExportError> {
@@ -60,7 +60,7 @@ def Xform "rig"
         );
     }
     if let Some(file) = rig.dome_file() {
-        let turn = Axes::of_world(rig).dome * Mat3::from_rotation_y(PI);
+        let turn = Axes::of_world(rig).dome * rotation_y(PI);
         text += code!(
             Usd,
             r#"    def DomeLight "dome"

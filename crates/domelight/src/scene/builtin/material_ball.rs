@@ -5,7 +5,7 @@
 
 use super::shapes::{arc, lathe, uv_sphere};
 use crate::geometry::Mesh;
-use crate::math::{FRAC_PI_2, Mat4, PI, Vec2, Vec3, vec2};
+use crate::math::{FRAC_PI_2, Mat4, PI, Vec2, Vec3, functions, rotation_x, rotation_z, vec2};
 
 /// Height of the ball's center above the floor; its radius is 1.
 pub const CENTER_HEIGHT: f32 = 1.14;
@@ -66,15 +66,15 @@ struct Lip {
 /// The edge at height `side · half_width`: its circle touches that plane and the unit sphere inside.
 fn lip(half_width: f32, side: f32) -> Lip {
     let y = side * (half_width + EDGE);
-    let center = vec2(((1.0 - EDGE).powi(2) - y * y).sqrt(), y);
-    Lip { center, angle: center.to_angle() }
+    let center = vec2((functions::powi(1.0 - EDGE, 2) - y * y).sqrt(), y);
+    Lip { center, angle: functions::atan2(center.y, center.x) }
 }
 
 /// The sphere from the latitude `from` to the rim of the recess at the pole, and its flat ground.
 fn recessed_pole(from: f32) -> Vec<Vec2> {
     let x = RECESS + EDGE;
-    let center = vec2(x, ((1.0 - EDGE).powi(2) - x * x).sqrt());
-    let rim = center.to_angle();
+    let center = vec2(x, (functions::powi(1.0 - EDGE, 2) - x * x).sqrt());
+    let rim = functions::atan2(center.y, center.x);
     let ground = center.y - 2.0 * EDGE;
     let mut profile: Vec<Vec2> = arc(Vec2::ZERO, 1.0, from, rim, 40).split_off(1);
     profile.extend(arc(center, EDGE, rim, PI, 10).into_iter().skip(1));
@@ -87,7 +87,7 @@ fn recessed_pole(from: f32) -> Vec<Vec2> {
 
 /// Tilted toward +x and +z, and lifted onto the cradle.
 fn placed(mut mesh: Mesh) -> Mesh {
-    let tilt = Mat4::from_rotation_x(0.55) * Mat4::from_rotation_z(-0.42);
+    let tilt = Mat4::from_mat3(rotation_x(0.55) * rotation_z(-0.42));
     mesh.transform(&(Mat4::from_translation(CENTER_HEIGHT * Vec3::Y) * tilt));
     mesh
 }

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use crate::geometry::Mesh;
-use crate::math::{FRAC_PI_2, PI, TAU, Vec2, Vec3, vec2, vec3};
+use crate::math::{FRAC_PI_2, PI, TAU, Vec2, Vec3, functions, vec2, vec3};
 
 /// Profiles of [`lathe`] are smooth where they turn by less than this angle \[rad\].
 const CREASE: f32 = 0.5;
@@ -60,7 +60,7 @@ pub fn uv_sphere(segments: u32, rings: u32) -> Mesh {
         0 => Vec2::NEG_Y,
         j if j == rings => Vec2::Y,
         j => {
-            let (sin, cos) = (PI * j as f32 / rings as f32).sin_cos();
+            let (sin, cos) = functions::sin_cos(PI * j as f32 / rings as f32);
             vec2(sin, -cos)
         }
     };
@@ -96,7 +96,8 @@ pub fn lathe(profile: &[Vec2], segments: u32) -> Mesh {
     let normal = |i: usize, j: Option<usize>| {
         let own = directions[i];
         let other = j.map_or(own, |j| directions[j]);
-        let along = if own.angle_to(other).abs() < CREASE { own + other } else { own };
+        let turn = functions::atan2(own.perp_dot(other), own.dot(other)).abs();
+        let along = if turn < CREASE { own + other } else { own };
         vec2(along.y, -along.x).normalize_or_zero()
     };
     let mut builder = Revolution::new(segments);
@@ -113,12 +114,16 @@ pub fn lathe(profile: &[Vec2], segments: u32) -> Mesh {
 /// `steps` pieces: a part of a profile for [`lathe`].
 pub fn arc(center: Vec2, radius: f32, from: f32, to: f32, steps: u32) -> Vec<Vec2> {
     let angle = |i: u32| from + (to - from) * i as f32 / steps as f32;
-    (0..=steps).map(|i| center + radius * Vec2::from_angle(angle(i))).collect()
+    let at = |i| {
+        let (sin, cos) = functions::sin_cos(angle(i));
+        center + radius * vec2(cos, sin)
+    };
+    (0..=steps).map(at).collect()
 }
 
 /// A point (distance from the axis, height) turned by `phi` from +z toward +x.
 fn around_y(p: Vec2, phi: f32) -> Vec3 {
-    let (sin, cos) = phi.sin_cos();
+    let (sin, cos) = functions::sin_cos(phi);
     vec3(p.x * sin, p.y, p.x * cos)
 }
 
@@ -214,7 +219,7 @@ fn bevelled_face(mesh: &mut Mesh, half: Vec3, bevel: f32, steps: u32, axis: usiz
 fn bevel_ticks(steps: u32) -> Vec<(f32, f32)> {
     let tangent = |i: u32| match i {
         i if i == steps => 1.0,
-        i => (0.5 * FRAC_PI_2 * i as f32 / steps as f32).tan(),
+        i => functions::tan(0.5 * FRAC_PI_2 * i as f32 / steps as f32),
     };
     let low = (0..=steps).rev().map(|i| (-1.0, tangent(i)));
     low.chain((0..=steps).map(|i| (1.0, tangent(i)))).collect()

@@ -9,7 +9,7 @@
 use super::shapes::{arc, lathe};
 use super::surface_nets::surface_nets;
 use crate::geometry::{Aabb, Mesh};
-use crate::math::{FRAC_PI_2, PI, Vec2, Vec3, vec2, vec3};
+use crate::math::{FRAC_PI_2, PI, Vec2, Vec3, functions, vec2, vec3};
 
 /// Height of the plinth's top above the floor.
 pub const PLINTH_HEIGHT: f32 = 0.8;
@@ -49,8 +49,8 @@ fn figure_distance(p: Vec3) -> f32 {
 
 /// Straightens the form's bend and twist.
 fn untwist(p: Vec3) -> Vec3 {
-    let bend = vec2(0.13 * (1.7 * p.y - 0.3).sin(), 0.07 * (2.1 * p.y).sin());
-    let (sin, cos) = (TWIST * p.y).sin_cos();
+    let bend = vec2(0.13 * functions::sin(1.7 * p.y - 0.3), 0.07 * functions::sin(2.1 * p.y));
+    let (sin, cos) = functions::sin_cos(TWIST * p.y);
     let (x, z) = (p.x - bend.x, p.z - bend.y);
     vec3(cos * x - sin * z, p.y, sin * x + cos * z)
 }
@@ -91,11 +91,11 @@ fn flutes(q: Vec3, openings: f32) -> f32 {
     if fade == 0.0 {
         return 0.0;
     }
-    let phase = 0.5 * FLUTES * q.x.atan2(q.z) + 2.0 * q.y;
+    let phase = 0.5 * FLUTES * functions::atan2(q.x, q.z) + 2.0 * q.y;
     // |sin| with its kink, the ridge, rounded to more than a cell.
     let (rounding, whole) = (0.12, 0.12f32.sqrt());
-    let scoop =
-        ((phase.sin().powi(2) + rounding).sqrt() - whole) / ((1.0 + rounding).sqrt() - whole);
+    let scoop = ((functions::powi(functions::sin(phase), 2) + rounding).sqrt() - whole)
+        / ((1.0 + rounding).sqrt() - whole);
     fade * FLUTE_DEPTH * scoop
 }
 

@@ -56,7 +56,7 @@ use super::{Budget, LoadError, LoadOptions, Loaded, load_mesh, relative};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, ParseMaterialError};
 use crate::geometry::linear_part;
-use crate::math::{Mat4, Vec2, Vec3, Vec4};
+use crate::math::{Mat4, Vec2, Vec3, Vec4, rotation_x, rotation_y, rotation_z};
 use crate::scene::builtin::{BuiltinScene, UnknownScene};
 use crate::scene::camera::{CameraError, CameraSettings, Projection};
 use crate::scene::{
@@ -507,9 +507,7 @@ fn matrix(table: &ObjectTable) -> Result<Mat4, TomlErrorKind> {
             };
             let [x, y, z] = table.rotate.unwrap_or_default().map(f32::to_radians);
             Mat4::from_translation(table.translate.unwrap_or_default().into())
-                * Mat4::from_rotation_z(z)
-                * Mat4::from_rotation_y(y)
-                * Mat4::from_rotation_x(x)
+                * Mat4::from_mat3(rotation_z(z) * rotation_y(y) * rotation_x(x))
                 * Mat4::from_scale(scale)
         }
     };

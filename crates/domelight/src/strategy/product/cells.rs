@@ -23,7 +23,7 @@ use std::ops::{Deref, DerefMut, Range};
 
 use crate::Rgb;
 use crate::environment::Environment;
-use crate::math::Vec3;
+use crate::math::{Vec3, functions};
 use crate::sampling::hilbert::HilbertState;
 use crate::simd::{LANES, Lanes, Simd, SimdF32x16};
 
@@ -206,7 +206,7 @@ impl Cells {
             }
             *get_mut(&mut cells.radius, slot) = radius;
             for (spread, ramp) in NORMAL_SPREADS.iter().zip(&mut cells.ramps) {
-                let s = radius.hypot(*spread);
+                let s = functions::hypot(radius, *spread);
                 *get_mut(&mut ramp.s, slot) = s;
                 *get_mut(&mut ramp.scale, slot) = 0.25 / s;
             }
@@ -369,7 +369,7 @@ impl Cells {
             u = ((at - [0.0, a, b, c][i]) / f64::from(mass)).clamp(0.0, 1.0 - f64::EPSILON);
             square = square.quarter(i, mass);
         }
-        let side = f64::from(square.size).exp2();
+        let side = functions::exp2(f64::from(square.size));
         let column = (f64::from(square.column) + f64::from(jitter[0])) * side;
         let row = (f64::from(square.row) + f64::from(jitter[1])) * side;
         let wi = environment.orientation().up.to_world(environment.map_direction(column, row));
@@ -412,7 +412,7 @@ impl Map<'_> {
 
     /// Its rectangle of the map, in texels: columns and rows, from and to.
     fn rectangle(&self, square: &Square) -> [[f64; 2]; 2] {
-        let side = f64::from(square.size).exp2();
+        let side = functions::exp2(f64::from(square.size));
         let span =
             |i: u32, n: usize| [f64::from(i) * side, (f64::from(i + 1) * side).min(n as f64)];
         let map = self.environment.map();
@@ -438,11 +438,11 @@ impl Map<'_> {
         let cos = rows.map(|row| self.environment.cos_theta(row).clamp(-1.0, 1.0));
         let area = width * (cos[0] - cos[1]);
         // ∫ sin² θ dθ and ∫ sin θ cos θ dθ
-        let across = |c: f64| 0.5 * (c.acos() - c * (1.0 - c * c).sqrt());
+        let across = |c: f64| 0.5 * (functions::acos(c) - c * (1.0 - c * c).sqrt());
         let along = |c: f64| -0.5 * c * c;
-        let horizontal = (across(cos[1]) - across(cos[0])) * 2.0 * (0.5 * width).sin();
+        let horizontal = (across(cos[1]) - across(cos[0])) * 2.0 * functions::sin(0.5 * width);
         let vertical = (along(cos[1]) - along(cos[0])) * width;
-        (area, 1.0 - (horizontal.hypot(vertical) / area).min(1.0))
+        (area, 1.0 - (functions::hypot(horizontal, vertical) / area).min(1.0))
     }
 
     fn priority(&self, square: &Square) -> f64 {
@@ -463,7 +463,7 @@ impl Map<'_> {
         let center = moment.try_normalize().unwrap_or(middle);
         let bounding_angle = self.farthest(square, center);
         // The light's variance along one axis, and the half side of a square that has it.
-        let variance = 0.5 * (1.0 - (moment.length() / square.mass).min(1.0).powi(2));
+        let variance = 0.5 * (1.0 - functions::powi((moment.length() / square.mass).min(1.0), 2));
         let radius = (3.0 * variance).sqrt().max(0.5 * bounding_angle);
         let up = self.environment.orientation().up;
         // Directions are in single precision.
@@ -476,21 +476,22 @@ impl Map<'_> {
     /// is A sin θ + B cos θ, which is least at an end, or where it has its one minimum.
     fn farthest(&self, square: &Square, center: Vec3) -> f32 {
         let [columns, rows] = self.rectangle(square);
-        let azimuth = |v: Vec3| f64::from(v.x).atan2(f64::from(-v.z));
+        let azimuth = |v: Vec3| functions::atan2(f64::from(v.x), f64::from(-v.z));
         let edge = self.environment.map_direction(columns[0], 0.5 * (rows[0] + rows[1]));
         let first = wrapped(azimuth(edge) - azimuth(center));
         let last = first + (columns[1] - columns[0]) * TAU / self.environment.map().width as f64;
         let away = if last >= PI { PI } else { first.abs().max(last.abs()) };
 
-        let a = f64::from(center.x.hypot(center.z)) * away.cos();
+        let a = f64::from(functions::hypot(center.x, center.z)) * functions::cos(away);
         let b = f64::from(center.y);
-        let thetas = rows.map(|row| self.environment.cos_theta(row).clamp(-1.0, 1.0).acos());
-        let cosine = |theta: f64| a * theta.sin() + b * theta.cos();
-        let lowest = a.atan2(b) + PI;
+        let thetas =
+            rows.map(|row| functions::acos(self.environment.cos_theta(row).clamp(-1.0, 1.0)));
+        let cosine = |theta: f64| a * functions::sin(theta) + b * functions::cos(theta);
+        let lowest = functions::atan2(a, b) + PI;
         let inside = thetas[0] < lowest && lowest < thetas[1];
         let least = cosine(thetas[0]).min(cosine(thetas[1]));
-        let least = if inside { -a.hypot(b) } else { least };
-        least.clamp(-1.0, 1.0).acos() as f32
+        let least = if inside { -functions::hypot(a, b) } else { least };
+        functions::acos(least.clamp(-1.0, 1.0)) as f32
     }
 }
 

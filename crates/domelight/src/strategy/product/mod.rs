@@ -48,6 +48,7 @@ use super::levels::{N_LEVELS, coarser};
 use super::{Contributions, PixelPoints, Strategy, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
+use crate::math::functions;
 use crate::sampling::Sampler;
 use crate::simd::{Colors, InstructionSet, Kernel, LANES, Simd, SimdF32x8, dispatch};
 use candidates::{Candidate, CandidateIndex, Candidates, Counts, Hits, PixelSamples, Sources};
@@ -146,7 +147,7 @@ impl<'a> ProductSampling<'a> {
 
     /// The brightness of a pixel that its error is measured by.
     fn brightness(&self, luminance: f32) -> f32 {
-        luminance.hypot(self.dark)
+        functions::hypot(luminance, self.dark)
     }
 }
 

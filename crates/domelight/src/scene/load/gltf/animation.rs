@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::error::{Failure, GltfErrorKind};
 use super::json::{self, Interpolation};
 use super::source::Source;
-use crate::math::{Quat, Vec4};
+use crate::math::{Quat, Vec4, functions};
 use crate::scene::load::AnimationTime;
 
 /// What an animation sets of a node.
@@ -147,10 +147,23 @@ impl Curve<'_> {
         };
         if path == "rotation" && self.interpolation == Interpolation::Linear && n == 4 {
             let q = |key| Quat::from_slice(value(key)).normalize();
-            return Some(q(key).slerp(q(next), t).to_array().to_vec());
+            return Some(slerp(q(key), q(next), t).to_array().to_vec());
         }
         Some((0..n).map(mix).collect())
     }
+}
+
+/// The rotation at `t` in [0, 1] on the shorter way from `a` to `b`, at constant speed; unit quaternions.
+fn slerp(a: Quat, b: Quat, t: f32) -> Quat {
+    let cos = a.dot(b);
+    let b = if cos < 0.0 { -b } else { b };
+    // Of the half angle's tangent: the arc cosine is inaccurate near 1.
+    let angle = 2.0 * functions::atan2((b - a).length(), (b + a).length());
+    let sin = functions::sin(angle);
+    if sin < 1e-6 {
+        return a.lerp(b, t);
+    }
+    a * (functions::sin((1.0 - t) * angle) / sin) + b * (functions::sin(t * angle) / sin)
 }
 
 #[cfg(test)]

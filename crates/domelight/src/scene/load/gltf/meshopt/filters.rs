@@ -1,6 +1,7 @@
 //! What is done to decoded elements (appendix B of the specification).
 
 use super::Filter;
+use crate::math::functions;
 
 /// Applies a filter to elements of `stride` bytes, a stride that the filter allows.
 pub(super) fn apply(filter: Filter, stride: usize, elements: &mut [u8]) {
@@ -69,7 +70,7 @@ fn quaternion([x, y, z, w]: [i16; 4]) -> [i16; 4] {
 fn exponential(element: &mut [u8; 4]) {
     let v = i32::from_le_bytes(*element);
     let (e, m) = (v >> 24, v << 8 >> 8);
-    *element = (2f32.powi(e) * m as f32).to_le_bytes();
+    *element = (functions::powi(2f32, e) * m as f32).to_le_bytes();
 }
 
 /// RGBA from luma, chroma and alpha of as many bits as alpha's highest bit says.

@@ -1,0 +1,170 @@
+//! Films of every strategy and material, and a checksum of their bits for each: the same wherever the library runs.
+
+use std::fmt::Write as _;
+use std::sync::OnceLock;
+
+use domelight::Rgb;
+use domelight::bsdf::{Bsdf, MaterialSpec};
+use domelight::bvh::InstructionSet;
+use domelight::environment::{Environment, Orientation, builtin::BuiltinProbe};
+use domelight::render::{Background, Filter, Layers, RenderSettings, render};
+use domelight::scene::builtin::BuiltinScene;
+use domelight::scene::{Camera, EnvironmentSource, Material, Scene};
+use domelight::strategy::{PreparedStrategy, StrategySpec};
+
+/// One for each kind of strategy, and for what differs most within a kind.
+const STRATEGIES: [&str; 14] = [
+    "brdf:4",
+    "environment:4",
+    "mis:2:1",
+    "mis:2:1:heuristic=balance:no-compensation",
+    "product:8",
+    "rejection:8",
+    "rejection:8:proposal=brdf",
+    "rejection:rays=2:tries=64:proposal=tighter",
+    "sir:2/32",
+    "sir:2",
+    "sir:2/32:from=brdf:resampling=multinomial",
+    "sir:2/32:from=environment:resampling=reservoir",
+    "median-cut:32",
+    "variance-minimization:32",
+];
+
+/// One for each model, and for what differs most within a model.
+const MATERIALS: [&str; 10] = [
+    "diffuse:0.8,0.5,0.2",
+    "phong:50:0.6:0.3",
+    "ward:0.15:0.5",
+    "ward:0.3:0.1:0.9:1992",
+    "ward:0.2:0.2:0.9:duer",
+    "ggx:0.2,0.4:gold",
+    "ggx:0.1:0.04:correlated",
+    "beckmann:0.2:copper",
+    "gltf:0.9,0.5,0.2:0.5:0.3",
+    "mix",
+];
+
+const SCENES: [BuiltinScene; 4] = [
+    BuiltinScene::Statue,
+    BuiltinScene::Spheres,
+    BuiltinScene::MaterialBall,
+    BuiltinScene::SphereOrthographic,
+];
+
+/// Pixels along an edge: not a multiple of a tile.
+const SIZE: usize = 37;
+
+/// A line for each strategy and each material: its name, a space and sixteen hexadecimal digits.
+///
+/// # Panics
+/// If a name above is none, a scene cannot be rendered, or the processor lacks the instructions.
+pub fn report(instruction_set: InstructionSet) -> String {
+    let stages = SCENES.map(|scene| Stage::new(scene, instruction_set));
+    let mut report = String::new();
+    for strategy in STRATEGIES {
+        let mut checksum = Checksum::new();
+        for stage in &stages {
+            checksum.layers(&stage.render(strategy));
+        }
+        writeln!(report, "{strategy} {:016x}", checksum.0).expect("text has room");
+    }
+    let mut stage = Stage::new(BuiltinScene::Sphere, instruction_set);
+    for material in MATERIALS {
+        let spec: MaterialSpec = material.parse().expect("a material");
+        stage.replace_materials(Bsdf::from(spec));
+        let mut checksum = Checksum::new();
+        for strategy in ["mis:2:2", "product:4", "sir:2/16:from=brdf"] {
+            checksum.layers(&stage.render(strategy));
+        }
+        writeln!(report, "{material} {:016x}", checksum.0).expect("text has room");
+    }
+    report
+}
+
+/// A scene in its light.
+struct Stage {
+    builtin: BuiltinScene,
+    scene: Scene,
+    environment: Environment,
+    instruction_set: InstructionSet,
+}
+
+impl Stage {
+    fn new(builtin: BuiltinScene, instruction_set: InstructionSet) -> Self {
+        let light = builtin.environment();
+        let EnvironmentSource::Builtin(probe) = &light.source else { panic!("a built-in probe") };
+        let map = probe.parse::<BuiltinProbe>().expect("a probe").image(64);
+        let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
+        let environment = Environment::new(map, orientation, light.factor()).expect("a map");
+        let scene =
+            Scene::builtin(builtin).with_instruction_set(instruction_set).expect("instructions");
+        Self { builtin, scene, environment, instruction_set }
+    }
+
+    fn replace_materials(&mut self, bsdf: Bsdf) {
+        let mut description = self.builtin.description();
+        for material in &mut description.materials {
+            *material = Material::fixed("replaced", bsdf);
+        }
+        let scene = Scene::new(description).expect("a scene");
+        self.scene = scene.with_instruction_set(self.instruction_set).expect("instructions");
+    }
+
+    fn render(&self, strategy: &str) -> Layers {
+        let settings = RenderSettings {
+            width: SIZE,
+            height: SIZE,
+            n_samples: 6,
+            filter: Filter::BlackmanHarris,
+            background: Background::Shown,
+            ..RenderSettings::default()
+        };
+        let camera = Camera::framing(&self.scene, SIZE, SIZE);
+        let Self { scene, environment, .. } = self;
+        let spec: StrategySpec = strategy.parse().expect("a strategy");
+        let spec = spec.for_picture(scene, &camera, environment, &settings);
+        let strategy = PreparedStrategy::new(spec, environment)
+            .expect("a strategy that suits the environment")
+            .with_instruction_set(self.instruction_set)
+            .expect("instructions");
+        render(scene, &camera, environment, &strategy, &settings, &()).layers
+    }
+}
+
+/// FNV-1a of 64 bits.
+struct Checksum(u64);
+
+impl Checksum {
+    fn new() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+
+    fn word(&mut self, word: u32) {
+        for byte in word.to_le_bytes() {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+
+    fn numbers(&mut self, numbers: impl IntoIterator<Item = f32>) {
+        numbers.into_iter().for_each(|x| self.word(x.to_bits()));
+    }
+
+    fn layers(&mut self, layers: &Layers) {
+        for image in [&layers.color, &layers.unoccluded, &layers.albedo, &layers.variance] {
+            self.numbers(image.pixels.iter().flat_map(|&Rgb { r, g, b }| [r, g, b]));
+        }
+        self.numbers(layers.normal.iter().flat_map(|v| v.to_array()));
+        self.numbers(layers.alpha.iter().chain(&layers.depth).copied());
+        for &n in layers.n_samples.iter().chain(&layers.n_hits) {
+            self.word(n);
+        }
+    }
+}
+
+/// Byte `i` of the report, or 256 beyond its end: for WebAssembly, which has no standard output.
+#[unsafe(no_mangle)]
+pub extern "C" fn report_byte(i: u32) -> u32 {
+    static REPORT: OnceLock<String> = OnceLock::new();
+    let report = REPORT.get_or_init(|| report(InstructionSet::best()));
+    report.as_bytes().get(i as usize).map_or(256, |&byte| u32::from(byte))
+}
