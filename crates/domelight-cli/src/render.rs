@@ -58,8 +58,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         target_error: arguments.samples.target_error,
         ..arguments.scene.render_settings(&arguments.pixel, arguments.samples.spp)
     };
-    let points = || pilot_points(scene, camera, settings);
-    let spec = spec.for_scene(points, environment, settings.seed);
+    let spec = spec.for_picture(scene, camera, environment, settings);
     let strategy = &PreparedStrategy::new(spec, environment).with_context(|| probe.clone())?;
     let described = Settings {
         scene: report.clone(),
@@ -113,6 +112,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         outputs.iter().map(write).fold(Ok(()), Result::and)?;
     }
     let stages = Timings { load, build, render, write: watch.lap() };
+    let points = || pilot_points(scene, camera, settings);
     let rejection = acceptance(spec, points, environment, settings.seed)?;
     let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
     report.profile = progress.profile();

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use anyhow::Result;
 use domelight::RgbImage;
 use domelight::picture::compare::compare;
-use domelight::render::pilot_points;
+use domelight::render::RenderSettings;
 use domelight::strategy::{PreparedStrategy, StrategySpec};
 use serde::{Deserialize, Serialize};
 
@@ -91,8 +91,9 @@ impl<'e> BenchStrategy<'e> {
     pub(super) fn new(strategy: &NamedStrategy, built: &'e BuiltCase, seed: u64) -> Result<Self> {
         let BuiltCase { view, settings, .. } = built;
         let mut watch = Stopwatch::start();
-        let points = || pilot_points(&view.scene, &view.camera, settings);
-        let spec = strategy.spec.for_scene(points, &view.environment, seed);
+        let settings = &RenderSettings { seed, ..*settings };
+        let spec =
+            strategy.spec.for_picture(&view.scene, &view.camera, &view.environment, settings);
         let prepared = PreparedStrategy::new(spec, &view.environment)?;
         let name = strategy.text.clone();
         Ok(Self { name, spec, strategy: prepared, setup: watch.lap() })

@@ -14,7 +14,7 @@ use domelight::RgbImage;
 use domelight::picture::compare::relative_error_map;
 use domelight::picture::flip::{PIXELS_PER_DEGREE, ldr_flip};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
-use domelight::render::{RenderSettings, pilot_points};
+use domelight::render::RenderSettings;
 use domelight::strategy::{PreparedStrategy, StrategyKind};
 
 pub(crate) use budget::Budget;
@@ -164,8 +164,7 @@ impl Comparison<'_> {
     ) -> Result<(StrategyReport, Option<Picture>)> {
         let PreparedScene { scene, camera, environment, .. } = self.view;
         let mut watch = Stopwatch::start();
-        let points = || pilot_points(scene, camera, &settings);
-        let spec = strategy.spec.for_scene(points, environment, settings.seed);
+        let spec = strategy.spec.for_picture(scene, camera, environment, &settings);
         let prepared = PreparedStrategy::new(spec, environment)?;
         let setup = watch.lap();
         let render_setup =

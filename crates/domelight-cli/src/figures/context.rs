@@ -17,7 +17,7 @@ use domelight::math::{Vec3, vec2};
 use domelight::picture::compare::compare;
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::quote::{Code, Shell, shell};
-use domelight::render::{Layers, RenderSettings, pilot_points};
+use domelight::render::{Layers, RenderSettings};
 use domelight::sampling::{Heuristic, SamplerKind};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{Camera, EnvironmentSettings, EnvironmentSource, Scene, SceneDescription};
@@ -266,8 +266,7 @@ impl FigureScene<'_> {
 
     /// Fills in what a specification leaves to the scene.
     pub(crate) fn complete(&self, spec: StrategySpec) -> StrategySpec {
-        let points = || pilot_points(&self.scene, &self.camera, &self.settings);
-        spec.for_scene(points, &self.context.environment, self.settings.seed)
+        spec.for_picture(&self.scene, &self.camera, &self.context.environment, &self.settings)
     }
 
     /// Renders the picture.

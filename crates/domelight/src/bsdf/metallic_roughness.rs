@@ -63,7 +63,8 @@ impl MetallicRoughness {
         Ggx::new([self.alpha; 2], fresnel, Masking::Correlated)
     }
 
-    /// The probability of drawing from the specular part.
+    /// The probability of drawing from the specular part: at most [`MOST_SPECULAR`] beside a diffuse one, whose weights
+    /// would have no bound at grazing views.
     #[inline]
     pub(super) fn specular_share<F: SimdFloat>(&self, cos_theta_o: F) -> F {
         let one = |x| cos_theta_o.splat(x);
@@ -71,9 +72,13 @@ impl MetallicRoughness {
         let specular = one(self.f0_mean) + one(1.0 - self.f0_mean) * grazing;
         let diffuse = (one(1.0) - specular) * one(self.diffuse_mean);
         // Zero only for a black metal, which has no diffuse part either.
-        F::select(one(0.0).lt(specular), specular / (specular + diffuse), one(1.0))
+        let share = F::select(one(0.0).lt(specular), specular / (specular + diffuse), one(1.0));
+        share.min(one(if self.diffuse_mean > 0.0 { MOST_SPECULAR } else { 1.0 }))
     }
 }
+
+/// The greatest probability of drawing from the specular part beside a diffuse one.
+const MOST_SPECULAR: f32 = 0.95;
 
 impl Brdf for MetallicRoughness {
     #[inline(always)]

@@ -76,7 +76,7 @@ pub(crate) fn check_bound(lobe: &impl Brdf, factor: f32) {
 
 /// A grid of half vectors, fine round the normal, and one of directions; then a pattern search from
 /// the best of them.
-fn search_maximum(lobe: &impl Brdf, wo: Vec3) -> (f32, Vec3) {
+pub(crate) fn search_maximum(lobe: &impl Brdf, wo: Vec3) -> (f32, Vec3) {
     let value = |wi: Vec3| lobe.eval(wo, wi).max_component();
     let mut best = (0.0, Vec3::Z);
     let mut consider = |wi: Vec3| {

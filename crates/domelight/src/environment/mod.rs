@@ -111,12 +111,6 @@ pub enum EnvironmentError {
     /// A rotation that is NaN or infinite.
     #[error("the rotation is {0} degrees; it must be finite")]
     BadRotation(f32),
-    /// More light than single precision holds.
-    #[error("the map's total is {power:e}, beyond single precision; scale it down")]
-    TooBright {
-        /// ∫ luminance dω.
-        power: f64,
-    },
 }
 
 /// A direction drawn from the environment.
@@ -124,7 +118,7 @@ pub enum EnvironmentError {
 pub struct EnvironmentSample {
     /// Toward the light, world frame.
     pub wi: Vec3,
-    /// Radiance from there \[W·m⁻²·sr⁻¹\], [`Environment::le`] of `wi`.
+    /// Radiance from there, [`Environment::le`] of `wi`.
     pub le: Rgb,
     /// Density \[sr⁻¹\], [`Environment::pdf`] of `wi`, positive.
     pub pdf: f32,
@@ -139,10 +133,16 @@ struct Texel {
 
 /// Radiance from every direction, and a way to draw directions in proportion to its luminance.
 ///
+/// Radiance, power and map are multiples of [`Environment::unit`] W·m⁻²·sr⁻¹, which is 1 unless the brightest texel
+/// lies outside 2^±64: then only ratios matter, and neither weights nor their squares overflow or vanish.
+///
 /// Resident memory is 17⅓ bytes a texel: three floats of radiance and a pyramid of weights.
 #[derive(Clone, Debug)]
 pub struct Environment {
+    /// In multiples of the unit.
     map: RgbImage,
+    /// A power of two.
+    unit: f64,
     orientation: Orientation,
     grid: Grid,
     /// Luminance · solid angle; none for a black map.
@@ -160,6 +160,9 @@ impl Environment {
         let mut fingerprinter = crate::fingerprint::Fingerprinter::default();
         let RgbImage { width, height, pixels } = &self.map;
         fingerprinter.text(format_args!("{width}x{height} {:?}", self.orientation));
+        if self.unit != 1.0 {
+            fingerprinter.text(format_args!("{:e}", self.unit));
+        }
         fingerprinter.numbers(pixels.iter().flat_map(|texel| texel.to_array()));
         fingerprinter.finish()
     }
@@ -196,15 +199,15 @@ impl Environment {
     /// If the angle is not finite.
     pub fn rotated(self, degrees: f32) -> Result<Self, EnvironmentError> {
         let rotation = self.orientation.rotation + degrees;
-        Self::new(self.map, Orientation { rotation, ..self.orientation }, 1.0)
+        Self::in_units(self.map, Orientation { rotation, ..self.orientation }, self.unit, 1.0)
     }
 
     /// The same environment with its radiance multiplied by `scale` ≥ 0.
     ///
     /// # Errors
-    /// If the scale is negative or not finite, or the result is too bright.
+    /// If the scale is negative or not finite.
     pub fn scaled(self, scale: f32) -> Result<Self, EnvironmentError> {
-        Self::new(self.map, self.orientation, scale)
+        Self::in_units(self.map, self.orientation, self.unit, scale)
     }
 
     /// From a lat-long map: row 0 up, texel centers at +½, every texel finite and not negative;
@@ -213,8 +216,18 @@ impl Environment {
     /// # Errors
     /// The first bad texel in row order, an empty map, or a bad scale or rotation.
     pub fn new(
+        map: RgbImage,
+        orientation: Orientation,
+        scale: f32,
+    ) -> Result<Self, EnvironmentError> {
+        Self::in_units(map, orientation, 1.0, scale)
+    }
+
+    /// [`Environment::new`] from multiples of `unit`.
+    fn in_units(
         mut map: RgbImage,
         orientation: Orientation,
+        unit: f64,
         scale: f32,
     ) -> Result<Self, EnvironmentError> {
         let (width, height) = (map.width, map.height);
@@ -227,8 +240,19 @@ impl Environment {
         if !orientation.rotation.is_finite() {
             return Err(EnvironmentError::BadRotation(orientation.rotation));
         }
-        if scale != 1.0 {
-            map.pixels.iter_mut().for_each(|p| *p *= scale);
+        let is_bad = |p: &Rgb| !p.is_finite() || p.min_component() < 0.0;
+        if map.pixels.iter().any(is_bad) {
+            return Err(Self::bad_texel(&map));
+        }
+        let brightest = map.pixels.iter().map(|p| p.max_component()).fold(0.0, f32::max);
+        let factor = unit * f64::from(scale);
+        let unit = unit_of(f64::from(brightest) * factor);
+        let factor = factor / unit;
+        if factor == f64::from(factor as f32) {
+            map.pixels.iter_mut().filter(|_| factor != 1.0).for_each(|p| *p *= factor as f32);
+        } else {
+            let scaled = |c: f32| (f64::from(c) * factor) as f32;
+            map.pixels.iter_mut().for_each(|p| *p = Rgb::from(p.to_array().map(scaled)));
         }
         let grid = Grid::new(width, height, orientation.rotation);
         let table = grid.table(&map, Rgb::luminance);
@@ -237,23 +261,29 @@ impl Environment {
             Err(TableError::AllZero) => None,
             Err(_) => return Err(Self::bad_texel(&map)),
         };
-        // A luminance can be fine where a channel is not.
-        let mut max_luminance = 0f32;
-        for p in &map.pixels {
-            if !p.is_finite() || p.min_component() < 0.0 {
-                return Err(Self::bad_texel(&map));
-            }
-            max_luminance = max_luminance.max(p.luminance());
-        }
+        let max_luminance = map.pixels.iter().map(|p| p.luminance()).fold(0.0, f32::max);
         let power = table.as_ref().map_or(0.0, HierarchicalTable::total);
-        if power > f64::from(f32::MAX) {
-            return Err(EnvironmentError::TooBright { power });
+        let inverse_power = if power > 0.0 { (1.0 / power) as f32 } else { 0.0 };
+        Ok(Self { map, unit, orientation, grid, table, inverse_power, max_luminance })
+    }
+
+    /// The same radiance of more texels, each divided into columns and rows of equal ones, if the map is much narrower or
+    /// wider than 2:1; else `None`.
+    ///
+    /// Divisions of a map into squares of texels assume that its texels are about as wide as high.
+    pub(crate) fn divided(&self) -> Option<Self> {
+        /// A map beyond is left as it is.
+        const MOST_TEXELS: usize = 1 << 22;
+        let RgbImage { width, height, .. } = self.map;
+        let columns = if width < height { (2 * height).div_ceil(width) } else { 1 };
+        let rows = if width > 4 * height { width.div_ceil(2 * height) } else { 1 };
+        let n_texels = width.checked_mul(height)?.checked_mul(columns)?.checked_mul(rows)?;
+        if columns * rows == 1 || n_texels > MOST_TEXELS {
+            return None;
         }
-        // Less light than single precision can invert is none.
-        let inverse_power = (1.0 / power) as f32;
-        let table = table.filter(|_| inverse_power.is_finite());
-        let inverse_power = if table.is_some() { inverse_power } else { 0.0 };
-        Ok(Self { map, orientation, grid, table, inverse_power, max_luminance })
+        let texel = |x: usize, y: usize| self.map.get(x / columns, y / rows);
+        let map = RgbImage::from_fn(width * columns, height * rows, texel);
+        Self::in_units(map, self.orientation, self.unit, 1.0).ok()
     }
 
     /// The same radiance from everywhere.
@@ -269,6 +299,11 @@ impl Environment {
         let i = map.pixels.iter().position(bad).unwrap_or(0);
         let (x, y) = (i % map.width, i / map.width);
         EnvironmentError::BadTexel { x, y, value: map.pixels[i] }
+    }
+
+    /// What radiance, power and map are multiples of \[W·m⁻²·sr⁻¹\]: a power of two, 1 for all but extreme maps.
+    pub fn unit(&self) -> f64 {
+        self.unit
     }
 
     /// The map, scale included.
@@ -299,13 +334,12 @@ impl Environment {
         self.table.as_ref().map_or(0.0, HierarchicalTable::total)
     }
 
-    /// The greatest luminance of [`Environment::le`] over all directions \[W·m⁻²·sr⁻¹\]; 0 for a
-    /// black map.
+    /// The greatest luminance of [`Environment::le`] over all directions; 0 for a black map.
     pub fn max_luminance(&self) -> f32 {
         self.max_luminance
     }
 
-    /// Radiance from the unit direction `wi` \[W·m⁻²·sr⁻¹\], constant over each texel.
+    /// Radiance from the unit direction `wi`, constant over each texel, in multiples of [`Environment::unit`].
     pub fn le(&self, wi: Vec3) -> Rgb {
         let t = self.texel(wi);
         self.map.get(t.column, t.row)
@@ -416,6 +450,18 @@ impl Environment {
     /// The point of the map that `wi` looks at, in [0, 1]².
     pub fn uv(&self, wi: Vec3) -> Vec2 {
         self.grid.uv(self.orientation.up.to_map(wi.into())).into()
+    }
+}
+
+/// The unit for a map whose brightest channel is `brightest`.
+fn unit_of(brightest: f64) -> f64 {
+    /// Products and squares of such radiances, times and over solid angles, stay within single precision.
+    const ORDINARY: std::ops::RangeInclusive<f64> =
+        5.421_010_862_427_522e-20..=18_446_744_073_709_551_616.0;
+    if brightest == 0.0 || ORDINARY.contains(&brightest) {
+        1.0
+    } else {
+        2f64.powi(brightest.log2().floor() as i32)
     }
 }
 

@@ -61,16 +61,18 @@ impl PixelSums {
         Self { n_samples, ..Self::default() }
     }
 
-    /// Adds a sample of a set. A sample that is not finite counts as black and is reported: it returns false.
-    pub(super) fn add(&mut self, sample: &CameraSample, set: SampleSet) -> bool {
+    /// Adds a sample of a set, with colors in multiples of `unit`. A sample that is not finite counts as black and is
+    /// reported: it returns false.
+    pub(super) fn add(&mut self, sample: &CameraSample, set: SampleSet, unit: f64) -> bool {
         let finite = sample.color.is_finite() && sample.unoccluded.is_finite();
         if finite {
-            for (c, x) in sample.color.to_array().into_iter().enumerate() {
-                self.color[c] += f64::from(x);
-                self.color_squared[c] += f64::from(x) * f64::from(x);
+            let in_units = |color: Rgb| color.to_array().map(|c| f64::from(c) * unit);
+            for (c, x) in in_units(sample.color).into_iter().enumerate() {
+                self.color[c] += x;
+                self.color_squared[c] += x * x;
             }
-            for (c, x) in sample.unoccluded.to_array().into_iter().enumerate() {
-                self.unoccluded[c] += f64::from(x);
+            for (c, x) in in_units(sample.unoccluded).into_iter().enumerate() {
+                self.unoccluded[c] += x;
             }
         }
         self.alpha += sample.alpha;
@@ -79,11 +81,11 @@ impl PixelSums {
             self.n_second += 1;
             let color = if finite { sample.color } else { Rgb::BLACK };
             for (sum, x) in self.second.iter_mut().zip(color.to_array()) {
-                *sum += f64::from(x);
+                *sum += f64::from(x) * unit;
             }
         }
         if self.n_samples.is_power_of_two() {
-            self.prefixes = [Rgb::from(self.color.map(|c| c as f32)), self.prefixes[0]];
+            self.prefixes = [Rgb::from(self.color.map(narrowed)), self.prefixes[0]];
         }
         if let Some(surface) = sample.surface {
             self.albedo += surface.albedo;
@@ -144,7 +146,7 @@ impl PixelSums {
         let independent: f64 = self.independent_variance().into_iter().sum();
         let squares = |x: [f64; 3]| x.into_iter().map(|x| x * x).sum::<f64>();
         if self.n_second > 0 {
-            return Some(Contrast::SimdBitSets([
+            return Some(Contrast::Sets([
                 independent,
                 self.balance() * squares(self.difference()),
             ]));
@@ -162,7 +164,7 @@ impl PixelSums {
 
     fn mean(&self, sum: [f64; 3]) -> Rgb {
         let n = f64::from(self.n_samples.max(1));
-        Rgb::from(sum.map(|c| (c / n) as f32))
+        Rgb::from(sum.map(|c| narrowed(c / n)))
     }
 
     fn alpha(&self) -> f32 {
@@ -188,8 +190,13 @@ impl PixelSums {
     /// Of the mean.
     fn variance(&self, sums: &VarianceSums) -> Rgb {
         let scale = sums.scale(self.n_samples);
-        Rgb::from(self.independent_variance().map(|v| (scale * v) as f32))
+        Rgb::from(self.independent_variance().map(|v| narrowed(scale * v)))
     }
+}
+
+/// The nearest finite number of single precision.
+fn narrowed(x: f64) -> f32 {
+    x.min(f64::from(f32::MAX)) as f32
 }
 
 /// A rendered picture in layers. Colors are premultiplied by alpha.
@@ -207,7 +214,7 @@ pub struct Layers {
     pub normal: Vec<Vec3>,
     /// Mean distance from the camera plane over the samples that hit; 0 where none did.
     pub depth: Vec<f32>,
-    /// Variance of each pixel's mean: that of independent samples of the same spread, scaled to what the samples of
+    /// Variance of each pixel's mean, at most `f32::MAX`: that of independent samples of the same spread, scaled to what the samples of
     /// the whole picture err.
     pub variance: RgbImage,
     /// Camera samples of each pixel.
@@ -542,7 +549,7 @@ mod tests {
                 let sample =
                     CameraSample { color, unoccluded: -color, alpha: x, surface: Some(surface) };
                 let set = if j % 2 == 1 { SampleSet::Second } else { SampleSet::First };
-                pixel.add(&sample, set);
+                pixel.add(&sample, set, 1.0);
             }
         }
         let words: Vec<_> = film.words().collect();

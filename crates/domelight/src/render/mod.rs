@@ -31,9 +31,11 @@ pub use tiling::{Tiling, Window};
 pub use variance::VarianceSums;
 
 use crate::environment::Environment;
+use crate::geometry::{Ray, offset_origin};
+use crate::math::Vec3;
 use crate::sampling::SamplerKind;
 use crate::scene::{Camera, Scene};
-use crate::strategy::{ShadingPoint, Strategy};
+use crate::strategy::{ShadingPoint, Strategy, StrategySpec};
 
 /// What camera rays see that leave the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -179,6 +181,27 @@ pub fn render<S: Strategy>(
     let mut renderer = Renderer::with_strategy(scene, camera, environment, strategy, *settings);
     renderer.run(observer);
     renderer.rendering()
+}
+
+impl StrategySpec {
+    /// Chooses what is left open, by a pilot at points that the picture shows; see [`StrategySpec::for_scene`].
+    #[must_use]
+    pub fn for_picture(
+        self,
+        scene: &Scene,
+        camera: &Camera,
+        environment: &Environment,
+        settings: &RenderSettings,
+    ) -> Self {
+        let extent = scene.bounds().size().max_element();
+        let visibility = |at: &ShadingPoint, wi: Vec3| {
+            let side = if at.ng.dot(wi) < 0.0 { -at.ng } else { at.ng };
+            let ray = Ray::new(offset_origin(at.position, side, extent), wi);
+            if scene.bvh().any_hit(&ray) { 0.0 } else { 1.0 }
+        };
+        let points = || pilot_points(scene, camera, settings);
+        self.for_scene(points, visibility, environment, settings.seed)
+    }
 }
 
 /// The shading points of up to 256 pixels' centers, spread over the picture: for pilots.

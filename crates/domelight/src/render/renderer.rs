@@ -104,8 +104,7 @@ impl<'a> Renderer<'a> {
         strategy: StrategySpec,
         settings: RenderSettings,
     ) -> Result<Self, PrepareError> {
-        let points = || super::pilot_points(scene, camera, &settings);
-        let spec = strategy.for_scene(points, environment, settings.seed);
+        let spec = strategy.for_picture(scene, camera, environment, &settings);
         let prepared = Held::Own(Box::new(PreparedStrategy::new(spec, environment)?));
         let renderer = Self::hold(scene, camera, environment, prepared, settings);
         Ok(Self { spec: Some(spec), ..renderer })

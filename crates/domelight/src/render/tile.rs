@@ -263,7 +263,7 @@ impl Tile {
                     of_strategy,
                     observer,
                 );
-                counts.non_finite += self.add_samples(context, SampleSet::Second, batch);
+                counts.non_finite += self.add_samples(&strategy_context, SampleSet::Second, batch);
             }
             batch.choose(|i, _| of_round(i));
             counts += self.sample(&strategy_context, round, pass.set, batch, of_strategy, observer);
@@ -271,7 +271,7 @@ impl Tile {
                 batch.learn(&strategy_context, of_strategy);
             }
             observer.stage_started(Stage::Sums);
-            counts.non_finite += self.add_samples(context, pass.set, batch);
+            counts.non_finite += self.add_samples(&strategy_context, pass.set, batch);
         }
         self.counts += counts;
         counts
@@ -395,7 +395,15 @@ impl Tile {
 
     /// Adds each camera sample to its pixel, in order, and lets the other pixels learn from them; returns how many are
     /// not finite.
-    fn add_samples(&mut self, context: &RenderContext, set: SampleSet, batch: &mut Batch) -> u64 {
+    fn add_samples<S: Strategy>(
+        &mut self,
+        strategy_context: &StrategyContext<S>,
+        set: SampleSet,
+        batch: &mut Batch,
+    ) -> u64 {
+        let context = strategy_context.context;
+        let unit = strategy_context.strategy.unit();
+        let background_sample = |direction| background_sample(context, direction, unit);
         let mut non_finite = 0;
         let mut point = 0;
         let adaptive = batch.adaptive;
@@ -419,17 +427,17 @@ impl Tile {
                         point += 1;
                         batch.surface_sample(context, point - 1, ray, &hit)
                     }
-                    Some((ray, None)) => background_sample(context, ray.direction),
+                    Some((ray, None)) => background_sample(ray.direction),
                     None => {
                         let set = batch.pixels[i].sampler.set(Dimension::Film);
                         let ray = camera_ray(context, x, y, &set, sample);
-                        background_sample(context, ray.direction)
+                        background_sample(ray.direction)
                     }
                 };
                 if adaptive {
                     sums.add(sample.color.luminance(), sample.surface.is_some());
                 }
-                non_finite += u64::from(!self.pixels[i].add(&sample, set));
+                non_finite += u64::from(!self.pixels[i].add(&sample, set, unit));
             }
             if adaptive {
                 batch.allocation.learn(i, &sums, first.is_some());
@@ -475,11 +483,14 @@ fn camera_ray(
     context.camera.ray(x as f32 + at.x, y as f32 + at.y)
 }
 
-fn background_sample(context: &RenderContext, direction: Vec3) -> CameraSample {
+/// What a ray sees behind the scene, in multiples of `unit`.
+fn background_sample(context: &RenderContext, direction: Vec3, unit: f64) -> CameraSample {
     match context.settings.background {
         Background::Hidden => CameraSample::default(),
         Background::Shown => {
             let le = context.environment.le_interpolated(direction);
+            let own = context.environment.unit();
+            let le = if own == unit { le } else { le * (own / unit) as f32 };
             CameraSample { color: le, unoccluded: le, alpha: 1.0, surface: None }
         }
     }

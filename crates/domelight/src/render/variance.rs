@@ -33,7 +33,7 @@ pub struct VarianceSums {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Contrast {
     /// Of two independent sets: s²/n, and the variance by their difference.
-    SimdBitSets([f64; 2]),
+    Sets([f64; 2]),
     /// Of a sequence: s²/N of its longest prefix of a power of two N, and D² of the halves of that.
     Halves([f64; 2]),
 }
@@ -52,7 +52,7 @@ impl VarianceSums {
         for contrast in pixels.iter().filter_map(PixelSums::contrast) {
             let mut of_pixel = Self::default();
             match contrast {
-                Contrast::SimdBitSets(sets) => of_pixel.sets = sets.map(fixed),
+                Contrast::Sets(sets) => of_pixel.sets = sets.map(fixed),
                 Contrast::Halves(halves) => of_pixel.halves = halves.map(fixed),
             }
             sums.add(&of_pixel);

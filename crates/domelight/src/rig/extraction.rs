@@ -199,7 +199,8 @@ impl<'a> CompactExtraction<'a> {
     /// Compact lights and the lights of regions of the rest, without those that are too dim.
     fn combine(&self, mut regions: Rig) -> Result<Extraction, RigError> {
         let rest = self.rest();
-        let scale = (rest.power() / self.environment.power()) as f32;
+        let power = |environment: &Environment| environment.power() * environment.unit();
+        let scale = (power(rest) / power(&self.environment)) as f32;
         regions.lights.iter_mut().for_each(|l| l.share *= scale);
         // Lights are in order, the dim ones last.
         let min_share = self.settings.min_share.unwrap_or(0.0);
@@ -239,7 +240,8 @@ fn without(environment: &Environment, sources: &[CompactSource]) -> Environment 
 /// Other radiance of the same orientation, nowhere above the first.
 fn environment_of(environment: &Environment, pixels: Vec<Rgb>) -> Environment {
     let map = RgbImage { pixels, ..*environment.map() };
-    Environment::new(map, environment.orientation(), 1.0).expect("parts of a valid map are valid")
+    Environment::new(map, environment.orientation(), environment.unit() as f32)
+        .expect("parts of a valid map are valid")
 }
 
 /// The light of what a source took.

@@ -317,7 +317,8 @@ impl RegionSums {
     }
 
     fn light(&self, texels: &Texels, total: f64, region: Region) -> RigLight {
-        let [r, g, b] = self.irradiance.map(|c| c as f32);
+        let unit = texels.environment().unit();
+        let [r, g, b] = self.irradiance.map(|c| (c * unit) as f32);
         let length = self.moment.map(|m| m * m).iter().sum::<f64>().sqrt();
         let concentration = (length / self.energy).min(1.0);
         RigLight {

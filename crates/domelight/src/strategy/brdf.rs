@@ -20,6 +20,10 @@ impl PointStrategy for BrdfSampling<'_> {
 
     const UNBIASED: bool = true;
 
+    fn unit(&self) -> f64 {
+        self.environment.unit()
+    }
+
     fn n_rays(&self) -> u32 {
         self.n_samples
     }

@@ -22,6 +22,10 @@ impl PointStrategy for EnvironmentSampling<'_> {
 
     const UNBIASED: bool = true;
 
+    fn unit(&self) -> f64 {
+        self.environment.unit()
+    }
+
     fn n_rays(&self) -> u32 {
         self.n_samples
     }

@@ -78,6 +78,8 @@ impl<'s, S: Strategy> Estimator<'s, S> {
                 self.strategy.learn(&tile, &self.rays, &self.visibility, &mut self.scratch);
             }
         }
+        let unit = self.strategy.unit() as f32;
+        self.radiance.iter_mut().filter(|_| unit != 1.0).for_each(|sum| *sum *= unit);
         &self.radiance
     }
 }

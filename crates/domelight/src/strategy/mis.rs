@@ -69,6 +69,10 @@ impl PointStrategy for MultipleImportanceSampling<'_> {
 
     const UNBIASED: bool = true;
 
+    fn unit(&self) -> f64 {
+        self.environment.unit()
+    }
+
     fn n_rays(&self) -> u32 {
         self.n_environment + self.n_brdf
     }

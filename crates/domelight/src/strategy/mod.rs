@@ -37,7 +37,7 @@ pub use rejection::{
     StoppingRule,
 };
 pub use sir::{
-    Candidates, RAY_COST, Resampling, SamplingImportanceResampling, SirScratch, optimal_candidates,
+    CandidatePilot, Candidates, RAY_COST, Resampling, SamplingImportanceResampling, SirScratch,
 };
 pub use spec::{StrategyError, StrategyKind, StrategyOptions, StrategySpec};
 
@@ -195,6 +195,12 @@ pub trait PointStrategy: Sync {
     /// Shadow rays asked for at each point at the most.
     fn n_rays(&self) -> u32;
 
+    /// What weights are multiples of: [`Environment::unit`](crate::Environment::unit) of a strategy whose weights are
+    /// in proportion to [`Environment::le`](crate::Environment::le).
+    fn unit(&self) -> f64 {
+        1.0
+    }
+
     /// Calls `push(wi, weight)` for each shadow ray at the point.
     fn sample(
         &self,
@@ -262,6 +268,11 @@ pub trait Strategy: Sync {
     /// The most shadow rays at a point, for sizing batches.
     fn n_rays(&self) -> u32;
 
+    /// What weights and base are multiples of; see [`PointStrategy::unit`].
+    fn unit(&self) -> f64 {
+        1.0
+    }
+
     /// Camera samples of each pixel that a pass should have, for strategies that place the rays of
     /// all of them together; `None` where it does not matter.
     fn samples_per_pass(&self) -> Option<u32> {
@@ -299,6 +310,10 @@ impl<S: PointStrategy> Strategy for S {
 
     fn n_rays(&self) -> u32 {
         PointStrategy::n_rays(self)
+    }
+
+    fn unit(&self) -> f64 {
+        PointStrategy::unit(self)
     }
 
     fn begin_pass(&self, _: Sampler, _: u32) {}

@@ -1,12 +1,13 @@
 //! A running strategy of any kind: the tables and lights that a [`StrategySpec`] needs of an environment.
 
 use super::{
-    BrdfSampling, CompensationNeedsBrdf, Contributions, EnvironmentSampling, LightSet, LightTable,
-    MultipleImportanceSampling, ProductSampling, RAY_COST, RejectionError, RejectionSampling,
-    SamplingImportanceResampling, ShadingPoint, Strategy, StrategySpec, TileShading,
-    optimal_candidates, product, rejection, sir,
+    BrdfSampling, CandidatePilot, CompensationNeedsBrdf, Contributions, EnvironmentSampling,
+    LightSet, LightTable, MultipleImportanceSampling, ProductSampling, RejectionError,
+    RejectionSampling, SamplingImportanceResampling, ShadingPoint, Strategy, StrategySpec,
+    TileShading, product, rejection, sir,
 };
 use crate::environment::{CompensatedTable, Environment};
+use crate::math::Vec3;
 use crate::rig::{MedianCut, RigError, VarianceMinimization, median_cut, variance_minimization};
 use crate::sampling::Sampler;
 
@@ -47,19 +48,29 @@ pub enum PrepareError {
 }
 
 impl StrategySpec {
-    /// Chooses what is left open, by a pilot over some of the scene's points: the number of SIR's candidates with
-    /// the least error for its cost. `points` is called only where it matters.
+    /// Chooses what is left open, by a pilot at some of the scene's points: the number of SIR's candidates with the
+    /// least error for its cost ([`CandidatePilot`]). `points` is called only where it matters; `visibility` is V of a
+    /// point and a direction, in [0, 1].
     #[must_use]
     pub fn for_scene(
         self,
         points: impl FnOnce() -> Vec<ShadingPoint>,
+        visibility: impl Fn(&ShadingPoint, Vec3) -> f32,
         environment: &Environment,
         seed: u64,
     ) -> Self {
         match self {
             Self::Sir { n_candidates: None, n_samples, candidates, resampling } => {
-                let variance = candidates.relative_variance(environment, &points(), seed);
-                let n_candidates = Some(optimal_candidates(n_samples, variance, RAY_COST));
+                let points = &points();
+                let pilot = CandidatePilot::new(environment, points, visibility, seed);
+                let sir = SamplingImportanceResampling {
+                    environment,
+                    n_candidates: n_samples,
+                    n_samples,
+                    candidates,
+                    resampling,
+                };
+                let n_candidates = Some(pilot.optimal_number(&sir));
                 Self::Sir { n_candidates, n_samples, candidates, resampling }
             }
             spec => spec,
@@ -151,6 +162,10 @@ impl Strategy for PreparedStrategy<'_> {
 
     fn n_rounds(&self) -> u32 {
         each!(self, s => s.n_rounds())
+    }
+
+    fn unit(&self) -> f64 {
+        each!(self, s => Strategy::unit(s))
     }
 
     fn n_rays(&self) -> u32 {

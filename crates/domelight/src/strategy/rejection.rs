@@ -278,6 +278,10 @@ impl PointStrategy for RejectionSampling<'_> {
 
     const UNBIASED: bool = true;
 
+    fn unit(&self) -> f64 {
+        self.environment.unit()
+    }
+
     fn n_rays(&self) -> u32 {
         match self.stop {
             StoppingRule::Tries(n) | StoppingRule::Accepted { n, .. } => n,

@@ -19,14 +19,14 @@
 //!
 //! The first term is that of plain importance sampling with M rays, the second what is unknown of
 //! visibility: no better than tracing all candidates, but a candidate costs less than a ray. See
-//! [`optimal_candidates`].
+//! [`Candidates::optimal_number`].
 //!
 //! Weights are luminances, and a pick carries its color over its luminance: the luminance of the
 //! weights adds up to Σ W exactly, colors do in expectation. A candidate picked k times is one ray
 //! of k times the weight.
 //!
 //! Candidates from both factors are weighed by Veach's balance heuristic: the density is the mixture
-//! with the counts that were drawn. Candidates sorted along a curve through space make a systematic
+//! with the expected counts. An odd candidate comes from either factor by the toss of a coin. Candidates sorted along a curve through space make a systematic
 //! choice a stratified one, for the picks spread over what lights the point.
 //!
 //! Rejected: a number of candidates that adapts to the estimate itself (a bias, for when to stop
@@ -47,18 +47,18 @@ pub enum Candidates {
     Environment,
     /// The BRDF.
     Brdf,
-    /// Half from each (an odd one from the environment), weighed by the balance heuristic.
+    /// Half from each, an odd one from either at random, weighed by the balance heuristic.
     #[default]
     Mixture,
 }
 
 impl Candidates {
-    /// How many of `m` come from the environment and from the BRDF.
+    /// How many of `m` come from the environment and from the BRDF for certain; one more may come from either.
     fn split(self, m: u32) -> (u32, u32) {
         match self {
             Self::Environment => (m, 0),
             Self::Brdf => (0, m),
-            Self::Mixture => (m - m / 2, m / 2),
+            Self::Mixture => (m / 2, m / 2),
         }
     }
 }
@@ -120,7 +120,18 @@ pub struct SirScratch {
 impl SamplingImportanceResampling<'_> {
     /// Offers each candidate with a positive weight.
     fn draw(&self, at: &ShadingPoint, sample_index: SampleIndex, mut add: impl FnMut(Candidate)) {
-        let (m, n) = self.candidates.split(self.n_candidates);
+        let (mut m, mut n) = self.candidates.split(self.n_candidates);
+        let expected = |count: u32, odd: f32| count as f32 + odd;
+        let is_odd = m + n < self.n_candidates;
+        let odd = if is_odd { 0.5 } else { 0.0 };
+        let (expected_m, expected_n) = (expected(m, odd), expected(n, odd));
+        // Samples of the pixel share a sequence, so each reserves as many numbers.
+        let (numbers_m, numbers_n) = (m + u32::from(is_odd), n + u32::from(is_odd));
+        if is_odd {
+            // Toss a coin for the odd candidate, by a number that no direction uses.
+            let coin = sample_index.get(Dimension::Environment, m, numbers_m).u_lobe();
+            if coin < 0.5 { m += 1 } else { n += 1 }
+        }
         let mut add = |wi, value: Rgb, density: f32, index| {
             let value = value / density;
             let weight = value.luminance();
@@ -129,16 +140,17 @@ impl SamplingImportanceResampling<'_> {
             }
         };
         for j in 0..m {
-            let u = sample_index.get(Dimension::Environment, j, m);
+            let u = sample_index.get(Dimension::Environment, j, numbers_m);
             let Some(s) = self.environment.sample(u.u()) else { continue };
-            let (value, pdf) = if n > 0 { at.eval_pdf(s.wi) } else { (at.eval(s.wi), 0.0) };
-            add(s.wi, value * s.le, m as f32 * s.pdf + n as f32 * pdf, j);
+            let mixed = expected_n > 0.0;
+            let (value, pdf) = if mixed { at.eval_pdf(s.wi) } else { (at.eval(s.wi), 0.0) };
+            add(s.wi, value * s.le, expected_m * s.pdf + expected_n * pdf, j);
         }
         for j in 0..n {
-            let u = sample_index.get(Dimension::Brdf, j, n);
+            let u = sample_index.get(Dimension::Brdf, j, numbers_n);
             let Some(s) = at.sample(u.u_lobe(), u.u()) else { continue };
             let (le, pdf) = self.environment.le_pdf(s.wi);
-            add(s.wi, s.value * le, m as f32 * pdf + n as f32 * s.pdf, m + j);
+            add(s.wi, s.value * le, expected_m * pdf + expected_n * s.pdf, m + j);
         }
     }
 
@@ -245,6 +257,10 @@ impl PointStrategy for SamplingImportanceResampling<'_> {
 
     const UNBIASED: bool = true;
 
+    fn unit(&self) -> f64 {
+        self.environment.unit()
+    }
+
     fn n_rays(&self) -> u32 {
         self.n_samples
     }
@@ -263,67 +279,105 @@ impl PointStrategy for SamplingImportanceResampling<'_> {
     }
 }
 
-impl Candidates {
-    /// The relative variance of a candidate's weight, Var(p̂/q) / L_ns² or a little more, averaged over
-    /// points: a pilot for [`optimal_candidates`], of 64 candidates each.
-    ///
-    /// Points that see no light do not count. The numbers are those of streams of their own, so the
-    /// pilot may look at the very points that are rendered and leave the estimates unbiased.
-    pub fn relative_variance<'p>(
-        self,
-        environment: &Environment,
-        points: impl IntoIterator<Item = &'p ShadingPoint>,
-        seed: u64,
-    ) -> f64 {
-        const N_CANDIDATES: u32 = 64;
-        const PILOT: u64 = 0x0070_696c_6f74;
-        let sir = SamplingImportanceResampling {
-            environment,
-            n_candidates: N_CANDIDATES,
-            n_samples: 1,
-            candidates: self,
-            resampling: Resampling::default(),
-        };
-        let (mut sum, mut n_points) = (0.0, 0.0);
-        for (i, at) in (0u64..).zip(points) {
-            let sampler = Sampler::new(SamplerKind::Sobol, hash2(seed, PILOT), i);
-            let (mut first, mut second) = (0.0, 0.0);
-            sir.draw(at, SampleIndex { sampler, sample: 0 }, |c| {
-                first += f64::from(c.weight);
-                second += f64::from(c.weight).powi(2);
-            });
-            if first > 0.0 {
-                sum += f64::from(N_CANDIDATES) * second / (first * first) - 1.0;
-                n_points += 1.0;
-            }
-        }
-        if n_points > 0.0 { sum / n_points } else { 0.0 }
-    }
-}
-
 /// The cost of a shadow ray over that of a candidate, as measured with this library on scenes of a
 /// hundred thousand triangles under a map of 1024 × 512 texels: 0.05 to 0.08 µs against 0.2 µs, of
 /// which the look-up in the map and its table is the most. Rays cost more in larger scenes.
 pub const RAY_COST: f64 = 0.3;
 
-/// The number of candidates M with the least error for the cost of `n_samples` = N shadow rays and M
-/// candidates, a power of two not below N.
-///
-/// The variance is A/M + B/N and the cost M c + N r, so M/N = √(A/B · r/c), where `ray_cost` is r/c,
-/// such as [`RAY_COST`]. If the share v of a point's light is visible, whatever its direction, then
-/// with CV² = `relative_variance` of the weights ([`Candidates::relative_variance`])
-///
-/// ```text
-/// A = v (CV² + 1 − v) L_ns²    B = v (1 − v) L_ns²    A/B = 1 + CV²/(1 − v)
-/// ```
-///
-/// No ray is traced to know v: a half is assumed. The optimum is flat, so the power of two, of which
-/// Sobol' points are best distributed, costs little: at √2 times the optimal ratio the product of
-/// cost and variance is at most 3 % above its minimum.
-pub fn optimal_candidates(n_samples: u32, relative_variance: f64, ray_cost: f64) -> u32 {
-    let ratio = ((1.0 + 2.0 * relative_variance) * ray_cost).sqrt();
-    let m = (f64::from(n_samples.max(1)) * ratio).clamp(1.0, f64::from(1u32 << 20));
-    (1u32 << m.log2().round() as u32).max(n_samples)
+/// Estimates of a pilot at each point.
+const REPEATS: u32 = 16;
+
+/// Measures SIR at a few points of a scene, to choose its number of candidates.
+#[derive(Clone, Debug)]
+pub struct CandidatePilot<'p, V> {
+    visibility: V,
+    seed: u64,
+    /// Points that see light, and what they reflect of it, nearly.
+    points: Vec<(&'p ShadingPoint, f64)>,
+}
+
+impl<'p, V: Fn(&ShadingPoint, Vec3) -> f32> CandidatePilot<'p, V> {
+    /// A pilot at 64 of the points, spread over their order; `visibility` is V of a point and a direction, in [0, 1].
+    ///
+    /// Its random numbers are other ones than a render's with the same seed.
+    pub fn new(
+        environment: &'p Environment,
+        points: &'p [ShadingPoint],
+        visibility: V,
+        seed: u64,
+    ) -> Self {
+        const N_POINTS: usize = 64;
+        let chosen = points.iter().step_by(points.len().div_ceil(N_POINTS).max(1));
+        let points: Vec<_> = chosen.map(|at| (at, 0.0)).collect();
+        let mut pilot = Self { visibility, seed: hash2(seed, 0x0070_696c_6f74), points };
+        let precise = SamplingImportanceResampling {
+            environment,
+            n_candidates: 256,
+            n_samples: 16,
+            candidates: Candidates::Mixture,
+            resampling: Resampling::default(),
+        };
+        let mut references = vec![0.0; pilot.points.len()];
+        pilot.estimate(&precise, |i, estimate| references[i] += estimate / f64::from(REPEATS));
+        pilot.points.iter_mut().zip(references).for_each(|((_, old), new)| *old = new);
+        pilot.points.retain(|&(_, reference)| reference > 0.0);
+        pilot
+    }
+
+    /// Calls `each` with the index of a point and an estimate of the luminance that it reflects.
+    fn estimate(&self, sir: &SamplingImportanceResampling, mut each: impl FnMut(usize, f64)) {
+        let mut scratch = SirScratch::default();
+        for (i, (at, _)) in self.points.iter().enumerate() {
+            for repeat in 0..REPEATS {
+                let stream = i as u64 * u64::from(REPEATS) + u64::from(repeat);
+                let seed = hash2(self.seed, u64::from(sir.n_candidates));
+                let sampler = Sampler::new(SamplerKind::Sobol, seed, stream);
+                let mut estimate = 0.0;
+                let add = |wi: Vec3, weight: Rgb| {
+                    estimate += f64::from(weight.luminance() * (self.visibility)(at, wi));
+                };
+                sir.sample(at, SampleIndex { sampler, sample: 0 }, &mut scratch, add);
+                each(i, estimate);
+            }
+        }
+    }
+
+    /// Error² times cost of N of M candidates at each point that sees light: the mean squared relative error of an
+    /// estimate, times M + [`RAY_COST`] N.
+    pub fn work(&self, sir: &SamplingImportanceResampling) -> Vec<f64> {
+        let cost = f64::from(sir.n_candidates) + RAY_COST * f64::from(sir.n_samples);
+        let mut work = vec![0.0; self.points.len()];
+        self.estimate(sir, |i, estimate| {
+            work[i] += (estimate / self.points[i].1 - 1.0).powi(2) * cost / f64::from(REPEATS);
+        });
+        work
+    }
+
+    /// The number of candidates M, N or a power of two above it, with the least [`CandidatePilot::work`] for the picks
+    /// of `sir`, whose own M does not matter.
+    ///
+    /// The search doubles M until two doublings in turn have won nothing. More candidates must win by more than two
+    /// standard errors over the points.
+    pub fn optimal_number(&self, sir: &SamplingImportanceResampling) -> u32 {
+        const MOST: u32 = 1 << 14;
+        let work = |n_candidates| self.work(&SamplingImportanceResampling { n_candidates, ..*sir });
+        let mut best = sir.n_samples.max(1);
+        let mut least = work(best);
+        let (mut m, mut n_lost) = (best, 0);
+        while n_lost < 2 && m < MOST {
+            m = (m + 1).next_power_of_two();
+            let other = work(m);
+            let differences = || least.iter().zip(&other).map(|(old, new)| old - new);
+            let won: f64 = differences().sum();
+            let deviation = differences().map(|d| d * d).sum::<f64>().sqrt();
+            if won > 2.0 * deviation {
+                (best, least, n_lost) = (m, other, 0);
+            } else {
+                n_lost += 1;
+            }
+        }
+        best
+    }
 }
 
 #[cfg(test)]
@@ -331,27 +385,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_optimal_number_of_candidates() {
-        // Light as even as the product: no more candidates than rays, if they cost the same.
-        assert_eq!(optimal_candidates(16, 0.0, 1.0), 16);
-        assert_eq!(optimal_candidates(15, 0.0, 1.0), 16);
-        assert_eq!(optimal_candidates(17, 0.0, 1.0), 17);
-        // √(1 + 2·31.5) = 8.
-        assert_eq!(optimal_candidates(4, 31.5, 1.0), 32);
-        assert_eq!(optimal_candidates(4, 31.5, 4.0), 64);
-        for odd in [f64::INFINITY, f64::NAN] {
-            assert!(optimal_candidates(4, odd, 1.0) >= 4);
-        }
-    }
-
-    #[test]
     fn candidates_are_split_to_the_last() {
         for m in [1, 2, 3, 64] {
             for c in [Candidates::Environment, Candidates::Brdf, Candidates::Mixture] {
                 let (from_light, from_brdf) = c.split(m);
-                assert_eq!(from_light + from_brdf, m);
+                let for_certain = from_light + from_brdf;
+                assert_eq!(for_certain, if c == Candidates::Mixture { m & !1 } else { m });
             }
         }
-        assert_eq!(Candidates::Mixture.split(1), (1, 0));
     }
 }

@@ -42,6 +42,8 @@ mod visibility;
 
 pub use light_samples::LightSamplePool;
 
+use std::borrow::Cow;
+
 use super::levels::{N_LEVELS, coarser};
 use super::{Contributions, PixelPoints, Strategy, TileShading};
 use crate::Rgb;
@@ -85,7 +87,8 @@ const DARK: f32 = 0.15;
 /// Up to N rays a camera sample, where light, reflectance and visibility say.
 #[derive(Clone, Debug)]
 pub struct ProductSampling<'a> {
-    environment: &'a Environment,
+    /// Of texels that are about as wide as high, so that cells are.
+    environment: Cow<'a, Environment>,
     /// Of short passes and of long ones; none under a black sky.
     cells: Option<[Cells; 2]>,
     /// Luminance below which brightness does not count.
@@ -99,15 +102,16 @@ impl<'a> ProductSampling<'a> {
     /// many. It is the number of candidates: those that cannot change the pixel visibly are not traced.
     pub fn new(environment: &'a Environment, n_rays: u32) -> Self {
         let mean = environment.power() / (4.0 * std::f64::consts::PI);
+        let environment = environment.divided().map_or(Cow::Borrowed(environment), Cow::Owned);
         Self {
-            environment,
             cells: Cells::new(
-                environment,
+                &environment,
                 [PassLength::Short, PassLength::Long].map(PassLength::rows),
             ),
             dark: (f64::from(DARK) * mean) as f32,
             n_rays: n_rays.max(1),
             instruction_set: InstructionSet::best(),
+            environment,
         }
     }
 
@@ -171,6 +175,10 @@ impl Strategy for ProductSampling<'_> {
         N_LEVELS
     }
 
+    fn unit(&self) -> f64 {
+        self.environment.unit()
+    }
+
     fn n_rays(&self) -> u32 {
         self.n_rays
     }
@@ -181,7 +189,7 @@ impl Strategy for ProductSampling<'_> {
 
     fn begin_pass(&self, sampler: Sampler, n_samples: u32) -> LightSamplePool {
         let length = PassLength::new(n_samples as usize);
-        let draw = |cells| LightSamplePool::draw(cells, self.environment, sampler, length);
+        let draw = |cells| LightSamplePool::draw(cells, &self.environment, sampler, length);
         self.cells(length).map_or_else(LightSamplePool::empty, draw)
     }
 
@@ -308,7 +316,7 @@ impl PixelContext<'_, '_> {
         // The first camera sample that hits tells passes apart.
         let sampler = pixel.sampler.part(tile.samples[pixel.points.start]);
         let numbers = PixelSamples::new(sampler);
-        let (environment, cells, pool) = (strategy.environment, self.cells, self.pool);
+        let (environment, cells, pool) = (&*strategy.environment, self.cells, self.pool);
         let control_variate = (!self.pilots).then_some(&*control_variate);
         let sources = Sources { environment, cells, pool, table, control_variate };
         sources.draw(simd, hits, &groups.diffuse, counts, &numbers, candidates);
