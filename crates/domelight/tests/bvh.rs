@@ -296,16 +296,26 @@ fn has_area([a, b, c]: [Vec3; 3]) -> bool {
 }
 
 fn brute_force(scene: &Scene, ray: &Ray) -> Option<Hit> {
+    brute_force_where(scene, ray, |_| true)
+}
+
+fn brute_force_where(scene: &Scene, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
     let mut closest: Option<Hit> = None;
-    for triangle in 0..scene.triangles.len() {
-        let corners = scene.corners(triangle);
-        if let Some((t, u, v)) = watertight(ray, corners).filter(|_| has_area(corners))
-            && closest.is_none_or(|c| t < c.t)
-        {
-            closest = Some(Hit { t, u, v, triangle: triangle as u32 });
+    for hit in all_hits(scene, ray) {
+        if closest.is_none_or(|c| hit.t < c.t) && accept(&hit) {
+            closest = Some(hit);
         }
     }
     closest
+}
+
+/// In the order of the triangles.
+fn all_hits(scene: &Scene, ray: &Ray) -> impl Iterator<Item = Hit> {
+    (0..scene.triangles.len()).filter_map(|triangle| {
+        let corners = scene.corners(triangle);
+        let (t, u, v) = watertight(ray, corners).filter(|_| has_area(corners))?;
+        Some(Hit { t, u, v, triangle: triangle as u32 })
+    })
 }
 
 /// Möller & Trumbore 1997 in f64: t, and how far inside the triangle, in barycentric weight.
@@ -339,6 +349,55 @@ fn all_queries_answer_like_a_loop_over_all_triangles() {
                 assert_eq!(bvh.closest_hit(ray), expected[i], "{name}: {ray:?}");
                 assert_eq!(bvh.any_hit(ray), expected[i].is_some(), "{name}: {ray:?}");
                 assert_eq!(occluded[i], blocked[i], "{name}: {ray:?}");
+            }
+        }
+    }
+}
+
+/// Accepted or not by where it is and whose it is.
+fn accepted(hit: &Hit) -> bool {
+    (hit.triangle.wrapping_mul(0x9e37_79b9) ^ hit.u.to_bits() ^ hit.v.to_bits()).is_multiple_of(3)
+}
+
+#[test]
+fn refused_hits_are_as_if_they_were_not_there() {
+    for (seed, (name, scene)) in scenes().into_iter().enumerate() {
+        let bvh = scene.bvh();
+        let rays = rays(&scene, &bvh, 2_000_000 / (scene.triangles.len() + 1000), seed as u64);
+        let expected: Vec<_> =
+            rays.iter().map(|r| brute_force_where(&scene, r, accepted)).collect();
+        for bvh in on(&bvh) {
+            for (ray, expected) in rays.iter().zip(&expected) {
+                assert_eq!(bvh.closest_hit_where(ray, accepted), *expected, "{name}: {ray:?}");
+                assert_eq!(bvh.closest_hit_where(ray, |_| true), bvh.closest_hit(ray));
+                assert_eq!(bvh.closest_hit_where(ray, |_| false), None);
+            }
+        }
+    }
+}
+
+/// Powers of two have exact products in any order.
+#[test]
+fn transmittances_are_products_over_all_hits() {
+    let of_hit = |hit: &Hit| match hit.triangle % 61 {
+        0 => 0.0,
+        odd if odd % 2 == 1 => 1.0,
+        _ => 0.5,
+    };
+    for (seed, (name, scene)) in scenes().into_iter().enumerate() {
+        let bvh = scene.bvh();
+        let rays = rays(&scene, &bvh, 2_000_000 / (scene.triangles.len() + 1000), seed as u64);
+        let product = |ray: &Ray| {
+            let ray = Ray { t_max: f32::INFINITY, ..*ray };
+            all_hits(&scene, &ray).map(|hit| of_hit(&hit)).product::<f32>()
+        };
+        let expected: Vec<_> = rays.iter().map(product).collect();
+        for bvh in on(&bvh) {
+            let mut transmittances = vec![7.0];
+            bvh.transmittances(&batch(&rays), &of_hit, &mut transmittances);
+            assert_eq!(transmittances.len(), rays.len());
+            for ((ray, t), expected) in rays.iter().zip(transmittances).zip(&expected) {
+                assert_eq!(t, *expected, "{name}: {ray:?}");
             }
         }
     }

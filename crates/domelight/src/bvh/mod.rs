@@ -193,6 +193,12 @@ impl Bvh {
         simd::dispatch(self.instruction_set, traverse::ClosestHit { bvh: self, ray })
     }
 
+    /// [`Bvh::closest_hit`] among the hits that `accept` returns true for: one that it refuses is as if it were not
+    /// there. It may be asked about hits in any order, and must answer the same each time.
+    pub fn closest_hit_where(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
+        simd::dispatch(self.instruction_set, traverse::ClosestHitWhere { bvh: self, ray, accept })
+    }
+
     /// [`Bvh::closest_hit`] of many rays; quickest for neighbors, such as a tile's camera rays.
     ///
     /// `hits` is overwritten, one entry a ray.
@@ -216,6 +222,29 @@ impl Bvh {
         simd::dispatch(
             self.instruction_set,
             traverse::Occluded { bvh: self, rays, answers: occluded },
+        );
+    }
+
+    /// What share of light gets along each ray of a batch, to infinity: the product of `of_hit`, in \[0, 1\], over all
+    /// triangles that it meets; 1 where it meets none.
+    ///
+    /// A ray's answer has the same bits whatever rays go with it. `transmittances` is overwritten, one entry a ray.
+    ///
+    /// # Panics
+    /// If the batch has fewer directions than origins.
+    pub fn transmittances(
+        &self,
+        rays: &RayBatch,
+        of_hit: &dyn Fn(&Hit) -> f32,
+        transmittances: &mut Vec<f32>,
+    ) {
+        assert!(rays.directions.len() >= rays.origins.len(), "a ray without a direction");
+        transmittances.clear();
+        transmittances.resize(rays.len(), 1.0);
+        let answers = transmittances;
+        simd::dispatch(
+            self.instruction_set,
+            traverse::Transmittances { bvh: self, rays, of_hit, answers },
         );
     }
 

@@ -39,7 +39,25 @@ impl Kernel for ClosestHit<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Option<Hit> {
         let ray = prepare_one(simd, self.bvh, self.ray)?;
-        closest_hit(simd, self.bvh, &ray, last_below(self.ray.t_max))
+        closest_hit(simd, self.bvh, &ray, last_below(self.ray.t_max), &Everything)
+    }
+}
+
+/// [`Bvh::closest_hit_where`]
+pub(super) struct ClosestHitWhere<'a, F> {
+    pub(super) bvh: &'a Bvh,
+    pub(super) ray: &'a Ray,
+    pub(super) accept: F,
+}
+
+impl<F: Fn(&Hit) -> bool> Kernel for ClosestHitWhere<'_, F> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Option<Hit> {
+        let ray = prepare_one(simd, self.bvh, self.ray)?;
+        let limit = last_below(self.ray.t_max);
+        closest_hit(simd, self.bvh, &ray, limit, &Where(self.accept))
     }
 }
 
@@ -62,7 +80,7 @@ impl Kernel for ClosestHits<'_> {
             first += rays.len();
             (first - rays.len(), rays)
         });
-        interleave::<S, ClosestStream>(simd, self.bvh, starts, self.hits);
+        interleave::<S, ClosestStream>(simd, self.bvh, (), starts, self.hits);
     }
 }
 
@@ -100,7 +118,32 @@ impl Kernel for Occluded<'_> {
             let octants = sort_by_octant(&self.rays.directions[start..end], &mut order);
             let chunks = octants.iter().flat_map(|octant| order[octant.clone()].chunks(STREAM));
             let starts = chunks.map(|members| ShadowRays { batch: self.rays, start, members });
-            interleave::<S, ShadowStream>(simd, self.bvh, starts, self.answers);
+            interleave::<S, ShadowStream>(simd, self.bvh, (), starts, self.answers);
+        }
+    }
+}
+
+/// [`Bvh::transmittances`]; `answers` start all 1.
+pub(super) struct Transmittances<'a> {
+    pub(super) bvh: &'a Bvh,
+    pub(super) rays: &'a RayBatch,
+    pub(super) of_hit: &'a dyn Fn(&Hit) -> f32,
+    pub(super) answers: &'a mut [f32],
+}
+
+impl Kernel for Transmittances<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let mut order = [0; WINDOW];
+        for start in (0..self.rays.len()).step_by(WINDOW) {
+            let end = self.rays.len().min(start + WINDOW);
+            let octants = sort_by_octant(&self.rays.directions[start..end], &mut order);
+            let chunks = octants.iter().flat_map(|octant| order[octant.clone()].chunks(STREAM));
+            let starts = chunks.map(|members| ShadowRays { batch: self.rays, start, members });
+            let answers = &mut *self.answers;
+            interleave::<S, TransmittanceStream>(simd, self.bvh, self.of_hit, starts, answers);
         }
     }
 }
@@ -166,19 +209,79 @@ impl ClosestStack {
     }
 }
 
+/// Which hits of a leaf count.
+trait Accepting {
+    /// The best hit of a leaf for a ray that counts, if it is nearer than `closest`, or as near and of a lower number.
+    fn closest_in_block<S: Simd>(
+        &self,
+        simd: S,
+        bvh: &Bvh,
+        leaf: Child,
+        ray: &PreparedRays<WIDTH>,
+        limit: f32,
+        closest: Option<Hit>,
+    ) -> Option<Hit>;
+}
+
+/// All hits.
+struct Everything;
+
+impl Accepting for Everything {
+    #[inline(always)]
+    fn closest_in_block<S: Simd>(
+        &self,
+        simd: S,
+        bvh: &Bvh,
+        leaf: Child,
+        ray: &PreparedRays<WIDTH>,
+        limit: f32,
+        closest: Option<Hit>,
+    ) -> Option<Hit> {
+        closest_in_block(simd, bvh, leaf, ray, 0, limit, closest)
+    }
+}
+
+/// Those that the function accepts.
+struct Where<F>(F);
+
+impl<F: Fn(&Hit) -> bool> Accepting for Where<F> {
+    #[inline(always)]
+    fn closest_in_block<S: Simd>(
+        &self,
+        simd: S,
+        bvh: &Bvh,
+        leaf: Child,
+        ray: &PreparedRays<WIDTH>,
+        limit: f32,
+        closest: Option<Hit>,
+    ) -> Option<Hit> {
+        let mut best = None;
+        for_hits_in_block(simd, bvh, leaf, ray, 0, limit, |hit| {
+            let nearest = best.or(closest);
+            let is_nearer = nearest.is_none_or(|n: Hit| (hit.t, hit.triangle) < (n.t, n.triangle));
+            if is_nearer && (self.0)(&hit) {
+                best = Some(hit);
+            }
+        });
+        best
+    }
+}
+
 #[inline(always)]
 fn closest_hit<S: Simd>(
     simd: S,
     bvh: &Bvh,
     ray: &PreparedRays<WIDTH>,
     mut limit: f32,
+    accepting: &impl Accepting,
 ) -> Option<Hit> {
     let mut stack = ClosestStack::new();
     let mut closest: Option<Hit> = None;
     let mut child = Child::node(0);
     loop {
         if child.is_leaf() {
-            if let Some(hit) = closest_in_block(simd, bvh, child, ray, 0, limit, closest) {
+            let hit = accepting.closest_in_block(simd, bvh, child, ray, limit, closest);
+            if let Some(hit) = hit {
                 limit = hit.t;
                 closest = Some(hit);
             }
@@ -262,6 +365,32 @@ fn closest_in_block<S: Simd, const N: usize>(
     Some(Hit { t: t[lane], u: u[lane], v: v[lane], triangle: block.ids[lane] })
 }
 
+/// Hands over each hit of a leaf, in the order of its triangles.
+#[inline(always)]
+fn for_hits_in_block<S: Simd, const N: usize>(
+    simd: S,
+    bvh: &Bvh,
+    leaf: Child,
+    rays: &PreparedRays<N>,
+    i: usize,
+    limit: f32,
+    mut each: impl FnMut(Hit),
+) {
+    let block = &bvh.blocks[leaf.index()];
+    let sheared = Sheared::new(simd, block, rays, i);
+    if sheared.misses() {
+        return;
+    }
+    let hits = sheared.hits(simd, &Planes::of(simd, block), limit);
+    if hits.mask == 0 {
+        return;
+    }
+    let (t, [u, v]) = (hits.t.store(), hits.barycentric());
+    for lane in set_bits(hits.mask) {
+        each(Hit { t: t[lane], u: u[lane], v: v[lane], triangle: block.ids[lane] });
+    }
+}
+
 // ---- streams -------------------------------------------------------------------------------------
 
 /// Rays of one octant on their way through the tree, together: a node's planes are loaded once for all
@@ -270,12 +399,14 @@ trait Stream: Sized {
     const EMPTY: Self;
     /// The rays to start with.
     type Rays<'a>;
+    /// What it needs to know besides.
+    type Context<'a>: Copy;
     type Answer;
 
     /// Begins at the root.
     fn start<S: Simd>(&mut self, simd: S, bvh: &Bvh, rays: Self::Rays<'_>);
     /// Visits the next node or leaf; false if there is none.
-    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh) -> bool;
+    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh, context: Self::Context<'_>) -> bool;
     /// Hands over the answers.
     fn finish(&mut self, answers: &mut [Self::Answer]);
 }
@@ -285,13 +416,14 @@ trait Stream: Sized {
 fn interleave<'a, S: Simd, T: Stream>(
     simd: S,
     bvh: &Bvh,
+    context: T::Context<'_>,
     starts: impl Iterator<Item = T::Rays<'a>>,
     answers: &mut [T::Answer],
 ) {
     if bvh.bytes() <= CACHED {
-        take_turns::<S, T, 2>(simd, bvh, starts, answers);
+        take_turns::<S, T, 2>(simd, bvh, context, starts, answers);
     } else {
-        take_turns::<S, T, INTERLEAVED>(simd, bvh, starts, answers);
+        take_turns::<S, T, INTERLEAVED>(simd, bvh, context, starts, answers);
     }
 }
 
@@ -300,6 +432,7 @@ fn interleave<'a, S: Simd, T: Stream>(
 fn take_turns<'a, S: Simd, T: Stream, const N: usize>(
     simd: S,
     bvh: &Bvh,
+    context: T::Context<'_>,
     mut starts: impl Iterator<Item = T::Rays<'a>>,
     answers: &mut [T::Answer],
 ) {
@@ -308,7 +441,7 @@ fn take_turns<'a, S: Simd, T: Stream, const N: usize>(
     while running {
         running = false;
         for stream in &mut streams {
-            if stream.advance(simd, bvh) {
+            if stream.advance(simd, bvh, context) {
                 running = true;
                 continue;
             }
@@ -430,6 +563,7 @@ impl Stream for ClosestStream {
 
     /// With the number of the first.
     type Rays<'a> = (usize, &'a [Ray]);
+    type Context<'a> = ();
     type Answer = Option<Hit>;
 
     #[inline(always)]
@@ -445,7 +579,7 @@ impl Stream for ClosestStream {
     }
 
     #[inline(always)]
-    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh) -> bool {
+    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh, (): ()) -> bool {
         let Some((child, rays)) = self.stack.pop(u64::MAX) else { return false };
         if child.is_leaf() {
             for i in set_bits(rays) {
@@ -530,6 +664,7 @@ impl Stream for ShadowStream {
     };
 
     type Rays<'a> = ShadowRays<'a>;
+    type Context<'a> = ();
     type Answer = bool;
 
     #[inline(always)]
@@ -548,7 +683,7 @@ impl Stream for ShadowStream {
     /// The node's planes stay in registers while one ray after the other is tested against the eight
     /// boxes and its bit added to the sets of those that it crosses.
     #[inline(always)]
-    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh) -> bool {
+    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh, (): ()) -> bool {
         let Some((child, rays)) = self.stack.pop(self.free) else { return false };
         if child.is_leaf() {
             let block = &bvh.blocks[child.index()];
@@ -583,6 +718,87 @@ impl Stream for ShadowStream {
             answers[self.members[i]] = true;
         }
         self.hit = 0;
+    }
+}
+
+/// What gets through all hits of up to [`STREAM`] rays. A ray meets its leaves in the same order whatever rays go with
+/// it, so that its product has the same bits.
+struct TransmittanceStream {
+    rays: PreparedRays<STREAM>,
+    /// Where the rays are in their batch.
+    members: [usize; STREAM],
+    count: usize,
+    transmittances: [f32; STREAM],
+    /// Rays of which something is left, as bits.
+    free: u64,
+    stack: StreamStack,
+}
+
+impl Stream for TransmittanceStream {
+    const EMPTY: Self = Self {
+        rays: PreparedRays::EMPTY,
+        members: [0; STREAM],
+        count: 0,
+        transmittances: [1.0; STREAM],
+        free: 0,
+        stack: StreamStack::EMPTY,
+    };
+
+    type Rays<'a> = ShadowRays<'a>;
+    type Context<'a> = &'a dyn Fn(&Hit) -> f32;
+    type Answer = f32;
+
+    #[inline(always)]
+    fn start<S: Simd>(&mut self, simd: S, bvh: &Bvh, rays: ShadowRays<'_>) {
+        let RayBatch { origins, directions } = rays.batch;
+        let numbers = rays.members.iter().map(|&member| rays.start + usize::from(member));
+        for (i, number) in numbers.enumerate() {
+            self.rays.set(i, origins[number], directions[number]);
+            self.members[i] = number;
+        }
+        self.count = rays.members.len();
+        self.transmittances[..self.count].fill(1.0);
+        let octant = octant(directions[self.members[0]]);
+        self.free = self.rays.prepare(simd, octant, self.count, &bvh.bounds);
+        self.stack.push(Child::node(0), self.free);
+    }
+
+    #[inline(always)]
+    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh, of_hit: &dyn Fn(&Hit) -> f32) -> bool {
+        let Some((child, rays)) = self.stack.pop(self.free) else { return false };
+        if child.is_leaf() {
+            for i in set_bits(rays) {
+                let mut transmittance = self.transmittances[i];
+                for_hits_in_block(simd, bvh, child, &self.rays, i, f32::MAX, |hit| {
+                    if transmittance > 0.0 {
+                        transmittance *= of_hit(&hit);
+                    }
+                });
+                self.transmittances[i] = transmittance;
+                self.free &= !(u64::from(transmittance <= 0.0) << i);
+            }
+        } else {
+            let node = &bvh.nodes[child.index()];
+            let slabs = Slabs::load(simd, node, self.rays.octant);
+            let mut entering = Entering::none(simd);
+            for i in set_bits(rays) {
+                let [enter, leave] = slabs.cross(simd, &self.rays, i);
+                entering.insert(i, enter.le(leave));
+            }
+            self.stack.push_entered(&node.children, entering);
+        }
+        self.stack.prefetch(simd, bvh);
+        true
+    }
+
+    #[inline(always)]
+    fn finish(&mut self, answers: &mut [f32]) {
+        for (&member, &transmittance) in
+            self.members.iter().zip(&self.transmittances).take(self.count)
+        {
+            answers[member] = transmittance;
+        }
+        self.count = 0;
     }
 }
 

@@ -214,6 +214,8 @@ pub fn pilot_points(
     let at = |i: usize, n: usize| ((2 * i + 1) * n) as f32 / (2 * ACROSS) as f32;
     let rays = (0..ACROSS * ACROSS)
         .map(|i| camera.ray(at(i % ACROSS, settings.width), at(i / ACROSS, settings.height)));
-    let hit = |ray| scene.bvh().closest_hit(&ray).map(|hit| scene.shading_point(&ray, &hit));
-    rays.filter_map(hit).collect()
+    let hit = |(i, ray): (usize, Ray)| {
+        scene.camera_hit(&ray, i as u64).map(|hit| scene.shading_point(&ray, &hit))
+    };
+    rays.enumerate().filter_map(hit).collect()
 }

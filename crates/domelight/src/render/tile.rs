@@ -20,6 +20,9 @@ use crate::strategy::{Contributions, PixelPoints, ShadingPoint, Strategy, TileSh
 /// Camera samples below which the difference of two sets says nothing.
 const FEWEST_SAMPLES: u32 = 16;
 
+/// Names the random numbers that decide which surfaces camera rays see.
+const COVERAGE: u64 = 0x636f_7665_7261_6765;
+
 /// A rectangle of the picture and the sums of its pixels.
 #[derive(Clone, Debug)]
 pub(super) struct Tile {
@@ -143,7 +146,7 @@ impl CameraRays {
 struct ShadowRays {
     contributions: Contributions,
     traced: RayBatch,
-    occluded: Vec<bool>,
+    tracing: visibility::Scratch,
     /// V of each ray, in [0, 1].
     visibility: Vec<f32>,
 }
@@ -332,7 +335,23 @@ impl Tile {
             count += u64::from(n_samples);
         }
         context.scene.bvh().closest_hits(rays, hits);
+        if context.scene.has_see_through() {
+            for (i, of_pixel) in camera_rays.iter().enumerate() {
+                let key = self.key(context, i, set);
+                for (ray, sample) in of_pixel.range().zip(of_pixel.samples.clone()) {
+                    let key = hash2(key, u64::from(sample));
+                    hits[ray] = context.scene.seen(&rays[ray], hits[ray], key);
+                }
+            }
+        }
         count
+    }
+
+    /// What random numbers of a set of pixel `i` depend on that decide which surfaces are seen.
+    fn key(&self, context: &RenderContext, i: usize, set: SampleSet) -> u64 {
+        let (x, y) = self.position(i);
+        let pixel = (y * context.settings.width + x) as u64;
+        hash2(hash2(hash2(context.settings.seed, COVERAGE), pixel), set as u64)
     }
 
     /// Marks the pixels of a part of the tile that may see something.
@@ -343,7 +362,7 @@ impl Tile {
         let span = |start: usize, n: usize| [start as f32 - margin, (start + n) as f32 + margin];
         let Window { x, y, width, height } = part;
         let frustum = context.camera.frustum(span(x, width), span(y, height));
-        if !context.scene.bvh().may_hit(&frustum) {
+        if !context.scene.may_hit(&frustum) {
             return;
         }
         if width.max(height) > SMALL {
@@ -568,9 +587,10 @@ impl Batch {
         hit: &Hit,
     ) -> CameraSample {
         let p = &self.points[point];
+        let emitted = context.scene.emitted(hit);
         CameraSample {
-            color: self.radiance[point],
-            unoccluded: self.unoccluded[point],
+            color: self.radiance[point] + emitted,
+            unoccluded: self.unoccluded[point] + emitted,
             alpha: 1.0,
             surface: Some(SurfaceSample {
                 albedo: p.bsdf.albedo(),
@@ -603,11 +623,6 @@ impl ShadowRays {
         self.traced.clear();
         self.traced.origins.extend(wi.iter().zip(point).map(origin));
         self.traced.directions.extend_from_slice(wi);
-        visibility::trace(
-            context.scene.bvh(),
-            &self.traced,
-            &mut self.occluded,
-            &mut self.visibility,
-        );
+        visibility::trace(context.scene, &self.traced, &mut self.tracing, &mut self.visibility);
     }
 }

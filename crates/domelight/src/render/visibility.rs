@@ -1,17 +1,42 @@
 //! The one place where shadow rays are traced.
 
-use crate::bvh::Bvh;
 use crate::geometry::RayBatch;
+use crate::scene::Scene;
+
+/// Memory that tracing keeps.
+#[derive(Default)]
+pub(super) struct Scratch {
+    occluded: Vec<bool>,
+    /// Rays that nothing opaque blocks, where they are in their batch, and what gets along them.
+    free: RayBatch,
+    numbers: Vec<u32>,
+    transmittances: Vec<f32>,
+}
 
 /// Traces a batch of shadow rays to infinity. Sets `visibility[i]`, in [0, 1], of each ray: 0 where the scene blocks
-/// it; the length of `visibility` becomes that of the batch. `occluded` is scratch memory.
+/// it, and the share that gets through where surfaces cover only a share; the length of `visibility` becomes that of the
+/// batch.
 pub(super) fn trace(
-    bvh: &Bvh,
+    scene: &Scene,
     rays: &RayBatch,
-    occluded: &mut Vec<bool>,
+    scratch: &mut Scratch,
     visibility: &mut Vec<f32>,
 ) {
-    bvh.occluded(rays, occluded);
+    let Scratch { occluded, free, numbers, transmittances } = scratch;
+    scene.bvh().occluded(rays, occluded);
     visibility.clear();
     visibility.extend(occluded.iter().map(|&occluded| if occluded { 0.0 } else { 1.0 }));
+    if !scene.has_partial() {
+        return;
+    }
+    free.clear();
+    numbers.clear();
+    for (i, _) in occluded.iter().enumerate().filter(|&(_, &occluded)| !occluded) {
+        free.push(rays.origins[i], rays.directions[i]);
+        numbers.push(i as u32);
+    }
+    scene.transmittances(free, transmittances);
+    for (&i, &transmittance) in numbers.iter().zip(&*transmittances) {
+        visibility[i as usize] = transmittance;
+    }
 }

@@ -200,7 +200,7 @@ impl<'a> CompactExtraction<'a> {
     fn combine(&self, mut regions: Rig) -> Result<Extraction, RigError> {
         let rest = self.rest();
         let power = |environment: &Environment| environment.power() * environment.unit();
-        let scale = (power(rest) / power(&self.environment)) as f32;
+        let scale = (power(rest) / power(self.environment)) as f32;
         regions.lights.iter_mut().for_each(|l| l.share *= scale);
         // Lights are in order, the dim ones last.
         let min_share = self.settings.min_share.unwrap_or(0.0);

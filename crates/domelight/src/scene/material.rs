@@ -1,10 +1,9 @@
 //! What a mesh is made of, before textures are looked up.
 //!
 //! A [`Material`] becomes a [`Bsdf`], a sum of reflectance lobes, at each hit:
-//! textures are looked up there and vertex colors multiplied in. All surfaces are opaque and
-//! two-sided.
+//! textures are looked up there and vertex colors multiplied in.
 
-use super::layers::{AlphaMode, Coverage, Emission, Layers};
+use super::layers::{Coverage, Emission, Layers};
 use super::texture::{Texture, TextureRef, Uvs};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Lambert, MetallicRoughness, Phong};
@@ -21,9 +20,9 @@ pub struct Material {
     pub normal_map: Option<NormalMap>,
     /// What lies behind it and shows.
     pub coverage: Coverage,
-    /// Whether it is seen from behind, too.
+    /// Whether it is seen from behind, too. Its shadow falls from either side.
     pub double_sided: bool,
-    /// Light of its own.
+    /// Light of its own, which the camera sees and which lights nothing else.
     pub emission: Option<Emission>,
     /// Whether its color is shown as it is, whatever the light (`KHR_materials_unlit`).
     pub unlit: bool,
@@ -123,17 +122,10 @@ impl Material {
     }
 
     /// What of this surface a picture lacks, in glTF's terms; whoever draws a feature deletes its line.
-    ///
-    /// Single-sided surfaces are not among them: nearly all of glTF are, and nearly none is seen from
-    /// behind.
     pub fn undrawn_features(&self) -> impl Iterator<Item = &'static str> {
-        let Self { coverage, emission, unlit, layers, .. } = self;
-        let Layers { ior, specular, clearcoat, sheen, anisotropy, transmission, volume } = layers;
+        let Layers { ior, specular, clearcoat, sheen, anisotropy, transmission, volume } =
+            &self.layers;
         [
-            (matches!(coverage.mode, AlphaMode::Mask { .. }), "alphaMode MASK"),
-            (coverage.mode == AlphaMode::Blend, "alphaMode BLEND"),
-            (emission.is_some(), "emission"),
-            (*unlit, "KHR_materials_unlit"),
             (ior.is_some_and(|ior| ior != 1.5), "KHR_materials_ior"),
             (specular.is_some(), "KHR_materials_specular"),
             (clearcoat.is_some(), "KHR_materials_clearcoat"),
@@ -203,6 +195,18 @@ impl Material {
         self.layers.textures_mut().for_each(shift);
     }
 
+    /// The color of an unlit surface at texture coordinates `uvs` under the vertex color `tint`.
+    pub(crate) fn color(&self, textures: &[Texture], uvs: &Uvs, tint: Rgb) -> Rgb {
+        let (color, texture) = match &self.model {
+            MaterialModel::Fixed(bsdf) => return bsdf.albedo(),
+            MaterialModel::Phong(p) => (p.diffuse, &p.diffuse_texture),
+            MaterialModel::MetallicRoughness(m) => (m.base_color, &m.base_color_texture),
+            MaterialModel::SpecularGlossiness(s) => (s.diffuse, &s.diffuse_texture),
+        };
+        let texture = texture.as_ref().map_or(Rgb::WHITE, |t| t.at(textures, uvs));
+        (color * texture * tint).map(unit)
+    }
+
     /// Sets `bsdf` to that at texture coordinates `uvs` under the vertex color `tint`, seen from `wo`.
     #[inline]
     pub(crate) fn set_bsdf(
@@ -215,6 +219,10 @@ impl Material {
     ) {
         let look_up =
             |t: &Option<TextureRef>| t.as_ref().map_or(Rgb::WHITE, |t| t.at(textures, uvs));
+        if self.unlit {
+            *bsdf = Bsdf::single(Lambert::new(Rgb::BLACK));
+            return;
+        }
         match &self.model {
             MaterialModel::Fixed(fixed) => bsdf.set(fixed, wo),
             MaterialModel::Phong(p) => {
@@ -277,7 +285,7 @@ impl TextureRef {
 }
 
 /// Clamps to [0, 1]; NaN becomes 0.
-fn unit(v: f32) -> f32 {
+pub(super) fn unit(v: f32) -> f32 {
     if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) }
 }
 

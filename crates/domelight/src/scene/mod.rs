@@ -6,7 +6,9 @@
 
 pub mod builtin;
 mod camera;
+mod coverage;
 mod description;
+mod emission;
 #[cfg(feature = "io")]
 mod fingerprint;
 mod layers;
@@ -37,6 +39,7 @@ pub use texture::{Encoding, Texture, TextureError, TextureFilter, TextureRef, Uv
 use crate::bsdf::Bsdf;
 use crate::bvh::{Bvh, BvhError, InstructionSet};
 use crate::geometry::{Aabb, Mesh, MeshError};
+use coverage::Partial;
 
 /// A scene ready for rays.
 #[derive(Debug)]
@@ -46,7 +49,14 @@ pub struct Scene {
     textures: Vec<Texture>,
     /// Of each part its first triangle in the hierarchy.
     first_triangle: Vec<u32>,
+    /// Of the parts that hide all behind them, which come first.
     bvh: Bvh,
+    /// Of the others, if there are any.
+    partial: Option<Partial>,
+    /// Some part is not seen from behind.
+    has_single_sided: bool,
+    /// Some part sends out light.
+    emits: bool,
     bounds: Aabb,
     /// The bounds of what is not scenery.
     subject_bounds: Aabb,
@@ -106,24 +116,38 @@ pub enum SceneError {
 }
 
 impl Scene {
-    /// Checks every mesh and reference, and builds one hierarchy over all parts.
+    /// Checks every mesh and reference, and builds a hierarchy over the parts that hide all behind them and one over
+    /// those that may not; the former are moved before the latter.
     ///
     /// # Errors
     /// The first [`SceneError`] found. A scene without triangles is not an error: nothing is hit.
     pub fn new(description: SceneDescription) -> Result<Self, SceneError> {
         check(&description)?;
         let subject_bounds = description.subject_bounds();
-        let SceneDescription { parts, materials, textures, camera, up, .. } = description;
+        let SceneDescription { mut parts, materials, textures, camera, up, .. } = description;
         let up = up.unwrap_or_default();
         let bounds = parts.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()));
         check_size(&bounds)?;
-        let (bvh, first_triangle) = build(&parts)?;
+        parts.sort_by_key(|part| !part.is_opaque(&materials));
+        let n_opaque = parts.partition_point(|part| part.is_opaque(&materials));
+        let (opaque, others) = parts.split_at(n_opaque);
+        let bvh = build(opaque)?;
+        let n_triangles = opaque.iter().map(|p| p.mesh.triangles.len()).sum::<usize>() as u32;
+        let partial =
+            if others.is_empty() { None } else { Some(Partial::new(build(others)?, n_triangles)) };
+        let first_triangle = first_triangles(&parts)?;
+        let used = || parts.iter().map(|part| &materials[part.material]);
+        let has_single_sided = used().any(|material| !material.double_sided);
+        let emits = used().any(|material| material.unlit || material.emission.is_some());
         Ok(Self {
             parts,
             materials,
             textures,
             first_triangle,
             bvh,
+            partial,
+            has_single_sided,
+            emits,
             bounds,
             subject_bounds,
             camera,
@@ -188,7 +212,8 @@ impl Scene {
         self.up
     }
 
-    /// The ray-tracing hierarchy over all triangles.
+    /// The ray-tracing hierarchy over all triangles that hide what is behind them: all but those whose material has a
+    /// [`Coverage`] that is not whole everywhere. [`Scene::camera_hit`] and [`Scene::transmittances`] know both.
     pub fn bvh(&self) -> &Bvh {
         &self.bvh
     }
@@ -243,20 +268,30 @@ fn check(description: &SceneDescription) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// The hierarchy over the parts one after the other, and the first triangle of each.
-fn build(parts: &[Part]) -> Result<(Bvh, Vec<u32>), SceneError> {
+/// The hierarchy over the parts one after the other.
+fn build(parts: &[Part]) -> Result<Bvh, SceneError> {
     let vertices: usize = parts.iter().map(|p| p.mesh.positions.len()).sum();
     if vertices > u32::MAX as usize {
         return Err(SceneError::TooManyVertices { vertices });
     }
     let mut positions = Vec::with_capacity(vertices);
     let mut triangles = Vec::new();
-    let mut first_triangle = Vec::with_capacity(parts.len());
     for Part { mesh, .. } in parts {
-        first_triangle.push(triangles.len() as u32);
         let base = positions.len() as u32;
         positions.extend_from_slice(&mesh.positions);
         triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
     }
-    Ok((Bvh::build(&positions, &triangles)?, first_triangle))
+    Ok(Bvh::build(&positions, &triangles)?)
+}
+
+/// The first triangle of each part.
+fn first_triangles(parts: &[Part]) -> Result<Vec<u32>, SceneError> {
+    let mut count = 0;
+    let first = parts.iter().map(|part| {
+        count += part.mesh.triangles.len();
+        (count - part.mesh.triangles.len()) as u32
+    });
+    let first = first.collect();
+    let max = u32::MAX as usize;
+    if count > max { Err(BvhError::TooManyTriangles { count, max }.into()) } else { Ok(first) }
 }

@@ -1,6 +1,6 @@
 //! From a hit to what shading needs: position, normals, frame and BSDF.
 //!
-//! Surfaces are two-sided: both normals are turned to the viewer's side. The position comes from
+//! Surfaces are shaded from either side: both normals are turned to the viewer's side. The position comes from
 //! the barycentric coordinates, whose error is that of the vertices, rather than from
 //! origin + t · direction, whose error grows with the distance.
 //!
@@ -40,7 +40,7 @@ impl Scene {
 
         let [p0, p1, p2] = corner.of(&part.mesh.positions);
         let ng = (p1 - p0).cross(p2 - p0).try_normalize().unwrap_or(viewer);
-        let uvs = [&part.mesh.uvs, &part.mesh.uvs2].map(|set| corner.mix(set).unwrap_or_default());
+        let uvs = corner.uvs(&part.mesh);
         let smooth = corner.mix(&part.mesh.normals).and_then(Vec3::try_normalize).unwrap_or(ng);
         let (normal, tangent) = if material.needs_tangent() {
             self.normal_and_tangent(part, material, &corner, smooth, &uvs)
@@ -114,14 +114,14 @@ fn bend(normal: Vec3, viewer: Vec3, ng: Vec3) -> Vec3 {
 }
 
 /// The corners of the triangle that was hit, and their barycentric weights.
-struct Corners {
+pub(super) struct Corners {
     indices: [usize; 3],
     weights: [f32; 3],
 }
 
 impl Corners {
     #[inline]
-    fn new(mesh: &Mesh, triangle: usize, hit: &Hit) -> Self {
+    pub(super) fn new(mesh: &Mesh, triangle: usize, hit: &Hit) -> Self {
         Self {
             indices: mesh.triangles[triangle].map(|i| i as usize),
             weights: [1.0 - hit.u - hit.v, hit.u, hit.v],
@@ -136,7 +136,7 @@ impl Corners {
 
     /// An attribute interpolated; `None` if the mesh lacks it.
     #[inline]
-    fn mix<T>(&self, attribute: &[T]) -> Option<T>
+    pub(super) fn mix<T>(&self, attribute: &[T]) -> Option<T>
     where
         T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>,
     {
@@ -146,6 +146,12 @@ impl Corners {
         let [a, b, c] = self.of(attribute);
         let [wa, wb, wc] = self.weights;
         Some(a * wa + b * wb + c * wc)
+    }
+
+    /// The texture coordinates; 0 of a set that the mesh lacks.
+    #[inline]
+    pub(super) fn uvs(&self, mesh: &Mesh) -> Uvs {
+        [&mesh.uvs, &mesh.uvs2].map(|set| self.mix(set).unwrap_or_default())
     }
 
     /// The tangent ∂p/∂u with the bitangent's sign as glTF defines it: the bitangent points toward

@@ -30,14 +30,14 @@ pub(super) struct Slot {
 /// The surfaces of the materials that are used.
 pub(super) struct Materials<'a> {
     images: Images<'a>,
-    materials: Vec<Material>,
+    loaded: Vec<Material>,
     slots: HashMap<Option<usize>, Slot>,
 }
 
 impl<'a> Materials<'a> {
     pub(super) fn new(source: &Source<'a>) -> Self {
         let images = Images::new(Textures::new(source.budget));
-        Self { images, materials: Vec::new(), slots: HashMap::new() }
+        Self { images, loaded: Vec::new(), slots: HashMap::new() }
     }
 
     /// The surface of a material, or of the default one.
@@ -67,12 +67,12 @@ impl<'a> Materials<'a> {
         let anisotropy = material.layers.anisotropy;
         let follows = follows.or(anisotropy.map(|a| a.texture.map_or(0, |t| t.uv_set)));
         let slot = Slot {
-            material: self.materials.len(),
+            material: self.loaded.len(),
             uv_sets,
             tangent_set: follows,
             alpha: material.coverage.mode != AlphaMode::Opaque,
         };
-        self.materials.push(material);
+        self.loaded.push(material);
         self.slots.insert(index, slot);
         Ok(slot)
     }
@@ -80,7 +80,7 @@ impl<'a> Materials<'a> {
     /// All surfaces and textures; what of them is not drawn is said once a feature.
     pub(super) fn finish(self, mut warn: impl FnMut(&str)) -> (Vec<Material>, Vec<Texture>) {
         let mut undrawn: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-        for material in &self.materials {
+        for material in &self.loaded {
             for feature in material.undrawn_features() {
                 undrawn.entry(feature).or_default().push(&material.name);
             }
@@ -92,7 +92,7 @@ impl<'a> Materials<'a> {
             };
             warn(&format!("{feature} is not drawn, of material '{}'{others}", names[0]));
         }
-        (self.materials, self.images.textures.loaded)
+        (self.loaded, self.images.textures.loaded)
     }
 }
 

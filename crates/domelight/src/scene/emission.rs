@@ -1,0 +1,29 @@
+//! Light that surfaces send to the camera: emission, and colors that are shown as they are. It lights nothing else.
+
+use super::Scene;
+use super::shading::Corners;
+use crate::Rgb;
+use crate::geometry::Hit;
+
+impl Scene {
+    /// The radiance ≥ 0 that the surface of a hit sends to the camera whatever light falls on it.
+    pub fn emitted(&self, hit: &Hit) -> Rgb {
+        if !self.emits {
+            return Rgb::BLACK;
+        }
+        let (part, triangle) = self.locate(hit.triangle);
+        let material = &self.materials[part.material];
+        let corners = || Corners::new(&part.mesh, triangle, hit);
+        if material.unlit {
+            let corners = corners();
+            let tint = corners.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
+            return material.color(&self.textures, &corners.uvs(&part.mesh), tint);
+        }
+        material.emission.as_ref().map_or(Rgb::BLACK, |emission| match &emission.texture {
+            Some(texture) => {
+                emission.radiance * texture.at(&self.textures, &corners().uvs(&part.mesh))
+            }
+            None => emission.radiance,
+        })
+    }
+}

@@ -1,0 +1,232 @@
+//! Surfaces that cover a share of what is behind them, that are not seen from behind, and that send out light.
+
+use domelight::environment::{Environment, Orientation};
+use domelight::geometry::{Mesh, Ray, RayBatch};
+use domelight::math::{Vec3, vec2, vec3};
+use domelight::render::{Background, Layers, RenderSettings, render};
+use domelight::sampling::Heuristic;
+use domelight::scene::{
+    AlphaMode, Camera, CameraSettings, Coverage, Emission, Encoding, Material, Part, Projection,
+    Scene, SceneDescription, Texture, TextureFilter, TextureRef,
+};
+use domelight::strategy::{
+    BrdfSampling, EnvironmentSampling, LightTable, MultipleImportanceSampling, ProductSampling,
+    Strategy,
+};
+use domelight::{Rgb, RgbImage};
+use testkit::{Suite, ZTest};
+
+/// A wide square at height `y` that faces up.
+fn card(y: f32) -> Mesh {
+    let corners = [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
+    Mesh {
+        positions: corners.map(|[x, z]| 50.0 * vec3(x, 0.0, z) + vec3(0.0, y, 0.0)).to_vec(),
+        uvs: corners.map(|[x, z]| 0.5 + 0.5 * vec2(x, z)).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    }
+}
+
+fn covering(mode: AlphaMode, opacity: f32, albedo: f32) -> Material {
+    let coverage = Coverage { mode, opacity, texture: None };
+    Material { coverage, ..Material::diffuse("card", Rgb::splat(albedo)) }
+}
+
+/// Cards from the top down, a unit apart.
+fn stack(materials: Vec<Material>, textures: Vec<Texture>) -> Scene {
+    let part = |i| Part { name: "card".into(), mesh: card(-(i as f32)), material: i };
+    let parts = (0..materials.len()).map(part).collect();
+    let description =
+        SceneDescription { parts, materials, textures, ..SceneDescription::default() };
+    Scene::new(description).unwrap()
+}
+
+/// A patch around the zenith: whatever a card sees of it lies behind all cards above.
+fn zenith() -> Environment {
+    let map =
+        RgbImage::from_fn(32, 16, |_, y| if y < 3 { Rgb::new(3.0, 2.0, 1.0) } else { Rgb::BLACK });
+    Environment::new(map, Orientation::default(), 1.0).unwrap()
+}
+
+fn settings() -> RenderSettings {
+    RenderSettings {
+        width: 8,
+        height: 8,
+        n_samples: 64,
+        background: Background::Hidden,
+        ..RenderSettings::default()
+    }
+}
+
+fn draw_from<S: Strategy>(
+    origin: Vec3,
+    scene: &Scene,
+    environment: &Environment,
+    strategy: &S,
+    settings: &RenderSettings,
+) -> Layers {
+    let camera = CameraSettings {
+        projection: Projection::Perspective { fov_y_degrees: 20.0 },
+        origin,
+        target: Vec3::ZERO,
+        up: Vec3::Z,
+    };
+    let camera = Camera::new(&camera, settings.width, settings.height).unwrap();
+    render(scene, &camera, environment, strategy, settings, &()).layers
+}
+
+const ABOVE: Vec3 = Vec3::new(3.0, 10.0, 0.0);
+
+fn mean(image: &RgbImage) -> [f64; 3] {
+    let sum: Rgb = image.pixels.iter().fold(Rgb::BLACK, |sum, &p| sum + p);
+    (sum / image.pixels.len() as f32).to_array().map(f64::from)
+}
+
+/// Means over pictures under many seeds.
+fn means<S: Strategy>(scene: &Scene, environment: &Environment, strategy: &S) -> Vec<[f64; 3]> {
+    let picture = |seed| {
+        let settings = RenderSettings { seed, ..settings() };
+        mean(&draw_from(ABOVE, scene, environment, strategy, &settings).color)
+    };
+    (0..32).map(picture).collect()
+}
+
+/// What is seen of a stack is Σ α ρ T², with T the product of 1 − α of the cards above: once for the camera, once for the
+/// light. One random number for all layers of a camera ray, or noise in both that is not independent, would differ.
+#[test]
+fn a_stack_of_cards_is_the_sum_over_its_layers_by_every_strategy() {
+    let layers = [(0.3, 0.8), (0.5, 0.2), (0.25, 0.9), (0.6, 0.5), (1.0, 0.7)];
+    let (mut through, mut expected) = (1.0, 0.0);
+    for (opacity, albedo) in layers {
+        expected += opacity * albedo * through * through;
+        through *= 1.0 - opacity;
+    }
+    let blend = |(opacity, albedo)| covering(AlphaMode::Blend, opacity as f32, albedo as f32);
+    let cards = stack(layers.map(blend).to_vec(), Vec::new());
+    let white = stack(vec![Material::diffuse("white", Rgb::WHITE)], Vec::new());
+    let environment = zenith();
+    let light = EnvironmentSampling { environment: &environment, n_samples: 4 };
+    let of_white = means(&white, &environment, &light);
+    let of_white: Vec<_> = of_white.iter().map(|m| m.map(|x| x * expected)).collect();
+
+    let test = ZTest { suite: Suite::of(4), ..ZTest::default() };
+    let check = |name: &str, means: Vec<[f64; 3]>| {
+        test.two_sample(name, &means, &of_white).unwrap_or_else(|f| panic!("{f}"));
+    };
+    let brdf = BrdfSampling { environment: &environment, n_samples: 4 };
+    check("brdf", means(&cards, &environment, &brdf));
+    check("environment", means(&cards, &environment, &light));
+    let mis =
+        MultipleImportanceSampling::new(&environment, LightTable::Full, Heuristic::Balance, 2, 2);
+    check("mis", means(&cards, &environment, &mis.unwrap()));
+    check("product", means(&cards, &environment, &ProductSampling::new(&environment, 2)));
+}
+
+/// A texture of two columns, opaque on the left and clear on the right.
+fn half() -> (Texture, TextureRef) {
+    let texture = Texture::from_rgb8("half", 2, 1, vec![[255; 3]; 2], Encoding::Linear).unwrap();
+    let reference = TextureRef { filter: TextureFilter::Nearest, ..TextureRef::new(0) };
+    (texture.with_alpha(vec![255, 100]).unwrap(), reference)
+}
+
+#[test]
+fn masks_cut_holes_for_the_camera_and_for_light() {
+    let (texture, reference) = half();
+    let mut masked = covering(AlphaMode::Mask { cutoff: 0.5 }, 1.0, 0.5);
+    masked.coverage.texture = Some(reference);
+    let scene = stack(vec![masked], vec![texture]);
+    let mut rays = RayBatch::default();
+    for (x, opacity) in [(-10.0, 1.0), (10.0, 0.0)] {
+        let down = Ray::new(vec3(x, 1.0, 1.0), -Vec3::Y);
+        rays.push(vec3(x, -1.0, 1.0), Vec3::Y);
+        for key in 0..50 {
+            assert_eq!(scene.camera_hit(&down, key).is_some(), opacity > 0.5);
+        }
+    }
+    let mut transmittances = Vec::new();
+    scene.transmittances(&rays, &mut transmittances);
+    assert_eq!(transmittances, [0.0, 1.0]);
+    // Nothing is opaque: the hierarchy of such surfaces is empty.
+    assert_eq!((scene.bvh().triangle_count(), scene.triangle_count()), (0, 2));
+}
+
+#[test]
+fn alpha_is_the_share_that_is_covered() {
+    let environment = zenith();
+    let strategy = EnvironmentSampling { environment: &environment, n_samples: 1 };
+    let scene = stack(vec![covering(AlphaMode::Blend, 0.25, 0.5); 2], Vec::new());
+    let settings = RenderSettings { n_samples: 256, ..settings() };
+    let layers = draw_from(ABOVE, &scene, &environment, &strategy, &settings);
+    let covered = layers.alpha.iter().map(|&a| f64::from(a)).sum::<f64>() / 64.0;
+    let n = 64.0 * 256.0;
+    let expected = 1.0 - 0.75f64.powi(2);
+    let sigma = (expected * (1.0 - expected) / n).sqrt();
+    // Five standard deviations of a binomial: one run in two million.
+    assert!((covered - expected).abs() < 5.0 * sigma, "{covered}, not {expected}");
+}
+
+#[test]
+fn a_mask_with_whole_opacity_is_opaque() {
+    let solid = covering(AlphaMode::Mask { cutoff: 0.5 }, 0.75, 0.5);
+    assert_eq!(stack(vec![solid], Vec::new()).bvh().triangle_count(), 2);
+}
+
+#[test]
+fn single_sided_surfaces_are_not_seen_from_behind_and_cast_shadow() {
+    let mut above = Material::diffuse("roof", Rgb::splat(0.5));
+    above.double_sided = false;
+    let floor = Material { emission: emission(1.0), ..Material::diffuse("floor", Rgb::WHITE) };
+    let scene = stack(vec![above, floor], Vec::new());
+    let up = Ray::new(vec3(1.0, -0.5, 2.0), Vec3::Y);
+    let down = Ray::new(vec3(1.0, 0.5, 2.0), -Vec3::Y);
+    let (from_below, from_above) = (scene.camera_hit(&up, 0), scene.camera_hit(&down, 0).unwrap());
+    assert_eq!(from_below, None);
+    assert_eq!(from_above.t, 0.5);
+    assert!(scene.bvh().any_hit(&up), "a shadow");
+    // From below the floor, its underside hides the roof.
+    let from_far_below = Ray::new(vec3(1.0, -5.0, 2.0), Vec3::Y);
+    assert_eq!(scene.camera_hit(&from_far_below, 0).unwrap().t, 4.0);
+}
+
+fn emission(radiance: f32) -> Option<Emission> {
+    Some(Emission { radiance: Rgb::splat(radiance), texture: None })
+}
+
+#[test]
+fn the_camera_sees_emission_and_unlit_colors_as_they_are() {
+    let dark =
+        Environment::new(RgbImage::filled(8, 4, Rgb::BLACK), Orientation::default(), 1.0).unwrap();
+    let bright = zenith();
+    let lit = Material { emission: emission(2.5), ..Material::diffuse("lamp", Rgb::splat(0.5)) };
+    let unlit = Material {
+        unlit: true,
+        emission: emission(9.0),
+        ..Material::diffuse("sign", Rgb::new(0.75, 0.5, 0.25))
+    };
+    let draw = |material: &Material, environment: &Environment| {
+        let scene = stack(vec![material.clone()], Vec::new());
+        let strategy = EnvironmentSampling { environment, n_samples: 1 };
+        mean(&draw_from(ABOVE, &scene, environment, &strategy, &settings()).color)
+    };
+    assert_eq!(draw(&lit, &dark), [2.5; 3]);
+    assert!(draw(&lit, &bright)[2] > 2.6);
+    for environment in [&dark, &bright] {
+        assert_eq!(draw(&unlit, environment), [0.75, 0.5, 0.25]);
+    }
+}
+
+#[test]
+fn tiles_do_not_change_what_is_seen_through() {
+    let cards = vec![covering(AlphaMode::Blend, 0.4, 0.5); 6];
+    let scene = stack(cards, Vec::new());
+    let environment = zenith();
+    let strategy = EnvironmentSampling { environment: &environment, n_samples: 2 };
+    let draw = |tile_size| {
+        let settings =
+            RenderSettings { tile_size, width: 21, height: 13, n_samples: 5, ..settings() };
+        let layers = draw_from(ABOVE, &scene, &environment, &strategy, &settings);
+        layers.color.pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>()
+    };
+    assert_eq!(draw(16), draw(5));
+    assert_eq!(draw(16), draw(64));
+}
