@@ -175,7 +175,8 @@ fn a_mask_with_whole_opacity_is_opaque() {
 fn single_sided_surfaces_are_not_seen_from_behind_and_cast_shadow() {
     let mut above = Material::diffuse("roof", Rgb::splat(0.5));
     above.double_sided = false;
-    let floor = Material { emission: emission(1.0), ..Material::diffuse("floor", Rgb::WHITE) };
+    let floor =
+        Material { emission: Some(emission(1.0)), ..Material::diffuse("floor", Rgb::WHITE) };
     let scene = stack(vec![above, floor], Vec::new());
     let up = Ray::new(vec3(1.0, -0.5, 2.0), Vec3::Y);
     let down = Ray::new(vec3(1.0, 0.5, 2.0), -Vec3::Y);
@@ -188,8 +189,8 @@ fn single_sided_surfaces_are_not_seen_from_behind_and_cast_shadow() {
     assert_eq!(scene.camera_hit(&from_far_below, 0).unwrap().t, 4.0);
 }
 
-fn emission(radiance: f32) -> Option<Emission> {
-    Some(Emission { radiance: Rgb::splat(radiance), texture: None })
+fn emission(radiance: f32) -> Emission {
+    Emission { radiance: Rgb::splat(radiance), texture: None }
 }
 
 #[test]
@@ -197,10 +198,11 @@ fn the_camera_sees_emission_and_unlit_colors_as_they_are() {
     let dark =
         Environment::new(RgbImage::filled(8, 4, Rgb::BLACK), Orientation::default(), 1.0).unwrap();
     let bright = zenith();
-    let lit = Material { emission: emission(2.5), ..Material::diffuse("lamp", Rgb::splat(0.5)) };
+    let lit =
+        Material { emission: Some(emission(2.5)), ..Material::diffuse("lamp", Rgb::splat(0.5)) };
     let unlit = Material {
         unlit: true,
-        emission: emission(9.0),
+        emission: Some(emission(9.0)),
         ..Material::diffuse("sign", Rgb::new(0.75, 0.5, 0.25))
     };
     let draw = |material: &Material, environment: &Environment| {

@@ -425,7 +425,7 @@ impl Tile {
                 let sample = match ray.map(|ray| (&batch.rays[ray], batch.hits[ray])) {
                     Some((ray, Some(hit))) => {
                         point += 1;
-                        batch.surface_sample(context, point - 1, ray, &hit)
+                        batch.surface_sample(context, point - 1, ray, &hit, unit)
                     }
                     Some((ray, None)) => background_sample(ray.direction),
                     None => {
@@ -585,9 +585,12 @@ impl Batch {
         point: usize,
         ray: &Ray,
         hit: &Hit,
+        unit: f64,
     ) -> CameraSample {
         let p = &self.points[point];
-        let emitted = context.scene.emitted(hit);
+        // In multiples of the unit, as the rest.
+        let in_units = |c: f32| (f64::from(c) / unit).min(f64::from(f32::MAX)) as f32;
+        let emitted = context.scene.emitted(hit).map(in_units);
         CameraSample {
             color: self.radiance[point] + emitted,
             unoccluded: self.unoccluded[point] + emitted,
