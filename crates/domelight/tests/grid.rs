@@ -139,7 +139,7 @@ fn estimate<S: Strategy>(strategy: &S, at: &ShadingPoint, n: usize, seed: u64) -
             .map(|i| {
                 let start = points.len();
                 if n_rounds == 1 || level(i % SIDE, i / SIDE) == round {
-                    points.extend(std::iter::repeat_n(at.clone(), n));
+                    points.extend(std::iter::repeat_n(*at, n));
                     samples.extend(0..n as u32);
                 }
                 let count = (points.len() - start) as u32;
