@@ -140,7 +140,7 @@ fn masks_cut_holes_for_the_camera_and_for_light() {
         let down = Ray::new(vec3(x, 1.0, 1.0), -Vec3::Y);
         rays.push(vec3(x, -1.0, 1.0), Vec3::Y);
         for key in 0..50 {
-            assert_eq!(scene.camera_hit(&down, key).is_some(), opacity > 0.5);
+            assert_eq!(scene.camera_hit(&down, key, 0).is_some(), opacity > 0.5);
         }
     }
     let mut transmittances = Vec::new();
@@ -180,13 +180,14 @@ fn single_sided_surfaces_are_not_seen_from_behind_and_cast_shadow() {
     let scene = stack(vec![above, floor], Vec::new());
     let up = Ray::new(vec3(1.0, -0.5, 2.0), Vec3::Y);
     let down = Ray::new(vec3(1.0, 0.5, 2.0), -Vec3::Y);
-    let (from_below, from_above) = (scene.camera_hit(&up, 0), scene.camera_hit(&down, 0).unwrap());
+    let (from_below, from_above) =
+        (scene.camera_hit(&up, 0, 0), scene.camera_hit(&down, 0, 0).unwrap());
     assert_eq!(from_below, None);
     assert_eq!(from_above.t, 0.5);
     assert!(scene.bvh().any_hit(&up), "a shadow");
     // From below the floor, its underside hides the roof.
     let from_far_below = Ray::new(vec3(1.0, -5.0, 2.0), Vec3::Y);
-    assert_eq!(scene.camera_hit(&from_far_below, 0).unwrap().t, 4.0);
+    assert_eq!(scene.camera_hit(&from_far_below, 0, 0).unwrap().t, 4.0);
 }
 
 fn emission(radiance: f32) -> Emission {

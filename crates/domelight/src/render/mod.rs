@@ -215,7 +215,7 @@ pub fn pilot_points(
     let rays = (0..ACROSS * ACROSS)
         .map(|i| camera.ray(at(i % ACROSS, settings.width), at(i / ACROSS, settings.height)));
     let hit = |(i, ray): (usize, Ray)| {
-        scene.camera_hit(&ray, i as u64).map(|hit| scene.shading_point(&ray, &hit))
+        scene.camera_hit(&ray, 0, i as u32).map(|hit| scene.shading_point(&ray, &hit))
     };
     rays.enumerate().filter_map(hit).collect()
 }

@@ -339,8 +339,7 @@ impl Tile {
             for (i, of_pixel) in camera_rays.iter().enumerate() {
                 let key = self.key(context, i, set);
                 for (ray, sample) in of_pixel.range().zip(of_pixel.samples.clone()) {
-                    let key = hash2(key, u64::from(sample));
-                    hits[ray] = context.scene.seen(&rays[ray], hits[ray], key);
+                    hits[ray] = context.scene.seen(&rays[ray], hits[ray], key, sample);
                 }
             }
         }

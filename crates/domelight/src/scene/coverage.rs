@@ -9,7 +9,7 @@ use super::shading::Corners;
 use super::{AlphaMode, Coverage, Material, Part, Scene};
 use crate::bvh::{Bvh, Frustum};
 use crate::geometry::{Hit, Ray, RayBatch};
-use crate::sampling::rng::hash2;
+use crate::sampling::{rng::hash2, sobol};
 
 /// The triangles that may not hide what is behind them.
 #[derive(Debug)]
@@ -54,9 +54,10 @@ impl Part {
 
 impl Scene {
     /// What a camera ray sees first. A surface that covers only a share of what is behind it is seen with that
-    /// probability, by random numbers that are a function of `key` and the triangle; a single-sided one not from behind.
-    pub fn camera_hit(&self, ray: &Ray, key: u64) -> Option<Hit> {
-        self.seen(ray, self.bvh.closest_hit(ray), key)
+    /// probability, by random numbers that are a function of `key`, `sample` and the triangle; a single-sided one not from behind. Numbers of many samples of
+    /// one key, which may be a pixel, are stratified.
+    pub fn camera_hit(&self, ray: &Ray, key: u64, sample: u32) -> Option<Hit> {
+        self.seen(ray, self.bvh.closest_hit(ray), key, sample)
     }
 
     /// Whether [`Scene::camera_hit`] may differ from the closest hit of the hierarchy of [`Scene::bvh`].
@@ -66,7 +67,13 @@ impl Scene {
     }
 
     /// [`Scene::camera_hit`], given the closest `hit` of what is opaque.
-    pub(crate) fn seen(&self, ray: &Ray, mut hit: Option<Hit>, key: u64) -> Option<Hit> {
+    pub(crate) fn seen(
+        &self,
+        ray: &Ray,
+        mut hit: Option<Hit>,
+        key: u64,
+        sample: u32,
+    ) -> Option<Hit> {
         if hit.is_some_and(|hit| !self.faces(ray, &hit)) {
             hit = self.bvh.closest_hit_where(ray, |hit| self.faces(ray, hit));
         }
@@ -74,8 +81,7 @@ impl Scene {
         let nearer = Ray { t_max: hit.map_or(ray.t_max, |hit| hit.t), ..*ray };
         let accept = |hit: &Hit| {
             let hit = partial.in_scene(hit);
-            self.faces(ray, &hit)
-                && uniform(hash2(key, u64::from(hit.triangle))) < self.opacity(&hit)
+            self.faces(ray, &hit) && uniform(key, sample, hit.triangle) < self.opacity(&hit)
         };
         partial.bvh.closest_hit_where(&nearer, accept).map(|hit| partial.in_scene(&hit)).or(hit)
     }
@@ -129,7 +135,9 @@ impl Scene {
     }
 }
 
-/// A number in [0, 1) from a hash.
-fn uniform(hash: u64) -> f32 {
-    (hash >> 40) as f32 * (1.0 / (1 << 24) as f32)
+/// The number in [0, 1) of a camera sample for a triangle: those of many samples are stratified, those of two triangles
+/// independent.
+fn uniform(key: u64, sample: u32, triangle: u32) -> f32 {
+    let [bits, _] = sobol::first_two(sample, hash2(key, u64::from(triangle)));
+    (bits >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
