@@ -19,6 +19,22 @@ use domelight::picture::tone::{ToneCurve, ToneMapping};
 use std::path::PathBuf;
 use std::str::FromStr;
 
+/// Shown when the program starts without arguments, and at the end of `--help`.
+const FIRST_STEPS: &str = "\
+Five things to do:
+  domelight render
+      the built-in statue under the built-in sky, into domelight.exr and domelight.png
+  domelight render robot.glb --env studio.hdr -o robot.png
+      your model under your HDRI
+  domelight probe studio.hdr --preview studio.png
+      what is in an HDRI, and a picture of it
+  domelight lights studio.hdr -o rig.json
+      an HDRI as lights for other programs
+  domelight compare
+      how noisy each strategy is on one scene, as a page to look at; takes half a minute
+
+domelight COMMAND --help lists every option of a command.";
+
 /// Direct illumination under measured light.
 #[derive(Debug, Parser)]
 #[command(
@@ -27,7 +43,8 @@ use std::str::FromStr;
     about,
     propagate_version = true,
     args_override_self = true,
-    arg_required_else_help = true
+    arg_required_else_help = true,
+    after_help = FIRST_STEPS
 )]
 pub(crate) struct Arguments {
     /// What to do.
