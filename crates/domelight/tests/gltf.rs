@@ -168,6 +168,7 @@ fn extensions_of_materials_are_kept_and_named_once_if_not_drawn() {
     assert!(material.unlit && !material.double_sided);
     let layers = &material.layers;
     assert_eq!(layers.ior, Some(1.3));
+    assert!((layers.dielectric_f0() - 0.017_013_2).abs() < 1e-6);
     let specular = layers.specular.unwrap();
     assert_eq!((specular.strength.value, specular.color.value), (0.5, Rgb::new(2.0, 1.0, 0.0)));
     let coat = layers.clearcoat.unwrap();

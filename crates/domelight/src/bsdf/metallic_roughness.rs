@@ -34,10 +34,16 @@ impl MetallicRoughness {
     /// Of the base color, metalness and perceptual roughness; all are clamped to [0, 1], as glTF
     /// has it for products of factors and textures, and α = roughness² to at least [`super::MIN_ALPHA`].
     pub fn new(base_color: Rgb, metallic: f32, roughness: f32) -> Self {
+        Self::with_dielectric(base_color, metallic, roughness, 0.04)
+    }
+
+    /// The same over a dielectric of another refractive index than 1.5 (`KHR_materials_ior`): `f0` is its reflectance
+    /// at normal incidence, ((ior − 1) / (ior + 1))², clamped to \[0, 1\].
+    pub fn with_dielectric(base_color: Rgb, metallic: f32, roughness: f32, f0: f32) -> Self {
         let (base, metallic) = (range::reflectance(base_color), range::unit(metallic));
         let [alpha, _] = range::alpha([sqr(range::unit(roughness)); 2]);
         let diffuse = base * (1.0 - metallic);
-        let f0 = Rgb::splat(0.04).lerp(base, metallic);
+        let f0 = Rgb::splat(range::unit(f0)).lerp(base, metallic);
         Self { diffuse, f0, alpha, diffuse_mean: diffuse.mean(), f0_mean: f0.mean() }
     }
 
@@ -167,6 +173,22 @@ mod tests {
             let (wo, wi) = (toward(degrees, 0.2), toward(30.0, 3.0));
             assert_eq!(lobe.eval_pdf(wo, wi), ggx.eval_pdf(wo, wi));
         }
+    }
+
+    #[test]
+    fn a_dielectric_reflects_by_its_refractive_index() {
+        let base = Rgb::new(0.9, 0.5, 0.1);
+        assert_eq!(
+            MetallicRoughness::with_dielectric(base, 0.3, 0.4, 0.04),
+            MetallicRoughness::new(base, 0.3, 0.4)
+        );
+        for f0 in [0.0, 0.17, 1.0] {
+            let lobe = MetallicRoughness::with_dielectric(base, 0.0, 0.4, f0);
+            assert_eq!(lobe.f0, Rgb::splat(f0));
+            check_lobe(&lobe);
+            check_bound(&lobe, 4.0);
+        }
+        assert_eq!(MetallicRoughness::with_dielectric(base, 0.0, 0.4, f32::NAN).f0, Rgb::BLACK);
     }
 
     /// A rough dielectric looks like its base color and shines like glass of index 1.5.

@@ -5,6 +5,7 @@
 
 use super::texture::TextureRef;
 use crate::Rgb;
+use crate::math::sqr;
 
 /// How much of what lies behind a surface shows through it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,6 +138,12 @@ pub struct Volume {
 }
 
 impl Layers {
+    /// The reflectance of the dielectric at normal incidence, in \[0, 1\]: by the refractive index, which is 1.5 unless set.
+    #[inline]
+    pub fn dielectric_f0(&self) -> f32 {
+        self.ior.map_or(0.04, |ior| sqr((ior - 1.0) / (ior + 1.0)))
+    }
+
     /// Every use of a texture.
     pub(super) fn textures(&self) -> impl Iterator<Item = &TextureRef> {
         let Self { ior: _, specular, clearcoat, sheen, anisotropy, transmission, volume } = self;

@@ -123,10 +123,9 @@ impl Material {
 
     /// What of this surface a picture lacks, in glTF's terms; whoever draws a feature deletes its line.
     pub fn undrawn_features(&self) -> impl Iterator<Item = &'static str> {
-        let Layers { ior, specular, clearcoat, sheen, anisotropy, transmission, volume } =
+        let Layers { ior: _, specular, clearcoat, sheen, anisotropy, transmission, volume } =
             &self.layers;
         [
-            (ior.is_some_and(|ior| ior != 1.5), "KHR_materials_ior"),
             (specular.is_some(), "KHR_materials_specular"),
             (clearcoat.is_some(), "KHR_materials_clearcoat"),
             (sheen.is_some(), "KHR_materials_sheen"),
@@ -233,7 +232,9 @@ impl Material {
                 let base = m.base_color * look_up(&m.base_color_texture) * tint;
                 let factors = look_up(&m.metallic_roughness_texture);
                 let (metallic, roughness) = (m.metallic * factors.b, m.roughness * factors.g);
-                *bsdf = Bsdf::single(MetallicRoughness::new(base, metallic, roughness));
+                let f0 = self.layers.dielectric_f0();
+                let lobe = MetallicRoughness::with_dielectric(base, metallic, roughness, f0);
+                *bsdf = Bsdf::single(lobe);
             }
             MaterialModel::SpecularGlossiness(s) => {
                 let diffuse = s.diffuse * look_up(&s.diffuse_texture) * tint;
