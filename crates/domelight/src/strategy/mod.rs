@@ -195,8 +195,8 @@ pub trait PointStrategy: Sync {
     /// Shadow rays asked for at each point at the most.
     fn n_rays(&self) -> u32;
 
-    /// What weights are multiples of: [`Environment::unit`](crate::Environment::unit) of a strategy whose weights are
-    /// in proportion to [`Environment::le`](crate::Environment::le).
+    /// What weights are multiples of: [`Environment::unit`](crate::environment::Environment::unit) of a strategy whose weights are
+    /// in proportion to [`Environment::le`](crate::environment::Environment::le).
     fn unit(&self) -> f64 {
         1.0
     }
