@@ -1,4 +1,7 @@
 #![no_main]
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| drop(domelight::picture::exr::decode(bytes, None)));
+#[path = "../decoders.rs"]
+mod decoders;
+
+fuzz_target!(init: decoders::let_unwind(), |bytes: &[u8]| drop(domelight::picture::exr::decode(bytes, None)));
