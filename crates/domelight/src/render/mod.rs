@@ -176,7 +176,7 @@ pub fn render<S: Strategy>(
     environment: &Environment,
     strategy: &S,
     settings: &RenderSettings,
-    observer: &impl Observer,
+    observer: &(impl Observer + ?Sized),
 ) -> Rendering {
     let mut renderer = Renderer::with_strategy(scene, camera, environment, strategy, *settings);
     renderer.run(observer);
