@@ -15,7 +15,7 @@ mod renderer;
 mod tile;
 mod tiling;
 mod variance;
-mod visibility;
+pub(crate) mod visibility;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
