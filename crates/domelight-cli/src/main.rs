@@ -14,6 +14,7 @@ mod error;
 mod farm;
 mod figures;
 mod files;
+mod inspect;
 mod interrupt;
 mod lights;
 mod memory;
@@ -46,6 +47,7 @@ fn main() -> ExitCode {
         Command::Merge(arguments) => merge::run(&arguments, quiet),
         Command::Farm(arguments) => farm::run(&arguments, quiet),
         Command::Compare(arguments) => compare::run(&arguments, quiet),
+        Command::Inspect(arguments) => inspect::run(&arguments, quiet),
         Command::Bench(arguments) => bench::run(&arguments, quiet),
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Lights(arguments) => lights::run(&arguments, quiet),

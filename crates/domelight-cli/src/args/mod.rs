@@ -4,6 +4,7 @@ pub(crate) mod bench;
 pub(crate) mod compare;
 pub(crate) mod farm;
 pub(crate) mod figures;
+pub(crate) mod inspect;
 pub(crate) mod lights;
 pub(crate) mod render;
 pub(crate) mod render_run;
@@ -80,6 +81,9 @@ pub(crate) enum Command {
     /// Compare strategies on one scene at equal samples, rays or time, in a report to look at.
     #[command(after_help = compare::EXAMPLES)]
     Compare(Box<compare::CompareArguments>),
+    /// Look into one pixel: its hemisphere, where each strategy sends its rays, and why it is noisy.
+    #[command(after_help = inspect::EXAMPLES)]
+    Inspect(Box<inspect::InspectArguments>),
     /// Measure what error costs: CPU time of each strategy to a wanted error, rays a second, rigs; also
     /// against other programs.
     #[command(after_help = bench::EXAMPLES)]

@@ -10,6 +10,7 @@ use super::pixels;
 use super::plots::{Cost, convergence};
 use super::report::CompareReport;
 use crate::Error;
+use crate::page::{STYLE as PAGE_STYLE, fill};
 use crate::svg::{PALETTE, font_face_css};
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -46,7 +47,7 @@ pub(super) fn page(
         TEMPLATE,
         &[
             ("title", html::text(&title)),
-            ("style", Code::generated(format!("{}\n{STYLE}", font_face_css()))),
+            ("style", Code::generated(format!("{}\n{PAGE_STYLE}\n{STYLE}", font_face_css()))),
             ("over-rays", Code::generated(convergence(report, Cost::Rays))),
             ("over-time", Code::generated(convergence(report, Cost::Seconds))),
             ("command", html::text(&report.command)),
@@ -57,29 +58,9 @@ pub(super) fn page(
     ))
 }
 
-/// The template with each `{{name}}` replaced; what is filled in is not looked at again.
-fn fill(template: &'static str, values: &[(&str, Code<Html>)]) -> Code<Html> {
-    let mut parts = template.split("{{");
-    let mut page = Code::literal(parts.next().unwrap_or_default());
-    for part in parts {
-        let (name, rest) = part.split_once("}}").unwrap_or((part, ""));
-        if let Some((_, value)) = values.iter().find(|(n, _)| *n == name) {
-            page += value;
-        }
-        page += rest;
-    }
-    page
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn templates_are_filled_once() {
-        let values = [("x", html::text("{{y}}")), ("y", html::text("2"))];
-        assert_eq!(fill("a {{x}} b {{y}}{{x}}", &values).as_str(), "a {{y}} b 2{{y}}");
-    }
 
     #[test]
     fn the_template_has_no_unknown_places() {

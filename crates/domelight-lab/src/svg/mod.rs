@@ -131,6 +131,7 @@ impl Display for Style {
 /// Which point of a text its place means.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Anchor {
+    /// On the left of the text.
     #[default]
     Start,
     /// Its middle.

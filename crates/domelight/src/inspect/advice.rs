@@ -14,7 +14,11 @@ impl fmt::Display for Diagnosis<'_> {
         let Some(&Share { cause, share }) = decomposition.shares.first() else {
             return f.write_str("no error: all estimates of this pixel are alike");
         };
-        write!(f, "{} of the error: ", percent(share))?;
+        if share >= 0.995 {
+            f.write_str("nearly all of the error: ")?;
+        } else {
+            write!(f, "{} of the error: ", percent(share))?;
+        }
         let of = |kind| decomposition.source(kind).copied();
         match cause {
             Cause::Coverage => write!(
@@ -56,9 +60,9 @@ impl fmt::Display for Diagnosis<'_> {
 pub enum Advice {
     /// There is no error.
     Nothing,
-    /// The best strategy's error is between camera samples.
+    /// The error of most strategies is between camera samples.
     CameraSamples {
-        /// Of the best strategy.
+        /// The strategy that needs the fewest rays.
         name: String,
         /// Share of its variance between camera samples.
         between: f64,
@@ -67,9 +71,9 @@ pub enum Advice {
     Strategy {
         /// Of the best strategy.
         name: String,
-        /// How many times fewer rays than the worst of the others.
+        /// How many times fewer rays than the next that is much worse.
         times_fewer: f64,
-        /// The worst of the others.
+        /// That one.
         than: String,
     },
     /// All strategies are about alike: more rays.
@@ -80,22 +84,21 @@ pub enum Advice {
 pub fn advice(strategies: &[Decomposition]) -> Advice {
     /// A factor that is worth changing the strategy for.
     const WORTH: f64 = 1.5;
-    let variance = |d: &&Decomposition| d.variance_per_ray();
-    let by_variance = |a: &&Decomposition, b: &&Decomposition| variance(a).total_cmp(&variance(b));
-    let best = strategies.iter().min_by(by_variance);
-    let worst = strategies.iter().max_by(by_variance);
-    let (Some(best), Some(worst)) = (best, worst) else { return Advice::Nothing };
+    let mut order: Vec<&Decomposition> = strategies.iter().collect();
+    order.sort_by(|a, b| a.variance_per_ray().total_cmp(&b.variance_per_ray()));
+    let (Some(best), Some(worst)) = (order.first(), order.last()) else { return Advice::Nothing };
     if worst.variance == 0.0 {
         return Advice::Nothing;
     }
-    let times_fewer = variance(&worst) / variance(&best);
-    if times_fewer >= WORTH {
-        let (name, than) = (best.name.clone(), worst.name.clone());
-        return Advice::Strategy { name, times_fewer, than };
+    let (name, between) = (best.name.clone(), best.between_samples());
+    let is_between = |d: &&&Decomposition| d.variance > 0.0 && d.between_samples() >= 0.5;
+    if between >= 0.5 && 2 * order.iter().filter(is_between).count() >= order.len() {
+        return Advice::CameraSamples { name, between };
     }
-    let between = best.between_samples();
-    if between >= 0.5 {
-        return Advice::CameraSamples { name: best.name.clone(), between };
+    let ratio = |d: &Decomposition| d.variance_per_ray() / best.variance_per_ray();
+    let next = order.iter().find(|d| ratio(d) >= WORTH).map(|d| (ratio(d), d.name.clone()));
+    if let Some((times_fewer, than)) = next {
+        return Advice::Strategy { name, times_fewer, than };
     }
     Advice::Rays
 }

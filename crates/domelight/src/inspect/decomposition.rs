@@ -76,7 +76,7 @@ pub struct SourceStatistics {
     pub source: Source,
     /// Share of the strategy's rays that go there.
     pub rays: f64,
-    /// Share of the light reflected toward the camera that comes from there.
+    /// Share of the light reflected toward the camera that comes from there, by multiple importance sampling.
     pub light: f64,
     /// Mean visibility of the rays that go there; none if none do.
     pub free: Option<f64>,
@@ -114,10 +114,12 @@ impl Decomposition {
         samples: &[CameraSample],
         replicates: &Replicates,
         regions: &Regions,
+        light: &[f64],
     ) -> Self {
         let means = Means::of(samples, replicates);
         let mut shares = means.between(regions.sources());
         shares.extend(within(samples, replicates, &means, regions.sources()));
+        add_missed(&mut shares, replicates, regions.sources(), light, samples.len());
         let variance: f64 = shares.iter().map(|share| share.share).sum();
         if variance <= ROUNDING * means.mean * means.mean {
             shares.clear();
@@ -132,7 +134,7 @@ impl Decomposition {
             rays_per_sample: replicates.rays_per_sample(),
             coverage: means.coverage,
             shares,
-            sources: means.statistics(replicates, regions.sources()),
+            sources: means.statistics(replicates, regions.sources(), light),
         }
     }
 
@@ -266,16 +268,21 @@ impl Means {
         shares
     }
 
-    fn statistics(&self, replicates: &Replicates, sources: &[Source]) -> Vec<SourceStatistics> {
+    fn statistics(
+        &self,
+        replicates: &Replicates,
+        sources: &[Source],
+        light: &[f64],
+    ) -> Vec<SourceStatistics> {
         let all_rays: u64 = replicates.rays.iter().sum();
-        let all_light: f64 = self.seen.iter().flatten().sum();
+        let all_light: f64 = light.iter().sum();
         let of_source = |(part, &source): (usize, &Source)| {
             let seen = self.seen.iter().filter(|hit| hit[part] > 0.0).count();
             let rays = replicates.rays[part] as f64;
             SourceStatistics {
                 source,
                 rays: ratio(rays, all_rays as f64),
-                light: ratio(self.seen.iter().map(|hit| hit[part]).sum(), all_light),
+                light: light.get(part).map_or(0.0, |&light| ratio(light, all_light)),
                 free: (rays > 0.0).then(|| replicates.free[part] / rays),
                 seen: ratio(seen as f64, self.seen.len() as f64),
             }
@@ -327,6 +334,33 @@ fn within(
         }
     }
     shares
+}
+
+/// Adds what a strategy must have missed of a source that it found less than half of: if k of n estimates have found it,
+/// no more than about (k + 3) / n of all do (the rule of three, at 95 %), so that a mean ℓ has a variance of ℓ² n / (k + 3)
+/// at least.
+fn add_missed(
+    shares: &mut [Share],
+    replicates: &Replicates,
+    sources: &[Source],
+    light: &[f64],
+    n_samples: usize,
+) {
+    let found = replicates.light_by_source(n_samples);
+    let n = (replicates.n_replicates * n_samples) as f64;
+    let all: f64 = light.iter().sum();
+    for (part, (&there, &found)) in light.iter().zip(&found).enumerate() {
+        /// Less is not worth a word.
+        const LEAST: f64 = 0.02;
+        if found >= 0.5 * there || there < LEAST * all {
+            continue;
+        }
+        let least = there * there * n / (replicates.rays[part] as f64 + 3.0);
+        let of_source = |share: &&mut Share| share.cause == Cause::Directions(sources[part].kind);
+        if let Some(share) = shares.iter_mut().find(of_source) {
+            share.share = share.share.max(least);
+        }
+    }
 }
 
 fn ratio(a: f64, b: f64) -> f64 {

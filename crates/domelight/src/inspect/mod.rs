@@ -42,9 +42,9 @@ use crate::environment::Environment;
 use crate::geometry::{Ray, RayBatch, offset_origin};
 use crate::math::Vec3;
 use crate::render::{Background, FilterSampler, RenderSettings, visibility};
-use crate::sampling::{Dimension, Sampler};
+use crate::sampling::{Dimension, Heuristic, Sampler};
 use crate::scene::{Camera, Scene};
-use crate::strategy::{ShadingPoint, Strategy};
+use crate::strategy::{LightTable, MultipleImportanceSampling, ShadingPoint, Strategy};
 use crate::{Rgb, math::vec2};
 use regions::Regions;
 use replicates::Replicates;
@@ -83,6 +83,9 @@ pub struct Inspector<'a> {
     /// The hit nearest to the pixel's center.
     representative: Option<ShadingPoint>,
     regions: Regions,
+    /// Luminance that each source adds to the pixel, by multiple importance sampling: what a strategy that misses rare
+    /// light is told by.
+    light: Vec<f64>,
     /// The longest extent of the scene.
     extent: f32,
 }
@@ -158,7 +161,7 @@ impl<'a> Inspector<'a> {
         let representative = scene.camera_hit(&center, settings.seed, 0);
         let representative = representative.map(|hit| scene.shading_point(&center, &hit));
         let first = || samples.iter().find_map(|sample| sample.point);
-        Ok(Self {
+        let mut inspector = Self {
             scene,
             environment,
             settings: *settings,
@@ -166,8 +169,23 @@ impl<'a> Inspector<'a> {
             representative: representative.or_else(first),
             samples,
             regions: Regions::of(environment),
+            light: Vec::new(),
             extent: scene.bounds().size().max_element(),
-        })
+        };
+        inspector.light = inspector.light_by_source();
+        Ok(inspector)
+    }
+
+    fn light_by_source(&self) -> Vec<f64> {
+        let mis = MultipleImportanceSampling::new(
+            self.environment,
+            LightTable::Full,
+            Heuristic::Power,
+            4,
+            4,
+        );
+        let replicates = mis.map(|mis| self.replicates(&mis));
+        replicates.map_or(Vec::new(), |replicates| replicates.light_by_source(self.samples.len()))
     }
 
     /// What the pixel shows.
@@ -211,7 +229,14 @@ impl<'a> Inspector<'a> {
     }
 
     /// The variance of a strategy at this pixel, by causes.
+    ///
+    /// Rays that are so rare that none was found count by what they must bring at least, with a confidence of 95 %.
     pub fn decompose<S: Strategy>(&self, name: &str, strategy: &S) -> Decomposition {
+        let replicates = self.replicates(strategy);
+        Decomposition::new(name, &self.samples, &replicates, &self.regions, &self.light)
+    }
+
+    fn replicates<S: Strategy>(&self, strategy: &S) -> Replicates {
         let trace = |points: &[ShadingPoint], of: &[u32], wi: &[Vec3], out: &mut [f32]| {
             let mut rays = RayBatch::default();
             for (&point, &wi) in of.iter().zip(wi) {
@@ -219,15 +244,14 @@ impl<'a> Inspector<'a> {
             }
             out.copy_from_slice(&self.trace_batch(&rays));
         };
-        let replicates = Replicates::of(
+        Replicates::of(
             &self.samples,
             strategy,
             &self.settings,
             &self.regions,
             self.environment,
             trace,
-        );
-        Decomposition::new(name, &self.samples, &replicates, &self.regions)
+        )
     }
 
     fn trace(&self, point: &ShadingPoint, wi: &[Vec3]) -> Vec<f32> {

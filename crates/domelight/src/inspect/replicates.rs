@@ -118,6 +118,16 @@ impl Replicates {
         self.unoccluded[(replicate * self.n_points + point) * self.n_parts + part]
     }
 
+    /// Mean over `n_samples` camera samples, hits and misses, of what each source adds.
+    pub(super) fn light_by_source(&self, n_samples: usize) -> Vec<f64> {
+        let n = (self.n_replicates * n_samples) as f64;
+        let n_rows = self.n_replicates * self.n_points;
+        let of_source = |part: usize| -> f64 {
+            (0..n_rows).map(|row| self.seen[row * self.n_parts + part]).sum::<f64>() / n
+        };
+        (0..self.n_parts - 1).map(of_source).collect()
+    }
+
     /// Rays of a camera sample, hits and misses.
     pub(super) fn rays_per_sample(&self) -> f64 {
         self.rays.iter().sum::<u64>() as f64 / (self.n_replicates * N_SAMPLES) as f64

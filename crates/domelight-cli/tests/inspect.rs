@@ -1,0 +1,61 @@
+//! `domelight inspect` as a user runs it: a page, numbers, refusals.
+
+mod common;
+
+use common::{domelight, ended, json, stderr};
+use std::fs;
+use tempfile::TempDir;
+
+const QUICK: [&str; 7] =
+    ["inspect", "sphere", "--size", "32x32", "--env-rows", "32", "--strategies=brdf,mis,product"];
+
+#[test]
+fn numbers_whose_shares_sum_to_one() {
+    let folder = TempDir::new().unwrap();
+    let report = json(&domelight(&folder, &[&QUICK[..], &["-o", "-"]].concat()));
+    assert_eq!(report["pixel"]["pixel"], serde_json::json!([16, 16]));
+    assert_eq!(report["pixel"]["coverage"], 1.0);
+    let strategies = report["strategies"].as_array().unwrap();
+    assert_eq!(strategies.len(), 3);
+    for strategy in strategies {
+        let shares = strategy["shares"].as_array().unwrap();
+        let sum: f64 = shares.iter().map(|share| share["share"].as_f64().unwrap()).sum();
+        assert!((sum - 1.0).abs() < 1e-6, "{strategy}");
+        assert!(strategy["diagnosis"].as_str().unwrap().contains("of the error"));
+        let density = strategy["density"].as_array().unwrap();
+        let solid_angle = 8.0 / density.len() as f64;
+        let sum: f64 = density.iter().map(|d| d.as_f64().unwrap() * solid_angle).sum();
+        assert!(sum > 0.9 && sum < 1.001, "{sum}");
+    }
+    let resolution = report["maps"]["resolution"].as_u64().unwrap() as usize;
+    let product = report["maps"]["product"].as_array().unwrap();
+    assert_eq!(product.len(), resolution * resolution);
+    // The maps integrate to what the strategies estimate.
+    let sum: f64 = product.iter().map(|p| p.as_f64().unwrap()).sum();
+    let integral = sum * 8.0 / product.len() as f64;
+    let mean = strategies[2]["mean"].as_f64().unwrap();
+    assert!((integral / mean - 1.0).abs() < 0.1, "{integral} {mean}");
+}
+
+#[test]
+fn a_page_that_needs_nothing_else() {
+    let folder = TempDir::new().unwrap();
+    let done = domelight(&folder, &[&QUICK[..], &["--pixel", "3,4"]].concat());
+    assert!(done.status.success(), "{}", stderr(&done));
+    let page = fs::read_to_string(folder.path().join("inspect.html")).unwrap();
+    assert!(page.starts_with("<!doctype html>") && !page.contains("{{"));
+    assert!(!page.contains("src=\"http") && !page.contains("<script"));
+    assert!(page.contains("Pixel 3, 4 of sphere"));
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    let folder = TempDir::new().unwrap();
+    for (arguments, words) in [
+        (&["--pixel", "32,0"][..], "outside the picture of 32x32"),
+        (&["--pixel", "a"], "such as 120,88"),
+        (&["-o", "pixel.png"], ".html or .json"),
+    ] {
+        ended(&domelight(&folder, &[&QUICK[..], arguments].concat()), 2, &[words]);
+    }
+}

@@ -1,0 +1,202 @@
+//! The pixel X-ray of a view: strategies at one pixel, as numbers and as a page.
+
+mod page;
+
+use domelight::inspect::{
+    Advice, Decomposition, DirectionHistogram, Hemisphere, Inspector, PixelSummary, Source, advice,
+};
+use domelight::quote::{Code, Html};
+use domelight::render::RenderSettings;
+use domelight::strategy::{PreparedStrategy, Strategy};
+use serde::Serialize;
+
+use crate::report::SceneReport;
+use crate::scene::View;
+use crate::{At as _, Error, Host, NamedStrategy};
+
+/// Pixels along an edge of the maps of light and reflectance.
+const RESOLUTION: usize = 128;
+/// Of the maps of densities, whose pixels need some rays each.
+const DENSITY_RESOLUTION: usize = 64;
+
+/// One pixel of a view under some strategies.
+pub struct Inspection<'a> {
+    view: View<'a>,
+    settings: RenderSettings,
+    inspector: Inspector<'a>,
+    command: String,
+    hemisphere: Option<Hemisphere>,
+    strategies: Vec<InspectedStrategy>,
+}
+
+/// A strategy at the pixel.
+struct InspectedStrategy {
+    settings: String,
+    decomposition: Decomposition,
+    directions: Option<DirectionHistogram>,
+}
+
+/// All numbers.
+#[derive(Debug, Serialize)]
+pub struct InspectionReport<'a> {
+    /// Of domelight.
+    pub version: &'static str,
+    /// As it was typed.
+    pub command: &'a str,
+    /// What was rendered.
+    pub scene: &'a SceneReport,
+    /// What the pixel shows.
+    pub pixel: PixelSummary,
+    /// The light by parts.
+    pub sources: &'a [Source],
+    /// In the order in which they were given.
+    pub strategies: Vec<StrategyReport<'a>>,
+    /// What would help.
+    pub advice: Advice,
+    /// The same as a sentence.
+    pub advice_text: String,
+    /// Maps of the hemisphere; null of a pixel that shows nothing of the scene.
+    pub maps: Option<Maps>,
+}
+
+/// The numbers of a strategy.
+#[derive(Debug, Serialize)]
+pub struct StrategyReport<'a> {
+    /// In full.
+    pub settings: &'a str,
+    /// Variance of the estimate from one shadow ray.
+    pub variance_per_ray: f64,
+    /// Why the pixel is noisy, as a sentence.
+    pub diagnosis: String,
+    /// The variance by causes.
+    #[serde(flatten)]
+    pub decomposition: &'a Decomposition,
+    /// Where its rays go \[sr⁻¹\], in the projection of [`Maps`] with 64 pixels along an edge; null of a pixel that shows nothing of the scene.
+    pub density: Option<&'a [f32]>,
+}
+
+/// Maps of the hemisphere above the hit nearest to the pixel's center: luminance, row by row, of the disk of Lambert's
+/// azimuthal equal-area projection in a square.
+#[derive(Debug, Serialize)]
+pub struct Maps {
+    /// Pixels along an edge.
+    pub resolution: usize,
+    /// x, y and z of the local frame in the world.
+    pub frame: [[f32; 3]; 3],
+    /// L \[W·m⁻²·sr⁻¹\].
+    pub radiance: Vec<f32>,
+    /// f_r · cos θ \[sr⁻¹\].
+    pub bsdf_cos: Vec<f32>,
+    /// V.
+    pub visibility: Vec<f32>,
+    /// f_r · cos θ · L · V.
+    pub product: Vec<f32>,
+}
+
+impl<'a> Inspection<'a> {
+    /// Looks at the pixel in that column and row, counted from the upper left. `command` is what makes the report again.
+    ///
+    /// # Errors
+    /// If the pixel is not in the picture.
+    pub fn new(
+        view: View<'a>,
+        settings: RenderSettings,
+        pixel: [usize; 2],
+        command: impl Into<String>,
+    ) -> Result<Self, Error> {
+        let View { scene, camera, environment, .. } = view;
+        let inspector = Inspector::new(scene, camera, environment, &settings, pixel)
+            .map_err(|error| Error::Usage(error.to_string()))?;
+        let hemisphere = inspector.hemisphere(RESOLUTION);
+        let (command, strategies) = (command.into(), Vec::new());
+        Ok(Self { view, settings, inspector, command, hemisphere, strategies })
+    }
+
+    /// Measures one of the library's strategies.
+    ///
+    /// # Errors
+    /// If it does not suit the environment, or the host ended the work.
+    pub fn add_named(&mut self, strategy: &NamedStrategy, host: &dyn Host) -> Result<(), Error> {
+        host.check_canceled()?;
+        let View { scene, camera, environment, .. } = self.view;
+        let spec = strategy.spec.for_picture(scene, camera, environment, &self.settings);
+        let prepared = PreparedStrategy::new(spec, environment).at(&strategy.text)?;
+        self.measure(&strategy.text, spec.description(), &prepared);
+        Ok(())
+    }
+
+    /// Measures a strategy of any type.
+    pub fn add(&mut self, name: &str, strategy: &impl Strategy) {
+        self.measure(name, name.to_owned(), strategy);
+    }
+
+    fn measure(&mut self, name: &str, settings: String, strategy: &impl Strategy) {
+        let decomposition = self.inspector.decompose(name, strategy);
+        let directions = self.inspector.directions(strategy, DENSITY_RESOLUTION);
+        self.strategies.push(InspectedStrategy { settings, decomposition, directions });
+    }
+
+    /// What would help.
+    pub fn advice(&self) -> Advice {
+        let all: Vec<Decomposition> =
+            self.strategies.iter().map(|s| s.decomposition.clone()).collect();
+        advice(&all)
+    }
+
+    /// A sentence for each strategy, and what would help.
+    pub fn summary(&self) -> Vec<String> {
+        let named = self.strategies.iter().map(|s| &s.decomposition);
+        let width = named.clone().map(|d| d.name.chars().count()).max().unwrap_or(0);
+        let mut lines: Vec<String> = named
+            .map(|d| {
+                let variance = d.variance_per_ray();
+                format!("{:width$}  variance of a ray {variance:.2e}  {}", d.name, d.diagnosis())
+            })
+            .collect();
+        lines.push(self.advice().to_string());
+        lines
+    }
+
+    /// All numbers.
+    pub fn report(&self) -> InspectionReport<'_> {
+        let luminance = |map: &[domelight::Rgb]| map.iter().map(|c| c.luminance()).collect();
+        let maps = |h: &Hemisphere| Maps {
+            resolution: h.resolution,
+            frame: h.frame,
+            radiance: luminance(&h.radiance),
+            bsdf_cos: luminance(&h.bsdf_cos),
+            visibility: h.visibility.clone(),
+            product: luminance(&h.product),
+        };
+        let advice = self.advice();
+        InspectionReport {
+            version: env!("CARGO_PKG_VERSION"),
+            command: &self.command,
+            scene: self.view.report,
+            pixel: self.inspector.summary(),
+            sources: self.inspector.sources(),
+            strategies: self
+                .strategies
+                .iter()
+                .map(|s| StrategyReport {
+                    settings: &s.settings,
+                    variance_per_ray: s.decomposition.variance_per_ray(),
+                    diagnosis: s.decomposition.diagnosis().to_string(),
+                    decomposition: &s.decomposition,
+                    density: s.directions.as_ref().map(|d| &d.density[..]),
+                })
+                .collect(),
+            advice_text: advice.to_string(),
+            advice,
+            maps: self.hemisphere.as_ref().map(maps),
+        }
+    }
+
+    /// The report as one page of HTML that needs nothing else.
+    ///
+    /// # Errors
+    /// If a picture cannot be encoded.
+    pub fn page(&self) -> Result<Code<Html>, Error> {
+        page::page(self)
+    }
+}
