@@ -1,0 +1,2 @@
+import type { App } from "./app";
+export class Lecture { constructor(_app: App) {} }
