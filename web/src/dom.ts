@@ -33,12 +33,17 @@ export function short(x: number): string {
   const size = Math.abs(x);
   if (size >= 1e4 || size < 1e-3) {
     const exponent = Math.floor(Math.log10(size));
-    return `${(x / 10 ** exponent).toFixed(1)}·10${[...String(exponent)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)] ?? "⁻").join("")}`;
+    const lead = Number((x / 10 ** exponent).toPrecision(2));
+    return `${lead === 1 ? "" : `${lead}·`}10${[...String(exponent)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)] ?? "⁻").join("")}`;
   }
   return String(Number(x.toPrecision(3)));
 }
-export const count = (n: number) =>
-  n >= 1e9 ? `${(n / 1e9).toFixed(2)} G` : n >= 1e6 ? `${(n / 1e6).toFixed(1)} M` : n >= 1e4 ? `${Math.round(n / 1e3)} k` : String(Math.round(n));
+export const count = (n: number) => {
+  const [unit, name] = n >= 1e9 ? [1e9, " G"] : n >= 1e6 ? [1e6, " M"] : n >= 1e4 ? [1e3, " k"] : [1, ""];
+  return `${Number((n / (unit as number)).toPrecision(3))}${name}`;
+};
+/** A signed number with a minus that looks like one. */
+export const signed = (x: number, digits = 2) => x.toFixed(digits).replace("-", "−");
 
 /** Runs at most one of a kind at a time, and of those asked for meanwhile the last. */
 export function latest<A extends unknown[]>(task: (...args: A) => Promise<void>): (...args: A) => void {

@@ -11,7 +11,7 @@ async function unpacked(): Promise<WebAssembly.Module> {
 }
 
 /** An engine in a Worker of its own. */
-class Host {
+export class Host {
   private worker!: Worker;
   private nextId = 0;
   private waiting = new Map<number, { resolve: (value: never) => void; reject: (error: Error) => void }>();
@@ -136,7 +136,7 @@ export class Engines {
   events: JobEvents = { update() {}, failed() {} };
   onRestart: () => void = () => {};
 
-  private constructor(readonly hosts: Host[]) {
+  private constructor(readonly hosts: Host[], private another: () => Host) {
     for (const host of hosts) {
       host.onRender = (message) => this.receive(host, message);
       host.onRestart = () => this.onRestart();
@@ -148,7 +148,8 @@ export class Engines {
     const module = await unpacked();
     // Two at least, for two strategies side by side.
     const n = Math.max(2, Math.min(navigator.hardwareConcurrency || 2, 8));
-    return new Engines(Array.from({ length: n }, () => new Host(module, script)));
+    const another = () => new Host(module, script);
+    return new Engines(Array.from({ length: n }, another), another);
   }
 
   /** The engine that answers questions. */
@@ -171,6 +172,13 @@ export class Engines {
       return job;
     });
     return this.jobs;
+  }
+
+  private aside: Host | null = null;
+
+  /** An engine beside the picture's, for scenes of figures. */
+  extra(): Host {
+    return (this.aside ??= this.another());
   }
 
   stop() {

@@ -1,7 +1,7 @@
 // The Picture panel: the progressive picture, its camera, material, strategies, and what it costs.
 
 import type { App, Change } from "./app";
-import { $, color, count, degrees, fill, save, short, stops } from "./dom";
+import { $, color, count, degrees, fill, save, short, signed, stops } from "./dom";
 import { materialEditor, strategyEditor } from "./editors";
 import type { Camera, Job, RenderSettings } from "./engines";
 import { Film, FilmView } from "./film";
@@ -31,6 +31,8 @@ export class PicturePanel {
   private settle = 0;
   private automatic = true;
   private lastPlot = 0;
+  /** What decides the picture that is rendered. */
+  private renderedKey = "";
   /** Times of the last start and of the first pixels after it [ms]. */
   readonly times = { start: 0, first: 0, done: 0 };
 
@@ -56,7 +58,13 @@ export class PicturePanel {
     }
     if (what === "scene" || what === "light") this.automatic = this.app.state.exposure === null;
     this.showView();
-    if (this.app.scene && this.app.probe) this.restart(what !== "render");
+    if (!this.app.scene || !this.app.probe) return;
+    const { panel, step, pixel, exposure, curve, mapping, method, lights, sun, lamps, ...rendered } = this.app.state;
+    const key = JSON.stringify(rendered);
+    // What came by the hash may be of another panel alone.
+    if (what === "all" && key === this.renderedKey) return;
+    this.renderedKey = key;
+    this.restart(what !== "render");
   }
 
   // ---- rendering
@@ -178,10 +186,10 @@ export class PicturePanel {
       points: this.histories[i].map((p): [number, number] => [p.rays, p.error]),
     }));
     $("error-plot").innerHTML = plot(series, { x: { name: "shadow rays", log: true, tick: count }, y: { name: "relative variance of the mean", log: true }, height: 200 });
-    const slopes = series.map((s) => `${s.name}: ${short(s.points.at(-1)?.[1] ?? NaN)}, slope ${slope(s.points).toFixed(2)}`);
+    const slopes = series.map((s) => `${s.name}: ${short(s.points.at(-1)?.[1] ?? NaN)}, slope ${signed(slope(s.points))}`);
     $("error-plot").setAttribute("aria-label", `Estimated relative variance. ${slopes.join("; ")}`);
     $("error-plot").parentElement!.querySelector("figcaption")!.textContent =
-      `Estimated error over shadow rays — ${series.map((s) => { const k = slope(s.points); return isFinite(k) ? `${s.name} falls with slope ${k.toFixed(2)}` : `${s.name}: two passes are needed`; }).join("; ")}`;
+      `Estimated error over shadow rays — ${series.map((s) => { const k = slope(s.points); return isFinite(k) ? `${s.name} falls with slope ${signed(k)}` : `${s.name}: two passes are needed`; }).join("; ")}`;
     $("command").textContent = command(this.app.state);
   }
 

@@ -60,7 +60,8 @@ export function plot(series: Series[], axes: Axes): string {
   }
   for (const t of axes.x.ticks ?? ticksOf(xs, axes.x.log)) {
     const label = axes.x.tick ? axes.x.tick(t) : short(t);
-    out.push(`<text x="${X(t)}" y="${height - bottom + 17}" text-anchor="middle">${escape(label)}</text>`);
+    const anchor = X(t) > width - right - 12 ? "end" : "middle";
+    out.push(`<text x="${X(t)}" y="${height - bottom + 17}" text-anchor="${anchor}">${escape(label)}</text>`);
   }
   const base = Y(axes.y.log ? ys[0] : Math.max(ys[0], Math.min(0, ys[1])));
   for (const s of series) {

@@ -34,7 +34,7 @@ export interface State {
 
 export const DEFAULT: State = {
   panel: "picture", scene: "statue", material: "", ground: false, hide: false,
-  env: "sky", rows: 256, rotate: 125, ev: 0, size: 640, spp: 64, seed: 0,
+  env: "sky", rows: 256, rotate: 125, ev: 0, size: 640, spp: 32, seed: 0,
   strategy: "product:8", beside: "", equal: "rays", camera: null, exposure: null, curve: "agx",
   mapping: "lat-long", method: "variance-minimization", lights: 64, sun: false, lamps: 0, pixel: null, step: 1,
 };
