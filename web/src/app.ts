@@ -133,11 +133,13 @@ export class App {
       this.tell((error as Error).message, true);
       return;
     }
-    this.emit("files");
-    this.set({
+    const change: Partial<State> = {
       ...(scenes.length ? { scene: scenes[0], camera: null, material: "", pixel: null } : {}),
       ...(probes.length ? { env: probes[0], rotate: 0, ev: 0, exposure: null } : {}),
-    });
+    };
+    Object.assign(this.state, change);
+    this.emit("files");
+    this.set(change);
   }
 
   get envName() {

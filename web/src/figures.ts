@@ -290,7 +290,7 @@ const combination: Figure = (stage) => {
     const top = (g: (x: number) => number) => Math.max(...line(400, g).map((p) => p[1]));
     stage.svg(plot([
       { name: "light", kind: "second", points: line(400, (x) => q(x) / top(q)) }, { name: "lobe", kind: "first", points: line(400, (x) => lobe(x) / top(lobe)) },
-      { name: "weight of the light's samples", kind: "third", points: line(400, w), as: "area" },
+      { name: "weight of the light’s samples", kind: "third", points: line(400, w), as: "area" },
     ], { x: { name: "direction", range: [0, 1] }, y: { name: "relative to the greatest", range: [0, 1.05] } }), "Two densities and the weight of one of them");
     stage.say(`Error of 16 samples: light alone ${error(variance(q, () => 1) / 16)}, lobe alone ${error(variance(lobe, () => 1) / 16)}, both ${error(variance(q, w) / m + variance(lobe, (x) => 1 - w(x)) / n)}.`);
   });
@@ -363,8 +363,8 @@ const resampling: Figure = (stage) => {
 };
 
 const fourWays: Figure = (stage) => {
-  const by = stage.choice("Compare", [["counts", "at the lecture's counts"], ["time", "in half a second each"]]);
-  const diffuse = stage.slider("Diffuse k_d", 0, 0.8, 0.1, 0);
+  const by = stage.choice("Compare", [["counts", "at the counts named above"], ["time", "in half a second each"]]);
+  const diffuse = stage.slider("Diffuse share", 0, 0.8, 0.1, 0);
   const ways: [string, string][] = [["environment:100", "environment, 100"], ["brdf:75", "reflectance, 75"], ["mis:50:38", "both, 50 : 38"], ["sir:15/800", "resampling, 15 of 800"]];
   const size = 96, figures = ways.map(([, name]) => {
     const element = h("canvas", { width: String(size), height: String(size), role: "img", "aria-label": `A sphere by ${name}` });

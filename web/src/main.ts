@@ -7,8 +7,9 @@ import { Lecture } from "./lecture";
 import { LightsPanel } from "./lights";
 import { MapPanel } from "./map";
 import { PicturePanel } from "./picture";
+import { XrayPanel } from "./xray";
 
-const PANELS = ["picture", "map", "lights", "lecture"];
+const PANELS = ["picture", "map", "xray", "lights", "lecture"];
 
 /** What the page cannot do without; the name of what is missing. */
 function missing(): string | null {
@@ -30,6 +31,7 @@ async function main() {
   const app = new App(await Engines.create());
   const picture = new PicturePanel(app);
   new MapPanel(app);
+  new XrayPanel(app);
   new LightsPanel(app);
   const lecture = new Lecture(app);
   wireTabs(app);

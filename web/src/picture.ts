@@ -185,7 +185,8 @@ export class PicturePanel {
       name: job.strategy || job.settings.strategy, kind: i ? "second" : "first",
       points: this.histories[i].map((p): [number, number] => [p.rays, p.error]),
     }));
-    $("error-plot").innerHTML = plot(series, { x: { name: "shadow rays", log: true, tick: count }, y: { name: "relative variance of the mean", log: true }, height: 200 });
+    if (series.every((s) => !s.points.length)) $("error-plot").replaceChildren();
+    else $("error-plot").innerHTML = plot(series, { x: { name: "shadow rays", log: true, tick: count }, y: { name: "relative variance of the mean", log: true }, height: 200 });
     const slopes = series.map((s) => `${s.name}: ${short(s.points.at(-1)?.[1] ?? NaN)}, slope ${signed(slope(s.points))}`);
     $("error-plot").setAttribute("aria-label", `Estimated relative variance. ${slopes.join("; ")}`);
     $("error-plot").parentElement!.querySelector("figcaption")!.textContent =
@@ -333,7 +334,7 @@ export class PicturePanel {
     const box = $("viewer").getBoundingClientRect(), { size } = this.app.state;
     const at = (x: number, n: number) => Math.min(Math.max(Math.floor(x / n * size), 0), size - 1);
     this.app.set({ pixel: [at(event.clientX - box.left, box.width), at(event.clientY - box.top, box.height)] }, "pixel");
-    this.app.tell("Picked: the Map panel shows what this pixel samples");
+    this.app.tell("Picked: see X-ray and Map for what this pixel samples");
   }
 
   // ---- controls

@@ -4,6 +4,7 @@
 //! the library's own sentences.
 
 mod files;
+mod inspect;
 mod lights;
 mod lobe;
 mod map;

@@ -84,6 +84,12 @@ fn dome_file(format: Format) -> Option<&'static str> {
     })
 }
 
+impl Engine {
+    fn rig(&self) -> Result<&domelight::rig::Extraction, JsError> {
+        self.extraction.as_ref().ok_or_else(|| JsError::new("there are no lights yet"))
+    }
+}
+
 #[wasm_bindgen]
 impl Engine {
     /// Divides the map into lights: `{"method", "n", "sun", "lamps"}`.
@@ -136,10 +142,6 @@ impl Engine {
         };
         self.extraction = Some(extraction);
         Ok(to_json(&report))
-    }
-
-    fn rig(&self) -> Result<&domelight::rig::Extraction, JsError> {
-        self.extraction.as_ref().ok_or_else(|| JsError::new("there are no lights yet"))
     }
 
     /// The number of the light of each texel of the map, not turned, `width` by `width` / 2; the greatest number where
