@@ -105,7 +105,7 @@ export class Job {
   }
 
   get complete() {
-    return this.hosts.every((host) => this.statisticsOf.get(host)?.complete);
+    return this.ended || this.hosts.every((host) => this.statisticsOf.get(host)?.complete);
   }
 
   get progress() {
@@ -179,6 +179,21 @@ export class Engines {
   /** An engine beside the picture's, for scenes of figures. */
   extra(): Host {
     return (this.aside ??= this.another());
+  }
+
+  /** Begins one of the pictures anew with other settings. */
+  again(job: Job, change: Partial<RenderSettings>): Job {
+    const next = new Job(this.nextToken++, job.hosts, { ...job.settings, ...change });
+    this.jobs = this.jobs.map((other) => (other === job ? next : other));
+    next.hosts.forEach((host, k) =>
+      host.send({ kind: "render", token: next.token, settings: JSON.stringify({ ...next.settings, shard: [k, next.hosts.length] }) }));
+    return next;
+  }
+
+  /** Ends one of the pictures as it is. */
+  end(job: Job) {
+    job.ended = true;
+    job.hosts.forEach((host) => host.send({ kind: "pause", token: job.token, paused: true }));
   }
 
   stop() {

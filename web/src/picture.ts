@@ -86,11 +86,13 @@ export class PicturePanel {
       width: size, height: size, spp: preview ? 1 : state.spp, strategy: preview ? "mis:1:1:no-compensation" : strategy,
       seed: state.seed, hideEnvironment: state.hide, camera: state.camera,
     });
-    const both = !preview && state.beside;
+    const pair = !preview && state.beside;
     this.preview = preview;
+    this.calibrated = false;
     this.times.start = performance.now();
     this.times.first = this.times.done = 0;
-    this.jobs = this.app.engines.render(both ? [settings(state.strategy), settings(state.beside)] : [settings(state.strategy)]);
+    const right = () => ({ ...settings(state.beside), ...(state.equal === "time" ? { spp: 65536 } : {}) });
+    this.jobs = this.app.engines.render(pair ? [settings(state.strategy), right()] : [settings(state.strategy)]);
     // What was seen stays until there is more.
     this.films = this.jobs.map(() => new Film(size, size));
     this.histories = [[], []];
@@ -149,16 +151,32 @@ export class PicturePanel {
     }
   }
 
-  /** At equal rays the one that is ahead waits. */
+  private calibrated = false;
+
+  /** At equal rays the right picture has as many samples as make as many rays, and the one that is ahead waits; at equal
+   *  time it ends with the left one. */
   private pace() {
-    if (this.jobs.length < 2 || this.app.state.equal !== "rays") {
-      this.jobs.forEach((job) => this.app.engines.pause(job, false));
+    if (this.jobs.length < 2) return;
+    const { engines, state } = this.app, [a, b] = this.jobs;
+    if (state.equal !== "rays") {
+      if (a.complete && !b.complete) engines.end(b);
       return;
     }
-    const [a, b] = this.jobs, rays = this.jobs.map((job) => job.statistics.shadowRays);
+    const both = this.jobs.map((job) => job.statistics), rays = both.map((s) => s.shadowRays);
+    if (!this.calibrated && both.every((s) => s.samples >= 1)) {
+      this.calibrated = true;
+      const [perSampleA, perSampleB] = both.map((s) => s.shadowRays / Math.max(s.cameraRays, 1));
+      const spp = Math.min(Math.max(1, Math.round(state.spp * perSampleA / Math.max(perSampleB, 1e-3))), 65536);
+      if (spp !== b.settings.spp) {
+        this.jobs[1] = engines.again(b, { spp });
+        this.histories[1] = [];
+        engines.pause(a, false);
+        return;
+      }
+    }
     const ahead = 1.02 * Math.max(1, Math.min(...rays)) + 20_000;
-    this.app.engines.pause(a, !b.complete && rays[0] > ahead);
-    this.app.engines.pause(b, !a.complete && rays[1] > ahead);
+    engines.pause(a, !b.complete && rays[0] > ahead);
+    engines.pause(b, !a.complete && rays[1] > ahead);
   }
 
   private expose(film: Film) {

@@ -97,6 +97,8 @@ test("two strategies at equal rays, with a divider", async () => {
   await page.keyboard.press("End");
   const left = await canvasHash(page, "film");
   assert.ok(new Set([half, left, right]).size === 3);
+  const rays = await page.evaluate(() => window.domelight.picture.jobs.map((job) => job.statistics.shadowRays));
+  assert.ok(Math.abs(rays[0] / rays[1] - 1) < 0.1, `rays ${rays}`);
   await done();
 });
 
