@@ -165,8 +165,9 @@ export class PicturePanel {
     const both = this.jobs.map((job) => job.statistics), rays = both.map((s) => s.shadowRays);
     if (!this.calibrated && both.every((s) => s.samples >= 1)) {
       this.calibrated = true;
-      const [perSampleA, perSampleB] = both.map((s) => s.shadowRays / Math.max(s.cameraRays, 1));
-      const spp = Math.min(Math.max(1, Math.round(state.spp * perSampleA / Math.max(perSampleB, 1e-3))), 65536);
+      // By hits, of which both have as many: some tiles are already in another pass than the others.
+      const [ofLeft, ofRight] = both.map((s) => s.shadowRays / Math.max(s.shadingPoints, 1));
+      const spp = Math.min(Math.max(1, Math.round(state.spp * ofLeft / Math.max(ofRight, 1e-3))), 65536);
       if (spp !== b.settings.spp) {
         this.jobs[1] = engines.again(b, { spp });
         this.histories[1] = [];

@@ -1,6 +1,6 @@
 // What the page and its Workers say to each other.
 
-import type { Engine, lobeSamples, lobeSection } from "../node_modules/.engine/engine.js";
+import type { Engine, lobeSamples, lobeSection } from "../dist/engine/engine.js";
 
 type Methods = { [K in keyof Engine]: Engine[K] extends (...args: never[]) => unknown ? K : never }[keyof Engine];
 export type Call = Exclude<Methods, "free" | typeof Symbol.dispose> | "lobeSection" | "lobeSamples";

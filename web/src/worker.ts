@@ -1,6 +1,6 @@
 // One engine. Answers calls in their order, and renders between them in slices of time.
 
-import { Engine, initSync, lobeSamples, lobeSection } from "../node_modules/.engine/engine.js";
+import { Engine, initSync, lobeSamples, lobeSection } from "../dist/engine/engine.js";
 import type { Call, FromWorker, ToWorker } from "./protocol";
 
 const SLICE = 40;

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use domelight::picture::png::{self, Depth};
 use domelight::picture::tone::{Exposure, ToneCurve, ToneMapping};
 use domelight::render::{Checkpoint, Layers, VarianceSums};
+use domelight::strategy::StrategySpec;
 use serde::Deserialize;
 use wasm_bindgen::prelude::*;
 
@@ -34,7 +35,7 @@ impl Engine {
             identity: Vec::new(),
             provenance: vec![(
                 "strategy".to_owned(),
-                renderer.spec().map(|spec| spec.description()).unwrap_or_default(),
+                renderer.spec().map(StrategySpec::description).unwrap_or_default(),
             )],
             tiles: renderer.tiles(),
             n_tiles: renderer.tiling().n_tiles(),
@@ -104,7 +105,9 @@ impl Engine {
         let first = parts.first().ok_or_else(|| JsError::new("there are no parts"))?;
         let (width, height) = (first.film.width, first.film.height);
         let mut variance = VarianceSums::default();
-        parts.iter().for_each(|part| variance.add(&part.film.variance_sums()));
+        for part in &parts {
+            variance.add(&part.film.variance_sums());
+        }
         let mut layers = Layers::new(width, height);
         for part in &parts {
             if (part.film.width, part.film.height) != (width, height) {

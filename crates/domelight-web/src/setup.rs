@@ -156,20 +156,19 @@ impl Engine {
     #[wasm_bindgen(js_name = loadScene)]
     pub fn load_scene(&mut self, json: &str) -> Result<String, JsError> {
         let setup: Setup = parse(json)?;
-        let (mut description, warnings) = match BuiltinScene::from_str(&setup.scene) {
-            Ok(scene) => (scene.description(), Vec::new()),
-            Err(_) => {
-                let options =
-                    LoadOptions { max_memory: Some(MAX_SCENE_MEMORY), ..LoadOptions::default() };
-                let path = Path::new(&setup.scene);
-                let bytes = self
-                    .files
-                    .get(path)
-                    .map_err(|e| JsError::new(&format!("cannot read {}: {e}", path.display())))?;
-                let resolver = |path: &Path| self.files.get(path).map(<[u8]>::to_vec);
-                let loaded = load_bytes(path, bytes, &resolver, &options).map_err(error)?;
-                (loaded.description, loaded.warnings)
-            }
+        let (mut description, warnings) = if let Ok(scene) = BuiltinScene::from_str(&setup.scene) {
+            (scene.description(), Vec::new())
+        } else {
+            let options =
+                LoadOptions { max_memory: Some(MAX_SCENE_MEMORY), ..LoadOptions::default() };
+            let path = Path::new(&setup.scene);
+            let bytes = self
+                .files
+                .get(path)
+                .map_err(|e| JsError::new(&format!("cannot read {}: {e}", path.display())))?;
+            let resolver = |path: &Path| self.files.get(path).map(<[u8]>::to_vec);
+            let loaded = load_bytes(path, bytes, &resolver, &options).map_err(error)?;
+            (loaded.description, loaded.warnings)
         };
         if !setup.material.is_empty() {
             let material: MaterialSpec = setup.material.parse().map_err(error)?;
@@ -216,19 +215,18 @@ impl Engine {
     #[wasm_bindgen(js_name = loadEnvironment)]
     pub fn load_environment(&mut self, json: &str) -> Result<String, JsError> {
         let light: Light = parse(json)?;
-        let (image, warnings) = match BuiltinProbe::from_str(&light.probe) {
-            Ok(probe) => (probe.image(light.rows.clamp(1, 4096)), Vec::new()),
-            Err(_) => {
-                let path = Path::new(&light.probe);
-                let bytes = self
-                    .files
-                    .get(path)
-                    .map_err(|e| JsError::new(&format!("cannot read {}: {e}", path.display())))?;
-                let options =
-                    ProbeOptions { max_memory: Some(MAX_PROBE_MEMORY), ..ProbeOptions::default() };
-                let probe = probe_from_bytes(bytes, &light.probe, &options).map_err(error)?;
-                (probe.image, probe.warnings)
-            }
+        let (image, warnings) = if let Ok(probe) = BuiltinProbe::from_str(&light.probe) {
+            (probe.image(light.rows.clamp(1, 4096)), Vec::new())
+        } else {
+            let path = Path::new(&light.probe);
+            let bytes = self
+                .files
+                .get(path)
+                .map_err(|e| JsError::new(&format!("cannot read {}: {e}", path.display())))?;
+            let options =
+                ProbeOptions { max_memory: Some(MAX_PROBE_MEMORY), ..ProbeOptions::default() };
+            let probe = probe_from_bytes(bytes, &light.probe, &options).map_err(error)?;
+            (probe.image, probe.warnings)
         };
         let up = self.scene.as_ref().map_or(UpAxis::Y, |(_, loaded)| loaded.up);
         let orientation = Orientation { up, rotation: light.rotate };
