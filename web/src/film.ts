@@ -155,11 +155,24 @@ class GpuPainter implements Painter {
     gl.uniform1i(this.uniform("second"), 1);
   }
 
+  /** The look of what is on the canvas. */
+  private painted = "";
+
   paint(films: (Film | null)[], look: Look, changed: (Uint32Array | "all" | null)[]) {
     const gl = this.gl;
+    const key = JSON.stringify([look, films.map((film) => film && [film.width, film.height])]);
+    const all = key !== this.painted || changed.includes("all");
+    this.painted = key;
+    /** Bands of rows that changed: all at once would take software longer than a frame. */
+    const dirty = new Set<number>();
+    const BAND = 16;
     films.forEach((film, i) => {
       const windows = changed[i];
       if (!film || !windows) return;
+      if (windows !== "all") for (let k = 1; k < windows.length; k += 4) {
+        for (let y = windows[k]; y < windows[k] + windows[k + 2]; y += BAND) dirty.add(Math.floor(y / BAND));
+        dirty.add(Math.floor((windows[k] + windows[k + 2] - 1) / BAND));
+      }
       gl.activeTexture(gl.TEXTURE0 + i);
       gl.bindTexture(gl.TEXTURE_2D, this.textures[i]);
       const size = `${film.width}x${film.height}`;
@@ -168,15 +181,12 @@ class GpuPainter implements Painter {
         this.sizes[i] = size;
         return;
       }
-      // The rows that changed: one call is cheaper than one for each tile.
-      let top = film.height, bottom = 0;
-      for (let k = 0; k < windows.length; k += 4) {
-        top = Math.min(top, windows[k + 1]);
-        bottom = Math.max(bottom, windows[k + 1] + windows[k + 3]);
+      for (const [from, to] of runs(dirty)) {
+        const top = from * BAND, bottom = Math.min(to * BAND, film.height);
+        if (top >= bottom) continue;
+        const rows = film.pixels.subarray(4 * film.width * top, 4 * film.width * bottom);
+        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, top, film.width, bottom - top, gl.RGBA, gl.FLOAT, rows);
       }
-      if (top >= bottom) return;
-      const rows = film.pixels.subarray(4 * film.width * top, 4 * film.width * bottom);
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, top, film.width, bottom - top, gl.RGBA, gl.FLOAT, rows);
     });
     const { width, height } = films[0]!;
     gl.viewport(0, 0, width, height);
@@ -184,8 +194,28 @@ class GpuPainter implements Painter {
     gl.uniform1f(this.uniform("divider"), films[1] ? look.divider : 2);
     gl.uniform1i(this.uniform("curve"), CURVES.indexOf(look.curve));
     gl.uniform2f(this.uniform("size"), width, height);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    if (all) {
+      gl.disable(gl.SCISSOR_TEST);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+      return;
+    }
+    gl.enable(gl.SCISSOR_TEST);
+    for (const [from, to] of runs(dirty)) {
+      gl.scissor(0, height - Math.min(to * BAND, height), width, Math.min((to - from) * BAND, height));
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+    }
   }
+}
+
+/** Ranges of whole numbers that follow each other, from the first to after the last. */
+function runs(numbers: Set<number>): [number, number][] {
+  const ranges: [number, number][] = [];
+  for (const n of [...numbers].sort((a, b) => a - b)) {
+    const last = ranges.at(-1);
+    if (last && last[1] === n) last[1]++;
+    else ranges.push([n, n + 1]);
+  }
+  return ranges;
 }
 
 /** Rows one after the other, no longer than a frame at a time. */
