@@ -249,7 +249,7 @@ pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
     let path = path.as_ref();
     let budget = &Budget::new(path, Files::System, options.max_memory, options.reach);
     let bytes = budget.read(path, |source| LoadError::Read { path: path.into(), source })?;
-    finish(load_file(path, &bytes, false, budget, options)?, path, budget)
+    Ok(finish(load_file(path, &bytes, false, budget, options)?, path, budget))
 }
 
 /// As [`load_with`], from a file's bytes. `name` is the file's own path, for messages and for a format that the
@@ -282,13 +282,13 @@ pub fn load_bytes(
     let path = name.as_ref();
     let budget = &Budget::new(path, Files::Given(resolver), options.max_memory, options.reach);
     budget.take(&path.display().to_string(), bytes.len() as u64)?;
-    finish(load_file(path, bytes, false, budget, options)?, path, budget)
+    Ok(finish(load_file(path, bytes, false, budget, options)?, path, budget))
 }
 
-fn finish(mut loaded: Loaded, path: &Path, budget: &Budget) -> Result<Loaded, LoadError> {
+fn finish(mut loaded: Loaded, path: &Path, budget: &Budget) -> Loaded {
     loaded.warnings.extend(budget.warning(path));
     once(&mut loaded.warnings);
-    Ok(Loaded { memory: budget.taken(), files: budget.files(), ..loaded })
+    Loaded { memory: budget.taken(), files: budget.files(), ..loaded }
 }
 
 /// Leaves each warning once, and no more than anybody reads.
