@@ -58,6 +58,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let settings = &RenderSettings {
         adaptive: !arguments.samples.no_adaptive,
         target_error: arguments.samples.target_error,
+        passes: arguments.samples.passes.into(),
         ..arguments.scene.render_settings(&arguments.pixel, arguments.samples.spp)
     };
     let spec = spec.for_picture(scene, camera, environment, settings);
@@ -66,6 +67,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         scene: report.clone(),
         strategy: spec.description(),
         spp: settings.n_samples,
+        passes: format!("{:?}", settings.passes).to_lowercase(),
         sampler: format!("{:?}", settings.sampler).to_lowercase(),
         filter: settings.filter.name(),
         seed: settings.seed,

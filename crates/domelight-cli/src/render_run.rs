@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 use domelight::render::{
-    Checkpoint, Counts, Observer, RenderSettings, Renderer, Rendering, Stage, Tiling,
+    Checkpoint, Counts, Observer, Passes, RenderSettings, Renderer, Rendering, Stage, Tiling,
 };
 use domelight::strategy::Strategy;
 
@@ -146,6 +146,10 @@ fn identity(
         ("strategy", report.strategy.clone()),
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
     ];
+    // As it was before there was a choice.
+    if settings.passes != Passes::default() {
+        identity.push(("passes", report.passes.clone()));
+    }
     identity.extend(settings.target_error.map(|e| ("target-error", e.to_string())));
     identity.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }

@@ -21,7 +21,7 @@ pub use crate::{Error, Rgb, RgbImage};
 
 #[cfg(feature = "render")]
 pub use crate::{
-    render::{Background, Film, Layers, Observer, RenderSettings, Renderer},
+    render::{Background, Film, Layers, Observer, Passes, RenderSettings, Renderer},
     scene::{Camera, CameraSettings, Scene, SceneDescription, builtin::BuiltinScene},
 };
 

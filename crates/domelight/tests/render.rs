@@ -5,7 +5,9 @@ use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::environment::{CompensatedTable, Environment, Orientation};
 use domelight::geometry::Mesh;
 use domelight::math::{Mat4, Vec3, vec3};
-use domelight::render::{Background, Filter, Layers, Observer, RenderSettings, Rendering, render};
+use domelight::render::{
+    Background, Filter, Layers, Observer, Passes, RenderSettings, Renderer, Rendering, render,
+};
 use domelight::rig::{VarianceMinimization, variance_minimization};
 use domelight::sampling::{Heuristic, Pcg32, SamplerKind};
 use domelight::scene::builtin::shapes;
@@ -462,6 +464,29 @@ fn a_canceled_render_keeps_what_is_done() {
     assert!(!rendering.complete);
     assert!(rendering.layers.n_samples.iter().all(|&n| (1..64).contains(&n)));
     assert!(rendering.layers.color.pixels.iter().all(|p| p.is_finite()));
+}
+
+#[test]
+fn passes_of_one_two_and_four_samples_go_on_where_they_were_ended() {
+    use std::sync::atomic::{AtomicBool, Ordering};
+    #[derive(Default)]
+    struct OneTile(AtomicBool);
+    impl Observer for OneTile {
+        fn tile_finished(&self, _: &domelight::render::Counts) {
+            self.0.store(true, Ordering::Relaxed);
+        }
+        fn canceled(&self) -> bool {
+            self.0.load(Ordering::Relaxed)
+        }
+    }
+    let (scene, environment) = (scene("phong:50:0.5:0.3"), environment());
+    let settings = RenderSettings { n_samples: 6, passes: Passes::Doubling, ..small() };
+    let camera = camera(&settings);
+    let product = ProductSampling::new(&environment, 4);
+    let start = || Renderer::with_strategy(&scene, &camera, &environment, &product, settings);
+    let mut interrupted = start();
+    while !interrupted.run(&OneTile::default()) {}
+    assert!(interrupted.film() == start().finish(), "an interruption changed the picture");
 }
 
 #[test]

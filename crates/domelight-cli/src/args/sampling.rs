@@ -1,7 +1,7 @@
 //! How directions and points are chosen.
 
 use clap::{Args, ValueEnum};
-use domelight::render::Filter;
+use domelight::render::{Filter, Passes};
 use domelight::sampling::{Heuristic, SamplerKind};
 use domelight::strategy::{Candidates, Proposal, Resampling, StrategyKind};
 
@@ -65,6 +65,10 @@ pub(crate) struct SampleArguments {
     /// With product, as many camera samples for every pixel
     #[arg(long)]
     pub(crate) no_adaptive: bool,
+    /// How camera samples are divided into passes over the picture
+    #[arg(long, value_enum, value_name = "HOW", default_value_t = PassesName::Efficient,
+          conflicts_with = "target_error")]
+    pub(crate) passes: PassesName,
     /// End each tile when the spread of its samples suggests this relMSE, such as 1e-3, but not before 16 samples
     #[arg(long, value_name = "E", value_parser = positive)]
     pub(crate) target_error: Option<f32>,
@@ -129,6 +133,14 @@ pub(crate) enum HeuristicName {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum PassesName {
+    /// As long as the strategy works best with
+    Efficient,
+    /// 1, 1, 2, 4, … samples, as the browser edition has them: with product another picture
+    Doubling,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum SamplerName {
     /// Owen-scrambled Sobol' points
     Sobol,
@@ -183,6 +195,15 @@ impl From<HeuristicName> for Heuristic {
         match name {
             HeuristicName::Balance => Self::Balance,
             HeuristicName::Power => Self::Power,
+        }
+    }
+}
+
+impl From<PassesName> for Passes {
+    fn from(name: PassesName) -> Self {
+        match name {
+            PassesName::Efficient => Self::Efficient,
+            PassesName::Doubling => Self::Doubling,
         }
     }
 }

@@ -98,6 +98,19 @@ pub fn load_probe(path: &Path, options: &ProbeOptions) -> Result<LoadedProbe, Pr
     probe_from_picture(picture, &file, options)
 }
 
+/// The light probe in the bytes of a file; `file` is its name, for messages.
+///
+/// # Errors
+/// As [`load_probe`].
+pub fn probe_from_bytes(
+    bytes: &[u8],
+    file: &str,
+    options: &ProbeOptions,
+) -> Result<LoadedProbe, ProbeError> {
+    let read = ReadOptions { layer: options.layer.clone(), max_memory: options.max_memory };
+    probe_from_picture(picture::read_bytes(bytes, file, &read)?, file, options)
+}
+
 /// The light probe in a picture; `file` is for messages.
 ///
 /// # Errors

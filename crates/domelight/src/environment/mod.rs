@@ -178,6 +178,16 @@ impl Environment {
         Ok(Self::from_image(probe.image)?)
     }
 
+    /// The light probe in the bytes of a picture file of any known format and mapping.
+    ///
+    /// # Errors
+    /// If the bytes are damaged or no picture; [`io::probe_from_bytes`] takes options.
+    #[cfg(feature = "io")]
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, crate::Error> {
+        let probe = io::probe_from_bytes(bytes, "the map", &io::ProbeOptions::default())?;
+        Ok(Self::from_image(probe.image)?)
+    }
+
     /// A built-in probe with 512 rows.
     pub fn builtin(probe: builtin::BuiltinProbe) -> Self {
         const ROWS: usize = 512;

@@ -47,6 +47,18 @@ pub enum Background {
     Hidden,
 }
 
+/// How camera samples are divided into passes over the picture.
+///
+/// Strategies that learn nothing give the same picture with any.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Passes {
+    /// As long as the strategy works best with.
+    #[default]
+    Efficient,
+    /// 1, 1, 2, 4, … samples, up to the length of [`Passes::Efficient`]: a first picture soon.
+    Doubling,
+}
+
 /// How to render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
@@ -63,6 +75,8 @@ pub struct RenderSettings {
     /// than this relMSE suggests: mean of variance over (luminance² + 0.01). To stop on what was
     /// drawn biases a picture by far less than the error.
     pub target_error: Option<f32>,
+    /// How samples are divided into passes; with a target error passes have lengths of their own.
+    pub passes: Passes,
     /// Names the whole set of random numbers.
     pub seed: u64,
     /// Pixel filter.
@@ -84,6 +98,7 @@ impl Default for RenderSettings {
             n_samples: 64,
             adaptive: true,
             target_error: None,
+            passes: Passes::default(),
             seed: 0,
             filter: Filter::default(),
             sampler: SamplerKind::default(),

@@ -53,6 +53,8 @@ pub struct Renderer<'a, S: Strategy = PreparedStrategy<'a>> {
     before: Counts,
     /// Passes begun so far.
     mark: Mark,
+    /// The pass that the observer ended, to go on with.
+    interrupted: Option<(u32, Pass<S>)>,
 }
 
 /// A strategy of the renderer's own, or the caller's.
@@ -154,6 +156,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
             tiles: Vec::new(),
             before: Counts::default(),
             mark: Mark::default(),
+            interrupted: None,
         };
         empty.only(0..tiling.n_tiles())
     }
@@ -166,6 +169,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     pub fn only(mut self, tiles: Range<usize>) -> Self {
         self.tiles = tiles.clone().map(|t| Tile::new(self.tiling.tile(t))).collect();
         self.range = tiles;
+        self.interrupted = None;
         self
     }
 
@@ -226,21 +230,13 @@ impl<'a, S: Strategy> Renderer<'a, S> {
             return PassEnd::Canceled;
         }
         self.mark.0 += 1;
-        let Self { context, strategy, tiling, tiles, mark, .. } = self;
-        let (strategy, settings): (&S, _) = (strategy, &context.settings);
-        let (samples, set) = match settings.target_error {
-            None => (tiling.pass(strategy, start, settings.n_samples - start), SampleSet::First),
-            Some(_) => paired_pass(start, settings.n_samples),
+        let pass = match self.interrupted.take() {
+            Some((of, pass)) if of == start => pass,
+            _ => self.begin_pass(start),
         };
-        observer.pass_started(samples.clone());
-        let sampler = Sampler::for_pass(settings.sampler, settings.seed, start);
-        let n_samples = samples.len() as u32;
-        let shared = strategy.begin_pass(sampler, n_samples);
-        let adaptive = settings.adaptive && strategy.n_rounds() > 1;
-        let mut pass = Pass { n_samples, set, adaptive, mean_log: None, shared };
-        if adaptive {
-            pass.mean_log = scale(context, strategy, &pass);
-        }
+        observer.pass_started(start..start + pass.n_samples);
+        let Self { context, strategy, tiles, mark, .. } = self;
+        let (strategy, settings): (&S, _) = (strategy, &context.settings);
         let behind = |tile: &Tile| tile.n_samples() == start && !tile.is_finished(settings);
         let complete = tiles
             .par_iter_mut()
@@ -255,7 +251,31 @@ impl<'a, S: Strategy> Renderer<'a, S> {
                 true
             })
             .reduce(|| true, |a, b| a & b);
-        if complete { PassEnd::Complete } else { PassEnd::Canceled }
+        if complete {
+            return PassEnd::Complete;
+        }
+        self.interrupted = Some((start, pass));
+        PassEnd::Canceled
+    }
+
+    /// Prepares the pass that begins at sample `start`.
+    fn begin_pass(&self, start: u32) -> Pass<S> {
+        let Self { context, strategy, tiling, .. } = self;
+        let (strategy, settings): (&S, _) = (strategy, &context.settings);
+        let left = settings.n_samples - start;
+        let (samples, set) = match settings.target_error {
+            None => (tiling.pass(strategy, settings.passes, start, left), SampleSet::First),
+            Some(_) => paired_pass(start, settings.n_samples),
+        };
+        let sampler = Sampler::for_pass(settings.sampler, settings.seed, start);
+        let n_samples = samples.len() as u32;
+        let shared = strategy.begin_pass(sampler, n_samples);
+        let adaptive = settings.adaptive && strategy.n_rounds() > 1;
+        let mut pass = Pass { n_samples, set, adaptive, mean_log: None, shared };
+        if adaptive {
+            pass.mean_log = scale(context, strategy, &pass);
+        }
+        pass
     }
 
     /// Whether all samples of all pixels are there.
@@ -325,6 +345,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     pub fn restore(&mut self, film: &Film, counts: Counts) -> Result<(), FilmMismatch> {
         film.require_window(&self.context.settings, self.tiling.window(&self.range))?;
         self.mark.0 += 1;
+        self.interrupted = None;
         for tile in &mut self.tiles {
             let pixels: Vec<PixelSums> = film.get(tile.window);
             let n_samples = pixels[0].n_samples();

@@ -3,8 +3,8 @@
 use std::fmt;
 use std::ops::Range;
 
-use super::RenderSettings;
 use super::film::SampleSet;
+use super::{Passes, RenderSettings};
 use crate::strategy::Strategy;
 
 /// A rectangle of pixels.
@@ -124,11 +124,21 @@ impl Tiling {
 
     /// Camera samples of the pass that begins at sample `start`: as many as the strategy says, or as went
     /// before, up to as many as keep a tile's rays in the caches; no more than `left`.
-    pub(super) fn pass(&self, strategy: &impl Strategy, start: u32, left: u32) -> Range<u32> {
-        let count = strategy.samples_per_pass().unwrap_or_else(|| {
-            let rays = self.size * self.size * strategy.n_rays().max(1) as usize;
-            start.clamp(1, (RAYS_PER_TILE / rays).clamp(1, 64) as u32)
-        });
+    pub(super) fn pass(
+        &self,
+        strategy: &impl Strategy,
+        passes: Passes,
+        start: u32,
+        left: u32,
+    ) -> Range<u32> {
+        let count = match (strategy.samples_per_pass(), passes) {
+            (Some(count), Passes::Efficient) => count,
+            (Some(count), Passes::Doubling) => start.clamp(1, count),
+            (None, _) => {
+                let rays = self.size * self.size * strategy.n_rays().max(1) as usize;
+                start.clamp(1, (RAYS_PER_TILE / rays).clamp(1, 64) as u32)
+            }
+        };
         start..start + count.clamp(1, left.max(1))
     }
 
@@ -221,6 +231,14 @@ mod tests {
     }
 
     #[test]
+    fn doubling_passes_begin_with_one_sample() {
+        let environment = Environment::constant(Rgb::WHITE).expect("a light");
+        let product = ProductSampling::new(&environment, 8);
+        let end = |start| tiling(64, 64, 16).pass(&product, Passes::Doubling, start, 99).end;
+        assert_eq!([0, 1, 2, 4, 8].map(end), [1, 2, 4, 8, 16]);
+    }
+
+    #[test]
     fn sets_have_equal_passes() {
         for n_samples in [1, 2, 3, 16, 20, 64, 1000] {
             let (mut next, mut sums) = (0, [0; 2]);
@@ -240,13 +258,15 @@ mod tests {
     }
 
     fn cover(tiling: &Tiling, strategy: &impl Strategy, n_samples: u32) {
-        let mut next = 0;
-        while next < n_samples {
-            let pass = tiling.pass(strategy, next, n_samples - next);
-            assert_eq!(pass.start, next);
-            assert!(pass.end > pass.start);
-            next = pass.end;
+        for passes in [Passes::Efficient, Passes::Doubling] {
+            let mut next = 0;
+            while next < n_samples {
+                let pass = tiling.pass(strategy, passes, next, n_samples - next);
+                assert_eq!(pass.start, next);
+                assert!(pass.end > pass.start);
+                next = pass.end;
+            }
+            assert_eq!(next, n_samples);
         }
-        assert_eq!(next, n_samples);
     }
 }

@@ -29,7 +29,10 @@ pub use layers::{
     Specular, Volume,
 };
 #[cfg(feature = "io")]
-pub use load::{AnimationTime, LoadError, LoadOptions, Loaded, Reach, load, load_with};
+pub use load::{
+    AnimationTime, LoadError, LoadOptions, Loaded, Reach, Resolver, SceneFormat, load, load_bytes,
+    load_with,
+};
 pub use material::{
     Material, MaterialModel, MetallicRoughnessMaterial, NormalMap, PhongMaterial,
     SpecularGlossinessMaterial,
@@ -163,6 +166,23 @@ impl Scene {
     #[cfg(feature = "io")]
     pub fn load(path: impl AsRef<std::path::Path>) -> Result<Self, crate::Error> {
         Ok(Self::new(load(path)?.description)?)
+    }
+
+    /// Builds a scene from the bytes of a file, for instance where there is no file system; `resolver` gives the bytes of
+    /// the files that it refers to.
+    ///
+    /// # Errors
+    /// If the file is damaged or makes no scene. [`load_bytes`] gives the loader's warnings as well, and a description to
+    /// change before it is built.
+    #[cfg(feature = "io")]
+    pub fn from_bytes(
+        bytes: &[u8],
+        format: SceneFormat,
+        resolver: &Resolver<'_>,
+    ) -> Result<Self, crate::Error> {
+        let name = format!("scene.{format}");
+        let loaded = load_bytes(name, bytes, resolver, &LoadOptions::default())?;
+        Ok(Self::new(loaded.description)?)
     }
 
     /// The same scene, traced with another instruction set; `None` if this processor lacks it. Pictures are the same.

@@ -19,6 +19,8 @@ mod neon;
 mod neon_model;
 mod pair;
 mod scalar;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod simd128;
 mod single;
 mod vector;
 
@@ -37,6 +39,8 @@ pub(crate) type Lanes = [f32; LANES];
 pub enum InstructionSet {
     /// One number at a time; the reference, on every processor.
     Scalar,
+    /// WebAssembly SIMD: four numbers at a time, in modules that were compiled for it.
+    Simd128,
     /// AArch64 NEON: four numbers at a time.
     Neon,
     /// x86-64 AVX2 and FMA: eight numbers at a time.
@@ -47,12 +51,13 @@ pub enum InstructionSet {
 
 impl InstructionSet {
     /// All that this version knows, the fastest last.
-    pub const ALL: [Self; 4] = [Self::Scalar, Self::Neon, Self::Avx2, Self::Avx512];
+    pub const ALL: [Self; 5] = [Self::Scalar, Self::Simd128, Self::Neon, Self::Avx2, Self::Avx512];
 
     /// Whether this processor has the instructions.
     pub fn is_available(self) -> bool {
         match self {
             Self::Scalar => true,
+            Self::Simd128 => cfg!(all(target_arch = "wasm32", target_feature = "simd128")),
             #[cfg(any(target_arch = "aarch64", test))]
             Self::Neon => neon::Neon::new().is_some(),
             #[cfg(target_arch = "x86_64")]
@@ -85,6 +90,8 @@ pub(crate) trait Kernel {
 #[inline]
 pub(crate) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) -> K::Output {
     match instruction_set {
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        InstructionSet::Simd128 => return kernel.run(simd128::Simd128),
         #[cfg(any(target_arch = "aarch64", test))]
         InstructionSet::Neon => {
             if let Some(simd) = neon::Neon::new() {

@@ -1,15 +1,19 @@
 //! What a scene may take while it is loaded: memory, and files.
 
 use std::cell::{Cell, RefCell};
+use std::io;
 use std::path::{Path, PathBuf};
 
+use super::files::Files;
 use super::{LoadError, Reach};
 use crate::memory::require;
 
 /// What was taken of the memory allowed, by estimates from headers and counts, and which files were read.
-pub(super) struct Budget {
+pub(super) struct Budget<'r> {
     max: Option<u64>,
     taken: Cell<u64>,
+    /// Where files are read.
+    source: Files<'r>,
     /// Whether files outside of the folder may be read.
     reach: Reach,
     /// The scene's own folder, without links.
@@ -18,13 +22,14 @@ pub(super) struct Budget {
     outside: RefCell<Vec<PathBuf>>,
 }
 
-impl Budget {
+impl<'r> Budget<'r> {
     /// For the scene in a file.
-    pub(super) fn new(scene: &Path, max: Option<u64>, reach: Reach) -> Self {
-        let folder = scene.canonicalize().ok().and_then(|path| Some(path.parent()?.to_owned()));
+    pub(super) fn new(scene: &Path, source: Files<'r>, max: Option<u64>, reach: Reach) -> Self {
+        let folder = source.resolved(scene).and_then(|path| Some(path.parent()?.to_owned()));
         Self {
             max,
             taken: Cell::new(0),
+            source,
             reach,
             folder,
             files: RefCell::default(),
@@ -35,7 +40,7 @@ impl Budget {
     /// Without limits.
     #[cfg(test)]
     pub(super) fn unlimited() -> Self {
-        Self::new(Path::new(""), None, Reach::Anywhere)
+        Self::new(Path::new(""), Files::System, None, Reach::Anywhere)
     }
 
     pub(super) fn taken(&self) -> u64 {
@@ -57,8 +62,8 @@ impl Budget {
     /// Counts a file that the scene refers to, before it is read.
     pub(super) fn refer(&self, path: &Path, referrer: &str) -> Result<(), LoadError> {
         // What is not there is somebody else's error.
-        if let (Ok(path), Some(folder)) = (path.canonicalize(), &self.folder)
-            && !path.starts_with(folder)
+        if let (Some(path), Some(folder)) = (self.source.resolved(path), &self.folder)
+            && (!path.starts_with(folder) || path.starts_with(".."))
         {
             if self.reach == Reach::OwnFolder {
                 let referrer = referrer.to_owned();
@@ -68,6 +73,21 @@ impl Budget {
         }
         self.files.borrow_mut().push(path.to_owned());
         Ok(())
+    }
+
+    /// The bytes of a file, if they are not too many.
+    pub(super) fn read(
+        &self,
+        path: &Path,
+        error: impl Fn(io::Error) -> LoadError,
+    ) -> Result<Vec<u8>, LoadError> {
+        let allow = |bytes| self.take(&path.display().to_string(), bytes);
+        self.source.read(path, allow, error)
+    }
+
+    /// Whether there is such a file.
+    pub(super) fn exists(&self, path: &Path) -> bool {
+        self.source.exists(path)
     }
 
     /// The files that were read beside the scene's own.

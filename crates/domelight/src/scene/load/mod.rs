@@ -16,6 +16,8 @@
 
 mod budget;
 mod faces;
+mod files;
+mod format;
 mod gltf;
 mod mtl;
 mod notes;
@@ -29,11 +31,12 @@ mod toml;
 
 use std::borrow::Cow;
 use std::collections::HashSet;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 pub use self::gltf::{GltfErrorKind, Ktx2Error, MeshoptError};
+pub use files::Resolver;
+pub use format::SceneFormat;
 pub use obj::ObjErrorKind;
 pub use off::OffErrorKind;
 pub use ply::{PlyErrorKind, PlyPlace};
@@ -43,6 +46,7 @@ pub use toml::TomlErrorKind;
 use super::SceneDescription;
 use crate::memory::OverLimit;
 use budget::Budget;
+use files::Files;
 
 /// A scene from a file, and what the loader passed over.
 #[derive(Clone, Debug, Default)]
@@ -243,11 +247,48 @@ pub fn load(path: impl AsRef<Path>) -> Result<Loaded, LoadError> {
 /// what the options refuse, and a scene or an animation that the file does not have.
 pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let path = path.as_ref();
-    let budget = &Budget::new(path, options.max_memory, options.reach);
-    let mut loaded = load_bytes(path, &read(path, budget)?, false, budget, options)?;
+    let budget = &Budget::new(path, Files::System, options.max_memory, options.reach);
+    let bytes = budget.read(path, |source| LoadError::Read { path: path.into(), source })?;
+    Ok(finish(load_file(path, &bytes, false, budget, options)?, path, budget))
+}
+
+/// As [`load_with`], from a file's bytes. `name` is the file's own path, for messages and for a format that the
+/// content does not tell; `resolver` gives the bytes of the files that it refers to, whose paths are relative to the
+/// folder of `name`.
+///
+/// ```
+/// use std::io;
+/// use std::path::Path;
+///
+/// let obj = b"mtllib red.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+/// let resolver = |path: &Path| match path.to_str() {
+///     Some("red.mtl") => Ok(b"newmtl red\nKd 1 0 0\n".to_vec()),
+///     _ => Err(io::ErrorKind::NotFound.into()),
+/// };
+/// let options = domelight::scene::LoadOptions::default();
+/// let loaded = domelight::scene::load_bytes("triangle.obj", obj, &resolver, &options)?;
+/// assert_eq!(loaded.description.materials[0].name, "red");
+/// # Ok::<(), domelight::scene::LoadError>(())
+/// ```
+///
+/// # Errors
+/// As [`load_with`]. With [`Reach::OwnFolder`] the resolver is not asked for files outside of the scene's folder.
+pub fn load_bytes(
+    name: impl AsRef<Path>,
+    bytes: &[u8],
+    resolver: &Resolver<'_>,
+    options: &LoadOptions,
+) -> Result<Loaded, LoadError> {
+    let path = name.as_ref();
+    let budget = &Budget::new(path, Files::Given(resolver), options.max_memory, options.reach);
+    budget.take(&path.display().to_string(), bytes.len() as u64)?;
+    Ok(finish(load_file(path, bytes, false, budget, options)?, path, budget))
+}
+
+fn finish(mut loaded: Loaded, path: &Path, budget: &Budget) -> Loaded {
     loaded.warnings.extend(budget.warning(path));
     once(&mut loaded.warnings);
-    Ok(Loaded { memory: budget.taken(), files: budget.files(), ..loaded })
+    Loaded { memory: budget.taken(), files: budget.files(), ..loaded }
 }
 
 /// Leaves each warning once, and no more than anybody reads.
@@ -269,35 +310,33 @@ fn load_mesh(
     budget: &Budget,
     options: &LoadOptions,
 ) -> Result<Loaded, LoadError> {
-    load_bytes(path, &read_referenced(path, referrer, budget)?, true, budget, options)
+    load_file(path, &read_referenced(path, referrer, budget)?, true, budget, options)
 }
 
-fn load_bytes(
+fn load_file(
     path: &Path,
     bytes: &[u8],
     mesh_only: bool,
     budget: &Budget,
     options: &LoadOptions,
 ) -> Result<Loaded, LoadError> {
-    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-    let is_gltf = bytes.starts_with(b"glTF") || extension == "gltf" || extension == "glb";
+    let unknown = || LoadError::UnknownFormat { path: path.into() };
+    let format = SceneFormat::of(path, bytes).ok_or_else(unknown)?;
+    let is_gltf = matches!(format, SceneFormat::Gltf | SceneFormat::Glb);
     let chosen = [("scenes", options.scene.is_some()), ("animations", options.animation.is_some())];
     if let (false, Some((what, _))) = (is_gltf, chosen.into_iter().find(|(_, chosen)| *chosen)) {
         return Err(LoadError::NoChoice { path: path.into(), what });
     }
-    let loaded = match extension.to_str() {
-        _ if bytes.starts_with(b"ply") => ply::load(path, bytes, budget)?,
-        _ if bytes.starts_with(b"glTF") => gltf::load(path, bytes, budget, options)?,
+    let loaded = match format {
         // Another file's content is nobody's business.
-        Some("ply") if !mesh_only => ply::load(path, bytes, budget)?,
-        Some("gltf" | "glb") => gltf::load(path, bytes, budget, options)?,
-        Some("obj") => obj::load(path, bytes, budget)?,
-        Some("stl") => stl::load(path, bytes, budget)?,
-        Some("off") => off::load(path, bytes, budget)?,
-        Some("toml") if !mesh_only => toml::load(path, bytes, budget, options)?,
-        _ if off::is_off(bytes) => off::load(path, bytes, budget)?,
-        _ if stl::is_stl(bytes) => stl::load(path, bytes, budget)?,
-        _ => return Err(LoadError::UnknownFormat { path: path.into() }),
+        SceneFormat::Ply if mesh_only && !bytes.starts_with(b"ply") => return Err(unknown()),
+        SceneFormat::Toml if mesh_only => return Err(unknown()),
+        SceneFormat::Ply => ply::load(path, bytes, budget)?,
+        SceneFormat::Gltf | SceneFormat::Glb => gltf::load(path, bytes, budget, options)?,
+        SceneFormat::Obj => obj::load(path, bytes, budget)?,
+        SceneFormat::Stl => stl::load(path, bytes, budget)?,
+        SceneFormat::Off => off::load(path, bytes, budget)?,
+        SceneFormat::Toml => toml::load(path, bytes, budget, options)?,
     };
     if loaded.description.parts.iter().all(|p| p.mesh.triangles.is_empty()) {
         return Err(LoadError::NoTriangles { path: path.into() });
@@ -305,34 +344,13 @@ fn load_bytes(
     Ok(loaded)
 }
 
-fn read(path: &Path, budget: &Budget) -> Result<Vec<u8>, LoadError> {
-    read_plain(path, budget, |source| LoadError::Read { path: path.into(), source })
-}
-
 fn read_referenced(path: &Path, referrer: &str, budget: &Budget) -> Result<Vec<u8>, LoadError> {
     budget.refer(path, referrer)?;
-    read_plain(path, budget, |source| LoadError::ReadReferenced {
+    budget.read(path, |source| LoadError::ReadReferenced {
         path: path.into(),
         referrer: referrer.into(),
         source,
     })
-}
-
-/// The bytes of a plain file: a device or a pipe might never end.
-fn read_plain(
-    path: &Path,
-    budget: &Budget,
-    error: impl Fn(io::Error) -> LoadError,
-) -> Result<Vec<u8>, LoadError> {
-    let metadata = fs::metadata(path).map_err(&error)?;
-    if metadata.is_dir() {
-        return Err(error(io::ErrorKind::IsADirectory.into()));
-    }
-    if !metadata.is_file() {
-        return Err(error(io::Error::new(io::ErrorKind::InvalidInput, "it is not a plain file")));
-    }
-    budget.take(&path.display().to_string(), metadata.len())?;
-    fs::read(path).map_err(error)
 }
 
 /// Text that may be of before UTF-8.

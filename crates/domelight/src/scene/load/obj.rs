@@ -139,7 +139,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn new(path: &'a Path, budget: &'a Budget) -> Self {
+    fn new(path: &'a Path, budget: &'a Budget<'a>) -> Self {
         Self {
             path,
             positions: Vec::new(),
@@ -252,7 +252,7 @@ impl<'a> Reader<'a> {
     fn library(&mut self, line: usize, names: &str) -> Result<(), LoadError> {
         // A name may hold spaces.
         let path = super::relative(self.path, names);
-        if names.contains(char::is_whitespace) && !path.exists() {
+        if names.contains(char::is_whitespace) && !self.textures.budget.exists(&path) {
             return words(names).try_for_each(|name| self.one_library(line, name));
         }
         self.one_library(line, names)

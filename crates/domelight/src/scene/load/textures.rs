@@ -14,11 +14,11 @@ use crate::scene::texture::{Encoding, Texture};
 pub(super) struct Textures<'b> {
     pub(super) loaded: Vec<Texture>,
     files: HashMap<(PathBuf, Encoding), usize>,
-    pub(super) budget: &'b Budget,
+    pub(super) budget: &'b Budget<'b>,
 }
 
 impl<'b> Textures<'b> {
-    pub(super) fn new(budget: &'b Budget) -> Self {
+    pub(super) fn new(budget: &'b Budget<'b>) -> Self {
         Self { loaded: Vec::new(), files: HashMap::new(), budget }
     }
 

@@ -272,7 +272,7 @@ struct Reader<'a> {
     /// Built-in scenes that were made.
     builtin: BTreeMap<&'static str, SceneDescription>,
     textures: Textures<'a>,
-    budget: &'a Budget,
+    budget: &'a Budget<'a>,
     options: &'a LoadOptions,
     loaded: Loaded,
 }

@@ -81,6 +81,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::scene::load::files::Files;
     use crate::scene::load::{Budget, Reach};
 
     /// A square of two triangles, (0, 0, 0) to (1, 1, 0), its last corner (0, 1, ½).
@@ -99,7 +100,7 @@ mod tests {
 "bufferViews":[{{"buffer":0,"byteLength":{}}}]}}"#,
             stream.len() / 4 * 3 - stream.bytes().filter(|&b| b == b'=').count()
         );
-        let budget = Budget::new(Path::new(""), max_memory, Reach::Anywhere);
+        let budget = Budget::new(Path::new(""), Files::System, max_memory, Reach::Anywhere);
         let source = Source::new(Path::new("a"), json.as_bytes(), &budget);
         let source = source.map_err(|failure| failure.to_string())?;
         let attributes = BTreeMap::from([("POSITION".into(), 0), ("TEXCOORD_0".into(), 1)]);

@@ -27,7 +27,7 @@ const MAX_ZEROS: usize = 1 << 24;
 pub(super) struct Source<'a> {
     pub(super) path: &'a Path,
     pub(super) document: Document<'a>,
-    pub(super) budget: &'a Budget,
+    pub(super) budget: &'a Budget<'a>,
     /// Whether what is missing is an error, not a warning.
     pub(super) strict: bool,
     binary: Option<&'a [u8]>,
@@ -61,7 +61,7 @@ impl<'a> Source<'a> {
     pub(super) fn new(
         path: &'a Path,
         bytes: &'a [u8],
-        budget: &'a Budget,
+        budget: &'a Budget<'a>,
     ) -> Result<Self, Failure> {
         let Container { json, binary } = Container::new(bytes)?;
         // An item of an array is kept as a reference of 16 bytes.
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(percent_decoded("%zz%f"), "%zz%f");
     }
 
-    fn source<'a>(json: &'a str, budget: &'a Budget) -> Source<'a> {
+    fn source<'a>(json: &'a str, budget: &'a Budget<'a>) -> Source<'a> {
         Source::new(Path::new("a.gltf"), json.as_bytes(), budget).ok().expect("a document")
     }
 

@@ -1,0 +1,254 @@
+//! A probe as lights: regions, files of rigs, and how well they shade.
+
+use domelight::Rgb;
+use domelight::environment::mapping::{Mapping, from_lat_long};
+use domelight::math::Vec3;
+use domelight::picture::exr::ExrLayers;
+use domelight::picture::hdr;
+use domelight::rig::export::{Dome, DomePicture, Format, RigExport};
+use domelight::rig::{
+    ExtractionSettings, MedianCut, Method, Region, Rig, ShadingReference, SphericalHarmonics,
+    extract, quadrature,
+};
+use serde::{Deserialize, Serialize};
+use wasm_bindgen::prelude::*;
+
+use crate::setup::{parse, to_json};
+use crate::{Engine, error};
+
+/// Lights that stand for the probe when it lights a sphere.
+const QUADRATURE: usize = 1 << 12;
+
+/// The settings of [`Engine::lights`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LightsState {
+    method: MethodName,
+    /// None leaves what is not of compact sources on the map.
+    n: Option<usize>,
+    sun: bool,
+    lamps: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum MethodName {
+    MedianCut,
+    VarianceMinimization,
+}
+
+/// A rig, for the page.
+#[derive(Serialize)]
+struct RigReport {
+    lights: Vec<LightReport>,
+    /// Relative errors of shading of a matte and a glossy surface.
+    diffuse: f64,
+    glossy: f64,
+    /// Whether light was left on the map.
+    residual: bool,
+    formats: Vec<FormatReport>,
+}
+
+#[derive(Serialize)]
+struct LightReport {
+    name: String,
+    /// On the map as the probe has it, not turned.
+    uv: [f32; 2],
+    irradiance: [f32; 3],
+    share: f32,
+    /// \[degrees\]
+    radius: f32,
+    kind: &'static str,
+}
+
+#[derive(Serialize)]
+struct FormatReport {
+    name: &'static str,
+    extension: &'static str,
+    dome: Option<String>,
+}
+
+fn method(name: &MethodName) -> Method {
+    match name {
+        MethodName::MedianCut => Method::MedianCut(MedianCut::default()),
+        MethodName::VarianceMinimization => Method::default(),
+    }
+}
+
+/// The file of the dome that rigs of a format name.
+fn dome_file(format: Format) -> Option<&'static str> {
+    format.dome_picture().map(|picture| match picture {
+        DomePicture::LatLong => "dome.exr",
+        DomePicture::LatLongHdr => "dome.hdr",
+        DomePicture::Octahedral => "dome_octahedral.exr",
+    })
+}
+
+impl Engine {
+    fn rig(&self) -> Result<&domelight::rig::Extraction, JsError> {
+        self.extraction.as_ref().ok_or_else(|| JsError::new("there are no lights yet"))
+    }
+}
+
+#[wasm_bindgen]
+impl Engine {
+    /// Divides the map into lights: `{"method", "n", "sun", "lamps"}`.
+    ///
+    /// # Errors
+    /// If there is no environment or no rig of it.
+    pub fn lights(&mut self, json: &str) -> Result<String, JsError> {
+        let state: LightsState = parse(json)?;
+        let environment = self.environment()?.clone();
+        let settings = ExtractionSettings {
+            sun: state.sun,
+            n_lamps: state.lamps,
+            n_lights: state.n,
+            method: method(&state.method),
+            min_share: None,
+        };
+        let extraction = extract(&environment, settings).map_err(error)?;
+        let reference = ShadingReference::new(&environment);
+        let rig = &extraction.rig;
+        let measured = match &extraction.residual {
+            Some(dome) => reference.error_beside(rig, &ShadingReference::new(dome)),
+            None => reference.error(rig),
+        };
+        let orientation = environment.orientation();
+        let to_map = orientation.map_to_world().transpose();
+        let export = RigExport { probe: "", orientation, lights: &rig.lights, dome: None };
+        let lights = rig.lights.iter().zip(export.names()).map(|(light, name)| LightReport {
+            name,
+            uv: Mapping::LatLong.uv(to_map * light.direction).to_array(),
+            irradiance: light.irradiance.to_array(),
+            share: light.share,
+            radius: light.angular_radius.to_degrees(),
+            kind: match light.region {
+                Region::Sun => "sun",
+                Region::Lamp => "lamp",
+                Region::Rectangle(_) | Region::Cell => "region",
+            },
+        });
+        let formats = Format::ALL.map(|format| FormatReport {
+            name: format.name(),
+            extension: format.extensions()[0],
+            dome: extraction.residual.as_ref().and(dome_file(format)).map(str::to_owned),
+        });
+        let report = RigReport {
+            lights: lights.collect(),
+            diffuse: measured.diffuse,
+            glossy: measured.glossy,
+            residual: extraction.residual.is_some(),
+            formats: formats.into(),
+        };
+        self.extraction = Some(extraction);
+        Ok(to_json(&report))
+    }
+
+    /// The number of the light of each texel of the map, not turned, `width` by `width` / 2; the greatest number where
+    /// there is none.
+    ///
+    /// # Errors
+    /// If there are no lights.
+    pub fn regions(&self, width: usize) -> Result<Vec<u32>, JsError> {
+        let rig: &Rig = &self.rig()?.rig;
+        let height = width / 2;
+        let at = |i: usize, n: usize, of: usize| (2 * i + 1) * of / (2 * n);
+        let row = |y: usize| at(y, height, rig.height) * rig.width;
+        let texels = (0..height)
+            .flat_map(|y| (0..width).map(move |x| rig.labels[row(y) + at(x, width, rig.width)]));
+        Ok(texels.collect())
+    }
+
+    /// The lights as a file of a format.
+    ///
+    /// # Errors
+    /// If there are no lights or no such format.
+    #[wasm_bindgen(js_name = rigFile)]
+    pub fn rig_file(&self, format: &str, probe: &str) -> Result<Vec<u8>, JsError> {
+        let format: Format = format
+            .parse()
+            .map_err(|e: domelight::rig::export::UnknownFormat| JsError::new(&e.to_string()))?;
+        let extraction = self.rig()?;
+        let residual = extraction.residual.as_ref();
+        let dome = residual.map(|environment| Dome {
+            environment,
+            harmonics: SphericalHarmonics::project(environment),
+            file: dome_file(format),
+        });
+        let orientation = self.environment()?.orientation();
+        let rig = RigExport { probe, orientation, lights: &extraction.rig.lights, dome };
+        format.encode(&rig).map_err(|e| JsError::new(&e.to_string()))
+    }
+
+    /// The picture of what the lights leave of the map, as files of a format name it.
+    ///
+    /// # Errors
+    /// If nothing is left, or there is no such file.
+    #[wasm_bindgen(js_name = domeFile)]
+    pub fn dome_file(&self, name: &str) -> Result<Vec<u8>, JsError> {
+        let missing = || JsError::new("the lights take all of the map");
+        let map = self.rig()?.residual.as_ref().ok_or_else(missing)?.map();
+        let failed = |e: String| JsError::new(&e);
+        match name {
+            "dome.hdr" => {
+                let mut bytes = Vec::new();
+                hdr::encode(map, &mut bytes).map_err(|e| failed(e.to_string()))?;
+                Ok(bytes)
+            }
+            "dome_octahedral.exr" => {
+                let size = Mapping::Octahedral.size_for(map.height);
+                let converted = from_lat_long(map, Mapping::Octahedral, size);
+                ExrLayers::from_image(&converted, None).encode().map_err(|e| failed(e.to_string()))
+            }
+            "dome.exr" => {
+                ExrLayers::from_image(map, None).encode().map_err(|e| failed(e.to_string()))
+            }
+            _ => Err(failed(format!("there is no picture {name} of a dome"))),
+        }
+    }
+
+    /// A white sphere of `size` pixels lit by the map and, beside it, by the lights and what they leave, without
+    /// shadows: R, G and B of both pictures, radiance. `exponent` 0 is matte, else a lobe cos^exponent.
+    ///
+    /// # Errors
+    /// If there are no lights.
+    pub fn spheres(&self, size: usize, exponent: i32) -> Result<Vec<f32>, JsError> {
+        let extraction = self.rig()?;
+        let truth = quadrature(self.environment()?, QUADRATURE);
+        let mut approximate = extraction.rig.clone().lights;
+        if let Some(dome) = &extraction.residual
+            && dome.power() > 0.0
+        {
+            approximate.extend(quadrature(dome, QUADRATURE).lights);
+        }
+        let mut out = Vec::with_capacity(6 * size * size);
+        for lights in [&truth.lights, &approximate] {
+            for i in 0..size * size {
+                let at = |k: usize| (2.0 * k as f32 + 1.0) / size as f32 - 1.0;
+                let (x, y) = (at(i % size), -at(i / size));
+                let inside = 1.0 - x * x - y * y;
+                let color = if inside > 0.0 {
+                    shade(Vec3::new(x, y, inside.sqrt()), exponent, lights)
+                } else {
+                    Rgb::BLACK
+                };
+                out.extend(color.to_array());
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// Radiance toward a viewer at +Z from a surface of the normal `n`.
+fn shade(n: Vec3, exponent: i32, lights: &[domelight::rig::RigLight]) -> Rgb {
+    let (axis, power) = if exponent == 0 { (n, 1) } else { (2.0 * n.z * n - Vec3::Z, exponent) };
+    let normalization = (power as f32 + 1.0) / std::f32::consts::TAU;
+    let mut sum = Rgb::BLACK;
+    for light in lights {
+        let cos = axis.dot(light.direction);
+        if cos > 0.0 && n.dot(light.direction) > 0.0 {
+            sum += light.irradiance * (normalization * cos.powi(power));
+        }
+    }
+    sum
+}

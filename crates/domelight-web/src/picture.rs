@@ -1,0 +1,120 @@
+//! Finished pictures as files: the Workers' parts put together.
+
+use std::io::Cursor;
+use std::str::FromStr;
+
+use domelight::picture::png::{self, Depth};
+use domelight::picture::tone::{Exposure, ToneCurve, ToneMapping};
+use domelight::render::{Checkpoint, Layers, VarianceSums};
+use domelight::strategy::StrategySpec;
+use serde::Deserialize;
+use wasm_bindgen::prelude::*;
+
+use crate::Engine;
+use crate::session::nothing_started;
+use crate::setup::parse;
+
+/// What a picture tells of its making.
+#[derive(Deserialize)]
+struct Provenance {
+    scene: String,
+    environment: String,
+    samples: u32,
+    seed: u64,
+}
+
+#[wasm_bindgen]
+impl Engine {
+    /// The sums of this Worker's shard as a part of the picture, for [`Engine::add_part`] of another.
+    ///
+    /// # Errors
+    /// If nothing was started.
+    pub fn part(&self) -> Result<Vec<u8>, JsError> {
+        let session = self.session.as_ref().ok_or_else(nothing_started)?;
+        let checkpoint = session.with(|_, renderer| Checkpoint {
+            identity: Vec::new(),
+            provenance: vec![(
+                "strategy".to_owned(),
+                renderer.spec().map(StrategySpec::description).unwrap_or_default(),
+            )],
+            tiles: renderer.tiles(),
+            n_tiles: renderer.tiling().n_tiles(),
+            n_samples: renderer.settings().n_samples,
+            complete: renderer.is_complete(),
+            counts: renderer.counts(),
+            film: renderer.film(),
+        });
+        checkpoint.encode().map_err(|e| JsError::new(&e.to_string()))
+    }
+
+    /// Keeps a part.
+    ///
+    /// # Errors
+    /// If it is damaged.
+    #[wasm_bindgen(js_name = addPart)]
+    pub fn add_part(&mut self, bytes: &[u8]) -> Result<(), JsError> {
+        self.parts.push(Checkpoint::decode(bytes).map_err(|e| JsError::new(&e.to_string()))?);
+        Ok(())
+    }
+
+    /// The OpenEXR file of the parts with all layers, as `domelight render` writes it; they are forgotten.
+    ///
+    /// # Errors
+    /// If there are no parts.
+    pub fn exr(&mut self, provenance: &str) -> Result<Vec<u8>, JsError> {
+        let Provenance { scene, environment, samples, seed } = parse(provenance)?;
+        let (layers, parts) = self.merged()?;
+        let strategy = parts[0].provenance.iter().find(|(name, _)| name == "strategy");
+        let attributes = [
+            ("version", crate::version()),
+            ("scene", scene),
+            ("environment", environment),
+            ("strategy", strategy.map(|(_, text)| text.clone()).unwrap_or_default()),
+            ("samples", samples.to_string()),
+            ("passes", "doubling".to_owned()),
+            ("sampler", "sobol".to_owned()),
+            ("filter", "gaussian".to_owned()),
+            ("seed", seed.to_string()),
+            ("complete", parts.iter().all(|part| part.complete).to_string()),
+        ];
+        let attributes = attributes.map(|(name, value)| (format!("domelight.{name}"), value));
+        let mut bytes = Cursor::new(Vec::new());
+        let written = layers.write_exr(&attributes, &mut bytes);
+        written.map_err(|e| JsError::new(&e.to_string()))?;
+        Ok(bytes.into_inner())
+    }
+
+    /// The PNG file of the parts; an exposure \[stops\] that is NaN brings the median to middle gray. They are forgotten.
+    ///
+    /// # Errors
+    /// If there are no parts or no such curve.
+    pub fn png(&mut self, exposure: f32, curve: &str) -> Result<Vec<u8>, JsError> {
+        let (layers, _) = self.merged()?;
+        let alpha = layers.alpha.iter().any(|&a| a < 1.0).then_some(&layers.alpha[..]);
+        let curve = ToneCurve::from_str(curve).map_err(|e| JsError::new(&e.to_string()))?;
+        let exposure = if exposure.is_nan() { Exposure::Auto } else { Exposure::Stops(exposure) };
+        let tone = ToneMapping { exposure: exposure.stops(&layers.color, alpha), curve };
+        let mut bytes = Vec::new();
+        png::encode(&layers.color, alpha, &tone, Depth::Eight, &mut bytes)
+            .map_err(|e| JsError::new(&e.to_string()))?;
+        Ok(bytes)
+    }
+
+    fn merged(&mut self) -> Result<(Layers, Vec<Checkpoint>), JsError> {
+        let parts = std::mem::take(&mut self.parts);
+        let first = parts.first().ok_or_else(|| JsError::new("there are no parts"))?;
+        let (width, height) = (first.film.width, first.film.height);
+        let mut variance = VarianceSums::default();
+        for part in &parts {
+            variance.add(&part.film.variance_sums());
+        }
+        let mut layers = Layers::new(width, height);
+        for part in &parts {
+            if (part.film.width, part.film.height) != (width, height) {
+                return Err(JsError::new("the parts are of different pictures"));
+            }
+            layers.merge(&part.film, 0, &variance);
+        }
+        Ok((layers, parts))
+    }
+}

@@ -1,0 +1,264 @@
+//! What is rendered: the page's settings, and the scene and light that they name.
+
+use std::path::Path;
+use std::rc::Rc;
+use std::str::FromStr;
+
+use domelight::bsdf::{Bsdf, MaterialSpec};
+use domelight::environment::builtin::BuiltinProbe;
+use domelight::environment::io::{ProbeOptions, probe_from_bytes};
+use domelight::environment::{Environment, Orientation, UpAxis};
+use domelight::geometry::Aabb;
+use domelight::math::Vec3;
+use domelight::scene::builtin::BuiltinScene;
+use domelight::scene::{
+    CameraSettings, EnvironmentSettings, EnvironmentSource, LoadOptions, Projection, Scene,
+    load_bytes,
+};
+use serde::{Deserialize, Serialize};
+use wasm_bindgen::prelude::*;
+
+use crate::{Engine, error};
+
+/// The most that a scene and its textures take: an instance of WebAssembly has 4 GiB at the most, and builds a
+/// hierarchy beside them \[bytes\].
+const MAX_SCENE_MEMORY: u64 = 1 << 30;
+/// The most that reading a probe takes \[bytes\].
+const MAX_PROBE_MEMORY: u64 = 1 << 30;
+
+/// The settings of [`Engine::load_scene`].
+#[derive(Clone, Default, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub(crate) struct Setup {
+    /// A built-in scene, or a file.
+    pub(crate) scene: String,
+    /// The subject's, as `--material` has it; empty leaves what the scene brings.
+    material: String,
+    ground: bool,
+}
+
+/// What is known of a scene beside its geometry.
+pub(crate) struct LoadedScene {
+    up: UpAxis,
+    camera: Option<CameraSettings>,
+    framed: Aabb,
+    /// What the scene was scaled by.
+    scale: f32,
+}
+
+/// A camera in JSON; one of `fov` and `ortho` is null.
+#[derive(Clone, Copy, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct CameraState {
+    origin: [f32; 3],
+    target: [f32; 3],
+    up: [f32; 3],
+    fov: Option<f32>,
+    ortho: Option<f32>,
+}
+
+impl CameraState {
+    fn new(settings: &CameraSettings) -> Self {
+        let (fov, ortho) = match settings.projection {
+            Projection::Perspective { fov_y_degrees } => (Some(fov_y_degrees), None),
+            Projection::Orthographic { height } => (None, Some(height)),
+        };
+        let [origin, target, up] =
+            [settings.origin, settings.target, settings.up].map(|v| v.to_array());
+        Self { origin, target, up, fov, ortho }
+    }
+
+    fn settings(self) -> CameraSettings {
+        let projection = match self.ortho {
+            Some(height) => Projection::Orthographic { height },
+            None => Projection::Perspective {
+                fov_y_degrees: self.fov.unwrap_or(CameraSettings::DEFAULT_FOV_Y_DEGREES),
+            },
+        };
+        let [origin, target, up] = [self.origin, self.target, self.up].map(Vec3::from);
+        CameraSettings { projection, origin, target, up }
+    }
+}
+
+impl LoadedScene {
+    /// The camera that was asked for, or else the scene's own, or one framed to it.
+    pub(crate) fn camera(&self, asked: Option<CameraState>, aspect: f32) -> CameraSettings {
+        let framed = || CameraSettings::framing(&self.framed, aspect, self.up.vector());
+        let mut camera =
+            asked.map_or_else(|| self.camera.unwrap_or_else(framed), CameraState::settings);
+        if self.scale != 1.0 {
+            camera.scale(self.scale);
+        }
+        camera
+    }
+}
+
+/// What a scene brings, for the page.
+#[derive(Serialize)]
+struct SceneReport {
+    triangles: usize,
+    warnings: Vec<String>,
+    camera: CameraState,
+    /// Center and half diagonal of what the camera orbits.
+    center: [f32; 3],
+    radius: f32,
+    up: [f32; 3],
+    environment: Option<LightReport>,
+}
+
+/// The light that a scene names.
+#[derive(Serialize)]
+struct LightReport {
+    probe: String,
+    rotate: f32,
+    scale: f32,
+    exposure: f32,
+}
+
+/// The settings of [`Engine::load_environment`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Light {
+    /// A built-in probe, or a file.
+    probe: String,
+    /// Of a built-in probe.
+    rows: usize,
+    /// \[degrees\]
+    rotate: f32,
+    scale: f32,
+    /// \[stops\]
+    exposure: f32,
+}
+
+/// What a probe is, for the page.
+#[derive(Serialize)]
+struct ProbeReport {
+    size: [usize; 2],
+    warnings: Vec<String>,
+}
+
+/// Reads the page's settings.
+pub(crate) fn parse<'a, T: Deserialize<'a>>(json: &'a str) -> Result<T, JsError> {
+    serde_json::from_str(json).map_err(|e| JsError::new(&format!("settings: {e}")))
+}
+
+/// Writes what the page reads.
+pub(crate) fn to_json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_default()
+}
+
+#[wasm_bindgen]
+impl Engine {
+    /// Loads and builds a scene: `{"scene", "material", "ground"}`; returns what it brings.
+    ///
+    /// # Errors
+    /// If there is no such scene, its file is damaged, or the material is none.
+    #[wasm_bindgen(js_name = loadScene)]
+    pub fn load_scene(&mut self, json: &str) -> Result<String, JsError> {
+        let setup: Setup = parse(json)?;
+        let (mut description, warnings) = if let Ok(scene) = BuiltinScene::from_str(&setup.scene) {
+            (scene.description(), Vec::new())
+        } else {
+            let options =
+                LoadOptions { max_memory: Some(MAX_SCENE_MEMORY), ..LoadOptions::default() };
+            let path = Path::new(&setup.scene);
+            let bytes = self
+                .files
+                .get(path)
+                .map_err(|e| JsError::new(&format!("cannot read {}: {e}", path.display())))?;
+            let resolver = |path: &Path| self.files.get(path).map(<[u8]>::to_vec);
+            let loaded = load_bytes(path, bytes, &resolver, &options).map_err(error)?;
+            (loaded.description, loaded.warnings)
+        };
+        if !setup.material.is_empty() {
+            let material: MaterialSpec = setup.material.parse().map_err(error)?;
+            description.set_subject_material(Bsdf::from(material));
+        }
+        let up = description.up.unwrap_or_default();
+        let framed = description.subject_bounds();
+        if setup.ground {
+            description.add_ground(up.vector());
+        }
+        let camera = description.camera;
+        let light = description.environment.take().map(|light| LightReport {
+            probe: match light.source {
+                EnvironmentSource::Builtin(name) => name,
+                EnvironmentSource::File(path) => path.display().to_string(),
+            },
+            rotate: light.rotate_degrees,
+            scale: light.scale,
+            exposure: light.exposure,
+        });
+        let mut view = camera.unwrap_or_else(|| CameraSettings::framing(&framed, 1.0, up.vector()));
+        let report_camera = CameraState::new(&view);
+        let scale = description.rescale(&mut view);
+        let scene = Scene::new(description).map_err(error)?;
+        let report = SceneReport {
+            triangles: scene.triangle_count(),
+            warnings,
+            camera: report_camera,
+            center: framed.center().to_array(),
+            radius: 0.5 * framed.size().length(),
+            up: up.vector().to_array(),
+            environment: light,
+        };
+        self.session = None;
+        self.scene = Some((Rc::new(scene), LoadedScene { up, camera, framed, scale }));
+        self.setup = setup;
+        Ok(to_json(&report))
+    }
+
+    /// Loads a probe: `{"probe", "rows", "rotate", "scale", "exposure"}`; returns its size and what was repaired.
+    ///
+    /// # Errors
+    /// If there is no such probe or its file is damaged.
+    #[wasm_bindgen(js_name = loadEnvironment)]
+    pub fn load_environment(&mut self, json: &str) -> Result<String, JsError> {
+        let light: Light = parse(json)?;
+        let (image, warnings) = if let Ok(probe) = BuiltinProbe::from_str(&light.probe) {
+            (probe.image(light.rows.clamp(1, 4096)), Vec::new())
+        } else {
+            let path = Path::new(&light.probe);
+            let bytes = self
+                .files
+                .get(path)
+                .map_err(|e| JsError::new(&format!("cannot read {}: {e}", path.display())))?;
+            let options =
+                ProbeOptions { max_memory: Some(MAX_PROBE_MEMORY), ..ProbeOptions::default() };
+            let probe = probe_from_bytes(bytes, &light.probe, &options).map_err(error)?;
+            (probe.image, probe.warnings)
+        };
+        let up = self.scene.as_ref().map_or(UpAxis::Y, |(_, loaded)| loaded.up);
+        let orientation = Orientation { up, rotation: light.rotate };
+        let settings = EnvironmentSettings {
+            source: EnvironmentSource::Builtin(light.probe),
+            rotate_degrees: light.rotate,
+            scale: light.scale,
+            exposure: light.exposure,
+            up,
+        };
+        let environment = Environment::new(image, orientation, settings.factor()).map_err(error)?;
+        let map = environment.map();
+        let report = ProbeReport { size: [map.width, map.height], warnings };
+        self.session = None;
+        self.extraction = None;
+        self.environment = Some(Rc::new(environment));
+        Ok(to_json(&report))
+    }
+
+    /// Turns the environment \[degrees\]; the map is not read again.
+    ///
+    /// # Errors
+    /// If there is no environment or the angle is not finite.
+    #[wasm_bindgen(js_name = turnEnvironment)]
+    pub fn turn_environment(&mut self, rotate: f32) -> Result<(), JsError> {
+        self.session = None;
+        self.extraction = None;
+        let missing = || JsError::new("there is no environment yet; load one first");
+        let environment = self.environment.take().ok_or_else(missing)?;
+        let environment = Rc::unwrap_or_clone(environment);
+        let by = rotate - environment.orientation().rotation;
+        self.environment = Some(Rc::new(environment.rotated(by).map_err(error)?));
+        Ok(())
+    }
+}

@@ -1,0 +1,269 @@
+//! WebAssembly SIMD: a vector is two registers of four. A module has the instructions or it does not, so there is
+//! nothing to ask for at run time, and the intrinsics are safe.
+
+use std::arch::wasm32::{
+    f32x4, f32x4_add, f32x4_convert_i32x4, f32x4_demote_f64x2_zero, f32x4_div, f32x4_eq,
+    f32x4_extract_lane, f32x4_le, f32x4_lt, f32x4_mul, f32x4_pmax, f32x4_pmin, f32x4_splat,
+    f32x4_sqrt, f32x4_sub, f64x2_mul, f64x2_promote_low_f32x4, f64x2_sub, i32x4, i32x4_add,
+    i32x4_bitmask, i32x4_eq, i32x4_extract_lane, i32x4_lt, i32x4_min, i32x4_shl, i32x4_shuffle,
+    i32x4_splat, i32x4_trunc_sat_f32x4, u32x4_splat, v128, v128_and, v128_bitselect, v128_not,
+    v128_or,
+};
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
+
+use super::pair::Pair;
+use super::{LANES, LaneMask, Lanes, Simd, SimdBitSets, SimdF32x8, SimdFloat, SimdI32x8, last_of};
+
+#[derive(Clone, Copy)]
+pub(crate) struct Simd128;
+
+#[derive(Clone, Copy)]
+pub(crate) struct F32x8(v128, v128);
+
+#[derive(Clone, Copy)]
+pub(crate) struct I32x8(v128, v128);
+
+/// A lane has all bits set or none.
+#[derive(Clone, Copy)]
+pub(crate) struct Mask8(v128, v128);
+
+#[derive(Clone, Copy)]
+pub(crate) struct BitSets8(v128, v128);
+
+/// The lanes of two registers of whole numbers.
+#[inline(always)]
+fn lanes(a: v128, b: v128) -> [i32; LANES] {
+    [
+        i32x4_extract_lane::<0>(a),
+        i32x4_extract_lane::<1>(a),
+        i32x4_extract_lane::<2>(a),
+        i32x4_extract_lane::<3>(a),
+        i32x4_extract_lane::<0>(b),
+        i32x4_extract_lane::<1>(b),
+        i32x4_extract_lane::<2>(b),
+        i32x4_extract_lane::<3>(b),
+    ]
+}
+
+impl Simd for Simd128 {
+    type F32x8 = F32x8;
+    type I32x8 = I32x8;
+    type F32x16 = Pair<F32x8>;
+    type BitSets = BitSets8;
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> F32x8 {
+        F32x8(f32x4_splat(x), f32x4_splat(x))
+    }
+    #[inline(always)]
+    fn load(self, x: &Lanes) -> F32x8 {
+        F32x8(f32x4(x[0], x[1], x[2], x[3]), f32x4(x[4], x[5], x[6], x[7]))
+    }
+    #[inline(always)]
+    fn prefetch<T>(self, _: &T) {}
+    #[inline(always)]
+    fn splat_i32(self, x: i32) -> I32x8 {
+        I32x8(i32x4_splat(x), i32x4_splat(x))
+    }
+    #[inline(always)]
+    fn load_i32(self, x: &[i32; LANES]) -> I32x8 {
+        I32x8(i32x4(x[0], x[1], x[2], x[3]), i32x4(x[4], x[5], x[6], x[7]))
+    }
+    #[inline(always)]
+    fn iota(self) -> I32x8 {
+        I32x8(i32x4(0, 1, 2, 3), i32x4(4, 5, 6, 7))
+    }
+    #[inline(always)]
+    fn empty(self) -> BitSets8 {
+        BitSets8(u32x4_splat(0), u32x4_splat(0))
+    }
+    #[inline(always)]
+    fn transpose(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
+        std::array::from_fn(|column| self.load(&rows.map(|row| row[column])))
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $method:ident, $type:ident, $intrinsic:ident) => {
+        impl $trait for $type {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, b: Self) -> Self {
+                Self($intrinsic(self.0, b.0), $intrinsic(self.1, b.1))
+            }
+        }
+    };
+}
+operator!(Add, add, F32x8, f32x4_add);
+operator!(Sub, sub, F32x8, f32x4_sub);
+operator!(Mul, mul, F32x8, f32x4_mul);
+operator!(Div, div, F32x8, f32x4_div);
+operator!(Add, add, I32x8, i32x4_add);
+operator!(BitAnd, bitand, Mask8, v128_and);
+operator!(BitOr, bitor, Mask8, v128_or);
+
+impl SimdFloat for F32x8 {
+    type Mask = Mask8;
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> Self {
+        Simd128.splat(x)
+    }
+
+    // The pseudo-minimum of x and y is y < x ? y : x.
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        Self(f32x4_pmin(b.0, self.0), f32x4_pmin(b.1, self.1))
+    }
+    #[inline(always)]
+    fn max(self, b: Self) -> Self {
+        Self(f32x4_pmax(b.0, self.0), f32x4_pmax(b.1, self.1))
+    }
+    #[inline(always)]
+    fn le(self, b: Self) -> Mask8 {
+        Mask8(f32x4_le(self.0, b.0), f32x4_le(self.1, b.1))
+    }
+    #[inline(always)]
+    fn lt(self, b: Self) -> Mask8 {
+        Mask8(f32x4_lt(self.0, b.0), f32x4_lt(self.1, b.1))
+    }
+    #[inline(always)]
+    fn eq(self, b: Self) -> Mask8 {
+        Mask8(f32x4_eq(self.0, b.0), f32x4_eq(self.1, b.1))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(f32x4_sqrt(self.0), f32x4_sqrt(self.1))
+    }
+    #[inline(always)]
+    fn select(m: Mask8, a: Self, b: Self) -> Self {
+        Self(v128_bitselect(a.0, b.0, m.0), v128_bitselect(a.1, b.1, m.1))
+    }
+    #[inline(always)]
+    fn each<const M: usize, const N: usize>(
+        arguments: [Self; M],
+        mut f: impl FnMut([f32; M]) -> [f32; N],
+    ) -> [Self; N] {
+        let arguments = arguments.map(Self::store);
+        let mut values = [[0.0; LANES]; N];
+        for lane in 0..LANES {
+            for (value, y) in values.iter_mut().zip(f(arguments.map(|x| x[lane]))) {
+                value[lane] = y;
+            }
+        }
+        values.map(|value| Simd128.load(&value))
+    }
+}
+
+/// a b − c of an exact product, of the first two lanes.
+#[inline(always)]
+fn mul_sub_low(a: v128, b: v128, c: v128) -> v128 {
+    let [a, b, c] = [a, b, c].map(|x| f64x2_promote_low_f32x4(x));
+    f32x4_demote_f64x2_zero(f64x2_sub(f64x2_mul(a, b), c))
+}
+
+/// The same of all four.
+#[inline(always)]
+fn mul_sub(a: v128, b: v128, c: v128) -> v128 {
+    let low = mul_sub_low(a, b, c);
+    let [a, b, c] = [a, b, c].map(|x| i32x4_shuffle::<2, 3, 2, 3>(x, x));
+    i32x4_shuffle::<0, 1, 4, 5>(low, mul_sub_low(a, b, c))
+}
+
+impl SimdF32x8 for F32x8 {
+    type I32x8 = I32x8;
+
+    #[inline(always)]
+    fn mul_sub(self, b: Self, c: Self) -> Self {
+        Self(mul_sub(self.0, b.0, c.0), mul_sub(self.1, b.1, c.1))
+    }
+    #[inline(always)]
+    fn store(self) -> Lanes {
+        [
+            f32x4_extract_lane::<0>(self.0),
+            f32x4_extract_lane::<1>(self.0),
+            f32x4_extract_lane::<2>(self.0),
+            f32x4_extract_lane::<3>(self.0),
+            f32x4_extract_lane::<0>(self.1),
+            f32x4_extract_lane::<1>(self.1),
+            f32x4_extract_lane::<2>(self.1),
+            f32x4_extract_lane::<3>(self.1),
+        ]
+    }
+    #[inline(always)]
+    fn to_i32(self) -> I32x8 {
+        I32x8(i32x4_trunc_sat_f32x4(self.0), i32x4_trunc_sat_f32x4(self.1))
+    }
+    #[inline(always)]
+    fn gather<const N: usize>(table: &[Lanes; N], at: I32x8) -> Self {
+        let lanes = at.store().map(|i| {
+            let i = i as usize & last_of::<N>();
+            table[i / LANES][i % LANES]
+        });
+        Simd128.load(&lanes)
+    }
+}
+
+impl SimdI32x8 for I32x8 {
+    type F32x8 = F32x8;
+
+    #[inline(always)]
+    fn shl<const N: i32>(self) -> Self {
+        Self(i32x4_shl(self.0, N as u32), i32x4_shl(self.1, N as u32))
+    }
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        Self(i32x4_min(self.0, b.0), i32x4_min(self.1, b.1))
+    }
+    #[inline(always)]
+    fn lt(self, b: Self) -> Mask8 {
+        Mask8(i32x4_lt(self.0, b.0), i32x4_lt(self.1, b.1))
+    }
+    #[inline(always)]
+    fn to_f32(self) -> F32x8 {
+        F32x8(f32x4_convert_i32x4(self.0), f32x4_convert_i32x4(self.1))
+    }
+    #[inline(always)]
+    fn select(m: Mask8, a: Self, b: Self) -> Self {
+        Self(v128_bitselect(a.0, b.0, m.0), v128_bitselect(a.1, b.1, m.1))
+    }
+    #[inline(always)]
+    fn compress(self, keep: Mask8) -> [i32; 8] {
+        super::compress(self.store(), keep.bits())
+    }
+    #[inline(always)]
+    fn store(self) -> [i32; 8] {
+        lanes(self.0, self.1)
+    }
+}
+
+impl LaneMask for Mask8 {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from(i32x4_bitmask(self.0)) | u32::from(i32x4_bitmask(self.1)) << 4
+    }
+}
+
+impl SimdBitSets for BitSets8 {
+    type Mask = Mask8;
+
+    #[inline(always)]
+    fn insert(self, m: Mask8, bit: u32) -> Self {
+        let bit = u32x4_splat(bit);
+        Self(v128_or(self.0, v128_and(m.0, bit)), v128_or(self.1, v128_and(m.1, bit)))
+    }
+    #[inline(always)]
+    fn not_empty(self) -> u32 {
+        let is_set = |x| v128_not(i32x4_eq(x, i32x4_splat(0)));
+        Mask8(is_set(self.0), is_set(self.1)).bits()
+    }
+    #[inline(always)]
+    fn pack(pair: [Self; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
+        super::pack(pair.map(Self::store), numbers)
+    }
+    #[inline(always)]
+    fn store(self) -> [u32; 8] {
+        lanes(self.0, self.1).map(|x| x as u32)
+    }
+}

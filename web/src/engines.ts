@@ -1,0 +1,228 @@
+// The Workers, one engine each.
+
+import type { Arguments, Call, FromWorker, Result, Statistics, ToWorker, Update } from "./protocol";
+
+/** The engine's module, unpacked from the page. */
+async function unpacked(): Promise<WebAssembly.Module> {
+  const packed = document.getElementById("engine")!.textContent!.trim();
+  const bytes = Uint8Array.from(atob(packed), (c) => c.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+  return WebAssembly.compile(await new Response(stream).arrayBuffer());
+}
+
+/** An engine in a Worker of its own. */
+export class Host {
+  private worker!: Worker;
+  private nextId = 0;
+  private waiting = new Map<number, { resolve: (value: never) => void; reject: (error: Error) => void }>();
+  onRender: (message: Extract<FromWorker, { token: number }>) => void = () => {};
+  /** Called after the engine died and another has taken its place, without scene and light. */
+  onRestart: () => void = () => {};
+
+  constructor(private module: WebAssembly.Module, private script: string) {
+    this.boot();
+  }
+
+  private boot() {
+    this.worker = new Worker(this.script);
+    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.receive(data);
+    this.send({ kind: "boot", module: this.module });
+  }
+
+  private receive(message: FromWorker) {
+    switch (message.kind) {
+      case "booted":
+        return;
+      case "result":
+        this.waiting.get(message.id)?.resolve(message.result as never);
+        this.waiting.delete(message.id);
+        return;
+      case "error":
+        this.waiting.get(message.id)?.reject(new Error(message.error));
+        this.waiting.delete(message.id);
+        if (message.dead) this.restart(message.error);
+        return;
+      default:
+        this.onRender(message);
+        if (message.kind === "failed" && message.dead) this.restart(message.error);
+    }
+  }
+
+  private restart(why: string) {
+    this.worker.terminate();
+    this.waiting.forEach(({ reject }) => reject(new Error(why)));
+    this.waiting.clear();
+    this.boot();
+    this.onRestart();
+  }
+
+  send(message: ToWorker, transfer: Transferable[] = []) {
+    this.worker.postMessage(message, transfer);
+  }
+
+  call<C extends Call>(call: C, ...args: Arguments<C>): Promise<Result<C>> {
+    const id = this.nextId++;
+    return new Promise((resolve, reject) => {
+      this.waiting.set(id, { resolve, reject });
+      this.send({ kind: "call", id, call, args });
+    });
+  }
+}
+
+/** The settings of a render but for its shard. */
+export interface RenderSettings {
+  width: number;
+  height: number;
+  spp: number;
+  strategy: string;
+  seed: number;
+  hideEnvironment: boolean;
+  camera: Camera | null;
+}
+
+export interface Camera {
+  origin: number[];
+  target: number[];
+  up: number[];
+  fov: number | null;
+  ortho: number | null;
+}
+
+/** A picture that some of the engines render together. */
+export class Job {
+  /** As the engine names it, with what its pilot chose. */
+  strategy = "";
+  private statisticsOf = new Map<Host, Statistics>();
+  private progressOf = new Map<Host, number>();
+  paused = false;
+  ended = false;
+
+  constructor(readonly token: number, readonly hosts: Host[], readonly settings: RenderSettings) {}
+
+  note(host: Host, update: Update) {
+    this.statisticsOf.set(host, update.statistics);
+    this.progressOf.set(host, update.progress);
+  }
+
+  get complete() {
+    return this.ended || this.hosts.every((host) => this.statisticsOf.get(host)?.complete);
+  }
+
+  get progress() {
+    return this.hosts.reduce((sum, host) => sum + (this.progressOf.get(host) ?? 0), 0) / this.hosts.length;
+  }
+
+  get statistics(): Statistics {
+    const all = [...this.statisticsOf.values()];
+    const sum = (key: keyof Statistics) => all.reduce((sum, s) => sum + Number(s[key]), 0);
+    const pixels = sum("pixels");
+    return {
+      cameraRays: sum("cameraRays"), shadowRays: sum("shadowRays"), shadingPoints: sum("shadingPoints"),
+      nonFinite: sum("nonFinite"), pixels, samples: sum("cameraRays") / Math.max(pixels, 1),
+      relativeVariance: sum("relativeVariance") / Math.max(pixels, 1), complete: this.complete,
+    };
+  }
+}
+
+export interface JobEvents {
+  update(job: Job, update: Update): void;
+  failed(job: Job, error: string): void;
+}
+
+/** All engines. */
+export class Engines {
+  private nextToken = 1;
+  private jobs: Job[] = [];
+  events: JobEvents = { update() {}, failed() {} };
+  onRestart: () => void = () => {};
+
+  private constructor(readonly hosts: Host[], private another: () => Host) {
+    for (const host of hosts) {
+      host.onRender = (message) => this.receive(host, message);
+      host.onRestart = () => this.onRestart();
+    }
+  }
+
+  static async create(): Promise<Engines> {
+    const script = URL.createObjectURL(new Blob([document.getElementById("worker")!.textContent!], { type: "text/javascript" }));
+    const module = await unpacked();
+    // Two at least, for two strategies side by side.
+    const n = Math.max(2, Math.min(navigator.hardwareConcurrency || 2, 8));
+    const another = () => new Host(module, script);
+    return new Engines(Array.from({ length: n }, another), another);
+  }
+
+  /** The engine that answers questions. */
+  call<C extends Call>(call: C, ...args: Arguments<C>): Promise<Result<C>> {
+    return this.hosts[0].call(call, ...args);
+  }
+
+  /** The same for all; the first one's answer. */
+  async all<C extends Call>(call: C, ...args: Arguments<C>): Promise<Result<C>> {
+    return (await Promise.all(this.hosts.map((host) => host.call(call, ...args))))[0];
+  }
+
+  /** Renders pictures side by side, each with its share of the engines. */
+  render(pictures: RenderSettings[]): Job[] {
+    this.jobs = pictures.map((settings, i) => {
+      const hosts = this.hosts.filter((_, k) => k % pictures.length === i);
+      const job = new Job(this.nextToken++, hosts, settings);
+      hosts.forEach((host, k) =>
+        host.send({ kind: "render", token: job.token, settings: JSON.stringify({ ...settings, shard: [k, hosts.length] }) }));
+      return job;
+    });
+    return this.jobs;
+  }
+
+  private aside: Host | null = null;
+
+  /** An engine beside the picture's, for scenes of figures. */
+  extra(): Host {
+    return (this.aside ??= this.another());
+  }
+
+  /** Begins one of the pictures anew with other settings. */
+  again(job: Job, change: Partial<RenderSettings>): Job {
+    const next = new Job(this.nextToken++, job.hosts, { ...job.settings, ...change });
+    this.jobs = this.jobs.map((other) => (other === job ? next : other));
+    next.hosts.forEach((host, k) =>
+      host.send({ kind: "render", token: next.token, settings: JSON.stringify({ ...next.settings, shard: [k, next.hosts.length] }) }));
+    return next;
+  }
+
+  /** Ends one of the pictures as it is. */
+  end(job: Job) {
+    job.ended = true;
+    job.hosts.forEach((host) => host.send({ kind: "pause", token: job.token, paused: true }));
+  }
+
+  stop() {
+    this.jobs = [];
+    this.hosts.forEach((host) => host.send({ kind: "stop" }));
+  }
+
+  pause(job: Job, paused: boolean) {
+    if (job.paused === paused) return;
+    job.paused = paused;
+    job.hosts.forEach((host) => host.send({ kind: "pause", token: job.token, paused }));
+  }
+
+  private receive(host: Host, message: Extract<FromWorker, { token: number }>) {
+    const job = this.jobs.find((job) => job.token === message.token);
+    if (!job) return;
+    if (message.kind === "started") job.strategy = message.strategy;
+    if (message.kind === "failed") this.events.failed(job, message.error);
+    if (message.kind === "update") {
+      job.note(host, message);
+      this.events.update(job, message);
+    }
+  }
+
+  /** The whole picture of a job in one engine, to be written as a file. */
+  async gather(job: Job) {
+    for (const host of job.hosts) {
+      const part = await host.call("part");
+      await this.call("addPart", part as Uint8Array);
+    }
+  }
+}

@@ -1,0 +1,466 @@
+// The live figures of the lecture, one for each step.
+
+import { color, h, short, signed } from "./dom";
+import { Film, FilmView } from "./film";
+import type { Stage } from "./lecture";
+import { plot, slope, type Series } from "./plot";
+import type { FromWorker } from "./protocol";
+
+type Figure = (stage: Stage) => void;
+type Point = [number, number];
+
+/** Uniform numbers that are the same every time. */
+function generator(seed: number): () => number {
+  let s = seed >>> 0;
+  return () => {
+    s = (s + 0x6d2b79f5) | 0;
+    let t = Math.imul(s ^ (s >>> 15), 1 | s);
+    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+    return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
+  };
+}
+
+const line = (n: number, f: (x: number) => number, [low, high]: Point = [0, 1]): Point[] =>
+  Array.from({ length: n + 1 }, (_, i) => low + (high - low) * i / n).map((x) => [x, f(x)]);
+const integral = (f: (x: number) => number, n = 2000) =>
+  Array.from({ length: n }, (_, i) => f((i + 0.5) / n)).reduce((a, b) => a + b, 0) / n;
+const gauss = (x: number, mean: number, width: number) => Math.exp(-0.5 * ((x - mean) / width) ** 2);
+const normalized = (f: (x: number) => number) => {
+  const total = integral(f);
+  return (x: number) => f(x) / total;
+};
+
+/** A function on [0, 1] as a table that can be drawn from. */
+class Table {
+  private cdf: Float64Array;
+  constructor(f: (x: number) => number, private n = 1000) {
+    this.cdf = new Float64Array(n + 1);
+    for (let i = 0; i < n; i++) this.cdf[i + 1] = this.cdf[i] + f((i + 0.5) / n);
+    for (let i = 0; i <= n; i++) this.cdf[i] /= this.cdf[n] || 1;
+    this.cdf = this.cdf.map((c) => c);
+    const total = this.cdf[n];
+    if (total !== 1) this.cdf = this.cdf.map((c) => c / total);
+  }
+  at(x: number) {
+    const i = Math.min(Math.floor(x * this.n), this.n - 1);
+    return this.cdf[i] + (this.cdf[i + 1] - this.cdf[i]) * (x * this.n - i);
+  }
+  sample(u: number) {
+    let [low, high] = [0, this.n];
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (this.cdf[middle] <= u) low = middle;
+      else high = middle;
+    }
+    const width = this.cdf[low + 1] - this.cdf[low];
+    return (low + (width > 0 ? (u - this.cdf[low]) / width : 0.5)) / this.n;
+  }
+}
+
+const estimator: Figure = (stage) => {
+  const resemblance = stage.slider("Density", 0, 1, 0.05, 0, (x) => (x === 0 ? "uniform" : `${Math.round(100 * x)} % alike`));
+  const most = stage.slider("Samples", 2, 12, 1, 10, (x) => String(2 ** x));
+  stage.draw(() => {
+    const f = (x: number) => 3 * x * x;
+    const p = (x: number) => 1 - resemblance() + resemblance() * f(x);
+    const table = new Table(p);
+    const random = generator(1), runs = 200, n = 2 ** most();
+    const squares = new Map<number, number>();
+    const first: Point[] = [];
+    for (let run = 0; run < runs; run++) {
+      let sum = 0;
+      for (let k = 1; k <= n; k++) {
+        const x = table.sample(random());
+        sum += f(x) / p(x);
+        if ((k & (k - 1)) === 0) {
+          squares.set(k, (squares.get(k) ?? 0) + (sum / k - 1) ** 2);
+          if (run === 0) first.push([k, Math.abs(sum / k - 1)]);
+        }
+      }
+    }
+    const rms = [...squares].map(([k, s]): Point => [k, Math.sqrt(s / runs)]);
+    stage.svg(plot([
+      { name: "root mean square of 200 runs", kind: "first", points: rms }, { name: "one run", kind: "second", points: first, as: "dots" },
+    ], { x: { name: "samples N", log: true }, y: { name: "error", log: true, range: [1e-4, 1] } }), "Error over samples");
+    stage.say(`The error at ${n} samples is ${short(rms.at(-1)![1])}; the line's slope is ${signed(slope(rms))}.`);
+  });
+};
+
+/** A polar diagram of functions of the angle from the normal, −90° to 90°. */
+function polar(series: Series[], directions: [number, string][]): string {
+  const [width, height, x0, y0, radius] = [640, 300, 320, 276, 250];
+  const most = Math.max(...series.flatMap((s) => s.points.map((p) => p[1])), 1e-9);
+  const at = (theta: number, r: number) => `${(x0 + radius * r * Math.sin(theta)).toFixed(1)},${(y0 - radius * r * Math.cos(theta)).toFixed(1)}`;
+  const curves = series.map((s) => `<path class="${s.kind} line" d="M${s.points.map(([t, r]) => at(t, r / most)).join("L")}"/>`);
+  const arrows = directions.map(([theta, name]) => `<path class="axis" d="M${x0} ${y0}L${at(theta, 1)}"/><text class="name" x="${at(theta, 1.06).split(",")[0]}" y="${at(theta, 1.03).split(",")[1]}" text-anchor="middle">${name}</text>`);
+  const legend = series.map((s, i) => `<path class="${s.kind} line" d="M8 ${14 + 18 * i}h16"/><text class="name" x="30" y="${18 + 18 * i}">${s.name}</text>`);
+  return `<svg viewBox="0 0 ${width} ${height}" aria-hidden="true"><path class="axis" d="M20 ${y0}H620"/>${arrows.join("")}${curves.join("")}${legend.join("")}</svg>`;
+}
+
+const lobes: Figure = (stage) => {
+  const exponent = stage.slider("Exponent n", 1, 200, 1, 20);
+  const angle = stage.slider("Viewer", 0, 85, 1, 40, (x) => `${x}°`);
+  stage.draw(async () => {
+    const { engines } = stage.app, n = 361;
+    const curve = async (material: string) => {
+      const values = (await engines.call("lobeSection", material, angle(), n)) as Float32Array;
+      return Array.from({ length: n }, (_, i): Point => [Math.PI * ((i + 0.5) / n - 0.5), values[2 * i + 1]]);
+    };
+    const phong = `phong:${exponent()}:1:0`;
+    const kept = ((await engines.call("lobeSamples", phong, angle(), 2000, 1)) as Float32Array).length / 3;
+    const series: Series[] = [
+      { name: `Phong, n = ${exponent()}`, kind: "first", points: await curve(phong) },
+      { name: "cosine", kind: "second", points: await curve("diffuse:1") },
+    ];
+    const theta = angle() * Math.PI / 180;
+    stage.svg(polar(series, [[-theta, "viewer"], [theta, "mirror"]]), "Densities in the plane of incidence");
+    const peak = Math.max(...series[0].points.map((p) => p[1]));
+    stage.say(`Greatest density ${short(peak)} per steradian; ${short(100 * (1 - kept / 2000))} % of the samples end below the surface.`);
+  });
+};
+
+/** A square canvas and its context, of so many pixels. */
+function canvas(stage: Stage, width: number, height: number, label: string): CanvasRenderingContext2D {
+  let element = stage.drawing.querySelector("canvas");
+  if (!element || element.width !== width) {
+    element = h("canvas", { width: String(width), height: String(height) });
+    stage.drawing.replaceChildren(element);
+  }
+  element.setAttribute("role", "img");
+  element.setAttribute("aria-label", label);
+  const context = element.getContext("2d")!;
+  context.clearRect(0, 0, width, height);
+  return context;
+}
+
+const ward: Figure = (stage) => {
+  const ax = stage.slider("α along x", 0.02, 0.8, 0.01, 0.3);
+  const ay = stage.slider("α along y", 0.02, 0.8, 0.01, 0.08);
+  const angle = stage.slider("Viewer", 0, 80, 1, 30, (x) => `${x}°`);
+  stage.draw(async () => {
+    const samples = (await stage.app.engines.call("lobeSamples", `ward:${ax()}:${ay()}:1`, angle(), 3000, 1)) as Float32Array;
+    const size = 320, context = canvas(stage, size, size, "Directions drawn from Ward's lobe, seen from above");
+    const [middle, radius] = [size / 2, size / 2 - 6];
+    context.strokeStyle = color("line");
+    for (const theta of [30, 60, 90]) {
+      context.beginPath();
+      context.arc(middle, middle, radius * Math.sin(theta * Math.PI / 180), 0, 2 * Math.PI);
+      context.stroke();
+    }
+    context.fillStyle = color("first");
+    context.globalAlpha = 0.5;
+    let [sx, sy, mx] = [0, 0, 0];
+    const n = samples.length / 3;
+    for (let i = 0; i < samples.length; i += 3) {
+      const [x, y] = samples.subarray(i, i + 2);
+      context.fillRect(middle + radius * x - 1, middle - radius * y - 1, 2, 2);
+      [sx, sy, mx] = [sx + x * x, sy + y * y, mx + x];
+    }
+    context.globalAlpha = 1;
+    stage.say(`Spread along x ${short(Math.sqrt(sx / n - (mx / n) ** 2))}, along y ${short(Math.sqrt(sy / n))}; rings at 30°, 60° and 90°.`);
+  });
+};
+
+const halfVectors: Figure = (stage) => {
+  const angle = stage.slider("Viewer", 0, 85, 1, 40, (x) => `${x}°`);
+  stage.draw(() => {
+    const o = -angle() * Math.PI / 180, [x0, y0, r] = [320, 280, 250];
+    const at = (theta: number, length: number) => `${x0 + length * Math.sin(theta)} ${y0 - length * Math.cos(theta)}`;
+    const parts: string[] = [], factors: number[] = [];
+    for (let k = -8; k <= 8; k++) {
+      const half = k * Math.PI / 36, direction = 2 * half - o;
+      parts.push(`<path class="second line faint" d="M${x0} ${y0}L${at(half, 0.45 * r)}"/>`);
+      if (Math.abs(direction) < Math.PI / 2) {
+        factors.push(1 / (4 * Math.cos(direction - half)));
+        parts.push(`<path class="first line" d="M${x0} ${y0}L${at(direction, r)}"/>`);
+      }
+    }
+    parts.push(`<path class="axis" d="M20 ${y0}H620M${x0} ${y0}L${at(o, r)}"/><text class="name" x="${at(o, r + 14).split(" ")[0]}" y="${at(o, r + 10).split(" ")[1]}" text-anchor="middle">viewer</text>`);
+    parts.push(`<path class="second line" d="M8 14h16"/><text class="name" x="30" y="18">half vectors, every 5°</text><path class="first line" d="M8 32h16"/><text class="name" x="30" y="36">directions</text>`);
+    stage.svg(`<svg viewBox="0 0 640 300" aria-hidden="true">${parts.join("")}</svg>`, "Half vectors and the directions that they mirror to");
+    stage.say(`${factors.length} of 17 directions are above the surface; the factor 1 / (4 ωh·ωi) is between ${short(Math.min(...factors))} and ${short(Math.max(...factors))}.`);
+  });
+};
+
+const inversion: Figure = (stage) => {
+  const n = stage.slider("Samples", 1, 64, 1, 16);
+  const peak = stage.slider("Peak", 0.01, 0.2, 0.01, 0.04, (x) => `width ${x}`);
+  stage.draw(() => {
+    const p = normalized((x) => 0.25 + gauss(x, 0.7, peak()) * 0.2 / peak() + 0.6 * gauss(x, 0.25, 0.1));
+    const table = new Table(p), top = Math.max(...line(200, p).map((q) => q[1]));
+    const samples = Array.from({ length: n() }, (_, i): Point => [table.sample((i + 0.5) / n()), (i + 0.5) / n()]);
+    stage.svg(plot([
+      { name: `density, of ${short(top)}`, kind: "second", points: line(200, (x) => p(x) / top), as: "area" }, { name: "P(x)", kind: "first", points: line(200, (x) => table.at(x)) },
+      { name: "", kind: "first", points: samples, as: "dots" }, { name: "", kind: "third", points: samples.map(([x]): Point => [x, 0]), as: "dots" },
+    ], { x: { name: "x", range: [0, 1] }, y: { name: "u", range: [0, 1] } }), "A cumulative distribution and samples by its inverse");
+    const inside = samples.filter(([x]) => Math.abs(x - 0.7) < 2 * peak()).length;
+    stage.say(`${inside} of ${n()} samples lie within the peak.`);
+  });
+};
+
+/** The map's luminance, small, with what each row covers. */
+async function mapTable(stage: Stage, width = 128) {
+  const rgb = (await stage.app.engines.call("map", width)) as Float32Array;
+  const height = width / 2;
+  const luminance = Array.from({ length: width * height }, (_, i) => 0.2126 * rgb[3 * i] + 0.7152 * rgb[3 * i + 1] + 0.0722 * rgb[3 * i + 2]);
+  const sin = Array.from({ length: height }, (_, y) => Math.cos(Math.PI * y / height) - Math.cos(Math.PI * (y + 1) / height));
+  return { rgb, luminance, sin, width, height };
+}
+
+const rowsAndColumns: Figure = (stage) => {
+  const weighted = stage.choice("Rows count", [["1", "with sin θ"], ["", "all alike (wrong)"]]);
+  const chosen = stage.slider("Row", 0, 63, 1, 24);
+  stage.draw(async () => {
+    const { luminance, sin, width, height } = await mapTable(stage);
+    const sums = sin.map((s, y) => (weighted() ? s : 1) * luminance.slice(y * width, (y + 1) * width).reduce((a, b) => a + b, 0));
+    const total = sums.reduce((a, b) => a + b, 0) || 1, y = chosen();
+    const row = luminance.slice(y * width, (y + 1) * width), sum = row.reduce((a, b) => a + b, 0) || 1;
+    stage.svg(plot([{ name: "p(y)", kind: "first", points: sums.map((s, i): Point => [i, s / total]), as: "bars" }, { name: "", kind: "second", points: [[y, sums[y] / total]], as: "dots" }],
+      { x: { name: "row y, from the top", range: [-1, height] }, y: { name: "probability of a row", range: [0, Math.max(...sums) / total] }, height: 170 })
+      + plot([{ name: `p(x | y = ${y})`, kind: "second", points: row.map((s, i): Point => [i, s / sum]), as: "bars" }],
+        { x: { name: "column x", range: [-1, width] }, y: { name: "probability of a column", range: [0, Math.max(...row) / sum] }, height: 170 }), "Probabilities of rows, and of columns in the chosen one");
+    const poles = (sums.slice(0, 4).reduce((a, b) => a + b, 0) + sums.slice(-4).reduce((a, b) => a + b, 0)) / total;
+    stage.say(`Row ${y} is drawn with probability ${short(sums[y] / total)}; the four rows at each pole together with ${short(poles)}.`);
+  });
+};
+
+/** Draws the small map behind a figure. */
+function paintMap(context: CanvasRenderingContext2D, rgb: Float32Array, width: number) {
+  const film = Film.fromRgb(width, width / 2, rgb), scale = 2 ** film.exposure();
+  const small = h("canvas", { width: String(width), height: String(width / 2) }), inner = small.getContext("2d")!;
+  const image = inner.createImageData(width, width / 2);
+  for (let i = 0; i < width * width / 2; i++) {
+    for (let c = 0; c < 3; c++) {
+      const x = scale * rgb[3 * i + c];
+      image.data[4 * i + c] = 255 * (x / (1 + x)) ** (1 / 2.2) * 1.3;
+    }
+    image.data[4 * i + 3] = 255;
+  }
+  inner.putImageData(image, 0, 0);
+  context.imageSmoothingEnabled = true;
+  context.drawImage(small, 0, 0, context.canvas.width, context.canvas.height);
+}
+
+const environmentSamples: Figure = (stage) => {
+  const n = stage.slider("Samples", 0, 11, 1, 7, (x) => String(2 ** x));
+  stage.draw(async () => {
+    const { rgb, luminance, sin, width, height } = await mapTable(stage, 256);
+    const weights = luminance.map((l, i) => l * sin[Math.floor(i / width)]);
+    const rows = Array.from({ length: height }, (_, y) => weights.slice(y * width, (y + 1) * width));
+    const table = new Table((y) => rows[Math.min(Math.floor(y * height), height - 1)].reduce((a, b) => a + b, 0), height);
+    const random = generator(3), context = canvas(stage, 640, 320, "Samples of the environment");
+    paintMap(context, rgb, width);
+    const order = [...weights].sort((a, b) => b - a), limit = order[Math.floor(order.length / 100)];
+    let inside = 0;
+    const count = 2 ** n();
+    for (let k = 0; k < count; k++) {
+      const y = table.sample((k + random()) / count), row = rows[Math.min(Math.floor(y * height), height - 1)];
+      const x = new Table((u) => row[Math.min(Math.floor(u * width), width - 1)], width).sample(random());
+      if (row[Math.min(Math.floor(x * width), width - 1)] > limit) inside++;
+      context.beginPath();
+      context.arc(640 * x, 320 * y, 2.5, 0, 2 * Math.PI);
+      context.fillStyle = "#fff";
+      context.fill();
+      context.strokeStyle = "#000";
+      context.stroke();
+    }
+    const share = order.slice(0, Math.floor(order.length / 100)).reduce((a, b) => a + b, 0) / order.reduce((a, b) => a + b, 0);
+    stage.say(`${inside} of ${count} samples (${short(100 * inside / count)} %) lie in the brightest hundredth of ${stage.app.envName}, which holds ${short(100 * share)} % of its light.`);
+  });
+};
+
+/** Light with a small bright lamp, on [0, 1]. */
+const light = (x: number) => 0.15 + 4 * gauss(x, 0.35, 0.02) + 0.7 * gauss(x, 0.75, 0.15);
+
+const combination: Figure = (stage) => {
+  const width = stage.slider("Lobe", -3, -0.3, 0.1, -1.3, (x) => `width ${short(10 ** x)}`);
+  const split = stage.slider("Of 16 from the light", 1, 15, 1, 8);
+  const heuristic = stage.choice("Weights", [["1", "balance"], ["2", "power"]]);
+  stage.draw(() => {
+    const lobe = normalized((x) => gauss(x, 0.5, 10 ** width()));
+    const q = normalized(light), f = (x: number) => light(x) * lobe(x);
+    const [m, n] = [split(), 16 - split()], beta = Number(heuristic());
+    const w = (x: number) => (m * q(x)) ** beta / ((m * q(x)) ** beta + (n * lobe(x)) ** beta);
+    const variance = (p: (x: number) => number, weight: (x: number) => number) => {
+      const part = (x: number) => weight(x) * f(x);
+      return integral((x) => (part(x) > 0 ? part(x) ** 2 / p(x) : 0), 8000) - integral(part, 8000) ** 2;
+    };
+    const exact = integral(f, 8000);
+    const error = (v: number) => `${short(100 * Math.sqrt(Math.max(v, 0)) / exact)} %`;
+    const top = (g: (x: number) => number) => Math.max(...line(400, g).map((p) => p[1]));
+    stage.svg(plot([
+      { name: "light", kind: "second", points: line(400, (x) => q(x) / top(q)) }, { name: "lobe", kind: "first", points: line(400, (x) => lobe(x) / top(lobe)) },
+      { name: "weight of the light’s samples", kind: "third", points: line(400, w), as: "area" },
+    ], { x: { name: "direction", range: [0, 1] }, y: { name: "relative to the greatest", range: [0, 1.05] } }), "Two densities and the weight of one of them");
+    stage.say(`Error of 16 samples: light alone ${error(variance(q, () => 1) / 16)}, lobe alone ${error(variance(lobe, () => 1) / 16)}, both ${error(variance(q, w) / m + variance(lobe, (x) => 1 - w(x)) / n)}.`);
+  });
+};
+
+const product: Figure = (stage) => {
+  const center = stage.slider("Mirror direction", 0.05, 0.95, 0.01, 0.5);
+  const width = stage.slider("Lobe", 0.02, 0.4, 0.01, 0.08, (x) => `width ${x}`);
+  const hidden = stage.slider("Hidden from", 0, 1, 0.01, 0.6);
+  stage.draw(() => {
+    const lobe = (x: number) => gauss(x, center(), width());
+    const f = (x: number) => light(x) * lobe(x), total = integral(f, 4000), p = (x: number) => f(x) / total;
+    const visible = integral((x) => (x < hidden() ? p(x) : 0), 4000), exact = visible * total;
+    const q = normalized(light), r = normalized(lobe);
+    const relative = (d: (x: number) => number) => {
+      const second = integral((x) => (x < hidden() && d(x) > 0 ? f(x) ** 2 / d(x) : 0), 4000);
+      return exact > 0 ? short(Math.sqrt(Math.max(second / exact ** 2 - 1, 0))) : "–";
+    };
+    const top = (g: (x: number) => number) => Math.max(...line(400, g).map((s) => s[1]));
+    stage.svg(plot([
+      { name: "light", kind: "second", points: line(400, (x) => light(x) / top(light)) }, { name: "lobe", kind: "first", points: line(400, lobe) },
+      { name: "product", kind: "third", points: line(400, (x) => p(x) / top(p)), as: "area" },
+    ], { x: { name: "direction", range: [0, 1] }, y: { name: "relative to the greatest", range: [0, 1.05] } }), "Light, lobe and their product");
+    stage.say(`${short(100 * visible)} % of the product is visible. Relative deviation of one sample: light ${relative(q)}, lobe ${relative(r)}, product ${visible > 0 ? short(Math.sqrt((1 - visible) / visible)) : "–"}.`);
+  });
+};
+
+const target = normalized((x) => light(x) * gauss(x, 0.5, 0.12));
+
+const rejection: Figure = (stage) => {
+  const bound = stage.slider("Envelope", 0.3, 3, 0.05, 1, (x) => `${short(x)} of what is needed`);
+  stage.draw(() => {
+    const q = normalized(light), needed = Math.max(...line(2000, (x) => target(x) / q(x)).map((p) => p[1]));
+    const c = bound() * needed, table = new Table(q), random = generator(5);
+    const kept: Point[] = [], lost: Point[] = [];
+    for (let k = 0; k < 800; k++) {
+      const x = table.sample(random()), y = random() * c * q(x);
+      (y < target(x) ? kept : lost).push([x, y]);
+    }
+    stage.svg(plot([
+      { name: "c · q", kind: "second", points: line(400, (x) => c * q(x)) }, { name: "target", kind: "first", points: line(400, target) },
+      { name: "", kind: "second", points: lost, as: "dots" }, { name: "", kind: "first", points: kept, as: "dots" },
+    ], { x: { name: "direction", range: [0, 1] }, y: { name: "density", range: [0, Math.max(c * q(0.35), 5)] }, height: 280 }), "Tries under an envelope");
+    const bias = integral((x) => Math.max(target(x) - c * q(x), 0));
+    stage.say(`${kept.length} of 800 tries are kept (1 / c = ${short(1 / c)})${bias > 1e-3 ? `; ${short(100 * bias)} % of the target sticks out of the envelope and is lost` : ""}.`);
+  });
+};
+
+const resampling: Figure = (stage) => {
+  const m = stage.slider("Candidates M", 0, 10, 1, 2, (x) => String(2 ** x));
+  stage.draw(() => {
+    const table = new Table(light), q = normalized(light), random = generator(7);
+    const bins = 50, picks = Math.min(20000, Math.floor(2e6 / 2 ** m())), histogram = new Array<number>(bins).fill(0);
+    for (let k = 0; k < picks; k++) {
+      let chosen = 0, sum = 0;
+      for (let j = 0; j < 2 ** m(); j++) {
+        const x = table.sample(random()), w = target(x) / q(x);
+        sum += w;
+        if (random() * sum < w) chosen = x;
+      }
+      histogram[Math.min(Math.floor(chosen * bins), bins - 1)]++;
+    }
+    const bars = histogram.map((count, i): Point => [(i + 0.5) / bins, count * bins / picks]);
+    const distance = 0.5 * bars.reduce((sum, [x, y]) => sum + Math.abs(y - integral((u) => target(x + (u - 0.5) / bins), 20)) / bins, 0);
+    stage.svg(plot([
+      { name: "picked", kind: "third", points: bars, as: "bars" }, { name: "candidates", kind: "second", points: line(400, q) }, { name: "target", kind: "first", points: line(400, target) },
+    ], { x: { name: "direction", range: [0, 1] }, y: { name: "density", range: [0, 8] }, height: 260 }), "A histogram of what resampling picks");
+    stage.say(`${short(100 * distance)} % of the picks lie where the target has no room for them.`);
+  });
+};
+
+const fourWays: Figure = (stage) => {
+  const by = stage.choice("Compare", [["counts", "at the counts named above"], ["time", "in half a second each"]]);
+  const diffuse = stage.slider("Diffuse share", 0, 0.8, 0.1, 0);
+  const ways: [string, string][] = [["environment:100", "environment, 100"], ["brdf:75", "reflectance, 75"], ["mis:50:38", "both, 50 : 38"], ["sir:15/800", "resampling, 15 of 800"]];
+  const size = 96, figures = ways.map(([, name]) => {
+    const element = h("canvas", { width: String(size), height: String(size), role: "img", "aria-label": `A sphere by ${name}` });
+    const caption = h("figcaption", {}, name);
+    return { view: new FilmView(element, false), caption, figure: h("figure", {}, element, caption) };
+  });
+  stage.drawing.replaceChildren(h("div", { class: "quartet" }, ...figures.map((f) => f.figure)));
+  let token = 0;
+  stage.draw(async () => {
+    const host = stage.app.engines.extra();
+    await host.call("loadScene", JSON.stringify({ scene: "sphere-orthographic", material: `phong:50:1:${diffuse()}`, ground: false }));
+    await host.call("loadEnvironment", JSON.stringify({ probe: "cathedral", rows: 128, rotate: 0, scale: 1, exposure: 0 }));
+    const told: string[] = [];
+    for (const [k, [strategy, name]] of ways.entries()) {
+      const film = new Film(size, size), timed = by() === "time";
+      let exposed = false;
+      const started = performance.now(), mine = ++token;
+      let last: Extract<FromWorker, { kind: "update" }> | undefined;
+      await new Promise<void>((resolve, reject) => {
+        const timer = timed ? setTimeout(resolve, 500) : 0;
+        host.onRender = (message) => {
+          if (message.token !== mine) return;
+          if (message.kind === "failed") reject(new Error(message.error));
+          if (message.kind !== "update") return;
+          film.put(message.windows, message.pixels);
+          last = message;
+          if (message.complete) { clearTimeout(timer); resolve(); }
+        };
+        const few = timed && k === 3 ? strategy : timed ? strategy.replace("100", "4").replace("75", "4").replace("50:38", "2:2") : strategy;
+        host.send({ kind: "render", token: mine, settings: JSON.stringify({ width: size, height: size, spp: timed ? 4096 : 1, strategy: few, seed: 0, hideEnvironment: true, camera: null, shard: [0, 1] }) });
+      });
+      host.send({ kind: "stop" });
+      if (!exposed) figures[k].view.set({ exposure: 0, curve: "agx" });
+      exposed = true;
+      figures[k].view.show(0, film);
+      const seconds = (performance.now() - started) / 1000;
+      figures[k].caption.textContent = `${name.split(",")[0]}${timed ? "" : `,${name.split(",")[1]}`}: ${short(seconds)} s`;
+      if (last) told.push(`${name.split(",")[0]} ${short(last.statistics.shadowRays / 1000)} thousand rays`);
+    }
+    stage.say(`Traced: ${told.join(", ")}.`);
+  });
+};
+
+const biasAndVariance: Figure = (stage) => {
+  const edge = stage.slider("Edge of the shadow", 0.1, 0.9, 0.005, 0.4);
+  stage.draw(() => {
+    const f = (x: number) => (x < edge() ? 1 : 0), random = generator(9);
+    const counts = Array.from({ length: 40 }, (_, k) => Math.round(2 ** (1 + k / 4.5))).filter((c, k, all) => c !== all[k - 1]);
+    const fixed = counts.map((n): Point => [n, Math.abs(Array.from({ length: n }, (_, i) => f((i + 0.5) / n)).reduce((a: number, b) => a + b, 0) / n - edge())]);
+    const runs = 200;
+    const noisy = counts.map((n): Point => {
+      let squares = 0;
+      for (let run = 0; run < runs; run++) {
+        let sum = 0;
+        for (let k = 0; k < n; k++) sum += f(random());
+        squares += (sum / n - edge()) ** 2;
+      }
+      return [n, Math.sqrt(squares / runs)];
+    });
+    stage.svg(plot([{ name: "random samples", kind: "first", points: noisy }, { name: "fixed lights", kind: "second", points: fixed }],
+      { x: { name: "N", log: true, range: [2, 1000], ticks: [2, 10, 100, 1000] }, y: { name: "error", log: true, range: [1e-5, 1] } }), "Error of random and of fixed points");
+    stage.say(`At N = ${counts.at(-1)} the noise is ${short(noisy.at(-1)![1])} and the bias ${short(fixed.at(-1)![1])}; at N = ${counts[8]} they are ${short(noisy[8][1])} and ${short(fixed[8][1])}.`);
+  });
+};
+
+const cuts = (method: string, other: string): Figure => (stage) => {
+  const rounds = stage.slider("Lights", 0, 9, 1, 4, (k) => String(2 ** k));
+  stage.draw(async () => {
+    const { engines } = stage.app, n = 2 ** rounds(), width = 512;
+    const ask = async (name: string) => JSON.parse(await engines.call("lights", JSON.stringify({ method: name, n, sun: false, lamps: 0 })));
+    const beside = await ask(other), rig = await ask(method);
+    const regions = (await engines.call("regions", width)) as Uint32Array;
+    const rgb = (await engines.call("map", width)) as Float32Array;
+    const context = canvas(stage, 640, 320, `The map in ${n} regions`);
+    paintMap(context, rgb, width);
+    context.fillStyle = "rgb(255 255 255 / 0.8)";
+    const [sx, sy] = [640 / width, 640 / width];
+    regions.forEach((label, i) => {
+      const x = i % width, below = regions[i + width];
+      if (label !== regions[i - x + (x + 1) % width]) context.fillRect((x + 1) * sx - 0.5, Math.floor(i / width) * sy, 1, sy);
+      if (below !== undefined && label !== below) context.fillRect(x * sx, (Math.floor(i / width) + 1) * sy - 0.5, sx, 1);
+    });
+    for (const { uv, share } of rig.lights as { uv: Point; share: number }[]) {
+      context.beginPath();
+      context.arc(640 * uv[0], 320 * uv[1], 2 + 8 * Math.sqrt(share), 0, 2 * Math.PI);
+      context.fillStyle = "#ffd34d";
+      context.fill();
+      context.strokeStyle = "#000";
+      context.stroke();
+    }
+    const percent = (x: number) => `${short(100 * x)} %`;
+    stage.say(`${n} light${n > 1 ? "s" : ""} of ${stage.app.envName}: shading errs by ${percent(rig.diffuse)} matte and ${percent(rig.glossy)} glossy; ${other.replace("-", " ")} by ${percent(beside.diffuse)} and ${percent(beside.glossy)}.`);
+  });
+};
+
+export const FIGURES: Figure[] = [
+  estimator, lobes, ward, halfVectors, inversion, rowsAndColumns, environmentSamples, combination, product, rejection, resampling,
+  fourWays, biasAndVariance, cuts("median-cut", "variance-minimization"), cuts("variance-minimization", "median-cut"),
+];

@@ -1,0 +1,485 @@
+// The Picture panel: the progressive picture, its camera, material, strategies, and what it costs.
+
+import type { App, Change } from "./app";
+import { $, color, count, degrees, fill, save, short, signed, stops } from "./dom";
+import { materialEditor, strategyEditor } from "./editors";
+import type { Camera, Job, RenderSettings } from "./engines";
+import { Film, FilmView } from "./film";
+import { plot, slope, type Series } from "./plot";
+import { PROBES, SCENES, command, toHash } from "./state";
+import { CURVES, type Curve } from "./tone";
+
+type Vec = [number, number, number];
+const sub = (a: number[], b: number[]): Vec => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+const add = (a: number[], b: number[], k = 1): Vec => [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]];
+const dot = (a: number[], b: number[]) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a: number[], b: number[]): Vec => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const scale = (a: number[], k: number): Vec => [a[0] * k, a[1] * k, a[2] * k];
+const unit = (a: number[]): Vec => scale(a, 1 / Math.hypot(...a));
+const turned = (v: number[], axis: number[], angle: number): Vec =>
+  add(add(scale(v, Math.cos(angle)), cross(axis, v), Math.sin(angle)), axis, dot(axis, v) * (1 - Math.cos(angle)));
+
+/** The picture that is shown while the camera moves has this many pixels along an edge. */
+const PREVIEW = 128;
+
+export class PicturePanel {
+  private view: FilmView;
+  private jobs: Job[] = [];
+  private films: Film[] = [];
+  private histories: { rays: number; error: number; samples: number }[][] = [[], []];
+  private preview = false;
+  private settle = 0;
+  private automatic = true;
+  private lastPlot = 0;
+  /** What decides the picture that is rendered. */
+  private renderedKey = "";
+  /** Times of the last start and of the first pixels after it [ms]. */
+  readonly times = { start: 0, first: 0, done: 0 };
+
+  constructor(private app: App) {
+    this.view = new FilmView($<HTMLCanvasElement>("film"), !new URLSearchParams(location.search).has("2d"));
+    app.engines.events = {
+      update: (job, update) => this.update(job, update.windows, update.pixels),
+      failed: (_, error) => app.tell(error, true),
+    };
+    app.on((what) => this.changed(what));
+    this.wireControls();
+    this.wireCamera();
+    this.wireDivider();
+    this.fillControls();
+  }
+
+  private changed(what: Change) {
+    if (what === "all" || what === "files") this.fillControls();
+    if (what === "files" || what === "panel") return;
+    if (what === "pixel" || what === "view") {
+      this.showView();
+      return;
+    }
+    if (what === "scene" || what === "light") this.automatic = this.app.state.exposure === null;
+    this.showView();
+    if (!this.app.scene || !this.app.probe) return;
+    const { panel, step, pixel, exposure, curve, mapping, method, lights, sun, lamps, ...rendered } = this.app.state;
+    const key = JSON.stringify(rendered);
+    // What came by the hash may be of another panel alone.
+    if (what === "all" && key === this.renderedKey) return;
+    this.renderedKey = key;
+    this.restart(what !== "render");
+  }
+
+  // ---- rendering
+
+  /** Renders anew: after a change of what is seen first small, so that it is seen at once. */
+  restart(atOnce: boolean) {
+    clearTimeout(this.settle);
+    const small = atOnce && this.app.state.size > 1.5 * PREVIEW;
+    if (small) {
+      this.start(true);
+      this.settle = setTimeout(() => this.start(false), 150) as unknown as number;
+    } else this.start(false);
+  }
+
+  private start(preview: boolean) {
+    const { state } = this.app;
+    const size = preview ? PREVIEW : state.size;
+    const settings = (strategy: string): RenderSettings => ({
+      width: size, height: size, spp: preview ? 1 : state.spp, strategy: preview ? "mis:1:1:no-compensation" : strategy,
+      seed: state.seed, hideEnvironment: state.hide, camera: state.camera,
+    });
+    const pair = !preview && state.beside;
+    this.preview = preview;
+    this.calibrated = false;
+    this.times.start = performance.now();
+    this.times.first = this.times.done = 0;
+    const right = () => ({ ...settings(state.beside), ...(state.equal === "time" ? { spp: 65536 } : {}) });
+    this.jobs = this.app.engines.render(pair ? [settings(state.strategy), right()] : [settings(state.strategy)]);
+    // What was seen stays until there is more.
+    this.films = this.jobs.map(() => new Film(size, size));
+    this.histories = [[], []];
+    if (!preview) this.app.tell("Rendering …");
+    $("viewer").toggleAttribute("data-busy", true);
+  }
+
+  private update(job: Job, windows: Uint32Array, pixels: Float32Array) {
+    const side = this.jobs.indexOf(job);
+    if (side < 0) return;
+    const film = this.films[side];
+    const isFirst = this.view.films[side] !== film;
+    if (isFirst) {
+      film.put(windows, pixels);
+      // The rest of the picture until it is there: what was seen before, in this one's size.
+      const before = this.view.films[side] ?? this.view.films[0];
+      if (before) this.underlay(film, before, windows);
+      this.view.show(side, film);
+      if (side === 0 && this.jobs.length === 1) this.view.show(1, null);
+      this.times.first ||= performance.now();
+    } else this.view.update(side, windows, pixels);
+    if (this.automatic && (isFirst || job.complete || this.preview)) this.expose(film);
+    this.pace();
+    if (this.preview) {
+      document.documentElement.dataset.preview = String(Math.round(performance.now() - this.times.start));
+      return;
+    }
+    const statistics = job.statistics;
+    const history = this.histories[side];
+    const last = history.at(-1);
+    if (statistics.samples >= 2 && (!last || statistics.shadowRays > 1.15 * last.rays || job.complete)) {
+      history.push({ rays: statistics.shadowRays, error: statistics.relativeVariance, samples: statistics.samples });
+    }
+    this.report(job.complete);
+    if (this.jobs.every((j) => j.complete)) {
+      this.times.done = performance.now();
+      this.app.tell(`Done in ${((this.times.done - this.times.start) / 1000).toFixed(1)} s`);
+      $("viewer").toggleAttribute("data-busy", false);
+      document.documentElement.dataset.complete = String(job.token);
+    }
+    document.documentElement.dataset.ready = "true";
+  }
+
+  /** Fills what has no samples yet from an older picture of any size. */
+  private underlay(film: Film, before: Film, windows: Uint32Array) {
+    const has = new Uint8Array(film.width * film.height);
+    for (let i = 0; i < windows.length; i += 4) {
+      for (let y = windows[i + 1]; y < windows[i + 1] + windows[i + 3]; y++) has.fill(1, y * film.width + windows[i], y * film.width + windows[i] + windows[i + 2]);
+    }
+    for (let i = 0; i < has.length; i++) {
+      if (has[i]) continue;
+      const x = Math.floor((i % film.width) * before.width / film.width), y = Math.floor(Math.floor(i / film.width) * before.height / film.height);
+      const from = 4 * (y * before.width + x);
+      film.pixels.copyWithin(0, 0, 0);
+      for (let c = 0; c < 4; c++) film.pixels[4 * i + c] = before.pixels[from + c];
+    }
+  }
+
+  private calibrated = false;
+
+  /** At equal rays the right picture has as many samples as make as many rays, and the one that is ahead waits; at equal
+   *  time it ends with the left one. */
+  private pace() {
+    if (this.jobs.length < 2) return;
+    const { engines, state } = this.app, [a, b] = this.jobs;
+    if (state.equal !== "rays") {
+      if (a.complete && !b.complete) engines.end(b);
+      return;
+    }
+    const both = this.jobs.map((job) => job.statistics), rays = both.map((s) => s.shadowRays);
+    if (!this.calibrated && both.every((s) => s.samples >= 1)) {
+      this.calibrated = true;
+      // By hits, of which both have as many: some tiles are already in another pass than the others.
+      const [ofLeft, ofRight] = both.map((s) => s.shadowRays / Math.max(s.shadingPoints, 1));
+      const spp = Math.min(Math.max(1, Math.round(state.spp * ofLeft / Math.max(ofRight, 1e-3))), 65536);
+      if (spp !== b.settings.spp) {
+        this.jobs[1] = engines.again(b, { spp });
+        this.histories[1] = [];
+        engines.pause(a, false);
+        return;
+      }
+    }
+    const ahead = 1.02 * Math.max(1, Math.min(...rays)) + 20_000;
+    engines.pause(a, !b.complete && rays[0] > ahead);
+    engines.pause(b, !a.complete && rays[1] > ahead);
+  }
+
+  private expose(film: Film) {
+    const exposure = film.exposure();
+    this.view.set({ exposure });
+    const slider = $<HTMLInputElement>("exposure");
+    slider.value = String(exposure);
+    $("exposure-value").textContent = stops(exposure);
+  }
+
+  private report(force: boolean) {
+    const now = performance.now();
+    if (!force && now - this.lastPlot < 200) return;
+    this.lastPlot = now;
+    const progress = this.jobs.reduce((sum, job) => sum + job.progress, 0) / this.jobs.length;
+    $<HTMLProgressElement>("progress").value = progress;
+    const one = (job: Job) => {
+      const s = job.statistics;
+      const bad = s.nonFinite ? `, ${s.nonFinite} not finite` : "";
+      return `${s.samples.toFixed(s.samples < 10 ? 1 : 0)} samples a pixel, ${count(s.shadowRays)} shadow rays${bad}`;
+    };
+    $("counts").textContent = this.jobs.map((job) => (this.jobs.length > 1 ? `${job.strategy}: ` : "") + one(job)).join(" · ");
+    const series: Series[] = this.jobs.map((job, i) => ({
+      name: job.strategy || job.settings.strategy, kind: i ? "second" : "first",
+      points: this.histories[i].map((p): [number, number] => [p.rays, p.error]),
+    }));
+    if (series.every((s) => !s.points.length)) $("error-plot").replaceChildren();
+    else $("error-plot").innerHTML = plot(series, { x: { name: "shadow rays", log: true, tick: count }, y: { name: "relative variance of the mean", log: true }, height: 200 });
+    const slopes = series.map((s) => `${s.name}: ${short(s.points.at(-1)?.[1] ?? NaN)}, slope ${signed(slope(s.points))}`);
+    $("error-plot").setAttribute("aria-label", `Estimated relative variance. ${slopes.join("; ")}`);
+    $("error-plot").parentElement!.querySelector("figcaption")!.textContent =
+      `Estimated error over shadow rays — ${series.map((s) => { const k = slope(s.points); return isFinite(k) ? `${s.name} falls with slope ${signed(k)}` : `${s.name}: two passes are needed`; }).join("; ")}`;
+    $("command").textContent = command(this.app.state);
+  }
+
+  // ---- what is shown of it
+
+  private showView() {
+    const { state } = this.app;
+    this.view.look.curve = state.curve as Curve;
+    if (state.exposure !== null) {
+      this.automatic = false;
+      this.view.set({ exposure: state.exposure });
+      $<HTMLInputElement>("exposure").value = String(state.exposure);
+      $("exposure-value").textContent = stops(state.exposure);
+    } else this.view.set({});
+    const split = !!state.beside;
+    $("divider").hidden = !split;
+    if (!split) this.view.set({ divider: 1 });
+    else if (this.view.look.divider === 1) this.setDivider(0.5);
+    for (const [id, text] of [["tag-left", state.strategy], ["tag-right", state.beside]]) {
+      $(id).hidden = !split;
+      $(id).textContent = text;
+    }
+    $("command").textContent = command(state);
+    const marks = $<HTMLCanvasElement>("film-marks"), context = marks.getContext("2d")!;
+    context.clearRect(0, 0, marks.width, marks.height);
+    if (state.pixel) {
+      const [x, y] = state.pixel.map((c) => (c + 0.5) / state.size * marks.width);
+      for (const [width, style] of [[4, "#000"], [1.75, "#fff"]] as const) {
+        context.lineWidth = width;
+        context.strokeStyle = style;
+        context.beginPath();
+        context.arc(x, y, 9, 0, 2 * Math.PI);
+        context.stroke();
+      }
+    }
+  }
+
+  private setDivider(share: number) {
+    const clamped = Math.min(Math.max(share, 0), 1);
+    this.view.set({ divider: clamped });
+    const divider = $("divider");
+    divider.style.left = `${100 * clamped}%`;
+    divider.setAttribute("aria-valuenow", String(Math.round(100 * clamped)));
+  }
+
+  private wireDivider() {
+    const divider = $("divider");
+    divider.addEventListener("pointerdown", (event) => {
+      event.stopPropagation();
+      divider.setPointerCapture(event.pointerId);
+    });
+    divider.addEventListener("pointermove", (event) => {
+      if (!divider.hasPointerCapture(event.pointerId)) return;
+      const box = $("viewer").getBoundingClientRect();
+      this.setDivider((event.clientX - box.left) / box.width);
+    });
+    divider.addEventListener("keydown", (event) => {
+      const step = { ArrowLeft: -0.02, ArrowRight: 0.02, Home: -1, End: 1 }[event.key];
+      if (step === undefined) return;
+      event.preventDefault();
+      event.stopPropagation();
+      this.setDivider(this.view.look.divider + step);
+    });
+  }
+
+  // ---- camera
+
+  private camera(): Camera | null {
+    return this.app.state.camera ?? this.app.scene?.camera ?? null;
+  }
+
+  private orbit(yaw: number, pitch: number, zoom = 1) {
+    const camera = this.camera(), scene = this.app.scene;
+    if (!camera || !scene) return;
+    const up = unit(scene.up), center = scene.center;
+    const turn = (point: number[]) => add(center, turned(sub(point, center), up, yaw));
+    let origin = turn(camera.origin), target = turn(camera.target);
+    const forward = unit(sub(target, origin)), right = unit(cross(forward, up));
+    const elevation = Math.asin(Math.min(Math.max(-dot(forward, up), -1), 1));
+    const limited = Math.min(Math.max(elevation + pitch, -1.5), 1.5) - elevation;
+    const tilt = (point: number[]) => add(center, turned(sub(point, center), right, -limited));
+    origin = tilt(origin);
+    target = tilt(target);
+    origin = add(target, sub(origin, target), zoom);
+    const ortho = camera.ortho === null ? null : Math.fround(camera.ortho * zoom);
+    const rounded = (v: Vec) => v.map(Math.fround);
+    this.app.state.camera = { origin: rounded(origin), target: rounded(target), up: rounded(turned(camera.up, up, yaw)), fov: camera.fov, ortho };
+    this.app.set({ pixel: null }, "camera");
+  }
+
+  private wireCamera() {
+    const viewer = $("viewer");
+    const pointers = new Map<number, { x: number; y: number }>();
+    let moved = 0;
+    viewer.addEventListener("pointerdown", (event) => {
+      viewer.setPointerCapture(event.pointerId);
+      pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      moved = 0;
+    });
+    viewer.addEventListener("pointermove", (event) => {
+      const last = pointers.get(event.pointerId);
+      if (!last) return;
+      const dx = event.clientX - last.x, dy = event.clientY - last.y;
+      moved += Math.abs(dx) + Math.abs(dy);
+      if (pointers.size === 2) {
+        const [a, b] = [...pointers.values()];
+        const before = Math.hypot(a.x - b.x, a.y - b.y);
+        pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+        const [c, d] = [...pointers.values()];
+        this.orbit(0, 0, before / Math.max(Math.hypot(c.x - d.x, c.y - d.y), 1));
+        return;
+      }
+      if (moved < 4) return;
+      pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      this.orbit(-dx * 0.01, dy * 0.01);
+    });
+    const end = (event: PointerEvent) => {
+      const was = pointers.delete(event.pointerId);
+      if (was && event.type === "pointerup" && moved < 4 && pointers.size === 0) this.pick(event);
+    };
+    viewer.addEventListener("pointerup", end);
+    viewer.addEventListener("pointercancel", end);
+    viewer.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.orbit(0, 0, Math.exp(Math.min(Math.max(event.deltaY, -100), 100) * 0.002));
+    }, { passive: false });
+    viewer.addEventListener("keydown", (event) => {
+      const step = 0.1;
+      const moves: Record<string, [number, number, number]> = {
+        ArrowLeft: [-step, 0, 1], ArrowRight: [step, 0, 1], ArrowUp: [0, step, 1], ArrowDown: [0, -step, 1],
+        "+": [0, 0, 0.9], "=": [0, 0, 0.9], "-": [0, 0, 1 / 0.9],
+      };
+      const move = moves[event.key];
+      if (!move || event.target !== viewer) return;
+      event.preventDefault();
+      this.orbit(...move);
+    });
+  }
+
+  private pick(event: PointerEvent) {
+    const box = $("viewer").getBoundingClientRect(), { size } = this.app.state;
+    const at = (x: number, n: number) => Math.min(Math.max(Math.floor(x / n * size), 0), size - 1);
+    this.app.set({ pixel: [at(event.clientX - box.left, box.width), at(event.clientY - box.top, box.height)] }, "pixel");
+    this.app.tell("Picked: see X-ray and Map for what this pixel samples");
+  }
+
+  // ---- controls
+
+  private fillControls() {
+    const { app } = this, { state } = app;
+    const withFile = (known: string[], files: string[], chosen: string) => [...known, ...files, ...([...known, ...files].includes(chosen) ? [] : [chosen])];
+    fill($("scene"), withFile(SCENES, app.files.scenes, state.scene), state.scene);
+    fill($("env"), withFile(PROBES, app.files.probes, state.env), state.env);
+    fill($("curve"), CURVES, state.curve);
+    $<HTMLInputElement>("ground").checked = state.ground;
+    $<HTMLInputElement>("hide").checked = state.hide;
+    for (const id of ["spp", "size", "seed", "rotate", "ev", "material"] as const) $<HTMLInputElement>(id).value = String(state[id]);
+    $("rotate-value").textContent = degrees(state.rotate);
+    $("ev-value").textContent = stops(state.ev);
+    $<HTMLSelectElement>("equal").value = state.equal;
+    $<HTMLInputElement>("split").checked = !!state.beside;
+    $("beside").hidden = !state.beside;
+    this.fillMaterial();
+    strategyEditor($("strategy-editor"), state.strategy, (strategy) => app.set({ strategy }));
+    strategyEditor($("beside-editor"), state.beside || "mis:1:1", (beside) => app.set({ beside }));
+  }
+
+  private materialTimer = 0;
+  private fillMaterial() {
+    materialEditor($("model"), $("material-numbers"), this.app.state.material, (material) => {
+      $<HTMLInputElement>("material").value = material;
+      clearTimeout(this.materialTimer);
+      this.materialTimer = setTimeout(() => this.app.set({ material }), 60) as unknown as number;
+    });
+  }
+
+  private wireControls() {
+    const { app } = this;
+    const on = (id: string, event: string, f: (input: HTMLInputElement) => void) =>
+      $(id).addEventListener(event, () => f($<HTMLInputElement>(id)));
+    on("scene", "change", (i) => {
+      app.set({ scene: i.value, camera: null, material: "", pixel: null });
+      $<HTMLInputElement>("material").value = "";
+      this.fillMaterial();
+    });
+    on("env", "change", (i) => app.set({ env: i.value, exposure: null }));
+    on("ground", "change", (i) => app.set({ ground: i.checked }));
+    on("hide", "change", (i) => app.set({ hide: i.checked }));
+    on("material", "change", (i) => {
+      app.set({ material: i.value.trim() });
+      this.fillMaterial();
+    });
+    on("rotate", "input", (i) => {
+      $("rotate-value").textContent = degrees(Number(i.value));
+      app.set({ rotate: Number(i.value) });
+    });
+    on("ev", "input", (i) => {
+      $("ev-value").textContent = stops(Number(i.value));
+      app.set({ ev: Number(i.value) });
+    });
+    const number = (id: "spp" | "size" | "seed", most: number) => on(id, "change", (i) => {
+      const least = id === "seed" ? 0 : id === "size" ? 16 : 1;
+      i.value = String(Math.min(Math.max(Math.round(Number(i.value)) || least, least), most));
+      app.set({ [id]: Number(i.value), ...(id === "size" ? { pixel: null } : {}) });
+    });
+    number("spp", 65536);
+    number("size", 2048);
+    number("seed", 4294967295);
+    on("split", "change", (i) => {
+      $("beside").hidden = !i.checked;
+      app.set({ beside: i.checked ? "mis:1:1" : "" });
+      if (i.checked) strategyEditor($("beside-editor"), "mis:1:1", (beside) => app.set({ beside }));
+    });
+    on("equal", "change", (i) => app.set({ equal: i.value }));
+    on("exposure", "input", (i) => app.set({ exposure: Number(i.value) }, "view"));
+    on("curve", "change", (i) => app.set({ curve: i.value }, "view"));
+    $("auto").addEventListener("click", () => {
+      app.set({ exposure: null }, "view");
+      this.automatic = true;
+      if (this.view.films[0]) this.expose(this.view.films[0]);
+    });
+    $("reset-camera").addEventListener("click", () => {
+      app.state.camera = null;
+      app.set({ pixel: null }, "camera");
+    });
+    on("files", "change", (i) => {
+      void app.open([...(i.files ?? [])].map((file) => ({ path: file.webkitRelativePath || file.name, file })));
+      i.value = "";
+    });
+    $("save-exr").addEventListener("click", () => this.save("exr"));
+    $("save-png").addEventListener("click", () => this.save("png"));
+    $("copy-link").addEventListener("click", () => this.copy(`${location.href.replace(/#.*/, "")}#${toHash(app.state)}`, "The link is copied"));
+    $("copy-command").addEventListener("click", () => this.copy(command(app.state), "The command is copied"));
+  }
+
+  private async copy(text: string, told: string) {
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      // Where there is no right to the clipboard, the old way.
+      const area = document.createElement("textarea");
+      area.value = text;
+      document.body.append(area);
+      area.select();
+      document.execCommand("copy");
+      area.remove();
+    }
+    this.app.tell(told);
+  }
+
+  /** The bytes of the picture as a file. */
+  async file(kind: "exr" | "png"): Promise<Uint8Array> {
+    const { engines, state } = this.app;
+    await engines.gather(this.jobs[0]);
+    if (kind === "png") return engines.call("png", this.view.look.exposure, state.curve) as Promise<Uint8Array>;
+    const { scene, env, spp, seed } = state;
+    return engines.call("exr", JSON.stringify({ scene, environment: env, samples: spp, seed })) as Promise<Uint8Array>;
+  }
+
+  private async save(kind: "exr" | "png") {
+    if (this.preview || !this.jobs.length) return;
+    try {
+      save(`domelight.${kind}`, await this.file(kind));
+      this.app.tell(`domelight.${kind} is saved`);
+    } catch (error) {
+      this.app.tell((error as Error).message, true);
+    }
+  }
+}
+
+/** Keeps the theme's colors in canvases that draw with them. */
+export const themed = (draw: () => void) => matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+export { color };

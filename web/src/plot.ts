@@ -1,0 +1,97 @@
+// Plots as SVG.
+
+import { short } from "./dom";
+
+export interface Series {
+  name: string;
+  points: [number, number][];
+  kind: "first" | "second" | "third";
+  /** Drawn as bars, dots or an area instead of a line. */
+  as?: "line" | "dots" | "bars" | "area" | "faint";
+}
+
+export interface Axes {
+  x: { name: string; log?: boolean; range?: [number, number]; ticks?: number[]; tick?: (x: number) => string };
+  y: { name: string; log?: boolean; range?: [number, number]; ticks?: number[] };
+  height?: number;
+  width?: number;
+}
+
+const escape = (text: string) => text.replace(/[&<>]/g, (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;" })[c]!);
+
+function extent(values: number[], log = false): [number, number] {
+  const usable = values.filter((v) => isFinite(v) && (!log || v > 0));
+  if (!usable.length) return log ? [0.1, 1] : [0, 1];
+  let [low, high] = [Math.min(...usable), Math.max(...usable)];
+  if (log) {
+    [low, high] = [10 ** Math.floor(Math.log10(low)), 10 ** Math.ceil(Math.log10(high))];
+    return low === high ? [low, 10 * low] : [low, high];
+  }
+  return low === high ? [low - 0.5, high + 0.5] : [low, high];
+}
+
+function ticksOf([low, high]: [number, number], log = false): number[] {
+  if (log) {
+    const decades = Math.round(Math.log10(high / low));
+    const every = Math.ceil(decades / 6) || 1;
+    return Array.from({ length: Math.floor(decades / every) + 1 }, (_, i) => low * 10 ** (i * every));
+  }
+  const rough = (high - low) / 5;
+  const unit = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map((k) => k * unit).find((s) => s >= rough)!;
+  const first = Math.ceil(low / step - 1e-9) * step;
+  return Array.from({ length: Math.floor((high - first) / step + 1e-9) + 1 }, (_, i) => Number((first + i * step).toPrecision(10)));
+}
+
+/** An SVG of series over two axes. */
+export function plot(series: Series[], axes: Axes): string {
+  const width = axes.width ?? 640, height = axes.height ?? 240;
+  const [left, right, top, bottom] = [58, 14, 22, 38];
+  const xs = axes.x.range ?? extent(series.flatMap((s) => s.points.map((p) => p[0])), axes.x.log);
+  const ys = axes.y.range ?? extent(series.flatMap((s) => s.points.map((p) => p[1])), axes.y.log);
+  const share = (v: number, [low, high]: [number, number], log = false) =>
+    log ? Math.log(Math.max(v, 1e-300) / low) / Math.log(high / low) : (v - low) / (high - low);
+  const X = (v: number) => left + (width - left - right) * share(v, xs, axes.x.log);
+  const Y = (v: number) => height - bottom - (height - top - bottom) * Math.min(Math.max(share(v, ys, axes.y.log), -0.02), 1.02);
+  const at = (p: [number, number]) => `${X(p[0]).toFixed(1)},${Y(p[1]).toFixed(1)}`;
+  const out: string[] = [];
+  for (const t of axes.y.ticks ?? ticksOf(ys, axes.y.log)) {
+    out.push(`<path class="grid" d="M${left} ${Y(t)}H${width - right}"/><text x="${left - 7}" y="${Y(t) + 4}" text-anchor="end">${short(t)}</text>`);
+  }
+  for (const t of axes.x.ticks ?? ticksOf(xs, axes.x.log)) {
+    const label = axes.x.tick ? axes.x.tick(t) : short(t);
+    const anchor = X(t) > width - right - 12 ? "end" : "middle";
+    out.push(`<text x="${X(t)}" y="${height - bottom + 17}" text-anchor="${anchor}">${escape(label)}</text>`);
+  }
+  const base = Y(axes.y.log ? ys[0] : Math.max(ys[0], Math.min(0, ys[1])));
+  for (const s of series) {
+    const points = s.points.filter(([x, y]) => isFinite(x) && isFinite(y) && (!axes.y.log || y > 0) && (!axes.x.log || x > 0));
+    if (!points.length) continue;
+    if (s.as === "dots") out.push(...points.map((p) => `<circle class="${s.kind} fill" cx="${X(p[0]).toFixed(1)}" cy="${Y(p[1]).toFixed(1)}" r="3"/>`));
+    else if (s.as === "bars") {
+      const w = points.length > 1 ? Math.abs(X(points[1][0]) - X(points[0][0])) * 0.9 : 8;
+      out.push(...points.map((p) => `<rect class="${s.kind} fill faint" x="${(X(p[0]) - w / 2).toFixed(1)}" y="${Math.min(Y(p[1]), base).toFixed(1)}" width="${w.toFixed(1)}" height="${Math.abs(Y(p[1]) - base).toFixed(1)}"/>`));
+    } else if (s.as === "area") out.push(`<path class="${s.kind} fill faint" d="M${X(points[0][0])},${base}L${points.map(at).join("L")}L${X(points[points.length - 1][0])},${base}Z"/>`);
+    else out.push(`<path class="${s.kind} line${s.as === "faint" ? " faint" : ""}" d="M${points.map(at).join("L")}"/>`);
+  }
+  out.push(`<path class="axis" d="M${left} ${height - bottom}H${width - right}"/>`);
+  out.push(`<text x="${(left + width - right) / 2}" y="${height - 4}" text-anchor="middle">${escape(axes.x.name)}</text>`);
+  out.push(`<text x="${left}" y="12">${escape(axes.y.name)}</text>`);
+  let legend = width - right;
+  for (const s of [...series].reverse().filter((s) => s.name)) {
+    out.push(`<text class="name" x="${legend}" y="12" text-anchor="end">${escape(s.name)}</text>`);
+    legend -= 6.6 * s.name.length + 8;
+    out.push(`<path class="${s.kind} line" d="M${legend - 14} 8h14"/>`);
+    legend -= 26;
+  }
+  return `<svg viewBox="0 0 ${width} ${height}" aria-hidden="true">${out.join("")}</svg>`;
+}
+
+/** The slope of log y over log x by least squares; NaN of fewer than two points. */
+export function slope(points: [number, number][]): number {
+  const logs = points.filter(([x, y]) => x > 0 && y > 0).map(([x, y]) => [Math.log(x), Math.log(y)]);
+  const mean = (i: number) => logs.reduce((sum, p) => sum + p[i], 0) / logs.length;
+  const [mx, my] = [mean(0), mean(1)];
+  const dot = (f: (p: number[]) => number) => logs.reduce((sum, p) => sum + f(p), 0);
+  return logs.length < 2 ? NaN : dot((p) => (p[0] - mx) * (p[1] - my)) / dot((p) => (p[0] - mx) ** 2);
+}

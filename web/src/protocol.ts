@@ -1,0 +1,55 @@
+// What the page and its Workers say to each other.
+
+import type { Engine, lobeSamples, lobeSection } from "../dist/engine/engine.js";
+
+type Methods = { [K in keyof Engine]: Engine[K] extends (...args: never[]) => unknown ? K : never }[keyof Engine];
+export type Call = Exclude<Methods, "free" | typeof Symbol.dispose> | "lobeSection" | "lobeSamples";
+type Signature<C extends Call> = C extends "lobeSection" ? typeof lobeSection
+  : C extends "lobeSamples" ? typeof lobeSamples
+  : C extends keyof Engine ? Engine[C] : never;
+export type Arguments<C extends Call> = Signature<C> extends (...args: infer A) => unknown ? A : never;
+/** A map in some mapping: R, G, B and alpha. */
+export interface MapPicture {
+  width: number;
+  height: number;
+  pixels: Float32Array;
+}
+
+export type Result<C extends Call> = C extends "mapView" ? MapPicture : Signature<C> extends (...args: never[]) => infer R ? R : never;
+
+/** What was done so far by one Worker, or by several together. */
+export interface Statistics {
+  cameraRays: number;
+  shadowRays: number;
+  shadingPoints: number;
+  nonFinite: number;
+  samples: number;
+  relativeVariance: number;
+  pixels: number;
+  complete: boolean;
+}
+
+export type ToWorker =
+  | { kind: "boot"; module: WebAssembly.Module }
+  | { kind: "call"; id: number; call: Call; args: unknown[] }
+  | { kind: "render"; token: number; settings: string }
+  | { kind: "pause"; token: number; paused: boolean }
+  | { kind: "stop" };
+
+export interface Update {
+  kind: "update";
+  token: number;
+  windows: Uint32Array;
+  pixels: Float32Array;
+  complete: boolean;
+  progress: number;
+  statistics: Statistics;
+}
+
+export type FromWorker =
+  | { kind: "booted" }
+  | { kind: "result"; id: number; result: unknown }
+  | { kind: "error"; id: number; error: string; dead: boolean }
+  | { kind: "started"; token: number; strategy: string }
+  | { kind: "failed"; token: number; error: string; dead: boolean }
+  | Update;

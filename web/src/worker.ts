@@ -1,0 +1,115 @@
+// One engine. Answers calls in their order, and renders between them in slices of time.
+
+import { Engine, initSync, lobeSamples, lobeSection } from "../dist/engine/engine.js";
+import type { Call, FromWorker, ToWorker } from "./protocol";
+
+const SLICE = 40;
+
+let engine: Engine | undefined;
+let rendering: { token: number; paused: boolean } | undefined;
+const pending: ToWorker[] = [];
+
+const post = (message: FromWorker, transfer: Transferable[] = []) =>
+  (self as unknown as Worker).postMessage(message, transfer);
+
+// A message to ourselves comes after those that are already waiting.
+const channel = new MessageChannel();
+const soon = () => channel.port2.postMessage(0);
+channel.port1.onmessage = turn;
+
+self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
+  if (data.kind === "pause") {
+    if (rendering?.token === data.token) {
+      const wasPaused = rendering.paused;
+      rendering.paused = data.paused;
+      if (wasPaused && !data.paused) soon();
+    }
+    return;
+  }
+  pending.push(data);
+  soon();
+};
+
+function turn() {
+  const message = pending.shift();
+  if (message) answer(message);
+  else if (rendering && !rendering.paused) slice();
+}
+
+function answer(message: ToWorker) {
+  switch (message.kind) {
+    case "boot":
+      initSync({ module: message.module });
+      engine = new Engine();
+      post({ kind: "booted" });
+      break;
+    case "call":
+      try {
+        const result = call(message.call, message.args);
+        const buffer = ArrayBuffer.isView(result) ? [result.buffer as ArrayBuffer] : [];
+        post({ kind: "result", id: message.id, result }, buffer);
+      } catch (error) {
+        fail(message.id, error);
+      }
+      break;
+    case "render":
+      // Of several that wait, the last.
+      if (pending.some((other) => other.kind === "render")) break;
+      try {
+        const started = JSON.parse(engine!.start(message.settings));
+        rendering = { token: message.token, paused: false };
+        post({ kind: "started", token: message.token, strategy: started.strategy });
+      } catch (error) {
+        rendering = undefined;
+        post({ kind: "failed", token: message.token, error: text(error), dead: isDead(error) });
+      }
+      soon();
+      break;
+    case "stop":
+      rendering = undefined;
+      break;
+  }
+  if (pending.length || rendering) soon();
+}
+
+function call(name: Call, args: unknown[]): unknown {
+  if (name === "lobeSection") return lobeSection(...(args as Parameters<typeof lobeSection>));
+  if (name === "lobeSamples") return lobeSamples(...(args as Parameters<typeof lobeSamples>));
+  if (name === "loadScene" || name === "loadEnvironment" || name === "turnEnvironment") rendering = undefined;
+  if (name === "mapView") {
+    const view = engine!.mapView(...(args as Parameters<Engine["mapView"]>));
+    const plain = { width: view.width, height: view.height, pixels: view.pixels() };
+    view.free();
+    return plain;
+  }
+  const method = engine![name] as (...args: unknown[]) => unknown;
+  return method.apply(engine, args);
+}
+
+function slice() {
+  const { token } = rendering!;
+  try {
+    const update = engine!.step(SLICE);
+    const windows = update.windows(), pixels = update.pixels();
+    const { complete, progress } = update;
+    update.free();
+    const statistics = JSON.parse(engine!.statistics());
+    if (complete) rendering = undefined;
+    post({ kind: "update", token, windows, pixels, complete, progress, statistics }, [windows.buffer as ArrayBuffer, pixels.buffer as ArrayBuffer]);
+    if (!complete) soon();
+  } catch (error) {
+    rendering = undefined;
+    post({ kind: "failed", token, error: text(error), dead: isDead(error) });
+  }
+}
+
+/** What WebAssembly throws leaves an engine of unknown state. */
+const isDead = (error: unknown) => error instanceof WebAssembly.RuntimeError;
+
+const text = (error: unknown) =>
+  isDead(error) ? "the engine stopped, most likely for want of memory; it was started again"
+    : error instanceof Error ? error.message : String(error);
+
+function fail(id: number, error: unknown) {
+  post({ kind: "error", id, error: text(error), dead: isDead(error) });
+}

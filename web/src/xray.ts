@@ -1,0 +1,128 @@
+// The X-ray panel: the hemisphere above a pixel, where strategies send their rays, and why the pixel is noisy.
+
+import type { App, Change } from "./app";
+import { $, color, h, latest, short } from "./dom";
+import { Film, FilmView } from "./film";
+
+const SIZE = 160, DENSITY = 48;
+const LAYERS = ["light L", "reflectance f · cos θ", "visibility V", "what arrives, f · cos θ · L · V"];
+const COMPARED = ["brdf:1", "environment:1", "mis:1:1", "product:8", "sir:2/32", "rejection:16"];
+
+interface Report {
+  summary: { pixel: [number, number]; coverage: number };
+  strategies: {
+    name: string; mean: number; variance: number; raysPerSample: number; variancePerRay: number; diagnosis: string;
+    causes: [string, number][]; samples: { place: [number, number]; weight: number; visibility: number }[];
+  }[];
+  advice: string;
+}
+
+const percent = (x: number) => `${short(100 * x)} %`;
+
+export class XrayPanel {
+  private chosen = new Set(["brdf:1", "environment:1", "mis:1:1", "product:8"]);
+  private views: FilmView[] = [];
+
+  constructor(private app: App) {
+    app.on((what) => this.changed(what));
+    $("compared").replaceChildren(...COMPARED.map((name) => {
+      const input = h("input", { type: "checkbox" });
+      input.checked = this.chosen.has(name);
+      input.addEventListener("change", () => {
+        if (input.checked) this.chosen.add(name);
+        else this.chosen.delete(name);
+        this.look();
+      });
+      return h("label", { class: "check" }, input, name);
+    }));
+    $("hemispheres").replaceChildren(...LAYERS.map((name) => {
+      const canvas = h("canvas", { width: String(SIZE), height: String(SIZE), role: "img", "aria-label": `Hemisphere: ${name}` });
+      this.views.push(new FilmView(canvas, false));
+      return h("figure", {}, canvas, h("figcaption", {}, name));
+    }));
+  }
+
+  private changed(what: Change) {
+    if (this.app.state.panel === "xray" && this.app.probe && what !== "view") this.look();
+  }
+
+  private readonly look = latest(async () => {
+    const { app } = this, pixel = app.pixel();
+    $("xray-hint").hidden = !!pixel;
+    $("xray-found").hidden = !pixel;
+    if (!pixel) return;
+    $("xray-found").setAttribute("aria-busy", "true");
+    const own = app.state.strategy;
+    const strategies = [own, ...[...this.chosen].filter((name) => name !== own)];
+    const settings = (names: string[]) => JSON.stringify({ ...JSON.parse(pixel), seed: app.state.seed, strategies: names });
+    try {
+      const maps = (await app.engines.call("hemisphere", settings([]), SIZE)) as Float32Array;
+      const report = JSON.parse(await app.engines.call("inspect", settings(strategies))) as Report;
+      const { pixel: [x, y], coverage } = report.summary;
+      $("xray-summary").textContent = `Pixel ${x}, ${y} of ${app.state.size} × ${app.state.size}: ${percent(coverage)} of its camera samples show the scene.`;
+      $("xray-advice").textContent = sentence(report.advice);
+      $("hemispheres").hidden = !maps.length;
+      if (maps.length) this.paint(maps);
+      const densities: Float32Array[] = [];
+      for (const { name } of report.strategies) densities.push((await app.engines.call("directions", settings([name]), DENSITY)) as Float32Array);
+      $("densities").replaceChildren(...report.strategies.flatMap((strategy, i) => (densities[i].length ? [this.density(strategy, densities[i])] : [])));
+      this.tell(report);
+    } catch (error) {
+      app.tell((error as Error).message, true);
+    }
+    $("xray-found").setAttribute("aria-busy", "false");
+    document.documentElement.dataset.xray = pixel;
+  });
+
+  private paint(maps: Float32Array) {
+    const n = 3 * SIZE * SIZE;
+    this.views.forEach((view, i) => {
+      const film = Film.fromRgb(SIZE, SIZE, maps.subarray(i * n, (i + 1) * n));
+      // Visibility and reflectance are shares; light has its own exposure.
+      view.set({ exposure: i === 2 ? 0 : film.exposure() + (i === 3 ? 1 : 0), curve: i === 2 ? "srgb" : "agx" });
+      view.show(0, film);
+    });
+  }
+
+  private density(strategy: Report["strategies"][0], density: Float32Array) {
+    const canvas = h("canvas", { width: String(SIZE), height: String(SIZE), role: "img", "aria-label": `Directions of ${strategy.name}` });
+    const context = canvas.getContext("2d")!;
+    const small = h("canvas", { width: String(DENSITY), height: String(DENSITY) }), inner = small.getContext("2d")!;
+    const image = inner.createImageData(DENSITY, DENSITY), most = density.reduce((a, b) => Math.max(a, b), 0) || 1;
+    density.forEach((value, i) => image.data.set([255, 96, 176, 255 * Math.sqrt(value / most)], 4 * i));
+    inner.putImageData(image, 0, 0);
+    context.drawImage(small, 0, 0, SIZE, SIZE);
+    const mean = strategy.samples.reduce((sum, s) => sum + Math.abs(s.weight), 0) / (strategy.samples.length || 1) || 1;
+    for (const { place: [x, y], weight, visibility } of strategy.samples.slice(0, 96)) {
+      context.beginPath();
+      context.arc((x + 1) / 2 * SIZE, (1 - y) / 2 * SIZE, Math.min(Math.max(2 * Math.sqrt(Math.abs(weight) / mean), 1), 9), 0, 2 * Math.PI);
+      context.lineWidth = 1.25;
+      context.strokeStyle = visibility > 0 ? "#fff" : "#ff8a80";
+      context.stroke();
+      if (visibility > 0) {
+        context.fillStyle = color("free");
+        context.fill();
+      }
+    }
+    return h("figure", {}, canvas, h("figcaption", {}, strategy.name));
+  }
+
+  private tell(report: Report) {
+    $("xray-table").querySelector("tbody")!.replaceChildren(...report.strategies.map((s) =>
+      h("tr", {}, h("th", { scope: "row" }, s.name), h("td", {}, short(s.variance)), h("td", {}, short(s.raysPerSample)), h("td", {}, short(s.variancePerRay)))));
+    $("causes").replaceChildren(...report.strategies.flatMap((s) => [
+      h("h3", {}, s.name), h("p", { class: "sentence" }, sentence(s.diagnosis)),
+      ...s.causes.slice(0, 4).map(([name, share]) => {
+        const bar = h("div", { class: "bar" });
+        bar.style.width = `${Math.max(0, Math.min(100, 100 * share))}%`;
+        return h("div", { class: "cause" }, h("span", {}, name), h("div", {}, bar), h("span", {}, percent(share)));
+      }),
+    ]));
+  }
+}
+
+/** With a full stop, and a capital unless it begins with a strategy's name. */
+const sentence = (text: string) => {
+  const begin = /^[a-z-]+:/.test(text) ? text.slice(0, 1) : text.slice(0, 1).toUpperCase();
+  return text && begin + text.slice(1).replace(/\.?$/, ".");
+};

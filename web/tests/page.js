@@ -1,0 +1,98 @@
+// The page in headless Chromium, from a file.
+
+import assert from "node:assert/strict";
+import { existsSync } from "node:fs";
+import { join, resolve } from "node:path";
+import { pathToFileURL } from "node:url";
+import { chromium } from "playwright-core";
+
+const root = resolve(import.meta.dirname, "../..");
+const first = (places) => places.filter(Boolean).find((place) => existsSync(place));
+
+/** The program whose pictures the page's must be. */
+export const program = first([process.env.DOMELIGHT, join(root, "target/release/domelight"), join(root, "target/debug/domelight")]);
+const browserPath = first([process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"]);
+const file = join(root, "web/dist/domelight.html");
+assert.ok(browserPath, "no Chromium: install it, or set CHROMIUM");
+assert.ok(existsSync(file), "no web/dist/domelight.html: run web/build first");
+export const address = pathToFileURL(file).href;
+
+/** A small picture, and no more samples than a test needs. */
+export const SMALL = "size=64&spp=4&rows=64";
+
+let browser;
+export async function launch() {
+  browser = await chromium.launch({
+    executablePath: browserPath,
+    args: ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+  });
+}
+export const close = () => browser?.close();
+
+/** Opens the page; whatever goes wrong there, or reaches for the network, fails the test. */
+export async function open(hash = SMALL, { query = "", ...options } = {}) {
+  const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, acceptDownloads: true, ...options });
+  const page = await context.newPage();
+  page.setDefaultTimeout(60_000);
+  const complaints = [];
+  page.on("console", (message) => {
+    // Chromium without a GPU remarks on its own driver.
+    if (["error", "warning"].includes(message.type()) && !/GL Driver Message/.test(message.text())) complaints.push(message.text());
+  });
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  page.on("request", (request) => /^(file|data|blob):/.test(request.url()) || complaints.push(request.url()));
+  await page.goto(`${address}${query}#${hash}`);
+  await page.waitForSelector("html[data-ready]");
+  return { page, done: async () => { await context.close(); assert.deepEqual(complaints, []); } };
+}
+
+/** Does what starts a picture, and waits for its last sample. */
+export async function rendered(page, act) {
+  await act?.();
+  await page.waitForFunction(() => {
+    const { jobs, preview } = window.domelight.picture;
+    return !preview && jobs.length > 0 && jobs.every((job) => job.complete) && document.documentElement.dataset.complete === String(jobs.at(-1).token)
+      || (!preview && jobs.length > 0 && jobs.every((job) => job.complete));
+  });
+}
+
+/** Waits until the action has led to other jobs that are complete. */
+export async function renderedAnew(page, act) {
+  const before = await page.evaluate(() => Math.max(0, ...window.domelight.picture.jobs.map((job) => job.token)));
+  await act();
+  await page.waitForFunction((before) => {
+    const { jobs, preview } = window.domelight.picture;
+    return !preview && jobs.length > 0 && jobs.every((job) => job.token > before && job.complete);
+  }, before);
+}
+
+/** A hash (FNV-1a) of a canvas. */
+export const canvasHash = (page, id) => page.evaluate(async (id) => {
+  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  const canvas = document.getElementById(id);
+  const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+  const context = copy.getContext("2d", { willReadFrequently: true });
+  context.drawImage(canvas, 0, 0);
+  return context.getImageData(0, 0, copy.width, copy.height).data.reduce((hash, byte) => Math.imul(hash ^ byte, 16777619), 2166136261);
+}, id);
+
+/** The mean of a canvas's bytes. */
+export const brightness = (page, id) => page.evaluate(async (id) => {
+  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  const canvas = document.getElementById(id);
+  const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+  const context = copy.getContext("2d", { willReadFrequently: true });
+  context.drawImage(canvas, 0, 0);
+  const { data } = context.getImageData(0, 0, copy.width, copy.height);
+  return data.reduce((sum, byte) => sum + byte, 0) / data.length;
+}, id);
+
+export const text = (page, selector) => page.$eval(selector, (e) => e.textContent);
+
+/** Moves a slider like a person who drags it. */
+export const slide = (page, selector, value) => page.$eval(selector, (input, value) => {
+  input.value = String(value);
+  input.dispatchEvent(new Event("input", { bubbles: true }));
+}, value);
+
+export const show = (page, panel) => page.click(`#tab-${panel}`);

@@ -1,0 +1,272 @@
+// Each panel, driven like a person does.
+
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { after, before, test } from "node:test";
+import { SMALL, address, brightness, canvasHash, close, launch, open, rendered, renderedAnew, show, slide, text } from "./page.js";
+
+before(launch);
+after(close);
+
+const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+/** Axe's findings, by rule. */
+async function violations(page) {
+  await page.evaluate(axe);
+  return page.evaluate(async () => (await window.axe.run(document, { resultTypes: ["violations"] })).violations.map((v) =>
+    `${v.id}: ${v.nodes.map((n) => n.target).join(" ")}`));
+}
+
+test("the first picture is small, then it is refined", async () => {
+  const { page, done } = await open("size=256&spp=2&rows=64");
+  assert.equal(await page.$eval("#film", (canvas) => canvas.dataset.painter), "webgl2");
+  await rendered(page);
+  assert.equal(await page.$eval("#film", (canvas) => canvas.width), 256);
+  assert.ok(await brightness(page, "film") > 80);
+  assert.match(await text(page, "#counts"), /2(\.\d)? samples a pixel/);
+  await done();
+});
+
+test("without WebGL2 the picture is the same", async () => {
+  const gpu = await open(SMALL);
+  await rendered(gpu.page);
+  const expected = await brightness(gpu.page, "film");
+  await gpu.done();
+  const plain = await open(SMALL, { query: "?2d" });
+  await rendered(plain.page);
+  await plain.page.waitForTimeout(500);
+  assert.equal(await plain.page.$eval("#film", (canvas) => canvas.dataset.painter), "2d");
+  assert.ok(Math.abs(await brightness(plain.page, "film") - expected) < 0.5);
+  await plain.done();
+});
+
+test("orbiting shows a small picture at once", async () => {
+  const { page, done } = await open("size=256&spp=2&rows=64");
+  await rendered(page);
+  const whole = await canvasHash(page, "film");
+  const box = await page.locator("#viewer").boundingBox();
+  await page.evaluate(() => delete document.documentElement.dataset.preview);
+  await page.mouse.move(box.x + 300, box.y + 300);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 360, box.y + 280, { steps: 3 });
+  await page.waitForSelector("html[data-preview]");
+  await page.mouse.up();
+  await page.waitForTimeout(300);
+  await rendered(page);
+  assert.notEqual(await canvasHash(page, "film"), whole);
+  assert.match(await page.evaluate(() => location.hash), /camera=/);
+  await renderedAnew(page, () => page.click("#reset-camera"));
+  assert.equal(await canvasHash(page, "film"), whole, "the first view is back, to the bit");
+  await done();
+});
+
+test("exposure, curve and material change the picture", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  const middle = await brightness(page, "film");
+  await slide(page, "#exposure", -6);
+  assert.ok(await brightness(page, "film") < middle - 20);
+  await page.click("#auto");
+  assert.ok(Math.abs(await brightness(page, "film") - middle) < 1);
+  const agx = await canvasHash(page, "film");
+  await page.selectOption("#curve", "neutral");
+  assert.notEqual(await canvasHash(page, "film"), agx);
+  await page.selectOption("#curve", "agx");
+  await renderedAnew(page, () => page.selectOption("#model", "ggx"));
+  assert.match(await text(page, "#command"), /--material=ggx:0\.2:gold/);
+  assert.notEqual(await canvasHash(page, "film"), agx);
+  await renderedAnew(page, () => slide(page, "#material-numbers input", 0.6));
+  assert.match(await text(page, "#command"), /ggx:0\.6:gold/);
+  await page.fill("#material", "velvet");
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#status.error");
+  assert.match(await text(page, "#status"), /velvet/);
+  await done();
+});
+
+test("two strategies at equal rays, with a divider", async () => {
+  const { page, done } = await open("size=96&spp=16&rows=64&strategy=brdf:4&beside=mis:1:1");
+  await rendered(page);
+  assert.ok(await page.isVisible("#divider"));
+  assert.equal(await text(page, "#tag-right"), "mis:1:1");
+  const half = await canvasHash(page, "film");
+  await page.focus("#divider");
+  await page.keyboard.press("Home");
+  const right = await canvasHash(page, "film");
+  await page.keyboard.press("End");
+  const left = await canvasHash(page, "film");
+  assert.ok(new Set([half, left, right]).size === 3);
+  const rays = await page.evaluate(() => window.domelight.picture.jobs.map((job) => job.statistics.shadowRays));
+  assert.ok(Math.abs(rays[0] / rays[1] - 1) < 0.1, `rays ${rays}`);
+  await done();
+});
+
+test("the map turns, shows the sun, and what a pixel samples", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  await show(page, "map");
+  await page.waitForSelector("html[data-map]");
+  assert.match(await text(page, "#map-caption"), /sky, 128 × 64 texels, turned by 125°; its sun is outlined/);
+  const first = await canvasHash(page, "map-film");
+  await page.focus("#map-viewer");
+  await page.keyboard.press("ArrowLeft");
+  await page.waitForFunction(() => /130°/.test(document.getElementById("map-caption").textContent));
+  assert.notEqual(await canvasHash(page, "map-film"), first);
+  await page.selectOption("#mapping", "angular");
+  await page.waitForFunction(() => document.getElementById("map-film").width === document.getElementById("map-film").height);
+  await page.selectOption("#mapping", "lat-long");
+  await show(page, "picture");
+  const box = await page.locator("#viewer").boundingBox();
+  await page.mouse.click(box.x + 0.42 * box.width, box.y + 0.42 * box.height);
+  await show(page, "map");
+  await page.waitForFunction(() => Number(document.documentElement.dataset.samples) > 0);
+  assert.match(await text(page, "#point-table"), /Radiance, by quadrature/);
+  const marks = await canvasHash(page, "map-marks");
+  await page.selectOption("#layer", "6");
+  assert.notEqual(await canvasHash(page, "map-marks"), marks);
+  await done();
+});
+
+test("lights: regions, files of every format, and what is left", async () => {
+  const { page, done } = await open(SMALL);
+  await show(page, "lights");
+  await page.waitForSelector("html[data-rig='variance-minimization:64']");
+  const many = await canvasHash(page, "rig-marks");
+  await slide(page, "#n-lights", 3);
+  await page.waitForSelector("html[data-rig='variance-minimization:8']");
+  assert.notEqual(await canvasHash(page, "rig-marks"), many);
+  await page.selectOption("#method", "median-cut");
+  await page.waitForSelector("html[data-rig='median-cut:8']");
+  await page.check("#leave");
+  await page.waitForSelector("html[data-rig='median-cut:1']");
+  assert.match(await text(page, "#rig-caption"), /beside what they leave on the map/);
+  const names = await page.$$eval("#formats button, #dome-files button", (all) => all.map((button) => button.textContent));
+  assert.ok(names.includes("rig.usda") && names.includes("dome.exr"), names.join(" "));
+  for (const name of names) {
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click(`button:text-is("${name}")`)]);
+    assert.equal(download.suggestedFilename(), name);
+    assert.ok(readFileSync(await download.path()).length > 100, name);
+    // A browser takes many downloads at once for an attack.
+    await page.waitForTimeout(250);
+  }
+  await done();
+});
+
+test("the X-ray of a pixel names causes whose shares are drawn", async () => {
+  const { page, done } = await open(`${SMALL}&pixel=[27,27]&panel=xray&strategy=mis:1:1`);
+  await page.waitForSelector("html[data-xray]");
+  assert.ok((await text(page, "#xray-advice")).length > 20);
+  assert.equal((await page.$$("#xray-table tbody tr")).length, 4);
+  assert.ok((await page.$$("#causes .bar")).length >= 4);
+  assert.equal((await page.$$("#hemispheres canvas")).length, 4);
+  const densities = (await page.$$("#densities canvas")).length;
+  await page.evaluate(() => delete document.documentElement.dataset.xray);
+  await page.check("#compared label:nth-child(5) input");
+  await page.waitForSelector("html[data-xray]");
+  assert.equal((await page.$$("#densities canvas")).length, densities + 1);
+  await done();
+});
+
+test("every step of the lecture has a figure that its controls change", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lecture`);
+  const steps = await page.$$eval("#steps a", (all) => all.length);
+  assert.equal(steps, 15);
+  const figure = () => page.$eval("#figure", (figure) => {
+    const canvases = [...figure.querySelectorAll("canvas")].map((canvas) => {
+      const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+      const context = copy.getContext("2d", { willReadFrequently: true });
+      context.drawImage(canvas, 0, 0);
+      return context.getImageData(0, 0, copy.width, copy.height).data.reduce((hash, byte) => Math.imul(hash ^ byte, 16777619), 7);
+    });
+    return JSON.stringify([[...figure.querySelectorAll("svg")].map((svg) => svg.innerHTML), canvases]);
+  });
+  const drawn = (n) => page.waitForFunction((n) => Number(document.getElementById("figure")?.dataset.drawn ?? 0) >= n, n);
+  for (let step = 1; step <= steps; step++) {
+    await page.click(`#steps li:nth-child(${step}) a`);
+    await drawn(1);
+    assert.ok(await page.$("#step math"), `step ${step} has a formula`);
+    assert.ok((await text(page, "#step .question")).length > 40);
+    assert.match(await text(page, "#figure .result"), /\d/, `step ${step} says a number`);
+    await page.waitForTimeout(50);
+    const before = await figure();
+    await page.focus("#figure input[type=range]");
+    const value = await page.$eval("#figure input[type=range]", (i) => i.value);
+    await page.keyboard.press("ArrowRight");
+    if (await page.$eval("#figure input[type=range]", (i) => i.value) === value) await page.keyboard.press("ArrowLeft");
+    await drawn(2);
+    await page.waitForTimeout(50);
+    assert.notEqual(await figure(), before, `the figure of step ${step} changes`);
+  }
+  await done();
+});
+
+/** Drops files on the page. */
+const drop = (page, files) => page.evaluate((files) => {
+  const data = new DataTransfer();
+  for (const [name, bytes] of files) data.items.add(new File([typeof bytes === "string" ? bytes : new Uint8Array(bytes)], name));
+  document.body.dispatchEvent(new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true }));
+}, files);
+
+const OBJ = "mtllib red.mtl\nv -1 0 0\nv 1 0 0\nv 0 1.5 0\nusemtl red\nf 1 2 3\n";
+
+test("dropped files are shown, and their errors named", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  await renderedAnew(page, () => drop(page, [["red.mtl", "newmtl red\nKd 0.8 0.1 0.1\n"], ["triangle.obj", OBJ]]));
+  assert.equal(await page.inputValue("#scene"), "triangle.obj");
+  const red = await page.evaluate(() => {
+    const { films } = window.domelight.picture;
+    const { pixels, width, height } = films[0], at = 4 * (Math.floor(height / 2) * width + width / 2);
+    return [...pixels.slice(at, at + 3)];
+  });
+  assert.ok(red[0] > 3 * red[1], `red: ${red}`);
+  // A Radiance picture of one color.
+  const hdr = ["#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n", ...Array(8).fill(String.fromCharCode(128, 64, 32, 129))].join("");
+  await renderedAnew(page, () => drop(page, [["blue.hdr", [...hdr].map((c) => c.charCodeAt(0))]]));
+  assert.equal(await page.inputValue("#env"), "blue.hdr");
+  await drop(page, [["broken.obj", "v 0 0 0\nf 1 2 3\n"]]);
+  await page.waitForSelector("#status.error");
+  assert.match(await text(page, "#status"), /broken\.obj, line 2: index 2 names no vertex/);
+  await drop(page, [["notes.txt", "hello"]]);
+  await page.waitForFunction(() => /notes\.txt is neither/.test(document.getElementById("status").textContent));
+  await done();
+});
+
+test("the hash keeps the state", async () => {
+  const { page, done } = await open(`${SMALL}&scene=sphere&env=cathedral&rotate=0&strategy=brdf:2&panel=lights&lights=16&method=median-cut`);
+  await page.waitForSelector("html[data-rig='median-cut:16']");
+  await show(page, "picture");
+  assert.equal(await page.inputValue("#scene"), "sphere");
+  await page.waitForTimeout(300);
+  const hash = await page.evaluate(() => location.hash);
+  assert.match(hash, /scene=sphere/);
+  assert.doesNotMatch(hash, /panel/);
+  await page.goto("about:blank");
+  await page.goto(`${address}${hash}`);
+  await page.waitForSelector("html[data-ready]");
+  assert.equal(await page.inputValue("#env"), "cathedral");
+  await done();
+});
+
+test("a hash of nonsense is the default picture", async () => {
+  const { page, done } = await open("size=-5&spp=99999999&camera={}&pixel=[1]&panel=__proto__&step=99&rows=x&size=64&spp=1");
+  await rendered(page);
+  assert.equal(await page.inputValue("#scene"), "statue");
+  await done();
+});
+
+for (const colorScheme of ["light", "dark"]) {
+  test(`every panel fits a phone and has no violations of accessibility, ${colorScheme}`, async () => {
+    const { page, done } = await open(SMALL, { viewport: { width: 390, height: 844 }, colorScheme });
+    await rendered(page);
+    for (const panel of ["picture", "map", "xray", "lights", "lecture"]) {
+      await show(page, panel);
+      await page.waitForTimeout(300);
+      const [wide, seen] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+      assert.ok(wide <= seen, `${panel}: ${wide} px in ${seen}`);
+      assert.deepEqual(await violations(page), [], panel);
+    }
+    await done();
+  });
+}
