@@ -1,7 +1,8 @@
 //! NumPy arrays in and out: anything array-like comes in as C-contiguous `float32`, without a copy where it is that.
 
+use domelight::math::{Vec3, vec3};
 use numpy::{
-    Element, IntoPyArray, PyArrayDyn, PyArrayMethods as _, PyReadonlyArrayDyn,
+    Element, IntoPyArray as _, PyArrayDyn, PyArrayMethods as _, PyReadonlyArrayDyn,
     PyUntypedArrayMethods as _,
 };
 use pyo3::prelude::*;
@@ -40,12 +41,20 @@ impl<'py> Floats<'py> {
         bad_value(format!("{} has shape {}; it must be {expected}", self.name, self.shape_text()))
     }
 
-    /// The rows of an array (…, K), and the shape without K.
+    /// The rows of an array (…, K), and the shape without K. An empty list has no rows.
     pub(crate) fn rows<const K: usize>(&self) -> PyResult<(&[[f32; K]], &[usize])> {
         match self.shape().split_last() {
+            Some((0, [])) => Ok((&[], self.shape())),
             Some((&k, lead)) if k == K => Ok((self.values()?.as_chunks().0, lead)),
             _ => Err(self.bad_shape(&format!("(…, {K})"))),
         }
+    }
+
+    /// The rows of finite numbers.
+    pub(crate) fn finite<const K: usize>(&self) -> PyResult<(&[[f32; K]], &[usize])> {
+        let rows = self.rows::<K>()?;
+        self.require_finite()?;
+        Ok(rows)
     }
 
     /// The rows of uniform numbers, each in [0, 1).
@@ -138,7 +147,7 @@ pub(crate) fn shape_text(shape: &[usize]) -> String {
     }
 }
 
-/// Two arrays of rows side by side; one of them may be a single row for all.
+/// Two arrays of finite rows side by side; one of them may be a single row for all.
 pub(crate) struct Pairs<'a, const A: usize, const B: usize> {
     a: &'a [[f32; A]],
     b: &'a [[f32; B]],
@@ -148,7 +157,7 @@ pub(crate) struct Pairs<'a, const A: usize, const B: usize> {
 
 impl<'a, const A: usize, const B: usize> Pairs<'a, A, B> {
     pub(crate) fn new(a: &'a Floats<'_>, b: &'a Floats<'_>) -> PyResult<Self> {
-        let ((a_rows, a_lead), (b_rows, b_lead)) = (a.rows::<A>()?, b.rows::<B>()?);
+        let ((a_rows, a_lead), (b_rows, b_lead)) = (a.finite::<A>()?, b.finite::<B>()?);
         let lead = match () {
             () if a_lead == b_lead || b_lead.is_empty() => a_lead,
             () if a_lead.is_empty() => b_lead,
@@ -210,10 +219,10 @@ pub(crate) fn from_image<'py>(
 }
 
 /// A vector of three finite numbers.
-pub(crate) fn vector(name: &'static str, value: &Bound<'_, PyAny>) -> PyResult<domelight::math::Vec3> {
+pub(crate) fn vector(name: &'static str, value: &Bound<'_, PyAny>) -> PyResult<Vec3> {
     let floats = Floats::new(name, value)?;
     match *floats.values()? {
-        [x, y, z] => Ok(domelight::math::vec3(x, y, z)),
+        [x, y, z] => Ok(vec3(x, y, z)),
         _ => Err(floats.bad_shape("(3,)")),
     }
 }

@@ -311,7 +311,7 @@ impl Environment {
     fn radiance<'py>(&self, wi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let py = wi.py();
         let wi = Floats::new("wi", wi)?;
-        let (directions, lead) = wi.rows::<3>()?;
+        let (directions, lead) = wi.finite::<3>()?;
         let values = alone(py, || {
             directions.iter().map(|&w| self.watts(self.inner.le(w.into()))).collect()
         })?;
@@ -347,7 +347,7 @@ impl Environment {
     fn directions<'py>(&self, uv: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let py = uv.py();
         let uv = Floats::new("uv", uv)?;
-        let (points, lead) = uv.rows::<2>()?;
+        let (points, lead) = uv.finite::<2>()?;
         let values = alone(py, || {
             points.iter().map(|&p| self.inner.direction(p.into()).to_array()).collect()
         })?;
@@ -368,7 +368,7 @@ impl Environment {
     fn uv<'py>(&self, wi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let py = wi.py();
         let wi = Floats::new("wi", wi)?;
-        let (directions, lead) = wi.rows::<3>()?;
+        let (directions, lead) = wi.finite::<3>()?;
         let values =
             alone(py, || directions.iter().map(|&w| self.inner.uv(w.into()).to_array()).collect())?;
         rows(py, values, lead)
@@ -443,7 +443,7 @@ fn densities<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
     let py = wi.py();
     let wi = Floats::new("wi", wi)?;
-    let (directions, lead) = wi.rows::<3>()?;
+    let (directions, lead) = wi.finite::<3>()?;
     let values = alone(py, || directions.iter().map(|&w| pdf(w)).collect())?;
     array(py, values, lead)
 }

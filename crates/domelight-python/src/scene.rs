@@ -289,8 +289,10 @@ impl Scene {
         let py = vertices.py();
         let vertices = Floats::new("vertices", vertices)?;
         vertices.require_finite()?;
-        let &[n, 3] = vertices.shape() else { return Err(vertices.bad_shape("(V, 3)")) };
-        let positions: Vec<Vec3> = vertices.rows::<3>()?.0.iter().map(|&p| p.into()).collect();
+        let Ok((positions, &[n])) = vertices.rows::<3>() else {
+            return Err(vertices.bad_shape("(V, 3)"));
+        };
+        let positions: Vec<Vec3> = positions.iter().map(|&p| p.into()).collect();
         let (corners, shape) = indices("faces", faces, n)?;
         let triangles = match shape[..] {
             [_, 3] => corners.as_chunks::<3>().0.to_vec(),

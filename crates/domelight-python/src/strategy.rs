@@ -220,7 +220,7 @@ impl ShadingPoints {
     ) -> PyResult<(FloatArray<'py>, FloatArray<'py>)> {
         let py = wi.py();
         let wi = Floats::new("wi", wi)?;
-        let (directions, lead) = wi.rows::<3>()?;
+        let (directions, lead) = wi.finite::<3>()?;
         let points = self.points_of(index.as_ref(), lead)?;
         let (values, densities) = self.evaluate(py, &points, directions)?;
         Ok((rows(py, values, lead)?, array(py, densities, lead)?))

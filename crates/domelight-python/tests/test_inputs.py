@@ -92,9 +92,11 @@ def test_inputs_are_not_changed(rng):
     assert np.array_equal(wi, before)
 
 
-def test_not_a_number_is_black_or_refused():
-    assert not BSDF.eval([np.nan, 0, 1], [[0, 0, 1]]).any()
-    assert np.isfinite(ENV.pdf([[np.nan] * 3, [np.inf, 0, 0]])).all()
+def test_not_a_number_is_refused():
+    with pytest.raises(ValueError, match=r"wo\[0\] is NaN; it must be finite"):
+        BSDF.eval([np.nan, 0, 1], [[0, 0, 1]])
+    with pytest.raises(ValueError, match=r"wi\[1, 0\] is inf"):
+        ENV.pdf([[0, 0, 1], [np.inf, 0, 0]])
     with pytest.raises(ValueError, match=r"vertices\[1, 2\] is NaN"):
         dl.Scene([[0, 0, 0], [0, 0, np.nan]], [])
 

@@ -53,7 +53,7 @@ def test_every_format_is_the_programs(program, tmp_path, format):
     dl.write(tmp_path / "probe.pfm", dl.Environment.builtin("cathedral", rows=64).map)
     for folder in ("program", "python"):
         (tmp_path / folder).mkdir()
-    arguments = ["lights", "--env", "../probe.pfm", "--lamps", "3", "-o", name]
+    arguments = ["lights", "../probe.pfm", "--lamps", "3", "-o", name]
     subprocess.run([program, "--quiet", *arguments], check=True, cwd=tmp_path / "program")
     env = dl.Environment.load(tmp_path / "probe.pfm")
     env = dl.Environment(env.map, name="../probe.pfm")
