@@ -1,11 +1,21 @@
 //! The command line as it was typed, for reports.
 
+use domelight::fingerprint::Fingerprinter;
 use domelight::quote::shell;
 
 /// The command line of this process.
 pub(crate) fn command() -> String {
     // A name may be no UTF-8.
     quoted(std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()))
+}
+
+/// The fingerprint of this program's file: another build may make other pictures.
+pub(crate) fn program() -> String {
+    let mut fingerprint = Fingerprinter::default();
+    if let Ok(program) = std::env::current_exe().and_then(std::fs::read) {
+        fingerprint.bytes(program);
+    }
+    fingerprint.finish().to_string()
 }
 
 /// As it may be typed again.

@@ -14,6 +14,7 @@ use domelight::picture::compare::SizeMismatch;
 use domelight::quote::terminal;
 use domelight::render::CheckpointError;
 use domelight::scene::{CameraError, LoadError, SceneError};
+use std::error::Error;
 use std::fmt::Write as _;
 use std::io::{self, IsTerminal, Write as _};
 use std::process::ExitCode;
@@ -28,7 +29,7 @@ impl std::fmt::Display for UsageError {
     }
 }
 
-impl std::error::Error for UsageError {}
+impl Error for UsageError {}
 
 /// The work was interrupted and its state saved: run it again; exit code 75, the EX_TEMPFAIL of sysexits.h.
 #[derive(Debug)]
@@ -40,7 +41,7 @@ impl std::fmt::Display for InterruptedAndSaved {
     }
 }
 
-impl std::error::Error for InterruptedAndSaved {}
+impl Error for InterruptedAndSaved {}
 
 /// Prints a line to standard error, in which nothing commands the terminal. If that is closed or full, nobody can be
 /// told, and the work goes on.
@@ -73,20 +74,6 @@ enum Label {
     Error,
     Hint,
     Warning,
-}
-
-/// Warns of `n` camera samples that were NaN or infinite, of the picture named by `label`: they are black in it,
-/// and a defect.
-pub(crate) fn warn_of_non_finite(quiet: bool, label: &str, n: u64) {
-    if n > 0 {
-        warn(
-            quiet,
-            &format!(
-                "{label}{n} camera samples were NaN or infinite and count as black, which is a defect of \
-                 domelight: please report this command with its scene and probe"
-            ),
-        );
-    }
 }
 
 /// Prints a warning unless asked for quiet.
@@ -123,14 +110,20 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
 
 /// 2 if trying again cannot help: the arguments, the scene or the probe are wrong. 75 if it goes on where it was.
 fn code(error: &anyhow::Error) -> u8 {
+    let is_wrong_use = |cause: &(dyn Error + 'static)| {
+        matches!(cause.downcast_ref(), Some(domelight_lab::Error::Usage(_)))
+            || cause.is::<UsageError>()
+            || cause.is::<LoadError>()
+            || cause.is::<ProbeError>()
+            || cause.is::<SceneError>()
+            || cause.is::<CameraError>()
+            || cause.is::<EnvironmentError>()
+            || cause.is::<CheckpointError>()
+            || cause.is::<FileConflict>()
+    };
     let is_permanent = error.is::<UsageError>()
-        || error.is::<LoadError>()
-        || error.is::<ProbeError>()
-        || error.is::<SceneError>()
-        || error.is::<CameraError>()
-        || error.is::<EnvironmentError>()
-        || error.is::<CheckpointError>()
         || error.is::<FileConflict>()
+        || error.chain().any(is_wrong_use)
         || over_limit(error).is_some();
     // What is not there or no plain file was asked for wrongly; other troubles of the system may pass.
     let passing = io_kind(error).is_some_and(|kind| {
@@ -159,13 +152,13 @@ fn chain(error: &anyhow::Error) -> String {
 }
 
 fn hint(error: &anyhow::Error) -> Option<String> {
-    if error.is::<SizeMismatch>() {
+    if find::<SizeMismatch>(error).is_some() {
         return Some("render both with the same --size".into());
     }
     if let Some(error) = over_limit(error) {
         return Some(memory::hint(error));
     }
-    match error.downcast_ref()? {
+    match find(error)? {
         ProbeError::Picture(_) if io_kind(error) == Some(io::ErrorKind::NotFound) => {
             let names = BuiltinProbe::ALL.map(BuiltinProbe::name).join(", ");
             Some(format!("a probe is a file or one of {names}"))
@@ -175,6 +168,11 @@ fn hint(error: &anyhow::Error) -> Option<String> {
         }
         _ => None,
     }
+}
+
+/// The cause of that type.
+fn find<T: Error + Send + Sync + 'static>(error: &anyhow::Error) -> Option<&T> {
+    error.downcast_ref().or_else(|| error.chain().find_map(|cause| cause.downcast_ref()))
 }
 
 /// More memory than is allowed: the same again would not help.

@@ -5,7 +5,6 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-mod acceptance;
 mod args;
 mod bench;
 mod command_line;
@@ -17,7 +16,6 @@ mod figures;
 mod files;
 mod interrupt;
 mod lights;
-mod measure;
 mod memory;
 mod merge;
 mod output;
@@ -31,8 +29,7 @@ mod render_run;
 mod report;
 mod scene;
 mod strategy;
-mod svg;
-mod usage;
+mod terminal;
 
 use args::{Arguments, Command};
 use clap::Parser;

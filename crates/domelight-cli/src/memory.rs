@@ -28,9 +28,6 @@ impl std::str::FromStr for MaxMemory {
     }
 }
 
-/// For each texel of an environment: its map, its tables, and what fixed lights are made with.
-pub(crate) const ENVIRONMENT_TEXEL: u64 = 36;
-
 /// For each texel of a probe whose light is taken out: the map, what is left of it, and where lamps are.
 pub(crate) const EXTRACTION_TEXEL: u64 = 64;
 
@@ -39,9 +36,6 @@ pub(crate) const MAP_TEXEL: u64 = 24;
 
 /// For each texel of a map that is written: the map, its channels, the file.
 pub(crate) const WRITTEN_TEXEL: u64 = 24;
-
-/// For each triangle: the tree, and what it is built from.
-pub(crate) const TRIANGLE: u64 = 140;
 
 /// For each pixel of a render: its sums, and the layers that they become.
 pub(crate) const PIXEL: u64 = 308;

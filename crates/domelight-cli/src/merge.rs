@@ -17,10 +17,12 @@ use domelight::{Rgb, RgbImage};
 use serde::Serialize;
 
 use crate::args::MergeArguments;
-use crate::error::{status, warn_of_non_finite};
+use crate::error::status;
 use crate::memory;
 use crate::output::{PicturePath, print_json, require_one_on_standard_output};
 use crate::render_run::read;
+use crate::terminal::Terminal;
+use domelight_lab::Host as _;
 
 /// Memory of a pixel of a band: its layers, as channels, and compressed.
 const BAND_PIXEL: u64 = 300;
@@ -271,7 +273,7 @@ impl Merged {
             non_finite_samples: u64,
             outputs: Vec<String>,
         }
-        warn_of_non_finite(quiet, "", self.counts.non_finite);
+        Terminal { quiet }.warn_of_non_finite("", self.counts.non_finite);
         let report = Report {
             parts: self.parts.len(),
             tiles: self.n_tiles,

@@ -3,7 +3,6 @@
 use std::str::FromStr;
 use std::time::Duration;
 
-use domelight::bsdf::{MaterialSpec, ParseMaterialError};
 use domelight::math::{Vec3, vec3};
 
 /// A value that could not be read, and what it should look like.
@@ -68,21 +67,6 @@ impl FromStr for Triple {
             }
             _ => Err(bad(s, expected)),
         }
-    }
-}
-
-/// A material in the notation of `--material`, and the text that it was given as.
-#[derive(Clone, Debug)]
-pub(crate) struct NamedMaterial {
-    pub(crate) text: String,
-    pub(crate) spec: MaterialSpec,
-}
-
-impl FromStr for NamedMaterial {
-    type Err = ParseMaterialError;
-
-    fn from_str(s: &str) -> Result<Self, ParseMaterialError> {
-        Ok(Self { text: s.to_owned(), spec: s.parse()? })
     }
 }
 

@@ -11,8 +11,8 @@ use domelight::strategy::PreparedStrategy;
 
 use crate::output::PicturePath;
 use crate::progress::RenderProgress;
-use crate::scene::PreparedScene;
 use crate::strategy::Job;
+use domelight_lab::scene::PreparedScene;
 
 /// Writes PNG output after one sample of each square of 2 × 2 pixels.
 pub(crate) fn write(

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use domelight::render::Stage;
 use serde::Serialize;
 
-use crate::usage::thread_seconds;
+use domelight_lab::thread_seconds;
 
 thread_local! {
     /// What this thread is at, and its CPU time when that began.

@@ -108,6 +108,12 @@ impl RenderProgress {
     }
 }
 
+impl Drop for RenderProgress {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
 impl Observer for RenderProgress {
     fn pass_started(&self, samples: Range<u32>) {
         let samples = format!("samples {}–{}", samples.start + 1, samples.end);

@@ -18,9 +18,11 @@ use crate::preview;
 use crate::progress::RenderProgress;
 use crate::render_run::RenderRun;
 use crate::report::{RenderReport, Settings, StopReason, Timings};
-use crate::scene::{PreparedScene, start_threads};
-use crate::strategy::{Job, acceptance, refuse_repeating_points};
-use crate::usage::Stopwatch;
+use crate::scene::start_threads;
+use crate::strategy::{Job, acceptance};
+use crate::terminal::Terminal;
+use domelight_lab::scene::PreparedScene;
+use domelight_lab::{Stopwatch, refuse_repeating_points};
 
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &RenderArguments, quiet: bool) -> Result<()> {
@@ -51,7 +53,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let loaded = arguments.scene.load(quiet)?;
     let load = watch.lap();
 
-    let view = &arguments.scene.build(loaded)?;
+    let view = &loaded.build(&Terminal { quiet })?;
     let PreparedScene { scene, camera, environment, probe, report, .. } = view;
     let settings = &RenderSettings {
         adaptive: !arguments.samples.no_adaptive,

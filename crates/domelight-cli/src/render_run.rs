@@ -22,7 +22,7 @@ use crate::output::{PictureFormat, PicturePath};
 use crate::parse::{Shard, Tiles};
 use crate::progress::RenderProgress;
 use crate::report::Settings;
-use crate::scene::PreparedScene;
+use domelight_lab::scene::PreparedScene;
 
 /// How a render proceeds.
 pub(crate) struct RenderRun {

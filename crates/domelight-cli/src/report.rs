@@ -1,33 +1,16 @@
 //! What a render did: as JSON or as two lines for people.
 
 use anyhow::{Result, bail};
-use domelight::environment::{Environment, UpAxis};
 use domelight::render::Rendering;
-use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
+use domelight_lab::report::SceneReport;
+use domelight_lab::{Acceptance, Host as _, Seconds, peak_memory};
 use serde::Serialize;
 use std::path::Path;
 
-use crate::acceptance::Acceptance;
-use crate::error::{InterruptedAndSaved, status, tell_lines, warn_of_non_finite};
+use crate::error::{InterruptedAndSaved, status, tell_lines};
 use crate::output::{self, PicturePath};
 use crate::profile::{self, StageSeconds};
-use crate::usage::{Seconds, peak_memory};
-
-/// A scene under its light, seen by a camera.
-#[derive(Clone, Serialize)]
-pub(crate) struct SceneReport {
-    pub(crate) scene: String,
-    pub(crate) triangles: usize,
-    /// What the picture lacks of the file, one sentence each.
-    pub(crate) warnings: Vec<String>,
-    pub(crate) material: Option<String>,
-    pub(crate) normalize: bool,
-    pub(crate) ground: bool,
-    pub(crate) hide_env: bool,
-    pub(crate) environment: EnvironmentReport,
-    pub(crate) camera: CameraReport,
-    pub(crate) size: [usize; 2],
-}
+use crate::terminal::Terminal;
 
 /// What was rendered, and how: enough to make the same picture again.
 #[derive(Serialize)]
@@ -42,63 +25,6 @@ pub(crate) struct Settings {
     pub(crate) threads: usize,
 }
 
-/// The light of a render.
-#[derive(Clone, Serialize)]
-pub(crate) struct EnvironmentReport {
-    probe: String,
-    size: [usize; 2],
-    rotate: f32,
-    scale: f32,
-    exposure: f32,
-    up: &'static str,
-}
-
-impl EnvironmentReport {
-    /// What a user would call the probe.
-    pub(crate) fn probe(&self) -> &str {
-        &self.probe
-    }
-
-    pub(crate) fn new(
-        probe: String,
-        light: &EnvironmentSettings,
-        environment: &Environment,
-    ) -> Self {
-        Self {
-            probe,
-            size: [environment.map().width, environment.map().height],
-            rotate: light.rotate_degrees,
-            scale: light.scale,
-            exposure: light.exposure,
-            up: match light.up {
-                UpAxis::Y => "y",
-                UpAxis::Z => "z",
-            },
-        }
-    }
-}
-
-/// The view of a render; one of `fov` and `ortho` is null.
-#[derive(Clone, Serialize)]
-pub(crate) struct CameraReport {
-    origin: [f32; 3],
-    target: [f32; 3],
-    up: [f32; 3],
-    fov: Option<f32>,
-    ortho: Option<f32>,
-}
-
-impl CameraReport {
-    pub(crate) fn new(view: &CameraSettings) -> Self {
-        let (fov, ortho) = match view.projection {
-            Projection::Perspective { fov_y_degrees } => (Some(fov_y_degrees), None),
-            Projection::Orthographic { height } => (None, Some(height)),
-        };
-        let [origin, target, up] = [view.origin, view.target, view.up].map(|v| v.to_array());
-        Self { origin, target, up, fov, ortho }
-    }
-}
-
 impl Settings {
     /// What OpenEXR files tell of their making.
     pub(crate) fn provenance(&self) -> Vec<(String, String)> {
@@ -106,7 +32,7 @@ impl Settings {
             vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
         let settings = [
             ("scene", self.scene.scene.clone()),
-            ("environment", self.scene.environment.probe.clone()),
+            ("environment", self.scene.environment.probe().to_owned()),
             ("strategy", self.strategy.clone()),
             ("samples", self.spp.to_string()),
             ("sampler", self.sampler.clone()),
@@ -198,7 +124,7 @@ impl RenderReport {
     pub(crate) fn print_summary(&self) {
         let Settings { scene, strategy, spp, .. } = &self.settings;
         let SceneReport { scene, environment, size: [w, h], .. } = scene;
-        let environment = &environment.probe;
+        let environment = environment.probe();
         let Timings { load, build, render, .. } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
         status(&format!("{scene} under {environment}: {w}x{h}, {spp} samples a pixel, {strategy}"));
@@ -220,7 +146,7 @@ impl RenderReport {
     /// # Errors
     /// If the render was interrupted, or time ended it before a part was whole.
     pub(crate) fn check(&self, saved: Option<&Path>, is_part: bool, quiet: bool) -> Result<()> {
-        warn_of_non_finite(quiet, "", self.non_finite_samples);
+        Terminal { quiet }.warn_of_non_finite("", self.non_finite_samples);
         match (self.stopped, saved) {
             (Some(StopReason::Interrupted), None) => {
                 bail!("interrupted; what was done so far is in {}", self.outputs.join(", "))

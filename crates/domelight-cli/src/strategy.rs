@@ -11,26 +11,12 @@ use domelight::strategy::{
     StrategyOptions, StrategySpec,
 };
 
-use crate::acceptance::{Acceptance, count_tries};
+use domelight_lab::{Acceptance, count_tries};
+
 use crate::args::sampling::StrategyArguments;
 use crate::error::UsageError;
 use crate::progress::RenderProgress;
 use crate::render_run::RenderRun;
-
-/// A strategy and the text that it was given as.
-#[derive(Clone, Debug)]
-pub(crate) struct NamedStrategy {
-    pub(crate) text: String,
-    pub(crate) spec: StrategySpec,
-}
-
-impl FromStr for NamedStrategy {
-    type Err = StrategyError;
-
-    fn from_str(text: &str) -> Result<Self, StrategyError> {
-        Ok(Self { text: text.to_owned(), spec: text.parse()? })
-    }
-}
 
 /// A strategy's name and the options that go with it in one text.
 #[derive(Clone, Copy, Debug)]
@@ -92,19 +78,6 @@ pub(crate) fn acceptance(
     let StrategySpec::Rejection { proposal, stop } = spec else { return Ok(None) };
     let rejection = RejectionSampling::new(environment, proposal, stop)?;
     Ok(Some(Acceptance::of(&count_tries(&rejection, &points(), seed))))
-}
-
-/// Refuses more points than the 2³² that the sequence of a pixel has.
-pub(crate) fn refuse_repeating_points(spec: StrategySpec, spp: u32) -> Result<()> {
-    let n_points = spec.points_per_sample();
-    if u64::from(spp) * u64::from(n_points) > 1 << 32 {
-        return Err(UsageError(format!(
-            "{spp} camera samples of {n_points} directions are more points than a pixel has \
-             (2^32): lower --spp, or render several seeds and average them"
-        ))
-        .into());
-    }
-    Ok(())
 }
 
 /// A scene ready to be rendered.

@@ -27,6 +27,10 @@ pub enum Error {
     #[cfg(feature = "render")]
     #[error(transparent)]
     Camera(#[from] crate::scene::CameraError),
+    /// A pixel that cannot be inspected.
+    #[cfg(feature = "render")]
+    #[error(transparent)]
+    Inspect(#[from] crate::inspect::InspectError),
     /// A film that does not belong to a render.
     #[cfg(feature = "render")]
     #[error(transparent)]

@@ -59,6 +59,8 @@ pub mod bvh;
 #[cfg(feature = "render")]
 pub mod geometry;
 #[cfg(feature = "render")]
+pub mod inspect;
+#[cfg(feature = "render")]
 pub mod render;
 #[cfg(feature = "render")]
 pub mod scene;

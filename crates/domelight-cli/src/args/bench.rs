@@ -6,7 +6,7 @@ use clap::{ArgAction, Args, ValueEnum};
 
 use super::{finite, positive};
 use crate::parse::Size;
-use crate::strategy::NamedStrategy;
+use domelight_lab::NamedStrategy;
 
 pub(super) const EXAMPLES: &str = "\
 Strategies are written as for compare: NAME[:OPTION]…, such as mis:3/1 or sir:15/800. Materials are those

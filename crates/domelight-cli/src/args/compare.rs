@@ -7,8 +7,8 @@ use clap::Args;
 use super::finite;
 use super::sampling::PixelArguments;
 use super::scene::SceneArguments;
-use crate::compare::Budget;
-use crate::strategy::NamedStrategy;
+use domelight_lab::NamedStrategy;
+use domelight_lab::compare::Budget;
 
 pub(super) const EXAMPLES: &str = "\
 Strategies are NAME[:OPTION]…, separated by commas; an option is a flag of render without its

@@ -5,10 +5,8 @@ use domelight::environment::UpAxis;
 use domelight::environment::mapping::Mapping;
 
 use super::{finite, mapping};
-use crate::parse::{NamedMaterial, Size, Triple, not_negative};
-
-/// Rows of a built-in probe unless told otherwise.
-pub(crate) const BUILTIN_ROWS: u32 = 1024;
+use crate::parse::{Size, Triple, not_negative};
+use domelight_lab::scene::{BUILTIN_ROWS, NamedMaterial};
 
 /// A scene under its light, seen by a camera: for every command that renders.
 #[derive(Args, Debug)]

@@ -17,7 +17,7 @@ use crate::args::farm::{Engine, FarmArguments};
 use crate::error::{UsageError, status};
 use crate::files;
 use crate::output::{PicturePath, print_code};
-use crate::strategy::refuse_repeating_points;
+use domelight_lab::refuse_repeating_points;
 
 /// What every engine is told.
 struct Farm {

@@ -22,7 +22,9 @@ use crate::error::UsageError;
 use crate::files;
 use crate::memory;
 use crate::output::{PictureFormat, PicturePath, print, print_json};
-use crate::usage::Stopwatch;
+use crate::terminal::Terminal;
+use domelight_lab::Stopwatch;
+use domelight_lab::scene::ENVIRONMENT_TEXEL;
 use preview::Preview;
 use report::{LightsReport, Timings};
 
@@ -172,10 +174,11 @@ impl LightsArguments {
     }
 
     fn load(&self, quiet: bool) -> Result<(Environment, String)> {
-        let light = self.environment.settings(&SceneDescription::default());
-        let map = self.environment.load(&light, quiet)?;
+        let settings = self.environment.settings();
+        let light = settings.over(&SceneDescription::default());
+        let map = settings.load(&light, &Terminal { quiet })?;
         let probe = self.environment.env.clone().unwrap_or_default();
-        let more = memory::EXTRACTION_TEXEL - memory::ENVIRONMENT_TEXEL;
+        let more = memory::EXTRACTION_TEXEL - ENVIRONMENT_TEXEL;
         memory::allow(&format!("{probe}: its lights"), more * map.pixels.len() as u64)?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
         let scale = light.factor();

@@ -13,8 +13,10 @@ use rayon::prelude::*;
 
 use super::ExtractedRig;
 use super::report::error_text;
-use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
-use crate::svg::{Anchor, Color, Document, PALETTE, Pixels, Rect, Style, TextStyle, rasterize};
+use domelight_lab::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
+use domelight_lab::svg::{
+    Anchor, Color, Document, PALETTE, Pixels, Rect, Style, TextStyle, rasterize,
+};
 
 const WIDTH: f64 = 1320.0;
 const MARGIN: f64 = 20.0;
@@ -54,7 +56,7 @@ impl Preview<'_> {
             let left = MARGIN + 3.0 * (edge + GAP);
             self.draw_errors(&mut sheet, Rect::new(left, below, WIDTH - left - MARGIN, 340.0));
         }
-        rasterize(&sheet.to_svg(), 1.0)
+        Ok(rasterize(&sheet.to_svg(), 1.0)?)
     }
 
     fn rig(&self) -> &Rig {

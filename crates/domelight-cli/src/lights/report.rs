@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::ExtractedRig;
 use crate::args::lights::LightsArguments;
-use crate::usage::{Seconds, peak_memory};
+use domelight_lab::{Seconds, peak_memory};
 
 /// Seconds of each phase of the work.
 #[derive(Clone, Copy, Debug, serde::Serialize)]

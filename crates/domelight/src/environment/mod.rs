@@ -427,7 +427,7 @@ impl Environment {
     }
 
     /// The column and the row that `wi` looks at.
-    #[cfg(test)]
+    #[cfg(any(test, feature = "render"))]
     pub(crate) fn texel_at(&self, wi: Vec3) -> [usize; 2] {
         let Texel { column, row } = self.texel(wi);
         [column, row]

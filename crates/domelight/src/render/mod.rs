@@ -15,7 +15,7 @@ mod renderer;
 mod tile;
 mod tiling;
 mod variance;
-mod visibility;
+pub(crate) mod visibility;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -176,7 +176,7 @@ pub fn render<S: Strategy>(
     environment: &Environment,
     strategy: &S,
     settings: &RenderSettings,
-    observer: &impl Observer,
+    observer: &(impl Observer + ?Sized),
 ) -> Rendering {
     let mut renderer = Renderer::with_strategy(scene, camera, environment, strategy, *settings);
     renderer.run(observer);

@@ -213,7 +213,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
 
     /// Renders what is missing, on rayon's current pool of threads, until the observer ends it: a later run goes on
     /// from there. Returns whether all samples of all pixels are there.
-    pub fn run(&mut self, observer: &impl Observer) -> bool {
+    pub fn run(&mut self, observer: &(impl Observer + ?Sized)) -> bool {
         loop {
             match self.pass(observer) {
                 PassEnd::Complete => {}
@@ -224,7 +224,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     }
 
     /// Renders one pass over the tiles that are behind.
-    fn pass(&mut self, observer: &impl Observer) -> PassEnd {
+    fn pass(&mut self, observer: &(impl Observer + ?Sized)) -> PassEnd {
         let Some(start) = self.unfinished().map(Tile::n_samples).min() else {
             return PassEnd::NothingLeft;
         };

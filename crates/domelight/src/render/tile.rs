@@ -218,7 +218,7 @@ impl Tile {
         strategy: &S,
         pass: &Pass<S>,
         scratch: &mut Scratch<S>,
-        observer: &impl Observer,
+        observer: &(impl Observer + ?Sized),
     ) -> Counts {
         observer.stage_started(Stage::CameraRays);
         let Scratch { batch, of_strategy } = scratch;
@@ -296,7 +296,7 @@ impl Tile {
         set: SampleSet,
         batch: &mut Batch,
         scratch: &mut S::Scratch,
-        observer: &impl Observer,
+        observer: &(impl Observer + ?Sized),
     ) -> Counts {
         observer.stage_started(Stage::CameraRays);
         let camera_rays = self.trace_camera_rays(strategy_context.context, set, batch);
@@ -535,7 +535,7 @@ impl Batch {
         strategy_context: &StrategyContext<S>,
         round: u32,
         scratch: &mut S::Scratch,
-        observer: &impl Observer,
+        observer: &(impl Observer + ?Sized),
     ) -> u64 {
         let &StrategyContext { context, strategy, pass, width } = strategy_context;
         observer.stage_started(Stage::Strategy);

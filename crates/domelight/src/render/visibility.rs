@@ -5,7 +5,7 @@ use crate::scene::Scene;
 
 /// Memory that tracing keeps.
 #[derive(Default)]
-pub(super) struct Scratch {
+pub(crate) struct Scratch {
     occluded: Vec<bool>,
     /// Rays that nothing opaque blocks, where they are in their batch, and what gets along them.
     free: RayBatch,
@@ -16,7 +16,7 @@ pub(super) struct Scratch {
 /// Traces a batch of shadow rays to infinity. Sets `visibility[i]`, in [0, 1], of each ray: 0 where the scene blocks
 /// it, and the share that gets through where surfaces cover only a share; the length of `visibility` becomes that of the
 /// batch.
-pub(super) fn trace(
+pub(crate) fn trace(
     scene: &Scene,
     rays: &RayBatch,
     scratch: &mut Scratch,

@@ -1,0 +1,97 @@
+//! `domelight compare`: strategies on one scene at equal samples, rays or time.
+
+use std::path::Path;
+
+use anyhow::Result;
+use domelight_lab::Host as _;
+use domelight_lab::compare::{Comparison, ComparisonResult, ComparisonSettings};
+use domelight_lab::measure::{Cache, Reference};
+
+use crate::args::compare::CompareArguments;
+use crate::command_line;
+use crate::error::UsageError;
+use crate::files;
+use crate::interrupt;
+use crate::memory;
+use crate::output::print_json;
+use crate::parse::Size;
+use crate::scene::start_threads;
+use crate::terminal::Terminal;
+
+/// Runs the subcommand.
+pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
+    check(arguments)?;
+    for path in [Some(&arguments.output), arguments.json.as_ref()].into_iter().flatten() {
+        files::writes(path)?;
+    }
+    let Size { width, height } = arguments.scene.camera.size;
+    memory::allow_picture(width, height, memory::COMPARED_PIXEL)?;
+    start_threads(arguments.pixel.threads)?;
+    interrupt::flag();
+    let host = &Terminal { quiet };
+    let loading = interrupt::nothing_to_keep(interrupt::ENDED);
+    let given = arguments.reference.as_deref();
+    let given = given.map(|path| Reference::read(path, [width, height], host)).transpose()?;
+    let scene = arguments.scene.load(quiet)?.build(host)?;
+    drop(loading);
+    let mut comparison = Comparison::new(scene.view(), arguments.settings());
+    for strategy in &arguments.strategies {
+        comparison.add_named(strategy.clone())?;
+    }
+    let reference = match given {
+        Some(reference) => reference,
+        None => {
+            let cache = cache(arguments.no_cache, arguments.cache.as_deref(), host);
+            comparison.reference(cache.as_ref(), host)?
+        }
+    };
+    let result = comparison.run(&reference, host)?;
+    write(arguments, &result)?;
+    result.report.summary().iter().for_each(|line| host.status(line));
+    host.status(&format!("-> {}", arguments.output.display()));
+    Ok(())
+}
+
+/// The cache of references, if one is wanted.
+pub(crate) fn cache(no_cache: bool, folder: Option<&Path>, host: &Terminal) -> Option<Cache> {
+    (!no_cache).then(|| Cache::new(folder, &command_line::program(), host)).flatten()
+}
+
+impl CompareArguments {
+    fn settings(&self) -> ComparisonSettings {
+        ComparisonSettings {
+            render: self.scene.render_settings(&self.pixel, 1),
+            budget: self.budget,
+            n_seeds: self.seeds,
+            exposure: self.exposure,
+            reference_spp: self.reference_spp,
+            command: command_line::command(),
+        }
+    }
+}
+
+/// Refuses what does not go together.
+fn check(arguments: &CompareArguments) -> Result<(), UsageError> {
+    let standard_output = Path::new("-");
+    if arguments.output == standard_output && arguments.json.as_deref() == Some(standard_output) {
+        let why = "only one result can go to standard output; use -o FILE or --json=FILE";
+        return Err(UsageError(why.into()));
+    }
+    // Before anything is rendered.
+    let names: Vec<&str> = arguments.strategies.iter().map(|s| s.text.as_str()).collect();
+    match names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
+        Some((_, name)) => Err(UsageError(format!("--strategies has '{name}' twice"))),
+        None => Ok(()),
+    }
+}
+
+fn write(arguments: &CompareArguments, result: &ComparisonResult) -> Result<()> {
+    let page = result.page()?;
+    files::write(&arguments.output, |out| out.write_all(page.as_str().as_bytes()))?;
+    let Some(path) = &arguments.json else { return Ok(()) };
+    if path == Path::new("-") {
+        return print_json(&result.report);
+    }
+    let json = serde_json::to_string_pretty(&result.report)?;
+    files::write(path, |out| writeln!(out, "{json}"))
+}

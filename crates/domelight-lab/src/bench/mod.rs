@@ -1,0 +1,132 @@
+//! What error costs, in CPU time.
+
+mod bound;
+mod cases;
+mod embree;
+mod fit;
+mod kernels;
+mod machine;
+mod mitsuba;
+mod ply;
+mod renders;
+mod results;
+mod rigs;
+mod strategy_run;
+mod table;
+
+use std::path::PathBuf;
+
+pub use results::Results;
+pub use table::Table;
+
+use crate::measure::Cache;
+use crate::{Error, Host, NamedStrategy};
+use results::Rows;
+
+/// What is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Suite {
+    /// The lecture's statue at 176x248: what its strategies cost.
+    Lecture,
+    /// Rays a second of the ray kernel, and the build of its tree.
+    Kernels,
+    /// Probes x meshes x materials: CPU time of each strategy to the same error.
+    Probes,
+    /// Rigs of lights: time to extract them, and how well they shade.
+    Rigs,
+}
+
+impl Suite {
+    /// As it is typed.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lecture => "lecture",
+            Self::Kernels => "kernels",
+            Self::Probes => "probes",
+            Self::Rigs => "rigs",
+        }
+    }
+}
+
+/// Another renderer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Peer {
+    /// Mitsuba 3, its module for Python: MIS with compensation and multijitter, compiled by LLVM.
+    Mitsuba {
+        /// The Python whose module is used.
+        python: PathBuf,
+    },
+}
+
+/// What is measured, and how. Empty lists stand for the suite's own.
+#[derive(Clone, Debug)]
+pub struct BenchSettings {
+    /// What is measured.
+    pub suite: Suite,
+    /// Scenes.
+    pub meshes: Vec<String>,
+    /// Probes: files, folders of them, built-in ones.
+    pub probes: Vec<String>,
+    /// Materials, separated by commas.
+    pub materials: Option<String>,
+    /// Threes of scenes, probes and materials, each a list with commas.
+    pub cases: Vec<String>,
+    /// Turn the probes about the up axis \[degrees\].
+    pub rotate: f32,
+    /// Width and height of the pictures \[pixels\].
+    pub size: Option<[usize; 2]>,
+    /// Who is measured.
+    pub strategies: Vec<NamedStrategy>,
+    /// Pictures at each budget.
+    pub n_seeds: u32,
+    /// The first seed.
+    pub seed: u64,
+    /// CPU seconds that the pictures of a strategy's last budget may take together.
+    pub most: f32,
+    /// The errors (relMSE) that strategies are to reach.
+    pub errors: Vec<f64>,
+    /// Another renderer on the same cases.
+    pub vs: Option<Peer>,
+    /// Embree 4's library, for the suite `kernels` to measure against.
+    pub embree: Option<PathBuf>,
+    /// The relMSE of converged pictures.
+    pub reference_error: Option<f64>,
+    /// Where references are kept.
+    pub cache: Option<Cache>,
+    /// What makes the results again; for people.
+    pub command: String,
+}
+
+/// Measures. What is done is in the results, whatever ended the work; then comes what ended it.
+pub fn run(settings: &BenchSettings, host: &dyn Host) -> (Results, Result<(), Error>) {
+    let bench = Bench { settings, host };
+    let mut results = Results::new(settings.suite, &settings.command);
+    let done = bench.measure(&mut results.rows);
+    results.complete = done.is_ok();
+    (results, done)
+}
+
+/// Tells the host which files will be read.
+///
+/// # Errors
+/// If one must not be, or a folder has no probes.
+pub fn declare(settings: &BenchSettings, host: &dyn Host) -> Result<(), Error> {
+    cases::declare(settings, host)
+}
+
+/// What all suites share.
+struct Bench<'a> {
+    settings: &'a BenchSettings,
+    host: &'a dyn Host,
+}
+
+impl Bench<'_> {
+    fn measure(&self, rows: &mut Rows) -> Result<(), Error> {
+        match rows {
+            Rows::Lecture(rows) => renders::run_lecture(self, rows),
+            Rows::Kernels(rows) => kernels::run(self, rows),
+            Rows::Probes(rows) => renders::run_probes(self, rows),
+            Rows::Rigs(rows) => rigs::run(self, rows),
+        }
+    }
+}

@@ -1,0 +1,303 @@
+//! One strategy of a comparison: as many samples as its budget buys, pictures, and their errors.
+
+use domelight::RgbImage;
+use domelight::picture::compare::{REGULARIZER, compare};
+use serde::Serialize;
+
+use super::budget::{Budget, MOST_SAMPLES};
+use crate::Error;
+use crate::measure::render::{Render, RenderSetup};
+
+/// How far beyond its budget a strategy may be where it cannot meet it.
+const MOST_EXCESS: f64 = 1.5;
+
+/// Halvings of the budget that the convergence shows.
+const HALVINGS: u32 = 4;
+
+/// How many camera samples of each pixel a budget buys.
+pub(super) enum SampleCount {
+    Samples(u32),
+    /// Not one, and why.
+    OverBudget(String),
+}
+
+/// A mean over seeds and its standard deviation.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct MeanAndDeviation {
+    /// Over all seeds.
+    pub mean: f64,
+    /// Standard deviation over seeds; null for a single one.
+    pub sd: Option<f64>,
+}
+
+impl MeanAndDeviation {
+    fn of(values: &[f64]) -> Self {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+        Self { mean, sd: (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt()) }
+    }
+}
+
+/// Cost and error at a number of samples.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ConvergencePoint {
+    /// As asked for.
+    pub spp: u32,
+    /// Camera samples of a pixel, as counted; the mean over seeds.
+    pub camera_samples: f64,
+    /// Shadow rays of a pixel that the scene covers, as counted; the mean over seeds.
+    pub rays: f64,
+    /// Of rendering alone.
+    pub cpu_seconds: MeanAndDeviation,
+    /// Against the reference, over all pixels.
+    pub rel_mse: MeanAndDeviation,
+}
+
+/// relMSE that no more samples take away. An estimate, which may be below 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bias {
+    pub(super) mean: f64,
+    /// Of 95 %.
+    pub(super) interval: [f64; 2],
+}
+
+/// All that was measured of a strategy.
+pub(super) struct StrategyMeasurement {
+    /// With few samples first; the last is that of the whole budget.
+    pub(super) steps: Vec<ConvergencePoint>,
+    /// The first seed's picture.
+    pub(super) image: RgbImage,
+    /// None for one seed.
+    pub(super) bias: Option<Bias>,
+    pub(super) non_finite: u64,
+}
+
+/// A strategy and how it is rendered.
+pub(super) struct StrategyRun<'a> {
+    pub(super) render_setup: RenderSetup<'a>,
+    /// For the progress bar.
+    pub(super) label: String,
+    pub(super) reference: &'a RgbImage,
+    /// relMSE of the reference itself, as far as it is known.
+    pub(super) reference_noise: f64,
+    pub(super) n_seeds: u32,
+}
+
+impl StrategyRun<'_> {
+    fn pilot(&self, n_samples: u32) -> Result<Render, Error> {
+        // A seed of its own, as calibration must not look at the pictures that are measured.
+        let label = format!("{}, calibrating", self.label);
+        self.render_setup.render(&label, n_samples, !self.render_setup.settings.seed)
+    }
+
+    /// What the budget buys.
+    pub(super) fn calibrate(&self, budget: Budget) -> Result<SampleCount, Error> {
+        match budget {
+            Budget::Samples(n) => Ok(SampleCount::Samples(n)),
+            Budget::Rays(rays) => self.calibrate_rays(rays),
+            Budget::Time(seconds) => self.calibrate_time(seconds),
+        }
+    }
+
+    /// Goes from pilot to pilot, as strategies that learn trace fewer rays for a camera sample the more there are, and
+    /// takes the number whose rays came nearest.
+    fn calibrate_rays(&self, rays: f64) -> Result<SampleCount, Error> {
+        const MOST_PILOTS: usize = 4;
+        let each = self.pilot(4)?.rays() / 4.0;
+        let mut purchase = sample_count(rays, each, &format!("traces {each:.1} shadow rays"));
+        let mut tried: Vec<(u32, f64)> = Vec::new();
+        while let SampleCount::Samples(n) = purchase {
+            if tried.len() == MOST_PILOTS || tried.iter().any(|&(m, _)| m == n) {
+                break;
+            }
+            let traced = self.pilot(n)?.rays();
+            tried.push((n, traced));
+            purchase = sample_count(rays, traced / f64::from(n), "");
+        }
+        let off = |traced: f64| (traced / rays).ln().abs();
+        let nearest = tried.into_iter().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+        Ok(nearest.map_or(purchase, |(n, _)| SampleCount::Samples(n)))
+    }
+
+    /// Doubles the samples until they take an eighth of the time, then goes along the line through
+    /// the last two.
+    fn calibrate_time(&self, seconds: f64) -> Result<SampleCount, Error> {
+        self.pilot(1)?; // warms the caches
+        let mut last = (1, self.pilot(1)?.seconds());
+        let mut before = (0, 0.0);
+        while last.1 < seconds / 8.0 && last.0 < MOST_SAMPLES {
+            let n = last.0 * 2;
+            (before, last) = (last, (n, self.pilot(n)?.seconds()));
+        }
+        let slope = (last.1 - before.1) / f64::from(last.0 - before.0);
+        let each = if slope > 0.0 { slope } else { last.1 / f64::from(last.0) };
+        let fixed = (last.1 - each * f64::from(last.0)).max(0.0);
+        Ok(sample_count(seconds - fixed, each, &format!("takes {:.3} CPU seconds", fixed + each)))
+    }
+
+    /// Renders all seeds at the number of samples and its halves.
+    pub(super) fn measure(&self, n_samples: u32) -> Result<StrategyMeasurement, Error> {
+        let mut steps = Vec::new();
+        for halving in (1..=HALVINGS).rev() {
+            let n = n_samples >> halving;
+            if n > 0 {
+                steps.push(self.step(n, |_| {})?);
+            }
+        }
+        let mut pictures = PictureSum::default();
+        steps.push(self.step(n_samples, |render| pictures.add(render, self.reference))?);
+        let bias = pictures.bias(self.reference_noise);
+        let PictureSum { first, non_finite, .. } = pictures;
+        let image = first.unwrap_or_else(|| RgbImage::new(0, 0, Vec::new()));
+        Ok(StrategyMeasurement { steps, image, bias, non_finite })
+    }
+
+    fn step(
+        &self,
+        n_samples: u32,
+        mut see: impl FnMut(&Render),
+    ) -> Result<ConvergencePoint, Error> {
+        let (mut camera_samples, mut rays) = (0.0, 0.0);
+        let (mut seconds, mut errors) = (Vec::new(), Vec::new());
+        for i in 0..self.n_seeds {
+            let of = self.n_seeds;
+            let label = format!("{}, {n_samples} spp, seed {} of {of}", self.label, i + 1);
+            let seed = self.render_setup.settings.seed.wrapping_add(u64::from(i));
+            let render = self.render_setup.render(&label, n_samples, seed)?;
+            camera_samples += render.camera_samples() / f64::from(of);
+            rays += render.rays() / f64::from(of);
+            seconds.push(render.seconds());
+            errors.push(compare(&render.layers.color, self.reference, None)?.rel_mse);
+            see(&render);
+        }
+        let (cpu_seconds, rel_mse) =
+            (MeanAndDeviation::of(&seconds), MeanAndDeviation::of(&errors));
+        Ok(ConvergencePoint { spp: n_samples, camera_samples, rays, cpu_seconds, rel_mse })
+    }
+}
+
+/// Whole samples for a budget, the nearest number that is not 0.
+fn sample_count(budget: f64, each: f64, one_sample: &str) -> SampleCount {
+    if each > MOST_EXCESS * budget {
+        let advice = "give the strategy fewer rays or lights, or all a larger budget";
+        return SampleCount::OverBudget(format!(
+            "one camera sample a pixel {one_sample}; {advice}"
+        ));
+    }
+    SampleCount::Samples(
+        (budget / each.max(1e-12)).round().clamp(1.0, f64::from(MOST_SAMPLES)) as u32
+    )
+}
+
+/// The pictures of all seeds, added up.
+#[derive(Default)]
+struct PictureSum {
+    first: Option<RgbImage>,
+    /// Of each pixel and channel the differences d from the reference R, over √(R² + 0.01): Σ d and Σ d².
+    sums: Vec<[[f64; 2]; 3]>,
+    n: u32,
+    non_finite: u64,
+}
+
+impl PictureSum {
+    fn add(&mut self, render: &Render, reference: &RgbImage) {
+        self.add_picture(&render.layers.color, reference);
+        self.non_finite += render.counts.non_finite;
+    }
+
+    fn add_picture(&mut self, image: &RgbImage, reference: &RgbImage) {
+        self.sums.resize(image.pixels.len(), [[0.0; 2]; 3]);
+        for (sums, (x, r)) in self.sums.iter_mut().zip(image.pixels.iter().zip(&reference.pixels)) {
+            for (sums, (x, r)) in sums.iter_mut().zip(x.to_array().into_iter().zip(r.to_array())) {
+                let (x, r) = (f64::from(x), f64::from(r));
+                let d = (x - r) / (r * r + REGULARIZER).sqrt();
+                *sums = [sums[0] + d, sums[1] + d * d];
+            }
+        }
+        self.first.get_or_insert_with(|| image.clone());
+        self.n += 1;
+    }
+
+    /// Two independent pictures I and J have E[(I − R)(J − R)] = bias² + that of the reference's own error, so the mean
+    /// over all pairs, ((Σ d)² − Σ d²) / (n (n − 1)), less `noise` estimates bias². Pixels err independently of one
+    /// another, so their spread gives the interval.
+    fn bias(&self, noise: f64) -> Option<Bias> {
+        if self.n < 2 {
+            return None;
+        }
+        let n = f64::from(self.n);
+        let of_channel = |[sum, squares]: [f64; 2]| (sum * sum - squares) / (n * (n - 1.0));
+        let of_pixel =
+            |sums: &[[f64; 2]; 3]| sums.iter().copied().map(of_channel).sum::<f64>() / 3.0;
+        let n_pixels = self.sums.len() as f64;
+        let mean = self.sums.iter().map(of_pixel).sum::<f64>() / n_pixels;
+        let variance = self.sums.iter().map(|s| (of_pixel(s) - mean).powi(2)).sum::<f64>()
+            / (n_pixels * (n_pixels - 1.0).max(1.0));
+        let half = 1.96 * variance.sqrt();
+        let mean = mean - noise;
+        Some(Bias { mean, interval: [mean - half, mean + half] })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use domelight::Rgb;
+    use domelight::sampling::Pcg32;
+
+    #[test]
+    fn samples_are_whole_and_never_none() {
+        let samples = |budget, each| match sample_count(budget, each, "") {
+            SampleCount::Samples(n) => Some(n),
+            SampleCount::OverBudget(_) => None,
+        };
+        assert_eq!(samples(64.0, 1.7), Some(38));
+        assert_eq!(samples(64.0, 45.0), Some(1));
+        assert_eq!(samples(64.0, 80.0), Some(1));
+        assert_eq!(samples(64.0, 97.0), None);
+        assert_eq!(samples(-1.0, 1.0), None);
+        assert_eq!(samples(64.0, 0.0), Some(MOST_SAMPLES));
+    }
+
+    #[test]
+    fn the_deviation_is_that_of_a_sample() {
+        let deviation = MeanAndDeviation::of(&[1.0, 2.0, 3.0]);
+        assert_eq!((deviation.mean, deviation.sd), (2.0, Some(1.0)));
+        assert!(MeanAndDeviation::of(&[4.0]).sd.is_none());
+    }
+
+    /// Of noisy pictures without bias against a noisy reference, and of pictures with bias.
+    #[test]
+    fn the_noise_of_the_reference_is_no_bias() {
+        let (width, height, n_seeds) = (64, 64, 5);
+        let mut pcg = Pcg32::new(7, 8);
+        // Little, as errors are divided by the reference with its noise.
+        let noise = 0.01f64;
+        // A uniform number of variance noise².
+        let mut noisy = |value: f32| {
+            let pixel =
+                |_, _| Rgb::splat(value + noise as f32 * 12f32.sqrt() * (pcg.next_f32() - 0.5));
+            RgbImage::from_fn(width, height, pixel)
+        };
+        let of_reference = noise * noise / 1.01;
+        for bias in [0.0f64, 0.005] {
+            let truth = bias * bias / 1.01;
+            let mut n_inside = 0;
+            for _ in 0..60 {
+                let reference = noisy(1.0);
+                let mut pictures = PictureSum::default();
+                assert_eq!(pictures.bias(of_reference), None);
+                for _ in 0..n_seeds {
+                    pictures.add_picture(&noisy(1.0 + bias as f32), &reference);
+                }
+                let Bias { mean, interval: [low, high] } = pictures.bias(of_reference).unwrap();
+                assert!(low < mean && mean < high, "{low} to {high}");
+                assert!(high - low < 0.3 * of_reference, "{low} to {high}");
+                n_inside += u32::from(low <= truth && truth <= high);
+            }
+            // 95 % of 60 are 57, give or take 1.7.
+            assert!(n_inside >= 50, "{bias}: {n_inside} of 60 intervals hold the truth");
+        }
+    }
+}

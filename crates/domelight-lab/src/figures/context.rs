@@ -1,0 +1,360 @@
+//! What all figures share: the light, the scene, and how pictures are rendered and measured.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+use std::str::FromStr as _;
+
+use domelight::RgbImage;
+use domelight::bsdf::Bsdf;
+use domelight::code;
+use domelight::environment::builtin::BuiltinProbe;
+use domelight::environment::mapping::{Mapping, to_lat_long};
+use domelight::environment::{Environment, Orientation};
+use domelight::math::{Vec3, vec2};
+use domelight::picture::compare::compare;
+use domelight::picture::tone::{ToneCurve, ToneMapping};
+use domelight::quote::{Code, Shell, shell};
+use domelight::render::{Layers, RenderSettings, Renderer};
+use domelight::sampling::{Heuristic, SamplerKind};
+use domelight::scene::builtin::BuiltinScene;
+use domelight::scene::{Camera, EnvironmentSettings, EnvironmentSource, Scene, SceneDescription};
+use domelight::strategy::{PreparedStrategy, StrategySpec};
+
+use super::FigureSettings;
+use crate::scene::{
+    BUILTIN_ROWS, FileSettings, LightSettings, close_up, load_scene, probe_name, view_of,
+};
+use crate::usage::Stopwatch;
+use crate::{At as _, Error, Host};
+
+/// Rows of the map as it is shown.
+const SHOWN_ROWS: usize = 240;
+
+/// The light, the scene and the settings of a run.
+pub struct FigureContext<'a> {
+    pub(crate) environment: Environment,
+    /// The map, small enough to be shown.
+    pub(crate) map: RgbImage,
+    /// The arguments that all figures of this run have in common, for the commands on the page.
+    pub(crate) arguments: Code<Shell>,
+    pub(crate) probe: String,
+    pub(crate) scene: String,
+    pub(crate) quick: bool,
+    pub(crate) seed: u64,
+    description: SceneDescription,
+    up: Vec3,
+    pub(crate) host: &'a dyn Host,
+    references: RefCell<HashMap<String, Rc<Layers>>>,
+}
+
+/// What is in front of the camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Subject<'a> {
+    /// The scene as it is.
+    Scene,
+    /// What the scene is about, without floor and plinth, of one material: the lecture's statue.
+    Alone(&'a str),
+    /// A white matte sphere that fills an orthographic picture.
+    Sphere,
+}
+
+impl<'a> FigureContext<'a> {
+    /// Loads scene and probe.
+    ///
+    /// # Errors
+    /// If one cannot be used, or the map is black.
+    pub fn load(settings: &FigureSettings, host: &'a dyn Host) -> Result<Self, Error> {
+        let (mut description, _) =
+            load_scene(&settings.scene, &FileSettings::default(), false, host)?;
+        let is_builtin = BuiltinScene::from_str(&settings.scene).is_ok();
+        if is_builtin || description.environment.is_none() {
+            description.environment = Some(EnvironmentSettings {
+                source: EnvironmentSource::Builtin(BuiltinProbe::Cathedral.name().to_owned()),
+                rotate_degrees: 0.0,
+                scale: 1.0,
+                exposure: 0.0,
+                up: description.up.unwrap_or_default(),
+            });
+        }
+        let light = settings.environment.over(&description);
+        let map = settings.environment.load(&light, host)?;
+        let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
+        let probe = probe_name(&light.source);
+        let scale = light.factor();
+        let environment = Environment::new(map, orientation, scale).at(&probe)?;
+        if environment.power() == 0.0 {
+            let why = format!("{probe}: the map is black; there is nothing to show");
+            return Err(Error::Failed(why));
+        }
+        let shown = SHOWN_ROWS.min(environment.map().height);
+        Ok(Self {
+            map: to_lat_long(environment.map(), Mapping::LatLong, shown),
+            environment,
+            arguments: common_arguments(settings),
+            probe,
+            scene: settings.scene.clone(),
+            quick: settings.quick,
+            seed: settings.seed,
+            up: light.up.vector(),
+            description,
+            host,
+            references: RefCell::default(),
+        })
+    }
+
+    /// `full`, or `quick` in a quick run.
+    pub(crate) fn choose<T>(&self, full: T, quick: T) -> T {
+        if self.quick { quick } else { full }
+    }
+
+    /// How the map is shown: the mean of its logarithms, which lamps and suns hardly move, a little
+    /// below middle gray.
+    pub(crate) fn map_tone(&self) -> ToneMapping {
+        let lit = self.map.pixels.iter().map(|p| p.luminance()).filter(|&y| y > 0.0);
+        let (sum, n) = lit.fold((0.0, 0.0f32), |(sum, n), y| (sum + y.ln(), n + 1.0));
+        exposed((sum / n.max(1.0)).exp(), 0.09)
+    }
+
+    /// The direction of the map's brightest texel.
+    pub(crate) fn brightest(&self) -> Vec3 {
+        let map = self.environment.map();
+        let brightest = (0..map.pixels.len())
+            .max_by(|&a, &b| map.pixels[a].luminance().total_cmp(&map.pixels[b].luminance()))
+            .unwrap_or(0);
+        let (x, y) = (brightest % map.width, brightest / map.width);
+        let at = |i: usize, n: usize| (i as f32 + 0.5) / n as f32;
+        self.environment.direction(vec2(at(x, map.width), at(y, map.height)))
+    }
+
+    /// Sets up the camera.
+    pub(crate) fn scene(
+        &self,
+        subject: Subject,
+        width: usize,
+        height: usize,
+    ) -> Result<FigureScene<'_>, Error> {
+        let mut description = match subject {
+            Subject::Sphere => BuiltinScene::SphereOrthographic.description(),
+            _ => self.description.clone(),
+        };
+        let aspect = width as f32 / height as f32;
+        let mut view = if let Subject::Alone(material) = subject {
+            let text = material;
+            let bsdf: Bsdf = text.parse().at(format_args!("material {text}"))?;
+            description.set_subject_material(bsdf);
+            description.remove_scenery();
+            close_up(&description, aspect, self.up)
+        } else {
+            view_of(&description, aspect, self.up)
+        };
+        description.rescale(&mut view);
+        Ok(FigureScene {
+            context: self,
+            name: format!("{subject:?} {width}x{height}"),
+            reference: match subject {
+                Subject::Alone(_) => self.choose(split(1024, 1024), split(64, 64)),
+                // Matte for the most part.
+                Subject::Scene | Subject::Sphere => self.choose(split(1536, 128), split(64, 16)),
+            },
+            camera: Camera::new(&view, width, height)?,
+            scene: Scene::new(description).at(&self.scene)?,
+            settings: RenderSettings {
+                width,
+                height,
+                n_samples: 1,
+                seed: self.seed,
+                ..RenderSettings::default()
+            },
+        })
+    }
+}
+
+/// The flags that a command on the page repeats.
+fn common_arguments(settings: &FigureSettings) -> Code<Shell> {
+    let mut text = Code::default();
+    let mut add = |flag: &'static str, value: String| {
+        text += code!(Shell, " {flag} {value}", flag = flag, value = shell::word(&value));
+    };
+    let environment: &LightSettings = &settings.environment;
+    if settings.scene != BuiltinScene::Statue.name() {
+        add("--scene", settings.scene.clone());
+    }
+    if let Some(probe) = &environment.probe {
+        add("--env", probe.clone());
+    }
+    let numbers = [
+        ("--env-rotate", environment.rotate),
+        ("--env-scale", environment.scale),
+        ("--env-exposure", environment.exposure),
+    ];
+    for (flag, value) in numbers {
+        if let Some(value) = value {
+            add(flag, value.to_string());
+        }
+    }
+    if let Some(up) = environment.up {
+        add("--env-up", format!("{up:?}").to_lowercase());
+    }
+    if let Some(mapping) = environment.mapping {
+        add("--env-mapping", mapping.name().to_owned());
+    }
+    if let Some(layer) = &environment.layer {
+        add("--env-layer", layer.clone());
+    }
+    if environment.rows != BUILTIN_ROWS {
+        add("--env-rows", environment.rows.to_string());
+    }
+    if settings.seed != 0 {
+        add("--seed", settings.seed.to_string());
+    }
+    for (flag, given) in [(" --strict", environment.strict_scene), (" --quick", settings.quick)] {
+        text += if given { flag } else { "" };
+    }
+    text
+}
+
+/// A scene in front of a camera. All its pictures have the same camera rays under one seed, one
+/// a pixel: what differs between them is the estimate of the light alone.
+pub(crate) struct FigureScene<'a> {
+    context: &'a FigureContext<'a>,
+    /// Names what is seen, not how it is sampled.
+    name: String,
+    /// Samples of each kind in a pixel of the converged picture.
+    reference: Split,
+    pub(crate) scene: Scene,
+    pub(crate) camera: Camera,
+    pub(crate) settings: RenderSettings,
+}
+
+/// A picture and its cost.
+pub(crate) struct FigureRender {
+    pub(crate) layers: Layers,
+    /// What was done, in words.
+    pub(crate) strategy: String,
+    pub(crate) shadow_rays: u64,
+    pub(crate) points: u64,
+    /// CPU seconds of all threads; wall-clock seconds where the system does not tell.
+    pub(crate) seconds: f64,
+}
+
+/// A picture and how far it is from the converged one.
+pub(crate) struct Measurement {
+    pub(crate) render: FigureRender,
+    /// Mean over pixels that show the scene of (I − R)² / (R² + 0.01).
+    pub(crate) rel_mse: f64,
+}
+
+impl FigureScene<'_> {
+    /// With as many camera samples a pixel.
+    pub(crate) fn samples(mut self, n_samples: u32) -> Self {
+        self.settings.n_samples = n_samples;
+        self
+    }
+
+    /// Fills in what a specification leaves to the scene.
+    pub(crate) fn complete(&self, spec: StrategySpec) -> StrategySpec {
+        spec.for_picture(&self.scene, &self.camera, &self.context.environment, &self.settings)
+    }
+
+    /// Renders the picture.
+    pub(crate) fn render(&self, spec: StrategySpec) -> Result<FigureRender, Error> {
+        self.render_with(spec, self.settings.seed, SamplerKind::Sobol)
+    }
+
+    /// Renders the picture with numbers of another seed or kind.
+    pub(crate) fn render_with(
+        &self,
+        spec: StrategySpec,
+        seed: u64,
+        sampler: SamplerKind,
+    ) -> Result<FigureRender, Error> {
+        let FigureContext { environment, host, .. } = self.context;
+        let settings = RenderSettings { seed, sampler, ..self.settings };
+        let spec = self.complete(spec);
+        let strategy = PreparedStrategy::new(spec, environment)?;
+        let mut watch = Stopwatch::start();
+        let Self { scene, camera, .. } = self;
+        let mut renderer = Renderer::with_strategy(scene, camera, environment, &strategy, settings);
+        renderer.run(&*host.progress("", &settings));
+        let rendering = renderer.rendering();
+        let seconds = watch.lap();
+        host.check_canceled()?;
+        Ok(FigureRender {
+            layers: rendering.layers,
+            strategy: spec.description(),
+            shadow_rays: rendering.counts.shadow_rays,
+            points: rendering.counts.shading_points,
+            seconds: seconds.cpu.unwrap_or(seconds.wall),
+        })
+    }
+
+    /// Renders the picture and compares it with the converged one.
+    pub(crate) fn measure(&self, spec: StrategySpec) -> Result<Measurement, Error> {
+        self.measure_with(spec, self.settings.seed, SamplerKind::Sobol)
+    }
+
+    /// As [`FigureScene::measure`], with numbers of another seed or kind.
+    pub(crate) fn measure_with(
+        &self,
+        spec: StrategySpec,
+        seed: u64,
+        sampler: SamplerKind,
+    ) -> Result<Measurement, Error> {
+        let reference = self.reference(seed, sampler)?;
+        let render = self.render_with(spec, seed, sampler)?;
+        let covered: Vec<bool> = reference.depth.iter().map(|&d| d > 0.0).collect();
+        let error = compare(&render.layers.color, &reference.color, Some(&covered))?;
+        Ok(Measurement { render, rel_mse: error.rel_mse })
+    }
+
+    /// The converged picture with the camera rays of that seed: many samples of both kinds, by
+    /// multiple importance sampling. Made once in a run.
+    pub(crate) fn reference(&self, seed: u64, sampler: SamplerKind) -> Result<Rc<Layers>, Error> {
+        let n_samples = self.settings.n_samples;
+        let key = format!("{} {n_samples} {seed} {sampler:?}", self.name);
+        if let Some(made) = self.context.references.borrow().get(&key) {
+            return Ok(made.clone());
+        }
+        let Split { environment, brdf } = self.reference;
+        let spec = StrategySpec::Mis {
+            n_environment: environment.div_ceil(n_samples),
+            n_brdf: brdf.div_ceil(n_samples),
+            heuristic: Heuristic::Power,
+            compensation: true,
+        };
+        let made = Rc::new(self.render_with(spec, seed, sampler)?.layers);
+        self.context.references.borrow_mut().insert(key, made.clone());
+        Ok(made)
+    }
+
+    /// How pictures of this scene are shown: the scene's mean in the reference at middle gray.
+    pub(crate) fn tone(&self) -> Result<ToneMapping, Error> {
+        let reference = self.reference(self.settings.seed, SamplerKind::Sobol)?;
+        let covered =
+            reference.color.pixels.iter().zip(&reference.depth).filter(|(_, d)| **d > 0.0);
+        let (mut sum, mut n) = (0.0, 0.0f32);
+        for (color, _) in covered {
+            sum += color.luminance().min(1e6);
+            n += 1.0;
+        }
+        Ok(exposed(sum / n.max(1.0), 0.4))
+    }
+}
+
+/// Samples of the environment and of the BRDF.
+#[derive(Clone, Copy, Debug)]
+struct Split {
+    environment: u32,
+    brdf: u32,
+}
+
+fn split(environment: u32, brdf: u32) -> Split {
+    Split { environment, brdf }
+}
+
+/// Exposure that takes `mean` to `gray`, before the curve.
+fn exposed(mean: f32, gray: f32) -> ToneMapping {
+    let exposure = if mean > 0.0 { (gray / mean).log2().clamp(-30.0, 30.0) } else { 0.0 };
+    ToneMapping { exposure, curve: ToneCurve::Agx }
+}

@@ -1,0 +1,240 @@
+//! Figure 8: bias against variance, every method's error over its rays.
+
+use crate::Error;
+use domelight::code;
+use domelight::quote::Html;
+use domelight::sampling::SamplerKind;
+use domelight::strategy::{Proposal, StoppingRule, StrategySpec};
+
+use super::context::{FigureContext, Subject};
+use super::figure::{Figure, Row, Table, number, plot_panel};
+use super::formulas;
+use super::four_ways::{mis, sir};
+use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
+use crate::svg::{Document, PALETTE};
+
+const MATERIAL: &str = "phong:50:1:0.5";
+/// Candidates of each ray that is resampled, and tries of each that rejection should accept.
+const CANDIDATES: u32 = 4;
+const TRIES: u32 = 8;
+
+/// The strategy for a number of rays or lights.
+type SpecFor = fn(u32) -> StrategySpec;
+
+/// What is compared, by name.
+const METHODS: [(&str, SpecFor); 7] = [
+    ("EM", |n| StrategySpec::Environment { n_samples: n }),
+    ("BRDF", |n| StrategySpec::Brdf { n_samples: n }),
+    ("MIS", |n| mis(n.div_ceil(2))),
+    ("SIR, M = 4 N", |n| sir(n, Some(CANDIDATES * n))),
+    ("rejection", |n| StrategySpec::Rejection {
+        proposal: Proposal::Tighter,
+        stop: StoppingRule::Tries(TRIES * n),
+    }),
+    ("median cut", |n| StrategySpec::MedianCut { n_lights: n }),
+    ("variance minimization", |n| StrategySpec::VarianceMinimization { n_lights: n }),
+];
+
+/// A method at one count, over all seeds.
+struct Point {
+    n: u32,
+    /// Shadow rays at each shading point.
+    rays: f64,
+    seconds: f64,
+    /// √relMSE of each seed.
+    errors: Vec<f64>,
+}
+
+impl Point {
+    fn mean(&self) -> f64 {
+        self.errors.iter().sum::<f64>() / self.errors.len() as f64
+    }
+
+    /// Standard deviation over the seeds.
+    fn spread(&self) -> f64 {
+        let n = self.errors.len();
+        if n < 2 {
+            return 0.0;
+        }
+        let mean = self.mean();
+        (self.errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / (n - 1) as f64).sqrt()
+    }
+}
+
+/// The errors of a method.
+struct Curve {
+    name: &'static str,
+    points: Vec<Point>,
+}
+
+impl Curve {
+    /// The exponent of the rays that fits the errors best: least squares of logarithms.
+    fn slope(&self) -> f64 {
+        let logs: Vec<(f64, f64)> = self
+            .points
+            .iter()
+            .map(|p| (p.rays.ln(), p.mean().ln()))
+            .filter(|(x, y)| x.is_finite() && y.is_finite())
+            .collect();
+        let n = logs.len() as f64;
+        let (mx, my) =
+            (logs.iter().map(|l| l.0).sum::<f64>() / n, logs.iter().map(|l| l.1).sum::<f64>() / n);
+        let xy: f64 = logs.iter().map(|(x, y)| (x - mx) * (y - my)).sum();
+        xy / logs.iter().map(|(x, _)| (x - mx).powi(2)).sum::<f64>()
+    }
+}
+
+pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
+    let counts: &[u32] = context.choose(&[1, 4, 16, 64, 256], &[1, 4, 16]);
+    let n_seeds = context.choose(3, 2);
+    let mut table = Table::new(&[
+        "numbers",
+        "method",
+        "n",
+        "shadow rays a point",
+        "CPU seconds",
+        "RMS relative error",
+        "standard deviation",
+        "seeds",
+    ]);
+    let mut slopes =
+        Table::new(&["method", "slope, independent numbers", "slope, Owen-scrambled Sobol’"]);
+    let independent = curves(context, counts, n_seeds, SamplerKind::Independent)?;
+    let sobol = curves(context, counts, n_seeds, SamplerKind::Sobol)?;
+    for (name, curves) in [("independent", &independent), ("sobol", &sobol)] {
+        for curve in curves {
+            for p in &curve.points {
+                table.rows.push(vec![
+                    name.into(),
+                    curve.name.into(),
+                    p.n.into(),
+                    p.rays.into(),
+                    p.seconds.into(),
+                    p.mean().into(),
+                    p.spread().into(),
+                    p.errors.len().into(),
+                ]);
+            }
+        }
+    }
+    for (a, b) in independent.iter().zip(&sobol) {
+        let rounded = |x: f64| (100.0 * x).round() / 100.0;
+        slopes.rows.push(vec![a.name.into(), rounded(a.slope()).into(), rounded(b.slope()).into()]);
+    }
+    let plots = vec![
+        plot("Independent numbers", &independent, Cost::Rays),
+        plot("Owen-scrambled Sobol’ points", &sobol, Cost::Rays),
+    ];
+    let over_time = plot("Owen-scrambled Sobol’ points, over time", &sobol, Cost::Seconds);
+    Ok(Figure {
+        number: 8,
+        title: "Bias against variance",
+        slides: "slides 3 and 30",
+        caption: code!(
+            Html,
+            "<p>Error of every method over its shadow rays or lights at each point, for the statue of {MATERIAL}; bars are \
+             the standard deviation over {n_seeds} seeds. Sampling is right on average, and its error falls \
+             with 1/√N: a slope of −½ for independent numbers, whatever the method (the variance falls with \
+             1/N, not with 1/N²). Stratified points fall faster. Fixed lights have no noise; what they have instead is \
+             bias, which falls as lights are added, but which no average over pictures takes away.</p>",
+            MATERIAL = MATERIAL,
+            n_seeds = n_seeds,
+        ),
+        formulas: formulas::convergence(),
+        rows: vec![Row::new("", plots), Row::new("", vec![over_time])],
+        tables: vec![table, slopes],
+        has_data: true,
+        pictures: Vec::new(),
+    })
+}
+
+fn curves(
+    context: &FigureContext,
+    counts: &[u32],
+    n_seeds: u64,
+    sampler: SamplerKind,
+) -> Result<Vec<Curve>, Error> {
+    let (width, height) = context.choose((88, 124), (11, 16));
+    let figure_scene = context.scene(Subject::Alone(MATERIAL), width, height)?;
+    let mut curves = Vec::new();
+    for (name, spec) in METHODS {
+        let mut points = Vec::new();
+        for &n in counts {
+            let (mut errors, mut rays, mut seconds) = (Vec::new(), 0.0, 0.0);
+            for seed in 0..n_seeds {
+                let measured =
+                    figure_scene.measure_with(spec(n), context.seed.wrapping_add(seed), sampler)?;
+                let render = measured.render;
+                errors.push(measured.rel_mse.sqrt());
+                rays += render.shadow_rays as f64 / render.points.max(1) as f64 / n_seeds as f64;
+                seconds += render.seconds / n_seeds as f64;
+            }
+            points.push(Point { n, rays, seconds, errors });
+        }
+        curves.push(Curve { name, points });
+    }
+    Ok(curves)
+}
+
+/// What an error is plotted over.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Cost {
+    Rays,
+    Seconds,
+}
+
+fn plot(title: &str, curves: &[Curve], cost: Cost) -> Document {
+    let of = |p: &Point| if cost == Cost::Rays { p.rays } else { p.seconds };
+    let series = curves.iter().enumerate().map(|(i, curve)| {
+        let name = match cost {
+            Cost::Rays => format!("{} ({})", curve.name, number_of(curve.slope())),
+            Cost::Seconds => curve.name.to_owned(),
+        };
+        let datum = |p: &Point| {
+            let (mean, spread) = (p.mean(), p.spread());
+            let low = (mean - spread).max(0.1 * mean);
+            Datum { x: of(p), y: mean, error: (spread > 0.0).then_some((low, mean + spread)) }
+        };
+        Series {
+            name,
+            color: PALETTE[i],
+            join: Join::Curve,
+            marker: Some(Marker::ALL[i % Marker::ALL.len()]),
+            points: curve.points.iter().map(datum).collect(),
+        }
+    });
+    let mut series: Vec<Series> = series.collect();
+    let all = || curves.iter().flat_map(|c| &c.points);
+    if cost == Cost::Rays {
+        series.push(guide(&curves[0]));
+    }
+    let label =
+        if cost == Cost::Rays { "shadow rays (lights) at each point, N" } else { "CPU seconds" };
+    let plot = Plot {
+        title: title.to_owned(),
+        x: Axis::around(label, Scale::Log, all().map(of)),
+        y: Axis::around("RMS relative error, √relMSE", Scale::Log, all().map(Point::mean)),
+        series,
+        legend: Legend::Right,
+    };
+    plot_panel(&plot, 900.0, 520.0)
+}
+
+/// With a true minus sign and two digits.
+fn number_of(slope: f64) -> String {
+    if slope.is_finite() { format!("{slope:.2}").replace('-', "−") } else { number(slope) }
+}
+
+/// A line of slope −½ above the first curve.
+fn guide(curve: &Curve) -> Series {
+    let (first, last) = (&curve.points[0], &curve.points[curve.points.len() - 1]);
+    let top = 1.6 * first.mean();
+    let at = |p: &Point| Datum::new(p.rays, top * (p.rays / first.rays).powf(-0.5));
+    Series {
+        name: "1/√N".to_owned(),
+        color: PALETTE[7],
+        join: Join::Dashed,
+        marker: None,
+        points: vec![at(first), at(last)],
+    }
+}

@@ -1,0 +1,321 @@
+//! Figure 4: the environment's samples, the BRDF's, both, and their product, at the lecture's counts and
+//! in equal time.
+
+use crate::Error;
+use domelight::quote::Code;
+use domelight::sampling::Heuristic;
+use domelight::strategy::{Candidates, Resampling, StrategySpec};
+
+use super::context::{FigureContext, FigureScene, Measurement, Subject};
+use super::figure::{
+    Figure, Picture, Radiance, Row, Table, count, number, picture_panel, plot_panel, png_bytes,
+};
+use super::formulas;
+use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
+use crate::svg::{Document, PALETTE, Pixels};
+
+/// The lecture's picture.
+const SIZE: (usize, usize) = (176, 248);
+/// Its counts: environment, BRDF, both (environment and BRDF each), resampled of candidates.
+const EM: u32 = 100;
+const BRDF: u32 = 75;
+const MIS: u32 = 37;
+const SIR: (u32, u32) = (15, 800);
+
+/// The lecture's materials.
+const MATERIALS: [(&str, &str); 2] = [
+    ("Phong, s = 50, ks = 1", "phong:50:1"),
+    ("Phong, s = 50, ks = 1, kd = 0.5", "phong:50:1:0.5"),
+];
+/// Two more, for the environment against the product.
+const MORE: [(&str, &str); 2] =
+    [("Ward, α = 0.15 × 0.5", "ward:0.15:0.5"), ("Gold, GGX, α = 0.2", "ggx:0.2:gold")];
+
+/// The product by resampling, from candidates of both factors.
+pub(super) fn sir(n: u32, n_candidates: Option<u32>) -> StrategySpec {
+    let (candidates, resampling) = (Candidates::Mixture, Resampling::SystematicSorted);
+    StrategySpec::Sir { n_candidates, n_samples: n, candidates, resampling }
+}
+
+/// As many samples of the environment as of the BRDF, weighed as the program does by default.
+pub(super) fn mis(each: u32) -> StrategySpec {
+    StrategySpec::Mis {
+        n_environment: each,
+        n_brdf: each,
+        heuristic: Heuristic::Power,
+        compensation: true,
+    }
+}
+
+pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
+    let (width, height) = context.choose(SIZE, (SIZE.0 / 8, SIZE.1 / 8));
+    let mut figure = Figure {
+        number: 4,
+        title: "Environment, BRDF, both, and their product",
+        slides: "slides 15, 19–20, 28–29",
+        caption: Code::literal(CAPTION),
+        formulas: formulas::four_ways(),
+        rows: Vec::new(),
+        tables: vec![Table::new(&[
+            "material",
+            "budget",
+            "strategy",
+            "shadow rays",
+            "CPU seconds",
+            "relMSE",
+            "relMSE × seconds",
+        ])],
+        has_data: true,
+        pictures: Vec::new(),
+    };
+    let mut plots = Vec::new();
+    for (name, material) in MATERIALS {
+        let figure_scene = context.scene(Subject::Alone(material), width, height)?;
+        let lecture = at_lectures_counts(&figure_scene)?;
+        let seconds = lecture[0].measured.render.seconds;
+        let equal = in_equal_time(&figure_scene, seconds)?;
+        plots.push(plot(name, &lecture, &equal));
+        let heading = format!("{name}: the lecture's counts, and MIS in the time of SIR");
+        add(&mut figure, &figure_scene, name, "lecture", &heading, lecture)?;
+        let heading = format!("{name}: equal time, {} CPU s each", number(seconds));
+        add(&mut figure, &figure_scene, name, "equal time", &heading, equal)?;
+    }
+    figure.rows.push(Row::new("Error over time, at the lecture's counts and at equal time", plots));
+    for (name, material) in MORE {
+        let figure_scene = context.scene(Subject::Alone(material), width, height)?;
+        let em =
+            ShownStrategy::new("EM", &figure_scene, StrategySpec::Environment { n_samples: EM })?;
+        let seconds = em.measured.render.seconds;
+        let resampled = equal_time(&figure_scene, seconds, SIR.0, tuned_sir(&figure_scene))?;
+        let heading =
+            format!("{name}: environment against product, {} CPU s each", number(seconds));
+        let resampled = ShownStrategy::new("Bidirectional: SIR", &figure_scene, resampled)?;
+        add(&mut figure, &figure_scene, name, "equal time", &heading, vec![em, resampled])?;
+    }
+    Ok(figure)
+}
+
+const CAPTION: &str = "<p>One camera ray a pixel, the same in all pictures; what differs is the estimate of the \
+    light alone. First at the lecture's counts: 100 samples of the environment (EM), 75 of the BRDF, 37 of each by \
+    multiple importance sampling (power heuristic, compensated), and 15 shadow rays resampled from 800 candidates \
+    (SIR), which took the same time in 2005. They no longer do: a shadow ray is now cheaper than a candidate. So MIS \
+    stands there once more, with as many samples as it gets in the time of SIR; and the second row gives \
+    all the time of the environment’s 100 samples, their counts calibrated by measurement: SIR with the \
+    lecture’s ratio of candidates to rays, and with the ratio that suits what they cost here. Under each picture \
+    stand its error against the converged one (relMSE: mean of (I − R)² / (R² + 0.01) over the pixels that show the \
+    scene), its shadow rays and its CPU seconds.</p><p>The weights of multiple importance sampling add up to 1 for \
+    each direction, and each kind of sample is divided by its own count: divided by M + N, as it is sometimes \
+    written, the same weights \
+    give half the answer.</p>";
+
+/// A picture with its name.
+struct ShownStrategy {
+    title: String,
+    spec: StrategySpec,
+    measured: Measurement,
+}
+
+impl ShownStrategy {
+    fn new(name: &str, figure_scene: &FigureScene, spec: StrategySpec) -> Result<Self, Error> {
+        let spec = figure_scene.complete(spec);
+        let counts = match spec {
+            StrategySpec::Brdf { n_samples } | StrategySpec::Environment { n_samples } => {
+                n_samples.to_string()
+            }
+            StrategySpec::Mis { n_environment, n_brdf, .. } => {
+                format!("{n_environment} + {n_brdf}")
+            }
+            StrategySpec::Sir { n_samples: n, n_candidates, .. } => {
+                format!("{n}/{}", n_candidates.unwrap_or(n))
+            }
+            _ => String::new(),
+        };
+        Ok(Self { title: format!("{name} {counts}"), spec, measured: figure_scene.measure(spec)? })
+    }
+
+    /// What the plot and the colors know it by.
+    fn kind(&self) -> usize {
+        match self.spec {
+            StrategySpec::Environment { .. } => 0,
+            StrategySpec::Brdf { .. } => 1,
+            StrategySpec::Mis { .. } => 2,
+            StrategySpec::Sir { n_samples: n, n_candidates, .. }
+                if n_candidates == Some(scaled_candidates(n)) =>
+            {
+                3
+            }
+            _ => 4,
+        }
+    }
+}
+
+/// Candidates of `n` rays in the lecture's ratio.
+fn scaled_candidates(n: u32) -> u32 {
+    (u64::from(n) * u64::from(SIR.1) / u64::from(SIR.0)) as u32
+}
+
+/// Resampling by the ratio of candidates to rays that a pilot finds best here.
+fn tuned_sir(figure_scene: &FigureScene) -> impl Fn(u32) -> StrategySpec + use<> {
+    const PILOT: u32 = 64;
+    let ratio = match figure_scene.complete(sir(PILOT, None)) {
+        StrategySpec::Sir { n_candidates: Some(m), .. } => m / PILOT,
+        _ => 1,
+    };
+    move |n| sir(n, Some(n * ratio.max(1)))
+}
+
+/// The lecture's four, and how far both factors come in the time of the last.
+fn at_lectures_counts(figure_scene: &FigureScene) -> Result<Vec<ShownStrategy>, Error> {
+    let mut shown = vec![
+        ShownStrategy::new("EM", figure_scene, StrategySpec::Environment { n_samples: EM })?,
+        ShownStrategy::new("BRDF", figure_scene, StrategySpec::Brdf { n_samples: BRDF })?,
+        ShownStrategy::new("MIS", figure_scene, mis(MIS))?,
+        ShownStrategy::new("SIR", figure_scene, sir(SIR.0, Some(SIR.1)))?,
+    ];
+    let seconds = shown[3].measured.render.seconds;
+    shown.push(ShownStrategy::new(
+        "MIS",
+        figure_scene,
+        equal_time(figure_scene, seconds, MIS, mis)?,
+    )?);
+    Ok(shown)
+}
+
+/// The four again with `seconds` for each, and resampling with the ratio that suits.
+fn in_equal_time(figure_scene: &FigureScene, seconds: f64) -> Result<Vec<ShownStrategy>, Error> {
+    let lectures_ratio = |n: u32| sir(n, Some(scaled_candidates(n)));
+    Ok(vec![
+        ShownStrategy::new(
+            "EM",
+            figure_scene,
+            equal_time(figure_scene, seconds, EM, |n| StrategySpec::Environment { n_samples: n })?,
+        )?,
+        ShownStrategy::new(
+            "BRDF",
+            figure_scene,
+            equal_time(figure_scene, seconds, BRDF, |n| StrategySpec::Brdf { n_samples: n })?,
+        )?,
+        ShownStrategy::new("MIS", figure_scene, equal_time(figure_scene, seconds, MIS, mis)?)?,
+        ShownStrategy::new(
+            "SIR",
+            figure_scene,
+            equal_time(figure_scene, seconds, 2, lectures_ratio)?,
+        )?,
+        ShownStrategy::new(
+            "SIR",
+            figure_scene,
+            equal_time(figure_scene, seconds, SIR.0, tuned_sir(figure_scene))?,
+        )?,
+    ])
+}
+
+/// The strategy with the count that takes `seconds`, by measurement from `start` on.
+///
+/// A picture costs a + b·n; the part a, camera rays and shading points, is measured with one sample.
+fn equal_time(
+    figure_scene: &FigureScene,
+    seconds: f64,
+    start: u32,
+    spec: impl Fn(u32) -> StrategySpec,
+) -> Result<StrategySpec, Error> {
+    let start = start.max(2);
+    let least = figure_scene.render(spec(1))?.seconds;
+    let some = figure_scene.render(spec(start))?.seconds;
+    let each = ((some - least) / f64::from(start - 1)).max(1e-9);
+    let n = 1.0 + (seconds - least) / each;
+    Ok(spec(n.round().clamp(1.0, 30_000.0) as u32))
+}
+
+/// Puts a row of pictures into the figure, the converged one last.
+fn add(
+    figure: &mut Figure,
+    figure_scene: &FigureScene,
+    material: &str,
+    budget: &str,
+    heading: &str,
+    shown: Vec<ShownStrategy>,
+) -> Result<(), Error> {
+    let tone = figure_scene.tone()?;
+    let (width, height) = (figure_scene.settings.width, figure_scene.settings.height);
+    // With the scale of the file a whole number of pixels for each.
+    let enlarged = (4.0 / 3.0) * SIZE.0 as f64 / width as f64;
+    let (w, h) = (width as f64 * enlarged, height as f64 * enlarged);
+    let mut panels: Vec<Document> = Vec::new();
+    let mut push =
+        |title: &str, image: &domelight::RgbImage, notes: &[String]| -> Result<(), Error> {
+            let png = png_bytes(image, tone)?;
+            let picture = Picture { png, width: w, height: h, pixels: Pixels::Sharp, title, notes };
+            panels.push(picture_panel(&picture, |_, _| {}));
+            Ok(())
+        };
+    for s in shown {
+        let Measurement { render, rel_mse } = s.measured;
+        let notes = [
+            format!("relMSE {}", number(rel_mse)),
+            format!("{} shadow rays", count(render.shadow_rays)),
+            format!("{} CPU s", number(render.seconds)),
+        ];
+        push(&s.title, &render.layers.color, &notes)?;
+        figure.tables[0].rows.push(vec![
+            material.into(),
+            budget.into(),
+            render.strategy.into(),
+            render.shadow_rays.into(),
+            render.seconds.into(),
+            rel_mse.into(),
+            (rel_mse * render.seconds).into(),
+        ]);
+        figure.pictures.push(Radiance {
+            name: file_name(&format!("{material} {budget} {}", s.title)),
+            image: render.layers.color,
+            tone,
+        });
+    }
+    let reference =
+        figure_scene.reference(figure_scene.settings.seed, figure_scene.settings.sampler)?;
+    push("Converged", &reference.color, &[])?;
+    let name = file_name(&format!("{material} converged"));
+    if figure.pictures.iter().all(|p| p.name != name) {
+        figure.pictures.push(Radiance { name, image: reference.color.clone(), tone });
+    }
+    figure.rows.push(Row::new(heading, panels));
+    Ok(())
+}
+
+/// Letters, digits and hyphens.
+pub(super) fn file_name(text: &str) -> String {
+    let plain: String = text
+        .to_lowercase()
+        .chars()
+        .filter(|c| !matches!(c, ',' | '=' | '_'))
+        .map(|c| if c.is_ascii_alphanumeric() || c == '.' { c } else { ' ' })
+        .collect();
+    plain.split_whitespace().collect::<Vec<_>>().join("-")
+}
+
+/// Error over CPU seconds, at the lecture's counts and at equal time.
+fn plot(name: &str, lecture: &[ShownStrategy], equal: &[ShownStrategy]) -> Document {
+    const KINDS: [&str; 5] =
+        ["EM", "BRDF", "MIS", "SIR, the lecture's ratio", "SIR, measured ratio"];
+    let all = || lecture.iter().chain(equal);
+    let series = KINDS.iter().enumerate().map(|(kind, name)| {
+        let datum = |s: &ShownStrategy| Datum::new(s.measured.render.seconds, s.measured.rel_mse);
+        let mut points: Vec<Datum> = all().filter(|s| s.kind() == kind).map(datum).collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x));
+        Series {
+            name: (*name).to_owned(),
+            color: PALETTE[kind],
+            join: Join::Curve,
+            marker: Some(Marker::ALL[kind % Marker::ALL.len()]),
+            points,
+        }
+    });
+    let plot = Plot {
+        title: name.to_owned(),
+        x: Axis::around("CPU seconds", Scale::Log, all().map(|s| s.measured.render.seconds)),
+        y: Axis::around("relMSE", Scale::Log, all().map(|s| s.measured.rel_mse)),
+        series: series.collect(),
+        legend: Legend::Above,
+    };
+    plot_panel(&plot, 640.0, 420.0)
+}

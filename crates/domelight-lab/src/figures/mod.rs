@@ -1,0 +1,84 @@
+//! The figures of a lecture on sampling direct illumination, one a file, and a page that shows them.
+
+mod context;
+mod convergence;
+mod figure;
+mod formulas;
+mod four_ways;
+mod inversion;
+mod lobes;
+mod maps;
+mod median_cut;
+mod page;
+mod product;
+mod rejection;
+mod variance_minimization;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use crate::scene::LightSettings;
+use crate::{At as _, Error};
+pub use context::FigureContext;
+use figure::Figure;
+
+/// How many figures there are.
+pub const N_FIGURES: u8 = 8;
+
+/// What the figures show.
+#[derive(Clone, Debug)]
+pub struct FigureSettings {
+    /// A built-in scene or a file.
+    pub scene: String,
+    /// The light; a built-in scene is lit by the cathedral unless told otherwise.
+    pub environment: LightSettings,
+    /// Small pictures, few samples, poor references.
+    pub quick: bool,
+    /// Names the random numbers.
+    pub seed: u64,
+}
+
+/// Draws figures into a folder, with a page that shows them; returns the page's name. `only` are the numbers of the
+/// figures, from 1 to [`N_FIGURES`]; none are all. After an error what is done stays, on the page as well.
+///
+/// # Errors
+/// If a file cannot be written, or the host ended the work.
+pub fn draw(context: &FigureContext, only: &[u8], folder: &Path) -> Result<PathBuf, Error> {
+    fs::create_dir_all(folder).at(folder.display())?;
+    let host = context.host;
+    let mut figures = Vec::new();
+    for number in (1..=N_FIGURES).filter(|n| only.is_empty() || only.contains(n)) {
+        let start = Instant::now();
+        let made = make(context, number).and_then(|figure| {
+            figure.write(folder, context.choose(1.5, 0.75), host)?;
+            Ok(figure)
+        });
+        match made {
+            Ok(figure) => {
+                let seconds = start.elapsed().as_secs_f64();
+                host.status(&format!("figure {number}: {} ({seconds:.1} s)", figure.title));
+                figures.push(figure);
+            }
+            Err(error) => {
+                page::write(context, folder, &figures)?;
+                return Err(error).at(format_args!("figure {number}"));
+            }
+        }
+    }
+    page::write(context, folder, &figures)?;
+    Ok(folder.join(page::NAME))
+}
+
+fn make(context: &FigureContext, number: u8) -> Result<Figure, Error> {
+    match number {
+        1 => lobes::make(context),
+        2 => inversion::make(context),
+        3 => product::make(context),
+        4 => four_ways::make(context),
+        5 => rejection::make(context),
+        6 => median_cut::make(context),
+        7 => variance_minimization::make(context),
+        _ => convergence::make(context),
+    }
+}

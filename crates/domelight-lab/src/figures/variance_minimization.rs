@@ -1,0 +1,190 @@
+//! Figure 7: variance minimization beside median cut.
+
+use crate::Error;
+use domelight::RgbImage;
+use domelight::quote::Code;
+use domelight::rig::{
+    LightPosition, MedianCut, Rig, RigError, ShadingReference, VarianceMinimization, median_cut,
+    variance_minimization,
+};
+use domelight::strategy::StrategySpec;
+
+use super::context::FigureContext;
+use super::figure::{Figure, Picture, Radiance, Row, Table, picture_panel, png_bytes};
+use super::formulas;
+use super::maps::{borders, mark};
+use super::median_cut::{converged_panel, full_scene, lit_panel, regions_panel, sphere_scene};
+use crate::svg::{Document, Pixels, Rect};
+
+/// The poster's numbers of regions.
+const REGIONS: [usize; 4] = [4, 16, 64, 256];
+/// Lights of the renders and of the detail.
+const LIGHTS: usize = 64;
+
+pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
+    let environment = &context.environment;
+    let poster = |n| variance_minimization(environment, n, VarianceMinimization::poster());
+    let refined = |n| variance_minimization(environment, n, VarianceMinimization::default());
+    let cut = |n| median_cut(environment, n, MedianCut::default());
+    let (mut by_poster, mut by_default) = (Vec::new(), Vec::new());
+    for n in REGIONS {
+        let title = format!("{n} regions");
+        by_poster.push(regions_panel(context, &poster(n)?, &title)?);
+        by_default.push(regions_panel(context, &refined(n)?, &title)?);
+    }
+    let detail = Detail::new(context);
+    let details = vec![
+        detail.panel("Part of the map", None)?,
+        detail.panel("Median cut, 64", Some(&cut(LIGHTS)?))?,
+        detail.panel("Variance minimization, 64", Some(&poster(LIGHTS)?))?,
+        detail.panel("On the sphere, refined, 64", Some(&refined(LIGHTS)?))?,
+    ];
+
+    let mut renders = Vec::new();
+    let mut pictures = Vec::new();
+    for (figure_scene, name) in
+        [(full_scene(context)?, "scene"), (sphere_scene(context)?, "sphere")]
+    {
+        for (spec, title, file) in [
+            (StrategySpec::MedianCut { n_lights: LIGHTS as u32 }, "Median cut, 64", "median-cut"),
+            (
+                StrategySpec::VarianceMinimization { n_lights: LIGHTS as u32 },
+                "Variance min., 64",
+                "variance-minimization",
+            ),
+        ] {
+            let measured = figure_scene.measure(spec)?;
+            renders.push(lit_panel(title, &measured, figure_scene.tone()?)?);
+            let image = measured.render.layers.color;
+            pictures.push(Radiance {
+                name: format!("{name}-{file}"),
+                image,
+                tone: figure_scene.tone()?,
+            });
+        }
+        renders.push(converged_panel(&figure_scene)?);
+    }
+    Ok(Figure {
+        number: 7,
+        title: "Variance minimization",
+        slides: "slides 42–45",
+        caption: Code::literal(
+            "<p>Equal energy is not what shading asks for: light that lies close together may share a light, \
+            light that is spread out may not. Here a cut minimizes the greater of the two halves’ variances, the \
+            energy times the squared distance to the centroid (not the variance of the pixels’ values). The first row is the \
+            poster’s rule, with distances on the map; the second the program’s default: distances on the sphere, where no pole \
+            or seam matters, the worst region cut first, then joined and refined into cells about their lights. \
+            The detail shows the surroundings of the brightest light: lights (blue) sit on what shines.</p>\
+            <p>The table has the RMS error of unoccluded shading over all normals, in percent of the RMS shading: matte, \
+            and of a lobe cos<sup>20</sup>.</p>",
+        ),
+        formulas: vec![formulas::region_variance()],
+        rows: vec![
+            Row::new("The poster's rule", by_poster),
+            Row::new("On the sphere, worst region first, refined", by_default),
+            Row::new("One region in detail", details),
+            Row::new("The scene and a matte sphere, lit by 64 lights", renders),
+        ],
+        tables: vec![errors(context)?],
+        has_data: false,
+        pictures,
+    })
+}
+
+/// A rig of some lights.
+type Method<'a> = Box<dyn Fn(usize) -> Result<Rig, RigError> + 'a>;
+
+/// RMS shading errors of every method.
+fn errors(context: &FigureContext) -> Result<Table, Error> {
+    let environment = &context.environment;
+    let reference = ShadingReference::new(environment);
+    let mut table = Table::new(&[
+        "method",
+        "16 matte",
+        "16 glossy",
+        "64 matte",
+        "64 glossy",
+        "256 matte",
+        "256 glossy",
+    ]);
+    let center = MedianCut { position: LightPosition::GeometricCenter, ..MedianCut::default() };
+    let flat = MedianCut { scale_width: false, ..MedianCut::default() };
+    let sphere = VarianceMinimization { lloyd_steps: 0, ..VarianceMinimization::default() };
+    let methods: [(&str, Method); 6] = [
+        ("median cut, geometric center", Box::new(move |n| median_cut(environment, n, center))),
+        ("median cut", Box::new(|n| median_cut(environment, n, MedianCut::default()))),
+        ("median cut, widths not scaled", Box::new(move |n| median_cut(environment, n, flat))),
+        (
+            "variance, poster",
+            Box::new(|n| variance_minimization(environment, n, VarianceMinimization::poster())),
+        ),
+        (
+            "variance, on the sphere",
+            Box::new(move |n| variance_minimization(environment, n, sphere)),
+        ),
+        (
+            "variance, refined",
+            Box::new(|n| variance_minimization(environment, n, VarianceMinimization::default())),
+        ),
+    ];
+    for (name, method) in &methods {
+        let mut row = vec![(*name).into()];
+        for n in [16, 64, 256] {
+            let error = reference.error(&method(n)?);
+            row.extend([error.diffuse, error.glossy].map(|e| (100.0 * e).into()));
+        }
+        table.rows.push(row);
+    }
+    Ok(table)
+}
+
+/// The surroundings of the map's brightest texel.
+struct Detail<'a> {
+    context: &'a FigureContext<'a>,
+    /// In [0, 1]² of the map.
+    part: Rect,
+    image: RgbImage,
+}
+
+impl<'a> Detail<'a> {
+    /// Share of the map's width.
+    const WIDTH: f64 = 0.14;
+
+    fn new(context: &'a FigureContext) -> Self {
+        let map = context.environment.map();
+        let uv = context.environment.uv(context.brightest());
+        // A square of whole texels.
+        let side = ((Self::WIDTH * map.width as f64) as usize).clamp(1, map.height);
+        let corner = |at: f32, n: usize| {
+            ((f64::from(at) * n as f64 - 0.5 * side as f64).max(0.0) as usize).min(n - side)
+        };
+        let (x0, y0) = (corner(uv.x, map.width), corner(uv.y, map.height));
+        let (w, h) = (map.width as f64, map.height as f64);
+        let part = Rect::new(x0 as f64 / w, y0 as f64 / h, side as f64 / w, side as f64 / h);
+        let image = RgbImage::from_fn(side, side, |x, y| map.get(x0 + x, y0 + y));
+        Self { context, part, image }
+    }
+
+    fn panel(&self, title: &str, rig: Option<&Rig>) -> Result<Document, Error> {
+        let mut tone = self.context.map_tone();
+        tone.exposure -= 3.0;
+        let picture = Picture {
+            png: png_bytes(&self.image, tone)?,
+            width: 340.0,
+            height: 340.0,
+            pixels: Pixels::Sharp,
+            title,
+            notes: &[],
+        };
+        Ok(picture_panel(&picture, |sheet, r| {
+            let Some(rig) = rig else { return };
+            borders(sheet, r, rig, self.part);
+            for light in &rig.lights {
+                let uv = self.context.environment.uv(light.direction);
+                let x = r.x + (f64::from(uv.x) - self.part.x) / self.part.width * r.width;
+                let y = r.y + (f64::from(uv.y) - self.part.y) / self.part.height * r.height;
+                mark(sheet, (x, y));
+            }
+        }))
+    }
+}

@@ -1,0 +1,107 @@
+//! What a front end decides for the work that is done for it.
+
+use std::path::Path;
+
+use domelight::environment::io::{LoadedProbe, ProbeOptions, load_probe};
+use domelight::files::write_atomically;
+use domelight::memory::require;
+use domelight::render::{Observer, RenderSettings};
+
+use crate::Error;
+
+/// A front end: where messages go, who sees the progress, when to stop, which files and how much memory may be taken.
+pub trait Host: Sync {
+    /// Shows a warning.
+    fn warn(&self, _text: &str) {}
+
+    /// Shows how the work goes.
+    fn status(&self, _text: &str) {}
+
+    /// Warns of `n` camera samples that were NaN or infinite, of the picture named by `label`: they are black in it,
+    /// and a defect.
+    fn warn_of_non_finite(&self, label: &str, n: u64) {
+        if n > 0 {
+            self.warn(&format!(
+                "{label}{n} camera samples were NaN or infinite and count as black, which is a defect of \
+                 domelight: please report this command with its scene and probe"
+            ));
+        }
+    }
+
+    /// Shows a render, named by `label`; what is returned is told of each tile and may end the render.
+    fn progress<'a>(&'a self, _label: &str, _settings: &RenderSettings) -> Box<dyn Observer + 'a> {
+        Box::new(CanceledBy(|| self.canceled()))
+    }
+
+    /// True ends the work.
+    fn canceled(&self) -> bool {
+        false
+    }
+
+    /// A file is about to be read.
+    ///
+    /// # Errors
+    /// If it must not be.
+    fn reads(&self, _path: &Path) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Writes a result, whole or not at all.
+    ///
+    /// # Errors
+    /// If it cannot be written, or must not be.
+    fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), Error> {
+        Ok(write_atomically(path, |out| out.write_all(bytes))?)
+    }
+
+    /// Loads a probe from a file.
+    ///
+    /// # Errors
+    /// If that fails.
+    fn load_probe(&self, path: &Path, options: &ProbeOptions) -> Result<LoadedProbe, Error> {
+        Ok(load_probe(path, options)?)
+    }
+
+    /// What may still be taken \[bytes\]; none if there is no limit.
+    fn memory_left(&self) -> Option<u64> {
+        None
+    }
+
+    /// So many bytes were taken and are kept.
+    fn keeps_memory(&self, _bytes: u64) {}
+}
+
+impl dyn Host + '_ {
+    /// Refuses, by the name of what takes it, more memory than is left; else counts it.
+    pub(crate) fn take_memory(&self, what: &str, bytes: u64) -> Result<(), Error> {
+        use crate::At as _;
+        require(bytes, self.memory_left()).at(what)?;
+        self.keeps_memory(bytes);
+        Ok(())
+    }
+
+    /// An observer that shows nothing.
+    pub(crate) fn unseen(&self) -> Box<dyn Observer + '_> {
+        Box::new(CanceledBy(|| self.canceled()))
+    }
+
+    /// Ends the work if the host says so.
+    pub(crate) fn check_canceled(&self) -> Result<(), Error> {
+        if self.canceled() { Err(Error::Interrupted("")) } else { Ok(()) }
+    }
+}
+
+/// A host that says nothing and never stops.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Host for Silent {}
+
+/// An observer that asks whether the render should end.
+struct CanceledBy<F>(F);
+
+impl<F: Fn() -> bool + Sync> Observer for CanceledBy<F> {
+    fn canceled(&self) -> bool {
+        (self.0)()
+    }
+}

@@ -1,0 +1,44 @@
+//! What is done with renders of [`domelight`]: comparisons of strategies, converged references and their cache,
+//! benchmarks, the lecture's figures, and the pages that show them.
+//!
+//! Every entry takes a [`Host`], which is what a front end decides: where messages go, who sees the progress, when to
+//! stop. [`Silent`] is the host of programs that want results alone.
+//!
+//! ```no_run
+//! use domelight_lab::compare::{Budget, Comparison, ComparisonSettings};
+//! use domelight_lab::scene::SceneSettings;
+//! use domelight::render::RenderSettings;
+//! use domelight_lab::Silent;
+//!
+//! let scene = SceneSettings::new("robot.glb", [256, 256]).load(&Silent)?.build(&Silent)?;
+//! let render = RenderSettings { width: 256, height: 256, ..Default::default() };
+//! let settings = ComparisonSettings { render, budget: Budget::Rays(32.0), ..Default::default() };
+//! let mut comparison = Comparison::new(scene.view(), settings);
+//! comparison.add_named("mis:1:1".parse()?)?;
+//! comparison.add_named("product".parse()?)?;
+//! let reference = comparison.reference(None, &Silent)?;
+//! let result = comparison.run(&reference, &Silent)?;
+//! std::fs::write("compare.html", result.page()?.as_str())?;
+//! # Ok::<(), domelight_lab::Error>(())
+//! ```
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+mod acceptance;
+pub mod bench;
+pub mod compare;
+mod error;
+pub mod figures;
+mod host;
+pub mod measure;
+pub mod report;
+pub mod scene;
+mod strategy;
+pub mod svg;
+mod usage;
+
+pub use acceptance::{Acceptance, count_tries};
+pub use error::{At, Error};
+pub use host::{Host, Silent};
+pub use strategy::{NamedStrategy, refuse_repeating_points};
+pub use usage::{Seconds, Stopwatch, cpu_seconds, peak_memory, thread_seconds};

@@ -1,0 +1,111 @@
+//! References in the user's cache folder, by content.
+//!
+//! An entry is `KEY-SUM.exr`: KEY is the fingerprint of everything that decides the picture, SUM that of
+//! the file itself, so that a damaged entry is known and made again.
+
+use std::fmt::Display;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use domelight::files::{remove_abandoned, write_atomically};
+use domelight::fingerprint::{Fingerprint, Fingerprinter};
+use etcetera::base_strategy::{BaseStrategy as _, choose_native_strategy};
+
+use crate::scene::View;
+use crate::{At as _, Error, Host};
+
+/// A folder of references.
+#[derive(Clone, Debug)]
+pub struct Cache {
+    folder: PathBuf,
+    program: String,
+}
+
+impl Cache {
+    /// The folder that was asked for, else that of the platform; none, with a warning, where there is none. `program`
+    /// is the fingerprint of what renders: another build may make other pictures.
+    pub fn new(folder: Option<&Path>, program: &str, host: &dyn Host) -> Option<Self> {
+        let folder = folder
+            .map(Path::to_path_buf)
+            .or_else(|| Some(choose_native_strategy().ok()?.cache_dir().join("domelight")));
+        if folder.is_none() {
+            host.warn("this user has no home to keep references in; --cache FOLDER names a place");
+        }
+        Some(Self { folder: folder?, program: program.to_owned() })
+    }
+
+    /// The entry and its bytes, if it is there and sound; a damaged one is removed.
+    pub(crate) fn get(&self, key: &Key, host: &dyn Host) -> Option<(PathBuf, Vec<u8>)> {
+        let entries = fs::read_dir(&self.folder).ok()?.flatten().map(|entry| entry.path());
+        for path in entries {
+            let Some(sum) = key.sum_in(&path) else { continue };
+            // A pipe might never end.
+            if !fs::metadata(&path).is_ok_and(|there| there.is_file()) {
+                continue;
+            }
+            match fs::read(&path) {
+                Ok(bytes) if of(&bytes).to_string() == sum => return Some((path, bytes)),
+                _ => {
+                    host.warn(&format!("{}: damaged; it is made again", path.display()));
+                    let _ = fs::remove_file(&path);
+                }
+            }
+        }
+        None
+    }
+
+    /// Keeps the bytes, if that is possible; else warns, for what was rendered is there all the same.
+    pub(crate) fn put(&self, key: &Key, bytes: &[u8], host: &dyn Host) -> Option<PathBuf> {
+        let kept = self.try_put(key, bytes);
+        kept.inspect_err(|error| host.warn(&format!("the reference is not kept: {error}"))).ok()
+    }
+
+    fn try_put(&self, key: &Key, bytes: &[u8]) -> Result<PathBuf, Error> {
+        let folder = &self.folder;
+        fs::create_dir_all(folder)
+            .at(format!("cannot make the cache folder {}", folder.display()))?;
+        let path = folder.join(format!("{}-{}.exr", key.0, of(bytes)));
+        remove_abandoned(folder);
+        write_atomically(&path, |out| out.write_all(bytes))?;
+        Ok(path)
+    }
+}
+
+/// Names everything that decides a picture.
+pub(crate) struct Key(String);
+
+impl Key {
+    /// Of what this program makes: scene, light and view, the program itself, and what `settings` say.
+    pub(crate) fn of_program(cache: &Cache, view: View, settings: impl Display) -> Self {
+        let mut key = Fingerprinter::default();
+        key.text(env!("CARGO_PKG_VERSION"));
+        key.text(&cache.program);
+        Self::of(key, view, settings)
+    }
+
+    /// Of what another program makes, which `settings` name.
+    pub(crate) fn of_other(view: View, settings: impl Display) -> Self {
+        Self::of(Fingerprinter::default(), view, settings)
+    }
+
+    fn of(mut key: Fingerprinter, view: View, settings: impl Display) -> Self {
+        let View { scene, camera, environment, .. } = view;
+        key.text(scene.fingerprint());
+        key.text(environment.fingerprint());
+        // Debug's text of a number is exact.
+        key.text(format_args!("{camera:?}{settings}"));
+        Self(key.finish().to_string())
+    }
+
+    /// The sum that the name of an entry of this key tells.
+    fn sum_in<'a>(&self, path: &'a Path) -> Option<&'a str> {
+        let name = path.file_name()?.to_str()?;
+        name.strip_prefix(&self.0)?.strip_prefix('-')?.strip_suffix(".exr")
+    }
+}
+
+fn of(bytes: &[u8]) -> Fingerprint {
+    let mut fingerprint = Fingerprinter::default();
+    fingerprint.bytes(bytes.iter().copied());
+    fingerprint.finish()
+}

@@ -1,0 +1,313 @@
+//! The converged picture that all others are measured against.
+
+use std::path::Path;
+
+use domelight::picture::compare::{SizeMismatch, compare};
+use domelight::picture::exr::{ExrLayers, text_attributes};
+use domelight::picture::{ReadOptions, read, read_bytes};
+use domelight::render::{Layers, RenderSettings};
+use domelight::sampling::Heuristic;
+use domelight::strategy::{PreparedStrategy, StrategySpec};
+use domelight::{Rgb, RgbImage};
+use serde::{Deserialize, Serialize};
+
+use super::cache::{Cache, Key};
+use super::render::RenderSetup;
+use crate::scene::View;
+use crate::{At as _, Error, Host};
+
+/// How a reference with a picture without shadows is rendered.
+pub(crate) const MIS: StrategySpec = StrategySpec::Mis {
+    n_environment: 4,
+    n_brdf: 4,
+    heuristic: Heuristic::Power,
+    compensation: true,
+};
+
+/// To the same error in a tenth of the time of MIS, and unbiased like it.
+pub(crate) const PRODUCT: StrategySpec = StrategySpec::Product { n_rays: 8 };
+
+/// Seeds of its halves, which nobody takes for pictures.
+const SEEDS: [u64; 2] = [0x7265_6665_7265_6e63, 0x6365_6e65_7265_6665];
+
+/// The attributes that keep the noise and the samples.
+const NOISE: &str = "domelight.reference.noise";
+const COVERED_NOISE: &str = "domelight.reference.noise-covered";
+const SAMPLES: &str = "domelight.reference.samples";
+
+/// The layer that keeps the picture without shadows.
+const UNOCCLUDED: &str = "unoccluded";
+
+/// The converged picture.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// The picture.
+    pub picture: ReferencePicture,
+    /// Where it comes from, and how far it has converged.
+    pub report: ReferenceReport,
+}
+
+/// What is kept of a converged picture.
+#[derive(Clone, Debug)]
+pub struct ReferencePicture {
+    /// Radiance.
+    pub image: RgbImage,
+    /// Coverage; none of a file without it.
+    pub alpha: Option<Vec<f32>>,
+    /// With every shadow ray free; none of files and of other programs.
+    pub unoccluded: Option<RgbImage>,
+}
+
+/// Where the reference comes from.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ReferenceReport {
+    /// File, cache or render.
+    pub source: Source,
+    /// Where it is kept.
+    pub file: Option<String>,
+    /// How it was rendered; null for files.
+    pub strategy: Option<String>,
+    /// Camera samples of each pixel; null for files.
+    pub spp: Option<u32>,
+    /// relMSE of the reference itself, estimated from its halves; null for files.
+    pub rel_mse: Option<f64>,
+    /// The same over the pixels that the scene fills; null for files and without coverage.
+    pub rel_mse_covered: Option<f64>,
+}
+
+/// Where the reference comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Source {
+    /// A file that the user gave.
+    File,
+    /// It was rendered before.
+    Cache,
+    /// It was rendered now.
+    Rendered,
+}
+
+/// When a reference is good enough.
+#[derive(Clone, Copy, Debug)]
+pub enum Goal {
+    /// With so many camera samples a pixel.
+    Samples(u32),
+    /// When the relMSE of the pixels that show any of the scene is no greater than `noise`, or after `most` camera samples a pixel.
+    Noise {
+        /// relMSE.
+        noise: f64,
+        /// Camera samples of each pixel.
+        most: u32,
+    },
+}
+
+/// relMSE of a reference.
+#[derive(Clone, Copy, Debug)]
+struct Noise {
+    /// Of all pixels, or of those that show any of the scene where that was the goal.
+    all: f64,
+    /// Of those that the scene fills.
+    covered: Option<f64>,
+}
+
+/// Camera samples of a pilot's halves.
+const PILOT: u32 = 16;
+
+impl From<Layers> for ReferencePicture {
+    fn from(layers: Layers) -> Self {
+        let Layers { color: image, alpha, unoccluded, .. } = layers;
+        Self { image, alpha: Some(alpha), unoccluded: Some(unoccluded) }
+    }
+}
+
+impl ReferencePicture {
+    /// Which pixels the scene fills.
+    pub(crate) fn covered(&self) -> Option<Vec<bool>> {
+        Some(self.alpha.as_ref()?.iter().map(|&alpha| alpha > 0.999).collect())
+    }
+
+    /// Which pixels show any of the scene.
+    pub(crate) fn touched(&self) -> Option<Vec<bool>> {
+        Some(self.alpha.as_ref()?.iter().map(|&alpha| alpha > 0.0).collect())
+    }
+
+    /// The mean m of two halves.
+    fn mean(&self, other: &Self) -> Self {
+        let alpha = self.alpha.iter().flatten().zip(other.alpha.iter().flatten());
+        let unoccluded = self.unoccluded.as_ref().zip(other.unoccluded.as_ref());
+        Self {
+            image: mean(&self.image, &other.image),
+            alpha: self.alpha.as_ref().map(|_| alpha.map(|(a, b)| 0.5 * (a + b)).collect()),
+            unoccluded: unoccluded.map(|(a, b)| mean(a, b)),
+        }
+    }
+
+    fn encode(&self, noise: Noise, spp: u32) -> Result<Vec<u8>, Error> {
+        let mut layers = ExrLayers::from_image(&self.image, self.alpha.as_deref());
+        if let Some(unoccluded) = &self.unoccluded {
+            layers.push_rgb(UNOCCLUDED, unoccluded, None);
+        }
+        let attribute = |name: &str, value: String| (name.to_owned(), value);
+        layers.attributes =
+            vec![attribute(NOISE, noise.all.to_string()), attribute(SAMPLES, spp.to_string())];
+        let covered = noise.covered.map(|noise| attribute(COVERED_NOISE, noise.to_string()));
+        layers.attributes.extend(covered);
+        Ok(layers.encode()?)
+    }
+
+    /// The picture, its noise and its samples.
+    fn decode(bytes: &[u8], file: &str, host: &dyn Host) -> Option<(Self, Noise, u32)> {
+        let main = read_bytes(bytes, file, &ReadOptions::default()).ok()?;
+        let layer =
+            ReadOptions { layer: Some(UNOCCLUDED.to_owned()), max_memory: host.memory_left() };
+        let unoccluded = read_bytes(bytes, file, &layer).ok().map(|read| read.image);
+        let attributes = text_attributes(bytes).ok()?;
+        let attribute = |key| attributes.iter().find(|(name, _)| name == key).map(|(_, text)| text);
+        let (all, spp) = (attribute(NOISE)?.parse().ok()?, attribute(SAMPLES)?.parse().ok()?);
+        let covered = attribute(COVERED_NOISE).and_then(|noise| noise.parse().ok());
+        let noise = Noise { all, covered };
+        Some((Self { image: main.image, alpha: main.alpha, unoccluded }, noise, spp))
+    }
+}
+
+fn mean(a: &RgbImage, b: &RgbImage) -> RgbImage {
+    let mean = a.pixels.iter().zip(&b.pixels).map(|(&a, &b)| (a + b) * 0.5);
+    RgbImage::new(a.width, a.height, mean.collect::<Vec<Rgb>>())
+}
+
+impl Reference {
+    /// Reads a reference of the wanted size.
+    ///
+    /// # Errors
+    /// If it cannot be read, has another size, or a pixel that is NaN or infinite.
+    pub fn read(path: &Path, size: [usize; 2], host: &dyn Host) -> Result<Self, Error> {
+        let name = path.display().to_string();
+        host.reads(path)?;
+        let options = ReadOptions { max_memory: host.memory_left(), ..Default::default() };
+        let image = read(path, &options)?.image;
+        if [image.width, image.height] != size {
+            let mismatch =
+                SizeMismatch { test: (size[0], size[1]), reference: (image.width, image.height) };
+            return Err(mismatch).at(name);
+        }
+        if let Some(i) = image.pixels.iter().position(|pixel| !pixel.is_finite()) {
+            let (x, y) = (i % image.width, i / image.width);
+            let why =
+                format!("{name}: pixel ({x}, {y}) is NaN or infinite; a reference must not be");
+            return Err(Error::Failed(why));
+        }
+        let report = ReferenceReport {
+            source: Source::File,
+            file: Some(name),
+            strategy: None,
+            spp: None,
+            rel_mse: None,
+            rel_mse_covered: None,
+        };
+        Ok(Self { picture: ReferencePicture { image, alpha: None, unoccluded: None }, report })
+    }
+
+    /// From the cache, else taken half by half by `render`, which is given camera samples a pixel and 0 or 1,
+    /// and kept.
+    pub(crate) fn get(
+        cache: Option<(&Cache, &Key)>,
+        goal: Goal,
+        strategy: &str,
+        host: &dyn Host,
+        render: impl FnMut(u32, usize) -> Result<ReferencePicture, Error>,
+    ) -> Result<Self, Error> {
+        let report = |source, file: Option<&Path>, noise: Noise, spp| ReferenceReport {
+            source,
+            file: file.map(|path| path.display().to_string()),
+            strategy: Some(strategy.to_owned()),
+            spp: Some(spp),
+            rel_mse: Some(noise.all),
+            rel_mse_covered: noise.covered,
+        };
+        let kept = cache.and_then(|(cache, key)| cache.get(key, host));
+        if let Some((path, bytes)) = kept
+            && let Some((picture, noise, spp)) =
+                ReferencePicture::decode(&bytes, &path.to_string_lossy(), host)
+        {
+            return Ok(Self { picture, report: report(Source::Cache, Some(&path), noise, spp) });
+        }
+        let (picture, noise, spp) = goal.reach(render)?;
+        let path = match cache {
+            None => None,
+            Some((cache, key)) => cache.put(key, &picture.encode(noise, spp)?, host),
+        };
+        Ok(Self { picture, report: report(Source::Rendered, path.as_deref(), noise, spp) })
+    }
+
+    /// Of a view, by an unbiased strategy.
+    ///
+    /// # Errors
+    /// If the strategy does not suit the environment, the scene is not in sight, or the host ended the work.
+    pub fn of_view(
+        cache: Option<&Cache>,
+        view: View,
+        strategy: StrategySpec,
+        settings: RenderSettings,
+        goal: Goal,
+        host: &dyn Host,
+    ) -> Result<Self, Error> {
+        let settings = RenderSettings { n_samples: 0, seed: SEEDS[0], ..settings };
+        let key = |cache| {
+            (cache, Key::of_program(cache, view, format_args!("{settings:?}{strategy}{goal:?}")))
+        };
+        let keyed = cache.map(key);
+        let keyed = keyed.as_ref().map(|(cache, key)| (*cache, key));
+        let prepared = PreparedStrategy::new(strategy, view.environment)?;
+        let render_setup = RenderSetup { view, settings, strategy: &prepared, host, shown: true };
+        Self::get(keyed, goal, &strategy.description(), host, |n_samples, half| {
+            let label = format!("reference, half {} of 2", half + 1);
+            Ok(render_setup.render(&label, n_samples, SEEDS[half])?.layers.into())
+        })
+    }
+}
+
+impl Goal {
+    /// The mean of two halves, its relMSE and its camera samples a pixel.
+    fn reach(
+        self,
+        mut render: impl FnMut(u32, usize) -> Result<ReferencePicture, Error>,
+    ) -> Result<(ReferencePicture, Noise, u32), Error> {
+        let mut take = |each: u32| -> Result<(ReferencePicture, Noise), Error> {
+            let [a, b] = [render(each, 0)?, render(each, 1)?];
+            let mean = a.mean(&b);
+            // (a − m)² = ((a − b) / 2)², whose expected value is the variance of m.
+            let noise = |mask: Option<&[bool]>| -> Result<f64, Error> {
+                Ok(compare(&a.image, &mean.image, mask)?.rel_mse)
+            };
+            let touched = mean.touched().filter(|_| matches!(self, Self::Noise { .. }));
+            let covered = mean.covered().filter(|covered| covered.contains(&true));
+            let covered = covered.map(|covered| noise(Some(&covered))).transpose()?;
+            let noise = Noise { all: noise(touched.as_deref())?, covered };
+            Ok((mean, noise))
+        };
+        match self {
+            Self::Samples(n) => {
+                let each = n.div_ceil(2);
+                let (picture, noise) = take(each)?;
+                Ok((picture, noise, 2 * each))
+            }
+            Self::Noise { noise: goal, most } => {
+                let most = most.div_ceil(2);
+                let mut each = PILOT.min(most);
+                loop {
+                    let (picture, noise) = take(each)?;
+                    if noise.all <= goal || each == most {
+                        return Ok((picture, noise, 2 * each));
+                    }
+                    each = next_samples(each, noise.all / goal).min(most);
+                }
+            }
+        }
+    }
+}
+
+/// Enough to divide the noise by `ratio`, which falls with the samples or faster: not much more at once
+/// than was tried, and twice as many at least.
+fn next_samples(each: u32, ratio: f64) -> u32 {
+    (f64::from(each) * ratio.clamp(2.0, 16.0)).ceil() as u32
+}

@@ -1,0 +1,91 @@
+//! One picture and what it cost.
+
+use domelight::render::{Counts, Layers, Observer, RenderSettings, Renderer};
+use domelight::strategy::Strategy;
+
+use crate::scene::View;
+use crate::usage::{Seconds, Stopwatch};
+use crate::{Error, Host};
+
+/// A strategy of any type, which renders pictures of a view.
+pub(crate) trait Picturing {
+    /// The picture and what was done for it; none if the observer ended it.
+    fn picture(
+        &self,
+        view: View,
+        settings: &RenderSettings,
+        observer: &dyn Observer,
+    ) -> Option<(Layers, Counts)>;
+}
+
+impl<S: Strategy> Picturing for S {
+    fn picture(
+        &self,
+        view: View,
+        settings: &RenderSettings,
+        observer: &dyn Observer,
+    ) -> Option<(Layers, Counts)> {
+        let View { scene, camera, environment, .. } = view;
+        let mut renderer = Renderer::with_strategy(scene, camera, environment, self, *settings);
+        let complete = renderer.run(observer);
+        let rendering = renderer.rendering();
+        complete.then_some((rendering.layers, rendering.counts))
+    }
+}
+
+/// What all renders of a strategy share.
+#[derive(Clone, Copy)]
+pub(crate) struct RenderSetup<'a> {
+    pub(crate) view: View<'a>,
+    /// But for the number of samples and the seed.
+    pub(crate) settings: RenderSettings,
+    pub(crate) strategy: &'a dyn Picturing,
+    pub(crate) host: &'a dyn Host,
+    /// The host shows the progress.
+    pub(crate) shown: bool,
+}
+
+/// A picture and what it cost.
+pub(crate) struct Render {
+    pub(crate) layers: Layers,
+    pub(crate) counts: Counts,
+    /// Of rendering alone.
+    pub(crate) time: Seconds,
+}
+
+impl Render {
+    /// CPU seconds of rendering; wall-clock seconds where the system does not tell.
+    pub(crate) fn seconds(&self) -> f64 {
+        self.time.cpu.unwrap_or(self.time.wall)
+    }
+
+    /// Shadow rays of a pixel that the scene covers.
+    pub(crate) fn rays(&self) -> f64 {
+        self.counts.shadow_rays as f64 / self.layers.covered_pixels()
+    }
+
+    /// Camera samples of a pixel, which not all strategies have as many of as asked for.
+    pub(crate) fn camera_samples(&self) -> f64 {
+        self.counts.camera_rays as f64 / self.layers.n_samples.len() as f64
+    }
+}
+
+impl RenderSetup<'_> {
+    /// Renders with so many camera samples a pixel; an error if interrupted.
+    pub(crate) fn render(&self, label: &str, n_samples: u32, seed: u64) -> Result<Render, Error> {
+        let settings = RenderSettings { n_samples, seed, ..self.settings };
+        let mut watch = Stopwatch::start();
+        let host = self.host;
+        let observer = if self.shown { host.progress(label, &settings) } else { host.unseen() };
+        let picture = self.strategy.picture(self.view, &settings, &*observer);
+        let time = watch.lap();
+        let Some((layers, counts)) = picture else {
+            return Err(Error::Interrupted("; no report was written"));
+        };
+        if counts.shading_points == 0 {
+            let why = "the camera sees nothing of the scene: there is nothing to compare";
+            return Err(Error::Failed(why.into()));
+        }
+        Ok(Render { layers, counts, time })
+    }
+}

@@ -1,0 +1,85 @@
+//! What was rendered, in words and numbers.
+
+use domelight::environment::{Environment, UpAxis};
+use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
+use serde::Serialize;
+
+/// A scene under its light, seen by a camera.
+#[derive(Clone, Debug, Serialize)]
+pub struct SceneReport {
+    /// A built-in scene or a file.
+    pub scene: String,
+    /// How many the scene has.
+    pub triangles: usize,
+    /// What the picture lacks of the file, one sentence each.
+    pub warnings: Vec<String>,
+    /// What the subject is made of instead of its own material.
+    pub material: Option<String>,
+    /// The scene was moved and scaled to the unit cube.
+    pub normalize: bool,
+    /// A disk lies under the scene.
+    pub ground: bool,
+    /// The background is left out.
+    pub hide_env: bool,
+    /// The light.
+    pub environment: EnvironmentReport,
+    /// The view.
+    pub camera: CameraReport,
+    /// Width and height \[pixels\].
+    pub size: [usize; 2],
+}
+
+/// The light of a render.
+#[derive(Clone, Debug, Serialize)]
+pub struct EnvironmentReport {
+    probe: String,
+    size: [usize; 2],
+    rotate: f32,
+    scale: f32,
+    exposure: f32,
+    up: &'static str,
+}
+
+impl EnvironmentReport {
+    /// What a user would call the probe.
+    pub fn probe(&self) -> &str {
+        &self.probe
+    }
+
+    /// Of a probe by its name, used as `light` says.
+    pub fn new(probe: String, light: &EnvironmentSettings, environment: &Environment) -> Self {
+        Self {
+            probe,
+            size: [environment.map().width, environment.map().height],
+            rotate: light.rotate_degrees,
+            scale: light.scale,
+            exposure: light.exposure,
+            up: match light.up {
+                UpAxis::Y => "y",
+                UpAxis::Z => "z",
+            },
+        }
+    }
+}
+
+/// The view of a render; one of `fov` and `ortho` is null.
+#[derive(Clone, Debug, Serialize)]
+pub struct CameraReport {
+    origin: [f32; 3],
+    target: [f32; 3],
+    up: [f32; 3],
+    fov: Option<f32>,
+    ortho: Option<f32>,
+}
+
+impl CameraReport {
+    /// Of a camera in the scene's own units.
+    pub fn new(view: &CameraSettings) -> Self {
+        let (fov, ortho) = match view.projection {
+            Projection::Perspective { fov_y_degrees } => (Some(fov_y_degrees), None),
+            Projection::Orthographic { height } => (None, Some(height)),
+        };
+        let [origin, target, up] = [view.origin, view.target, view.up].map(|v| v.to_array());
+        Self { origin, target, up, fov, ortho }
+    }
+}

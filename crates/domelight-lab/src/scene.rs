@@ -1,0 +1,479 @@
+//! From what a user says of a scene, its light and its view to what can be rendered.
+
+use std::path::Path;
+use std::str::FromStr as _;
+
+use domelight::RgbImage;
+use domelight::bsdf::{Bsdf, MaterialSpec, ParseMaterialError};
+use domelight::environment::builtin::BuiltinProbe;
+use domelight::environment::io::ProbeOptions;
+use domelight::environment::mapping::Mapping;
+use domelight::environment::{Environment, Orientation, UpAxis};
+use domelight::geometry::Aabb;
+use domelight::math::Vec3;
+use domelight::scene::builtin::BuiltinScene;
+use domelight::scene::{
+    AnimationTime, Camera, CameraSettings, EnvironmentSettings, EnvironmentSource, LoadOptions,
+    NamedCamera, Projection, Scene, SceneDescription, load_with,
+};
+
+use crate::report::{CameraReport, EnvironmentReport, SceneReport};
+use crate::{At as _, Error, Host};
+
+/// Rows of a built-in probe unless told otherwise.
+pub const BUILTIN_ROWS: u32 = 1024;
+
+/// For each texel of an environment \[bytes\]: its map, its tables, and what fixed lights are made with.
+pub const ENVIRONMENT_TEXEL: u64 = 36;
+
+/// For each triangle \[bytes\]: the tree, and what it is built from.
+pub const TRIANGLE: u64 = 140;
+
+/// A scene under its light, seen by a camera, as a user says it.
+#[derive(Clone, Debug)]
+pub struct SceneSettings {
+    /// A built-in scene or a file.
+    pub scene: String,
+    /// What of the file is shown.
+    pub file: FileSettings,
+    /// The light.
+    pub environment: LightSettings,
+    /// The view.
+    pub view: ViewSettings,
+    /// What is changed about the scene.
+    pub subject: SubjectSettings,
+}
+
+/// What of a file is shown.
+#[derive(Clone, Debug, Default)]
+pub struct FileSettings {
+    /// The scene of a glTF file with several, by name or number; none is the file's own.
+    pub scene: Option<String>,
+    /// An animation of a glTF file and the moment that is shown; none is at rest.
+    pub animation: Option<AnimationTime>,
+}
+
+/// The light: what is none is as the scene says.
+#[derive(Clone, Debug)]
+pub struct LightSettings {
+    /// A built-in probe or a file.
+    pub probe: Option<String>,
+    /// About the up axis, counter-clockwise seen from above \[degrees\].
+    pub rotate: Option<f32>,
+    /// The radiance is multiplied by it.
+    pub scale: Option<f32>,
+    /// The radiance is multiplied by 2 to the power of it.
+    pub exposure: Option<f32>,
+    /// Where the top of the map points to.
+    pub up: Option<UpAxis>,
+    /// The map's layout, where shape and attributes do not tell it rightly.
+    pub mapping: Option<Mapping>,
+    /// The layer of an OpenEXR map.
+    pub layer: Option<String>,
+    /// Of a built-in probe.
+    pub rows: u32,
+    /// Refuses scenes that would be repaired or shown in part.
+    pub strict_scene: bool,
+    /// Refuses maps that would be repaired.
+    pub strict_map: bool,
+}
+
+impl Default for LightSettings {
+    fn default() -> Self {
+        Self {
+            probe: None,
+            rotate: None,
+            scale: None,
+            exposure: None,
+            up: None,
+            mapping: None,
+            layer: None,
+            rows: BUILTIN_ROWS,
+            strict_scene: false,
+            strict_map: false,
+        }
+    }
+}
+
+/// The view: what is none is as the scene's camera has it, else framed to the scene.
+#[derive(Clone, Debug)]
+pub struct ViewSettings {
+    /// Width and height of the picture \[pixels\].
+    pub size: [usize; 2],
+    /// One of the scene's cameras, by name or number; none is the first.
+    pub camera: Option<String>,
+    /// Where the camera is.
+    pub origin: Option<Vec3>,
+    /// What it looks at.
+    pub target: Option<Vec3>,
+    /// The direction that is up in the picture.
+    pub up: Option<Vec3>,
+    /// Perspective or orthographic.
+    pub projection: Option<Projection>,
+}
+
+/// What is changed about the scene.
+#[derive(Clone, Debug, Default)]
+pub struct SubjectSettings {
+    /// What the subject is made of; none is its own.
+    pub material: Option<NamedMaterial>,
+    /// Move and scale the scene: center of the bounds to 0, longest half-extent to 1.
+    pub normalize: bool,
+    /// Put a diffuse disk under the scene.
+    pub ground: bool,
+    /// Leave the background out.
+    pub hide_env: bool,
+}
+
+/// A material in the notation of `--material`, and the text that it was given as.
+#[derive(Clone, Debug)]
+pub struct NamedMaterial {
+    /// As it was given.
+    pub text: String,
+    /// What it says.
+    pub spec: MaterialSpec,
+}
+
+impl std::str::FromStr for NamedMaterial {
+    type Err = ParseMaterialError;
+
+    fn from_str(s: &str) -> Result<Self, ParseMaterialError> {
+        Ok(Self { text: s.to_owned(), spec: s.parse()? })
+    }
+}
+
+/// What was read, changed as the settings say; nothing is built yet.
+#[derive(Debug)]
+pub struct LoadedScene {
+    /// Geometry and materials.
+    pub description: SceneDescription,
+    /// How the map is used.
+    pub light: EnvironmentSettings,
+    /// The map, lat-long.
+    pub map: RgbImage,
+    /// The camera.
+    pub camera: CameraSettings,
+    /// What the picture lacks of the files, one sentence each.
+    pub warnings: Vec<String>,
+    settings: SceneSettings,
+}
+
+/// A scene under its light, seen by a camera.
+#[derive(Debug)]
+pub struct PreparedScene {
+    /// Geometry and materials.
+    pub scene: Scene,
+    /// The view.
+    pub camera: Camera,
+    /// The view, in the scene's own units.
+    pub camera_settings: CameraSettings,
+    /// The light.
+    pub environment: Environment,
+    /// What a user would call the probe.
+    pub probe: String,
+    /// In words and numbers.
+    pub report: SceneReport,
+}
+
+/// A scene under its light, seen by a camera, that somebody else owns.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// Geometry and materials.
+    pub scene: &'a Scene,
+    /// The view.
+    pub camera: &'a Camera,
+    /// The light.
+    pub environment: &'a Environment,
+    /// In words and numbers.
+    pub report: &'a SceneReport,
+}
+
+impl PreparedScene {
+    /// What a render needs of it.
+    pub fn view(&self) -> View<'_> {
+        let Self { scene, camera, environment, report, .. } = self;
+        View { scene, camera, environment, report }
+    }
+}
+
+impl SceneSettings {
+    /// A scene as it is, under its own light or the built-in sky.
+    pub fn new(scene: impl Into<String>, size: [usize; 2]) -> Self {
+        Self {
+            scene: scene.into(),
+            file: FileSettings::default(),
+            environment: LightSettings::default(),
+            view: ViewSettings {
+                size,
+                camera: None,
+                origin: None,
+                target: None,
+                up: None,
+                projection: None,
+            },
+            subject: SubjectSettings::default(),
+        }
+    }
+
+    /// Reads scene and probe.
+    ///
+    /// # Errors
+    /// If one cannot be read, or the view is not to be had.
+    pub fn load(self, host: &dyn Host) -> Result<LoadedScene, Error> {
+        let is_builtin = BuiltinScene::from_str(&self.scene);
+        let (mut description, light, map, warnings) = if let Ok(scene) = is_builtin {
+            self.file.check_builtin(&self.scene)?;
+            // It takes no memory to speak of, so that its light may be read meanwhile.
+            let environment = Some(scene.environment());
+            let of_scene = SceneDescription { environment, ..SceneDescription::default() };
+            let light = self.environment.over(&of_scene);
+            let map = || self.environment.load(&light, host);
+            let (description, map) = rayon::join(|| scene.description(), map);
+            (description, light, map?, Vec::new())
+        } else {
+            let strict = self.environment.strict_scene;
+            let (description, warnings) = load_scene(&self.scene, &self.file, strict, host)?;
+            let light = self.environment.over(&description);
+            let map = self.environment.load(&light, host)?;
+            (description, light, map, warnings)
+        };
+        self.view.choose(&self.scene, &mut description)?;
+        let camera = self.frame(&mut description, light.up.vector())?;
+        Ok(LoadedScene { description, light, map, camera, warnings, settings: self })
+    }
+
+    /// Changes the scene as the settings say; the camera frames what is not scenery.
+    fn frame(&self, scene: &mut SceneDescription, up: Vec3) -> Result<CameraSettings, Error> {
+        let [width, height] = self.view.size;
+        let bounds = self.subject.apply(scene, up);
+        // Squares of lengths must be finite.
+        let extent = bounds.size().max_element();
+        if extent > 1e18 || extent > 0.0 && extent < 1e-18 {
+            let how = if extent < 1.0 { "small" } else { "large" };
+            let text = format!("{}: the scene is too {how}: {extent:e} across", self.scene);
+            return Err(Error::Usage(text));
+        }
+        Ok(self.view.over(scene.camera.as_ref(), || {
+            CameraSettings::framing(&bounds, width as f32 / height as f32, up)
+        }))
+    }
+}
+
+impl LoadedScene {
+    /// Builds tree and tables.
+    ///
+    /// # Errors
+    /// If scene, camera or environment cannot be used.
+    pub fn build(self, host: &dyn Host) -> Result<PreparedScene, Error> {
+        let Self { mut description, light, map, mut camera, warnings, settings } = self;
+        let [width, height] = settings.view.size;
+        let camera_report = CameraReport::new(&camera);
+        description.rescale(&mut camera);
+        let (camera, camera_settings) = (Camera::new(&camera, width, height)?, camera);
+        let n_triangles: usize = description.parts.iter().map(|p| p.mesh.triangles.len()).sum();
+        let tree = format!("{}: a tree over {n_triangles} triangles", settings.scene);
+        host.take_memory(&tree, TRIANGLE * n_triangles as u64)?;
+        let scene = Scene::new(description).at(&settings.scene)?;
+        let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
+        let scale = light.factor();
+        let probe = probe_name(&light.source);
+        let environment = Environment::new(map, orientation, scale).at(&probe)?;
+        let report = SceneReport {
+            scene: settings.scene,
+            triangles: scene.triangle_count(),
+            warnings,
+            material: settings.subject.material.map(|m| m.text),
+            normalize: settings.subject.normalize,
+            ground: settings.subject.ground,
+            hide_env: settings.subject.hide_env,
+            environment: EnvironmentReport::new(probe.clone(), &light, &environment),
+            camera: camera_report,
+            size: [width, height],
+        };
+        Ok(PreparedScene { scene, camera, camera_settings, environment, probe, report })
+    }
+}
+
+/// The scene's own camera, or one framed to it.
+pub(crate) fn view_of(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
+    let framed = || CameraSettings::framing(&description.subject_bounds(), aspect, up);
+    description.camera.unwrap_or_else(framed)
+}
+
+/// That view, moved until the scene just fits.
+pub(crate) fn close_up(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
+    const FOV: f32 = 26.0;
+    let view = view_of(description, aspect, up);
+    let bounds = description.bounds();
+    let (center, size) = (bounds.center(), bounds.size());
+    let toward = (view.origin - view.target).normalize_or(Vec3::Z);
+    let height = size.abs().dot(up.abs());
+    // The widest side, whichever way it is turned.
+    let width = (size - up.abs() * height).max_element();
+    let extent = height.max(width / aspect) * 1.08;
+    let distance = 0.5 * extent / (0.5 * FOV.to_radians()).tan() + 0.5 * width;
+    CameraSettings {
+        projection: Projection::Perspective { fov_y_degrees: FOV },
+        origin: center + toward * distance,
+        target: center,
+        up: view.up,
+    }
+}
+
+/// A built-in scene by its name, else a file, and what of it is not shown.
+pub(crate) fn load_scene(
+    name: &str,
+    file: &FileSettings,
+    strict: bool,
+    host: &dyn Host,
+) -> Result<(SceneDescription, Vec<String>), Error> {
+    if let Ok(builtin) = BuiltinScene::from_str(name) {
+        return Ok((builtin.description(), Vec::new()));
+    }
+    host.reads(Path::new(name))?;
+    let options = LoadOptions {
+        max_memory: host.memory_left(),
+        strict,
+        scene: file.scene.clone(),
+        animation: file.animation.clone(),
+        ..LoadOptions::default()
+    };
+    let loaded = load_with(Path::new(name), &options)?;
+    loaded.files.iter().try_for_each(|file| host.reads(file))?;
+    host.keeps_memory(loaded.memory);
+    for warning in &loaded.warnings {
+        host.warn(warning);
+    }
+    Ok((loaded.description, loaded.warnings))
+}
+
+impl FileSettings {
+    /// Refuses what a built-in scene does not have.
+    fn check_builtin(&self, scene: &str) -> Result<(), Error> {
+        match (&self.scene, &self.animation) {
+            (None, None) => Ok(()),
+            _ => Err(Error::Usage(format!(
+                "--scene and --animation choose in a glTF file; {scene} is built in"
+            ))),
+        }
+    }
+}
+
+/// What a user would call the probe.
+pub(crate) fn probe_name(source: &EnvironmentSource) -> String {
+    match source {
+        EnvironmentSource::File(path) => path.display().to_string(),
+        EnvironmentSource::Builtin(name) => name.clone(),
+    }
+}
+
+impl LightSettings {
+    /// The scene's own settings with these over them.
+    pub fn over(&self, scene: &SceneDescription) -> EnvironmentSettings {
+        let source = |name: &str| match BuiltinProbe::from_str(name) {
+            Ok(probe) => EnvironmentSource::Builtin(probe.name().to_owned()),
+            Err(_) => EnvironmentSource::File(name.into()),
+        };
+        let plain = |source| EnvironmentSettings {
+            source,
+            rotate_degrees: 0.0,
+            scale: 1.0,
+            exposure: 0.0,
+            up: scene.up.unwrap_or_default(),
+        };
+        let mut settings = match (&self.probe, &scene.environment) {
+            // Another probe takes none of the first one's adjustments over.
+            (Some(name), _) => plain(source(name)),
+            (None, Some(of_scene)) => of_scene.clone(),
+            (None, None) => plain(source(BuiltinProbe::Sky.name())),
+        };
+        settings.rotate_degrees = self.rotate.unwrap_or(settings.rotate_degrees);
+        settings.scale = self.scale.unwrap_or(settings.scale);
+        settings.exposure = self.exposure.unwrap_or(settings.exposure);
+        settings.up = self.up.unwrap_or(settings.up);
+        settings
+    }
+
+    /// Reads or makes the map, lat-long.
+    ///
+    /// # Errors
+    /// If it cannot be read, or takes too much memory.
+    pub fn load(&self, light: &EnvironmentSettings, host: &dyn Host) -> Result<RgbImage, Error> {
+        let path = match &light.source {
+            EnvironmentSource::Builtin(name) => {
+                let probe = BuiltinProbe::from_str(name);
+                let probe = probe.map_err(|error| Error::Usage(error.to_string()))?;
+                let rows = u64::from(self.rows);
+                let bytes = ENVIRONMENT_TEXEL * 2 * rows * rows;
+                host.take_memory(&format!("{name} with {rows} rows"), bytes)?;
+                return Ok(probe.image(self.rows as usize));
+            }
+            EnvironmentSource::File(path) => path,
+        };
+        let options = ProbeOptions {
+            mapping: self.mapping,
+            layer: self.layer.clone(),
+            strict: self.strict_map,
+            max_memory: host.memory_left(),
+        };
+        host.reads(path)?;
+        let loaded = host.load_probe(path, &options)?;
+        let texels = loaded.image.pixels.len() as u64;
+        host.take_memory(&path.display().to_string(), ENVIRONMENT_TEXEL * texels)?;
+        loaded.warnings.iter().for_each(|warning| host.warn(warning));
+        Ok(loaded.image)
+    }
+}
+
+impl SubjectSettings {
+    /// Changes the scene as it says; returns the bounds of what the camera should frame.
+    fn apply(&self, scene: &mut SceneDescription, up: Vec3) -> Aabb {
+        if self.normalize {
+            scene.normalize();
+        }
+        if let Some(material) = &self.material {
+            scene.set_subject_material(Bsdf::from(material.spec));
+        }
+        let bounds = scene.subject_bounds();
+        if self.ground {
+            scene.add_ground(up);
+        }
+        bounds
+    }
+}
+
+impl ViewSettings {
+    /// Makes the camera that was asked for the scene's.
+    fn choose(&self, name: &str, scene: &mut SceneDescription) -> Result<(), Error> {
+        let Some(asked) = &self.camera else { return Ok(()) };
+        let cameras = &scene.cameras;
+        let by_name = cameras.iter().find(|camera| camera.name == *asked);
+        let by_number = || asked.parse().ok().and_then(|i: usize| cameras.get(i));
+        if let Some(NamedCamera { settings, .. }) = by_name.or_else(by_number) {
+            scene.camera = Some(*settings);
+            return Ok(());
+        }
+        let names: Vec<_> =
+            cameras.iter().enumerate().map(|(i, c)| format!("{i} '{}'", c.name)).collect();
+        let known = match names.len() {
+            0 => "has no camera to choose".to_owned(),
+            _ => format!("has no camera '{asked}'; there are {}", names.join(", ")),
+        };
+        Err(Error::Usage(format!("{name} {known}")))
+    }
+
+    /// These over the scene's own camera, or over one framed to the scene.
+    fn over(
+        &self,
+        of_scene: Option<&CameraSettings>,
+        framed: impl FnOnce() -> CameraSettings,
+    ) -> CameraSettings {
+        let camera = of_scene.copied().unwrap_or_else(framed);
+        CameraSettings {
+            origin: self.origin.unwrap_or(camera.origin),
+            target: self.target.unwrap_or(camera.target),
+            up: self.up.unwrap_or(camera.up),
+            projection: self.projection.unwrap_or(camera.projection),
+        }
+    }
+}

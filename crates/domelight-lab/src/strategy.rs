@@ -1,0 +1,39 @@
+//! Strategies by their text.
+
+use std::str::FromStr;
+
+use domelight::strategy::{StrategyError, StrategySpec};
+
+use crate::Error;
+
+/// A strategy and the text that it was given as.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedStrategy {
+    /// As it was given.
+    pub text: String,
+    /// What it says.
+    pub spec: StrategySpec,
+}
+
+impl FromStr for NamedStrategy {
+    type Err = StrategyError;
+
+    fn from_str(text: &str) -> Result<Self, StrategyError> {
+        Ok(Self { text: text.to_owned(), spec: text.parse()? })
+    }
+}
+
+/// Refuses more points than the 2³² that the sequence of a pixel has.
+///
+/// # Errors
+/// If there are more.
+pub fn refuse_repeating_points(spec: StrategySpec, spp: u32) -> Result<(), Error> {
+    let n_points = spec.points_per_sample();
+    if u64::from(spp) * u64::from(n_points) > 1 << 32 {
+        return Err(Error::Usage(format!(
+            "{spp} camera samples of {n_points} directions are more points than a pixel has \
+             (2^32): lower --spp, or render several seeds and average them"
+        )));
+    }
+    Ok(())
+}

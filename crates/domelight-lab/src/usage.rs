@@ -1,0 +1,75 @@
+//! What the process has used: CPU time and memory.
+
+/// CPU seconds of all threads so far; none where the system does not tell.
+pub fn cpu_seconds() -> Option<f64> {
+    #[cfg(unix)]
+    {
+        use nix::sys::resource::{UsageWho, getrusage};
+        let usage = getrusage(UsageWho::RUSAGE_SELF).ok()?;
+        let seconds = |t: nix::sys::time::TimeVal| t.tv_sec() as f64 + t.tv_usec() as f64 * 1e-6;
+        Some(seconds(usage.user_time()) + seconds(usage.system_time()))
+    }
+    #[cfg(not(unix))]
+    None
+}
+
+/// CPU seconds of this thread since some moment; wall-clock where the system does not tell.
+pub fn thread_seconds() -> f64 {
+    use std::{sync::LazyLock, time::Instant};
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    #[cfg(unix)]
+    {
+        use nix::time::{ClockId, clock_gettime};
+        if let Ok(time) = clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID) {
+            return time.tv_sec() as f64 + time.tv_nsec() as f64 * 1e-9;
+        }
+    }
+    START.elapsed().as_secs_f64()
+}
+
+/// The most memory that was ever resident \[bytes\]; none where the system does not tell.
+pub fn peak_memory() -> Option<u64> {
+    #[cfg(unix)]
+    {
+        use nix::sys::resource::{UsageWho, getrusage};
+        let usage = getrusage(UsageWho::RUSAGE_SELF).ok()?;
+        // Bytes on Apple's systems, kibibytes elsewhere.
+        let unit = if cfg!(target_vendor = "apple") { 1 } else { 1024 };
+        Some(usage.max_rss() as u64 * unit)
+    }
+    #[cfg(not(unix))]
+    None
+}
+
+/// Wall-clock and CPU seconds between two moments.
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Seconds {
+    /// By the clock.
+    pub wall: f64,
+    /// Of all threads; none where the system does not tell.
+    pub cpu: Option<f64>,
+}
+
+/// Measures one phase after another.
+pub struct Stopwatch {
+    wall: std::time::Instant,
+    cpu: Option<f64>,
+}
+
+impl Stopwatch {
+    /// From now on.
+    pub fn start() -> Self {
+        Self { wall: std::time::Instant::now(), cpu: cpu_seconds() }
+    }
+
+    /// The time since the start or the last lap.
+    pub fn lap(&mut self) -> Seconds {
+        let now = Self::start();
+        let seconds = Seconds {
+            wall: (now.wall - self.wall).as_secs_f64(),
+            cpu: now.cpu.zip(self.cpu).map(|(now, then)| now - then),
+        };
+        *self = now;
+        seconds
+    }
+}

@@ -1,0 +1,133 @@
+//! Why a pixel is noisy and what would help, in sentences with numbers.
+
+use std::fmt;
+
+use super::decomposition::{Cause, Decomposition, Share};
+
+/// Why the pixel is noisy under one strategy; its text is a sentence.
+#[derive(Clone, Copy, Debug)]
+pub struct Diagnosis<'a>(pub(super) &'a Decomposition);
+
+impl fmt::Display for Diagnosis<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(decomposition) = self;
+        let Some(&Share { cause, share }) = decomposition.shares.first() else {
+            return f.write_str("no error: all estimates of this pixel are alike");
+        };
+        write!(f, "{} of the error: ", percent(share))?;
+        let of = |kind| decomposition.source(kind).copied();
+        match cause {
+            Cause::Coverage => write!(
+                f,
+                "the pixel lies on an edge, and {} of its camera samples show the scene",
+                percent(decomposition.coverage)
+            ),
+            Cause::Background => {
+                f.write_str("what is behind the scene differs between camera samples")
+            }
+            Cause::Emission => {
+                f.write_str("the light that surfaces emit differs between camera samples")
+            }
+            Cause::Known => f.write_str("what is known without rays differs from pass to pass"),
+            Cause::Shading(kind) => {
+                write!(f, "the surfaces that the pixel shows reflect {kind} differently")
+            }
+            Cause::ShadowEdge(kind) => {
+                let seen = of(kind).map_or(0.0, |statistics| statistics.seen);
+                write!(f, "{kind} is seen by {} of the camera samples", percent(seen))
+            }
+            Cause::Directions(kind) => {
+                let (rays, light) = of(kind).map_or((0.0, 0.0), |s| (s.rays, s.light));
+                let (rays, light) = (percent(rays), percent(light));
+                write!(f, "{rays} of the rays go to {kind}, which gives {light} of the light")
+            }
+            Cause::Penumbra(kind) => {
+                let free = of(kind).and_then(|statistics| statistics.free).unwrap_or(0.0);
+                write!(f, "{kind} is hidden in part: {} of the rays to it are free", percent(free))
+            }
+        }
+    }
+}
+
+/// What would help at a pixel; its text is a sentence.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[non_exhaustive]
+pub enum Advice {
+    /// There is no error.
+    Nothing,
+    /// The best strategy's error is between camera samples.
+    CameraSamples {
+        /// Of the best strategy.
+        name: String,
+        /// Share of its variance between camera samples.
+        between: f64,
+    },
+    /// The strategy needs the fewest rays to the same error.
+    Strategy {
+        /// Of the best strategy.
+        name: String,
+        /// How many times fewer rays than the worst of the others.
+        times_fewer: f64,
+        /// The worst of the others.
+        than: String,
+    },
+    /// All strategies are about alike: more rays.
+    Rays,
+}
+
+/// What would help at a pixel, given the variance of some strategies there.
+pub fn advice(strategies: &[Decomposition]) -> Advice {
+    /// A factor that is worth changing the strategy for.
+    const WORTH: f64 = 1.5;
+    let variance = |d: &&Decomposition| d.variance_per_ray();
+    let by_variance = |a: &&Decomposition, b: &&Decomposition| variance(a).total_cmp(&variance(b));
+    let best = strategies.iter().min_by(by_variance);
+    let worst = strategies.iter().max_by(by_variance);
+    let (Some(best), Some(worst)) = (best, worst) else { return Advice::Nothing };
+    if worst.variance == 0.0 {
+        return Advice::Nothing;
+    }
+    let times_fewer = variance(&worst) / variance(&best);
+    if times_fewer >= WORTH {
+        let (name, than) = (best.name.clone(), worst.name.clone());
+        return Advice::Strategy { name, times_fewer, than };
+    }
+    let between = best.between_samples();
+    if between >= 0.5 {
+        return Advice::CameraSamples { name: best.name.clone(), between };
+    }
+    Advice::Rays
+}
+
+impl fmt::Display for Advice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Nothing => f.write_str("nothing needs to be done"),
+            Self::CameraSamples { name, between } => write!(
+                f,
+                "more camera samples would help: {} of the error of {name}, the best here, is between them, and no \
+                 choice of directions changes that",
+                percent(*between)
+            ),
+            Self::Strategy { name, times_fewer, than } if times_fewer.is_finite() => {
+                let digits = usize::from(*times_fewer < 10.0);
+                write!(
+                    f,
+                    "{name} would help: it needs {times_fewer:.digits$} times fewer rays than {than} to the same error"
+                )
+            }
+            Self::Strategy { name, .. } => {
+                write!(f, "{name} would help: it has no error at this pixel")
+            }
+            Self::Rays => f.write_str("more rays would help; the strategies are about alike here"),
+        }
+    }
+}
+
+/// Two digits.
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    let digits = usize::from(percent.abs() < 10.0 && percent != 0.0);
+    format!("{percent:.digits$} %")
+}

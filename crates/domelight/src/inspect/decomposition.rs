@@ -1,0 +1,352 @@
+//! The variance of a strategy at a pixel, by causes.
+//!
+//! Let t be the estimate from one camera sample, a sum of parts: what rays toward each source add, and what is known
+//! without rays. By the law of total variance, Var\[t\] = Var\[E\[t | p\]\] + E\[Var\[t | p\]\] over points p of the pixel. Both
+//! terms are sums of covariances with the parts, Var\[t\] = Σ Cov\[t, tᵣ\], so that shares sum to 1. A part is divided
+//! once more, tᵣ = v uᵣ + (tᵣ − v uᵣ), where uᵣ is the same with all rays free and v = E\[tᵣ\] / E\[uᵣ\]: the first
+//! varies with light, reflectance and densities, the second with visibility. A share below 0 belongs to a cause that
+//! offsets others.
+
+use std::fmt;
+
+use super::CameraSample;
+use super::advice::Diagnosis;
+use super::regions::{Regions, Source, SourceKind};
+use super::replicates::{N_PIXELS, Replicates, SAMPLES_PER_PIXEL};
+
+/// Why estimates of a pixel differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum Cause {
+    /// Some camera samples hit the scene, some miss it.
+    Coverage,
+    /// What is behind the scene differs between camera samples.
+    Background,
+    /// The light that surfaces emit differs between camera samples.
+    Emission,
+    /// What is known without rays differs between camera samples, or between passes.
+    Known,
+    /// The unoccluded light of a source differs between camera samples: texture, curvature, materials.
+    Shading(SourceKind),
+    /// The source is seen by some of the camera samples: the edge of a shadow.
+    ShadowEdge(SourceKind),
+    /// The density of the directions does not follow what the source's light does at a point.
+    Directions(SourceKind),
+    /// The source is hidden in part from one point: a penumbra.
+    Penumbra(SourceKind),
+}
+
+impl Cause {
+    /// Differs between camera samples, so that no choice of directions changes it.
+    pub fn is_between_samples(self) -> bool {
+        !matches!(self, Self::Directions(_) | Self::Penumbra(_) | Self::Known)
+    }
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Coverage => f.write_str("edge of the scene"),
+            Self::Background => f.write_str("background"),
+            Self::Emission => f.write_str("emission"),
+            Self::Known => f.write_str("known without rays"),
+            Self::Shading(source) => write!(f, "shading, {source}"),
+            Self::ShadowEdge(source) => write!(f, "shadow edge, {source}"),
+            Self::Directions(source) => write!(f, "directions, {source}"),
+            Self::Penumbra(source) => write!(f, "penumbra, {source}"),
+        }
+    }
+}
+
+/// A cause and its share of the variance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize))]
+pub struct Share {
+    /// Why.
+    pub cause: Cause,
+    /// Of the variance; all of them sum to 1.
+    pub share: f64,
+}
+
+/// What a strategy does with a source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize))]
+pub struct SourceStatistics {
+    /// The source.
+    pub source: Source,
+    /// Share of the strategy's rays that go there.
+    pub rays: f64,
+    /// Share of the light reflected toward the camera that comes from there.
+    pub light: f64,
+    /// Mean visibility of the rays that go there; none if none do.
+    pub free: Option<f64>,
+    /// Share of the hits that any light from there was found at.
+    pub seen: f64,
+}
+
+/// The variance of a strategy at a pixel, by causes. Units are those of luminance.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize))]
+pub struct Decomposition {
+    /// Of the strategy.
+    pub name: String,
+    /// Luminance of the pixel.
+    pub mean: f64,
+    /// Variance of the estimate from one camera sample. Directions are as well distributed as in a pass of 16 samples
+    /// a pixel, camera samples count as independent.
+    pub variance: f64,
+    /// Shadow rays of a camera sample.
+    pub rays_per_sample: f64,
+    /// Share of the camera samples that hit the scene.
+    pub coverage: f64,
+    /// The causes, the greatest share first; empty if there is no variance.
+    pub shares: Vec<Share>,
+    /// What the strategy does with each source.
+    pub sources: Vec<SourceStatistics>,
+}
+
+/// A variance below that share of the mean's square is rounding.
+const ROUNDING: f64 = 1e-10;
+
+impl Decomposition {
+    pub(super) fn new(
+        name: &str,
+        samples: &[CameraSample],
+        replicates: &Replicates,
+        regions: &Regions,
+    ) -> Self {
+        let means = Means::of(samples, replicates);
+        let mut shares = means.between(regions.sources());
+        shares.extend(within(samples, replicates, &means, regions.sources()));
+        let variance: f64 = shares.iter().map(|share| share.share).sum();
+        if variance <= ROUNDING * means.mean * means.mean {
+            shares.clear();
+        }
+        shares.retain(|share| share.share != 0.0);
+        shares.iter_mut().for_each(|share| share.share /= variance);
+        shares.sort_by(|a, b| b.share.total_cmp(&a.share));
+        Self {
+            name: name.to_owned(),
+            mean: means.mean,
+            variance: if shares.is_empty() { 0.0 } else { variance },
+            rays_per_sample: replicates.rays_per_sample(),
+            coverage: means.coverage,
+            shares,
+            sources: means.statistics(replicates, regions.sources()),
+        }
+    }
+
+    /// Variance of the estimate from one shadow ray; from one camera sample where there are no rays.
+    pub fn variance_per_ray(&self) -> f64 {
+        self.variance * if self.rays_per_sample > 0.0 { self.rays_per_sample } else { 1.0 }
+    }
+
+    /// Share of the variance between camera samples, which no choice of directions changes.
+    pub fn between_samples(&self) -> f64 {
+        let between = self.shares.iter().filter(|share| share.cause.is_between_samples());
+        between.map(|share| share.share).sum()
+    }
+
+    /// What a strategy does with a source of that kind.
+    pub(super) fn source(&self, kind: SourceKind) -> Option<&SourceStatistics> {
+        self.sources.iter().find(|statistics| statistics.source.kind == kind)
+    }
+
+    /// Why the pixel is noisy, in a sentence with numbers.
+    pub fn diagnosis(&self) -> Diagnosis<'_> {
+        Diagnosis(self)
+    }
+}
+
+/// Means over replicates, and over the pixel.
+struct Means {
+    /// Of each camera sample: what needs no estimate, and its place among the hits.
+    samples: Vec<(f64, Option<usize>)>,
+    /// Of each hit and part, with visibility and without.
+    seen: Vec<Vec<f64>>,
+    unoccluded: Vec<Vec<f64>>,
+    /// Of each part over the pixel: how much of it is visible.
+    visible: Vec<f64>,
+    /// Of each part: mean over the hits of the covariance, over replicates, of a hit's sum with its part, divided by
+    /// their number; what the means of finitely many replicates vary by themselves.
+    seen_noise: Vec<f64>,
+    unoccluded_noise: Vec<f64>,
+    coverage: f64,
+    mean: f64,
+}
+
+impl Means {
+    fn of(samples: &[CameraSample], replicates: &Replicates) -> Self {
+        let &Replicates { n_points, n_parts, n_replicates, .. } = replicates;
+        let n = n_replicates as f64;
+        let mean_of = |value: &dyn Fn(usize) -> f64| (0..n_replicates).map(value).sum::<f64>() / n;
+        let of_hits = |value: &dyn Fn(usize, usize, usize) -> f64| -> Vec<Vec<f64>> {
+            let of_part = |i, part| mean_of(&|k| value(k, i, part));
+            (0..n_points).map(|i| (0..n_parts).map(|part| of_part(i, part)).collect()).collect()
+        };
+        let seen = of_hits(&|k, i, part| replicates.seen(k, i, part));
+        let unoccluded = of_hits(&|k, i, part| replicates.unoccluded(k, i, part));
+        let visible = (0..n_parts).map(|part| {
+            let sum = |of: &[Vec<f64>]| of.iter().map(|hit| hit[part]).sum::<f64>();
+            ratio(sum(&seen), sum(&unoccluded))
+        });
+        let visible = visible.collect();
+        let (mut seen_noise, mut unoccluded_noise) = (vec![0.0; n_parts], vec![0.0; n_parts]);
+        for i in 0..n_points {
+            let sums: Vec<f64> = (0..n_replicates)
+                .map(|k| (0..n_parts).map(|part| replicates.seen(k, i, part)).sum())
+                .collect();
+            for part in 0..n_parts {
+                let scale = 1.0 / (n * n_points as f64);
+                seen_noise[part] += scale * covariance(&sums, |k| replicates.seen(k, i, part));
+                unoccluded_noise[part] +=
+                    scale * covariance(&sums, |k| replicates.unoccluded(k, i, part));
+            }
+        }
+        let mut hits = 0..n_points;
+        let place =
+            |sample: &CameraSample| (sample.known, sample.point.as_ref().and_then(|_| hits.next()));
+        let samples: Vec<_> = samples.iter().map(place).collect();
+        let estimated: f64 = seen.iter().flatten().sum();
+        let known: f64 = samples.iter().map(|(known, _)| known).sum();
+        Self {
+            coverage: n_points as f64 / samples.len() as f64,
+            mean: (estimated + known) / samples.len() as f64,
+            samples,
+            seen,
+            unoccluded,
+            visible,
+            seen_noise,
+            unoccluded_noise,
+        }
+    }
+
+    /// The variance of E\[t | p\] over the pixel, by causes.
+    fn between(&self, sources: &[Source]) -> Vec<Share> {
+        let n = self.samples.len() as f64;
+        // Unbiased for independent camera samples.
+        let scale = n / (n - 1.0);
+        let total = |&(known, hit): &(f64, Option<usize>)| {
+            known + hit.map_or(0.0, |i| self.seen[i].iter().sum())
+        };
+        let hits: Vec<_> = self.samples.iter().filter(|(_, hit)| hit.is_some()).collect();
+        let misses: Vec<_> = self.samples.iter().filter(|(_, hit)| hit.is_none()).collect();
+        let totals =
+            |of: &[&(f64, Option<usize>)]| of.iter().map(|s| total(s)).collect::<Vec<f64>>();
+        let (of_hits, of_misses) = (totals(&hits), totals(&misses));
+        let (h, m) = (self.coverage, 1.0 - self.coverage);
+        let step = if h > 0.0 && m > 0.0 { average(&of_hits) - average(&of_misses) } else { 0.0 };
+        let known = |of: &[&(f64, Option<usize>)]| of.iter().map(|s| s.0).collect::<Vec<f64>>();
+        let (emission, background) = (known(&hits), known(&misses));
+        let mut shares = vec![
+            Share { cause: Cause::Coverage, share: scale * h * m * step * step },
+            Share {
+                cause: Cause::Background,
+                share: scale * m * population_covariance(&of_misses, |i| background[i]),
+            },
+            Share {
+                cause: Cause::Emission,
+                share: scale * h * population_covariance(&of_hits, |i| emission[i]),
+            },
+        ];
+        for (part, &visible) in self.visible.iter().enumerate() {
+            let seen = population_covariance(&of_hits, |i| self.seen[i][part]);
+            let unoccluded = population_covariance(&of_hits, |i| self.unoccluded[i][part]);
+            let seen = scale * h * (seen - self.seen_noise[part]);
+            let shading = scale * h * visible * (unoccluded - self.unoccluded_noise[part]);
+            match sources.get(part) {
+                Some(source) => {
+                    shares.push(Share { cause: Cause::Shading(source.kind), share: shading });
+                    let cause = Cause::ShadowEdge(source.kind);
+                    shares.push(Share { cause, share: seen - shading });
+                }
+                None => shares.push(Share { cause: Cause::Known, share: seen }),
+            }
+        }
+        shares
+    }
+
+    fn statistics(&self, replicates: &Replicates, sources: &[Source]) -> Vec<SourceStatistics> {
+        let all_rays: u64 = replicates.rays.iter().sum();
+        let all_light: f64 = self.seen.iter().flatten().sum();
+        let of_source = |(part, &source): (usize, &Source)| {
+            let seen = self.seen.iter().filter(|hit| hit[part] > 0.0).count();
+            let rays = replicates.rays[part] as f64;
+            SourceStatistics {
+                source,
+                rays: ratio(rays, all_rays as f64),
+                light: ratio(self.seen.iter().map(|hit| hit[part]).sum(), all_light),
+                free: (rays > 0.0).then(|| replicates.free[part] / rays),
+                seen: ratio(seen as f64, self.seen.len() as f64),
+            }
+        };
+        sources.iter().enumerate().map(of_source).collect()
+    }
+}
+
+/// The variance of t given p, averaged over the pixel, by causes: that of a pixel's mean over 16 camera samples times
+/// 16, so that directions which are well distributed over them count as such.
+fn within(
+    samples: &[CameraSample],
+    replicates: &Replicates,
+    means: &Means,
+    sources: &[Source],
+) -> Vec<Share> {
+    let &Replicates { n_parts, n_replicates, .. } = replicates;
+    let n = SAMPLES_PER_PIXEL as f64;
+    let (mut seen, mut shape) = (vec![0.0; n_parts], vec![0.0; n_parts]);
+    let mut next = 0;
+    for of_pixel in samples.chunks(SAMPLES_PER_PIXEL) {
+        let hits = of_pixel.iter().filter(|sample| sample.point.is_some()).count();
+        let points = next..next + hits;
+        next = points.end;
+        let mean_of = |k: usize, value: &dyn Fn(usize, usize) -> f64| {
+            points.clone().map(|i| value(k, i)).sum::<f64>() / n
+        };
+        let part_of = |k, part| mean_of(k, &|k, i| replicates.seen(k, i, part));
+        let sums: Vec<f64> =
+            (0..n_replicates).map(|k| (0..n_parts).map(|part| part_of(k, part)).sum()).collect();
+        for part in 0..n_parts {
+            let visible = |i: usize| ratio(means.seen[i][part], means.unoccluded[i][part]);
+            seen[part] += covariance(&sums, |k| part_of(k, part));
+            shape[part] += covariance(&sums, |k| {
+                mean_of(k, &|k, i| visible(i) * replicates.unoccluded(k, i, part))
+            });
+        }
+    }
+    let scale = n / N_PIXELS as f64;
+    let mut shares = Vec::new();
+    for part in 0..n_parts {
+        let (seen, shape) = (scale * seen[part], scale * shape[part]);
+        match sources.get(part) {
+            Some(source) => {
+                shares.push(Share { cause: Cause::Directions(source.kind), share: shape });
+                shares.push(Share { cause: Cause::Penumbra(source.kind), share: seen - shape });
+            }
+            None => shares.push(Share { cause: Cause::Known, share: seen }),
+        }
+    }
+    shares
+}
+
+fn ratio(a: f64, b: f64) -> f64 {
+    if b == 0.0 { 0.0 } else { a / b }
+}
+
+fn average(values: &[f64]) -> f64 {
+    ratio(values.iter().sum(), values.len() as f64)
+}
+
+/// Unbiased.
+fn covariance(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
+    let n = a.len() as f64;
+    population_covariance(a, b) * n / (n - 1.0)
+}
+
+/// Of all that there are.
+fn population_covariance(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
+    let b: Vec<f64> = (0..a.len()).map(b).collect();
+    let (mean_a, mean_b) = (average(a), average(&b));
+    let products = a.iter().zip(&b).map(|(a, b)| (a - mean_a) * (b - mean_b));
+    ratio(products.sum(), a.len() as f64)
+}

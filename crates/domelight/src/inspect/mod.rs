@@ -1,0 +1,253 @@
+//! The pixel X-ray: why is this pixel noisy, and what would help?
+//!
+//! An [`Inspector`] takes many camera samples of one pixel and lets strategies estimate each of them again and again.
+//! From that follow the hemisphere as maps ([`Hemisphere`]), where a strategy sends its rays ([`DirectionHistogram`]),
+//! and a decomposition of a strategy's variance into causes whose shares sum to 1 ([`Decomposition`]).
+//!
+//! ```
+//! use domelight::inspect::{Inspector, advice};
+//! use domelight::prelude::*;
+//! use domelight::scene::builtin::BuiltinScene;
+//!
+//! let description = BuiltinScene::Sphere.description();
+//! let settings = RenderSettings { width: 64, height: 64, ..Default::default() };
+//! let scene = Scene::new(description)?;
+//! let camera = Camera::framing(&scene, settings.width, settings.height);
+//! let environment = Environment::from_image(BuiltinProbe::Sky.image(64))?;
+//! let inspector = Inspector::new(&scene, &camera, &environment, &settings, [32, 32])?;
+//! let mut found = Vec::new();
+//! for text in ["brdf", "mis", "product"] {
+//!     let strategy = PreparedStrategy::new(text.parse()?, &environment)?;
+//!     found.push(inspector.decompose(text, &strategy));
+//! }
+//! for decomposition in &found {
+//!     println!("{}: {}", decomposition.name, decomposition.diagnosis());
+//! }
+//! println!("{}", advice(&found));
+//! # Ok::<(), domelight::Error>(())
+//! ```
+
+mod advice;
+mod decomposition;
+mod hemisphere;
+mod regions;
+mod replicates;
+
+pub use advice::{Advice, advice};
+pub use decomposition::{Cause, Decomposition, Share, SourceStatistics};
+pub use hemisphere::{DirectionHistogram, DirectionSample, Hemisphere};
+pub use regions::{Source, SourceKind};
+
+use crate::environment::Environment;
+use crate::geometry::{Ray, RayBatch, offset_origin};
+use crate::math::Vec3;
+use crate::render::{Background, FilterSampler, RenderSettings, visibility};
+use crate::sampling::{Dimension, Sampler};
+use crate::scene::{Camera, Scene};
+use crate::strategy::{ShadingPoint, Strategy};
+use crate::{Rgb, math::vec2};
+use regions::Regions;
+use replicates::Replicates;
+
+/// Camera samples of the pixel.
+const N_SAMPLES: usize = 256;
+
+/// A pixel that cannot be inspected.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InspectError {
+    /// It is not in the picture.
+    #[error(
+        "pixel ({x}, {y}) is outside the picture of {width}x{height} pixels; they count from 0"
+    )]
+    Outside {
+        /// Its column.
+        x: usize,
+        /// Its row.
+        y: usize,
+        /// Of the picture.
+        width: usize,
+        /// Of the picture.
+        height: usize,
+    },
+}
+
+/// A pixel under the microscope.
+#[derive(Debug)]
+pub struct Inspector<'a> {
+    scene: &'a Scene,
+    environment: &'a Environment,
+    settings: RenderSettings,
+    pixel: [usize; 2],
+    samples: Vec<CameraSample>,
+    /// The hit nearest to the pixel's center.
+    representative: Option<ShadingPoint>,
+    regions: Regions,
+    /// The longest extent of the scene.
+    extent: f32,
+}
+
+/// A camera sample of the pixel.
+#[derive(Debug)]
+struct CameraSample {
+    /// What it sees of the scene.
+    point: Option<ShadingPoint>,
+    /// Luminance that needs no estimate: emission, or what is behind the scene.
+    known: f64,
+}
+
+/// What a pixel shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize))]
+pub struct PixelSummary {
+    /// Column and row, from the upper left.
+    pub pixel: [usize; 2],
+    /// Share of the camera samples that hit the scene.
+    pub coverage: f64,
+    /// Of the hit nearest to the pixel's center, in the world; none of a pixel without a hit.
+    pub position: Option<[f32; 3]>,
+    /// The shading normal there.
+    pub normal: Option<[f32; 3]>,
+    /// Directional-hemispherical reflectance there, linear Rec. 709.
+    pub albedo: Option<[f32; 3]>,
+}
+
+impl<'a> Inspector<'a> {
+    /// Takes camera samples of the pixel in that column and row, counted from the upper left. `settings` give the
+    /// picture's size, filter, background and seed.
+    ///
+    /// # Errors
+    /// If the pixel is not in the picture.
+    pub fn new(
+        scene: &'a Scene,
+        camera: &Camera,
+        environment: &'a Environment,
+        settings: &RenderSettings,
+        pixel: [usize; 2],
+    ) -> Result<Self, InspectError> {
+        let ([x, y], RenderSettings { width, height, .. }) = (pixel, *settings);
+        if x >= width || y >= height {
+            return Err(InspectError::Outside { x, y, width, height });
+        }
+        let sampler = Sampler::new(settings.sampler, settings.seed, (y * width + x) as u64);
+        let (film, filter) = (sampler.set(Dimension::Film), FilterSampler::new(settings.filter));
+        let see = |ray: &Ray, sample: u32| match scene.camera_hit(ray, settings.seed, sample) {
+            Some(hit) => CameraSample {
+                point: Some(scene.shading_point(ray, &hit)),
+                known: luminance(scene.emitted(&hit)),
+            },
+            None => CameraSample {
+                point: None,
+                known: match settings.background {
+                    Background::Hidden => 0.0,
+                    Background::Shown => {
+                        let le = environment.le_interpolated(ray.direction);
+                        luminance(le) * environment.unit()
+                    }
+                },
+            },
+        };
+        let samples: Vec<CameraSample> = (0..N_SAMPLES as u32)
+            .map(|i| {
+                let [[u], [v]] = film.u(i);
+                let at = filter.sample(vec2(u, v));
+                see(&camera.ray(x as f32 + at.x, y as f32 + at.y), i)
+            })
+            .collect();
+        let center = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
+        let representative = scene.camera_hit(&center, settings.seed, 0);
+        let representative = representative.map(|hit| scene.shading_point(&center, &hit));
+        let first = || samples.iter().find_map(|sample| sample.point);
+        Ok(Self {
+            scene,
+            environment,
+            settings: *settings,
+            pixel,
+            representative: representative.or_else(first),
+            samples,
+            regions: Regions::of(environment),
+            extent: scene.bounds().size().max_element(),
+        })
+    }
+
+    /// What the pixel shows.
+    pub fn summary(&self) -> PixelSummary {
+        let hits = self.samples.iter().filter(|sample| sample.point.is_some()).count();
+        let point = self.representative.as_ref();
+        PixelSummary {
+            pixel: self.pixel,
+            coverage: hits as f64 / self.samples.len() as f64,
+            position: point.map(|p| p.position.to_array()),
+            normal: point.map(|p| p.frame.z.to_array()),
+            albedo: point.map(|p| p.bsdf.albedo().to_array()),
+        }
+    }
+
+    /// The suns and lamps that causes are told by, and the rest of the map.
+    pub fn sources(&self) -> &[Source] {
+        self.regions.sources()
+    }
+
+    /// The hemisphere above the hit nearest to the pixel's center, as maps of `resolution` by `resolution` pixels; none
+    /// of a pixel without a hit.
+    pub fn hemisphere(&self, resolution: usize) -> Option<Hemisphere> {
+        let point = self.representative.as_ref()?;
+        let trace = |point: &ShadingPoint, wi: &[Vec3]| self.trace(point, wi);
+        Some(Hemisphere::new(point, self.environment, resolution, trace))
+    }
+
+    /// Where a strategy sends its rays from that hit, as a map of `resolution` by `resolution` pixels; none of a pixel
+    /// without a hit.
+    pub fn directions<S: Strategy>(
+        &self,
+        strategy: &S,
+        resolution: usize,
+    ) -> Option<DirectionHistogram> {
+        let point = self.representative.as_ref()?;
+        let rays = replicates::rays_of_one_point(point, strategy, &self.settings);
+        let wi: Vec<Vec3> = rays.iter().map(|&(wi, _)| wi).collect();
+        let visibility = self.trace(point, &wi);
+        Some(DirectionHistogram::new(point, &rays, &visibility, resolution))
+    }
+
+    /// The variance of a strategy at this pixel, by causes.
+    pub fn decompose<S: Strategy>(&self, name: &str, strategy: &S) -> Decomposition {
+        let trace = |points: &[ShadingPoint], of: &[u32], wi: &[Vec3], out: &mut [f32]| {
+            let mut rays = RayBatch::default();
+            for (&point, &wi) in of.iter().zip(wi) {
+                self.push_ray(&points[point as usize], wi, &mut rays);
+            }
+            out.copy_from_slice(&self.trace_batch(&rays));
+        };
+        let replicates = Replicates::of(
+            &self.samples,
+            strategy,
+            &self.settings,
+            &self.regions,
+            self.environment,
+            trace,
+        );
+        Decomposition::new(name, &self.samples, &replicates, &self.regions)
+    }
+
+    fn trace(&self, point: &ShadingPoint, wi: &[Vec3]) -> Vec<f32> {
+        let mut rays = RayBatch::default();
+        wi.iter().for_each(|&wi| self.push_ray(point, wi, &mut rays));
+        self.trace_batch(&rays)
+    }
+
+    fn trace_batch(&self, rays: &RayBatch) -> Vec<f32> {
+        let mut visible = Vec::new();
+        visibility::trace(self.scene, rays, &mut visibility::Scratch::default(), &mut visible);
+        visible
+    }
+
+    fn push_ray(&self, point: &ShadingPoint, wi: Vec3, rays: &mut RayBatch) {
+        let side = if point.ng.dot(wi) < 0.0 { -point.ng } else { point.ng };
+        rays.push(offset_origin(point.position, side, self.extent), wi);
+    }
+}
+
+fn luminance(color: Rgb) -> f64 {
+    f64::from(color.luminance())
+}
