@@ -217,7 +217,8 @@ impl Film {
     /// ------
     /// OSError, ValueError
     ///     If the file cannot be written, or its name says no format.
-    #[pyo3(signature = (path, *, exposure = Some(0.0), curve = "agx"))]
+    #[pyo3(signature = (path, *, exposure = Some(0.0), curve = "agx"),
+    text_signature = "($self, path, *, exposure=0.0, curve='agx')")]
     fn save(
         &self,
         py: Python<'_>,

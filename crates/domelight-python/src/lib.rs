@@ -9,6 +9,7 @@ mod engine;
 mod environment;
 mod error;
 mod film;
+mod inspect;
 mod lobe;
 mod metrics;
 mod picture;
@@ -29,6 +30,7 @@ mod _domelight {
         environment::{Density, Environment},
         error::{DomelightWarning, RenderInterrupted},
         film::Film,
+        inspect::inspect,
         metrics::{compare_pictures, error_map, flip, hdr_flip},
         picture::{read, tone_map, write},
         progressive::{Progressive, progressive},

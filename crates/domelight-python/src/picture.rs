@@ -147,7 +147,8 @@ pub(crate) fn read(
 /// OSError, ValueError
 ///     If the file cannot be written, or the shape or the name is wrong.
 #[pyfunction]
-#[pyo3(signature = (path, picture, *, exposure = Some(0.0), curve = "agx"))]
+#[pyo3(signature = (path, picture, *, exposure = Some(0.0), curve = "agx"),
+    text_signature = "(path, picture, *, exposure=0.0, curve='agx')")]
 pub(crate) fn write(
     path: PathBuf,
     picture: &Bound<'_, PyAny>,

@@ -123,7 +123,8 @@ impl Progressive {
 #[pyfunction]
 #[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = (640, 640), seed = 0, threads = None,
     camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,
-    tile_size = None))]
+    tile_size = None),
+    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None)")]
 pub(crate) fn progressive<'py>(
     py: Python<'py>,
     scene: &Bound<'py, Scene>,

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc;
 
 use domelight::environment;
+use domelight::inspect::{InspectError, Inspector};
 use domelight::render::{
     Background, Counts, Filter, Observer, RenderSettings, Renderer,
 };
@@ -167,6 +168,23 @@ impl Job {
         )
     }
 
+    /// A pixel under the microscope.
+    pub(crate) fn inspector(&self, pixel: [usize; 2]) -> Result<Inspector<'_>, InspectError> {
+        let Self { scene, environment, camera, settings, .. } = self;
+        Inspector::new(&scene.scene, camera, environment, settings, pixel)
+    }
+
+    /// A strategy with what a pilot chooses.
+    pub(crate) fn for_picture(&self, spec: StrategySpec) -> StrategySpec {
+        let Self { scene, environment, camera, settings, .. } = self;
+        spec.for_picture(&scene.scene, camera, environment, settings)
+    }
+
+    /// The light.
+    pub(crate) fn environment(&self) -> &environment::Environment {
+        &self.environment
+    }
+
     /// Threads to render with.
     pub(crate) fn n_threads(&self) -> usize {
         self.n_threads
@@ -199,7 +217,7 @@ impl Job {
 const BUILTIN_ROWS: usize = 1024;
 
 /// The strategy that Python names or gives.
-fn choose(
+pub(crate) fn choose(
     strategy: &Bound<'_, PyAny>,
     spp: u32,
     lobes: &[&'static PythonLobe],
@@ -353,7 +371,8 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
 #[pyfunction(name = "_render")]
 #[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = (640, 640), seed = 0, threads = None,
     camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,
-    tile_size = None, progress = None))]
+    tile_size = None, progress = None),
+    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, progress=None)")]
 pub(crate) fn render<'py>(
     py: Python<'py>,
     scene: &Bound<'py, Scene>,

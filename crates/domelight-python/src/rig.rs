@@ -332,7 +332,8 @@ type Pickled<'py> = (
 /// ValueError
 ///     If the map is black, has no sun or lamp where they were asked for alone, or fewer lit texels than lights.
 #[pyfunction]
-#[pyo3(signature = (env, n = Some(64), *, method = "variance-minimization", sun = false, lamps = 0, min_share = None))]
+#[pyo3(signature = (env, n = Some(64), *, method = "variance-minimization", sun = false, lamps = 0, min_share = None),
+    text_signature = "(env, n=64, *, method='variance-minimization', sun=False, lamps=0, min_share=None)")]
 pub(crate) fn lights(
     env: &Bound<'_, Environment>,
     n: Option<usize>,

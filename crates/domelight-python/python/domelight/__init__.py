@@ -43,6 +43,7 @@ from ._domelight import (
     tone_map,
     write,
 )
+from ._inspect import Inspection, inspect
 from ._render import render
 
 __all__ = [
@@ -52,6 +53,7 @@ __all__ = [
     "DomelightWarning",
     "Environment",
     "Film",
+    "Inspection",
     "Material",
     "Progressive",
     "RenderInterrupted",
@@ -59,6 +61,7 @@ __all__ = [
     "Scene",
     "ShadingPoints",
     "__version__",
+    "inspect",
     "lights",
     "metrics",
     "progressive",
