@@ -128,7 +128,10 @@ impl Found {
             one.set_item("between_samples", decomposition.between_samples())?;
             let shares = PyDict::new(py);
             for share in &decomposition.shares {
-                shares.set_item(share.cause.to_string(), share.share)?;
+                // What is known without rays may differ for two reasons.
+                let cause = share.cause.to_string();
+                let before = shares.get_item(&cause)?.map_or(Ok(0.0), |before| before.extract::<f64>())?;
+                shares.set_item(cause, before + share.share)?;
             }
             one.set_item("shares", shares)?;
             one.set_item("diagnosis", decomposition.diagnosis().to_string())?;

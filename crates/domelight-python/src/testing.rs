@@ -51,6 +51,7 @@ pub(crate) fn chi2<'py>(
         axis: axis.normalize().to_array(),
         seed,
         suite: suite(tests, significance)?,
+        save_tables: false,
         ..Chi2::default()
     };
 

@@ -35,6 +35,8 @@ pub struct Chi2 {
     pub seed: u64,
     /// The tests that share the probability of a false alarm.
     pub suite: Suite,
+    /// Writes the cells of a test that fails as pictures beside the build's other products.
+    pub save_tables: bool,
 }
 
 impl Default for Chi2 {
@@ -48,6 +50,7 @@ impl Default for Chi2 {
             min_expected: 5.0,
             seed: 1,
             suite: Suite::default(),
+            save_tables: true,
         }
     }
 }
@@ -69,7 +72,6 @@ pub struct Chi2Report {
 
 /// Samples counted in cells beside what the density expects there.
 struct Cells {
-    columns: usize,
     observed: Vec<f64>,
     expected: Vec<f64>,
     lost: usize,
@@ -207,17 +209,18 @@ impl Chi2 {
         expected: Vec<f64>,
     ) -> Result<Chi2Report, Failure> {
         let mass = expected.iter().sum::<f64>() / self.samples as f64;
-        let cells = Cells { columns: self.cells[1], observed, expected, lost, mass };
+        let cells = Cells { observed, expected, lost, mass };
         self.judge(&cells).map_err(|why| {
-            let tables = dump(
-                name,
-                &Table { columns: cells.columns, cells: cells.observed.clone() },
-                &Table { columns: cells.columns, cells: cells.expected.clone() },
-            );
-            Failure::new(format!(
-                "{name}: {why}\n  {} samples, {} lost, ∫ pdf = {:.6}\n  {tables}",
+            let mut text = format!(
+                "{name}: {why}\n  {} samples, {} lost, ∫ pdf = {:.6}",
                 self.samples, cells.lost, cells.mass
-            ))
+            );
+            if self.save_tables {
+                let table = |cells: &Vec<f64>| Table { columns: self.cells[1], cells: cells.clone() };
+                text += "\n  ";
+                text += &dump(name, &table(&cells.observed), &table(&cells.expected));
+            }
+            Failure::new(text)
         })
     }
 

@@ -129,8 +129,8 @@ class Cosine:
             + (r * np.sin(phi))[..., np.newaxis] * bitangent
             + z[..., np.newaxis] * normal
         ).astype(np.float32)
-        pdf = z / np.float32(np.pi)
-        weight = _over(points.eval(wi) * self._env.radiance(wi), pdf * np.float32(self.n_rays))
+        pdf = (self.n_rays * z / np.pi).astype(np.float32)
+        weight = _over(points.eval(wi) * self._env.radiance(wi), pdf)
         return _flat(wi, weight)
 
 
