@@ -105,7 +105,11 @@ fn as_array<'py>(
     let only_dlpack = value.hasattr("__dlpack__")?
         && !value.hasattr("__array__")?
         && !value.hasattr("__array_interface__")?;
-    let array = if only_dlpack { numpy.call_method1("from_dlpack", (value,)) } else { numpy.call_method1("asarray", (value,)) };
+    let array = if only_dlpack {
+        numpy.call_method1("from_dlpack", (value,))
+    } else {
+        numpy.call_method1("asarray", (value,))
+    };
     let array = array.map_err(|error| {
         let wrong = bad_value(format!("{name} is no array of {what}: {error}"));
         wrong.set_cause(py, Some(error));
@@ -114,7 +118,8 @@ fn as_array<'py>(
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     // NumPy calls an empty list an array of doubles.
     let is_empty = array.getattr("size")?.extract::<usize>()? == 0;
-    if !kinds.contains(&kind) && !(is_empty && kind == "f") {
+    let is_known = kinds.contains(&kind) || (is_empty && kind == "f");
+    if !is_known {
         let found = array.getattr("dtype")?.str()?;
         return Err(bad_value(format!("{name} has dtype {found}; it must be {what}")));
     }
@@ -134,7 +139,10 @@ pub(crate) fn indices(
     let array = array.cast_into::<PyArrayDyn<i64>>()?.try_readonly()?;
     let is_bad = |&&i: &&i64| !usize::try_from(i).is_ok_and(|i| i < end);
     if let Some(bad) = array.as_slice()?.iter().find(is_bad) {
-        return Err(bad_value(format!("{name} holds {bad}; it must be from 0 to {} (there are {end})", end as i64 - 1)));
+        return Err(bad_value(format!(
+            "{name} holds {bad}; it must be from 0 to {} (there are {end})",
+            end as i64 - 1
+        )));
     }
     Ok((array.as_slice()?.iter().map(|&i| i as u32).collect(), array.shape().to_vec()))
 }

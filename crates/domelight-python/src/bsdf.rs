@@ -54,6 +54,9 @@ impl Bsdf {
     }
 }
 
+/// A direction, its weight and its density.
+type Drawn = ([f32; 3], [f32; 3], f32);
+
 type FloatArray<'py> = Bound<'py, PyArrayDyn<f32>>;
 
 #[pymethods]
@@ -104,9 +107,14 @@ impl Bsdf {
         roughness: Option<f32>,
     ) -> PyResult<Self> {
         let py = cls.py();
-        for (name, function) in [("eval", Some(&eval)), ("pdf", pdf.as_ref()), ("sample", sample.as_ref())] {
+        for (name, function) in
+            [("eval", Some(&eval)), ("pdf", pdf.as_ref()), ("sample", sample.as_ref())]
+        {
             if let Some(function) = function.filter(|f| !f.bind(py).is_callable()) {
-                return Err(bad_value(format!("{name} is {}; it must be callable", function.bind(py).repr()?)));
+                return Err(bad_value(format!(
+                    "{name} is {}; it must be callable",
+                    function.bind(py).repr()?
+                )));
             }
         }
         let sampling = match (pdf, sample) {
@@ -123,11 +131,16 @@ impl Bsdf {
             None => Rgb::splat(0.5),
         };
         if albedo.min_component() < 0.0 || albedo.max_component() > 1.0 {
-            return Err(bad_value(format!("albedo is {:?}; it must lie in [0, 1]", albedo.to_array())));
+            return Err(bad_value(format!(
+                "albedo is {:?}; it must lie in [0, 1]",
+                albedo.to_array()
+            )));
         }
         for (name, value) in [("max_eval", max_eval), ("roughness", roughness)] {
             if let Some(value) = value.filter(|x| !(x.is_finite() && *x > 0.0)) {
-                return Err(bad_value(format!("{name} is {value}; it must be positive and finite")));
+                return Err(bad_value(format!(
+                    "{name} is {value}; it must be positive and finite"
+                )));
             }
         }
         let lobe = PythonLobe::leak(eval, sampling, albedo, max_eval, roughness);
@@ -146,7 +159,11 @@ impl Bsdf {
     /// -------
     /// ndarray, shape (..., 3)
     ///     f_r * cos(theta_i) [sr^-1].
-    fn eval<'py>(&self, wo: &Bound<'py, PyAny>, wi: &Bound<'py, PyAny>) -> PyResult<FloatArray<'py>> {
+    fn eval<'py>(
+        &self,
+        wo: &Bound<'py, PyAny>,
+        wi: &Bound<'py, PyAny>,
+    ) -> PyResult<FloatArray<'py>> {
         Ok(self.eval_pdf(wo, wi)?.0)
     }
 
@@ -161,7 +178,11 @@ impl Bsdf {
     /// -------
     /// ndarray, shape (...)
     ///     Density of wi [sr^-1]; it may integrate to less than 1, the rest being the probability of no sample.
-    fn pdf<'py>(&self, wo: &Bound<'py, PyAny>, wi: &Bound<'py, PyAny>) -> PyResult<FloatArray<'py>> {
+    fn pdf<'py>(
+        &self,
+        wo: &Bound<'py, PyAny>,
+        wi: &Bound<'py, PyAny>,
+    ) -> PyResult<FloatArray<'py>> {
         Ok(self.eval_pdf(wo, wi)?.1)
     }
 
@@ -209,7 +230,8 @@ impl Bsdf {
             }
             u.uniform::<2>()?;
             let pairs = Pairs::<3, 2>::new(&wo, &u)?;
-            let (a, b): (Vec<_>, Vec<_>) = pairs.iter().map(|(wo, [x, y])| (wo, [x, y, 0.0])).unzip();
+            let (a, b): (Vec<_>, Vec<_>) =
+                pairs.iter().map(|(wo, [x, y])| (wo, [x, y, 0.0])).unzip();
             (a, b, pairs.lead)
         } else {
             u.uniform::<3>()?;
@@ -239,19 +261,16 @@ impl Bsdf {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
         match &slf.get().text {
             Some(text) => Ok((slf.get_type().getattr("parse")?, (text.clone(),))),
-            None => Err(pyo3::exceptions::PyTypeError::new_err("a BSDF of functions cannot be pickled")),
+            None => {
+                Err(pyo3::exceptions::PyTypeError::new_err("a BSDF of functions cannot be pickled"))
+            }
         }
     }
 }
 
 impl Bsdf {
     /// Directions, weights and densities; zeros where nothing is drawn.
-    fn draw(
-        &self,
-        py: Python<'_>,
-        wo: &[[f32; 3]],
-        u: &[[f32; 3]],
-    ) -> PyResult<Vec<([f32; 3], [f32; 3], f32)>> {
+    fn draw(&self, py: Python<'_>, wo: &[[f32; 3]], u: &[[f32; 3]]) -> PyResult<Vec<Drawn>> {
         let weighed = |wi: [f32; 3], value: Rgb, pdf: f32| {
             let is_sample = pdf > 0.0 && pdf.is_finite();
             if is_sample { (wi, (value / pdf).to_array(), pdf) } else { ([0.0; 3], [0.0; 3], 0.0) }
@@ -296,7 +315,10 @@ pub(crate) enum MaterialLike {
 }
 
 impl MaterialLike {
-    pub(crate) fn bsdf(&self, py: Python<'_>) -> PyResult<(bsdf::Bsdf, Option<&'static PythonLobe>)> {
+    pub(crate) fn bsdf(
+        &self,
+        py: Python<'_>,
+    ) -> PyResult<(bsdf::Bsdf, Option<&'static PythonLobe>)> {
         let of = |bsdf: &Py<Bsdf>| (bsdf.get().inner, bsdf.get().lobe);
         let _ = py;
         Ok(match self {

@@ -90,11 +90,7 @@ fn watts(environment: &environment::Environment, radiance: Rgb) -> [f32; 3] {
 }
 
 /// A light probe's map from a file, its light as warnings say.
-pub(crate) fn load_map(
-    py: Python<'_>,
-    path: PathBuf,
-    options: ProbeOptions,
-) -> PyResult<RgbImage> {
+pub(crate) fn load_map(py: Python<'_>, path: PathBuf, options: ProbeOptions) -> PyResult<RgbImage> {
     let probe = parallel(py, || load_probe(&path, &options))?.map_err(to_python)?;
     warn(py, &probe.warnings)?;
     Ok(probe.image)
@@ -386,10 +382,7 @@ impl Environment {
         )
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyArrayDyn<f32>>, f32, f64, &'static str, String))>
-    {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
         let py = slf.py();
         let this = slf.get();
         let restore = slf.get_type().getattr("_restore")?;
@@ -412,6 +405,9 @@ impl Environment {
         Self::build(cls.py(), map, orientation, unit as f32, name)
     }
 }
+
+/// What a pickled environment consists of: map, rotation, unit, axis and name.
+type Pickled<'py> = (Bound<'py, PyArrayDyn<f32>>, f32, f64, &'static str, String);
 
 /// Directions, radiance and densities.
 type Samples<'py> =

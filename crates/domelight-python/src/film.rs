@@ -49,7 +49,7 @@ fn plane<'py, T: numpy::Element>(
 }
 
 fn vectors<'py>(py: Python<'py>, layers: &Layers, values: &[Vec3]) -> PyResult<Bound<'py, PyAny>> {
-    let values = values.iter().map(|v| v.to_array()).collect();
+    let values = values.iter().map(Vec3::to_array).collect();
     Ok(rows(py, values, &[layers.height(), layers.width()])?.into_any())
 }
 
@@ -75,7 +75,7 @@ fn vectors<'py>(py: Python<'py>, layers: &Layers, values: &[Vec3]) -> PyResult<B
 /// behind them are, to the bit.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Film {
-    pub(crate) film: render::Film,
+    sums: render::Film,
     pub(crate) counts: Counts,
     pub(crate) complete: bool,
     /// Camera samples that each pixel is to have.
@@ -89,7 +89,7 @@ pub(crate) struct Film {
 
 impl Film {
     pub(crate) fn new(
-        film: render::Film,
+        sums: render::Film,
         counts: Counts,
         complete: bool,
         n_samples: u32,
@@ -97,11 +97,11 @@ impl Film {
         hidden: bool,
     ) -> Self {
         let layers = OnceLock::new();
-        Self { film, counts, complete, n_samples, provenance, hidden, layers }
+        Self { sums, counts, complete, n_samples, provenance, hidden, layers }
     }
 
     fn layers(&self) -> &Layers {
-        self.layers.get_or_init(|| self.film.layers())
+        self.layers.get_or_init(|| self.sums.layers())
     }
 
     fn alpha_to_show(&self) -> Option<&[f32]> {
@@ -110,19 +110,23 @@ impl Film {
 
     fn checkpoint(&self) -> Checkpoint {
         Checkpoint {
-            identity: vec![("background".into(), if self.hidden { "hidden" } else { "shown" }.into())],
+            identity: vec![(
+                "background".into(),
+                if self.hidden { "hidden" } else { "shown" }.into(),
+            )],
             provenance: self.provenance.clone(),
             tiles: 0..1,
             n_tiles: 1,
             n_samples: self.n_samples,
             complete: self.complete,
             counts: self.counts,
-            film: self.film.clone(),
+            film: self.sums.clone(),
         }
     }
 }
 
 #[pymethods]
+#[expect(clippy::unused_self, reason = "Python's methods have it")]
 impl Film {
     /// ndarray, shape (H, W, 3): direct light, and the background where it is shown [W m^-2 sr^-1].
     #[getter]
@@ -138,7 +142,8 @@ impl Film {
 
     fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let Some(layer) = LAYERS.iter().find(|layer| layer.name == name) else {
-            let text = format!("a film has no layer {name:?}; its layers are {}", Self::keys().join(", "));
+            let text =
+                format!("a film has no layer {name:?}; its layers are {}", Self::keys().join(", "));
             return Err(PyKeyError::new_err(text));
         };
         (layer.get)(py, self.layers())
@@ -161,7 +166,7 @@ impl Film {
     /// (int, int): rows and columns.
     #[getter]
     fn shape(&self) -> (usize, usize) {
-        (self.film.height, self.film.width)
+        (self.sums.height, self.sums.width)
     }
 
     /// bool: all samples of all pixels are there.
@@ -274,7 +279,7 @@ impl Film {
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|other| {
             let other = other.get();
-            self.film == other.film
+            self.sums == other.sums
                 && self.hidden == other.hidden
                 && self.complete == other.complete
                 && self.n_samples == other.n_samples
@@ -304,7 +309,15 @@ impl Film {
     fn _restore(cls: &Bound<'_, PyType>, bytes: &[u8]) -> PyResult<Self> {
         let read = parallel(cls.py(), || Checkpoint::decode(bytes))?;
         let state = read.map_err(|error| bad_value(format!("the pickled film: {error}")))?;
-        let hidden = state.identity.iter().any(|(name, value)| name == "background" && value == "hidden");
-        Ok(Self::new(state.film, state.counts, state.complete, state.n_samples, state.provenance, hidden))
+        let hidden =
+            state.identity.iter().any(|(name, value)| name == "background" && value == "hidden");
+        Ok(Self::new(
+            state.film,
+            state.counts,
+            state.complete,
+            state.n_samples,
+            state.provenance,
+            hidden,
+        ))
     }
 }

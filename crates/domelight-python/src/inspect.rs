@@ -1,9 +1,7 @@
 //! The pixel X-ray.
 
 use domelight::Rgb;
-use domelight::inspect::{
-    Decomposition, DirectionHistogram, Hemisphere, PixelSummary, advice,
-};
+use domelight::inspect::{Decomposition, DirectionHistogram, Hemisphere, PixelSummary, advice};
 use domelight::strategy::PreparedStrategy;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -96,12 +94,16 @@ impl Found {
     fn into_dict(self, py: Python<'_>, resolution: usize) -> PyResult<Bound<'_, PyDict>> {
         let Self { summary, hemisphere, strategies } = self;
         let square = [resolution, resolution];
-        let picture = |pixels: &[Rgb]| rows(py, pixels.iter().map(|p| p.to_array()).collect(), &square);
+        let picture =
+            |pixels: &[Rgb]| rows(py, pixels.iter().map(|p| p.to_array()).collect(), &square);
         let found = PyDict::new(py);
         found.set_item("pixel", (summary.pixel[0], summary.pixel[1]))?;
         found.set_item("coverage", summary.coverage)?;
-        let vectors =
-            [("position", summary.position), ("normal", summary.normal), ("albedo", summary.albedo)];
+        let vectors = [
+            ("position", summary.position),
+            ("normal", summary.normal),
+            ("albedo", summary.albedo),
+        ];
         for (name, vector) in vectors {
             let vector = vector.map(|v| array(py, v.to_vec(), &[3])).transpose()?;
             found.set_item(name, vector)?;
@@ -130,7 +132,8 @@ impl Found {
             for share in &decomposition.shares {
                 // What is known without rays may differ for two reasons.
                 let cause = share.cause.to_string();
-                let before = shares.get_item(&cause)?.map_or(Ok(0.0), |before| before.extract::<f64>())?;
+                let before =
+                    shares.get_item(&cause)?.map_or(Ok(0.0), |before| before.extract::<f64>())?;
                 shares.set_item(cause, before + share.share)?;
             }
             one.set_item("shares", shares)?;

@@ -68,7 +68,8 @@ impl PythonLobe {
         if n == 0 {
             return Ok((Vec::new(), Vec::new()));
         }
-        let arguments = || Ok::<_, PyErr>((rows(py, wo.to_vec(), &[n])?, rows(py, wi.to_vec(), &[n])?));
+        let arguments =
+            || Ok::<_, PyErr>((rows(py, wo.to_vec(), &[n])?, rows(py, wi.to_vec(), &[n])?));
         let values = self.eval.bind(py).call1(arguments()?)?;
         let mut values = colors("the result of eval", &values, n)?;
         let mut densities = match &self.sampling {
@@ -92,9 +93,13 @@ impl PythonLobe {
     ) -> PyResult<Vec<[f32; 3]>> {
         let n = wo.len();
         let Some((_, sample)) = self.sampling.as_ref().filter(|_| n > 0) else {
-            return Ok(u.iter().map(|u| cosine_hemisphere(Vec2::new(u[0], u[1])).to_array()).collect());
+            return Ok(u
+                .iter()
+                .map(|u| cosine_hemisphere(Vec2::new(u[0], u[1])).to_array())
+                .collect());
         };
-        let drawn = sample.bind(py).call1((rows(py, wo.to_vec(), &[n])?, rows(py, u.to_vec(), &[n])?))?;
+        let drawn =
+            sample.bind(py).call1((rows(py, wo.to_vec(), &[n])?, rows(py, u.to_vec(), &[n])?))?;
         let drawn = Floats::new("the result of sample", &drawn)?;
         let (directions, lead) = drawn.rows::<3>()?;
         if lead != [n] {

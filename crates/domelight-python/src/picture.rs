@@ -37,7 +37,10 @@ impl Format {
             Some("hdr" | "pic" | "rgbe") => Ok(Self::Hdr),
             Some("pfm") => Ok(Self::Pfm),
             Some("png") => Ok(Self::Png),
-            _ => Err(bad_value(format!("{}: its name must end in .exr, .hdr, .pfm or .png", path.display()))),
+            _ => Err(bad_value(format!(
+                "{}: its name must end in .exr, .hdr, .pfm or .png",
+                path.display()
+            ))),
         }
     }
 }

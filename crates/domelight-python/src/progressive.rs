@@ -72,7 +72,9 @@ impl Progressive {
 
     fn __next__(&self, py: Python<'_>) -> PyResult<Option<Py<Film>>> {
         if std::process::id() != self.process {
-            return Err(PyRuntimeError::new_err("this render was begun before the process was forked"));
+            return Err(PyRuntimeError::new_err(
+                "this render was begun before the process was forked",
+            ));
         }
         let (result, stopped) = py.detach(|| {
             let answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);

@@ -6,9 +6,7 @@ use std::sync::mpsc;
 
 use domelight::environment;
 use domelight::inspect::{InspectError, Inspector};
-use domelight::render::{
-    Background, Counts, Filter, Observer, RenderSettings, Renderer,
-};
+use domelight::render::{Background, Counts, Filter, Observer, RenderSettings, Renderer};
 use domelight::sampling::SamplerKind;
 use domelight::scene;
 use domelight::strategy::{Strategy, StrategyKind, StrategySpec};
@@ -77,7 +75,9 @@ impl Job {
             return Err(bad_value(format!("spp is {spp}; it must be from 1 to 16777216")));
         }
         if let Some(error) = target_error.filter(|e| !(e.is_finite() && *e > 0.0)) {
-            return Err(bad_value(format!("target_error is {error}; it must be positive and finite")));
+            return Err(bad_value(format!(
+                "target_error is {error}; it must be positive and finite"
+            )));
         }
         if let Some(tile) = keywords.tile_size.filter(|n| !(1..=1024).contains(n)) {
             return Err(bad_value(format!("tile_size is {tile}; it must be from 1 to 1024")));
@@ -87,19 +87,20 @@ impl Job {
             "sobol" => SamplerKind::Sobol,
             "independent" => SamplerKind::Independent,
             other => {
-                return Err(bad_value(format!("sampler is {other:?}; it must be 'sobol' or 'independent'")));
+                return Err(bad_value(format!(
+                    "sampler is {other:?}; it must be 'sobol' or 'independent'"
+                )));
             }
         };
         let n_threads = n_threads(threads)?;
         let choice = choose(&strategy, spp, &scene.inner.lobes)?;
         require_memory(width, height)?;
 
-        let (environment, probe) = match environment {
-            Some(environment) => (environment.get().inner.clone(), environment.get().name.clone()),
-            None => {
-                let of_scene = scene.environment(py, BUILTIN_ROWS)?;
-                (of_scene.inner, of_scene.name)
-            }
+        let (environment, probe) = if let Some(environment) = environment {
+            (environment.get().inner.clone(), environment.get().name.clone())
+        } else {
+            let of_scene = scene.environment(py, BUILTIN_ROWS)?;
+            (of_scene.inner, of_scene.name)
         };
         let up = environment.orientation().up.vector();
         let camera = scene.inner.camera(keywords.camera.as_ref(), (width, height), up)?;
@@ -128,7 +129,8 @@ impl Job {
             ("filter", filter.name().to_owned()),
             ("seed", keywords.seed.to_string()),
         ];
-        let provenance = provenance.map(|(name, value)| (format!("domelight.{name}"), value)).to_vec();
+        let provenance =
+            provenance.map(|(name, value)| (format!("domelight.{name}"), value)).to_vec();
         let (scene, strategy) = (scene.inner.clone(), choice);
         Ok(Self { scene, environment, camera, settings, strategy, n_threads, provenance })
     }
@@ -231,7 +233,8 @@ pub(crate) fn choose(
         }
         return Ok(Choice::Python(PythonStrategy::new(strategy.clone(), lobes.to_vec())?));
     };
-    let spec: StrategySpec = text.parse().map_err(|e: domelight::strategy::StrategyError| to_python(e))?;
+    let spec: StrategySpec =
+        text.parse().map_err(|e: domelight::strategy::StrategyError| to_python(e))?;
     let n_points = spec.points_per_sample();
     if u64::from(spp) * u64::from(n_points) > 1 << 32 {
         return Err(bad_value(format!(
@@ -299,7 +302,8 @@ pub(crate) fn interrupted(py: Python<'_>, error: PyErr, film: Film) -> PyResult<
     if !error.is_instance_of::<pyo3::exceptions::PyKeyboardInterrupt>(py) {
         return Ok(error);
     }
-    let interrupted = RenderInterrupted::new_err("the render was interrupted; its film is in the attribute film");
+    let interrupted =
+        RenderInterrupted::new_err("the render was interrupted; its film is in the attribute film");
     interrupted.value(py).setattr("film", film)?;
     interrupted.set_cause(py, Some(error));
     Ok(interrupted)

@@ -28,7 +28,7 @@ use crate::picture::{Format as PictureFormat, write_image};
 /// Lights come compact ones first, of each kind those of the greatest luminance first.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Rig {
-    rig: rig::Rig,
+    inner: rig::Rig,
     residual: Option<Arc<environment::Environment>>,
     orientation: Orientation,
     name: String,
@@ -42,7 +42,7 @@ impl Rig {
         py: Python<'py>,
         get: impl Fn(&RigLight) -> f32,
     ) -> PyResult<FloatArray<'py>> {
-        array(py, self.rig.lights.iter().map(get).collect(), &[self.rig.lights.len()])
+        array(py, self.inner.lights.iter().map(get).collect(), &[self.inner.lights.len()])
     }
 
     fn vectors<'py>(
@@ -50,14 +50,14 @@ impl Rig {
         py: Python<'py>,
         get: impl Fn(&RigLight) -> [f32; 3],
     ) -> PyResult<FloatArray<'py>> {
-        rows(py, self.rig.lights.iter().map(get).collect(), &[self.rig.lights.len()])
+        rows(py, self.inner.lights.iter().map(get).collect(), &[self.inner.lights.len()])
     }
 
     fn export<'a>(&'a self, dome: Option<Dome<'a>>) -> RigExport<'a> {
         RigExport {
             probe: &self.name,
             orientation: self.orientation,
-            lights: &self.rig.lights,
+            lights: &self.inner.lights,
             dome,
         }
     }
@@ -91,7 +91,7 @@ impl Rig {
 #[pymethods]
 impl Rig {
     fn __len__(&self) -> usize {
-        self.rig.lights.len()
+        self.inner.lights.len()
     }
 
     /// ndarray, shape (N, 3): unit vectors toward the lights, in the world.
@@ -133,7 +133,7 @@ impl Rig {
     /// ndarray of uint32, shape (H, W): the light of each texel of the map; 4294967295 where none was taken.
     #[getter]
     fn labels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<u32>>> {
-        array(py, self.rig.labels.clone(), &[self.rig.height, self.rig.width])
+        array(py, self.inner.labels.clone(), &[self.inner.height, self.inner.width])
     }
 
     /// Environment or None: the environment without the light that was taken; None if all was.
@@ -164,8 +164,8 @@ impl Rig {
         let error = parallel(py, || {
             let reference = ShadingReference::new(&environment);
             match &self.residual {
-                Some(dome) => reference.error_beside(&self.rig, &ShadingReference::new(dome)),
-                None => reference.error(&self.rig),
+                Some(dome) => reference.error_beside(&self.inner, &ShadingReference::new(dome)),
+                None => reference.error(&self.inner),
             }
         })?;
         let values = pyo3::types::PyDict::new(py);
@@ -196,7 +196,10 @@ impl Rig {
             Some(name) => name.parse().map_err(|e| from_source(&e))?,
             None => extension.and_then(Format::of_extension).ok_or_else(|| {
                 let known = Format::ALL.map(|f| format!(".{}", f.extensions()[0])).join(", ");
-                bad_value(format!("{}: its name must end in one of {known}, or give format", path.display()))
+                bad_value(format!(
+                    "{}: its name must end in one of {known}, or give format",
+                    path.display()
+                ))
             })?,
         };
         parallel(py, || {
@@ -215,7 +218,9 @@ impl Rig {
         other.cast::<Self>().is_ok_and(|other| {
             let other = other.get();
             let map = |rig: &Self| rig.residual.as_ref().map(|e| e.map().clone());
-            self.rig == other.rig && self.orientation == other.orientation && map(self) == map(other)
+            self.inner == other.inner
+                && self.orientation == other.orientation
+                && map(self) == map(other)
         })
     }
 
@@ -225,16 +230,14 @@ impl Rig {
 
     fn __repr__(&self) -> String {
         let rest = if self.residual.is_some() { ", with a residual" } else { "" };
-        format!("<Rig of {:?}: {} lights{rest}>", self.name, self.rig.lights.len())
+        format!("<Rig of {:?}: {} lights{rest}>", self.name, self.inner.lights.len())
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
         let py = slf.py();
         let this = slf.get();
-        let number = |light: &RigLight| {
-            [light.angular_radius, light.share, light.solid_angle]
-        };
-        let regions = this.rig.lights.iter().map(|light| match light.region {
+        let number = |light: &RigLight| [light.angular_radius, light.share, light.solid_angle];
+        let regions = this.inner.lights.iter().map(|light| match light.region {
             Region::Sun => [0; 5],
             Region::Lamp => [1, 0, 0, 0, 0],
             Region::Cell => [2, 0, 0, 0, 0],
@@ -243,7 +246,7 @@ impl Rig {
         let values = (
             this.directions(py)?,
             this.irradiance(py)?,
-            rows(py, this.rig.lights.iter().map(number).collect(), &[this.rig.lights.len()])?,
+            rows(py, this.inner.lights.iter().map(number).collect(), &[this.inner.lights.len()])?,
             regions.collect(),
             this.labels(py)?,
             this.residual(),
@@ -270,25 +273,33 @@ impl Rig {
         let irradiance = Floats::new("irradiance", irradiance)?;
         let sizes = Floats::new("sizes", sizes)?;
         let (labels, shape) = indices("labels", labels, u32::MAX as usize + 1)?;
-        let &[height, width] = &shape[..] else { return Err(bad_value("the pickled labels are no map")) };
+        let &[height, width] = &shape[..] else {
+            return Err(bad_value("the pickled labels are no map"));
+        };
         let all = directions.rows::<3>()?.0.iter().zip(irradiance.rows::<3>()?.0);
         let all = all.zip(sizes.rows::<3>()?.0).zip(regions);
-        let lights = all.map(|(((&d, &e), &[angular_radius, share, solid_angle]), region)| RigLight {
-            direction: d.into(),
-            irradiance: Rgb::from(e),
-            angular_radius,
-            share,
-            solid_angle,
-            region: match region {
-                [0, ..] => Region::Sun,
-                [1, ..] => Region::Lamp,
-                [2, ..] => Region::Cell,
-                [_, x0, x1, y0, y1] => Region::Rectangle(TexelRect { x0, x1, y0, y1 }),
-            },
-        });
+        let lights =
+            all.map(|(((&d, &e), &[angular_radius, share, solid_angle]), region)| RigLight {
+                direction: d.into(),
+                irradiance: Rgb::from(e),
+                angular_radius,
+                share,
+                solid_angle,
+                region: match region {
+                    [0, ..] => Region::Sun,
+                    [1, ..] => Region::Lamp,
+                    [2, ..] => Region::Cell,
+                    [_, x0, x1, y0, y1] => Region::Rectangle(TexelRect { x0, x1, y0, y1 }),
+                },
+            });
         let rig = rig::Rig { lights: lights.collect(), width, height, labels };
         let residual = residual.map(|residual| residual.get().inner.clone());
-        Ok(Self { rig, residual, orientation: Orientation { up: up_axis(&up)?, rotation }, name })
+        Ok(Self {
+            inner: rig,
+            residual,
+            orientation: Orientation { up: up_axis(&up)?, rotation },
+            name,
+        })
     }
 }
 
@@ -364,7 +375,8 @@ pub(crate) fn lights(
     }
     let Environment { inner, name } = env.get();
     let settings = ExtractionSettings { sun, n_lamps: lamps, n_lights: n, method, min_share };
-    let Extraction { rig, residual } = parallel(py, || extract(inner, settings))?.map_err(to_python)?;
+    let Extraction { rig, residual } =
+        parallel(py, || extract(inner, settings))?.map_err(to_python)?;
     let residual = residual.map(Arc::new);
-    Ok(Rig { rig, residual, orientation: inner.orientation(), name: name.clone() })
+    Ok(Rig { inner: rig, residual, orientation: inner.orientation(), name: name.clone() })
 }

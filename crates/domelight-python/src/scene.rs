@@ -80,8 +80,10 @@ impl Camera {
             (None, Some(height)) => Some(Projection::Orthographic { height }),
             (None, None) => None,
         };
-        let read = |name, value: Option<Bound<'_, PyAny>>| value.map(|v| vector(name, &v)).transpose();
-        let (origin, target, up) = (read("origin", origin)?, read("target", target)?, read("up", up)?);
+        let read =
+            |name, value: Option<Bound<'_, PyAny>>| value.map(|v| vector(name, &v)).transpose();
+        let (origin, target, up) =
+            (read("origin", origin)?, read("target", target)?, read("up", up)?);
         Ok(Self { origin, target, up, projection })
     }
 
@@ -122,12 +124,18 @@ impl Camera {
     }
 
     fn __repr__(&self) -> String {
-        let vector = |name: &str, v: Option<Vec3>| v.map(|v| format!("{name}=({}, {}, {})", v.x, v.y, v.z));
+        let vector =
+            |name: &str, v: Option<Vec3>| v.map(|v| format!("{name}=({}, {}, {})", v.x, v.y, v.z));
         let projection = self.projection.map(|p| match p {
             Projection::Perspective { fov_y_degrees } => format!("fov={fov_y_degrees}"),
             Projection::Orthographic { height } => format!("ortho={height}"),
         });
-        let parts = [vector("origin", self.origin), vector("target", self.target), vector("up", self.up), projection];
+        let parts = [
+            vector("origin", self.origin),
+            vector("target", self.target),
+            vector("up", self.up),
+            projection,
+        ];
         format!("Camera({})", parts.into_iter().flatten().collect::<Vec<_>>().join(", "))
     }
 }
@@ -175,8 +183,14 @@ impl SceneData {
         scene::Camera::new(&settings, width, height).map_err(to_python)
     }
 
-    fn camera_settings(&self, camera: Option<&CameraLike>, aspect: f32, up: Vec3) -> PyResult<CameraSettings> {
-        let own = || self.camera.unwrap_or_else(|| CameraSettings::framing(&self.subject, aspect, up));
+    fn camera_settings(
+        &self,
+        camera: Option<&CameraLike>,
+        aspect: f32,
+        up: Vec3,
+    ) -> PyResult<CameraSettings> {
+        let own =
+            || self.camera.unwrap_or_else(|| CameraSettings::framing(&self.subject, aspect, up));
         let by_number = |i: usize| self.cameras.get(i).map(|camera| camera.settings);
         let by_name = |name: &str| self.cameras.iter().find(|c| c.name == name).map(|c| c.settings);
         let (found, asked) = match camera {
@@ -187,7 +201,11 @@ impl SceneData {
         };
         found.ok_or_else(|| {
             let names: Vec<_> = self.cameras.iter().map(|c| format!("{:?}", c.name)).collect();
-            bad_value(format!("{} has no camera {asked}; its cameras are [{}]", self.name, names.join(", ")))
+            bad_value(format!(
+                "{} has no camera {asked}; its cameras are [{}]",
+                self.name,
+                names.join(", ")
+            ))
         })
     }
 }
@@ -252,7 +270,9 @@ impl Scene {
         // Squares of lengths must be finite.
         let extent = subject.size().max_element();
         if extent > 1e18 || extent > 0.0 && extent < 1e-18 {
-            return Err(bad_value(format!("{name}: the scene is {extent:e} across; it must be from 1e-18 to 1e18")));
+            return Err(bad_value(format!(
+                "{name}: the scene is {extent:e} across; it must be from 1e-18 to 1e18"
+            )));
         }
         if ground {
             description.add_ground(up.vector());
@@ -260,11 +280,13 @@ impl Scene {
         let (camera, cameras) = (description.camera, description.cameras.clone());
         let environment = description.environment.clone();
         let built = parallel(py, move || {
-            let factor = description.rescale(&mut CameraSettings::framing(&subject, 1.0, up.vector()));
+            let factor =
+                description.rescale(&mut CameraSettings::framing(&subject, 1.0, up.vector()));
             scene::Scene::new(description).map(|scene| (scene, factor))
         })?;
         let (scene, factor) = built.map_err(|error| bad_value(format!("{name}: {error}")))?;
-        let data = SceneData { scene, name, factor, camera, cameras, subject, environment, up, lobes };
+        let data =
+            SceneData { scene, name, factor, camera, cameras, subject, environment, up, lobes };
         Ok(Self { inner: Arc::new(data) })
     }
 }
@@ -303,14 +325,20 @@ impl Scene {
                 return Err(bad_value(format!("faces has shape {shape}; it must be (F, 3)")));
             }
         };
-        let normals = normals.map(|v| attribute::<3>("normals", &v, n)).transpose()?.unwrap_or_default();
+        let normals =
+            normals.map(|v| attribute::<3>("normals", &v, n)).transpose()?.unwrap_or_default();
         let normals = normals.into_iter().map(Vec3::from).enumerate().map(|(i, v)| {
-            v.try_normalize().ok_or_else(|| bad_value(format!("normals[{i}] is {v}; it must have a length")))
+            v.try_normalize()
+                .ok_or_else(|| bad_value(format!("normals[{i}] is {v}; it must have a length")))
         });
         let normals = normals.collect::<PyResult<Vec<_>>>()?;
-        let colors = colors.map(|v| attribute::<3>("colors", &v, n)).transpose()?.unwrap_or_default();
+        let colors =
+            colors.map(|v| attribute::<3>("colors", &v, n)).transpose()?.unwrap_or_default();
         if let Some(i) = colors.iter().position(|c| c.iter().any(|c| !(0.0..=1.0).contains(c))) {
-            return Err(bad_value(format!("colors[{i}] is {:?}; it must lie in [0, 1]", colors[i])));
+            return Err(bad_value(format!(
+                "colors[{i}] is {:?}; it must lie in [0, 1]",
+                colors[i]
+            )));
         }
         let uvs = uvs.map(|v| attribute::<2>("uvs", &v, n)).transpose()?.unwrap_or_default();
         let mesh = Mesh {
@@ -483,9 +511,10 @@ impl Scene {
         let settings = self.inner.environment.clone().unwrap_or_else(sky);
         let (map, name) = match &settings.source {
             EnvironmentSource::Builtin(name) => (builtin_map(py, name, rows)?, name.clone()),
-            EnvironmentSource::File(path) => {
-                (load_map(py, path.clone(), domelight::environment::io::ProbeOptions::default())?, path.display().to_string())
-            }
+            EnvironmentSource::File(path) => (
+                load_map(py, path.clone(), domelight::environment::io::ProbeOptions::default())?,
+                path.display().to_string(),
+            ),
         };
         let orientation = Orientation { up: settings.up, rotation: settings.rotate_degrees };
         Environment::build(py, map, orientation, settings.factor(), name)

@@ -1,7 +1,7 @@
 //! Strategies written in Python.
 
-use std::sync::{Mutex, PoisonError};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use domelight::Rgb;
 use domelight::bsdf::Lobe;
@@ -28,6 +28,9 @@ pub(crate) struct ShadingPoints {
 
 type FloatArray<'py> = Bound<'py, PyArrayDyn<f32>>;
 
+/// Directions, values and densities.
+type Drawn = (Vec<[f32; 3]>, Vec<[f32; 3]>, Vec<f32>);
+
 /// Values and densities of directions at points.
 type Evaluated = (Vec<[f32; 3]>, Vec<f32>);
 
@@ -45,7 +48,9 @@ impl ShadingPoints {
         let n: usize = lead.iter().product();
         let Some(index) = index else {
             let each = match lead {
-                [points, rest @ ..] if *points == self.points.len() => rest.iter().product::<usize>(),
+                [points, rest @ ..] if *points == self.points.len() => {
+                    rest.iter().product::<usize>()
+                }
                 _ => {
                     let (found, points) = (shape_text(lead), self.points.len());
                     return Err(bad_value(format!(
@@ -143,7 +148,11 @@ impl ShadingPoints {
     /// ndarray, shape (N, 3): reflected fraction of uniform light, roughly.
     #[getter]
     fn albedo<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
-        rows(py, self.points.iter().map(|p| p.bsdf.albedo().to_array()).collect(), &[self.points.len()])
+        rows(
+            py,
+            self.points.iter().map(|p| p.bsdf.albedo().to_array()).collect(),
+            &[self.points.len()],
+        )
     }
 
     /// Uniform numbers of each point: a pixel's form one well-distributed sequence.
@@ -270,12 +279,7 @@ impl ShadingPoints {
 
 impl ShadingPoints {
     /// Directions, values and densities; zeros where nothing is drawn.
-    fn draw(
-        &self,
-        py: Python<'_>,
-        index: &[u32],
-        u: &[[f32; 3]],
-    ) -> PyResult<(Vec<[f32; 3]>, Vec<[f32; 3]>, Vec<f32>)> {
+    fn draw(&self, py: Python<'_>, index: &[u32], u: &[[f32; 3]]) -> PyResult<Drawn> {
         let mut drawn: Vec<([f32; 3], [f32; 3], f32)> = alone(py, || {
             let one = |(&i, &[x, y, u_lobe]): (&u32, &[f32; 3])| {
                 let point = &self.points[i as usize];
@@ -322,14 +326,21 @@ pub(crate) struct PythonStrategy {
 impl PythonStrategy {
     /// # Errors
     /// If it cannot be called, or its attribute `n_rays` is no number of rays.
-    pub(crate) fn new(function: Bound<'_, PyAny>, lobes: Vec<&'static PythonLobe>) -> PyResult<Self> {
+    pub(crate) fn new(
+        function: Bound<'_, PyAny>,
+        lobes: Vec<&'static PythonLobe>,
+    ) -> PyResult<Self> {
         const MOST: u32 = 1 << 16;
         let n_rays = match function.getattr_opt("n_rays")? {
             None => 1,
-            Some(n) => n.extract::<u32>().ok().filter(|n| (1..=MOST).contains(n)).ok_or_else(|| {
-                let found = n.repr().map_or_else(|_| "?".to_owned(), |r| r.to_string());
-                bad_value(format!("the strategy's n_rays is {found}; it must be from 1 to {MOST}"))
-            })?,
+            Some(n) => {
+                n.extract::<u32>().ok().filter(|n| (1..=MOST).contains(n)).ok_or_else(|| {
+                    let found = n.repr().map_or_else(|_| "?".to_owned(), |r| r.to_string());
+                    bad_value(format!(
+                        "the strategy's n_rays is {found}; it must be from 1 to {MOST}"
+                    ))
+                })?
+            }
         };
         let (failure, failed) = (Mutex::new(None), AtomicBool::new(false));
         Ok(Self { function: function.unbind(), n_rays, lobes, failure, failed })
@@ -362,13 +373,17 @@ impl PythonStrategy {
         let (index, wi, weight): (Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>) =
             result.extract().map_err(|_| {
                 let found = result.get_type();
-                bad_value(format!("the strategy returned {found}; it must return (index, wi, weight)"))
+                bad_value(format!(
+                    "the strategy returned {found}; it must return (index, wi, weight)"
+                ))
             })?;
         let (index, shape) = indices("the strategy's index", &index, tile.points.len())?;
         let wi = Floats::new("the strategy's wi", &wi)?;
         let (directions, lead) = wi.rows::<3>()?;
         if shape != lead {
-            return Err(wi.bad_shape(&format!("(…, 3) with … = {}, that of index", shape_text(&shape))));
+            return Err(
+                wi.bad_shape(&format!("(…, 3) with … = {}, that of index", shape_text(&shape)))
+            );
         }
         let weights = weights(&weight, lead)?;
         let mut order: Vec<u32> = (0..index.len() as u32).collect();
@@ -381,7 +396,8 @@ impl PythonStrategy {
             if weight.is_black() {
                 continue;
             }
-            if !((wi.length_squared() - 1.0).abs() < 1e-3) {
+            let is_unit = (wi.length_squared() - 1.0).abs() < 1e-3;
+            if !is_unit {
                 return Err(bad_value(format!(
                     "the strategy's wi[{row}] is ({}, {}, {}); it must be a unit vector",
                     wi.x, wi.y, wi.z

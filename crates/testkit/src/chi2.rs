@@ -216,7 +216,8 @@ impl Chi2 {
                 self.samples, cells.lost, cells.mass
             );
             if self.save_tables {
-                let table = |cells: &Vec<f64>| Table { columns: self.cells[1], cells: cells.clone() };
+                let table =
+                    |cells: &Vec<f64>| Table { columns: self.cells[1], cells: cells.clone() };
                 text += "\n  ";
                 text += &dump(name, &table(&cells.observed), &table(&cells.expected));
             }

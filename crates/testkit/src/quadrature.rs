@@ -184,7 +184,8 @@ impl Adaptive {
             for some in level.chunks(BATCH) {
                 let quarters: Vec<Rect> = some.iter().flat_map(|(_, r, _)| r.quarters()).collect();
                 let parts = tensors(&quarters, &mut f);
-                let each = some.iter().zip(quarters.as_chunks::<4>().0).zip(parts.as_chunks::<4>().0);
+                let each =
+                    some.iter().zip(quarters.as_chunks::<4>().0).zip(parts.as_chunks::<4>().0);
                 for ((&(i, _, whole), quarters), parts) in each {
                     let sum: f64 = parts.iter().sum();
                     let settled = (sum - whole).abs() <= self.tolerance;
@@ -264,7 +265,8 @@ mod tests {
         let f = |x: f64, y: f64| if x * x + y < 0.7 { (9.0 * x * y).exp() } else { 0.1 };
         let half = |x: [f64; 2]| Rect { x, y: [0.0, 1.0] };
         let rects = [half([0.0, 0.5]), half([0.5, 1.0])];
-        for rule in [Adaptive::default(), Adaptive { tolerance: 1e-3, min_depth: 0, max_depth: 5 }] {
+        for rule in [Adaptive::default(), Adaptive { tolerance: 1e-3, min_depth: 0, max_depth: 5 }]
+        {
             let sums = rule.rects_batched(&rects, |p| p.iter().map(|&[x, y]| f(x, y)).collect());
             for (rect, sum) in rects.into_iter().zip(sums) {
                 let [one] = rule.rect(rect, &mut |x, y| [f(x, y)]);

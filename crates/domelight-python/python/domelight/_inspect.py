@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from .strategies import Strategy
 
 
+SHOWN = 8
+"""Causes that a figure tells apart."""
+
+
 @dataclass(frozen=True)
 class Decomposition:
     """The variance of a strategy at a pixel, by causes; in units of luminance.
@@ -115,17 +119,24 @@ class Inspection:
             axes.set_title(title, fontsize=9)
             axes.axis("off")
         axes = figure.add_subplot(grid[1, :])
-        causes = list(dict.fromkeys(cause for s in self.strategies for cause in s.shares))
+        variances = np.array([s.variance_per_ray for s in self.strategies])
+        bars = {
+            cause: variances * [s.shares.get(cause, 0.0) for s in self.strategies]
+            for cause in dict.fromkeys(cause for s in self.strategies for cause in s.shares)
+        }
+        greatest = sorted(bars, key=lambda cause: -float(np.max(bars[cause])))
         left = np.zeros(len(self.strategies))
         names = [s.name for s in self.strategies]
-        for cause in causes:
-            width = np.array([s.shares.get(cause, 0.0) * s.variance_per_ray for s in self.strategies])
-            axes.barh(names, width, left=left, label=cause)
-            left += width
+        for cause in greatest[:SHOWN]:
+            axes.barh(names, bars[cause], left=left, label=cause)
+            left += bars[cause]
+        if greatest[SHOWN:]:
+            others = np.sum([bars[cause] for cause in greatest[SHOWN:]], axis=0)
+            axes.barh(names, others, left=left, label="others", color="lightgray")
         axes.set_xlabel("variance per shadow ray, by cause")
         axes.invert_yaxis()
-        if causes:
-            axes.legend(fontsize=8)
+        if greatest:
+            axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
         axes.set_title(self.advice, fontsize=9)
         return figure
 

@@ -95,7 +95,9 @@ impl EnvironmentDensity {
 
     /// Density of [`EnvironmentDensity::sample`] at `wi` \[sr⁻¹\].
     pub fn pdf(&self, environment: &Environment, wi: crate::math::Vec3) -> f32 {
-        self.density(environment.grid.texel(environment.orientation.up.to_map(Vectors::from(wi)).into()))
+        self.density(
+            environment.grid.texel(environment.orientation.up.to_map(Vectors::from(wi)).into()),
+        )
     }
 
     fn density(&self, texel: Texel) -> f32 {
