@@ -5,6 +5,7 @@
 
 mod arrays;
 mod bsdf;
+mod compare;
 mod engine;
 mod environment;
 mod error;
@@ -27,6 +28,7 @@ mod _domelight {
     #[pymodule_export]
     use super::{
         bsdf::{Bsdf, Material},
+        compare::compare,
         environment::{Density, Environment},
         error::{DomelightWarning, RenderInterrupted},
         film::Film,

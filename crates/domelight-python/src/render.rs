@@ -8,8 +8,10 @@ use domelight::environment;
 use domelight::inspect::{InspectError, Inspector};
 use domelight::render::{Background, Counts, Filter, Observer, RenderSettings, Renderer};
 use domelight::sampling::SamplerKind;
-use domelight::scene;
+use domelight::scene::{self, CameraSettings, EnvironmentSettings, EnvironmentSource};
 use domelight::strategy::{Strategy, StrategyKind, StrategySpec};
+use domelight_lab::report::{CameraReport, EnvironmentReport, SceneReport};
+use domelight_lab::scene::View;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
@@ -35,6 +37,10 @@ pub(crate) struct Job {
     scene: Arc<SceneData>,
     environment: Arc<environment::Environment>,
     camera: scene::Camera,
+    /// In the scene's own units.
+    camera_settings: CameraSettings,
+    /// What the environment is called.
+    probe: String,
     settings: RenderSettings,
     strategy: Choice,
     n_threads: usize,
@@ -103,7 +109,8 @@ impl Job {
             (of_scene.inner, of_scene.name)
         };
         let up = environment.orientation().up.vector();
-        let camera = scene.inner.camera(keywords.camera.as_ref(), (width, height), up)?;
+        let (camera, camera_settings) =
+            scene.inner.camera(keywords.camera.as_ref(), (width, height), up)?;
         let default_tile = match choice {
             Choice::Builtin(_) => RenderSettings::default().tile_size,
             Choice::Python(_) => PYTHON_TILE_SIZE,
@@ -123,7 +130,7 @@ impl Job {
         let provenance = [
             ("version", env!("CARGO_PKG_VERSION").to_owned()),
             ("scene", scene.inner.name.clone()),
-            ("environment", probe),
+            ("environment", probe.clone()),
             ("samples", spp.to_string()),
             ("sampler", keywords.sampler.to_owned()),
             ("filter", filter.name().to_owned()),
@@ -131,8 +138,17 @@ impl Job {
         ];
         let provenance =
             provenance.map(|(name, value)| (format!("domelight.{name}"), value)).to_vec();
-        let (scene, strategy) = (scene.inner.clone(), choice);
-        Ok(Self { scene, environment, camera, settings, strategy, n_threads, provenance })
+        Ok(Self {
+            scene: scene.inner.clone(),
+            environment,
+            camera,
+            camera_settings,
+            probe,
+            settings,
+            strategy: choice,
+            n_threads,
+            provenance,
+        })
     }
 
     /// Hands a renderer over; on the calling thread's pool.
@@ -182,6 +198,42 @@ impl Job {
         spec.for_picture(&scene.scene, camera, environment, settings)
     }
 
+    /// Of each picture.
+    pub(crate) fn settings(&self) -> &RenderSettings {
+        &self.settings
+    }
+
+    /// The scene under its light, with a report on it.
+    pub(crate) fn view<'a>(&'a self, report: &'a SceneReport) -> View<'a> {
+        let Self { scene, camera, environment, .. } = self;
+        View { scene: &scene.scene, camera, environment, report }
+    }
+
+    /// The scene in words and numbers.
+    pub(crate) fn scene_report(&self) -> SceneReport {
+        let Self { scene, environment, settings, camera_settings, probe, .. } = self;
+        let orientation = environment.orientation();
+        let light = EnvironmentSettings {
+            source: EnvironmentSource::Builtin(probe.clone()),
+            rotate_degrees: orientation.rotation,
+            scale: 1.0,
+            exposure: 0.0,
+            up: orientation.up,
+        };
+        SceneReport {
+            scene: scene.name.clone(),
+            triangles: scene.scene.triangle_count(),
+            warnings: Vec::new(),
+            material: None,
+            normalize: false,
+            ground: false,
+            hide_env: settings.background == Background::Hidden,
+            environment: EnvironmentReport::new(probe.clone(), &light, environment),
+            camera: CameraReport::new(camera_settings),
+            size: [settings.width, settings.height],
+        }
+    }
+
     /// The light.
     pub(crate) fn environment(&self) -> &environment::Environment {
         &self.environment
@@ -209,7 +261,8 @@ impl Job {
         of_lobes.fold(of_strategy, |first, next| first.or(Some(next)))
     }
 
-    fn has_failed(&self) -> bool {
+    /// A function of Python's has raised.
+    pub(crate) fn has_failed(&self) -> bool {
         let strategy = matches!(&self.strategy, Choice::Python(strategy) if strategy.has_failed());
         strategy || self.scene.lobes.iter().any(|lobe| lobe.has_failed())
     }

@@ -168,19 +168,21 @@ pub(crate) struct SceneData {
 }
 
 impl SceneData {
-    /// The camera of a picture.
+    /// The camera of a picture, and its settings in the scene's own units.
     pub(crate) fn camera(
         &self,
         camera: Option<&CameraLike>,
         (width, height): (usize, usize),
         up: Vec3,
-    ) -> PyResult<scene::Camera> {
+    ) -> PyResult<(scene::Camera, CameraSettings)> {
         let aspect = width as f32 / height as f32;
-        let mut settings = self.camera_settings(camera, aspect, up)?;
+        let settings = self.camera_settings(camera, aspect, up)?;
+        let mut scaled = settings;
         if self.factor != 1.0 {
-            settings.scale(self.factor);
+            scaled.scale(self.factor);
         }
-        scene::Camera::new(&settings, width, height).map_err(to_python)
+        let camera = scene::Camera::new(&scaled, width, height).map_err(to_python)?;
+        Ok((camera, settings))
     }
 
     fn camera_settings(

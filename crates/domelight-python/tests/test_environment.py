@@ -126,5 +126,5 @@ def test_densities_of_ones_own(env, rng):
     weights[3, 4] = -1
     with pytest.raises(ValueError, match=r"texel \(4, 3\)"):
         dl.Density(env, weights)
-    with pytest.raises(ValueError, match="integrate to 0"):
+    with pytest.raises(ValueError, match="all weights are 0"):
         dl.Density(env, np.zeros(env.shape))

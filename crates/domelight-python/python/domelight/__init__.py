@@ -43,12 +43,14 @@ from ._domelight import (
     tone_map,
     write,
 )
+from ._compare import Comparison, compare
 from ._inspect import Inspection, inspect
 from ._render import render
 
 __all__ = [
     "Bsdf",
     "Camera",
+    "Comparison",
     "Density",
     "DomelightWarning",
     "Environment",
@@ -61,6 +63,7 @@ __all__ = [
     "Scene",
     "ShadingPoints",
     "__version__",
+    "compare",
     "inspect",
     "lights",
     "metrics",

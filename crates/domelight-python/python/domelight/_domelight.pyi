@@ -312,6 +312,20 @@ def progressive(
     target_error: float | None = None,
     tile_size: int | None = None,
 ) -> Progressive: ...
+def compare(
+    scene: Scene,
+    env: Environment | None,
+    strategies: list[tuple[str, str | Strategy]],
+    budget: str,
+    seeds: int,
+    reference_spp: int,
+    size: tuple[int, int],
+    seed: int,
+    threads: int | None,
+    camera: Camera | str | int | None,
+    hide_env: bool,
+    tile_size: int | None,
+) -> dict[str, Any]: ...
 def inspect(
     scene: Scene,
     env: Environment | None,

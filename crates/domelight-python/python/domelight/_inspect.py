@@ -150,6 +150,18 @@ class Inspection:
         return out.getvalue()
 
 
+def named(
+    strategies: Sequence[str | Strategy] | Mapping[str, str | Strategy],
+) -> list[tuple[str, str | Strategy]]:
+    """Strategies with their names: their texts, or what functions are called."""
+    if isinstance(strategies, Mapping):
+        return list(strategies.items())
+    return [
+        (s if isinstance(s, str) else getattr(s, "__name__", type(s).__name__), s)
+        for s in strategies
+    ]
+
+
 def inspect(
     scene: Scene,
     env: Environment | None = None,
@@ -188,10 +200,6 @@ def inspect(
     ValueError
         If the pixel is not in the picture, or a setting is wrong.
     """
-    if isinstance(strategies, Mapping):
-        named = list(strategies.items())
-    else:
-        named = [(s if isinstance(s, str) else getattr(s, "__name__", type(s).__name__), s) for s in strategies]
-    found = _domelight.inspect(scene, env, named, pixel, size, seed, camera, hide_env, resolution)
+    found = _domelight.inspect(scene, env, named(strategies), pixel, size, seed, camera, hide_env, resolution)
     found["strategies"] = [Decomposition(**s) for s in found["strategies"]]
     return Inspection(**found)

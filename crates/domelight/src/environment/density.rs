@@ -1,8 +1,8 @@
 //! Densities of the caller's own over an environment's texels.
 
-use super::{Environment, EnvironmentSample, Texel};
+use super::{Environment, EnvironmentSample, Texel, unit_of};
 use crate::math::Vec2;
-use crate::sampling::{HierarchicalTable, TableError};
+use crate::sampling::HierarchicalTable;
 use crate::simd::Vectors;
 
 /// A way to draw directions in proportion to weights that the caller gives the texels of an environment, constant over
@@ -43,9 +43,9 @@ pub enum DensityError {
         /// The weight.
         value: f32,
     },
-    /// No weight is positive, or their integral is beyond single precision.
-    #[error("the weights integrate to {0}; it must be positive and its inverse finite")]
-    Total(f64),
+    /// No weight is positive.
+    #[error("all weights are 0")]
+    AllZero,
 }
 
 impl EnvironmentDensity {
@@ -53,7 +53,7 @@ impl EnvironmentDensity {
     ///
     /// # Errors
     /// The first weight in row order that is negative or not finite, another number of weights than of texels, or
-    /// weights without an integral.
+    /// weights that are all 0.
     pub fn new(environment: &Environment, weights: Vec<f32>) -> Result<Self, DensityError> {
         let grid = &environment.grid;
         let (width, height) = (grid.width, grid.height);
@@ -63,21 +63,20 @@ impl EnvironmentDensity {
         if let Some(i) = weights.iter().position(|w| !(w.is_finite() && *w >= 0.0)) {
             return Err(DensityError::BadWeight { x: i % width, y: i / width, value: weights[i] });
         }
+        // Only quotients of weights matter, and neither sums nor their inverses may overflow.
+        let greatest = weights.iter().copied().fold(0.0, f32::max);
+        let unit = unit_of(f64::from(greatest));
+        let scaled = |w: f32| (f64::from(w) / unit) as f32;
+        let weights: Vec<f32> = weights.into_iter().map(scaled).collect();
         let table = HierarchicalTable::from_rows(width, height, |row, out| {
             let solid_angle = grid.solid_angle(row) as f32;
             for (o, &weight) in out.iter_mut().zip(&weights[row * width..(row + 1) * width]) {
                 *o = weight * solid_angle;
             }
         });
-        let table = table.map_err(|error| match error {
-            TableError::AllZero => DensityError::Total(0.0),
-            _ => DensityError::Total(f64::INFINITY),
-        })?;
-        let total = table.total();
-        let inverse_total = (1.0 / total) as f32;
-        if !(inverse_total > 0.0 && inverse_total.is_finite()) {
-            return Err(DensityError::Total(total));
-        }
+        // Finite weights that are not negative have no other fault.
+        let table = table.map_err(|_| DensityError::AllZero)?;
+        let inverse_total = (1.0 / table.total()) as f32;
         Ok(Self { table, weights, width, inverse_total })
     }
 
@@ -155,12 +154,21 @@ mod tests {
         let environment = environment();
         let refused = |weights| EnvironmentDensity::new(&environment, weights).unwrap_err();
         assert_eq!(refused(vec![1.0; 3]), DensityError::Count { found: 3, width: 8, height: 4 });
-        assert_eq!(refused(vec![0.0; 32]), DensityError::Total(0.0));
+        assert_eq!(refused(vec![0.0; 32]), DensityError::AllZero);
         for value in [f32::INFINITY, -1.0] {
             let mut weights = vec![1.0; 32];
             weights[10] = value;
             assert_eq!(refused(weights), DensityError::BadWeight { x: 2, y: 1, value });
         }
-        assert!(matches!(refused(vec![f32::MAX; 32]), DensityError::Total(_)));
+    }
+
+    #[test]
+    fn only_quotients_of_weights_matter() {
+        let environment = environment();
+        for weight in [f32::MAX, 1.0, 1e-44] {
+            let density = EnvironmentDensity::new(&environment, vec![weight; 32]).unwrap();
+            let sample = density.sample(&environment, vec2(0.3, 0.6)).unwrap();
+            assert!((sample.pdf * 4.0 * crate::math::PI - 1.0).abs() < 1e-6, "{weight}");
+        }
     }
 }
