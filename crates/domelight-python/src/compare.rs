@@ -32,7 +32,8 @@ impl Host for PythonHost<'_> {
     }
 
     fn canceled(&self) -> bool {
-        let failed = |(_, choice): &(String, Choice)| matches!(choice, Choice::Python(s) if s.has_failed());
+        let failed =
+            |(_, choice): &(String, Choice)| matches!(choice, Choice::Python(s) if s.has_failed());
         self.cancel.load(Ordering::Relaxed)
             || self.job.has_failed()
             || self.choices.iter().any(failed)
@@ -91,7 +92,13 @@ pub(crate) fn compare<'py>(
     let run = || -> Result<ComparisonResult, Error> {
         let view = job.view(report);
         let render = *job.settings();
-        let settings = ComparisonSettings { render, budget, n_seeds: seeds, reference_spp, ..Default::default() };
+        let settings = ComparisonSettings {
+            render,
+            budget,
+            n_seeds: seeds,
+            reference_spp,
+            ..Default::default()
+        };
         let mut comparison = Comparison::new(view, settings);
         for (name, choice) in choices {
             match choice {

@@ -16,7 +16,7 @@ use rayon::ThreadPool;
 use crate::error::{bad_value, from_panic};
 
 /// How often a waiting call looks for signals and reports progress.
-const POLL: Duration = Duration::from_millis(50);
+const POLL: Duration = Duration::from_millis(10);
 
 /// Threads of a pool: as many as asked for, else the cores that the process may use.
 pub(crate) fn n_threads(asked: Option<usize>) -> PyResult<usize> {

@@ -407,7 +407,7 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
 /// tile_size : int, optional
 ///     Pixels along a tile's edge; 16 by default, 64 for functions. Only 'product' depends on it.
 /// progress : callable, optional
-///     Called every twentieth of a second with the share that is done, in [0, 1].
+///     Called every hundredth of a second with the share that is done, in [0, 1].
 ///
 /// Returns
 /// -------

@@ -70,7 +70,7 @@ def _bar() -> Any:
 
 
 render.__doc__ = (_domelight._render.__doc__ or "").replace(
-    "progress : callable, optional\n    Called every twentieth of a second with the share that is done, in [0, 1].",
+    "progress : callable, optional\n    Called every hundredth of a second with the share that is done, in [0, 1].",
     "progress : bool or callable, default False\n    True shows a bar if tqdm is installed; a callable gets the share that "
-    "is done, in [0, 1],\n    every twentieth of a second.",
+    "is done, in [0, 1],\n    every hundredth of a second.",
 )
