@@ -8,12 +8,14 @@
 pub mod builtin;
 pub(crate) mod compact;
 mod compensation;
+mod density;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod mapping;
 pub mod statistics;
 
 pub use compensation::CompensatedTable;
+pub use density::{DensityError, EnvironmentDensity};
 
 use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, vec3};
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};

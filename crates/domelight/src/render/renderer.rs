@@ -203,6 +203,12 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         self.pass(&()) != PassEnd::NothingLeft
     }
 
+    /// Renders the next pass, or what the observer lets be done of it. Returns false when there was nothing left to
+    /// render.
+    pub fn step_with(&mut self, observer: &impl Observer) -> bool {
+        self.pass(observer) != PassEnd::NothingLeft
+    }
+
     /// Renders all that is missing and returns the film.
     pub fn finish(&mut self) -> Film {
         self.run(&());

@@ -1,0 +1,129 @@
+"""Strategies on one scene at equal samples, rays or time."""
+
+from __future__ import annotations
+
+import html
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _domelight
+from ._inspect import named
+
+if TYPE_CHECKING:
+    from ._domelight import Camera, Environment, Scene
+    from .strategies import Strategy
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What a comparison found; a notebook shows its page.
+
+    Attributes
+    ----------
+    report : dict
+        All numbers, as `domelight compare --json` gives them.
+    page : str
+        One page of HTML with pictures, errors and plots that needs nothing else.
+    reference : ndarray, shape (H, W, 3)
+        What the pictures were measured against.
+    pictures : dict of str to ndarray, shape (H, W, 3)
+        The first seed's picture of each strategy that was not left out.
+    errors : dict of str to ndarray, shape (H, W)
+        Their relative errors.
+    flip : dict of str to ndarray, shape (H, W)
+        Their FLIP, in [0, 1].
+    """
+
+    report: dict[str, Any]
+    page: str
+    reference: npt.NDArray[np.float32]
+    pictures: dict[str, npt.NDArray[np.float32]]
+    errors: dict[str, npt.NDArray[np.float32]]
+    flip: dict[str, npt.NDArray[np.float32]]
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the page."""
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(self.page)
+
+    def __str__(self) -> str:
+        lines = [f"{'strategy':24} {'spp':>6} {'rays':>8} {'CPU s':>8} {'relMSE':>10}"]
+        for strategy in self.report["strategies"]:
+            result = strategy["result"]
+            if result is None:
+                lines.append(f"{strategy['name']:24} left out: {strategy['left_out']}")
+                continue
+            rays, seconds, error = (
+                result[key]["mean"] if isinstance(result[key], dict) else result[key]
+                for key in ("rays", "cpu_seconds", "rel_mse")
+            )
+            lines.append(
+                f"{strategy['name']:24} {result['spp']:6} {rays:8.1f} {seconds:8.3f} {error:10.2e}"
+            )
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        # A frame of its own, so that the page's styles stay its own.
+        return (
+            f'<iframe srcdoc="{html.escape(self.page)}" style="width:100%;height:900px;border:0">'
+            f"</iframe>"
+        )
+
+
+def compare(
+    scene: Scene,
+    env: Environment | None = None,
+    strategies: Sequence[str | Strategy] | Mapping[str, str | Strategy] = ("mis", "product"),
+    *,
+    budget: str = "rays:32",
+    seeds: int = 4,
+    reference_spp: int = 64,
+    size: tuple[int, int] = (256, 256),
+    seed: int = 0,
+    threads: int | None = None,
+    camera: Camera | str | int | None = None,
+    hide_env: bool = False,
+    tile_size: int | None = None,
+) -> Comparison:
+    """Compare strategies at equal samples, shadow rays or time.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is seen.
+    env : Environment, optional
+        The light; by default the scene's own.
+    strategies : sequence or mapping
+        Strategies as of `render`; a mapping names them. Functions count as unbiased.
+    budget : str, default 'rays:32'
+        What each picture may cost: 'spp:16' camera samples a pixel, 'rays:64' shadow rays a pixel, or 'time:2s' of CPU.
+    seeds : int, default 4
+        Pictures of each strategy.
+    reference_spp : int, default 64
+        Camera samples of the rendered reference.
+    size, seed, threads, camera, hide_env, tile_size
+        As of `render`; tiles are of 16 pixels unless said otherwise, for functions too.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    ValueError
+        If a setting is wrong, or two strategies have one name.
+
+    Warns
+    -----
+    DomelightWarning
+        If a strategy is left out or misses the budget, or the reference is too noisy to tell.
+    """
+    found = _domelight.compare(
+        scene, env, named(strategies), budget, seeds, reference_spp, size, seed, threads, camera, hide_env, tile_size
+    )
+    return Comparison(**found)

@@ -1,0 +1,386 @@
+"""The engine. Classes and functions document themselves; see `help(domelight.Environment)`, for instance."""
+
+from collections.abc import Callable, Iterator
+from os import PathLike
+from typing import Any, Literal, SupportsIndex, TypeAlias, final
+
+import numpy as np
+import numpy.typing as npt
+
+from .metrics import Comparison
+from .strategies import Strategy
+from .testing import Chi2Report
+
+_Floats: TypeAlias = npt.NDArray[np.float32]
+_Counts: TypeAlias = npt.NDArray[np.uint32]
+_Path: TypeAlias = str | PathLike[str]
+_Up: TypeAlias = Literal["y", "z"]
+_MaterialLike: TypeAlias = Material | Bsdf | str
+
+__version__: str
+
+class DomelightWarning(UserWarning):
+    """What a picture or a map lacks, or what was repaired in it."""
+
+class RenderInterrupted(KeyboardInterrupt):
+    """A render was interrupted; `film` holds what was done."""
+
+    film: Film
+
+@final
+class Environment:
+    def __new__(
+        cls,
+        map: npt.ArrayLike,
+        *,
+        rotation: float = 0.0,
+        scale: float = 1.0,
+        up: str = "y",
+        name: str = "array",
+    ) -> Environment: ...
+    @classmethod
+    def load(
+        cls,
+        path: _Path,
+        *,
+        rotation: float = 0.0,
+        scale: float = 1.0,
+        up: str = "y",
+        mapping: str | None = None,
+        layer: str | None = None,
+        strict: bool = False,
+    ) -> Environment: ...
+    @classmethod
+    def builtin(
+        cls,
+        name: str,
+        *,
+        rows: int = 1024,
+        rotation: float = 0.0,
+        scale: float = 1.0,
+        up: str = "y",
+    ) -> Environment: ...
+    @property
+    def map(self) -> _Floats: ...
+    @property
+    def solid_angles(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def rotation(self) -> float: ...
+    @property
+    def up(self) -> _Up: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def power(self) -> float: ...
+    def rotated(self, degrees: float) -> Environment: ...
+    def scaled(self, factor: float) -> Environment: ...
+    def sample(self, u: npt.ArrayLike) -> tuple[_Floats, _Floats, _Floats]: ...
+    def radiance(self, wi: npt.ArrayLike) -> _Floats: ...
+    def pdf(self, wi: npt.ArrayLike) -> _Floats: ...
+    def directions(self, uv: npt.ArrayLike) -> _Floats: ...
+    def uv(self, wi: npt.ArrayLike) -> _Floats: ...
+
+@final
+class Density:
+    def __new__(cls, environment: Environment, weights: npt.ArrayLike) -> Density: ...
+    def sample(self, u: npt.ArrayLike) -> tuple[_Floats, _Floats, _Floats]: ...
+    def pdf(self, wi: npt.ArrayLike) -> _Floats: ...
+
+@final
+class Bsdf:
+    @classmethod
+    def parse(cls, text: str) -> Bsdf: ...
+    @classmethod
+    def custom(
+        cls,
+        eval: Callable[[_Floats, _Floats], npt.ArrayLike],
+        pdf: Callable[[_Floats, _Floats], npt.ArrayLike] | None = None,
+        sample: Callable[[_Floats, _Floats], npt.ArrayLike] | None = None,
+        *,
+        albedo: npt.ArrayLike | None = None,
+        max_eval: float | None = None,
+        roughness: float | None = None,
+    ) -> Bsdf: ...
+    @property
+    def albedo(self) -> _Floats: ...
+    def eval(self, wo: npt.ArrayLike, wi: npt.ArrayLike) -> _Floats: ...
+    def pdf(self, wo: npt.ArrayLike, wi: npt.ArrayLike) -> _Floats: ...
+    def eval_pdf(self, wo: npt.ArrayLike, wi: npt.ArrayLike) -> tuple[_Floats, _Floats]: ...
+    def sample(
+        self, wo: npt.ArrayLike, u: npt.ArrayLike
+    ) -> tuple[_Floats, _Floats, _Floats]: ...
+
+@final
+class Material:
+    def __new__(cls, bsdf: _MaterialLike) -> Material: ...
+    @classmethod
+    def parse(cls, text: str) -> Material: ...
+    @property
+    def bsdf(self) -> Bsdf: ...
+
+@final
+class Camera:
+    def __new__(
+        cls,
+        *,
+        origin: npt.ArrayLike | None = None,
+        target: npt.ArrayLike | None = None,
+        up: npt.ArrayLike | None = None,
+        fov: float | None = None,
+        ortho: float | None = None,
+    ) -> Camera: ...
+    @property
+    def origin(self) -> _Floats | None: ...
+    @property
+    def target(self) -> _Floats | None: ...
+    @property
+    def up(self) -> _Floats | None: ...
+    @property
+    def fov(self) -> float | None: ...
+    @property
+    def ortho(self) -> float | None: ...
+
+@final
+class Scene:
+    def __new__(
+        cls,
+        vertices: npt.ArrayLike,
+        faces: npt.ArrayLike,
+        *,
+        normals: npt.ArrayLike | None = None,
+        colors: npt.ArrayLike | None = None,
+        uvs: npt.ArrayLike | None = None,
+        material: _MaterialLike | None = None,
+        ground: bool = False,
+        normalize: bool = False,
+        up: str = "y",
+        name: str = "mesh",
+    ) -> Scene: ...
+    @classmethod
+    def load(
+        cls,
+        path: _Path,
+        *,
+        material: _MaterialLike | None = None,
+        ground: bool = False,
+        normalize: bool = False,
+        scene: str | None = None,
+        animation: str | None = None,
+        at: float = 0.0,
+        strict: bool = False,
+        up: str | None = None,
+    ) -> Scene: ...
+    @classmethod
+    def builtin(
+        cls,
+        name: str,
+        *,
+        material: _MaterialLike | None = None,
+        ground: bool = False,
+        normalize: bool = False,
+    ) -> Scene: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def n_triangles(self) -> int: ...
+    @property
+    def bounds(self) -> _Floats | None: ...
+    @property
+    def up(self) -> _Up: ...
+    @property
+    def cameras(self) -> list[str]: ...
+    def camera(self, aspect: float = 1.0) -> Camera: ...
+    def environment(self, rows: int = 1024) -> Environment: ...
+
+@final
+class Film:
+    @property
+    def color(self) -> _Floats: ...
+    @property
+    def alpha(self) -> _Floats: ...
+    def __getitem__(self, name: str, /) -> npt.NDArray[Any]: ...
+    def __contains__(self, name: object, /) -> bool: ...
+    def __iter__(self) -> Iterator[str]: ...
+    @staticmethod
+    def keys() -> list[str]: ...
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def complete(self) -> bool: ...
+    @property
+    def strategy(self) -> str: ...
+    @property
+    def camera_rays(self) -> int: ...
+    @property
+    def shading_points(self) -> int: ...
+    @property
+    def shadow_rays(self) -> int: ...
+    @property
+    def non_finite(self) -> int: ...
+    def save(
+        self, path: _Path, *, exposure: float | None = 0.0, curve: str = "agx"
+    ) -> None: ...
+    def to_png(self, *, exposure: float | None = None, curve: str = "agx") -> bytes: ...
+    def to_xarray(self) -> Any: ...
+    def _repr_png_(self) -> bytes: ...
+
+@final
+class Progressive:
+    def __iter__(self) -> Progressive: ...
+    def __next__(self) -> Film: ...
+    @property
+    def film(self) -> Film | None: ...
+
+@final
+class ShadingPoints:
+    def __len__(self) -> int: ...
+    @property
+    def position(self) -> _Floats: ...
+    @property
+    def normal(self) -> _Floats: ...
+    @property
+    def geometric_normal(self) -> _Floats: ...
+    @property
+    def wo(self) -> _Floats: ...
+    @property
+    def albedo(self) -> _Floats: ...
+    def random(self, n: SupportsIndex = 1, purpose: str = "environment") -> _Floats: ...
+    def eval(self, wi: npt.ArrayLike, index: npt.ArrayLike | None = None) -> _Floats: ...
+    def eval_pdf(
+        self, wi: npt.ArrayLike, index: npt.ArrayLike | None = None
+    ) -> tuple[_Floats, _Floats]: ...
+    def sample(
+        self, u: npt.ArrayLike, index: npt.ArrayLike | None = None
+    ) -> tuple[_Floats, _Floats, _Floats]: ...
+
+@final
+class Rig:
+    def __len__(self) -> int: ...
+    @property
+    def directions(self) -> _Floats: ...
+    @property
+    def irradiance(self) -> _Floats: ...
+    @property
+    def angular_radius(self) -> _Floats: ...
+    @property
+    def share(self) -> _Floats: ...
+    @property
+    def solid_angle(self) -> _Floats: ...
+    @property
+    def names(self) -> list[str]: ...
+    @property
+    def labels(self) -> _Counts: ...
+    @property
+    def residual(self) -> Environment | None: ...
+    def shading_error(self, environment: Environment) -> dict[str, float]: ...
+    def save(self, path: _Path, *, format: str | None = None) -> None: ...
+
+def _render(
+    scene: Scene,
+    env: Environment | None = None,
+    strategy: str | Strategy | None = None,
+    *,
+    spp: int = 32,
+    size: tuple[int, int] = (640, 640),
+    seed: int = 0,
+    threads: int | None = None,
+    camera: Camera | str | int | None = None,
+    filter: str = "gaussian",
+    sampler: str = "sobol",
+    hide_env: bool = False,
+    adaptive: bool = True,
+    target_error: float | None = None,
+    tile_size: int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> Film: ...
+def progressive(
+    scene: Scene,
+    env: Environment | None = None,
+    strategy: str | Strategy | None = None,
+    *,
+    spp: int = 32,
+    size: tuple[int, int] = (640, 640),
+    seed: int = 0,
+    threads: int | None = None,
+    camera: Camera | str | int | None = None,
+    filter: str = "gaussian",
+    sampler: str = "sobol",
+    hide_env: bool = False,
+    adaptive: bool = True,
+    target_error: float | None = None,
+    tile_size: int | None = None,
+) -> Progressive: ...
+def compare(
+    scene: Scene,
+    env: Environment | None,
+    strategies: list[tuple[str, str | Strategy]],
+    budget: str,
+    seeds: int,
+    reference_spp: int,
+    size: tuple[int, int],
+    seed: int,
+    threads: int | None,
+    camera: Camera | str | int | None,
+    hide_env: bool,
+    tile_size: int | None,
+) -> dict[str, Any]: ...
+def inspect(
+    scene: Scene,
+    env: Environment | None,
+    strategies: list[tuple[str, str | Strategy]],
+    pixel: tuple[int, int],
+    size: tuple[int, int],
+    seed: int,
+    camera: Camera | str | int | None,
+    hide_env: bool,
+    resolution: int,
+) -> dict[str, Any]: ...
+def lights(
+    env: Environment,
+    n: int | None = 64,
+    *,
+    method: str = "variance-minimization",
+    sun: bool = False,
+    lamps: int = 0,
+    min_share: float | None = None,
+) -> Rig: ...
+def read(path: _Path, *, layer: str | None = None) -> _Floats: ...
+def write(
+    path: _Path, picture: npt.ArrayLike, *, exposure: float | None = 0.0, curve: str = "agx"
+) -> None: ...
+def tone_map(
+    picture: npt.ArrayLike, *, exposure: float | None = None, curve: str = "agx"
+) -> _Floats: ...
+def strategy_names() -> list[tuple[str, str]]: ...
+def compare_pictures(
+    test: npt.ArrayLike, reference: npt.ArrayLike, mask: npt.ArrayLike | None = None
+) -> Comparison: ...
+def error_map(test: npt.ArrayLike, reference: npt.ArrayLike, relative: bool) -> _Floats: ...
+def flip(
+    test: npt.ArrayLike, reference: npt.ArrayLike, pixels_per_degree: float | None = None
+) -> _Floats: ...
+def hdr_flip(
+    test: npt.ArrayLike, reference: npt.ArrayLike, pixels_per_degree: float | None = None
+) -> _Floats: ...
+def chi2(
+    name: str,
+    sample: Callable[[_Floats], npt.ArrayLike],
+    pdf: Callable[[_Floats], npt.ArrayLike],
+    samples: int,
+    cells: tuple[int, int],
+    axis: npt.ArrayLike,
+    seed: int,
+    tests: int,
+    significance: float,
+) -> Chi2Report: ...
+def z_test(
+    name: str,
+    batches: npt.NDArray[np.float64],
+    reference: list[float],
+    standard_error: list[float],
+    tests: int,
+    significance: float,
+    rounding: float,
+) -> float: ...

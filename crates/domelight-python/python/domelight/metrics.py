@@ -1,0 +1,136 @@
+"""How far a picture is from its reference.
+
+All take linear pictures of shape (H, W, 3), the one under test first, and compute in double precision. Errors of pictures
+with NaN or infinities are NaN or infinite.
+"""
+
+from __future__ import annotations
+
+from typing import TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+from ._domelight import compare_pictures, error_map, flip as _flip, hdr_flip as _hdr_flip
+
+__all__ = [
+    "Comparison",
+    "absolute_error_map",
+    "compare",
+    "flip",
+    "flip_map",
+    "hdr_flip",
+    "hdr_flip_map",
+    "mse",
+    "psnr",
+    "rel_mse",
+    "rel_mse_trimmed",
+    "relative_error_map",
+]
+
+
+class Comparison(TypedDict):
+    """All differences of a picture I from its reference R.
+
+    The errors are means over pixels and channels; `psnr` is in dB over the greatest channel of the reference.
+    """
+
+    n_pixels: int
+    mse: float
+    rel_mse: float
+    rel_mse_trimmed: float
+    psnr: float
+    mean: list[float]
+    mean_reference: list[float]
+    mean_ratio: list[float]
+    n_non_finite: int
+
+
+def compare(
+    test: npt.ArrayLike, reference: npt.ArrayLike, mask: npt.ArrayLike | None = None
+) -> Comparison:
+    """All differences at once.
+
+    Parameters
+    ----------
+    test, reference : array_like, shape (H, W, 3)
+        Linear pictures of the same size.
+    mask : array_like, shape (H, W), optional
+        Pixels that count are not 0.
+
+    Returns
+    -------
+    Comparison
+        A dictionary.
+    """
+    return compare_pictures(test, reference, mask)
+
+
+def mse(test: npt.ArrayLike, reference: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
+    """Mean over pixels and channels of (I - R)^2."""
+    return compare(test, reference, mask)["mse"]
+
+
+def rel_mse(
+    test: npt.ArrayLike, reference: npt.ArrayLike, mask: npt.ArrayLike | None = None
+) -> float:
+    """Mean over pixels and channels of (I - R)^2 / (R^2 + 0.01)."""
+    return compare(test, reference, mask)["rel_mse"]
+
+
+def rel_mse_trimmed(
+    test: npt.ArrayLike, reference: npt.ArrayLike, mask: npt.ArrayLike | None = None
+) -> float:
+    """`rel_mse` without the worst 0.1 % of the pixels, so that a few fireflies do not decide."""
+    return compare(test, reference, mask)["rel_mse_trimmed"]
+
+
+def psnr(test: npt.ArrayLike, reference: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
+    """10 log10(peak^2 / MSE) [dB]; the peak is the greatest channel of the reference. Infinite for equal pictures."""
+    return compare(test, reference, mask)["psnr"]
+
+
+def relative_error_map(test: npt.ArrayLike, reference: npt.ArrayLike) -> npt.NDArray[np.float32]:
+    """Square root of the mean over channels of (I - R)^2 / (R^2 + 0.01), of shape (H, W)."""
+    return error_map(test, reference, True)
+
+
+def absolute_error_map(test: npt.ArrayLike, reference: npt.ArrayLike) -> npt.NDArray[np.float32]:
+    """Square root of the mean over channels of (I - R)^2, of shape (H, W)."""
+    return error_map(test, reference, False)
+
+
+def flip_map(
+    test: npt.ArrayLike, reference: npt.ArrayLike, pixels_per_degree: float | None = None
+) -> npt.NDArray[np.float32]:
+    """LDR-FLIP of each pixel, in [0, 1].
+
+    Parameters
+    ----------
+    test, reference : array_like, shape (H, W, 3)
+        Linear light on the screen, after the tone curve and before the sRGB encoding; clamped to [0, 1].
+    pixels_per_degree : float, optional
+        Resolution at the eye; by default that of a 0.7 m wide 4K screen seen from 0.7 m, 67.02.
+    """
+    return _flip(test, reference, pixels_per_degree)
+
+
+def flip(
+    test: npt.ArrayLike, reference: npt.ArrayLike, pixels_per_degree: float | None = None
+) -> float:
+    """The mean of `flip_map`."""
+    return float(np.mean(flip_map(test, reference, pixels_per_degree), dtype=np.float64))
+
+
+def hdr_flip_map(
+    test: npt.ArrayLike, reference: npt.ArrayLike, pixels_per_degree: float | None = None
+) -> npt.NDArray[np.float32]:
+    """HDR-FLIP of each pixel, in [0, 1], of linear radiance; non-finite values count as 0."""
+    return _hdr_flip(test, reference, pixels_per_degree)
+
+
+def hdr_flip(
+    test: npt.ArrayLike, reference: npt.ArrayLike, pixels_per_degree: float | None = None
+) -> float:
+    """The mean of `hdr_flip_map`."""
+    return float(np.mean(hdr_flip_map(test, reference, pixels_per_degree), dtype=np.float64))

@@ -1,0 +1,357 @@
+//! BSDFs and materials.
+
+use domelight::Rgb;
+use domelight::bsdf::{self, Brdf as _, BrdfSample, CustomLobe};
+use domelight::math::{Vec2, Vec3};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+use pyo3::types::PyType;
+
+use crate::arrays::{Floats, Pairs, array, rows};
+use crate::engine::alone;
+use crate::error::{bad_value, to_python};
+use crate::lobe::PythonLobe;
+
+/// A sum of reflectance lobes in the local frame, whose z axis is the shading normal.
+///
+/// `wo` points toward the viewer, `wi` toward the light; both are unit vectors away from the surface. Values are
+/// f_r * cos(theta_i), the cosine inside, and densities are per solid angle [sr^-1]; both are 0 where a direction lies
+/// at or below the surface.
+///
+/// `Bsdf.parse` and `Bsdf.custom` make one.
+#[pyclass(frozen, module = "domelight")]
+pub(crate) struct Bsdf {
+    pub(crate) inner: bsdf::Bsdf,
+    text: Option<String>,
+    pub(crate) lobe: Option<&'static PythonLobe>,
+}
+
+impl Bsdf {
+    pub(crate) fn from_text(text: &str) -> PyResult<Self> {
+        let inner = text.parse().map_err(|e: bsdf::ParseMaterialError| to_python(e))?;
+        Ok(Self { inner, text: Some(text.to_owned()), lobe: None })
+    }
+
+    /// Values and densities of pairs of directions.
+    fn evaluate(
+        &self,
+        py: Python<'_>,
+        pairs: &Pairs<'_, 3, 3>,
+    ) -> PyResult<(Vec<[f32; 3]>, Vec<f32>)> {
+        if let Some(lobe) = self.lobe {
+            let (wo, wi): (Vec<_>, Vec<_>) = pairs.iter().unzip();
+            let (values, densities) = lobe.eval_pdf_rows(py, &wo, &wi)?;
+            return Ok((values.iter().map(|v| v.to_array()).collect(), densities));
+        }
+        alone(py, || {
+            let pair = |(wo, wi): ([f32; 3], [f32; 3])| {
+                let (wo, wi) = (Vec3::from(wo), Vec3::from(wi));
+                let (value, pdf) = self.inner.for_view(wo).eval_pdf(wo, wi);
+                (value.to_array(), pdf)
+            };
+            pairs.iter().map(pair).unzip()
+        })
+    }
+}
+
+/// A direction, its weight and its density.
+type Drawn = ([f32; 3], [f32; 3], f32);
+
+type FloatArray<'py> = Bound<'py, PyArrayDyn<f32>>;
+
+#[pymethods]
+impl Bsdf {
+    /// A BSDF from its text, such as 'diffuse:0.8', 'phong:50:1:0.5', 'ggx:0.2:gold' or 'gltf:1,0.8,0.6:0:0.5'.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If the text is none; the message says what may stand there.
+    #[classmethod]
+    fn parse(_cls: &Bound<'_, PyType>, text: &str) -> PyResult<Self> {
+        Self::from_text(text)
+    }
+
+    /// A BSDF of one's own, from functions of arrays.
+    ///
+    /// Parameters
+    /// ----------
+    /// eval : callable
+    ///     `eval(wo, wi)` takes two arrays (N, 3) of local directions above the surface and returns f_r * cos(theta_i)
+    ///     [sr^-1], not negative, as (N, 3) or (N,).
+    /// pdf : callable, optional
+    ///     `pdf(wo, wi)` returns the density of `sample` [sr^-1], (N,), positive wherever the value is.
+    /// sample : callable, optional
+    ///     `sample(wo, u)` takes uniform numbers (N, 3) and returns directions (N, 3); one that points below the
+    ///     surface is a sample of value 0. Without `pdf` and `sample` directions are cosine-weighted.
+    /// albedo : float or array_like, shape (3,), default 0.5
+    ///     The reflected fraction of uniform light, roughly.
+    /// max_eval : float, optional
+    ///     An upper bound of the values; the strategy 'rejection' needs it.
+    /// roughness : float, optional
+    ///     The GGX alpha of a lobe about the mirror direction that is about as wide; it guides 'product'.
+    ///
+    /// Notes
+    /// -----
+    /// Strategies written in Python evaluate such a BSDF for all points of a tile at once; the built-in ones call it
+    /// direction by direction, which is slow. The functions are kept until the program ends.
+    #[classmethod]
+    #[pyo3(signature = (eval, pdf = None, sample = None, *, albedo = None, max_eval = None, roughness = None))]
+    fn custom(
+        cls: &Bound<'_, PyType>,
+        eval: Py<PyAny>,
+        pdf: Option<Py<PyAny>>,
+        sample: Option<Py<PyAny>>,
+        albedo: Option<Bound<'_, PyAny>>,
+        max_eval: Option<f32>,
+        roughness: Option<f32>,
+    ) -> PyResult<Self> {
+        let py = cls.py();
+        for (name, function) in
+            [("eval", Some(&eval)), ("pdf", pdf.as_ref()), ("sample", sample.as_ref())]
+        {
+            if let Some(function) = function.filter(|f| !f.bind(py).is_callable()) {
+                return Err(bad_value(format!(
+                    "{name} is {}; it must be callable",
+                    function.bind(py).repr()?
+                )));
+            }
+        }
+        let sampling = match (pdf, sample) {
+            (Some(pdf), Some(sample)) => Some((pdf, sample)),
+            (None, None) => None,
+            _ => return Err(bad_value("pdf and sample belong together; give both or neither")),
+        };
+        let albedo = match albedo {
+            Some(albedo) => {
+                let floats = Floats::new("albedo", &albedo)?;
+                floats.require_finite()?;
+                floats.color()?
+            }
+            None => Rgb::splat(0.5),
+        };
+        if albedo.min_component() < 0.0 || albedo.max_component() > 1.0 {
+            return Err(bad_value(format!(
+                "albedo is {:?}; it must lie in [0, 1]",
+                albedo.to_array()
+            )));
+        }
+        for (name, value) in [("max_eval", max_eval), ("roughness", roughness)] {
+            if let Some(value) = value.filter(|x| !(x.is_finite() && *x > 0.0)) {
+                return Err(bad_value(format!(
+                    "{name} is {value}; it must be positive and finite"
+                )));
+            }
+        }
+        let lobe = PythonLobe::leak(eval, sampling, albedo, max_eval, roughness);
+        let inner = bsdf::Bsdf::single(CustomLobe::new(lobe));
+        Ok(Self { inner, text: None, lobe: Some(lobe) })
+    }
+
+    /// Values for pairs of directions.
+    ///
+    /// Parameters
+    /// ----------
+    /// wo, wi : array_like, shape (..., 3)
+    ///     Local unit vectors; one of them may be a single vector for all.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (..., 3)
+    ///     f_r * cos(theta_i) [sr^-1].
+    fn eval<'py>(
+        &self,
+        wo: &Bound<'py, PyAny>,
+        wi: &Bound<'py, PyAny>,
+    ) -> PyResult<FloatArray<'py>> {
+        Ok(self.eval_pdf(wo, wi)?.0)
+    }
+
+    /// Density of `sample` for pairs of directions.
+    ///
+    /// Parameters
+    /// ----------
+    /// wo, wi : array_like, shape (..., 3)
+    ///     Local unit vectors; one of them may be a single vector for all.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (...)
+    ///     Density of wi [sr^-1]; it may integrate to less than 1, the rest being the probability of no sample.
+    fn pdf<'py>(
+        &self,
+        wo: &Bound<'py, PyAny>,
+        wi: &Bound<'py, PyAny>,
+    ) -> PyResult<FloatArray<'py>> {
+        Ok(self.eval_pdf(wo, wi)?.1)
+    }
+
+    /// `eval` and `pdf` at once.
+    fn eval_pdf<'py>(
+        &self,
+        wo: &Bound<'py, PyAny>,
+        wi: &Bound<'py, PyAny>,
+    ) -> PyResult<(FloatArray<'py>, FloatArray<'py>)> {
+        let py = wo.py();
+        let (wo, wi) = (Floats::new("wo", wo)?, Floats::new("wi", wi)?);
+        let pairs = Pairs::<3, 3>::new(&wo, &wi)?;
+        let (values, densities) = self.evaluate(py, &pairs)?;
+        Ok((rows(py, values, &pairs.lead)?, array(py, densities, &pairs.lead)?))
+    }
+
+    /// Draw directions toward the light.
+    ///
+    /// Parameters
+    /// ----------
+    /// wo : array_like, shape (..., 3)
+    ///     Local unit vectors toward the viewer.
+    /// u : array_like, shape (..., 3)
+    ///     Uniform numbers in [0, 1): two for the direction, the third for the choice of a lobe. BSDFs of a single lobe
+    ///     also take (..., 2).
+    ///
+    /// Returns
+    /// -------
+    /// wi : ndarray, shape (..., 3)
+    ///     Local unit vectors.
+    /// weight : ndarray, shape (..., 3)
+    ///     f_r * cos(theta_i) / pdf.
+    /// pdf : ndarray, shape (...)
+    ///     Density [sr^-1]. All three are 0 where there is no sample: such a sample counts, with value 0.
+    fn sample<'py>(
+        &self,
+        wo: &Bound<'py, PyAny>,
+        u: &Bound<'py, PyAny>,
+    ) -> PyResult<(FloatArray<'py>, FloatArray<'py>, FloatArray<'py>)> {
+        let py = wo.py();
+        let (wo, u) = (Floats::new("wo", wo)?, Floats::new("u", u)?);
+        let (directions, numbers, lead) = if u.shape().last() == Some(&2) {
+            if self.inner.lobes().count() > 1 {
+                return Err(u.bad_shape("(…, 3): the third number chooses among the lobes"));
+            }
+            u.uniform::<2>()?;
+            let pairs = Pairs::<3, 2>::new(&wo, &u)?;
+            let (a, b): (Vec<_>, Vec<_>) =
+                pairs.iter().map(|(wo, [x, y])| (wo, [x, y, 0.0])).unzip();
+            (a, b, pairs.lead)
+        } else {
+            u.uniform::<3>()?;
+            let pairs = Pairs::<3, 3>::new(&wo, &u)?;
+            let (a, b): (Vec<_>, Vec<_>) = pairs.iter().unzip();
+            (a, b, pairs.lead)
+        };
+        let drawn = self.draw(py, &directions, &numbers)?;
+        let (wi, rest): (Vec<_>, Vec<_>) = drawn.into_iter().map(|(wi, w, p)| (wi, (w, p))).unzip();
+        let (weight, pdf): (Vec<_>, Vec<_>) = rest.into_iter().unzip();
+        Ok((rows(py, wi, &lead)?, rows(py, weight, &lead)?, array(py, pdf, &lead)?))
+    }
+
+    /// ndarray, shape (3,): the reflected fraction of uniform light, roughly.
+    #[getter]
+    fn albedo<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
+        array(py, self.inner.albedo().to_array().to_vec(), &[3])
+    }
+
+    fn __repr__(&self) -> String {
+        match &self.text {
+            Some(text) => format!("Bsdf.parse({text:?})"),
+            None => "<Bsdf of functions>".to_owned(),
+        }
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        match &slf.get().text {
+            Some(text) => Ok((slf.get_type().getattr("parse")?, (text.clone(),))),
+            None => {
+                Err(pyo3::exceptions::PyTypeError::new_err("a BSDF of functions cannot be pickled"))
+            }
+        }
+    }
+}
+
+impl Bsdf {
+    /// Directions, weights and densities; zeros where nothing is drawn.
+    fn draw(&self, py: Python<'_>, wo: &[[f32; 3]], u: &[[f32; 3]]) -> PyResult<Vec<Drawn>> {
+        let weighed = |wi: [f32; 3], value: Rgb, pdf: f32| {
+            let is_sample = pdf > 0.0 && pdf.is_finite();
+            if is_sample { (wi, (value / pdf).to_array(), pdf) } else { ([0.0; 3], [0.0; 3], 0.0) }
+        };
+        if let Some(lobe) = self.lobe {
+            let wi = lobe.sample_rows(py, wo, u)?;
+            let (values, densities) = lobe.eval_pdf_rows(py, wo, &wi)?;
+            let all = wi.into_iter().zip(values).zip(densities);
+            return Ok(all.map(|((wi, value), pdf)| weighed(wi, value, pdf)).collect());
+        }
+        alone(py, || {
+            let draw = |(&wo, &[x, y, u_lobe]): (&[f32; 3], &[f32; 3])| {
+                let wo = Vec3::from(wo);
+                let sample = self.inner.for_view(wo).sample(wo, u_lobe, Vec2::new(x, y));
+                sample.map_or(([0.0; 3], [0.0; 3], 0.0), |BrdfSample { wi, value, pdf }| {
+                    weighed(wi.to_array(), value, pdf)
+                })
+            };
+            wo.iter().zip(u).map(draw).collect()
+        })
+    }
+}
+
+/// What a mesh is made of: the same BSDF everywhere.
+///
+/// Parameters
+/// ----------
+/// bsdf : Bsdf or str
+///     The reflectance, or its text as of `Bsdf.parse`.
+#[pyclass(frozen, module = "domelight")]
+pub(crate) struct Material {
+    #[pyo3(get)]
+    pub(crate) bsdf: Py<Bsdf>,
+}
+
+/// A BSDF, a material or the text of one.
+#[derive(FromPyObject)]
+pub(crate) enum MaterialLike {
+    Text(String),
+    Bsdf(Py<Bsdf>),
+    Material(Py<Material>),
+}
+
+impl MaterialLike {
+    pub(crate) fn bsdf(
+        &self,
+        py: Python<'_>,
+    ) -> PyResult<(bsdf::Bsdf, Option<&'static PythonLobe>)> {
+        let of = |bsdf: &Py<Bsdf>| (bsdf.get().inner, bsdf.get().lobe);
+        let _ = py;
+        Ok(match self {
+            Self::Text(text) => (Bsdf::from_text(text)?.inner, None),
+            Self::Bsdf(bsdf) => of(bsdf),
+            Self::Material(material) => of(&material.get().bsdf),
+        })
+    }
+}
+
+#[pymethods]
+impl Material {
+    #[new]
+    fn new(py: Python<'_>, bsdf: MaterialLike) -> PyResult<Self> {
+        let bsdf = match bsdf {
+            MaterialLike::Text(text) => Py::new(py, Bsdf::from_text(&text)?)?,
+            MaterialLike::Bsdf(bsdf) => bsdf,
+            MaterialLike::Material(material) => material.get().bsdf.clone_ref(py),
+        };
+        Ok(Self { bsdf })
+    }
+
+    /// A material from the text of its BSDF; see `Bsdf.parse`.
+    #[classmethod]
+    fn parse(cls: &Bound<'_, PyType>, text: &str) -> PyResult<Self> {
+        Self::new(cls.py(), MaterialLike::Text(text.to_owned()))
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(format!("Material({})", self.bsdf.bind(py).repr()?))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Py<Bsdf>,)) {
+        (slf.get_type(), (slf.get().bsdf.clone_ref(slf.py()),))
+    }
+}

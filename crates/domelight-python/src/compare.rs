@@ -1,0 +1,161 @@
+//! Comparisons of strategies at equal samples, rays or time.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::sync::{Mutex, PoisonError};
+
+use domelight::RgbImage;
+use domelight::render::RenderSettings;
+use domelight_lab::compare::{Budget, Comparison, ComparisonResult, ComparisonSettings};
+use domelight_lab::{Error, Host, NamedStrategy};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{array, from_image};
+use crate::engine::{caught, pool, wait};
+use crate::environment::Environment;
+use crate::error::{bad_value, from_source, warn};
+use crate::render::{Choice, Job, Keywords, choose};
+use crate::scene::{CameraLike, Scene};
+
+/// Ends the work on a signal or when a function of Python's has raised, and keeps the warnings.
+struct PythonHost<'a> {
+    job: &'a Job,
+    choices: &'a [(String, Choice)],
+    cancel: &'a AtomicBool,
+    warnings: Mutex<Vec<String>>,
+}
+
+impl Host for PythonHost<'_> {
+    fn warn(&self, text: &str) {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
+    }
+
+    fn canceled(&self) -> bool {
+        let failed =
+            |(_, choice): &(String, Choice)| matches!(choice, Choice::Python(s) if s.has_failed());
+        self.cancel.load(Ordering::Relaxed)
+            || self.job.has_failed()
+            || self.choices.iter().any(failed)
+    }
+}
+
+/// A comparison as a dictionary; `domelight.compare` documents it and makes a `Comparison` of it.
+#[pyfunction]
+pub(crate) fn compare<'py>(
+    py: Python<'py>,
+    scene: &Bound<'py, Scene>,
+    env: Option<&Bound<'py, Environment>>,
+    strategies: Vec<(String, Bound<'py, PyAny>)>,
+    budget: &str,
+    seeds: u32,
+    reference_spp: u32,
+    size: (i64, i64),
+    seed: u64,
+    threads: Option<usize>,
+    camera: Option<CameraLike>,
+    hide_env: bool,
+    tile_size: Option<usize>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let Some((_, first)) = strategies.first() else {
+        return Err(bad_value("there is no strategy to compare"));
+    };
+    let budget: Budget = budget.parse().map_err(|e| from_source(&e))?;
+    for (name, value, most) in [("seeds", seeds, 1000), ("reference_spp", reference_spp, 1 << 24)] {
+        if !(1..=most).contains(&value) {
+            return Err(bad_value(format!("{name} is {value}; it must be from 1 to {most}")));
+        }
+    }
+    let keywords = Keywords {
+        strategy: first.clone(),
+        spp: 1,
+        size,
+        seed,
+        threads,
+        camera,
+        filter: "gaussian",
+        sampler: "sobol",
+        hide_env,
+        adaptive: true,
+        target_error: None,
+        tile_size: Some(tile_size.unwrap_or(RenderSettings::default().tile_size)),
+    };
+    let job = &Job::new(py, scene.get(), env, keywords)?;
+    let lobes = &scene.get().inner.lobes;
+    let choices = &strategies
+        .into_iter()
+        .map(|(name, strategy)| Ok((name, choose(&strategy, 1, lobes)?)))
+        .collect::<PyResult<Vec<_>>>()?;
+    let report = &job.scene_report();
+    let cancel = &AtomicBool::new(false);
+    let host = &PythonHost { job, choices, cancel, warnings: Mutex::new(Vec::new()) };
+    let run = || -> Result<ComparisonResult, Error> {
+        let view = job.view(report);
+        let render = *job.settings();
+        let settings = ComparisonSettings {
+            render,
+            budget,
+            n_seeds: seeds,
+            reference_spp,
+            ..Default::default()
+        };
+        let mut comparison = Comparison::new(view, settings);
+        for (name, choice) in choices {
+            match choice {
+                Choice::Builtin(spec) => {
+                    comparison.add_named(NamedStrategy { text: name.clone(), spec: *spec })?;
+                }
+                Choice::Python(strategy) => comparison.add(name, strategy)?,
+            }
+        }
+        let reference = comparison.reference(None, host)?;
+        comparison.run(&reference, host)
+    };
+    let (result, stopped) = py.detach(|| {
+        std::thread::scope(|scope| {
+            let (sender, results) = mpsc::channel();
+            scope.spawn(move || {
+                let compared = pool(job.n_threads()).and_then(|pool| caught(|| pool.install(run)));
+                // Whoever waits is there.
+                let _ = sender.send(compared);
+            });
+            wait(&results, cancel, &|_| Ok(()))
+        })
+    })?;
+    let of_choices = choices.iter().find_map(|(_, choice)| match choice {
+        Choice::Python(strategy) => strategy.take_failure(),
+        Choice::Builtin(_) => None,
+    });
+    if let Some(error) = job.take_failure().or(of_choices).or(stopped) {
+        return Err(error);
+    }
+    let result = result?.map_err(|e| from_source(&e))?;
+    warn(py, &host.warnings.lock().unwrap_or_else(PoisonError::into_inner))?;
+    into_dict(py, &result, choices)
+}
+
+fn into_dict<'py>(
+    py: Python<'py>,
+    result: &ComparisonResult,
+    choices: &[(String, Choice)],
+) -> PyResult<Bound<'py, PyDict>> {
+    let page = result.page().map_err(|e| from_source(&e))?;
+    let report = serde_json::to_string(&result.report).map_err(|e| from_source(&e))?;
+    let found = PyDict::new(py);
+    found.set_item("report", py.import("json")?.call_method1("loads", (report,))?)?;
+    found.set_item("page", page.as_str())?;
+    found.set_item("reference", from_image(py, &result.reference)?)?;
+    let RgbImage { width, height, .. } = result.reference;
+    let [pictures, errors, flips] = [(); 3].map(|()| PyDict::new(py));
+    for ((name, _), picture) in choices.iter().zip(&result.pictures) {
+        if let Some(picture) = picture {
+            pictures.set_item(name, from_image(py, &picture.image)?)?;
+            errors.set_item(name, array(py, picture.relative_error.clone(), &[height, width])?)?;
+            flips.set_item(name, array(py, picture.flip.clone(), &[height, width])?)?;
+        }
+    }
+    found.set_item("pictures", pictures)?;
+    found.set_item("errors", errors)?;
+    found.set_item("flip", flips)?;
+    Ok(found)
+}

@@ -1,0 +1,522 @@
+//! Environments and densities over them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use domelight::environment::builtin::BuiltinProbe;
+use domelight::environment::io::{ProbeOptions, load_probe};
+use domelight::environment::mapping::Mapping;
+use domelight::environment::{self, EnvironmentDensity, EnvironmentSample, Orientation, UpAxis};
+use domelight::{Rgb, RgbImage};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+use pyo3::types::PyType;
+
+use crate::arrays::{Floats, array, from_image, image, rows};
+use crate::engine::{alone, parallel};
+use crate::error::{bad_value, from_source, to_python, warn};
+
+/// The texels of a map beyond which loading is refused: the library's limit for pictures.
+const MAX_ROWS: usize = 16_384;
+
+/// The axis that a text names.
+pub(crate) fn up_axis(text: &str) -> PyResult<UpAxis> {
+    match text {
+        "y" => Ok(UpAxis::Y),
+        "z" => Ok(UpAxis::Z),
+        _ => Err(bad_value(format!("up is {text:?}; it must be 'y' or 'z'"))),
+    }
+}
+
+/// The text that names an axis.
+pub(crate) fn up_name(up: UpAxis) -> &'static str {
+    match up {
+        UpAxis::Y => "y",
+        UpAxis::Z => "z",
+    }
+}
+
+/// Radiance from every direction, and a way to draw directions in proportion to its luminance.
+///
+/// Parameters
+/// ----------
+/// map : array_like, shape (H, W, 3)
+///     Radiance of a latitude-longitude map, linear Rec. 709 [W m^-2 sr^-1], finite and not negative.
+///     The first row faces the up axis; the center column looks toward -Z (toward +Y where z is up), and
+///     columns go to the right as seen from inside.
+/// rotation : float, default 0
+///     Rotation about the up axis [degrees], counter-clockwise seen from above.
+/// scale : float, default 1
+///     Factor on the radiance, not negative.
+/// up : {'y', 'z'}, default 'y'
+///     The world axis that the first row faces.
+/// name : str, optional
+///     What the environment is called in files and messages.
+///
+/// Raises
+/// ------
+/// ValueError
+///     If the map is empty, has another shape, or a texel is negative or not finite; the message names it.
+#[pyclass(frozen, module = "domelight")]
+pub(crate) struct Environment {
+    pub(crate) inner: Arc<environment::Environment>,
+    pub(crate) name: String,
+}
+
+impl Environment {
+    pub(crate) fn build(
+        py: Python<'_>,
+        map: RgbImage,
+        orientation: Orientation,
+        scale: f32,
+        name: String,
+    ) -> PyResult<Self> {
+        let inner = parallel(py, || environment::Environment::new(map, orientation, scale))?;
+        Ok(Self { inner: Arc::new(inner.map_err(to_python)?), name })
+    }
+
+    /// Radiance in watts, whatever the map's unit.
+    fn watts(&self, radiance: Rgb) -> [f32; 3] {
+        watts(&self.inner, radiance)
+    }
+}
+
+/// Radiance in watts, whatever the map's unit.
+fn watts(environment: &environment::Environment, radiance: Rgb) -> [f32; 3] {
+    match environment.unit() {
+        1.0 => radiance.to_array(),
+        unit => radiance.to_array().map(|c| (f64::from(c) * unit) as f32),
+    }
+}
+
+/// A light probe's map from a file, its light as warnings say.
+pub(crate) fn load_map(py: Python<'_>, path: PathBuf, options: ProbeOptions) -> PyResult<RgbImage> {
+    let probe = parallel(py, || load_probe(&path, &options))?.map_err(to_python)?;
+    warn(py, &probe.warnings)?;
+    Ok(probe.image)
+}
+
+/// A built-in probe's map.
+pub(crate) fn builtin_map(py: Python<'_>, name: &str, height: usize) -> PyResult<RgbImage> {
+    let probe: BuiltinProbe = name.parse().map_err(|e| from_source(&e))?;
+    if !(1..=MAX_ROWS).contains(&height) {
+        return Err(bad_value(format!("rows is {height}; it must be from 1 to {MAX_ROWS}")));
+    }
+    parallel(py, || probe.image(height))
+}
+
+#[pymethods]
+impl Environment {
+    #[new]
+    #[pyo3(signature = (map, *, rotation = 0.0, scale = 1.0, up = "y", name = "array"))]
+    fn new(
+        map: &Bound<'_, PyAny>,
+        rotation: f32,
+        scale: f32,
+        up: &str,
+        name: &str,
+    ) -> PyResult<Self> {
+        let py = map.py();
+        let orientation = Orientation { up: up_axis(up)?, rotation };
+        let map = image(&Floats::new("map", map)?)?;
+        Self::build(py, map, orientation, scale, name.to_owned())
+    }
+
+    /// Load a light probe of any known format and layout.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     A picture: .hdr, .exr, .pfm, .png or .jpg.
+    /// rotation, scale, up
+    ///     As of the class.
+    /// mapping : str, optional
+    ///     The layout, such as 'latlong', 'angular' or 'cube-cross'; guessed by default.
+    /// layer : str, optional
+    ///     The OpenEXR layer.
+    /// strict : bool, default False
+    ///     Refuse negative and non-finite texels instead of repairing them with a warning.
+    ///
+    /// Returns
+    /// -------
+    /// Environment
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     If the file cannot be read.
+    /// ValueError
+    ///     If it is damaged or no light probe.
+    ///
+    /// Warns
+    /// -----
+    /// DomelightWarning
+    ///     If texels were repaired, or the format holds nothing brighter than white.
+    #[classmethod]
+    #[pyo3(signature = (path, *, rotation = 0.0, scale = 1.0, up = "y", mapping = None, layer = None, strict = false))]
+    fn load(
+        cls: &Bound<'_, PyType>,
+        path: PathBuf,
+        rotation: f32,
+        scale: f32,
+        up: &str,
+        mapping: Option<&str>,
+        layer: Option<String>,
+        strict: bool,
+    ) -> PyResult<Self> {
+        let py = cls.py();
+        let orientation = Orientation { up: up_axis(up)?, rotation };
+        let mapping: Option<Mapping> =
+            mapping.map(|m| m.parse().map_err(|e| from_source(&e))).transpose()?;
+        let name = path.display().to_string();
+        let options = ProbeOptions { mapping, layer, strict, max_memory: None };
+        let map = load_map(py, path, options)?;
+        Self::build(py, map, orientation, scale, name)
+    }
+
+    /// A probe made in code: 'sky', 'studio', 'cathedral' or 'constant'.
+    ///
+    /// Parameters
+    /// ----------
+    /// name : str
+    ///     Which one.
+    /// rows : int, default 1024
+    ///     Rows of the map, which has twice as many columns.
+    /// rotation, scale, up
+    ///     As of the class.
+    #[classmethod]
+    #[pyo3(signature = (name, *, rows = 1024, rotation = 0.0, scale = 1.0, up = "y"))]
+    fn builtin(
+        cls: &Bound<'_, PyType>,
+        name: &str,
+        rows: usize,
+        rotation: f32,
+        scale: f32,
+        up: &str,
+    ) -> PyResult<Self> {
+        let py = cls.py();
+        let orientation = Orientation { up: up_axis(up)?, rotation };
+        let map = builtin_map(py, name, rows)?;
+        Self::build(py, map, orientation, scale, name.to_owned())
+    }
+
+    /// ndarray, shape (H, W, 3): radiance of each texel [W m^-2 sr^-1], a copy.
+    #[getter]
+    fn map<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        if self.inner.unit() == 1.0 {
+            return from_image(py, self.inner.map());
+        }
+        let RgbImage { width, height, ref pixels } = *self.inner.map();
+        rows(py, pixels.iter().map(|&p| self.watts(p)).collect(), &[height, width])
+    }
+
+    /// ndarray, shape (H,): solid angle of a texel of each row [sr], exact.
+    #[getter]
+    fn solid_angles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let n = self.inner.map().height;
+        array(py, (0..n).map(|row| self.inner.texel_solid_angle(row)).collect(), &[n])
+    }
+
+    /// (int, int): rows and columns of the map.
+    #[getter]
+    fn shape(&self) -> (usize, usize) {
+        let map = self.inner.map();
+        (map.height, map.width)
+    }
+
+    /// float: rotation about the up axis [degrees].
+    #[getter]
+    fn rotation(&self) -> f32 {
+        self.inner.orientation().rotation
+    }
+
+    /// str: the axis that the first row faces, 'y' or 'z'.
+    #[getter]
+    fn up(&self) -> &'static str {
+        up_name(self.inner.orientation().up)
+    }
+
+    /// str: what the environment is called.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// float: integral of luminance over the sphere [W m^-2].
+    #[getter]
+    fn power(&self) -> f64 {
+        self.inner.power() * self.inner.unit()
+    }
+
+    /// The same environment rotated further about its up axis.
+    ///
+    /// Parameters
+    /// ----------
+    /// degrees : float
+    ///     Counter-clockwise seen from above.
+    fn rotated(&self, py: Python<'_>, degrees: f32) -> PyResult<Self> {
+        let inner = self.inner.clone();
+        let inner = parallel(py, || (*inner).clone().rotated(degrees))?.map_err(to_python)?;
+        Ok(Self { inner: Arc::new(inner), name: self.name.clone() })
+    }
+
+    /// The same environment with its radiance multiplied by a factor.
+    ///
+    /// Parameters
+    /// ----------
+    /// factor : float
+    ///     Finite and not negative.
+    fn scaled(&self, py: Python<'_>, factor: f32) -> PyResult<Self> {
+        let inner = self.inner.clone();
+        let inner = parallel(py, || (*inner).clone().scaled(factor))?.map_err(to_python)?;
+        Ok(Self { inner: Arc::new(inner), name: self.name.clone() })
+    }
+
+    /// Draw directions in proportion to luminance.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (..., 2)
+    ///     Uniform numbers in [0, 1).
+    ///
+    /// Returns
+    /// -------
+    /// wi : ndarray, shape (..., 3)
+    ///     Unit vectors toward the light, in the world.
+    /// radiance : ndarray, shape (..., 3)
+    ///     Radiance from there [W m^-2 sr^-1].
+    /// pdf : ndarray, shape (...)
+    ///     Density [sr^-1], equal to `pdf(wi)` to the bit. All three are 0 where nothing could be drawn, as of a
+    ///     black map.
+    fn sample<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Samples<'py>> {
+        let draw = |u: [f32; 2]| self.inner.sample(u.into());
+        samples(&self.inner, u, draw)
+    }
+
+    /// Radiance from directions, constant over each texel.
+    ///
+    /// Parameters
+    /// ----------
+    /// wi : array_like, shape (..., 3)
+    ///     Unit vectors toward the light, in the world.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (..., 3)
+    ///     Radiance [W m^-2 sr^-1].
+    fn radiance<'py>(&self, wi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let py = wi.py();
+        let wi = Floats::new("wi", wi)?;
+        let (directions, lead) = wi.finite::<3>()?;
+        let values = alone(py, || {
+            directions.iter().map(|&w| self.watts(self.inner.le(w.into()))).collect()
+        })?;
+        rows(py, values, lead)
+    }
+
+    /// Density of `sample` at directions.
+    ///
+    /// Parameters
+    /// ----------
+    /// wi : array_like, shape (..., 3)
+    ///     Unit vectors toward the light, in the world.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (...)
+    ///     Density [sr^-1].
+    fn pdf<'py>(&self, wi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        densities(wi, |w| self.inner.pdf(w.into()))
+    }
+
+    /// The directions of points of the map.
+    ///
+    /// Parameters
+    /// ----------
+    /// uv : array_like, shape (..., 2)
+    ///     Points in [0, 1] across and down; (0, 0) is the corner of the first texel.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (..., 3)
+    ///     Unit vectors in the world.
+    fn directions<'py>(&self, uv: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let py = uv.py();
+        let uv = Floats::new("uv", uv)?;
+        let (points, lead) = uv.finite::<2>()?;
+        let values = alone(py, || {
+            points.iter().map(|&p| self.inner.direction(p.into()).to_array()).collect()
+        })?;
+        rows(py, values, lead)
+    }
+
+    /// The points of the map that directions look at: the inverse of `directions`.
+    ///
+    /// Parameters
+    /// ----------
+    /// wi : array_like, shape (..., 3)
+    ///     Unit vectors in the world.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (..., 2)
+    ///     Points in [0, 1] across and down.
+    fn uv<'py>(&self, wi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let py = wi.py();
+        let wi = Floats::new("wi", wi)?;
+        let (directions, lead) = wi.finite::<3>()?;
+        let values =
+            alone(py, || directions.iter().map(|&w| self.inner.uv(w.into()).to_array()).collect())?;
+        rows(py, values, lead)
+    }
+
+    fn __repr__(&self) -> String {
+        let map = self.inner.map();
+        let Orientation { up, rotation } = self.inner.orientation();
+        format!(
+            "<Environment {:?}: {} x {} texels, rotation {rotation}, {} up>",
+            self.name,
+            map.width,
+            map.height,
+            up_name(up)
+        )
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
+        let py = slf.py();
+        let this = slf.get();
+        let restore = slf.get_type().getattr("_restore")?;
+        let map = from_image(py, this.inner.map())?;
+        let Orientation { up, rotation } = this.inner.orientation();
+        Ok((restore, (map, rotation, this.inner.unit(), up_name(up), this.name.clone())))
+    }
+
+    #[classmethod]
+    fn _restore(
+        cls: &Bound<'_, PyType>,
+        map: &Bound<'_, PyAny>,
+        rotation: f32,
+        unit: f64,
+        up: &str,
+        name: String,
+    ) -> PyResult<Self> {
+        let orientation = Orientation { up: up_axis(up)?, rotation };
+        let map = image(&Floats::new("map", map)?)?;
+        Self::build(cls.py(), map, orientation, unit as f32, name)
+    }
+}
+
+/// What a pickled environment consists of: map, rotation, unit, axis and name.
+type Pickled<'py> = (Bound<'py, PyArrayDyn<f32>>, f32, f64, &'static str, String);
+
+/// Directions, radiance and densities.
+type Samples<'py> =
+    (Bound<'py, PyArrayDyn<f32>>, Bound<'py, PyArrayDyn<f32>>, Bound<'py, PyArrayDyn<f32>>);
+
+/// Draws a sample for each pair of uniform numbers.
+fn samples<'py>(
+    environment: &environment::Environment,
+    u: &Bound<'py, PyAny>,
+    draw: impl Fn([f32; 2]) -> Option<EnvironmentSample> + Send + Sync,
+) -> PyResult<Samples<'py>> {
+    let py = u.py();
+    let u = Floats::new("u", u)?;
+    let (points, lead) = u.uniform::<2>()?;
+    let (wi, (le, pdf)): (Vec<_>, (Vec<_>, Vec<_>)) = alone(py, || {
+        let drawn = points.iter().map(|&u| match draw(u) {
+            Some(s) => (s.wi.to_array(), (watts(environment, s.le), s.pdf)),
+            None => ([0.0; 3], ([0.0; 3], 0.0)),
+        });
+        drawn.unzip()
+    })?;
+    Ok((rows(py, wi, lead)?, rows(py, le, lead)?, array(py, pdf, lead)?))
+}
+
+/// A density at each direction.
+fn densities<'py>(
+    wi: &Bound<'py, PyAny>,
+    pdf: impl Fn([f32; 3]) -> f32 + Send + Sync,
+) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+    let py = wi.py();
+    let wi = Floats::new("wi", wi)?;
+    let (directions, lead) = wi.finite::<3>()?;
+    let values = alone(py, || directions.iter().map(|&w| pdf(w)).collect())?;
+    array(py, values, lead)
+}
+
+/// A density of one's own over the texels of an environment.
+///
+/// Parameters
+/// ----------
+/// environment : Environment
+///     Whose texels.
+/// weights : array_like, shape (H, W)
+///     Density of each texel up to a common factor, per solid angle; finite, not negative, not all zero.
+///
+/// Notes
+/// -----
+/// Where a weight is 0 and the radiance is not, this density alone is biased; combine it with another one.
+///
+/// Raises
+/// ------
+/// ValueError
+///     If the shape is not that of the map, or a weight is negative or not finite; the message names it.
+#[pyclass(frozen, module = "domelight")]
+pub(crate) struct Density {
+    environment: Arc<environment::Environment>,
+    density: EnvironmentDensity,
+}
+
+#[pymethods]
+impl Density {
+    #[new]
+    fn new(environment: &Bound<'_, Environment>, weights: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = weights.py();
+        let environment = environment.get().inner.clone();
+        let weights = Floats::new("weights", weights)?;
+        let map = environment.map();
+        if weights.shape() != [map.height, map.width] {
+            let expected = format!("({}, {}), that of the map", map.height, map.width);
+            return Err(weights.bad_shape(&expected));
+        }
+        let values = weights.values()?.to_vec();
+        let density = parallel(py, || EnvironmentDensity::new(&environment, values))?;
+        Ok(Self { density: density.map_err(|e| from_source(&e))?, environment })
+    }
+
+    /// Draw directions from the density.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : array_like, shape (..., 2)
+    ///     Uniform numbers in [0, 1).
+    ///
+    /// Returns
+    /// -------
+    /// wi, radiance, pdf
+    ///     As of `Environment.sample`.
+    fn sample<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Samples<'py>> {
+        let draw = |u: [f32; 2]| self.density.sample(&self.environment, u.into());
+        samples(&self.environment, u, draw)
+    }
+
+    /// Density of `sample` at directions.
+    ///
+    /// Parameters
+    /// ----------
+    /// wi : array_like, shape (..., 3)
+    ///     Unit vectors toward the light, in the world.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (...)
+    ///     Density [sr^-1].
+    fn pdf<'py>(&self, wi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        densities(wi, |w| self.density.pdf(&self.environment, w.into()))
+    }
+
+    fn __repr__(&self) -> String {
+        let map = self.environment.map();
+        format!("<Density over {} x {} texels>", map.width, map.height)
+    }
+}

@@ -1,0 +1,72 @@
+//! The library's errors and warnings as Python's.
+
+use std::error::Error as StdError;
+use std::ffi::CString;
+use std::io;
+
+use domelight::picture::PictureErrorKind;
+use pyo3::exceptions::{
+    PyFileNotFoundError, PyKeyboardInterrupt, PyOSError, PyPermissionError, PyRuntimeError,
+    PyUserWarning, PyValueError,
+};
+use pyo3::prelude::*;
+
+pyo3::create_exception!(
+    domelight,
+    DomelightWarning,
+    PyUserWarning,
+    "What a picture or a map lacks, or what was repaired in it."
+);
+pyo3::create_exception!(
+    domelight,
+    RenderInterrupted,
+    PyKeyboardInterrupt,
+    "A render was interrupted; the attribute `film` holds what was done."
+);
+
+/// An error of the library: `OSError` where the system said no, else `ValueError`.
+pub(crate) fn to_python(error: impl Into<domelight::Error>) -> PyErr {
+    from_source(&error.into())
+}
+
+/// As [`to_python`], of any error.
+pub(crate) fn from_source(error: &(dyn StdError + 'static)) -> PyErr {
+    let text = error.to_string();
+    let mut source = Some(error);
+    while let Some(error) = source {
+        let of_picture = match error.downcast_ref() {
+            Some(PictureErrorKind::Io(error)) => Some(error),
+            _ => None,
+        };
+        if let Some(error) = error.downcast_ref::<io::Error>().or(of_picture) {
+            return match error.kind() {
+                io::ErrorKind::NotFound => PyFileNotFoundError::new_err(text),
+                io::ErrorKind::PermissionDenied => PyPermissionError::new_err(text),
+                _ => PyOSError::new_err(text),
+            };
+        }
+        source = error.source();
+    }
+    PyValueError::new_err(text)
+}
+
+/// A `ValueError`.
+pub(crate) fn bad_value(text: impl Into<String>) -> PyErr {
+    PyValueError::new_err(text.into())
+}
+
+/// A panic of the engine, which is a bug, as a `RuntimeError`.
+pub(crate) fn from_panic(panic: &(dyn std::any::Any + Send)) -> PyErr {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+    PyRuntimeError::new_err(format!("internal error of domelight, please report it: {text}"))
+}
+
+/// Issues warnings, each of which may become an exception.
+pub(crate) fn warn(py: Python<'_>, warnings: &[String]) -> PyResult<()> {
+    for text in warnings {
+        let text = CString::new(text.replace('\0', "\u{fffd}"))?;
+        PyErr::warn(py, &py.get_type::<DomelightWarning>(), &text, 1)?;
+    }
+    Ok(())
+}

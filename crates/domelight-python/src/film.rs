@@ -1,0 +1,323 @@
+//! Films: rendered pictures in layers.
+
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+use domelight::RgbImage;
+use domelight::math::Vec3;
+use domelight::picture::write_atomically_seeking;
+use domelight::render::{self, Checkpoint, Counts, Layers};
+use numpy::PyArrayDyn;
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyType};
+
+use crate::arrays::{array, from_image, rows};
+use crate::engine::parallel;
+use crate::error::{bad_value, from_source, to_python};
+use crate::picture::{Format, into_io, to_png, tone, write_image};
+
+/// A layer of a film.
+struct Layer {
+    name: &'static str,
+    get: for<'py> fn(Python<'py>, &Layers) -> PyResult<Bound<'py, PyAny>>,
+}
+
+/// All layers, in their order in OpenEXR files.
+const LAYERS: [Layer; 9] = [
+    Layer { name: "color", get: |py, layers| picture(py, &layers.color) },
+    Layer { name: "alpha", get: |py, layers| plane(py, layers, layers.alpha.clone()) },
+    Layer { name: "unoccluded", get: |py, layers| picture(py, &layers.unoccluded) },
+    Layer { name: "albedo", get: |py, layers| picture(py, &layers.albedo) },
+    Layer { name: "normal", get: |py, layers| vectors(py, layers, &layers.normal) },
+    Layer { name: "depth", get: |py, layers| plane(py, layers, layers.depth.clone()) },
+    Layer { name: "variance", get: |py, layers| picture(py, &layers.variance) },
+    Layer { name: "samples", get: |py, layers| plane(py, layers, layers.n_samples.clone()) },
+    Layer { name: "hits", get: |py, layers| plane(py, layers, layers.n_hits.clone()) },
+];
+
+fn picture<'py>(py: Python<'py>, image: &RgbImage) -> PyResult<Bound<'py, PyAny>> {
+    Ok(from_image(py, image)?.into_any())
+}
+
+fn plane<'py, T: numpy::Element>(
+    py: Python<'py>,
+    layers: &Layers,
+    values: Vec<T>,
+) -> PyResult<Bound<'py, PyAny>> {
+    Ok(array(py, values, &[layers.height(), layers.width()])?.into_any())
+}
+
+fn vectors<'py>(py: Python<'py>, layers: &Layers, values: &[Vec3]) -> PyResult<Bound<'py, PyAny>> {
+    let values = values.iter().map(Vec3::to_array).collect();
+    Ok(rows(py, values, &[layers.height(), layers.width()])?.into_any())
+}
+
+/// A rendered picture in layers. `render` and `progressive` make them.
+///
+/// `film[name]` is a new array of a layer:
+///
+/// ============  =========  =========================================================================
+/// name          shape      what
+/// ============  =========  =========================================================================
+/// 'color'       (H, W, 3)  direct light and the background where it is shown [W m^-2 sr^-1], premultiplied by alpha
+/// 'alpha'       (H, W)     the share of camera samples that hit the scene; 1 where the background is shown
+/// 'unoccluded'  (H, W, 3)  as color with every shadow ray free
+/// 'albedo'      (H, W, 3)  reflectance of what is seen
+/// 'normal'      (H, W, 3)  mean shading normal in the world, not normalized; 0 where nothing was hit
+/// 'depth'       (H, W)     mean distance from the camera's plane over the samples that hit
+/// 'variance'    (H, W, 3)  estimated variance of each pixel's mean
+/// 'samples'     (H, W)     camera samples (uint32)
+/// 'hits'        (H, W)     those that hit the scene (uint32)
+/// ============  =========  =========================================================================
+///
+/// Arrays are float32 but for the counts; row 0 is the top. Films can be pickled and compared: they are equal if all sums
+/// behind them are, to the bit.
+#[pyclass(frozen, module = "domelight")]
+pub(crate) struct Film {
+    sums: render::Film,
+    pub(crate) counts: Counts,
+    pub(crate) complete: bool,
+    /// Camera samples that each pixel is to have.
+    pub(crate) n_samples: u32,
+    /// What the picture is of: names and values.
+    pub(crate) provenance: Vec<(String, String)>,
+    /// The background was left out.
+    pub(crate) hidden: bool,
+    layers: OnceLock<Layers>,
+}
+
+impl Film {
+    pub(crate) fn new(
+        sums: render::Film,
+        counts: Counts,
+        complete: bool,
+        n_samples: u32,
+        provenance: Vec<(String, String)>,
+        hidden: bool,
+    ) -> Self {
+        let layers = OnceLock::new();
+        Self { sums, counts, complete, n_samples, provenance, hidden, layers }
+    }
+
+    fn layers(&self) -> &Layers {
+        self.layers.get_or_init(|| self.sums.layers())
+    }
+
+    fn alpha_to_show(&self) -> Option<&[f32]> {
+        self.hidden.then(|| &self.layers().alpha[..])
+    }
+
+    fn checkpoint(&self) -> Checkpoint {
+        Checkpoint {
+            identity: vec![(
+                "background".into(),
+                if self.hidden { "hidden" } else { "shown" }.into(),
+            )],
+            provenance: self.provenance.clone(),
+            tiles: 0..1,
+            n_tiles: 1,
+            n_samples: self.n_samples,
+            complete: self.complete,
+            counts: self.counts,
+            film: self.sums.clone(),
+        }
+    }
+}
+
+#[pymethods]
+#[expect(clippy::unused_self, reason = "Python's methods have it")]
+impl Film {
+    /// ndarray, shape (H, W, 3): direct light, and the background where it is shown [W m^-2 sr^-1].
+    #[getter]
+    fn color<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        from_image(py, &self.layers().color)
+    }
+
+    /// ndarray, shape (H, W): coverage in [0, 1].
+    #[getter]
+    fn alpha<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.__getitem__(py, "alpha")
+    }
+
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let Some(layer) = LAYERS.iter().find(|layer| layer.name == name) else {
+            let text =
+                format!("a film has no layer {name:?}; its layers are {}", Self::keys().join(", "));
+            return Err(PyKeyError::new_err(text));
+        };
+        (layer.get)(py, self.layers())
+    }
+
+    fn __contains__(&self, name: &str) -> bool {
+        LAYERS.iter().any(|layer| layer.name == name)
+    }
+
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Self::keys().into_pyobject(py)?.call_method0("__iter__")
+    }
+
+    /// The names of the layers.
+    #[staticmethod]
+    fn keys() -> Vec<&'static str> {
+        LAYERS.iter().map(|layer| layer.name).collect()
+    }
+
+    /// (int, int): rows and columns.
+    #[getter]
+    fn shape(&self) -> (usize, usize) {
+        (self.sums.height, self.sums.width)
+    }
+
+    /// bool: all samples of all pixels are there.
+    #[getter]
+    fn complete(&self) -> bool {
+        self.complete
+    }
+
+    /// str: the strategy that rendered.
+    #[getter]
+    fn strategy(&self) -> &str {
+        let of_strategy = self.provenance.iter().find(|(name, _)| name == "domelight.strategy");
+        of_strategy.map_or("", |(_, value)| value)
+    }
+
+    /// int: camera rays, with those of which it is known that they meet nothing.
+    #[getter]
+    fn camera_rays(&self) -> u64 {
+        self.counts.camera_rays
+    }
+
+    /// int: camera rays that hit the scene.
+    #[getter]
+    fn shading_points(&self) -> u64 {
+        self.counts.shading_points
+    }
+
+    /// int: shadow rays traced.
+    #[getter]
+    fn shadow_rays(&self) -> u64 {
+        self.counts.shadow_rays
+    }
+
+    /// int: camera samples whose value was NaN or infinite; they count as black.
+    #[getter]
+    fn non_finite(&self) -> u64 {
+        self.counts.non_finite
+    }
+
+    /// Write the film; the end of the name says how.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     .exr gets all layers, .hdr and .pfm color alone, .png what a screen shows, with alpha if the background was
+    ///     left out. The file is the old one or the whole new one.
+    /// exposure : float or None, default 0
+    ///     Of PNG [stops]; None makes the median middle gray.
+    /// curve : {'srgb', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
+    ///     The tone curve of PNG.
+    ///
+    /// Raises
+    /// ------
+    /// OSError, ValueError
+    ///     If the file cannot be written, or its name says no format.
+    #[pyo3(signature = (path, *, exposure = Some(0.0), curve = "agx"),
+    text_signature = "($self, path, *, exposure=0.0, curve='agx')")]
+    fn save(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        exposure: Option<f32>,
+        curve: &str,
+    ) -> PyResult<()> {
+        let format = Format::of(&path)?;
+        let layers = self.layers();
+        let tone = tone(&layers.color, Some(&layers.alpha), exposure, curve)?;
+        let written = parallel(py, || match format {
+            Format::Exr => write_atomically_seeking(&path, |out| {
+                let mut attributes = self.provenance.clone();
+                attributes.push(("domelight.complete".into(), self.complete.to_string()));
+                layers.write_exr(&attributes, out).map_err(into_io)
+            }),
+            _ => write_image(&path, format, &layers.color, self.alpha_to_show(), &tone),
+        })?;
+        written.map_err(to_python)
+    }
+
+    /// The bytes of a PNG file as a screen shows it.
+    ///
+    /// Parameters
+    /// ----------
+    /// exposure : float or None, default None
+    ///     In stops; None makes the median middle gray.
+    /// curve : {'srgb', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
+    ///     The tone curve.
+    #[pyo3(signature = (*, exposure = None, curve = "agx"))]
+    fn to_png<'py>(
+        &self,
+        py: Python<'py>,
+        exposure: Option<f32>,
+        curve: &str,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let layers = self.layers();
+        let alpha = self.alpha_to_show();
+        let tone = tone(&layers.color, alpha, exposure, curve)?;
+        let bytes = parallel(py, || to_png(&layers.color, alpha, &tone))?;
+        Ok(PyBytes::new(py, &bytes.map_err(|e| from_source(&e))?))
+    }
+
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        self.to_png(py, None, "agx")
+    }
+
+    /// The film as an `xarray.Dataset` with the dimensions y, x and channel; needs the package xarray.
+    fn to_xarray<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("domelight._interop")?.call_method1("film_to_xarray", (slf,))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| {
+            let other = other.get();
+            self.sums == other.sums
+                && self.hidden == other.hidden
+                && self.complete == other.complete
+                && self.n_samples == other.n_samples
+        })
+    }
+
+    fn __hash__(slf: &Bound<'_, Self>) -> usize {
+        slf.as_ptr() as usize >> 4
+    }
+
+    fn __repr__(&self) -> String {
+        let (height, width) = self.shape();
+        let state = if self.complete { "" } else { ", not complete" };
+        format!("<Film {width} x {height}: {}, {} samples{state}>", self.strategy(), self.n_samples)
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let py = slf.py();
+        let this = slf.get();
+        let bytes = parallel(py, || this.checkpoint().encode())?.map_err(|e| from_source(&e))?;
+        Ok((slf.get_type().getattr("_restore")?, (PyBytes::new(py, &bytes),)))
+    }
+
+    #[classmethod]
+    fn _restore(cls: &Bound<'_, PyType>, bytes: &[u8]) -> PyResult<Self> {
+        let read = parallel(cls.py(), || Checkpoint::decode(bytes))?;
+        let state = read.map_err(|error| bad_value(format!("the pickled film: {error}")))?;
+        let hidden =
+            state.identity.iter().any(|(name, value)| name == "background" && value == "hidden");
+        Ok(Self::new(
+            state.film,
+            state.counts,
+            state.complete,
+            state.n_samples,
+            state.provenance,
+            hidden,
+        ))
+    }
+}

@@ -1,0 +1,52 @@
+//! The Python module `domelight._domelight`: a thin front end over the library's public functions.
+//!
+//! Arrays come in by [`arrays`], go out by it, and leave the interpreter free while the engine works ([`engine`]).
+//! What Python says better than Rust (strategies as functions, metrics by name, progress) is in `python/domelight`.
+
+mod arrays;
+mod bsdf;
+mod compare;
+mod engine;
+mod environment;
+mod error;
+mod film;
+mod inspect;
+mod lobe;
+mod metrics;
+mod picture;
+mod progressive;
+mod render;
+mod rig;
+mod scene;
+mod strategy;
+mod testing;
+
+use pyo3::prelude::*;
+
+#[pymodule(gil_used = false)]
+mod _domelight {
+    #[pymodule_export]
+    use super::{
+        bsdf::{Bsdf, Material},
+        compare::compare,
+        environment::{Density, Environment},
+        error::{DomelightWarning, RenderInterrupted},
+        film::Film,
+        inspect::inspect,
+        metrics::{compare_pictures, error_map, flip, hdr_flip},
+        picture::{read, tone_map, write},
+        progressive::{Progressive, progressive},
+        render::{render, strategy_names},
+        rig::{Rig, lights},
+        scene::{Camera, Scene},
+        strategy::ShadingPoints,
+        testing::{chi2, z_test},
+    };
+
+    use super::{Bound, PyModule, PyModuleMethods as _, PyResult};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,215 @@
+//! Pictures in files, and as a screen shows them.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use domelight::RgbImage;
+use domelight::picture::exr::ExrLayers;
+use domelight::picture::exr::bands::{self, BAND_ROWS};
+use domelight::picture::png::{self, Depth};
+use domelight::picture::tone::{Exposure, ToneCurve, ToneMapping, srgb_from_linear};
+use domelight::picture::{
+    self, PictureError, PictureErrorKind, ReadOptions, hdr, pfm, write_atomically,
+    write_atomically_seeking,
+};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+
+use crate::arrays::{Floats, from_image, image};
+use crate::engine::parallel;
+use crate::error::{bad_value, from_source, to_python};
+
+/// The formats that can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Format {
+    Exr,
+    Hdr,
+    Pfm,
+    Png,
+}
+
+impl Format {
+    /// What the end of a file's name means.
+    pub(crate) fn of(path: &Path) -> PyResult<Self> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            Some("exr") => Ok(Self::Exr),
+            Some("hdr" | "pic" | "rgbe") => Ok(Self::Hdr),
+            Some("pfm") => Ok(Self::Pfm),
+            Some("png") => Ok(Self::Png),
+            _ => Err(bad_value(format!(
+                "{}: its name must end in .exr, .hdr, .pfm or .png",
+                path.display()
+            ))),
+        }
+    }
+}
+
+/// Exposure as Python gives it: a number of stops, or `None` for the automatic one.
+pub(crate) fn tone(
+    image: &RgbImage,
+    alpha: Option<&[f32]>,
+    exposure: Option<f32>,
+    curve: &str,
+) -> PyResult<ToneMapping> {
+    let curve: ToneCurve = curve.parse().map_err(|e| from_source(&e))?;
+    if let Some(stops) = exposure.filter(|stops| !stops.is_finite()) {
+        return Err(bad_value(format!("exposure is {stops}; it must be finite")));
+    }
+    let exposure = exposure.map_or(Exposure::Auto, Exposure::Stops);
+    Ok(ToneMapping { exposure: exposure.stops(image, alpha), curve })
+}
+
+/// Writes color alone, PNG with alpha if there is one.
+pub(crate) fn write_image(
+    path: &Path,
+    format: Format,
+    image: &RgbImage,
+    alpha: Option<&[f32]>,
+    tone: &ToneMapping,
+) -> Result<(), PictureError> {
+    match format {
+        Format::Exr => write_bands(path, image.height, |y| {
+            let RgbImage { width, height, ref pixels } = *image;
+            let end = height.min(y + BAND_ROWS);
+            let rows = RgbImage::new(width, end - y, pixels[y * width..end * width].to_vec());
+            ExrLayers::from_image(&rows, None)
+        }),
+        Format::Hdr => write_atomically(path, |out| hdr::encode(image, out)),
+        Format::Pfm => write_atomically(path, |out| pfm::encode(image, out)),
+        Format::Png => {
+            write_atomically(path, |out| png::encode(image, alpha, tone, Depth::Eight, out))
+        }
+    }
+}
+
+/// Writes OpenEXR from bands of rows.
+fn write_bands(
+    path: &Path,
+    height: usize,
+    band: impl Fn(usize) -> ExrLayers,
+) -> Result<(), PictureError> {
+    write_atomically_seeking(path, |out| {
+        bands::write(height, out, |y| Ok::<_, PictureErrorKind>(band(y))).map_err(into_io)
+    })
+}
+
+/// What the system says stays what the system says.
+pub(crate) fn into_io(kind: PictureErrorKind) -> std::io::Error {
+    match kind {
+        PictureErrorKind::Io(error) => error,
+        kind => std::io::Error::other(kind),
+    }
+}
+
+/// Read a picture: OpenEXR, Radiance .hdr, PFM, PNG or JPEG.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+///     The file.
+/// layer : str, optional
+///     The OpenEXR layer.
+///
+/// Returns
+/// -------
+/// ndarray, shape (H, W, 3)
+///     Linear Rec. 709, top row first.
+///
+/// Raises
+/// ------
+/// OSError, ValueError
+///     If the file cannot be read or is damaged.
+#[pyfunction]
+#[pyo3(signature = (path, *, layer = None))]
+pub(crate) fn read(
+    py: Python<'_>,
+    path: PathBuf,
+    layer: Option<String>,
+) -> PyResult<Bound<'_, PyArrayDyn<f32>>> {
+    let options = ReadOptions { layer, max_memory: None };
+    let picture = parallel(py, || picture::read(&path, &options))?.map_err(to_python)?;
+    from_image(py, &picture.image)
+}
+
+/// Write a picture; the end of the name says whether as OpenEXR, Radiance .hdr, PFM or PNG.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+///     The file: it is the old one or the whole new one.
+/// picture : array_like, shape (H, W, 3)
+///     Linear Rec. 709, top row first.
+/// exposure : float or None, default 0
+///     Of PNG [stops]; None makes the median middle gray.
+/// curve : {'srgb', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
+///     The tone curve of PNG.
+///
+/// Raises
+/// ------
+/// OSError, ValueError
+///     If the file cannot be written, or the shape or the name is wrong.
+#[pyfunction]
+#[pyo3(signature = (path, picture, *, exposure = Some(0.0), curve = "agx"),
+    text_signature = "(path, picture, *, exposure=0.0, curve='agx')")]
+pub(crate) fn write(
+    path: PathBuf,
+    picture: &Bound<'_, PyAny>,
+    exposure: Option<f32>,
+    curve: &str,
+) -> PyResult<()> {
+    let py = picture.py();
+    let format = Format::of(&path)?;
+    let floats = Floats::new("picture", picture)?;
+    let image = image(&floats)?;
+    if image.pixels.is_empty() {
+        return Err(floats.bad_shape("(height, width, 3) with at least one pixel"));
+    }
+    let tone = tone(&image, None, exposure, curve)?;
+    parallel(py, || write_image(&path, format, &image, None, &tone))?.map_err(to_python)
+}
+
+/// What a screen shows of linear light.
+///
+/// Parameters
+/// ----------
+/// picture : array_like, shape (H, W, 3)
+///     Linear Rec. 709.
+/// exposure : float or None, default None
+///     In stops; None makes the median middle gray.
+/// curve : {'srgb', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
+///     The tone curve.
+///
+/// Returns
+/// -------
+/// ndarray, shape (H, W, 3)
+///     sRGB-encoded, in [0, 1], as `matplotlib.pyplot.imshow` takes it.
+#[pyfunction]
+#[pyo3(signature = (picture, *, exposure = None, curve = "agx"))]
+pub(crate) fn tone_map<'py>(
+    picture: &Bound<'py, PyAny>,
+    exposure: Option<f32>,
+    curve: &str,
+) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+    let py = picture.py();
+    let mut image = image(&Floats::new("picture", picture)?)?;
+    let tone = tone(&image, None, exposure, curve)?;
+    parallel(py, || {
+        image.pixels.iter_mut().for_each(|p| {
+            *p = tone.apply(*p).map(srgb_from_linear);
+        });
+    })?;
+    from_image(py, &image)
+}
+
+/// The bytes of a PNG file of 8 bits.
+pub(crate) fn to_png(
+    image: &RgbImage,
+    alpha: Option<&[f32]>,
+    tone: &ToneMapping,
+) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let out: &mut dyn Write = &mut bytes;
+    png::encode(image, alpha, tone, Depth::Eight, out)?;
+    Ok(bytes)
+}

@@ -1,0 +1,180 @@
+//! Renders that are watched: a film after each pass.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+
+use domelight::render::Renderer;
+use domelight::strategy::Strategy;
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use crate::engine::{caught, pool, wait};
+use crate::environment::Environment;
+use crate::film::Film;
+use crate::render::{Job, Keywords, Visitor, Watch, interrupted, warn_of};
+use crate::scene::{CameraLike, Scene};
+
+/// The film after a pass; none if there was nothing left to render.
+type Step = PyResult<Option<Film>>;
+
+/// A render that goes on with each `next`, which gives a film of all samples so far.
+///
+/// It lives on a thread of its own and is idle between the calls. After an interruption the next call goes on.
+#[pyclass(frozen, module = "domelight")]
+pub(crate) struct Progressive {
+    job: Arc<Job>,
+    cancel: Arc<AtomicBool>,
+    /// Asks the render's thread for a step.
+    questions: Sender<()>,
+    /// What it answers.
+    answers: Mutex<Receiver<Step>>,
+    last: Mutex<Option<Py<Film>>>,
+    /// The process that the thread belongs to.
+    process: u32,
+}
+
+/// Answers each question with the next pass.
+struct Steps<'a> {
+    job: &'a Job,
+    cancel: &'a AtomicBool,
+    questions: Receiver<()>,
+    answers: Sender<Step>,
+}
+
+impl Visitor for Steps<'_> {
+    type Output = ();
+
+    fn visit<S: Strategy>(self, mut renderer: Renderer<S>) {
+        let Self { job, cancel, questions, answers } = self;
+        let done = AtomicU64::new(0);
+        let watch = Watch { job, cancel, done: &done };
+        while questions.recv().is_ok() {
+            if renderer.is_complete() {
+                let _ = answers.send(Ok(None));
+                continue;
+            }
+            let step = caught(|| {
+                renderer.step_with(&watch);
+                Some(job.film(&renderer))
+            });
+            let _ = answers.send(step);
+        }
+    }
+}
+
+#[pymethods]
+impl Progressive {
+    fn __iter__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Py<Film>>> {
+        if std::process::id() != self.process {
+            return Err(PyRuntimeError::new_err(
+                "this render was begun before the process was forked",
+            ));
+        }
+        let (result, stopped) = py.detach(|| {
+            let answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
+            self.cancel.store(false, Ordering::Relaxed);
+            // A thread that has ended is noticed by its missing answer.
+            let _ = self.questions.send(());
+            wait(&answers, &self.cancel, &|_| Ok(()))
+        })?;
+        if let Some(error) = self.job.take_failure() {
+            return Err(error);
+        }
+        let Some(film) = result? else { return Ok(None) };
+        if let Some(error) = stopped {
+            return Err(interrupted(py, error, film)?);
+        }
+        if film.complete {
+            warn_of(py, &film)?;
+        }
+        let film = Py::new(py, film)?;
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(film.clone_ref(py));
+        Ok(Some(film))
+    }
+
+    /// Film or None: the last one.
+    #[getter]
+    fn film(&self, py: Python<'_>) -> Option<Py<Film>> {
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        last.as_ref().map(|film| film.clone_ref(py))
+    }
+}
+
+/// Render pass by pass: an iterator of films that grow.
+///
+/// Parameters
+/// ----------
+/// scene, env, strategy, spp, size, seed, threads, camera, filter, sampler, hide_env, adaptive, target_error, tile_size
+///     As of `render`.
+///
+/// Yields
+/// ------
+/// Film
+///     All samples so far; the last one is complete and has the bits of `render`'s.
+///
+/// Raises
+/// ------
+/// RenderInterrupted
+///     A `KeyboardInterrupt` whose attribute `film` holds what was done; a later `next` goes on from there.
+#[pyfunction]
+#[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = (640, 640), seed = 0, threads = None,
+    camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,
+    tile_size = None),
+    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None)")]
+pub(crate) fn progressive<'py>(
+    py: Python<'py>,
+    scene: &Bound<'py, Scene>,
+    env: Option<&Bound<'py, Environment>>,
+    strategy: Option<Bound<'py, PyAny>>,
+    spp: u32,
+    size: (i64, i64),
+    seed: u64,
+    threads: Option<usize>,
+    camera: Option<CameraLike>,
+    filter: &str,
+    sampler: &str,
+    hide_env: bool,
+    adaptive: bool,
+    target_error: Option<f32>,
+    tile_size: Option<usize>,
+) -> PyResult<Progressive> {
+    let strategy = strategy.unwrap_or_else(|| pyo3::types::PyString::new(py, "product").into_any());
+    let keywords = Keywords {
+        strategy,
+        spp,
+        size,
+        seed,
+        threads,
+        camera,
+        filter,
+        sampler,
+        hide_env,
+        adaptive,
+        target_error,
+        tile_size,
+    };
+    let job = Arc::new(Job::new(py, scene.get(), env, keywords)?);
+    let cancel = Arc::new(AtomicBool::new(false));
+    let (ask, questions) = mpsc::channel();
+    let (answers, answered) = mpsc::channel();
+    let on_thread = (job.clone(), cancel.clone());
+    let body = move || {
+        let (job, cancel) = (&*on_thread.0, &*on_thread.1);
+        let steps = Steps { job, cancel, questions, answers: answers.clone() };
+        let served = pool(job.n_threads())
+            .and_then(|pool| caught(|| pool.install(|| job.with_renderer(steps)))?);
+        if let Err(error) = served {
+            let _ = answers.send(Err(error));
+        }
+    };
+    let started = thread::Builder::new().name("domelight".into()).spawn(body);
+    started.map_err(|e| PyRuntimeError::new_err(format!("cannot start a thread: {e}")))?;
+    let (answers, last) = (Mutex::new(answered), Mutex::new(None));
+    Ok(Progressive { job, cancel, questions: ask, answers, last, process: std::process::id() })
+}

@@ -1,0 +1,509 @@
+//! Rendering: settings from Python, a render that signals may end, and its film.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc;
+
+use domelight::environment;
+use domelight::inspect::{InspectError, Inspector};
+use domelight::render::{Background, Counts, Filter, Observer, RenderSettings, Renderer};
+use domelight::sampling::SamplerKind;
+use domelight::scene::{self, CameraSettings, EnvironmentSettings, EnvironmentSource};
+use domelight::strategy::{Strategy, StrategyKind, StrategySpec};
+use domelight_lab::report::{CameraReport, EnvironmentReport, SceneReport};
+use domelight_lab::scene::View;
+use pyo3::exceptions::PyMemoryError;
+use pyo3::prelude::*;
+
+use crate::engine::{caught, n_threads, pool, wait};
+use crate::environment::Environment;
+use crate::error::{RenderInterrupted, bad_value, from_source, to_python, warn};
+use crate::film::Film;
+use crate::lobe::PythonLobe;
+use crate::scene::{CameraLike, Scene, SceneData, size};
+use crate::strategy::PythonStrategy;
+
+/// Bytes of a pixel of a render: its sums, and the layers that they become.
+const PIXEL_BYTES: usize = 308;
+
+/// What renders: a strategy of the library's, or a function.
+pub(crate) enum Choice {
+    Builtin(StrategySpec),
+    Python(PythonStrategy),
+}
+
+/// All that a render needs.
+pub(crate) struct Job {
+    scene: Arc<SceneData>,
+    environment: Arc<environment::Environment>,
+    camera: scene::Camera,
+    /// In the scene's own units.
+    camera_settings: CameraSettings,
+    /// What the environment is called.
+    probe: String,
+    settings: RenderSettings,
+    strategy: Choice,
+    n_threads: usize,
+    /// Attributes of the film, but for the strategy.
+    provenance: Vec<(String, String)>,
+}
+
+/// The keywords of `render` and `progressive`.
+pub(crate) struct Keywords<'py> {
+    pub(crate) strategy: Bound<'py, PyAny>,
+    pub(crate) spp: u32,
+    pub(crate) size: (i64, i64),
+    pub(crate) seed: u64,
+    pub(crate) threads: Option<usize>,
+    pub(crate) camera: Option<CameraLike>,
+    pub(crate) filter: &'py str,
+    pub(crate) sampler: &'py str,
+    pub(crate) hide_env: bool,
+    pub(crate) adaptive: bool,
+    pub(crate) target_error: Option<f32>,
+    pub(crate) tile_size: Option<usize>,
+}
+
+/// Pixels along the edge of a tile of a strategy written in Python: large enough that calls cost little.
+const PYTHON_TILE_SIZE: usize = 64;
+
+impl Job {
+    /// Checks the settings before any work is done.
+    pub(crate) fn new(
+        py: Python<'_>,
+        scene: &Scene,
+        environment: Option<&Bound<'_, Environment>>,
+        keywords: Keywords<'_>,
+    ) -> PyResult<Self> {
+        let Keywords { strategy, spp, threads, adaptive, target_error, .. } = keywords;
+        let (width, height) = size(keywords.size)?;
+        if !(1..=1 << 24).contains(&spp) {
+            return Err(bad_value(format!("spp is {spp}; it must be from 1 to 16777216")));
+        }
+        if let Some(error) = target_error.filter(|e| !(e.is_finite() && *e > 0.0)) {
+            return Err(bad_value(format!(
+                "target_error is {error}; it must be positive and finite"
+            )));
+        }
+        if let Some(tile) = keywords.tile_size.filter(|n| !(1..=1024).contains(n)) {
+            return Err(bad_value(format!("tile_size is {tile}; it must be from 1 to 1024")));
+        }
+        let filter: Filter = keywords.filter.parse().map_err(|e| from_source(&e))?;
+        let sampler = match keywords.sampler {
+            "sobol" => SamplerKind::Sobol,
+            "independent" => SamplerKind::Independent,
+            other => {
+                return Err(bad_value(format!(
+                    "sampler is {other:?}; it must be 'sobol' or 'independent'"
+                )));
+            }
+        };
+        let n_threads = n_threads(threads)?;
+        let choice = choose(&strategy, spp, &scene.inner.lobes)?;
+        require_memory(width, height)?;
+
+        let (environment, probe) = if let Some(environment) = environment {
+            (environment.get().inner.clone(), environment.get().name.clone())
+        } else {
+            let of_scene = scene.environment(py, BUILTIN_ROWS)?;
+            (of_scene.inner, of_scene.name)
+        };
+        let up = environment.orientation().up.vector();
+        let (camera, camera_settings) =
+            scene.inner.camera(keywords.camera.as_ref(), (width, height), up)?;
+        let default_tile = match choice {
+            Choice::Builtin(_) => RenderSettings::default().tile_size,
+            Choice::Python(_) => PYTHON_TILE_SIZE,
+        };
+        let settings = RenderSettings {
+            width,
+            height,
+            n_samples: spp,
+            adaptive,
+            target_error,
+            seed: keywords.seed,
+            filter,
+            sampler,
+            background: if keywords.hide_env { Background::Hidden } else { Background::Shown },
+            tile_size: keywords.tile_size.unwrap_or(default_tile),
+        };
+        let provenance = [
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("scene", scene.inner.name.clone()),
+            ("environment", probe.clone()),
+            ("samples", spp.to_string()),
+            ("sampler", keywords.sampler.to_owned()),
+            ("filter", filter.name().to_owned()),
+            ("seed", keywords.seed.to_string()),
+        ];
+        let provenance =
+            provenance.map(|(name, value)| (format!("domelight.{name}"), value)).to_vec();
+        Ok(Self {
+            scene: scene.inner.clone(),
+            environment,
+            camera,
+            camera_settings,
+            probe,
+            settings,
+            strategy: choice,
+            n_threads,
+            provenance,
+        })
+    }
+
+    /// Hands a renderer over; on the calling thread's pool.
+    pub(crate) fn with_renderer<V: Visitor>(&self, visitor: V) -> PyResult<V::Output> {
+        let Self { scene, environment, camera, settings, .. } = self;
+        let scene = &scene.scene;
+        match &self.strategy {
+            Choice::Builtin(spec) => {
+                let renderer = Renderer::new(scene, camera, environment, *spec, *settings);
+                Ok(visitor.visit(renderer.map_err(to_python)?))
+            }
+            Choice::Python(strategy) => {
+                let renderer =
+                    Renderer::with_strategy(scene, camera, environment, strategy, *settings);
+                Ok(visitor.visit(renderer))
+            }
+        }
+    }
+
+    /// The film of a renderer so far.
+    pub(crate) fn film<S: Strategy>(&self, renderer: &Renderer<S>) -> Film {
+        let strategy = match &self.strategy {
+            Choice::Builtin(spec) => spec.to_string(),
+            Choice::Python(_) => "python".to_owned(),
+        };
+        let mut provenance = self.provenance.clone();
+        provenance.insert(3, ("domelight.strategy".to_owned(), strategy));
+        Film::new(
+            renderer.film(),
+            renderer.counts(),
+            renderer.is_complete(),
+            self.settings.n_samples,
+            provenance,
+            self.settings.background == Background::Hidden,
+        )
+    }
+
+    /// A pixel under the microscope.
+    pub(crate) fn inspector(&self, pixel: [usize; 2]) -> Result<Inspector<'_>, InspectError> {
+        let Self { scene, environment, camera, settings, .. } = self;
+        Inspector::new(&scene.scene, camera, environment, settings, pixel)
+    }
+
+    /// A strategy with what a pilot chooses.
+    pub(crate) fn for_picture(&self, spec: StrategySpec) -> StrategySpec {
+        let Self { scene, environment, camera, settings, .. } = self;
+        spec.for_picture(&scene.scene, camera, environment, settings)
+    }
+
+    /// Of each picture.
+    pub(crate) fn settings(&self) -> &RenderSettings {
+        &self.settings
+    }
+
+    /// The scene under its light, with a report on it.
+    pub(crate) fn view<'a>(&'a self, report: &'a SceneReport) -> View<'a> {
+        let Self { scene, camera, environment, .. } = self;
+        View { scene: &scene.scene, camera, environment, report }
+    }
+
+    /// The scene in words and numbers.
+    pub(crate) fn scene_report(&self) -> SceneReport {
+        let Self { scene, environment, settings, camera_settings, probe, .. } = self;
+        let orientation = environment.orientation();
+        let light = EnvironmentSettings {
+            source: EnvironmentSource::Builtin(probe.clone()),
+            rotate_degrees: orientation.rotation,
+            scale: 1.0,
+            exposure: 0.0,
+            up: orientation.up,
+        };
+        SceneReport {
+            scene: scene.name.clone(),
+            triangles: scene.scene.triangle_count(),
+            warnings: Vec::new(),
+            material: None,
+            normalize: false,
+            ground: false,
+            hide_env: settings.background == Background::Hidden,
+            environment: EnvironmentReport::new(probe.clone(), &light, environment),
+            camera: CameraReport::new(camera_settings),
+            size: [settings.width, settings.height],
+        }
+    }
+
+    /// The light.
+    pub(crate) fn environment(&self) -> &environment::Environment {
+        &self.environment
+    }
+
+    /// Threads to render with.
+    pub(crate) fn n_threads(&self) -> usize {
+        self.n_threads
+    }
+
+    /// Camera samples of all pixels.
+    pub(crate) fn total_samples(&self) -> u64 {
+        let RenderSettings { width, height, n_samples, .. } = self.settings;
+        width as u64 * height as u64 * u64::from(n_samples)
+    }
+
+    /// What functions of Python's raised while they rendered.
+    pub(crate) fn take_failure(&self) -> Option<PyErr> {
+        let of_strategy = match &self.strategy {
+            Choice::Builtin(_) => None,
+            Choice::Python(strategy) => strategy.take_failure(),
+        };
+        // All of them, lest a failure show up in a later render.
+        let of_lobes = self.scene.lobes.iter().filter_map(|lobe| lobe.take_failure());
+        of_lobes.fold(of_strategy, |first, next| first.or(Some(next)))
+    }
+
+    /// A function of Python's has raised.
+    pub(crate) fn has_failed(&self) -> bool {
+        let strategy = matches!(&self.strategy, Choice::Python(strategy) if strategy.has_failed());
+        strategy || self.scene.lobes.iter().any(|lobe| lobe.has_failed())
+    }
+}
+
+/// Rows of the built-in probe that a scene names, as of the program.
+const BUILTIN_ROWS: usize = 1024;
+
+/// The strategy that Python names or gives.
+pub(crate) fn choose(
+    strategy: &Bound<'_, PyAny>,
+    spp: u32,
+    lobes: &[&'static PythonLobe],
+) -> PyResult<Choice> {
+    let Ok(text) = strategy.extract::<String>() else {
+        if !strategy.is_callable() {
+            return Err(bad_value(format!(
+                "strategy is {}; it must be a text such as 'product:8' or callable",
+                strategy.repr()?
+            )));
+        }
+        return Ok(Choice::Python(PythonStrategy::new(strategy.clone(), lobes.to_vec())?));
+    };
+    let spec: StrategySpec =
+        text.parse().map_err(|e: domelight::strategy::StrategyError| to_python(e))?;
+    let n_points = spec.points_per_sample();
+    if u64::from(spp) * u64::from(n_points) > 1 << 32 {
+        return Err(bad_value(format!(
+            "spp is {spp}: so many camera samples of {n_points} directions are more points than a pixel has (2^32)"
+        )));
+    }
+    if spec.kind() == StrategyKind::Rejection && lobes.iter().any(|lobe| !lobe.has_bound()) {
+        return Err(bad_value("rejection needs the max_eval of a BSDF of one's own"));
+    }
+    Ok(Choice::Builtin(spec))
+}
+
+/// Refuses a picture for which there is no memory, before the allocator ends the process.
+fn require_memory(width: usize, height: usize) -> PyResult<()> {
+    let bytes = width.saturating_mul(height).saturating_mul(PIXEL_BYTES);
+    Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| {
+        let text = format!("size is ({width}, {height}): {bytes} bytes of memory are not there");
+        PyMemoryError::new_err(text)
+    })
+}
+
+/// Something to be done with a renderer of any strategy.
+pub(crate) trait Visitor {
+    /// What it gives.
+    type Output;
+
+    /// Does it.
+    fn visit<S: Strategy>(self, renderer: Renderer<S>) -> Self::Output;
+}
+
+/// Ends a render that was canceled or whose functions failed, and counts its samples.
+pub(crate) struct Watch<'a> {
+    pub(crate) job: &'a Job,
+    pub(crate) cancel: &'a AtomicBool,
+    pub(crate) done: &'a AtomicU64,
+}
+
+impl Observer for Watch<'_> {
+    fn tile_finished(&self, counts: &Counts) {
+        self.done.fetch_add(counts.camera_rays, Ordering::Relaxed);
+    }
+
+    fn canceled(&self) -> bool {
+        self.cancel.load(Ordering::Relaxed) || self.job.has_failed()
+    }
+}
+
+/// Renders until the end or until it is canceled.
+struct ToTheEnd<'a> {
+    job: &'a Job,
+    watch: Watch<'a>,
+}
+
+impl Visitor for ToTheEnd<'_> {
+    type Output = Film;
+
+    fn visit<S: Strategy>(self, mut renderer: Renderer<S>) -> Film {
+        renderer.run(&self.watch);
+        self.job.film(&renderer)
+    }
+}
+
+/// What was done, as an exception: `RenderInterrupted` if a signal's handler raised `KeyboardInterrupt`.
+pub(crate) fn interrupted(py: Python<'_>, error: PyErr, film: Film) -> PyResult<PyErr> {
+    if !error.is_instance_of::<pyo3::exceptions::PyKeyboardInterrupt>(py) {
+        return Ok(error);
+    }
+    let interrupted =
+        RenderInterrupted::new_err("the render was interrupted; its film is in the attribute film");
+    interrupted.value(py).setattr("film", film)?;
+    interrupted.set_cause(py, Some(error));
+    Ok(interrupted)
+}
+
+/// Warns of what went wrong in a film.
+pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
+    match film.counts.non_finite {
+        0 => Ok(()),
+        n => warn(py, &[format!("{n} camera samples were NaN or infinite and count as black")]),
+    }
+}
+
+/// Render a scene that is lit by an environment.
+///
+/// Parameters
+/// ----------
+/// scene : Scene
+///     What is seen.
+/// env : Environment, optional
+///     The light; by default the scene's own, else the built-in sky.
+/// strategy : str or callable, default 'product'
+///     How directions are chosen: a text such as 'brdf:4', 'environment', 'mis:3:1', 'product:8', 'rejection:16',
+///     'sir:15/800', 'median-cut:64' or 'variance-minimization:64', or a function. A function gets the
+///     `ShadingPoints` of a tile and returns `(index, wi, weight)`: the points of shadow rays (M,), their directions
+///     (M, 3) and what each adds if it is free (M, 3) or (M,), 1 / n and 1 / pdf included. Its attribute `n_rays`, 1 by
+///     default, is the most rays of a point. It is called from several threads, one at a time.
+/// spp : int, default 32
+///     Camera samples of each pixel; with 'product' their mean.
+/// size : (int, int), default (640, 640)
+///     Width and height.
+/// seed : int, default 0
+///     Names the random numbers; the same seed gives the same bits.
+/// threads : int, optional
+///     By default the cores that the process may use. The picture does not depend on it.
+/// camera : Camera, str or int, optional
+///     A camera, or the name or number of one of the file's; by default the scene's own or a framing one.
+/// filter : {'box', 'tent', 'gaussian', 'blackman-harris'}, default 'gaussian'
+///     The pixel filter.
+/// sampler : {'sobol', 'independent'}, default 'sobol'
+///     Owen-scrambled Sobol' points or independent random numbers.
+/// hide_env : bool, default False
+///     Leave the background out.
+/// adaptive : bool, default True
+///     With 'product', more samples for noisier pixels.
+/// target_error : float, optional
+///     End each tile when the spread of its samples suggests this relMSE, such as 1e-3.
+/// tile_size : int, optional
+///     Pixels along a tile's edge; 16 by default, 64 for functions. Only 'product' depends on it.
+/// progress : callable, optional
+///     Called every hundredth of a second with the share that is done, in [0, 1].
+///
+/// Returns
+/// -------
+/// Film
+///     The same bits as the program's for the same settings.
+///
+/// Raises
+/// ------
+/// ValueError
+///     If a setting is wrong; the message says which.
+/// RenderInterrupted
+///     A `KeyboardInterrupt` whose attribute `film` holds what was done.
+///
+/// Warns
+/// -----
+/// DomelightWarning
+///     If samples were NaN or infinite.
+#[pyfunction(name = "_render")]
+#[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = (640, 640), seed = 0, threads = None,
+    camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,
+    tile_size = None, progress = None),
+    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, progress=None)")]
+pub(crate) fn render<'py>(
+    py: Python<'py>,
+    scene: &Bound<'py, Scene>,
+    env: Option<&Bound<'py, Environment>>,
+    strategy: Option<Bound<'py, PyAny>>,
+    spp: u32,
+    size: (i64, i64),
+    seed: u64,
+    threads: Option<usize>,
+    camera: Option<CameraLike>,
+    filter: &str,
+    sampler: &str,
+    hide_env: bool,
+    adaptive: bool,
+    target_error: Option<f32>,
+    tile_size: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Film> {
+    let strategy = strategy.unwrap_or_else(|| pyo3::types::PyString::new(py, "product").into_any());
+    let keywords = Keywords {
+        strategy,
+        spp,
+        size,
+        seed,
+        threads,
+        camera,
+        filter,
+        sampler,
+        hide_env,
+        adaptive,
+        target_error,
+        tile_size,
+    };
+    let job = &Job::new(py, scene.get(), env, keywords)?;
+    let (cancel, done) = (&AtomicBool::new(false), &AtomicU64::new(0));
+    let total = job.total_samples().max(1) as f64;
+    let report = |py: Python<'_>| match &progress {
+        Some(progress) => {
+            let share = (done.load(Ordering::Relaxed) as f64 / total).min(1.0);
+            progress.bind(py).call1((share,)).map(drop)
+        }
+        None => Ok(()),
+    };
+    let (result, stopped) = py.detach(|| {
+        std::thread::scope(|scope| {
+            let (sender, results) = mpsc::channel();
+            scope.spawn(move || {
+                let rendered = pool(job.n_threads()).and_then(|pool| {
+                    let visitor = ToTheEnd { job, watch: Watch { job, cancel, done } };
+                    caught(|| pool.install(|| job.with_renderer(visitor)))?
+                });
+                // Whoever waits is there.
+                let _ = sender.send(rendered);
+            });
+            wait(&results, cancel, &report)
+        })
+    })?;
+    if let Some(error) = job.take_failure() {
+        return Err(error);
+    }
+    let film = result?;
+    if let Some(error) = stopped {
+        return Err(interrupted(py, error, film)?);
+    }
+    if progress.is_some() {
+        done.store(total as u64, Ordering::Relaxed);
+        report(py)?;
+    }
+    warn_of(py, &film)?;
+    Ok(film)
+}
+
+/// The names of the built-in strategies, with a line for each.
+#[pyfunction]
+pub(crate) fn strategy_names() -> Vec<(&'static str, &'static str)> {
+    StrategyKind::ALL.into_iter().map(|kind| (kind.name(), kind.summary())).collect()
+}

@@ -1,0 +1,553 @@
+//! Scenes and cameras.
+
+use std::path::PathBuf;
+use std::str::FromStr as _;
+use std::sync::Arc;
+
+use domelight::environment::{Orientation, UpAxis};
+use domelight::geometry::{Aabb, Mesh};
+use domelight::math::{Vec2, Vec3};
+use domelight::picture::MAX_TEXELS;
+use domelight::scene::builtin::BuiltinScene;
+use domelight::scene::{
+    self, AnimationTime, CameraSettings, EnvironmentSettings, EnvironmentSource, LoadOptions,
+    Material, NamedCamera, Part, Projection, SceneDescription,
+};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+use pyo3::types::PyType;
+
+use crate::arrays::{Floats, array, indices, vector};
+use crate::bsdf::MaterialLike;
+use crate::engine::parallel;
+use crate::environment::{Environment, builtin_map, load_map, up_axis, up_name};
+use crate::error::{bad_value, from_source, to_python, warn};
+use crate::lobe::PythonLobe;
+
+/// Where a picture is taken from; what is left out is the scene's own camera's, or one's that frames the scene.
+///
+/// Parameters
+/// ----------
+/// origin : array_like, shape (3,), optional
+///     Where the camera is, or any point of an orthographic one's axis.
+/// target : array_like, shape (3,), optional
+///     A point that it looks at.
+/// up : array_like, shape (3,), optional
+///     A direction that points up in the picture.
+/// fov : float, optional
+///     Vertical field of view of a perspective camera, in (0, 180) [degrees].
+/// ortho : float, optional
+///     Height of the picture of an orthographic camera in the world, positive.
+#[pyclass(frozen, from_py_object, module = "domelight")]
+#[derive(Clone)]
+pub(crate) struct Camera {
+    origin: Option<Vec3>,
+    target: Option<Vec3>,
+    up: Option<Vec3>,
+    projection: Option<Projection>,
+}
+
+impl Camera {
+    fn settings(&self, mut of_scene: CameraSettings) -> CameraSettings {
+        of_scene.origin = self.origin.unwrap_or(of_scene.origin);
+        of_scene.target = self.target.unwrap_or(of_scene.target);
+        of_scene.up = self.up.unwrap_or(of_scene.up);
+        of_scene.projection = self.projection.unwrap_or(of_scene.projection);
+        of_scene
+    }
+
+    fn of(settings: CameraSettings) -> Self {
+        let CameraSettings { projection, origin, target, up } = settings;
+        let [origin, target, up] = [origin, target, up].map(Some);
+        Self { origin, target, up, projection: Some(projection) }
+    }
+}
+
+#[pymethods]
+impl Camera {
+    #[new]
+    #[pyo3(signature = (*, origin = None, target = None, up = None, fov = None, ortho = None))]
+    fn new(
+        origin: Option<Bound<'_, PyAny>>,
+        target: Option<Bound<'_, PyAny>>,
+        up: Option<Bound<'_, PyAny>>,
+        fov: Option<f32>,
+        ortho: Option<f32>,
+    ) -> PyResult<Self> {
+        let projection = match (fov, ortho) {
+            (Some(_), Some(_)) => return Err(bad_value("give fov or ortho, not both")),
+            (Some(fov_y_degrees), None) => Some(Projection::Perspective { fov_y_degrees }),
+            (None, Some(height)) => Some(Projection::Orthographic { height }),
+            (None, None) => None,
+        };
+        let read =
+            |name, value: Option<Bound<'_, PyAny>>| value.map(|v| vector(name, &v)).transpose();
+        let (origin, target, up) =
+            (read("origin", origin)?, read("target", target)?, read("up", up)?);
+        Ok(Self { origin, target, up, projection })
+    }
+
+    /// ndarray, shape (3,), or None: where the camera is.
+    #[getter]
+    fn origin<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArrayDyn<f32>>>> {
+        from_vector(py, self.origin)
+    }
+
+    /// ndarray, shape (3,), or None: a point that it looks at.
+    #[getter]
+    fn target<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArrayDyn<f32>>>> {
+        from_vector(py, self.target)
+    }
+
+    /// ndarray, shape (3,), or None: a direction that points up in the picture.
+    #[getter]
+    fn up<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArrayDyn<f32>>>> {
+        from_vector(py, self.up)
+    }
+
+    /// float or None: vertical field of view [degrees].
+    #[getter]
+    fn fov(&self) -> Option<f32> {
+        match self.projection {
+            Some(Projection::Perspective { fov_y_degrees }) => Some(fov_y_degrees),
+            _ => None,
+        }
+    }
+
+    /// float or None: height of an orthographic picture in the world.
+    #[getter]
+    fn ortho(&self) -> Option<f32> {
+        match self.projection {
+            Some(Projection::Orthographic { height }) => Some(height),
+            _ => None,
+        }
+    }
+
+    fn __repr__(&self) -> String {
+        let vector =
+            |name: &str, v: Option<Vec3>| v.map(|v| format!("{name}=({}, {}, {})", v.x, v.y, v.z));
+        let projection = self.projection.map(|p| match p {
+            Projection::Perspective { fov_y_degrees } => format!("fov={fov_y_degrees}"),
+            Projection::Orthographic { height } => format!("ortho={height}"),
+        });
+        let parts = [
+            vector("origin", self.origin),
+            vector("target", self.target),
+            vector("up", self.up),
+            projection,
+        ];
+        format!("Camera({})", parts.into_iter().flatten().collect::<Vec<_>>().join(", "))
+    }
+}
+
+fn from_vector(py: Python<'_>, v: Option<Vec3>) -> PyResult<Option<Bound<'_, PyArrayDyn<f32>>>> {
+    v.map(|v| array(py, v.to_array().to_vec(), &[3])).transpose()
+}
+
+/// A camera, or the name or the number of one of the scene's.
+#[derive(FromPyObject)]
+pub(crate) enum CameraLike {
+    Camera(Camera),
+    Number(usize),
+    Name(String),
+}
+
+/// A built scene and what a description knows beyond it.
+pub(crate) struct SceneData {
+    pub(crate) scene: scene::Scene,
+    pub(crate) name: String,
+    /// What the scene was scaled by for tracing; cameras are in its own units.
+    factor: f32,
+    camera: Option<CameraSettings>,
+    cameras: Vec<NamedCamera>,
+    subject: Aabb,
+    environment: Option<EnvironmentSettings>,
+    up: UpAxis,
+    /// Reflectance written in Python.
+    pub(crate) lobes: Vec<&'static PythonLobe>,
+}
+
+impl SceneData {
+    /// The camera of a picture, and its settings in the scene's own units.
+    pub(crate) fn camera(
+        &self,
+        camera: Option<&CameraLike>,
+        (width, height): (usize, usize),
+        up: Vec3,
+    ) -> PyResult<(scene::Camera, CameraSettings)> {
+        let aspect = width as f32 / height as f32;
+        let settings = self.camera_settings(camera, aspect, up)?;
+        let mut scaled = settings;
+        if self.factor != 1.0 {
+            scaled.scale(self.factor);
+        }
+        let camera = scene::Camera::new(&scaled, width, height).map_err(to_python)?;
+        Ok((camera, settings))
+    }
+
+    fn camera_settings(
+        &self,
+        camera: Option<&CameraLike>,
+        aspect: f32,
+        up: Vec3,
+    ) -> PyResult<CameraSettings> {
+        let own =
+            || self.camera.unwrap_or_else(|| CameraSettings::framing(&self.subject, aspect, up));
+        let by_number = |i: usize| self.cameras.get(i).map(|camera| camera.settings);
+        let by_name = |name: &str| self.cameras.iter().find(|c| c.name == name).map(|c| c.settings);
+        let (found, asked) = match camera {
+            None => return Ok(own()),
+            Some(CameraLike::Camera(camera)) => return Ok(camera.settings(own())),
+            Some(CameraLike::Number(i)) => (by_number(*i), i.to_string()),
+            Some(CameraLike::Name(name)) => (by_name(name), format!("{name:?}")),
+        };
+        found.ok_or_else(|| {
+            let names: Vec<_> = self.cameras.iter().map(|c| format!("{:?}", c.name)).collect();
+            bad_value(format!(
+                "{} has no camera {asked}; its cameras are [{}]",
+                self.name,
+                names.join(", ")
+            ))
+        })
+    }
+}
+
+/// Meshes and what they are made of, ready for rays.
+///
+/// Parameters
+/// ----------
+/// vertices : array_like, shape (V, 3)
+///     Positions, finite.
+/// faces : array_like of int, shape (F, 3)
+///     Triangles as counter-clockwise indices of vertices.
+/// normals : array_like, shape (V, 3), optional
+///     Shading normals, of any length but 0; faces are flat without.
+/// colors : array_like, shape (V, 3), optional
+///     Linear vertex colors in [0, 1], for meshes without a material.
+/// uvs : array_like, shape (V, 2), optional
+///     Texture coordinates: they orient anisotropic materials.
+/// material : Material, Bsdf or str, default 'diffuse:0.5'
+///     What the mesh is made of.
+/// ground : bool, default False
+///     Put a diffuse disk of reflectance 0.5 under the mesh.
+/// normalize : bool, default False
+///     Move the center of the bounds to the origin and scale the longest half-extent to 1.
+/// up : {'y', 'z'}, default 'y'
+///     The axis that points up.
+/// name : str, default 'mesh'
+///     What the scene is called in files and messages.
+///
+/// Raises
+/// ------
+/// ValueError
+///     If an array has a wrong shape or type, an index names no vertex, or a position is not finite.
+#[pyclass(frozen, module = "domelight")]
+pub(crate) struct Scene {
+    pub(crate) inner: Arc<SceneData>,
+}
+
+/// The material of meshes that are given without.
+const DEFAULT_REFLECTANCE: f32 = 0.5;
+
+impl Scene {
+    fn build(
+        py: Python<'_>,
+        name: String,
+        mut description: SceneDescription,
+        material: Option<MaterialLike>,
+        ground: bool,
+        normalize: bool,
+    ) -> PyResult<Self> {
+        let mut lobes = Vec::new();
+        if normalize {
+            description.normalize();
+        }
+        if let Some(material) = material {
+            let (bsdf, lobe) = material.bsdf(py)?;
+            description.set_subject_material(bsdf);
+            lobes.extend(lobe);
+        }
+        let up = description.up.unwrap_or_default();
+        let subject = description.subject_bounds();
+        // Squares of lengths must be finite.
+        let extent = subject.size().max_element();
+        if extent > 1e18 || extent > 0.0 && extent < 1e-18 {
+            return Err(bad_value(format!(
+                "{name}: the scene is {extent:e} across; it must be from 1e-18 to 1e18"
+            )));
+        }
+        if ground {
+            description.add_ground(up.vector());
+        }
+        let (camera, cameras) = (description.camera, description.cameras.clone());
+        let environment = description.environment.clone();
+        let built = parallel(py, move || {
+            let factor =
+                description.rescale(&mut CameraSettings::framing(&subject, 1.0, up.vector()));
+            scene::Scene::new(description).map(|scene| (scene, factor))
+        })?;
+        let (scene, factor) = built.map_err(|error| bad_value(format!("{name}: {error}")))?;
+        let data =
+            SceneData { scene, name, factor, camera, cameras, subject, environment, up, lobes };
+        Ok(Self { inner: Arc::new(data) })
+    }
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    #[pyo3(signature = (vertices, faces, *, normals = None, colors = None, uvs = None, material = None,
+        ground = false, normalize = false, up = "y", name = "mesh"))]
+    fn new(
+        vertices: &Bound<'_, PyAny>,
+        faces: &Bound<'_, PyAny>,
+        normals: Option<Bound<'_, PyAny>>,
+        colors: Option<Bound<'_, PyAny>>,
+        uvs: Option<Bound<'_, PyAny>>,
+        material: Option<MaterialLike>,
+        ground: bool,
+        normalize: bool,
+        up: &str,
+        name: &str,
+    ) -> PyResult<Self> {
+        let py = vertices.py();
+        let vertices = Floats::new("vertices", vertices)?;
+        vertices.require_finite()?;
+        let Ok((positions, &[n])) = vertices.rows::<3>() else {
+            return Err(vertices.bad_shape("(V, 3)"));
+        };
+        let positions: Vec<Vec3> = positions.iter().map(|&p| p.into()).collect();
+        let (corners, shape) = indices("faces", faces, n)?;
+        let triangles = match shape[..] {
+            [_, 3] => corners.as_chunks::<3>().0.to_vec(),
+            // An empty list is a mesh without faces.
+            [0] => Vec::new(),
+            _ => {
+                let shape = crate::arrays::shape_text(&shape);
+                return Err(bad_value(format!("faces has shape {shape}; it must be (F, 3)")));
+            }
+        };
+        let normals =
+            normals.map(|v| attribute::<3>("normals", &v, n)).transpose()?.unwrap_or_default();
+        let normals = normals.into_iter().map(Vec3::from).enumerate().map(|(i, v)| {
+            v.try_normalize()
+                .ok_or_else(|| bad_value(format!("normals[{i}] is {v}; it must have a length")))
+        });
+        let normals = normals.collect::<PyResult<Vec<_>>>()?;
+        let colors =
+            colors.map(|v| attribute::<3>("colors", &v, n)).transpose()?.unwrap_or_default();
+        if let Some(i) = colors.iter().position(|c| c.iter().any(|c| !(0.0..=1.0).contains(c))) {
+            return Err(bad_value(format!(
+                "colors[{i}] is {:?}; it must lie in [0, 1]",
+                colors[i]
+            )));
+        }
+        let uvs = uvs.map(|v| attribute::<2>("uvs", &v, n)).transpose()?.unwrap_or_default();
+        let mesh = Mesh {
+            positions,
+            normals,
+            uvs: uvs.into_iter().map(Vec2::from).collect(),
+            colors: colors.into_iter().map(domelight::Rgb::from).collect(),
+            triangles,
+            ..Mesh::default()
+        };
+        let base = if mesh.colors.is_empty() { DEFAULT_REFLECTANCE } else { 1.0 };
+        let description = SceneDescription {
+            parts: vec![Part { name: "mesh".to_owned(), mesh, material: 0 }],
+            materials: vec![Material::diffuse("mesh", domelight::Rgb::splat(base))],
+            up: Some(up_axis(up)?),
+            ..SceneDescription::default()
+        };
+        Self::build(py, name.to_owned(), description, material, ground, normalize)
+    }
+
+    /// Load a mesh or a scene file: .ply, .obj, .stl, .off, .gltf, .glb or .toml.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     The file.
+    /// material : Material, Bsdf or str, optional
+    ///     Made of this instead of what the file says, but for floors and plinths.
+    /// ground, normalize
+    ///     As of the class.
+    /// scene : str, optional
+    ///     The scene of a glTF file with several, by name or number from 0.
+    /// animation : str, optional
+    ///     An animation of a glTF file, by name or number from 0; at rest by default.
+    /// at : float, default 0
+    ///     The moment of the animation [s].
+    /// strict : bool, default False
+    ///     Refuse what cannot be drawn instead of warning.
+    /// up : {'y', 'z'}, optional
+    ///     The axis that points up, where the file does not say rightly.
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     If a file cannot be read.
+    /// ValueError
+    ///     If it is damaged; the message names the place.
+    ///
+    /// Warns
+    /// -----
+    /// DomelightWarning
+    ///     For what the picture will lack.
+    #[classmethod]
+    #[pyo3(signature = (path, *, material = None, ground = false, normalize = false, scene = None,
+        animation = None, at = 0.0, strict = false, up = None))]
+    fn load(
+        cls: &Bound<'_, PyType>,
+        path: PathBuf,
+        material: Option<MaterialLike>,
+        ground: bool,
+        normalize: bool,
+        scene: Option<String>,
+        animation: Option<String>,
+        at: f32,
+        strict: bool,
+        up: Option<&str>,
+    ) -> PyResult<Self> {
+        let py = cls.py();
+        if !at.is_finite() {
+            return Err(bad_value(format!("at is {at}; it must be finite")));
+        }
+        let animation = animation.map(|name| AnimationTime { name, seconds: at });
+        let options = LoadOptions { strict, scene, animation, ..LoadOptions::default() };
+        let loaded = parallel(py, || scene::load_with(&path, &options))?.map_err(to_python)?;
+        warn(py, &loaded.warnings)?;
+        let mut description = loaded.description;
+        if let Some(up) = up {
+            description.up = Some(up_axis(up)?);
+        }
+        Self::build(py, path.display().to_string(), description, material, ground, normalize)
+    }
+
+    /// A scene made in code: 'statue', 'spheres', 'material-ball', 'sphere' or 'sphere-orthographic'.
+    ///
+    /// Parameters
+    /// ----------
+    /// name : str
+    ///     Which one.
+    /// material, ground, normalize
+    ///     As of `load`.
+    #[classmethod]
+    #[pyo3(signature = (name, *, material = None, ground = false, normalize = false))]
+    fn builtin(
+        cls: &Bound<'_, PyType>,
+        name: &str,
+        material: Option<MaterialLike>,
+        ground: bool,
+        normalize: bool,
+    ) -> PyResult<Self> {
+        let py = cls.py();
+        let builtin = BuiltinScene::from_str(name).map_err(|e| from_source(&e))?;
+        let description = parallel(py, || builtin.description())?;
+        Self::build(py, name.to_owned(), description, material, ground, normalize)
+    }
+
+    /// str: what the scene is called.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.inner.name
+    }
+
+    /// int: triangles of all meshes.
+    #[getter]
+    fn n_triangles(&self) -> usize {
+        self.inner.scene.triangle_count()
+    }
+
+    /// ndarray, shape (2, 3), or None: least and greatest coordinates of what the camera frames.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArrayDyn<f32>>>> {
+        let Aabb { min, max } = self.inner.subject;
+        if self.inner.subject.is_empty() {
+            return Ok(None);
+        }
+        array(py, [min.to_array(), max.to_array()].concat(), &[2, 3]).map(Some)
+    }
+
+    /// str: the axis that points up, 'y' or 'z'.
+    #[getter]
+    fn up(&self) -> &'static str {
+        up_name(self.inner.up)
+    }
+
+    /// list of str: the names of the file's cameras.
+    #[getter]
+    fn cameras(&self) -> Vec<&str> {
+        self.inner.cameras.iter().map(|camera| camera.name.as_str()).collect()
+    }
+
+    /// The scene's own camera, or one that frames the scene in a picture of a width / height.
+    ///
+    /// Parameters
+    /// ----------
+    /// aspect : float, default 1
+    ///     Width over height.
+    #[pyo3(signature = (aspect = 1.0))]
+    fn camera(&self, aspect: f32) -> PyResult<Camera> {
+        if !(aspect.is_finite() && aspect > 0.0) {
+            return Err(bad_value(format!("aspect is {aspect}; it must be positive and finite")));
+        }
+        let up = self.inner.up.vector();
+        Ok(Camera::of(self.inner.camera_settings(None, aspect, up)?))
+    }
+
+    /// The environment that the scene names, else the built-in sky.
+    ///
+    /// Parameters
+    /// ----------
+    /// rows : int, default 1024
+    ///     Rows of a built-in probe.
+    #[pyo3(signature = (rows = 1024))]
+    pub(crate) fn environment(&self, py: Python<'_>, rows: usize) -> PyResult<Environment> {
+        let sky = || EnvironmentSettings {
+            source: EnvironmentSource::Builtin("sky".to_owned()),
+            rotate_degrees: 0.0,
+            scale: 1.0,
+            exposure: 0.0,
+            up: self.inner.up,
+        };
+        let settings = self.inner.environment.clone().unwrap_or_else(sky);
+        let (map, name) = match &settings.source {
+            EnvironmentSource::Builtin(name) => (builtin_map(py, name, rows)?, name.clone()),
+            EnvironmentSource::File(path) => (
+                load_map(py, path.clone(), domelight::environment::io::ProbeOptions::default())?,
+                path.display().to_string(),
+            ),
+        };
+        let orientation = Orientation { up: settings.up, rotation: settings.rotate_degrees };
+        Environment::build(py, map, orientation, settings.factor(), name)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Scene {:?}: {} triangles>", self.inner.name, self.n_triangles())
+    }
+}
+
+/// An attribute of each vertex, finite.
+fn attribute<const K: usize>(
+    name: &'static str,
+    value: &Bound<'_, PyAny>,
+    n: usize,
+) -> PyResult<Vec<[f32; K]>> {
+    let floats = Floats::new(name, value)?;
+    floats.require_finite()?;
+    match floats.rows::<K>() {
+        Ok((rows, &[found])) if found == n => Ok(rows.to_vec()),
+        _ => Err(floats.bad_shape(&format!("({n}, {K}), a row for each vertex"))),
+    }
+}
+
+/// A picture's width and height.
+pub(crate) fn size((width, height): (i64, i64)) -> PyResult<(usize, usize)> {
+    let positive = |n: i64| usize::try_from(n).ok().filter(|&n| n > 0);
+    let area = |(w, h): &(usize, usize)| w.checked_mul(*h).is_some_and(|area| area <= MAX_TEXELS);
+    positive(width).zip(positive(height)).filter(area).ok_or_else(|| {
+        bad_value(format!(
+            "size is ({width}, {height}); width and height must be positive, and their product at most {MAX_TEXELS}"
+        ))
+    })
+}

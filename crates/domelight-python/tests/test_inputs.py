@@ -1,0 +1,150 @@
+"""Whatever comes in, what comes out is a result or an exception that says what is wrong."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+import domelight as dl
+
+ENV = dl.Environment(np.random.default_rng(3).random((6, 12, 3)))
+BSDF = dl.Bsdf.parse("ggx:0.3")
+DTYPES = [np.float16, np.float32, np.float64, np.int8, np.uint16, np.int64, ">f4", ">f8"]
+
+arrays = st.one_of(
+    hnp.arrays(
+        st.sampled_from([np.dtype(d) for d in DTYPES]),
+        hnp.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4),
+    ),
+    hnp.arrays(
+        st.sampled_from([np.dtype(d) for d in (bool, complex, "U3", "S2", object, "datetime64[s]")]),
+        hnp.array_shapes(min_dims=0, max_dims=2, min_side=0, max_side=3),
+    ),
+)
+anything = st.one_of(arrays, st.none(), st.text(max_size=3), st.integers(), st.floats(), st.just({}))
+
+# What may be raised; nothing else, and no crash.
+REFUSALS = (ValueError, TypeError, OverflowError)
+FUNCTIONS = [
+    lambda a, b: ENV.sample(a),
+    lambda a, b: ENV.radiance(a),
+    lambda a, b: ENV.pdf(a),
+    lambda a, b: ENV.uv(a),
+    lambda a, b: ENV.directions(a),
+    lambda a, b: dl.Environment(a, rotation=b),
+    lambda a, b: dl.Density(ENV, a),
+    lambda a, b: BSDF.eval(a, b),
+    lambda a, b: BSDF.sample(a, b),
+    lambda a, b: dl.Scene(a, b),
+    lambda a, b: dl.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], normals=a, colors=b),
+    lambda a, b: dl.Camera(origin=a, target=b),
+    lambda a, b: dl.metrics.compare(a, b),
+    lambda a, b: dl.metrics.flip(a, b),
+    lambda a, b: dl.tone_map(a, exposure=b),
+    lambda a, b: dl.render(dl.Scene([[0, 0, 0]], []), ENV, a, size=b),
+    lambda a, b: dl.lights(ENV, a, min_share=b),
+]
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@settings(max_examples=600, deadline=None, derandomize=True)
+@given(st.sampled_from(FUNCTIONS), anything, anything)
+def test_anything_gives_a_result_or_an_exception(function, a, b):
+    try:
+        function(a, b)
+    except REFUSALS as error:
+        assert str(error)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(hnp.arrays(np.float32, hnp.array_shapes(min_dims=1, max_dims=3, max_side=5).map(lambda s: (*s, 3)),
+                  elements=st.floats(-2, 2, width=32)), st.data())
+def test_strides_do_not_matter(wi, data):
+    expected = ENV.pdf(wi)
+    assert expected.shape == wi.shape[:-1]
+    for other in (np.asfortranarray(wi), wi.astype(np.float64), wi.astype(">f4"), wi.tolist()):
+        assert np.array_equal(ENV.pdf(other), expected)
+    backward = wi[::-1]
+    assert np.array_equal(ENV.pdf(backward), expected[::-1])
+    wide = np.zeros((*wi.shape[:-1], 6), np.float32)
+    wide[..., ::2] = wi
+    assert np.array_equal(ENV.pdf(wide[..., ::2]), expected)
+    frozen = wi.copy()
+    frozen.flags.writeable = False
+    assert np.array_equal(ENV.pdf(frozen), expected)
+    axis = data.draw(st.integers(0, wi.ndim - 1))
+    assert np.array_equal(ENV.pdf(np.broadcast_to(wi, (2, *wi.shape))), np.stack([expected] * 2)), axis
+
+
+def test_empty_arrays_give_empty_arrays():
+    nothing = np.empty((0, 3))
+    assert ENV.pdf(nothing).shape == (0,) and ENV.radiance(nothing).shape == (0, 3)
+    assert BSDF.eval(nothing, nothing).shape == (0, 3)
+    assert BSDF.eval([0, 0, 1], nothing).shape == (0, 3)
+    assert [a.shape for a in BSDF.sample(nothing, nothing)] == [(0, 3), (0, 3), (0,)]
+
+
+def test_inputs_are_not_changed(rng):
+    wi = rng.normal(size=(5, 3)).astype(np.float32)
+    before = wi.copy()
+    ENV.pdf(wi), BSDF.eval(wi, wi), dl.Scene(wi, [[0, 1, 2]], normalize=True)
+    assert np.array_equal(wi, before)
+
+
+def test_not_a_number_is_refused():
+    with pytest.raises(ValueError, match=r"wo\[0\] is NaN; it must be finite"):
+        BSDF.eval([np.nan, 0, 1], [[0, 0, 1]])
+    with pytest.raises(ValueError, match=r"wi\[1, 0\] is inf"):
+        ENV.pdf([[0, 0, 1], [np.inf, 0, 0]])
+    with pytest.raises(ValueError, match=r"vertices\[1, 2\] is NaN"):
+        dl.Scene([[0, 0, 0], [0, 0, np.nan]], [])
+
+
+def test_scenes_of_arrays(env):
+    quad = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
+    faces = [[0, 1, 2], [0, 2, 3]]
+    scene = dl.Scene(quad, faces, normals=[[0, 0, 2]] * 4, material=dl.Material("diffuse:0.8"))
+    assert scene.n_triangles == 2 and np.array_equal(scene.bounds, [[-1, -1, 0], [1, 1, 0]])
+    white = dl.Environment(np.ones((4, 8, 3)))
+    film = dl.render(scene, white, "brdf:4", spp=16, size=(16, 16), hide_env=True)
+    seen = film.alpha == 1
+    assert seen.any() and np.allclose(film.color[seen], 0.8, rtol=1e-4)
+    red = dl.Scene(quad, faces, colors=[[1, 0, 0]] * 4)
+    film = dl.render(red, white, spp=4, size=(16, 16), hide_env=True)
+    assert np.allclose(film["albedo"][seen], [1, 0, 0])
+    assert dl.Scene([], []).bounds is None
+    assert dl.Scene(np.empty((0, 3)), np.empty((0, 3), int)).n_triangles == 0
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (([[0, 0]], []), r"vertices has shape \(1, 2\)"),
+        (([[0, 0, 0]], [[0, 0, 1]]), "faces holds 1"),
+        (([[0, 0, 0]], [[0, 0, -1]]), "faces holds -1"),
+        (([[0, 0, 0]], [[0.0, 0.0, 0.0]]), "faces has dtype float64"),
+        (([[0, 0, 0]], [0, 0, 0]), r"faces has shape \(3,\)"),
+        (([[0, 0, 0]], [[0, 0, 2**70]]), "faces"),
+        (([[1e30, 0, 0], [0, 0, 0], [0, 1, 0]], [[0, 1, 2]]), "across"),
+    ],
+)
+def test_wrong_meshes_are_named(arguments, words):
+    with pytest.raises(ValueError, match=words):
+        dl.Scene(*arguments)
+
+
+@pytest.mark.parametrize(
+    "attributes, words",
+    [
+        (dict(normals=[[0, 0, 1]]), r"normals has shape \(1, 3\)"),
+        (dict(normals=[[0, 0, 0]] * 3), r"normals\[0\]"),
+        (dict(colors=[[2, 0, 0]] * 3), r"colors\[0\]"),
+        (dict(uvs=[[0, 0, 0]] * 3), "uvs has shape"),
+        (dict(material="velvet"), "velvet"),
+        (dict(up="x"), "up is"),
+    ],
+)
+def test_wrong_attributes_are_named(attributes, words):
+    with pytest.raises(ValueError, match=words):
+        dl.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], **attributes)

@@ -1,0 +1,329 @@
+"""Renders: films, interruption, progress, threads, processes."""
+
+import importlib.util
+import multiprocessing
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import domelight as dl
+
+SMALL = dict(spp=4, size=(32, 24))
+
+
+def test_films_have_all_layers(sphere, env):
+    film = dl.render(sphere, env, **SMALL)
+    assert film.shape == (24, 32) and film.complete and film.strategy == "product:8"
+    assert list(film) == film.keys() and "variance" in film and "velvet" not in film
+    for name in film:
+        values = film[name]
+        assert values.shape[:2] == (24, 32) and values.flags.c_contiguous and values.flags.writeable
+        assert values.dtype == (np.uint32 if name in ("samples", "hits") else np.float32)
+    assert np.array_equal(film.color, film["color"]) and np.array_equal(film.alpha, film["alpha"])
+    with pytest.raises(KeyError, match="velvet"):
+        film["velvet"]
+    assert 0 < film.shading_points < film.camera_rays and film.shadow_rays > 0
+    assert film.non_finite == 0
+
+
+def test_a_notebook_shows_the_picture(sphere, env, tmp_path):
+    film = dl.render(sphere, env, hide_env=True, **SMALL)
+    png = film._repr_png_()
+    assert png.startswith(b"\x89PNG") and png == film.to_png()
+    assert film.to_png(exposure=2) != png
+    assert film.alpha.min() == 0
+    film.save(tmp_path / "a.png", exposure=None)
+    assert (tmp_path / "a.png").read_bytes() == png
+    with pytest.raises(ValueError, match="must end in"):
+        film.save(tmp_path / "a.tiff")
+    with pytest.raises(ValueError, match="velvet"):
+        film.to_png(curve="velvet")
+    with pytest.raises(OSError):
+        film.save(tmp_path / "nowhere" / "a.exr")
+
+
+def test_threads_and_tiles_change_no_bit(sphere, env):
+    films = [dl.render(sphere, env, "mis", threads=t, tile_size=s, **SMALL) for t, s in [(1, 16), (3, 7)]]
+    assert films[0] == films[1]
+    assert films[0] != dl.render(sphere, env, "mis", seed=1, **SMALL)
+    product = [dl.render(sphere, env, threads=t, **SMALL) for t in (1, 2)]
+    assert product[0] == product[1]
+
+
+@pytest.mark.parametrize("strategy", ["product:4", "environment:2", "sir"])
+def test_progressive_ends_in_the_same_bits(sphere, env, strategy):
+    settings = dict(spp=24 if strategy == "sir" else 100, size=(24, 24))
+    films = list(dl.progressive(sphere, env, strategy, **settings))
+    assert films[-1] == dl.render(sphere, env, strategy, **settings)
+    assert [film.complete for film in films] == [False] * (len(films) - 1) + [True]
+    assert len(films) > 1
+    samples = [film["samples"].mean() for film in films]
+    assert samples == sorted(samples)
+
+
+def test_progressive_can_be_left_and_ends_once(sphere, env):
+    steps = dl.progressive(sphere, env, "brdf", spp=64, size=(16, 16))
+    assert steps.film is None
+    assert next(steps) == steps.film
+    del steps
+    steps = dl.progressive(sphere, env, "brdf", spp=1, size=(16, 16))
+    assert len(list(steps)) == 1 and list(steps) == []
+
+
+def test_target_error_ends_early(sphere, env):
+    film = dl.render(sphere, env, "mis", spp=4096, size=(16, 16), target_error=0.1)
+    assert film.complete and film["samples"].max() < 4096
+
+
+def test_films_are_pickled(sphere, env, tmp_path):
+    film = dl.render(sphere, env, hide_env=True, **SMALL)
+    other = pickle.loads(pickle.dumps(film))
+    assert other == film and repr(other) == repr(film)
+    for name in film:
+        assert np.array_equal(other[name], film[name])
+    assert other.to_png() == film.to_png()
+    with pytest.raises(ValueError, match="pickled film"):
+        dl.Film._restore(b"no film")
+
+
+def test_films_as_datasets(sphere, env):
+    pytest.importorskip("xarray")
+    film = dl.render(sphere, env, **SMALL)
+    data = film.to_xarray()
+    assert data["color"].dims == ("y", "x", "channel") and data["depth"].dims == ("y", "x")
+    assert np.array_equal(data["variance"].values, film["variance"])
+
+
+def test_dlpack(sphere, env):
+    film = dl.render(sphere, env, **SMALL)
+    assert np.array_equal(np.from_dlpack(film.color), film.color)
+
+    class Foreign:
+        """An array of a library that speaks DLPack alone."""
+
+        def __init__(self, array):
+            self.array = array
+
+        def __dlpack__(self, **keywords):
+            return self.array.__dlpack__(**keywords)
+
+        def __dlpack_device__(self):
+            return self.array.__dlpack_device__()
+
+    wi = np.float32([[0, 1, 0], [1, 0, 0]])
+    assert np.array_equal(env.radiance(Foreign(wi)), env.radiance(wi))
+
+
+def test_jax_arrays():
+    """In a process of its own: JAX starts threads that a later fork would miss."""
+    if importlib.util.find_spec("jax") is None:
+        pytest.skip("jax is not installed")
+    script = """if True:
+        import domelight as dl, jax, numpy as np
+        env = dl.Environment.builtin("studio", rows=16)
+        wi = jax.numpy.asarray([[0.0, 1.0, 0.0]])
+        assert np.array_equal(env.radiance(wi), env.radiance(np.asarray(wi)))
+        assert np.array_equal(np.asarray(jax.dlpack.from_dlpack(env.map)), env.map)
+    """
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_cameras(sphere, env):
+    own = sphere.camera(4 / 3)
+    same = dl.render(sphere, env, camera=own, **SMALL)
+    assert same == dl.render(sphere, env, **SMALL)
+    assert own.fov == 40 or own.fov > 0
+    away = dl.Camera(origin=(0, 0, 50))
+    assert dl.render(sphere, env, camera=away, **SMALL)["hits"].sum() < same["hits"].sum()
+    ortho = dl.render(sphere, env, camera=dl.Camera(ortho=2), **SMALL)
+    assert ortho["hits"].mean() > 0.4
+    for camera, words in [
+        (dl.Camera(fov=180), "180"),
+        (dl.Camera(origin=(0, 0, 0), target=(0, 0, 0)), "same point"),
+        (dl.Camera(up=(0, 0, 0)), "up"),
+        (dl.Camera(origin=(0, np.nan, 0)), "origin"),
+        (7, "no camera 7"),
+        ("front", 'no camera "front"'),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            dl.render(sphere, env, camera=camera, **SMALL)
+    with pytest.raises(ValueError, match="both"):
+        dl.Camera(fov=30, ortho=2)
+    with pytest.raises(ValueError, match=r"origin has shape \(2,\)"):
+        dl.Camera(origin=(0, 1))
+
+
+@pytest.mark.parametrize(
+    "wrong, words",
+    [
+        (dict(spp=0), "spp is 0"),
+        (dict(size=(0, 4)), r"size is \(0, 4\)"),
+        (dict(size=(-3, 4)), r"size is \(-3, 4\)"),
+        (dict(size=(1 << 40, 1 << 40)), "size is"),
+        (dict(threads=0), "threads is 0"),
+        (dict(filter="velvet"), "velvet"),
+        (dict(sampler="velvet"), "velvet"),
+        (dict(strategy="velvet"), "velvet"),
+        (dict(strategy=7), "strategy is 7"),
+        (dict(strategy="brdf:65536", spp=1 << 24), "more points"),
+        (dict(target_error=-1), "target_error is -1"),
+        (dict(tile_size=0), "tile_size is 0"),
+    ],
+)
+def test_wrong_settings_are_named(sphere, env, wrong, words):
+    with pytest.raises(ValueError, match=words):
+        dl.render(sphere, env, **{**SMALL, **wrong})
+    with pytest.raises(ValueError, match=words):
+        dl.progressive(sphere, env, **{**SMALL, **wrong})
+
+
+def interrupt_after(seconds):
+    timer = threading.Timer(seconds, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    return time.monotonic() + seconds
+
+
+@pytest.mark.parametrize("strategy", ["product", "mis", "python"])
+def test_interruption_keeps_what_was_done(sphere, env, strategy):
+    if strategy == "python":
+        strategy = dl.strategies.Environment(env)
+    delays = []
+    for _ in range(3):
+        at = interrupt_after(0.3)
+        with pytest.raises(dl.RenderInterrupted) as stopped:
+            dl.render(sphere, env, strategy, spp=1 << 20, size=(64, 64), tile_size=16)
+        delays.append(time.monotonic() - at)
+    # The least, for other programs may be at work.
+    assert min(delays) < 0.2, delays
+    film = stopped.value.film
+    assert not film.complete and film.camera_rays > 0 and np.isfinite(film.color).all()
+    assert isinstance(stopped.value, KeyboardInterrupt)
+
+
+def test_progressive_goes_on_after_an_interruption(sphere, env):
+    settings = dict(spp=512, size=(96, 96))
+    steps = dl.progressive(sphere, env, "mis", **settings)
+    interrupt_after(0.3)
+    with pytest.raises(dl.RenderInterrupted) as stopped:
+        for _ in steps:
+            pass
+    assert not stopped.value.film.complete
+    for film in steps:
+        pass
+    assert film.complete and film == dl.render(sphere, env, "mis", **settings)
+
+
+def test_other_threads_run_meanwhile(sphere, env):
+    ticks = []
+    stop = threading.Event()
+
+    def tick():
+        while not stop.wait(0.005):
+            ticks.append(time.monotonic())
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    dl.render(sphere, env, "mis:4:4", spp=256, size=(128, 128), threads=1)
+    stop.set()
+    thread.join()
+    assert len(ticks) > 10
+
+
+def test_renders_at_the_same_time(sphere, env):
+    results = {}
+
+    def work(seed):
+        results[seed] = dl.render(sphere, env, dl.strategies.Brdf(env), seed=seed, **SMALL)
+
+    threads = [threading.Thread(target=work, args=(seed,)) for seed in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    for seed, film in results.items():
+        assert film == dl.render(sphere, env, "brdf", seed=seed, **SMALL)
+
+
+def test_progress_is_reported(sphere, env):
+    shares = []
+    dl.render(sphere, env, "mis", spp=512, size=(96, 96), progress=shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0
+    dl.render(sphere, env, progress=True, **SMALL)
+
+    def broken(share):
+        raise LookupError("no more")
+
+    with pytest.raises(LookupError, match="no more"):
+        dl.render(sphere, env, "mis", spp=1 << 16, size=(64, 64), progress=broken)
+
+
+def _render_in_a_child(queue):
+    sphere = dl.Scene.builtin("sphere")
+    env = dl.Environment.builtin("studio", rows=64)
+    queue.put(dl.render(sphere, env, **SMALL))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_forked_processes_render(sphere, env):
+    film = dl.render(sphere, env, **SMALL)
+    steps = dl.progressive(sphere, env, **SMALL)
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    child = context.Process(target=_render_in_a_child, args=(queue,))
+    child.start()
+    assert queue.get(timeout=60) == film
+    child.join(60)
+    assert child.exitcode == 0
+    # A render that was begun before the fork is refused, not waited for.
+    pid = os.fork()
+    if pid == 0:
+        try:
+            next(steps)
+        except RuntimeError:
+            os._exit(7)
+        os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 7
+    assert next(steps) is not None
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="no /proc here")
+def test_memory_is_given_back():
+    """200 renders, with what they need made anew each time."""
+    script = textwrap.dedent(
+        """
+        import domelight as dl, numpy as np, os
+        def rss():
+            with open("/proc/self/statm") as file:
+                return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+        def once(i):
+            scene = dl.Scene.builtin("sphere")
+            env = dl.Environment(1 + np.random.default_rng(i).random((32, 64, 3)))
+            film = dl.render(scene, env, ["product", "mis", dl.strategies.Brdf(env)][i % 3], spp=1, size=(32, 32))
+            film.color, film["depth"], film.to_png(), dl.lights(env, 8)
+            next(dl.progressive(scene, env, spp=2, size=(16, 16)))
+        for i in range(50):
+            once(i)
+        before = rss()
+        for i in range(200):
+            once(i)
+        print((rss() - before) / 2**20)
+        """
+    )
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert float(found.stdout) < 8, f"{found.stdout} MiB more after 200 renders"
+
+
+def test_import_is_quick():
+    """No more than 30 ms beyond NumPy's, the best of several tries."""
+    script = "import time, numpy, numpy.typing; t = time.perf_counter(); import domelight; print(time.perf_counter() - t)"
+    run = lambda: float(subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout)
+    assert min(run() for _ in range(5)) < 0.03
