@@ -38,12 +38,11 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     for strategy in &arguments.strategies {
         comparison.add_named(strategy.clone())?;
     }
-    let reference = match given {
-        Some(reference) => reference,
-        None => {
-            let cache = cache(arguments.no_cache, arguments.cache.as_deref(), host);
-            comparison.reference(cache.as_ref(), host)?
-        }
+    let reference = if let Some(reference) = given {
+        reference
+    } else {
+        let cache = cache(arguments.no_cache, arguments.cache.as_deref(), host);
+        comparison.reference(cache.as_ref(), host)?
     };
     let result = comparison.run(&reference, host)?;
     write(arguments, &result)?;

@@ -242,14 +242,14 @@ impl Embree {
             .map_err(|error| usage(format!("this is not Embree 4 ({error})")))?;
         // SAFETY: the configuration is a C string.
         let device = unsafe { (functions.rtcNewDevice)(c"threads=1".as_ptr()) };
-        if !(!device.is_null()) {
-            return Err(Error::Failed(format!("Embree makes no device")));
+        if device.is_null() {
+            return Err(Error::Failed("Embree makes no device".into()));
         }
         let embree = Self { functions, device, _library: ManuallyDrop::new(library) };
         let [major, minor, patch] = embree.version();
         if major != 4 {
             let why = format!("this is Embree {major}.{minor}.{patch}, and 4 is needed");
-            return Err(usage(why).into());
+            return Err(usage(why));
         }
         // SAFETY: the device lives; the function touches nothing but a static number.
         unsafe {
@@ -283,8 +283,8 @@ impl Embree {
                 |kind, format, len| (f.rtcSetNewGeometryBuffer)(geometry, kind, 0, format, 12, len);
             let triangles = buffer(INDEX, UINT3, mesh.triangles.len()).cast::<[u32; 3]>();
             let positions = buffer(VERTEX, FLOAT3, mesh.positions.len()).cast::<Vec3>();
-            if !(!triangles.is_null() && !positions.is_null()) {
-                return Err(Error::Failed(format!("Embree takes no such mesh")));
+            if triangles.is_null() || positions.is_null() {
+                return Err(Error::Failed("Embree takes no such mesh".into()));
             }
             triangles.copy_from_nonoverlapping(mesh.triangles.as_ptr(), mesh.triangles.len());
             positions.copy_from_nonoverlapping(mesh.positions.as_ptr(), mesh.positions.len());
@@ -335,7 +335,7 @@ impl<'a> Committed<'a> {
         };
         let bytes = BYTES.load(Ordering::Relaxed).wrapping_sub(before) as usize;
         let committed = Self { embree: mesh.embree, scene, bytes };
-        if !(error == 0) {
+        if error != 0 {
             return Err(Error::Failed(format!("Embree fails to build its tree: error {error}")));
         }
         Ok(committed)

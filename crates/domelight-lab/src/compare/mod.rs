@@ -13,7 +13,7 @@ use domelight::picture::flip::{PIXELS_PER_DEGREE, ldr_flip};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::quote::{Code, Html};
 use domelight::render::RenderSettings;
-use domelight::strategy::{PreparedStrategy, Strategy, StrategyKind};
+use domelight::strategy::{PreparedStrategy, Strategy, StrategyKind, StrategySpec};
 
 pub use budget::{BadBudget, Budget};
 pub use report::{CompareReport, ResultReport, StrategyReport};
@@ -228,8 +228,9 @@ impl<'a> Comparison<'a> {
         };
         let mut report = StrategyReport {
             name: competitor.name().to_owned(),
-            settings: spec.map_or("a strategy of the caller's".to_owned(), |s| s.description()),
-            unbiased: spec.is_none_or(|spec| spec.is_unbiased()),
+            settings: spec
+                .map_or("a strategy of the caller's".to_owned(), StrategySpec::description),
+            unbiased: spec.is_none_or(StrategySpec::is_unbiased),
             setup_seconds: setup.cpu.unwrap_or(setup.wall),
             left_out: None,
             result: None,

@@ -93,16 +93,19 @@ impl Style {
     }
 
     /// A line around it.
+    #[must_use]
     pub fn outlined(self, color: Color, width: f64) -> Self {
         Self { stroke: Some((color, width)), ..self }
     }
 
     /// The line in dashes of this length.
+    #[must_use]
     pub fn dashed(self, length: f64) -> Self {
         Self { dash: Some(length), ..self }
     }
 
     /// Half seen through, and so on; 1 is opaque.
+    #[must_use]
     pub fn opacity(self, opacity: f64) -> Self {
         Self { opacity: Some(opacity), ..self }
     }
@@ -159,26 +162,31 @@ impl TextStyle {
     }
 
     /// In that color.
+    #[must_use]
     pub fn color(self, color: Color) -> Self {
         Self { color, ..self }
     }
 
     /// Placed by that point.
+    #[must_use]
     pub fn anchor(self, anchor: Anchor) -> Self {
         Self { anchor, ..self }
     }
 
     /// With strong strokes.
+    #[must_use]
     pub fn bold(self) -> Self {
         Self { bold: true, ..self }
     }
 
     /// Turned clockwise about its place \[degrees\].
+    #[must_use]
     pub fn rotated(self, degrees: f64) -> Self {
         Self { rotation: degrees, ..self }
     }
 
     /// With a white rim, to be read on a picture.
+    #[must_use]
     pub fn halo(self) -> Self {
         Self { halo: true, ..self }
     }

@@ -118,14 +118,22 @@ impl Decomposition {
     ) -> Self {
         let means = Means::of(samples, replicates);
         let mut shares = means.between(regions.sources());
-        shares.extend(within(samples, replicates, &means, regions.sources()));
+        for Share { cause, share } in within(samples, replicates, &means, regions.sources()) {
+            // What is known without rays differs between camera samples and between passes.
+            match shares.iter_mut().find(|other| other.cause == cause) {
+                Some(other) => other.share += share,
+                None => shares.push(Share { cause, share }),
+            }
+        }
         add_missed(&mut shares, replicates, regions.sources(), light, samples.len());
         let variance: f64 = shares.iter().map(|share| share.share).sum();
         if variance <= ROUNDING * means.mean * means.mean {
             shares.clear();
         }
         shares.retain(|share| share.share != 0.0);
-        shares.iter_mut().for_each(|share| share.share /= variance);
+        for share in &mut shares {
+            share.share /= variance;
+        }
         shares.sort_by(|a, b| b.share.total_cmp(&a.share));
         Self {
             name: name.to_owned(),
@@ -179,9 +187,9 @@ struct Means {
 
 impl Means {
     fn of(samples: &[CameraSample], replicates: &Replicates) -> Self {
-        let &Replicates { n_points, n_parts, n_replicates, .. } = replicates;
-        let n = n_replicates as f64;
-        let mean_of = |value: &dyn Fn(usize) -> f64| (0..n_replicates).map(value).sum::<f64>() / n;
+        let &Replicates { n_points, n_parts, n_passes, .. } = replicates;
+        let n = n_passes as f64;
+        let mean_of = |value: &dyn Fn(usize) -> f64| (0..n_passes).map(value).sum::<f64>() / n;
         let of_hits = |value: &dyn Fn(usize, usize, usize) -> f64| -> Vec<Vec<f64>> {
             let of_part = |i, part| mean_of(&|k| value(k, i, part));
             (0..n_points).map(|i| (0..n_parts).map(|part| of_part(i, part)).collect()).collect()
@@ -195,7 +203,7 @@ impl Means {
         let visible = visible.collect();
         let (mut seen_noise, mut unoccluded_noise) = (vec![0.0; n_parts], vec![0.0; n_parts]);
         for i in 0..n_points {
-            let sums: Vec<f64> = (0..n_replicates)
+            let sums: Vec<f64> = (0..n_passes)
                 .map(|k| (0..n_parts).map(|part| replicates.seen(k, i, part)).sum())
                 .collect();
             for part in 0..n_parts {
@@ -299,7 +307,7 @@ fn within(
     means: &Means,
     sources: &[Source],
 ) -> Vec<Share> {
-    let &Replicates { n_parts, n_replicates, .. } = replicates;
+    let &Replicates { n_parts, n_passes, .. } = replicates;
     let n = SAMPLES_PER_PIXEL as f64;
     let (mut seen, mut shape) = (vec![0.0; n_parts], vec![0.0; n_parts]);
     let mut next = 0;
@@ -312,7 +320,7 @@ fn within(
         };
         let part_of = |k, part| mean_of(k, &|k, i| replicates.seen(k, i, part));
         let sums: Vec<f64> =
-            (0..n_replicates).map(|k| (0..n_parts).map(|part| part_of(k, part)).sum()).collect();
+            (0..n_passes).map(|k| (0..n_parts).map(|part| part_of(k, part)).sum()).collect();
         for part in 0..n_parts {
             let visible = |i: usize| ratio(means.seen[i][part], means.unoccluded[i][part]);
             seen[part] += covariance(&sums, |k| part_of(k, part));
@@ -347,7 +355,7 @@ fn add_missed(
     n_samples: usize,
 ) {
     let found = replicates.light_by_source(n_samples);
-    let n = (replicates.n_replicates * n_samples) as f64;
+    let n = (replicates.n_passes * n_samples) as f64;
     let all: f64 = light.iter().sum();
     for (part, (&there, &found)) in light.iter().zip(&found).enumerate() {
         /// Less is not worth a word.

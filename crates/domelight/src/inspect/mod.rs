@@ -256,7 +256,9 @@ impl<'a> Inspector<'a> {
 
     fn trace(&self, point: &ShadingPoint, wi: &[Vec3]) -> Vec<f32> {
         let mut rays = RayBatch::default();
-        wi.iter().for_each(|&wi| self.push_ray(point, wi, &mut rays));
+        for &wi in wi {
+            self.push_ray(point, wi, &mut rays);
+        }
         self.trace_batch(&rays)
     }
 

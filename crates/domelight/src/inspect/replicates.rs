@@ -11,7 +11,7 @@ use crate::sampling::rng::hash2;
 use crate::strategy::{Contributions, Estimator, PixelPoints, ShadingPoint, Strategy, TileShading};
 
 /// How often each camera sample is estimated.
-const N_REPLICATES: usize = 64;
+const N_PASSES: usize = 64;
 
 /// The camera samples stand for a tile of pixels like this one, so that strategies that learn from neighbors do.
 pub(super) const TILE_WIDTH: usize = 4;
@@ -27,7 +27,7 @@ pub(super) struct Replicates {
     pub(super) n_points: usize,
     /// Sources, and at last what needs no ray.
     pub(super) n_parts: usize,
-    pub(super) n_replicates: usize,
+    pub(super) n_passes: usize,
     /// Luminance with visibility, by replicate, point and part.
     seen: Vec<f64>,
     /// The same with all rays free.
@@ -51,11 +51,11 @@ impl Replicates {
         let points: Vec<ShadingPoint> = samples.iter().filter_map(|sample| sample.point).collect();
         let n_sources = regions.sources().len();
         let n_parts = n_sources + 1;
-        let n_values = N_REPLICATES * points.len() * n_parts;
+        let n_values = N_PASSES * points.len() * n_parts;
         let mut replicates = Self {
             n_points: points.len(),
             n_parts,
-            n_replicates: N_REPLICATES,
+            n_passes: N_PASSES,
             seen: vec![0.0; n_values],
             unoccluded: vec![0.0; n_values],
             rays: vec![0; n_sources],
@@ -64,7 +64,7 @@ impl Replicates {
         let (numbers, ranges) = pixels(samples);
         let unit = strategy.unit();
         let mut estimator = Estimator::new(strategy);
-        for k in 0..N_REPLICATES {
+        for k in 0..N_PASSES {
             let seed = hash2(settings.seed ^ SEED, k as u64);
             let pass = Sampler::for_pass(settings.sampler, seed, 0);
             let pass = strategy.begin_pass(pass, SAMPLES_PER_PIXEL as u32);
@@ -120,8 +120,8 @@ impl Replicates {
 
     /// Mean over `n_samples` camera samples, hits and misses, of what each source adds.
     pub(super) fn light_by_source(&self, n_samples: usize) -> Vec<f64> {
-        let n = (self.n_replicates * n_samples) as f64;
-        let n_rows = self.n_replicates * self.n_points;
+        let n = (self.n_passes * n_samples) as f64;
+        let n_rows = self.n_passes * self.n_points;
         let of_source = |part: usize| -> f64 {
             (0..n_rows).map(|row| self.seen[row * self.n_parts + part]).sum::<f64>() / n
         };
@@ -130,7 +130,7 @@ impl Replicates {
 
     /// Rays of a camera sample, hits and misses.
     pub(super) fn rays_per_sample(&self) -> f64 {
-        self.rays.iter().sum::<u64>() as f64 / (self.n_replicates * N_SAMPLES) as f64
+        self.rays.iter().sum::<u64>() as f64 / (self.n_passes * N_SAMPLES) as f64
     }
 }
 
@@ -159,7 +159,7 @@ pub(super) fn rays_of_one_point<S: Strategy>(
     let unit = strategy.unit() as f32;
     let mut estimator = Estimator::new(strategy);
     let mut found = Vec::new();
-    for k in 0..4 * N_REPLICATES as u64 {
+    for k in 0..4 * N_PASSES as u64 {
         let seed = hash2(settings.seed ^ !SEED, k);
         let pass = Sampler::for_pass(settings.sampler, seed, 0);
         let pass = strategy.begin_pass(pass, SAMPLES_PER_PIXEL as u32);
