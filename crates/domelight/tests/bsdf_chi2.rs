@@ -25,6 +25,7 @@ const WIDE: Chi2 = Chi2 {
     min_expected: 5.0,
     seed: 100,
     suite: Suite { tests: SUITE, significance: 0.01 },
+    save_tables: true,
 };
 
 /// Runs the χ² test of a lobe at all angles.
