@@ -153,6 +153,7 @@ def test_not_a_number_is_counted(sphere, env):
     assert film.non_finite > 0 and np.isfinite(film.color).all()
 
 
+@pytest.mark.timing
 def test_a_strategy_in_python_is_fast_enough(sphere, env):
     """At least a quarter of the built-in rate of shadow rays, at tiles of 64 x 64."""
     settings = dict(spp=16, size=(256, 256), hide_env=True)
