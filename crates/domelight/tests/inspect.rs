@@ -184,6 +184,22 @@ fn a_small_sun() {
 }
 
 #[test]
+fn a_sun_that_no_ray_finds() {
+    // Of 16 384 estimates none meets so small a texel: what was not found must not count as quiet.
+    let image = RgbImage::from_fn(16_384, 8, |x, y| {
+        Rgb::splat(if (x, y) == (3000, 2) { 1e6 } else { 0.1 })
+    });
+    let sun = Environment::new(image, Orientation::default(), 1.0).unwrap();
+    let pixel = Pixel::new(vec![card([-9.0, 9.0], 0.0, 9.0)], "diffuse:0.5", 0.01, sun);
+    let found = pixel.inspect(0, &["brdf", "environment"]);
+    assert!(found[0].mean < 0.5 * found[1].mean, "{found:?}");
+    assert!(found[0].variance > 100.0 * found[1].variance, "{found:?}");
+    let text = found[0].diagnosis().to_string();
+    assert!(text.contains("hardly any of the rays go to"), "{text}");
+    assert!(matches!(advice(&found), Advice::Strategy { name, .. } if name == "environment"));
+}
+
+#[test]
 fn constant_light() {
     let pixel = Pixel::new(vec![card([-9.0, 9.0], 0.0, 9.0)], "diffuse:0.5", 0.01, constant());
     let found = pixel.inspect(0, &["brdf"]);

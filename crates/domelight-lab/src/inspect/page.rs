@@ -86,7 +86,7 @@ fn causes(report: &InspectionReport) -> Code<Html> {
                 cause = html::text(&cause.to_string()),
                 class = if cause.is_between_samples() { " class=\"between\"" } else { "" },
                 width = (100.0 * share.clamp(0.0, 1.0)).round(),
-                share = number(format!("{:.1}", 100.0 * share)),
+                share = number(format!("{:.1}", (1000.0 * share).round() / 10.0 + 0.0)),
             );
         }
         all += code!(

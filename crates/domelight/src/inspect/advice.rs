@@ -42,7 +42,8 @@ impl fmt::Display for Diagnosis<'_> {
             }
             Cause::Directions(kind) => {
                 let (rays, light) = of(kind).map_or((0.0, 0.0), |s| (s.rays, s.light));
-                let (rays, light) = (percent(rays), percent(light));
+                let rays = if rays < 5e-4 { "hardly any".to_owned() } else { percent(rays) };
+                let light = percent(light);
                 write!(f, "{rays} of the rays go to {kind}, which gives {light} of the light")
             }
             Cause::Penumbra(kind) => {
