@@ -116,8 +116,11 @@ fn table(report: &InspectionReport) -> Code<Html> {
             rays = number(format!("{:.2}", d.rays_per_sample)),
             best = if *variance_per_ray <= least { " class=\"best\"" } else { "" },
             per_ray = number(format!("{variance_per_ray:.2e}")),
-            ratio =
-                number(if ratio.is_finite() { format!("{ratio:.1}") } else { "–".to_owned() }),
+            ratio = number(match ratio {
+                _ if !ratio.is_finite() => "–".to_owned(),
+                ..1000.0 => format!("{ratio:.1}"),
+                _ => format!("{ratio:.1e}"),
+            }),
         );
     }
     code!(
