@@ -121,6 +121,7 @@ impl Job {
             n_samples: spp,
             adaptive,
             target_error,
+            passes: domelight::render::Passes::default(),
             seed: keywords.seed,
             filter,
             sampler,
