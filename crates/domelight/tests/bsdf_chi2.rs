@@ -12,7 +12,7 @@ use testkit::{Chi2, Suite};
 const ANGLES: [f32; 5] = [0.0, 30.0, 60.0, 75.0, 85.0];
 
 /// More than the tests of this file, which share one probability of a false alarm.
-const SUITE: usize = 150;
+const SUITE: usize = 200;
 
 /// How closely the cells look: rings and sectors about the mirror direction, where narrow lobes have
 /// their peak.
@@ -89,6 +89,18 @@ fn metallic_roughness() {
         let lobe = MetallicRoughness::new(base, metallic, roughness);
         check(&format!("metallic {metallic} rough {roughness}"), &lobe);
     }
+}
+
+#[test]
+fn metallic_roughness_with_extensions() {
+    let base = Rgb::new(0.9, 0.5, 0.2);
+    for (strength, f0) in [(0.0, 0.04), (0.5, 0.3), (1.0, 0.0)] {
+        let f0 = Rgb::new(f0, 2.0 * f0, 0.0);
+        let lobe = MetallicRoughness::with_specular(base, 0.0, 0.4, f0, strength);
+        check(&format!("strength {strength} f0 {f0:?}"), &lobe);
+    }
+    let brushed = MetallicRoughness::new(base, 0.5, 0.3).anisotropic(0.7);
+    check("anisotropic", &brushed);
 }
 
 /// Rings of two thousandths of a radian resolve lobes a few of them wide.

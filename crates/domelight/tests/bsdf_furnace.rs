@@ -36,7 +36,11 @@ fn bounded_lobes() -> Vec<(String, Lobe)> {
     }
     let gold = Fresnel::Conductor(Conductor::GOLD);
     lobes.push(("gold".into(), Ggx::new([0.2; 2], gold, Masking::Correlated).into()));
-    lobes.push(("metal".into(), MetallicRoughness::new(Rgb::WHITE, 1.0, 0.5).into()));
+    let metal = MetallicRoughness::new(Rgb::WHITE, 1.0, 0.5);
+    lobes.push(("metal".into(), metal.into()));
+    lobes.push(("brushed metal".into(), metal.anisotropic(0.8).into()));
+    let matte = MetallicRoughness::with_specular(Rgb::WHITE, 0.0, 0.4, Rgb::WHITE, 0.0);
+    lobes.push(("matte".into(), matte.into()));
     lobes
 }
 
@@ -104,6 +108,9 @@ fn lobes_that_gain_energy_agree_with_quadrature() {
     for (metallic, roughness) in [(0.0, 0.3), (0.0, 1.0), (0.5, 0.5)] {
         let lobe = MetallicRoughness::new(Rgb::new(1.0, 0.5, 0.1), metallic, roughness);
         lobes.push((format!("metallic {metallic} rough {roughness}"), lobe.into()));
+        let f0 = Rgb::new(0.5, 0.1, 0.0);
+        let colored = MetallicRoughness::with_specular(Rgb::WHITE, metallic, roughness, f0, 0.7);
+        lobes.push((format!("metallic {metallic} rough {roughness} colored"), colored.into()));
     }
     for (name, lobe) in lobes {
         for degrees in ANGLES {

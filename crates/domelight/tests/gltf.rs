@@ -7,11 +7,14 @@ use std::path::PathBuf;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use domelight::Rgb;
+use domelight::bsdf::{Brdf, Bsdf, MetallicRoughness};
+use domelight::geometry::Ray;
 use domelight::math::{Vec2, Vec3, vec2, vec3};
 use domelight::scene::{
     AlphaMode, AnimationTime, Coverage, LoadOptions, Loaded, Material, MaterialModel, Scene,
     TextureFilter, Wrap, load_with,
 };
+use domelight::strategy::ShadingPoint;
 use tempfile::TempDir;
 
 /// Bytes that accessors look into: a triangle's positions, and three times two, four and one number.
@@ -190,6 +193,46 @@ fn extensions_of_materials_are_kept_and_named_once_if_not_drawn() {
     let (material, loaded) = self::material(plain, &[]);
     assert_eq!(material.undrawn_features().count(), 0);
     assert!(loaded.warnings.is_empty());
+}
+
+/// The point of the triangle of [`document`] that a viewer sees at 60°, with its material. Its vertices are (1, ½, ¼).
+fn shaded(bsdf: &str, images: &[String]) -> ShadingPoint {
+    let (_, loaded) = material(bsdf, images);
+    let scene = Scene::new(loaded.description).unwrap();
+    let ray = Ray::new(vec3(0.25 + 3f32.sqrt(), 0.25, 1.0), vec3(-3f32.sqrt(), 0.0, -1.0) / 2.0);
+    let hit = scene.bvh().closest_hit(&ray).expect("the triangle");
+    scene.shading_point(&ray, &hit)
+}
+
+const VERTEX_COLOR: Rgb = Rgb::new(1.0, 0.5, 0.25);
+
+/// A BSDF looks like another from the viewer's side; 8-bit textures leave a little room.
+fn assert_alike(point: &ShadingPoint, expected: &Bsdf) {
+    assert_eq!(point.bsdf.lobes().count(), expected.lobes().count());
+    for (x, y) in [(0.0, 0.0), (-0.5, 0.3), (0.2, -0.7), (0.6, 0.1), (-0.8, -0.1)] {
+        let wi = vec3(x, y, (1.0 - x * x - y * y as f32).sqrt());
+        let (value, expected) = (point.bsdf.eval(point.wo, wi), expected.eval(point.wo, wi));
+        let difference = (value - expected).map(f32::abs).max_component();
+        assert!(difference < 1e-3 * expected.max_component(), "{wi}: {value:?} {expected:?}");
+    }
+}
+
+#[test]
+fn specular_strength_and_color_are_drawn() {
+    let bsdf = r#"{"pbrMetallicRoughness":{"metallicFactor":0.25,"roughnessFactor":0.5},"extensions":{
+"KHR_materials_ior":{"ior":2},"KHR_materials_specular":{"specularFactor":0.8,"specularTexture":{"index":0},
+"specularColorFactor":[3,2,1],"specularColorTexture":{"index":1}}}}"#;
+    let images = [png([0, 0, 0, 51]), png([255, 255, 0, 255])];
+    let (read, loaded) = material(bsdf, &images);
+    let specular = read.layers.specular.unwrap();
+    assert_eq!((specular.strength.value, specular.color.value), (0.8, Rgb::new(3.0, 2.0, 1.0)));
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    let f0 = Rgb::new(3.0, 2.0, 0.0) / 9.0;
+    let lobe = MetallicRoughness::with_specular(VERTEX_COLOR, 0.25, 0.5, f0, 0.8 * 0.2);
+    assert_alike(&shaded(bsdf, &images), &Bsdf::single(lobe));
+    let ordinary = MetallicRoughness::with_dielectric(VERTEX_COLOR, 0.25, 0.5, 1.0 / 9.0);
+    let bsdf = bsdf.replace("KHR_materials_specular", "none");
+    assert_alike(&shaded(&bsdf, &images), &Bsdf::single(ordinary));
 }
 
 #[test]

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use testkit::{Suite, ZTest};
 
 /// Smooth and narrow, black and white, metal and dielectric.
-const LOBES: [(&str, Width); 17] = [
+const LOBES: [(&str, Width); 20] = [
     ("diffuse:1", Width::Wide),
     ("diffuse:0", Width::Wide),
     ("phong:0:1:0", Width::Wide),
@@ -35,6 +35,9 @@ const LOBES: [(&str, Width); 17] = [
     ("gltf:1,1,1:0:0", Width::Narrow),
     ("gltf:1,1,1:0:0.14", Width::Narrow),
     ("gltf:1,0,0.5:0.5:1", Width::Wide),
+    ("gltf:1:0:0:0", Width::Wide),
+    ("gltf:1,0.5,0:0.2:0.14:0.5:1,0.2,0", Width::Narrow),
+    ("gltf:1:0.5:0.1:1:1:1", Width::Narrow),
 ];
 
 /// Whether samples of the environment alone find the lobe.

@@ -56,7 +56,8 @@ impl Bsdf {
             Lobe::Ward(l) => l.alpha()[0] == l.alpha()[1],
             Lobe::Ggx(l) => l.alpha()[0] == l.alpha()[1],
             Lobe::Beckmann(l) => l.alpha()[0] == l.alpha()[1],
-            Lobe::Lambert(_) | Lobe::Phong(_) | Lobe::MetallicRoughness(_) => true,
+            Lobe::MetallicRoughness(l) => l.alpha()[0] == l.alpha()[1],
+            Lobe::Lambert(_) | Lobe::Phong(_) => true,
             Lobe::Custom(_) => false,
         })
     }
@@ -94,8 +95,10 @@ impl Bsdf {
                 Lobe::MetallicRoughness(l) => {
                     let specular = l.specular_share(wo.z);
                     diffuse += albedo * (1.0 - specular);
-                    let alpha = l.alpha();
-                    add(albedo * specular, GlossyLobe::Slopes { alpha, gaussian: false });
+                    if specular > 0.0 {
+                        let alpha = l.alpha();
+                        add(albedo * specular, GlossyLobe::Slopes { alpha, gaussian: false });
+                    }
                 }
             }
         }

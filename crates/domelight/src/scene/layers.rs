@@ -3,7 +3,7 @@
 //! A loader fills these in whole; [`Material::undrawn_features`](super::Material::undrawn_features) says
 //! which of them a picture lacks. Where a number has a texture, the two are multiplied.
 
-use super::texture::TextureRef;
+use super::texture::{Texture, TextureRef, Uvs};
 use crate::Rgb;
 use crate::math::sqr;
 
@@ -64,6 +64,29 @@ pub struct ColorFactor {
     pub value: Rgb,
     /// The texture, in sRGB.
     pub texture: Option<TextureRef>,
+}
+
+/// A channel of a texture that holds a number.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Channel {
+    Alpha,
+}
+
+impl Factor {
+    /// The number times that of the texture at texture coordinates `uvs`.
+    pub(super) fn at(&self, channel: Channel, textures: &[Texture], uvs: &Uvs) -> f32 {
+        let of_texture = |texture: &TextureRef| match channel {
+            Channel::Alpha => texture.alpha_at(textures, uvs),
+        };
+        self.value * self.texture.as_ref().map_or(1.0, of_texture)
+    }
+}
+
+impl ColorFactor {
+    /// The color times that of the texture at texture coordinates `uvs`.
+    pub(super) fn at(&self, textures: &[Texture], uvs: &Uvs) -> Rgb {
+        self.value * self.texture.as_ref().map_or(Rgb::WHITE, |texture| texture.at(textures, uvs))
+    }
 }
 
 /// What lies on, in and behind the metallic-roughness layer; nothing by default.

@@ -3,7 +3,7 @@
 //! A [`Material`] becomes a [`Bsdf`], a sum of reflectance lobes, at each hit:
 //! textures are looked up there and vertex colors multiplied in.
 
-use super::layers::{Coverage, Emission, Layers};
+use super::layers::{Channel, Coverage, Emission, Layers};
 use super::texture::{Texture, TextureRef, Uvs};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Lambert, MetallicRoughness, Phong};
@@ -123,10 +123,9 @@ impl Material {
 
     /// What of this surface a picture lacks, in glTF's terms; whoever draws a feature deletes its line.
     pub fn undrawn_features(&self) -> impl Iterator<Item = &'static str> {
-        let Layers { ior: _, specular, clearcoat, sheen, anisotropy, transmission, volume } =
+        let Layers { ior: _, specular: _, clearcoat, sheen, anisotropy, transmission, volume } =
             &self.layers;
         [
-            (specular.is_some(), "KHR_materials_specular"),
             (clearcoat.is_some(), "KHR_materials_clearcoat"),
             (sheen.is_some(), "KHR_materials_sheen"),
             (anisotropy.is_some(), "KHR_materials_anisotropy"),
@@ -142,7 +141,6 @@ impl Material {
         self.shading_textures()
             .chain(&self.coverage.texture)
             .chain(self.emission.iter().filter_map(|e| e.texture.as_ref()))
-            .chain(self.layers.textures())
     }
 
     /// The textures that its material depends on.
@@ -158,7 +156,8 @@ impl Material {
                 [s.diffuse_texture.as_ref(), s.specular_glossiness_texture.as_ref()]
             }
         };
-        of_model.into_iter().flatten().chain(self.normal_map.as_ref().map(|n| &n.texture))
+        let of_model = of_model.into_iter().flatten();
+        of_model.chain(self.normal_map.as_ref().map(|n| &n.texture)).chain(self.layers.textures())
     }
 
     /// Whether it matters which way the tangent points.
@@ -233,7 +232,14 @@ impl Material {
                 let factors = look_up(&m.metallic_roughness_texture);
                 let (metallic, roughness) = (m.metallic * factors.b, m.roughness * factors.g);
                 let f0 = self.layers.dielectric_f0();
-                let lobe = MetallicRoughness::with_dielectric(base, metallic, roughness, f0);
+                let lobe = match &self.layers.specular {
+                    None => MetallicRoughness::with_dielectric(base, metallic, roughness, f0),
+                    Some(specular) => {
+                        let f0 = specular.color.at(textures, uvs) * f0;
+                        let strength = specular.strength.at(Channel::Alpha, textures, uvs);
+                        MetallicRoughness::with_specular(base, metallic, roughness, f0, strength)
+                    }
+                };
                 *bsdf = Bsdf::single(lobe);
             }
             MaterialModel::SpecularGlossiness(s) => {

@@ -11,7 +11,7 @@ use testkit::quadrature::{Adaptive, Rect};
 pub(crate) const WIDTH: usize = 8;
 pub(crate) const HEIGHT: usize = 6;
 
-pub(crate) const MATERIALS: [&str; 9] = [
+pub(crate) const MATERIALS: [&str; 10] = [
     "diffuse:0.8,0.5,0.2",
     "phong:50:1:0",
     "phong:50:0.5:0.5",
@@ -21,6 +21,7 @@ pub(crate) const MATERIALS: [&str; 9] = [
     "beckmann:0.3",
     "mix",
     "gltf:0.9,0.6,0.3:0.5:0.5",
+    "gltf:0.9,0.6,0.3:0.2:0.5:0.6:0.2,0.9,1:0.7",
 ];
 
 /// Noise with a texel that outshines it near the horizon of most points.
