@@ -1,7 +1,7 @@
 //! Every lobe at its extremes × every extreme map × every strategy × short and long passes × normal and grazing views:
 //! no NaN, no infinity, and no bias.
 
-use domelight::bsdf::{Bsdf, MaterialSpec};
+use domelight::bsdf::{Bsdf, Coat, MaterialSpec, MetallicRoughness, Sheen};
 use domelight::environment::{Environment, Orientation};
 use domelight::math::{Frame, Vec3, from_spherical, vec3};
 use domelight::render::{Background, RenderSettings, Renderer};
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use testkit::{Suite, ZTest};
 
 /// Smooth and narrow, black and white, metal and dielectric.
-const LOBES: [(&str, Width); 20] = [
+const LOBES: [(&str, Width); 23] = [
     ("diffuse:1", Width::Wide),
     ("diffuse:0", Width::Wide),
     ("phong:0:1:0", Width::Wide),
@@ -38,7 +38,31 @@ const LOBES: [(&str, Width); 20] = [
     ("gltf:1:0:0:0", Width::Wide),
     ("gltf:1,0.5,0:0.2:0.14:0.5:1,0.2,0", Width::Narrow),
     ("gltf:1:0.5:0.1:1:1:1", Width::Narrow),
+    ("the narrowest sheen on white", Width::Wide),
+    ("the smoothest coat, leaning, on black", Width::Narrow),
+    ("a coat on sheen on a smooth metal", Width::Narrow),
 ];
+
+/// What a text of `--material` says, or layers by their names in [`LOBES`], seen at the cosine `cos_o`.
+fn bsdf(text: &str, cos_o: f32) -> Bsdf {
+    let base =
+        |color, metallic, roughness| MetallicRoughness::new(Rgb::splat(color), metallic, roughness);
+    let (base, sheen, coat) = match text {
+        "the narrowest sheen on white" => {
+            (base(1.0, 0.0, 1.0), Some(Sheen::new(Rgb::WHITE, 0.0)), None)
+        }
+        "the smoothest coat, leaning, on black" => {
+            let leaning = Coat::new(0.0, vec3(0.5, 0.1, 1.0));
+            (base(0.0, 1.0, 1.0), None, Some((1.0, leaning)))
+        }
+        "a coat on sheen on a smooth metal" => {
+            let sheen = Sheen::new(Rgb::new(1.0, 0.0, 0.2), 1.0);
+            (base(1.0, 1.0, 0.0), Some(sheen), Some((0.5, Coat::new(0.3, Vec3::Z))))
+        }
+        text => return text.parse::<MaterialSpec>().unwrap().into(),
+    };
+    Bsdf::layered(base, sheen, coat, from_spherical(cos_o, 2.5))
+}
 
 /// Whether samples of the environment alone find the lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -179,13 +203,12 @@ fn no_value_is_beyond_any_strategy() {
     let cells: Vec<_> =
         LOBES.iter().flat_map(|lobe| maps.iter().map(move |map| (lobe, map))).collect();
     cells.par_iter().for_each(|&(&(text, width), (name, light, env))| {
-        let bsdf = text.parse::<MaterialSpec>().unwrap().into();
         let prepare = |text: &str| {
             let spec: StrategySpec = text.parse().unwrap();
             PreparedStrategy::new(spec, env).unwrap()
         };
         for view in views {
-            let at = point(bsdf, view);
+            let at = point(bsdf(text, view), view);
             let reference = batches(&prepare("mis:4:4"), &at, 8, 1 << 20);
             for (strategy, n, needed_width, needed_light) in STRATEGIES {
                 let label = format!("{strategy}, {text}, {name}, view {view}");

@@ -57,7 +57,8 @@ impl Bsdf {
             Lobe::Ggx(l) => l.alpha()[0] == l.alpha()[1],
             Lobe::Beckmann(l) => l.alpha()[0] == l.alpha()[1],
             Lobe::MetallicRoughness(l) => l.alpha()[0] == l.alpha()[1],
-            Lobe::Lambert(_) | Lobe::Phong(_) => true,
+            Lobe::Lambert(_) | Lobe::Phong(_) | Lobe::Sheen(_) => true,
+            Lobe::Coat(l) => l.lean() == 0.0,
             Lobe::Custom(_) => false,
         })
     }
@@ -74,7 +75,7 @@ impl Bsdf {
         for (weight, lobe) in self.lobes() {
             let albedo = lobe.directional_albedo(wo.z) * weight;
             match lobe {
-                Lobe::Lambert(_) => diffuse += albedo,
+                Lobe::Lambert(_) | Lobe::Sheen(_) => diffuse += albedo,
                 Lobe::Custom(l) => match l.bxdf().roughness() {
                     None => diffuse += albedo,
                     Some(alpha) => {
@@ -91,6 +92,11 @@ impl Bsdf {
                 }
                 Lobe::Beckmann(l) => {
                     add(albedo, GlossyLobe::Slopes { alpha: l.alpha(), gaussian: true });
+                }
+                Lobe::Coat(l) => {
+                    // Its direction is that of a coat that does not lean: samples of the BSDF find where it is.
+                    let alpha = [l.alpha(); 2];
+                    add(albedo, GlossyLobe::Slopes { alpha, gaussian: false });
                 }
                 Lobe::MetallicRoughness(l) => {
                     let specular = l.specular_share(wo.z);
