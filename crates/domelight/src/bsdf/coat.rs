@@ -32,6 +32,11 @@ impl Coat {
         self.alpha
     }
 
+    /// A unit vector in the local frame of the layer below.
+    pub(super) fn normal(&self) -> Vec3 {
+        self.frame.z
+    }
+
     /// How far the coat's normal leans from that of the layer below: the tangent of the angle.
     pub(super) fn lean(&self) -> f32 {
         let n = self.frame.z;

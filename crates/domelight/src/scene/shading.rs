@@ -59,8 +59,10 @@ impl Scene {
             .map_or_else(|| Frame::from_z(normal), |t| Frame::from_z_and_tangent(normal, t));
         let wo = frame.to_local(viewer).normalize();
         let coat_normal = match material.layers.clearcoat {
-            None => Vec3::Z,
-            Some(_) => frame.to_local(to_viewer(relief.coat_normal)),
+            Some(_) if relief.coat_normal != relief.normal => {
+                frame.to_local(to_viewer(relief.coat_normal))
+            }
+            _ => Vec3::Z,
         };
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
         material.set_bsdf(&self.textures, &uvs, tint, [wo, coat_normal], &mut point.bsdf);
