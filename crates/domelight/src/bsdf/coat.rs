@@ -55,7 +55,7 @@ impl Coat {
 
     /// From the frame of the layer below to the coat's.
     #[inline(always)]
-    fn to_coat<F: SimdFloat>(&self, w: Vectors<F>) -> Vectors<F> {
+    fn in_coat<F: SimdFloat>(&self, w: Vectors<F>) -> Vectors<F> {
         let along = |axis: Vec3| w.dot_each(Vectors::splat(w.z, axis));
         Vectors { x: along(self.frame.x), y: along(self.frame.y), z: along(self.frame.z) }
     }
@@ -64,14 +64,14 @@ impl Coat {
 impl Brdf for Coat {
     #[inline(always)]
     fn eval_lanes<F: SimdFloat>(&self, wo: Vectors<F>, wi: Vectors<F>) -> (Colors<F>, F) {
-        let (value, pdf) = self.ggx().eval_lanes(self.to_coat(wo), self.to_coat(wi));
+        let (value, pdf) = self.ggx().eval_lanes(self.in_coat(wo), self.in_coat(wi));
         let Colors([gray, ..]) = value;
         (Colors([where_above(wo, wi, gray); 3]), where_above(wo, wi, pdf))
     }
 
     #[inline(always)]
     fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
-        let to_viewer = self.to_coat(wo);
+        let to_viewer = self.in_coat(wo);
         let wi = self.ggx().sample_lanes(to_viewer, u_lobe, u);
         let axis = |axis| Vectors::splat(wo.z, axis);
         let Frame { x, y, z } = self.frame;

@@ -122,9 +122,9 @@ mod tests {
                 // A coat about a normal of its own is not reciprocal about the surface's.
                 let leans = matches!(lobe, Lobe::Coat(coat) if coat.lean() > 0.0);
                 if leans {
-                    check_one_way(&lobe)
+                    check_one_way(&lobe);
                 } else {
-                    check_lobe(&lobe)
+                    check_lobe(&lobe);
                 }
                 for cosine in [0.0, 1e-6, 0.5, 1.0] {
                     let sine = f32::sqrt(1.0 - cosine * cosine);
