@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::RenderSettings;
-use super::tiling::Window;
+use super::tiling::{SampleSet, Window};
 use super::variance::{Contrast, VarianceSums};
 use crate::math::{Vec3, functions};
 use crate::{Rgb, RgbImage};
@@ -38,14 +38,6 @@ pub(super) struct SurfaceSample {
     pub(super) albedo: Rgb,
     pub(super) normal: Vec3,
     pub(super) depth: f32,
-}
-
-/// One of two independent sets of a pixel's samples; most pixels have the first alone.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum SampleSet {
-    #[default]
-    First,
-    Second,
 }
 
 /// The sums of one pixel. Samples are added one by one in their order, whatever the passes: the
@@ -391,7 +383,7 @@ impl Film {
 
     /// What the variance of the pixels is estimated from.
     pub fn variance_sums(&self) -> VarianceSums {
-        VarianceSums::of(&self.pixels)
+        VarianceSums::of(self.pixels.iter().filter_map(PixelSums::contrast))
     }
 
     /// Color and alpha of the window.

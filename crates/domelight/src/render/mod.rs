@@ -12,6 +12,7 @@ mod filter;
 #[cfg(feature = "io")]
 mod output;
 mod renderer;
+mod scouts;
 mod tile;
 mod tiling;
 mod variance;
