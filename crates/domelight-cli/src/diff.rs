@@ -77,7 +77,7 @@ impl Difference {
         mask: Option<&[bool]>,
     ) -> anyhow::Result<Self> {
         let comparison = compare(test, reference, mask)?;
-        let tone = arguments.tone.mapping(ToneCurve::Srgb);
+        let tone = arguments.tone.mapping(ToneCurve::Standard);
         let flip = ldr_flip(&shown(reference, tone), &shown(test, tone), PIXELS_PER_DEGREE)?;
         let hdr = arguments.hdr_flip.then(|| hdr_flip(reference, test, PIXELS_PER_DEGREE));
         Ok(Self { comparison, flip, hdr_flip: hdr.transpose()?, mask: mask.map(<[bool]>::to_vec) })

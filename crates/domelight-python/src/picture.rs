@@ -7,7 +7,8 @@ use domelight::RgbImage;
 use domelight::picture::exr::ExrLayers;
 use domelight::picture::exr::bands::{self, BAND_ROWS};
 use domelight::picture::png::{self, Depth};
-use domelight::picture::tone::{Exposure, ToneCurve, ToneMapping, srgb_from_linear};
+use domelight::picture::exposure::Exposure;
+use domelight::picture::tone::{ToneCurve, ToneMapping, srgb_from_linear};
 use domelight::picture::{
     self, PictureError, PictureErrorKind, ReadOptions, hdr, pfm, write_atomically,
     write_atomically_seeking,

@@ -235,7 +235,7 @@ fn png_round_trip_with_straight_alpha() {
         }
     }
     let mut opaque = Vec::new();
-    let tone = ToneMapping { exposure: 1.0, curve: ToneCurve::Srgb };
+    let tone = ToneMapping { exposure: 1.0, curve: ToneCurve::Standard };
     png::encode(
         &RgbImage::filled(2, 1, Rgb::splat(0.5)),
         None,

@@ -226,7 +226,7 @@ impl LightsArguments {
         map: &RgbImage,
         outputs: &[Output],
     ) -> Result<Vec<Option<PicturePath>>> {
-        let tone = self.tone.mapping(ToneCurve::Srgb);
+        let tone = self.tone.mapping(ToneCurve::Standard);
         path.write(map, tone, PictureFormat::Exr, None)?;
         let mut pictures = Vec::new();
         for output in outputs {

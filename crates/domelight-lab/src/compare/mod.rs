@@ -255,7 +255,7 @@ impl<'a> Comparison<'a> {
         measured: &StrategyMeasurement,
         reference: &RgbImage,
     ) -> Result<Picture, Error> {
-        let tone = ToneMapping { exposure: self.settings.exposure, curve: ToneCurve::Srgb };
+        let tone = ToneMapping { exposure: self.settings.exposure, curve: ToneCurve::Standard };
         let shown = |image: &RgbImage| {
             let pixels = image.pixels.iter().map(|&p| tone.apply(p)).collect();
             RgbImage { pixels, ..*image }

@@ -7,8 +7,11 @@
 //! Writers make bytes ([`hdr::encode`], [`exr::ExrLayers::encode`], [`pfm::encode`], [`png::encode`]);
 //! [`write_atomically`] puts them into a file that is either the old one or the whole new one.
 
+mod agx;
 pub mod compare;
+mod display;
 mod error;
+pub mod exposure;
 pub mod exr;
 pub mod flip;
 pub mod hdr;

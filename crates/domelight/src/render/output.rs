@@ -7,7 +7,8 @@ use super::{Film, Layers};
 use crate::picture::exr::ExrLayers;
 use crate::picture::exr::bands::{self, BAND_ROWS};
 use crate::picture::png::{self, Depth};
-use crate::picture::tone::{Exposure, ToneCurve, ToneMapping};
+use crate::picture::exposure::Exposure;
+use crate::picture::tone::{ToneCurve, ToneMapping};
 use crate::picture::{PictureErrorKind, write_atomically, write_atomically_seeking};
 use crate::{Error, RgbImage};
 
