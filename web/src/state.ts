@@ -23,6 +23,8 @@ export interface State {
   camera: Camera | null;
   exposure: number | null;
   curve: string;
+  /** What is shown: the picture, or its error against a reference. */
+  view: string;
   mapping: string;
   method: string;
   lights: number;
@@ -35,7 +37,7 @@ export interface State {
 export const DEFAULT: State = {
   panel: "picture", scene: "statue", material: "", ground: false, hide: false,
   env: "sky", rows: 256, rotate: 125, ev: 0, size: 640, spp: 32, seed: 0,
-  strategy: "product:8", beside: "", equal: "rays", camera: null, exposure: null, curve: "agx",
+  strategy: "product:8", beside: "", equal: "rays", camera: null, exposure: null, curve: "agx", view: "picture",
   mapping: "lat-long", method: "variance-minimization", lights: 64, sun: false, lamps: 0, pixel: null, step: 1,
 };
 

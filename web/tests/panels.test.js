@@ -102,6 +102,40 @@ test("two strategies at equal rays, with a divider", async () => {
   await done();
 });
 
+test("the error view measures the picture against a reference", async () => {
+  const { page, done } = await open("size=64&spp=32&rows=64&env=studio&strategy=mis:1:1&beside=product:8&view=error");
+  await page.waitForFunction(() => /Relative squared error: mis:1:1/.test(document.getElementById("error-legend").textContent));
+  await rendered(page);
+  await page.waitForFunction(() => {
+    const { films, reference } = window.domelight.picture;
+    return reference.variance < 0.1 * reference.error(films[1]);
+  });
+  const sides = await page.evaluate(() => {
+    const { films, jobs, reference } = window.domelight.picture;
+    return films.map((film, i) => [reference.error(film), jobs[i].statistics.relativeVariance]);
+  });
+  for (const [measured, estimated] of sides) assert.ok(measured > 0.3 * estimated && measured < 3 * estimated, `measured ${measured}, estimated ${estimated}`);
+  assert.equal((await page.$$("#error-plot circle")).length, 2);
+  const errors = await canvasHash(page, "film");
+  await page.selectOption("#view", "picture");
+  assert.ok(await page.isHidden("#error-legend"));
+  assert.notEqual(await canvasHash(page, "film"), errors);
+  await done();
+});
+
+test("without WebGL2 the error view is the same", async () => {
+  const seen = [];
+  for (const query of ["", "?2d"]) {
+    const { page, done } = await open("size=64&spp=1&rows=64&env=studio&strategy=brdf:1&view=error", { query });
+    await page.waitForFunction(() => document.getElementById("error-plot").querySelector("circle"));
+    await page.evaluate(() => window.domelight.picture.reference.settle(1e9));
+    await page.waitForTimeout(200);
+    seen.push(await brightness(page, "film"));
+    await done();
+  }
+  assert.ok(Math.abs(seen[0] - seen[1]) < 3, `${seen}`);
+});
+
 test("the map turns, shows the sun, and what a pixel samples", async () => {
   const { page, done } = await open(SMALL);
   await rendered(page);
