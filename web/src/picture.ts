@@ -62,7 +62,7 @@ export class PicturePanel {
     if (what === "scene" || what === "light") this.automatic = this.app.state.exposure === null;
     this.showView();
     if (!this.app.scene || !this.app.probe) return;
-    const { panel, step, pixel, exposure, curve, view, mapping, method, lights, sun, lamps, ...rendered } = this.app.state;
+    const { panel, step, pixel, exposure, curve, view, mapping, method, refine, lights, sun, lamps, ...rendered } = this.app.state;
     const key = JSON.stringify(rendered);
     // What came by the hash may be of another panel alone.
     if (what === "all" && key === this.renderedKey) return;

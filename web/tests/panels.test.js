@@ -167,7 +167,7 @@ test("lights: regions, files of every format, and what is left", async () => {
   await show(page, "lights");
   await page.waitForSelector("html[data-rig='variance-minimization:64']");
   const many = await canvasHash(page, "rig-marks");
-  await slide(page, "#n-lights", 3);
+  await slide(page, "#n-lights", 7);
   await page.waitForSelector("html[data-rig='variance-minimization:8']");
   assert.notEqual(await canvasHash(page, "rig-marks"), many);
   await page.selectOption("#method", "median-cut");
@@ -186,6 +186,28 @@ test("lights: regions, files of every format, and what is left", async () => {
   }
   await done();
 });
+
+for (const method of ["median-cut", "variance-minimization"]) {
+  test(`lights: ${method} step by step`, async () => {
+    const { page, done } = await open(`${SMALL}&panel=lights&lights=1&refine=false&method=${method}`);
+    await page.waitForSelector(`html[data-rig='${method}:1']`);
+    for (const n of [2, 3, 4]) {
+      await page.click("#more-lights");
+      await page.waitForSelector(`html[data-rig='${method}:${n}'][data-divided='1']`);
+      assert.match(await text(page, "#rig-step"), /This step divided the region along the orange line/);
+    }
+    await page.click("#fewer-lights");
+    await page.waitForSelector(`html[data-rig='${method}:3'][data-divided='0']`);
+    await page.click("#play-lights");
+    assert.equal(await page.getAttribute("#play-lights", "aria-pressed"), "true");
+    await page.waitForSelector(`html[data-rig='${method}:6']`);
+    await page.click("#play-lights");
+    const n = await page.inputValue("#n-lights");
+    await page.waitForTimeout(1000);
+    assert.equal(await page.inputValue("#n-lights"), n, "it stays where it was stopped");
+    await done();
+  });
+}
 
 test("the X-ray of a pixel names causes whose shares are drawn", async () => {
   const { page, done } = await open(`${SMALL}&pixel=[27,27]&panel=xray&strategy=mis:1:1`);
