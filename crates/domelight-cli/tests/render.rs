@@ -272,7 +272,7 @@ fn gltf(required: &str) -> String {
 "nodes":[{{"mesh":0}},{{"camera":0,"name":"front","translation":[0,1,5]}},{{"camera":0,"name":"far","translation":[0,1,50]}}],
 "cameras":[{{"type":"perspective","perspective":{{"yfov":0.6,"znear":1}}}}],
 "materials":[{{"name":"leaf","emissiveFactor":[1,1,1],"extensions":{{
-"KHR_materials_sheen":{{"sheenColorFactor":[1,1,1]}},"KHR_materials_transmission":{{"transmissionFactor":0.5}}}}}}],
+"KHR_materials_volume":{{"thicknessFactor":1}},"KHR_materials_transmission":{{"transmissionFactor":0.5}}}}}}],
 "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"material":0}}]}}],
 "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],
 "bufferViews":[{{"buffer":0,"byteLength":36}}],
@@ -281,7 +281,7 @@ fn gltf(required: &str) -> String {
 }
 
 #[test]
-fn what_a_picture_lacks_is_said_on_the_terminal_and_in_json() {
+fn what_a_picture_approximates_is_said_on_the_terminal_and_in_json() {
     let folder = folder();
     fs::write(folder.path().join("a.gltf"), gltf("")).unwrap();
     let output = render(&folder, &["a.gltf", "-o", "a.exr", "--json", "--strategy", "mis"]);
@@ -289,7 +289,7 @@ fn what_a_picture_lacks_is_said_on_the_terminal_and_in_json() {
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let warnings = &report["settings"]["warnings"];
     for (i, feature) in
-        ["KHR_materials_sheen", "KHR_materials_transmission"].into_iter().enumerate()
+        ["KHR_materials_transmission", "KHR_materials_volume"].into_iter().enumerate()
     {
         assert!(warnings[i].as_str().unwrap().contains(feature), "{warnings}");
         assert_eq!(stderr(&output).matches(feature).count(), 1, "{}", stderr(&output));

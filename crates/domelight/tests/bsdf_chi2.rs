@@ -2,17 +2,17 @@
 
 use domelight::Rgb;
 use domelight::bsdf::{
-    Beckmann, Brdf, Bsdf, Conductor, Fresnel, Ggx, Lambert, Lobe, Masking, MetallicRoughness,
-    Phong, Ward, WardForm,
+    Beckmann, Brdf, Bsdf, Coat, Conductor, Fresnel, Ggx, Lambert, Lobe, Masking, MetallicRoughness,
+    Phong, Sheen, Ward, WardForm,
 };
-use domelight::math::{Vec2, Vec3, from_spherical};
+use domelight::math::{Vec2, Vec3, from_spherical, vec3};
 use testkit::quadrature::Adaptive;
 use testkit::{Chi2, Suite};
 
 const ANGLES: [f32; 5] = [0.0, 30.0, 60.0, 75.0, 85.0];
 
 /// More than the tests of this file, which share one probability of a false alarm.
-const SUITE: usize = 150;
+const SUITE: usize = 250;
 
 /// How closely the cells look: rings and sectors about the mirror direction, where narrow lobes have
 /// their peak.
@@ -89,6 +89,37 @@ fn metallic_roughness() {
         let lobe = MetallicRoughness::new(base, metallic, roughness);
         check(&format!("metallic {metallic} rough {roughness}"), &lobe);
     }
+}
+
+#[test]
+fn metallic_roughness_with_extensions() {
+    let base = Rgb::new(0.9, 0.5, 0.2);
+    for (strength, f0) in [(0.0, 0.04), (0.5, 0.3), (1.0, 0.0)] {
+        let f0 = Rgb::new(f0, 2.0 * f0, 0.0);
+        let lobe = MetallicRoughness::with_specular(base, 0.0, 0.4, f0, strength);
+        check(&format!("strength {strength} f0 {f0:?}"), &lobe);
+    }
+    let brushed = MetallicRoughness::new(base, 0.5, 0.3).anisotropic(0.7);
+    check("anisotropic", &brushed);
+}
+
+#[test]
+fn layers() {
+    for roughness in [0.1, 0.4, 1.0] {
+        check(&format!("sheen {roughness}"), &Sheen::new(Rgb::WHITE, roughness));
+    }
+    let leaning = vec3(0.3, -0.2, 0.9);
+    for alpha in [0.05, 0.4] {
+        check(&format!("coat {alpha}"), &Coat::new(alpha, Vec3::Z));
+        // More oblique views are below the coat.
+        for degrees in [0.0, 30.0, 60.0] {
+            check_at("leaning coat", &Coat::new(alpha, leaning), degrees, WIDE);
+        }
+    }
+    let base = MetallicRoughness::new(Rgb::new(0.8, 0.3, 0.1), 0.2, 0.6).anisotropic(0.5);
+    let (sheen, coat) = (Sheen::new(Rgb::new(0.2, 0.5, 1.0), 0.3), Coat::new(0.05, leaning));
+    let layered = Bsdf::layered(base, Some(sheen), Some((0.8, coat)), from_spherical(0.5, 0.0));
+    check("coat over sheen over a base", &layered);
 }
 
 /// Rings of two thousandths of a radian resolve lobes a few of them wide.

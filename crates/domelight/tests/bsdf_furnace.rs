@@ -3,8 +3,8 @@
 
 use domelight::Rgb;
 use domelight::bsdf::{
-    Beckmann, Brdf, Bsdf, Conductor, Fresnel, Ggx, Lambert, Lobe, Masking, MetallicRoughness,
-    Phong, Ward, WardForm,
+    Beckmann, Brdf, Bsdf, Coat, Conductor, Fresnel, Ggx, Lambert, Lobe, Masking, MetallicRoughness,
+    Phong, Sheen, Ward, WardForm,
 };
 use domelight::math::{Vec2, Vec3, from_spherical};
 use testkit::quadrature::Adaptive;
@@ -36,7 +36,12 @@ fn bounded_lobes() -> Vec<(String, Lobe)> {
     }
     let gold = Fresnel::Conductor(Conductor::GOLD);
     lobes.push(("gold".into(), Ggx::new([0.2; 2], gold, Masking::Correlated).into()));
-    lobes.push(("metal".into(), MetallicRoughness::new(Rgb::WHITE, 1.0, 0.5).into()));
+    let metal = MetallicRoughness::new(Rgb::WHITE, 1.0, 0.5);
+    lobes.push(("metal".into(), metal.into()));
+    lobes.push(("brushed metal".into(), metal.anisotropic(0.8).into()));
+    lobes.push(("coat".into(), Coat::new(0.2, Vec3::Z).into()));
+    let matte = MetallicRoughness::with_specular(Rgb::WHITE, 0.0, 0.4, Rgb::WHITE, 0.0);
+    lobes.push(("matte".into(), matte.into()));
     lobes
 }
 
@@ -104,7 +109,15 @@ fn lobes_that_gain_energy_agree_with_quadrature() {
     for (metallic, roughness) in [(0.0, 0.3), (0.0, 1.0), (0.5, 0.5)] {
         let lobe = MetallicRoughness::new(Rgb::new(1.0, 0.5, 0.1), metallic, roughness);
         lobes.push((format!("metallic {metallic} rough {roughness}"), lobe.into()));
+        let f0 = Rgb::new(0.5, 0.1, 0.0);
+        let colored = MetallicRoughness::with_specular(Rgb::WHITE, metallic, roughness, f0, 0.7);
+        lobes.push((format!("metallic {metallic} rough {roughness} colored"), colored.into()));
     }
+    for roughness in [0.1, 0.5, 1.0] {
+        let sheen = Sheen::new(Rgb::new(1.0, 0.5, 0.1), roughness);
+        lobes.push((format!("sheen {roughness}"), sheen.into()));
+    }
+    lobes.push(("leaning coat".into(), Coat::new(0.1, Vec3::new(0.3, -0.2, 0.9)).into()));
     for (name, lobe) in lobes {
         for degrees in ANGLES {
             let wo = view(degrees);

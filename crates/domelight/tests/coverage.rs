@@ -4,15 +4,12 @@ use domelight::environment::{Environment, Orientation};
 use domelight::geometry::{Mesh, Ray, RayBatch};
 use domelight::math::{Vec3, vec2, vec3};
 use domelight::render::{Background, Layers, RenderSettings, render};
-use domelight::sampling::Heuristic;
 use domelight::scene::{
-    AlphaMode, Camera, CameraSettings, Coverage, Emission, Encoding, Material, Part, Projection,
-    Scene, SceneDescription, Texture, TextureFilter, TextureRef,
+    AlphaMode, Camera, CameraSettings, ColorFactor, Coverage, Emission, Encoding, Factor,
+    Layers as MaterialLayers, Material, MaterialModel, MetallicRoughnessMaterial, Part, Projection,
+    Scene, SceneDescription, Specular, Texture, TextureFilter, TextureRef, Volume,
 };
-use domelight::strategy::{
-    BrdfSampling, EnvironmentSampling, LightTable, MultipleImportanceSampling, ProductSampling,
-    Strategy,
-};
+use domelight::strategy::{EnvironmentSampling, PreparedStrategy, Strategy};
 use domelight::{Rgb, RgbImage};
 use testkit::{Suite, ZTest};
 
@@ -108,18 +105,100 @@ fn a_stack_of_cards_is_the_sum_over_its_layers_by_every_strategy() {
     let light = EnvironmentSampling { environment: &environment, n_samples: 4 };
     let of_white = means(&white, &environment, &light);
     let of_white: Vec<_> = of_white.iter().map(|m| m.map(|x| x * expected)).collect();
+    check_every_strategy(&cards, &environment, &of_white);
+}
 
-    let test = ZTest { suite: Suite::of(4), ..ZTest::default() };
-    let check = |name: &str, means: Vec<[f64; 3]>| {
-        test.two_sample(name, &means, &of_white).unwrap_or_else(|f| panic!("{f}"));
+/// Every strategy estimates what `expected` are batches of.
+fn check_every_strategy(scene: &Scene, environment: &Environment, expected: &[[f64; 3]]) {
+    let test = ZTest { suite: Suite::of(STRATEGIES.len()), ..ZTest::default() };
+    for name in STRATEGIES {
+        let strategy = PreparedStrategy::new(name.parse().unwrap(), environment).unwrap();
+        let means = means(scene, environment, &strategy);
+        test.two_sample(name, &means, expected).unwrap_or_else(|f| panic!("{f}"));
+    }
+}
+
+const STRATEGIES: [&str; 6] =
+    ["brdf:4", "environment:4", "mis:2:2", "rejection:4", "sir:2/8", "product:2"];
+
+/// A material that lets the share `transmission` of each channel of `color` pass, and reflects the rest of it diffusely.
+fn pane(color: Rgb, transmission: f32, opacity: f32) -> Material {
+    let model = MaterialModel::MetallicRoughness(MetallicRoughnessMaterial {
+        base_color: color,
+        base_color_texture: None,
+        metallic: 0.0,
+        roughness: 1.0,
+        metallic_roughness_texture: None,
+    });
+    let transmission = Some(Factor { value: transmission, texture: None });
+    let matte = Specular {
+        strength: Factor { value: 0.0, texture: None },
+        color: ColorFactor { value: Rgb::WHITE, texture: None },
     };
-    let brdf = BrdfSampling { environment: &environment, n_samples: 4 };
-    check("brdf", means(&cards, &environment, &brdf));
-    check("environment", means(&cards, &environment, &light));
-    let mis =
-        MultipleImportanceSampling::new(&environment, LightTable::Full, Heuristic::Balance, 2, 2);
-    check("mis", means(&cards, &environment, &mis.unwrap()));
-    check("product", means(&cards, &environment, &ProductSampling::new(&environment, 2)));
+    Material {
+        coverage: Coverage { mode: AlphaMode::Blend, opacity, texture: None },
+        layers: MaterialLayers { specular: Some(matte), transmission, ..MaterialLayers::default() },
+        ..Material::new("pane", model)
+    }
+}
+
+/// A card behind a clear pane and a milky one that covers a share: the camera sees through them in color, light passes by
+/// the mean of their channels.
+#[test]
+fn panes_tint_what_is_behind_them_by_every_strategy() {
+    let (clear, milky) = (Rgb::new(1.0, 0.5, 0.25), Rgb::new(0.8, 0.8, 0.4));
+    let scene = stack(
+        vec![pane(clear, 1.0, 1.0), pane(milky, 0.5, 0.6), covering(AlphaMode::Opaque, 1.0, 0.7)],
+        Vec::new(),
+    );
+    let through = Rgb::splat(0.4) + milky * 0.3;
+    let milk = clear * clear.mean() * milky * 0.3;
+    let card = clear * through * (0.7 * clear.mean() * through.mean());
+    let expected = (milk + card).to_array().map(f64::from);
+    let white = stack(vec![Material::diffuse("white", Rgb::WHITE)], Vec::new());
+    let environment = zenith();
+    let light = EnvironmentSampling { environment: &environment, n_samples: 4 };
+    let of_white = means(&white, &environment, &light);
+    let of_white: Vec<_> =
+        of_white.iter().map(|m| std::array::from_fn(|c| m[c] * expected[c])).collect();
+    check_every_strategy(&scene, &environment, &of_white);
+}
+
+/// Behind panes, a bright map is seen tinted, and what hides it is counted in alpha.
+#[test]
+fn panes_show_the_map_behind_them() {
+    let map = RgbImage::filled(8, 4, Rgb::splat(2.0));
+    let environment = Environment::new(map, Orientation::default(), 1.0).unwrap();
+    let strategy = EnvironmentSampling { environment: &environment, n_samples: 1 };
+    let color = Rgb::new(1.0, 0.5, 0.25);
+    let body = Volume {
+        thickness: Factor { value: 3.0, texture: None },
+        attenuation_distance: 1.5,
+        attenuation_color: Rgb::new(0.5, 1.0, 0.25),
+    };
+    // A two-sided surface is half of a body: three units at half strength a unit and a half.
+    for (volume, through) in [(None, color), (Some(body), color * Rgb::new(0.5, 1.0, 0.25))] {
+        let mut glass = pane(color, 1.0, 1.0);
+        glass.layers.volume = volume;
+        let scene = stack(vec![glass; 2], Vec::new());
+        let expected = through * through;
+        let pictures = |background| -> Vec<([f64; 3], f64)> {
+            let picture = |seed| {
+                let settings = RenderSettings { seed, background, ..settings() };
+                let layers = draw_from(ABOVE, &scene, &environment, &strategy, &settings);
+                let alpha = layers.alpha.iter().map(|&a| f64::from(a)).sum::<f64>();
+                (mean(&layers.color), alpha / layers.alpha.len() as f64)
+            };
+            (0..32).map(picture).collect()
+        };
+        let test = ZTest { suite: Suite::of(4), ..ZTest::default() };
+        let shown: Vec<_> = pictures(Background::Shown).iter().map(|p| p.0).collect();
+        let reference = (expected * 2.0).to_array().map(f64::from);
+        test.against("color", &shown, reference).unwrap_or_else(|f| panic!("{f}"));
+        let alpha: Vec<_> = pictures(Background::Hidden).iter().map(|p| [p.1; 3]).collect();
+        let reference = [1.0 - f64::from(expected.mean()); 3];
+        test.against("alpha", &alpha, reference).unwrap_or_else(|f| panic!("{f}"));
+    }
 }
 
 /// A texture of two columns, opaque on the left and clear on the right.

@@ -7,11 +7,14 @@ use std::path::PathBuf;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use domelight::Rgb;
+use domelight::bsdf::{self, Brdf, Bsdf, Coat, MetallicRoughness};
+use domelight::geometry::Ray;
 use domelight::math::{Vec2, Vec3, vec2, vec3};
 use domelight::scene::{
     AlphaMode, AnimationTime, Coverage, LoadOptions, Loaded, Material, MaterialModel, Scene,
     TextureFilter, Wrap, load_with,
 };
+use domelight::strategy::ShadingPoint;
 use tempfile::TempDir;
 
 /// Bytes that accessors look into: a triangle's positions, and three times two, four and one number.
@@ -154,7 +157,7 @@ fn two_sets_of_texture_coordinates_and_no_third() {
 }
 
 #[test]
-fn extensions_of_materials_are_kept_and_named_once_if_not_drawn() {
+fn extensions_of_materials_are_kept_and_named_once_if_approximated() {
     let bsdf = r#"{"name":"all","emissiveFactor":[1,0.5,0],"extensions":{
 "KHR_materials_emissive_strength":{"emissiveStrength":4},"KHR_materials_unlit":{},"KHR_materials_ior":{"ior":1.3},
 "KHR_materials_specular":{"specularFactor":0.5,"specularColorFactor":[2,1,0]},
@@ -180,16 +183,132 @@ fn extensions_of_materials_are_kept_and_named_once_if_not_drawn() {
     let volume = layers.volume.unwrap();
     assert_eq!((volume.thickness.value, volume.attenuation_distance), (2.0, f32::INFINITY));
     assert_eq!(material.textures().count(), 1);
-    let features: Vec<_> = material.undrawn_features().collect();
-    assert_eq!(loaded.warnings.len(), features.len(), "{:?}", loaded.warnings);
-    for feature in features {
-        has(&loaded.warnings.join("\n"), &[feature, "'all'"]);
-    }
+    let unlit: Vec<_> = material.approximated_features().collect();
+    assert!(unlit.is_empty(), "nothing of an unlit surface is drawn but its color: {unlit:?}");
+    let lit = Material { unlit: false, ..material };
+    let features: Vec<_> = lit.approximated_features().collect();
+    assert_eq!(features, ["KHR_materials_transmission", "KHR_materials_volume"]);
+    assert!(loaded.warnings.is_empty());
+    let glass = r#"{"name":"glass","extensions":{"KHR_materials_transmission":{"transmissionFactor":0.9}}}"#;
+    let (_, loaded) = self::material(glass, &[]);
+    assert_eq!(loaded.warnings.len(), 1, "{:?}", loaded.warnings);
+    has(&loaded.warnings[0], &["KHR_materials_transmission", "'glass'", "approximated"]);
     // What an extension leaves as it is, is not named.
     let plain = r#"{"extensions":{"KHR_materials_ior":{"ior":1.5},"KHR_materials_specular":{},"KHR_materials_clearcoat":{}}}"#;
     let (material, loaded) = self::material(plain, &[]);
-    assert_eq!(material.undrawn_features().count(), 0);
+    assert_eq!(material.approximated_features().count(), 0);
     assert!(loaded.warnings.is_empty());
+}
+
+/// The point of the triangle of [`document`] that a viewer sees at 60°, with its material. Its vertices are (1, ½, ¼).
+fn shaded(bsdf: &str, images: &[String]) -> ShadingPoint {
+    let (_, loaded) = material(bsdf, images);
+    let scene = Scene::new(loaded.description).unwrap();
+    let ray = Ray::new(vec3(0.25 + 3f32.sqrt(), 0.25, 1.0), vec3(-3f32.sqrt(), 0.0, -1.0) / 2.0);
+    let hit = scene.bvh().closest_hit(&ray).expect("the triangle");
+    scene.shading_point(&ray, &hit)
+}
+
+const VERTEX_COLOR: Rgb = Rgb::new(1.0, 0.5, 0.25);
+
+/// A BSDF looks like another from the viewer's side; 8-bit textures leave a little room.
+fn assert_alike(point: &ShadingPoint, expected: &Bsdf) {
+    assert_eq!(point.bsdf.lobes().count(), expected.lobes().count());
+    for (x, y) in [(0.0, 0.0), (-0.5, 0.3), (0.2, -0.7), (0.6, 0.1), (-0.8, -0.1)] {
+        let wi = vec3(x, y, (1.0 - x * x - y * y as f32).sqrt());
+        let (value, expected) = (point.bsdf.eval(point.wo, wi), expected.eval(point.wo, wi));
+        let difference = (value - expected).map(f32::abs).max_component();
+        assert!(difference < 1e-3 * expected.max_component(), "{wi}: {value:?} {expected:?}");
+    }
+}
+
+#[test]
+fn specular_strength_and_color_are_drawn() {
+    let bsdf = r#"{"pbrMetallicRoughness":{"metallicFactor":0.25,"roughnessFactor":0.5},"extensions":{
+"KHR_materials_ior":{"ior":2},"KHR_materials_specular":{"specularFactor":0.8,"specularTexture":{"index":0},
+"specularColorFactor":[3,2,1],"specularColorTexture":{"index":1}}}}"#;
+    let images = [png([0, 0, 0, 51]), png([255, 255, 0, 255])];
+    let (read, loaded) = material(bsdf, &images);
+    let specular = read.layers.specular.unwrap();
+    assert_eq!((specular.strength.value, specular.color.value), (0.8, Rgb::new(3.0, 2.0, 1.0)));
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    let f0 = Rgb::new(3.0, 2.0, 0.0) / 9.0;
+    let lobe = MetallicRoughness::with_specular(VERTEX_COLOR, 0.25, 0.5, f0, 0.8 * 0.2);
+    assert_alike(&shaded(bsdf, &images), &Bsdf::single(lobe));
+    let ordinary = MetallicRoughness::with_dielectric(VERTEX_COLOR, 0.25, 0.5, 1.0 / 9.0);
+    let bsdf = bsdf.replace("KHR_materials_specular", "none");
+    assert_alike(&shaded(&bsdf, &images), &Bsdf::single(ordinary));
+}
+
+#[test]
+fn coats_and_sheen_are_drawn() {
+    let bsdf = r#"{"extensions":{"KHR_materials_clearcoat":{"clearcoatFactor":0.8,"clearcoatTexture":{"index":0},
+"clearcoatRoughnessFactor":0.5,"clearcoatRoughnessTexture":{"index":0}},
+"KHR_materials_sheen":{"sheenColorFactor":[0.2,0.4,0.8],"sheenColorTexture":{"index":1},"sheenRoughnessFactor":0.5,
+"sheenRoughnessTexture":{"index":1}}},"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0.5}}"#;
+    let images = [png([51, 204, 0, 255]), png([255, 0, 255, 153])];
+    let (_, loaded) = material(bsdf, &images);
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    let base = MetallicRoughness::new(VERTEX_COLOR, 0.0, 0.5);
+    let sheen = bsdf::Sheen::new(Rgb::new(0.2, 0.0, 0.8), 0.5 * 0.6);
+    let roughness = 0.5 * 0.8;
+    let coat = Coat::new(roughness * roughness, Vec3::Z);
+    let point = shaded(bsdf, &images);
+    let expected = Bsdf::layered(base, Some(sheen), Some((0.8 * 0.2, coat)), point.wo);
+    assert_alike(&point, &expected);
+}
+
+/// A coat follows the surface where the layer below has relief, and the relief of its own.
+#[test]
+fn coats_have_normals_of_their_own() {
+    let normal = |red| png([red, 128, 230, 255]);
+    let bsdf = |coat: &str| {
+        format!(
+            r#"{{"normalTexture":{{"index":0}},"extensions":{{"KHR_materials_clearcoat":{{"clearcoatFactor":1,
+"clearcoatRoughnessFactor":0.3{coat}}}}}}}"#
+        )
+    };
+    let mirror = |normal: Vec3, point: &ShadingPoint| {
+        let n = point.frame.to_local(normal.normalize());
+        2.0 * n.dot(point.wo) * n - point.wo
+    };
+    let coat_of = |point: &ShadingPoint| {
+        let coat = point.bsdf.lobes().map(|(_, lobe)| *lobe);
+        coat.into_iter().find(|lobe| matches!(lobe, bsdf::Lobe::Coat(_))).expect("a coat")
+    };
+    let images = [normal(180), normal(128)];
+    let plain = shaded(&bsdf(""), &images);
+    let relief = shaded(&bsdf(r#","clearcoatNormalTexture":{"index":0}"#), &images);
+    assert!(plain.frame.z.z < 0.99, "the layer below has relief");
+    let (straight, bent) = (mirror(Vec3::Z, &plain), mirror(plain.frame.z, &plain));
+    let at = |point: &ShadingPoint, wi: Vec3| coat_of(point).eval(point.wo, wi).r;
+    assert!(at(&plain, straight) > 2.0 * at(&plain, bent));
+    assert!(at(&relief, bent) > 2.0 * at(&relief, straight));
+}
+
+#[test]
+fn anisotropy_is_drawn_along_its_direction() {
+    let bsdf = |rotation: f32, texture: &str| {
+        format!(
+            r#"{{"pbrMetallicRoughness":{{"roughnessFactor":0.4}},"extensions":{{"KHR_materials_anisotropy":{{
+"anisotropyStrength":0.8,"anisotropyRotation":{rotation}{texture}}}}}}}"#
+        )
+    };
+    let lobe = MetallicRoughness::new(VERTEX_COLOR, 1.0, 0.4);
+    let images = [png([128, 255, 128, 255])];
+    let point = shaded(&bsdf(0.0, ""), &images);
+    assert_alike(&point, &Bsdf::single(lobe.anisotropic(0.8)));
+    let along = point.frame.x;
+    // A quarter turn, by a number and by a texture of half the strength.
+    let turned = shaded(&bsdf(std::f32::consts::FRAC_PI_2, ""), &images);
+    let texture = r#","anisotropyTexture":{"index":0}"#;
+    let by_texture = shaded(&bsdf(0.0, texture), &images);
+    assert!(turned.frame.x.dot(along).abs() < 1e-5);
+    assert!(by_texture.frame.x.dot(along).abs() < 0.01);
+    assert!(turned.frame.x.dot(by_texture.frame.x) > 0.99);
+    assert_alike(&by_texture, &Bsdf::single(lobe.anisotropic(0.8 * 128.0 / 255.0)));
+    let half = shaded(&bsdf(0.5, ""), &images);
+    assert!((half.frame.x.dot(along) - 0.5f32.cos()).abs() < 1e-5);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Every lobe at its extremes × every extreme map × every strategy × short and long passes × normal and grazing views:
 //! no NaN, no infinity, and no bias.
 
-use domelight::bsdf::{Bsdf, MaterialSpec};
+use domelight::bsdf::{Bsdf, Coat, MaterialSpec, MetallicRoughness, Sheen};
 use domelight::environment::{Environment, Orientation};
 use domelight::math::{Frame, Vec3, from_spherical, vec3};
 use domelight::render::{Background, RenderSettings, Renderer};
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use testkit::{Suite, ZTest};
 
 /// Smooth and narrow, black and white, metal and dielectric.
-const LOBES: [(&str, Width); 17] = [
+const LOBES: [(&str, Width); 24] = [
     ("diffuse:1", Width::Wide),
     ("diffuse:0", Width::Wide),
     ("phong:0:1:0", Width::Wide),
@@ -35,14 +35,43 @@ const LOBES: [(&str, Width); 17] = [
     ("gltf:1,1,1:0:0", Width::Narrow),
     ("gltf:1,1,1:0:0.14", Width::Narrow),
     ("gltf:1,0,0.5:0.5:1", Width::Wide),
+    ("gltf:0:1:1", Width::Beyond),
+    ("gltf:1:0:0:0", Width::Wide),
+    ("gltf:1,0.5,0:0.2:0.14:0.5:1,0.2,0", Width::Narrow),
+    ("gltf:1:0.5:0.1:1:1:1", Width::Narrow),
+    ("the narrowest sheen on white", Width::Wide),
+    ("the smoothest coat, leaning, on gray", Width::Narrow),
+    ("a coat on sheen on a smooth metal", Width::Narrow),
 ];
+
+/// What a text of `--material` says, or layers by their names in [`LOBES`], seen at the cosine `cos_o`.
+fn bsdf(text: &str, cos_o: f32) -> Bsdf {
+    let base =
+        |color, metallic, roughness| MetallicRoughness::new(Rgb::splat(color), metallic, roughness);
+    let (base, sheen, coat) = match text {
+        "the narrowest sheen on white" => {
+            (base(1.0, 0.0, 1.0), Some(Sheen::new(Rgb::WHITE, 0.0)), None)
+        }
+        "the smoothest coat, leaning, on gray" => {
+            let leaning = Coat::new(0.0, vec3(0.5, 0.1, 1.0));
+            (base(0.5, 0.0, 1.0), None, Some((1.0, leaning)))
+        }
+        "a coat on sheen on a smooth metal" => {
+            let sheen = Sheen::new(Rgb::new(1.0, 0.0, 0.2), 1.0);
+            (base(1.0, 1.0, 0.0), Some(sheen), Some((0.5, Coat::new(0.3, Vec3::Z))))
+        }
+        text => return text.parse::<MaterialSpec>().unwrap().into(),
+    };
+    Bsdf::layered(base, sheen, coat, from_spherical(cos_o, 2.5))
+}
 
 /// Whether samples of the environment alone find the lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Width {
     Wide,
     Narrow,
-    /// Nor do those of the BRDF, most of which fall below the surface: means of a few have no normal distribution.
+    /// Nor do those of the BRDF, most of which fall below the surface, or it is so dark that rays are rare: means of a
+    /// few have no normal distribution.
     Beyond,
 }
 
@@ -176,13 +205,12 @@ fn no_value_is_beyond_any_strategy() {
     let cells: Vec<_> =
         LOBES.iter().flat_map(|lobe| maps.iter().map(move |map| (lobe, map))).collect();
     cells.par_iter().for_each(|&(&(text, width), (name, light, env))| {
-        let bsdf = text.parse::<MaterialSpec>().unwrap().into();
         let prepare = |text: &str| {
             let spec: StrategySpec = text.parse().unwrap();
             PreparedStrategy::new(spec, env).unwrap()
         };
         for view in views {
-            let at = point(bsdf, view);
+            let at = point(bsdf(text, view), view);
             let reference = batches(&prepare("mis:4:4"), &at, 8, 1 << 20);
             for (strategy, n, needed_width, needed_light) in STRATEGIES {
                 let label = format!("{strategy}, {text}, {name}, view {view}");
@@ -197,6 +225,23 @@ fn no_value_is_beyond_any_strategy() {
             }
         }
     });
+}
+
+/// A black metal reflects nothing at normal incidence, and a ten-thousandth of the light by rough slopes.
+#[test]
+fn what_is_black_at_normal_incidence_reflects_at_others() {
+    let env = Environment::from_image(RgbImage::filled(8, 6, Rgb::WHITE)).unwrap();
+    let at = point(bsdf("gltf:0:1:1", 1.0), 1.0);
+    let of = |text: &str, n| {
+        let strategy = PreparedStrategy::new(text.parse().unwrap(), &env).unwrap();
+        batches(&strategy, &at, n, 1)
+    };
+    let reference = of("mis:4:4", 8);
+    assert!(reference.iter().all(|mean| mean[0] > 1e-5));
+    for (text, n) in [("product:8", SHORT), ("product:1", LONG)] {
+        let test = ZTest { suite: Suite::of(2), ..ZTest::default() };
+        test.two_sample(text, &of(text, n), &reference).unwrap_or_else(|f| panic!("{f}"));
+    }
 }
 
 /// A map 2ⁿ times as bright makes a picture 2ⁿ times as bright, to the bit, as far as single precision goes.

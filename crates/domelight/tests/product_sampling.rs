@@ -6,10 +6,10 @@ mod common;
 use std::cell::RefCell;
 
 use common::{
-    HEIGHT, MATERIALS, WIDTH, batches, environment, hidden, integral, point, quadrature,
+    HEIGHT, MATERIALS, WIDTH, batches, bsdf, environment, hidden, integral, point, quadrature,
     texel_integrals, white_environment,
 };
-use domelight::bsdf::{Brdf, Bsdf, MaterialSpec};
+use domelight::bsdf::Brdf;
 use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::{Vec2, Vec3};
 use domelight::sampling::{Heuristic, Sampler, SamplerKind};
@@ -32,10 +32,6 @@ const RESAMPLINGS: [Resampling; 4] = [
     Resampling::SystematicSorted,
     Resampling::Reservoir,
 ];
-
-fn bsdf(name: &str) -> Bsdf {
-    name.parse::<MaterialSpec>().unwrap().into()
-}
 
 fn rejection(env: &Environment, proposal: Proposal, stop: StoppingRule) -> RejectionSampling<'_> {
     RejectionSampling::new(env, proposal, stop).unwrap()

@@ -4,10 +4,9 @@
 mod common;
 
 use common::{
-    HEIGHT, MATERIALS, WIDTH, batches, environment, hidden, integral, point, quadrature,
+    HEIGHT, MATERIALS, WIDTH, batches, bsdf, environment, hidden, integral, point, quadrature,
     white_environment,
 };
-use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::bvh::InstructionSet;
 use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::{Frame, Vec3};
@@ -22,10 +21,6 @@ use domelight::{Rgb, RgbImage};
 use rayon::prelude::*;
 use testkit::quadrature::Adaptive;
 use testkit::{Suite, ZTest};
-
-fn bsdf(name: &str) -> Bsdf {
-    name.parse::<MaterialSpec>().unwrap().into()
-}
 
 /// A tile of 5 × 5 pixels, all with the same hits.
 const SIDE: usize = 5;

@@ -4,7 +4,8 @@
 mod common;
 
 use common::{
-    HEIGHT, MATERIALS, WIDTH, batches, environment, estimate, point, quadrature, white_environment,
+    HEIGHT, MATERIALS, WIDTH, batches, bsdf, environment, estimate, point, quadrature,
+    white_environment,
 };
 use domelight::bsdf::MaterialSpec;
 use domelight::environment::{CompensatedTable, Environment, Orientation, UpAxis};
@@ -26,7 +27,7 @@ fn strategies_agree_with_quadrature() {
     for env in &environments {
         let table = CompensatedTable::new(env);
         MATERIALS.par_iter().for_each(|name| {
-            let bsdf = name.parse::<MaterialSpec>().unwrap().into();
+            let bsdf = bsdf(name);
             for theta in views {
                 let at = point(bsdf, theta);
                 let reference = quadrature(env, &at);

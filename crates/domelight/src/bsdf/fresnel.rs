@@ -61,8 +61,14 @@ impl Fresnel {
 /// Schlick's approximation.
 #[inline(always)]
 pub(super) fn schlick<F: SimdFloat>(f0: Rgb, cos_theta: F) -> Colors<F> {
+    schlick_to(f0, 1.0, cos_theta)
+}
+
+/// Schlick's approximation with the reflectance `f90` of every channel at grazing incidence.
+#[inline(always)]
+pub(super) fn schlick_to<F: SimdFloat>(f0: Rgb, f90: f32, cos_theta: F) -> Colors<F> {
     let weight = schlick_weight(cos_theta);
-    let rest = Colors::splat(weight, Rgb::WHITE - f0).scaled(weight);
+    let rest = Colors::splat(weight, Rgb::splat(f90) - f0).scaled(weight);
     Colors::splat(weight, f0).zip(rest, |f0, rest| f0 + rest)
 }
 

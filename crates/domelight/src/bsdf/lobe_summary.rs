@@ -13,6 +13,8 @@ pub enum GlossyLobe {
         alpha: [f32; 2],
         /// Whether tails fall as a Gaussian.
         gaussian: bool,
+        /// The normal that the lobe is about, where it is not the surface's: a unit vector in the local frame.
+        leaning: Option<Vec3>,
     },
     /// About the mirror direction, cosⁿ.
     Mirror {
@@ -31,6 +33,9 @@ impl GlossyLobe {
         }
     }
 }
+
+/// The albedo of a lobe that is black from a view, but not from all.
+const LEAST_ALBEDO: f32 = 1e-4;
 
 /// A diffuse part and glossy lobes, weighed by the light that they reflect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,7 +61,9 @@ impl Bsdf {
             Lobe::Ward(l) => l.alpha()[0] == l.alpha()[1],
             Lobe::Ggx(l) => l.alpha()[0] == l.alpha()[1],
             Lobe::Beckmann(l) => l.alpha()[0] == l.alpha()[1],
-            Lobe::Lambert(_) | Lobe::Phong(_) | Lobe::MetallicRoughness(_) => true,
+            Lobe::MetallicRoughness(l) => l.alpha()[0] == l.alpha()[1],
+            Lobe::Lambert(_) | Lobe::Phong(_) | Lobe::Sheen(_) => true,
+            Lobe::Coat(l) => l.lean() == 0.0,
             Lobe::Custom(_) => false,
         })
     }
@@ -71,31 +78,52 @@ impl Bsdf {
         };
         let mut diffuse = Rgb::BLACK;
         for (weight, lobe) in self.lobes() {
-            let albedo = lobe.directional_albedo(wo.z) * weight;
+            // One that reflects nothing toward this view by Fresnel's factor at the normal still does at others.
+            let albedo = lobe.directional_albedo(wo.z);
+            let albedo = if albedo.is_black() { Rgb::splat(LEAST_ALBEDO) } else { albedo } * weight;
             match lobe {
-                Lobe::Lambert(_) => diffuse += albedo,
+                Lobe::Lambert(_) | Lobe::Sheen(_) => diffuse += albedo,
                 Lobe::Custom(l) => match l.bxdf().roughness() {
                     None => diffuse += albedo,
                     Some(alpha) => {
                         let alpha = [alpha.clamp(MIN_ALPHA, 1.0); 2];
-                        add(albedo, GlossyLobe::Slopes { alpha, gaussian: false });
+                        add(albedo, GlossyLobe::Slopes { alpha, gaussian: false, leaning: None });
                     }
                 },
                 Lobe::Phong(l) => add(albedo, GlossyLobe::Mirror { exponent: l.exponent() }),
                 Lobe::Ward(l) => {
-                    add(albedo, GlossyLobe::Slopes { alpha: l.alpha(), gaussian: true });
+                    add(
+                        albedo,
+                        GlossyLobe::Slopes { alpha: l.alpha(), gaussian: true, leaning: None },
+                    );
                 }
                 Lobe::Ggx(l) => {
-                    add(albedo, GlossyLobe::Slopes { alpha: l.alpha(), gaussian: false });
+                    add(
+                        albedo,
+                        GlossyLobe::Slopes { alpha: l.alpha(), gaussian: false, leaning: None },
+                    );
                 }
                 Lobe::Beckmann(l) => {
-                    add(albedo, GlossyLobe::Slopes { alpha: l.alpha(), gaussian: true });
+                    add(
+                        albedo,
+                        GlossyLobe::Slopes { alpha: l.alpha(), gaussian: true, leaning: None },
+                    );
+                }
+                Lobe::Coat(l) => {
+                    let leaning = (l.lean() > 0.0).then(|| l.normal());
+                    let alpha = [l.alpha(); 2];
+                    add(albedo, GlossyLobe::Slopes { alpha, gaussian: false, leaning });
                 }
                 Lobe::MetallicRoughness(l) => {
                     let specular = l.specular_share(wo.z);
                     diffuse += albedo * (1.0 - specular);
-                    let alpha = l.alpha();
-                    add(albedo * specular, GlossyLobe::Slopes { alpha, gaussian: false });
+                    if specular > 0.0 {
+                        let alpha = l.alpha();
+                        add(
+                            albedo * specular,
+                            GlossyLobe::Slopes { alpha, gaussian: false, leaning: None },
+                        );
+                    }
                 }
             }
         }

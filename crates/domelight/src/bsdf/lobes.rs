@@ -3,7 +3,9 @@
 //! A material is sampled by choosing one lobe and drawing from it; its density is that of the
 //! mixture, so no sample is worse than the chosen lobes' own by more than the choice.
 
-use super::{Beckmann, Brdf, CustomLobe, Ggx, Lambert, MetallicRoughness, Phong, Ward, range};
+use super::{
+    Beckmann, Brdf, Coat, CustomLobe, Ggx, Lambert, MetallicRoughness, Phong, Sheen, Ward, range,
+};
 use crate::Rgb;
 use crate::math::Vec3;
 use crate::sampling::ONE_MINUS_EPSILON;
@@ -43,7 +45,11 @@ lobes! {
     /// Microfacets, Gaussian slopes.
     Beckmann,
     /// glTF's coupled diffuse and GGX.
-    MetallicRoughness
+    MetallicRoughness,
+    /// glTF's fibers.
+    Sheen,
+    /// glTF's clear coat.
+    Coat
 }
 
 /// The same expression for the lobe inside, whatever it is.
@@ -56,6 +62,8 @@ macro_rules! each {
             Lobe::Ggx($l) => $body,
             Lobe::Beckmann($l) => $body,
             Lobe::MetallicRoughness($l) => $body,
+            Lobe::Sheen($l) => $body,
+            Lobe::Coat($l) => $body,
             Lobe::Custom($l) => $body,
         }
     };
@@ -149,6 +157,29 @@ impl Bsdf {
     /// [`TooManyLobes`] when more than [`MAX_LOBES`] are not black.
     pub fn weighted(lobes: &[(f32, Lobe)]) -> Result<Self, TooManyLobes> {
         Self::checked(lobes.iter().copied())
+    }
+
+    /// glTF's layers as seen from `wo`: sheen on the `base`, and a coat of a strength in \[0, 1\] on both. A layer takes
+    /// from those below it what it reflects toward `wo`, whatever the direction of light, so that the result is good
+    /// for this view alone.
+    #[must_use]
+    pub fn layered(
+        base: impl Into<Lobe>,
+        sheen: Option<Sheen>,
+        coat: Option<(f32, Coat)>,
+        wo: Vec3,
+    ) -> Self {
+        let below_coat =
+            coat.map_or(1.0, |(strength, coat)| 1.0 - range::unit(strength) * coat.reflectance(wo));
+        let below_sheen = sheen.map_or(1.0, |sheen| sheen.share_below(wo.z));
+        let base = (below_coat * below_sheen, base.into());
+        let sheen = sheen.map(|sheen| (below_coat, sheen.into()));
+        let coat = coat.map(|(strength, coat)| (range::unit(strength), coat.into()));
+        let mut layered = Self::of_terms([Some(base), sheen, coat].into_iter().flatten());
+        if layered.n_terms > 1 {
+            layered.choose_by_albedo(wo.z.clamp(0.0, 1.0));
+        }
+        layered
     }
 
     fn checked(lobes: impl Iterator<Item = (f32, Lobe)> + Clone) -> Result<Self, TooManyLobes> {
@@ -323,6 +354,24 @@ mod tests {
     fn obeys_the_laws() {
         check_lobe(&three());
         check_bound(&three(), 3.0);
+    }
+
+    /// A coat over sheen over a base: each takes from those below.
+    #[test]
+    fn layers_take_from_those_below() {
+        let base = MetallicRoughness::new(Rgb::new(0.8, 0.5, 0.2), 0.0, 0.5);
+        let (sheen, coat) = (Sheen::new(Rgb::new(0.5, 1.0, 0.0), 0.4), Coat::new(0.1, Vec3::Z));
+        let (wo, wi) = (toward(60.0, 0.3), toward(40.0, 2.5));
+        let layered = Bsdf::layered(base, Some(sheen), Some((0.5, coat)), wo);
+        let reflected = 0.5 * (0.04 + 0.96 * 0.5f32.powi(5));
+        let below = 1.0 - reflected;
+        let kept = 1.0 - sheen.directional_albedo(wo.z).max_component();
+        let expected =
+            base.eval(wo, wi) * kept * below + sheen.eval(wo, wi) * below + coat.eval(wo, wi) * 0.5;
+        let difference = (layered.eval(wo, wi) - expected).map(f32::abs).max_component();
+        assert!(difference < 1e-5, "{difference}");
+        assert_eq!(Bsdf::layered(base, None, None, wo), Bsdf::single(base));
+        assert_eq!(Bsdf::layered(base, None, Some((f32::NAN, coat)), wo), Bsdf::single(base));
     }
 
     #[test]

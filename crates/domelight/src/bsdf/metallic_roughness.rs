@@ -6,6 +6,10 @@
 //! parts are one lobe, not a sum of two; it is sampled as a mixture whose share follows Fresnel's
 //! reflectance at `wo`.
 //!
+//! `KHR_materials_specular` gives the dielectric a strength w and a color: F goes from
+//! f0 = lerp(w min(f0 color, 1), base, metallic) to f90 = lerp(w, 1, metallic), and the diffuse part keeps 1 − max F,
+//! so that it does not take on the complementary color. `KHR_materials_anisotropy` makes the lobe rougher along x.
+//!
 //! This is the specification's formula, so that materials look as in other glTF viewers; it does not
 //! conserve energy. Light from everywhere meets half vectors that are less oblique than the view, so
 //! 1 − F takes too little from the diffuse part at grazing angles: a white dielectric of roughness
@@ -24,10 +28,11 @@ use crate::simd::{Colors, LaneMask as _, SimdFloat, Vectors};
 pub struct MetallicRoughness {
     diffuse: Rgb,
     f0: Rgb,
-    alpha: f32,
-    /// The channels' means, which choose between the parts.
-    diffuse_mean: f32,
-    f0_mean: f32,
+    /// No less than any channel of `f0`.
+    f90: f32,
+    alpha: [f32; 2],
+    /// Whether the diffuse part loses the greatest channel of F from every channel.
+    keeps_hue: bool,
 }
 
 impl MetallicRoughness {
@@ -40,11 +45,51 @@ impl MetallicRoughness {
     /// The same over a dielectric of another refractive index than 1.5 (`KHR_materials_ior`): `f0` is its reflectance
     /// at normal incidence, ((ior − 1) / (ior + 1))², clamped to \[0, 1\].
     pub fn with_dielectric(base_color: Rgb, metallic: f32, roughness: f32, f0: f32) -> Self {
+        let specular = Self::with_specular(base_color, metallic, roughness, Rgb::splat(f0), 1.0);
+        Self { keeps_hue: false, ..specular }
+    }
+
+    /// The same over a dielectric that reflects more or less, and in a color (`KHR_materials_specular`): `f0` is its
+    /// reflectance at normal incidence, the product of the color and ((ior − 1) / (ior + 1))², clamped to \[0, 1\], and
+    /// `strength` in \[0, 1\] a factor on its reflectance at every angle.
+    pub fn with_specular(
+        base_color: Rgb,
+        metallic: f32,
+        roughness: f32,
+        f0: Rgb,
+        strength: f32,
+    ) -> Self {
         let (base, metallic) = (range::reflectance(base_color), range::unit(metallic));
-        let [alpha, _] = range::alpha([sqr(range::unit(roughness)); 2]);
-        let diffuse = base * (1.0 - metallic);
-        let f0 = Rgb::splat(range::unit(f0)).lerp(base, metallic);
-        Self { diffuse, f0, alpha, diffuse_mean: diffuse.mean(), f0_mean: f0.mean() }
+        let strength = range::unit(strength);
+        Self {
+            diffuse: base * (1.0 - metallic),
+            f0: (range::reflectance(f0) * strength).lerp(base, metallic),
+            f90: strength + (1.0 - strength) * metallic,
+            alpha: range::alpha([sqr(range::unit(roughness)); 2]),
+            keeps_hue: true,
+        }
+        .ordered()
+    }
+
+    /// The same with a lobe that is drawn out along x (`KHR_materials_anisotropy`): there, α is
+    /// lerp(α, 1, `strength`²), with `strength` clamped to \[0, 1\].
+    #[must_use]
+    pub fn anisotropic(self, strength: f32) -> Self {
+        let [alpha, _] = self.alpha;
+        let along = sqr(range::unit(strength));
+        Self { alpha: [alpha * (1.0 - along) + along, alpha], ..self }
+    }
+
+    /// The same over a body that lets the share `transmission` in \[0, 1\] of what enters it pass
+    /// (`KHR_materials_transmission`): the diffuse part loses it.
+    #[must_use]
+    pub fn transmitting(self, transmission: f32) -> Self {
+        Self { diffuse: self.diffuse * (1.0 - range::unit(transmission)), ..self }
+    }
+
+    /// With f90 ≥ f0 to the last bit, whatever was rounded.
+    fn ordered(self) -> Self {
+        Self { f90: self.f90.max(self.f0.max_component()), ..self }
     }
 
     /// The same lobe by glTF's older parameters (`KHR_materials_pbrSpecularGlossiness`): diffuse color,
@@ -55,18 +100,25 @@ impl MetallicRoughness {
         let unit = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
         let f0 = specular.map(unit);
         let diffuse = diffuse.map(unit) * (1.0 - f0.max_component());
-        let (diffuse_mean, f0_mean) = (diffuse.mean(), f0.mean());
         let of_roughness = Self::new(Rgb::BLACK, 0.0, 1.0 - unit(glossiness));
-        Self { diffuse, f0, diffuse_mean, f0_mean, ..of_roughness }
+        Self { diffuse, f0, ..of_roughness }
     }
 
     pub(super) fn alpha(&self) -> [f32; 2] {
-        [self.alpha; 2]
+        self.alpha
     }
 
+    /// The specular part over `f90`.
     fn specular(&self) -> Ggx {
-        let fresnel = Fresnel::Schlick { f0: self.f0 };
-        Ggx::new([self.alpha; 2], fresnel, Masking::Correlated)
+        let f0 = if self.f90 > 0.0 { self.f0 / self.f90 } else { Rgb::BLACK };
+        Ggx::new(self.alpha, Fresnel::Schlick { f0 }, Masking::Correlated)
+    }
+
+    /// What the diffuse part loses to reflection, where that is `f`.
+    #[inline(always)]
+    fn lost<F: SimdFloat>(&self, f: Colors<F>) -> Colors<F> {
+        let Colors([r, g, b]) = f;
+        if self.keeps_hue { Colors([r.max(g).max(b); 3]) } else { f }
     }
 
     /// The probability of drawing from the specular part: at most [`MOST_SPECULAR`] beside a diffuse one, whose weights
@@ -75,11 +127,13 @@ impl MetallicRoughness {
     pub(super) fn specular_share<F: SimdFloat>(&self, cos_theta_o: F) -> F {
         let one = |x| cos_theta_o.splat(x);
         let grazing = fresnel::schlick_weight(cos_theta_o);
-        let specular = one(self.f0_mean) + one(1.0 - self.f0_mean) * grazing;
-        let diffuse = (one(1.0) - specular) * one(self.diffuse_mean);
-        // Zero only for a black metal, which has no diffuse part either.
-        let share = F::select(one(0.0).lt(specular), specular / (specular + diffuse), one(1.0));
-        share.min(one(if self.diffuse_mean > 0.0 { MOST_SPECULAR } else { 1.0 }))
+        let (diffuse_mean, f0_mean) = (self.diffuse.mean(), self.f0.mean());
+        let specular = one(f0_mean) + one(self.f90 - f0_mean) * grazing;
+        let diffuse = (one(1.0) - specular) * one(diffuse_mean);
+        // At most this, and where nothing is specular: all of a black metal, which has no diffuse part.
+        let [most, none] = if diffuse_mean > 0.0 { [MOST_SPECULAR, 0.0] } else { [1.0, 1.0] };
+        let share = F::select(one(0.0).lt(specular), specular / (specular + diffuse), one(none));
+        share.min(one(most))
     }
 }
 
@@ -94,10 +148,12 @@ impl Brdf for MetallicRoughness {
         let (geometry, pdf_specular) = self.specular().geometry_pdf(wo, wi, h);
         let geometry = where_above(wo, wi, geometry);
         let pdf_specular = where_above(wo, wi, pdf_specular);
-        let f = fresnel::schlick(self.f0, one(0.5) * h.length_squared().sqrt());
+        let cos_d = one(0.5) * h.length_squared().sqrt();
+        let f = fresnel::schlick_to(self.f0, self.f90, cos_d);
         let cosine = where_above(wo, wi, wi.z * one(FRAC_1_PI));
         let diffuse = Colors::splat(cosine, self.diffuse).scaled(cosine);
-        let value = diffuse.zip(f, |d, f| (one(1.0) - f) * d + f * geometry);
+        let diffuse = diffuse.zip(self.lost(f), |d, lost| (one(1.0) - lost) * d);
+        let value = diffuse.zip(f, |d, f| d + f * geometry);
         let share = self.specular_share(wo.z);
         (value, share * pdf_specular + (one(1.0) - share) * cosine)
     }
@@ -108,7 +164,7 @@ impl Brdf for MetallicRoughness {
         let (specular, diffuse) = (u_lobe.lt(share), share.le(u_lobe));
         let mut wi = wo;
         if specular.bits() != 0 {
-            wi = reflect_about(wo, GgxNormals::new([self.alpha; 2]).sample_normals(wo, u));
+            wi = reflect_about(wo, GgxNormals::new(self.alpha).sample_normals(wo, u));
         }
         if diffuse.bits() != 0 {
             wi = Vectors::select(diffuse, warp::cosine_lanes(u), wi);
@@ -122,14 +178,15 @@ impl Brdf for MetallicRoughness {
         if wo.z <= HORIZON {
             return 0.0;
         }
-        let diffuse = ((Rgb::WHITE - self.f0) * self.diffuse).max_component() * FRAC_1_PI;
-        diffuse + self.specular().max_eval(wo)
+        let lost = self.lost(Colors::splat(wo.z, self.f0)).single();
+        let diffuse = ((Rgb::WHITE - lost) * self.diffuse).max_component() * FRAC_1_PI;
+        diffuse + self.f90 * self.specular().max_eval(wo)
     }
 
     #[inline]
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb {
-        let f = fresnel::schlick(self.f0, cos_theta_o).single();
-        (Rgb::WHITE - f) * self.diffuse + f
+        let f = fresnel::schlick_to(self.f0, self.f90, cos_theta_o);
+        (Rgb::WHITE - self.lost(f).single()) * self.diffuse + f.single()
     }
 }
 
@@ -158,7 +215,7 @@ mod tests {
         let plastic = MetallicRoughness::new(base, 0.0, 0.3);
         let same = MetallicRoughness::specular_glossiness(base / 0.96, Rgb::splat(0.04), 0.7);
         assert!((plastic.diffuse.r - same.diffuse.r).abs() < 1e-6);
-        assert!((plastic.alpha - same.alpha).abs() < 1e-6 && plastic.f0 == same.f0);
+        assert!((plastic.alpha[0] - same.alpha[0]).abs() < 1e-6 && plastic.f0 == same.f0);
         let metal = MetallicRoughness::specular_glossiness(base, Rgb::WHITE, 0.5);
         check_lobe(&metal);
         check_lobe(&MetallicRoughness::specular_glossiness(base, Rgb::splat(0.2), 0.4));
@@ -189,6 +246,75 @@ mod tests {
             check_bound(&lobe, 4.0);
         }
         assert_eq!(MetallicRoughness::with_dielectric(base, 0.0, 0.4, f32::NAN).f0, Rgb::BLACK);
+    }
+
+    /// By the definition: the dielectric's and the metal's BRDF, mixed.
+    #[test]
+    fn specular_strength_and_color_change_the_dielectric_alone() {
+        let base = Rgb::new(0.9, 0.5, 0.1);
+        let (wo, wi) = (toward(70.0, 0.3), toward(50.0, 2.5));
+        let h = (wo + wi).normalize();
+        let x = crate::math::functions::powi(1.0 - h.dot(wo), 5);
+        let ggx = Ggx::new([0.16; 2], Fresnel::One, Masking::Correlated).eval(wo, wi).r;
+        for (f0, strength) in [
+            (Rgb::new(0.08, 0.04, 0.0), 1.0),
+            (Rgb::new(0.02, 0.5, 3.0), 0.6),
+            (Rgb::splat(0.04), 0.0),
+        ] {
+            let lobe = MetallicRoughness::with_specular(base, 0.0, 0.4, f0, strength);
+            let f = f0.map(|f0| strength * (f0.min(1.0) + (1.0 - f0.min(1.0)) * x));
+            let diffuse = base * (wi.z * FRAC_1_PI * (1.0 - f.max_component()));
+            let difference = (diffuse + f * ggx - lobe.eval(wo, wi)).map(f32::abs).max_component();
+            assert!(difference < 1e-5, "{difference}");
+            let metal = MetallicRoughness::with_specular(base, 1.0, 0.4, f0, strength);
+            let ordinary = MetallicRoughness::new(base, 1.0, 0.4);
+            assert_eq!(metal.eval(wo, wi), ordinary.eval(wo, wi));
+            for metallic in [0.0, 0.3, 1.0] {
+                for roughness in [0.2, 0.7] {
+                    let lobe =
+                        MetallicRoughness::with_specular(base, metallic, roughness, f0, strength);
+                    check_lobe(&lobe);
+                    check_bound(&lobe, 4.0);
+                    let brushed = lobe.anisotropic(0.8);
+                    check_lobe(&brushed);
+                    // Rings of half vectors are coarse for slopes of 0.65 by 0.04.
+                    check_bound(&brushed, 8.0);
+                }
+            }
+        }
+        // Without a specular part all samples are the diffuse part's.
+        let matte = MetallicRoughness::with_specular(base, 0.0, 0.4, Rgb::splat(0.04), 0.0);
+        let lambert = Lambert::new(base);
+        assert_eq!(matte.pdf(wo, wi), lambert.pdf(wo, wi));
+        assert!((matte.eval(wo, wi) - lambert.eval(wo, wi)).map(f32::abs).max_component() < 1e-6);
+    }
+
+    #[test]
+    fn what_transmits_is_less_diffuse() {
+        let base = Rgb::new(0.9, 0.6, 0.2);
+        let (wo, wi) = (toward(45.0, 0.2), toward(30.0, 3.0));
+        let of = |metallic, transmission| {
+            MetallicRoughness::new(base, metallic, 0.5).transmitting(transmission).eval(wo, wi)
+        };
+        let [opaque, half, clear] = [0.0, 0.5, 1.0].map(|transmission| of(0.0, transmission));
+        let difference = (half - (opaque + clear) * 0.5).map(f32::abs).max_component();
+        assert!(difference < 1e-6 && clear.r < opaque.r, "{opaque:?} {half:?} {clear:?}");
+        assert_eq!(of(1.0, 1.0), of(1.0, 0.0));
+        check_lobe(&MetallicRoughness::new(base, 0.0, 0.5).transmitting(1.0));
+    }
+
+    #[test]
+    fn an_anisotropic_metal_is_an_anisotropic_ggx_lobe() {
+        let base = Rgb::new(0.9, 0.6, 0.2);
+        let lobe = MetallicRoughness::new(base, 1.0, 0.5).anisotropic(0.6);
+        let alpha = [0.25 * (1.0 - 0.36) + 0.36, 0.25];
+        let ggx = Ggx::new(alpha, Fresnel::Schlick { f0: base }, Masking::Correlated);
+        let (wo, wi) = (toward(45.0, 0.2), toward(30.0, 3.0));
+        let difference = (lobe.eval(wo, wi) - ggx.eval(wo, wi)).map(f32::abs).max_component();
+        assert!(difference < 1e-5, "{difference}");
+        let round = MetallicRoughness::new(base, 0.2, 0.5);
+        assert_eq!(round.anisotropic(0.0), round);
+        assert_eq!(round.anisotropic(f32::NAN), round);
     }
 
     /// A rough dielectric looks like its base color and shines like glass of index 1.5.

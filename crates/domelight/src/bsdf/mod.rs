@@ -1,7 +1,7 @@
 //! Reflectance: lobes and the materials that they add up to.
 //!
 //! A [`Bsdf`] is a small sum of [`Lobe`]s: [`Lambert`], [`Phong`], [`Ward`], [`Ggx`],
-//! [`Beckmann`] and glTF's [`MetallicRoughness`], one model a file. All work in the local frame,
+//! [`Beckmann`], and glTF's [`MetallicRoughness`], [`Sheen`] and [`Coat`], one model a file. All work in the local frame,
 //! are plain `Copy` data and evaluate value and density together, because multiple importance
 //! sampling always needs both.
 //!
@@ -18,13 +18,15 @@
 //! # Ok::<(), domelight::bsdf::ParseMaterialError>(())
 //! ```
 //!
-//! All lobes here are reciprocal: f_r(wo, wi) = f_r(wi, wo). Their constructors clamp every parameter to the
+//! All lobes here are reciprocal: f_r(wo, wi) = f_r(wi, wo). (glTF's layers are not: what a coat or sheen leaves to
+//! the layer below depends on `wo` alone, as in its specification.) Their constructors clamp every parameter to the
 //! range that the formulas bear, so no lobe evaluates to NaN or infinity.
 //!
 //! Rejected: trait objects (the set is closed, and the sample loop should inline); tabulated
 //! energy compensation (its tables would have to enter the bounds of [`Brdf::max_eval`]).
 
 mod beckmann;
+mod coat;
 mod custom;
 mod fresnel;
 mod ggx;
@@ -36,11 +38,13 @@ mod microfacet;
 mod parse;
 mod phong;
 mod range;
+mod sheen;
 #[cfg(test)]
 mod test_support;
 mod ward;
 
 pub use beckmann::{Beckmann, BeckmannNormals};
+pub use coat::Coat;
 pub use custom::{Bxdf, CustomLobe};
 pub use fresnel::{Conductor, Fresnel};
 pub use ggx::{Ggx, GgxNormals};
@@ -52,6 +56,7 @@ pub use microfacet::{Masking, Microfacet, NormalDistribution};
 pub use parse::{MaterialSpec, ParseMaterialError};
 pub use phong::Phong;
 pub use range::{MAX_ALPHA, MAX_EXPONENT, MIN_ALPHA};
+pub use sheen::Sheen;
 pub use ward::{Ward, WardForm};
 
 use crate::Rgb;

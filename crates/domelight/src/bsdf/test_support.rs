@@ -23,6 +23,15 @@ fn point(rng: &mut Pcg) -> Vec2 {
 /// Black below the surface, finite, not negative, reciprocal; `eval`, `pdf` and `sample` agree with
 /// `eval_pdf` exactly; the corners of the unit square do no harm.
 pub(crate) fn check_lobe(lobe: &impl Brdf) {
+    check(lobe, true);
+}
+
+/// [`check_lobe`] of what is not reciprocal.
+pub(crate) fn check_one_way(lobe: &impl Brdf) {
+    check(lobe, false);
+}
+
+fn check(lobe: &impl Brdf, is_reciprocal: bool) {
     let mut rng = Pcg::new(11);
     let last = 1.0 - f32::EPSILON / 2.0;
     let corners = [vec2(0.0, 0.0), vec2(last, 0.0), vec2(0.0, last), vec2(last, last)];
@@ -30,29 +39,32 @@ pub(crate) fn check_lobe(lobe: &impl Brdf) {
         for i in 0..200 {
             let u = corners.get(i).copied().unwrap_or_else(|| point(&mut rng));
             let u_lobe = if i == 0 { last } else { rng.next_f32() };
-            check_pair(lobe, wo, crate::sampling::warp::uniform_sphere(u));
+            check_pair(lobe, wo, crate::sampling::warp::uniform_sphere(u), is_reciprocal);
             if let Some(s) = lobe.sample(wo, u_lobe, u) {
                 assert_eq!((s.value, s.pdf), lobe.eval_pdf(wo, s.wi));
                 assert!(above(wo, s.wi) && s.pdf > 0.0 && s.pdf.is_finite(), "{wo} {s:?}");
                 assert!((s.wi.length() - 1.0).abs() < 1e-5, "{wo} {s:?}");
-                check_pair(lobe, wo, s.wi);
+                check_pair(lobe, wo, s.wi, is_reciprocal);
             }
         }
     }
     for below in [toward(100.0, 0.0), -Vec3::Z, Vec3::X, Vec3::NAN] {
         assert!(lobe.sample(below, 0.5, vec2(0.3, 0.4)).is_none());
-        check_pair(lobe, below, Vec3::Z);
-        check_pair(lobe, Vec3::Z, below);
+        check_pair(lobe, below, Vec3::Z, is_reciprocal);
+        check_pair(lobe, Vec3::Z, below, is_reciprocal);
     }
 }
 
-fn check_pair(lobe: &impl Brdf, wo: Vec3, wi: Vec3) {
+fn check_pair(lobe: &impl Brdf, wo: Vec3, wi: Vec3, is_reciprocal: bool) {
     let (value, pdf) = lobe.eval_pdf(wo, wi);
     assert_eq!((lobe.eval(wo, wi), lobe.pdf(wo, wi)), (value, pdf));
     assert!(value.is_finite() && value.min_component() >= 0.0, "{wo} {wi} {value:?}");
     assert!(pdf.is_finite() && pdf >= 0.0, "{wo} {wi} {pdf}");
     if !above(wo, wi) {
         assert!(value.is_black() && pdf == 0.0, "{wo} {wi}");
+        return;
+    }
+    if !is_reciprocal {
         return;
     }
     // f_r(wo, wi) = f_r(wi, wo): the same arithmetic but for the order of some products.

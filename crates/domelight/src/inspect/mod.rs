@@ -43,7 +43,7 @@ use crate::geometry::{Ray, RayBatch, offset_origin};
 use crate::math::Vec3;
 use crate::render::{Background, FilterSampler, RenderSettings, visibility};
 use crate::sampling::{Dimension, Heuristic, Sampler};
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Scene, Sight};
 use crate::strategy::{LightTable, MultipleImportanceSampling, ShadingPoint, Strategy};
 use crate::{Rgb, math::vec2};
 use regions::Regions;
@@ -97,6 +97,8 @@ struct CameraSample {
     point: Option<ShadingPoint>,
     /// Luminance that needs no estimate: emission, or what is behind the scene.
     known: f64,
+    /// A factor on the light that the point reflects: what surfaces before it let through.
+    throughput: Rgb,
 }
 
 /// What a pixel shows.
@@ -134,21 +136,18 @@ impl<'a> Inspector<'a> {
         }
         let sampler = Sampler::new(settings.sampler, settings.seed, (y * width + x) as u64);
         let (film, filter) = (sampler.set(Dimension::Film), FilterSampler::new(settings.filter));
-        let see = |ray: &Ray, sample: u32| match scene.camera_hit(ray, settings.seed, sample) {
-            Some(hit) => CameraSample {
-                point: Some(scene.shading_point(ray, &hit)),
-                known: luminance(scene.emitted(&hit)),
-            },
-            None => CameraSample {
-                point: None,
-                known: match settings.background {
-                    Background::Hidden => 0.0,
-                    Background::Shown => {
-                        let le = environment.le_interpolated(ray.direction);
-                        luminance(le) * environment.unit()
-                    }
-                },
-            },
+        let see = |ray: &Ray, sample: u32| {
+            let Sight { hit, throughput } = scene.sight(ray, settings.seed, sample);
+            let known = match (&hit, settings.background) {
+                (Some(hit), _) => luminance(scene.emitted(hit) * throughput),
+                (None, Background::Hidden) => 0.0,
+                (None, Background::Shown) => {
+                    let le = environment.le_interpolated(ray.direction) * throughput;
+                    luminance(le) * environment.unit()
+                }
+            };
+            let point = hit.map(|hit| scene.shading_point(ray, &hit));
+            CameraSample { point, known, throughput }
         };
         let samples: Vec<CameraSample> = (0..N_SAMPLES as u32)
             .map(|i| {

@@ -49,6 +49,8 @@ impl Replicates {
         trace: impl Fn(&[ShadingPoint], &[u32], &[Vec3], &mut [f32]),
     ) -> Self {
         let points: Vec<ShadingPoint> = samples.iter().filter_map(|sample| sample.point).collect();
+        let hits = samples.iter().filter(|sample| sample.point.is_some());
+        let throughputs: Vec<Rgb> = hits.map(|sample| sample.throughput).collect();
         let n_sources = regions.sources().len();
         let n_parts = n_sources + 1;
         let n_values = N_PASSES * points.len() * n_parts;
@@ -88,7 +90,8 @@ impl Replicates {
                 for (i, &v) in visible.iter().enumerate() {
                     let source = regions.source_of(environment, asked.wi[i]);
                     let at = asked.point[i] as usize * n_parts + source;
-                    let weight = f64::from(asked.weight[i].luminance()) * unit;
+                    let throughput = throughputs[asked.point[i] as usize];
+                    let weight = f64::from((asked.weight[i] * throughput).luminance()) * unit;
                     unoccluded[at] += weight;
                     seen[at] += weight * f64::from(v);
                     rays[source] += 1;
@@ -99,7 +102,8 @@ impl Replicates {
             for (point, radiance) in radiance.iter().enumerate() {
                 let row = point * n_parts..(point + 1) * n_parts;
                 let by_rays: f64 = seen[row.clone()].iter().sum();
-                let base = f64::from(radiance.luminance()) - by_rays;
+                let radiance = f64::from((*radiance * throughputs[point]).luminance());
+                let base = radiance - by_rays;
                 let known = if base.abs() > 1e-5 * by_rays.abs() { base } else { 0.0 };
                 seen[row.end - 1] = known;
                 unoccluded[row.end - 1] = known;

@@ -18,6 +18,20 @@ pub(super) struct CameraSample {
     pub(super) surface: Option<SurfaceSample>,
 }
 
+impl CameraSample {
+    /// Seen through surfaces that let the share `throughput` of each channel pass.
+    pub(super) fn through(self, throughput: Rgb) -> Self {
+        // What is not seen behind the scene hides its share.
+        let behind = if self.surface.is_some() { 0.0 } else { throughput.mean() };
+        Self {
+            color: self.color * throughput,
+            unoccluded: self.unoccluded * throughput,
+            alpha: 1.0 - (1.0 - self.alpha) * behind,
+            surface: self.surface,
+        }
+    }
+}
+
 /// What a camera sample saw of a surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SurfaceSample {

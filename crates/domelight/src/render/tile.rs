@@ -113,6 +113,8 @@ struct Batch {
     allocation: Allocation,
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
+    /// Factors on what the rays see; none in scenes where nothing transmits.
+    throughputs: Vec<Rgb>,
     /// Of each pixel.
     camera_rays: Vec<CameraRays>,
     points: Vec<ShadingPoint>,
@@ -309,7 +311,9 @@ impl Tile {
 
     /// Those of a set of the chosen pixels; returns how many.
     fn trace_camera_rays(&self, context: &RenderContext, set: SampleSet, batch: &mut Batch) -> u64 {
-        let Batch { seen, chosen, allocation, rays, hits, camera_rays, pixels, .. } = batch;
+        let Batch {
+            seen, chosen, allocation, rays, hits, throughputs, camera_rays, pixels, ..
+        } = batch;
         rays.clear();
         pixels.clear();
         camera_rays.clear();
@@ -335,11 +339,16 @@ impl Tile {
             count += u64::from(n_samples);
         }
         context.scene.bvh().closest_hits(rays, hits);
+        throughputs.clear();
         if context.scene.has_see_through() {
             for (i, of_pixel) in camera_rays.iter().enumerate() {
                 let key = self.key(context, i, set);
                 for (ray, sample) in of_pixel.range().zip(of_pixel.samples.clone()) {
-                    hits[ray] = context.scene.seen(&rays[ray], hits[ray], key, sample);
+                    let sight = context.scene.seen(&rays[ray], hits[ray], key, sample);
+                    hits[ray] = sight.hit;
+                    if context.scene.transmits() {
+                        throughputs.push(sight.throughput);
+                    }
                 }
             }
         }
@@ -433,6 +442,8 @@ impl Tile {
                         background_sample(ray.direction)
                     }
                 };
+                let throughput = ray.and_then(|ray| batch.throughputs.get(ray));
+                let sample = throughput.map_or(sample, |&through| sample.through(through));
                 if adaptive {
                     sums.add(sample.color.luminance(), sample.surface.is_some());
                 }

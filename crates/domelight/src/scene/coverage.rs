@@ -1,12 +1,20 @@
 //! What rays see and pass through: surfaces that do not hide all behind them, or are not seen from behind.
 //!
-//! A camera ray meets a surface with a probability that is its opacity; each triangle along the ray has a random number
-//! of its own, so that what is seen through several layers is their product. A shadow ray takes the product of
-//! 1 − opacity over all surfaces along it, without noise. A single-sided surface is not there for a camera ray that
+//! A surface with coverage a, the share of it that is there, that transmits T lets 1 − a + a T through, a color where T is
+//! one. T is that of `KHR_materials_transmission`: the base color, for light that is not reflected, straight through.
+//!
+//! A camera ray meets a surface with a probability that is its coverage; each triangle along the ray has a random number
+//! of its own, so that what is seen through several layers is their product. One that transmits is met with the
+//! probability p = max(1 − max(T), ¼) where it is there, and the sample's weight is 1/p if it is met, T/(1 − p) if not. A
+//! shadow ray takes the product of what all surfaces along it let through, without noise, by the mean of T's channels at
+//! normal incidence. A single-sided surface is not there for a camera ray that
 //! comes from behind; its shadow falls from either side, as that of a closed body does.
+
+use std::cell::RefCell;
 
 use super::shading::Corners;
 use super::{AlphaMode, Coverage, Material, Part, Scene};
+use crate::Rgb;
 use crate::bvh::{Bvh, Frustum};
 use crate::geometry::{Hit, Ray, RayBatch};
 use crate::sampling::{rng::hash2, sobol};
@@ -30,6 +38,61 @@ impl Partial {
     }
 }
 
+/// What a camera ray sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sight {
+    /// The surface that it meets; `None`: what is behind the scene.
+    pub hit: Option<Hit>,
+    /// A factor ≥ 0 on the radiance that comes from there; one where nothing transmits.
+    pub throughput: Rgb,
+}
+
+impl Sight {
+    fn clear(hit: Option<Hit>) -> Self {
+        Self { hit, throughput: Rgb::WHITE }
+    }
+}
+
+/// The least probability with which a camera ray meets a surface that transmits. What it reflects is a few percent of
+/// the light, but may be a sun.
+const LEAST_REFLECTED: f32 = 0.25;
+
+/// How a camera ray meets a surface that is not opaque.
+#[derive(Clone, Copy, Debug)]
+struct Layer {
+    transmits: bool,
+    /// Of being met.
+    probability: f32,
+    /// Factors on the radiance of a ray that meets it, and of one that does not.
+    if_met: Rgb,
+    if_not: Rgb,
+}
+
+impl Default for Layer {
+    fn default() -> Self {
+        Self { transmits: false, probability: 1.0, if_met: Rgb::WHITE, if_not: Rgb::WHITE }
+    }
+}
+
+/// The product over the layers up to the surface that is seen. The hierarchy asks about hits in any order, and about some
+/// twice.
+fn throughput(mut layers: Vec<(Hit, Layer, bool)>, seen: Option<Hit>) -> Rgb {
+    layers.sort_unstable_by(|(a, ..), (b, ..)| {
+        (a.t.total_cmp(&b.t)).then(a.triangle.cmp(&b.triangle))
+    });
+    layers.dedup_by_key(|(hit, ..)| hit.triangle);
+    let mut throughput = Rgb::WHITE;
+    for (hit, layer, is_met) in layers {
+        let is_seen = seen.is_some_and(|seen| seen.triangle == hit.triangle);
+        if is_seen {
+            throughput = throughput * layer.if_met;
+        } else if !is_met && seen.is_none_or(|seen| hit.t <= seen.t) {
+            throughput = throughput * layer.if_not;
+        }
+    }
+    throughput
+}
+
 impl Coverage {
     /// The share in \[0, 1\] of the surface in what is seen, where the product of factor, texture and vertices is
     /// `opacity`; 0 if that is NaN.
@@ -46,44 +109,102 @@ impl Coverage {
 impl Part {
     /// Whether it hides all behind it, everywhere.
     pub(super) fn is_opaque(&self, materials: &[Material]) -> bool {
-        let coverage = &materials[self.material].coverage;
+        let material = &materials[self.material];
+        if material.transmits() {
+            return false;
+        }
+        let coverage = &material.coverage;
         let is_uniform = coverage.texture.is_none() && self.mesh.alphas.is_empty();
         coverage.mode == AlphaMode::Opaque || is_uniform && coverage.of(coverage.opacity) >= 1.0
     }
 }
 
 impl Scene {
-    /// What a camera ray sees first. A surface that covers only a share of what is behind it is seen with that
-    /// probability, by random numbers that are a function of `key`, `sample` and the triangle; a single-sided one not from behind. Numbers of many samples of
-    /// one key, which may be a pixel, are stratified.
-    pub fn camera_hit(&self, ray: &Ray, key: u64, sample: u32) -> Option<Hit> {
+    /// What a camera ray sees first. A surface that covers only a share of what is behind it, or lets light through, is
+    /// seen with a probability, by random numbers that are a function of `key`, `sample` and the triangle; a single-sided
+    /// one not from behind. Numbers of many samples of one key, which may be a pixel, are stratified.
+    pub fn sight(&self, ray: &Ray, key: u64, sample: u32) -> Sight {
         self.seen(ray, self.bvh.closest_hit(ray), key, sample)
     }
 
-    /// Whether [`Scene::camera_hit`] may differ from the closest hit of the hierarchy of [`Scene::bvh`].
+    /// The hit of [`Scene::sight`].
+    pub fn camera_hit(&self, ray: &Ray, key: u64, sample: u32) -> Option<Hit> {
+        self.sight(ray, key, sample).hit
+    }
+
+    /// Whether [`Scene::sight`] may differ from the closest hit of the hierarchy of [`Scene::bvh`].
     #[inline]
     pub(crate) fn has_see_through(&self) -> bool {
         self.has_single_sided || self.partial.is_some()
     }
 
-    /// [`Scene::camera_hit`], given the closest `hit` of what is opaque.
-    pub(crate) fn seen(
-        &self,
-        ray: &Ray,
-        mut hit: Option<Hit>,
-        key: u64,
-        sample: u32,
-    ) -> Option<Hit> {
+    /// Whether the throughput of a [`Sight`] may differ from one.
+    #[inline]
+    pub(crate) fn transmits(&self) -> bool {
+        self.transmits
+    }
+
+    /// [`Scene::sight`], given the closest `hit` of what is opaque.
+    pub(crate) fn seen(&self, ray: &Ray, mut hit: Option<Hit>, key: u64, sample: u32) -> Sight {
         if hit.is_some_and(|hit| !self.faces(ray, &hit)) {
             hit = self.bvh.closest_hit_where(ray, |hit| self.faces(ray, hit));
         }
-        let Some(partial) = &self.partial else { return hit };
+        let Some(partial) = &self.partial else { return Sight::clear(hit) };
         let nearer = Ray { t_max: hit.map_or(ray.t_max, |hit| hit.t), ..*ray };
+        let layers = RefCell::new(Vec::new());
         let accept = |hit: &Hit| {
             let hit = partial.in_scene(hit);
-            self.faces(ray, &hit) && uniform(key, sample, hit.triangle) < self.opacity(&hit)
+            if !self.faces(ray, &hit) {
+                return false;
+            }
+            let layer = self.layer(ray, &hit);
+            let is_met = uniform(key, sample, hit.triangle) < layer.probability;
+            if layer.transmits {
+                layers.borrow_mut().push((hit, layer, is_met));
+            }
+            is_met
         };
-        partial.bvh.closest_hit_where(&nearer, accept).map(|hit| partial.in_scene(&hit)).or(hit)
+        let met = partial.bvh.closest_hit_where(&nearer, accept);
+        let hit = met.map(|hit| partial.in_scene(&hit)).or(hit);
+        Sight { hit, throughput: throughput(layers.into_inner(), hit) }
+    }
+
+    /// How a camera ray meets a surface that is not opaque.
+    fn layer(&self, ray: &Ray, hit: &Hit) -> Layer {
+        let coverage = self.opacity(hit);
+        let (part, triangle) = self.locate(hit.triangle);
+        let material = &self.materials[part.material];
+        if !material.transmits() {
+            return Layer { probability: coverage, ..Layer::default() };
+        }
+        let [a, b, c] = part.mesh.triangles[triangle].map(|i| part.mesh.positions[i as usize]);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let cos_theta = normal.dot(ray.direction.normalize()).abs();
+        let through = self.transmittance(part, triangle, hit, coverage, cos_theta);
+        let probability = (1.0 - through.max_component()).max(LEAST_REFLECTED * coverage);
+        Layer {
+            transmits: true,
+            probability,
+            if_met: Rgb::splat(if probability > 0.0 { coverage / probability } else { 0.0 }),
+            if_not: through / (1.0 - probability).max(f32::MIN_POSITIVE),
+        }
+    }
+
+    /// The share of each channel of light that a surface lets through at a hit, where the share `coverage` of it is there.
+    fn transmittance(
+        &self,
+        part: &Part,
+        triangle: usize,
+        hit: &Hit,
+        coverage: f32,
+        cos_theta: f32,
+    ) -> Rgb {
+        let corners = Corners::new(&part.mesh, triangle, hit);
+        let tint = corners.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
+        let uvs = corners.uvs(&part.mesh);
+        let material = &self.materials[part.material];
+        let body = material.transmittance(&self.textures, &uvs, tint, cos_theta);
+        Rgb::splat(1.0 - coverage) + body * coverage
     }
 
     /// Whether a camera ray within the frustum may see anything; false only if none does.
@@ -98,14 +219,22 @@ impl Scene {
     }
 
     /// What share of light, in \[0, 1\], the surfaces that are not in [`Scene::bvh`] let through along each shadow ray:
-    /// the product of 1 − opacity. `transmittances` is overwritten, one entry a ray.
+    /// a product over all of them. `transmittances` is overwritten, one entry a ray.
     pub fn transmittances(&self, rays: &RayBatch, transmittances: &mut Vec<f32>) {
         let Some(partial) = &self.partial else {
             transmittances.clear();
             transmittances.resize(rays.len(), 1.0);
             return;
         };
-        let of_hit = |hit: &Hit| 1.0 - self.opacity(&partial.in_scene(hit));
+        let of_hit = |hit: &Hit| {
+            let hit = partial.in_scene(hit);
+            let coverage = self.opacity(&hit);
+            let (part, triangle) = self.locate(hit.triangle);
+            if self.transmits && self.materials[part.material].transmits() {
+                return self.transmittance(part, triangle, &hit, coverage, 1.0).mean();
+            }
+            1.0 - coverage
+        };
         partial.bvh.transmittances(rays, &of_hit, transmittances);
     }
 

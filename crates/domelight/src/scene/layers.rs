@@ -3,9 +3,10 @@
 //! A loader fills these in whole; [`Material::undrawn_features`](super::Material::undrawn_features) says
 //! which of them a picture lacks. Where a number has a texture, the two are multiplied.
 
-use super::texture::TextureRef;
+use super::texture::{Texture, TextureRef, Uvs};
 use crate::Rgb;
-use crate::math::sqr;
+use crate::bsdf::{self, Coat};
+use crate::math::{Vec2, Vec3, functions, sqr, vec2};
 
 /// How much of what lies behind a surface shows through it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,6 +65,33 @@ pub struct ColorFactor {
     pub value: Rgb,
     /// The texture, in sRGB.
     pub texture: Option<TextureRef>,
+}
+
+/// A channel of a texture that holds a number.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Channel {
+    Red,
+    Green,
+    Alpha,
+}
+
+impl Factor {
+    /// The number times that of the texture at texture coordinates `uvs`.
+    pub(super) fn at(&self, channel: Channel, textures: &[Texture], uvs: &Uvs) -> f32 {
+        let of_texture = |texture: &TextureRef| match channel {
+            Channel::Red => texture.at(textures, uvs).r,
+            Channel::Green => texture.at(textures, uvs).g,
+            Channel::Alpha => texture.alpha_at(textures, uvs),
+        };
+        self.value * self.texture.as_ref().map_or(1.0, of_texture)
+    }
+}
+
+impl ColorFactor {
+    /// The color times that of the texture at texture coordinates `uvs`.
+    pub(super) fn at(&self, textures: &[Texture], uvs: &Uvs) -> Rgb {
+        self.value * self.texture.as_ref().map_or(Rgb::WHITE, |texture| texture.at(textures, uvs))
+    }
 }
 
 /// What lies on, in and behind the metallic-roughness layer; nothing by default.
@@ -135,6 +163,56 @@ pub struct Volume {
     pub attenuation_distance: f32,
     /// The color at that distance, in \[0, 1\].
     pub attenuation_color: Rgb,
+}
+
+impl Clearcoat {
+    /// The strength and the lobe at texture coordinates `uvs`, about a `normal` in the shading frame; `None` where the
+    /// strength is 0.
+    pub(super) fn coat(
+        &self,
+        textures: &[Texture],
+        uvs: &Uvs,
+        normal: Vec3,
+    ) -> Option<(f32, Coat)> {
+        let strength = self.strength.at(Channel::Red, textures, uvs);
+        if strength <= 0.0 {
+            return None;
+        }
+        let roughness = self.roughness.at(Channel::Green, textures, uvs);
+        Some((strength, Coat::new(sqr(roughness), normal)))
+    }
+}
+
+impl Sheen {
+    /// The lobe at texture coordinates `uvs`.
+    pub(super) fn lobe(&self, textures: &[Texture], uvs: &Uvs) -> bsdf::Sheen {
+        let roughness = self.roughness.at(Channel::Alpha, textures, uvs);
+        bsdf::Sheen::new(self.color.at(textures, uvs), roughness)
+    }
+}
+
+impl Anisotropy {
+    /// At texture coordinates `uvs`: the strength in \[0, 1\], and the longer direction along the tangent and the
+    /// bitangent, not of unit length.
+    pub(super) fn at(&self, textures: &[Texture], uvs: &Uvs) -> (f32, Vec2) {
+        let (sin, cos) = functions::sin_cos(self.rotation);
+        let Some(texture) = &self.texture else { return (self.strength, vec2(cos, sin)) };
+        let texel = texture.at(textures, uvs);
+        let along = vec2(2.0 * texel.r - 1.0, 2.0 * texel.g - 1.0);
+        (self.strength * texel.b, vec2(cos, sin).rotate(along))
+    }
+}
+
+impl Volume {
+    /// The share of each channel that passes half of the body at texture coordinates `uvs`, since light meets a body's
+    /// surface twice; all of it at a surface that is seen from its front alone.
+    pub(super) fn transmittance(&self, textures: &[Texture], uvs: &Uvs, double_sided: bool) -> Rgb {
+        let thickness = self.thickness.at(Channel::Green, textures, uvs);
+        let share = if double_sided { 0.5 } else { 1.0 };
+        // Infinite distances attenuate nothing.
+        let exponent = share * thickness / self.attenuation_distance;
+        self.attenuation_color.map(|c| functions::powf(c, exponent))
+    }
 }
 
 impl Layers {

@@ -3,10 +3,10 @@
 //! A [`Material`] becomes a [`Bsdf`], a sum of reflectance lobes, at each hit:
 //! textures are looked up there and vertex colors multiplied in.
 
-use super::layers::{Coverage, Emission, Layers};
+use super::layers::{Channel, Coverage, Emission, Layers};
 use super::texture::{Texture, TextureRef, Uvs};
 use crate::Rgb;
-use crate::bsdf::{Bsdf, Lambert, MetallicRoughness, Phong};
+use crate::bsdf::{Bsdf, Fresnel, Lambert, MetallicRoughness, Phong};
 use crate::math::Vec3;
 
 /// What a part of a scene is made of.
@@ -121,20 +121,56 @@ impl Material {
         Self::new(name, MaterialModel::Fixed(bsdf))
     }
 
-    /// What of this surface a picture lacks, in glTF's terms; whoever draws a feature deletes its line.
-    pub fn undrawn_features(&self) -> impl Iterator<Item = &'static str> {
-        let Layers { ior: _, specular, clearcoat, sheen, anisotropy, transmission, volume } =
-            &self.layers;
+    /// What of this surface a picture only approximates, in glTF's terms.
+    pub fn approximated_features(&self) -> impl Iterator<Item = &'static str> {
+        let Layers { transmission, volume, .. } = &self.layers;
+        let transmits = self.transmits();
         [
-            (specular.is_some(), "KHR_materials_specular"),
-            (clearcoat.is_some(), "KHR_materials_clearcoat"),
-            (sheen.is_some(), "KHR_materials_sheen"),
-            (anisotropy.is_some(), "KHR_materials_anisotropy"),
-            (transmission.is_some(), "KHR_materials_transmission"),
-            (volume.is_some(), "KHR_materials_volume"),
+            (transmission.is_some() && transmits, "KHR_materials_transmission"),
+            (volume.is_some() && transmits, "KHR_materials_volume"),
         ]
         .into_iter()
         .filter_map(|(is_used, feature)| is_used.then_some(feature))
+    }
+
+    /// Whether light passes through it where it is there.
+    #[inline]
+    pub(crate) fn transmits(&self) -> bool {
+        self.layers.transmission.is_some()
+            && !self.unlit
+            && matches!(self.model, MaterialModel::MetallicRoughness(_))
+    }
+
+    /// The share of each channel that passes straight through the surface at texture coordinates `uvs` under the vertex
+    /// color `tint`, along a direction at the cosine `cos_theta` to its normal. A body does not refract.
+    pub(crate) fn transmittance(
+        &self,
+        textures: &[Texture],
+        uvs: &Uvs,
+        tint: Rgb,
+        cos_theta: f32,
+    ) -> Rgb {
+        let MaterialModel::MetallicRoughness(m) = &self.model else { return Rgb::BLACK };
+        let Some(transmission) = self.layers.transmission.filter(|_| !self.unlit) else {
+            return Rgb::BLACK;
+        };
+        let look_up =
+            |t: &Option<TextureRef>| t.as_ref().map_or(Rgb::WHITE, |t| t.at(textures, uvs));
+        let base = (m.base_color * look_up(&m.base_color_texture) * tint).map(unit);
+        let dielectric = 1.0 - unit(m.metallic * look_up(&m.metallic_roughness_texture).b);
+        let f0 = Rgb::splat(self.layers.dielectric_f0());
+        let strength = self
+            .layers
+            .specular
+            .as_ref()
+            .map_or(1.0, |specular| unit(specular.strength.at(Channel::Alpha, textures, uvs)));
+        let entering = 1.0 - strength * Fresnel::Schlick { f0 }.eval(cos_theta).r;
+        let share = unit(transmission.at(Channel::Red, textures, uvs)) * dielectric * entering;
+        let body =
+            self.layers.volume.as_ref().map_or(Rgb::WHITE, |volume| {
+                volume.transmittance(textures, uvs, self.double_sided)
+            });
+        base * body * share
     }
 
     /// The textures that it refers to.
@@ -142,7 +178,6 @@ impl Material {
         self.shading_textures()
             .chain(&self.coverage.texture)
             .chain(self.emission.iter().filter_map(|e| e.texture.as_ref()))
-            .chain(self.layers.textures())
     }
 
     /// The textures that its material depends on.
@@ -158,7 +193,8 @@ impl Material {
                 [s.diffuse_texture.as_ref(), s.specular_glossiness_texture.as_ref()]
             }
         };
-        of_model.into_iter().flatten().chain(self.normal_map.as_ref().map(|n| &n.texture))
+        let of_model = of_model.into_iter().flatten();
+        of_model.chain(self.normal_map.as_ref().map(|n| &n.texture)).chain(self.layers.textures())
     }
 
     /// Whether it matters which way the tangent points.
@@ -170,7 +206,18 @@ impl Material {
             | MaterialModel::MetallicRoughness(_)
             | MaterialModel::SpecularGlossiness(_) => false,
         };
-        fixed || self.normal_map.is_some()
+        let coat_relief = self.layers.clearcoat.as_ref().is_some_and(|c| c.normal_map.is_some());
+        fixed || self.normal_map.is_some() || self.layers.anisotropy.is_some() || coat_relief
+    }
+
+    /// Which set of texture coordinates tangents follow: 0 or 1.
+    #[inline]
+    pub(crate) fn tangent_set(&self) -> usize {
+        let Layers { anisotropy, clearcoat, .. } = &self.layers;
+        let of_anisotropy = || anisotropy.as_ref().and_then(|a| a.texture);
+        let of_coat = || clearcoat.as_ref().and_then(|c| c.normal_map).map(|n| n.texture);
+        let texture = self.normal_map.map(|n| n.texture).or_else(of_anisotropy).or_else(of_coat);
+        texture.map_or(0, |texture| texture.uv_set)
     }
 
     /// Adds `by` to the index of every texture.
@@ -206,14 +253,15 @@ impl Material {
         (color * texture * tint).map(unit)
     }
 
-    /// Sets `bsdf` to that at texture coordinates `uvs` under the vertex color `tint`, seen from `wo`.
+    /// Sets `bsdf` to that at texture coordinates `uvs` under the vertex color `tint`, seen from `wo`. The normal of a
+    /// coat, in the shading frame, is `coat_normal`.
     #[inline]
     pub(crate) fn set_bsdf(
         &self,
         textures: &[Texture],
         uvs: &Uvs,
         tint: Rgb,
-        wo: Vec3,
+        [wo, coat_normal]: [Vec3; 2],
         bsdf: &mut Bsdf,
     ) {
         let look_up =
@@ -233,8 +281,30 @@ impl Material {
                 let factors = look_up(&m.metallic_roughness_texture);
                 let (metallic, roughness) = (m.metallic * factors.b, m.roughness * factors.g);
                 let f0 = self.layers.dielectric_f0();
-                let lobe = MetallicRoughness::with_dielectric(base, metallic, roughness, f0);
-                *bsdf = Bsdf::single(lobe);
+                let lobe = match &self.layers.specular {
+                    None => MetallicRoughness::with_dielectric(base, metallic, roughness, f0),
+                    Some(specular) => {
+                        let f0 = specular.color.at(textures, uvs) * f0;
+                        let strength = specular.strength.at(Channel::Alpha, textures, uvs);
+                        MetallicRoughness::with_specular(base, metallic, roughness, f0, strength)
+                    }
+                };
+                let lobe = match &self.layers.anisotropy {
+                    None => lobe,
+                    Some(anisotropy) => lobe.anisotropic(anisotropy.at(textures, uvs).0),
+                };
+                let Layers { sheen, clearcoat, transmission, .. } = &self.layers;
+                let lobe = match transmission {
+                    None => lobe,
+                    Some(share) => lobe.transmitting(share.at(Channel::Red, textures, uvs)),
+                };
+                if sheen.is_none() && clearcoat.is_none() {
+                    *bsdf = Bsdf::single(lobe);
+                    return;
+                }
+                let sheen = sheen.map(|sheen| sheen.lobe(textures, uvs));
+                let coat = clearcoat.and_then(|coat| coat.coat(textures, uvs, coat_normal));
+                *bsdf = Bsdf::layered(lobe, sheen, coat, wo);
             }
             MaterialModel::SpecularGlossiness(s) => {
                 let diffuse = s.diffuse * look_up(&s.diffuse_texture) * tint;

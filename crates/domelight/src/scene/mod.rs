@@ -21,6 +21,7 @@ mod texture;
 
 pub use crate::environment::UpAxis;
 pub use camera::{Camera, CameraError, CameraSettings, Projection};
+pub use coverage::Sight;
 pub use description::{
     EnvironmentSettings, EnvironmentSource, NamedCamera, Part, SceneDescription,
 };
@@ -60,6 +61,8 @@ pub struct Scene {
     has_single_sided: bool,
     /// Some part sends out light.
     emits: bool,
+    /// Light passes through some part.
+    transmits: bool,
     bounds: Aabb,
     /// The bounds of what is not scenery.
     subject_bounds: Aabb,
@@ -142,6 +145,7 @@ impl Scene {
         let used = || parts.iter().map(|part| &materials[part.material]);
         let has_single_sided = used().any(|material| !material.double_sided);
         let emits = used().any(|material| material.unlit || material.emission.is_some());
+        let transmits = used().any(Material::transmits);
         Ok(Self {
             parts,
             materials,
@@ -151,6 +155,7 @@ impl Scene {
             partial,
             has_single_sided,
             emits,
+            transmits,
             bounds,
             subject_bounds,
             camera,
@@ -233,7 +238,7 @@ impl Scene {
     }
 
     /// The ray-tracing hierarchy over all triangles that hide what is behind them: all but those whose material has a
-    /// [`Coverage`] that is not whole everywhere. [`Scene::camera_hit`] and [`Scene::transmittances`] know both.
+    /// [`Coverage`] that is not whole everywhere. [`Scene::sight`] and [`Scene::transmittances`] know both.
     pub fn bvh(&self) -> &Bvh {
         &self.bvh
     }

@@ -9,7 +9,7 @@
 //! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Black pixels
 //! along silhouettes would be the alternative.
 
-use super::{Material, Part, Scene};
+use super::{Layers, Material, NormalMap, Part, Scene};
 use crate::Rgb;
 use crate::geometry::{Hit, Mesh, Ray};
 use crate::math::{Frame, Vec2, Vec3, Vec4};
@@ -42,22 +42,30 @@ impl Scene {
         let ng = (p1 - p0).cross(p2 - p0).try_normalize().unwrap_or(viewer);
         let uvs = corner.uvs(&part.mesh);
         let smooth = corner.mix(&part.mesh.normals).and_then(Vec3::try_normalize).unwrap_or(ng);
-        let (normal, tangent) = if material.needs_tangent() {
-            self.normal_and_tangent(part, material, &corner, smooth, &uvs)
+        let relief = if material.needs_tangent() {
+            self.relief(part, material, &corner, smooth, &uvs)
         } else {
-            (smooth, None)
+            Relief { normal: smooth, coat_normal: smooth, tangent: None }
         };
 
         let ng = if ng.dot(viewer) < 0.0 { -ng } else { ng };
-        let normal = if smooth.dot(ng) < 0.0 { -normal } else { normal };
-        let normal = bend(normal, viewer, ng);
-        let frame = tangent.map_or_else(
-            || Frame::from_z(normal),
-            |t| Frame::from_z_and_tangent(normal, t.truncate()),
-        );
+        let to_viewer = |normal: Vec3| {
+            let normal = if smooth.dot(ng) < 0.0 { -normal } else { normal };
+            bend(normal, viewer, ng)
+        };
+        let normal = to_viewer(relief.normal);
+        let frame = relief
+            .tangent
+            .map_or_else(|| Frame::from_z(normal), |t| Frame::from_z_and_tangent(normal, t));
         let wo = frame.to_local(viewer).normalize();
+        let coat_normal = match material.layers.clearcoat {
+            Some(_) if relief.coat_normal != relief.normal => {
+                frame.to_local(to_viewer(relief.coat_normal))
+            }
+            _ => Vec3::Z,
+        };
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
-        material.set_bsdf(&self.textures, &uvs, tint, wo, &mut point.bsdf);
+        material.set_bsdf(&self.textures, &uvs, tint, [wo, coat_normal], &mut point.bsdf);
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
         (point.position, point.ng, point.frame, point.wo) = (position, ng, frame, wo);
     }
@@ -71,31 +79,57 @@ impl Scene {
         is_plain.then_some(part.material)
     }
 
-    /// On the front side: the interpolated normal with the normal map applied, and the tangent. Which side the viewer is
-    /// on follows from the first, for relief may tip the second over.
-    fn normal_and_tangent(
+    /// The normals and the tangent at a hit, given the interpolated `normal`.
+    fn relief(
         &self,
         part: &Part,
         material: &Material,
         corner: &Corners,
         normal: Vec3,
         uvs: &Uvs,
-    ) -> (Vec3, Option<Vec4>) {
+    ) -> Relief {
         let mesh = &part.mesh;
-        let set = match material.normal_map {
-            Some(map) if map.texture.uv_set == 1 => &mesh.uvs2,
+        let set = match material.tangent_set() {
+            1 => &mesh.uvs2,
             _ => &mesh.uvs,
         };
         let tangent = corner.mix(&mesh.tangents);
         let tangent = tangent.or_else(|| corner.uv_tangent(&mesh.positions, set, normal));
-        let mapped = material.normal_map.zip(tangent).and_then(|(map, tangent)| {
-            let frame = Frame::from_z_and_tangent(normal, tangent.truncate());
-            let n = map.normal(&self.textures, uvs);
-            let bitangent = frame.y * 1f32.copysign(tangent.w);
+        let Some(tangent) = tangent else {
+            return Relief { normal, coat_normal: normal, tangent: None };
+        };
+        let frame = Frame::from_z_and_tangent(normal, tangent.truncate());
+        let bitangent = frame.y * 1f32.copysign(tangent.w);
+        let mapped = |map: &Option<NormalMap>| {
+            let n = map.as_ref()?.normal(&self.textures, uvs);
             (frame.x * n.x + bitangent * n.y + frame.z * n.z).try_normalize()
-        });
-        (mapped.unwrap_or(normal), tangent)
+        };
+        let Layers { anisotropy, clearcoat, .. } = &material.layers;
+        let coat_map = clearcoat.as_ref().map_or(&None, |coat| &coat.normal_map);
+        let tangent = match anisotropy {
+            None => tangent.truncate(),
+            Some(anisotropy) => {
+                let (_, along) = anisotropy.at(&self.textures, uvs);
+                frame.x * along.x + bitangent * along.y
+            }
+        };
+        Relief {
+            normal: mapped(&material.normal_map).unwrap_or(normal),
+            coat_normal: mapped(coat_map).unwrap_or(normal),
+            tangent: Some(tangent),
+        }
     }
+}
+
+/// What maps say of a surface at a point, on its front side. Which side the viewer is on follows from the interpolated
+/// normal, for relief may tip others over.
+struct Relief {
+    /// The interpolated normal with the normal map applied.
+    normal: Vec3,
+    /// The same of a clear coat.
+    coat_normal: Vec3,
+    /// The x axis of anisotropic lobes, of any length.
+    tangent: Option<Vec3>,
 }
 
 /// `normal` bent toward `viewer` until their cosine is [`MIN_COS_THETA_O`]; see the

@@ -1,6 +1,6 @@
 //! Points under coarse maps with some texels hidden, and their integrals by quadrature.
 
-use domelight::bsdf::Bsdf;
+use domelight::bsdf::{Bsdf, Coat, MaterialSpec, MetallicRoughness, Sheen};
 use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::{Frame, Vec3, from_spherical, vec2, vec3};
 use domelight::sampling::{Pcg32, Sampler, SamplerKind};
@@ -11,7 +11,8 @@ use testkit::quadrature::{Adaptive, Rect};
 pub(crate) const WIDTH: usize = 8;
 pub(crate) const HEIGHT: usize = 6;
 
-pub(crate) const MATERIALS: [&str; 9] = [
+/// Of [`bsdf`].
+pub(crate) const MATERIALS: [&str; 11] = [
     "diffuse:0.8,0.5,0.2",
     "phong:50:1:0",
     "phong:50:0.5:0.5",
@@ -21,7 +22,20 @@ pub(crate) const MATERIALS: [&str; 9] = [
     "beckmann:0.3",
     "mix",
     "gltf:0.9,0.6,0.3:0.5:0.5",
+    "gltf:0.9,0.6,0.3:0.2:0.5:0.6:0.2,0.9,1:0.7",
+    "layers",
 ];
+
+/// What a text of `--material` says, or a leaning coat over sheen over a base.
+pub(crate) fn bsdf(name: &str) -> Bsdf {
+    if name != "layers" {
+        return name.parse::<MaterialSpec>().unwrap().into();
+    }
+    let base = MetallicRoughness::new(Rgb::new(0.8, 0.3, 0.1), 0.2, 0.5);
+    let sheen = Sheen::new(Rgb::new(0.2, 0.5, 1.0), 0.3);
+    let coat = Coat::new(0.15, vec3(0.2, -0.1, 0.9));
+    Bsdf::layered(base, Some(sheen), Some((0.8, coat)), from_spherical(0.4, 2.5))
+}
 
 /// Noise with a texel that outshines it near the horizon of most points.
 pub(crate) fn environment(spots: bool, up: UpAxis) -> Environment {

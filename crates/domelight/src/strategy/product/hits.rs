@@ -20,6 +20,15 @@ pub(super) struct Group {
     pub(super) share: f32,
 }
 
+impl Group {
+    /// A frame about another normal, given in that of the group, and the direction to the viewer in it.
+    pub(super) fn about(&self, normal: Vec3) -> (Frame, Vec3) {
+        let frame = Frame::from_z(self.frame.to_world(normal));
+        let wo = frame.to_local(self.frame.to_world(self.wo));
+        (frame, Vec3::new(wo.x, wo.y, wo.z.max(1e-3)))
+    }
+}
+
 /// Hits of a group have normals within 18° of the first one's.
 const LIKE_NORMALS: f32 = 0.95;
 /// The roughnesses of a group are within this factor of the first one's.
@@ -132,6 +141,15 @@ impl Groups {
     }
 }
 
+/// Both in local frames that are near.
+fn near_normals(a: Option<Vec3>, b: Option<Vec3>) -> bool {
+    match (a, b) {
+        (None, None) => true,
+        (Some(a), Some(b)) => a.dot(b) > LIKE_NORMALS,
+        _ => false,
+    }
+}
+
 /// Of the same kinds of lobes, about as rough.
 fn alike(a: &LobeSummary, b: &LobeSummary) -> bool {
     let near = |a: f32, b: f32| a < LIKE_ROUGHNESS * b && b < LIKE_ROUGHNESS * a;
@@ -142,9 +160,9 @@ fn alike(a: &LobeSummary, b: &LobeSummary) -> bool {
     };
     let gloss = |a: GlossyLobe, b: GlossyLobe| match (a, b) {
         (
-            GlossyLobe::Slopes { alpha: a, gaussian: c },
-            GlossyLobe::Slopes { alpha: b, gaussian: d },
-        ) => c == d && near(a[0], b[0]) && near(a[1], b[1]),
+            GlossyLobe::Slopes { alpha: a, gaussian: c, leaning: m },
+            GlossyLobe::Slopes { alpha: b, gaussian: d, leaning: n },
+        ) => c == d && near(a[0], b[0]) && near(a[1], b[1]) && near_normals(m, n),
         (GlossyLobe::Mirror { exponent: a }, GlossyLobe::Mirror { exponent: b }) => {
             near_exponents(a, b)
         }

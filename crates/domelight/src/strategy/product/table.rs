@@ -73,19 +73,19 @@ impl Table {
                 let share = group.share * albedo.luminance();
                 let lobe = GroupLobe { cells, group, share, first: n_lobes == 0 };
                 match gloss {
-                    GlossyLobe::Slopes { alpha, gaussian: true } => {
+                    GlossyLobe::Slopes { alpha, gaussian: true, leaning } => {
                         self.add_slopes::<S, true, CONTROL_VARIATE>(
                             simd,
                             lobe,
-                            alpha,
+                            (alpha, leaning),
                             control_variate,
                         );
                     }
-                    GlossyLobe::Slopes { alpha, gaussian: false } => {
+                    GlossyLobe::Slopes { alpha, gaussian: false, leaning } => {
                         self.add_slopes::<S, false, CONTROL_VARIATE>(
                             simd,
                             lobe,
-                            alpha,
+                            (alpha, leaning),
                             control_variate,
                         );
                     }
@@ -167,12 +167,14 @@ impl Table {
         &mut self,
         simd: S,
         GroupLobe { cells, group, share, first }: GroupLobe,
-        alpha: [f32; 2],
+        (alpha, leaning): ([f32; 2], Option<Vec3>),
         control_variate: &mut ControlVariate,
     ) {
         let one = |x| simd.splat_f32x16(x);
-        let frame = &group.frame;
-        let wo = group.wo;
+        let (frame, wo) = match leaning {
+            None => (group.frame, group.wo),
+            Some(normal) => group.about(normal),
+        };
         let half = Vectors::splat(one(0.0), frame.to_world(wo));
         let [ax2, ay2] = alpha.map(|a| one(sqr(a)));
         let rough2 = one(0.5) * (ax2 + ay2);
@@ -214,7 +216,7 @@ impl Table {
                     out = out * one(2.0 / 3.0);
                 }
                 let across = [out * x, out * y, up];
-                let slope = h.times(along).plus(frame_vector(frame, across).times(steady));
+                let slope = h.times(along).plus(frame_vector(&frame, across).times(steady));
                 let slope = slope.times(weight * one(4.0));
                 control_variate.add_glossy_lobe(simd, pair, [center, slope], weight, first);
             }

@@ -63,9 +63,7 @@ impl<'a> Materials<'a> {
         let material = reader.material(&material);
         let uv_sets = reader.uv_sets;
         let material = material.map_err(|e| e.within(|| format!("material '{name}'")))?;
-        let follows = material.normal_map.as_ref().map(|n| n.texture.uv_set);
-        let anisotropy = material.layers.anisotropy;
-        let follows = follows.or(anisotropy.map(|a| a.texture.map_or(0, |t| t.uv_set)));
+        let follows = material.needs_tangent().then(|| material.tangent_set());
         let slot = Slot {
             material: self.loaded.len(),
             uv_sets,
@@ -77,20 +75,23 @@ impl<'a> Materials<'a> {
         Ok(slot)
     }
 
-    /// All surfaces and textures; what of them is not drawn is said once a feature.
+    /// All surfaces and textures; what of them is only approximated is said once a feature.
     pub(super) fn finish(self, mut warn: impl FnMut(&str)) -> (Vec<Material>, Vec<Texture>) {
-        let mut undrawn: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        let mut approximated: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
         for material in &self.loaded {
-            for feature in material.undrawn_features() {
-                undrawn.entry(feature).or_default().push(&material.name);
+            for feature in material.approximated_features() {
+                approximated.entry(feature).or_default().push(&material.name);
             }
         }
-        for (feature, names) in undrawn {
+        for (feature, names) in approximated {
             let others = match names.len() {
                 1 => String::new(),
                 n => format!(" and of {} more", n - 1),
             };
-            warn(&format!("{feature} is not drawn, of material '{}'{others}", names[0]));
+            warn(&format!(
+                "{feature} of material '{}'{others} is approximated: light passes straight through, without refraction",
+                names[0]
+            ));
         }
         (self.loaded, self.images.textures.loaded)
     }
