@@ -1,7 +1,7 @@
 // What all panels share: the engines, the state, and what is loaded.
 
 import { $, latest } from "./dom";
-import type { Camera, Engines } from "./engines";
+import type { Camera, Engines, Host } from "./engines";
 import { fromHash, isBuiltinProbe, toHash, type State } from "./state";
 
 export interface SceneReport {
@@ -68,7 +68,7 @@ export class App {
   readonly load = latest(async () => {
     const { scene, material, ground, env, rows, rotate, ev } = this.state;
     const sceneKey = JSON.stringify({ scene, material, ground });
-    const envKey = JSON.stringify({ env, rows, ev });
+    const envKey = JSON.stringify({ probe: env, rows, exposure: ev });
     let what: Change = "render";
     try {
       if (this.loaded.scene !== sceneKey) {
@@ -78,7 +78,7 @@ export class App {
         if (this.scene!.warnings.length) this.tell(this.scene!.warnings.join("; "));
       }
       if (this.loaded.env !== envKey) {
-        const light = { probe: env, rows, rotate, scale: 1, exposure: ev };
+        const light = { ...JSON.parse(envKey), rotate, scale: 1 };
         this.probe = JSON.parse(await this.engines.all("loadEnvironment", JSON.stringify(light)));
         this.loaded.env = envKey;
         this.loaded.rotate = rotate;
@@ -100,6 +100,19 @@ export class App {
     const status = $("status");
     status.textContent = text;
     status.classList.toggle("error", isError);
+  }
+
+  /** An engine for a reference, with what is loaded. */
+  async reference(): Promise<Host> {
+    const [host, isNew] = this.engines.reference();
+    if (isNew && this.loaded.scene && this.loaded.env) {
+      const { scene, env, rotate } = this.loaded;
+      // All are sent before anything else is: an engine answers in order.
+      const files = this.contents.map(({ path, bytes }) => host.call("addFile", path, bytes));
+      const light = { ...JSON.parse(env), rotate, scale: 1 };
+      await Promise.all([...files, host.call("loadScene", scene), host.call("loadEnvironment", JSON.stringify(light))]);
+    }
+    return host;
   }
 
   /** Gives the engines the dropped files. */

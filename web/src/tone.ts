@@ -35,6 +35,25 @@ vec3 shown(vec3 c, int curve) {
   return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
 }`;
 
+/** Signed relative errors of luminance as colors: blue is too dark, orange too bright, on a logarithmic scale from 2⁻⁸ to 1. */
+export const ERROR_GLSL = `
+vec3 error_color(vec3 c, vec3 reference) {
+  const vec3 luminance = vec3(0.2126, 0.7152, 0.0722);
+  float y = dot(reference, luminance), d = (dot(c, luminance) - y) / sqrt(y * y + 0.01);
+  float t = clamp(1.0 + log2(max(abs(d), 1e-9)) / 8.0, 0.0, 1.0);
+  return mix(vec3(0.05), d < 0.0 ? vec3(0.35, 0.65, 1.0) : vec3(1.0, 0.55, 0.15), t);
+}`;
+
+/** The same as bytes, into `out` at `at`. */
+export function errorColor(pixel: Float32Array, reference: Float32Array, out: Uint8ClampedArray, at: number) {
+  const luminance = (c: Float32Array) => 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+  const y = luminance(reference), d = (luminance(pixel) - y) / Math.sqrt(y * y + 0.01);
+  const t = Math.min(Math.max(1 + Math.log2(Math.max(Math.abs(d), 1e-9)) / 8, 0), 1);
+  const full = d < 0 ? [0.35, 0.65, 1] : [1, 0.55, 0.15];
+  for (let i = 0; i < 3; i++) out[at + i] = 255 * (0.05 + t * (full[i] - 0.05));
+  out[at + 3] = 255;
+}
+
 type Color = [number, number, number];
 const times = (m: number[], [r, g, b]: Color): Color =>
   [m[0] * r + m[1] * g + m[2] * b, m[3] * r + m[4] * g + m[5] * b, m[6] * r + m[7] * g + m[8] * b];

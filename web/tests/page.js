@@ -68,8 +68,9 @@ export async function renderedAnew(page, act) {
 
 /** A hash (FNV-1a) of a canvas. */
 export const canvasHash = (page, id) => page.evaluate(async (id) => {
-  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  const frame = () => new Promise(requestAnimationFrame);
   const canvas = document.getElementById(id);
+  do await frame(); while (canvas.hasAttribute("data-stale"));
   const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
   const context = copy.getContext("2d", { willReadFrequently: true });
   context.drawImage(canvas, 0, 0);
@@ -78,8 +79,9 @@ export const canvasHash = (page, id) => page.evaluate(async (id) => {
 
 /** The mean of a canvas's bytes. */
 export const brightness = (page, id) => page.evaluate(async (id) => {
-  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  const frame = () => new Promise(requestAnimationFrame);
   const canvas = document.getElementById(id);
+  do await frame(); while (canvas.hasAttribute("data-stale"));
   const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
   const context = copy.getContext("2d", { willReadFrequently: true });
   context.drawImage(canvas, 0, 0);
