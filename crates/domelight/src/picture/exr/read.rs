@@ -10,6 +10,7 @@
 //! of returning an error is caught here and becomes [`PictureErrorKind::ExrPanic`].
 
 use super::luminance_chroma::LuminanceChroma;
+use super::write::string_attributes;
 use crate::environment::mapping::EnvmapKind;
 use crate::picture::primaries::{Primaries, transform};
 use crate::picture::{
@@ -85,7 +86,14 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Pictur
     let planes = planes.map_or_else(|| Planes::new(&header, channels), Ok)?;
     let image = planes.into_image(matrix.filter(|_| is_color));
     let window = window(&header);
-    Ok(Picture { alpha: image.1, envmap, window, ..Picture::opaque(image.0, Format::Exr) })
+    let attributes = string_attributes(&header);
+    Ok(Picture {
+        alpha: image.1,
+        envmap,
+        window,
+        attributes,
+        ..Picture::opaque(image.0, Format::Exr)
+    })
 }
 
 /// Where the data window lies in the display window, if they differ.
