@@ -159,7 +159,7 @@ export class LightsPanel {
     const [truth, approximate] = [0, 1].map((i) => Film.fromRgb(SPHERE, SPHERE, spheres.subarray(i * n, (i + 1) * n)));
     const exposure = truth.exposure();
     for (const [sphere, picture] of [[this.truth, truth], [this.approximate, approximate]] as const) {
-      sphere.set({ exposure, curve: "srgb" });
+      sphere.set({ exposure, curve: "standard" });
       sphere.show(0, picture);
     }
     const lights = rig.lights.length;

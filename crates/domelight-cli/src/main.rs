@@ -31,6 +31,7 @@ mod report;
 mod scene;
 mod strategy;
 mod terminal;
+mod tone;
 
 use args::{Arguments, Command};
 use clap::Parser;
@@ -52,6 +53,7 @@ fn main() -> ExitCode {
         Command::Diff(arguments) => diff::run(&arguments, quiet),
         Command::Lights(arguments) => lights::run(&arguments, quiet),
         Command::Probe(arguments) => probe::run(&arguments, quiet),
+        Command::Tone(arguments) => tone::run(&arguments, quiet),
         Command::Figures(arguments) => figures::run(&arguments, quiet),
     };
     match done {

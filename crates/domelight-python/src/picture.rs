@@ -143,7 +143,7 @@ pub(crate) fn read(
 ///     Linear Rec. 709, top row first.
 /// exposure : float or None, default 0
 ///     Of PNG [stops]; None makes the median middle gray.
-/// curve : {'srgb', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
+/// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
 ///     The tone curve of PNG.
 ///
 /// Raises
@@ -178,7 +178,7 @@ pub(crate) fn write(
 ///     Linear Rec. 709.
 /// exposure : float or None, default None
 ///     In stops; None makes the median middle gray.
-/// curve : {'srgb', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
+/// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
 ///     The tone curve.
 ///
 /// Returns

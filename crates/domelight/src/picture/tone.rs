@@ -34,7 +34,8 @@ pub struct UnknownToneCurve {
 
 impl ToneCurve {
     /// All curves.
-    pub const ALL: [Self; 5] = [Self::Standard, Self::Reinhard, Self::Aces, Self::Agx, Self::Neutral];
+    pub const ALL: [Self; 5] =
+        [Self::Standard, Self::Reinhard, Self::Aces, Self::Agx, Self::Neutral];
 
     /// The name that [`FromStr`] understands.
     pub const fn name(self) -> &'static str {
@@ -78,7 +79,8 @@ impl FromStr for ToneCurve {
     type Err = UnknownToneCurve;
 
     fn from_str(name: &str) -> Result<Self, UnknownToneCurve> {
-        let found = Self::ALL.into_iter().find(|curve| curve.name() == name || curve.alias() == Some(name));
+        let found =
+            Self::ALL.into_iter().find(|curve| curve.name() == name || curve.alias() == Some(name));
         found.ok_or_else(|| UnknownToneCurve { name: name.to_owned() })
     }
 }

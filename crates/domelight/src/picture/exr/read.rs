@@ -11,6 +11,7 @@
 
 use super::attributes::{to_rec709, window};
 use super::luminance_chroma::LuminanceChroma;
+use super::write::string_attributes;
 use crate::environment::mapping::EnvmapKind;
 use crate::picture::primaries::transform;
 use crate::picture::{Format, MAX_TEXELS, Picture, PictureErrorKind, allocate, checked_area};
@@ -84,7 +85,14 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Pictur
     let planes = planes.map_or_else(|| Planes::new(&header, channels), Ok)?;
     let image = planes.into_image(matrix.filter(|_| is_color));
     let window = window(&header);
-    Ok(Picture { alpha: image.1, envmap, window, ..Picture::opaque(image.0, Format::Exr) })
+    let attributes = string_attributes(&header);
+    Ok(Picture {
+        alpha: image.1,
+        envmap,
+        window,
+        attributes,
+        ..Picture::opaque(image.0, Format::Exr)
+    })
 }
 
 /// How many texels the largest part has.
