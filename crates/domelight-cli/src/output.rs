@@ -4,7 +4,7 @@ use crate::error::UsageError;
 use crate::files;
 use crate::interrupt;
 use domelight::RgbImage;
-use domelight::environment::mapping::{EnvmapKind, Mapping};
+use domelight::environment::mapping::Mapping;
 use domelight::picture::exr::ExrLayers;
 use domelight::picture::exr::bands::{self, BAND_ROWS};
 use domelight::picture::png::Depth;
@@ -89,11 +89,7 @@ impl PicturePath {
     }
 
     fn write_exr(&self, image: &RgbImage, mapping: Option<Mapping>) -> anyhow::Result<()> {
-        let envmap = match mapping {
-            Some(Mapping::LatLongExr) => Some(EnvmapKind::LatLong),
-            Some(Mapping::CubeStripVertical) => Some(EnvmapKind::Cube),
-            _ => None,
-        };
+        let envmap = mapping.and_then(Mapping::envmap);
         let height = image.height;
         self.write_bands(height, |y| {
             let rows = band(image, y..height.min(y + BAND_ROWS));

@@ -3,8 +3,9 @@
 //! Everything is weighed by the exact solid angle of the texels, in f64. Means over pixels, which
 //! overrate the poles, are given beside it only because other programs print them.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
 
+use super::LatLongGrid;
 use super::compact::{SourceCriteria, compact_sources};
 use super::mapping::Mapping;
 use crate::color::Rgb;
@@ -97,31 +98,24 @@ impl Sun {
 }
 
 /// Integrals over a texel of each row.
-struct Weights {
-    width: usize,
-    height: usize,
-}
+struct Weights(LatLongGrid);
 
 impl Weights {
     fn new(map: &RgbImage) -> Self {
-        Self { width: map.width, height: map.height }
-    }
-
-    fn theta(&self, row: usize) -> f64 {
-        PI * row as f64 / self.height as f64
+        Self(LatLongGrid::new(map.width, map.height))
     }
 
     /// ∫ dω over a texel \[sr\].
     fn solid_angle(&self, y: usize) -> f64 {
-        TAU / self.width as f64
-            * (functions::cos(self.theta(y)) - functions::cos(self.theta(y + 1)))
+        self.0.column_angle() * self.0.band(y..y + 1)
     }
 
     /// ∫ max(0, cos θ) dω over a texel, with ∫ sin θ cos θ dθ = ½ sin² θ.
     fn projected_up(&self, y: usize) -> f64 {
-        let [a, b] = [y, y + 1]
-            .map(|row| functions::powi(functions::sin(self.theta(row).min(FRAC_PI_2)), 2));
-        TAU / self.width as f64 * 0.5 * (b - a)
+        let theta = |row: usize| PI * row as f64 / self.0.height() as f64;
+        let [a, b] =
+            [y, y + 1].map(|row| functions::powi(functions::sin(theta(row).min(FRAC_PI_2)), 2));
+        self.0.column_angle() * 0.5 * (b - a)
     }
 }
 
