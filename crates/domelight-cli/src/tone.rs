@@ -191,7 +191,8 @@ enum ExposureSource {
 
 fn develop(arguments: &ToneArguments, picture: &Picture) -> (ExposureSource, ToneMapping) {
     // Reflectance and normals are no light.
-    let of_light = |layer: &str| layer.eq_ignore_ascii_case("unoccluded");
+    let of_light =
+        |layer: &str| ["unoccluded", "denoised"].iter().any(|l| l.eq_ignore_ascii_case(layer));
     let is_light = arguments.layer.as_deref().is_none_or(of_light);
     let kept = kept(&picture.attributes).filter(|_| is_light);
     let automatic =
