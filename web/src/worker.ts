@@ -91,7 +91,6 @@ function answer(message: ToWorker) {
 function call(name: Call, args: unknown[]): unknown {
   if (name === "lobeSection") return lobeSection(...(args as Parameters<typeof lobeSection>));
   if (name === "lobeSamples") return lobeSamples(...(args as Parameters<typeof lobeSamples>));
-  if (name === "loadScene" || name === "loadEnvironment" || name === "turnEnvironment") rendering = undefined;
   if (name === "mapView") {
     const view = engine!.mapView(...(args as Parameters<Engine["mapView"]>));
     const plain = { width: view.width, height: view.height, pixels: view.pixels() };
@@ -99,7 +98,10 @@ function call(name: Call, args: unknown[]): unknown {
     return plain;
   }
   const method = engine![name] as (...args: unknown[]) => unknown;
-  return method.apply(engine, args);
+  const result = method.apply(engine, args);
+  // What was rendered is of another scene or light. After an error it goes on.
+  if (name === "loadScene" || name === "loadEnvironment" || name === "turnEnvironment") rendering = undefined;
+  return result;
 }
 
 function slice() {
