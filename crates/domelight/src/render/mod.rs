@@ -9,10 +9,12 @@ mod allocation;
 mod checkpoint;
 mod film;
 mod filter;
+mod layers;
 #[cfg(feature = "io")]
 mod output;
 mod renderer;
 mod scouts;
+mod sums;
 mod tile;
 mod tiling;
 mod variance;
@@ -22,8 +24,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 #[cfg(feature = "io")]
 pub use checkpoint::{Checkpoint, CheckpointError, Difference};
-pub use film::{Film, FilmMismatch, Layers};
+pub use film::{Film, FilmMismatch};
 pub use filter::{Filter, FilterSampler, UnknownFilter};
+pub use layers::{LAYERS, LayerInfo, LayerValues, Layers};
 #[cfg(feature = "io")]
 pub use output::Developed;
 pub use renderer::{Mark, Renderer};
