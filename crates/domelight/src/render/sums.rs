@@ -151,7 +151,9 @@ impl Words for f64 {
 #[cfg(feature = "io")]
 impl<T: Words, const N: usize> Words for [T; N] {
     fn put_words(self, put: &mut impl FnMut(u32)) {
-        self.into_iter().for_each(|x| x.put_words(put));
+        for x in self {
+            x.put_words(put);
+        }
     }
 
     fn take_words(take: &mut impl FnMut() -> u32) -> Self {
