@@ -98,30 +98,38 @@ impl Sun {
 
 /// Integrals over a texel of each row.
 struct Weights {
-    width: usize,
-    height: usize,
+    /// ∫ dω \[sr\].
+    solid_angle: Vec<f64>,
+    /// ∫ max(0, cos θ) dω \[sr\].
+    projected_up: Vec<f64>,
 }
 
 impl Weights {
     fn new(map: &RgbImage) -> Self {
-        Self { width: map.width, height: map.height }
+        let turn = TAU / map.width as f64;
+        let theta = |row: usize| PI * row as f64 / map.height as f64;
+        let solid_angle =
+            |y: usize| turn * (functions::cos(theta(y)) - functions::cos(theta(y + 1)));
+        // ∫ sin θ cos θ dθ = ½ sin² θ
+        let projected_up = |y: usize| {
+            let [a, b] = [y, y + 1]
+                .map(|row| functions::powi(functions::sin(theta(row).min(FRAC_PI_2)), 2));
+            turn * 0.5 * (b - a)
+        };
+        Self {
+            solid_angle: (0..map.height).map(solid_angle).collect(),
+            projected_up: (0..map.height).map(projected_up).collect(),
+        }
     }
 
-    fn theta(&self, row: usize) -> f64 {
-        PI * row as f64 / self.height as f64
-    }
-
-    /// ∫ dω over a texel \[sr\].
+    /// ∫ dω over a texel of that row \[sr\].
     fn solid_angle(&self, y: usize) -> f64 {
-        TAU / self.width as f64
-            * (functions::cos(self.theta(y)) - functions::cos(self.theta(y + 1)))
+        self.solid_angle[y]
     }
 
-    /// ∫ max(0, cos θ) dω over a texel, with ∫ sin θ cos θ dθ = ½ sin² θ.
+    /// ∫ max(0, cos θ) dω over a texel of that row \[sr\].
     fn projected_up(&self, y: usize) -> f64 {
-        let [a, b] = [y, y + 1]
-            .map(|row| functions::powi(functions::sin(self.theta(row).min(FRAC_PI_2)), 2));
-        TAU / self.width as f64 * 0.5 * (b - a)
+        self.projected_up[y]
     }
 }
 
