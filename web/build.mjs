@@ -6,7 +6,7 @@ import { deflateRawSync } from "node:zlib";
 const [, , wasm] = process.argv;
 const bundle = async (entry) => {
   const { outputFiles } = await build({
-    entryPoints: [entry], bundle: true, minify: true, write: false, format: "iife", target: "es2022",
+    entryPoints: [entry], bundle: true, minify: !process.env.PLAIN, write: false, format: "iife", target: "es2022",
     // The engine's script would look for its module beside itself; the page hands it over instead.
     define: { "import.meta.url": "''" }, logLevel: "error",
   });

@@ -1,7 +1,7 @@
 // What all panels share: the engines, the state, and what is loaded.
 
 import { $, latest } from "./dom";
-import type { Camera, Engines } from "./engines";
+import type { Camera, Engines, Host } from "./engines";
 import { fromHash, isBuiltinProbe, toHash, type State } from "./state";
 
 export interface SceneReport {
@@ -19,6 +19,8 @@ export interface ProbeReport {
   warnings: string[];
 }
 
+type Contents = { path: string; bytes: Uint8Array }[];
+
 /** Files that are too large for an instance of WebAssembly with what is made of them. */
 const MAX_FILES = 1 << 30;
 
@@ -28,7 +30,10 @@ export class App {
   probe: ProbeReport | null = null;
   /** Names of dropped files that can be a scene or a probe. */
   files = { scenes: [] as string[], probes: [] as string[] };
-  private contents: { path: string; bytes: Uint8Array }[] = [];
+  /** What was dropped with the scene and with the probe. */
+  private drops = { scene: [] as Contents, probe: [] as Contents };
+  /** What was loaded last without an error. */
+  private good: { state: State; files: App["files"]; drops: App["drops"]; loaded: App["loaded"] } | null = null;
   private listeners: ((what: Change) => void)[] = [];
   private hashTimer = 0;
   private loaded = { scene: "", env: "", rotate: NaN };
@@ -68,7 +73,7 @@ export class App {
   readonly load = latest(async () => {
     const { scene, material, ground, env, rows, rotate, ev } = this.state;
     const sceneKey = JSON.stringify({ scene, material, ground });
-    const envKey = JSON.stringify({ env, rows, ev });
+    const envKey = JSON.stringify({ probe: env, rows, exposure: ev });
     let what: Change = "render";
     try {
       if (this.loaded.scene !== sceneKey) {
@@ -78,7 +83,7 @@ export class App {
         if (this.scene!.warnings.length) this.tell(this.scene!.warnings.join("; "));
       }
       if (this.loaded.env !== envKey) {
-        const light = { probe: env, rows, rotate, scale: 1, exposure: ev };
+        const light = { ...JSON.parse(envKey), rotate, scale: 1 };
         this.probe = JSON.parse(await this.engines.all("loadEnvironment", JSON.stringify(light)));
         this.loaded.env = envKey;
         this.loaded.rotate = rotate;
@@ -90,11 +95,26 @@ export class App {
         if (what === "render") what = "turn";
       }
     } catch (error) {
+      await this.goBack();
       this.tell((error as Error).message, true);
       return;
     }
+    this.good = { state: { ...this.state }, files: this.files, drops: this.drops, loaded: { ...this.loaded } };
     this.emit(what);
   });
+
+  /** After a file that cannot be loaded: what the engines still have. */
+  private async goBack() {
+    const { good, state } = this;
+    if (!good || (good.drops === this.drops && good.state.scene === state.scene && good.state.env === state.env)) return;
+    const { scene, material, camera, pixel, env, rotate, ev, exposure } = good.state;
+    Object.assign(state, { scene, material, camera, pixel, env, rotate, ev, exposure });
+    this.files = good.files;
+    this.drops = good.drops;
+    this.loaded = { ...good.loaded };
+    await this.provide();
+    this.emit("files");
+  }
 
   tell(text: string, isError = false) {
     const status = $("status");
@@ -102,10 +122,29 @@ export class App {
     status.classList.toggle("error", isError);
   }
 
+  /** An engine for a reference, with what is loaded. */
+  async reference(): Promise<Host> {
+    const [host, isNew] = this.engines.reference();
+    if (isNew && this.loaded.scene && this.loaded.env) {
+      const { scene, env, rotate } = this.loaded;
+      // All are sent before anything else is: an engine answers in order.
+      const files = this.contents().map(({ path, bytes }) => host.call("addFile", path, bytes));
+      const light = { ...JSON.parse(env), rotate, scale: 1 };
+      await Promise.all([...files, host.call("loadScene", scene), host.call("loadEnvironment", JSON.stringify(light))]);
+    }
+    return host;
+  }
+
+  /** All files that scene and probe may want. */
+  private contents(): Contents {
+    const { scene, probe } = this.drops;
+    return scene === probe ? scene : [...scene, ...probe];
+  }
+
   /** Gives the engines the dropped files. */
   private async provide() {
     await this.engines.all("clearFiles");
-    for (const { path, bytes } of this.contents) await this.engines.all("addFile", path, bytes);
+    for (const { path, bytes } of this.contents()) await this.engines.all("addFile", path, bytes);
   }
 
   /** Takes files over and shows the first scene and the first probe among them. */
@@ -118,14 +157,16 @@ export class App {
     this.tell("Reading …");
     const isScene = (path: string) => /\.(glb|gltf|obj|ply|stl|off|toml)$/i.test(path);
     const isProbe = (path: string) => /\.(hdr|exr|pfm|pic|rgbe)$/i.test(path);
-    this.contents = await Promise.all(files.map(async ({ path, file }) => ({ path, bytes: new Uint8Array(await file.arrayBuffer()) })));
-    const paths = this.contents.map(({ path }) => path);
+    const paths = files.map(({ path }) => path);
     const scenes = paths.filter(isScene), probes = paths.filter(isProbe);
     if (!scenes.length && !probes.length) {
       this.tell(`${paths[0] ?? "nothing"} is neither a scene (GLB, glTF, OBJ, PLY, STL, OFF, TOML) nor a light probe (HDR, EXR, PFM)`, true);
       return;
     }
-    this.files = { scenes, probes };
+    const contents = await Promise.all(files.map(async ({ path, file }) => ({ path, bytes: new Uint8Array(await file.arrayBuffer()) })));
+    // A probe that is dropped leaves the scene's files, and a scene the probe's.
+    this.drops = { scene: scenes.length ? contents : this.drops.scene, probe: probes.length ? contents : this.drops.probe };
+    this.files = { scenes: scenes.length ? scenes : this.files.scenes, probes: probes.length ? probes : this.files.probes };
     this.loaded = { scene: scenes.length ? "" : this.loaded.scene, env: probes.length ? "" : this.loaded.env, rotate: this.loaded.rotate };
     try {
       await this.provide();

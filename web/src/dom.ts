@@ -36,7 +36,7 @@ export function short(x: number): string {
     const lead = Number((x / 10 ** exponent).toPrecision(2));
     return `${lead === 1 ? "" : `${lead}·`}10${[...String(exponent)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)] ?? "⁻").join("")}`;
   }
-  return String(Number(x.toPrecision(3)));
+  return String(Number(x.toPrecision(3))).replace("-", "−");
 }
 export const count = (n: number) => {
   const [unit, name] = n >= 1e9 ? [1e9, " G"] : n >= 1e6 ? [1e6, " M"] : n >= 1e4 ? [1e3, " k"] : [1, ""];

@@ -2,12 +2,18 @@
 
 import type { Arguments, Call, FromWorker, Result, Statistics, ToWorker, Update } from "./protocol";
 
-/** The engine's module, unpacked from the page. */
-async function unpacked(): Promise<WebAssembly.Module> {
-  const packed = document.getElementById("engine")!.textContent!.trim();
-  const bytes = Uint8Array.from(atob(packed), (c) => c.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
-  return WebAssembly.compile(await new Response(stream).arrayBuffer());
+/** A first Worker, and the engine's module, which it unpacks from the page. */
+async function unpacked(script: string): Promise<[Worker, WebAssembly.Module]> {
+  const worker = new Worker(script);
+  const module = await new Promise<WebAssembly.Module>((resolve, reject) => {
+    worker.onmessage = ({ data }: MessageEvent<FromWorker>) => {
+      if (data.kind === "unpacked") resolve(data.module);
+      else if (data.kind === "failed") reject(new Error(data.error));
+    };
+    worker.onerror = (event) => reject(new Error(event.message));
+    worker.postMessage({ kind: "unpack", packed: document.getElementById("engine")!.textContent! } satisfies ToWorker);
+  });
+  return [worker, module];
 }
 
 /** An engine in a Worker of its own. */
@@ -19,12 +25,12 @@ export class Host {
   /** Called after the engine died and another has taken its place, without scene and light. */
   onRestart: () => void = () => {};
 
-  constructor(private module: WebAssembly.Module, private script: string) {
-    this.boot();
+  constructor(private module: WebAssembly.Module, private script: string, worker?: Worker) {
+    this.boot(worker);
   }
 
-  private boot() {
-    this.worker = new Worker(this.script);
+  private boot(worker = new Worker(this.script)) {
+    this.worker = worker;
     this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.receive(data);
     this.send({ kind: "boot", module: this.module });
   }
@@ -32,6 +38,7 @@ export class Host {
   private receive(message: FromWorker) {
     switch (message.kind) {
       case "booted":
+      case "unpacked":
         return;
       case "result":
         this.waiting.get(message.id)?.resolve(message.result as never);
@@ -100,7 +107,8 @@ export class Job {
   constructor(readonly token: number, readonly hosts: Host[], readonly settings: RenderSettings) {}
 
   note(host: Host, update: Update) {
-    this.statisticsOf.set(host, update.statistics);
+    const relativeVariance = update.statistics.relativeVariance ?? this.statisticsOf.get(host)?.relativeVariance ?? null;
+    this.statisticsOf.set(host, { ...update.statistics, relativeVariance });
     this.progressOf.set(host, update.progress);
   }
 
@@ -119,7 +127,7 @@ export class Job {
     return {
       cameraRays: sum("cameraRays"), shadowRays: sum("shadowRays"), shadingPoints: sum("shadingPoints"),
       nonFinite: sum("nonFinite"), pixels, samples: sum("cameraRays") / Math.max(pixels, 1),
-      relativeVariance: sum("relativeVariance") / Math.max(pixels, 1), complete: this.complete,
+      relativeVariance: all.some((s) => s.relativeVariance === null) ? null : sum("relativeVariance") / Math.max(pixels, 1), complete: this.complete,
     };
   }
 }
@@ -145,11 +153,11 @@ export class Engines {
 
   static async create(): Promise<Engines> {
     const script = URL.createObjectURL(new Blob([document.getElementById("worker")!.textContent!], { type: "text/javascript" }));
-    const module = await unpacked();
+    const [worker, module] = await unpacked(script);
     // Two at least, for two strategies side by side.
     const n = Math.max(2, Math.min(navigator.hardwareConcurrency || 2, 8));
     const another = () => new Host(module, script);
-    return new Engines(Array.from({ length: n }, another), another);
+    return new Engines([new Host(module, script, worker), ...Array.from({ length: n - 1 }, another)], another);
   }
 
   /** The engine that answers questions. */
@@ -159,7 +167,8 @@ export class Engines {
 
   /** The same for all; the first one's answer. */
   async all<C extends Call>(call: C, ...args: Arguments<C>): Promise<Result<C>> {
-    return (await Promise.all(this.hosts.map((host) => host.call(call, ...args))))[0];
+    const hosts = this.beside ? [...this.hosts, this.beside] : this.hosts;
+    return (await Promise.all(hosts.map((host) => host.call(call, ...args))))[0];
   }
 
   /** Renders pictures side by side, each with its share of the engines. */
@@ -175,6 +184,17 @@ export class Engines {
   }
 
   private aside: Host | null = null;
+  private beside: Host | null = null;
+
+  /** An engine beside the picture's that has its scene and light from now on; whether it is new. */
+  reference(): [Host, boolean] {
+    const isNew = !this.beside;
+    if (!this.beside) {
+      this.beside = this.another();
+      this.beside.onRestart = () => this.onRestart();
+    }
+    return [this.beside, isNew];
+  }
 
   /** An engine beside the picture's, for scenes of figures. */
   extra(): Host {

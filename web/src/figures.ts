@@ -434,7 +434,7 @@ const cuts = (method: string, other: string): Figure => (stage) => {
   const rounds = stage.slider("Lights", 0, 9, 1, 4, (k) => String(2 ** k));
   stage.draw(async () => {
     const { engines } = stage.app, n = 2 ** rounds(), width = 512;
-    const ask = async (name: string) => JSON.parse(await engines.call("lights", JSON.stringify({ method: name, n, sun: false, lamps: 0 })));
+    const ask = async (name: string) => JSON.parse(await engines.call("lights", JSON.stringify({ method: name, refine: true, n, sun: false, lamps: 0 })));
     const beside = await ask(other), rig = await ask(method);
     const regions = (await engines.call("regions", width)) as Uint32Array;
     const rgb = (await engines.call("map", width)) as Float32Array;

@@ -1,6 +1,7 @@
-// Radiance on a canvas: two pictures with a divider, exposed on the GPU, or without one in slices of time.
+// Radiance on a canvas: two pictures with a divider, or their errors against a third, on the GPU, or without one in
+// slices of time.
 
-import { CURVES, GLSL, develop, type Curve } from "./tone";
+import { CURVES, ERROR_GLSL, GLSL, develop, errorColor, type Curve } from "./tone";
 
 /** A picture of linear R, G, B and alpha. */
 export class Film {
@@ -27,18 +28,38 @@ export class Film {
     }
   }
 
+  /** Takes over another picture of any size, as what is seen until there is more. */
+  underlay(before: Film) {
+    if (before.width === this.width && before.height === this.height) {
+      this.pixels.set(before.pixels);
+      return;
+    }
+    const columns = Int32Array.from({ length: this.width }, (_, x) => 4 * Math.floor(x * before.width / this.width));
+    const to = this.pixels, from = before.pixels;
+    for (let y = 0, at = 0; y < this.height; y++) {
+      const row = 4 * before.width * Math.floor(y * before.height / this.height);
+      for (let x = 0; x < this.width; x++, at += 4) {
+        const i = row + columns[x];
+        to[at] = from[i];
+        to[at + 1] = from[i + 1];
+        to[at + 2] = from[i + 2];
+        to[at + 3] = from[i + 3];
+      }
+    }
+  }
+
   /** The median luminance of what has light, brought to middle gray [stops]. */
   exposure(): number {
-    const luminances: number[] = [];
-    const step = Math.max(1, Math.floor(this.width * this.height / 20000));
-    for (let i = 0; i < this.width * this.height; i += step) {
-      const [r, g, b, alpha] = this.pixels.subarray(4 * i, 4 * i + 4);
-      const y = 0.2126 * r + 0.7152 * g + 0.0722 * b;
-      if (alpha > 0 && y > 0 && isFinite(y)) luminances.push(y);
+    const n = this.width * this.height, step = Math.max(1, Math.floor(n / 20000)), { pixels } = this;
+    const luminances = new Float32Array(Math.ceil(n / step));
+    let found = 0;
+    for (let i = 0; i < 4 * n; i += 4 * step) {
+      const y = 0.2126 * pixels[i] + 0.7152 * pixels[i + 1] + 0.0722 * pixels[i + 2];
+      if (pixels[i + 3] > 0 && y > 0 && isFinite(y)) luminances[found++] = y;
     }
-    if (!luminances.length) return 0;
-    luminances.sort((a, b) => a - b);
-    return Math.min(Math.max(Math.log2(0.18 / luminances[luminances.length >> 1]), -30), 30);
+    if (!found) return 0;
+    const sorted = luminances.subarray(0, found).sort();
+    return Math.min(Math.max(Math.log2(0.18 / sorted[found >> 1]), -30), 30);
   }
 }
 
@@ -47,41 +68,47 @@ interface Look {
   curve: Curve;
   /** Where the second picture begins, as a share of the width. */
   divider: number;
+  /** Shows errors against the third picture. */
+  errors: boolean;
 }
 
 interface Painter {
-  /** Both pictures; windows say what changed since, none that all did. */
-  paint(films: (Film | null)[], look: Look, changed: (Uint32Array | "all" | null)[]): void;
+  /** Both pictures and the reference; windows say what changed since. Ends when it is on the canvas. */
+  paint(films: (Film | null)[], look: Look, changed: (Uint32Array | "all" | null)[]): Promise<void>;
 }
 
 export class FilmView {
-  films: (Film | null)[] = [null, null];
-  look: Look = { exposure: 0, curve: "agx", divider: 1 };
-  readonly onGpu: boolean;
-  private painter: Painter;
-  private changed: (Uint32Array | "all" | null)[] = [null, null];
-  private queued = false;
+  /** The left one, the right one and the reference. */
+  films: (Film | null)[] = [null, null, null];
+  look: Look = { exposure: 0, curve: "agx", divider: 1, errors: false };
+  private painter: Painter | null = null;
+  private changed: (Uint32Array | "all" | null)[] = [null, null, null];
+  /** There is something to paint, and something is being painted. */
+  private stale = false;
+  private busy = false;
 
-  constructor(readonly canvas: HTMLCanvasElement, gpu = true) {
-    const gl = gpu ? canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: true }) : null;
-    this.onGpu = !!gl;
-    this.painter = gl ? new GpuPainter(gl) : new PlainPainter(canvas.getContext("2d")!);
-    canvas.dataset.painter = gl ? "webgl2" : "2d";
+  constructor(readonly canvas: HTMLCanvasElement, private gpu = true) {}
+
+  /** Made when there is something to paint: a panel may never be seen. */
+  private makePainter(): Painter {
+    const gl = this.gpu ? this.canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: true }) : null;
+    this.canvas.dataset.painter = gl ? "webgl2" : "2d";
+    return gl ? new GpuPainter(gl) : new PlainPainter(this.canvas.getContext("2d")!);
   }
 
   show(side: number, film: Film | null) {
     this.films[side] = film;
     this.changed[side] = "all";
-    const first = this.films[0];
-    if (first && (this.canvas.width !== first.width || this.canvas.height !== first.height)) {
-      this.canvas.width = first.width;
-      this.canvas.height = first.height;
-    }
     this.refresh();
   }
 
   update(side: number, windows: Uint32Array, pixels: Float32Array) {
     this.films[side]?.put(windows, pixels);
+    this.repaint(side, windows);
+  }
+
+  /** Paints pixels of a film anew. */
+  repaint(side: number, windows: Uint32Array) {
     const before = this.changed[side];
     if (before !== "all") {
       const all = new Uint32Array((before?.length ?? 0) + windows.length);
@@ -97,15 +124,20 @@ export class FilmView {
     this.refresh();
   }
 
-  /** Paints at the next frame. */
+  /** Paints at the next frame, or the one after what is being painted. */
   private refresh() {
-    if (this.queued) return;
-    this.queued = true;
-    const paint = () => {
-      this.queued = false;
-      if (!this.films[0]) return;
-      this.painter.paint(this.films, this.look, this.changed);
-      this.changed = [null, null];
+    this.stale = true;
+    this.canvas.toggleAttribute("data-stale", true);
+    if (this.busy) return;
+    this.busy = true;
+    const paint = async () => {
+      this.stale = false;
+      const { changed } = this;
+      this.changed = [null, null, null];
+      if (this.films[0]) await (this.painter ??= this.makePainter()).paint(this.films, this.look, changed);
+      this.busy = false;
+      if (this.stale) this.refresh();
+      else this.canvas.removeAttribute("data-stale");
     };
     // A tab in the background has no frames.
     if (document.hidden) setTimeout(paint, 100);
@@ -113,17 +145,19 @@ export class FilmView {
   }
 }
 
+/** Draws into a texture, and shows it when the GPU is done: the page never waits, not even for a GPU that is none. */
 class GpuPainter implements Painter {
   private textures: WebGLTexture[];
-  private sizes: string[] = ["", ""];
-  private uniform: (name: string) => WebGLUniformLocation | null;
+  private target: { framebuffer: WebGLFramebuffer; texture: WebGLTexture; size: string };
+  private sizes: string[] = ["", "", ""];
+  private uniform!: (name: string) => WebGLUniformLocation | null;
+  private ready: Promise<void>;
 
   constructor(private gl: WebGL2RenderingContext) {
     const compiled = (type: number, source: string) => {
       const shader = gl.createShader(type)!;
       gl.shaderSource(shader, source);
       gl.compileShader(shader);
-      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader) ?? "shader");
       return shader;
     };
     const program = gl.createProgram()!;
@@ -131,19 +165,17 @@ class GpuPainter implements Painter {
       void main() { gl_Position = vec4(vec2(gl_VertexID % 2, gl_VertexID / 2) * 4.0 - 1.0, 0.0, 1.0); }`));
     gl.attachShader(program, compiled(gl.FRAGMENT_SHADER, `#version 300 es
       precision highp float; precision highp int; precision highp sampler2D;
-      uniform sampler2D first, second; uniform float scale, divider; uniform int curve; uniform vec2 size;
+      uniform sampler2D first, second, third; uniform float scale, divider; uniform int curve; uniform vec2 size; uniform bool errors;
       out vec4 color;
-      ${GLSL}
+      ${GLSL}${ERROR_GLSL}
       void main() {
         vec2 at = vec2(gl_FragCoord.x, size.y - gl_FragCoord.y);
         vec4 texel = at.x / size.x < divider ? texelFetch(first, ivec2(at), 0)
           : texelFetch(second, ivec2(at / size * vec2(textureSize(second, 0))), 0);
-        color = vec4(shown(texel.rgb * scale, curve), 1.0);
+        color = vec4(errors ? error_color(texel.rgb, texelFetch(third, ivec2(at), 0).rgb) : shown(texel.rgb * scale, curve), 1.0);
       }`));
     gl.linkProgram(program);
-    gl.useProgram(program);
-    this.uniform = (name) => gl.getUniformLocation(program, name);
-    this.textures = [0, 1].map((i) => {
+    this.textures = [0, 1, 2].map((i) => {
       const texture = gl.createTexture()!;
       gl.activeTexture(gl.TEXTURE0 + i);
       gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -151,19 +183,61 @@ class GpuPainter implements Painter {
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, 1, 1, 0, gl.RGBA, gl.FLOAT, new Float32Array(4));
       return texture;
     });
+    const texture = gl.createTexture()!, framebuffer = gl.createFramebuffer()!;
+    this.target = { framebuffer, texture, size: "" };
+    this.ready = this.use(program);
+  }
+
+  /** Takes a program as soon as it is linked; to ask for more before would wait. */
+  private async use(program: WebGLProgram) {
+    const { gl } = this, parallel = gl.getExtension("KHR_parallel_shader_compile");
+    if (parallel) {
+      while (!gl.isContextLost() && !gl.getProgramParameter(program, parallel.COMPLETION_STATUS_KHR)) await pause();
+    } else await this.finished();
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+      throw new Error(gl.getProgramInfoLog(program) ?? "the shader does not link");
+    }
+    gl.useProgram(program);
+    const places = Object.fromEntries(["first", "second", "third", "scale", "divider", "curve", "size", "errors"].map((name) => [name, gl.getUniformLocation(program, name)]));
+    this.uniform = (name) => places[name];
     gl.uniform1i(this.uniform("first"), 0);
     gl.uniform1i(this.uniform("second"), 1);
+    gl.uniform1i(this.uniform("third"), 2);
+  }
+
+  /** Makes the texture that is drawn into as large as the picture; whether it was another. */
+  private resize(width: number, height: number): boolean {
+    const { gl, target } = this, size = `${width}x${height}`;
+    if (target.size === size) return false;
+    target.size = size;
+    gl.activeTexture(gl.TEXTURE3);
+    gl.bindTexture(gl.TEXTURE_2D, target.texture);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, width, height, 0, gl.RGBA, gl.UNSIGNED_BYTE, null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);
+    return true;
+  }
+
+  /** Ends when the GPU has done all that it was told. */
+  private async finished() {
+    const { gl } = this, sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    if (!sync) return;
+    do await pause();
+    while (gl.clientWaitSync(sync, 0, 0) === gl.TIMEOUT_EXPIRED);
+    gl.deleteSync(sync);
   }
 
   /** The look of what is on the canvas. */
   private painted = "";
 
-  paint(films: (Film | null)[], look: Look, changed: (Uint32Array | "all" | null)[]) {
-    const gl = this.gl;
+  async paint(films: (Film | null)[], look: Look, changed: (Uint32Array | "all" | null)[]) {
+    await this.ready;
+    const gl = this.gl, { width, height } = films[0]!;
     const key = JSON.stringify([look, films.map((film) => film && [film.width, film.height])]);
-    const all = key !== this.painted || changed.includes("all");
+    const all = this.resize(width, height) || key !== this.painted || changed.includes("all");
     this.painted = key;
-    /** Bands of rows that changed: all at once would take software longer than a frame. */
+    /** Bands of rows that changed. */
     const dirty = new Set<number>();
     const BAND = 16;
     films.forEach((film, i) => {
@@ -188,24 +262,34 @@ class GpuPainter implements Painter {
         gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, top, film.width, bottom - top, gl.RGBA, gl.FLOAT, rows);
       }
     });
-    const { width, height } = films[0]!;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.framebuffer);
     gl.viewport(0, 0, width, height);
     gl.uniform1f(this.uniform("scale"), 2 ** look.exposure);
     gl.uniform1f(this.uniform("divider"), films[1] ? look.divider : 2);
     gl.uniform1i(this.uniform("curve"), CURVES.indexOf(look.curve));
     gl.uniform2f(this.uniform("size"), width, height);
-    if (all) {
+    gl.uniform1i(this.uniform("errors"), Number(shows(films, look)));
+    if (all) gl.drawArrays(gl.TRIANGLES, 0, 3);
+    else {
+      gl.enable(gl.SCISSOR_TEST);
+      for (const [from, to] of runs(dirty)) {
+        gl.scissor(0, height - Math.min(to * BAND, height), width, Math.min((to - from) * BAND, height));
+        gl.drawArrays(gl.TRIANGLES, 0, 3);
+      }
       gl.disable(gl.SCISSOR_TEST);
-      gl.drawArrays(gl.TRIANGLES, 0, 3);
-      return;
     }
-    gl.enable(gl.SCISSOR_TEST);
-    for (const [from, to] of runs(dirty)) {
-      gl.scissor(0, height - Math.min(to * BAND, height), width, Math.min((to - from) * BAND, height));
-      gl.drawArrays(gl.TRIANGLES, 0, 3);
-    }
+    await this.finished();
+    fit(gl.canvas, width, height);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+    gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
   }
 }
+
+/** Whether errors are to be shown and can be. */
+const shows = ([first, , third]: (Film | null)[], look: Look) =>
+  look.errors && !!first && !!third && first.width === third.width && first.height === third.height;
+
+const pause = () => new Promise((done) => setTimeout(done, 2));
 
 /** Ranges of whole numbers that follow each other, from the first to after the last. */
 function runs(numbers: Set<number>): [number, number][] {
@@ -218,22 +302,26 @@ function runs(numbers: Set<number>): [number, number][] {
   return ranges;
 }
 
+/** Gives a canvas a size, which clears it; whether it had another. */
+function fit(canvas: HTMLCanvasElement | OffscreenCanvas, width: number, height: number): boolean {
+  if (canvas.width === width && canvas.height === height) return false;
+  canvas.width = width;
+  canvas.height = height;
+  return true;
+}
+
 /** Rows one after the other, no longer than a frame at a time. */
 class PlainPainter implements Painter {
-  private run = 0;
-
   constructor(private context: CanvasRenderingContext2D) {}
 
-  paint(films: (Film | null)[], look: Look) {
-    const run = ++this.run;
+  async paint(films: (Film | null)[], look: Look) {
     const { width, height } = films[0]!;
+    this.fit(width, height);
     const scale = 2 ** look.exposure;
-    const split = films[1] ? Math.round(look.divider * width) : width;
-    const { exposure, curve, divider } = look;
-    const rows = (from: number) => {
-      if (run !== this.run || exposure !== look.exposure || curve !== look.curve || divider !== look.divider) return;
+    const { exposure, curve, divider, errors } = look, withErrors = shows(films, look);
+    const split = films[1] ? Math.round(divider * width) : width;
+    for (let y = 0; y < height;) {
       const end = performance.now() + 12;
-      let y = from;
       do {
         const image = this.context.createImageData(width, 1);
         for (let x = 0; x < width; x++) {
@@ -241,12 +329,26 @@ class PlainPainter implements Painter {
           const column = film.width === width ? x : Math.floor(x * film.width / width);
           const row = film.height === height ? y : Math.floor(y * film.height / height);
           const at = 4 * (row * film.width + column);
-          develop(scale * film.pixels[at], scale * film.pixels[at + 1], scale * film.pixels[at + 2], curve, image.data, 4 * x);
+          if (withErrors) {
+            const i = 4 * (y * width + x);
+            errorColor(film.pixels.subarray(at, at + 3), films[2]!.pixels.subarray(i, i + 3), image.data, 4 * x);
+          } else develop(scale * film.pixels[at], scale * film.pixels[at + 1], scale * film.pixels[at + 2], curve, image.data, 4 * x);
         }
         this.context.putImageData(image, 0, y);
       } while (++y < height && performance.now() < end);
-      if (y < height) setTimeout(rows, 0, y);
-    };
-    rows(0);
+      if (y < height) await new Promise((done) => setTimeout(done, 0));
+      // Another look or picture begins anew.
+      if (exposure !== look.exposure || curve !== look.curve || divider !== look.divider || errors !== look.errors || films[0]!.width !== width) return;
+    }
+  }
+
+  /** Gives the canvas a size, and what was on it. */
+  private fit(width: number, height: number) {
+    const { canvas } = this.context;
+    if (canvas.width === width && canvas.height === height) return;
+    const before = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+    before.getContext("2d")!.drawImage(canvas, 0, 0);
+    fit(canvas, width, height);
+    this.context.drawImage(before, 0, 0, width, height);
   }
 }

@@ -7,6 +7,20 @@ import { isBuiltinProbe } from "./state";
 
 const WIDTH = 768, SPHERE = 160;
 
+/** Numbers of lights that the slider goes through: one by one up to 16, then four in each doubling, up to 1024. */
+const COUNTS = [
+  ...Array.from({ length: 16 }, (_, i) => i + 1),
+  ...[16, 32, 64, 128, 256, 512].flatMap((n) => [1.25, 1.5, 1.75, 2].map((k) => k * n)),
+];
+/** How long a step is seen when they are played [ms]. */
+const STEP = 700;
+
+/** Which regions the methods divide, and where. */
+const RULES: Record<string, string> = {
+  "median-cut": "across its longer side, so that both parts have the same light",
+  "variance-minimization": "where the variance of both parts adds up to the least",
+};
+
 interface Rig {
   lights: { name: string; uv: [number, number]; irradiance: number[]; share: number; radius: number; kind: string }[];
   diffuse: number;
@@ -15,6 +29,23 @@ interface Rig {
   formats: { name: string; extension: string; dome: string | null }[];
 }
 
+/** The place of a number of lights on the slider: that of the nearest. */
+const place = (lights: number) => COUNTS.reduce((best, n, i) => (Math.abs(n - lights) < Math.abs(COUNTS[best] - lights) ? i : best), 0);
+
+/** The regions of the first division that have parts in more than one of the second. */
+function splits(before: Uint32Array, after: Uint32Array): Set<number> {
+  const part = new Map<number, number>(), divided = new Set<number>();
+  for (let i = 0; i < before.length; i++) {
+    const known = part.get(before[i]);
+    if (known === undefined) part.set(before[i], after[i]);
+    else if (known !== after[i]) divided.add(before[i]);
+  }
+  return divided;
+}
+
+/** Whether a number of lights has regions of its own instead of those of the number before with one divided. */
+const isRefined = (method: string, refine: boolean) => refine && method === "variance-minimization";
+
 const percent = (x: number) => `${short(100 * x)} %`;
 
 export class LightsPanel {
@@ -22,11 +53,27 @@ export class LightsPanel {
   private truth = new FilmView($<HTMLCanvasElement>("sphere-truth"), false);
   private approximate = new FilmView($<HTMLCanvasElement>("sphere-rig"), false);
   private rig: Rig | null = null;
+  /** The regions of the last step, and what they were made of. */
+  private before: { regions: Uint32Array; lights: number; of: string } | null = null;
+  private timer = 0;
 
   constructor(private app: App) {
     app.on((what) => this.changed(what));
     $("method").addEventListener("change", () => app.set({ method: $<HTMLSelectElement>("method").value }, "panel"));
-    $("n-lights").addEventListener("input", () => app.set({ lights: 2 ** Number($<HTMLInputElement>("n-lights").value) }, "panel"));
+    const slider = $<HTMLInputElement>("n-lights");
+    slider.max = String(COUNTS.length - 1);
+    slider.addEventListener("input", () => {
+      this.play(false);
+      app.set({ lights: COUNTS[Number(slider.value)] }, "panel");
+    });
+    for (const [id, by] of [["fewer-lights", -1], ["more-lights", 1]] as const) {
+      $(id).addEventListener("click", () => {
+        this.play(false);
+        this.step(by);
+      });
+    }
+    $("play-lights").addEventListener("click", () => this.play(!this.timer));
+    $("refine").addEventListener("change", () => app.set({ refine: $<HTMLInputElement>("refine").checked }, "panel"));
     $("sun").addEventListener("change", () => {
       const sun = $<HTMLInputElement>("sun").checked;
       if (!sun) $<HTMLInputElement>("leave").checked = false;
@@ -39,12 +86,44 @@ export class LightsPanel {
     $("gloss").addEventListener("change", () => this.draw());
   }
 
+  /** Goes to the next number of lights, or the one before; whether there is one. */
+  private step(by: number): boolean {
+    const at = place(this.app.state.lights) + by;
+    if (at < 0 || at >= COUNTS.length) return false;
+    this.app.set({ lights: COUNTS[at] }, "panel");
+    return true;
+  }
+
+  /** Plays the steps from here, from the first if here is the last, or stops. */
+  private play(on: boolean) {
+    const { state } = this.app;
+    clearTimeout(this.timer);
+    this.timer = 0;
+    $("play-lights").textContent = on ? "Pause" : "Play";
+    $("play-lights").setAttribute("aria-pressed", String(on));
+    if (!on) return;
+    if (place(state.lights) === COUNTS.length - 1) this.app.set({ lights: 1 }, "panel");
+    const next = () => {
+      // A step is seen before the next one comes.
+      if (this.drawn !== state.lights) this.timer = setTimeout(next, 50) as unknown as number;
+      else if (state.panel !== "lights" || !this.step(1)) this.play(false);
+      else this.timer = setTimeout(next, STEP) as unknown as number;
+    };
+    this.timer = setTimeout(next, STEP) as unknown as number;
+  }
+
+  /** The number of lights that is shown. */
+  private drawn = 0;
+
   private changed(what: Change) {
     const { state, probe } = this.app;
+    if (state.panel !== "lights" && this.timer) this.play(false);
     if (state.panel !== "lights" || !probe || what === "pixel" || what === "view") return;
     $<HTMLSelectElement>("method").value = state.method;
     $<HTMLInputElement>("sun").checked = state.sun;
-    $<HTMLInputElement>("n-lights").value = String(Math.round(Math.log2(state.lights)));
+    $<HTMLInputElement>("refine").checked = state.refine;
+    $<HTMLInputElement>("refine").disabled = state.method !== "variance-minimization";
+    $<HTMLInputElement>("n-lights").value = String(place(state.lights));
     this.draw();
   }
 
@@ -52,8 +131,9 @@ export class LightsPanel {
     const { app } = this, { state } = app;
     $("n-lights-value").textContent = String(state.lights);
     const leave = $<HTMLInputElement>("leave").checked;
-    $<HTMLInputElement>("n-lights").disabled = leave;
-    const settings = { method: state.method, n: leave ? null : state.lights, sun: state.sun, lamps: state.lamps };
+    for (const id of ["n-lights", "fewer-lights", "more-lights", "play-lights"]) $<HTMLInputElement>(id).disabled = leave;
+    if (leave) this.play(false);
+    const settings = { method: state.method, refine: state.refine, n: leave ? null : state.lights, sun: state.sun, lamps: state.lamps };
     let rig: Rig, regions: Uint32Array, view, spheres: Float32Array;
     try {
       rig = JSON.parse(await app.engines.call("lights", JSON.stringify(settings)));
@@ -69,12 +149,17 @@ export class LightsPanel {
     film.pixels = view.pixels;
     this.map.set({ exposure: film.exposure() });
     this.map.show(0, film);
-    this.mark(regions, leave);
+    const of = JSON.stringify({ ...settings, n: 0, env: state.env, rows: state.rows, rotate: state.rotate });
+    const divided = leave || isRefined(state.method, state.refine) || this.before?.of !== of || this.before.lights >= rig.lights.length ? new Set<number>() : splits(this.before.regions, regions);
+    this.mark(regions, leave, divided);
+    this.tellStep(divided, rig.lights.length);
+    this.before = { regions, lights: rig.lights.length, of };
+    this.drawn = state.lights;
     const n = 3 * SPHERE * SPHERE;
     const [truth, approximate] = [0, 1].map((i) => Film.fromRgb(SPHERE, SPHERE, spheres.subarray(i * n, (i + 1) * n)));
     const exposure = truth.exposure();
     for (const [sphere, picture] of [[this.truth, truth], [this.approximate, approximate]] as const) {
-      sphere.set({ exposure, curve: "srgb" });
+      sphere.set({ exposure, curve: "standard" });
       sphere.show(0, picture);
     }
     const lights = rig.lights.length;
@@ -85,14 +170,32 @@ export class LightsPanel {
     document.documentElement.dataset.rig = `${state.method}:${lights}`;
   });
 
-  private mark(regions: Uint32Array, leave: boolean) {
+  /** What the last step did. */
+  private tellStep(divided: Set<number>, lights: number) {
+    const { method, refine } = this.app.state;
+    const before = this.before ? lights - this.before.lights : 0;
+    $("rig-step").textContent = isRefined(method, refine) ? "The map is cut into twice as many parts as there are lights; those that belong together are joined, and the lights move to the centers of their light. Without Refine, each step divides a region."
+      : divided.size === 0 ? `Each step divides a region ${RULES[method]}.`
+        : before === 1 ? `This step divided the region along the orange line ${RULES[method]}.`
+          : `These ${before} steps divided regions along the orange lines, each ${RULES[method]}.`;
+    document.documentElement.dataset.divided = String(divided.size);
+  }
+
+  /** Draws the borders of the regions, those that are new in orange, and the lights. */
+  private mark(regions: Uint32Array, leave: boolean, divided: Set<number>) {
+    const before = this.before?.regions;
     const canvas = $<HTMLCanvasElement>("rig-marks"), context = canvas.getContext("2d")!;
     const height = WIDTH / 2, image = context.createImageData(WIDTH, height);
     for (let y = 0; y < height; y++) {
       for (let x = 0; x < WIDTH; x++) {
         const i = y * WIDTH + x;
-        const differs = (y + 1 < height && regions[i] !== regions[i + WIDTH]) || regions[i] !== regions[y * WIDTH + (x + 1) % WIDTH];
-        if (differs) image.data.set([255, 255, 255, 190], 4 * i);
+        const below = y + 1 < height ? i + WIDTH : i, right = y * WIDTH + (x + 1) % WIDTH;
+        const other = regions[i] !== regions[below] ? below : regions[i] !== regions[right] ? right : i;
+        if (other === i) continue;
+        const isNew = divided.size > 0 && before![i] === before![other] && divided.has(before![i]);
+        image.data.set(isNew ? [255, 140, 0, 255] : [255, 255, 255, 190], 4 * i);
+        // Twice as wide.
+        if (isNew) for (const j of [i - 1, i - WIDTH]) if (j >= 0) image.data.set([255, 140, 0, 255], 4 * j);
       }
     }
     context.putImageData(image, 0, 0);
@@ -130,6 +233,8 @@ export class LightsPanel {
     const words = ["domelight", "lights", state.env, ...(isBuiltinProbe(state.env) ? [`--env-rows=${state.rows}`] : []),
       ...(state.rotate ? [`--env-rotate=${state.rotate}`] : []), ...(state.sun ? ["--sun"] : []),
       ...(leave ? ["--keep-residual", "dome.exr"] : ["-n", String(state.lights)]), "--method", state.method, "-o", "rig.json"];
+    // The program refines.
+    $("rig-command").hidden = state.method === "variance-minimization" && !state.refine;
     $("rig-command").textContent = words.map((w) => (/^[\w@%+=:,./-]+$/.test(w) ? w : `'${w}'`)).join(" ");
   }
 }

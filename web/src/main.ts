@@ -69,8 +69,22 @@ function wireTabs(app: App) {
   });
 }
 
-/** All files of a dropped folder, with their paths in it. */
-async function filesOf(entry: FileSystemEntry, folder = ""): Promise<{ path: string; file: File }[]> {
+interface Dropped {
+  path: string;
+  file: File;
+}
+
+/** All files of a folder, with their paths in it. */
+async function filesOf(handle: FileSystemHandle, folder = ""): Promise<Dropped[]> {
+  const path = folder + handle.name;
+  if (handle.kind === "file") return [{ path, file: await (handle as FileSystemFileHandle).getFile() }];
+  const inside: Promise<Dropped[]>[] = [];
+  for await (const inner of (handle as FileSystemDirectoryHandle).values()) inside.push(filesOf(inner, `${path}/`));
+  return (await Promise.all(inside)).flat();
+}
+
+/** The same of browsers without handles. */
+async function filesOfEntry(entry: FileSystemEntry, folder = ""): Promise<Dropped[]> {
   const path = folder + entry.name;
   if (entry.isFile) {
     const file = await new Promise<File>((resolve, reject) => (entry as FileSystemFileEntry).file(resolve, reject));
@@ -82,7 +96,24 @@ async function filesOf(entry: FileSystemEntry, folder = ""): Promise<{ path: str
     if (!some.length) break;
     all.push(...some);
   }
-  return (await Promise.all(all.map((inner) => filesOf(inner, `${path}/`)))).flat();
+  return (await Promise.all(all.map((inner) => filesOfEntry(inner, `${path}/`)))).flat();
+}
+
+/** What was dropped. Chromium has entries of nothing for a page from the disk, so handles come first. */
+function dropped(transfer: DataTransfer): Promise<Dropped[]> {
+  type Item = DataTransferItem & { getAsFileSystemHandle?: () => Promise<FileSystemHandle | null> };
+  const items = [...transfer.items].filter((item) => item.kind === "file") as Item[];
+  // All is asked for at once: after the event there is nothing to ask.
+  return Promise.all(items.map((item) => {
+    const file = item.getAsFile(), entry = item.webkitGetAsEntry?.();
+    const handle = item.getAsFileSystemHandle?.().catch(() => null);
+    return (async () => {
+      const found = await handle;
+      if (found) return filesOf(found);
+      if (entry?.isDirectory) return filesOfEntry(entry);
+      return file ? [{ path: file.name, file }] : [];
+    })();
+  })).then((lists) => lists.flat());
 }
 
 function wireDrop(app: App) {
@@ -99,11 +130,13 @@ function wireDrop(app: App) {
   addEventListener("drop", async (event) => {
     event.preventDefault();
     end();
-    const items = [...(event.dataTransfer?.items ?? [])].filter((item) => item.kind === "file");
-    const entries = items.map((item) => item.webkitGetAsEntry?.() ?? null);
-    const plain = [...(event.dataTransfer?.files ?? [])].map((file) => ({ path: file.name, file }));
-    const found = entries.length && entries.every(Boolean) ? (await Promise.all(entries.map((entry) => filesOf(entry!)))).flat() : plain;
-    if (found.length) await app.open(found);
+    if (!event.dataTransfer) return;
+    try {
+      const found = await dropped(event.dataTransfer);
+      if (found.length) await app.open(found);
+    } catch (error) {
+      app.tell(`what was dropped cannot be read: ${(error as Error).message}`, true);
+    }
   });
 }
 

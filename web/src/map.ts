@@ -94,7 +94,7 @@ export class MapPanel {
     if (this.sunOf !== key) {
       this.sunOf = key;
       try {
-        await app.engines.call("lights", JSON.stringify({ method: "median-cut", n: null, sun: true, lamps: 0 }));
+        await app.engines.call("lights", JSON.stringify({ method: "median-cut", refine: true, n: null, sun: true, lamps: 0 }));
         this.sun = (await app.engines.call("regions", WIDTH)) as Uint32Array;
       } catch {
         this.sun = null;

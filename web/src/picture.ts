@@ -6,6 +6,7 @@ import { materialEditor, strategyEditor } from "./editors";
 import type { Camera, Job, RenderSettings } from "./engines";
 import { Film, FilmView } from "./film";
 import { plot, slope, type Series } from "./plot";
+import { Reference } from "./reference";
 import { PROBES, SCENES, command, toHash } from "./state";
 import { CURVES, type Curve } from "./tone";
 
@@ -30,6 +31,7 @@ export class PicturePanel {
   private preview = false;
   private settle = 0;
   private automatic = true;
+  private reference: Reference;
   private lastPlot = 0;
   /** What decides the picture that is rendered. */
   private renderedKey = "";
@@ -42,6 +44,7 @@ export class PicturePanel {
       update: (job, update) => this.update(job, update.windows, update.pixels),
       failed: (_, error) => app.tell(error, true),
     };
+    this.reference = new Reference(app, (windows) => this.referenceChanged(windows));
     app.on((what) => this.changed(what));
     this.wireControls();
     this.wireCamera();
@@ -59,7 +62,7 @@ export class PicturePanel {
     if (what === "scene" || what === "light") this.automatic = this.app.state.exposure === null;
     this.showView();
     if (!this.app.scene || !this.app.probe) return;
-    const { panel, step, pixel, exposure, curve, mapping, method, lights, sun, lamps, ...rendered } = this.app.state;
+    const { panel, step, pixel, exposure, curve, view, mapping, method, refine, lights, sun, lamps, ...rendered } = this.app.state;
     const key = JSON.stringify(rendered);
     // What came by the hash may be of another panel alone.
     if (what === "all" && key === this.renderedKey) return;
@@ -96,6 +99,7 @@ export class PicturePanel {
     // What was seen stays until there is more.
     this.films = this.jobs.map(() => new Film(size, size));
     this.histories = [[], []];
+    this.refer();
     if (!preview) this.app.tell("Rendering …");
     $("viewer").toggleAttribute("data-busy", true);
   }
@@ -106,10 +110,10 @@ export class PicturePanel {
     const film = this.films[side];
     const isFirst = this.view.films[side] !== film;
     if (isFirst) {
-      film.put(windows, pixels);
-      // The rest of the picture until it is there: what was seen before, in this one's size.
+      // The rest of the picture until it is there: what was seen before.
       const before = this.view.films[side] ?? this.view.films[0];
-      if (before) this.underlay(film, before, windows);
+      if (before) film.underlay(before);
+      film.put(windows, pixels);
       this.view.show(side, film);
       if (side === 0 && this.jobs.length === 1) this.view.show(1, null);
       this.times.first ||= performance.now();
@@ -123,8 +127,9 @@ export class PicturePanel {
     const statistics = job.statistics;
     const history = this.histories[side];
     const last = history.at(-1);
-    if (statistics.samples >= 2 && (!last || statistics.shadowRays > 1.15 * last.rays || job.complete)) {
-      history.push({ rays: statistics.shadowRays, error: statistics.relativeVariance, samples: statistics.samples });
+    const error = statistics.relativeVariance;
+    if (error !== null && statistics.samples >= 2 && (!last || statistics.shadowRays > 1.15 * last.rays || job.complete)) {
+      history.push({ rays: statistics.shadowRays, error, samples: statistics.samples });
     }
     this.report(job.complete);
     if (this.jobs.every((j) => j.complete)) {
@@ -136,19 +141,38 @@ export class PicturePanel {
     document.documentElement.dataset.ready = "true";
   }
 
-  /** Fills what has no samples yet from an older picture of any size. */
-  private underlay(film: Film, before: Film, windows: Uint32Array) {
-    const has = new Uint8Array(film.width * film.height);
-    for (let i = 0; i < windows.length; i += 4) {
-      for (let y = windows[i + 1]; y < windows[i + 1] + windows[i + 3]; y++) has.fill(1, y * film.width + windows[i], y * film.width + windows[i] + windows[i + 2]);
+  // ---- the error
+
+  /** Begins a reference of the picture, where its error is to be shown. */
+  private refer() {
+    this.reference.stop();
+    this.view.show(2, null);
+    this.tellError();
+    if (this.app.state.view === "error" && !this.preview && this.jobs.length) void this.reference.start(this.jobs[0].settings);
+  }
+
+  private referenceChanged(windows: Uint32Array | "all") {
+    const { reference } = this;
+    if (windows === "all" || !this.view.films[2]) {
+      if (reference.isReady) this.view.show(2, reference.film);
+    } else this.view.repaint(2, windows);
+    this.report(false);
+  }
+
+  /** What the error is, under the picture. */
+  private tellError(): number[] {
+    const { reference } = this, legend = $("error-legend");
+    legend.hidden = this.app.state.view !== "error";
+    if (legend.hidden) return [];
+    if (!reference.isReady) {
+      legend.textContent = "A reference begins to converge …";
+      return [];
     }
-    for (let i = 0; i < has.length; i++) {
-      if (has[i]) continue;
-      const x = Math.floor((i % film.width) * before.width / film.width), y = Math.floor(Math.floor(i / film.width) * before.height / film.height);
-      const from = 4 * (y * before.width + x);
-      film.pixels.copyWithin(0, 0, 0);
-      for (let c = 0; c < 4; c++) film.pixels[4 * i + c] = before.pixels[from + c];
-    }
+    const errors = this.films.map((film) => reference.error(film));
+    const named = errors.map((error, i) => (errors.length > 1 ? `${this.jobs[i].strategy} ` : "") + short(error)).join(", ");
+    legend.textContent = `Blue pixels are too dark, orange ones too bright; full color is an error of 100 %, black one of 0.4 % or less. Relative squared error: ${named}, against ${Math.round(reference.statistics!.samples)} samples a pixel of a reference whose own variance, ${short(reference.variance)}, is taken off.`;
+    if (this.jobs.every((job) => job.complete)) reference.settle(Math.min(...errors));
+    return errors;
   }
 
   private calibrated = false;
@@ -200,16 +224,20 @@ export class PicturePanel {
       return `${s.samples.toFixed(s.samples < 10 ? 1 : 0)} samples a pixel, ${count(s.shadowRays)} shadow rays${bad}`;
     };
     $("counts").textContent = this.jobs.map((job) => (this.jobs.length > 1 ? `${job.strategy}: ` : "") + one(job)).join(" · ");
+    const errors = this.tellError();
     const series: Series[] = this.jobs.map((job, i) => ({
       name: job.strategy || job.settings.strategy, kind: i ? "second" : "first",
       points: this.histories[i].map((p): [number, number] => [p.rays, p.error]),
     }));
-    if (series.every((s) => !s.points.length)) $("error-plot").replaceChildren();
-    else $("error-plot").innerHTML = plot(series, { x: { name: "shadow rays", log: true, tick: count }, y: { name: "relative variance of the mean", log: true }, height: 200 });
+    const measured = errors.flatMap((error, i): Series[] => (error > 0 ? [{
+      name: "", kind: i ? "second" : "first", as: "dots", points: [[this.jobs[i].statistics.shadowRays, error]],
+    }] : []));
+    if ([...series, ...measured].every((s) => !s.points.length)) $("error-plot").replaceChildren();
+    else $("error-plot").innerHTML = plot([...series, ...measured], { x: { name: "shadow rays", log: true, tick: count }, y: { name: "relative variance of the mean", log: true }, height: 200 });
     const slopes = series.map((s) => `${s.name}: ${short(s.points.at(-1)?.[1] ?? NaN)}, slope ${signed(slope(s.points))}`);
     $("error-plot").setAttribute("aria-label", `Estimated relative variance. ${slopes.join("; ")}`);
     $("error-plot").parentElement!.querySelector("figcaption")!.textContent =
-      `Estimated error over shadow rays — ${series.map((s) => { const k = slope(s.points); return isFinite(k) ? `${s.name} falls with slope ${signed(k)}` : `${s.name}: two passes are needed`; }).join("; ")}`;
+      `Estimated error over shadow rays — ${series.map((s) => { const k = slope(s.points); return isFinite(k) ? `${s.name} falls with slope ${signed(k)}` : `${s.name}: two passes are needed`; }).join("; ")}${measured.length ? ". Dots: measured against the reference" : ""}`;
     $("command").textContent = command(this.app.state);
   }
 
@@ -218,6 +246,8 @@ export class PicturePanel {
   private showView() {
     const { state } = this.app;
     this.view.look.curve = state.curve as Curve;
+    this.view.look.errors = state.view === "error";
+    if (this.view.look.errors !== !!this.reference.isStarted) this.refer();
     if (state.exposure !== null) {
       this.automatic = false;
       this.view.set({ exposure: state.exposure });
@@ -364,6 +394,7 @@ export class PicturePanel {
     fill($("scene"), withFile(SCENES, app.files.scenes, state.scene), state.scene);
     fill($("env"), withFile(PROBES, app.files.probes, state.env), state.env);
     fill($("curve"), CURVES, state.curve);
+    $<HTMLSelectElement>("view").value = state.view;
     $<HTMLInputElement>("ground").checked = state.ground;
     $<HTMLInputElement>("hide").checked = state.hide;
     for (const id of ["spp", "size", "seed", "rotate", "ev", "material"] as const) $<HTMLInputElement>(id).value = String(state[id]);
@@ -425,6 +456,7 @@ export class PicturePanel {
     });
     on("equal", "change", (i) => app.set({ equal: i.value }));
     on("exposure", "input", (i) => app.set({ exposure: Number(i.value) }, "view"));
+    on("view", "change", (i) => app.set({ view: i.value }, "view"));
     on("curve", "change", (i) => app.set({ curve: i.value }, "view"));
     $("auto").addEventListener("click", () => {
       app.set({ exposure: null }, "view");

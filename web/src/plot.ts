@@ -45,8 +45,13 @@ function ticksOf([low, high]: [number, number], log = false): number[] {
 
 /** An SVG of series over two axes. */
 export function plot(series: Series[], axes: Axes): string {
-  const width = axes.width ?? 640, height = axes.height ?? 240;
-  const [left, right, top, bottom] = [58, 14, 22, 38];
+  // Text keeps its size on a phone.
+  const width = axes.width ?? Math.min(640, Math.max(320, document.documentElement.clientWidth - 32)), height = axes.height ?? 240;
+  const named = series.filter((s) => s.name);
+  const ofLegend = named.reduce((sum, s) => sum + 6.6 * s.name.length + 34, 0);
+  const [left, right, bottom] = [58, 14, 38];
+  // Below the axis's name where both do not fit side by side.
+  const legendAt = left + 6.6 * axes.y.name.length + ofLegend > width - right ? 30 : 12, top = legendAt + 10;
   const xs = axes.x.range ?? extent(series.flatMap((s) => s.points.map((p) => p[0])), axes.x.log);
   const ys = axes.y.range ?? extent(series.flatMap((s) => s.points.map((p) => p[1])), axes.y.log);
   const share = (v: number, [low, high]: [number, number], log = false) =>
@@ -78,10 +83,10 @@ export function plot(series: Series[], axes: Axes): string {
   out.push(`<text x="${(left + width - right) / 2}" y="${height - 4}" text-anchor="middle">${escape(axes.x.name)}</text>`);
   out.push(`<text x="${left}" y="12">${escape(axes.y.name)}</text>`);
   let legend = width - right;
-  for (const s of [...series].reverse().filter((s) => s.name)) {
-    out.push(`<text class="name" x="${legend}" y="12" text-anchor="end">${escape(s.name)}</text>`);
+  for (const s of [...named].reverse()) {
+    out.push(`<text class="name" x="${legend}" y="${legendAt}" text-anchor="end">${escape(s.name)}</text>`);
     legend -= 6.6 * s.name.length + 8;
-    out.push(`<path class="${s.kind} line" d="M${legend - 14} 8h14"/>`);
+    out.push(`<path class="${s.kind} line" d="M${legend - 14} ${legendAt - 4}h14"/>`);
     legend -= 26;
   }
   return `<svg viewBox="0 0 ${width} ${height}" aria-hidden="true">${out.join("")}</svg>`;

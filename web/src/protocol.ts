@@ -24,12 +24,14 @@ export interface Statistics {
   shadingPoints: number;
   nonFinite: number;
   samples: number;
-  relativeVariance: number;
+  /** Of a Worker null where it was not estimated. */
+  relativeVariance: number | null;
   pixels: number;
   complete: boolean;
 }
 
 export type ToWorker =
+  | { kind: "unpack"; packed: string }
   | { kind: "boot"; module: WebAssembly.Module }
   | { kind: "call"; id: number; call: Call; args: unknown[] }
   | { kind: "render"; token: number; settings: string }
@@ -47,6 +49,7 @@ export interface Update {
 }
 
 export type FromWorker =
+  | { kind: "unpacked"; module: WebAssembly.Module }
   | { kind: "booted" }
   | { kind: "result"; id: number; result: unknown }
   | { kind: "error"; id: number; error: string; dead: boolean }

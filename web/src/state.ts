@@ -23,8 +23,12 @@ export interface State {
   camera: Camera | null;
   exposure: number | null;
   curve: string;
+  /** What is shown: the picture, or its error against a reference. */
+  view: string;
   mapping: string;
   method: string;
+  /** Variance minimization gives up the rectangles of its cuts. */
+  refine: boolean;
   lights: number;
   sun: boolean;
   lamps: number;
@@ -35,8 +39,8 @@ export interface State {
 export const DEFAULT: State = {
   panel: "picture", scene: "statue", material: "", ground: false, hide: false,
   env: "sky", rows: 256, rotate: 125, ev: 0, size: 640, spp: 32, seed: 0,
-  strategy: "product:8", beside: "", equal: "rays", camera: null, exposure: null, curve: "agx",
-  mapping: "lat-long", method: "variance-minimization", lights: 64, sun: false, lamps: 0, pixel: null, step: 1,
+  strategy: "product:8", beside: "", equal: "rays", camera: null, exposure: null, curve: "agx", view: "picture",
+  mapping: "lat-long", method: "variance-minimization", refine: true, lights: 64, sun: false, lamps: 0, pixel: null, step: 1,
 };
 
 /** What differs from the defaults, as text after `#`. */

@@ -1,6 +1,6 @@
 // Exposure and tone curves as the program has them, on the GPU and without one.
 
-export const CURVES = ["agx", "aces", "neutral", "reinhard", "srgb"] as const;
+export const CURVES = ["agx", "aces", "neutral", "reinhard", "standard"] as const;
 export type Curve = (typeof CURVES)[number];
 
 export const GLSL = `
@@ -10,12 +10,26 @@ vec3 aces(vec3 c) {
   vec3 v = a * min(c, vec3(1e9));
   return b * ((v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.432951) + 0.238081));
 }
+float agx_shaped(float light) {
+  float d = 2.4 * (clamp(log2(max(light, 1e-10) / 0.18), -10.0, 6.5) / 16.5);
+  float scale = d < 0.0 ? -0.5656756 : 0.7151983;
+  float u = d / scale;
+  return pow(max(scale * u / pow(1.0 + u * sqrt(u), 1.0 / 1.5) + pow(0.18, 1.0 / 2.4), 0.0), 2.4);
+}
+float agx_purity(float y) { return 1.0 - min(pow(y, 0.08), 1.0); }
 vec3 agx(vec3 c) {
-  mat3 a = mat3(0.84247906, 0.04232824, 0.042375654, 0.0784336, 0.87846864, 0.0784336, 0.079223745, 0.07916613, 0.87914297);
-  mat3 b = mat3(1.196879, -0.05289685, -0.052971635, -0.09802088, 1.1519031, -0.09804345, -0.09902974, -0.09896118, 1.1510737);
-  vec3 x = (clamp(log2(max(a * c, vec3(1e-10))), -12.47393, 4.026069) + 12.47393) / 16.499999;
-  vec3 s = ((((((15.5 * x - 40.14) * x + 31.96) * x - 6.868) * x + 0.4298) * x + 0.1191) * x - 0.00232);
-  return pow(max(b * s, vec3(0.0)), vec3(2.2));
+  mat3 a = mat3(0.54481475, 0.14041695, 0.08881042, 0.3737874, 0.75413756, 0.17887176, 0.081397855, 0.1054455, 0.7323178);
+  mat3 b = mat3(1.9648874, -0.29931337, -0.16435274, -0.8559885, 1.326398, -0.23818397, -0.10889892, -0.0270846, 1.4025367);
+  vec3 v = a * c;
+  vec3 s = vec3(agx_shaped(v.r), agx_shaped(v.g), agx_shaped(v.b));
+  float least = min(v.r, min(v.g, v.b)), range = max(v.r, max(v.g, v.b)) - least;
+  float low = min(s.r, min(s.g, s.b)), formed = max(s.r, max(s.g, s.b)) - low;
+  if (range > 0.0 && formed > 0.0) s = low + formed * mix((v - least) / range, (s - low) / formed, 0.4);
+  s = b * s;
+  float below = -min(s.r, min(s.g, s.b));
+  if (below <= 0.0) return s;
+  float y = max(dot(s, vec3(0.2067738, 0.6581298, 0.1350964)), 0.0), raised = y + below;
+  return (s + below) * min((y + agx_purity(y) * raised) / (raised + agx_purity(raised) * raised), 1.0);
 }
 vec3 neutral(vec3 c) {
   float least = min(c.r, min(c.g, c.b));
@@ -35,6 +49,25 @@ vec3 shown(vec3 c, int curve) {
   return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
 }`;
 
+/** Signed relative errors of luminance as colors: blue is too dark, orange too bright, on a logarithmic scale from 2⁻⁸ to 1. */
+export const ERROR_GLSL = `
+vec3 error_color(vec3 c, vec3 reference) {
+  const vec3 luminance = vec3(0.2126, 0.7152, 0.0722);
+  float y = dot(reference, luminance), d = (dot(c, luminance) - y) / sqrt(y * y + 0.01);
+  float t = clamp(1.0 + log2(max(abs(d), 1e-9)) / 8.0, 0.0, 1.0);
+  return mix(vec3(0.05), d < 0.0 ? vec3(0.35, 0.65, 1.0) : vec3(1.0, 0.55, 0.15), t);
+}`;
+
+/** The same as bytes, into `out` at `at`. */
+export function errorColor(pixel: Float32Array, reference: Float32Array, out: Uint8ClampedArray, at: number) {
+  const luminance = (c: Float32Array) => 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+  const y = luminance(reference), d = (luminance(pixel) - y) / Math.sqrt(y * y + 0.01);
+  const t = Math.min(Math.max(1 + Math.log2(Math.max(Math.abs(d), 1e-9)) / 8, 0), 1);
+  const full = d < 0 ? [0.35, 0.65, 1] : [1, 0.55, 0.15];
+  for (let i = 0; i < 3; i++) out[at + i] = 255 * (0.05 + t * (full[i] - 0.05));
+  out[at + 3] = 255;
+}
+
 type Color = [number, number, number];
 const times = (m: number[], [r, g, b]: Color): Color =>
   [m[0] * r + m[1] * g + m[2] * b, m[3] * r + m[4] * g + m[5] * b, m[6] * r + m[7] * g + m[8] * b];
@@ -45,14 +78,29 @@ function aces(c: Color): Color {
   return times([1.60475, -0.53108, -0.07367, -0.10208, 1.10813, -0.00605, -0.00327, -0.07276, 1.07602], v);
 }
 
+const agxPurity = (y: number) => 1 - Math.min(y ** 0.08, 1);
+
+function agxShaped(light: number): number {
+  const d = (2.4 * Math.min(Math.max(Math.log2(Math.max(light, 1e-10) / 0.18), -10), 6.5)) / 16.5;
+  const scale = d < 0 ? -0.5656756 : 0.7151983;
+  const u = d / scale;
+  return Math.max((scale * u) / (1 + u ** 1.5) ** (1 / 1.5) + 0.18 ** (1 / 2.4), 0) ** 2.4;
+}
+
 function agx(c: Color): Color {
-  const inside = times([0.84247906, 0.0784336, 0.079223745, 0.04232824, 0.87846864, 0.07916613, 0.042375654, 0.0784336, 0.87914297], c);
-  const shaped = inside.map((v) => {
-    const x = (Math.min(Math.max(Math.log2(Math.max(v, 1e-10)), -12.47393), 4.026069) + 12.47393) / 16.499999;
-    return [15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232].reduce((sum, k) => sum * x + k, 0);
-  }) as Color;
-  return times([1.196879, -0.09802088, -0.09902974, -0.05289685, 1.1519031, -0.09896118, -0.052971635, -0.09804345, 1.1510737], shaped)
-    .map((v) => Math.max(v, 0) ** 2.2) as Color;
+  const v = times([0.54481475, 0.3737874, 0.081397855, 0.14041695, 0.75413756, 0.1054455, 0.08881042, 0.17887176, 0.7323178], c);
+  let s = v.map(agxShaped) as Color;
+  const [least, low] = [Math.min(...v), Math.min(...s)];
+  const [range, formed] = [Math.max(...v) - least, Math.max(...s) - low];
+  // Six tenths of the hue before the curve come back.
+  if (range > 0 && formed > 0) s = s.map((x, i) => low + 0.6 * formed * ((v[i] - least) / range) + 0.4 * (x - low)) as Color;
+  s = times([1.9648874, -0.8559885, -0.10889892, -0.29931337, 1.326398, -0.0270846, -0.16435274, -0.23818397, 1.4025367], s);
+  const below = -Math.min(...s);
+  if (below <= 0) return s;
+  const y = Math.max(0.2067738 * s[0] + 0.6581298 * s[1] + 0.1350964 * s[2], 0);
+  const raised = y + below;
+  const factor = Math.min((y + agxPurity(y) * raised) / (raised + agxPurity(raised) * raised), 1);
+  return s.map((x) => (x + below) * factor) as Color;
 }
 
 function neutral(c: Color): Color {

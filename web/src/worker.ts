@@ -3,10 +3,12 @@
 import { Engine, initSync, lobeSamples, lobeSection } from "../dist/engine/engine.js";
 import type { Call, FromWorker, ToWorker } from "./protocol";
 
-const SLICE = 40;
+const SLICE = 16;
 
 let engine: Engine | undefined;
 let rendering: { token: number; paused: boolean } | undefined;
+/** When the variance may be estimated again, so that it takes no more than a thirtieth of the time. */
+let nextVariance = 0;
 const pending: ToWorker[] = [];
 
 const post = (message: FromWorker, transfer: Transferable[] = []) =>
@@ -17,7 +19,20 @@ const channel = new MessageChannel();
 const soon = () => channel.port2.postMessage(0);
 channel.port1.onmessage = turn;
 
+/** The engine's module from the page's text: in base64, compressed. */
+async function unpack(packed: string) {
+  const text = atob(packed.trim()), bytes = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+  const response = new Response(stream, { headers: { "Content-Type": "application/wasm" } });
+  post({ kind: "unpacked", module: await WebAssembly.compileStreaming(response) });
+}
+
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
+  if (data.kind === "unpack") {
+    unpack(data.packed).catch((error) => post({ kind: "failed", token: 0, error: text(error), dead: false }));
+    return;
+  }
   if (data.kind === "pause") {
     if (rendering?.token === data.token) {
       const wasPaused = rendering.paused;
@@ -58,6 +73,7 @@ function answer(message: ToWorker) {
       try {
         const started = JSON.parse(engine!.start(message.settings));
         rendering = { token: message.token, paused: false };
+        nextVariance = 0;
         post({ kind: "started", token: message.token, strategy: started.strategy });
       } catch (error) {
         rendering = undefined;
@@ -75,7 +91,6 @@ function answer(message: ToWorker) {
 function call(name: Call, args: unknown[]): unknown {
   if (name === "lobeSection") return lobeSection(...(args as Parameters<typeof lobeSection>));
   if (name === "lobeSamples") return lobeSamples(...(args as Parameters<typeof lobeSamples>));
-  if (name === "loadScene" || name === "loadEnvironment" || name === "turnEnvironment") rendering = undefined;
   if (name === "mapView") {
     const view = engine!.mapView(...(args as Parameters<Engine["mapView"]>));
     const plain = { width: view.width, height: view.height, pixels: view.pixels() };
@@ -83,7 +98,10 @@ function call(name: Call, args: unknown[]): unknown {
     return plain;
   }
   const method = engine![name] as (...args: unknown[]) => unknown;
-  return method.apply(engine, args);
+  const result = method.apply(engine, args);
+  // What was rendered is of another scene or light. After an error it goes on.
+  if (name === "loadScene" || name === "loadEnvironment" || name === "turnEnvironment") rendering = undefined;
+  return result;
 }
 
 function slice() {
@@ -93,7 +111,9 @@ function slice() {
     const windows = update.windows(), pixels = update.pixels();
     const { complete, progress } = update;
     update.free();
-    const statistics = JSON.parse(engine!.statistics());
+    const before = performance.now(), withVariance = complete || before >= nextVariance;
+    const statistics = JSON.parse(engine!.statistics(withVariance));
+    if (withVariance) nextVariance = performance.now() + 30 * (performance.now() - before);
     if (complete) rendering = undefined;
     post({ kind: "update", token, windows, pixels, complete, progress, statistics }, [windows.buffer as ArrayBuffer, pixels.buffer as ArrayBuffer]);
     if (!complete) soon();

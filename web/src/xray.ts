@@ -79,7 +79,7 @@ export class XrayPanel {
     this.views.forEach((view, i) => {
       const film = Film.fromRgb(SIZE, SIZE, maps.subarray(i * n, (i + 1) * n));
       // Visibility and reflectance are shares; light has its own exposure.
-      view.set({ exposure: i === 2 ? 0 : film.exposure() + (i === 3 ? 1 : 0), curve: i === 2 ? "srgb" : "agx" });
+      view.set({ exposure: i === 2 ? 0 : film.exposure() + (i === 3 ? 1 : 0), curve: i === 2 ? "standard" : "agx" });
       view.show(0, film);
     });
   }

@@ -1,7 +1,7 @@
 // The page in headless Chromium, from a file.
 
 import assert from "node:assert/strict";
-import { existsSync } from "node:fs";
+import { existsSync, readFileSync } from "node:fs";
 import { join, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
 import { chromium } from "playwright-core";
@@ -68,8 +68,9 @@ export async function renderedAnew(page, act) {
 
 /** A hash (FNV-1a) of a canvas. */
 export const canvasHash = (page, id) => page.evaluate(async (id) => {
-  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  const frame = () => new Promise(requestAnimationFrame);
   const canvas = document.getElementById(id);
+  do await frame(); while (canvas.hasAttribute("data-stale"));
   const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
   const context = copy.getContext("2d", { willReadFrequently: true });
   context.drawImage(canvas, 0, 0);
@@ -78,8 +79,9 @@ export const canvasHash = (page, id) => page.evaluate(async (id) => {
 
 /** The mean of a canvas's bytes. */
 export const brightness = (page, id) => page.evaluate(async (id) => {
-  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  const frame = () => new Promise(requestAnimationFrame);
   const canvas = document.getElementById(id);
+  do await frame(); while (canvas.hasAttribute("data-stale"));
   const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
   const context = copy.getContext("2d", { willReadFrequently: true });
   context.drawImage(canvas, 0, 0);
@@ -94,5 +96,23 @@ export const slide = (page, selector, value) => page.$eval(selector, (input, val
   input.value = String(value);
   input.dispatchEvent(new Event("input", { bubbles: true }));
 }, value);
+
+/** Drops files and folders of the disk on the page, as a hand does. */
+export async function drop(page, paths) {
+  const cdp = await page.context().newCDPSession(page);
+  const data = { items: [], files: paths, dragOperationsMask: 1 };
+  for (const type of ["dragEnter", "dragOver", "drop"]) await cdp.send("Input.dispatchDragEvent", { type, x: 400, y: 400, data });
+  await cdp.detach();
+}
+
+/** Megabytes in memory of the browser's processes that run pages. */
+export async function memory() {
+  const cdp = await browser.newBrowserCDPSession();
+  const { processInfo } = await cdp.send("SystemInfo.getProcessInfo");
+  await cdp.detach();
+  const pages = processInfo.filter(({ type }) => type === "renderer").map(({ id }) => Number(id));
+  const resident = (id) => Number(/VmRSS:\s+(\d+)/.exec(readFileSync(`/proc/${id}/status`, "utf8"))[1]) / 1024;
+  return pages.reduce((sum, id) => sum + resident(id), 0);
+}
 
 export const show = (page, panel) => page.click(`#tab-${panel}`);

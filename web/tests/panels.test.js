@@ -102,6 +102,40 @@ test("two strategies at equal rays, with a divider", async () => {
   await done();
 });
 
+test("the error view measures the picture against a reference", async () => {
+  const { page, done } = await open("size=64&spp=32&rows=64&env=studio&strategy=mis:1:1&beside=product:8&view=error");
+  await page.waitForFunction(() => /Relative squared error: mis:1:1/.test(document.getElementById("error-legend").textContent));
+  await rendered(page);
+  await page.waitForFunction(() => {
+    const { films, reference } = window.domelight.picture;
+    return reference.variance < 0.1 * reference.error(films[1]);
+  });
+  const sides = await page.evaluate(() => {
+    const { films, jobs, reference } = window.domelight.picture;
+    return films.map((film, i) => [reference.error(film), jobs[i].statistics.relativeVariance]);
+  });
+  for (const [measured, estimated] of sides) assert.ok(measured > 0.3 * estimated && measured < 3 * estimated, `measured ${measured}, estimated ${estimated}`);
+  assert.equal((await page.$$("#error-plot circle")).length, 2);
+  const errors = await canvasHash(page, "film");
+  await page.selectOption("#view", "picture");
+  assert.ok(await page.isHidden("#error-legend"));
+  assert.notEqual(await canvasHash(page, "film"), errors);
+  await done();
+});
+
+test("without WebGL2 the error view is the same", async () => {
+  const seen = [];
+  for (const query of ["", "?2d"]) {
+    const { page, done } = await open("size=64&spp=1&rows=64&env=studio&strategy=brdf:1&view=error", { query });
+    await page.waitForFunction(() => document.getElementById("error-plot").querySelector("circle"));
+    await page.evaluate(() => window.domelight.picture.reference.settle(1e9));
+    await page.waitForTimeout(200);
+    seen.push(await brightness(page, "film"));
+    await done();
+  }
+  assert.ok(Math.abs(seen[0] - seen[1]) < 3, `${seen}`);
+});
+
 test("the map turns, shows the sun, and what a pixel samples", async () => {
   const { page, done } = await open(SMALL);
   await rendered(page);
@@ -133,7 +167,7 @@ test("lights: regions, files of every format, and what is left", async () => {
   await show(page, "lights");
   await page.waitForSelector("html[data-rig='variance-minimization:64']");
   const many = await canvasHash(page, "rig-marks");
-  await slide(page, "#n-lights", 3);
+  await slide(page, "#n-lights", 7);
   await page.waitForSelector("html[data-rig='variance-minimization:8']");
   assert.notEqual(await canvasHash(page, "rig-marks"), many);
   await page.selectOption("#method", "median-cut");
@@ -152,6 +186,28 @@ test("lights: regions, files of every format, and what is left", async () => {
   }
   await done();
 });
+
+for (const method of ["median-cut", "variance-minimization"]) {
+  test(`lights: ${method} step by step`, async () => {
+    const { page, done } = await open(`${SMALL}&panel=lights&lights=1&refine=false&method=${method}`);
+    await page.waitForSelector(`html[data-rig='${method}:1']`);
+    for (const n of [2, 3, 4]) {
+      await page.click("#more-lights");
+      await page.waitForSelector(`html[data-rig='${method}:${n}'][data-divided='1']`);
+      assert.match(await text(page, "#rig-step"), /This step divided the region along the orange line/);
+    }
+    await page.click("#fewer-lights");
+    await page.waitForSelector(`html[data-rig='${method}:3'][data-divided='0']`);
+    await page.click("#play-lights");
+    assert.equal(await page.getAttribute("#play-lights", "aria-pressed"), "true");
+    await page.waitForSelector(`html[data-rig='${method}:6']`);
+    await page.click("#play-lights");
+    const n = await page.inputValue("#n-lights");
+    await page.waitForTimeout(1000);
+    assert.equal(await page.inputValue("#n-lights"), n, "it stays where it was stopped");
+    await done();
+  });
+}
 
 test("the X-ray of a pixel names causes whose shares are drawn", async () => {
   const { page, done } = await open(`${SMALL}&pixel=[27,27]&panel=xray&strategy=mis:1:1`);

@@ -11,8 +11,9 @@ use domelight::RgbImage;
 use domelight::picture::compare::{
     ColorScale, Comparison, absolute_error_map, compare, relative_error_map,
 };
+use domelight::picture::exposure::Exposure;
 use domelight::picture::flip::{HdrFlip, PIXELS_PER_DEGREE, hdr_flip, ldr_flip};
-use domelight::picture::tone::{ToneCurve, ToneMapping};
+use domelight::picture::tone::ToneMapping;
 use domelight::picture::{ReadOptions, read};
 use std::fmt::Write;
 use std::path::Path;
@@ -77,7 +78,7 @@ impl Difference {
         mask: Option<&[bool]>,
     ) -> anyhow::Result<Self> {
         let comparison = compare(test, reference, mask)?;
-        let tone = arguments.tone.mapping(ToneCurve::Srgb);
+        let tone = arguments.tone.of_measurement(|| Exposure::Auto.stops(reference, None));
         let flip = ldr_flip(&shown(reference, tone), &shown(test, tone), PIXELS_PER_DEGREE)?;
         let hdr = arguments.hdr_flip.then(|| hdr_flip(reference, test, PIXELS_PER_DEGREE));
         Ok(Self { comparison, flip, hdr_flip: hdr.transpose()?, mask: mask.map(<[bool]>::to_vec) })

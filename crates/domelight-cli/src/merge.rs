@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use std::slice;
 
 use anyhow::{Context as _, Result};
+use domelight::picture::exposure::Exposure;
 use domelight::picture::exr::bands::BAND_ROWS;
-use domelight::picture::tone::ToneCurve;
 use domelight::render::{Checkpoint, CheckpointError, Counts, Film, Layers, VarianceSums};
 use domelight::{Rgb, RgbImage};
 use serde::Serialize;
@@ -22,6 +22,7 @@ use crate::memory;
 use crate::output::{PicturePath, print_json, require_one_on_standard_output};
 use crate::render_run::read;
 use crate::terminal::Terminal;
+use crate::tone::{Shown, kept};
 use domelight_lab::Host as _;
 
 /// Memory of a pixel of a band: its layers, as channels, and compressed.
@@ -109,8 +110,8 @@ pub(crate) fn run(arguments: &MergeArguments, quiet: bool) -> Result<()> {
     };
     merged.require_all(&unfinished)?;
 
-    merged.write(arguments)?;
-    merged.report(arguments, quiet)
+    let png = merged.write(arguments)?;
+    merged.report(arguments, png, quiet)
 }
 
 /// The files themselves, and the pictures in folders by name.
@@ -221,8 +222,9 @@ impl Merged {
         if text.is_empty() { Ok(()) } else { Err(MergeError::Missing(text.join("; "))) }
     }
 
-    /// Writes all outputs; what is no OpenEXR needs all of the picture's colors in memory.
-    fn write(&self, arguments: &MergeArguments) -> Result<()> {
+    /// Writes all outputs; what is no OpenEXR needs all of the picture's colors in memory. Returns how PNG output is
+    /// shown.
+    fn write(&self, arguments: &MergeArguments) -> Result<Option<Shown>> {
         let mut attributes = self.provenance.clone();
         attributes.push(("domelight.complete".into(), "true".into()));
         let (layered, flat): (Vec<_>, Vec<_>) =
@@ -245,7 +247,7 @@ impl Merged {
                 Ok(band.to_exr(attributes.clone()))
             })?;
         }
-        let Some(mut picture) = picture else { return Ok(()) };
+        let Some(mut picture) = picture else { return Ok(None) };
         if layered.is_empty() {
             let mut bands = Bands::new(self);
             for y in (0..self.height).step_by(BAND_ROWS) {
@@ -255,13 +257,17 @@ impl Merged {
         let background =
             |(name, value): &(String, String)| name == "background" && value == "hidden";
         let hidden = self.identity.iter().any(background);
-        let tone = arguments.tone.mapping(ToneCurve::Agx);
         let color = RgbImage::new(self.width, self.height, picture.color);
         let alpha = hidden.then_some(&picture.alpha[..]);
-        flat.iter().try_for_each(|output| output.write_color(&color, alpha, &tone))
+        let median = || Exposure::Auto.stops(&color, alpha);
+        let automatic = || kept(&self.provenance).unwrap_or_else(median);
+        let tone = arguments.tone.of_picture(automatic);
+        flat.iter().try_for_each(|output| output.write_color(&color, alpha, &tone))?;
+        let is_shown = flat.iter().any(|output| output.is_png());
+        Ok(is_shown.then(|| Shown::new(&arguments.tone, &tone)))
     }
 
-    fn report(&self, arguments: &MergeArguments, quiet: bool) -> Result<()> {
+    fn report(&self, arguments: &MergeArguments, png: Option<Shown>, quiet: bool) -> Result<()> {
         #[derive(Serialize)]
         struct Report {
             parts: usize,
@@ -272,6 +278,8 @@ impl Merged {
             shadow_rays: u64,
             non_finite_samples: u64,
             outputs: Vec<String>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            png: Option<Shown>,
         }
         Terminal { quiet }.warn_of_non_finite("", self.counts.non_finite);
         let report = Report {
@@ -283,13 +291,15 @@ impl Merged {
             shadow_rays: self.counts.shadow_rays,
             non_finite_samples: self.counts.non_finite,
             outputs: arguments.output.iter().map(ToString::to_string).collect(),
+            png,
         };
         if arguments.json {
             print_json(&report)?;
         } else if !quiet {
             let Report { parts, size: [w, h], spp, outputs, .. } = report;
             let outputs = outputs.join(", ");
-            status(&format!("{parts} parts: {w}x{h}, {spp} samples a pixel -> {outputs}"));
+            let png = png.map_or(String::new(), |shown| format!(" (PNG at {shown})"));
+            status(&format!("{parts} parts: {w}x{h}, {spp} samples a pixel -> {outputs}{png}"));
         }
         Ok(())
     }

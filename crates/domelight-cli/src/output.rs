@@ -4,7 +4,7 @@ use crate::error::UsageError;
 use crate::files;
 use crate::interrupt;
 use domelight::RgbImage;
-use domelight::environment::mapping::{EnvmapKind, Mapping};
+use domelight::environment::mapping::Mapping;
 use domelight::picture::exr::ExrLayers;
 use domelight::picture::exr::bands::{self, BAND_ROWS};
 use domelight::picture::png::Depth;
@@ -15,6 +15,7 @@ use domelight::render::Layers;
 use serde::Serialize;
 use std::fmt;
 use std::io::{self, IsTerminal as _, Write as _};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -88,15 +89,10 @@ impl PicturePath {
     }
 
     fn write_exr(&self, image: &RgbImage, mapping: Option<Mapping>) -> anyhow::Result<()> {
-        let envmap = match mapping {
-            Some(Mapping::LatLongExr) => Some(EnvmapKind::LatLong),
-            Some(Mapping::CubeStripVertical) => Some(EnvmapKind::Cube),
-            _ => None,
-        };
-        let RgbImage { width, height, ref pixels } = *image;
+        let envmap = mapping.and_then(Mapping::envmap);
+        let height = image.height;
         self.write_bands(height, |y| {
-            let end = height.min(y + BAND_ROWS);
-            let rows = RgbImage::new(width, end - y, pixels[y * width..end * width].to_vec());
+            let rows = band(image, y..height.min(y + BAND_ROWS));
             Ok(ExrLayers { envmap, ..ExrLayers::from_image(&rows, None) })
         })
     }
@@ -121,20 +117,31 @@ impl PicturePath {
     }
 
     /// Writes a rendering: OpenEXR, also to standard output, gets all its layers and `attributes`.
-    /// PNG gets alpha if the background is `hidden`.
+    /// PNG gets alpha if the background is `hidden`. What a denoiser made of it is a layer of OpenEXR, and takes the place
+    /// of color in other formats.
     pub(crate) fn write_layers(
         &self,
         layers: &Layers,
+        denoised: Option<&RgbImage>,
         tone: &ToneMapping,
         hidden: bool,
         attributes: &[(String, String)],
     ) -> anyhow::Result<()> {
-        if self.has_all_layers() {
+        if !self.has_all_layers() {
+            let color = denoised.unwrap_or(&layers.color);
+            return self.write_color(color, hidden.then_some(&layers.alpha[..]), tone);
+        }
+        let Some(denoised) = denoised else {
             return files::write_seeking(&self.path, |out| {
                 layers.write_exr(attributes, out).map_err(into_io)
             });
-        }
-        self.write_color(&layers.color, hidden.then_some(&layers.alpha[..]), tone)
+        };
+        self.write_bands(layers.height(), |y| {
+            let rows = y..layers.height().min(y + BAND_ROWS);
+            let mut exr = layers.rows(rows.clone()).to_exr(attributes.to_vec());
+            exr.push_rgb("denoised", &band(denoised, rows), None);
+            Ok(exr)
+        })
     }
 
     /// Writes OpenEXR from bands of rows, as [`bands::write`] does; no file is there if one fails.
@@ -181,6 +188,12 @@ impl fmt::Display for PicturePath {
         }
         self.path.display().fmt(f)
     }
+}
+
+/// Some rows of a picture.
+fn band(image: &RgbImage, rows: Range<usize>) -> RgbImage {
+    let (width, height) = (image.width, rows.len());
+    RgbImage::new(width, height, image.pixels[rows.start * width..rows.end * width].to_vec())
 }
 
 /// What the system says stays what the system says.

@@ -11,7 +11,7 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{LoadedProbe, ProbeOptions, SanitizeReport, load_probe};
 use domelight::environment::mapping::{Mapping, from_lat_long, to_lat_long};
 use domelight::environment::statistics::{ProbeStatistics, Sun};
-use domelight::picture::tone::ToneCurve;
+use domelight::picture::exposure::Exposure;
 use domelight::{Rgb, RgbImage};
 use std::fmt::Write;
 
@@ -70,7 +70,7 @@ fn write_pictures(arguments: &ProbeArguments, map: &RgbImage) -> anyhow::Result<
     memory::allow(&what, (12 + memory::WRITTEN_TEXEL) * 2 * (rows as u64).pow(2))?;
     let resized = (rows != map.height).then(|| to_lat_long(map, Mapping::LatLong, rows));
     let map = resized.as_ref().unwrap_or(map);
-    let tone = arguments.tone.mapping(ToneCurve::Aces);
+    let tone = arguments.tone.of_picture(|| Exposure::Auto.stops(map, None));
     if let Some(preview) = &arguments.preview {
         preview.write(map, tone, PictureFormat::Png, None)?;
     }

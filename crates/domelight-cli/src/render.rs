@@ -4,8 +4,7 @@ use std::str::FromStr as _;
 use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, bail};
-use domelight::picture::tone::ToneCurve;
-use domelight::render::{RenderSettings, pilot_points};
+use domelight::render::{RenderSettings, automatic_exposure, pilot_points};
 use domelight::strategy::PreparedStrategy;
 
 use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
@@ -21,6 +20,8 @@ use crate::report::{RenderReport, Settings, StopReason, Timings};
 use crate::scene::start_threads;
 use crate::strategy::{Job, acceptance};
 use crate::terminal::Terminal;
+use crate::tone::{self, Shown};
+use domelight_lab::denoise::Denoiser;
 use domelight_lab::scene::PreparedScene;
 use domelight_lab::{Stopwatch, refuse_repeating_points};
 
@@ -46,6 +47,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         memory::allow_picture(width, height, memory::PIXEL)?;
     }
     start_threads(arguments.pixel.threads)?;
+    // Before the work that would be in vain.
+    let denoiser = arguments.output.denoise.then(Denoiser::load).transpose()?;
     let interrupted = interrupt::flag();
     let loading = interrupt::nothing_to_keep(arguments.render_run.code_of_an_early_end());
     let mut watch = Stopwatch::start();
@@ -63,6 +66,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     };
     let spec = spec.for_picture(scene, camera, environment, settings);
     let strategy = &PreparedStrategy::new(spec, environment).with_context(|| probe.clone())?;
+    let automatic = automatic_exposure(scene, camera, environment, settings);
     let described = Settings {
         scene: report.clone(),
         strategy: spec.description(),
@@ -72,6 +76,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         filter: settings.filter.name(),
         seed: settings.seed,
         threads: rayon::current_num_threads(),
+        automatic_exposure: automatic,
     };
     let render_run = &arguments.render_run;
     let render_run =
@@ -79,9 +84,9 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let build = watch.lap();
     drop(loading);
 
-    let tone = arguments.output.tone.mapping(ToneCurve::Agx);
+    let shown_as = arguments.output.tone.of_picture(|| automatic);
     if arguments.output.preview {
-        preview::write(view, settings, strategy, &outputs, &tone, interrupted)?;
+        preview::write(view, settings, strategy, &outputs, &shown_as, interrupted)?;
     }
 
     let n_pixels = (settings.width * settings.height) as u64;
@@ -104,12 +109,14 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     }
     let render = watch.lap();
 
+    let denoised = denoiser.as_ref().map(|d| tone::denoise(d, &rendering.layers)).transpose()?;
     // A full disk under one file must not cost the others.
     let write = |path: &PicturePath| {
         let mut attributes = described.provenance();
         // If not, the layer of sample counts tells how many there are.
         attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
-        path.write_layers(&rendering.layers, &tone, report.hide_env, &attributes)
+        let denoised = denoised.as_ref().map(|(color, _)| color);
+        path.write_layers(&rendering.layers, denoised, &shown_as, report.hide_env, &attributes)
     };
     // A part is its own checkpoint, and written.
     if !arguments.render_run.is_part() {
@@ -120,6 +127,10 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let rejection = acceptance(spec, points, environment, settings.seed)?;
     let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
     report.profile = progress.profile();
+    report.denoised = denoised.map(|(_, by)| by);
+    if outputs.iter().any(PicturePath::is_png) {
+        report.png = Some(Shown::new(&arguments.output.tone, &shown_as));
+    }
     if arguments.output.json {
         report.print_json()?;
     } else if !quiet {

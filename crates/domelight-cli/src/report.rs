@@ -11,6 +11,7 @@ use crate::error::{InterruptedAndSaved, status, tell_lines};
 use crate::output::{self, PicturePath};
 use crate::profile::{self, StageSeconds};
 use crate::terminal::Terminal;
+use crate::tone::{self, Shown};
 
 /// What was rendered, and how: enough to make the same picture again.
 #[derive(Serialize)]
@@ -24,6 +25,8 @@ pub(crate) struct Settings {
     pub(crate) filter: &'static str,
     pub(crate) seed: u64,
     pub(crate) threads: usize,
+    /// What brings the median of the picture to middle gray \[stops\].
+    pub(crate) automatic_exposure: f32,
 }
 
 impl Settings {
@@ -43,6 +46,7 @@ impl Settings {
         ];
         let named = settings.map(|(name, value)| (format!("domelight.{name}"), value));
         attributes.extend(named);
+        attributes.push(tone::attribute(self.automatic_exposure));
         attributes
     }
 }
@@ -84,6 +88,12 @@ pub(crate) struct RenderReport {
     complete: bool,
     stopped: Option<StopReason>,
     outputs: Vec<String>,
+    /// How PNG output is shown, if there is any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) png: Option<Shown>,
+    /// How output was denoised, if it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) denoised: Option<String>,
     /// CPU seconds by stage of the render, if they were asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) profile: Option<Vec<StageSeconds>>,
@@ -114,6 +124,8 @@ impl RenderReport {
             complete: rendering.complete,
             stopped,
             outputs: outputs.iter().map(ToString::to_string).collect(),
+            png: None,
+            denoised: None,
             profile: None,
         }
     }
@@ -130,14 +142,18 @@ impl RenderReport {
         let Timings { load, build, render, .. } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
         status(&format!("{scene} under {environment}: {w}x{h}, {spp} samples a pixel, {strategy}"));
+        let png = self.png.map_or(String::new(), |shown| format!(" (PNG at {shown})"));
         status(&format!(
-            "loaded in {:.2} s, built in {:.2} s, rendered in {:.2} s{cpu}, {:.1} Mrays/s -> {}",
+            "loaded in {:.2} s, built in {:.2} s, rendered in {:.2} s{cpu}, {:.1} Mrays/s -> {}{png}",
             load.wall,
             build.wall,
             render.wall,
             self.rays_per_second * 1e-6,
             self.outputs.join(", ")
         ));
+        if let Some(by) = &self.denoised {
+            status(&tone::denoised_line(by));
+        }
         if let Some(profile) = &self.profile {
             tell_lines(&profile::lines(profile));
         }

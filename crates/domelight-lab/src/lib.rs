@@ -27,6 +27,7 @@
 mod acceptance;
 pub mod bench;
 pub mod compare;
+pub mod denoise;
 mod error;
 pub mod figures;
 mod host;

@@ -79,6 +79,7 @@ pub(crate) fn compare<'py>(
         adaptive: true,
         target_error: None,
         tile_size: Some(tile_size.unwrap_or(RenderSettings::default().tile_size)),
+        passes: "efficient",
     };
     let job = &Job::new(py, scene.get(), env, keywords)?;
     let lobes = &scene.get().inner.lobes;

@@ -200,6 +200,48 @@ impl Environment {
         Self::build(py, map, orientation, scale, name.to_owned())
     }
 
+    /// The environment of a Mitsuba 3 emitter, or of a picture in its layout.
+    ///
+    /// Parameters
+    /// ----------
+    /// source : mitsuba.Emitter or mitsuba.Bitmap
+    ///     An `envmap` or `constant` of an RGB variant, or a latitude-longitude picture whose first column looks
+    ///     toward -Z.
+    ///
+    /// Returns
+    /// -------
+    /// Environment
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     If Mitsuba is not installed.
+    /// ValueError
+    ///     If it is another emitter, or turned otherwise than about +Y, or about +Z with the first row up.
+    #[classmethod]
+    fn from_mitsuba<'py>(
+        cls: &Bound<'py, PyType>,
+        source: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let interop = cls.py().import("domelight._interop")?;
+        interop.call_method1("environment_from_mitsuba", (source,))
+    }
+
+    /// A description of the environment for `mitsuba.load_dict`.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     An `envmap` with the map, in single precision, and its rotation.
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     If Mitsuba is not installed.
+    fn to_mitsuba<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("domelight._interop")?.call_method1("environment_to_mitsuba", (slf,))
+    }
+
     /// ndarray, shape (H, W, 3): radiance of each texel [W m^-2 sr^-1], a copy.
     #[getter]
     fn map<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {

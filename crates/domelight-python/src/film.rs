@@ -215,7 +215,7 @@ impl Film {
     ///     left out. The file is the old one or the whole new one.
     /// exposure : float or None, default 0
     ///     Of PNG [stops]; None makes the median middle gray.
-    /// curve : {'srgb', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
+    /// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
     ///     The tone curve of PNG.
     ///
     /// Raises
@@ -251,7 +251,7 @@ impl Film {
     /// ----------
     /// exposure : float or None, default None
     ///     In stops; None makes the median middle gray.
-    /// curve : {'srgb', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
+    /// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
     ///     The tone curve.
     #[pyo3(signature = (*, exposure = None, curve = "agx"))]
     fn to_png<'py>(

@@ -53,6 +53,7 @@ pub(crate) fn inspect<'py>(
         adaptive: true,
         target_error: None,
         tile_size: None,
+        passes: "efficient",
     };
     let job = &Job::new(py, scene.get(), env, keywords)?;
     let inside = |(x, y): (i64, i64)| Some([usize::try_from(x).ok()?, usize::try_from(y).ok()?]);

@@ -7,7 +7,8 @@ use domelight::RgbImage;
 use domelight::picture::exr::ExrLayers;
 use domelight::picture::exr::bands::{self, BAND_ROWS};
 use domelight::picture::png::{self, Depth};
-use domelight::picture::tone::{Exposure, ToneCurve, ToneMapping, srgb_from_linear};
+use domelight::picture::exposure::Exposure;
+use domelight::picture::tone::{ToneCurve, ToneMapping, srgb_from_linear};
 use domelight::picture::{
     self, PictureError, PictureErrorKind, ReadOptions, hdr, pfm, write_atomically,
     write_atomically_seeking,
@@ -142,7 +143,7 @@ pub(crate) fn read(
 ///     Linear Rec. 709, top row first.
 /// exposure : float or None, default 0
 ///     Of PNG [stops]; None makes the median middle gray.
-/// curve : {'srgb', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
+/// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
 ///     The tone curve of PNG.
 ///
 /// Raises
@@ -177,7 +178,7 @@ pub(crate) fn write(
 ///     Linear Rec. 709.
 /// exposure : float or None, default None
 ///     In stops; None makes the median middle gray.
-/// curve : {'srgb', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
+/// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
 ///     The tone curve.
 ///
 /// Returns

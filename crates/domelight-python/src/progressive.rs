@@ -112,11 +112,14 @@ impl Progressive {
 /// ----------
 /// scene, env, strategy, spp, size, seed, threads, camera, filter, sampler, hide_env, adaptive, target_error, tile_size
 ///     As of `render`.
+/// passes : {'doubling', 'efficient'}, default 'doubling'
+///     As of `render`: films of 1, 2, 4, 8, … samples, up to one for each 64 with 'product'; or as few films as the
+///     strategy works best with.
 ///
 /// Yields
 /// ------
 /// Film
-///     All samples so far; the last one is complete and has the bits of `render`'s.
+///     All samples so far; the last one is complete and has the bits of `render`'s with the same `passes`.
 ///
 /// Raises
 /// ------
@@ -125,8 +128,8 @@ impl Progressive {
 #[pyfunction]
 #[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = (640, 640), seed = 0, threads = None,
     camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,
-    tile_size = None),
-    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None)")]
+    tile_size = None, passes = "doubling"),
+    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, passes='doubling')")]
 pub(crate) fn progressive<'py>(
     py: Python<'py>,
     scene: &Bound<'py, Scene>,
@@ -143,6 +146,7 @@ pub(crate) fn progressive<'py>(
     adaptive: bool,
     target_error: Option<f32>,
     tile_size: Option<usize>,
+    passes: &str,
 ) -> PyResult<Progressive> {
     let strategy = strategy.unwrap_or_else(|| pyo3::types::PyString::new(py, "product").into_any());
     let keywords = Keywords {
@@ -158,6 +162,7 @@ pub(crate) fn progressive<'py>(
         adaptive,
         target_error,
         tile_size,
+        passes,
     };
     let job = Arc::new(Job::new(py, scene.get(), env, keywords)?);
     let cancel = Arc::new(AtomicBool::new(false));

@@ -6,7 +6,7 @@ use std::sync::mpsc;
 
 use domelight::environment;
 use domelight::inspect::{InspectError, Inspector};
-use domelight::render::{Background, Counts, Filter, Observer, RenderSettings, Renderer};
+use domelight::render::{Background, Counts, Filter, Observer, Passes, RenderSettings, Renderer};
 use domelight::sampling::SamplerKind;
 use domelight::scene::{self, CameraSettings, EnvironmentSettings, EnvironmentSource};
 use domelight::strategy::{Strategy, StrategyKind, StrategySpec};
@@ -62,6 +62,7 @@ pub(crate) struct Keywords<'py> {
     pub(crate) adaptive: bool,
     pub(crate) target_error: Option<f32>,
     pub(crate) tile_size: Option<usize>,
+    pub(crate) passes: &'py str,
 }
 
 /// Pixels along the edge of a tile of a strategy written in Python: large enough that calls cost little.
@@ -98,6 +99,15 @@ impl Job {
                 )));
             }
         };
+        let passes = match keywords.passes {
+            "efficient" => Passes::Efficient,
+            "doubling" => Passes::Doubling,
+            other => {
+                return Err(bad_value(format!(
+                    "passes is {other:?}; it must be 'efficient' or 'doubling'"
+                )));
+            }
+        };
         let n_threads = n_threads(threads)?;
         let choice = choose(&strategy, spp, &scene.inner.lobes)?;
         require_memory(width, height)?;
@@ -121,7 +131,7 @@ impl Job {
             n_samples: spp,
             adaptive,
             target_error,
-            passes: domelight::render::Passes::default(),
+            passes,
             seed: keywords.seed,
             filter,
             sampler,
@@ -133,6 +143,7 @@ impl Job {
             ("scene", scene.inner.name.clone()),
             ("environment", probe.clone()),
             ("samples", spp.to_string()),
+            ("passes", keywords.passes.to_owned()),
             ("sampler", keywords.sampler.to_owned()),
             ("filter", filter.name().to_owned()),
             ("seed", keywords.seed.to_string()),
@@ -407,6 +418,9 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
 ///     End each tile when the spread of its samples suggests this relMSE, such as 1e-3.
 /// tile_size : int, optional
 ///     Pixels along a tile's edge; 16 by default, 64 for functions. Only 'product' depends on it.
+/// passes : {'efficient', 'doubling'}, default 'efficient'
+///     How samples are divided: as the strategy works best, or 1, 1, 2, 4, …, as `--passes doubling` of the program.
+///     Only 'product' depends on it.
 /// progress : callable, optional
 ///     Called every hundredth of a second with the share that is done, in [0, 1].
 ///
@@ -429,8 +443,8 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
 #[pyfunction(name = "_render")]
 #[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = (640, 640), seed = 0, threads = None,
     camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,
-    tile_size = None, progress = None),
-    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, progress=None)")]
+    tile_size = None, passes = "efficient", progress = None),
+    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, passes='efficient', progress=None)")]
 pub(crate) fn render<'py>(
     py: Python<'py>,
     scene: &Bound<'py, Scene>,
@@ -447,6 +461,7 @@ pub(crate) fn render<'py>(
     adaptive: bool,
     target_error: Option<f32>,
     tile_size: Option<usize>,
+    passes: &str,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Film> {
     let strategy = strategy.unwrap_or_else(|| pyo3::types::PyString::new(py, "product").into_any());
@@ -463,6 +478,7 @@ pub(crate) fn render<'py>(
         adaptive,
         target_error,
         tile_size,
+        passes,
     };
     let job = &Job::new(py, scene.get(), env, keywords)?;
     let (cancel, done) = (&AtomicBool::new(false), &AtomicU64::new(0));

@@ -59,14 +59,21 @@ def test_threads_and_tiles_change_no_bit(sphere, env):
 
 
 @pytest.mark.parametrize("strategy", ["product:4", "environment:2", "sir"])
-def test_progressive_ends_in_the_same_bits(sphere, env, strategy):
-    settings = dict(spp=24 if strategy == "sir" else 100, size=(24, 24))
+@pytest.mark.parametrize("passes", ["doubling", "efficient"])
+def test_progressive_ends_in_the_same_bits(sphere, env, strategy, passes):
+    settings = dict(spp=24 if strategy == "sir" else 100, size=(24, 24), passes=passes)
     films = list(dl.progressive(sphere, env, strategy, **settings))
     assert films[-1] == dl.render(sphere, env, strategy, **settings)
     assert [film.complete for film in films] == [False] * (len(films) - 1) + [True]
     assert len(films) > 1
     samples = [film["samples"].mean() for film in films]
     assert samples == sorted(samples)
+
+
+def test_progressive_films_of_product_double(sphere, env):
+    films = list(dl.progressive(sphere, env, "product:4", spp=16, size=(24, 24), adaptive=False))
+    # Some pixels have a second set, which shows the variance.
+    assert [film["samples"].mean() for film in films] == pytest.approx([1, 2, 4, 8, 16], rel=0.03)
 
 
 def test_progressive_can_be_left_and_ends_once(sphere, env):

@@ -8,7 +8,7 @@ use domelight::picture::hdr;
 use domelight::rig::export::{Dome, DomePicture, Format, RigExport};
 use domelight::rig::{
     ExtractionSettings, MedianCut, Method, Region, Rig, ShadingReference, SphericalHarmonics,
-    extract, quadrature,
+    VarianceMinimization, extract, quadrature,
 };
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
@@ -24,6 +24,8 @@ const QUADRATURE: usize = 1 << 12;
 #[serde(deny_unknown_fields)]
 struct LightsState {
     method: MethodName,
+    /// Whether variance minimization gives up the rectangles of its cuts for cells that move.
+    refine: bool,
     /// None leaves what is not of compact sources on the map.
     n: Option<usize>,
     sun: bool,
@@ -68,10 +70,14 @@ struct FormatReport {
     dome: Option<String>,
 }
 
-fn method(name: &MethodName) -> Method {
+fn method(name: &MethodName, refine: bool) -> Method {
+    let all = VarianceMinimization::default();
     match name {
         MethodName::MedianCut => Method::MedianCut(MedianCut::default()),
-        MethodName::VarianceMinimization => Method::default(),
+        MethodName::VarianceMinimization if refine => Method::VarianceMinimization(all),
+        MethodName::VarianceMinimization => {
+            Method::VarianceMinimization(VarianceMinimization { lloyd_steps: 0, ..all })
+        }
     }
 }
 
@@ -92,7 +98,7 @@ impl Engine {
 
 #[wasm_bindgen]
 impl Engine {
-    /// Divides the map into lights: `{"method", "n", "sun", "lamps"}`.
+    /// Divides the map into lights: `{"method", "refine", "n", "sun", "lamps"}`.
     ///
     /// # Errors
     /// If there is no environment or no rig of it.
@@ -103,7 +109,7 @@ impl Engine {
             sun: state.sun,
             n_lamps: state.lamps,
             n_lights: state.n,
-            method: method(&state.method),
+            method: method(&state.method, state.refine),
             min_share: None,
         };
         let extraction = extract(&environment, settings).map_err(error)?;

@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use domelight::Rgb;
-use domelight::environment::Orientation;
+use domelight::environment::{LatLongGrid, Orientation};
 use domelight::environment::mapping::Mapping;
 use domelight::geometry::{Ray, RayBatch, offset_origin};
 use domelight::math::{Vec3, vec2};
@@ -69,9 +69,9 @@ impl Picked {
 /// The directions of the texels' centers of a lat-long map that stands upright in the world, with their solid angles.
 fn directions(width: usize) -> impl Iterator<Item = (Vec3, f64)> {
     let height = width / 2;
-    let edge = move |row: usize| (std::f64::consts::PI * row as f64 / height as f64).cos();
+    let grid = LatLongGrid::new(width, height);
     (0..height).flat_map(move |y| {
-        let solid_angle = (edge(y) - edge(y + 1)) * std::f64::consts::TAU / width as f64;
+        let solid_angle = grid.solid_angle(y);
         (0..width).map(move |x| {
             let uv = vec2((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
             (Mapping::LatLong.direction(uv).unwrap_or(Vec3::Y), solid_angle)

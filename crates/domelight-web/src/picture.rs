@@ -4,7 +4,8 @@ use std::io::Cursor;
 use std::str::FromStr;
 
 use domelight::picture::png::{self, Depth};
-use domelight::picture::tone::{Exposure, ToneCurve, ToneMapping};
+use domelight::picture::exposure::Exposure;
+use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::render::{Checkpoint, Layers, VarianceSums};
 use domelight::strategy::StrategySpec;
 use serde::Deserialize;

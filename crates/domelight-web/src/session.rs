@@ -69,8 +69,8 @@ struct Statistics {
     non_finite: u64,
     /// Camera samples of a pixel, in the mean over the shard.
     samples: f64,
-    /// Σ over the shard's pixels of variance / (luminance² + 0.01).
-    relative_variance: f64,
+    /// Σ over the shard's pixels of variance / (luminance² + 0.01), where it was asked for.
+    relative_variance: Option<f64>,
     pixels: usize,
     complete: bool,
 }
@@ -189,42 +189,45 @@ impl Engine {
             for window in renderer.changed_since(before) {
                 let Window { x, y, width, height } = window;
                 windows.extend([x, y, width, height].map(|n| n as u32));
-                let layers = renderer.film_of(window).layers();
-                let colors = layers.color.pixels.iter().zip(&layers.alpha);
+                let (color, alpha) = renderer.film_of(window).picture();
+                let colors = color.pixels.iter().zip(&alpha);
                 pixels.extend(colors.flat_map(|(c, &alpha)| [c.r, c.g, c.b, alpha]));
             }
             Update { windows, pixels, complete, progress: renderer.progress() }
         }))
     }
 
-    /// What was done so far, as JSON.
+    /// What was done so far, as JSON; with the variance, which takes a while of a large picture.
     ///
     /// # Errors
     /// If nothing was started.
-    pub fn statistics(&self) -> Result<String, JsError> {
+    pub fn statistics(&self, with_variance: bool) -> Result<String, JsError> {
         let session = self.session.as_ref().ok_or_else(nothing_started)?;
         Ok(session.with(|_, renderer| {
-            let rendering = renderer.rendering();
-            let layers = &rendering.layers;
-            let counts = rendering.counts;
+            let counts = renderer.counts();
             let in_tiles: usize = renderer.tiles().map(|t| renderer.tiling().tile(t).area()).sum();
-            let relative = |(variance, color): (&domelight::Rgb, &domelight::Rgb)| {
-                let luminance = f64::from(color.luminance());
-                f64::from(variance.luminance()) / (luminance * luminance + 0.01)
-            };
-            let sum = layers.variance.pixels.iter().zip(&layers.color.pixels).map(relative).sum();
             to_json(&Statistics {
                 camera_rays: counts.camera_rays,
                 shadow_rays: counts.shadow_rays,
                 shading_points: counts.shading_points,
                 non_finite: counts.non_finite,
                 samples: counts.camera_rays as f64 / in_tiles.max(1) as f64,
-                relative_variance: sum,
+                relative_variance: with_variance.then(|| relative_variance(renderer)),
                 pixels: in_tiles,
-                complete: rendering.complete,
+                complete: renderer.is_complete(),
             })
         }))
     }
+}
+
+/// Σ over the pixels of variance / (luminance² + 0.01).
+fn relative_variance(renderer: &Renderer<'_>) -> f64 {
+    let layers = renderer.rendering().layers;
+    let relative = |(variance, color): (&domelight::Rgb, &domelight::Rgb)| {
+        let luminance = f64::from(color.luminance());
+        f64::from(variance.luminance()) / (luminance * luminance + 0.01)
+    };
+    layers.variance.pixels.iter().zip(&layers.color.pixels).map(relative).sum()
 }
 
 /// There is nothing to go on with.

@@ -26,4 +26,5 @@ pub use crate::{
 };
 
 #[cfg(feature = "io")]
-pub use crate::picture::tone::{Exposure, ToneCurve, ToneMapping};
+pub use crate::picture::exposure::Exposure;
+pub use crate::picture::tone::{ToneCurve, ToneMapping};

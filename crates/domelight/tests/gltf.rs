@@ -215,7 +215,7 @@ const VERTEX_COLOR: Rgb = Rgb::new(1.0, 0.5, 0.25);
 fn assert_alike(point: &ShadingPoint, expected: &Bsdf) {
     assert_eq!(point.bsdf.lobes().count(), expected.lobes().count());
     for (x, y) in [(0.0, 0.0), (-0.5, 0.3), (0.2, -0.7), (0.6, 0.1), (-0.8, -0.1)] {
-        let wi = vec3(x, y, (1.0 - x * x - y * y as f32).sqrt());
+        let wi = vec3(x, y, f32::sqrt(1.0 - x * x - y * y));
         let (value, expected) = (point.bsdf.eval(point.wo, wi), expected.eval(point.wo, wi));
         let difference = (value - expected).map(f32::abs).max_component();
         assert!(difference < 1e-3 * expected.max_component(), "{wi}: {value:?} {expected:?}");

@@ -1,6 +1,8 @@
 //! Mappings between pictures and directions: inverses, Jacobians, conversion.
 
-use domelight::environment::mapping::{EnvmapKind, Mapping, from_lat_long, to_lat_long};
+use domelight::environment::mapping::{
+    CubeLayout, EnvmapKind, Mapping, from_lat_long, to_lat_long,
+};
 use domelight::math::{PI, Vec3, vec2, vec3};
 use domelight::{Rgb, RgbImage};
 use testkit::Chi2;
@@ -111,11 +113,11 @@ fn conventions() {
     is(at(Mapping::MirrorBall, 0.5 + 0.5 * 0.5f32.sqrt(), 0.5), Vec3::NEG_X);
     is(at(Mapping::MirrorBall, 0.5, 0.5 - 0.5 * 0.5f32.sqrt()), Vec3::Y);
     // HDRShop's vertical cross.
-    is(at(Mapping::CubeCrossVertical, 0.5, 0.125), Vec3::Y);
-    is(at(Mapping::CubeCrossVertical, 0.5, 0.375), Vec3::NEG_Z);
-    is(at(Mapping::CubeCrossVertical, 5.0 / 6.0, 0.375), Vec3::X);
-    is(at(Mapping::CubeCrossVertical, 0.5, 0.875), Vec3::Z);
-    is(at(Mapping::CubeCrossHorizontal, 0.875, 0.5), Vec3::Z);
+    is(at(Mapping::Cube(CubeLayout::CrossVertical), 0.5, 0.125), Vec3::Y);
+    is(at(Mapping::Cube(CubeLayout::CrossVertical), 0.5, 0.375), Vec3::NEG_Z);
+    is(at(Mapping::Cube(CubeLayout::CrossVertical), 5.0 / 6.0, 0.375), Vec3::X);
+    is(at(Mapping::Cube(CubeLayout::CrossVertical), 0.5, 0.875), Vec3::Z);
+    is(at(Mapping::Cube(CubeLayout::CrossHorizontal), 0.875, 0.5), Vec3::Z);
     // pbrt: the axis in the middle, the opposite one in the corners.
     is(at(Mapping::Octahedral, 0.5, 0.5), Vec3::Y);
     is(at(Mapping::Octahedral, 0.0, 1.0), Vec3::NEG_Y);
@@ -140,13 +142,15 @@ fn cube_strips_are_openexr_cube_maps() {
             let t = if c / 2 == 0 { e } else { 1.0 - e };
             let expected = corner(label).normalize();
             let strip = (f as f32 + t) / 6.0;
-            let vertical = Mapping::CubeStripVertical.direction(vec2(s, strip)).unwrap();
+            let vertical =
+                Mapping::Cube(CubeLayout::StripVertical).direction(vec2(s, strip)).unwrap();
             assert!(
                 (vertical - expected).length() < 1e-3,
                 "face {f} corner {c}: {vertical} {expected}"
             );
             let strip = (f as f32 + s) / 6.0;
-            let horizontal = Mapping::CubeStripHorizontal.direction(vec2(strip, t)).unwrap();
+            let horizontal =
+                Mapping::Cube(CubeLayout::StripHorizontal).direction(vec2(strip, t)).unwrap();
             assert!((horizontal - expected).length() < 1e-3);
         }
     }
@@ -155,7 +159,9 @@ fn cube_strips_are_openexr_cube_maps() {
 /// Neighboring texels of a cross that share an edge look in neighboring directions.
 #[test]
 fn crosses_have_no_seams_inside() {
-    for mapping in [Mapping::CubeCrossHorizontal, Mapping::CubeCrossVertical] {
+    for mapping in
+        [Mapping::Cube(CubeLayout::CrossHorizontal), Mapping::Cube(CubeLayout::CrossVertical)]
+    {
         let n = 240;
         let at =
             |x: usize, y: usize| mapping.direction(vec2(x as f32 + 0.5, y as f32 + 0.5) / n as f32);
@@ -176,12 +182,12 @@ fn mappings_are_guessed_from_shape_and_attribute() {
         ((1000, 499), None, Mapping::LatLong),
         ((1, 1), None, Mapping::LatLong),
         ((480, 480), None, Mapping::Angular),
-        ((400, 300), None, Mapping::CubeCrossHorizontal),
-        ((300, 400), None, Mapping::CubeCrossVertical),
-        ((600, 100), None, Mapping::CubeStripHorizontal),
-        ((100, 600), None, Mapping::CubeStripVertical),
-        ((100, 600), Some(EnvmapKind::Cube), Mapping::CubeStripVertical),
-        ((400, 300), Some(EnvmapKind::Cube), Mapping::CubeCrossHorizontal),
+        ((400, 300), None, Mapping::Cube(CubeLayout::CrossHorizontal)),
+        ((300, 400), None, Mapping::Cube(CubeLayout::CrossVertical)),
+        ((600, 100), None, Mapping::Cube(CubeLayout::StripHorizontal)),
+        ((100, 600), None, Mapping::Cube(CubeLayout::StripVertical)),
+        ((100, 600), Some(EnvmapKind::Cube), Mapping::Cube(CubeLayout::StripVertical)),
+        ((400, 300), Some(EnvmapKind::Cube), Mapping::Cube(CubeLayout::CrossHorizontal)),
         ((1024, 512), Some(EnvmapKind::LatLong), Mapping::LatLongExr),
     ];
     for ((width, height), envmap, expected) in guesses {
@@ -189,7 +195,7 @@ fn mappings_are_guessed_from_shape_and_attribute() {
     }
     assert!(Mapping::Angular.check_shape(10, 11).is_err());
     assert_eq!(
-        Mapping::CubeStripVertical.check_shape(7, 41).unwrap_err().to_string(),
+        Mapping::Cube(CubeLayout::StripVertical).check_shape(7, 41).unwrap_err().to_string(),
         "strip-vertical maps have width : height = 1:6, this picture is 7x41"
     );
     for mapping in Mapping::ALL {

@@ -2,7 +2,7 @@
 #![cfg(feature = "io")]
 
 use domelight::environment::io::{ProbeError, ProbeOptions, SanitizeReport, load_probe, sanitize};
-use domelight::environment::mapping::{EnvmapKind, Mapping};
+use domelight::environment::mapping::{CubeLayout, EnvmapKind, Mapping};
 use domelight::picture::exr::{ExrLayers, text_attributes};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::picture::{
@@ -235,7 +235,7 @@ fn png_round_trip_with_straight_alpha() {
         }
     }
     let mut opaque = Vec::new();
-    let tone = ToneMapping { exposure: 1.0, curve: ToneCurve::Srgb };
+    let tone = ToneMapping { exposure: 1.0, curve: ToneCurve::Standard };
     png::encode(
         &RgbImage::filled(2, 1, Rgb::splat(0.5)),
         None,
@@ -691,7 +691,10 @@ fn probes_of_any_shape_load() {
     }
     let cross = saved(&folder, "cross", &smooth(48, 64));
     let probe = load_probe(&cross, &ProbeOptions::default()).unwrap();
-    assert_eq!((probe.mapping, probe.file_size), (Mapping::CubeCrossVertical, (48, 64)));
+    assert_eq!(
+        (probe.mapping, probe.file_size),
+        (Mapping::Cube(CubeLayout::CrossVertical), (48, 64))
+    );
     assert_eq!((probe.image.width, probe.image.height), (52, 26));
     let ball = ProbeOptions { mapping: Some(Mapping::MirrorBall), ..Default::default() };
     assert_eq!(

@@ -5,8 +5,10 @@ use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::environment::{CompensatedTable, Environment, Orientation};
 use domelight::geometry::Mesh;
 use domelight::math::{Mat4, Vec3, vec3};
+use domelight::picture::exposure::Exposure;
 use domelight::render::{
-    Background, Filter, Layers, Observer, Passes, RenderSettings, Renderer, Rendering, render,
+    Background, Filter, Layers, Observer, Passes, RenderSettings, Renderer, Rendering,
+    automatic_exposure, render,
 };
 use domelight::rig::{VarianceMinimization, variance_minimization};
 use domelight::sampling::{Heuristic, Pcg32, SamplerKind};
@@ -501,4 +503,28 @@ fn an_empty_scene_and_a_black_probe_render() {
         let picture = draw(&scene, &environment, &product, &settings);
         assert!(picture.layers.color.pixels.iter().all(|p| p.is_black()));
     }
+}
+
+/// The exposure is that of the finished picture, whatever is left to the render: samples, seed, background, size.
+#[test]
+fn the_automatic_exposure_is_known_before_the_picture() {
+    let (scene, environment) = (scene("ggx:0.3"), environment());
+    let settings = RenderSettings { width: 150, height: 100, n_samples: 8, ..Default::default() };
+    let exposure = automatic_exposure(&scene, &camera(&settings), &environment, &settings);
+    let others = [
+        RenderSettings { seed: 5, n_samples: 1, ..settings },
+        RenderSettings { background: Background::Hidden, tile_size: 7, ..settings },
+        RenderSettings { width: 300, height: 200, ..settings },
+    ];
+    for other in others {
+        let of_other = automatic_exposure(&scene, &camera(&other), &environment, &other);
+        assert_eq!(of_other, exposure, "{other:?}");
+    }
+    let settings = RenderSettings { n_samples: 64, ..settings };
+    let camera = camera(&settings);
+    let Rendering { layers, .. } =
+        render(&scene, &camera, &environment, &mis(&environment), &settings, &());
+    let coverage: Vec<f32> = layers.n_hits.iter().map(|&n| n as f32).collect();
+    let of_picture = Exposure::Auto.stops(&layers.color, Some(&coverage));
+    assert!((of_picture - exposure).abs() < 0.1, "{of_picture} {exposure}");
 }

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::finite;
 use super::sampling::PixelArguments;
 use super::scene::SceneArguments;
+use domelight::picture::exposure::Exposure;
 use domelight_lab::NamedStrategy;
 use domelight_lab::compare::Budget;
 
@@ -88,8 +88,9 @@ pub(crate) struct CompareArguments {
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true,
           default_missing_value = "-", help_heading = "Output")]
     pub(crate) json: Option<PathBuf>,
-    /// Exposure in stops at which the page opens and ꟻLIP sees the pictures
-    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite,
+    /// Exposure at which the page opens and ꟻLIP sees the pictures, in stops, or auto: the median of what the
+    /// scene covers becomes middle gray
+    #[arg(long, value_name = "EV|auto", default_value_t = Exposure::Auto,
           allow_negative_numbers = true, help_heading = "Output")]
-    pub(crate) exposure: f32,
+    pub(crate) exposure: Exposure,
 }

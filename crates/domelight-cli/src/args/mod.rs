@@ -13,9 +13,10 @@ pub(crate) mod scene;
 
 use crate::memory::MaxMemory;
 use crate::output::PicturePath;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use domelight::environment::mapping::Mapping;
+use domelight::picture::exposure::Exposure;
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -97,6 +98,9 @@ pub(crate) enum Command {
     /// Measure, look at and convert a light probe.
     #[command(after_help = PROBE_EXAMPLES)]
     Probe(ProbeArguments),
+    /// Develop a picture again, with another exposure or tone curve, without rendering it.
+    #[command(after_help = TONE_EXAMPLES)]
+    Tone(ToneArguments),
     /// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
     #[command(after_help = figures::EXAMPLES)]
     Figures(Box<figures::FiguresArguments>),
@@ -150,6 +154,13 @@ Examples:
   domelight diff render.exr reference.exr
   domelight diff render.exr reference.exr --covered --json
   domelight diff render.exr reference.exr -o error.png --metric flip";
+
+const TONE_EXAMPLES: &str = "\
+Examples:
+  domelight tone render.exr -o brighter.png --exposure 1.5
+  domelight tone render.exr -o comparable.png --exposure 0 --tone standard
+  domelight tone render.exr --layer unoccluded -o unoccluded.png --bits 16
+  domelight render -o - | domelight tone - -o - > picture.png";
 
 const MERGE_EXAMPLES: &str = "\
 Examples:
@@ -269,21 +280,79 @@ pub(crate) struct ProbeArguments {
     pub(crate) tone: Tone,
 }
 
+/// Develop a picture again.
+#[derive(Args, Debug)]
+pub(crate) struct ToneArguments {
+    /// The picture (.exr, .hdr, .pfm, .png; - reads standard input)
+    #[arg(value_name = "IN")]
+    pub(crate) picture: PathBuf,
+    /// Where to (.png; - writes PNG to standard output)
+    #[arg(short, long, value_name = "OUT.png")]
+    pub(crate) output: PicturePath,
+    /// The OpenEXR layer, such as unoccluded or albedo
+    #[arg(long, value_name = "NAME")]
+    pub(crate) layer: Option<String>,
+    /// Denoise the picture by Open Image Denoise, if its library is installed or $OIDN_LIBRARY names it; with the layers
+    /// albedo and normal of the file, if it has them
+    #[arg(long)]
+    pub(crate) denoise: bool,
+    /// Bits of each channel
+    #[arg(long, value_enum, default_value_t = Bits::Eight)]
+    pub(crate) bits: Bits,
+    /// Print what was done as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// How the picture is shown.
+    #[command(flatten)]
+    pub(crate) tone: Tone,
+}
+
+/// Bits of a channel of a PNG file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Bits {
+    /// 8
+    #[value(name = "8")]
+    Eight,
+    /// 16
+    #[value(name = "16")]
+    Sixteen,
+}
+
 /// Exposure and tone curve of what is looked at.
 #[derive(Args, Debug)]
 pub(crate) struct Tone {
-    /// Exposure in stops, for what is looked at.
-    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
-    exposure: f32,
-    /// Tone curve, for what is looked at [default: of pictures agx, of a probe's preview aces, of
-    /// differences srgb, which cuts off at 1].
+    /// Exposure of what is looked at, in stops, or auto: the median of what the picture covers becomes middle gray
+    /// [default: auto; of differences 0]
+    #[arg(long, value_name = "EV|auto", allow_negative_numbers = true)]
+    exposure: Option<Exposure>,
+    /// Tone curve of what is looked at; agx is that of Blender, standard cuts off at 1 [default: agx; of differences
+    /// standard]
     #[arg(long, value_name = "CURVE", value_parser = tone_curve())]
     tone: Option<ToneCurve>,
 }
 
 impl Tone {
-    pub(crate) fn mapping(&self, default: ToneCurve) -> ToneMapping {
-        ToneMapping { exposure: self.exposure, curve: self.tone.unwrap_or(default) }
+    /// Of pictures to look at; `automatic` is the exposure where none was given.
+    pub(crate) fn of_picture(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
+        let exposure = match self.exposure.unwrap_or(Exposure::Auto) {
+            Exposure::Auto => automatic(),
+            Exposure::Stops(stops) => stops,
+        };
+        ToneMapping { exposure, curve: self.tone.unwrap_or(ToneCurve::Agx) }
+    }
+
+    /// Of pictures that are measured or used again: as they are, unless something else was asked for.
+    pub(crate) fn of_measurement(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
+        let exposure = match self.exposure.unwrap_or(Exposure::Stops(0.0)) {
+            Exposure::Auto => automatic(),
+            Exposure::Stops(stops) => stops,
+        };
+        ToneMapping { exposure, curve: self.tone.unwrap_or(ToneCurve::Standard) }
+    }
+
+    /// Whether pictures to look at are exposed automatically.
+    pub(crate) fn is_automatic(&self) -> bool {
+        matches!(self.exposure, None | Some(Exposure::Auto))
     }
 }
 
@@ -292,11 +361,14 @@ fn mapping() -> impl TypedValueParser<Value = Mapping> {
 }
 
 fn tone_curve() -> impl TypedValueParser<Value = ToneCurve> {
-    one_of(ToneCurve::ALL.map(ToneCurve::name))
+    let value = |curve: ToneCurve| PossibleValue::new(curve.name()).aliases(curve.alias());
+    one_of(ToneCurve::ALL.map(value))
 }
 
 /// Reads one of the `names`, which help and errors list.
-fn one_of<T>(names: impl IntoIterator<Item = &'static str>) -> impl TypedValueParser<Value = T>
+fn one_of<T>(
+    names: impl IntoIterator<Item: Into<PossibleValue>>,
+) -> impl TypedValueParser<Value = T>
 where
     T: FromStr<Err: std::error::Error + Send + Sync> + Clone + Send + Sync + 'static,
 {

@@ -51,6 +51,10 @@ pub(crate) struct OutputArguments {
     /// How PNG output is shown.
     #[command(flatten)]
     pub(crate) tone: Tone,
+    /// Denoise PNG, HDR and PFM output by Open Image Denoise, if its library is installed or $OIDN_LIBRARY names it;
+    /// OpenEXR keeps all layers as they were rendered, and gets one more, denoised
+    #[arg(long, conflicts_with_all = ["shard", "tiles"])]
+    pub(crate) denoise: bool,
     /// Print settings, times and counts as JSON on standard output
     #[arg(long)]
     pub(crate) json: bool,

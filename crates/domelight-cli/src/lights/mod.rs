@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result};
 use domelight::RgbImage;
 use domelight::environment::mapping::{Mapping, from_lat_long};
 use domelight::environment::{Environment, Orientation};
-use domelight::picture::tone::ToneCurve;
+use domelight::picture::exposure::Exposure;
 use domelight::rig::export::{Dome, DomePicture, Format, RigExport};
 use domelight::rig::{
     Extraction, ExtractionSettings, ShadingError, ShadingReference, SphericalHarmonics, extract,
@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
         files::write(output.path, |out| out.write_all(&bytes))?;
     }
     if let Some(path) = &arguments.preview {
-        let tone = arguments.tone.mapping(ToneCurve::Aces);
+        let tone = arguments.tone.of_picture(|| Exposure::Auto.stops(environment.map(), None));
         let preview = Preview { environment: &environment, found: &found, probe: &probe, tone };
         let bytes = preview.png()?;
         files::write(&path.0, |out| out.write_all(&bytes))?;
@@ -226,7 +226,7 @@ impl LightsArguments {
         map: &RgbImage,
         outputs: &[Output],
     ) -> Result<Vec<Option<PicturePath>>> {
-        let tone = self.tone.mapping(ToneCurve::Srgb);
+        let tone = self.tone.of_measurement(|| Exposure::Auto.stops(map, None));
         path.write(map, tone, PictureFormat::Exr, None)?;
         let mut pictures = Vec::new();
         for output in outputs {

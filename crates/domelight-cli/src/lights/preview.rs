@@ -169,7 +169,7 @@ impl Preview<'_> {
         let rig = sphere(self.environment, &lights);
         let brightest = probe.pixels.iter().map(|p| p.max_component()).fold(0.0, f32::max);
         let exposed = |image: &RgbImage, scale: f32| {
-            let curve = ToneMapping { exposure: 0.0, curve: ToneCurve::Srgb };
+            let curve = ToneMapping { exposure: 0.0, curve: ToneCurve::Standard };
             let show = |p: &Rgb| curve.apply(*p * (scale / brightest.max(f32::MIN_POSITIVE)));
             RgbImage { pixels: image.pixels.iter().map(show).collect(), ..*image }
         };

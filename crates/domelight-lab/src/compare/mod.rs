@@ -9,10 +9,11 @@ mod strategy_run;
 
 use domelight::RgbImage;
 use domelight::picture::compare::relative_error_map;
+use domelight::picture::exposure::Exposure;
 use domelight::picture::flip::{PIXELS_PER_DEGREE, ldr_flip};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::quote::{Code, Html};
-use domelight::render::RenderSettings;
+use domelight::render::{RenderSettings, automatic_exposure};
 use domelight::strategy::{PreparedStrategy, Strategy, StrategyKind, StrategySpec};
 
 pub use budget::{BadBudget, Budget};
@@ -42,8 +43,8 @@ pub struct ComparisonSettings {
     pub budget: Budget,
     /// Pictures of each strategy, from the seed of `render` on.
     pub n_seeds: u32,
-    /// At which ꟻLIP sees the pictures, and the page opens \[stops\].
-    pub exposure: f32,
+    /// At which ꟻLIP sees the pictures, and the page opens; automatic is [`automatic_exposure`].
+    pub exposure: Exposure,
     /// Camera samples of each pixel of a rendered reference.
     pub reference_spp: u32,
     /// What makes the report again; for people.
@@ -56,7 +57,7 @@ impl Default for ComparisonSettings {
             render: RenderSettings::default(),
             budget: Budget::Rays(32.0),
             n_seeds: 4,
-            exposure: 0.0,
+            exposure: Exposure::Auto,
             reference_spp: 64,
             command: String::new(),
         }
@@ -166,10 +167,11 @@ impl<'a> Comparison<'a> {
     /// # Errors
     /// If a strategy does not suit the environment, the sizes differ, or the host ended the work.
     pub fn run(&self, reference: &Reference, host: &dyn Host) -> Result<ComparisonResult, Error> {
+        let exposure = self.exposure();
         let mut strategies = Vec::new();
         let mut pictures = Vec::new();
         for competitor in &self.strategies {
-            let measured = self.measure(competitor, reference, host);
+            let measured = self.measure(competitor, reference, exposure, host);
             let (report, picture) = measured.at(format_args!("strategy {}", competitor.name()))?;
             strategies.push(report);
             pictures.push(picture);
@@ -187,7 +189,7 @@ impl<'a> Comparison<'a> {
             seed: settings.seed,
             seeds: self.settings.n_seeds,
             threads: rayon::current_num_threads(),
-            exposure: self.settings.exposure,
+            exposure,
             reference: reference.report.clone(),
             strategies,
         };
@@ -199,6 +201,7 @@ impl<'a> Comparison<'a> {
         &self,
         competitor: &Competitor,
         reference: &Reference,
+        exposure: f32,
         host: &dyn Host,
     ) -> Result<(StrategyReport, Option<Picture>), Error> {
         let View { scene, camera, environment, .. } = self.view;
@@ -243,30 +246,41 @@ impl<'a> Comparison<'a> {
             SampleCount::Samples(n) => {
                 spec.map_or(Ok(()), |spec| refuse_repeating_points(spec, n))?;
                 let measured = run.measure(n)?;
-                let picture = self.picture(&measured, &reference.picture.image)?;
+                let picture = picture(&measured, &reference.picture.image, exposure)?;
                 report.result = ResultReport::new(&measured, &picture.flip);
                 Ok((report, Some(picture)))
             }
         }
     }
 
-    fn picture(
-        &self,
-        measured: &StrategyMeasurement,
-        reference: &RgbImage,
-    ) -> Result<Picture, Error> {
-        let tone = ToneMapping { exposure: self.settings.exposure, curve: ToneCurve::Srgb };
-        let shown = |image: &RgbImage| {
-            let pixels = image.pixels.iter().map(|&p| tone.apply(p)).collect();
-            RgbImage { pixels, ..*image }
-        };
-        let image = measured.image.clone();
-        Ok(Picture {
-            relative_error: relative_error_map(&image, reference)?,
-            flip: ldr_flip(&shown(reference), &shown(&image), PIXELS_PER_DEGREE)?,
-            image,
-        })
+    /// The same for all pictures \[stops\].
+    fn exposure(&self) -> f32 {
+        match self.settings.exposure {
+            Exposure::Stops(stops) => stops,
+            Exposure::Auto => {
+                let View { scene, camera, environment, .. } = self.view;
+                automatic_exposure(scene, camera, environment, &self.settings.render)
+            }
+        }
     }
+}
+
+fn picture(
+    measured: &StrategyMeasurement,
+    reference: &RgbImage,
+    exposure: f32,
+) -> Result<Picture, Error> {
+    let tone = ToneMapping { exposure, curve: ToneCurve::Standard };
+    let shown = |image: &RgbImage| {
+        let pixels = image.pixels.iter().map(|&p| tone.apply(p)).collect();
+        RgbImage { pixels, ..*image }
+    };
+    let image = measured.image.clone();
+    Ok(Picture {
+        relative_error: relative_error_map(&image, reference)?,
+        flip: ldr_flip(&shown(reference), &shown(&image), PIXELS_PER_DEGREE)?,
+        image,
+    })
 }
 
 impl ResultReport {

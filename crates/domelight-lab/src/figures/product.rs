@@ -150,7 +150,7 @@ impl SphereView<'_> {
         let top = peak(&values);
         let color = |p: &Rgb| ColorScale::Magma.color((p.g / top).max(0.0).powf(0.4));
         let shown = RgbImage::new(self.n, self.n, values.pixels.iter().map(color).collect());
-        png_bytes(&shown, ToneMapping { exposure: 0.0, curve: ToneCurve::Srgb })
+        png_bytes(&shown, ToneMapping { exposure: 0.0, curve: ToneCurve::Standard })
     }
 
     /// The mapping knows the map's own frame: the map tells where that is in the world.

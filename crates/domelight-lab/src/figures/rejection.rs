@@ -131,7 +131,7 @@ fn points(figure_scene: &FigureScene) -> Vec<Option<ShadingPoint>> {
 }
 
 /// Colors are already what is to be seen.
-const AS_IT_IS: ToneMapping = ToneMapping { exposure: 0.0, curve: ToneCurve::Srgb };
+const AS_IT_IS: ToneMapping = ToneMapping { exposure: 0.0, curve: ToneCurve::Standard };
 
 fn map(
     points: &[Option<ShadingPoint>],

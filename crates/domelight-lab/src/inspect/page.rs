@@ -292,7 +292,7 @@ fn tone_mapped(n: usize, radiance: &[Rgb]) -> Result<Vec<u8>, Error> {
 
 /// Colors as they are.
 fn plain(n: usize, colors: &[Rgb]) -> Result<Vec<u8>, Error> {
-    disk_png(n, colors, &ToneMapping { exposure: 0.0, curve: ToneCurve::Srgb })
+    disk_png(n, colors, &ToneMapping { exposure: 0.0, curve: ToneCurve::Standard })
 }
 
 /// A square picture of which the disk is shown.
@@ -309,7 +309,7 @@ fn disk_png(n: usize, colors: &[Rgb], tone: &ToneMapping) -> Result<Vec<u8>, Err
 }
 
 fn encode(width: usize, height: usize, colors: &[Rgb]) -> Result<Vec<u8>, Error> {
-    let tone = ToneMapping { exposure: 0.0, curve: ToneCurve::Srgb };
+    let tone = ToneMapping { exposure: 0.0, curve: ToneCurve::Standard };
     let image = RgbImage::new(width, height, colors.to_vec());
     let mut bytes = Vec::new();
     png::encode(&image, None, &tone, Depth::Eight, &mut bytes)?;

@@ -60,6 +60,9 @@ class Environment:
         scale: float = 1.0,
         up: str = "y",
     ) -> Environment: ...
+    @classmethod
+    def from_mitsuba(cls, source: Any) -> Environment: ...
+    def to_mitsuba(self) -> dict[str, Any]: ...
     @property
     def map(self) -> _Floats: ...
     @property
@@ -293,6 +296,7 @@ def _render(
     adaptive: bool = True,
     target_error: float | None = None,
     tile_size: int | None = None,
+    passes: str = "efficient",
     progress: Callable[[float], object] | None = None,
 ) -> Film: ...
 def progressive(
@@ -311,6 +315,7 @@ def progressive(
     adaptive: bool = True,
     target_error: float | None = None,
     tile_size: int | None = None,
+    passes: str = "doubling",
 ) -> Progressive: ...
 def compare(
     scene: Scene,

@@ -28,6 +28,7 @@ def render(
     adaptive: bool = True,
     target_error: float | None = None,
     tile_size: int | None = None,
+    passes: str = "efficient",
     progress: bool | Callable[[float], object] = False,
 ) -> Film:
     report: Callable[[float], object] | None
@@ -53,6 +54,7 @@ def render(
             adaptive=adaptive,
             target_error=target_error,
             tile_size=tile_size,
+            passes=passes,
             progress=report,
         )
     finally:

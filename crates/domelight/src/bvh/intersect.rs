@@ -16,7 +16,8 @@
 //! product p/d, since |p| ≤ |o| + m. Of the latter o ± margin, its product with 1/d, and p/d again need one each.
 //! So it does not matter how often p/d − o/d is rounded: which boxes are entered may differ, hits do not. Instruction
 //! sets that fuse do so ([`SimdF32x8::mul_sub`]), the others do not; the tests compare all of them with a loop over all
-//! triangles. The product must not overflow, though, where the difference would not.
+//! triangles. The product must not overflow, though, where the difference would not, nor underflow: rays of which that
+//! cannot be said (`is_moderate`) have it exact.
 
 use super::prepare::PreparedRays;
 use super::{Block, Lanes, Node, WIDTH};
@@ -54,16 +55,17 @@ impl<S: Simd> Slabs<S> {
     ) -> [S::F32x8; 2] {
         let one = |numbers: &[[f32; N]; 3], k: usize| simd.splat(numbers[k][i]);
         let [near, far] = [&rays.near_origins, &rays.far_origins];
-        let x = one(&rays.inverse_directions, 0);
-        let y = one(&rays.inverse_directions, 1);
-        let z = one(&rays.inverse_directions, 2);
-        let enter_x = self.near[0].mul_sub(x, one(near, 0));
-        let enter_y = self.near[1].mul_sub(y, one(near, 1));
-        let enter_z = self.near[2].mul_sub(z, one(near, 2));
-        let leave_x = self.far[0].mul_sub(x, one(far, 0));
-        let leave_y = self.far[1].mul_sub(y, one(far, 1));
-        let leave_z = self.far[2].mul_sub(z, one(far, 2));
-        [enter_x.max(enter_y).max(enter_z.max(simd.splat(0.0))), leave_x.min(leave_y).min(leave_z)]
+        let inverse = &rays.inverse_directions;
+        let inverse = [one(inverse, 0), one(inverse, 1), one(inverse, 2)];
+        let near = [one(near, 0), one(near, 1), one(near, 2)];
+        let far = [one(far, 0), one(far, 1), one(far, 2)];
+        let [enter, leave] = if S::F32x8::FUSES || !rays.is_moderate {
+            [distances_fused(self.near, inverse, near), distances_fused(self.far, inverse, far)]
+        } else {
+            [distances(self.near, inverse, near), distances(self.far, inverse, far)]
+        };
+        let zero = simd.splat(0.0);
+        [enter[0].max(enter[1]).max(enter[2].max(zero)), leave[0].min(leave[1]).min(leave[2])]
     }
 
     /// Which boxes ray `i` crosses within [0, `limit`], and the distances where it enters them.
@@ -78,6 +80,20 @@ impl<S: Simd> Slabs<S> {
         let [enter, leave] = self.cross(simd, rays, i);
         (enter.le(leave.min(simd.splat(limit))), enter)
     }
+}
+
+/// Where a ray meets planes, an axis each.
+#[inline(always)]
+fn distances<F: SimdF32x8>(planes: [F; 3], inverse: [F; 3], origin: [F; 3]) -> [F; 3] {
+    let ([px, py, pz], [x, y, z], [ox, oy, oz]) = (planes, inverse, origin);
+    [px * x - ox, py * y - oy, pz * z - oz]
+}
+
+/// The same of exact products.
+#[inline(always)]
+fn distances_fused<F: SimdF32x8>(planes: [F; 3], inverse: [F; 3], origin: [F; 3]) -> [F; 3] {
+    let ([px, py, pz], [x, y, z], [ox, oy, oz]) = (planes, inverse, origin);
+    [px.mul_sub(x, ox), py.mul_sub(y, oy), pz.mul_sub(z, oz)]
 }
 
 /// The planes of an axis, the near one first; the lowest bit says whether that is the upper.

@@ -9,6 +9,8 @@ use crate::simd::{LaneMask, Simd, SimdF32x8, SimdFloat};
 pub(super) struct PreparedRays<const N: usize> {
     /// One bit an axis: set where the rays enter through the upper plane.
     pub(super) octant: u32,
+    /// Products of planes and inverse directions neither overflow nor lose digits to underflow.
+    pub(super) is_moderate: bool,
     /// By axis; origins and directions are given, the rest is computed from them.
     origins: [[f32; N]; 3],
     directions: [[f32; N]; 3],
@@ -37,6 +39,7 @@ pub(super) fn octant(direction: Vec3) -> u32 {
 impl<const N: usize> PreparedRays<N> {
     pub(super) const EMPTY: Self = Self {
         octant: 0,
+        is_moderate: false,
         origins: [[0.0; N]; 3],
         directions: [[0.0; N]; 3],
         near_origins: [[0.0; N]; 3],
@@ -66,21 +69,28 @@ impl<const N: usize> PreparedRays<N> {
         scene: &Aabb,
     ) -> u64 {
         self.octant = octant;
-        let mut valid = 0;
+        let (mut valid, mut moderate) = (0, 0);
         for first in (0..count).step_by(WIDTH) {
-            valid |= u64::from(self.prepare_eight(simd, first, scene)) << first;
+            let [is_finite, is_moderate] = self.prepare_eight(simd, first, scene);
+            valid |= u64::from(is_finite) << first;
+            moderate |= u64::from(is_moderate) << first;
         }
-        valid & u64::MAX.checked_shr(u64::BITS - count as u32).unwrap_or(0)
+        valid &= u64::MAX.checked_shr(u64::BITS - count as u32).unwrap_or(0);
+        self.is_moderate = valid & !moderate == 0;
+        valid
     }
 
+    /// Which of eight rays are finite, and which are moderate, as bits.
     #[inline(always)]
-    fn prepare_eight<S: Simd>(&mut self, simd: S, first: usize, scene: &Aabb) -> u32 {
+    fn prepare_eight<S: Simd>(&mut self, simd: S, first: usize, scene: &Aabb) -> [u32; 2] {
         const INFLATION: f32 = 1.0 / (1 << 20) as f32;
         // The rounding of origin ± inflation, of its product with the inverse direction and of the plane's, and room to
         // spare.
         const ORIGIN_ROUNDING: f32 = 1.0 / (1 << 22) as f32;
         // A component so small moves the ray by less than the inflation while it crosses the scene.
         const NEGLIGIBLE: f32 = 1.0 / (1 << 24) as f32;
+        // A margin so large hides what a product loses to underflow, 2⁻¹⁵⁰ at the most.
+        const LEAST_MARGIN: f32 = 1.0 / (1_u128 << 100) as f32;
 
         let sign = |axis: usize| if self.octant >> axis & 1 == 0 { 1.0 } else { -1.0 };
         let signs = [simd.splat(sign(0)), simd.splat(sign(1)), simd.splat(sign(2))];
@@ -101,6 +111,7 @@ impl<const N: usize> PreparedRays<N> {
 
         let mut inverse = [simd.splat(1.0); 3];
         let mut is_finite = simd.splat(0.0).eq(simd.splat(0.0));
+        let mut is_moderate = is_finite;
         for k in 0..3 {
             let margin = inflation + simd.splat(ORIGIN_ROUNDING) * o[k].abs();
             let forward = signs[k] * margin;
@@ -111,6 +122,11 @@ impl<const N: usize> PreparedRays<N> {
             // Not finite if any of the numbers is not.
             let sum = o[k] + d[k] + inverse[k] + inflation;
             is_finite = is_finite & sum.abs().lt(simd.splat(f32::INFINITY));
+            let (reach, size) = (scene.min[k].abs().max(scene.max[k].abs()), inverse[k].abs());
+            let greatest_product = simd.splat(reach) * size;
+            is_moderate = is_moderate
+                & greatest_product.lt(simd.splat(f32::INFINITY))
+                & simd.splat(LEAST_MARGIN).le(inflation * size);
         }
 
         let is_x = length[1].lt(length[0]) & length[2].lt(length[0]);
@@ -130,7 +146,7 @@ impl<const N: usize> PreparedRays<N> {
         for (k, shear) in [x * scale, y * scale, scale].into_iter().enumerate() {
             store(shear, &mut self.shears[k], first);
         }
-        is_finite.bits()
+        [is_finite.bits(), is_moderate.bits()]
     }
 
     /// The axes x, y and z of the sheared space of ray `i`.

@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::build::MAX_DEPTH;
 use super::intersect::{Planes, Sheared, Slabs};
 use super::prepare::{PreparedRays, octant};
-use super::{Bvh, Child, WIDTH};
+use super::{Bvh, Child, Node, WIDTH};
 use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
 use crate::simd::{Kernel, LaneMask, Simd, SimdBitSets, SimdF32x8, SimdFloat, set_bits};
@@ -503,6 +503,25 @@ impl StreamStack {
         self.len += 1;
     }
 
+    /// Pushes the children of a node whose boxes any of `members`, rays of the stream as bits, crosses. The node's
+    /// planes stay in registers while one ray after the other is tested against the eight boxes.
+    #[inline(always)]
+    fn push_crossed<S: Simd>(
+        &mut self,
+        simd: S,
+        node: &Node,
+        rays: &PreparedRays<STREAM>,
+        members: u64,
+    ) {
+        let slabs = Slabs::load(simd, node, rays.octant);
+        let mut entering = Entering::none(simd);
+        for i in set_bits(members) {
+            let [enter, leave] = slabs.cross(simd, rays, i);
+            entering.insert(i, enter.le(leave));
+        }
+        self.push_entered(&node.children, entering);
+    }
+
     /// Pushes the children that any ray enters, the last on top.
     #[inline(always)]
     fn push_entered<S: Simd>(&mut self, children: &[Child; WIDTH], rays: Entering<S>) {
@@ -680,8 +699,6 @@ impl Stream for ShadowStream {
         self.stack.push(Child::node(0), self.free);
     }
 
-    /// The node's planes stay in registers while one ray after the other is tested against the eight
-    /// boxes and its bit added to the sets of those that it crosses.
     #[inline(always)]
     fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh, (): ()) -> bool {
         let Some((child, rays)) = self.stack.pop(self.free) else { return false };
@@ -699,14 +716,7 @@ impl Stream for ShadowStream {
             self.hit |= hit;
             self.free &= !self.hit;
         } else {
-            let node = &bvh.nodes[child.index()];
-            let slabs = Slabs::load(simd, node, self.rays.octant);
-            let mut entering = Entering::none(simd);
-            for i in set_bits(rays) {
-                let [enter, leave] = slabs.cross(simd, &self.rays, i);
-                entering.insert(i, enter.le(leave));
-            }
-            self.stack.push_entered(&node.children, entering);
+            self.stack.push_crossed(simd, &bvh.nodes[child.index()], &self.rays, rays);
         }
         self.stack.prefetch(simd, bvh);
         true
@@ -778,14 +788,7 @@ impl Stream for TransmittanceStream {
                 self.free &= !(u64::from(transmittance <= 0.0) << i);
             }
         } else {
-            let node = &bvh.nodes[child.index()];
-            let slabs = Slabs::load(simd, node, self.rays.octant);
-            let mut entering = Entering::none(simd);
-            for i in set_bits(rays) {
-                let [enter, leave] = slabs.cross(simd, &self.rays, i);
-                entering.insert(i, enter.le(leave));
-            }
-            self.stack.push_entered(&node.children, entering);
+            self.stack.push_crossed(simd, &bvh.nodes[child.index()], &self.rays, rays);
         }
         self.stack.prefetch(simd, bvh);
         true

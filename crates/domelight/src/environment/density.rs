@@ -56,7 +56,7 @@ impl EnvironmentDensity {
     /// weights that are all 0.
     pub fn new(environment: &Environment, weights: Vec<f32>) -> Result<Self, DensityError> {
         let grid = &environment.grid;
-        let (width, height) = (grid.width, grid.height);
+        let (width, height) = (grid.texels.width(), grid.texels.height());
         if weights.len() != width * height {
             return Err(DensityError::Count { found: weights.len(), width, height });
         }
@@ -69,7 +69,7 @@ impl EnvironmentDensity {
         let scaled = |w: f32| (f64::from(w) / unit) as f32;
         let weights: Vec<f32> = weights.into_iter().map(scaled).collect();
         let table = HierarchicalTable::from_rows(width, height, |row, out| {
-            let solid_angle = grid.solid_angle(row) as f32;
+            let solid_angle = grid.texels.solid_angle(row) as f32;
             for (o, &weight) in out.iter_mut().zip(&weights[row * width..(row + 1) * width]) {
                 *o = weight * solid_angle;
             }

@@ -160,10 +160,8 @@ pub fn probe_from_picture(
     }
     let file_size = (image.width, image.height);
     let height = mapping.lat_long_height(image.width, image.height);
-    let image = match mapping {
-        Mapping::LatLong => image,
-        _ => to_lat_long(&image, mapping, height),
-    };
+    let image =
+        if mapping == Mapping::LatLong { image } else { to_lat_long(&image, mapping, height) };
     Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings })
 }
 

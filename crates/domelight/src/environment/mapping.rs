@@ -18,6 +18,7 @@ mod cube;
 mod overlap;
 
 pub use convert::{from_lat_long, to_lat_long};
+pub use cube::CubeLayout;
 
 use crate::math::{PI, TAU, Vec2, Vec3, functions, sqr, vec2, vec3};
 use std::str::FromStr;
@@ -50,14 +51,8 @@ pub enum Mapping {
     /// photograph gives an environment in which text reads the right way round. (pfstools and the book of Reinhard
     /// et al. take ball pictures that were mirrored beforehand.)
     MirrorBall,
-    /// Unfolded cube of 4 × 3 faces: +Y above −Z; then −X, −Z, +X, +Z from left to right; −Y below −Z.
-    CubeCrossHorizontal,
-    /// Unfolded cube of 3 × 4 faces: +Y; −X, −Z, +X; −Y; then +Z upside down, as in Debevec's gallery.
-    CubeCrossVertical,
-    /// The faces of [`Mapping::CubeStripVertical`] from left to right.
-    CubeStripHorizontal,
-    /// Faces +X, −X, +Y, −Y, +Z, −Z from top to bottom, each seen from inside: OpenEXR's cube map.
-    CubeStripVertical,
+    /// Six faces of a cube, unfolded in one of several ways.
+    Cube(CubeLayout),
     /// Equal-area octahedral square with +Y at its center and −Y at its corners, as in pbrt-v4. Rotated such that
     /// what pbrt's `imgtool makeequiarea` makes of a lat-long map comes back as that map.
     Octahedral,
@@ -90,10 +85,10 @@ impl Mapping {
         Self::LatLongExr,
         Self::Angular,
         Self::MirrorBall,
-        Self::CubeCrossHorizontal,
-        Self::CubeCrossVertical,
-        Self::CubeStripHorizontal,
-        Self::CubeStripVertical,
+        Self::Cube(CubeLayout::CrossHorizontal),
+        Self::Cube(CubeLayout::CrossVertical),
+        Self::Cube(CubeLayout::StripHorizontal),
+        Self::Cube(CubeLayout::StripVertical),
         Self::Octahedral,
     ];
 
@@ -104,10 +99,7 @@ impl Mapping {
             Self::LatLongExr => "lat-long-exr",
             Self::Angular => "angular",
             Self::MirrorBall => "mirror-ball",
-            Self::CubeCrossHorizontal => "cross-horizontal",
-            Self::CubeCrossVertical => "cross-vertical",
-            Self::CubeStripHorizontal => "strip-horizontal",
-            Self::CubeStripVertical => "strip-vertical",
+            Self::Cube(layout) => layout.name(),
             Self::Octahedral => "octahedral",
         }
     }
@@ -117,10 +109,7 @@ impl Mapping {
         match self {
             Self::LatLong | Self::LatLongExr => (2, 1),
             Self::Angular | Self::MirrorBall | Self::Octahedral => (1, 1),
-            Self::CubeCrossHorizontal => (4, 3),
-            Self::CubeCrossVertical => (3, 4),
-            Self::CubeStripHorizontal => (6, 1),
-            Self::CubeStripVertical => (1, 6),
+            Self::Cube(layout) => layout.faces_across_and_down(),
         }
     }
 
@@ -147,22 +136,36 @@ impl Mapping {
         let has_shape = |mapping: &Self| mapping.check_shape(width, height).is_ok();
         match envmap {
             Some(EnvmapKind::LatLong) => return Self::LatLongExr,
-            Some(EnvmapKind::Cube) if has_shape(&Self::CubeStripVertical) => {
-                return Self::CubeStripVertical;
+            Some(EnvmapKind::Cube) => {
+                let strip = Self::Cube(CubeLayout::StripVertical);
+                if has_shape(&strip) {
+                    return strip;
+                }
             }
-            _ => {}
+            None => {}
         }
         if width == 1 && height == 1 {
             return Self::LatLong;
         }
-        let by_shape = [
-            Self::Angular,
-            Self::CubeCrossHorizontal,
-            Self::CubeCrossVertical,
-            Self::CubeStripHorizontal,
-            Self::CubeStripVertical,
-        ];
-        by_shape.into_iter().find(has_shape).unwrap_or(Self::LatLong)
+        let cubes = CubeLayout::ALL.map(Self::Cube);
+        std::iter::once(Self::Angular).chain(cubes).find(has_shape).unwrap_or(Self::LatLong)
+    }
+
+    /// What OpenEXR's `envmap` attribute calls the mapping, if it knows it.
+    pub const fn envmap(self) -> Option<EnvmapKind> {
+        match self {
+            Self::LatLongExr => Some(EnvmapKind::LatLong),
+            Self::Cube(CubeLayout::StripVertical) => Some(EnvmapKind::Cube),
+            Self::LatLong
+            | Self::Angular
+            | Self::MirrorBall
+            | Self::Cube(
+                CubeLayout::CrossHorizontal
+                | CubeLayout::CrossVertical
+                | CubeLayout::StripHorizontal,
+            )
+            | Self::Octahedral => None,
+        }
     }
 
     /// The unit direction at (u, v); `None` outside \[0, 1\]², the disc or the faces of the cross.
@@ -176,7 +179,7 @@ impl Mapping {
             Self::Angular => angular_direction(uv),
             Self::MirrorBall => mirror_ball_direction(uv),
             Self::Octahedral => Some(octahedral_direction(uv)),
-            _ => self.cube().direction(uv),
+            Self::Cube(layout) => layout.direction(uv),
         }
     }
 
@@ -188,7 +191,7 @@ impl Mapping {
             Self::Angular => angular_uv(direction),
             Self::MirrorBall => mirror_ball_uv(direction),
             Self::Octahedral => octahedral_uv(direction),
-            _ => self.cube().uv(direction),
+            Self::Cube(layout) => layout.uv(direction),
         };
         uv.clamp(Vec2::ZERO, Vec2::ONE)
     }
@@ -210,8 +213,8 @@ impl Mapping {
             Self::MirrorBall => 16.0,
             Self::Octahedral => 4.0 * PI,
             // dω = ds dt / (1 + s² + t²)^{3/2}, and 1/√(1 + s² + t²) is the greatest component.
-            _ => {
-                let (columns, rows) = self.aspect();
+            Self::Cube(layout) => {
+                let (columns, rows) = layout.faces_across_and_down();
                 4.0 * (columns * rows) as f32 * functions::powi(direction.abs().max_element(), 3)
             }
         }
@@ -227,7 +230,7 @@ impl Mapping {
             Self::Angular => 0.5 * height as f32,
             Self::MirrorBall => 0.25 * PI * height as f32,
             Self::Octahedral => 0.5 * PI.sqrt() * width as f32,
-            _ => 0.5 * PI * edge,
+            Self::Cube(_) => 0.5 * PI * edge,
         };
         (keeps.ceil() as usize).max(1)
     }
@@ -241,20 +244,11 @@ impl Mapping {
             Self::Angular => 2.0 * h,
             Self::MirrorBall => 4.0 / PI * h,
             Self::Octahedral => 2.0 / PI.sqrt() * h,
-            _ => 2.0 / PI * h,
+            Self::Cube(_) => 2.0 / PI * h,
         };
         let unit = (unit.ceil() as usize).max(1);
         let (columns, rows) = self.aspect();
         (columns * unit, rows * unit)
-    }
-
-    fn cube(self) -> &'static cube::Cube {
-        match self {
-            Self::CubeCrossHorizontal => &cube::CROSS_HORIZONTAL,
-            Self::CubeCrossVertical => &cube::CROSS_VERTICAL,
-            Self::CubeStripHorizontal => &cube::STRIP_HORIZONTAL,
-            _ => &cube::STRIP_VERTICAL,
-        }
     }
 }
 

@@ -11,11 +11,13 @@ mod compensation;
 mod density;
 #[cfg(feature = "io")]
 pub mod io;
+pub(crate) mod lat_long;
 pub mod mapping;
 pub mod statistics;
 
 pub use compensation::CompensatedTable;
 pub use density::{DensityError, EnvironmentDensity};
+pub use lat_long::LatLongGrid;
 
 use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, vec3};
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
@@ -338,7 +340,7 @@ impl Environment {
     /// # Panics
     /// If there is no such row.
     pub fn texel_solid_angle(&self, row: usize) -> f64 {
-        self.grid.solid_angle(row)
+        self.grid.texels.solid_angle(row)
     }
 
     /// ∫ luminance dω over the sphere.
@@ -415,14 +417,12 @@ impl Environment {
     /// The direction of a place on the map, in texels from its upper left corner, in the map's own
     /// frame: +Y up. Within a texel rows are equally spaced in cos θ, as solid angle is.
     pub(crate) fn map_direction(&self, column: f64, row: f64) -> Vec3 {
-        self.grid.direction(column / self.grid.width as f64, self.cos_theta(row))
+        self.grid.direction(column / self.grid.texels.width() as f64, self.cos_theta(row))
     }
 
     /// The polar cosine of a row of the map, in texels from the upper edge.
     pub(crate) fn cos_theta(&self, row: f64) -> f64 {
-        let edges = &self.grid.cos_edges;
-        let texel = (row as usize).min(self.grid.height - 1);
-        edges[texel] + (row - texel as f64) * (edges[texel + 1] - edges[texel])
+        self.grid.texels.cos_theta(row)
     }
 
     /// The columns and the rows that directions look at; of one that is not finite anything.
@@ -447,8 +447,8 @@ impl Environment {
     pub(crate) fn inside(&self, wi: Vec3) -> Vec2 {
         let wi = Vec3::from(self.orientation.up.to_map(wi.into()));
         let Texel { column, row } = self.grid.texel(wi);
-        let x = self.grid.uv(wi.into())[0] * self.grid.width as f32 - column as f32;
-        let (top, bottom) = (self.grid.cos_edges[row], self.grid.cos_edges[row + 1]);
+        let x = self.grid.uv(wi.into())[0] * self.map.width as f32 - column as f32;
+        let (top, bottom) = (self.grid.texels.cos_edge(row), self.grid.texels.cos_edge(row + 1));
         let y = ((top - f64::from(wi.y)) / (top - bottom)) as f32;
         Vec2::new(x, y).clamp(Vec2::ZERO, Vec2::splat(ONE_MINUS_EPSILON))
     }
@@ -477,37 +477,26 @@ fn unit_of(brightest: f64) -> f64 {
     }
 }
 
-/// The lat-long grid in the map's own frame, rotation included.
+/// The map's texels and the directions in them, in the map's own frame, rotation included.
 #[derive(Clone, Debug)]
 struct Grid {
-    width: usize,
-    height: usize,
+    texels: LatLongGrid,
     /// The rotation as a share of a turn.
     turn: f32,
-    /// cos θ of the upper edge of each row, and of the lower edge of the last.
-    cos_edges: Vec<f64>,
     /// A distance from a texel's edge, in texels, within which rounding may cross it.
     margin: Vec2,
 }
 
 impl Grid {
     fn new(width: usize, height: usize, rotation: f32) -> Self {
-        let edge = |y: usize| functions::cos(std::f64::consts::PI * y as f64 / height as f64);
         // A direction in single precision is off by no more than a few units in the last place.
         let error = 16.0 * f32::EPSILON;
         let margin = Vec2::new(error * width as f32 / TAU, error * height as f32 / PI);
         Self {
-            width,
-            height,
+            texels: LatLongGrid::new(width, height),
             turn: (rotation / 360.0).rem_euclid(1.0),
-            cos_edges: (0..=height).map(edge).collect(),
             margin: margin.min(Vec2::splat(0.25)),
         }
-    }
-
-    fn solid_angle(&self, row: usize) -> f64 {
-        let band = self.cos_edges[row] - self.cos_edges[row + 1];
-        band * std::f64::consts::TAU / self.width as f64
     }
 
     /// A table of `importance(texel)` times solid angle.
@@ -516,8 +505,8 @@ impl Grid {
         map: &RgbImage,
         importance: impl Fn(Rgb) -> f32 + Sync,
     ) -> Result<HierarchicalTable, TableError> {
-        HierarchicalTable::from_rows(self.width, self.height, |row, out| {
-            let solid_angle = self.solid_angle(row) as f32;
+        HierarchicalTable::from_rows(self.texels.width(), self.texels.height(), |row, out| {
+            let solid_angle = self.texels.solid_angle(row) as f32;
             for (o, &le) in out.iter_mut().zip(map.row(row)) {
                 *o = importance(le) * solid_angle;
             }
@@ -535,8 +524,8 @@ impl Grid {
 
     /// The direction at `inside` a texel, uniform in solid angle: linear in φ and cos θ.
     fn direction_in(&self, t: Texel, inside: Vec2) -> Vec3 {
-        let u = (t.column as f64 + f64::from(inside.x)) / self.width as f64;
-        let (top, bottom) = (self.cos_edges[t.row], self.cos_edges[t.row + 1]);
+        let u = (t.column as f64 + f64::from(inside.x)) / self.texels.width() as f64;
+        let (top, bottom) = (self.texels.cos_edge(t.row), self.texels.cos_edge(t.row + 1));
         self.direction(u, top + f64::from(inside.y) * (bottom - top))
     }
 
@@ -562,8 +551,9 @@ impl Grid {
 
     fn texel(&self, d: Vec3) -> Texel {
         let [u, v] = self.uv(d.into());
-        let column = ((u * self.width as f32) as usize).min(self.width - 1);
-        let row = ((v * self.height as f32) as usize).min(self.height - 1);
+        let (width, height) = (self.texels.width(), self.texels.height());
+        let column = ((u * width as f32) as usize).min(width - 1);
+        let row = ((v * height as f32) as usize).min(height - 1);
         Texel { column, row }
     }
 }

@@ -3,8 +3,9 @@
 //! Everything is weighed by the exact solid angle of the texels, in f64. Means over pixels, which
 //! overrate the poles, are given beside it only because other programs print them.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
 
+use super::LatLongGrid;
 use super::compact::{SourceCriteria, compact_sources};
 use super::mapping::Mapping;
 use crate::color::Rgb;
@@ -97,39 +98,24 @@ impl Sun {
 }
 
 /// Integrals over a texel of each row.
-struct Weights {
-    /// ∫ dω \[sr\].
-    solid_angle: Vec<f64>,
-    /// ∫ max(0, cos θ) dω \[sr\].
-    projected_up: Vec<f64>,
-}
+struct Weights(LatLongGrid);
 
 impl Weights {
     fn new(map: &RgbImage) -> Self {
-        let turn = TAU / map.width as f64;
-        let theta = |row: usize| PI * row as f64 / map.height as f64;
-        let solid_angle =
-            |y: usize| turn * (functions::cos(theta(y)) - functions::cos(theta(y + 1)));
-        // ∫ sin θ cos θ dθ = ½ sin² θ
-        let projected_up = |y: usize| {
-            let [a, b] = [y, y + 1]
-                .map(|row| functions::powi(functions::sin(theta(row).min(FRAC_PI_2)), 2));
-            turn * 0.5 * (b - a)
-        };
-        Self {
-            solid_angle: (0..map.height).map(solid_angle).collect(),
-            projected_up: (0..map.height).map(projected_up).collect(),
-        }
+        Self(LatLongGrid::new(map.width, map.height))
     }
 
-    /// ∫ dω over a texel of that row \[sr\].
+    /// ∫ dω over a texel \[sr\].
     fn solid_angle(&self, y: usize) -> f64 {
-        self.solid_angle[y]
+        self.0.column_angle() * self.0.band(y..y + 1)
     }
 
-    /// ∫ max(0, cos θ) dω over a texel of that row \[sr\].
+    /// ∫ max(0, cos θ) dω over a texel, with ∫ sin θ cos θ dθ = ½ sin² θ.
     fn projected_up(&self, y: usize) -> f64 {
-        self.projected_up[y]
+        let theta = |row: usize| PI * row as f64 / self.0.height() as f64;
+        let [a, b] =
+            [y, y + 1].map(|row| functions::powi(functions::sin(theta(row).min(FRAC_PI_2)), 2));
+        self.0.column_angle() * 0.5 * (b - a)
     }
 }
 

@@ -4,9 +4,16 @@ use std::fmt;
 
 use super::decomposition::{Cause, Decomposition, Share};
 
+impl Decomposition {
+    /// Why the pixel is noisy, in a sentence with numbers.
+    pub fn diagnosis(&self) -> Diagnosis<'_> {
+        Diagnosis(self)
+    }
+}
+
 /// Why the pixel is noisy under one strategy; its text is a sentence.
 #[derive(Clone, Copy, Debug)]
-pub struct Diagnosis<'a>(pub(super) &'a Decomposition);
+pub struct Diagnosis<'a>(&'a Decomposition);
 
 impl fmt::Display for Diagnosis<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

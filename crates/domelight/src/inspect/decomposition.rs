@@ -10,7 +10,6 @@
 use std::fmt;
 
 use super::CameraSample;
-use super::advice::Diagnosis;
 use super::regions::{Regions, Source, SourceKind};
 use super::replicates::{N_PIXELS, Replicates, SAMPLES_PER_PIXEL};
 
@@ -160,11 +159,6 @@ impl Decomposition {
     /// What a strategy does with a source of that kind.
     pub(super) fn source(&self, kind: SourceKind) -> Option<&SourceStatistics> {
         self.sources.iter().find(|statistics| statistics.source.kind == kind)
-    }
-
-    /// Why the pixel is noisy, in a sentence with numbers.
-    pub fn diagnosis(&self) -> Diagnosis<'_> {
-        Diagnosis(self)
     }
 }
 

@@ -7,8 +7,11 @@
 //! Writers make bytes ([`hdr::encode`], [`exr::ExrLayers::encode`], [`pfm::encode`], [`png::encode`]);
 //! [`write_atomically`] puts them into a file that is either the old one or the whole new one.
 
+mod agx;
 pub mod compare;
+mod display;
 mod error;
+pub mod exposure;
 pub mod exr;
 pub mod flip;
 pub mod hdr;
@@ -67,11 +70,13 @@ pub struct Picture {
     pub window: Option<DataWindow>,
     /// The format it was read from.
     pub format: Format,
+    /// OpenEXR's attributes that are text, by name.
+    pub attributes: Vec<(String, String)>,
 }
 
 impl Picture {
     fn opaque(image: RgbImage, format: Format) -> Self {
-        Self { image, alpha: None, envmap: None, window: None, format }
+        Self { image, alpha: None, envmap: None, window: None, format, attributes: Vec::new() }
     }
 }
 
@@ -89,9 +94,16 @@ pub struct ReadOptions {
 /// # Errors
 /// If the file cannot be read or is not a whole, valid picture in one of the known formats.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Picture, PictureError> {
-    let name = display_name(path);
-    let bytes = read_all(path, options.max_memory).map_err(|kind| kind.in_file(&name))?;
-    read_bytes(&bytes, &name, options)
+    let bytes = read_file(path, options.max_memory)?;
+    read_bytes(&bytes, &display_name(path), options)
+}
+
+/// The bytes of a file, or of standard input if `path` is `-`; no more than `max_memory`.
+///
+/// # Errors
+/// If the file cannot be read or is larger.
+pub fn read_file(path: &Path, max_memory: Option<u64>) -> Result<Vec<u8>, PictureError> {
+    read_all(path, max_memory).map_err(|kind| kind.in_file(&display_name(path)))
 }
 
 /// The picture in `bytes`; `name` is for messages.

@@ -4,9 +4,10 @@
 //! alpha before the tone curve, so that what a viewer composes over black is the tone-mapped object; light that does
 //! not cover (alpha 0) cannot be kept. No dithering: the same color is the same byte everywhere.
 
-use super::tone::{ToneMapping, linear_from_srgb, srgb_from_linear};
+use super::display::DisplayEncoder;
+use super::tone::{ToneMapping, linear_from_srgb};
 use super::{Format, Picture, PictureErrorKind, checked_area};
-use crate::{Rgb, RgbImage};
+use crate::{Rgb, RgbImage, parallel};
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::{self, Cursor, Write};
 
@@ -42,12 +43,9 @@ pub fn encode(
         Depth::Sixteen => ::png::BitDepth::Sixteen,
     });
     encoder.set_source_srgb(::png::SrgbRenderingIntent::Perceptual);
-    let mut bytes = Vec::with_capacity(image.pixels.len() * 4);
-    for (i, &pixel) in image.pixels.iter().enumerate() {
-        let coverage = alpha.map(|alpha| alpha[i].clamp(0.0, 1.0));
-        let color = tone.apply(straight(pixel, coverage)).map(srgb_from_linear);
-        color.to_array().into_iter().chain(coverage).for_each(|v| quantize(v, depth, &mut bytes));
-    }
+    // A thirtieth of the default's time for files larger by a seventh.
+    encoder.set_compression(::png::Compression::Fast);
+    let bytes = samples(image, alpha, &DisplayEncoder::new(tone), depth);
     let mut writer = encoder.write_header().map_err(io::Error::other)?;
     writer.write_image_data(&bytes).map_err(io::Error::other)?;
     writer.finish().map_err(io::Error::other)
@@ -61,10 +59,39 @@ fn straight(color: Rgb, coverage: Option<f32>) -> Rgb {
     }
 }
 
-fn quantize(value: f32, depth: Depth, bytes: &mut Vec<u8>) {
+/// The picture's bytes, row by row.
+fn samples(
+    image: &RgbImage,
+    alpha: Option<&[f32]>,
+    encoder: &DisplayEncoder,
+    depth: Depth,
+) -> Vec<u8> {
+    let n_channels = if alpha.is_some() { 4 } else { 3 };
+    let sample = match depth {
+        Depth::Eight => 1,
+        Depth::Sixteen => 2,
+    };
+    let texel = n_channels * sample;
+    let mut bytes = vec![0; image.pixels.len() * texel];
+    parallel::bands(&mut bytes, image.width.max(1) * texel, |y, row| {
+        for (x, to) in row.chunks_exact_mut(texel).enumerate() {
+            let i = y * image.width + x;
+            let coverage = alpha.map(|alpha| alpha[i].clamp(0.0, 1.0));
+            let [r, g, b] = encoder.encode(straight(image.pixels[i], coverage)).to_array();
+            let values = [r, g, b, coverage.unwrap_or(1.0)];
+            for (to, value) in to.chunks_exact_mut(sample).zip(values) {
+                quantize(value, depth, to);
+            }
+        }
+    });
+    bytes
+}
+
+/// Rounds a value in \[0, 1\]; NaN is 0.
+fn quantize(value: f32, depth: Depth, to: &mut [u8]) {
     match depth {
-        Depth::Eight => bytes.push((value * 255.0).round() as u8),
-        Depth::Sixteen => bytes.extend(((value * 65535.0).round() as u16).to_be_bytes()),
+        Depth::Eight => to[0] = (value * 255.0 + 0.5) as u8,
+        Depth::Sixteen => to.copy_from_slice(&((value * 65535.0 + 0.5) as u16).to_be_bytes()),
     }
 }
 

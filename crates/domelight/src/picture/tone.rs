@@ -1,23 +1,24 @@
 //! From scene-linear radiance to what a screen shows: exposure, tone curve, sRGB encoding.
 
+use super::agx;
+use crate::Rgb;
 use crate::math::{Mat3, Vec3, functions};
-use crate::{Rgb, RgbImage};
 use std::str::FromStr;
 
 /// How radiance beyond the screen's range is brought into it. All curves take and give linear Rec. 709.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ToneCurve {
-    /// None: values beyond \[0, 1\] are cut off. Comparable, as values in range are shown as they are.
+    /// None: values beyond \[0, 1\] are cut off. Comparable, as values in range are shown as they are; Blender's view
+    /// Standard.
     #[default]
-    Srgb,
+    Standard,
     /// c / (1 + Y), Y the luminance: Reinhard et al. 2002, "Photographic Tone Reproduction for Digital Images",
     /// equation 3, without the key (that is the exposure's task).
     Reinhard,
     /// The ACES 1.0 reference and sRGB output transforms as fitted by Stephen Hill (2016, in "BakingLab" of Pettineo
     /// and Neubelt).
     Aces,
-    /// AgX (Sobotka 2022), the base look, with the sigmoid as the polynomial of Wrensch 2023, "Minimal AgX
-    /// Implementation".
+    /// AgX, the base look, as Blender shows it since version 4.0.
     Agx,
     /// Khronos PBR Neutral (2024): colors up to 0.8 as they are, for true-to-life base colors.
     Neutral,
@@ -33,12 +34,13 @@ pub struct UnknownToneCurve {
 
 impl ToneCurve {
     /// All curves.
-    pub const ALL: [Self; 5] = [Self::Srgb, Self::Reinhard, Self::Aces, Self::Agx, Self::Neutral];
+    pub const ALL: [Self; 5] =
+        [Self::Standard, Self::Reinhard, Self::Aces, Self::Agx, Self::Neutral];
 
     /// The name that [`FromStr`] understands.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Srgb => "srgb",
+            Self::Standard => "standard",
             Self::Reinhard => "reinhard",
             Self::Aces => "aces",
             Self::Agx => "agx",
@@ -46,14 +48,27 @@ impl ToneCurve {
         }
     }
 
+    /// Another name that [`FromStr`] understands.
+    pub const fn alias(self) -> Option<&'static str> {
+        match self {
+            Self::Standard => Some("srgb"),
+            Self::Reinhard | Self::Aces | Self::Agx | Self::Neutral => None,
+        }
+    }
+
     /// Linear light on the screen, in \[0, 1\], of exposed radiance; negative and NaN count as 0.
     pub fn apply(self, radiance: Rgb) -> Rgb {
+        self.apply_with(radiance, agx::shaped)
+    }
+
+    /// As [`Self::apply`]; `shape` is [`agx::shaped`], or quicker and nearly the same.
+    pub(super) fn apply_with(self, radiance: Rgb, shape: impl Fn(f32) -> f32) -> Rgb {
         let c = radiance.map(|c| f32::min(c.max(0.0), 1e30));
         let shown = match self {
-            Self::Srgb => c,
+            Self::Standard => c,
             Self::Reinhard => c / (1.0 + c.luminance()),
             Self::Aces => aces(c),
-            Self::Agx => agx(c),
+            Self::Agx => agx::agx(c, shape),
             Self::Neutral => neutral(c),
         };
         shown.map(|c| c.clamp(0.0, 1.0))
@@ -64,7 +79,8 @@ impl FromStr for ToneCurve {
     type Err = UnknownToneCurve;
 
     fn from_str(name: &str) -> Result<Self, UnknownToneCurve> {
-        let found = Self::ALL.into_iter().find(|curve| curve.name() == name);
+        let found =
+            Self::ALL.into_iter().find(|curve| curve.name() == name || curve.alias() == Some(name));
         found.ok_or_else(|| UnknownToneCurve { name: name.to_owned() })
     }
 }
@@ -72,37 +88,6 @@ impl FromStr for ToneCurve {
 impl std::fmt::Display for ToneCurve {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())
-    }
-}
-
-/// How exposure is chosen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Exposure {
-    /// The median luminance of what is covered becomes middle gray, 0.18.
-    Auto,
-    /// In stops: radiance times 2^stops.
-    Stops(f32),
-}
-
-impl Exposure {
-    /// The exposure of a picture \[stops\]; `alpha` says what is covered, everything if `None`. A black picture
-    /// has 0.
-    pub fn stops(self, image: &RgbImage, alpha: Option<&[f32]>) -> f32 {
-        const MIDDLE_GRAY: f32 = 0.18;
-        const RANGE: f32 = 30.0;
-        if let Self::Stops(stops) = self {
-            return stops;
-        }
-        let is_covered = |i: usize| alpha.is_none_or(|alpha| alpha[i] > 0.0);
-        let lit = image.pixels.iter().enumerate().filter(|(i, _)| is_covered(*i));
-        let mut luminances: Vec<f32> = lit.map(|(_, pixel)| pixel.luminance()).collect();
-        luminances.retain(|luminance| luminance.is_finite() && *luminance > 0.0);
-        if luminances.is_empty() {
-            return 0.0;
-        }
-        let middle = luminances.len() / 2;
-        let (_, median, _) = luminances.select_nth_unstable_by(middle, f32::total_cmp);
-        functions::log2(MIDDLE_GRAY / *median).clamp(-RANGE, RANGE)
     }
 }
 
@@ -140,7 +125,7 @@ pub fn linear_from_srgb(encoded: f32) -> f32 {
     }
 }
 
-fn rows(r: [f32; 3], g: [f32; 3], b: [f32; 3]) -> Mat3 {
+pub(super) fn rows(r: [f32; 3], g: [f32; 3], b: [f32; 3]) -> Mat3 {
     Mat3::from_cols(r.into(), g.into(), b.into()).transpose()
 }
 
@@ -157,34 +142,6 @@ fn aces(c: Rgb) -> Rgb {
     let numerator = v * (v + 0.024_578_6) - 0.000_090_537;
     let denominator = v * (0.983_729 * v + 0.432_951) + 0.238_081;
     Rgb::from((to_rec709 * (numerator / denominator)).to_array())
-}
-
-fn agx(c: Rgb) -> Rgb {
-    let inset = rows(
-        [0.842_479_06, 0.078_433_6, 0.079_223_745],
-        [0.042_328_24, 0.878_468_64, 0.079_166_13],
-        [0.042_375_654, 0.078_433_6, 0.879_142_97],
-    );
-    let outset = rows(
-        [1.196_879, -0.098_020_88, -0.099_029_74],
-        [-0.052_896_85, 1.151_903_1, -0.098_961_18],
-        [-0.052_971_635, -0.098_043_45, 1.151_073_7],
-    );
-    // 12.47 stops below and 4.03 above 1 are shown.
-    let (least, greatest) = (-12.473_93, 4.026_069);
-    let inside = inset * Vec3::from(c.to_array());
-    let encoded = inside.map(|v| {
-        (functions::log2(v.max(1e-10)).clamp(least, greatest) - least) / (greatest - least)
-    });
-    let shaped = encoded.map(agx_sigmoid);
-    let shown = (outset * shaped).max(Vec3::ZERO);
-    // The curve gives encoded values; back to linear light for the one encoding at the end.
-    Rgb::from(shown.map(|v| functions::powf(v, 2.2)).to_array())
-}
-
-fn agx_sigmoid(x: f32) -> f32 {
-    let coefficients = [15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232];
-    coefficients.iter().fold(0.0, |sum, c| sum * x + c)
 }
 
 fn neutral(c: Rgb) -> Rgb {
@@ -229,6 +186,7 @@ mod tests {
             }
         }
         assert!("Filmic".parse::<ToneCurve>().is_err());
+        assert_eq!("srgb".parse(), Ok(ToneCurve::Standard));
     }
 
     #[test]
@@ -236,9 +194,9 @@ mod tests {
         // PBR Neutral: base colors pass through with the reflection of 4 % added.
         let neutral = ToneCurve::Neutral.apply(Rgb::new(0.54, 0.34, 0.14));
         assert!((neutral - Rgb::new(0.5, 0.3, 0.1)).map(f32::abs).max_component() < 1e-6);
-        // Middle gray of AgX stays near middle gray.
-        let gray = ToneCurve::Agx.apply(Rgb::splat(0.18)).g;
-        assert!((0.16..0.24).contains(&gray), "{gray}");
+        // Middle gray of AgX stays middle gray.
+        let gray = ToneCurve::Agx.apply(Rgb::splat(0.18));
+        assert!((gray - Rgb::splat(0.18)).map(f32::abs).max_component() < 1e-6, "{gray:?}");
         assert_eq!(ToneCurve::Reinhard.apply(Rgb::splat(1.0)).g, 0.5);
     }
 
@@ -249,7 +207,7 @@ mod tests {
             let again = srgb_from_linear(linear_from_srgb(encoded));
             assert_eq!((again * 255.0).round() as u8, byte);
         }
-        let two_stops = ToneMapping { exposure: 2.0, curve: ToneCurve::Srgb };
+        let two_stops = ToneMapping { exposure: 2.0, curve: ToneCurve::Standard };
         assert_eq!(two_stops.apply(Rgb::splat(0.125)).r, 0.5);
     }
 }

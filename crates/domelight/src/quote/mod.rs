@@ -217,6 +217,13 @@ fn is_invisible(c: char) -> bool {
 
 /// A literal in double quotes that JavaScript, Python, YAML and JSON read alike.
 fn double_quoted(text: &str) -> String {
+    // All invisible characters have 16 bits.
+    escaped(text, |c| is_invisible(c).then(|| format!("\\u{:04x}", u32::from(c))))
+}
+
+/// A literal in double quotes with backslash escapes for quotes, backslashes, line breaks and tabs; `escape` gives those
+/// of further characters.
+fn escaped(text: &str, escape: impl Fn(char) -> Option<String>) -> String {
     let mut quoted = String::with_capacity(text.len() + 2);
     quoted.push('"');
     for c in text.chars() {
@@ -225,11 +232,10 @@ fn double_quoted(text: &str) -> String {
             '\n' => quoted += "\\n",
             '\r' => quoted += "\\r",
             '\t' => quoted += "\\t",
-            // All of them have 16 bits.
-            c if is_invisible(c) => {
-                let _ = write!(quoted, "\\u{:04x}", u32::from(c));
-            }
-            c => quoted.push(c),
+            c => match escape(c) {
+                Some(escape) => quoted += &escape,
+                None => quoted.push(c),
+            },
         }
     }
     quoted.push('"');

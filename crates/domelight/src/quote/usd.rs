@@ -1,28 +1,12 @@
 //! OpenUSD as text.
 
-use std::fmt::Write as _;
-
-use super::{Code, Usd};
+use super::{Code, Usd, escaped};
 
 /// A string in double quotes.
 pub fn string(text: &str) -> Code<Usd> {
-    let mut quoted = String::with_capacity(text.len() + 2);
-    quoted.push('"');
-    for c in text.chars() {
-        match c {
-            '"' | '\\' => quoted.extend(['\\', c]),
-            '\n' => quoted += "\\n",
-            '\r' => quoted += "\\r",
-            '\t' => quoted += "\\t",
-            // Escapes are of bytes: what has more than one stays as it is.
-            c if c.is_ascii_control() => {
-                let _ = write!(quoted, "\\x{:02x}", u32::from(c));
-            }
-            c => quoted.push(c),
-        }
-    }
-    quoted.push('"');
-    Code::generated(quoted)
+    // Escapes stand for bytes: characters of more than one byte stay as they are.
+    let escape = |c: char| c.is_ascii_control().then(|| format!("\\x{:02x}", u32::from(c)));
+    Code::generated(escaped(text, escape))
 }
 
 /// An asset path; none where USD has no way to write it.

@@ -12,31 +12,20 @@
 //! 1991, "Unbiased Sampling Techniques for Image Synthesis".) Pixels of lower levels find silhouettes by what their
 //! samples saw of the background, and by the difference of their means where one is covered more than another.
 //!
-//! One scale serves the whole picture, so that samples move from quiet tiles to noisy ones; scouts find it ([`scale`]).
+//! One scale serves the whole picture, so that samples move from quiet tiles to noisy ones; scouts find it ([`super::scouts`]).
 //! Exact budgets for tiles would cost a quarter to three quarters more error at equal rays (docs/experiments.md).
 
 use crate::math::functions;
-use rayon::prelude::*;
-
-use super::tile::{Pass, Scratch, Tile};
-use super::tiling::Window;
-use super::{RenderContext, RenderSettings};
-use crate::sampling::{Pcg32, Sampler};
-use crate::strategy::Strategy;
 use crate::strategy::levels::{N_LEVELS, coarser, level};
 
 /// The power of the relative variance that the number of samples is proportional to.
 const EXPONENT: f32 = 0.3;
 
 /// No pixel gets fewer than a fourth of the usual samples, nor more than eight times as many.
-const OCTAVES: [i32; 2] = [-2, 3];
+pub(super) const OCTAVES: [i32; 2] = [-2, 3];
 
 /// Relative variances below this count as this.
 const LEAST_VARIANCE: f32 = 1e-6;
-
-/// Columns and rows of a window of scouts: two steps from one pixel of the first level to the next, so that pixels
-/// within the border have all their neighbors.
-const SCOUT_WINDOW: usize = 9;
 
 /// Coverages that differ by more belong to a silhouette.
 const SILHOUETTE: f32 = 0.02;
@@ -121,6 +110,21 @@ impl Allocation {
         });
     }
 
+    /// Columns of the tile.
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// How many pixels the tile has.
+    pub(super) fn n_pixels(&self) -> usize {
+        self.counts.len()
+    }
+
+    /// log₂ of what the number of a pixel's samples is proportional to; `None` where nothing predicts it.
+    pub(super) fn log(&self, pixel: usize) -> Option<f32> {
+        self.predicted(pixel).map(|variance| log(variance) + dither(pixel))
+    }
+
     /// The relative variance that pixels of lower levels predict.
     fn predicted(&self, pixel: usize) -> Option<f32> {
         let around = || coarser(pixel, self.width, self.seen.len()).filter_map(|i| self.seen[i]);
@@ -149,28 +153,15 @@ impl Allocation {
         let Some(mean_log) = self.mean_log else { return };
         for i in 0..self.counts.len() {
             if self.level(i) == round
-                && let Some(variance) = self.predicted(i)
+                && let Some(log) = self.log(i)
             {
-                self.counts[i] =
-                    count(self.n_samples, log(variance) + dither(i) - mean_log, fewest(round));
+                self.counts[i] = count(self.n_samples, log - mean_log, fewest(round));
             }
         }
     }
 
-    /// The pixels as scouts of others.
-    fn scouts(&self) -> impl Iterator<Item = Scout> {
-        let scout = |pixel: usize| {
-            let level = self.level(pixel);
-            let log = self.predicted(pixel).map(|variance| log(variance) + dither(pixel));
-            Scout { level, log }
-        };
-        let inner = |i: usize, n: usize| n < SCOUT_WINDOW || (1..n - 1).contains(&i);
-        let (width, height) = (self.width, self.counts.len() / self.width);
-        let complete = move |i: &usize| inner(i % width, width) && inner(i / width, height);
-        (0..self.counts.len()).filter(complete).map(scout)
-    }
-
-    fn level(&self, pixel: usize) -> u32 {
+    /// The level of a pixel.
+    pub(super) fn level(&self, pixel: usize) -> u32 {
         level(pixel % self.width, pixel / self.width)
     }
 }
@@ -181,7 +172,7 @@ fn log(relative_variance: f32) -> f32 {
 }
 
 /// The usual number n times a power of two, as digital nets want it, within `fewest` and the most octaves.
-fn count(n: u32, octaves: f32, fewest: i32) -> u32 {
+pub(super) fn count(n: u32, octaves: f32, fewest: i32) -> u32 {
     let octaves = (octaves.round() as i32).clamp(fewest, OCTAVES[1]);
     let count = if octaves < 0 { n >> -octaves } else { n.saturating_mul(1 << octaves) };
     count.max(1)
@@ -189,123 +180,8 @@ fn count(n: u32, octaves: f32, fewest: i32) -> u32 {
 
 /// The fewest octaves of the pixels of a level. Where two more levels build on what they see, they have the usual
 /// number at least.
-fn fewest(level: u32) -> i32 {
+pub(super) fn fewest(level: u32) -> i32 {
     if level + 2 < N_LEVELS { 0 } else { OCTAVES[0] }
-}
-
-/// The share of a tile's pixels that are of a level.
-fn share(level: u32) -> f64 {
-    f64::from(1 << level.saturating_sub(1)) / 16.0
-}
-
-/// A pixel that shows how many samples pixels like it will get.
-#[derive(Clone, Copy, Debug)]
-struct Scout {
-    level: u32,
-    /// What its number of samples follows from; `None` where it is the usual number.
-    log: Option<f32>,
-}
-
-impl Scout {
-    /// Its samples, if a pixel at `mean_log` has `n`.
-    fn count(self, n: u32, mean_log: f32) -> f64 {
-        let octaves = self.log.map(|log| log - mean_log);
-        f64::from(octaves.map_or(n, |octaves| count(n, octaves, fewest(self.level))))
-    }
-}
-
-/// The mean number of samples of a pixel of the picture, over n, if a pixel at `mean_log` has `n`.
-fn spent(scouts: &[Scout], n: u32, mean_log: f32) -> f64 {
-    let (mut sum, mut shares) = (0.0, 0.0);
-    for level in 0..N_LEVELS {
-        let of_level = || scouts.iter().filter(|scout| scout.level == level);
-        let counts: f64 = of_level().map(|scout| scout.count(n, mean_log)).sum();
-        if counts > 0.0 {
-            sum += share(level) * counts / of_level().count() as f64;
-            shares += share(level);
-        }
-    }
-    sum / shares / f64::from(n)
-}
-
-/// The logarithm at which a pixel has `n` samples, if pixels like these have `n` on average; `None` if none of them
-/// sees the scene.
-fn mean_log(scouts: &[Scout], n: u32) -> Option<f32> {
-    /// The range is halved as often.
-    const STEPS: usize = 20;
-    let [fewest, most] = OCTAVES.map(|octaves| octaves as f32);
-    let logs = || scouts.iter().filter_map(|scout| scout.log);
-    let mut low = logs().reduce(f32::min)? - most - 1.0;
-    let mut high = logs().reduce(f32::max)? - fewest + 1.0;
-    // `low` spends too much, `high` does not.
-    for _ in 0..STEPS {
-        let middle = 0.5 * (low + high);
-        if spent(scouts, n, middle) > 1.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    Some(high)
-}
-
-/// The logarithm at which a pixel has the usual number of samples, so that those of the picture are about as many as
-/// were asked for; `None` if no scout sees the scene.
-///
-/// Scouts are windows of pixels, spread over the picture, with random numbers of their own: a scale that followed a
-/// pixel's own samples would bias them. They are rendered twice: a few with as many samples in every pixel, which finds
-/// a first scale; then all of them by that scale, since a strategy that learns errs less where more is learned.
-pub(super) fn scale<S: Strategy>(
-    context: &RenderContext,
-    strategy: &S,
-    pass: &Pass<S>,
-) -> Option<f32> {
-    /// A window for so many pixels of the picture: scouts cost a twentieth of the render, less in large pictures.
-    const PIXELS_PER_WINDOW: usize = 20 * SCOUT_WINDOW * SCOUT_WINDOW;
-    /// The fewest and the most.
-    const N_WINDOWS: [usize; 2] = [16, 400];
-    /// Windows for the first scale.
-    const FIRST: usize = 9;
-    let RenderSettings { width, height, seed, .. } = context.settings;
-    let settings = RenderSettings { seed: !seed, ..context.settings };
-    let context = &RenderContext { settings, filter: context.filter.clone(), ..*context };
-    let sampler = Sampler::for_pass(settings.sampler, settings.seed, 0);
-    let render = |n: usize, mean_log: Option<f32>| -> Vec<Scout> {
-        let shared = strategy.begin_pass(sampler, pass.n_samples);
-        let pass = &Pass { mean_log, shared, ..*pass };
-        spread(width, height, SCOUT_WINDOW, n)
-            .into_par_iter()
-            .map_init(Scratch::<S>::default, |scratch, window| {
-                Tile::new(window).render(context, strategy, pass, scratch, &());
-                scratch.allocation().scouts().collect::<Vec<_>>()
-            })
-            .flatten_iter()
-            .collect()
-    };
-    let first = mean_log(&render(FIRST, None), pass.n_samples)?;
-    let [fewest, most] = N_WINDOWS;
-    let n_windows = (width * height / PIXELS_PER_WINDOW).clamp(fewest, most);
-    mean_log(&render(n_windows, Some(first)), pass.n_samples)
-}
-
-/// About `n` windows of `size` × `size` pixels, or what the picture has, one at random in each cell of a grid.
-fn spread(width: usize, height: usize, size: usize, n: usize) -> Vec<Window> {
-    let aspect = (width as f64 / height as f64).sqrt();
-    let cells = |of: f64, extent: usize| ((n as f64).sqrt() * of).round().clamp(1.0, extent as f64);
-    let (across, down) = (cells(aspect, width), cells(1.0 / aspect, height));
-    let mut pcg = Pcg32::new(0, 0);
-    let mut place = |i: usize, cells: f64, extent: usize| {
-        let free = (extent + 1 - size.min(extent)) as f64;
-        ((i as f64 + f64::from(pcg.next_f32())) / cells * free) as usize
-    };
-    let mut windows = Vec::with_capacity((across * down) as usize);
-    for row in 0..down as usize {
-        for column in 0..across as usize {
-            let (x, y) = (place(column, across, width), place(row, down, height));
-            windows.push(Window { x, y, width: size.min(width), height: size.min(height) });
-        }
-    }
-    windows
 }
 
 /// An eighth of an octave more or less, so that pixels of equal variance do not all jump to another power of two at once.
@@ -351,38 +227,6 @@ mod tests {
         let mut sums = PassSums::default();
         (0..n).for_each(|_| sums.add(1.0 + deviation * (2.0 * pcg.next_f32() - 1.0), true));
         sums
-    }
-
-    /// Pixels like the scouts have as many samples on average as were asked for.
-    #[test]
-    fn the_scale_spends_what_was_asked_for() {
-        let mut pcg = Pcg32::new(1, 2);
-        for n in [8, 16, 64] {
-            for range in [0.0, 1.0, 4.0] {
-                let scouts: Vec<Scout> = (0..1024)
-                    .map(|i| {
-                        let level = level(i % 32, i / 32);
-                        let log = -3.0 + range * (pcg.next_f32() - 0.5);
-                        Scout { level, log: (level > 0).then_some(log) }
-                    })
-                    .collect();
-                let mean_log = mean_log(&scouts, n).unwrap();
-                let mean = spent(&scouts, n, mean_log);
-                assert!((mean - 1.0).abs() < 0.06, "{n} {range}: {mean}");
-            }
-        }
-        assert_eq!(mean_log(&[Scout { level: 0, log: None }], 8), None);
-    }
-
-    #[test]
-    fn scouts_lie_within_the_picture() {
-        for (width, height) in [(1, 1), (640, 3), (9, 700), (640, 480)] {
-            let windows = spread(width, height, SCOUT_WINDOW, 25);
-            assert!((1..=100).contains(&windows.len()), "{}", windows.len());
-            for w in windows {
-                assert!(w.x + w.width <= width && w.y + w.height <= height, "{w:?}");
-            }
-        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::RenderSettings;
-use super::tiling::Window;
+use super::tiling::{SampleSet, Window};
 use super::variance::{Contrast, VarianceSums};
 use crate::math::{Vec3, functions};
 use crate::{Rgb, RgbImage};
@@ -38,14 +38,6 @@ pub(super) struct SurfaceSample {
     pub(super) albedo: Rgb,
     pub(super) normal: Vec3,
     pub(super) depth: f32,
-}
-
-/// One of two independent sets of a pixel's samples; most pixels have the first alone.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum SampleSet {
-    #[default]
-    First,
-    Second,
 }
 
 /// The sums of one pixel. Samples are added one by one in their order, whatever the passes: the
@@ -201,9 +193,8 @@ impl PixelSums {
         })
     }
 
-    /// Of the mean.
-    fn variance(&self, sums: &VarianceSums) -> Rgb {
-        let scale = sums.scale(self.n_samples);
+    /// Of the mean, `scale` being [`VarianceSums::scale`] of its samples.
+    fn variance(&self, scale: f64) -> Rgb {
         Rgb::from(self.independent_variance().map(|v| narrowed(scale * v)))
     }
 }
@@ -326,6 +317,8 @@ impl Layers {
         let end = (from.y + from.height).min(window.y + window.height).max(start);
         let inside = (start - from.y) * from.width..(end - from.y) * from.width;
         let pixels = pixels.get(inside.clone()).unwrap_or_default().iter().zip(inside);
+        // Neighbors often have as many samples, and the scale costs a power.
+        let mut scale_of = (0, 1.0);
         for (p, i) in pixels.filter(|(p, _)| p.n_samples > 0) {
             let (x, y) = (from.x + i % from.width, from.y + i / from.width);
             assert!(window.contains(x, y), "pixel ({x}, {y}) outside {window}");
@@ -336,7 +329,10 @@ impl Layers {
             self.albedo.pixels[i] = p.albedo * p.scale();
             self.normal[i] = p.normal * p.scale();
             self.depth[i] = p.depth();
-            self.variance.pixels[i] = p.variance(variance);
+            if scale_of.0 != p.n_samples {
+                scale_of = (p.n_samples, variance.scale(p.n_samples));
+            }
+            self.variance.pixels[i] = p.variance(scale_of.1);
             self.n_samples[i] = p.n_samples;
             self.n_hits[i] = p.n_hits;
         }
@@ -391,12 +387,11 @@ impl Film {
 
     /// What the variance of the pixels is estimated from.
     pub fn variance_sums(&self) -> VarianceSums {
-        VarianceSums::of(&self.pixels)
+        VarianceSums::of(self.pixels.iter().filter_map(PixelSums::contrast))
     }
 
     /// Color and alpha of the window.
-    #[cfg(feature = "io")]
-    pub(super) fn picture(&self) -> (RgbImage, Vec<f32>) {
+    pub fn picture(&self) -> (RgbImage, Vec<f32>) {
         let color = self.pixels.iter().map(|p| p.mean(p.color)).collect();
         let alpha = self.pixels.iter().map(PixelSums::alpha).collect();
         (RgbImage::new(self.window.width, self.window.height, color), alpha)

@@ -7,11 +7,14 @@
 mod allocation;
 #[cfg(feature = "io")]
 mod checkpoint;
+#[cfg(feature = "io")]
+mod exposure;
 mod film;
 mod filter;
 #[cfg(feature = "io")]
 mod output;
 mod renderer;
+mod scouts;
 mod tile;
 mod tiling;
 mod variance;
@@ -21,6 +24,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 #[cfg(feature = "io")]
 pub use checkpoint::{Checkpoint, CheckpointError, Difference};
+#[cfg(feature = "io")]
+pub use exposure::automatic_exposure;
 pub use film::{Film, FilmMismatch, Layers};
 pub use filter::{Filter, FilterSampler, UnknownFilter};
 #[cfg(feature = "io")]

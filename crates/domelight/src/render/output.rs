@@ -4,10 +4,11 @@ use std::io::{Seek, Write};
 use std::path::Path;
 
 use super::{Film, Layers};
+use crate::picture::exposure::Exposure;
 use crate::picture::exr::ExrLayers;
 use crate::picture::exr::bands::{self, BAND_ROWS};
 use crate::picture::png::{self, Depth};
-use crate::picture::tone::{Exposure, ToneCurve, ToneMapping};
+use crate::picture::tone::{ToneCurve, ToneMapping};
 use crate::picture::{PictureErrorKind, write_atomically, write_atomically_seeking};
 use crate::{Error, RgbImage};
 
@@ -59,11 +60,13 @@ impl Film {
         })?)
     }
 
-    /// The picture for a screen. Where the background is hidden, alpha goes along.
+    /// The picture for a screen; automatic exposure is for what the scene covers. Where the background is hidden, alpha
+    /// goes along.
     pub fn develop(&self, exposure: Exposure, curve: ToneCurve) -> Developed {
-        let Layers { color, alpha, .. } = self.layers();
+        let Layers { color, alpha, n_hits, .. } = self.layers();
+        let coverage: Vec<f32> = n_hits.iter().map(|&n| n as f32).collect();
         let alpha = alpha.iter().any(|&a| a < 1.0).then_some(alpha);
-        let tone = ToneMapping { exposure: exposure.stops(&color, alpha.as_deref()), curve };
+        let tone = ToneMapping { exposure: exposure.stops(&color, Some(&coverage)), curve };
         Developed { color, alpha, tone }
     }
 }

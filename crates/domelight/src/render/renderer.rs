@@ -5,11 +5,11 @@ use std::ops::{Deref, Range};
 
 use rayon::prelude::*;
 
-use super::allocation::scale;
-use super::film::{Film, FilmMismatch, Layers, PixelSums, SampleSet};
+use super::film::{Film, FilmMismatch, Layers, PixelSums};
 use super::filter::FilterSampler;
+use super::scouts::scale;
 use super::tile::{Counts, Pass, Scratch, Tile};
-use super::tiling::{Tiling, Window, paired_pass};
+use super::tiling::{SampleSet, Tiling, Window, paired_pass};
 use super::variance::VarianceSums;
 use super::{Observer, RenderContext, RenderSettings, Rendering};
 use crate::environment::Environment;

@@ -5,8 +5,8 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::allocation::{Allocation, PassSums};
-use super::film::{CameraSample, Layers, PixelSums, SampleSet, SurfaceSample};
-use super::tiling::Window;
+use super::film::{CameraSample, Layers, PixelSums, SurfaceSample};
+use super::tiling::{SampleSet, Window};
 use super::variance::VarianceSums;
 use super::{Background, Mark, Observer, RenderContext, RenderSettings, Stage, visibility};
 use crate::Rgb;
@@ -185,7 +185,7 @@ impl Tile {
 
     /// What the variance of its pixels is estimated from.
     pub(super) fn variance_sums(&self) -> VarianceSums {
-        VarianceSums::of(&self.pixels)
+        VarianceSums::of(self.pixels.iter().filter_map(PixelSums::contrast))
     }
 
     /// Takes over the sums of a tile whose work is not counted here.
@@ -229,7 +229,12 @@ impl Tile {
         batch.seen.clear();
         batch.seen.resize(n_pixels, false);
         self.find_seen(context, self.window, &mut batch.seen);
-        batch.allocation.reset(width, n_pixels, pass.n_samples, pass.mean_log);
+        // Where nothing is seen there is nothing to learn.
+        let n_rounds = if batch.seen.contains(&true) { strategy.n_rounds() } else { 1 };
+        let learns = n_rounds > 1;
+        batch.adaptive = learns && pass.adaptive;
+        let mean_log = pass.mean_log.filter(|_| batch.adaptive);
+        batch.allocation.reset(width, n_pixels, pass.n_samples, mean_log);
         let hidden = context.settings.background == Background::Hidden;
         if self.pixels.is_empty() && hidden && !batch.seen.contains(&true) {
             self.n_missed += pass.n_samples;
@@ -241,16 +246,9 @@ impl Tile {
         self.pixels.resize(n_pixels, PixelSums::missed(self.n_missed));
         let strategy_context = StrategyContext { context, strategy, pass: &pass.shared, width };
         let mut counts = Counts::default();
-        // Where nothing is seen there is nothing to learn.
-        let n_rounds = if batch.seen.contains(&true) { strategy.n_rounds() } else { 1 };
-        let learns = n_rounds > 1;
         // Renders with a target error have a second set in every pixel.
         let one_in_many = learns && context.settings.target_error.is_none();
         self.choose_second_sets(context, one_in_many, batch);
-        batch.adaptive = learns && pass.adaptive;
-        if !batch.adaptive {
-            batch.allocation.reset(width, n_pixels, pass.n_samples, None);
-        }
         for round in 0..n_rounds {
             batch.allocation.assign(round);
             let of_round = |i: usize| !learns || level(i % width, i / width) == round;
@@ -600,7 +598,8 @@ impl Batch {
         let p = &self.points[point];
         // In multiples of the unit, as the rest.
         let in_units = |c: f32| (f64::from(c) / unit).min(f64::from(f32::MAX)) as f32;
-        let emitted = context.scene.emitted(hit).map(in_units);
+        let emitted = context.scene.emitted(hit);
+        let emitted = if emitted == Rgb::BLACK { emitted } else { emitted.map(in_units) };
         CameraSample {
             color: self.radiance[point] + emitted,
             unoccluded: self.unoccluded[point] + emitted,

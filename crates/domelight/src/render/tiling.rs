@@ -3,7 +3,6 @@
 use std::fmt;
 use std::ops::Range;
 
-use super::film::SampleSet;
 use super::{Passes, RenderSettings};
 use crate::strategy::Strategy;
 
@@ -53,6 +52,14 @@ impl fmt::Display for Window {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}x{}+{}+{}", self.width, self.height, self.x, self.y)
     }
+}
+
+/// One of two independent sets of a pixel's samples; most pixels have the first alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum SampleSet {
+    #[default]
+    First,
+    Second,
 }
 
 /// The tiles of a picture, in row order; those at the right and lower border may be smaller.

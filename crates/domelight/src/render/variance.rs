@@ -19,7 +19,6 @@
 //! Either is too noisy in a single pixel. So the quotient of this variance and of s²/n, both summed over all pixels of
 //! the picture, scales the s²/n of each.
 
-use super::film::PixelSums;
 use crate::math::functions;
 
 /// Sums over pixels of what their variance is estimated from. In whole numbers, so that the sums of parts of a
@@ -47,10 +46,10 @@ impl VarianceSums {
         sums.zip(others).for_each(|(sum, x)| *sum = sum.saturating_add(*x));
     }
 
-    /// Of some pixels.
-    pub(super) fn of(pixels: &[PixelSums]) -> Self {
+    /// The sums of what some pixels add.
+    pub(super) fn of(contrasts: impl Iterator<Item = Contrast>) -> Self {
         let mut sums = Self::default();
-        for contrast in pixels.iter().filter_map(PixelSums::contrast) {
+        for contrast in contrasts {
             let mut of_pixel = Self::default();
             match contrast {
                 Contrast::Sets(sets) => of_pixel.sets = sets.map(fixed),

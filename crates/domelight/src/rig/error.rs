@@ -8,6 +8,7 @@ use super::Rig;
 use super::regions::{Blocks, Metric};
 use super::texels::{Texels, unit};
 use crate::environment::Environment;
+use crate::environment::lat_long::narrow_band;
 use crate::math::{TAU, Vec3, functions, vec3};
 use crate::parallel::in_order;
 
@@ -111,12 +112,10 @@ fn of_cells(texels: &Texels) -> Vec<(Vec3, f64)> {
     let (width, height) = (texels.width(), texels.height());
     let (across, down) = (CELLS[0].div_ceil(width), CELLS[1].div_ceil(height));
     let middle = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
-    let step = std::f64::consts::PI / (height * down) as f64;
     let mut lights = Vec::new();
     for row in 0..height * down {
-        // cos θ₀ − cos θ₁ as a product.
-        let band = 2.0 * functions::sin(step * (row as f64 + 0.5)) * functions::sin(0.5 * step);
-        let solid_angle = band * std::f64::consts::TAU / (width * across) as f64;
+        let solid_angle =
+            narrow_band(row, height * down) * std::f64::consts::TAU / (width * across) as f64;
         let radiance = texels.row(row / down);
         for column in 0..width * across {
             let luminance = f64::from(radiance[column / across].luminance());

@@ -225,6 +225,13 @@ impl Camera {
         })
     }
 
+    /// The same view in a picture of another size: both sizes are (columns, rows), at least 1.
+    #[must_use]
+    pub fn resized(&self, from: (usize, usize), to: (usize, usize)) -> Self {
+        let [x, y] = [from.0 as f32 / to.0 as f32, from.1 as f32 / to.1 as f32];
+        Self { step_x: self.step_x * x, step_y: self.step_y * y, ..*self }
+    }
+
     /// The ray through the point (`px`, `py`) of the picture in pixels, `px` in [0, width) to the
     /// right and `py` in [0, height) down; its direction is a unit vector.
     #[inline]

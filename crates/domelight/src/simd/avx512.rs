@@ -330,6 +330,7 @@ impl SimdF32x16 for F32x16 {
 
 impl SimdF32x8 for F32x8 {
     type I32x8 = I32x8;
+    const FUSES: bool = true;
 
     #[inline(always)]
     fn mul_sub(self, b: Self, c: Self) -> Self {

@@ -195,6 +195,8 @@ pub trait SimdFloat:
 /// Eight f32.
 pub trait SimdF32x8: SimdFloat {
     type I32x8: SimdI32x8<F32x8 = Self>;
+    /// [`SimdF32x8::mul_sub`] is one instruction; else it takes many.
+    const FUSES: bool;
 
     fn store(self) -> Lanes;
     /// Toward zero; of numbers beyond 2³¹ and NaN anything.
@@ -287,9 +289,15 @@ fn compress<T: Copy + Default>(lanes: [T; LANES], keep: u32) -> [T; LANES] {
 #[inline(always)]
 fn pack(pair: [[u32; 8]; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
     let [a, b] = pair;
-    let not_empty = (0..LANES).fold(0, |bits, i| bits | u32::from(a[i] | b[i] != 0) << i);
-    let pair = pair.map(|sets| compress(sets, not_empty));
-    (pair, compress(numbers, not_empty), not_empty.count_ones() as usize)
+    let (mut packed, mut packed_numbers, mut len) = ([[0; 8]; 2], [0; 8], 0);
+    for i in 0..LANES {
+        // As in `compress`.
+        packed[0][len % LANES] = a[i];
+        packed[1][len % LANES] = b[i];
+        packed_numbers[len % LANES] = numbers[i];
+        len += usize::from(a[i] | b[i] != 0);
+    }
+    (packed, packed_numbers, len)
 }
 
 /// Eight sets of the numbers 0 to 31.

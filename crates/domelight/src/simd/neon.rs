@@ -203,6 +203,7 @@ impl SimdFloat for F32x8 {
 
 impl SimdF32x8 for F32x8 {
     type I32x8 = I32x8;
+    const FUSES: bool = true;
 
     #[inline(always)]
     fn mul_sub(self, b: Self, c: Self) -> Self {

@@ -173,6 +173,7 @@ fn mul_sub(a: v128, b: v128, c: v128) -> v128 {
 
 impl SimdF32x8 for F32x8 {
     type I32x8 = I32x8;
+    const FUSES: bool = false;
 
     #[inline(always)]
     fn mul_sub(self, b: Self, c: Self) -> Self {

@@ -16,6 +16,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::{averaged, direction};
 use crate::color::Rgb;
+use crate::environment::lat_long::narrow_band;
 use crate::image::RgbImage;
 use crate::math::{Vec3, functions, vec3};
 
@@ -224,8 +225,7 @@ fn sun_solid_angle() -> f64 {
 
 /// Exact solid angle of a texel of `row` \[sr\].
 fn texel_solid_angle(row: usize, height: usize) -> f64 {
-    let step = PI / height as f64;
-    2.0 * functions::sin(step * (row as f64 + 0.5)) * functions::sin(0.5 * step) * step
+    narrow_band(row, height) * (PI / height as f64)
 }
 
 /// Angle between two directions \[rad\], by haversines, which are exact for small angles.

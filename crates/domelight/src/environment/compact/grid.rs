@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use crate::environment::LatLongGrid;
 use crate::math::{Vec3, functions, vec3};
 use crate::parallel::bands;
 use crate::{Rgb, RgbImage};
@@ -15,8 +16,7 @@ pub(super) struct Grid<'a> {
     pub(super) step: usize,
     pub(super) columns: usize,
     pub(super) rows: usize,
-    /// cos θ of the upper edge of each texel row, and of the lower edge of the last.
-    cos_edges: Vec<f64>,
+    lat_long: LatLongGrid,
     /// Mean luminance over the solid angle of each cell, row by row.
     pub(super) luminance: Vec<f32>,
 }
@@ -28,9 +28,8 @@ impl<'a> Grid<'a> {
             step *= 2;
         }
         let (columns, rows) = (map.width.div_ceil(step), map.height.div_ceil(step));
-        let cos = |y: usize| functions::cos(PI * y as f64 / map.height as f64);
-        let cos_edges = (0..=map.height).map(cos).collect();
-        let mut grid = Self { map, step, columns, rows, cos_edges, luminance: Vec::new() };
+        let lat_long = LatLongGrid::new(map.width, map.height);
+        let mut grid = Self { map, step, columns, rows, lat_long, luminance: Vec::new() };
         let mut luminance = vec![0.0; columns * rows];
         bands(&mut luminance, columns, |row, out| {
             for (column, out) in out.iter_mut().enumerate() {
@@ -62,7 +61,7 @@ impl<'a> Grid<'a> {
         let mut sum = [0.0; 3];
         let mut weight = 0.0;
         for y in rows {
-            let band = self.cos_edges[y] - self.cos_edges[y + 1];
+            let band = self.lat_long.band(y..y + 1);
             weight += band * columns.len() as f64;
             for texel in &self.map.row(y)[columns.clone()] {
                 let le = texel.to_array();
@@ -76,7 +75,7 @@ impl<'a> Grid<'a> {
     pub(super) fn solid_angle(&self, cell: usize) -> f64 {
         let [columns, rows] = self.texels(cell);
         let turn = TAU * columns.len() as f64 / self.map.width as f64;
-        turn * (self.cos_edges[rows.start] - self.cos_edges[rows.end])
+        turn * self.lat_long.band(rows)
     }
 
     /// Solid angle of a cell on the horizon \[sr\].

@@ -5,8 +5,9 @@
 //! to about 10⁻⁶, and a constant map stays constant.
 
 use super::Mapping;
-use super::overlap::{Grid, Overlap};
+use super::overlap::Overlap;
 use crate::color::Rgb;
+use crate::environment::LatLongGrid;
 use crate::image::RgbImage;
 use crate::parallel::in_order;
 
@@ -30,7 +31,7 @@ pub fn to_lat_long(image: &RgbImage, mapping: Mapping, height: usize) -> RgbImag
         return turned_by_half(image);
     }
     let width = 2 * height;
-    let grid = Grid::new(width, height);
+    let grid = LatLongGrid::new(width, height);
     let mut sums = vec![Mean::default(); width * height];
     for band in (0..image.height).step_by(BAND) {
         let rows = in_order(BAND.min(image.height - band), |i| {
@@ -68,7 +69,7 @@ pub fn from_lat_long(image: &RgbImage, mapping: Mapping, size: (usize, usize)) -
     if turned && width.is_multiple_of(2) {
         return turned_by_half(image);
     }
-    let grid = Grid::new(image.width, image.height);
+    let grid = LatLongGrid::new(image.width, image.height);
     let rows = in_order(height, |y| {
         let mut overlap = Overlap::new(&grid, mapping, width, height);
         let mut row = vec![Rgb::BLACK; width];

@@ -8,8 +8,8 @@
 //!
 //! Everything here is in double precision: at 4096 rows a coordinate in single precision is off by 10⁻⁴ of a texel.
 
-use super::Mapping;
-use super::cube::Cube;
+use super::{CubeLayout, Mapping};
+use crate::environment::LatLongGrid;
 use crate::math::functions;
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
@@ -19,17 +19,9 @@ type Direction = [f64; 3];
 /// A lat-long texel and the solid angle \[sr\] that is shared with it.
 pub(super) type Share = (usize, f64);
 
-/// The lat-long grid that texels are laid over.
-pub(super) struct Grid {
-    width: usize,
-    height: usize,
-    /// cos θ of the lines between rows, falling from 1 to −1.
-    lines: Vec<f64>,
-}
-
-/// One texel at a time against a [`Grid`]; keeps its memory.
+/// One texel at a time against a [`LatLongGrid`]; keeps its memory.
 pub(super) struct Overlap<'a> {
-    grid: &'a Grid,
+    grid: &'a LatLongGrid,
     mapping: Mapping,
     /// Of the picture whose texels are laid over the grid.
     width: usize,
@@ -52,35 +44,6 @@ struct Vertex {
     longitude: Option<f64>,
 }
 
-impl Grid {
-    pub(super) fn new(width: usize, height: usize) -> Self {
-        let line = |row: usize| functions::cos(PI * row as f64 / height as f64);
-        Self { width, height, lines: (0..=height).map(line).collect() }
-    }
-
-    /// The row of a height.
-    fn row(&self, y: f64) -> usize {
-        let row = (functions::acos(y.clamp(-1.0, 1.0)) / PI * self.height as f64) as usize;
-        self.row_near(row.min(self.height - 1), y)
-    }
-
-    /// The row of a height that is in `row` or near.
-    fn row_near(&self, mut row: usize, y: f64) -> usize {
-        while row > 0 && y > self.lines[row] {
-            row -= 1;
-        }
-        while row + 1 < self.height && y < self.lines[row + 1] {
-            row += 1;
-        }
-        row
-    }
-
-    /// The solid angle of a texel \[sr\].
-    pub(super) fn solid_angle(&self, row: usize) -> f64 {
-        (self.lines[row] - self.lines[row + 1]) * TAU / self.width as f64
-    }
-}
-
 impl Vertex {
     fn new(direction: Direction) -> Self {
         let [x, _, z] = direction;
@@ -92,7 +55,12 @@ impl Vertex {
 }
 
 impl<'a> Overlap<'a> {
-    pub(super) fn new(grid: &'a Grid, mapping: Mapping, width: usize, height: usize) -> Self {
+    pub(super) fn new(
+        grid: &'a LatLongGrid,
+        mapping: Mapping,
+        width: usize,
+        height: usize,
+    ) -> Self {
         let (outline, areas, shares) = (Vec::new(), Vec::new(), Vec::new());
         Self { grid, mapping, width, height, outline, areas, shares }
     }
@@ -102,14 +70,14 @@ impl<'a> Overlap<'a> {
         self.shares.clear();
         self.outline.clear();
         if self.width == 1 && self.height == 1 {
-            let whole = |i: usize| (i, self.grid.solid_angle(i / self.grid.width));
-            self.shares.extend((0..self.grid.width * self.grid.height).map(whole));
+            let whole = |i: usize| (i, self.grid.solid_angle(i / self.grid.width()));
+            self.shares.extend((0..self.grid.width() * self.grid.height()).map(whole));
             return;
         }
         match self.mapping {
             Mapping::LatLong => self.rectangle(x, y, 0.0),
             Mapping::LatLongExr => self.rectangle(x, y, 0.5),
-            _ => {
+            Mapping::Angular | Mapping::MirrorBall | Mapping::Cube(_) | Mapping::Octahedral => {
                 let size = [self.width as f64, self.height as f64];
                 let Some(chart) = Chart::of(self.mapping, size, x, y) else { return };
                 self.trace(&chart, size, [x as f64, y as f64]);
@@ -121,7 +89,7 @@ impl<'a> Overlap<'a> {
 
     /// The outline of a texel of a lat-long map that is turned by so much of a turn.
     fn rectangle(&mut self, x: usize, y: usize, turn: f64) {
-        let column = |x: usize| (x as f64 / self.width as f64 + turn) * self.grid.width as f64;
+        let column = |x: usize| (x as f64 / self.width as f64 + turn) * self.grid.width() as f64;
         let line = |y: usize| functions::cos(PI * y as f64 / self.height as f64);
         let (left, right, top, bottom) = (column(x), column(x + 1), line(y), line(y + 1));
         self.outline.extend([[left, top], [right, top], [right, bottom], [left, bottom]]);
@@ -173,7 +141,7 @@ impl<'a> Overlap<'a> {
             self.outline.push([last, height.signum()]);
             return;
         };
-        let turn = self.grid.width as f64;
+        let turn = self.grid.width() as f64;
         let mut column = longitude * turn / TAU;
         if let Some(&[last, last_height]) = self.outline.last() {
             if last.is_nan() {
@@ -194,7 +162,7 @@ impl<'a> Overlap<'a> {
         let (Some(&first), Some(&last)) = (self.outline.first(), self.outline.last()) else {
             return;
         };
-        if (last[0] - first[0]).abs() > 0.5 * self.grid.width as f64 {
+        if (last[0] - first[0]).abs() > 0.5 * self.grid.width() as f64 {
             let mean: f64 = self.outline.iter().map(|p| p[1]).sum::<f64>();
             let pole = mean.signum();
             self.outline.extend([[last[0], pole], [first[0], pole]]);
@@ -220,7 +188,7 @@ impl<'a> Overlap<'a> {
             self.line([x0 - left, y0], [x1 - left, y1], top, columns);
         }
         self.outline = outline;
-        let (width, scale) = (self.grid.width, TAU / self.grid.width as f64);
+        let (width, scale) = (self.grid.width(), TAU / self.grid.width() as f64);
         let sign = self.areas.iter().sum::<f64>().signum();
         let left = (left as i64).rem_euclid(width as i64) as usize;
         for (i, &area) in self.areas.iter().enumerate() {
@@ -251,7 +219,7 @@ impl<'a> Overlap<'a> {
         for row in first..=last {
             let to = match row {
                 _ if row == last => lower,
-                _ => [at(self.grid.lines[row + 1]), self.grid.lines[row + 1]],
+                _ => [at(self.grid.cos_edge(row + 1)), self.grid.cos_edge(row + 1)],
             };
             let cells = &mut self.areas[(row - top) * columns..][..columns];
             add_trapezoids(cells, from, to, sign);
@@ -358,17 +326,15 @@ impl Chart {
             Mapping::Angular => Self::Angular,
             Mapping::MirrorBall => Self::MirrorBall,
             Mapping::Octahedral => Self::Octahedral,
-            Mapping::CubeCrossHorizontal
-            | Mapping::CubeCrossVertical
-            | Mapping::CubeStripHorizontal
-            | Mapping::CubeStripVertical => Self::face(mapping.cube(), center)?,
+            Mapping::Cube(layout) => Self::face(layout, center)?,
         })
     }
 
-    fn face(cube: &Cube, [u, v]: Point) -> Option<Self> {
-        let count = [cube.columns as f64, cube.rows as f64];
+    fn face(layout: CubeLayout, [u, v]: Point) -> Option<Self> {
+        let (columns, rows) = layout.faces_across_and_down();
+        let count = [columns as f64, rows as f64];
         let cell = [(u * count[0]).floor(), (v * count[1]).floor()];
-        let face = cube.faces.iter().find(|f| [f.column as f64, f.row as f64] == cell)?;
+        let face = layout.face_at(cell[0] as usize, cell[1] as usize)?;
         let [forward, right, up] =
             [face.forward, face.right, face.up].map(|axis| axis.as_dvec3().to_array());
         Some(Self::Cube { forward, right, up, cell, count })
@@ -460,7 +426,7 @@ mod tests {
             for (rows, size) in
                 [(16, mapping.size_for(16)), (9, mapping.size_for(40)), (40, mapping.size_for(7))]
             {
-                let grid = Grid::new(2 * rows, rows);
+                let grid = LatLongGrid::new(2 * rows, rows);
                 let (width, height) = size;
                 let mut overlap = Overlap::new(&grid, mapping, width, height);
                 let mut covered = vec![0.0; 2 * rows * rows];

@@ -63,6 +63,19 @@ pub fn write<B: Borrow<ExrLayers>, E: From<PictureErrorKind>>(
     Ok(())
 }
 
+impl ExrLayers {
+    /// The file's bytes: 32 bits a sample, scanlines.
+    ///
+    /// # Errors
+    /// If there are no texels or no channels, two channels have one name, a name is not ASCII or too long, or a
+    /// channel has not `width · height` values.
+    pub fn encode(&self) -> Result<Vec<u8>, PictureErrorKind> {
+        let mut bytes = Cursor::new(Vec::new());
+        write(self.height, &mut bytes, |_| Ok::<_, PictureErrorKind>(self))?;
+        Ok(bytes.into_inner())
+    }
+}
+
 fn error_kind(error: Error) -> PictureErrorKind {
     match error {
         Error::Io(error) => PictureErrorKind::Io(error),

@@ -6,7 +6,7 @@
 //! The `exr` crate decompresses subsampled channels, but refuses their headers; so the table of blocks is walked
 //! through here.
 
-use super::read::{to_rec709, window};
+use super::attributes::{primaries, to_rec709, window};
 use crate::picture::primaries::{Primaries, transform};
 use crate::picture::{Format, Picture, PictureErrorKind, allocate, checked_area};
 use crate::{Rgb, RgbImage};
@@ -80,7 +80,7 @@ impl LuminanceChroma {
             return Err(PictureErrorKind::ExrUnsupported("luminance without chroma"));
         };
         let chromaticities = self.header.shared_attributes.chromaticities.as_ref();
-        let weights = chromaticities.map_or(Primaries::REC709, super::read::primaries).luminance();
+        let weights = chromaticities.map_or(Primaries::REC709, primaries).luminance();
         let matrix = chromaticities.and_then(to_rec709);
         let image = RgbImage::from_fn(width, height, |x, y| {
             let luminance = luminance.at(x, y);

@@ -1,5 +1,6 @@
 //! OpenEXR: reads one layer of any flat file, writes several layers into one part.
 
+mod attributes;
 pub mod bands;
 mod luminance_chroma;
 mod read;

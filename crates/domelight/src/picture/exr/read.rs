@@ -9,18 +9,18 @@
 //! own for each file, in which a panic over a corrupt block would abort the process. What the crate asserts instead
 //! of returning an error is caught here and becomes [`PictureErrorKind::ExrPanic`].
 
+use super::attributes::{to_rec709, window};
 use super::luminance_chroma::LuminanceChroma;
+use super::write::string_attributes;
 use crate::environment::mapping::EnvmapKind;
-use crate::picture::primaries::{Primaries, transform};
-use crate::picture::{
-    DataWindow, Format, MAX_TEXELS, Picture, PictureErrorKind, allocate, checked_area,
-};
+use crate::picture::primaries::transform;
+use crate::picture::{Format, MAX_TEXELS, Picture, PictureErrorKind, allocate, checked_area};
 use crate::{Rgb, RgbImage};
 use ::exr::block::UncompressedBlock;
 use ::exr::block::chunk::{Chunk, CompressedBlock};
 use ::exr::block::lines::LineRef;
 use ::exr::block::reader::{ChunksReader, Reader};
-use ::exr::meta::attribute::{Chromaticities, EnvironmentMap};
+use ::exr::meta::attribute::EnvironmentMap;
 use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{Compression, SampleType, Text, f16};
@@ -85,18 +85,14 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Pictur
     let planes = planes.map_or_else(|| Planes::new(&header, channels), Ok)?;
     let image = planes.into_image(matrix.filter(|_| is_color));
     let window = window(&header);
-    Ok(Picture { alpha: image.1, envmap, window, ..Picture::opaque(image.0, Format::Exr) })
-}
-
-/// Where the data window lies in the display window, if they differ.
-pub(super) fn window(header: &Header) -> Option<DataWindow> {
-    let (data, display) = (header.data_window(), header.shared_attributes.display_window);
-    let step = |from: i32, to: i32| i64::from(to) - i64::from(from);
-    let position =
-        (step(display.position.0, data.position.0), step(display.position.1, data.position.1));
-    let display = (display.size.0, display.size.1);
-    let same = position == (0, 0) && display == (data.size.0, data.size.1);
-    (!same).then_some(DataWindow { position, display })
+    let attributes = string_attributes(&header);
+    Ok(Picture {
+        alpha: image.1,
+        envmap,
+        window,
+        attributes,
+        ..Picture::opaque(image.0, Format::Exr)
+    })
 }
 
 /// How many texels the largest part has.
@@ -190,14 +186,6 @@ fn check_dwa_sizes(chunk: &Chunk, meta: &MetaData) -> Result<(), PictureErrorKin
         return Err(PictureErrorKind::Promises { width, height, needed: greatest, held });
     }
     Ok(())
-}
-
-pub(super) fn to_rec709(c: &Chromaticities) -> Option<crate::math::Mat3> {
-    primaries(c).to_rec709()
-}
-
-pub(super) fn primaries(c: &Chromaticities) -> Primaries {
-    Primaries([c.red, c.green, c.blue, c.white].map(|xy| [xy.0, xy.1]))
 }
 
 /// Refuses a header whose blocks cannot all be in a file of `held` bytes.

@@ -12,8 +12,6 @@ use ::exr::meta::header::Header;
 use ::exr::prelude::{AttributeValue, ImageAttributes, IntegerBounds, LayerAttributes, Text, Vec2};
 use std::io::Cursor;
 
-use super::bands;
-
 /// Channels that belong together, such as `albedo` with R, G and B.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
@@ -127,17 +125,6 @@ impl ExrLayers {
     pub fn push_channel(&mut self, name: &str, channel: &str, values: impl Into<Plane>) {
         let channels = vec![(channel.to_owned(), values.into())];
         self.layers.push(Layer { name: name.to_owned(), channels });
-    }
-
-    /// The file's bytes: 32 bits a sample, scanlines.
-    ///
-    /// # Errors
-    /// If there are no texels or no channels, two channels have one name, a name is not ASCII or too long, or a
-    /// channel has not `width · height` values.
-    pub fn encode(&self) -> Result<Vec<u8>, PictureErrorKind> {
-        let mut bytes = Cursor::new(Vec::new());
-        bands::write(self.height, &mut bytes, |_| Ok::<_, PictureErrorKind>(self))?;
-        Ok(bytes.into_inner())
     }
 
     /// The channels by their full names, in the order of a file: by name.

@@ -28,6 +28,7 @@ mod polygon;
 mod stl;
 mod textures;
 mod toml;
+mod wavefront;
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -37,13 +38,15 @@ use std::path::{Path, PathBuf};
 pub use self::gltf::{GltfErrorKind, Ktx2Error, MeshoptError};
 pub use files::Resolver;
 pub use format::SceneFormat;
-pub use obj::ObjErrorKind;
 pub use off::OffErrorKind;
 pub use ply::{PlyErrorKind, PlyPlace};
 pub use stl::StlErrorKind;
 pub use toml::TomlErrorKind;
+pub use wavefront::ObjErrorKind;
 
-use super::SceneDescription;
+use super::{Material, Part, SceneDescription};
+use crate::Rgb;
+use crate::geometry::Mesh;
 use crate::memory::OverLimit;
 use budget::Budget;
 use files::Files;
@@ -60,6 +63,22 @@ pub struct Loaded {
     /// The files that were read beside the one that was asked for.
     pub files: Vec<PathBuf>,
 }
+
+impl Loaded {
+    /// The mesh of a file without materials: white under colors of its own, else gray.
+    fn of_mesh(path: &Path, mesh: Mesh) -> Self {
+        let albedo = if mesh.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
+        let description = SceneDescription {
+            parts: vec![Part { name: stem(path), mesh, material: 0 }],
+            materials: vec![Material::diffuse("default", albedo)],
+            ..SceneDescription::default()
+        };
+        Self { description, ..Self::default() }
+    }
+}
+
+/// The albedo of meshes that come without a material.
+const DEFAULT_ALBEDO: Rgb = Rgb::splat(0.6);
 
 /// Where the files may be that a scene refers to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -360,31 +379,6 @@ fn text_of(bytes: &[u8]) -> Cow<'_, str> {
         // Latin-1 is the first 256 characters of Unicode.
         Err(_) => Cow::Owned(bytes.iter().map(|&b| char::from(b)).collect()),
     }
-}
-
-/// The lines of an OBJ or MTL file with their numbers from 1; one that ends in a backslash goes on in the next.
-fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let mut rest = bytes.split(|&b| b == b'\n').enumerate();
-    std::iter::from_fn(move || {
-        let (index, first) = rest.next()?;
-        let Some(begin) = continued(first) else { return Some((index + 1, text_of(first))) };
-        let mut whole = begin.to_vec();
-        for (_, next) in rest.by_ref() {
-            whole.push(b' ');
-            let Some(part) = continued(next) else {
-                whole.extend(next);
-                break;
-            };
-            whole.extend(part);
-        }
-        Some((index + 1, Cow::Owned(text_of(&whole).into_owned())))
-    })
-}
-
-/// What stands before the backslash at the end of a line.
-fn continued(line: &[u8]) -> Option<&[u8]> {
-    line.trim_ascii_end().strip_suffix(b"\\")
 }
 
 /// The name of a file without folder and extension.

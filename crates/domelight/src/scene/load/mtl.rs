@@ -8,10 +8,10 @@
 
 use std::path::Path;
 
+use super::LoadError;
 use super::notes::Notes;
-use super::obj::{ObjErrorKind, number, numbers};
 use super::textures::Textures;
-use super::{LoadError, lines};
+use super::wavefront::{ObjErrorKind, lines, number, numbers};
 use crate::Rgb;
 use crate::math::{Vec2, vec2};
 use crate::scene::{

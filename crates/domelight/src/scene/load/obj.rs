@@ -14,69 +14,14 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::notes::Notes;
-use super::ply::DEFAULT_ALBEDO;
 use super::polygon::Triangulator;
 use super::textures::Textures;
-use super::{Budget, LoadError, Loaded, lines, mtl, stem};
+use super::wavefront::{ObjErrorKind, enough, lines, number, numbers, words};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, mtl, stem};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
 use crate::scene::{Material, Part, SceneDescription};
-
-/// What is wrong with a line of an OBJ or MTL file.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ObjErrorKind {
-    /// Not enough numbers.
-    #[error("{keyword} needs {needed} numbers, but there are only {found}")]
-    TooFew {
-        /// The line's keyword.
-        keyword: String,
-        /// How many it needs.
-        needed: usize,
-        /// How many there are.
-        found: usize,
-    },
-    /// A word that is not a number.
-    #[error("'{text}' is not a finite number")]
-    NotANumber {
-        /// The word.
-        text: String,
-    },
-    /// A face with a corner that cannot be read.
-    #[error("'{text}' is no corner of a face; write v, v/vt, v//vn or v/vt/vn")]
-    Corner {
-        /// The corner.
-        text: String,
-    },
-    /// An index that names nothing yet.
-    #[error("index {index} names no {what}; {count} are defined so far")]
-    Index {
-        /// The index as written.
-        index: i64,
-        /// What it should name.
-        what: &'static str,
-        /// How many there are.
-        count: usize,
-    },
-    /// A face with less than three corners.
-    #[error("a face needs three corners or more, but there are {corners}")]
-    Face {
-        /// How many it has.
-        corners: usize,
-    },
-    /// A keyword without its name.
-    #[error("{keyword} needs a name")]
-    Name {
-        /// The keyword.
-        keyword: String,
-    },
-    /// A material's property before any material.
-    #[error("{keyword} stands before the first newmtl")]
-    NoMaterial {
-        /// The keyword.
-        keyword: String,
-    },
-}
 
 /// Memory of a mesh for each byte of its text: a corner of a face is some 3 to 10 bytes, and takes 20 while it is read and
 /// up to 32 as a vertex.
@@ -374,16 +319,6 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The words of a line before its comment.
-pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
-    text.split_whitespace().take_while(|word| !word.starts_with('#'))
-}
-
-/// All numbers after a keyword, at least `needed`.
-pub(super) fn numbers(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjErrorKind> {
-    enough(keyword, words(rest).map(number).collect::<Result<_, _>>()?, needed)
-}
-
 /// As [`numbers`]; what exporters write of NaN and infinities (`nan`, `-1.#IND`) is 0.
 fn numbers_or_nan(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjErrorKind> {
     // `nan`, `-nan(ind)`, `1.#QNAN`, `inf`, and what is too large for a number.
@@ -395,19 +330,6 @@ fn numbers_or_nan(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, 
     };
     let value = |word| if is_none(word) { Ok(0.0) } else { number(word) };
     enough(keyword, words(rest).map(value).collect::<Result<_, _>>()?, needed)
-}
-
-fn enough(keyword: &str, numbers: Vec<f32>, needed: usize) -> Result<Vec<f32>, ObjErrorKind> {
-    if numbers.len() < needed {
-        let found = numbers.len();
-        return Err(ObjErrorKind::TooFew { keyword: keyword.into(), needed, found });
-    }
-    Ok(numbers)
-}
-
-pub(super) fn number(word: &str) -> Result<f32, ObjErrorKind> {
-    let not_a_number = || ObjErrorKind::NotANumber { text: word.chars().take(40).collect() };
-    word.parse().ok().filter(|v: &f32| v.is_finite()).ok_or_else(not_a_number)
 }
 
 /// An index of a file, from 1 or relative to the end, as one from 0.

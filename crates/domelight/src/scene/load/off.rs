@@ -11,13 +11,11 @@
 use std::path::Path;
 
 use super::faces::{Polygons, color_triangles};
-use super::ply::DEFAULT_ALBEDO;
-use super::{Budget, LoadError, Loaded, stem};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
 use crate::scene::texture::{Encoding, decode};
-use crate::scene::{Material, Part, SceneDescription};
 
 /// What is wrong with an OFF file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -79,13 +77,7 @@ pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded,
     budget.take(&path.display().to_string(), MEMORY_PER_BYTE * bytes.len() as u64)?;
     let error = |(line, kind)| LoadError::Off { path: path.into(), line, kind };
     let mesh = read(bytes).map_err(error)?;
-    let albedo = if mesh.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
-    let description = SceneDescription {
-        parts: vec![Part { name: stem(path), mesh, material: 0 }],
-        materials: vec![Material::diffuse("default", albedo)],
-        ..SceneDescription::default()
-    };
-    Ok(Loaded { description, ..Loaded::default() })
+    Ok(Loaded::of_mesh(path, mesh))
 }
 
 /// What the header word says of vertices.

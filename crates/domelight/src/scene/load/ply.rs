@@ -12,15 +12,11 @@ use std::fmt;
 use std::path::Path;
 
 use super::faces::{Polygons, color_triangles};
-use super::{Budget, LoadError, Loaded, stem};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
 use crate::scene::texture::{Encoding, decode};
-use crate::scene::{Material, Part, SceneDescription};
-
-/// The albedo of meshes that come without a material.
-pub(super) const DEFAULT_ALBEDO: Rgb = Rgb::splat(0.6);
 
 /// A place in a PLY file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -124,13 +120,7 @@ pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded,
     header.check_size(bytes.len() - header.length).map_err(error)?;
     budget.take(&path.display().to_string(), header.memory(bytes.len() - header.length))?;
     let mesh = parse(&header, bytes).map_err(error)?;
-    let albedo = if mesh.colors.is_empty() { DEFAULT_ALBEDO } else { Rgb::WHITE };
-    let description = SceneDescription {
-        parts: vec![Part { name: stem(path), mesh, material: 0 }],
-        materials: vec![Material::diffuse("default", albedo)],
-        ..SceneDescription::default()
-    };
-    Ok(Loaded { description, ..Loaded::default() })
+    Ok(Loaded::of_mesh(path, mesh))
 }
 
 fn parse(header: &Header, bytes: &[u8]) -> Located<Mesh> {

@@ -11,8 +11,7 @@
 
 use std::path::Path;
 
-use super::ply::DEFAULT_ALBEDO;
-use super::{Budget, LoadError, Loaded, stem, text_of};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, stem, text_of};
 use crate::geometry::Mesh;
 use crate::math::Vec3;
 use crate::scene::{Material, Part, SceneDescription};

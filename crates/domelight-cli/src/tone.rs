@@ -1,0 +1,206 @@
+//! `domelight tone`: from linear light to a picture to look at; and how all commands report that.
+
+use std::fmt;
+
+use anyhow::Result;
+use domelight::picture::exposure::Exposure;
+use domelight::picture::png::Depth;
+use domelight::picture::tone::ToneMapping;
+use domelight::picture::{
+    Format, Picture, PictureError, PictureErrorKind, ReadOptions, png, read_bytes, read_file,
+};
+use domelight::render::Layers;
+use domelight::{Rgb, RgbImage};
+use domelight_lab::denoise::{Denoiser, Features};
+use serde::Serialize;
+
+use crate::args::{Bits, Tone, ToneArguments};
+use crate::error::{UsageError, status};
+use crate::files;
+use crate::memory;
+use crate::output::{PictureFormat, print_json, require_one_on_standard_output};
+
+/// The attribute of OpenEXR files that holds the automatic exposure of a render.
+const EXPOSURE: &str = "domelight.exposure";
+
+/// Memory of a texel: color, alpha, and as PNG.
+const TEXEL: u64 = 16 + 8 + 4;
+
+/// At which exposure and by which curve a picture is shown.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct Shown {
+    /// In stops.
+    exposure: f32,
+    /// The exposure was chosen, not given.
+    automatic: bool,
+    tone: &'static str,
+}
+
+impl Shown {
+    pub(crate) fn new(arguments: &Tone, mapping: &ToneMapping) -> Self {
+        let automatic = arguments.is_automatic();
+        Self { exposure: mapping.exposure, automatic, tone: mapping.curve.name() }
+    }
+}
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { exposure, automatic, tone } = self;
+        let automatic = if *automatic { " (automatic)" } else { "" };
+        write!(f, "{exposure:+.2} EV{automatic}, {tone}")
+    }
+}
+
+/// The attribute that keeps a render's automatic exposure.
+pub(crate) fn attribute(exposure: f32) -> (String, String) {
+    (EXPOSURE.to_owned(), exposure.to_string())
+}
+
+/// The automatic exposure that a render kept.
+pub(crate) fn kept(attributes: &[(String, String)]) -> Option<f32> {
+    let (_, value) = attributes.iter().find(|(name, _)| name == EXPOSURE)?;
+    match value.parse() {
+        Ok(Exposure::Stops(stops)) => Some(stops),
+        _ => None,
+    }
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(arguments: &ToneArguments, quiet: bool) -> Result<()> {
+    let ToneArguments { picture: path, output, layer, .. } = arguments;
+    require_one_on_standard_output(&[Some(output)], arguments.json)?;
+    if output.format().is_some_and(|format| format != PictureFormat::Png) {
+        let text = format!("{output}: a developed picture is a PNG: its name must end in .png");
+        return Err(UsageError(text).into());
+    }
+    output.declare()?;
+    files::reads(path)?;
+    let denoiser = arguments.denoise.then(Denoiser::load).transpose()?;
+    let bytes = read_file(path, memory::left())?;
+    let name = path.display().to_string();
+    let picture = layer_of(&bytes, &name, layer.as_deref())?;
+    memory::allow(&name, TEXEL * picture.image.pixels.len() as u64)?;
+    let (exposure_from, tone) = develop(arguments, &picture);
+    let depth = match arguments.bits {
+        Bits::Eight => Depth::Eight,
+        Bits::Sixteen => Depth::Sixteen,
+    };
+    let denoised = match &denoiser {
+        Some(denoiser) => Some(denoise_file(denoiser, &picture, &bytes, &name)?),
+        None => None,
+    };
+    let Picture { alpha, .. } = &picture;
+    let image = denoised.as_ref().map_or(&picture.image, |(image, _)| image);
+    // What is covered everywhere needs no alpha.
+    let alpha = alpha.as_deref().filter(|alpha| alpha.iter().any(|&a| a < 1.0));
+    files::write(&output.path, |out| png::encode(image, alpha, &tone, depth, out))?;
+
+    let report = Report {
+        picture: path.to_string_lossy().into_owned(),
+        layer: layer.as_deref(),
+        size: [image.width, image.height],
+        shown: Shown::new(&arguments.tone, &tone),
+        exposure_from,
+        denoised: denoised.as_ref().map(|(_, by)| by.as_str()),
+        bits: match depth {
+            Depth::Eight => 8,
+            Depth::Sixteen => 16,
+        },
+        output: output.to_string(),
+    };
+    if arguments.json {
+        return print_json(&report);
+    }
+    if !quiet {
+        let Report { picture, size: [w, h], shown, output, denoised, .. } = report;
+        status(&format!("{picture}: {w}x{h}, {shown} -> {output}"));
+        denoised.into_iter().for_each(|by| status(&denoised_line(by)));
+    }
+    Ok(())
+}
+
+fn layer_of(bytes: &[u8], name: &str, layer: Option<&str>) -> Result<Picture, PictureError> {
+    let layer = layer.map(str::to_owned);
+    read_bytes(bytes, name, &ReadOptions { layer, max_memory: memory::left() })
+}
+
+/// What a denoiser makes of a render, and how, in words.
+pub(crate) fn denoise(denoiser: &Denoiser, layers: &Layers) -> Result<(RgbImage, String)> {
+    let normals = layers.normal.iter().map(|n| Rgb::from(n.to_array())).collect();
+    let normal = &RgbImage::new(layers.width(), layers.height(), normals);
+    let features = Features { albedo: Some(&layers.albedo), normal: Some(normal) };
+    let by = format!("{} {}", denoiser.name(), features.description());
+    Ok((denoiser.denoise(&layers.color, features)?, by))
+}
+
+/// The same of a file's picture, with the layers that the file has.
+fn denoise_file(
+    denoiser: &Denoiser,
+    picture: &Picture,
+    bytes: &[u8],
+    name: &str,
+) -> Result<(RgbImage, String)> {
+    let feature = |layer: &str| -> Result<Option<RgbImage>> {
+        if picture.format != Format::Exr {
+            return Ok(None);
+        }
+        match layer_of(bytes, name, Some(layer)) {
+            Ok(feature) => Ok(Some(feature.image)),
+            Err(PictureError { kind: PictureErrorKind::NoSuchLayer { .. }, .. }) => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    };
+    let (albedo, normal) = (feature("albedo")?, feature("normal")?);
+    let features = Features { albedo: albedo.as_ref(), normal: normal.as_ref() };
+    let by = format!("{} {}", denoiser.name(), features.description());
+    Ok((denoiser.denoise(&picture.image, features)?, by))
+}
+
+/// What people should know of a denoised picture.
+pub(crate) fn denoised_line(by: &str) -> String {
+    format!(
+        "denoised with {by}: to look at, not to measure; the filter trades noise for bias, and how much bias one \
+         picture cannot show"
+    )
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    picture: String,
+    layer: Option<&'a str>,
+    size: [usize; 2],
+    #[serde(flatten)]
+    shown: Shown,
+    /// Where the automatic exposure comes from.
+    exposure_from: ExposureSource,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    denoised: Option<&'a str>,
+    bits: u8,
+    output: String,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum ExposureSource {
+    Given,
+    /// What the render chose, kept in the file.
+    Render,
+    /// The median of the picture.
+    Median,
+}
+
+fn develop(arguments: &ToneArguments, picture: &Picture) -> (ExposureSource, ToneMapping) {
+    // Reflectance and normals are no light.
+    let of_light =
+        |layer: &str| ["unoccluded", "denoised"].iter().any(|l| l.eq_ignore_ascii_case(layer));
+    let is_light = arguments.layer.as_deref().is_none_or(of_light);
+    let kept = kept(&picture.attributes).filter(|_| is_light);
+    let automatic =
+        || kept.unwrap_or_else(|| Exposure::Auto.stops(&picture.image, picture.alpha.as_deref()));
+    let source = match (arguments.tone.is_automatic(), kept) {
+        (false, _) => ExposureSource::Given,
+        (true, Some(_)) => ExposureSource::Render,
+        (true, None) => ExposureSource::Median,
+    };
+    (source, arguments.tone.of_picture(automatic))
+}

@@ -1,0 +1,117 @@
+//! Pictures without noise, by Intel's Open Image Denoise where its library is installed.
+//!
+//! A denoised picture is biased: what the filter takes for noise may be texture, and what it invents may be wrong. How
+//! much cannot be known from the picture itself, so a denoised picture is to be looked at, not to be measured.
+
+mod oidn;
+
+use std::env;
+use std::ffi::{CStr, OsString};
+use std::path::PathBuf;
+
+use domelight::RgbImage;
+
+use crate::Error;
+use oidn::Device;
+
+/// Names the library's file; without it the system's loader looks for it.
+pub const LIBRARY_VARIABLE: &str = "OIDN_LIBRARY";
+
+const HOW_TO_GET: &str = "install Open Image Denoise 2 (openimagedenoise.org, or a package of your system), or: pip \
+     download --no-deps pyoidn && unzip pyoidn-*.whl 'pyoidn/oidn/*', then set OIDN_LIBRARY to \
+     pyoidn/oidn/lib/libOpenImageDenoise.so.2";
+
+/// What the library is called, best first.
+const NAMES: &[&str] = if cfg!(target_os = "windows") {
+    &["OpenImageDenoise.dll"]
+} else if cfg!(target_os = "macos") {
+    &["libOpenImageDenoise.2.dylib", "libOpenImageDenoise.dylib"]
+} else {
+    &["libOpenImageDenoise.so.2", "libOpenImageDenoise.so"]
+};
+
+/// Open Image Denoise 2, loaded.
+pub struct Denoiser {
+    device: Device,
+}
+
+/// What is known of a picture's surfaces. All images have the size of the picture.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Features<'a> {
+    /// Reflectance in \[0, 1\], premultiplied by coverage.
+    pub albedo: Option<&'a RgbImage>,
+    /// World normals as red, green and blue in \[−1, 1\], premultiplied by coverage.
+    pub normal: Option<&'a RgbImage>,
+}
+
+impl Features<'_> {
+    /// The features in words.
+    pub fn description(&self) -> &'static str {
+        match (self.albedo, self.normal) {
+            (Some(_), Some(_)) => "by color, albedo and normals",
+            (Some(_), None) => "by color and albedo",
+            _ => "by color alone",
+        }
+    }
+}
+
+impl Denoiser {
+    /// Loads the library that the environment variable [`LIBRARY_VARIABLE`] names, else the system's.
+    ///
+    /// # Errors
+    /// If there is none of version 2 or later.
+    pub fn load() -> Result<Self, Error> {
+        match env::var_os(LIBRARY_VARIABLE).filter(|path| !path.is_empty()) {
+            Some(path) => Self::load_first(&[path]),
+            None => Self::load_first(&NAMES.iter().map(OsString::from).collect::<Vec<_>>()),
+        }
+    }
+
+    /// Loads the library in a file.
+    ///
+    /// # Errors
+    /// If it is not Open Image Denoise of version 2 or later.
+    pub fn load_file(path: impl Into<PathBuf>) -> Result<Self, Error> {
+        Self::load_first(&[path.into().into_os_string()])
+    }
+
+    fn load_first(names: &[OsString]) -> Result<Self, Error> {
+        let mut reasons = Vec::new();
+        for name in names {
+            match Device::load(name, rayon::current_num_threads()) {
+                Ok(device) => return Ok(Self { device }),
+                Err(why) => reasons.push(format!("{}: {why}", name.to_string_lossy())),
+            }
+        }
+        let reasons = reasons.join("; ");
+        Err(Error::Usage(format!("no denoiser ({reasons}); to get one: {HOW_TO_GET}")))
+    }
+
+    /// Name and version of the library.
+    pub fn name(&self) -> String {
+        let [major, minor, patch] = self.device.version();
+        format!("Open Image Denoise {major}.{minor}.{patch}")
+    }
+
+    /// A picture without noise, of HDR radiance that may be premultiplied by coverage. Normals without albedo are no use
+    /// to the library; pixels without a normal show no surface and stay as they are.
+    ///
+    /// # Errors
+    /// If sizes differ, or the library fails.
+    pub fn denoise(&self, color: &RgbImage, features: Features) -> Result<RgbImage, Error> {
+        let mut images: Vec<(&CStr, &RgbImage)> = Vec::new();
+        if let Some(albedo) = features.albedo {
+            images.push((c"albedo", albedo));
+            images.extend(features.normal.map(|normal| (c"normal", normal)));
+        }
+        let filtered = self.device.filter(color, &images);
+        let mut filtered = filtered.map_err(|why| Error::Failed(format!("denoising: {why}")))?;
+        if let Some(normal) = features.normal {
+            let pixels = filtered.pixels.iter_mut().zip(&color.pixels).zip(&normal.pixels);
+            for ((filtered, color), _) in pixels.filter(|(_, normal)| normal.is_black()) {
+                *filtered = *color;
+            }
+        }
+        Ok(filtered)
+    }
+}

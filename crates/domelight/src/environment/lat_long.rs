@@ -1,0 +1,118 @@
+//! The grid of a lat-long map, and how much of the sphere its rows and texels cover.
+//!
+//! In the plane of longitude and cos θ areas are solid angles (Archimedes), and texels are rectangles.
+
+use crate::math::functions;
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+/// Columns of equal longitude and rows of equal polar angle θ, from θ = 0 in the first row's upper edge to π.
+#[derive(Clone, Debug)]
+pub struct LatLongGrid {
+    width: usize,
+    height: usize,
+    /// cos θ of the upper edge of each row, and of the lower edge of the last: falling from 1 to −1.
+    cos_edges: Vec<f64>,
+}
+
+impl LatLongGrid {
+    /// The grid of `width` × `height` texels, neither zero.
+    pub fn new(width: usize, height: usize) -> Self {
+        let edge = |row: usize| functions::cos(PI * row as f64 / height as f64);
+        Self { width, height, cos_edges: (0..=height).map(edge).collect() }
+    }
+
+    /// Columns.
+    #[inline]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    #[inline]
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The longitudes that a column spans \[rad\].
+    pub fn column_angle(&self) -> f64 {
+        TAU / self.width as f64
+    }
+
+    /// cos θ of the upper edge of a row; of row [`LatLongGrid::height`] the lower edge of the last row.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    #[inline]
+    pub fn cos_edge(&self, row: usize) -> f64 {
+        self.cos_edges[row]
+    }
+
+    /// The height of a band of rows in cos θ: 2 for all rows.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    #[inline]
+    pub fn band(&self, rows: Range<usize>) -> f64 {
+        self.cos_edges[rows.start] - self.cos_edges[rows.end]
+    }
+
+    /// Solid angle of a texel of row `row` \[sr\].
+    ///
+    /// # Panics
+    /// If there is no such row.
+    #[inline]
+    pub fn solid_angle(&self, row: usize) -> f64 {
+        self.band(row..row + 1) * TAU / self.width as f64
+    }
+
+    /// cos θ at a place between the rows' edges, in rows from the first; linear in solid angle within a row.
+    pub(crate) fn cos_theta(&self, row: f64) -> f64 {
+        let texel = (row as usize).min(self.height - 1);
+        let [top, bottom] = [self.cos_edges[texel], self.cos_edges[texel + 1]];
+        top + (row - texel as f64) * (bottom - top)
+    }
+
+    /// The row in which cos θ is `cos_theta`.
+    pub(crate) fn row(&self, cos_theta: f64) -> usize {
+        let theta = functions::acos(cos_theta.clamp(-1.0, 1.0));
+        let row = (theta / PI * self.height as f64) as usize;
+        self.row_near(row.min(self.height - 1), cos_theta)
+    }
+
+    /// The row in which cos θ is `cos_theta`, searched for from `row` on.
+    pub(crate) fn row_near(&self, mut row: usize, cos_theta: f64) -> usize {
+        while row > 0 && cos_theta > self.cos_edges[row] {
+            row -= 1;
+        }
+        while row + 1 < self.height && cos_theta < self.cos_edges[row + 1] {
+            row += 1;
+        }
+        row
+    }
+}
+
+/// [`LatLongGrid::band`] of one of `height` rows as a product, which loses no digits beside a pole however many rows
+/// there are.
+pub(crate) fn narrow_band(row: usize, height: usize) -> f64 {
+    let step = PI / height as f64;
+    2.0 * functions::sin(step * (row as f64 + 0.5)) * functions::sin(0.5 * step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texels_partition_the_sphere() {
+        for (width, height) in [(1, 1), (7, 3), (64, 32), (1, 9)] {
+            let grid = LatLongGrid::new(width, height);
+            let sphere: f64 = (0..height).map(|y| grid.solid_angle(y) * width as f64).sum();
+            assert!((sphere - 4.0 * PI).abs() < 1e-12);
+            for row in 0..height {
+                assert!((grid.band(row..row + 1) - narrow_band(row, height)).abs() < 1e-15);
+                assert_eq!(grid.row(grid.cos_theta(row as f64 + 0.5)), row);
+            }
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! What a header says of the picture's place and of its colors.
+
+use crate::math::Mat3;
+use crate::picture::DataWindow;
+use crate::picture::primaries::Primaries;
+use ::exr::meta::attribute::Chromaticities;
+use ::exr::meta::header::Header;
+
+/// Where the data window lies in the display window, if they differ.
+pub(super) fn window(header: &Header) -> Option<DataWindow> {
+    let (data, display) = (header.data_window(), header.shared_attributes.display_window);
+    let step = |from: i32, to: i32| i64::from(to) - i64::from(from);
+    let position =
+        (step(display.position.0, data.position.0), step(display.position.1, data.position.1));
+    let display = (display.size.0, display.size.1);
+    let same = position == (0, 0) && display == (data.size.0, data.size.1);
+    (!same).then_some(DataWindow { position, display })
+}
+
+pub(super) fn to_rec709(c: &Chromaticities) -> Option<Mat3> {
+    primaries(c).to_rec709()
+}
+
+pub(super) fn primaries(c: &Chromaticities) -> Primaries {
+    Primaries([c.red, c.green, c.blue, c.white].map(|xy| [xy.0, xy.1]))
+}

@@ -1,0 +1,115 @@
+// Files that are dropped from the disk, what is refused, and memory.
+
+import assert from "node:assert/strict";
+import { mkdirSync, mkdtempSync, rmSync, truncateSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
+import { after, before, test } from "node:test";
+import { glb, gltf } from "./models.js";
+import { SMALL, close, drop, launch, memory, open, rendered, renderedAnew, text } from "./page.js";
+
+let folder;
+before(async () => {
+  folder = mkdtempSync(join(tmpdir(), "domelight-web-"));
+  await launch();
+});
+after(async () => {
+  await close();
+  rmSync(folder, { recursive: true });
+});
+
+/** Puts a file on the disk. */
+function put(name, bytes) {
+  const path = join(folder, name);
+  mkdirSync(dirname(path), { recursive: true });
+  writeFileSync(path, bytes);
+  return path;
+}
+
+/** R, G and B in the middle of the picture. */
+const middle = (page) => page.evaluate(() => {
+  const { pixels, width, height } = window.domelight.picture.films[0], at = 4 * (Math.floor(height / 2) * width + width / 2);
+  return [...pixels.slice(at, at + 3)];
+});
+
+test("a GLB is dropped", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  await renderedAnew(page, () => drop(page, [put("triangle.glb", glb())]));
+  assert.equal(await page.inputValue("#scene"), "triangle.glb");
+  const [red, green] = await middle(page);
+  assert.ok(red > 3 * green, `red ${red}, green ${green}`);
+  await done();
+});
+
+test("a folder with a glTF file and what it refers to is dropped", async () => {
+  for (const [name, bytes] of Object.entries(gltf())) put(join("model", name), bytes);
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  await renderedAnew(page, () => drop(page, [join(folder, "model")]));
+  assert.equal(await page.inputValue("#scene"), "model/scene.gltf");
+  const [red, green] = await middle(page);
+  assert.ok(red > 3 * green, `red ${red}, green ${green}`);
+  await done();
+});
+
+test("a damaged file is named, and the picture stays", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  const before = await middle(page);
+  for (const [name, bytes] of [["cut.glb", glb().subarray(0, 60)], ["flipped.glb", Buffer.from(glb().map((byte, i) => (i < 4 ? 0 : byte)))], ["cut.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 64 +X 128\n"]]) {
+    await drop(page, [put(name, bytes)]);
+    await page.waitForFunction((name) => document.querySelector("#status.error")?.textContent.includes(name), name);
+  }
+  assert.deepEqual(await middle(page), before);
+  assert.equal(await page.inputValue("#scene"), "statue");
+  assert.equal(await page.inputValue("#env"), "sky");
+  await done();
+});
+
+test("a scene stays when a probe is dropped, and its material can be changed", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  await renderedAnew(page, () => drop(page, [put("triangle.glb", glb())]));
+  // A Radiance picture of one color.
+  const hdr = Buffer.concat([Buffer.from("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n"), ...Array(8).fill(Buffer.from([128, 64, 32, 129]))]);
+  await renderedAnew(page, () => drop(page, [put("orange.hdr", hdr)]));
+  await renderedAnew(page, () => page.selectOption("#model", "ggx"));
+  assert.equal(await page.inputValue("#scene"), "triangle.glb");
+  assert.equal(await page.inputValue("#env"), "orange.hdr");
+  assert.equal(await page.$("#status.error"), null);
+  await done();
+});
+
+test("files beyond what memory holds are refused before they are read", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  const path = put("huge.glb", "");
+  // A file with a hole takes no room on the disk.
+  truncateSync(path, 1.5 * 2 ** 30);
+  await drop(page, [path]);
+  await page.waitForSelector("#status.error");
+  assert.match(await text(page, "#status"), /1\.5 GiB are more than this page can hold; 1 GiB is the most/);
+  await done();
+});
+
+test("memory is bounded while the camera orbits", async () => {
+  // More by hand: an hour is 3600.
+  const seconds = Number(process.env.ORBIT_SECONDS ?? 12);
+  const { page, done } = await open("size=256&spp=4&rows=64&view=error");
+  await rendered(page);
+  await page.focus("#viewer");
+  const orbit = async (seconds) => {
+    for (const end = performance.now() + 1000 * seconds; performance.now() < end;) {
+      await page.keyboard.press("ArrowLeft");
+      await page.waitForTimeout(40);
+    }
+    await rendered(page);
+  };
+  await orbit(Math.min(0.5 * seconds, 60));
+  const before = await memory();
+  await orbit(seconds);
+  const after = await memory();
+  assert.ok(after < before + 100, `from ${Math.round(before)} to ${Math.round(after)} MB`);
+  await done();
+});
