@@ -65,6 +65,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         ..arguments.scene.render_settings(&arguments.pixel, arguments.samples.spp)
     };
     let spec = spec.for_picture(scene, camera, environment, settings);
+    memory::allow(&format!("the tables of {spec}"), PreparedStrategy::memory(spec, environment))?;
     let strategy = &PreparedStrategy::new(spec, environment).with_context(|| probe.clone())?;
     let automatic = automatic_exposure(scene, camera, environment, settings);
     let described = Settings {
@@ -80,7 +81,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     };
     let render_run = &arguments.render_run;
     let render_run =
-        render_run.render_run(view, settings, &described, &outputs, interrupted, quiet)?;
+        render_run.render_run(view, settings, &described, spec, &outputs, interrupted, quiet)?;
     let build = watch.lap();
     drop(loading);
 

@@ -11,7 +11,7 @@ use anyhow::{Context as _, Result};
 use domelight::render::{
     Checkpoint, Counts, Observer, Passes, RenderSettings, Renderer, Rendering, Stage, Tiling,
 };
-use domelight::strategy::Strategy;
+use domelight::strategy::{Strategy, StrategySpec};
 
 use crate::args::render_run::RenderRunArguments;
 use crate::error::{UsageError, warn};
@@ -91,6 +91,7 @@ impl RenderRunArguments {
         view: &PreparedScene,
         settings: &RenderSettings,
         report: &Settings,
+        strategy: StrategySpec,
         outputs: &[PicturePath],
         interrupted: &'static AtomicBool,
         quiet: bool,
@@ -104,7 +105,8 @@ impl RenderRunArguments {
         let existing = part.clone().filter(|path| path.exists());
         let save = part.or_else(|| self.checkpoint.clone()).or_else(|| self.resume.clone());
         // To know scene and environment by their content takes time.
-        let identity = if save.is_some() { identity(view, settings, report) } else { Vec::new() };
+        let identity =
+            if save.is_some() { identity(view, settings, report, strategy) } else { Vec::new() };
         let from = if let Some(path) = self.resume.clone().or(existing) {
             let checkpoint = read(&path)?;
             require_same(&path, &checkpoint, &identity)?;
@@ -131,6 +133,7 @@ fn identity(
     view: &PreparedScene,
     settings: &RenderSettings,
     report: &Settings,
+    strategy: StrategySpec,
 ) -> Vec<(String, String)> {
     let camera = &view.report.camera;
     let mut identity = vec![
@@ -143,7 +146,7 @@ fn identity(
         ("scene", view.scene.fingerprint().to_string()),
         ("seed", settings.seed.to_string()),
         ("size", format!("{}x{}", settings.width, settings.height)),
-        ("strategy", report.strategy.clone()),
+        ("strategy", strategy.to_string()),
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
     ];
     // As it was before there was a choice.

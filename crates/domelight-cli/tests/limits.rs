@@ -218,6 +218,17 @@ fn black_png(width: u32, height: u32) -> Vec<u8> {
     bytes
 }
 
+/// A map much narrower than 2:1 is small, but its texels are divided.
+#[test]
+fn tables_that_would_take_more_memory_are_named() {
+    let folder = folder();
+    write(&folder, "narrow.png", black_png(16, 1024));
+    let narrow = ["spheres", "--env", "narrow.png", "--max-memory", "40MiB"];
+    let by = |strategy| render(&folder, &[&narrow[..], &["--strategy", strategy]].concat());
+    ended(&by("product:8"), 2, &["the tables of product:8", "72.0 MiB", "--max-memory SIZE"]);
+    ended(&by("mis:1:1"), 0, &[]);
+}
+
 #[test]
 fn files_that_would_take_more_memory_are_named() {
     let folder = folder();

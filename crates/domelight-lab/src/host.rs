@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
+use domelight::environment::Environment;
 use domelight::environment::io::{LoadedProbe, ProbeOptions, load_probe};
 use domelight::files::write_atomically;
 use domelight::memory::require;
 use domelight::render::{Observer, RenderSettings};
+use domelight::strategy::{PreparedStrategy, StrategySpec};
 
 use crate::Error;
 
@@ -78,6 +80,18 @@ impl dyn Host + '_ {
         require(bytes, self.memory_left()).at(what)?;
         self.keeps_memory(bytes);
         Ok(())
+    }
+
+    /// Makes a strategy's tables and lights, if there is memory for them.
+    pub(crate) fn prepare<'e>(
+        &self,
+        spec: StrategySpec,
+        environment: &'e Environment,
+    ) -> Result<PreparedStrategy<'e>, Error> {
+        use crate::At as _;
+        let needed = PreparedStrategy::memory(spec, environment);
+        require(needed, self.memory_left()).at(&format!("the tables of {spec}"))?;
+        Ok(PreparedStrategy::new(spec, environment)?)
     }
 
     /// An observer that shows nothing.

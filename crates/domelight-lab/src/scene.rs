@@ -23,9 +23,6 @@ use crate::{At as _, Error, Host};
 /// Rows of a built-in probe unless told otherwise.
 pub const BUILTIN_ROWS: u32 = 1024;
 
-/// For each texel of an environment \[bytes\]: its map, its tables, and what fixed lights are made with.
-pub const ENVIRONMENT_TEXEL: u64 = 36;
-
 /// For each triangle \[bytes\]: the tree, and what it is built from.
 pub const TRIANGLE: u64 = 140;
 
@@ -404,7 +401,7 @@ impl LightSettings {
                 let probe = BuiltinProbe::from_str(name);
                 let probe = probe.map_err(|error| Error::Usage(error.to_string()))?;
                 let rows = u64::from(self.rows);
-                let bytes = ENVIRONMENT_TEXEL * 2 * rows * rows;
+                let bytes = Environment::MEMORY_PER_TEXEL * 2 * rows * rows;
                 host.take_memory(&format!("{name} with {rows} rows"), bytes)?;
                 return Ok(probe.image(self.rows as usize));
             }
@@ -419,7 +416,7 @@ impl LightSettings {
         host.reads(path)?;
         let loaded = host.load_probe(path, &options)?;
         let texels = loaded.image.pixels.len() as u64;
-        host.take_memory(&path.display().to_string(), ENVIRONMENT_TEXEL * texels)?;
+        host.take_memory(&path.display().to_string(), Environment::MEMORY_PER_TEXEL * texels)?;
         loaded.warnings.iter().for_each(|warning| host.warn(warning));
         Ok(loaded.image)
     }

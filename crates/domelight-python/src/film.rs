@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use domelight::RgbImage;
 use domelight::math::Vec3;
 use domelight::picture::write_atomically_seeking;
-use domelight::render::{self, Checkpoint, Counts, Layers};
+use domelight::render::{self, Checkpoint, Counts, LAYERS, LayerInfo, LayerValues, Layers};
 use numpy::PyArrayDyn;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
@@ -17,40 +16,18 @@ use crate::engine::parallel;
 use crate::error::{bad_value, from_source, to_python};
 use crate::picture::{Format, into_io, to_png, tone, write_image};
 
-/// A layer of a film.
-struct Layer {
-    name: &'static str,
-    get: for<'py> fn(Python<'py>, &Layers) -> PyResult<Bound<'py, PyAny>>,
-}
-
-/// All layers, in their order in OpenEXR files.
-const LAYERS: [Layer; 9] = [
-    Layer { name: "color", get: |py, layers| picture(py, &layers.color) },
-    Layer { name: "alpha", get: |py, layers| plane(py, layers, layers.alpha.clone()) },
-    Layer { name: "unoccluded", get: |py, layers| picture(py, &layers.unoccluded) },
-    Layer { name: "albedo", get: |py, layers| picture(py, &layers.albedo) },
-    Layer { name: "normal", get: |py, layers| vectors(py, layers, &layers.normal) },
-    Layer { name: "depth", get: |py, layers| plane(py, layers, layers.depth.clone()) },
-    Layer { name: "variance", get: |py, layers| picture(py, &layers.variance) },
-    Layer { name: "samples", get: |py, layers| plane(py, layers, layers.n_samples.clone()) },
-    Layer { name: "hits", get: |py, layers| plane(py, layers, layers.n_hits.clone()) },
-];
-
-fn picture<'py>(py: Python<'py>, image: &RgbImage) -> PyResult<Bound<'py, PyAny>> {
-    Ok(from_image(py, image)?.into_any())
-}
-
-fn plane<'py, T: numpy::Element>(
-    py: Python<'py>,
-    layers: &Layers,
-    values: Vec<T>,
-) -> PyResult<Bound<'py, PyAny>> {
-    Ok(array(py, values, &[layers.height(), layers.width()])?.into_any())
-}
-
-fn vectors<'py>(py: Python<'py>, layers: &Layers, values: &[Vec3]) -> PyResult<Bound<'py, PyAny>> {
-    let values = values.iter().map(Vec3::to_array).collect();
-    Ok(rows(py, values, &[layers.height(), layers.width()])?.into_any())
+/// The values of a layer as a new array.
+fn layer<'py>(py: Python<'py>, layers: &Layers, layer: &LayerInfo) -> PyResult<Bound<'py, PyAny>> {
+    let size = [layers.height(), layers.width()];
+    Ok(match (layer.values)(layers) {
+        LayerValues::Colors(image) => from_image(py, image)?.into_any(),
+        LayerValues::Vectors(vectors) => {
+            rows(py, vectors.iter().map(Vec3::to_array).collect(), &size)?.into_any()
+        }
+        LayerValues::Numbers(values) => array(py, values.to_vec(), &size)?.into_any(),
+        LayerValues::Counts(counts) => array(py, counts.to_vec(), &size)?.into_any(),
+        _ => unreachable!("a kind of layer that this package does not know"),
+    })
 }
 
 /// A rendered picture in layers. `render` and `progressive` make them.
@@ -141,12 +118,12 @@ impl Film {
     }
 
     fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let Some(layer) = LAYERS.iter().find(|layer| layer.name == name) else {
+        let Some(info) = LAYERS.iter().find(|layer| layer.name == name) else {
             let text =
                 format!("a film has no layer {name:?}; its layers are {}", Self::keys().join(", "));
             return Err(PyKeyError::new_err(text));
         };
-        (layer.get)(py, self.layers())
+        layer(py, self.layers(), info)
     }
 
     fn __contains__(&self, name: &str) -> bool {

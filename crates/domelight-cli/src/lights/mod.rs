@@ -24,7 +24,6 @@ use crate::memory;
 use crate::output::{PictureFormat, PicturePath, print, print_json};
 use crate::terminal::Terminal;
 use domelight_lab::Stopwatch;
-use domelight_lab::scene::ENVIRONMENT_TEXEL;
 use preview::Preview;
 use report::{LightsReport, Timings};
 
@@ -178,7 +177,7 @@ impl LightsArguments {
         let light = settings.over(&SceneDescription::default());
         let map = settings.load(&light, &Terminal { quiet })?;
         let probe = self.environment.env.clone().unwrap_or_default();
-        let more = memory::EXTRACTION_TEXEL - ENVIRONMENT_TEXEL;
+        let more = memory::EXTRACTION_TEXEL - Environment::MEMORY_PER_TEXEL;
         memory::allow(&format!("{probe}: its lights"), more * map.pixels.len() as u64)?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
         let scale = light.factor();

@@ -14,7 +14,7 @@ use domelight::picture::flip::{PIXELS_PER_DEGREE, ldr_flip};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::quote::{Code, Html};
 use domelight::render::{RenderSettings, automatic_exposure};
-use domelight::strategy::{PreparedStrategy, Strategy, StrategyKind, StrategySpec};
+use domelight::strategy::{Strategy, StrategyKind, StrategySpec};
 
 pub use budget::{BadBudget, Budget};
 pub use report::{CompareReport, ResultReport, StrategyReport};
@@ -210,7 +210,7 @@ impl<'a> Comparison<'a> {
         let (spec, strategy): (_, &dyn Picturing) = match competitor {
             Competitor::Named(NamedStrategy { spec, .. }) => {
                 let spec = spec.for_picture(scene, camera, environment, &self.settings.render);
-                prepared = PreparedStrategy::new(spec, environment)?;
+                prepared = host.prepare(spec, environment)?;
                 (Some(spec), &prepared)
             }
             Competitor::Own { strategy, .. } => (None, *strategy),

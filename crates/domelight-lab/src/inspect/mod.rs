@@ -7,7 +7,7 @@ use domelight::inspect::{
 };
 use domelight::quote::{Code, Html};
 use domelight::render::RenderSettings;
-use domelight::strategy::{PreparedStrategy, Strategy};
+use domelight::strategy::Strategy;
 use serde::Serialize;
 
 use crate::report::SceneReport;
@@ -120,7 +120,7 @@ impl<'a> Inspection<'a> {
         host.check_canceled()?;
         let View { scene, camera, environment, .. } = self.view;
         let spec = strategy.spec.for_picture(scene, camera, environment, &self.settings);
-        let prepared = PreparedStrategy::new(spec, environment).at(&strategy.text)?;
+        let prepared = host.prepare(spec, environment).at(&strategy.text)?;
         self.measure(&strategy.text, spec.description(), &prepared);
         Ok(())
     }

@@ -7,7 +7,7 @@ use domelight::picture::exr::{ExrLayers, text_attributes};
 use domelight::picture::{ReadOptions, read, read_bytes};
 use domelight::render::{Layers, RenderSettings};
 use domelight::sampling::Heuristic;
-use domelight::strategy::{PreparedStrategy, StrategySpec};
+use domelight::strategy::StrategySpec;
 use domelight::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
@@ -257,7 +257,7 @@ impl Reference {
         };
         let keyed = cache.map(key);
         let keyed = keyed.as_ref().map(|(cache, key)| (*cache, key));
-        let prepared = PreparedStrategy::new(strategy, view.environment)?;
+        let prepared = host.prepare(strategy, view.environment)?;
         let render_setup = RenderSetup { view, settings, strategy: &prepared, host, shown: true };
         Self::get(keyed, goal, &strategy.description(), host, |n_samples, half| {
             let label = format!("reference, half {} of 2", half + 1);

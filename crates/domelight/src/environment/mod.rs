@@ -286,19 +286,33 @@ impl Environment {
     ///
     /// Divisions of a map into squares of texels assume that its texels are about as wide as high.
     pub(crate) fn divided(&self) -> Option<Self> {
+        let RgbImage { width, height, .. } = self.map;
+        let [columns, rows] = self.division()?;
+        let texel = |x: usize, y: usize| self.map.get(x / columns, y / rows);
+        let map = RgbImage::from_fn(width * columns, height * rows, texel);
+        Self::in_units(map, self.orientation, self.unit, 1.0).ok()
+    }
+
+    /// Into how many columns and rows [`Environment::divided`] divides each texel; `None` if it leaves the map as it is.
+    fn division(&self) -> Option<[usize; 2]> {
         /// A map beyond is left as it is.
         const MOST_TEXELS: usize = 1 << 22;
         let RgbImage { width, height, .. } = self.map;
         let columns = if width < height { (2 * height).div_ceil(width) } else { 1 };
         let rows = if width > 4 * height { width.div_ceil(2 * height) } else { 1 };
         let n_texels = width.checked_mul(height)?.checked_mul(columns)?.checked_mul(rows)?;
-        if columns * rows == 1 || n_texels > MOST_TEXELS {
-            return None;
-        }
-        let texel = |x: usize, y: usize| self.map.get(x / columns, y / rows);
-        let map = RgbImage::from_fn(width * columns, height * rows, texel);
-        Self::in_units(map, self.orientation, self.unit, 1.0).ok()
+        (columns * rows > 1 && n_texels <= MOST_TEXELS).then_some([columns, rows])
     }
+
+    /// Memory that [`Environment::divided`] takes \[bytes\].
+    pub(crate) fn memory_to_divide(&self) -> u64 {
+        let [columns, rows] = self.division().unwrap_or([0; 2]);
+        Self::MEMORY_PER_TEXEL * (self.map.pixels.len() * columns * rows) as u64
+    }
+
+    /// Memory that an environment and what is made with it take for each texel \[bytes\], its making included: its map,
+    /// its tables, fixed lights.
+    pub const MEMORY_PER_TEXEL: u64 = 36;
 
     /// The same radiance from everywhere.
     ///

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use super::film::PixelSums;
+use super::sums::PixelSums;
 use super::{Counts, Film, Window};
 use crate::fingerprint::Fingerprinter;
 use crate::picture::PictureErrorKind;

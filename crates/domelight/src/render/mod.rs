@@ -11,10 +11,12 @@ mod checkpoint;
 mod exposure;
 mod film;
 mod filter;
+mod layers;
 #[cfg(feature = "io")]
 mod output;
 mod renderer;
 mod scouts;
+mod sums;
 mod tile;
 mod tiling;
 mod variance;
@@ -26,8 +28,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub use checkpoint::{Checkpoint, CheckpointError, Difference};
 #[cfg(feature = "io")]
 pub use exposure::automatic_exposure;
-pub use film::{Film, FilmMismatch, Layers};
+pub use film::{Film, FilmMismatch};
 pub use filter::{Filter, FilterSampler, UnknownFilter};
+pub use layers::{LAYERS, LayerInfo, LayerValues, Layers};
 #[cfg(feature = "io")]
 pub use output::Developed;
 pub use renderer::{Mark, Renderer};

@@ -3,7 +3,7 @@
 use std::io::{Seek, Write};
 use std::path::Path;
 
-use super::{Film, Layers};
+use super::{Film, LAYERS, LayerValues, Layers};
 use crate::picture::exposure::Exposure;
 use crate::picture::exr::ExrLayers;
 use crate::picture::exr::bands::{self, BAND_ROWS};
@@ -72,20 +72,26 @@ impl Film {
 }
 
 impl Layers {
-    /// All layers in one part: the picture itself as R, G, B, A; `unoccluded`, `albedo` and
-    /// `variance` with R, G, B; `normal` with X, Y, Z; `depth.Z` and `samples.Y`.
+    /// All layers that files have in one part, by the names that [`LAYERS`] gives: the picture itself as R, G, B, A,
+    /// and others such as `depth.Z`. Counts become numbers.
     ///
     /// `attributes` are written as strings, for provenance.
     pub fn to_exr(&self, attributes: Vec<(String, String)>) -> ExrLayers {
-        let mut exr = ExrLayers::from_image(&self.color, Some(&self.alpha));
-        exr.push_rgb("unoccluded", &self.unoccluded, None);
-        exr.push_rgb("albedo", &self.albedo, None);
-        exr.push_xyz("normal", &self.normal);
-        exr.push_channel("depth", "Z", self.depth.clone());
-        exr.push_rgb("variance", &self.variance, None);
-        let n_samples = self.n_samples.iter().map(|&n| n as f32);
-        exr.push_channel("samples", "Y", n_samples.collect::<Vec<_>>());
-        exr.attributes = attributes;
+        let mut exr = ExrLayers { attributes, ..ExrLayers::new(self.width(), self.height()) };
+        for layer in LAYERS {
+            let Some(name) = layer.file_layer else { continue };
+            match (layer.values)(self) {
+                LayerValues::Colors(image) => exr.push_rgb(name, image, None),
+                LayerValues::Vectors(vectors) => exr.push_xyz(name, vectors),
+                LayerValues::Numbers(values) => {
+                    exr.push_channel(name, layer.channels[0], values.to_vec());
+                }
+                LayerValues::Counts(counts) => {
+                    let values: Vec<f32> = counts.iter().map(|&n| n as f32).collect();
+                    exr.push_channel(name, layer.channels[0], values);
+                }
+            }
+        }
         exr
     }
 

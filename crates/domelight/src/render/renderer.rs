@@ -5,9 +5,11 @@ use std::ops::{Deref, Range};
 
 use rayon::prelude::*;
 
-use super::film::{Film, FilmMismatch, Layers, PixelSums};
+use super::film::{Film, FilmMismatch};
 use super::filter::FilterSampler;
+use super::layers::Layers;
 use super::scouts::scale;
+use super::sums::PixelSums;
 use super::tile::{Counts, Pass, Scratch, Tile};
 use super::tiling::{SampleSet, Tiling, Window, paired_pass};
 use super::variance::VarianceSums;

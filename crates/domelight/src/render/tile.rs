@@ -5,7 +5,8 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::allocation::{Allocation, PassSums};
-use super::film::{CameraSample, Layers, PixelSums, SurfaceSample};
+use super::layers::Layers;
+use super::sums::{CameraSample, PixelSums, SurfaceSample};
 use super::tiling::{SampleSet, Window};
 use super::variance::VarianceSums;
 use super::{Background, Mark, Observer, RenderContext, RenderSettings, Stage, visibility};

@@ -80,6 +80,21 @@ impl StrategySpec {
 }
 
 impl<'e> PreparedStrategy<'e> {
+    /// Memory that [`PreparedStrategy::new`] takes \[bytes\] beyond [`Environment::MEMORY_PER_TEXEL`], an estimate:
+    /// product sampling divides the texels of maps that are much wider or narrower than 2:1.
+    pub fn memory(spec: StrategySpec, environment: &Environment) -> u64 {
+        match spec {
+            StrategySpec::Product { .. } => environment.memory_to_divide(),
+            StrategySpec::Brdf { .. }
+            | StrategySpec::Environment { .. }
+            | StrategySpec::Mis { .. }
+            | StrategySpec::Rejection { .. }
+            | StrategySpec::Sir { .. }
+            | StrategySpec::MedianCut { .. }
+            | StrategySpec::VarianceMinimization { .. } => 0,
+        }
+    }
+
     /// Makes the tables and lights that all pictures under the environment share. SIR whose candidates are left open
     /// ([`StrategySpec::for_scene`]) has as many candidates as rays.
     ///

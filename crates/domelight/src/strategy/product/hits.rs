@@ -111,6 +111,11 @@ impl Groups {
 }
 
 impl Groups {
+    /// Whether any of the materials has a lobe beside a diffuse one.
+    pub(super) fn is_glossy(&self) -> bool {
+        self.narrowest().is_some()
+    }
+
     /// The roughness of the narrowest lobe; none if all is diffuse.
     pub(super) fn narrowest(&self) -> Option<f32> {
         let lobes = self.all.iter().flat_map(|g| g.lobe_summary.lobes());

@@ -32,8 +32,10 @@ mod brdf_samples;
 mod candidates;
 mod cells;
 mod control_variate;
+mod estimator;
 mod hits;
 mod light_samples;
+mod rays;
 mod systematic;
 mod table;
 #[cfg(test)]
@@ -44,21 +46,21 @@ pub use light_samples::LightSamplePool;
 
 use std::borrow::Cow;
 
-use super::levels::{N_LEVELS, coarser};
+use super::levels::N_LEVELS;
 use super::{Contributions, PixelPoints, Strategy, TileShading};
 use crate::Rgb;
 use crate::environment::Environment;
 use crate::math::functions;
 use crate::sampling::Sampler;
-use crate::simd::{Colors, InstructionSet, Kernel, LANES, Simd, SimdF32x8, dispatch};
-use candidates::{Candidate, CandidateIndex, Candidates, Counts, Hits, PixelSamples, Sources};
-use cells::{CellArray, Cells, get};
+use crate::simd::{InstructionSet, dispatch};
+use candidates::{CandidateIndex, Candidates, Counts};
+use cells::Cells;
 use control_variate::ControlVariate;
+use estimator::Round;
 use hits::Groups;
 use light_samples::PassLength;
-use systematic::{SystematicSampler, probabilities, probability, weight};
 use table::Table;
-use visibility::{Blocks, VisibilityEstimate, VisibilityStats};
+use visibility::{VisibilityEstimate, VisibilityStats};
 
 /// Camera samples of a pass: strata that one random offset spreads over all of them are worth more
 /// than the same number in two sets.
@@ -211,7 +213,7 @@ impl Strategy for ProductSampling<'_> {
             return;
         }
         let pilots = round == 0;
-        let context = PixelContext { strategy: self, cells, pool, tile, pilots, scratch, out };
+        let context = Round { strategy: self, cells, pool, tile, pilots, scratch, out };
         dispatch(self.instruction_set, context);
     }
 
@@ -237,252 +239,5 @@ impl Strategy for ProductSampling<'_> {
             }
             visibility_stats.set_luminance(i, sum.luminance().max(0.0) / *n_samples as f32);
         }
-    }
-}
-
-/// A round over a tile.
-struct PixelContext<'a, 'e> {
-    strategy: &'a ProductSampling<'e>,
-    cells: &'a Cells,
-    pool: &'a LightSamplePool,
-    tile: &'a TileShading<'a>,
-    pilots: bool,
-    scratch: &'a mut ProductScratch,
-    out: &'a mut Contributions,
-}
-
-impl Kernel for PixelContext<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(mut self, simd: S) {
-        let Self { tile, pilots, .. } = self;
-        let blocks = tile.blocks();
-        let ProductScratch { visibility, visibility_stats, .. } = &mut *self.scratch;
-        if !pilots {
-            visibility.estimate(simd, self.cells, visibility_stats, blocks);
-        }
-        self.scratch.targets.clear();
-        self.scratch.sampled_pixels.clear();
-        for (i, pixel) in tile.pixels.iter().enumerate() {
-            if !pixel.points.is_empty() {
-                let block = blocks.of(i % tile.width, i / tile.width);
-                self.sample_pixel(simd, i, pixel, block);
-            }
-        }
-    }
-}
-
-impl PixelContext<'_, '_> {
-    /// Asks for the rays of a pixel.
-    #[inline(always)]
-    fn sample_pixel<S: Simd>(&mut self, simd: S, i: usize, pixel: &PixelPoints, block: usize) {
-        let Self { strategy, tile, .. } = *self;
-        let ProductScratch {
-            groups,
-            table,
-            control_variate,
-            candidates,
-            chosen,
-            visibility,
-            targets,
-            sampled_pixels,
-            visibility_stats,
-        } = &mut *self.scratch;
-        sampled_pixels.push(i);
-        let points = &tile.points[pixel.points.clone()];
-        let hits = Hits { points, one_material: pixel.one_material };
-        groups.cluster(hits);
-        let is_glossy = groups.narrowest().is_some();
-        let counts = strategy.counts(groups, points.len(), self.pilots);
-        if self.pilots {
-            table.fill::<S, false>(simd, self.cells, &groups.all, control_variate);
-        } else {
-            table.fill::<S, true>(simd, self.cells, &groups.all, control_variate);
-            if !is_glossy {
-                let (visible, std_dev) = visibility.of(block);
-                table.weight_by_variance(
-                    simd,
-                    self.cells,
-                    &control_variate.above,
-                    visible,
-                    std_dev,
-                );
-            }
-        }
-        table.accumulate(simd, self.cells);
-        if !self.pilots {
-            control_variate.balance(simd, self.cells, groups.brdf_share(counts, table.total()));
-        }
-        // The first camera sample that hits tells passes apart.
-        let sampler = pixel.sampler.part(tile.samples[pixel.points.start]);
-        let numbers = PixelSamples::new(sampler);
-        let (environment, cells, pool) = (&*strategy.environment, self.cells, self.pool);
-        let control_variate = (!self.pilots).then_some(&*control_variate);
-        let sources = Sources { environment, cells, pool, table, control_variate };
-        sources.draw(simd, hits, &groups.diffuse, counts, &numbers, candidates);
-        let mut rays = Rays { pixel, out: self.out, targets };
-        if let Some(control_variate) = control_variate {
-            let visibility = visibility.of(block);
-            let integral = control_variate.integral(simd, cells, pool, visibility.0);
-            let mut known = Rgb::BLACK;
-            for (hit, (at, &diffuse)) in points.iter().zip(&groups.diffuse).enumerate() {
-                let of_hit = integral.eval(at.frame.z, diffuse);
-                *rays.base(hit as u32) += of_hit;
-                known += of_hit;
-            }
-            // No brighter than what is known of it: it may lie in a shadow or beside a highlight.
-            let known = known.luminance().max(0.0) / points.len() as f32;
-            let brightness = strategy.expected_brightness(tile, visibility_stats, i);
-            let brightness = brightness.min(strategy.brightness(known));
-            let n = (counts.light + counts.brdf) as f32;
-            let tolerance = TOLERANCE[usize::from(is_glossy)];
-            let covered = points.len() as f32 / pixel.n_samples as f32;
-            let scale = covered * n / (tolerance * brightness);
-            rays.weigh(simd, candidates, visibility, scale);
-            rays.push_chosen(
-                candidates,
-                visibility.0,
-                SystematicSampler::new(numbers.choice),
-                chosen,
-            );
-        } else {
-            rays.push_all(candidates);
-        }
-    }
-}
-
-impl TileShading<'_> {
-    fn blocks(&self) -> Blocks {
-        Blocks::new(self.width, self.pixels.len() / self.width.max(1))
-    }
-}
-
-impl ProductSampling<'_> {
-    /// How bright a pixel will be: the harmonic mean over those of lower levels about it, for a dark one among
-    /// them tells of a shadow's edge.
-    fn expected_brightness(
-        &self,
-        tile: &TileShading,
-        visibility_stats: &VisibilityStats,
-        pixel: usize,
-    ) -> f32 {
-        let around = coarser(pixel, tile.width, tile.pixels.len());
-        let known = around.filter_map(|i| visibility_stats.luminance(i));
-        let add = |(n, sum), luminance| (n + 1.0, sum + 1.0 / self.brightness(luminance));
-        let (n, sum) = known.fold((0.0, 0.0), add);
-        if n > 0.0 { n / sum } else { self.dark }
-    }
-}
-
-/// Where the rays of a pixel go.
-struct Rays<'a> {
-    pixel: &'a PixelPoints,
-    out: &'a mut Contributions,
-    targets: &'a mut Vec<u16>,
-}
-
-impl Rays<'_> {
-    /// The mean over the pixel's hits becomes a sum over its points.
-    fn scale(&self) -> f32 {
-        self.pixel.points.len() as f32
-    }
-
-    /// What `hit` has without rays.
-    #[inline(always)]
-    fn base(&mut self, hit: u32) -> &mut Rgb {
-        &mut self.out.base[self.pixel.points.start + hit as usize]
-    }
-
-    #[inline(always)]
-    fn push(&mut self, c: &Candidate, weight: Rgb) {
-        let point = self.pixel.points.start as u32 + c.hit;
-        self.out.wi.push(c.wi);
-        self.out.weight.push(weight);
-        self.out.point.push(point);
-        self.targets.push(c.slot as u16);
-    }
-
-    /// Σ W V: traces every candidate.
-    #[inline(always)]
-    fn push_all(&mut self, candidates: &Candidates) {
-        let scale = self.scale();
-        let n_blocks = candidates.assignment.blocks().max(1);
-        for (i, block) in candidates.lights.iter().enumerate() {
-            for lane in (0..LANES).filter(|&lane| block.luminance[lane] > 0.0) {
-                let c = block.get(lane, (i / n_blocks) as u32);
-                self.push(&c, c.value * scale);
-            }
-        }
-        for c in candidates.brdf.iter().filter(|c| c.luminance > 0.0) {
-            self.push(c, c.value * scale);
-        }
-    }
-
-    /// Adds Σ W V̂ and sets the π of all candidates: W g times `importance`.
-    #[inline(always)]
-    fn weigh<S: Simd>(
-        &mut self,
-        simd: S,
-        candidates: &mut Candidates,
-        (visible, std_dev): (&CellArray, &CellArray),
-        importance: f32,
-    ) {
-        let scale = self.scale();
-        let Candidates { lights, brdf, assignment, .. } = candidates;
-        for (hit, blocks) in lights.chunks_mut(assignment.blocks().max(1)).enumerate() {
-            let mut sums = [simd.splat(0.0); 3];
-            for c in blocks {
-                let slots = simd.load_i32(&c.slots);
-                let visible = S::F32x8::gather(visible, slots);
-                for (sum, residual) in sums.iter_mut().zip(&c.residual) {
-                    *sum = *sum + simd.load(residual) * visible;
-                }
-                let std_dev = S::F32x8::gather(std_dev, slots);
-                let size = simd.load(&c.luminance) * std_dev * simd.splat(importance);
-                c.selection_probabilities = probabilities(simd, size);
-            }
-            *self.base(hit as u32) += Colors(sums).sum() * scale;
-        }
-        for c in brdf {
-            let slot = c.slot as usize;
-            *self.base(c.hit) += c.value * (scale * get(visible, slot));
-            c.selection_probability = probability(c.luminance * get(std_dev, slot) * importance);
-        }
-    }
-
-    /// Σ W (V − V̂)/π: traces the chosen ones.
-    #[inline(always)]
-    fn push_chosen(
-        &mut self,
-        candidates: &Candidates,
-        visible: &CellArray,
-        mut systematic_sampler: SystematicSampler,
-        chosen: &mut Vec<CandidateIndex>,
-    ) {
-        let Candidates { lights, brdf, assignment, .. } = candidates;
-        chosen.resize(lights.len() * LANES + 1, CandidateIndex::default());
-        let mut n_chosen = 0;
-        for index in assignment.indices() {
-            // Overwritten by the next unless it is chosen.
-            chosen[n_chosen] = index;
-            let selection_probability =
-                lights[index.lane / LANES].selection_probabilities[index.lane % LANES];
-            n_chosen += usize::from(systematic_sampler.select(selection_probability as u32));
-        }
-        for &CandidateIndex { hit, lane } in &chosen[..n_chosen] {
-            self.push_one(&lights[lane / LANES].get(lane % LANES, hit as u32), visible);
-        }
-        for c in brdf.iter().filter(|c| systematic_sampler.select(c.selection_probability)) {
-            self.push_one(c, visible);
-        }
-    }
-
-    /// W (V − V̂)/π of one candidate.
-    #[inline(always)]
-    fn push_one(&mut self, c: &Candidate, visible: &CellArray) {
-        let value = c.value * (self.scale() * weight(c.selection_probability));
-        *self.base(c.hit) += value * -get(visible, c.slot as usize);
-        self.push(c, value);
     }
 }

@@ -1,0 +1,329 @@
+//! Sums of the camera samples of a pixel: what a film consists of, and what a checkpoint keeps bit by bit.
+
+use super::tiling::SampleSet;
+use super::variance::Contrast;
+use crate::Rgb;
+use crate::math::{Vec3, functions};
+
+/// What one camera sample adds to its pixel.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct CameraSample {
+    pub(super) color: Rgb,
+    pub(super) unoccluded: Rgb,
+    pub(super) alpha: f32,
+    /// None where the ray left the scene.
+    pub(super) surface: Option<SurfaceSample>,
+}
+
+impl CameraSample {
+    /// Seen through surfaces that let the share `throughput` of each channel pass.
+    pub(super) fn through(self, throughput: Rgb) -> Self {
+        // What is not seen behind the scene hides its share.
+        let behind = if self.surface.is_some() { 0.0 } else { throughput.mean() };
+        Self {
+            color: self.color * throughput,
+            unoccluded: self.unoccluded * throughput,
+            alpha: 1.0 - (1.0 - self.alpha) * behind,
+            surface: self.surface,
+        }
+    }
+}
+
+/// What a camera sample saw of a surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SurfaceSample {
+    pub(super) albedo: Rgb,
+    pub(super) normal: Vec3,
+    pub(super) depth: f32,
+}
+
+/// Defines the sums of a pixel: for each its type and the channels in which a checkpoint keeps its bits, one for each
+/// 32 of them. A checkpoint's digest takes the channels in the order of the sums.
+macro_rules! pixel_sums {
+    ($(#[$meta:meta])* { $($(#[$doc:meta])* $sum:ident: $type:ty = [$($word:literal)*],)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        pub(super) struct PixelSums {
+            $($(#[$doc])* pub(super) $sum: $type,)*
+        }
+
+        #[cfg(feature = "io")]
+        impl PixelSums {
+            /// The channels of [`PixelSums::to_words`].
+            pub(super) const WORDS: [&'static str; [$($($word,)*)*].len()] = [$($($word,)*)*];
+
+            /// The bits of all sums.
+            pub(super) fn to_words(self) -> [u32; Self::WORDS.len()] {
+                let mut words = [0; Self::WORDS.len()];
+                let mut slots = words.iter_mut();
+                let mut put = |word| *slots.next().expect("a channel for each word") = word;
+                $(self.$sum.put_words(&mut put);)*
+                words
+            }
+
+            /// The sums of [`PixelSums::to_words`].
+            pub(super) fn from_words(words: [u32; Self::WORDS.len()]) -> Self {
+                let mut words = words.into_iter();
+                let mut take = || words.next().expect("a channel for each word");
+                Self { $($sum: Words::take_words(&mut take),)* }
+            }
+        }
+    };
+}
+
+pixel_sums! {
+    /// The sums of one pixel. Samples are added one by one in their order, whatever the passes: the
+    /// same samples give the same bits.
+    {
+        color: [f64; 3] = [
+            "color.R.high" "color.R.low" "color.G.high" "color.G.low" "color.B.high" "color.B.low"
+        ],
+        color_squared: [f64; 3] = [
+            "color2.R.high" "color2.R.low" "color2.G.high" "color2.G.low" "color2.B.high"
+            "color2.B.low"
+        ],
+        unoccluded: [f64; 3] = [
+            "unoccluded.R.high" "unoccluded.R.low" "unoccluded.G.high" "unoccluded.G.low"
+            "unoccluded.B.high" "unoccluded.B.low"
+        ],
+        /// The part of `color` that is of the second set.
+        second: [f64; 3] = [
+            "second.R.high" "second.R.low" "second.G.high" "second.G.low" "second.B.high"
+            "second.B.low"
+        ],
+        depth: f64 = ["depth.Z.high" "depth.Z.low"],
+        /// `color` after the first n and n/2 samples, with n the greatest power of two so far.
+        prefixes: [Rgb; 2] = ["whole.R" "whole.G" "whole.B" "half.R" "half.G" "half.B"],
+        albedo: Rgb = ["albedo.R" "albedo.G" "albedo.B"],
+        normal: Vec3 = ["normal.X" "normal.Y" "normal.Z"],
+        alpha: f32 = ["alpha.A"],
+        n_hits: u32 = ["hits.Y"],
+        n_samples: u32 = ["samples.Y"],
+        /// Those of the second set.
+        n_second: u32 = ["second.samples.Y"],
+    }
+}
+
+/// What is kept in words of 32 bits.
+#[cfg(feature = "io")]
+trait Words: Sized {
+    fn put_words(self, put: &mut impl FnMut(u32));
+    fn take_words(take: &mut impl FnMut() -> u32) -> Self;
+}
+
+#[cfg(feature = "io")]
+impl Words for u32 {
+    fn put_words(self, put: &mut impl FnMut(u32)) {
+        put(self);
+    }
+
+    fn take_words(take: &mut impl FnMut() -> u32) -> Self {
+        take()
+    }
+}
+
+#[cfg(feature = "io")]
+impl Words for f32 {
+    fn put_words(self, put: &mut impl FnMut(u32)) {
+        put(self.to_bits());
+    }
+
+    fn take_words(take: &mut impl FnMut() -> u32) -> Self {
+        Self::from_bits(take())
+    }
+}
+
+/// The upper half of the bits, then the lower.
+#[cfg(feature = "io")]
+impl Words for f64 {
+    fn put_words(self, put: &mut impl FnMut(u32)) {
+        let bits = self.to_bits();
+        put((bits >> 32) as u32);
+        put(bits as u32);
+    }
+
+    fn take_words(take: &mut impl FnMut() -> u32) -> Self {
+        let [high, low] = [take(), take()].map(u64::from);
+        Self::from_bits(high << 32 | low)
+    }
+}
+
+#[cfg(feature = "io")]
+impl<T: Words, const N: usize> Words for [T; N] {
+    fn put_words(self, put: &mut impl FnMut(u32)) {
+        self.into_iter().for_each(|x| x.put_words(put));
+    }
+
+    fn take_words(take: &mut impl FnMut() -> u32) -> Self {
+        std::array::from_fn(|_| T::take_words(take))
+    }
+}
+
+#[cfg(feature = "io")]
+impl Words for Rgb {
+    fn put_words(self, put: &mut impl FnMut(u32)) {
+        self.to_array().put_words(put);
+    }
+
+    fn take_words(take: &mut impl FnMut() -> u32) -> Self {
+        <[f32; 3]>::take_words(take).into()
+    }
+}
+
+#[cfg(feature = "io")]
+impl Words for Vec3 {
+    fn put_words(self, put: &mut impl FnMut(u32)) {
+        self.to_array().put_words(put);
+    }
+
+    fn take_words(take: &mut impl FnMut() -> u32) -> Self {
+        <[f32; 3]>::take_words(take).into()
+    }
+}
+
+impl PixelSums {
+    /// After `n_samples` that saw nothing, before no background.
+    pub(super) fn missed(n_samples: u32) -> Self {
+        Self { n_samples, ..Self::default() }
+    }
+
+    /// Adds a sample of a set, with colors in multiples of `unit`. A sample that is not finite counts as black and is
+    /// reported: it returns false.
+    pub(super) fn add(&mut self, sample: &CameraSample, set: SampleSet, unit: f64) -> bool {
+        let finite = sample.color.is_finite() && sample.unoccluded.is_finite();
+        if finite {
+            let in_units = |color: Rgb| color.to_array().map(|c| f64::from(c) * unit);
+            for (c, x) in in_units(sample.color).into_iter().enumerate() {
+                self.color[c] += x;
+                self.color_squared[c] += x * x;
+            }
+            for (c, x) in in_units(sample.unoccluded).into_iter().enumerate() {
+                self.unoccluded[c] += x;
+            }
+        }
+        self.alpha += sample.alpha;
+        self.n_samples += 1;
+        if set == SampleSet::Second {
+            self.n_second += 1;
+            let color = if finite { sample.color } else { Rgb::BLACK };
+            for (sum, x) in self.second.iter_mut().zip(color.to_array()) {
+                *sum += f64::from(x) * unit;
+            }
+        }
+        if self.n_samples.is_power_of_two() {
+            self.prefixes = [Rgb::from(self.color.map(narrowed)), self.prefixes[0]];
+        }
+        if let Some(surface) = sample.surface {
+            self.albedo += surface.albedo;
+            self.normal += surface.normal;
+            self.depth += f64::from(surface.depth);
+            self.n_hits += 1;
+        }
+        finite
+    }
+
+    /// Adds `n` samples of a set that saw nothing, before no background, to a pixel that never saw anything.
+    pub(super) fn add_misses(&mut self, n: u32, set: SampleSet) {
+        self.n_samples += n;
+        self.n_second += if set == SampleSet::Second { n } else { 0 };
+    }
+
+    pub(super) fn n_samples(&self) -> u32 {
+        self.n_samples
+    }
+
+    /// Samples of a set.
+    pub(super) fn n_of(&self, set: SampleSet) -> u32 {
+        match set {
+            SampleSet::First => self.n_samples - self.n_second,
+            SampleSet::Second => self.n_second,
+        }
+    }
+
+    /// Error² of the mean's luminance over its own square, by the difference of the two sets; 0 without a second.
+    pub(super) fn relative_variance(&self) -> f32 {
+        let mean = self.mean(self.color).luminance();
+        let difference = Rgb::from(self.difference().map(|d| d as f32)).luminance();
+        self.balance() as f32 * difference * difference / (mean * mean + 0.01)
+    }
+
+    /// The mean of the first set less that of the second; 0 if either is empty.
+    fn difference(&self) -> [f64; 3] {
+        let [first, second] =
+            [SampleSet::First, SampleSet::Second].map(|set| f64::from(self.n_of(set)));
+        if first == 0.0 || second == 0.0 {
+            return [0.0; 3];
+        }
+        std::array::from_fn(|c| (self.color[c] - self.second[c]) / first - self.second[c] / second)
+    }
+
+    /// The variance of the mean over that of the difference of the sets, for sets that err alike: a b / (a + b)².
+    fn balance(&self) -> f64 {
+        let [first, second] =
+            [SampleSet::First, SampleSet::Second].map(|set| f64::from(self.n_of(set)));
+        first * second / functions::powi(first + second, 2).max(1.0)
+    }
+
+    /// What the pixel shows of how much less than independent samples its samples err.
+    pub(super) fn contrast(&self) -> Option<Contrast> {
+        if self.n_samples < 2 {
+            return None;
+        }
+        let independent: f64 = self.independent_variance().into_iter().sum();
+        let squares = |x: [f64; 3]| x.into_iter().map(|x| x * x).sum::<f64>();
+        if self.n_second > 0 {
+            return Some(Contrast::Sets([
+                independent,
+                self.balance() * squares(self.difference()),
+            ]));
+        }
+        let [whole, half] = self.prefixes.map(|sum| sum.to_array().map(f64::from));
+        let prefix = f64::from(1u32 << self.n_samples.ilog2());
+        let halves = std::array::from_fn(|c| (2.0 * half[c] - whole[c]) * 2.0 / prefix);
+        let independent = independent * f64::from(self.n_samples) / prefix;
+        Some(Contrast::Halves([independent, squares(halves)]))
+    }
+
+    /// One over the number of samples.
+    pub(super) fn scale(&self) -> f32 {
+        1.0 / self.n_samples.max(1) as f32
+    }
+
+    /// A sum over the number of samples.
+    pub(super) fn mean(&self, sum: [f64; 3]) -> Rgb {
+        let n = f64::from(self.n_samples.max(1));
+        Rgb::from(sum.map(|c| narrowed(c / n)))
+    }
+
+    /// The share of camera samples that show something.
+    pub(super) fn alpha(&self) -> f32 {
+        self.alpha * self.scale()
+    }
+
+    /// The mean over the samples that hit.
+    pub(super) fn depth(&self) -> f32 {
+        (self.depth / f64::from(self.n_hits.max(1))) as f32
+    }
+
+    /// s²/n: the variance of the mean if the samples were independent.
+    fn independent_variance(&self) -> [f64; 3] {
+        let n = f64::from(self.n_samples);
+        if n < 2.0 {
+            return [0.0; 3];
+        }
+        std::array::from_fn(|c| {
+            let mean = self.color[c] / n;
+            (self.color_squared[c] / n - mean * mean).max(0.0) / (n - 1.0)
+        })
+    }
+
+    /// Of the mean, `scale` being [`super::variance::VarianceSums::scale`] of its samples.
+    pub(super) fn variance(&self, scale: f64) -> Rgb {
+        Rgb::from(self.independent_variance().map(|v| narrowed(scale * v)))
+    }
+}
+
+/// The nearest finite number of single precision.
+fn narrowed(x: f64) -> f32 {
+    x.min(f64::from(f32::MAX)) as f32
+}

@@ -1,0 +1,207 @@
+//! The estimator of product sampling, step by step.
+//!
+//! For a pixel with hits x and cells c of the map (notation of [`super`]):
+//!
+//! ```text
+//! pilot    I = Σ_j W_j V_j                                                               all candidates traced
+//! others   I = Σ_c V̂_c ∫_c h L + Σ_j V̂_j (W_j − h_j L_j/p_j) + Σ_chosen (W_j/π_j) (V_j − V̂_j)
+//! ```
+//!
+//! The terms of V alone are rays; all others are the pixel's base, known without them.
+
+use super::candidates::{Counts, Hits, PixelSamples, Sources};
+use super::cells::Cells;
+use super::rays::Rays;
+use super::systematic::SystematicSampler;
+use super::visibility::{Blocks, VisibilityStats};
+use super::{LightSamplePool, ProductSampling, ProductScratch, TOLERANCE};
+use crate::Rgb;
+use crate::simd::{Kernel, Simd};
+use crate::strategy::levels::coarser;
+use crate::strategy::{Contributions, PixelPoints, ShadingPoint, TileShading};
+
+/// A round over a tile.
+pub(super) struct Round<'a, 'e> {
+    pub(super) strategy: &'a ProductSampling<'e>,
+    pub(super) cells: &'a Cells,
+    pub(super) pool: &'a LightSamplePool,
+    pub(super) tile: &'a TileShading<'a>,
+    /// Of the first level: nothing is known of visibility yet.
+    pub(super) pilots: bool,
+    pub(super) scratch: &'a mut ProductScratch,
+    pub(super) out: &'a mut Contributions,
+}
+
+impl Kernel for Round<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(mut self, simd: S) {
+        let Self { tile, pilots, .. } = self;
+        let blocks = tile.blocks();
+        if !pilots {
+            let ProductScratch { visibility, visibility_stats, .. } = &mut *self.scratch;
+            visibility.estimate(simd, self.cells, visibility_stats, blocks);
+        }
+        self.scratch.targets.clear();
+        self.scratch.sampled_pixels.clear();
+        for (i, pixel) in tile.pixels.iter().enumerate() {
+            if !pixel.points.is_empty() {
+                let block = blocks.of(i % tile.width, i / tile.width);
+                self.sample_pixel(simd, i, pixel, block);
+            }
+        }
+    }
+}
+
+impl Round<'_, '_> {
+    /// Chooses the rays of a pixel, and gives its points what they reflect without them.
+    #[inline(always)]
+    fn sample_pixel<S: Simd>(&mut self, simd: S, i: usize, pixel: &PixelPoints, block: usize) {
+        let tile = self.tile;
+        let points = &tile.points[pixel.points.clone()];
+        let hits = Hits { points, one_material: pixel.one_material };
+        self.scratch.sampled_pixels.push(i);
+        // Group the hits by surface and normal, and divide the candidates between light and BRDF.
+        self.scratch.groups.cluster(hits);
+        let counts = self.strategy.counts(&self.scratch.groups, points.len(), self.pilots);
+        // Tabulate light times reflectance over the cells (Clarberg & Akenine-Möller 2008, section 3).
+        self.tabulate_product(simd, block, counts);
+        // Draw candidates from the table and of the BRDF, weighted by the balance heuristic (Veach 1997, eq. 9.8).
+        let numbers = self.pixel_numbers(pixel);
+        self.draw_candidates(simd, hits, counts, &numbers);
+        if self.pilots {
+            // Trace them all.
+            let ProductScratch { candidates, targets, .. } = &mut *self.scratch;
+            Rays { pixel, out: self.out, targets }.push_all(candidates);
+            return;
+        }
+        // Integrate the control variate through the estimated visibility.
+        let known = self.integrate_control_variate(simd, pixel, points, block);
+        // Choose the candidates whose visibility matters, and correct the estimate by them (Horvitz & Thompson 1952).
+        let importance = self.importance(i, pixel, known, counts);
+        self.choose_rays(simd, pixel, block, importance, numbers.choice);
+    }
+
+    /// Fills the table, and beside pilots the control variate.
+    ///
+    /// Of a diffuse pixel, whose reflected light the control variate knows exactly, the table is proportional to what is
+    /// left: the standard deviation of visibility.
+    #[inline(always)]
+    fn tabulate_product<S: Simd>(&mut self, simd: S, block: usize, counts: Counts) {
+        let cells = self.cells;
+        let ProductScratch { groups, table, control_variate, visibility, .. } = &mut *self.scratch;
+        if self.pilots {
+            table.fill::<S, false>(simd, cells, &groups.all, control_variate);
+            table.accumulate(simd, cells);
+            return;
+        }
+        table.fill::<S, true>(simd, cells, &groups.all, control_variate);
+        if !groups.is_glossy() {
+            let (visible, std_dev) = visibility.of(block);
+            table.weight_by_variance(simd, cells, &control_variate.above, visible, std_dev);
+        }
+        table.accumulate(simd, cells);
+        control_variate.balance(simd, cells, groups.brdf_share(counts, table.total()));
+    }
+
+    /// The random numbers of a pixel in the pass.
+    fn pixel_numbers(&self, pixel: &PixelPoints) -> PixelSamples {
+        // The first camera sample that hits tells passes apart.
+        PixelSamples::new(pixel.sampler.part(self.tile.samples[pixel.points.start]))
+    }
+
+    /// Strata along the curve, each with a direction of the pool, and samples of the BRDF.
+    #[inline(always)]
+    fn draw_candidates<S: Simd>(
+        &mut self,
+        simd: S,
+        hits: Hits,
+        counts: Counts,
+        numbers: &PixelSamples,
+    ) {
+        let (environment, cells, pool) = (&*self.strategy.environment, self.cells, self.pool);
+        let ProductScratch { groups, table, control_variate, candidates, .. } = &mut *self.scratch;
+        let control_variate = (!self.pilots).then_some(&*control_variate);
+        let sources = Sources { environment, cells, pool, table, control_variate };
+        sources.draw(simd, hits, &groups.diffuse, counts, numbers, candidates);
+    }
+
+    /// Gives each point Σ_c V̂_c ∫_c h L; returns the mean luminance over the points.
+    #[inline(always)]
+    fn integrate_control_variate<S: Simd>(
+        &mut self,
+        simd: S,
+        pixel: &PixelPoints,
+        points: &[ShadingPoint],
+        block: usize,
+    ) -> f32 {
+        let ProductScratch { groups, control_variate, visibility, targets, .. } =
+            &mut *self.scratch;
+        let mut rays = Rays { pixel, out: self.out, targets };
+        let integral =
+            control_variate.integral(simd, self.cells, self.pool, visibility.of(block).0);
+        let mut known = Rgb::BLACK;
+        for (hit, (at, &diffuse)) in points.iter().zip(&groups.diffuse).enumerate() {
+            let of_hit = integral.eval(at.frame.z, diffuse);
+            *rays.base(hit as u32) += of_hit;
+            known += of_hit;
+        }
+        known.luminance().max(0.0) / points.len() as f32
+    }
+
+    /// What a candidate's standard deviation is multiplied by to give its selection probability π: one over the error that
+    /// the pixel's brightness tolerates.
+    fn importance(&self, i: usize, pixel: &PixelPoints, known: f32, counts: Counts) -> f32 {
+        let Self { strategy, tile, .. } = *self;
+        let n_points = pixel.points.len() as f32;
+        // No brighter than what is known of it: it may lie in a shadow or beside a highlight.
+        let brightness = strategy.expected_brightness(tile, &self.scratch.visibility_stats, i);
+        let brightness = brightness.min(strategy.brightness(known));
+        let n = (counts.light + counts.brdf) as f32;
+        let tolerance = TOLERANCE[usize::from(self.scratch.groups.is_glossy())];
+        let covered = n_points / pixel.n_samples as f32;
+        covered * n / (tolerance * brightness)
+    }
+
+    /// Gives each point Σ_j V̂_j (W_j − h_j L_j/p_j) − Σ_chosen (W_j/π_j) V̂_j, and traces the chosen candidates.
+    #[inline(always)]
+    fn choose_rays<S: Simd>(
+        &mut self,
+        simd: S,
+        pixel: &PixelPoints,
+        block: usize,
+        importance: f32,
+        choice: f32,
+    ) {
+        let ProductScratch { candidates, chosen, visibility, targets, .. } = &mut *self.scratch;
+        let visibility = visibility.of(block);
+        let mut rays = Rays { pixel, out: self.out, targets };
+        rays.weigh_candidates(simd, candidates, visibility, importance);
+        rays.push_chosen(candidates, visibility.0, SystematicSampler::new(choice), chosen);
+    }
+}
+
+impl TileShading<'_> {
+    /// The blocks of pixels that learn visibility together.
+    pub(super) fn blocks(&self) -> Blocks {
+        Blocks::new(self.width, self.pixels.len() / self.width.max(1))
+    }
+}
+
+impl ProductSampling<'_> {
+    /// How bright a pixel will be: the harmonic mean over those of lower levels about it, for a dark one among
+    /// them tells of a shadow's edge.
+    fn expected_brightness(
+        &self,
+        tile: &TileShading,
+        visibility_stats: &VisibilityStats,
+        pixel: usize,
+    ) -> f32 {
+        let around = coarser(pixel, tile.width, tile.pixels.len());
+        let known = around.filter_map(|i| visibility_stats.luminance(i));
+        let add = |(n, sum), luminance| (n + 1.0, sum + 1.0 / self.brightness(luminance));
+        let (n, sum) = known.fold((0.0, 0.0), add);
+        if n > 0.0 { n / sum } else { self.dark }
+    }
+}
