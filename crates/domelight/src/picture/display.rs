@@ -51,7 +51,12 @@ impl FloatTable {
     /// Of `f` between `least` and `greatest`, both above 0; beyond them it is as at the ends.
     fn new(least: f32, greatest: f32, f: impl Fn(f32) -> f32) -> Self {
         let (first, last) = (least.to_bits() >> SHIFT, (greatest.to_bits() >> SHIFT) + 1);
-        let values = (first..=last).map(|i| f(f32::from_bits(i << SHIFT))).collect();
+        let mut values: Vec<f32> = (first..=last).map(|i| f(f32::from_bits(i << SHIFT))).collect();
+        // The function may bend at its greatest argument: lead the last line through its value there.
+        let (t, n) = (fraction(greatest.to_bits()), values.len());
+        if t > 0.0 {
+            values[n - 1] = values[n - 2] + (f(greatest) - values[n - 2]) / t;
+        }
         Self { least, greatest, values }
     }
 
@@ -59,9 +64,13 @@ impl FloatTable {
     fn get(&self, x: f32) -> f32 {
         let bits = x.max(self.least).min(self.greatest).to_bits();
         let i = ((bits >> SHIFT) - (self.least.to_bits() >> SHIFT)) as usize;
-        let t = (bits & ((1 << SHIFT) - 1)) as f32 / (1 << SHIFT) as f32;
-        self.values[i] + (self.values[i + 1] - self.values[i]) * t
+        self.values[i] + (self.values[i + 1] - self.values[i]) * fraction(bits)
     }
+}
+
+/// How far between two values of the table, in [0, 1).
+fn fraction(bits: u32) -> f32 {
+    (bits & ((1 << SHIFT) - 1)) as f32 / (1 << SHIFT) as f32
 }
 
 #[cfg(test)]
