@@ -1,9 +1,12 @@
 //! Errors as the user sees them, and the exit code.
 
+use crate::args::FIRST_STEPS;
 use crate::interrupt::RUN_AGAIN;
 use crate::memory;
 use crate::merge::MergeError;
 use crate::output::NobodyReads;
+use crate::suggest;
+use clap::error::ErrorKind;
 use domelight::environment::EnvironmentError;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::ProbeError;
@@ -13,10 +16,12 @@ use domelight::picture::PictureErrorKind;
 use domelight::picture::compare::SizeMismatch;
 use domelight::quote::terminal;
 use domelight::render::CheckpointError;
+use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{CameraError, LoadError, SceneError};
 use std::error::Error;
 use std::fmt::Write as _;
 use std::io::{self, IsTerminal, Write as _};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Arguments that each are right but do not go together; exit code 2.
@@ -84,7 +89,12 @@ pub(crate) fn warn(quiet: bool, text: &str) {
 }
 
 /// Prints what is wrong with the command line, or the help that was asked for; the exit code.
-pub(crate) fn report_usage(error: &clap::Error) -> ExitCode {
+pub(crate) fn report_usage(mut error: clap::Error) -> ExitCode {
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        tell_lines(FIRST_STEPS);
+        return ExitCode::from(error.exit_code() as u8);
+    }
+    suggest::add_to(&mut error);
     let text = error.to_string();
     if terminal::lines(&text) == text {
         // In color.
@@ -158,16 +168,29 @@ fn hint(error: &anyhow::Error) -> Option<String> {
     if let Some(error) = over_limit(error) {
         return Some(memory::hint(error));
     }
+    let is_missing = io_kind(error) == Some(io::ErrorKind::NotFound);
+    if let Some(LoadError::Read { path, .. }) = find(error)
+        && is_missing
+    {
+        let names = BuiltinScene::ALL.map(BuiltinScene::name).join(", ");
+        return Some(known("a scene", &names, suggest::scene(path)));
+    }
     match find(error)? {
-        ProbeError::Picture(_) if io_kind(error) == Some(io::ErrorKind::NotFound) => {
+        ProbeError::Picture(picture) if is_missing => {
             let names = BuiltinProbe::ALL.map(BuiltinProbe::name).join(", ");
-            Some(format!("a probe is a file or one of {names}"))
+            Some(known("a probe", &names, suggest::probe(Path::new(&picture.file))))
         }
         ProbeError::Shape { .. } => {
             Some("--mapping (of render: --env-mapping) tells how the file is mapped".into())
         }
         _ => None,
     }
+}
+
+/// What the built-in names are, and which one was meant.
+fn known(what: &str, names: &str, meant: Option<&str>) -> String {
+    let text = format!("{what} is a file or one of {names}");
+    meant.map_or(text.clone(), |name| format!("{text}; did you mean '{name}'?"))
 }
 
 /// The cause of that type.

@@ -54,5 +54,5 @@ pub(crate) fn run(arguments: &InspectArguments, quiet: bool) -> Result<()> {
     files::write(output, |out| out.write_all(text.as_bytes()))?;
     inspection.summary().iter().for_each(|line| host.status(line));
     host.status(&format!("-> {}", output.display()));
-    Ok(())
+    if arguments.json { print_json(&inspection.report()) } else { Ok(()) }
 }

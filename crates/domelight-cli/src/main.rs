@@ -29,7 +29,9 @@ mod render;
 mod render_run;
 mod report;
 mod scene;
+mod shell;
 mod strategy;
+mod suggest;
 mod terminal;
 mod tone;
 
@@ -40,7 +42,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let Arguments { command, quiet, memory } = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) => return error::report_usage(&error),
+        Err(error) => return error::report_usage(error),
     };
     memory::limit(memory.max_memory);
     let done = match command {
@@ -55,6 +57,8 @@ fn main() -> ExitCode {
         Command::Probe(arguments) => probe::run(&arguments, quiet),
         Command::Tone(arguments) => tone::run(&arguments, quiet),
         Command::Figures(arguments) => figures::run(&arguments, quiet),
+        Command::Completions(arguments) => shell::completions(&arguments),
+        Command::Man(arguments) => shell::man(&arguments, quiet),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -58,6 +58,9 @@ pub(crate) struct FarmArguments {
     /// The container image, for kubernetes
     #[arg(long, value_name = "IMAGE", default_value = "domelight:latest", help_heading = "Farm")]
     pub(crate) image: String,
+    /// Print what was written, and the command that submits it, as JSON
+    #[arg(long, help_heading = "Farm")]
+    pub(crate) json: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -48,6 +48,9 @@ pub(crate) struct InspectArguments {
         help_heading = "Output"
     )]
     pub(crate) output: PathBuf,
+    /// Print the report as JSON, too
+    #[arg(long, help_heading = "Output")]
+    pub(crate) json: bool,
 }
 
 fn pixel(text: &str) -> Result<[usize; 2], String> {

@@ -22,7 +22,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 /// Shown when the program starts without arguments, and at the end of `--help`.
-const FIRST_STEPS: &str = "\
+pub(crate) const FIRST_STEPS: &str = "\
 Five things to do:
   domelight render
       the built-in statue under the built-in sky, into domelight.exr and domelight.png
@@ -35,7 +35,7 @@ Five things to do:
   domelight compare
       how noisy each strategy is on one scene, as a page to look at; takes half a minute
 
-domelight COMMAND --help lists every option of a command.";
+domelight --help lists the commands, domelight COMMAND --help every option of a command.";
 
 /// Direct illumination under measured light.
 #[derive(Debug, Parser)]
@@ -104,6 +104,49 @@ pub(crate) enum Command {
     /// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
     #[command(after_help = figures::EXAMPLES)]
     Figures(Box<figures::FiguresArguments>),
+    /// Print the script that completes command lines in a shell.
+    #[command(after_help = COMPLETIONS_EXAMPLES)]
+    Completions(CompletionsArguments),
+    /// Write manual pages: domelight.1 and one for each command.
+    #[command(after_help = MAN_EXAMPLES)]
+    Man(ManArguments),
+}
+
+const COMPLETIONS_EXAMPLES: &str = "\
+Examples:
+  domelight completions bash > ~/.local/share/bash-completion/completions/domelight
+  domelight completions zsh > ~/.zfunc/_domelight
+      with ~/.zfunc in $fpath, before compinit
+  domelight completions fish > ~/.config/fish/completions/domelight.fish
+  domelight completions powershell >> $PROFILE
+  domelight completions elvish >> ~/.config/elvish/rc.elv";
+
+const MAN_EXAMPLES: &str = "\
+Examples:
+  domelight man ~/.local/share/man/man1
+      then: man domelight, man domelight-render
+  domelight man . && man -l domelight.1";
+
+/// Print the script that completes command lines in a shell.
+#[derive(Args, Debug)]
+pub(crate) struct CompletionsArguments {
+    /// The shell
+    #[arg(value_enum)]
+    pub(crate) shell: clap_complete::Shell,
+    /// Print the script as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Write manual pages.
+#[derive(Args, Debug)]
+pub(crate) struct ManArguments {
+    /// The folder to write into, made if it is not there
+    #[arg(value_name = "FOLDER")]
+    pub(crate) folder: PathBuf,
+    /// Print the names of the files as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 const DIFF_EXAMPLES: &str = "\

@@ -10,13 +10,14 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
+use clap::ValueEnum as _;
 use domelight::code;
 use domelight::quote::{Code, Shell, Yaml, shell};
 
 use crate::args::farm::{Engine, FarmArguments};
 use crate::error::{UsageError, status};
 use crate::files;
-use crate::output::{PicturePath, print_code};
+use crate::output::{PicturePath, print_code, print_json};
 use domelight_lab::refuse_repeating_points;
 
 /// What every engine is told.
@@ -93,6 +94,16 @@ pub(crate) fn run(arguments: &FarmArguments, quiet: bool) -> Result<()> {
         if !quiet {
             status(&format!("wrote {path}"));
         }
+    }
+    if arguments.json {
+        let written: Vec<String> = files.iter().map(|file| farm.path(file.name)).collect();
+        return print_json(&serde_json::json!({
+            "engine": arguments.engine.to_possible_value().map(|value| value.get_name().to_owned()),
+            "files": written,
+            "shards": farm.n_shards,
+            "picture": farm.picture,
+            "submit": command.as_str(),
+        }));
     }
     print_code(&command)?;
     Ok(())

@@ -141,6 +141,12 @@ const FRESNEL: &str = "«one», a reflectance from 0 to 1 as a number or R,G,B, 
 const WARD_FORM: &str = "«bounded», «1992» or «duer»";
 const MASKING: &str = "«separable» or «correlated»";
 
+impl MaterialSpec {
+    /// The names of the models, as their texts begin.
+    pub const MODELS: [&'static str; 7] =
+        ["diffuse", "phong", "ward", "ggx", "beckmann", "gltf", "mix"];
+}
+
 impl FromStr for MaterialSpec {
     type Err = ParseMaterialError;
 
@@ -459,6 +465,10 @@ mod tests {
             error("gltf:1:0"),
             "«gltf» takes a color, two numbers, and up to a strength, a color and an anisotropy after colons, not 2; for instance gltf:1,0.8,0.6:0:0.5"
         );
+        for model in MaterialSpec::MODELS {
+            let parsed = model.parse::<MaterialSpec>();
+            assert!(!matches!(parsed, Err(ParseMaterialError::Model { .. })), "{model}");
+        }
         assert!(error("velvet:1").contains("«velvet»; write diffuse:COLOR, phong:"));
         assert!(error("ggx:0.1:unobtainium").contains("aluminium, chromium"));
     }

@@ -5,6 +5,8 @@
 //! irradiance as the angle changes. The dome becomes the world: an environment texture, whose
 //! middle Blender shows at +X where ours is at +Y. The world is Z-up.
 //!
+//! A script that runs again replaces the collection and the world "domelight" of its former run.
+//!
 //! The console runs a line at a time: blocks have no empty lines within, and one after them.
 
 use std::f32::consts::FRAC_PI_2;
@@ -18,7 +20,19 @@ use crate::environment::UpAxis;
 use crate::quote::{Code, Python, python};
 
 const ADD_LIGHTS: &str = r#"
+def remove_former_lights():
+    former = bpy.data.collections.get("domelight")
+    if former is None:
+        return
+    for sun in list(former.objects):
+        light = sun.data
+        bpy.data.objects.remove(sun)
+        if light is not None and light.users == 0:
+            bpy.data.lights.remove(light)
+    bpy.data.collections.remove(former)
+
 def add_lights():
+    remove_former_lights()
     collection = bpy.data.collections.new("domelight")
     bpy.context.scene.collection.children.link(collection)
     for name, toward, color, strength, angle in LIGHTS:
@@ -41,7 +55,7 @@ def find_dome():
     raise FileNotFoundError("the residual map is in none of these: " + ", ".join(paths))
 
 def set_world():
-    world = bpy.data.worlds.new("domelight")
+    world = bpy.data.worlds.get("domelight") or bpy.data.worlds.new("domelight")
     world.use_nodes = True
     nodes, link = world.node_tree.nodes, world.node_tree.links.new
     nodes.clear()
