@@ -39,7 +39,11 @@ pub(crate) fn man(arguments: &ManArguments, quiet: bool) -> Result<()> {
     }
     if !quiet {
         let n = written.len();
-        status(&format!("-> {n} pages in {}; read one with: man -l {}", folder.display(), written[0]));
+        status(&format!(
+            "-> {n} pages in {}; read one with: man -l {}",
+            folder.display(),
+            written[0]
+        ));
     }
     Ok(())
 }
