@@ -90,7 +90,7 @@ impl dyn Host + '_ {
     ) -> Result<PreparedStrategy<'e>, Error> {
         use crate::At as _;
         let needed = PreparedStrategy::memory(spec, environment);
-        require(needed, self.memory_left()).at(&format!("the tables of {spec}"))?;
+        require(needed, self.memory_left()).at(format!("the tables of {spec}"))?;
         Ok(PreparedStrategy::new(spec, environment)?)
     }
 

@@ -117,9 +117,10 @@ impl Device {
             if (self.functions.oidnGetDeviceError)(self.handle, &raw mut message) == 0 {
                 return Ok(());
             }
-            match message.is_null() {
-                true => "unknown error".into(),
-                false => CStr::from_ptr(message).to_string_lossy().into_owned(),
+            if message.is_null() {
+                "unknown error".into()
+            } else {
+                CStr::from_ptr(message).to_string_lossy().into_owned()
             }
         };
         Err(text)
