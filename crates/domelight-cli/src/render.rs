@@ -80,8 +80,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         automatic_exposure: automatic,
     };
     let render_run = &arguments.render_run;
-    let render_run =
-        render_run.render_run(view, settings, &described, spec, &outputs, interrupted, quiet)?;
+    let render_run = render_run.render_run(view, settings, &described, spec, &outputs, quiet)?;
     let build = watch.lap();
     drop(loading);
 

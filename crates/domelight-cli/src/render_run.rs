@@ -93,9 +93,9 @@ impl RenderRunArguments {
         report: &Settings,
         strategy: StrategySpec,
         outputs: &[PicturePath],
-        interrupted: &'static AtomicBool,
         quiet: bool,
     ) -> Result<RenderRun> {
+        let interrupted = interrupt::flag();
         let tiles = match (self.shard, self.tiles) {
             (Some(shard), _) => TileSelection::Shard(shard),
             (None, Some(tiles)) => TileSelection::Tiles(tiles),

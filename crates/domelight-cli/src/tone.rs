@@ -114,7 +114,9 @@ pub(crate) fn run(arguments: &ToneArguments, quiet: bool) -> Result<()> {
     if !quiet {
         let Report { picture, size: [w, h], shown, output, denoised, .. } = report;
         status(&format!("{picture}: {w}x{h}, {shown} -> {output}"));
-        denoised.into_iter().for_each(|by| status(&denoised_line(by)));
+        if let Some(by) = denoised {
+            status(&denoised_line(by));
+        }
     }
     Ok(())
 }

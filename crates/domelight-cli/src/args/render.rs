@@ -43,6 +43,7 @@ pub(crate) struct RenderArguments {
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Output")]
+#[expect(clippy::struct_excessive_bools, reason = "each is an option of its own")]
 pub(crate) struct OutputArguments {
     /// Where to: .exr (all layers), .png, .hdr or .pfm; several times for several files; - writes
     /// OpenEXR to standard output [default: domelight.exr and domelight.png]
