@@ -27,4 +27,5 @@ pub use crate::{
 
 #[cfg(feature = "io")]
 pub use crate::picture::exposure::Exposure;
+#[cfg(feature = "io")]
 pub use crate::picture::tone::{ToneCurve, ToneMapping};
