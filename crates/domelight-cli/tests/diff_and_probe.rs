@@ -135,7 +135,10 @@ fn a_missing_probe_is_named_with_a_hint() {
     assert_eq!(output.status.code(), Some(2));
     let lines: Vec<&str> = stderr(&output).lines().collect();
     assert!(lines[0].starts_with("error: skye: "), "{lines:?}");
-    assert_eq!(lines[1], "hint: a probe is a file or one of sky, studio, cathedral, constant");
+    assert_eq!(
+        lines[1],
+        "hint: a probe is a file or one of sky, studio, cathedral, constant; did you mean 'sky'?"
+    );
 }
 
 #[test]
