@@ -152,7 +152,7 @@ impl Engine {
         self.session = None;
         let (scene, loaded) = self.scene()?;
         let aspect = state.width as f32 / state.height as f32;
-        let view = loaded.camera(state.camera, aspect);
+        let view = loaded.camera(scene, state.camera, aspect);
         let camera = Camera::new(&view, state.width, state.height).map_err(error)?;
         let borrowed =
             Borrowed { scene: scene.clone(), environment: self.environment()?.clone(), camera };

@@ -11,20 +11,22 @@ mod description;
 mod emission;
 #[cfg(feature = "io")]
 mod fingerprint;
+mod framing;
 mod layers;
 #[cfg(feature = "io")]
 pub mod load;
-mod material;
+pub(crate) mod material;
 mod shading;
 mod subject;
 mod texture;
 
 pub use crate::environment::UpAxis;
-pub use camera::{Camera, CameraError, CameraSettings, Projection};
+pub use camera::{Camera, CameraError, CameraSettings, Lens, Projection};
 pub use coverage::Sight;
 pub use description::{
     EnvironmentSettings, EnvironmentSource, NamedCamera, Part, SceneDescription,
 };
+pub use framing::{Framing, UnknownView, ViewDirection};
 pub use layers::{
     AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers, Sheen,
     Specular, Volume,
@@ -63,9 +65,17 @@ pub struct Scene {
     emits: bool,
     /// Light passes through some part.
     transmits: bool,
+    /// Some part that does not hide all behind it dims light.
+    dims_light: bool,
+    /// Some part shows nothing but shadows.
+    catches_shadows: bool,
     bounds: Aabb,
     /// The bounds of what is not scenery.
     subject_bounds: Aabb,
+    /// Of each part, whether it is no scenery.
+    is_subject: Vec<bool>,
+    /// From where a framed camera looks.
+    view: Option<ViewDirection>,
     /// The camera and the up axis of the file, if it has them.
     camera: Option<CameraSettings>,
     up: UpAxis,
@@ -130,11 +140,14 @@ impl Scene {
     pub fn new(description: SceneDescription) -> Result<Self, SceneError> {
         check(&description)?;
         let subject_bounds = description.subject_bounds();
-        let SceneDescription { mut parts, materials, textures, camera, up, .. } = description;
+        let is_subject = description.is_subject();
+        let SceneDescription { parts, materials, textures, camera, up, view, .. } = description;
+        let mut parts: Vec<_> = parts.into_iter().zip(is_subject).collect();
         let up = up.unwrap_or_default();
-        let bounds = parts.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()));
+        let bounds = parts.iter().fold(Aabb::EMPTY, |b, (p, _)| b.union(p.mesh.bounds()));
         check_size(&bounds)?;
-        parts.sort_by_key(|part| !part.is_opaque(&materials));
+        parts.sort_by_key(|(part, _)| !part.is_opaque(&materials));
+        let (parts, is_subject): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
         let n_opaque = parts.partition_point(|part| part.is_opaque(&materials));
         let (opaque, others) = parts.split_at(n_opaque);
         let bvh = build(opaque)?;
@@ -146,6 +159,9 @@ impl Scene {
         let has_single_sided = used().any(|material| !material.double_sided);
         let emits = used().any(|material| material.unlit || material.emission.is_some());
         let transmits = used().any(Material::transmits);
+        let catches_shadows = used().any(|material| material.catches_shadows);
+        let dims = |part: &Part| !materials[part.material].catches_shadows;
+        let dims_light = parts[n_opaque..].iter().any(dims);
         Ok(Self {
             parts,
             materials,
@@ -156,8 +172,12 @@ impl Scene {
             has_single_sided,
             emits,
             transmits,
+            dims_light,
+            catches_shadows,
             bounds,
             subject_bounds,
+            is_subject,
+            view,
             camera,
             up,
         })
@@ -218,8 +238,16 @@ impl Scene {
     /// The camera of the file, or else one that frames what is not scenery in a picture of
     /// `aspect` = width / height.
     pub fn camera(&self, aspect: f32) -> CameraSettings {
-        let framed = || CameraSettings::framing(&self.subject_bounds, aspect, self.up.vector());
+        let framed = || self.framed(&Framing::new(aspect, self.up.vector()));
         self.camera.unwrap_or_else(framed)
+    }
+
+    /// A camera that frames what is not scenery, whatever camera the file has.
+    pub fn framed(&self, framing: &Framing) -> CameraSettings {
+        let parts = self.parts.iter().zip(&self.is_subject);
+        let subject = parts.filter(|(_, is_subject)| **is_subject);
+        let framing = Framing { view: framing.view.or(self.view), ..*framing };
+        framing.fit(subject.flat_map(|(part, _)| part.mesh.positions.iter().copied()))
     }
 
     /// The least box around all vertices; empty without any.
