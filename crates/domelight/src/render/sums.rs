@@ -203,7 +203,6 @@ impl PixelSums {
         let finite = colors.iter().all(|color| color.is_finite());
         if finite {
             self.shadow += sample.shadow;
-            self.alpha += sample.alpha;
             let in_units = |color: Rgb| color.to_array().map(|c| f64::from(c) * unit);
             for (c, x) in in_units(sample.color).into_iter().enumerate() {
                 self.color[c] += x;
@@ -212,6 +211,9 @@ impl PixelSums {
             for (c, x) in in_units(sample.unoccluded).into_iter().enumerate() {
                 self.unoccluded[c] += x;
             }
+        }
+        if sample.alpha.is_finite() {
+            self.alpha += sample.alpha;
         }
         self.n_samples += 1;
         if set == SampleSet::Second {

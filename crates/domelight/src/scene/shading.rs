@@ -332,7 +332,7 @@ mod tests {
             lowest = lowest.min(p.position.length());
             let origin = offset_origin(p.position, p.ng, 2.0);
             let is_seen = !scene.bvh().any_hit(&Ray::new(origin, wi));
-            assert!(is_seen || p.ng.dot(wi) < 0.08, "{} at {}", p.ng.dot(wi), p.position);
+            assert!(is_seen || p.ng.dot(wi) < 0.15, "{} at {}", p.ng.dot(wi), p.position);
         }
         // The triangles themselves come as near to the center as 0.93.
         assert!(lowest > 0.985, "{lowest}");
@@ -350,7 +350,7 @@ mod tests {
         let ray = Ray::new(vec3(0.1, 0.2, 0.0), vec3(0.4, 0.2, -0.9).normalize());
         let hit = within.bvh().closest_hit(&ray).unwrap();
         let p = within.shading_point(&ray, &hit);
-        assert!((p.position - ray.at(hit.t)).length() < 1e-6);
+        assert!((p.position - ray.at(hit.t)).length() < 1e-5);
         assert!(p.ng.dot(ray.direction) < 0.0);
     }
 
