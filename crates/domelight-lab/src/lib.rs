@@ -33,6 +33,7 @@ pub mod figures;
 mod host;
 pub mod inspect;
 pub mod measure;
+pub mod names;
 mod page;
 pub mod report;
 pub mod scene;

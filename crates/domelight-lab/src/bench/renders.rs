@@ -14,6 +14,7 @@ use super::strategy_run::{
 };
 use super::table::{Table, number};
 use super::{Bench, Peer};
+use crate::names::file_name;
 use crate::measure::{Cache, Goal, MIS, Reference, ReferenceReport};
 use crate::strategy::NamedStrategy;
 use crate::usage::Seconds;
@@ -187,8 +188,8 @@ impl CaseRunner<'_> {
             entry,
         });
         Ok(Row {
-            scene: case.scene.clone(),
-            probe: case.probe.clone(),
+            scene: file_name(&case.scene),
+            probe: file_name(&case.probe),
             material: case.material.to_string(),
             size: [settings.width, settings.height],
             triangles: view.scene.triangle_count(),

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cache::{Cache, Key};
 use super::render::RenderSetup;
+use crate::names::file_name;
 use crate::scene::View;
 use crate::{At as _, Error, Host};
 
@@ -63,7 +64,7 @@ pub struct ReferencePicture {
 pub struct ReferenceReport {
     /// File, cache or render.
     pub source: Source,
-    /// Where it is kept.
+    /// The name of the file that it is kept in, without the folder.
     pub file: Option<String>,
     /// How it was rendered; null for files.
     pub strategy: Option<String>,
@@ -198,7 +199,7 @@ impl Reference {
         }
         let report = ReferenceReport {
             source: Source::File,
-            file: Some(name),
+            file: Some(file_name(&name)),
             strategy: None,
             spp: None,
             rel_mse: None,
@@ -218,7 +219,7 @@ impl Reference {
     ) -> Result<Self, Error> {
         let report = |source, file: Option<&Path>, noise: Noise, spp| ReferenceReport {
             source,
-            file: file.map(|path| path.display().to_string()),
+            file: file.map(|path| file_name(&path.to_string_lossy())),
             strategy: Some(strategy.to_owned()),
             spp: Some(spp),
             rel_mse: Some(noise.all),
