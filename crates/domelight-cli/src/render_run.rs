@@ -138,11 +138,11 @@ fn identity(
     let camera = &view.report.camera;
     let mut identity = vec![
         ("adaptive", settings.adaptive.to_string()),
-        ("background", format!("{:?}", settings.background).to_lowercase()),
+        ("background", settings.background.name().to_owned()),
         ("camera", serde_json::to_string(camera).unwrap_or_default()),
         ("environment", view.environment.fingerprint().to_string()),
         ("filter", settings.filter.name().to_owned()),
-        ("sampler", report.sampler.clone()),
+        ("sampler", report.sampler.to_owned()),
         ("scene", view.scene.fingerprint().to_string()),
         ("seed", settings.seed.to_string()),
         ("size", format!("{}x{}", settings.width, settings.height)),
@@ -151,7 +151,7 @@ fn identity(
     ];
     // As it was before there was a choice.
     if settings.passes != Passes::default() {
-        identity.push(("passes", report.passes.clone()));
+        identity.push(("passes", report.passes.to_owned()));
     }
     identity.extend(settings.target_error.map(|e| ("target-error", e.to_string())));
     identity.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
