@@ -149,7 +149,7 @@ impl Difference {
         if let Some((white, metric)) = picture {
             row(
                 "error picture",
-                format!("{metric:?}, brightest color at {white:.4}").to_lowercase(),
+                format!("{}, brightest color at {white:.4}", metric.name()),
             );
         }
         text
