@@ -1,6 +1,6 @@
 //! `domelight compare` as a user runs it: a page and numbers, a cache, budgets, messages.
 
-mod common;
+use crate::common;
 
 use common::{domelight, ended as refused, json, stderr, write_exr};
 use domelight::picture::{ReadOptions, read_bytes};

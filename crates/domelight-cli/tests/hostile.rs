@@ -1,7 +1,7 @@
 //! Names that are commands, results that are inputs, amounts that are too large.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{domelight, ended, json, stderr, stdout};
 use std::fs;
