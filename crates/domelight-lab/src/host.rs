@@ -130,3 +130,34 @@ impl<F: Fn() -> bool + Sync> Observer for CanceledBy<F> {
         (self.0)()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+
+    /// Keeps what it is to show.
+    #[derive(Default)]
+    struct Warnings(Mutex<Vec<String>>);
+
+    impl Host for Warnings {
+        fn warn(&self, text: &str) {
+            self.0.lock().unwrap().push(text.to_owned());
+        }
+    }
+
+    #[test]
+    fn samples_that_are_not_finite_are_a_warning() {
+        let host = Warnings::default();
+        host.warn_of_non_finite("mis: ", 0);
+        host.warn_of_non_finite("product: ", 17);
+        let shown = host.0.into_inner().unwrap();
+        let [warning] = &shown[..] else { panic!("{shown:?}") };
+        assert!(
+            warning.starts_with("product: 17 camera samples were NaN or infinite"),
+            "{warning}"
+        );
+        assert!(warning.contains("please report this command"), "{warning}");
+    }
+}
