@@ -5,19 +5,20 @@ use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, bail};
 use domelight::picture::tone::ToneMapping;
-use domelight::render::{RenderSettings, Rendering, automatic_exposure, pilot_points};
+use domelight::render::{Layers, RenderSettings, Rendering, automatic_exposure, pilot_points};
 use domelight::scene::Camera;
 use domelight::strategy::PreparedStrategy;
 
 use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
+use crate::clock;
 use crate::error::UsageError;
 use crate::interrupt;
 use crate::memory;
-use crate::output::{PicturePath, print_progress, require_one_on_standard_output};
+use crate::output::{self, PicturePath, print_progress, require_one_on_standard_output};
 use crate::parse::Size;
 use crate::preview;
 use crate::progress::RenderProgress;
-use crate::render_run::RenderRun;
+use crate::render_run::TryWriting;
 use crate::report::{RenderReport, Settings, StopReason, Timings};
 use crate::scene::start_threads;
 use crate::strategy::{Job, acceptance};
@@ -77,8 +78,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         scene: report.clone(),
         strategy: spec.description(),
         spp: settings.n_samples,
-        passes: format!("{:?}", settings.passes).to_lowercase(),
-        sampler: format!("{:?}", settings.sampler).to_lowercase(),
+        passes: settings.passes.name(),
+        sampler: settings.sampler.name(),
         filter: settings.filter.name(),
         seed: settings.seed,
         threads: rayon::current_num_threads(),
@@ -100,9 +101,13 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let progress = RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
     let progress = progress.pictures(turntable.as_ref().map_or(1, Turntable::len));
     let progress = &progress.profiled(arguments.output.profile);
-    let render_run = Some(&render_run);
+    let attributes = described.provenance();
+    let try_writing = &|layers: &Layers| {
+        output::time_to_write(&outputs, layers, &shown_as, report.hide_env, &attributes)
+    };
+    let running = Some((&render_run, try_writing as TryWriting));
     let render = |camera: &Camera| {
-        Job { scene, camera, environment, settings, progress, render_run }.render(strategy)
+        Job { scene, camera, environment, settings, progress, render_run: running }.render(strategy)
     };
     let pictures = Pictures { described: &described, denoiser: denoiser.as_ref(), shown_as };
     let mut denoised = None;
@@ -119,7 +124,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         () if interrupted.load(Ordering::Relaxed) => Some(StopReason::Interrupted),
         () => Some(StopReason::Time),
     };
-    let saved = render_run.and_then(RenderRun::saved);
+    let saved = render_run.saved();
     if rendering.counts.camera_rays == 0 && saved.is_none() {
         bail!("ended before the first sample; nothing was written");
     }
@@ -129,7 +134,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     if turntable.is_none() && !arguments.render_run.is_part() {
         denoised = pictures.write(&rendering, None, &outputs)?;
     }
-    let stages = Timings { load, build, render, write: watch.lap() };
+    let total = clock::elapsed().as_secs_f64();
+    let stages = Timings { load, build, render, write: watch.lap(), total };
     let points = || pilot_points(scene, camera, settings);
     let rejection = acceptance(spec, points, environment, settings.seed)?;
     let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
