@@ -296,7 +296,8 @@ mod tests {
     }
 
     fn shapes() -> Vec<Vec<Vec3>> {
-        let ball = shapes::icosphere(3).positions.iter().map(|p| *p * 0.3 + vec3(9.0, 1.0, -4.0));
+        let sphere = shapes::icosphere(3).positions;
+        let ball = sphere.iter().map(|p| *p * 0.3 + vec3(9.0, 1.0, -4.0));
         let slab = corners(&Aabb { min: vec3(-3.0, 1.0, 2.0), max: vec3(4.0, 1.2, 9.0) });
         let rod = corners(&Aabb { min: vec3(0.0, 7.0, 1.0), max: vec3(2.0, 7.1, 1.3) });
         vec![ball.collect(), slab.to_vec(), rod.to_vec()]
