@@ -456,6 +456,9 @@ impl Tile {
     }
 }
 
+/// The share of the pixels that have a second set of samples in strategies that place the rays of a pixel together.
+pub(super) const SECOND_SETS: f64 = 4.0 / 256.0;
+
 /// Whether a pixel of the picture has a second set of samples in strategies that place the rays of a pixel together:
 /// four pixels in a square of 16 by 16, all of one [`level`], which is each level's as often as it has pixels.
 fn has_second_set(seed: u64, x: usize, y: usize) -> bool {
