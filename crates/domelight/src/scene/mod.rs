@@ -145,7 +145,9 @@ impl Scene {
         let SceneDescription { mut parts, materials, textures, camera, up, .. } = description;
         let up = up.unwrap_or_default();
         if scale != 1.0 {
-            parts.iter_mut().for_each(|part| part.mesh.scale(scale));
+            for part in &mut parts {
+                part.mesh.scale(scale);
+            }
         }
         parts.sort_by_key(|part| !part.is_opaque(&materials));
         let n_opaque = parts.partition_point(|part| part.is_opaque(&materials));
