@@ -230,7 +230,7 @@ pub struct PreparedScene {
     pub scene: Scene,
     /// The view.
     pub camera: Camera,
-    /// The view, in the scene's own units.
+    /// The view, in the units of the scene's file, as `camera`.
     pub camera_settings: CameraSettings,
     /// The lens of a camera that blurs.
     lens: Option<Lens>,
@@ -355,15 +355,13 @@ impl LoadedScene {
     /// # Errors
     /// If scene, camera or environment cannot be used.
     pub fn build(self, host: &dyn Host) -> Result<PreparedScene, Error> {
-        let Self { mut description, light, map, mut camera, warnings, settings } = self;
+        let Self { description, light, map, camera, warnings, settings } = self;
         let [width, height] = settings.view.size;
         let dof = settings.view.depth_of_field.map(|dof| dof.focused(&camera, &description));
-        let mut lens = dof.map(|(dof, focus)| dof.lens(&camera, focus)).transpose()?;
+        let lens = dof.map(|(dof, focus)| dof.lens(&camera, focus)).transpose()?;
         let focused =
             |(dof, focus): (DepthOfField, f32)| DepthOfField { focus_distance: Some(focus), ..dof };
         let camera_report = CameraReport::new(&camera, dof.map(focused));
-        let factor = description.rescale(&mut camera);
-        lens.iter_mut().for_each(|lens| lens.scale(factor));
         let (camera, camera_settings) = (Camera::new(&camera, width, height)?, camera);
         let camera = through(camera, lens);
         let n_triangles: usize = description.parts.iter().map(|p| p.mesh.triangles.len()).sum();

@@ -38,6 +38,9 @@ impl Scene {
                 f.text("catches shadows");
             }
         }
+        if self.unit != 1.0 {
+            f.numbers([self.unit]);
+        }
         self.textures.iter().for_each(|texture| texture.add_to(&mut f));
         f.finish()
     }
