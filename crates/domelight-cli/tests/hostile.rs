@@ -31,6 +31,11 @@ fn no_result_takes_the_place_of_what_is_read_or_of_another() {
     let scene = "[materials.m]\nbase_color_texture = \"t.png\"\n[[objects]]\nbuiltin = \"sphere\"\n\
                  material = \"m\"\n[environment]\nfile = \"in.hdr\"\n";
     fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    fs::hard_link(folder.path().join("scene.toml"), folder.path().join("page.html")).unwrap();
+    let figures = folder.path().join("figures");
+    fs::create_dir_all(figures.join("figure-4")).unwrap();
+    fs::copy(folder.path().join("ref.exr"), figures.join("figure-4/p.exr")).unwrap();
+    ended(&domelight(&folder, &["probe", "sky", "-q", "-o", "figures/figure-1.png"]), 0, &[]);
     let before = snapshot(&folder);
     let render = |more: &[&'static str]| [&["render"][..], &SMALL, more].concat();
     let over = "written over";
@@ -67,6 +72,10 @@ fn no_result_takes_the_place_of_what_is_read_or_of_another() {
         (vec!["probe", "in.hdr", "-o", "in.hdr"], over),
         (vec!["probe", "sky", "-o", "x.png", "--preview", "x.png"], "two results"),
         (vec!["diff", "ref.exr", "ref.exr", "-o", "ref.exr"], over),
+        (vec!["tone", "t.png", "-o", "./t.png"], over),
+        (vec!["inspect", "scene.toml", "-o", "page.html"], over),
+        (vec!["figures", "--quick", "--env", "figures/figure-1.png", "--only", "1"], over),
+        (vec!["figures", "--quick", "--env", "figures/figure-4/p.exr"], over),
         (vec!["bench", "--suite", "rigs", "--probes", "in.hdr", "-o", "in.hdr"], over),
         (vec!["farm", "slurm", "--shards", "2", "--env", "in.hdr", "--picture", "in.hdr"], over),
     ];
@@ -75,6 +84,7 @@ fn no_result_takes_the_place_of_what_is_read_or_of_another() {
         assert_ne!(output.status.code(), Some(0), "{arguments:?}");
         assert!(stderr(&output).contains(why), "{arguments:?}: {}", stderr(&output));
         assert!(snapshot(&folder) == before, "{arguments:?}");
+        assert_eq!(fs::read_dir(&figures).unwrap().count(), 2, "{arguments:?}");
     }
     // The dome's implied name.
     fs::copy(folder.path().join("ref.exr"), folder.path().join("r_dome.exr")).unwrap();
@@ -183,6 +193,35 @@ fn an_unusable_cache_costs_nothing_but_a_warning() {
     let output = domelight(&folder, &[&compare[..], &more].concat());
     ended(&output, 0, &["the reference is not kept", "in.hdr/cache"]);
     assert!(folder.path().join("compare.html").exists());
+}
+
+#[test]
+fn a_file_in_the_place_of_a_folder_is_named() {
+    let folder = folder();
+    for arguments in [
+        &["man", "in.hdr"][..],
+        &["man", "in.hdr/pages"],
+        &["figures", "--only", "1", "-o", "in.hdr"],
+    ] {
+        ended(&domelight(&folder, arguments), 1, &["in.hdr", "folder"]);
+    }
+}
+
+/// A pipe under the name of a kept reference is passed over: it might never end.
+#[test]
+fn a_pipe_in_the_cache_is_not_waited_for() {
+    let folder = folder();
+    let compare =
+        ["compare", "sphere", "--size", "24x20", "--env-rows", "16", "--reference-spp", "2"];
+    let more =
+        ["--strategies", "mis", "--budget", "spp:1", "--seeds", "1", "--cache", "cache", "-q"];
+    let compare = [&compare[..], &more].concat();
+    ended(&domelight(&folder, &compare), 0, &[]);
+    let entries = || fs::read_dir(folder.path().join("cache")).unwrap().flatten();
+    let entry = entries().next().unwrap().path();
+    fs::remove_file(&entry).unwrap();
+    nix::unistd::mkfifo(&entry, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    ended(&domelight(&folder, &compare), 0, &[]);
 }
 
 #[test]
@@ -314,20 +353,35 @@ fn a_picture_does_not_depend_on_the_units_of_its_scene() {
             let scene = format!("[[objects]]\nbuiltin = \"{builtin}\"\nscale = {scale}\n");
             fs::write(folder.path().join("scene.toml"), scene).unwrap();
             let options =
-                ["--env", "sky", "--hide-env", "--material", "diffuse:0.5", "-o", "x.pfm"];
+                ["--env", "sky", "--hide-env", "--material", "diffuse:0.5", "-o", "x.exr"];
             let output =
                 domelight(&folder, &[&["render", "scene.toml"], &SMALL[..], &options].concat());
             ended(&output, 0, &[]);
-            pictures.push((builtin, scale, common::load(&folder, "x.pfm")));
+            let depth = common::load_layer(&folder, "x.exr", "depth");
+            pictures.push((builtin, scale, common::load(&folder, "x.exr"), depth));
         }
     }
-    for (builtin, scale, picture) in &pictures {
+    for (builtin, scale, picture, depth) in &pictures {
         let mean = |p: &domelight::RgbImage| p.pixels.iter().map(|p| p.luminance()).sum::<f32>();
         let first = pictures.iter().find(|(other, ..)| other == builtin).unwrap();
         let ratio = mean(picture) / mean(&first.2);
         assert!((ratio - 1.0).abs() < 2e-3, "{builtin} {scale}: {ratio}");
         // The sphere's size is a power of two: it is traced at the same one.
         assert!(*builtin != "sphere" || picture == &first.2, "{scale}");
+        // Depths are in the scene's own units.
+        let ratio = mean(depth) / mean(&first.3) / scale.parse::<f32>().unwrap();
+        assert!((ratio - 1.0).abs() < 2e-3, "{builtin} {scale}: depth {ratio}");
+    }
+    for scale in [1e10, 1e-12] {
+        let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                   element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+        let ply = format!("{ply}0 0 0\n{scale:e} 0 0\n0 {scale:e} 0\n3 0 1 2\n");
+        fs::write(folder.path().join("a.ply"), ply).unwrap();
+        let options = ["--env", "constant", "--hide-env", "-o", "y.exr"];
+        ended(&domelight(&folder, &[&["render", "a.ply"], &SMALL[..], &options].concat()), 0, &[]);
+        let depth = common::load_layer(&folder, "y.exr", "depth");
+        let depth = depth.pixels[12 * 24 + 10].g / scale;
+        assert!((1.0..4.0).contains(&depth), "{scale:e}: {depth}");
     }
     fs::write(
         folder.path().join("scene.toml"),

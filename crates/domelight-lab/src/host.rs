@@ -11,6 +11,12 @@ use domelight::strategy::{PreparedStrategy, StrategySpec};
 
 use crate::Error;
 
+/// Shows the progress of work that consists of many renders.
+pub trait WorkProgress: Sync {
+    /// A share in [0, 1] of the work is done, the rest takes about `seconds_left`, and `label` is at work.
+    fn advance(&self, share: f64, seconds_left: f64, label: &str);
+}
+
 /// A front end: where messages go, who sees the progress, when to stop, which files and how much memory may be taken.
 pub trait Host: Sync {
     /// Shows a warning.
@@ -33,6 +39,11 @@ pub trait Host: Sync {
     /// Shows a render, named by `label`; what is returned is told of each tile and may end the render.
     fn progress<'a>(&'a self, _label: &str, _settings: &RenderSettings) -> Box<dyn Observer + 'a> {
         Box::new(CanceledBy(|| self.canceled()))
+    }
+
+    /// Shows work of many renders as a whole; a host that has none is shown render by render, by [`Host::progress`].
+    fn work_progress<'a>(&'a self) -> Option<Box<dyn WorkProgress + 'a>> {
+        None
     }
 
     /// True ends the work.

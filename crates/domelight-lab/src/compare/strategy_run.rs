@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::budget::{Budget, MOST_SAMPLES};
 use crate::Error;
+use crate::measure::Reference;
 use crate::measure::render::{Render, RenderSetup};
 
 /// How far beyond its budget a strategy may be where it cannot meet it.
@@ -15,10 +16,44 @@ const MOST_EXCESS: f64 = 1.5;
 const HALVINGS: u32 = 4;
 
 /// How many camera samples of each pixel a budget buys.
+#[derive(Clone, Debug)]
 pub(super) enum SampleCount {
     Samples(u32),
     /// Not one, and why.
     OverBudget(String),
+}
+
+/// What a budget buys, and a picture of about its size.
+pub(super) struct Calibration {
+    pub(super) samples: SampleCount,
+    /// None where the budget buys nothing.
+    pub(super) pilot: Option<Pilot>,
+}
+
+/// A picture that was made to calibrate.
+pub(super) struct Pilot {
+    n_samples: u32,
+    image: RgbImage,
+}
+
+impl Pilot {
+    pub(super) fn new(n_samples: u32, image: RgbImage) -> Self {
+        Self { n_samples, image }
+    }
+
+    /// About the relMSE that a picture of `n_samples` has, where the reference's own is `noise`.
+    pub(super) fn error_at(
+        &self,
+        n_samples: u32,
+        reference: &RgbImage,
+        noise: f64,
+    ) -> Result<f64, Error> {
+        /// The part of a measured error that remains at least.
+        const LEAST_PART: f64 = 0.1;
+        let measured = compare(&self.image, reference, None)?.rel_mse;
+        let own = (measured - noise).max(LEAST_PART * measured);
+        Ok(own * f64::from(self.n_samples) / f64::from(n_samples))
+    }
 }
 
 /// A mean over seeds and its standard deviation.
@@ -31,6 +66,11 @@ pub struct MeanAndDeviation {
 }
 
 impl MeanAndDeviation {
+    /// Of a single value.
+    pub(super) fn single(mean: f64) -> Self {
+        Self { mean, sd: None }
+    }
+
     fn of(values: &[f64]) -> Self {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
@@ -52,6 +92,11 @@ pub struct ConvergencePoint {
     pub cpu_seconds: MeanAndDeviation,
     /// Against the reference, over all pixels.
     pub rel_mse: MeanAndDeviation,
+}
+
+/// Camera samples of each pixel of all pictures that are measured, in multiples of the budget's.
+pub(super) fn samples_to_measure(n_seeds: u32) -> f64 {
+    f64::from(n_seeds) * (2.0 - 0.5f64.powi(HALVINGS as i32))
 }
 
 /// relMSE that no more samples take away. An estimate, which may be below 0.
@@ -78,9 +123,6 @@ pub(super) struct StrategyRun<'a> {
     pub(super) render_setup: RenderSetup<'a>,
     /// For the progress bar.
     pub(super) label: String,
-    pub(super) reference: &'a RgbImage,
-    /// relMSE of the reference itself, as far as it is known.
-    pub(super) reference_noise: f64,
     pub(super) n_seeds: u32,
 }
 
@@ -92,9 +134,12 @@ impl StrategyRun<'_> {
     }
 
     /// What the budget buys.
-    pub(super) fn calibrate(&self, budget: Budget) -> Result<SampleCount, Error> {
+    pub(super) fn calibrate(&self, budget: Budget) -> Result<Calibration, Error> {
         match budget {
-            Budget::Samples(n) => Ok(SampleCount::Samples(n)),
+            Budget::Samples(n) => {
+                let pilot = Some(Pilot::new(n, self.pilot(n)?.layers.color));
+                Ok(Calibration { samples: SampleCount::Samples(n), pilot })
+            }
             Budget::Rays(rays) => self.calibrate_rays(rays),
             Budget::Time(seconds) => self.calibrate_time(seconds),
         }
@@ -102,52 +147,67 @@ impl StrategyRun<'_> {
 
     /// Goes from pilot to pilot, as strategies that learn trace fewer rays for a camera sample the more there are, and
     /// takes the number whose rays came nearest.
-    fn calibrate_rays(&self, rays: f64) -> Result<SampleCount, Error> {
+    fn calibrate_rays(&self, rays: f64) -> Result<Calibration, Error> {
         const MOST_PILOTS: usize = 4;
         let each = self.pilot(4)?.rays() / 4.0;
         let mut purchase = sample_count(rays, each, &format!("traces {each:.1} shadow rays"));
         let mut tried: Vec<(u32, f64)> = Vec::new();
+        let off = |traced: f64| (traced / rays).ln().abs();
+        let mut nearest: Option<(f64, Pilot)> = None;
         while let SampleCount::Samples(n) = purchase {
             if tried.len() == MOST_PILOTS || tried.iter().any(|&(m, _)| m == n) {
                 break;
             }
-            let traced = self.pilot(n)?.rays();
+            let render = self.pilot(n)?;
+            let traced = render.rays();
             tried.push((n, traced));
+            if nearest.as_ref().is_none_or(|(least, _)| off(traced) < *least) {
+                nearest = Some((off(traced), Pilot::new(n, render.layers.color)));
+            }
             purchase = sample_count(rays, traced / f64::from(n), "");
         }
-        let off = |traced: f64| (traced / rays).ln().abs();
-        let nearest = tried.into_iter().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
-        Ok(nearest.map_or(purchase, |(n, _)| SampleCount::Samples(n)))
+        let pilot = nearest.map(|(_, pilot)| pilot);
+        let samples = pilot.as_ref().map(|pilot| SampleCount::Samples(pilot.n_samples));
+        Ok(Calibration { samples: samples.unwrap_or(purchase), pilot })
     }
 
     /// Doubles the samples until they take an eighth of the time, then goes along the line through
     /// the last two.
-    fn calibrate_time(&self, seconds: f64) -> Result<SampleCount, Error> {
+    fn calibrate_time(&self, seconds: f64) -> Result<Calibration, Error> {
         self.pilot(1)?; // warms the caches
-        let mut last = (1, self.pilot(1)?.seconds());
+        let mut render = self.pilot(1)?;
+        let mut last = (1, render.seconds());
         let mut before = (0, 0.0);
         while last.1 < seconds / 8.0 && last.0 < MOST_SAMPLES {
             let n = last.0 * 2;
-            (before, last) = (last, (n, self.pilot(n)?.seconds()));
+            render = self.pilot(n)?;
+            (before, last) = (last, (n, render.seconds()));
         }
         let slope = (last.1 - before.1) / f64::from(last.0 - before.0);
         let each = if slope > 0.0 { slope } else { last.1 / f64::from(last.0) };
         let fixed = (last.1 - each * f64::from(last.0)).max(0.0);
-        Ok(sample_count(seconds - fixed, each, &format!("takes {:.3} CPU seconds", fixed + each)))
+        let one_sample = format!("takes {:.3} CPU seconds", fixed + each);
+        let samples = sample_count(seconds - fixed, each, &one_sample);
+        Ok(Calibration { samples, pilot: Some(Pilot::new(last.0, render.layers.color)) })
     }
 
     /// Renders all seeds at the number of samples and its halves.
-    pub(super) fn measure(&self, n_samples: u32) -> Result<StrategyMeasurement, Error> {
+    pub(super) fn measure(
+        &self,
+        n_samples: u32,
+        reference: &Reference,
+    ) -> Result<StrategyMeasurement, Error> {
+        let image = &reference.picture.image;
         let mut steps = Vec::new();
         for halving in (1..=HALVINGS).rev() {
             let n = n_samples >> halving;
             if n > 0 {
-                steps.push(self.step(n, |_| {})?);
+                steps.push(self.step(n, image, |_| {})?);
             }
         }
         let mut pictures = PictureSum::default();
-        steps.push(self.step(n_samples, |render| pictures.add(render, self.reference))?);
-        let bias = pictures.bias(self.reference_noise);
+        steps.push(self.step(n_samples, image, |render| pictures.add(render, image))?);
+        let bias = pictures.bias(reference.report.rel_mse.unwrap_or(0.0));
         let PictureSum { first, non_finite, .. } = pictures;
         let image = first.unwrap_or_else(|| RgbImage::new(0, 0, Vec::new()));
         Ok(StrategyMeasurement { steps, image, bias, non_finite })
@@ -156,6 +216,7 @@ impl StrategyRun<'_> {
     fn step(
         &self,
         n_samples: u32,
+        reference: &RgbImage,
         mut see: impl FnMut(&Render),
     ) -> Result<ConvergencePoint, Error> {
         let (mut camera_samples, mut rays) = (0.0, 0.0);
@@ -168,7 +229,7 @@ impl StrategyRun<'_> {
             camera_samples += render.camera_samples() / f64::from(of);
             rays += render.rays() / f64::from(of);
             seconds.push(render.seconds());
-            errors.push(compare(&render.layers.color, self.reference, None)?.rel_mse);
+            errors.push(compare(&render.layers.color, reference, None)?.rel_mse);
             see(&render);
         }
         let (cpu_seconds, rel_mse) =
@@ -196,9 +257,16 @@ struct PictureSum {
     first: Option<RgbImage>,
     /// Of each pixel and channel the differences d from the reference R, over √(R² + 0.01): Σ d and Σ d².
     sums: Vec<[[f64; 2]; 3]>,
+    /// The differences d of the first pictures.
+    differences: Vec<Vec<[f32; 3]>>,
+    /// For pairs i < j of these, in the order of j and then of i, the mean of dᵢ dⱼ over pixels and channels.
+    products: Vec<f64>,
     n: u32,
     non_finite: u64,
 }
+
+/// Pictures that show how much the bias is uncertain, for the sake of memory.
+const MOST_PAIRED: usize = 8;
 
 impl PictureSum {
     fn add(&mut self, render: &Render, reference: &RgbImage) {
@@ -208,20 +276,33 @@ impl PictureSum {
 
     fn add_picture(&mut self, image: &RgbImage, reference: &RgbImage) {
         self.sums.resize(image.pixels.len(), [[0.0; 2]; 3]);
-        for (sums, (x, r)) in self.sums.iter_mut().zip(image.pixels.iter().zip(&reference.pixels)) {
-            for (sums, (x, r)) in sums.iter_mut().zip(x.to_array().into_iter().zip(r.to_array())) {
-                let (x, r) = (f64::from(x), f64::from(r));
-                let d = (x - r) / (r * r + REGULARIZER).sqrt();
+        let pixels = image.pixels.iter().zip(&reference.pixels);
+        let differences: Vec<[f64; 3]> = pixels
+            .map(|(x, r)| {
+                let (x, r) = (x.to_array().map(f64::from), r.to_array().map(f64::from));
+                std::array::from_fn(|c| (x[c] - r[c]) / (r[c] * r[c] + REGULARIZER).sqrt())
+            })
+            .collect();
+        for (sums, differences) in self.sums.iter_mut().zip(&differences) {
+            for (sums, &d) in sums.iter_mut().zip(differences) {
                 *sums = [sums[0] + d, sums[1] + d * d];
             }
+        }
+        if self.differences.len() < MOST_PAIRED {
+            let narrow: Vec<[f32; 3]> =
+                differences.iter().map(|pixel| pixel.map(|d| d as f32)).collect();
+            self.products.extend(self.differences.iter().map(|other| mean_product(other, &narrow)));
+            self.differences.push(narrow);
         }
         self.first.get_or_insert_with(|| image.clone());
         self.n += 1;
     }
 
     /// Two independent pictures I and J have E[(I − R)(J − R)] = bias² + that of the reference's own error, so the mean
-    /// over all pairs, ((Σ d)² − Σ d²) / (n (n − 1)), less `noise` estimates bias². Pixels err independently of one
-    /// another, so their spread gives the interval.
+    /// over all pairs, ((Σ d)² − Σ d²) / (n (n − 1)), less `noise` estimates bias².
+    ///
+    /// The spread of pixels gives the interval if they err independently of one another, the reference's included. Where
+    /// the pixels of a picture share an error, as those of `product` do, three pictures or more give a wider one.
     fn bias(&self, noise: f64) -> Option<Bias> {
         if self.n < 2 {
             return None;
@@ -234,10 +315,49 @@ impl PictureSum {
         let mean = self.sums.iter().map(of_pixel).sum::<f64>() / n_pixels;
         let variance = self.sums.iter().map(|s| (of_pixel(s) - mean).powi(2)).sum::<f64>()
             / (n_pixels * (n_pixels - 1.0).max(1.0));
+        let freedom = self.differences.len() as f64 - 1.0;
+        let of_pictures = |variance: f64| student(freedom) * variance.sqrt();
         let half = 1.96 * variance.sqrt();
+        let half = self.variance_by_jackknife().map_or(half, |v| half.max(of_pictures(v)));
         let mean = mean - noise;
         Some(Bias { mean, interval: [mean - half, mean + half] })
     }
+
+    /// The variance of the mean over pairs of pictures, by leaving out one picture at a time; none of fewer than three.
+    ///
+    /// Without bias it is up to twice too large (Efron & Stein 1981, "The Jackknife Estimate of Variance").
+    fn variance_by_jackknife(&self) -> Option<f64> {
+        let n = self.differences.len();
+        if n < 3 {
+            return None;
+        }
+        let mut of_picture = vec![0.0; n];
+        let pairs = (0..n).flat_map(|j| (0..j).map(move |i| (i, j)));
+        for ((i, j), product) in pairs.zip(&self.products) {
+            of_picture[i] += product;
+            of_picture[j] += product;
+        }
+        let n = n as f64;
+        // A mean without a picture differs from that of all by a constant and what the picture's pairs add.
+        let scale = 2.0 / ((n - 1.0) * (n - 2.0));
+        let mean = of_picture.iter().sum::<f64>() / n;
+        let squares = of_picture.iter().map(|sum| ((sum - mean) * scale).powi(2)).sum::<f64>();
+        Some((n - 1.0) / n * squares)
+    }
+}
+
+/// The mean of the products of two pictures' differences.
+fn mean_product(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
+    let product = |(a, b): (&[f32; 3], &[f32; 3])| {
+        a.iter().zip(b).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum::<f64>()
+    };
+    a.iter().zip(b).map(product).sum::<f64>() / (3 * a.len()).max(1) as f64
+}
+
+/// The 97.5 % quantile of Student's distribution, by its expansion about the normal one (Abramowitz & Stegun 26.7.5).
+fn student(freedom: f64) -> f64 {
+    let terms = [1.959_964, 2.372_3, 2.822_5, 2.555_9];
+    terms.into_iter().rev().fold(0.0, |sum, term| sum / freedom + term)
 }
 
 #[cfg(test)]
@@ -298,6 +418,39 @@ mod tests {
             }
             // 95 % of 60 are 57, give or take 1.7.
             assert!(n_inside >= 50, "{bias}: {n_inside} of 60 intervals hold the truth");
+        }
+    }
+
+    /// Pictures whose pixels err together, each by a number of its own, with bias and without.
+    #[test]
+    fn errors_that_pixels_share_widen_the_interval() {
+        let (side, n_seeds) = (32, 4);
+        let mut pcg = Pcg32::new(9, 10);
+        let mut uniform = || f64::from(pcg.next_f32()) - 0.5;
+        let reference = RgbImage::filled(side, side, Rgb::splat(1.0));
+        for bias in [0.0f64, 0.02] {
+            let truth = bias * bias / 1.01;
+            let mut n_inside = 0;
+            for _ in 0..100 {
+                let mut pictures = PictureSum::default();
+                for _ in 0..n_seeds {
+                    let shared = bias + 0.02 * uniform();
+                    let picture = RgbImage::from_fn(side, side, |_, _| {
+                        Rgb::splat((1.0 + shared + 0.02 * uniform()) as f32)
+                    });
+                    pictures.add_picture(&picture, &reference);
+                }
+                let Bias { interval: [low, high], .. } = pictures.bias(0.0).unwrap();
+                n_inside += u32::from(low <= truth && truth <= high);
+            }
+            assert!(n_inside >= 85, "{bias}: {n_inside} of 100 intervals hold the truth");
+        }
+    }
+
+    #[test]
+    fn few_degrees_of_freedom_widen_an_interval() {
+        for (freedom, quantile) in [(2.0, 4.303), (5.0, 2.571), (27.0, 2.052), (1e9, 1.96)] {
+            assert!((student(freedom) / quantile - 1.0).abs() < 0.04, "{freedom}");
         }
     }
 }
