@@ -33,7 +33,8 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     let given = arguments.reference.as_deref();
     let given = given.map(|path| Reference::read(path, [width, height], host)).transpose()?;
     let folder = arguments.pictures.as_deref();
-    let pictures = folder.map(|folder| read_pictures(folder, host)).transpose()?.unwrap_or_default();
+    let pictures =
+        folder.map(|folder| read_pictures(folder, host)).transpose()?.unwrap_or_default();
     let scene = arguments.scene.load(quiet)?.build(host)?;
     drop(loading);
     let mut comparison = Comparison::new(scene.view(), arguments.settings());

@@ -44,7 +44,8 @@ pub(crate) fn require_unread(folder: &Path) -> Result<()> {
     let input = with_ledger(|ledger| ledger.read_in(folder).map(Path::to_path_buf));
     let Some(input) = input else { return Ok(()) };
     let (folder, input) = (folder.display(), input.display());
-    let why = format!("{input} might be written over: results go to {folder}; choose another folder");
+    let why =
+        format!("{input} might be written over: results go to {folder}; choose another folder");
     Err(UsageError(why).into())
 }
 

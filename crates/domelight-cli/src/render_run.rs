@@ -11,7 +11,8 @@ mod timed;
 
 use anyhow::{Context as _, Result};
 use domelight::render::{
-    Checkpoint, Counts, Layers, Observer, Passes, RenderSettings, Renderer, Rendering, Stage, Tiling,
+    Checkpoint, Counts, Layers, Observer, Passes, RenderSettings, Renderer, Rendering, Stage,
+    Tiling,
 };
 use domelight::strategy::{Strategy, StrategySpec};
 
@@ -304,7 +305,8 @@ impl RenderRun {
             let stop = limit.stop();
             let seconds_left = stop.saturating_duration_since(Instant::now()).as_secs_f64();
             let share = session.share_behind();
-            let mut most = if may_divide { pace.most_samples(seconds_left, share) } else { u32::MAX };
+            let mut most =
+                if may_divide { pace.most_samples(seconds_left, share) } else { u32::MAX };
             if seconds_left == 0.0 && may_divide {
                 most = 1;
             }

@@ -59,7 +59,8 @@ pub(crate) fn without_folders<'a>(text: &str, files: impl Iterator<Item = &'a Pa
 
 fn leads_away(word: &str) -> bool {
     let path = Path::new(word);
-    path.has_root() || path.components().any(|c| matches!(c, Component::ParentDir | Component::Prefix(_)))
+    path.has_root()
+        || path.components().any(|c| matches!(c, Component::ParentDir | Component::Prefix(_)))
 }
 
 fn has_folder(word: &str) -> bool {
@@ -109,7 +110,8 @@ mod tests {
     #[test]
     fn texts_lose_the_folders_of_files() {
         let files = ["/home/me/a/b.obj", "/home/me/a/textures/c.png", "d.obj"].map(Path::new);
-        let text = "/home/me/a/b.obj: cannot read /home/me/a/textures/x.png or /home/me/a/z.mtl, d.obj";
+        let text =
+            "/home/me/a/b.obj: cannot read /home/me/a/textures/x.png or /home/me/a/z.mtl, d.obj";
         let without = without_folders(text, files.into_iter());
         assert_eq!(without, "b.obj: cannot read x.png or z.mtl, d.obj");
     }

@@ -509,8 +509,7 @@ fn short_passes_end_with_the_same_picture() {
     let settings = RenderSettings { n_samples: 11, ..small() };
     let (camera, strategy) = (camera(&settings), mis(&environment));
     let whole = render(&scene, &camera, &environment, &strategy, &settings, &());
-    let mut renderer =
-        Renderer::with_strategy(&scene, &camera, &environment, &strategy, settings);
+    let mut renderer = Renderer::with_strategy(&scene, &camera, &environment, &strategy, settings);
     assert_eq!((renderer.least_samples(), renderer.share_behind()), (0, 1.0));
     let ended = SomeTiles(AtomicUsize::new(0));
     assert!(renderer.step_at_most(7, &ended));

@@ -14,8 +14,8 @@ use super::strategy_run::{
 };
 use super::table::{Table, number};
 use super::{Bench, Peer};
-use crate::names::file_name;
 use crate::measure::{Cache, Goal, MIS, Reference, ReferenceReport};
+use crate::names::file_name;
 use crate::strategy::NamedStrategy;
 use crate::usage::Seconds;
 use crate::{At as _, Error};

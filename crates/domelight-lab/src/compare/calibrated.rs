@@ -7,9 +7,7 @@ use domelight::strategy::{PreparedStrategy, StrategyKind, StrategySpec};
 use domelight::{Rgb, RgbImage};
 
 use super::report::{CompareReport, ResultReport, StrategyReport};
-use super::strategy_run::{
-    Calibration, Pilot, SampleCount, StrategyRun, samples_to_measure,
-};
+use super::strategy_run::{Calibration, Pilot, SampleCount, StrategyRun, samples_to_measure};
 use super::{
     Budget, CONVERGED, Comparison, ComparisonResult, Competitor, OtherPicture, Picture,
     compare_with, picture,

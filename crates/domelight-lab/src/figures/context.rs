@@ -175,7 +175,8 @@ impl<'a> FigureContext<'a> {
 fn common_arguments(settings: &FigureSettings) -> Code<Shell> {
     let mut text = Code::default();
     let mut add = |flag: &'static str, value: String| {
-        text += code!(Shell, " {flag} {value}", flag = flag, value = shell::word(&shared_word(&value)));
+        text +=
+            code!(Shell, " {flag} {value}", flag = flag, value = shell::word(&shared_word(&value)));
     };
     let environment: &LightSettings = &settings.environment;
     if settings.scene != BuiltinScene::Statue.name() {

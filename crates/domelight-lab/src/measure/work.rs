@@ -120,11 +120,7 @@ impl<'a> Work<'a> {
 
 impl<'w> WorkStage<'w> {
     /// Shows a render as a part of the work, or alone if the host shows no work.
-    pub(crate) fn progress(
-        self,
-        label: &str,
-        settings: &RenderSettings,
-    ) -> Box<dyn Observer + 'w> {
+    pub(crate) fn progress(self, label: &str, settings: &RenderSettings) -> Box<dyn Observer + 'w> {
         if self.work.shown.is_none() {
             return self.work.host.progress(label, settings);
         }
