@@ -52,9 +52,9 @@ const one = (key: string, label: string, name: string, value: number, max: numbe
 });
 
 export const STRATEGIES: Kind[] = [
-  one("product", "product sampling", "Rays at most", 8, 64),
+  one("product", "product", "Rays at most", 8, 64),
   {
-    key: "mis", label: "multiple importance sampling",
+    key: "mis", label: "multiple importance",
     fields: [
       whole("Environment", 1, 128, 0), whole("BRDF", 1, 128, 0),
       choice("Weights", [["power", "power heuristic"], ["balance", "balance heuristic"]]),
@@ -69,10 +69,10 @@ export const STRATEGIES: Kind[] = [
       return [...(numbers.length ? numbers : ["1", "1"]), option(rest, "heuristic") ?? "power", rest.includes("no-compensation") ? "no-compensation" : ""];
     },
   },
-  one("environment", "environment sampling", "Samples", 1, 128),
-  one("brdf", "BRDF sampling", "Samples", 1, 128),
+  one("environment", "environment", "Rays", 1, 128),
+  one("brdf", "BRDF", "Rays", 1, 128),
   {
-    key: "sir", label: "sampling importance resampling",
+    key: "sir", label: "resampling (SIR)",
     fields: [
       whole("Rays", 1, 64), choice("Candidates", [["given", "as many as given"], ["pilot", "chosen by a pilot"]]),
       { ...whole("Number", 32, 1024), when: (values) => values[1] === "given" },
@@ -82,13 +82,13 @@ export const STRATEGIES: Kind[] = [
     text: ([n, by, m, from, picks]) =>
       [`sir:${n}${by === "given" ? `/${Math.max(Number(n), Number(m))}` : ""}`, ...(from === "mixture" ? [] : [`from=${from}`]), ...(picks === "sorted" ? [] : [`resampling=${picks}`])].join(":"),
     parse: (words) => {
-      const match = /^(\d+)(?:\/(\d+))?$/.exec(words[0] ?? "1/32");
+      const match = /^(\d+)(?:\/(\d+))?$/.exec(words[0] ?? "1");
       if (!match) return null;
       return [match[1], match[2] ? "given" : "pilot", match[2] ?? "32", option(words, "from") ?? "mixture", option(words, "resampling") ?? "sorted"];
     },
   },
   {
-    key: "rejection", label: "rejection sampling",
+    key: "rejection", label: "rejection",
     fields: [
       choice("Ends", [["tries", "after all tries"], ["rays", "when enough are accepted"]]),
       { ...whole("Accepted", 2, 64), when: (values) => values[0] === "rays" }, whole("Tries", 16, 256),
@@ -103,8 +103,8 @@ export const STRATEGIES: Kind[] = [
       return [rays ? "rays" : "tries", rays ?? "2", option(rest, "tries") ?? words.find(isCount) ?? "16", option(rest, "proposal") ?? "tighter"];
     },
   },
-  one("median-cut", "median cut lights", "Lights", 64, 1024),
-  one("variance-minimization", "variance minimization lights", "Lights", 64, 1024),
+  one("median-cut", "median cut", "Lights", 64, 1024),
+  one("variance-minimization", "variance minimization", "Lights", 64, 1024),
 ];
 
 const METALS: [string, string][] = ["gold", "copper", "silver", "aluminum", "chromium", "tungsten"].map((metal) => [metal, metal]);
@@ -126,7 +126,7 @@ const trimmed = (words: string[], usual: string[], least: number) => {
 const microfacet = (key: string, label: string): Kind => ({
   key, label,
   fields: [
-    alpha("Roughness α", 0.2), { kind: "number", name: "Across : along", min: 0.1, max: 1, step: 0.05, value: "1" },
+    alpha("Roughness α", 0.2), { kind: "number", name: "αy : αx", min: 0.1, max: 1, step: 0.05, value: "1" },
     { ...choice("Fresnel", [["one", "none"], ["0.04", "dielectric, 4 %"], ["color", "of a color"], ...METALS]), value: "gold" },
     { ...color("Reflectance", "0.9,0.6,0.3"), when: (values) => values[2] === "color" },
     choice("Masking", [["separable", "separable"], ["correlated", "height-correlated"]]),
@@ -166,7 +166,7 @@ export const MATERIALS: Kind[] = [
   microfacet("ggx", "GGX"),
   microfacet("beckmann", "Beckmann"),
   {
-    key: "gltf", label: "metallic-roughness (glTF)",
+    key: "gltf", label: "glTF metallic-roughness",
     fields: [color("Base color", GLTF[0]), unit("Metallic", 0), unit("Roughness", 0.3), unit("Specular", 1), color("Its color", "1"), unit("Anisotropy", 0)],
     text: (values) => trimmed(["gltf", ...values], ["", ...GLTF], 4), parse: inOrder(3, GLTF),
   },

@@ -1,7 +1,7 @@
 // The Map panel: the probe in any mapping, and what the picked pixel makes of it.
 
 import type { App, Change } from "./app";
-import { $, color, degrees, fill, h, latest, short, stops } from "./dom";
+import { $, degrees, fill, h, latest, short, stops } from "./dom";
 import { Film, FilmView } from "./film";
 import type { MapPicture } from "./protocol";
 
@@ -252,7 +252,7 @@ export class MapPanel {
     let mean = 0;
     for (let i = 2; i < this.samples.length; i += 4) mean += this.samples[i];
     mean /= this.samples.length / 4 || 1;
-    const [free, blocked] = [color("free"), color("blocked")], [width, height] = this.size;
+    const [free, blocked] = ["#1f9d57", "#ff6b5e"], [width, height] = this.size;
     for (let i = 4 * from; i < 4 * to; i += 4) {
       const [u, v, weight, visible] = this.samples.subarray(i, i + 4);
       const radius = Math.min(Math.max(4 * Math.sqrt(Math.abs(weight) / (mean || 1)), 1.5), 16);

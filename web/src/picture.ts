@@ -32,8 +32,8 @@ export class PicturePanel {
   private settle = 0;
   /** Counts what was begun. */
   private turn = 0;
-  /** What the automatic exposure was found for, and the light and scene that it suits nearly. */
-  private exposedFor = { view: "", light: "" };
+  /** The automatic exposure that was found last, of what, and the light and scene that it suits nearly. */
+  private automatic = { exposure: 0, view: "", light: "" };
   private reference: Reference;
   private lastPlot = 0;
   /** What decides the picture that is rendered. */
@@ -80,7 +80,7 @@ export class PicturePanel {
     clearTimeout(this.settle);
     // Another scene or light waits for its exposure; another view begins with the last one.
     const turn = ++this.turn;
-    if (this.app.state.exposure === null && this.exposedFor.light !== this.lightKey) {
+    if (this.app.state.exposure === null && this.automatic.light !== this.lightKey) {
       await this.expose();
       if (turn !== this.turn) return;
     }
@@ -222,13 +222,13 @@ export class PicturePanel {
   private async expose() {
     const view = JSON.stringify([this.lightKey, this.app.state.material, this.app.state.ground, this.app.state.rotate, this.app.camera]);
     const light = this.lightKey;
-    if (this.exposedFor.view === view) {
-      this.showExposure(this.view.look.exposure);
+    if (this.automatic.view === view) {
+      this.showExposure(this.automatic.exposure);
       return;
     }
     try {
       const exposure = (await this.app.engines.call("automaticExposure", JSON.stringify({ ...this.settings(this.app.state.strategy), shard: [0, 1] }))) as number;
-      this.exposedFor = { view, light };
+      this.automatic = { exposure, view, light };
       if (this.app.state.exposure === null) this.showExposure(exposure);
     } catch (error) {
       this.app.tell((error as Error).message, true);
@@ -283,10 +283,8 @@ export class PicturePanel {
     this.view.look.curve = state.curve as Curve;
     this.view.look.errors = state.view === "error";
     if (this.view.look.errors !== !!this.reference.isStarted) this.refer();
-    if (state.exposure !== null) {
-      this.exposedFor = { view: "", light: "" };
-      this.showExposure(state.exposure);
-    } else this.view.set({});
+    if (state.exposure !== null) this.showExposure(state.exposure);
+    else this.view.set({});
     const split = !!state.beside;
     $("divider").hidden = !split;
     if (!split) this.view.set({ divider: 1 });

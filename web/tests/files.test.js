@@ -184,7 +184,7 @@ test("the cameras of a file are chosen from", async () => {
 });
 
 test("fewer Workers hold a scene that is too large for all", async () => {
-  const { page, done } = await open(SMALL, { query: "?memory=0.12" });
+  const { page, done } = await open(SMALL, { query: "?memory=0.08" });
   await rendered(page);
   const all = await page.evaluate(() => window.domelight.app.engines.hosts.length);
   await renderedAnew(page, () => drop(page, [put("large.glb", glb({ padding: 12 << 20 }))]));
