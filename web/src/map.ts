@@ -217,13 +217,15 @@ export class MapPanel {
     return { ...layers, values: layers.pixels.subarray(at * n, (at + 1) * n) };
   }
 
-  /** A density as the opacity of one color, by the square root: tails are seen, too. */
+  /** A density as the opacity of one color, by the square root: tails are seen, too. Full is what all but a hundredth of
+   *  the map stay below, or a sun would leave nothing to be seen of the rest. */
   private heat(context: CanvasRenderingContext2D) {
     const layer = this.layer();
     if (!layer?.values.length) return;
-    const { values, width, height } = layer, most = values.reduce((a, b) => Math.max(a, b), 0);
+    const { values, width, height } = layer, sorted = values.filter((value) => value > 0).sort();
+    const most = sorted[Math.floor(0.99 * (sorted.length - 1))] ?? 0;
     const image = new ImageData(width, height);
-    values.forEach((value, i) => image.data.set([255, 64, 160, most > 0 ? 235 * Math.sqrt(value / most) : 0], 4 * i));
+    values.forEach((value, i) => image.data.set([255, 64, 160, most > 0 ? 235 * Math.sqrt(Math.min(value / most, 1)) : 0], 4 * i));
     const small = h("canvas", { width: String(width), height: String(height) });
     small.getContext("2d")!.putImageData(image, 0, 0);
     context.imageSmoothingEnabled = true;
