@@ -98,8 +98,10 @@ export class XrayPanel {
     const canvas = h("canvas", { width: String(SIZE), height: String(SIZE), role: "img", "aria-label": `Directions of ${strategy.name}` });
     const context = canvas.getContext("2d")!;
     const small = h("canvas", { width: String(DENSITY), height: String(DENSITY) }), inner = small.getContext("2d")!;
-    const image = inner.createImageData(DENSITY, DENSITY), most = density.reduce((a, b) => Math.max(a, b), 0) || 1;
-    density.forEach((value, i) => image.data.set([255, 96, 176, 255 * Math.sqrt(value / most)], 4 * i));
+    const image = inner.createImageData(DENSITY, DENSITY), sorted = density.filter((value) => value > 0).sort();
+    // Full is what all but a hundredth stays below, or a sun would leave nothing to be seen of the rest.
+    const most = sorted[Math.floor(0.99 * (sorted.length - 1))] ?? 1;
+    density.forEach((value, i) => image.data.set([255, 96, 176, 255 * Math.sqrt(Math.min(value / most, 1))], 4 * i));
     inner.putImageData(image, 0, 0);
     context.drawImage(small, 0, 0, SIZE, SIZE);
     const mean = strategy.samples.reduce((sum, s) => sum + Math.abs(s.weight), 0) / (strategy.samples.length || 1) || 1;
@@ -163,6 +165,9 @@ class PixelPicker {
       this.move(Math.floor((event.clientX - box.left) / box.width * size), Math.floor((event.clientY - box.top) / box.height * size));
       app.set({ pixel: this.cross() }, "pixel");
     });
+    $("film").addEventListener("painted", () => {
+      if (app.state.panel === "xray") this.timer ||= setTimeout(() => this.show(), 300) as unknown as number;
+    });
     viewer.addEventListener("focus", () => this.mark());
     viewer.addEventListener("blur", () => this.mark());
   }
@@ -178,15 +183,14 @@ class PixelPicker {
     this.mark();
   }
 
-  /** Copies the picture as long as it changes and is seen. */
+  /** Copies the picture. */
   private show() {
     clearTimeout(this.timer);
+    this.timer = 0;
     const film = $<HTMLCanvasElement>("film"), context = $<HTMLCanvasElement>("xray-film").getContext("2d")!;
     const { width, height } = context.canvas;
     context.drawImage(film, 0, 0, width, height);
     this.mark();
-    const changes = film.hasAttribute("data-stale") || $("viewer").hasAttribute("data-busy");
-    if (changes && this.app.state.panel === "xray") this.timer = setTimeout(() => this.show(), 400) as unknown as number;
   }
 
   private mark() {
