@@ -1,15 +1,18 @@
-// Bounds on what the page takes, so wide that a busy machine keeps them; web/measure measures.
+// Bounds on what the page takes, several times what it takes on an idle machine; web/measure measures.
 
 import assert from "node:assert/strict";
 import { statSync } from "node:fs";
+import { availableParallelism, loadavg } from "node:os";
 import { fileURLToPath } from "node:url";
 import { after, before, test } from "node:test";
-import { address, close, launch, open, rendered } from "./page.js";
+import { address, close, launch, open } from "./page.js";
 
 /** The whole page [bytes]. */
 const SIZE = 6e6;
 /** From the address to the first picture, and the main thread's longest task while it renders [ms]. */
-const START = 15_000, TASK = 400;
+const START = 10_000, TASK = 400;
+/** Programs for each core: times grow with it. */
+const busy = Math.max(1, loadavg()[0] / availableParallelism());
 
 before(launch);
 after(close);
@@ -23,15 +26,15 @@ test("the first picture is seen soon, and the page answers while it renders", as
   const start = performance.now();
   const { page, done } = await open("", { script });
   const seen = performance.now() - start;
-  assert.ok(seen < START, `${Math.round(seen)} ms to the first picture`);
+  assert.ok(seen < START * busy, `${Math.round(seen)} ms to the first picture`);
   await page.evaluate(() => window.long.splice(0));
   await page.focus("#viewer");
   for (let i = 0; i < 8; i++) {
     await page.keyboard.press("ArrowLeft");
     await page.waitForTimeout(100);
   }
-  await rendered(page);
+  await page.waitForTimeout(3000);
   const longest = Math.max(0, ...await page.evaluate(() => window.long));
-  assert.ok(longest < TASK, `a task of ${Math.round(longest)} ms`);
+  assert.ok(longest < TASK * busy, `a task of ${Math.round(longest)} ms`);
   await done();
 });

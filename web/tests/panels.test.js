@@ -271,6 +271,10 @@ test("the X-ray of a pixel names causes whose shares are drawn", async () => {
   await page.check("#compared label:nth-child(5) input");
   await page.waitForSelector("html[data-xray]");
   assert.equal((await page.$$("#densities canvas")).length, densities + 1);
+  // The picture to pick in comes as it is rendered.
+  await rendered(page);
+  await page.waitForTimeout(600);
+  assert.ok(await brightness(page, "xray-film") > 80);
   await done();
 });
 
