@@ -50,7 +50,7 @@ export class MapPanel {
       this.view.set({ exposure });
     });
     for (const id of ["show-samples", "show-sun"]) $(id).addEventListener("change", () => this.mark());
-    $("layer").addEventListener("change", () => app.set({ layer: $<HTMLSelectElement>("layer").value }, "pixel"));
+    $("layer").addEventListener("change", () => app.set({ layer: $<HTMLSelectElement>("layer").value }, "view"));
     $("n-samples").addEventListener("input", () => app.set({ samples: Number($<HTMLInputElement>("n-samples").value) }, "pixel"));
     const viewer = $("map-viewer");
     let last: number | null = null;
@@ -87,7 +87,12 @@ export class MapPanel {
     $<HTMLSelectElement>("layer").value = state.layer;
     $<HTMLInputElement>("n-samples").value = String(state.samples);
     $("n-samples-value").textContent = String(this.nSamples);
-    if (what !== "view" && what !== "pixel") this.draw();
+    if (what === "view") {
+      this.mark();
+      this.lay();
+      return;
+    }
+    if (what !== "pixel") this.draw();
     this.ask();
   }
 
@@ -147,8 +152,25 @@ export class MapPanel {
     }
     this.arrive();
     document.documentElement.dataset.samples = String(this.samples.length / 4);
-    document.documentElement.dataset.layer = `${state.layer} ${state.mapping}`;
+    this.tellLayer();
   });
+
+  /** Lays another layer over the map; the samples stay. */
+  private readonly lay = latest(async () => {
+    const { app } = this, pixel = app.pixel();
+    try {
+      if (pixel) await this.countRays(pixel);
+    } catch (error) {
+      app.tell((error as Error).message, true);
+    }
+    this.mark();
+    this.tellLayer();
+  });
+
+  private tellLayer() {
+    const { layer, mapping } = this.app.state;
+    document.documentElement.dataset.layer = `${layer} ${mapping}`;
+  }
 
   /** The strategy whose rays the chosen layer counts, if it counts any. */
   private get countedStrategy(): string | undefined {
@@ -161,6 +183,7 @@ export class MapPanel {
     const { env, ev, rows, rotate, scene, material } = state;
     const of = JSON.stringify([strategy, pixel, state.mapping, env, ev, rows, rotate, scene, material]);
     if (!strategy || this.counted?.of === of) return;
+    this.counted = null;
     this.counted = { of, density: await engines.call("rayDensity", pixel, strategy, state.mapping, LAYER) };
   }
 

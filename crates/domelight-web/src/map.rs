@@ -370,7 +370,7 @@ impl Engine {
         /// Pixels with other random numbers, camera samples of each, and columns of the cells that are counted in.
         const REPLICATES: u64 = 64;
         const SAMPLES: u32 = 32;
-        const CELLS: usize = 96;
+        const CELLS: usize = 64;
         let mapping = mapping_of(mapping)?;
         let Some(picked) = self.pick(pixel)? else { return Ok(MapView::empty()) };
         let environment = self.environment()?;
