@@ -4,10 +4,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use domelight::RgbImage;
+use domelight::picture::exposure::Exposure;
 use domelight::picture::exr::ExrLayers;
 use domelight::picture::exr::bands::{self, BAND_ROWS};
 use domelight::picture::png::{self, Depth};
-use domelight::picture::exposure::Exposure;
 use domelight::picture::tone::{ToneCurve, ToneMapping, srgb_from_linear};
 use domelight::picture::{
     self, PictureError, PictureErrorKind, ReadOptions, hdr, pfm, write_atomically,
