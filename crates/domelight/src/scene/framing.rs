@@ -354,7 +354,8 @@ mod tests {
         let points = shapes::icosphere(2).positions;
         let toward = |name: &str, up| {
             let framing = Framing { view: name.parse().ok(), ..Framing::new(1.0, up) };
-            framing.fit(points.iter().copied()).origin.normalize()
+            let s = framing.fit(points.iter().copied());
+            (s.origin - s.target).normalize()
         };
         let near = |a: Vec3, b: Vec3| assert!((a - b).length() < 1e-3, "{a} is not {b}");
         for (name, y_up, z_up) in [
