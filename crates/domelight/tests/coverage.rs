@@ -178,7 +178,7 @@ fn caught_shadows_are_those_of_a_diffuse_plate() {
     let environment = lamp();
     let unoccluded = environment.irradiance(Vec3::Y) * (0.5 / std::f32::consts::PI);
     let seeds = |of: &dyn Fn(&RenderSettings) -> [f64; 3]| -> Vec<[f64; 3]> {
-        (0..24).map(|seed| of(&RenderSettings { seed, ..settings() })).collect()
+        (0..32).map(|seed| of(&RenderSettings { seed, ..settings() })).collect()
     };
     let plate = ball_over(Some(Material::diffuse("plate", Rgb::splat(0.5))));
     let light = EnvironmentSampling { environment: &environment, n_samples: 4 };
