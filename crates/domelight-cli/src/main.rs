@@ -11,6 +11,7 @@ mod command_line;
 mod compare;
 mod diff;
 mod error;
+mod exit;
 mod farm;
 mod figures;
 mod files;
@@ -42,7 +43,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let Arguments { command, quiet, memory } = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) => return error::report_usage(error),
+        Err(error) => return exit::report_usage(error),
     };
     memory::limit(memory.max_memory);
     let done = match command {
@@ -62,6 +63,6 @@ fn main() -> ExitCode {
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => error::report(&error),
+        Err(error) => exit::report(&error),
     }
 }

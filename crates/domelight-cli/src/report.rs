@@ -83,7 +83,7 @@ pub(crate) struct RenderReport {
     rays_per_second: f64,
     peak_memory_bytes: Option<u64>,
     non_finite_samples: u64,
-    /// Of the strategy rejection, at the centers of pixels spread over the picture.
+    /// The acceptance of the strategy rejection, at the centers of pixels spread over the picture.
     rejection: Option<Acceptance>,
     complete: bool,
     stopped: Option<StopReason>,

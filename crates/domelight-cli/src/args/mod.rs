@@ -332,7 +332,7 @@ pub(crate) struct Tone {
 }
 
 impl Tone {
-    /// Of pictures to look at; `automatic` is the exposure where none was given.
+    /// The tone mapping of pictures to look at; `automatic` is the exposure where none was given.
     pub(crate) fn of_picture(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
         let exposure = match self.exposure.unwrap_or(Exposure::Auto) {
             Exposure::Auto => automatic(),
@@ -341,7 +341,7 @@ impl Tone {
         ToneMapping { exposure, curve: self.tone.unwrap_or(ToneCurve::Agx) }
     }
 
-    /// Of pictures that are measured or used again: as they are, unless something else was asked for.
+    /// The tone mapping of pictures that are measured or used again: none, unless something else was asked for.
     pub(crate) fn of_measurement(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
         let exposure = match self.exposure.unwrap_or(Exposure::Stops(0.0)) {
             Exposure::Auto => automatic(),

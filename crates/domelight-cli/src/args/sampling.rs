@@ -1,13 +1,32 @@
 //! How directions and points are chosen.
 
+use std::str::FromStr;
+
 use clap::{Args, ValueEnum};
 use domelight::render::{Filter, Passes};
 use domelight::sampling::{Heuristic, SamplerKind};
-use domelight::strategy::{Candidates, Proposal, Resampling, StrategyKind};
+use domelight::strategy::{
+    Candidates, Proposal, Resampling, StrategyError, StrategyKind, StrategyOptions,
+};
 
 use super::{one_of, positive};
 use crate::parse::Split;
-use crate::strategy::StrategyText;
+
+/// A strategy's name and the options that go with it in one text.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StrategyText {
+    pub(crate) kind: StrategyKind,
+    pub(crate) options: StrategyOptions,
+}
+
+impl FromStr for StrategyText {
+    type Err = StrategyError;
+
+    fn from_str(text: &str) -> Result<Self, StrategyError> {
+        let (kind, options) = StrategyOptions::parse(text)?;
+        Ok(Self { kind, options })
+    }
+}
 
 /// A strategy, and what it may be told.
 #[derive(Args, Debug)]

@@ -61,7 +61,7 @@ pub(crate) struct EnvironmentArguments {
     /// The world axis that the top of the map points to
     #[arg(long, value_enum, value_name = "AXIS")]
     pub(crate) env_up: Option<Up>,
-    /// The map's layout, where shape and attributes do not tell it rightly
+    /// The map's layout, where shape and attributes of the file do not determine it
     #[arg(long, value_name = "MAPPING", value_parser = mapping())]
     pub(crate) env_mapping: Option<Mapping>,
     /// The layer of an OpenEXR map

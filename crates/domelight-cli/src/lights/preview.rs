@@ -20,7 +20,7 @@ use domelight_lab::svg::{
 
 const WIDTH: f64 = 1320.0;
 const MARGIN: f64 = 20.0;
-/// Of the picture of the probe.
+/// Columns and rows of the picture of the probe.
 const MAP: (usize, usize) = (1280, 640);
 /// Pixels along the edge of the picture of a sphere.
 const SPHERE: usize = 300;

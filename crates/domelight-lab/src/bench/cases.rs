@@ -28,7 +28,7 @@ const MATERIALS: &str = "diffuse:0.8,ggx:0.2,ggx:0.05,phong:50:0.5:0.5";
 const MESH: BuiltinScene = BuiltinScene::Statue;
 const PROBES: [BuiltinProbe; 3] =
     [BuiltinProbe::Sky, BuiltinProbe::Studio, BuiltinProbe::Cathedral];
-/// Of a built-in probe.
+/// Rows of a built-in probe.
 const ROWS: u32 = 512;
 
 /// Where normalized meshes are looked at from, and how wide.

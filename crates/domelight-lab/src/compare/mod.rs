@@ -22,7 +22,7 @@ pub use strategy_run::{ConvergencePoint, MeanAndDeviation};
 
 use crate::measure::render::{Picturing, RenderSetup};
 use crate::measure::{Cache, Goal, PRODUCT, Reference, Source};
-use crate::scene::View;
+use crate::scene::PreparedSceneRef;
 use crate::strategy::{NamedStrategy, refuse_repeating_points};
 use crate::usage::Stopwatch;
 use crate::{At as _, Error, Host};
@@ -37,7 +37,7 @@ const TOLERANCE: f64 = 0.1;
 /// What all strategies of a comparison have in common.
 #[derive(Clone, Debug)]
 pub struct ComparisonSettings {
-    /// Of each picture, but for the number of samples.
+    /// Settings of each picture, except for the number of samples.
     pub render: RenderSettings,
     /// What each picture may cost.
     pub budget: Budget,
@@ -66,7 +66,7 @@ impl Default for ComparisonSettings {
 
 /// Strategies on one scene at equal samples, rays or time.
 pub struct Comparison<'a> {
-    view: View<'a>,
+    view: PreparedSceneRef<'a>,
     settings: ComparisonSettings,
     strategies: Vec<Competitor<'a>>,
 }
@@ -119,8 +119,8 @@ impl ComparisonResult {
 }
 
 impl<'a> Comparison<'a> {
-    /// Of nobody yet.
-    pub fn new(view: View<'a>, settings: ComparisonSettings) -> Self {
+    /// A comparison without strategies yet.
+    pub fn new(view: PreparedSceneRef<'a>, settings: ComparisonSettings) -> Self {
         Self { view, settings, strategies: Vec::new() }
     }
 
@@ -204,7 +204,7 @@ impl<'a> Comparison<'a> {
         exposure: f32,
         host: &dyn Host,
     ) -> Result<(StrategyReport, Option<Picture>), Error> {
-        let View { scene, camera, environment, .. } = self.view;
+        let PreparedSceneRef { scene, camera, environment, .. } = self.view;
         let mut watch = Stopwatch::start();
         let prepared;
         let (spec, strategy): (_, &dyn Picturing) = match competitor {
@@ -258,7 +258,7 @@ impl<'a> Comparison<'a> {
         match self.settings.exposure {
             Exposure::Stops(stops) => stops,
             Exposure::Auto => {
-                let View { scene, camera, environment, .. } = self.view;
+                let PreparedSceneRef { scene, camera, environment, .. } = self.view;
                 automatic_exposure(scene, camera, environment, &self.settings.render)
             }
         }

@@ -10,7 +10,7 @@ use crate::report::SceneReport;
 /// All numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct CompareReport {
-    /// Of domelight.
+    /// Version of domelight.
     pub version: &'static str,
     /// As it was typed.
     pub command: String,
@@ -63,7 +63,7 @@ pub struct ResultReport {
     pub camera_samples: f64,
     /// Shadow rays of a pixel that the scene covers, as counted; the mean over seeds.
     pub rays: f64,
-    /// Of rendering alone.
+    /// CPU seconds of rendering alone.
     pub cpu_seconds: MeanAndDeviation,
     /// Against the reference, over all pixels.
     pub rel_mse: MeanAndDeviation,

@@ -48,7 +48,7 @@ pub struct ConvergencePoint {
     pub camera_samples: f64,
     /// Shadow rays of a pixel that the scene covers, as counted; the mean over seeds.
     pub rays: f64,
-    /// Of rendering alone.
+    /// CPU seconds of rendering alone.
     pub cpu_seconds: MeanAndDeviation,
     /// Against the reference, over all pixels.
     pub rel_mse: MeanAndDeviation,
@@ -58,7 +58,7 @@ pub struct ConvergencePoint {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bias {
     pub(super) mean: f64,
-    /// Of 95 %.
+    /// The 95 % confidence interval.
     pub(super) interval: [f64; 2],
 }
 
@@ -194,7 +194,7 @@ fn sample_count(budget: f64, each: f64, one_sample: &str) -> SampleCount {
 #[derive(Default)]
 struct PictureSum {
     first: Option<RgbImage>,
-    /// Of each pixel and channel the differences d from the reference R, over √(R² + 0.01): Σ d and Σ d².
+    /// Σ d and Σ d² of each pixel and channel, d the difference from the reference R over √(R² + 0.01).
     sums: Vec<[[f64; 2]; 3]>,
     n: u32,
     non_finite: u64,
@@ -267,7 +267,7 @@ mod tests {
         assert!(MeanAndDeviation::of(&[4.0]).sd.is_none());
     }
 
-    /// Of noisy pictures without bias against a noisy reference, and of pictures with bias.
+    /// Noisy pictures without bias against a noisy reference, and pictures with bias.
     #[test]
     fn the_noise_of_the_reference_is_no_bias() {
         let (width, height, n_seeds) = (64, 64, 5);

@@ -3,7 +3,7 @@
 use domelight::render::{Counts, Layers, Observer, RenderSettings, Renderer};
 use domelight::strategy::Strategy;
 
-use crate::scene::View;
+use crate::scene::PreparedSceneRef;
 use crate::usage::{Seconds, Stopwatch};
 use crate::{Error, Host};
 
@@ -12,7 +12,7 @@ pub(crate) trait Picturing {
     /// The picture and what was done for it; none if the observer ended it.
     fn picture(
         &self,
-        view: View,
+        view: PreparedSceneRef,
         settings: &RenderSettings,
         observer: &dyn Observer,
     ) -> Option<(Layers, Counts)>;
@@ -21,11 +21,11 @@ pub(crate) trait Picturing {
 impl<S: Strategy> Picturing for S {
     fn picture(
         &self,
-        view: View,
+        view: PreparedSceneRef,
         settings: &RenderSettings,
         observer: &dyn Observer,
     ) -> Option<(Layers, Counts)> {
-        let View { scene, camera, environment, .. } = view;
+        let PreparedSceneRef { scene, camera, environment, .. } = view;
         let mut renderer = Renderer::with_strategy(scene, camera, environment, self, *settings);
         let complete = renderer.run(observer);
         let rendering = renderer.rendering();
@@ -36,7 +36,7 @@ impl<S: Strategy> Picturing for S {
 /// What all renders of a strategy share.
 #[derive(Clone, Copy)]
 pub(crate) struct RenderSetup<'a> {
-    pub(crate) view: View<'a>,
+    pub(crate) view: PreparedSceneRef<'a>,
     /// But for the number of samples and the seed.
     pub(crate) settings: RenderSettings,
     pub(crate) strategy: &'a dyn Picturing,
@@ -49,12 +49,12 @@ pub(crate) struct RenderSetup<'a> {
 pub(crate) struct Render {
     pub(crate) layers: Layers,
     pub(crate) counts: Counts,
-    /// Of rendering alone.
+    /// Seconds of rendering alone.
     pub(crate) time: Seconds,
 }
 
 impl Render {
-    /// CPU seconds of rendering; wall-clock seconds where the system does not tell.
+    /// CPU seconds of rendering; wall-clock seconds where the system does not report them.
     pub(crate) fn seconds(&self) -> f64 {
         self.time.cpu.unwrap_or(self.time.wall)
     }

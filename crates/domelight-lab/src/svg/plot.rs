@@ -124,7 +124,7 @@ pub enum Join {
 pub struct Series {
     /// In the legend; empty for none.
     pub name: String,
-    /// Of line and markers.
+    /// Color of the line and the markers.
     pub color: Color,
     /// How the points are joined.
     pub join: Join,

@@ -99,7 +99,7 @@ struct Machine {
     boot: String,
 }
 
-/// Stands where the system does not tell.
+/// Stands where the system does not report it.
 const UNKNOWN: &str = "00000000";
 
 impl Machine {

@@ -65,9 +65,9 @@ pub enum InspectError {
         x: usize,
         /// Its row.
         y: usize,
-        /// Of the picture.
+        /// Columns of the picture.
         width: usize,
-        /// Of the picture.
+        /// Rows of the picture.
         height: usize,
     },
 }
@@ -109,7 +109,7 @@ pub struct PixelSummary {
     pub pixel: [usize; 2],
     /// Share of the camera samples that hit the scene.
     pub coverage: f64,
-    /// Of the hit nearest to the pixel's center, in the world; none of a pixel without a hit.
+    /// World position of the hit nearest to the pixel's center; none where the pixel has no hit.
     pub position: Option<[f32; 3]>,
     /// The shading normal there.
     pub normal: Option<[f32; 3]>,

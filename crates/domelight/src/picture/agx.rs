@@ -5,9 +5,8 @@
 //! hold of the result is brought into it at nearly constant luminance. Blender tabulates this in a cube of 57³ values;
 //! here the formulas are evaluated themselves.
 
-use super::tone::rows;
 use crate::Rgb;
-use crate::math::{Vec3, functions};
+use crate::math::{Mat3, Vec3, functions};
 
 /// Stops below and above middle gray that the sigmoid shows.
 const DARKEST: f32 = -10.0;
@@ -48,6 +47,11 @@ pub(super) fn agx(light: Rgb, shape: impl Fn(f32) -> f32) -> Rgb {
     let inside = toward_gray * Vec3::from(light.to_array());
     let formed = with_hue_of(inside.map(shape), inside);
     Rgb::from(into_gamut(from_gray * formed).to_array())
+}
+
+/// The matrix with these rows.
+pub(super) fn rows(r: [f32; 3], g: [f32; 3], b: [f32; 3]) -> Mat3 {
+    Mat3::from_cols(r.into(), g.into(), b.into()).transpose()
 }
 
 /// The curve of one channel, from light to light on the screen.

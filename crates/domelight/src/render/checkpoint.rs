@@ -20,7 +20,7 @@ pub struct Checkpoint {
     pub identity: Vec<(String, String)>,
     /// What the finished picture tells of its making: further attributes, by name.
     pub provenance: Vec<(String, String)>,
-    /// Which tiles.
+    /// The tiles.
     pub tiles: Range<usize>,
     /// Tiles of the whole picture.
     pub n_tiles: usize,

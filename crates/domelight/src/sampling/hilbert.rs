@@ -37,7 +37,7 @@ const fn steps() -> [u8; 64] {
     steps
 }
 
-/// Which of its four turns the curve takes through a square.
+/// The turn, one of four, that the curve takes through a square.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HilbertState {
     swap: bool,
@@ -62,7 +62,7 @@ impl HilbertState {
     }
 }
 
-/// Where along the curve the cell (`x`, `y`) of a square of 4096² cells lies, from 0 to 4096² − 1.
+/// The index along the curve of the cell (`x`, `y`) of a square of 4096² cells, from 0 to 4096² − 1.
 pub fn index(x: u32, y: u32) -> u32 {
     let (mut state, mut index) = (0, 0);
     let mut shift = BITS;
@@ -76,7 +76,7 @@ pub fn index(x: u32, y: u32) -> u32 {
     index
 }
 
-/// Where along the curve the unit direction `w` of the upper hemisphere lies: [`index`] of its cell
+/// The index along the curve of the unit direction `w` of the upper hemisphere: [`index`] of its cell
 /// in the octahedral map of the hemisphere (Cigolle et al. 2014, "A Survey of Efficient
 /// Representations for Independent Unit Vectors").
 pub fn hemisphere_index(w: Vec3) -> u32 {

@@ -92,7 +92,7 @@ pub struct Table1d {
 }
 
 impl Table1d {
-    /// From non-negative finite weights, not all zero.
+    /// A table from non-negative finite weights, not all zero.
     ///
     /// # Errors
     /// See [`TableError`].
@@ -122,7 +122,7 @@ impl Table1d {
         }
     }
 
-    /// How many cells.
+    /// The number of cells.
     pub fn len(&self) -> usize {
         self.sums.len()
     }
@@ -176,7 +176,7 @@ pub struct Table2d {
 }
 
 impl Table2d {
-    /// From `width · height` weights, row by row: `weight(row, out)` writes those of one row.
+    /// A table from `width · height` weights, row by row: `weight(row, out)` writes those of one row.
     ///
     /// Rows are independent; they are filled in parallel with the feature `render`.
     ///
@@ -226,7 +226,7 @@ impl Table2d {
         Ok(Self { width, rows: Table1d::from_sums(sums)?, columns, guides })
     }
 
-    /// From weights row by row.
+    /// A table from weights, row by row.
     ///
     /// # Errors
     /// See [`TableError`].

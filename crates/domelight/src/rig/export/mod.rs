@@ -30,7 +30,7 @@ use crate::environment::{Environment, Orientation};
 pub struct RigExport<'a> {
     /// The probe's name, for comments.
     pub probe: &'a str,
-    /// How the probe stands in the world, whose axes [`RigLight::direction`] is over.
+    /// The orientation of the probe in the world, whose axes [`RigLight::direction`] refers to.
     pub orientation: Orientation,
     /// The lights: compact ones first.
     pub lights: &'a [RigLight],

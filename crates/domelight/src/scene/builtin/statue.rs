@@ -125,7 +125,7 @@ fn smooth_step(from: f32, to: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// A round plinth on y = 0: a foot, a torus, a drum between two hollows and a slab, all bevelled.
+/// A round plinth on y = 0: a foot, a torus, a drum between two hollows and a slab, all beveled.
 pub fn plinth() -> Mesh {
     let top = PLINTH_HEIGHT;
     let mut profile = vec![Vec2::ZERO];
