@@ -32,7 +32,7 @@ impl Scene {
     /// Loads a mesh or a scene file of any known format and builds it.
     ///
     /// # Errors
-    /// If the file cannot be read, is damaged, or makes no scene. [`scene::load`] gives the loader's warnings as well, and
+    /// If the file cannot be read, is damaged, or makes no scene. [`scene::load()`] gives the loader's warnings as well, and
     /// a description to change before it is built.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         Ok(Self::new(scene::load(path)?.description)?)

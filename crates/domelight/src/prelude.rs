@@ -1,5 +1,5 @@
 //! What most programs need: load a scene and an environment, render, write.
-//! The first page of the [crate](crate) shows it in use.
+//! The first page of this library, [`crate`], shows it in use.
 
 pub use crate::environment::builtin::BuiltinProbe;
 pub use crate::environment::{Environment, Orientation, UpAxis};

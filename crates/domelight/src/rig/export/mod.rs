@@ -246,7 +246,14 @@ impl Format {
             Self::Mitsuba => "'$' and control characters",
             Self::Sibl => "'\"' and control characters",
             Self::Radiance => "control characters and with quotes of one kind at the most",
-            _ => "control characters",
+            Self::Json
+            | Self::Csv
+            | Self::Gltf
+            | Self::Glb
+            | Self::Usd
+            | Self::Blender
+            | Self::Pbrt
+            | Self::Three => "control characters",
         }
     }
 
