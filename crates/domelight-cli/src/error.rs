@@ -28,19 +28,19 @@ impl std::fmt::Display for InterruptedAndSaved {
 
 impl Error for InterruptedAndSaved {}
 
-/// Prints a line to standard error, in which nothing commands the terminal. If that is closed or full, nobody can be
-/// told, and the work goes on.
+/// Prints a line to standard error, in which nothing commands the terminal. If that is closed or full, the line is
+/// lost, and the work goes on.
 pub(crate) fn status(line: &str) {
     let _ = writeln!(io::stderr(), "{}", terminal::line(line));
 }
 
 /// The same with several lines.
-pub(crate) fn tell_lines(text: &str) {
+pub(crate) fn status_lines(text: &str) {
     text.lines().for_each(status);
 }
 
 /// Prints a line after a label.
-pub(crate) fn tell_after(label: Label, text: &str) {
+pub(crate) fn print_labeled(label: Label, text: &str) {
     let (code, name) = match label {
         Label::Error => ("1;31", "error:"),
         Label::Hint => ("1;36", "hint:"),
@@ -65,7 +65,7 @@ pub(crate) enum Label {
 /// Prints a warning unless asked for quiet.
 pub(crate) fn warn(quiet: bool, text: &str) {
     if !quiet {
-        tell_after(Label::Warning, text);
+        print_labeled(Label::Warning, text);
     }
 }
 

@@ -1,7 +1,7 @@
 //! How the program ends: what is wrong as the user sees it, and the exit code.
 
 use crate::args::FIRST_STEPS;
-use crate::error::{InterruptedAndSaved, Label, UsageError, tell_after, tell_lines};
+use crate::error::{InterruptedAndSaved, Label, UsageError, print_labeled, status_lines};
 use crate::interrupt::RUN_AGAIN;
 use crate::memory;
 use crate::merge::MergeError;
@@ -28,7 +28,7 @@ use std::process::ExitCode;
 /// Prints what is wrong with the command line, or the help that was asked for; the exit code.
 pub(crate) fn report_usage(mut error: clap::Error) -> ExitCode {
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        tell_lines(FIRST_STEPS);
+        status_lines(FIRST_STEPS);
         return ExitCode::from(error.exit_code() as u8);
     }
     suggest::add_to(&mut error);
@@ -37,7 +37,7 @@ pub(crate) fn report_usage(mut error: clap::Error) -> ExitCode {
         // In color.
         let _ = error.print();
     } else {
-        tell_lines(text.trim_end());
+        status_lines(text.trim_end());
     }
     ExitCode::from(error.exit_code() as u8)
 }
@@ -48,9 +48,9 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
     if error.is::<NobodyReads>() {
         return ExitCode::SUCCESS;
     }
-    tell_after(Label::Error, &chain(error));
+    print_labeled(Label::Error, &chain(error));
     if let Some(hint) = hint(error) {
-        tell_after(Label::Hint, &hint);
+        print_labeled(Label::Hint, &hint);
     }
     ExitCode::from(code(error))
 }
@@ -118,7 +118,7 @@ fn hint(error: &anyhow::Error) -> Option<String> {
             Some(known("a probe", &names, suggest::probe(Path::new(&picture.file))))
         }
         ProbeError::Shape { .. } => {
-            Some("--mapping (of render: --env-mapping) tells how the file is mapped".into())
+            Some("--mapping (of render: --env-mapping) states the mapping of the file".into())
         }
         _ => None,
     }

@@ -15,7 +15,7 @@ use crate::Engine;
 use crate::session::nothing_started;
 use crate::setup::parse;
 
-/// What a picture tells of its making.
+/// The provenance of a picture.
 #[derive(Deserialize)]
 struct Provenance {
     scene: String,

@@ -60,7 +60,7 @@ pub(crate) struct LightsArguments {
     /// The rig, its format by its extension; several times for several files; - is standard output
     #[arg(short, long = "output", value_name = "RIG", help_heading = "Output")]
     pub(crate) output: Vec<RigPath>,
-    /// The format where no extension tells it [of standard output: json]
+    /// The format where no extension determines it [of standard output: json]
     #[arg(long, value_name = "FORMAT", help_heading = "Output", value_parser = format(),
           requires = "output")]
     pub(crate) format: Option<Format>,
@@ -97,6 +97,16 @@ pub(crate) enum MethodName {
     VarianceMinimization,
     /// Regions of even energy (Debevec 2005)
     MedianCut,
+}
+
+impl MethodName {
+    /// The name on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::VarianceMinimization => "variance-minimization",
+            Self::MedianCut => "median-cut",
+        }
+    }
 }
 
 impl From<MethodName> for Method {

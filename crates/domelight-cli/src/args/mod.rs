@@ -62,7 +62,7 @@ pub(crate) struct Arguments {
 /// How much memory the program may take.
 #[derive(Args, Debug)]
 pub(crate) struct MemoryArguments {
-    /// Refuse what would take more memory, such as 4GiB or none [default: nine tenths of what there is]
+    /// Refuse work that would need more memory, such as 4GiB or none [default: nine tenths of the memory that there is]
     #[arg(long, global = true, value_name = "SIZE")]
     pub(crate) max_memory: Option<MaxMemory>,
 }
@@ -242,6 +242,17 @@ pub(crate) enum Metric {
     Flip,
 }
 
+impl Metric {
+    /// What it is called in reports.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Rel => "relative error",
+            Self::Abs => "absolute error",
+            Self::Flip => "ꟻLIP",
+        }
+    }
+}
+
 /// Measure, look at and convert a light probe.
 #[derive(Args, Debug)]
 pub(crate) struct ProbeArguments {
@@ -321,11 +332,11 @@ pub(crate) enum Bits {
 /// Exposure and tone curve of what is looked at.
 #[derive(Args, Debug)]
 pub(crate) struct Tone {
-    /// Exposure of what is looked at, in stops, or auto: the median of what the picture covers becomes middle gray
+    /// Exposure of pictures to look at, in stops, or auto: the median of what the picture covers becomes middle gray
     /// [default: auto; of differences 0]
     #[arg(long, value_name = "EV|auto", allow_negative_numbers = true)]
     exposure: Option<Exposure>,
-    /// Tone curve of what is looked at; agx is that of Blender, standard cuts off at 1 [default: agx; of differences
+    /// Tone curve of pictures to look at; agx is Blender's, standard clips at 1 [default: agx; of differences
     /// standard]
     #[arg(long, value_name = "CURVE", value_parser = tone_curve())]
     tone: Option<ToneCurve>,

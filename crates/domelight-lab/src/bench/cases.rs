@@ -255,7 +255,7 @@ impl Case {
         Ok(BuiltCase { view, camera, settings, time: watch.lap() })
     }
 
-    /// As `render` would be told.
+    /// The arguments of `render` for it.
     fn scene_settings(&self, settings: &BenchSettings, size: [usize; 2]) -> SceneSettings {
         let normalize = self.material != CaseMaterial::Own;
         let usual = normalize && self.placement == CameraPlacement::Standard;
@@ -275,7 +275,7 @@ impl Case {
     }
 }
 
-/// A probe as `render` would be told.
+/// The argument of `render` for a probe.
 fn light(probe: &str, rotate: f32, rows: u32) -> LightSettings {
     LightSettings {
         probe: Some(probe.to_owned()),

@@ -153,7 +153,7 @@ impl SphereView<'_> {
         png_bytes(&shown, ToneMapping { exposure: 0.0, curve: ToneCurve::Standard })
     }
 
-    /// The mapping knows the map's own frame: the map tells where that is in the world.
+    /// The mapping knows the map's own frame: the orientation places it in the world.
     fn direction(&self, uv: Vec2) -> Option<Vec3> {
         let in_map = Mapping::Angular.direction(uv)?;
         let uv = Mapping::LatLong.uv(in_map);

@@ -101,7 +101,7 @@ impl Key {
         Self(key.finish().to_string())
     }
 
-    /// The sum that the name of an entry of this key tells.
+    /// The checksum in the name of an entry of this key.
     fn sum_in<'a>(&self, path: &'a Path) -> Option<&'a str> {
         let name = path.file_name()?.to_str()?;
         name.strip_prefix(&self.0)?.strip_prefix('-')?.strip_suffix(".exr")

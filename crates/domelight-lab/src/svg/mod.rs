@@ -59,7 +59,7 @@ impl Display for Color {
     }
 }
 
-/// Colors that the color-blind tell apart, on white: Okabe & Ito 2008, "Color Universal Design",
+/// Colors that the color-blind distinguish, on white: Okabe & Ito 2008, "Color Universal Design",
 /// without the yellow, the sky blue a little darker; then black and a brown.
 pub const PALETTE: [Color; 8] = [
     Color(0x00, 0x72, 0xb2),

@@ -241,7 +241,7 @@ impl Plot {
                 let style = Style::fill(series.color).opacity(0.4);
                 for pair in points.windows(2) {
                     let ((x, y), width) = (pair[0], pair[1].0 - pair[0].0);
-                    // A hair narrower, that bars can be told apart.
+                    // Leave a gap, so that bars are distinct.
                     sheet.rect(
                         Rect::new(x, y, (width - 0.8).max(0.4), (bottom - y).max(0.0)),
                         style,

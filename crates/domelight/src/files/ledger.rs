@@ -1,4 +1,4 @@
-//! What is read and what is written, told apart by what the system knows of files, not by their names.
+//! The files that are read and written, identified by what the system knows of them, not by their names.
 
 use std::ffi::OsString;
 use std::fs::{self, Metadata};
@@ -97,6 +97,14 @@ impl FileLedger {
             Some(output) => Err(FileConflict::Overwrites { output, input: path.to_owned() }),
             None => Ok(()),
         }
+    }
+
+    /// A file that was declared as read and lies in a folder, if there is one.
+    pub fn read_in(&self, folder: &Path) -> Option<&Path> {
+        let folder = fs::canonicalize(folder).ok()?;
+        let is_inside =
+            |path: &Path| fs::canonicalize(path).is_ok_and(|path| path.parent() == Some(&*folder));
+        self.read.iter().map(|(path, _)| path.as_path()).find(|path| is_inside(path))
     }
 
     /// Declares that `path` is written; `-` is standard output.

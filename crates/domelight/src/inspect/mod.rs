@@ -83,8 +83,8 @@ pub struct Inspector<'a> {
     /// The hit nearest to the pixel's center.
     representative: Option<ShadingPoint>,
     regions: Regions,
-    /// Luminance that each source adds to the pixel, by multiple importance sampling: what a strategy that misses rare
-    /// light is told by.
+    /// Luminance that each source adds to the pixel, by multiple importance sampling: it reveals a strategy that
+    /// misses rare light.
     light: Vec<f64>,
     /// The longest extent of the scene.
     extent: f32,
@@ -200,7 +200,7 @@ impl<'a> Inspector<'a> {
         }
     }
 
-    /// The suns and lamps that causes are told by, and the rest of the map.
+    /// The suns and lamps that causes are divided by, and the rest of the map.
     pub fn sources(&self) -> &[Source] {
         self.regions.sources()
     }

@@ -1,6 +1,6 @@
 //! Pictures in files: Radiance `.hdr`, OpenEXR, `.pfm`, PNG, JPEG (read only); and what a tone curve makes of them.
 //!
-//! The format is told from the first bytes, never from the name. What comes out is linear Rec. 709, top row first.
+//! The format is recognized by the first bytes, never by the name. What comes out is linear Rec. 709, top row first.
 //! A header that promises more texels than its file can hold is refused before memory is taken for them; truncated
 //! and corrupt files give a [`PictureError`] that names file, place and value.
 //!

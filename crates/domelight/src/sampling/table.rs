@@ -4,7 +4,7 @@
 //! difference of its two neighbors over the total, so what [`Table2d::sample`] draws and what
 //! [`Table2d::pmf`] says agree exactly, on maps of any size. Inversion keeps the order of the
 //! uniform numbers, so stratified points stay stratified (an alias table would be faster and lose
-//! the strata). A guide (Chen & Asau 1974's cutpoints) tells where to begin the search.
+//! the strata). A guide (Chen & Asau 1974's cutpoints) gives the start of the search.
 
 use super::ONE_MINUS_EPSILON;
 use crate::math::{Vec2, vec2};

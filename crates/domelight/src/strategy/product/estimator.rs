@@ -109,7 +109,7 @@ impl TileEstimator<'_, '_> {
 
     /// The random numbers of a pixel in the pass.
     fn pixel_numbers(&self, pixel: &PixelPoints) -> PixelSamples {
-        // The first camera sample that hits tells passes apart.
+        // The first camera sample that hits distinguishes passes.
         PixelSamples::new(pixel.sampler.part(self.tile.samples[pixel.points.start]))
     }
 
@@ -192,8 +192,8 @@ impl TileShading<'_> {
 }
 
 impl ProductSampling<'_> {
-    /// How bright a pixel will be: the harmonic mean over those of lower levels about it, for a dark one among
-    /// them tells of a shadow's edge.
+    /// How bright a pixel will be: the harmonic mean over those of lower levels about it, because a dark one
+    /// among them marks the edge of a shadow.
     fn expected_brightness(
         &self,
         tile: &TileShading,
