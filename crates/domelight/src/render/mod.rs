@@ -14,6 +14,8 @@ mod filter;
 mod layers;
 #[cfg(feature = "io")]
 mod output;
+#[cfg(feature = "io")]
+mod provenance;
 mod renderer;
 mod scouts;
 mod sums;
@@ -33,6 +35,8 @@ pub use filter::{Filter, FilterSampler, UnknownFilter};
 pub use layers::{LAYERS, LayerInfo, LayerValues, Layers};
 #[cfg(feature = "io")]
 pub use output::Developed;
+#[cfg(feature = "io")]
+pub use provenance::{Provenance, kept_exposure};
 pub use renderer::{Mark, Renderer};
 pub use tile::Counts;
 pub use tiling::{Tiling, Window};
