@@ -116,7 +116,7 @@ pub enum SceneError {
          nearer to the origin than some 1e10 times its size"
     )]
     Size {
-        /// The longest edge of the bounds.
+        /// The longest edge of the bounds of what is not scenery.
         size: f32,
         /// The greatest coordinate.
         farthest: f32,
@@ -140,7 +140,7 @@ impl Scene {
         let subject_bounds = description.subject_bounds();
         let bounds = description.bounds();
         let scale = description.usual_scale();
-        check_size(&bounds, scale)?;
+        check_size(&bounds, &subject_bounds, scale)?;
         let SceneDescription { mut parts, materials, textures, camera, up, .. } = description;
         let up = up.unwrap_or_default();
         if scale != 1.0 {
@@ -275,13 +275,14 @@ impl Scene {
 }
 
 /// Refuses what is so small or so large, or once scaled so small, that rays would hit the surface that they leave.
-fn check_size(bounds: &Aabb, scale: f32) -> Result<(), SceneError> {
-    let size = bounds.size().max_element();
+fn check_size(bounds: &Aabb, subject: &Aabb, scale: f32) -> Result<(), SceneError> {
+    let size = subject.size().max_element();
     let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
-    // What has no size is not seen.
-    let usable = bounds.is_empty()
-        || size == 0.0
-        || (1e-18..=1e18).contains(&size) && farthest <= 1e18 && size * scale >= 1e-6;
+    let scaled = bounds.size().max_element() * scale;
+    // What has no size is not seen. Squares of the subject's lengths must be finite.
+    let is_squarable = size == 0.0 || (1e-18..=1e18).contains(&size);
+    let is_empty = bounds.is_empty() || scaled == 0.0;
+    let usable = is_empty || is_squarable && farthest.is_finite() && scaled >= 1e-6;
     if usable { Ok(()) } else { Err(SceneError::Size { size, farthest }) }
 }
 
