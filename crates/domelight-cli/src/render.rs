@@ -20,7 +20,7 @@ use crate::report::{RenderReport, Settings, StopReason, Timings};
 use crate::scene::start_threads;
 use crate::strategy::{Job, acceptance};
 use crate::terminal::Terminal;
-use crate::tone::{self, Shown};
+use crate::tone::Shown;
 use domelight_lab::denoise::Denoiser;
 use domelight_lab::scene::PreparedScene;
 use domelight_lab::{Stopwatch, refuse_repeating_points};
@@ -72,8 +72,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         scene: report.clone(),
         strategy: spec.description(),
         spp: settings.n_samples,
-        passes: format!("{:?}", settings.passes).to_lowercase(),
-        sampler: format!("{:?}", settings.sampler).to_lowercase(),
+        passes: settings.passes.name().to_owned(),
+        sampler: settings.sampler.name().to_owned(),
         filter: settings.filter.name(),
         seed: settings.seed,
         threads: rayon::current_num_threads(),
@@ -109,10 +109,10 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     }
     let render = watch.lap();
 
-    let denoised = denoiser.as_ref().map(|d| tone::denoise(d, &rendering.layers)).transpose()?;
+    let denoised = denoiser.as_ref().map(|d| d.denoise_layers(&rendering.layers)).transpose()?;
     // A full disk under one file must not cost the others.
     let write = |path: &PicturePath| {
-        let mut attributes = described.provenance();
+        let mut attributes = described.provenance(settings);
         // If not, the layer of sample counts tells how many there are.
         attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
         let denoised = denoised.as_ref().map(|(color, _)| color);

@@ -14,6 +14,8 @@ mod filter;
 mod layers;
 #[cfg(feature = "io")]
 mod output;
+#[cfg(feature = "io")]
+mod provenance;
 mod renderer;
 mod scouts;
 mod sums;
@@ -33,6 +35,8 @@ pub use filter::{Filter, FilterSampler, UnknownFilter};
 pub use layers::{LAYERS, LayerInfo, LayerValues, Layers};
 #[cfg(feature = "io")]
 pub use output::Developed;
+#[cfg(feature = "io")]
+pub use provenance::{Provenance, kept_exposure};
 pub use renderer::{Mark, Renderer};
 pub use tile::Counts;
 pub use tiling::{Tiling, Window};
@@ -65,6 +69,16 @@ pub enum Passes {
     Efficient,
     /// 1, 1, 2, 4, … samples, up to the length of [`Passes::Efficient`]: a first picture soon.
     Doubling,
+}
+
+impl Passes {
+    /// Its name in text.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Efficient => "efficient",
+            Self::Doubling => "doubling",
+        }
+    }
 }
 
 /// How to render.
