@@ -8,7 +8,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
-use domelight::render::{Checkpoint, Passes, RenderSettings, Renderer, Rendering, Tiling};
+use domelight::render::{
+    Checkpoint, Counts, Observer, Passes, RenderSettings, Renderer, Rendering, Stage, Tiling,
+};
 use domelight::strategy::{Strategy, StrategySpec};
 
 use crate::args::render_run::RenderRunArguments;
@@ -20,7 +22,6 @@ use crate::output::{PictureFormat, PicturePath};
 use crate::parse::{Shard, Tiles};
 use crate::progress::RenderProgress;
 use crate::report::Settings;
-use domelight_lab::Deadline;
 use domelight_lab::scene::PreparedScene;
 
 /// How a render proceeds.
@@ -250,7 +251,8 @@ impl RenderRun {
         loop {
             let next_save = self.save.as_ref().map(|_| Instant::now() + self.every);
             let pause = [end, next_save].into_iter().flatten().min();
-            let complete = session.run(&Deadline::new(progress, pause));
+            let complete =
+                session.run(&Deadline { progress, pause, advanced: AtomicBool::new(false) });
             let interrupted = self.interrupted.load(Ordering::Relaxed);
             if complete || interrupted || end.is_some_and(|end| Instant::now() >= end) {
                 return self.save(session, settings);
@@ -328,4 +330,32 @@ fn restore<S: Strategy>(
     }
     let restored = session.restore(&checkpoint.film, checkpoint.counts);
     restored.with_context(|| path.display().to_string())
+}
+
+/// Ends a run at a moment.
+struct Deadline<'a> {
+    progress: &'a RenderProgress,
+    pause: Option<Instant>,
+    /// A tile was finished: however short the time, every run gets further.
+    advanced: AtomicBool,
+}
+
+impl Observer for Deadline<'_> {
+    fn pass_started(&self, samples: Range<u32>) {
+        self.progress.pass_started(samples);
+    }
+
+    fn stage_started(&self, stage: Stage) {
+        self.progress.stage_started(stage);
+    }
+
+    fn tile_finished(&self, counts: &Counts) {
+        self.progress.tile_finished(counts);
+        self.advanced.store(true, Ordering::Relaxed);
+    }
+
+    fn canceled(&self) -> bool {
+        let late = || self.pause.is_some_and(|pause| Instant::now() >= pause);
+        self.progress.canceled() || (self.advanced.load(Ordering::Relaxed) && late())
+    }
 }

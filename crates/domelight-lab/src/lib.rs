@@ -27,7 +27,6 @@
 mod acceptance;
 pub mod bench;
 pub mod compare;
-mod deadline;
 pub mod denoise;
 mod error;
 pub mod figures;
@@ -42,7 +41,6 @@ pub mod svg;
 mod usage;
 
 pub use acceptance::{Acceptance, count_tries};
-pub use deadline::Deadline;
 pub use error::{At, Error};
 pub use host::{Host, Silent};
 pub use strategy::{NamedStrategy, refuse_repeating_points};

@@ -1,11 +1,11 @@
 //! Comparisons of strategies at equal samples, rays or time.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc;
 use std::sync::{Mutex, PoisonError};
 
 use domelight::RgbImage;
-use domelight::render::RenderSettings;
+use domelight::render::{Counts, Observer, RenderSettings};
 use domelight_lab::compare::{Budget, Comparison, ComparisonResult, ComparisonSettings};
 use domelight_lab::{Error, Host, NamedStrategy};
 use pyo3::prelude::*;
@@ -24,11 +24,45 @@ struct PythonHost<'a> {
     choices: &'a [(String, Choice)],
     cancel: &'a AtomicBool,
     warnings: Mutex<Vec<String>>,
+    /// The picture that is rendered: its name, and its camera samples when all are there.
+    picture: Mutex<(String, u64)>,
+    /// Its camera samples so far.
+    done: AtomicU64,
+}
+
+impl PythonHost<'_> {
+    /// The picture that is rendered and the share of it that is done, in [0, 1].
+    fn state(&self) -> (String, f64) {
+        let (label, total) = self.picture.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let share = self.done.load(Ordering::Relaxed) as f64 / total.max(1) as f64;
+        (label, share.min(1.0))
+    }
+}
+
+/// Counts the camera samples of a picture.
+struct Counting<'a>(&'a PythonHost<'a>);
+
+impl Observer for Counting<'_> {
+    fn tile_finished(&self, counts: &Counts) {
+        self.0.done.fetch_add(counts.camera_rays, Ordering::Relaxed);
+    }
+
+    fn canceled(&self) -> bool {
+        self.0.canceled()
+    }
 }
 
 impl Host for PythonHost<'_> {
     fn warn(&self, text: &str) {
         self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
+    }
+
+    fn progress<'a>(&'a self, label: &str, settings: &RenderSettings) -> Box<dyn Observer + 'a> {
+        let total = settings.width as u64 * settings.height as u64 * u64::from(settings.n_samples);
+        let mut picture = self.picture.lock().unwrap_or_else(PoisonError::into_inner);
+        *picture = (label.to_owned(), total);
+        self.done.store(0, Ordering::Relaxed);
+        Box::new(Counting(self))
     }
 
     fn canceled(&self) -> bool {
@@ -56,6 +90,7 @@ pub(crate) fn compare<'py>(
     camera: Option<CameraLike>,
     hide_env: bool,
     tile_size: Option<usize>,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let Some((_, first)) = strategies.first() else {
         return Err(bad_value("there is no strategy to compare"));
@@ -89,7 +124,18 @@ pub(crate) fn compare<'py>(
         .collect::<PyResult<Vec<_>>>()?;
     let report = &job.scene_report();
     let cancel = &AtomicBool::new(false);
-    let host = &PythonHost { job, choices, cancel, warnings: Mutex::new(Vec::new()) };
+    let host = &PythonHost {
+        job,
+        choices,
+        cancel,
+        warnings: Mutex::new(Vec::new()),
+        picture: Mutex::new((String::new(), 0)),
+        done: AtomicU64::new(0),
+    };
+    let report_progress = |py: Python<'_>| match &progress {
+        Some(progress) => progress.bind(py).call1(host.state()).map(drop),
+        None => Ok(()),
+    };
     let run = || -> Result<ComparisonResult, Error> {
         let view = job.view(report);
         let render = *job.settings();
@@ -120,7 +166,7 @@ pub(crate) fn compare<'py>(
                 // Whoever waits is there.
                 let _ = sender.send(compared);
             });
-            wait(&results, cancel, &|_| Ok(()))
+            wait(&results, cancel, &report_progress)
         })
     })?;
     let of_choices = choices.iter().find_map(|(_, choice)| match choice {

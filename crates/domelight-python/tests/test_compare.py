@@ -39,6 +39,19 @@ def test_what_is_raised_comes_back(sphere, env, tmp_path):
     assert (tmp_path / "a.html").read_text(encoding="utf-8") == found.page
 
 
+@pytest.mark.filterwarnings("ignore::domelight.DomelightWarning")
+def test_progress_is_reported(sphere, env, capfd):
+    seen = []
+    report = lambda label, share: seen.append((label, share))
+    dl.compare(sphere, env, ["mis"], budget="spp:512", progress=report, **SMALL)
+    labels = [label for label, _ in seen if label]
+    assert any("mis" in label for label in labels), labels
+    assert all(0 <= share <= 1 for _, share in seen)
+    pytest.importorskip("tqdm")
+    dl.compare(sphere, env, ["mis"], budget="spp:512", progress=True, **SMALL)
+    assert "mis" in capfd.readouterr().err
+
+
 @pytest.mark.parametrize(
     "wrong, words",
     [

@@ -72,7 +72,7 @@ pub enum Passes {
 }
 
 impl Passes {
-    /// Its name in text.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Efficient => "efficient",

@@ -18,7 +18,7 @@ pub enum SamplerKind {
 }
 
 impl SamplerKind {
-    /// Its name in text.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sobol => "sobol",
