@@ -1,13 +1,13 @@
 //! Comparisons of strategies at equal samples, rays or time.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::sync::{Mutex, PoisonError};
 
 use domelight::RgbImage;
-use domelight::render::{Counts, Observer, RenderSettings};
+use domelight::render::RenderSettings;
 use domelight_lab::compare::{Budget, Comparison, ComparisonResult, ComparisonSettings};
-use domelight_lab::{Error, Host, NamedStrategy};
+use domelight_lab::{Error, Host, NamedStrategy, WorkProgress};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -24,31 +24,22 @@ struct PythonHost<'a> {
     choices: &'a [(String, Choice)],
     cancel: &'a AtomicBool,
     warnings: Mutex<Vec<String>>,
-    /// The picture that is rendered: its name, and its camera samples when all are there.
-    picture: Mutex<(String, u64)>,
-    /// Its camera samples so far.
-    done: AtomicU64,
+    /// The share of the work that is done, in [0, 1], and what is at work.
+    state: Mutex<(f64, String)>,
 }
 
 impl PythonHost<'_> {
-    /// The picture that is rendered and the share of it that is done, in [0, 1].
-    fn state(&self) -> (String, f64) {
-        let (label, total) = self.picture.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let share = self.done.load(Ordering::Relaxed) as f64 / total.max(1) as f64;
-        (label, share.min(1.0))
+    fn state(&self) -> (f64, String) {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
-/// Counts the camera samples of a picture.
-struct Counting<'a>(&'a PythonHost<'a>);
+/// Keeps how far the work is.
+struct Progress<'a>(&'a PythonHost<'a>);
 
-impl Observer for Counting<'_> {
-    fn tile_finished(&self, counts: &Counts) {
-        self.0.done.fetch_add(counts.camera_rays, Ordering::Relaxed);
-    }
-
-    fn canceled(&self) -> bool {
-        self.0.canceled()
+impl WorkProgress for Progress<'_> {
+    fn advance(&self, share: f64, _seconds_left: f64, label: &str) {
+        *self.0.state.lock().unwrap_or_else(PoisonError::into_inner) = (share, label.to_owned());
     }
 }
 
@@ -57,12 +48,8 @@ impl Host for PythonHost<'_> {
         self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
     }
 
-    fn progress<'a>(&'a self, label: &str, settings: &RenderSettings) -> Box<dyn Observer + 'a> {
-        let total = settings.width as u64 * settings.height as u64 * u64::from(settings.n_samples);
-        let mut picture = self.picture.lock().unwrap_or_else(PoisonError::into_inner);
-        *picture = (label.to_owned(), total);
-        self.done.store(0, Ordering::Relaxed);
-        Box::new(Counting(self))
+    fn work_progress<'a>(&'a self) -> Option<Box<dyn WorkProgress + 'a>> {
+        Some(Box::new(Progress(self)))
     }
 
     fn canceled(&self) -> bool {
@@ -129,8 +116,7 @@ pub(crate) fn compare<'py>(
         choices,
         cancel,
         warnings: Mutex::new(Vec::new()),
-        picture: Mutex::new((String::new(), 0)),
-        done: AtomicU64::new(0),
+        state: Mutex::new((0.0, String::new())),
     };
     let report_progress = |py: Python<'_>| match &progress {
         Some(progress) => progress.bind(py).call1(host.state()).map(drop),
@@ -144,6 +130,7 @@ pub(crate) fn compare<'py>(
             budget,
             n_seeds: seeds,
             reference_spp,
+            most_reference_spp: reference_spp,
             ..Default::default()
         };
         let mut comparison = Comparison::new(view, settings);
@@ -155,8 +142,9 @@ pub(crate) fn compare<'py>(
                 Choice::Python(strategy) => comparison.add(name, strategy)?,
             }
         }
-        let reference = comparison.reference(None, host)?;
-        comparison.run(&reference, host)
+        let calibrated = comparison.calibrate(host)?;
+        let reference = calibrated.reference(None)?;
+        calibrated.run(&reference)
     };
     let (result, stopped) = py.detach(|| {
         std::thread::scope(|scope| {

@@ -1,7 +1,5 @@
 //! Rendering: settings from Python, a render that signals may end, and its film.
 
-use std::ffi::OsStr;
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::{Duration, Instant};
@@ -15,6 +13,7 @@ use domelight::render::{
 use domelight::sampling::SamplerKind;
 use domelight::scene::{self, CameraSettings, EnvironmentSettings, EnvironmentSource};
 use domelight::strategy::{PreparedStrategy, Strategy, StrategyKind, StrategySpec};
+use domelight_lab::names::file_name;
 use domelight_lab::report::{CameraReport, EnvironmentReport, SceneReport};
 use domelight_lab::scene::View;
 use pyo3::exceptions::PyMemoryError;
@@ -189,13 +188,14 @@ impl Job {
         let sums = renderer.film();
         let exposure = *self.exposure.get_or_init(|| automatic_exposure_of(&sums.layers()));
         let (strategy, description) = match (&self.strategy, self.chosen.get()) {
-            (Choice::Builtin(spec), None) => (spec.to_string(), spec.description()),
-            (_, Some(spec)) => (spec.to_string(), spec.description()),
+            (Choice::Builtin(spec), None) | (_, Some(spec)) => {
+                (spec.to_string(), spec.description())
+            }
             (Choice::Python(_), None) => ("python".to_owned(), "python".to_owned()),
         };
         let provenance = Provenance {
-            scene: without_folder(&self.scene.name),
-            environment: without_folder(&self.probe),
+            scene: &file_name(&self.scene.name),
+            environment: &file_name(&self.probe),
             strategy: &description,
             settings: &self.settings,
             exposure,
@@ -294,11 +294,6 @@ impl Job {
         let strategy = matches!(&self.strategy, Choice::Python(strategy) if strategy.has_failed());
         strategy || self.scene.lobes.iter().any(|lobe| lobe.has_failed())
     }
-}
-
-/// A file's name without its folder, which is nobody else's business.
-fn without_folder(name: &str) -> &str {
-    Path::new(name).file_name().and_then(OsStr::to_str).unwrap_or(name)
 }
 
 /// Rows of the built-in probe that a scene names, as of the program.
@@ -450,8 +445,7 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
 ///     How samples are divided: as the strategy works best, or 1, 1, 2, 4, …, as `--passes doubling` of the program.
 ///     Only 'product' depends on it.
 /// time : float, optional
-///     End the render after so many seconds, as `--time` of the program; `film.complete` says whether all samples are
-///     there.
+///     End the render after so many seconds of rendering; `film.complete` says whether all samples are there.
 /// progress : bool or callable, default False
 ///     True shows a bar if tqdm is installed; a callable gets the share that is done, in [0, 1], every hundredth of a
 ///     second.

@@ -42,11 +42,11 @@ def test_what_is_raised_comes_back(sphere, env, tmp_path):
 @pytest.mark.filterwarnings("ignore::domelight.DomelightWarning")
 def test_progress_is_reported(sphere, env, capfd):
     seen = []
-    report = lambda label, share: seen.append((label, share))
+    report = lambda share, label: seen.append((share, label))
     dl.compare(sphere, env, ["mis"], budget="spp:512", progress=report, **SMALL)
-    labels = [label for label, _ in seen if label]
-    assert any("mis" in label for label in labels), labels
-    assert all(0 <= share <= 1 for _, share in seen)
+    assert any("mis" in label for _, label in seen), seen
+    shares = [share for share, _ in seen]
+    assert shares == sorted(shares) and 0 < shares[-1] <= 1
     pytest.importorskip("tqdm")
     dl.compare(sphere, env, ["mis"], budget="spp:512", progress=True, **SMALL)
     assert "mis" in capfd.readouterr().err

@@ -90,7 +90,7 @@ def compare(
     camera: Camera | str | int | None = None,
     hide_env: bool = False,
     tile_size: int | None = None,
-    progress: bool | Callable[[str, float], object] = False,
+    progress: bool | Callable[[float, str], object] = False,
 ) -> Comparison:
     """Compare strategies at equal samples, shadow rays or time.
 
@@ -111,8 +111,8 @@ def compare(
     size, seed, threads, camera, hide_env, tile_size
         As of `render`; tiles are of 16 pixels unless said otherwise, for functions too.
     progress : bool or callable, default False
-        True shows a bar for each picture if tqdm is installed; a callable gets the name of the picture that is rendered
-        and the share of it that is done, in [0, 1], every hundredth of a second.
+        True shows a bar if tqdm is installed; a callable gets the share of the work that is done, in [0, 1], and the name
+        of the picture that is rendered, every hundredth of a second.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def compare(
         If a strategy is left out or misses the budget, or the reference is too noisy to tell.
     """
     shown = bar(progress, "compare")
-    report = callback(progress) if shown is None else shown.of_picture
+    report = callback(progress) if shown is None else shown.labeled
     try:
         found = _domelight.compare(
             scene,

@@ -343,7 +343,7 @@ def compare(
     camera: Camera | str | int | None,
     hide_env: bool,
     tile_size: int | None,
-    progress: Callable[[str, float], object] | None,
+    progress: Callable[[float, str], object] | None,
 ) -> dict[str, Any]: ...
 def inspect(
     scene: Scene,

@@ -18,11 +18,10 @@ class Bar:
         if share >= 1.0:
             self.close()
 
-    def of_picture(self, label: str, share: float) -> None:
-        """Shows one picture after the other."""
-        if label != self._label:
+    def labeled(self, share: float, label: str) -> None:
+        """Shows what is at work, too."""
+        if label and label != self._label:
             self._label = label
-            self._bar.reset()
             self._bar.set_description_str(label, refresh=False)
         self._bar.update(100.0 * share - self._bar.n)
 

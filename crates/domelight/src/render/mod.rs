@@ -59,6 +59,16 @@ pub enum Background {
     Hidden,
 }
 
+impl Background {
+    /// The name in checkpoints.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Shown => "shown",
+            Self::Hidden => "hidden",
+        }
+    }
+}
+
 /// How camera samples are divided into passes over the picture.
 ///
 /// Strategies that learn nothing give the same picture with any.
