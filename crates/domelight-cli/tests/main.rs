@@ -12,6 +12,7 @@ mod hostile;
 mod inspect;
 mod lights;
 mod limits;
+mod names;
 mod render;
 mod rig_formats;
 mod terminal;

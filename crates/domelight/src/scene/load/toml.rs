@@ -394,7 +394,7 @@ impl Reader<'_> {
         let radiance = radiance.filter(|radiance| !radiance.is_black());
         let emission = radiance.map(|radiance| Emission { radiance, texture: emission_texture });
         let coverage = Coverage::blend(table.opacity, opacity_texture);
-        Ok(Material { normal_map, emission, coverage, ..Material::new(name, model) })
+        Ok(Material { normal_map, coverage, emission, ..Material::new(name, model) })
     }
 
     fn notation(&self, name: &str, text: &str, at: usize) -> Result<Material, LoadError> {
