@@ -45,13 +45,20 @@ def is_documented(found: object) -> bool:
     return inspect.isclass(found) or inspect.isroutine(found)
 
 
-def anchor(name: str) -> str:
-    """The link to a heading."""
-    return re.sub(r"[^a-z0-9_-]", "", name.lower())
+def anchors(names: list[str]) -> dict[str, str]:
+    """The links to headings, of which the second of the same letters gets a number."""
+    found: dict[str, str] = {}
+    for name in names:
+        plain = re.sub(r"[^a-z0-9_-]", "", name.lower())
+        taken = sum(re.fullmatch(rf"{plain}(-\d+)?", other) is not None for other in found.values())
+        found[name] = f"{plain}-{taken}" if taken else plain
+    return found
 
 
 def signature(name: str, found: object) -> str:
     """How it is called, without types; empty if it is not called by users."""
+    if inspect.isclass(found) and ("__new__" not in vars(found) and "__init__" not in vars(found) or issubclass(found, BaseException)):
+        return ""
     try:
         parameters = list(inspect.signature(found).parameters.values())  # type: ignore[arg-type]
     except (TypeError, ValueError):
@@ -148,7 +155,8 @@ def markdown(doc: str) -> str:
 def members(name: str, found: type) -> str:
     """The properties and methods of a class that people use."""
     properties, methods = [], []
-    for member, value in vars(found).items():
+    # Rust gives them in the order of its linker.
+    for member, value in sorted(vars(found).items()):
         doc = inspect.getdoc(getattr(found, member, None)) or ""
         if member.startswith("_") or not doc:
             continue
@@ -178,10 +186,11 @@ def page() -> str:
     missing = set(dl.__all__) - named - {"__version__"}
     if missing:
         sys.exit(f"api: SECTIONS lacks {', '.join(sorted(missing))}")
+    listed = {title: [one for name in names for one, _ in entries(name)] for title, names in SECTIONS.items()}
+    links = anchors([name for names in listed.values() for name in names])
     parts = [INTRO]
-    for title, names in SECTIONS.items():
-        all_of_them = [one for name in names for one in entries(name)]
-        parts.append(f"- {title}: " + ", ".join(f"[`{name}`](#{anchor(name)})" for name, _ in all_of_them))
+    for title, names in listed.items():
+        parts.append(f"- {title}: " + ", ".join(f"[`{name}`](#{links[name]})" for name in names))
     for title, names in SECTIONS.items():
         parts.append(f"\n## {title}\n")
         for name in names:
