@@ -65,6 +65,10 @@ impl Cache {
         create_folder(folder).at(format!("cannot make the cache folder {}", folder.display()))?;
         let path = folder.join(format!("{}-{}.exr", key.0, of(bytes)));
         remove_abandoned(folder);
+        // A pipe would be written to directly, and wait for its reader.
+        if fs::metadata(&path).is_ok_and(|there| !there.is_file()) {
+            return Err(Error::Failed(format!("{}: it is not a plain file", path.display())));
+        }
         write_atomically(&path, |out| out.write_all(bytes))?;
         Ok(path)
     }
