@@ -21,7 +21,7 @@ use crate::report::{RenderReport, Settings, StopReason, Timings};
 use crate::scene::start_threads;
 use crate::strategy::{Job, acceptance};
 use crate::terminal::Terminal;
-use crate::tone::{self, Shown};
+use crate::tone::Shown;
 use domelight_lab::denoise::Denoiser;
 use domelight_lab::scene::PreparedScene;
 use domelight_lab::{Stopwatch, refuse_repeating_points};
@@ -95,7 +95,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let openjd = arguments.output.progress == ProgressKind::Openjd;
     let progress = RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
     let progress = &progress.profiled(arguments.output.profile);
-    let attributes = described.provenance();
+    let attributes = described.provenance(settings);
     let try_writing = &|layers: &Layers| {
         output::time_to_write(&outputs, layers, &shown_as, report.hide_env, &attributes)
     };
@@ -114,7 +114,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     }
     let render = watch.lap();
 
-    let denoised = denoiser.as_ref().map(|d| tone::denoise(d, &rendering.layers)).transpose()?;
+    let denoised = denoiser.as_ref().map(|d| d.denoise_layers(&rendering.layers)).transpose()?;
     // A full disk under one file must not cost the others.
     let write = |path: &PicturePath| {
         let mut attributes = attributes.clone();

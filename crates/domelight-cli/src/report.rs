@@ -1,7 +1,7 @@
 //! What a render did: as JSON or as two lines for people.
 
 use anyhow::{Result, bail};
-use domelight::render::Rendering;
+use domelight::render::{Provenance, RenderSettings, Rendering};
 use domelight_lab::report::SceneReport;
 use domelight_lab::{Acceptance, Host as _, Seconds, peak_memory};
 use serde::Serialize;
@@ -11,7 +11,7 @@ use crate::error::{InterruptedAndSaved, status, status_lines};
 use crate::output::{self, PicturePath};
 use crate::profile::{self, StageSeconds};
 use crate::terminal::Terminal;
-use crate::tone::{self, Shown};
+use crate::tone::{Shown, denoised_line};
 
 /// What was rendered, and how: enough to make the same picture again.
 #[derive(Serialize)]
@@ -31,23 +31,15 @@ pub(crate) struct Settings {
 
 impl Settings {
     /// The provenance that OpenEXR files state.
-    pub(crate) fn provenance(&self) -> Vec<(String, String)> {
-        let mut attributes =
-            vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
-        let settings = [
-            ("scene", self.scene.scene.clone()),
-            ("environment", self.scene.environment.probe().to_owned()),
-            ("strategy", self.strategy.clone()),
-            ("samples", self.spp.to_string()),
-            ("passes", self.passes.to_owned()),
-            ("sampler", self.sampler.to_owned()),
-            ("filter", self.filter.to_owned()),
-            ("seed", self.seed.to_string()),
-        ];
-        let named = settings.map(|(name, value)| (format!("domelight.{name}"), value));
-        attributes.extend(named);
-        attributes.push(tone::attribute(self.automatic_exposure));
-        attributes
+    pub(crate) fn provenance(&self, settings: &RenderSettings) -> Vec<(String, String)> {
+        let provenance = Provenance {
+            scene: &self.scene.scene,
+            environment: self.scene.environment.probe(),
+            strategy: &self.strategy,
+            settings,
+            exposure: self.automatic_exposure,
+        };
+        provenance.attributes()
     }
 }
 
@@ -161,7 +153,7 @@ impl RenderReport {
             ));
         }
         if let Some(by) = &self.denoised {
-            status(&tone::denoised_line(by));
+            status(&denoised_line(by));
         }
         if let Some(profile) = &self.profile {
             status_lines(&profile::lines(profile));
