@@ -261,7 +261,7 @@ def check_web(table, rigs):
     for rig in rigs.values():
         calls = [("three", "module", "js"), ("three", "gltf", "glb"), ("three", "gltf", "gltf")]
         if rig.residual is not None:
-            calls += [("three", "dome", "js"), ("babylon", "gltf", "glb")]
+            calls += [("three", "dome", "js"), ("three", "rig", "js"), ("babylon", "gltf", "glb")]
         for page, call, extension in calls:
             for view in reference.VIEWS:
                 out = rig.folder / f"{page}-{call}-{extension}-{view}.raw"
@@ -276,6 +276,7 @@ def check_web(table, rigs):
     names = {
         ("three", "module"): f"three.js {versions['three']}, module",
         ("three", "dome"): f"three.js {versions['three']}, module with setDome",
+        ("three", "rig"): f"three.js {versions['three']}, module with its dome",
         ("three", "gltf"): f"three.js {versions['three']}, GLTFLoader",
         ("babylon", "gltf"): f"Babylon.js {versions['babylon']}, glTF",
     }
@@ -305,6 +306,10 @@ def check_blender(table, rigs):
             read = json.loads(out.with_suffix(".json").read_text())
             name = f"Blender {read['version']}, " + ("script" if view == "front" else "pasted")
             table.compare(name, rig, view, np.load(out), rig.expected["discs"][view], 0.01)
+            dome = int(rig.residual is not None)
+            once = {"suns": len(rig.lights), "collections": 1, "worlds": dome, "pictures": dome}
+            for what, n in once.items():
+                table.count(name, f"{rig.name}: run twice, {what} too many", abs(read["counts"][what] - n))
         z_up = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
         pairs = [(light, read["lights"][light["name"]]) for light in rig.lights]
         off = max(angle(z_up @ light["direction"], np.array(sun["toward"])) for light, sun in pairs)

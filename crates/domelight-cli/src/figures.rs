@@ -6,6 +6,7 @@ use domelight_lab::figures::{FigureContext, FigureSettings, draw};
 
 use crate::args::figures::FiguresArguments;
 use crate::interrupt;
+use crate::output::print_json;
 use crate::terminal::Terminal;
 
 /// Runs the subcommand.
@@ -21,7 +22,10 @@ pub(crate) fn run(arguments: &FiguresArguments, quiet: bool) -> Result<()> {
     let loading = interrupt::nothing_to_keep(interrupt::ENDED);
     let context = FigureContext::load(&settings, host)?;
     drop(loading);
-    let page = draw(&context, &arguments.only, &arguments.output)?;
-    host.status(&format!("-> {}", page.display()));
+    let drawn = draw(&context, &arguments.only, &arguments.output)?;
+    if arguments.json {
+        return print_json(&drawn);
+    }
+    host.status(&format!("-> {}", drawn.page.display()));
     Ok(())
 }

@@ -92,6 +92,24 @@ fn some_figures_can_be_made_alone() {
 }
 
 #[test]
+fn json_names_every_file() {
+    let folder = TempDir::new().unwrap();
+    let output = run(&folder, &["--only", "3,1", "--json", "-q"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["page"], "figures/index.html");
+    let figures = report["figures"].as_array().unwrap();
+    let numbers: Vec<_> = figures.iter().map(|figure| figure["number"].clone()).collect();
+    assert_eq!(numbers, [1, 3]);
+    assert_eq!(figures[0]["files"], serde_json::json!(["figures/figure-1.png"]));
+    assert!(figures[1]["seconds"].as_f64().unwrap() > 0.0);
+    let pictures = figures[1]["pictures"].as_array().unwrap();
+    assert!(pictures.len() > 1);
+    for file in pictures {
+        assert!(folder.path().join(file.as_str().unwrap()).is_file(), "{file}");
+    }
+}
+
+#[test]
 fn what_cannot_be_shown_is_refused() {
     let folder = TempDir::new().unwrap();
     let refused = |arguments: &[&str], code: i32, words: &str| {

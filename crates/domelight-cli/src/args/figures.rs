@@ -30,6 +30,9 @@ pub(crate) struct FiguresArguments {
     /// Small pictures, few samples, poor references: seconds instead of a minute
     #[arg(long)]
     pub(crate) quick: bool,
+    /// Print numbers, titles, files and times as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
     /// Names the random numbers
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,

@@ -18,6 +18,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use serde::Serialize;
+
 use crate::scene::LightSettings;
 use crate::{At as _, Error};
 pub use context::FigureContext;
@@ -39,15 +41,40 @@ pub struct FigureSettings {
     pub seed: u64,
 }
 
-/// Draws figures into a folder, with a page that shows them; returns the page's name. `only` are the numbers of the
-/// figures, from 1 to [`N_FIGURES`]; none are all. After an error what is done stays, on the page as well.
+/// What was drawn.
+#[derive(Clone, Debug, Serialize)]
+pub struct DrawnFigures {
+    /// The page that shows all figures.
+    pub page: PathBuf,
+    /// In the order of their numbers.
+    pub figures: Vec<DrawnFigure>,
+}
+
+/// A figure and its files.
+#[derive(Clone, Debug, Serialize)]
+pub struct DrawnFigure {
+    /// From 1 to [`N_FIGURES`].
+    pub number: u8,
+    /// What it shows.
+    pub title: String,
+    /// The drawing, and its data where there are.
+    pub files: Vec<PathBuf>,
+    /// Radiance as OpenEXR and PNG; empty if there is none.
+    pub pictures: Vec<PathBuf>,
+    /// Wall-clock time that it took \[s\].
+    pub seconds: f64,
+}
+
+/// Draws figures into a folder, with a page that shows them. `only` are the numbers of the figures, from 1 to
+/// [`N_FIGURES`]; none are all. After an error what is done stays, on the page as well.
 ///
 /// # Errors
 /// If a file cannot be written, or the host ended the work.
-pub fn draw(context: &FigureContext, only: &[u8], folder: &Path) -> Result<PathBuf, Error> {
+pub fn draw(context: &FigureContext, only: &[u8], folder: &Path) -> Result<DrawnFigures, Error> {
     fs::create_dir_all(folder).at(folder.display())?;
     let host = context.host;
     let mut figures = Vec::new();
+    let mut drawn = DrawnFigures { page: folder.join(page::NAME), figures: Vec::new() };
     for number in (1..=N_FIGURES).filter(|n| only.is_empty() || only.contains(n)) {
         let start = Instant::now();
         let made = make(context, number).and_then(|figure| {
@@ -58,6 +85,7 @@ pub fn draw(context: &FigureContext, only: &[u8], folder: &Path) -> Result<PathB
             Ok(figure) => {
                 let seconds = start.elapsed().as_secs_f64();
                 host.status(&format!("figure {number}: {} ({seconds:.1} s)", figure.title));
+                drawn.figures.push(drawn_figure(&figure, folder, seconds));
                 figures.push(figure);
             }
             Err(error) => {
@@ -67,7 +95,18 @@ pub fn draw(context: &FigureContext, only: &[u8], folder: &Path) -> Result<PathB
         }
     }
     page::write(context, folder, &figures)?;
-    Ok(folder.join(page::NAME))
+    Ok(drawn)
+}
+
+fn drawn_figure(figure: &Figure, folder: &Path, seconds: f64) -> DrawnFigure {
+    let in_folder = |names: Vec<String>| names.iter().map(|name| folder.join(name)).collect();
+    DrawnFigure {
+        number: figure.number,
+        title: figure.title.to_owned(),
+        files: in_folder(figure.files()),
+        pictures: in_folder(figure.picture_files()),
+        seconds,
+    }
 }
 
 fn make(context: &FigureContext, number: u8) -> Result<Figure, Error> {
