@@ -34,6 +34,7 @@ mod host;
 pub mod inspect;
 pub mod measure;
 mod page;
+pub mod probe;
 pub mod report;
 pub mod scene;
 mod strategy;

@@ -1,17 +1,24 @@
 //! The figures of a lecture on sampling direct illumination, one a file, and a page that shows them.
 
+mod balance;
 mod context;
 mod convergence;
+mod envelope;
 mod figure;
 mod formulas;
 mod four_ways;
+mod half_vector;
 mod inversion;
 mod lobes;
 mod maps;
 mod median_cut;
+mod median_cut_steps;
+mod mis_weights;
 mod page;
 mod product;
 mod rejection;
+mod sir_density;
+mod sphere;
 mod variance_minimization;
 
 use std::fs;
@@ -26,7 +33,7 @@ pub use context::FigureContext;
 use figure::Figure;
 
 /// How many figures there are.
-pub const N_FIGURES: u8 = 8;
+pub const N_FIGURES: u8 = 14;
 
 /// What the figures show.
 #[derive(Clone, Debug)]
@@ -118,6 +125,12 @@ fn make(context: &FigureContext, number: u8) -> Result<Figure, Error> {
         5 => rejection::make(context),
         6 => median_cut::make(context),
         7 => variance_minimization::make(context),
-        _ => convergence::make(context),
+        8 => convergence::make(context),
+        9 => half_vector::make(context),
+        10 => mis_weights::make(context),
+        11 => balance::make(context),
+        12 => sir_density::make(context),
+        13 => envelope::make(context),
+        _ => median_cut_steps::make(context),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Format;
 use crate::code;
-use crate::quote::{javascript, pbrt, shell, xml};
+use crate::quote::{Code, Xml, javascript, pbrt, shell, xml};
 
 impl Format {
     /// The programs that read files of this format, as they call themselves.
@@ -33,16 +33,13 @@ impl Format {
             Self::Usd => format!("usdview {word}"),
             Self::Blender => format!("blender --python {word}"),
             Self::Mitsuba => {
-                let include = code!(
-                    crate::quote::Xml,
-                    "in a scene <include filename=\"{file}\"/>",
-                    file = xml::text(file)
-                );
+                let include =
+                    code!(Xml, "in a scene <include filename=\"{file}\"/>", file = xml::text(file));
                 include.into_string()
             }
             Self::Pbrt => {
                 let name = pbrt::string(file);
-                let name = name.map_or_else(|| format!("\"{file}\""), |name| name.into_string());
+                let name = name.map_or_else(|| format!("\"{file}\""), Code::into_string);
                 format!("after WorldBegin Include {name}")
             }
             Self::Three => {
