@@ -34,7 +34,7 @@ fn all_figures_are_written() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let out = folder.path().join("out");
     let page = text(&out.join("index.html"));
-    for n in 1..=8 {
+    for n in 1..=14 {
         let picture = load(&folder, &format!("out/figure-{n}.png"));
         assert!(picture.width > 800 && picture.height > 300);
         assert!(page.contains(&format!("<section id=\"figure-{n}\">")));
@@ -50,7 +50,11 @@ fn all_figures_are_written() {
     }
     assert!(!without_data(&page).contains("NaN") && page.contains("<math"));
 
-    for (n, columns) in [(4, ["strategy", "relMSE"]), (8, ["method", "RMS relative error"])] {
+    for (n, columns) in [
+        (4, ["strategy", "relMSE"]),
+        (8, ["method", "RMS relative error"]),
+        (11, ["strategy", "relMSE × seconds"]),
+    ] {
         let csv = text(&out.join(format!("figure-{n}.csv")));
         let json: Value =
             serde_json::from_str(&text(&out.join(format!("figure-{n}.json")))).unwrap();
@@ -117,7 +121,7 @@ fn what_cannot_be_shown_is_refused() {
         assert_eq!(output.status.code(), Some(code), "{}", stderr(&output));
         assert!(stderr(&output).contains(words), "{}", stderr(&output));
     };
-    refused(&["--only", "9"], 2, "9");
+    refused(&["--only", "15"], 2, "15");
     refused(&["--env-scale", "0"], 1, "black");
     refused(&["--env", "nothing.hdr"], 2, "nothing.hdr");
     fs::write(folder.path().join("file"), "").unwrap();

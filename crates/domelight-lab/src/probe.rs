@@ -22,9 +22,9 @@ pub const RAYS_A_PIXEL: u32 = N_SAMPLES as u32 * N_RAYS;
 const TILE_WIDTH: usize = 4;
 const N_PIXELS: usize = TILE_WIDTH * TILE_WIDTH;
 /// How often a tile is estimated.
-const N_PASSES: usize = 6;
+const N_PASSES: usize = 4;
 /// Normals all over the sphere.
-const N_NORMALS: usize = 32;
+const N_NORMALS: usize = 24;
 /// The matte and the glossy material.
 const MATERIALS: [&str; 2] = ["diffuse:0.8", "ggx:0.2"];
 /// The sphere touches the floor; another one, as large, stands beside it.
@@ -182,8 +182,8 @@ fn reference(
     points: &[ShadingPoint],
 ) -> Result<Vec<PixelStatistics>, Error> {
     let spec = StrategySpec::Mis {
-        n_environment: 32,
-        n_brdf: 32,
+        n_environment: 8,
+        n_brdf: 8,
         heuristic: Heuristic::Power,
         compensation: false,
     };

@@ -174,7 +174,8 @@ fn draw_noise(sheet: &mut Document, r: Rect, noise: &[StrategyNoise]) {
             sheet.text(at, &percent(error), TextStyle::new(15.0));
         }
     }
-    let note = "relative RMS error on a logarithmic scale; a sphere on a floor beside another, matte and GGX 0.2";
+    let note =
+        "relative RMS error, logarithmic; a sphere on a floor beside another; glossy is GGX 0.2";
     let style = TextStyle::new(14.0).color(Color::GRAY);
     sheet.text((r.x + 12.0, r.y + r.height - 14.0), note, style);
 }

@@ -185,20 +185,22 @@ fn outliers(sampled: &[Curve]) -> Code<Html> {
         names.join(", ")
     };
     let (flat, steep) = (named(&|s| s > -0.5 + NEAR), named(&|s| s < -0.5 - NEAR));
-    let mut text = String::new();
-    if !flat.is_empty() {
-        text += &format!(
-            " Flatter at these counts: {flat}: a small bright light that is rarely met makes each of the few pictures look \
-             better than the method is, and a method whose candidates or tries set its error gains less from rays."
-        );
-    }
-    if !steep.is_empty() {
-        text += &format!(
-            " Steeper at these counts: {steep}: its candidates or tries grow with its rays, or its first counts are too \
-             small for the law to hold."
-        );
-    }
-    html::text(&text)
+    let sentence = |methods: &str, before: &str, why: &str| match methods {
+        "" => String::new(),
+        methods => format!(" {before} at these counts: {methods}: {why}."),
+    };
+    let flat = sentence(
+        &flat,
+        "Flatter",
+        "a small bright light that is rarely met makes pictures of few rays look better than the method is, and where \
+         candidates or tries set the error, rays gain less",
+    );
+    let steep = sentence(
+        &steep,
+        "Steeper",
+        "its candidates or tries grow with its rays, or its first counts are too small for the law to hold",
+    );
+    html::text(&(flat + &steep))
 }
 
 /// Whether stratification pays here.

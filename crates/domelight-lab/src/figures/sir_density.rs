@@ -11,7 +11,7 @@ use super::context::FigureContext;
 use super::figure::{Figure, Row, Table, number, plot_panel};
 use super::formulas;
 use super::product::by_rejection;
-use super::sphere::{OFF_AXIS, SphereView, peak, scaled, shading_point};
+use super::sphere::{OFF_AXIS, SphereView, peak, scaled, shading_point, sharp_panel};
 use crate::Error;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE};
@@ -49,12 +49,12 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
                 if m == 1 { "M = 1: the candidates".to_owned() } else { format!("M = {m}") };
             let notes = [format!("{} % away from the product", number(100.0 * distance))];
             let png = scaled(&histogram.picture(&view), top)?;
-            panels.push(view.sharp_panel(&png, &title, &notes));
+            panels.push(sharp_panel(&png, &title, &notes));
         }
     }
     table.rows.push(vec!["exact".into(), ((1000.0 * floor).round() / 10.0).into()]);
     let notes = [format!("{} %: the counts’ own noise", number(100.0 * floor))];
-    panels.push(view.sharp_panel(&scaled(&product.picture(&view), top)?, "The product", &notes));
+    panels.push(sharp_panel(&scaled(&product.picture(&view), top)?, "The product", &notes));
     Ok(Figure {
         number: 12,
         title: "Resampled directions approach the product",
@@ -74,7 +74,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         formulas: formulas::sir_density(),
         rows: vec![
             Row::new("Density of what is kept", panels),
-            Row::new("", vec![plot(distances, 100.0 * floor)]),
+            Row::new("", vec![plot(&distances, 100.0 * floor)]),
         ],
         tables: vec![table],
         has_data: false,
@@ -153,7 +153,7 @@ impl Histogram {
     }
 }
 
-fn plot(distances: Vec<Datum>, floor: f64) -> Document {
+fn plot(distances: &[Datum], floor: f64) -> Document {
     let most = CANDIDATES[CANDIDATES.len() - 1] as f64;
     let guide = |m: f64| Datum::new(m, 1.3 * distances[0].y / m);
     let series = vec![
@@ -162,7 +162,7 @@ fn plot(distances: Vec<Datum>, floor: f64) -> Document {
             color: PALETTE[3],
             join: Join::Curve,
             marker: Some(Marker::Disc),
-            points: distances.clone(),
+            points: distances.to_vec(),
         },
         Series {
             name: "1/M".to_owned(),

@@ -29,6 +29,17 @@ pub(super) fn weight_strip() -> Result<Vec<u8>, Error> {
     png_bytes(&RgbImage::from_fn(1, 128, color), AS_IT_IS)
 }
 
+/// A panel with a picture of the sphere in large cells.
+pub(super) fn sharp_panel(png: &[u8], title: &str, notes: &[String]) -> Document {
+    const SMALL: f64 = 0.75 * SIZE;
+    let (png, pixels) = (png.to_vec(), Pixels::Sharp);
+    let picture = Picture { png, width: SMALL, height: SMALL, pixels, title, notes };
+    picture_panel(&picture, |sheet, r| {
+        let center = (r.x + 0.5 * r.width, r.y + 0.5 * r.height);
+        sheet.circle(center, 0.5 * r.width - 0.5, Style::stroke(Color::GRAY, 1.0));
+    })
+}
+
 /// A picture of values up to `top` in a color scale over value^0.4, as PNG.
 pub(super) fn scaled(values: &RgbImage, top: f32) -> Result<Vec<u8>, Error> {
     let color = |p: &Rgb| ColorScale::Magma.color((p.g / top).max(0.0).powf(0.4));
@@ -98,17 +109,6 @@ impl<'a> SphereView<'a> {
         let uv = self.environment.uv(wi);
         let uv = vec2((uv.x - self.turn).rem_euclid(1.0), uv.y);
         Mapping::LatLong.direction(uv).map_or(uv, |in_map| Mapping::Angular.uv(in_map))
-    }
-
-    /// A picture of large cells.
-    pub(super) fn sharp_panel(&self, png: &[u8], title: &str, notes: &[String]) -> Document {
-        const SMALL: f64 = 0.75 * SIZE;
-        let (png, pixels) = (png.to_vec(), Pixels::Sharp);
-        let picture = Picture { png, width: SMALL, height: SMALL, pixels, title, notes };
-        picture_panel(&picture, |sheet, r| {
-            let center = (r.x + 0.5 * r.width, r.y + 0.5 * r.height);
-            sheet.circle(center, 0.5 * r.width - 0.5, Style::stroke(Color::GRAY, 1.0));
-        })
     }
 
     pub(super) fn panel(
