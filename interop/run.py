@@ -219,6 +219,30 @@ def check_radiance(table, rigs):
             picture = radiance.render(rig.file("rad"), view, rig.residual is not None)
             expected = rig.expected["parallel"][view]
             table.compare(f"Radiance {radiance.VERSION}", rig, view, picture, expected, 0.01)
+    check_odd_dome(table)
+
+
+def check_odd_dome(table):
+    """A dome that is not twice as wide as high: toward the middle of each texel it has that texel's radiance."""
+    folder, height, width = OUT / "odd", 50, 173
+    folder.mkdir(parents=True, exist_ok=True)
+    texels = np.random.default_rng(1).uniform(0.1, 1.0, (height, width, 3)).astype(np.float32)
+    texels[20:22, 70:72] = 400.0
+    probe.write_pfm(folder / "odd.pfm", texels)
+    outputs = ["-o", folder / "rig.rad", "-o", folder / "rig.json", "--keep-residual", folder / "residual.exr"]
+    world = ["--env-mapping", "lat-long", "--env-up", "z", "--env-rotate", "25"]
+    domelight("lights", folder / "odd.pfm", "--lamps", "1", *world, *outputs)
+    domelight("probe", folder / "residual.exr", "--mapping", "lat-long", "-o", folder / "residual.pfm")
+    residual = probe.read_pfm(folder / "residual.pfm")
+    lamp = np.array(json.loads((folder / "rig.json").read_text())["lights"][0]["direction"])
+    # The middle column looks toward +Y, and u grows to the right as seen from inside.
+    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width, indexing="ij")
+    theta, phi = np.pi * v, 2 * np.pi * (u - 0.5) - np.radians(25)
+    world = np.stack([np.sin(theta) * np.sin(phi), np.sin(theta) * np.cos(phi), np.cos(theta)], -1)
+    seen = world @ lamp < np.cos(np.radians(12))
+    read = radiance.trace(folder / "rig.rad", world[seen])
+    off = np.abs(read - residual[seen]).max() / residual[seen].max()
+    table.check(f"Radiance {radiance.VERSION}", f"a dome of {width}x{height}: radiance of its texels", off, 0.01)
 
 
 def check_usd(table, rigs):

@@ -21,10 +21,10 @@ const VIEWER: f64 = 40.0;
 /// Angular radius of the patches of half vectors [degrees].
 const PATCH: f32 = 6.0;
 /// Half vectors in the middle of patches: polar angle toward the viewer's side and azimuth [degrees].
-const PATCHES: [(f32, f32); 4] = [(0.0, 0.0), (20.0, 180.0), (32.0, 70.0), (24.0, -55.0)];
-/// Width of the slice around the plane of incidence, and of its bins [degrees].
+const PATCHES: [(f32, f32); 4] = [(0.0, 0.0), (12.0, 180.0), (32.0, 70.0), (24.0, -55.0)];
+/// Width of the slice around the plane of incidence, and of its bins, of which none straddles the normal [degrees].
 const SLICE: f64 = 12.0;
-const BIN: f64 = 4.0;
+const BIN: f64 = 5.0;
 
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let n = context.choose(400_000, 20_000);
@@ -179,7 +179,7 @@ fn plane_of_incidence() -> Document {
             PALETTE[1],
         );
         if strong {
-            label(&mut panel, at(half - 3.5, 0.62 * RADIUS + 22.0), "ωh", PALETTE[2]);
+            label(&mut panel, at(half - 5.0, 0.62 * RADIUS + 16.0), "ωh", PALETTE[2]);
             label(&mut panel, at(direction, RADIUS + 20.0), "ωi", PALETTE[1]);
         }
     }
@@ -188,8 +188,8 @@ fn plane_of_incidence() -> Document {
     let arc = |from: f64, to: f64, radius: f64| {
         (0..=24).map(move |i| from + (to - from) * f64::from(i) / 24.0).map(move |a| at(a, radius))
     };
-    panel.polyline(arc(0.0, -8.0, 110.0), Style::stroke(PALETTE[2], 2.0));
-    label(&mut panel, at(-11.5, 122.0), "8°", PALETTE[2]);
+    panel.polyline(arc(0.0, -8.0, 0.62 * RADIUS + 10.0), Style::stroke(PALETTE[2], 2.0));
+    label(&mut panel, at(-3.5, 0.62 * RADIUS + 18.0), "8°", PALETTE[2]);
     panel.polyline(arc(-VIEWER, -VIEWER - 16.0, 190.0), Style::stroke(PALETTE[1], 2.0));
     label(&mut panel, at(-VIEWER - 8.0, 172.0), "16°", PALETTE[1]);
     panel

@@ -1,5 +1,7 @@
 //! Figure 14: median cut, step by step: where each round cuts, and the cells as lights see them.
 
+use domelight::picture::exposure::Exposure;
+use domelight::picture::tone::ToneMapping;
 use domelight::quote::Code;
 use domelight::rig::{MedianCut, Rig, median_cut};
 use domelight::{Rgb, RgbImage};
@@ -27,11 +29,17 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         "least solid angle [sr]",
         "greatest solid angle [sr]",
     ]);
+    // The mean of the map becomes middle gray.
+    let tone = ToneMapping {
+        exposure: Exposure::Auto.stops(&cells_picture(context, &rigs[0]), None),
+        ..context.map_tone()
+    };
     let (mut cuts, mut cells) = (Vec::new(), Vec::new());
     for (round, pair) in rigs.windows(2).enumerate() {
         let (before, after) = (&pair[0], &pair[1]);
         cuts.push(cuts_panel(context, before, after, round + 1)?);
-        cells.push(cells_panel(context, after)?);
+        let png = png_bytes(&cells_picture(context, after), tone)?;
+        cells.push(image_panel(context, png, &format!("{} cells", after.lights.len())));
         let range = |value: &dyn Fn(usize) -> f64| {
             let values = || (0..after.lights.len()).map(value);
             [values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max)]
@@ -56,7 +64,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         caption: Code::literal(
             "<p>A round cuts every region once, across its longer side, where both halves have the same energy: the new cuts \
              are orange, those of earlier rounds white, and the lights blue. Below each round the map as its lights know it: \
-             every cell has the mean radiance of its region, so that its light is that times the solid angle. Bright parts are \
+             every cell has the mean radiance of its region, so that its light is that times the solid angle (exposed for the mean of the map). Bright parts are \
              cut into small cells soon; dark ones stay large, and cost no lights. Shares of the energy are not exactly even, \
              because a cut runs between texels.</p>",
         ),
@@ -82,7 +90,7 @@ fn cuts_panel(
     let title = format!("Round {round}: {} regions", after.lights.len());
     map_panel(context, &title, &[], |sheet, r| {
         borders_in(sheet, r, after, WHOLE, PALETTE[4], 2.2);
-        borders_in(sheet, r, before, WHOLE, Color::WHITE, 1.6);
+        borders_in(sheet, r, before, WHOLE, Color::WHITE, 2.4);
         for light in &after.lights {
             mark(sheet, on_map(context, r, light.direction));
         }
@@ -90,17 +98,15 @@ fn cuts_panel(
 }
 
 /// The map with the mean radiance of its region in every texel.
-fn cells_panel(context: &FigureContext, rig: &Rig) -> Result<Document, Error> {
+fn cells_picture(context: &FigureContext, rig: &Rig) -> RgbImage {
     let radiance: Vec<Rgb> = rig
         .lights
         .iter()
         .map(|light| light.irradiance / light.solid_angle.max(f32::MIN_POSITIVE))
         .collect();
     let (width, height) = (context.map.width, context.map.height);
-    let cells = RgbImage::from_fn(width, height, |x, y| {
+    RgbImage::from_fn(width, height, |x, y| {
         let texel = y * rig.height / height * rig.width + x * rig.width / width;
         radiance.get(rig.labels[texel] as usize).copied().unwrap_or(Rgb::BLACK)
-    });
-    let png = png_bytes(&cells, context.map_tone())?;
-    Ok(image_panel(context, png, &format!("{} cells", rig.lights.len())))
+    })
 }

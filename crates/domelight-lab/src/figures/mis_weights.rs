@@ -14,12 +14,14 @@ use crate::Error;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE};
 
+/// Degrees around the lobe that the maps show.
+const SHOWN: f32 = 50.0;
 /// Points along the great circle, on each side of the lobe's axis [half degrees].
 const REACH: i32 = 120;
 
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let point = shading_point(context)?;
-    let view = SphereView::new(context, &point);
+    let view = SphereView::new(context, &point).within(SHOWN);
     let environment = &context.environment;
     let densities = |wi: Vec3| (environment.pdf(wi), point.eval_pdf(wi).1);
     let weight = |heuristic: Heuristic, wi: Vec3| {
@@ -61,13 +63,14 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 19–20",
         caption: code!(
             Html,
-            "<p>The sphere of figure 3: its center looks toward where a Phong lobe of exponent 50 leans, {OFF_AXIS:.0}° past the \
+            "<p>The middle of the sphere of figure 3, {SHOWN:.0}° around where a Phong lobe of exponent 50 leans, {OFF_AXIS:.0}° past the \
              brightest light. Each direction has a weight for the kind of sample that found it, large where that kind is dense; \
              for one sample of each kind. The two weights of a direction add up to 1, so that the parts add up to the product. The \
              power heuristic decides more sharply, which spares the estimate the rare samples of the kind that should not have \
              found the direction. Outside of the lobe’s hemisphere the BRDF has no density: the weight is the environment’s, \
              and the product is black.</p>",
             OFF_AXIS = OFF_AXIS,
+            SHOWN = SHOWN,
         ),
         formulas: formulas::mis_weights(),
         rows: vec![

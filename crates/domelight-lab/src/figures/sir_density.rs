@@ -1,7 +1,7 @@
 //! Figure 12: the density of resampled directions converges to the product as candidates are added.
 
 use domelight::code;
-use domelight::math::Vec3;
+use domelight::math::{Vec2, Vec3};
 use domelight::quote::Html;
 use domelight::sampling::{Dimension, Sampler, SamplerKind};
 use domelight::strategy::ShadingPoint;
@@ -16,6 +16,8 @@ use crate::Error;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE};
 
+/// Degrees around the lobe that the maps show.
+const VIEW: f32 = 45.0;
 /// Candidates; those that have a picture.
 const CANDIDATES: [usize; 9] = [1, 2, 4, 8, 16, 32, 64, 128, 256];
 const SHOWN: [usize; 4] = [1, 4, 16, 256];
@@ -25,7 +27,7 @@ const PICKS: usize = 16;
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let point = shading_point(context)?;
     // Cells so large that counts are not noise alone.
-    let view = SphereView::new(context, &point).of_pixels(context.choose(88, 24));
+    let view = SphereView::new(context, &point).within(VIEW).of_pixels(context.choose(110, 24));
     let n = context.choose(200_000, 4_000);
     let exact = |pixel: u64| -> Result<Histogram, Error> {
         let sampler = Sampler::new(SamplerKind::Independent, context.seed, pixel);
@@ -61,7 +63,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 26–27",
         caption: code!(
             Html,
-            "<p>The sphere of figure 3, with a lobe that leans {OFF_AXIS:.0}° past the brightest light. M candidates are drawn, half \
+            "<p>The middle of the sphere of figure 3, {VIEW:.0}° around a lobe that leans {OFF_AXIS:.0}° past the brightest light. M candidates are drawn, half \
              from the environment and half from the BRDF, and one is kept with a probability in proportion to product over \
              density. A candidate alone follows the mixture; among more there is more often one where the product is large. Counted are \
              {n} directions for each M; the distance from the product is half the sum of absolute differences over the cells of the \
@@ -69,6 +71,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
              show (dashed; by rejection).</p><p>The estimate is unbiased for every M: candidates that were not representative are \
              made up for by the mean of their weights.</p>",
             OFF_AXIS = OFF_AXIS,
+            VIEW = VIEW,
             n = n,
         ),
         formulas: formulas::sir_density(),
@@ -126,18 +129,20 @@ fn resampled(context: &FigureContext, point: &ShadingPoint, m: usize, n: usize) 
     kept
 }
 
-/// Shares of directions in the cells of the sphere's picture.
+/// Shares of directions in the cells of the sphere's picture, and at last of those beside it.
 struct Histogram(Vec<f64>);
 
 impl Histogram {
     fn of(view: &SphereView, directions: Vec<Vec3>) -> Self {
         let n = view.n;
-        let mut shares = vec![0.0; n * n];
+        let mut shares = vec![0.0; n * n + 1];
         let each = 1.0 / directions.len().max(1) as f64;
         for wi in directions {
             let uv = view.uv(wi);
-            let cell = |t: f32| ((t * n as f32) as usize).min(n - 1);
-            shares[cell(uv.y) * n + cell(uv.x)] += each;
+            let is_shown = uv.cmpge(Vec2::ZERO).all() && uv.cmplt(Vec2::ONE).all();
+            let cell = |t: f32| (t * n as f32) as usize;
+            let at = if is_shown { cell(uv.y) * n + cell(uv.x) } else { n * n };
+            shares[at] += each;
         }
         Self(shares)
     }
@@ -148,7 +153,8 @@ impl Histogram {
     }
 
     fn picture(&self, view: &SphereView) -> RgbImage {
-        let pixels = self.0.iter().map(|&share| Rgb::splat(share as f32)).collect();
+        let shown = &self.0[..view.n * view.n];
+        let pixels = shown.iter().map(|&share| Rgb::splat(share as f32)).collect();
         RgbImage::new(view.n, view.n, pixels)
     }
 }
@@ -187,5 +193,5 @@ fn plot(distances: &[Datum], floor: f64) -> Document {
         series: series.clone(),
         legend: Legend::Above,
     };
-    plot_panel(&plot, 900.0, 440.0)
+    plot_panel(&plot, 1080.0, 440.0)
 }

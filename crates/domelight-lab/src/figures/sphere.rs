@@ -34,10 +34,7 @@ pub(super) fn sharp_panel(png: &[u8], title: &str, notes: &[String]) -> Document
     const SMALL: f64 = 0.75 * SIZE;
     let (png, pixels) = (png.to_vec(), Pixels::Sharp);
     let picture = Picture { png, width: SMALL, height: SMALL, pixels, title, notes };
-    picture_panel(&picture, |sheet, r| {
-        let center = (r.x + 0.5 * r.width, r.y + 0.5 * r.height);
-        sheet.circle(center, 0.5 * r.width - 0.5, Style::stroke(Color::GRAY, 1.0));
-    })
+    picture_panel(&picture, |_, _| {})
 }
 
 /// A picture of values up to `top` in a color scale over value^0.4, as PNG.
@@ -60,6 +57,8 @@ pub(super) struct SphereView<'a> {
     /// Where across the map the center looks, from the middle on.
     turn: f32,
     pub(super) n: usize,
+    /// The part of the sphere's radius that is shown: 1 is all of it, ½ the hemisphere around the center.
+    radius: f32,
 }
 
 impl<'a> SphereView<'a> {
@@ -67,7 +66,13 @@ impl<'a> SphereView<'a> {
     pub(super) fn new(context: &'a FigureContext, point: &ShadingPoint) -> Self {
         let environment = &context.environment;
         let ahead = environment.uv(point.frame.to_world(reflect(point.wo, Vec3::Z)));
-        Self { environment, turn: ahead.x - 0.5, n: context.choose(SIZE as usize, 64) }
+        let n = context.choose(SIZE as usize, 64);
+        Self { environment, turn: ahead.x - 0.5, n, radius: 1.0 }
+    }
+
+    /// Of the directions within `degrees` of the center, a little more in the corners.
+    pub(super) fn within(self, degrees: f32) -> Self {
+        Self { radius: degrees / 180.0, ..self }
     }
 
     /// With another number of pixels across.
@@ -100,7 +105,8 @@ impl<'a> SphereView<'a> {
 
     /// The mapping knows the map's own frame: the map tells where that is in the world.
     fn direction(&self, uv: Vec2) -> Option<Vec3> {
-        let in_map = Mapping::Angular.direction(uv)?;
+        let middle = Vec2::splat(0.5);
+        let in_map = Mapping::Angular.direction(middle + (uv - middle) * self.radius)?;
         let uv = Mapping::LatLong.uv(in_map);
         Some(self.environment.direction(vec2((uv.x + self.turn).rem_euclid(1.0), uv.y)))
     }
@@ -108,7 +114,9 @@ impl<'a> SphereView<'a> {
     pub(super) fn uv(&self, wi: Vec3) -> Vec2 {
         let uv = self.environment.uv(wi);
         let uv = vec2((uv.x - self.turn).rem_euclid(1.0), uv.y);
-        Mapping::LatLong.direction(uv).map_or(uv, |in_map| Mapping::Angular.uv(in_map))
+        let uv = Mapping::LatLong.direction(uv).map_or(uv, |in_map| Mapping::Angular.uv(in_map));
+        let middle = Vec2::splat(0.5);
+        middle + (uv - middle) / self.radius
     }
 
     pub(super) fn panel(
@@ -122,8 +130,10 @@ impl<'a> SphereView<'a> {
         let png = png.to_vec();
         let picture = Picture { png, width: SIZE, height: SIZE, pixels, title, notes };
         picture_panel(&picture, |sheet, r| {
-            let center = (r.x + 0.5 * r.width, r.y + 0.5 * r.height);
-            sheet.circle(center, 0.5 * r.width - 0.5, Style::stroke(Color::GRAY, 1.0));
+            if self.radius == 1.0 {
+                let center = (r.x + 0.5 * r.width, r.y + 0.5 * r.height);
+                sheet.circle(center, 0.5 * r.width - 0.5, Style::stroke(Color::GRAY, 1.0));
+            }
             for &wi in directions {
                 let uv = self.uv(wi);
                 let at = (r.x + f64::from(uv.x) * r.width, r.y + f64::from(uv.y) * r.height);
