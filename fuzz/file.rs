@@ -5,6 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use domelight::scene::{AnimationTime, LoadOptions, load_with};
+
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
@@ -22,10 +24,13 @@ pub fn write(name: &str, bytes: &[u8]) {
 /// What a scene of an input may take.
 const MAX_MEMORY: u64 = 1 << 30;
 
-/// Reads the input as a scene file.
+/// Reads the input as a scene file; that of glTF at a moment of its first animation, too.
 pub fn load(name: &str, bytes: &[u8]) {
     write(name, bytes);
-    let (max_memory, reach) = (Some(MAX_MEMORY), Default::default());
-    let options = domelight::scene::LoadOptions { max_memory, reach, ..Default::default() };
-    drop(domelight::scene::load_with(folder().join(name), &options));
+    let options = LoadOptions { max_memory: Some(MAX_MEMORY), ..LoadOptions::default() };
+    let at_rest = load_with(folder().join(name), &options);
+    if name.ends_with(".glb") && at_rest.is_ok() {
+        let animation = Some(AnimationTime { name: "0".into(), seconds: 0.5 });
+        drop(load_with(folder().join(name), &LoadOptions { animation, ..options }));
+    }
 }

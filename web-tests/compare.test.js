@@ -6,7 +6,7 @@
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { existsSync, mkdtempSync, rmSync } from "node:fs";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
@@ -20,16 +20,24 @@ const browserPath = first([process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/
 assert.ok(program, "no domelight in target/: build it first, or set DOMELIGHT");
 assert.ok(browserPath, "no Chromium: install it, or set CHROMIUM");
 
-let folder, browser, address;
+let folder, browser, address, develop;
 
 before(async () => {
   folder = mkdtempSync(join(tmpdir(), "domelight-web-"));
   const report = join(folder, "report.html");
-  execFileSync(program, [
-    "-q", "compare", "sphere", "--env", "sky", "--env-rows", "32", "--size", "64x48", "--budget", "rays:8",
+  const run = (...words) => execFileSync(program, ["-q", ...words], { stdio: "inherit" });
+  const scene = ["sphere", "--env", "sky", "--env-rows", "32", "--size", "64x48"];
+  mkdirSync(join(folder, "others"));
+  run("render", ...scene, "--spp", "16", "-o", join(folder, "others/cycles.1.5s.exr"));
+  run("render", ...scene, "--spp", "64", "-o", join(folder, "reference.exr"));
+  run("compare", ...scene, "--budget", "rays:8", "--pictures", join(folder, "others"),
     "--strategies", "brdf,mis,median-cut:8,variance-minimization:1000", "--seeds", "2",
-    "--reference-spp", "32", "--no-cache", "-o", report,
-  ], { stdio: "inherit" });
+    "--reference", join(folder, "reference.exr"), "-o", report);
+  develop = (tone, exposure) => {
+    const png = join(folder, `${tone}.png`);
+    run("tone", join(folder, "reference.exr"), "--tone", tone, "--exposure", String(exposure), "-o", png);
+    return readFileSync(png).toString("base64");
+  };
   address = pathToFileURL(report).href;
   browser = await chromium.launch({
     executablePath: browserPath,
@@ -96,9 +104,11 @@ test("the page shows every strategy, the table and the plots", async () => {
   const { page, done } = await open();
   assert.match(await text(page, "h1"), /sphere under sky/);
   const names = await page.$$eval("#grid .name", (all) => all.map((e) => e.textContent));
-  assert.deepEqual(names, ["reference", "brdf", "mis", "median-cut:8"]);
+  assert.deepEqual(names, ["reference", "brdf", "mis", "median-cut:8", "cycles"]);
   const rows = await page.$$eval("#table tbody tr", (all) => all.map((e) => e.textContent));
-  assert.equal(rows.length, 4);
+  assert.equal(rows.length, 5);
+  assert.match(rows[4], /^cycles.*–.*1\.5/);
+  assert.match(await text(page, "#lead"), /beside 1 picture by other renderers/);
   assert.match(rows[3], /left out: one camera sample a pixel traces/);
   assert.equal(await page.$$eval(".plots figure > svg", (all) => all.length), 2);
   assert.match(await text(page, "pre"), /^domelight -q compare sphere/);
@@ -200,8 +210,52 @@ test("exposure works on the radiance, not on the screen's values", async () => {
   await brightness(page);
   await set(-4);
   assert.equal(await brightness(page), dark);
-  await page.selectOption("#tone", "filmic");
+  await page.selectOption("#tone", "neutral");
   assert.notEqual(await brightness(page), dark);
+  await done();
+});
+
+test("the page opens as the program shows pictures, and has its tone curves", async () => {
+  const { page, done } = await open();
+  assert.equal(await page.$eval("#tone", (select) => select.value), "agx");
+  const exposure = await page.evaluate(() => JSON.parse(document.getElementById("data").textContent).report.exposure);
+  assert.ok(Math.abs(await page.$eval("#exposure", (slider) => slider.value) - exposure) < 1e-4);
+  const [least, most] = await page.$eval("#exposure", (slider) => [slider.min, slider.max].map(Number));
+  assert.ok(least <= exposure - 10 && most >= exposure + 10);
+  await page.selectOption("#left", "0");
+  await page.selectOption("#right", "0");
+  for (const tone of ["agx", "aces", "neutral", "reinhard", "standard"]) {
+    await page.selectOption("#tone", tone);
+    await painted(page);
+    const worst = await page.$eval("#pair-viewer canvas", async (canvas, png) => {
+      const image = new Image();
+      image.src = `data:image/png;base64,${png}`;
+      await image.decode();
+      const { width, height } = canvas;
+      const copy = Object.assign(document.createElement("canvas"), { width, height });
+      const context = copy.getContext("2d", { willReadFrequently: true });
+      context.imageSmoothingEnabled = false;
+      context.drawImage(image, 0, 0, width, height);
+      const [a, b] = [window.bytesOf(canvas), context.getImageData(0, 0, width, height).data];
+      return a.reduce((worst, byte, i) => Math.max(worst, Math.abs(byte - b[i])), 0);
+    }, develop(tone, exposure));
+    // The page's radiance has mantissas of eight bits.
+    assert.ok(worst <= 3, `${tone} is off by ${worst}`);
+  }
+  await done();
+});
+
+test("on paper there are no controls, and all fits", async () => {
+  const { page, done } = await open({ viewport: { width: 720, height: 1000 }, colorScheme: "dark" });
+  await page.emulateMedia({ media: "print" });
+  for (const hidden of [".controls", "#keys", "#swap", "#grid .choose"]) {
+    assert.ok(!await page.isVisible(hidden), hidden);
+  }
+  for (const seen of ["#pair-viewer", "#table", ".plots", "#settings"]) assert.ok(await page.isVisible(seen), seen);
+  const [wide, seen] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+  assert.ok(wide <= seen, `${wide} px in ${seen}`);
+  const paper = await page.$eval("body", (body) => getComputedStyle(body).backgroundColor);
+  assert.equal(paper, "rgb(255, 255, 255)");
   await done();
 });
 

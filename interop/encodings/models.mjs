@@ -35,12 +35,13 @@ class Model {
     return this.push("accessors", { bufferView, componentType, type, count: values.length / n, ...bounds, ...more });
   }
 
-  async texture(size, texel) {
+  async texture(size, texel, hasAlpha = false) {
     const data = Buffer.alloc(size * size * 4);
     for (let y = 0; y < size; y++) {
       for (let x = 0; x < size; x++) data.set(texel(x / size, y / size).map((c) => Math.round(255 * Math.min(Math.max(c, 0), 1))), 4 * (y * size + x));
     }
-    const png = await sharp(data, { raw: { width: size, height: size, channels: 4 } }).removeAlpha().png().toBuffer();
+    const image = sharp(data, { raw: { width: size, height: size, channels: 4 } });
+    const png = await (hasAlpha ? image : image.removeAlpha()).png().toBuffer();
     const source = this.push("images", { bufferView: this.view(png), mimeType: "image/png" });
     return { index: this.push("textures", { source }) };
   }
@@ -204,4 +205,25 @@ function sparse() {
   return model.glb();
 }
 
-export const MODELS = { textured, animated, instances, sparse };
+// A coat with a map, fibers, a mask and a blended opacity, each with its texture.
+async function layered() {
+  const model = new Model();
+  const surface = torus(64, 32);
+  const stripes = await model.texture(128, (u, v) => [0.8, 0.3 + 0.5 * smooth(3 * v), 0.3, smooth(8 * u) > 0.4 ? 1 : 0], true);
+  const veil = await model.texture(128, (u, v) => [0.2, 0.5, 0.9, 0.2 + 0.7 * smooth(4 * v)], true);
+  const coat = await model.texture(128, (u) => [smooth(4 * u), 0.2, 0]);
+  const extensions = {
+    KHR_materials_clearcoat: { clearcoatFactor: 1, clearcoatTexture: coat, clearcoatRoughnessFactor: 0.1 },
+    KHR_materials_sheen: { sheenColorFactor: [0.6, 0.6, 0.3], sheenRoughnessFactor: 0.4 },
+  };
+  model.json.extensionsUsed = Object.keys(extensions);
+  const base = (baseColorTexture) => ({ baseColorTexture, metallicFactor: 0, roughnessFactor: 0.7 });
+  const masked = model.push("materials", { alphaMode: "MASK", doubleSided: true, pbrMetallicRoughness: base(stripes), extensions });
+  const blended = model.push("materials", { alphaMode: "BLEND", doubleSided: true, pbrMetallicRoughness: base(veil) });
+  const names = attributes(model, surface);
+  model.node({ mesh: model.mesh(names, surface.indices, masked), rotation: [0.3826834, 0, 0, 0.9238795] });
+  model.node({ mesh: model.mesh(names, surface.indices, blended), scale: [0.5, 0.5, 0.5] });
+  return model.glb();
+}
+
+export const MODELS = { textured, animated, instances, sparse, layered };

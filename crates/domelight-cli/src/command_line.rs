@@ -1,12 +1,13 @@
-//! The command line as it was typed, for reports.
+//! The command line as it was typed, for reports that others read.
 
 use domelight::fingerprint::Fingerprinter;
 use domelight::quote::shell;
+use domelight_lab::names::shared_word;
 
-/// The command line of this process.
+/// The command line of this process, without folders of this machine.
 pub(crate) fn command() -> String {
     // A name may be no UTF-8.
-    quoted(std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()))
+    quoted(std::env::args_os().skip(1).map(|word| shared_word(&word.to_string_lossy())))
 }
 
 /// The fingerprint of this program's file: another build may make other pictures.

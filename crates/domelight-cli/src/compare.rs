@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use domelight_lab::Host as _;
-use domelight_lab::compare::{Comparison, ComparisonResult, ComparisonSettings};
+use domelight_lab::compare::{Comparison, ComparisonResult, ComparisonSettings, read_pictures};
 use domelight_lab::measure::{Cache, Reference};
 
 use crate::args::compare::CompareArguments;
@@ -32,19 +32,27 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     let loading = interrupt::nothing_to_keep(interrupt::ENDED);
     let given = arguments.reference.as_deref();
     let given = given.map(|path| Reference::read(path, [width, height], host)).transpose()?;
+    let folder = arguments.pictures.as_deref();
+    let pictures =
+        folder.map(|folder| read_pictures(folder, host)).transpose()?.unwrap_or_default();
     let scene = arguments.scene.load(quiet)?.build(host)?;
     drop(loading);
     let mut comparison = Comparison::new(scene.view(), arguments.settings());
     for strategy in &arguments.strategies {
         comparison.add_named(strategy.clone())?;
     }
+    for picture in pictures {
+        comparison.add_picture(picture)?;
+    }
+    let calibrated = comparison.calibrate(host)?;
     let reference = if let Some(reference) = given {
         reference
     } else {
         let cache = cache(arguments.no_cache, arguments.cache.as_deref(), host);
-        comparison.reference(cache.as_ref(), host)?
+        calibrated.reference(cache.as_ref())?
     };
-    let result = comparison.run(&reference, host)?;
+    let result = calibrated.run(&reference)?;
+    drop(calibrated);
     write(arguments, &result)?;
     result.report.summary().iter().for_each(|line| host.status(line));
     host.status(&format!("-> {}", arguments.output.display()));
@@ -58,12 +66,16 @@ pub(crate) fn cache(no_cache: bool, folder: Option<&Path>, host: &Terminal) -> O
 
 impl CompareArguments {
     fn settings(&self) -> ComparisonSettings {
+        let usual = ComparisonSettings::default();
         ComparisonSettings {
             render: self.scene.render_settings(&self.pixel, 1),
             budget: self.budget,
             n_seeds: self.seeds,
             exposure: self.exposure,
-            reference_spp: self.reference_spp,
+            tone: self.tone,
+            // What was asked for is what is rendered.
+            reference_spp: self.reference_spp.unwrap_or(usual.reference_spp),
+            most_reference_spp: self.reference_spp.unwrap_or(usual.most_reference_spp),
             command: command_line::command(),
         }
     }

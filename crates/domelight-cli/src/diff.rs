@@ -147,10 +147,7 @@ impl Difference {
             row("NaN, infinite", format!("{} pixels", c.n_non_finite));
         }
         if let Some((white, metric)) = picture {
-            row(
-                "error picture",
-                format!("{metric:?}, brightest color at {white:.4}").to_lowercase(),
-            );
+            row("error picture", format!("{}, brightest color at {white:.4}", metric.name()));
         }
         text
     }

@@ -36,6 +36,19 @@ pub(crate) fn declare(path: &Path) -> Result<(), FileConflict> {
     with_ledger(|ledger| ledger.write(path))
 }
 
+/// Declares a folder that is filled with results.
+///
+/// # Errors
+/// If a file in it is read.
+pub(crate) fn require_unread(folder: &Path) -> Result<()> {
+    let input = with_ledger(|ledger| ledger.read_in(folder).map(Path::to_path_buf));
+    let Some(input) = input else { return Ok(()) };
+    let (folder, input) = (folder.display(), input.display());
+    let why =
+        format!("{input} might be written over: results go to {folder}; choose another folder");
+    Err(UsageError(why).into())
+}
+
 /// Declares a result, and asks whether it can be written.
 ///
 /// # Errors

@@ -7,6 +7,7 @@
 
 mod args;
 mod bench;
+mod clock;
 mod command_line;
 mod compare;
 mod diff;
@@ -41,6 +42,7 @@ use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    clock::start();
     let Arguments { command, quiet, memory } = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => return error::report_usage(error),

@@ -176,11 +176,11 @@ impl Merged {
         if here != there {
             return foreign("number of samples", &here, &there);
         }
-        let size = |width: usize, height: usize| format!("{width}x{height}");
-        let here = (size(part.film.width, part.film.height), part.n_tiles);
-        let there = (size(self.width, self.height), self.n_tiles);
+        let divided = |width, height, n_tiles| format!("{width}x{height} in {n_tiles} tiles");
+        let here = divided(part.film.width, part.film.height, part.n_tiles);
+        let there = divided(self.width, self.height, self.n_tiles);
         if here != there {
-            return foreign("division into tiles", &format!("{here:?}"), &format!("{there:?}"));
+            return foreign("division into tiles", &here, &there);
         }
         Ok(())
     }

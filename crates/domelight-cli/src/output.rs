@@ -14,10 +14,11 @@ use domelight::quote::{Code, Shell, terminal};
 use domelight::render::Layers;
 use serde::Serialize;
 use std::fmt;
-use std::io::{self, IsTerminal as _, Write as _};
+use std::io::{self, Cursor, IsTerminal as _, Write as _};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::{Duration, Instant};
 
 /// A picture file to write; `-` is standard output.
 #[derive(Clone, Debug)]
@@ -188,6 +189,33 @@ impl fmt::Display for PicturePath {
         }
         self.path.display().fmt(f)
     }
+}
+
+/// About how long it takes to write a rendering: by a band of it, which is encoded and not written.
+pub(crate) fn time_to_write(
+    outputs: &[PicturePath],
+    layers: &Layers,
+    tone: &ToneMapping,
+    hidden: bool,
+    attributes: &[(String, String)],
+) -> anyhow::Result<Duration> {
+    let n_rows = layers.height().min(BAND_ROWS);
+    let first = (layers.height() - n_rows) / 2;
+    let band = layers.rows(first..first + n_rows);
+    let start = Instant::now();
+    for output in outputs {
+        let alpha = hidden.then_some(&band.alpha[..]);
+        let mut bytes = Vec::new();
+        match output.format.unwrap_or(PictureFormat::Exr) {
+            PictureFormat::Exr => band.write_exr(attributes, &mut Cursor::new(bytes))?,
+            PictureFormat::Hdr => hdr::encode(&band.color, &mut bytes)?,
+            PictureFormat::Pfm => pfm::encode(&band.color, &mut bytes)?,
+            PictureFormat::Png => {
+                png::encode(&band.color, alpha, tone, Depth::Eight, &mut bytes)?;
+            }
+        }
+    }
+    Ok(start.elapsed().mul_f64(layers.height() as f64 / n_rows as f64))
 }
 
 /// Some rows of a picture.

@@ -1,4 +1,4 @@
-//! The progress bar of a render.
+//! The progress bars of a render, and of work of many renders.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use domelight::quote::terminal;
 use domelight::render::{Counts, Observer, Stage};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use domelight_lab::WorkProgress;
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::output::print_progress;
 use crate::profile::{Profile, StageSeconds};
@@ -148,5 +149,43 @@ impl Observer for RenderProgress {
 
     fn canceled(&self) -> bool {
         self.interrupted.load(Ordering::Relaxed)
+    }
+}
+
+/// Shows the progress of work of many renders on standard error, if that is a terminal and nobody asked for quiet.
+pub(crate) struct WorkBar(ProgressBar);
+
+impl WorkBar {
+    /// Steps of the whole bar.
+    const STEPS: u64 = 1000;
+
+    /// A bar at its beginning.
+    pub(crate) fn new(quiet: bool) -> Self {
+        let target =
+            if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let bar = ProgressBar::with_draw_target(Some(Self::STEPS), target);
+        let template = "{bar:30.cyan/blue} {percent:>3} %  {elapsed} elapsed, {prefix} left  {msg}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style.progress_chars("━━╌"));
+        }
+        Self(bar)
+    }
+}
+
+impl WorkProgress for WorkBar {
+    fn advance(&self, share: f64, seconds_left: f64, label: &str) {
+        if self.0.is_hidden() {
+            return;
+        }
+        let left = Duration::from_secs(seconds_left.clamp(0.0, 1e9).ceil() as u64);
+        self.0.set_prefix(HumanDuration(left).to_string());
+        self.0.set_message(terminal::line(label));
+        self.0.set_position((share * Self::STEPS as f64) as u64);
+    }
+}
+
+impl Drop for WorkBar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
     }
 }

@@ -4,18 +4,19 @@ use std::str::FromStr as _;
 use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, bail};
-use domelight::render::{RenderSettings, automatic_exposure, pilot_points};
+use domelight::render::{Layers, RenderSettings, automatic_exposure, pilot_points};
 use domelight::strategy::PreparedStrategy;
 
 use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
+use crate::clock;
 use crate::error::UsageError;
 use crate::interrupt;
 use crate::memory;
-use crate::output::{PicturePath, print_progress, require_one_on_standard_output};
+use crate::output::{self, PicturePath, print_progress, require_one_on_standard_output};
 use crate::parse::Size;
 use crate::preview;
 use crate::progress::RenderProgress;
-use crate::render_run::RenderRun;
+use crate::render_run::TryWriting;
 use crate::report::{RenderReport, Settings, StopReason, Timings};
 use crate::scene::start_threads;
 use crate::strategy::{Job, acceptance};
@@ -72,8 +73,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         scene: report.clone(),
         strategy: spec.description(),
         spp: settings.n_samples,
-        passes: format!("{:?}", settings.passes).to_lowercase(),
-        sampler: format!("{:?}", settings.sampler).to_lowercase(),
+        passes: settings.passes.name(),
+        sampler: settings.sampler.name(),
         filter: settings.filter.name(),
         seed: settings.seed,
         threads: rayon::current_num_threads(),
@@ -94,8 +95,12 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let openjd = arguments.output.progress == ProgressKind::Openjd;
     let progress = RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
     let progress = &progress.profiled(arguments.output.profile);
-    let render_run = Some(&render_run);
-    let job = Job { scene, camera, environment, settings, progress, render_run };
+    let attributes = described.provenance();
+    let try_writing = &|layers: &Layers| {
+        output::time_to_write(&outputs, layers, &shown_as, report.hide_env, &attributes)
+    };
+    let running = Some((&render_run, try_writing as TryWriting));
+    let job = Job { scene, camera, environment, settings, progress, render_run: running };
     let rendering = job.render(strategy)?;
     progress.finish();
     let stopped = match () {
@@ -103,7 +108,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         () if interrupted.load(Ordering::Relaxed) => Some(StopReason::Interrupted),
         () => Some(StopReason::Time),
     };
-    let saved = render_run.and_then(RenderRun::saved);
+    let saved = render_run.saved();
     if rendering.counts.camera_rays == 0 && saved.is_none() {
         bail!("ended before the first sample; nothing was written");
     }
@@ -112,7 +117,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let denoised = denoiser.as_ref().map(|d| tone::denoise(d, &rendering.layers)).transpose()?;
     // A full disk under one file must not cost the others.
     let write = |path: &PicturePath| {
-        let mut attributes = described.provenance();
+        let mut attributes = attributes.clone();
         // If not, the layer of sample counts tells how many there are.
         attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
         let denoised = denoised.as_ref().map(|(color, _)| color);
@@ -122,7 +127,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     if !arguments.render_run.is_part() {
         outputs.iter().map(write).fold(Ok(()), Result::and)?;
     }
-    let stages = Timings { load, build, render, write: watch.lap() };
+    let total = clock::elapsed().as_secs_f64();
+    let stages = Timings { load, build, render, write: watch.lap(), total };
     let points = || pilot_points(scene, camera, settings);
     let rejection = acceptance(spec, points, environment, settings.seed)?;
     let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);

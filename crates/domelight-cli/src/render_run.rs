@@ -7,13 +7,17 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+mod timed;
+
 use anyhow::{Context as _, Result};
 use domelight::render::{
-    Checkpoint, Counts, Observer, Passes, RenderSettings, Renderer, Rendering, Stage, Tiling,
+    Checkpoint, Counts, Layers, Observer, Passes, RenderSettings, Renderer, Rendering, Stage,
+    Tiling,
 };
 use domelight::strategy::{Strategy, StrategySpec};
 
 use crate::args::render_run::RenderRunArguments;
+use crate::clock;
 use crate::error::{UsageError, warn};
 use crate::files;
 use crate::interrupt;
@@ -23,6 +27,10 @@ use crate::parse::{Shard, Tiles};
 use crate::progress::RenderProgress;
 use crate::report::Settings;
 use domelight_lab::scene::PreparedScene;
+use timed::{Pace, PassWatch, TimeLimit};
+
+/// Says how long it takes to write a rendering.
+pub(crate) type TryWriting<'a> = &'a dyn Fn(&Layers) -> Result<Duration>;
 
 /// How a render proceeds.
 pub(crate) struct RenderRun {
@@ -33,7 +41,8 @@ pub(crate) struct RenderRun {
     every: Duration,
     /// Where its state came from.
     from: Option<(PathBuf, Checkpoint)>,
-    time: Option<Duration>,
+    /// When it ends, written and all.
+    end: Option<Instant>,
     interrupted: &'static AtomicBool,
     quiet: bool,
     identity: Vec<(String, String)>,
@@ -117,8 +126,9 @@ impl RenderRunArguments {
             None
         };
         let Self { checkpoint_every: every, time, .. } = *self;
+        let end = time.and_then(|time| clock::start().checked_add(time));
         let provenance = report.provenance();
-        Ok(RenderRun { tiles, save, every, from, time, interrupted, quiet, identity, provenance })
+        Ok(RenderRun { tiles, save, every, from, end, interrupted, quiet, identity, provenance })
     }
 }
 
@@ -138,11 +148,11 @@ fn identity(
     let camera = &view.report.camera;
     let mut identity = vec![
         ("adaptive", settings.adaptive.to_string()),
-        ("background", format!("{:?}", settings.background).to_lowercase()),
+        ("background", settings.background.name().to_owned()),
         ("camera", serde_json::to_string(camera).unwrap_or_default()),
         ("environment", view.environment.fingerprint().to_string()),
         ("filter", settings.filter.name().to_owned()),
-        ("sampler", report.sampler.clone()),
+        ("sampler", report.sampler.to_owned()),
         ("scene", view.scene.fingerprint().to_string()),
         ("seed", settings.seed.to_string()),
         ("size", format!("{}x{}", settings.width, settings.height)),
@@ -151,7 +161,7 @@ fn identity(
     ];
     // As it was before there was a choice.
     if settings.passes != Passes::default() {
-        identity.push(("passes", report.passes.clone()));
+        identity.push(("passes", report.passes.to_owned()));
     }
     identity.extend(settings.target_error.map(|e| ("target-error", e.to_string())));
     identity.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
@@ -221,6 +231,7 @@ impl RenderRun {
         session: Renderer<S>,
         settings: &RenderSettings,
         progress: &RenderProgress,
+        try_writing: TryWriting,
     ) -> Result<Rendering> {
         let range = self.range(session.tiling())?;
         let window = session.tiling().window(&range);
@@ -233,7 +244,13 @@ impl RenderRun {
         let total = pixels as u64 * u64::from(settings.n_samples);
         progress.begin(total, session.counts().camera_rays);
         if !session.is_complete() {
-            self.advance(&mut session, settings, progress)?;
+            match self.end {
+                Some(end) => {
+                    let limit = TimeLimit::new(end);
+                    self.advance_until(limit, &mut session, settings, progress, try_writing)?;
+                }
+                None => self.advance(&mut session, settings, progress)?,
+            }
         } else if self.save.as_ref() != self.from.as_ref().map(|(path, _)| path) {
             self.save(&session, settings)?;
         }
@@ -247,21 +264,100 @@ impl RenderRun {
         settings: &RenderSettings,
         progress: &RenderProgress,
     ) -> Result<()> {
-        let end = self.time.map(|time| Instant::now() + time);
         loop {
-            let next_save = self.save.as_ref().map(|_| Instant::now() + self.every);
-            let pause = [end, next_save].into_iter().flatten().min();
+            let pause = self.save.as_ref().map(|_| Instant::now() + self.every);
             let complete =
                 session.run(&Deadline { progress, pause, advanced: AtomicBool::new(false) });
-            let interrupted = self.interrupted.load(Ordering::Relaxed);
-            if complete || interrupted || end.is_some_and(|end| Instant::now() >= end) {
+            if complete || self.interrupted.load(Ordering::Relaxed) {
                 return self.save(session, settings);
             }
-            // What was saved before is still there, and the render may yet be written elsewhere.
-            if let Err(error) = self.save(session, settings) {
-                warn(self.quiet, &format!("no checkpoint: {error:#}"));
+            self.save_meanwhile(session, settings);
+        }
+    }
+
+    /// What was saved before is still there if this fails, and the render may yet be written elsewhere.
+    fn save_meanwhile<S: Strategy>(&self, session: &Renderer<S>, settings: &RenderSettings) {
+        if let Err(error) = self.save(session, settings) {
+            warn(self.quiet, &format!("no checkpoint: {error:#}"));
+        }
+    }
+
+    /// Renders until nothing more fits before the end but writing, and saves from time to time. Passes of a picture
+    /// that is not saved become shorter toward the end; such a picture never gets its last sample, so that complete
+    /// pictures have the same bits with and without a time.
+    fn advance_until<S: Strategy>(
+        &self,
+        mut limit: TimeLimit,
+        session: &mut Renderer<S>,
+        settings: &RenderSettings,
+        progress: &RenderProgress,
+        try_writing: TryWriting,
+    ) -> Result<()> {
+        let n_pixels = settings.width * settings.height;
+        let may_divide = self.save.is_none() && settings.target_error.is_none();
+        let mut pace = Pace::default();
+        let mut was_shortened = false;
+        let mut trial_at = Some(limit.trial_at(Instant::now()));
+        let mut next_save = self.save.as_ref().map(|_| Instant::now() + self.every);
+        loop {
+            let start = session.least_samples();
+            let left = settings.n_samples.saturating_sub(start);
+            let stop = limit.stop();
+            let seconds_left = stop.saturating_duration_since(Instant::now()).as_secs_f64();
+            let share = session.share_behind();
+            let mut most =
+                if may_divide { pace.most_samples(seconds_left, share) } else { u32::MAX };
+            if seconds_left == 0.0 && may_divide {
+                most = 1;
+            }
+            if was_shortened {
+                most = most.min(left.saturating_sub(1));
+            }
+            // A picture has a sample of each pixel, however short the time.
+            let must_cover = may_divide && start == 0 && most == 1;
+            let pause = [Some(stop), next_save, trial_at].into_iter().flatten().min();
+            let watch = PassWatch::new(progress, pause.filter(|_| !must_cover), pace.tile_seconds)
+                .replanned(may_divide && most > 1, share * n_pixels as f64);
+            if most == 0 || !session.step_at_most(most, &watch) {
+                return self.save(session, settings);
+            }
+            pace.measure(&watch, n_pixels);
+            was_shortened |= watch.samples() == most && most < left;
+            let now = Instant::now();
+            let covers = session.least_samples() > 0;
+            let is_over = now + Duration::from_secs_f64(pace.tile_seconds) >= limit.stop();
+            if self.interrupted.load(Ordering::Relaxed)
+                || session.is_complete()
+                || is_over && (covers || !may_divide)
+            {
+                return self.save(session, settings);
+            }
+            if trial_at.is_some_and(|at| now >= at) {
+                trial_at = None;
+                limit.keep_for_writing(self.try_writing(session, settings, try_writing)?);
+            } else if next_save.is_some_and(|at| now >= at) {
+                self.save_meanwhile(session, settings);
+                next_save = Some(Instant::now() + self.every);
             }
         }
+    }
+
+    /// How long it takes to save and to write what there is.
+    fn try_writing<S: Strategy>(
+        &self,
+        session: &Renderer<S>,
+        settings: &RenderSettings,
+        try_writing: TryWriting,
+    ) -> Result<Duration> {
+        let start = Instant::now();
+        if self.save.is_some() {
+            self.save_meanwhile(session, settings);
+        }
+        let layers = session.rendering().layers;
+        let so_far = start.elapsed();
+        // A part is its own checkpoint.
+        let is_part = self.tiles != TileSelection::All;
+        Ok(so_far + if is_part { Duration::ZERO } else { try_writing(&layers)? })
     }
 
     fn save<S: Strategy>(&self, session: &Renderer<S>, settings: &RenderSettings) -> Result<()> {

@@ -20,8 +20,8 @@ pub(crate) struct Settings {
     pub(crate) scene: SceneReport,
     pub(crate) strategy: String,
     pub(crate) spp: u32,
-    pub(crate) passes: String,
-    pub(crate) sampler: String,
+    pub(crate) passes: &'static str,
+    pub(crate) sampler: &'static str,
     pub(crate) filter: &'static str,
     pub(crate) seed: u64,
     pub(crate) threads: usize,
@@ -39,8 +39,8 @@ impl Settings {
             ("environment", self.scene.environment.probe().to_owned()),
             ("strategy", self.strategy.clone()),
             ("samples", self.spp.to_string()),
-            ("passes", self.passes.clone()),
-            ("sampler", self.sampler.clone()),
+            ("passes", self.passes.to_owned()),
+            ("sampler", self.sampler.to_owned()),
             ("filter", self.filter.to_owned()),
             ("seed", self.seed.to_string()),
         ];
@@ -61,6 +61,8 @@ pub(crate) struct Timings {
     pub(crate) render: Seconds,
     /// Encoding and writing pictures.
     pub(crate) write: Seconds,
+    /// By the clock, since the program began.
+    pub(crate) total: f64,
 }
 
 /// What ended a render before all samples were there.
@@ -139,7 +141,7 @@ impl RenderReport {
         let Settings { scene, strategy, spp, .. } = &self.settings;
         let SceneReport { scene, environment, size: [w, h], .. } = scene;
         let environment = environment.probe();
-        let Timings { load, build, render, .. } = &self.seconds;
+        let Timings { load, build, render, write, total } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
         status(&format!("{scene} under {environment}: {w}x{h}, {spp} samples a pixel, {strategy}"));
         let png = self.png.map_or(String::new(), |shown| format!(" (PNG at {shown})"));
@@ -151,6 +153,13 @@ impl RenderReport {
             self.rays_per_second * 1e-6,
             self.outputs.join(", ")
         ));
+        if self.stopped == Some(StopReason::Time) {
+            status(&format!(
+                "ended by --time after {total:.2} s, of which {:.2} s loading and building, {:.2} s writing",
+                load.wall + build.wall,
+                write.wall
+            ));
+        }
         if let Some(by) = &self.denoised {
             status(&tone::denoised_line(by));
         }

@@ -16,7 +16,7 @@ use domelight_lab::{Acceptance, count_tries};
 use crate::args::sampling::StrategyArguments;
 use crate::error::UsageError;
 use crate::progress::RenderProgress;
-use crate::render_run::RenderRun;
+use crate::render_run::{RenderRun, TryWriting};
 
 /// A strategy's name and the options that go with it in one text.
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +89,7 @@ pub(crate) struct Job<'a> {
     pub(crate) settings: &'a RenderSettings,
     pub(crate) progress: &'a RenderProgress,
     /// From the first sample to the last, unless it says otherwise.
-    pub(crate) render_run: Option<&'a RenderRun>,
+    pub(crate) render_run: Option<(&'a RenderRun, TryWriting<'a>)>,
 }
 
 impl Job<'_> {
@@ -97,8 +97,8 @@ impl Job<'_> {
     pub(crate) fn render(&self, strategy: &PreparedStrategy) -> Result<Rendering> {
         let Self { scene, camera, environment, settings, progress, render_run } = *self;
         let mut renderer = Renderer::with_strategy(scene, camera, environment, strategy, *settings);
-        if let Some(render_run) = render_run {
-            return render_run.run(renderer, settings, progress);
+        if let Some((render_run, try_writing)) = render_run {
+            return render_run.run(renderer, settings, progress, try_writing);
         }
         renderer.run(progress);
         Ok(renderer.rendering())

@@ -5,13 +5,13 @@ use std::path::Path;
 
 use domelight::environment::io::{LoadedProbe, ProbeOptions, load_probe};
 use domelight::render::{Observer, RenderSettings};
-use domelight_lab::{Error, Host};
+use domelight_lab::{Error, Host, WorkProgress};
 
 use crate::error;
 use crate::files;
 use crate::interrupt;
 use crate::memory;
-use crate::progress::RenderProgress;
+use crate::progress::{RenderProgress, WorkBar};
 
 /// The terminal.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +35,10 @@ impl Host for Terminal {
         let n_pixels = (settings.width * settings.height) as u64;
         let n_camera_rays = n_pixels * u64::from(settings.n_samples);
         Box::new(RenderProgress::new(label, n_camera_rays, self.quiet, interrupt::flag()))
+    }
+
+    fn work_progress<'a>(&'a self) -> Option<Box<dyn WorkProgress + 'a>> {
+        Some(Box::new(WorkBar::new(self.quiet)))
     }
 
     fn canceled(&self) -> bool {

@@ -1,6 +1,6 @@
 //! `domelight bench` as a user runs it: what it prints, keeps and refuses. Nothing here looks at times.
 
-mod common;
+use crate::common;
 
 use common::{domelight, done, ended as refused, json, stderr, stdout};
 use serde_json::Value;

@@ -1,7 +1,7 @@
 //! Renders that are killed, interrupted, divided and limited, as a user or a farm runs them.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{domelight, ended};
 use domelight::sampling::Pcg32;

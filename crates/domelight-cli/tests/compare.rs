@@ -1,8 +1,9 @@
 //! `domelight compare` as a user runs it: a page and numbers, a cache, budgets, messages.
 
-mod common;
+use crate::common;
 
-use common::{domelight, ended as refused, json, stderr, write_exr};
+use common::{domelight, ended as refused, json, load, stderr, write_exr};
+use domelight::picture::exr::ExrLayers;
 use domelight::picture::{ReadOptions, read_bytes};
 use domelight::{Rgb, RgbImage};
 use serde_json::Value;
@@ -50,6 +51,7 @@ fn a_page_and_the_same_numbers_as_json() {
         "seeds",
         "strategies",
         "threads",
+        "tone",
         "version",
     ];
     assert_eq!(keys(&report), top);
@@ -309,6 +311,74 @@ fn names_cannot_break_the_page() {
     let page = common::done(&output);
     assert!(page.contains("&lt;b&gt;&amp;amp;.obj"));
     assert!(!page.contains("<b>"));
+}
+
+/// Times are stated by names, attributes and a table; sizes that differ are an error that names both.
+#[test]
+fn pictures_of_other_renderers_take_part() {
+    let folder = folder();
+    let others = folder.path().join("others");
+    fs::create_dir(&others).unwrap();
+    let run = |more: &[&str]| {
+        let fixed = ["sphere", "--budget", "spp:2", "--strategies", "mis", "--pictures", "others"];
+        compare(&folder, &[&fixed[..], more].concat())
+    };
+    refused(&run(&[]), 2, &["others", "no OpenEXR pictures"]);
+    // The same picture but for its noise, by this program.
+    let render = ["render", "sphere", "--env", "sky", "--env-rows", "16", "--size", "20x16", "-q"];
+    let render = |name: &str| {
+        let more = ["--spp", "8", "--strategy", "brdf", "-o", name];
+        common::done(&domelight(&folder, &[&render[..], &more].concat()));
+    };
+    render("others/cycles.1.5s.exr");
+    render("others/pbrt.exr");
+    refused(&run(&[]), 2, &["others/pbrt.exr", "pbrt.12.5s.exr", "times.csv", "domelight.seconds"]);
+    fs::write(others.join("times.csv"), "picture,seconds\npbrt.exr,0:02\n").unwrap();
+    let mut layers = ExrLayers::from_image(&load(&folder, "others/pbrt.exr"), None);
+    layers.attributes = vec![("renderTime".into(), "2.5".into())];
+    fs::write(others.join("mitsuba.exr"), layers.encode().unwrap()).unwrap();
+
+    let report = json(&run(&["-q", "--json"]));
+    let strategies = report["strategies"].as_array().unwrap();
+    let names: Vec<&str> = strategies.iter().map(|s| s["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["mis", "cycles", "mitsuba", "pbrt"]);
+    for (strategy, seconds) in strategies[1..].iter().zip([1.5, 2.5, 2.0]) {
+        let result = &strategy["result"];
+        assert_eq!(number(&result["cpu_seconds"]["mean"]), seconds);
+        assert!((0.0..0.1).contains(&number(&result["rel_mse"]["mean"])), "{strategy}");
+        let unknown = [&strategy["unbiased"], &result["spp"], &result["rays"], &result["bias"]];
+        assert!(unknown.into_iter().all(Value::is_null), "{strategy}");
+        assert_eq!(result["convergence"], serde_json::json!([]));
+        assert!(number(&result["efficiency_ratio_to_mis"]) > 0.0);
+    }
+    let page = fs::read_to_string(folder.path().join("compare.html")).unwrap();
+    let plots = page.split("<figure").skip(1).map(|plot| plot.contains(">cycles<"));
+    assert_eq!(plots.collect::<Vec<_>>(), [false, true], "they have a time and no rays");
+
+    // A picture of another light is told apart, one of another size refused.
+    let bright = load(&folder, "others/pbrt.exr").pixels.iter().map(|&p| p * 1.5).collect();
+    write_exr(&others.join("bright.3s.exr"), &RgbImage::new(20, 16, bright), None);
+    refused(&run(&[]), 0, &["the picture bright is +", "as bright as the reference"]);
+    write_exr(&others.join("small.3s.exr"), &RgbImage::filled(10, 8, Rgb::splat(0.5)), None);
+    refused(&run(&[]), 2, &["picture small is 10x8", "renders 20x16", "--size 10x8"]);
+}
+
+/// A noisy reference gets more samples unless their number was given.
+#[test]
+fn the_reference_grows_until_it_is_good_enough() {
+    let folder = folder();
+    let fixed = ["compare", "sphere", "--env", "sky", "--env-rows", "16", "--size", "20x16"];
+    let budget = ["--budget", "spp:64", "--strategies", "product", "--seeds", "2", "--no-cache"];
+    let run = |more: &[&str]| {
+        let output = domelight(&folder, &[&fixed[..], &budget, &["--json"], more].concat());
+        let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        let spp = report["reference"]["spp"].as_u64().unwrap();
+        (spp, number(&report["reference"]["rel_mse"]), stderr(&output).to_owned())
+    };
+    let (spp, noise, _) = run(&[]);
+    assert!(spp > 64 && spp <= 1024, "{spp}");
+    let (fixed, of_fixed, said) = run(&["--reference-spp", "64"]);
+    assert!(fixed == 64 && of_fixed > noise && said.contains("--reference-spp"), "{said}");
 }
 
 /// Ctrl-C leaves nothing half done.

@@ -1,7 +1,7 @@
 //! `--denoise` with a library that stands in for Open Image Denoise: what it is given, and what is made of its answer.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

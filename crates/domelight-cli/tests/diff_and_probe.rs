@@ -1,6 +1,6 @@
 //! The real program in a temporary folder: exit codes, messages, JSON, files.
 
-mod common;
+use crate::common;
 
 use common::{domelight, done, json, load, stderr, stdout, write_exr};
 use domelight::{Rgb, RgbImage};

@@ -1,7 +1,7 @@
 //! The files for farms; what can be run without the engine is run.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{domelight, stderr, stdout};
 use std::fs;

@@ -1,6 +1,6 @@
 //! `domelight figures` as a user runs it.
 
-mod common;
+use crate::common;
 
 use common::{domelight, load, stderr};
 use serde_json::Value;

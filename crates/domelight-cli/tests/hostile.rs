@@ -1,7 +1,7 @@
 //! Names that are commands, results that are inputs, amounts that are too large.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{domelight, ended, json, stderr, stdout};
 use std::fs;
@@ -31,6 +31,11 @@ fn no_result_takes_the_place_of_what_is_read_or_of_another() {
     let scene = "[materials.m]\nbase_color_texture = \"t.png\"\n[[objects]]\nbuiltin = \"sphere\"\n\
                  material = \"m\"\n[environment]\nfile = \"in.hdr\"\n";
     fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    fs::hard_link(folder.path().join("scene.toml"), folder.path().join("page.html")).unwrap();
+    let figures = folder.path().join("figures");
+    fs::create_dir_all(figures.join("figure-4")).unwrap();
+    fs::copy(folder.path().join("ref.exr"), figures.join("figure-4/p.exr")).unwrap();
+    ended(&domelight(&folder, &["probe", "sky", "-q", "-o", "figures/figure-1.png"]), 0, &[]);
     let before = snapshot(&folder);
     let render = |more: &[&'static str]| [&["render"][..], &SMALL, more].concat();
     let over = "written over";
@@ -67,6 +72,10 @@ fn no_result_takes_the_place_of_what_is_read_or_of_another() {
         (vec!["probe", "in.hdr", "-o", "in.hdr"], over),
         (vec!["probe", "sky", "-o", "x.png", "--preview", "x.png"], "two results"),
         (vec!["diff", "ref.exr", "ref.exr", "-o", "ref.exr"], over),
+        (vec!["tone", "t.png", "-o", "./t.png"], over),
+        (vec!["inspect", "scene.toml", "-o", "page.html"], over),
+        (vec!["figures", "--quick", "--env", "figures/figure-1.png", "--only", "1"], over),
+        (vec!["figures", "--quick", "--env", "figures/figure-4/p.exr"], over),
         (vec!["bench", "--suite", "rigs", "--probes", "in.hdr", "-o", "in.hdr"], over),
         (vec!["farm", "slurm", "--shards", "2", "--env", "in.hdr", "--picture", "in.hdr"], over),
     ];
@@ -75,6 +84,7 @@ fn no_result_takes_the_place_of_what_is_read_or_of_another() {
         assert_ne!(output.status.code(), Some(0), "{arguments:?}");
         assert!(stderr(&output).contains(why), "{arguments:?}: {}", stderr(&output));
         assert!(snapshot(&folder) == before, "{arguments:?}");
+        assert_eq!(fs::read_dir(&figures).unwrap().count(), 2, "{arguments:?}");
     }
     // The dome's implied name.
     fs::copy(folder.path().join("ref.exr"), folder.path().join("r_dome.exr")).unwrap();

@@ -1,6 +1,6 @@
 //! `domelight inspect` as a user runs it: a page, numbers, refusals.
 
-mod common;
+use crate::common;
 
 use common::{domelight, ended, json, stderr};
 use std::fs;

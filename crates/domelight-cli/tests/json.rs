@@ -1,8 +1,6 @@
 //! `--json` of every command: an object on standard output, whose fields docs/json.md lists.
 
-mod common;
-
-use common::{domelight, json, stdout};
+use crate::common::{domelight, json, stdout};
 use std::collections::BTreeSet;
 use std::fs;
 use tempfile::TempDir;

@@ -1,6 +1,6 @@
 //! `domelight lights` in a temporary folder: exit codes, messages, files.
 
-mod common;
+use crate::common;
 
 use common::{domelight, done, json, load, stderr, stdout, write_exr};
 use domelight::{Rgb, RgbImage};

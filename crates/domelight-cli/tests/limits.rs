@@ -1,7 +1,7 @@
 //! Odd sizes, odd scenes, odd files, and what would take too much memory: each works or is refused by name.
 #![cfg(unix)]
 
-mod common;
+use crate::common;
 
 use common::{domelight, ended};
 use std::fs;

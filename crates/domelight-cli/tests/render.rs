@@ -1,6 +1,6 @@
 //! `domelight render` as a user runs it: files in, pictures out, messages and exit codes.
 
-mod common;
+use crate::common;
 
 use common::{domelight, ended as refused, json, load, stderr, stdout, write_exr};
 use domelight::picture::exr::text_attributes;

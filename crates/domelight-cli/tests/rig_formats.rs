@@ -1,6 +1,6 @@
 //! `domelight lights` into the formats of other programs: the pictures of the dome beside them.
 
-mod common;
+use crate::common;
 
 use common::{domelight, done, load, stderr};
 use tempfile::TempDir;

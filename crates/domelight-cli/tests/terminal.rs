@@ -1,6 +1,6 @@
 //! The first minutes at a terminal: no arguments, misspelled names, completions, manual pages.
 
-mod common;
+use crate::common;
 
 use std::fs;
 use std::process::Command;

@@ -1,6 +1,6 @@
 //! Pictures to look at: exposure and tone curve of all commands, and `domelight tone`.
 
-mod common;
+use crate::common;
 
 use std::fs;
 use std::process::{Command, Output, Stdio};

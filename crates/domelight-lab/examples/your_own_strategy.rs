@@ -58,8 +58,9 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     for named in ["brdf", "mis", "product"] {
         comparison.add_named(named.parse()?)?;
     }
-    let reference = comparison.reference(None, &Silent)?;
-    let result = comparison.run(&reference, &Silent)?;
+    let calibrated = comparison.calibrate(&Silent)?;
+    let reference = calibrated.reference(None)?;
+    let result = calibrated.run(&reference)?;
     result.report.summary().iter().for_each(|line| println!("{line}"));
     std::fs::write(std::env::temp_dir().join("cosine.html"), result.page()?.as_str())?;
 

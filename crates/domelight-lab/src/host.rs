@@ -11,6 +11,12 @@ use domelight::strategy::{PreparedStrategy, StrategySpec};
 
 use crate::Error;
 
+/// Shows the progress of work that consists of many renders.
+pub trait WorkProgress: Sync {
+    /// A share in [0, 1] of the work is done, the rest takes about `seconds_left`, and `label` is at work.
+    fn advance(&self, share: f64, seconds_left: f64, label: &str);
+}
+
 /// A front end: where messages go, who sees the progress, when to stop, which files and how much memory may be taken.
 pub trait Host: Sync {
     /// Shows a warning.
@@ -33,6 +39,11 @@ pub trait Host: Sync {
     /// Shows a render, named by `label`; what is returned is told of each tile and may end the render.
     fn progress<'a>(&'a self, _label: &str, _settings: &RenderSettings) -> Box<dyn Observer + 'a> {
         Box::new(CanceledBy(|| self.canceled()))
+    }
+
+    /// Shows work of many renders as a whole; a host that has none is shown render by render, by [`Host::progress`].
+    fn work_progress<'a>(&'a self) -> Option<Box<dyn WorkProgress + 'a>> {
+        None
     }
 
     /// True ends the work.
@@ -117,5 +128,36 @@ struct CanceledBy<F>(F);
 impl<F: Fn() -> bool + Sync> Observer for CanceledBy<F> {
     fn canceled(&self) -> bool {
         (self.0)()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+
+    /// Keeps what it is to show.
+    #[derive(Default)]
+    struct Warnings(Mutex<Vec<String>>);
+
+    impl Host for Warnings {
+        fn warn(&self, text: &str) {
+            self.0.lock().unwrap().push(text.to_owned());
+        }
+    }
+
+    #[test]
+    fn samples_that_are_not_finite_are_a_warning() {
+        let host = Warnings::default();
+        host.warn_of_non_finite("mis: ", 0);
+        host.warn_of_non_finite("product: ", 17);
+        let shown = host.0.into_inner().unwrap();
+        let [warning] = &shown[..] else { panic!("{shown:?}") };
+        assert!(
+            warning.starts_with("product: 17 camera samples were NaN or infinite"),
+            "{warning}"
+        );
+        assert!(warning.contains("please report this command"), "{warning}");
     }
 }

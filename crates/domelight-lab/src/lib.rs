@@ -16,8 +16,9 @@
 //! let mut comparison = Comparison::new(scene.view(), settings);
 //! comparison.add_named("mis:1:1".parse()?)?;
 //! comparison.add_named("product".parse()?)?;
-//! let reference = comparison.reference(None, &Silent)?;
-//! let result = comparison.run(&reference, &Silent)?;
+//! let calibrated = comparison.calibrate(&Silent)?;
+//! let reference = calibrated.reference(None)?;
+//! let result = calibrated.run(&reference)?;
 //! std::fs::write("compare.html", result.page()?.as_str())?;
 //! # Ok::<(), domelight_lab::Error>(())
 //! ```
@@ -33,6 +34,7 @@ pub mod figures;
 mod host;
 pub mod inspect;
 pub mod measure;
+pub mod names;
 mod page;
 pub mod probe;
 pub mod report;
@@ -43,6 +45,6 @@ mod usage;
 
 pub use acceptance::{Acceptance, count_tries};
 pub use error::{At, Error};
-pub use host::{Host, Silent};
+pub use host::{Host, Silent, WorkProgress};
 pub use strategy::{NamedStrategy, refuse_repeating_points};
 pub use usage::{Seconds, Stopwatch, cpu_seconds, peak_memory, thread_seconds};

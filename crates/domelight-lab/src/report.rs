@@ -4,10 +4,12 @@ use domelight::environment::{Environment, UpAxis};
 use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
 use serde::Serialize;
 
+use crate::names::display_name;
+
 /// A scene under its light, seen by a camera.
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneReport {
-    /// A built-in scene or a file.
+    /// A built-in scene, or a file's name without its folder.
     pub scene: String,
     /// How many the scene has.
     pub triangles: usize,
@@ -40,13 +42,21 @@ pub struct EnvironmentReport {
     up: &'static str,
 }
 
+impl SceneReport {
+    /// What the pictures show, in a few words.
+    pub fn title(&self) -> String {
+        let [scene, probe] = [&self.scene, &self.environment.probe].map(|name| display_name(name));
+        format!("{scene} under {probe}")
+    }
+}
+
 impl EnvironmentReport {
-    /// What a user would call the probe.
+    /// A built-in probe, or a file's name without its folder.
     pub fn probe(&self) -> &str {
         &self.probe
     }
 
-    /// Of a probe by its name, used as `light` says.
+    /// Of a probe by its name, without folders, used as `light` says.
     pub fn new(probe: String, light: &EnvironmentSettings, environment: &Environment) -> Self {
         Self {
             probe,

@@ -1,6 +1,6 @@
 //! From what a user says of a scene, its light and its view to what can be rendered.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr as _;
 
 use domelight::RgbImage;
@@ -17,6 +17,7 @@ use domelight::scene::{
     NamedCamera, Projection, Scene, SceneDescription, load_with,
 };
 
+use crate::names::{file_name, without_folders};
 use crate::report::{CameraReport, EnvironmentReport, SceneReport};
 use crate::{At as _, Error, Host};
 
@@ -166,7 +167,7 @@ pub struct PreparedScene {
     pub camera_settings: CameraSettings,
     /// The light.
     pub environment: Environment,
-    /// What a user would call the probe.
+    /// The probe as it was named: a built-in one or a file, for messages.
     pub probe: String,
     /// In words and numbers.
     pub report: SceneReport,
@@ -276,14 +277,14 @@ impl LoadedScene {
         let probe = probe_name(&light.source);
         let environment = Environment::new(map, orientation, scale).at(&probe)?;
         let report = SceneReport {
-            scene: settings.scene,
+            scene: file_name(&settings.scene),
             triangles: scene.triangle_count(),
             warnings,
             material: settings.subject.material.map(|m| m.text),
             normalize: settings.subject.normalize,
             ground: settings.subject.ground,
             hide_env: settings.subject.hide_env,
-            environment: EnvironmentReport::new(probe.clone(), &light, &environment),
+            environment: EnvironmentReport::new(file_name(&probe), &light, &environment),
             camera: camera_report,
             size: [width, height],
         };
@@ -317,7 +318,7 @@ pub(crate) fn close_up(description: &SceneDescription, aspect: f32, up: Vec3) ->
     }
 }
 
-/// A built-in scene by its name, else a file, and what of it is not shown.
+/// A built-in scene by its name, else a file, and what of it is not shown, one sentence each, without folders.
 pub(crate) fn load_scene(
     name: &str,
     file: &FileSettings,
@@ -341,7 +342,10 @@ pub(crate) fn load_scene(
     for warning in &loaded.warnings {
         host.warn(warning);
     }
-    Ok((loaded.description, loaded.warnings))
+    let files = || loaded.files.iter().map(PathBuf::as_path).chain([Path::new(name)]);
+    let shared = |text: &String| without_folders(text, files());
+    let warnings = loaded.warnings.iter().map(shared).collect();
+    Ok((loaded.description, warnings))
 }
 
 impl FileSettings {
@@ -356,7 +360,7 @@ impl FileSettings {
     }
 }
 
-/// What a user would call the probe.
+/// The probe as it was named, for messages.
 pub(crate) fn probe_name(source: &EnvironmentSource) -> String {
     match source {
         EnvironmentSource::File(path) => path.display().to_string(),

@@ -98,6 +98,7 @@ pub(crate) fn compare<'py>(
             budget,
             n_seeds: seeds,
             reference_spp,
+            most_reference_spp: reference_spp,
             ..Default::default()
         };
         let mut comparison = Comparison::new(view, settings);
@@ -109,8 +110,9 @@ pub(crate) fn compare<'py>(
                 Choice::Python(strategy) => comparison.add(name, strategy)?,
             }
         }
-        let reference = comparison.reference(None, host)?;
-        comparison.run(&reference, host)
+        let calibrated = comparison.calibrate(host)?;
+        let reference = calibrated.reference(None)?;
+        calibrated.run(&reference)
     };
     let (result, stopped) = py.detach(|| {
         std::thread::scope(|scope| {

@@ -2,12 +2,12 @@
 
 use domelight::environment::{Environment, Orientation};
 use domelight::geometry::{Mesh, Ray, RayBatch};
-use domelight::math::{Vec3, vec2, vec3};
+use domelight::math::{Vec2, Vec3, vec2, vec3};
 use domelight::render::{Background, Layers, RenderSettings, render};
 use domelight::scene::{
     AlphaMode, Camera, CameraSettings, ColorFactor, Coverage, Emission, Encoding, Factor,
     Layers as MaterialLayers, Material, MaterialModel, MetallicRoughnessMaterial, Part, Projection,
-    Scene, SceneDescription, Specular, Texture, TextureFilter, TextureRef, Volume,
+    Scene, SceneDescription, Specular, Texture, TextureFilter, TextureRef, UvTransform, Volume,
 };
 use domelight::strategy::{EnvironmentSampling, PreparedStrategy, Strategy};
 use domelight::{Rgb, RgbImage};
@@ -198,6 +198,157 @@ fn panes_show_the_map_behind_them() {
         let alpha: Vec<_> = pictures(Background::Hidden).iter().map(|p| [p.1; 3]).collect();
         let reference = [1.0 - f64::from(expected.mean()); 3];
         test.against("alpha", &alpha, reference).unwrap_or_else(|f| panic!("{f}"));
+    }
+}
+
+/// The faces of a wide box from `top` down to `bottom`.
+fn boxed(top: f32, bottom: f32) -> Mesh {
+    let mut positions = Vec::new();
+    let mut triangles = Vec::new();
+    // The corner that each face turns round, and two edges whose cross product points out of the box.
+    let (low, high) = (vec3(-50.0, bottom, -50.0), vec3(50.0, top, 50.0));
+    let edges = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| axis * (high - low));
+    for axis in 0..3 {
+        let [u, v] = [edges[(axis + 1) % 3], edges[(axis + 2) % 3]];
+        for (corner, [u, v]) in [(low, [v, u]), (high, [-u, -v])] {
+            let first = positions.len() as u32;
+            positions.extend([corner, corner + u, corner + u + v, corner + v]);
+            triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| i + first)));
+        }
+    }
+    Mesh { positions, triangles, ..Mesh::default() }
+}
+
+/// A closed single-sided body of glass tints once what is behind it or in it: on the camera's way through its front, and
+/// on the light's. The two-sided one beside it does so at each of its surfaces.
+#[test]
+fn closed_bodies_tint_once_for_the_camera_and_once_for_light() {
+    let color = Rgb::new(0.9, 0.5, 0.25);
+    let volume = Volume {
+        thickness: Factor { value: 2.0, texture: None },
+        attenuation_distance: 1.0,
+        attenuation_color: Rgb::new(0.5, 0.9, 0.7),
+    };
+    let whole = Rgb::new(0.25, 0.81, 0.49);
+    let half = Rgb::new(0.5, 0.9, 0.7);
+    let squared = |c: Rgb| c * c;
+    // Behind the body, then in it.
+    let cases = [(false, -3.0, color * whole), (false, -1.0, color * whole)];
+    let two_sided = [(true, -3.0, squared(color * half)), (true, -1.0, color * half)];
+    let environment = zenith();
+    let light = EnvironmentSampling { environment: &environment, n_samples: 4 };
+    let white = stack(vec![Material::diffuse("white", Rgb::WHITE)], Vec::new());
+    let of_white = means(&white, &environment, &light);
+    for (double_sided, height, through) in cases.into_iter().chain(two_sided) {
+        let mut glass = pane(color, 1.0, 1.0);
+        glass.layers.volume = Some(volume);
+        glass.double_sided = double_sided;
+        let part = |mesh, material| Part { name: "part".into(), mesh, material };
+        let description = SceneDescription {
+            parts: vec![part(boxed(0.0, -2.0), 0), part(card(height), 1)],
+            materials: vec![glass, Material::diffuse("card", Rgb::splat(0.7))],
+            ..SceneDescription::default()
+        };
+        let scene = Scene::new(description).unwrap();
+        // Light passes one surface where the card is in the body, two where it is behind.
+        let to_light = match (double_sided, height < -2.0) {
+            (false, _) => (color * whole).mean(),
+            (true, false) => (color * half).mean(),
+            (true, true) => (color * half).mean() * (color * half).mean(),
+        };
+        let expected = (through * (0.7 * to_light)).to_array().map(f64::from);
+        let of_white: Vec<_> =
+            of_white.iter().map(|m| std::array::from_fn(|c| m[c] * expected[c])).collect();
+        check_every_strategy(&scene, &environment, &of_white);
+    }
+}
+
+/// What a single-sided surface hides stays hidden from either side.
+#[test]
+fn what_lets_nothing_through_casts_shadow_from_either_side() {
+    for (transmission, expected) in [(1.0, [0.5, 1.0]), (0.0, [0.0, 0.0])] {
+        let mut glass = pane(Rgb::splat(0.5), transmission, 1.0);
+        glass.double_sided = false;
+        let scene = stack(vec![glass], Vec::new());
+        let mut rays = RayBatch::default();
+        // Light comes upon the front of what the first ray leaves.
+        rays.push(vec3(1.0, -1.0, 2.0), Vec3::Y);
+        rays.push(vec3(1.0, 1.0, 2.0), -Vec3::Y);
+        let mut transmittances = Vec::new();
+        scene.transmittances(&rays, &mut transmittances);
+        assert_eq!(transmittances, expected);
+    }
+}
+
+/// How often the pattern of a leaf repeats along a card, and how many texels it has along a side.
+const REPEATS: u32 = 25;
+const TEXELS: u32 = 8;
+
+/// Whether the pattern of a leaf has a texel: about half of them, at random.
+fn is_leaf(column: u32, row: u32) -> bool {
+    let n = (row % TEXELS) * TEXELS + column % TEXELS;
+    n.wrapping_mul(2_654_435_761) >> 31 == 1
+}
+
+/// The texels of the leaf on a card as squares.
+fn cut_out() -> Mesh {
+    let n = REPEATS * TEXELS;
+    let mut mesh = Mesh::default();
+    let at = |i: u32| 100.0 * i as f32 / n as f32 - 50.0;
+    for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+        if is_leaf(column, row) {
+            let first = mesh.positions.len() as u32;
+            let (x, z) = ([at(column), at(column + 1)], [at(row), at(row + 1)]);
+            let corners = [(0, 1), (1, 1), (1, 0), (0, 0)];
+            mesh.positions.extend(corners.map(|(i, k): (usize, usize)| vec3(x[i], 0.0, z[k])));
+            mesh.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| i + first)));
+        }
+    }
+    mesh
+}
+
+/// A card with a map of its opacity above a floor is the mesh of its opaque texels, by every strategy: leaves, the light
+/// that falls between them, and their shadow.
+#[test]
+fn cards_of_leaves_are_the_meshes_of_their_texels_by_every_strategy() {
+    let leaf = || Material::diffuse("leaf", Rgb::new(0.2, 0.6, 0.1));
+    let floor = Material::diffuse("floor", Rgb::new(0.7, 0.6, 0.5));
+    let part = |mesh, material| Part { name: "part".into(), mesh, material };
+    let scene = |leaves: Mesh, material: Material, textures: Vec<Texture>| {
+        Scene::new(SceneDescription {
+            parts: vec![part(leaves, 0), part(card(-1.0), 1)],
+            materials: vec![material, floor.clone()],
+            textures,
+            ..SceneDescription::default()
+        })
+        .unwrap()
+    };
+    let environment = zenith();
+    let light = EnvironmentSampling { environment: &environment, n_samples: 4 };
+    let expected = means(&scene(cut_out(), leaf(), Vec::new()), &environment, &light);
+    let texels = (0..TEXELS).flat_map(|row| (0..TEXELS).map(move |column| (column, row)));
+    let texels = || texels.clone();
+    // A mask cuts at 100 of 255, whatever there is on either side.
+    let masked =
+        texels().map(|(x, y)| if is_leaf(x, y) { 100 + 2 * y as u8 } else { 99 - x as u8 });
+    let blended = texels().map(|(x, y)| if is_leaf(x, y) { 255 } else { 0 });
+    let modes = [
+        (AlphaMode::Mask { cutoff: 100.0 / 255.0 }, masked.collect::<Vec<u8>>()),
+        (AlphaMode::Blend, blended.collect()),
+    ];
+    for (mode, alpha) in modes {
+        let white = vec![[255; 3]; (TEXELS * TEXELS) as usize];
+        let texture = Texture::from_rgb8("leaf", TEXELS, TEXELS, white, Encoding::Linear);
+        let texture = texture.unwrap().with_alpha(alpha).unwrap();
+        let scale = Vec2::splat(REPEATS as f32);
+        let reference = TextureRef {
+            filter: TextureFilter::Nearest,
+            transform: UvTransform::new(Vec2::ZERO, 0.0, scale),
+            ..TextureRef::new(0)
+        };
+        let coverage = Coverage { mode, opacity: 1.0, texture: Some(reference) };
+        let scene = scene(card(0.0), Material { coverage, ..leaf() }, vec![texture]);
+        check_every_strategy(&scene, &environment, &expected);
     }
 }
 

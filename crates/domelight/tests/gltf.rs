@@ -78,6 +78,10 @@ fn error(json: &str) -> String {
     error_with(json, &LoadOptions::default())
 }
 
+fn strict() -> LoadOptions {
+    LoadOptions { strict: true, ..LoadOptions::default() }
+}
+
 fn has(text: &str, words: &[&str]) {
     for word in words {
         assert!(text.contains(word), "'{word}' is not in: {text}");
@@ -149,7 +153,7 @@ fn two_sets_of_texture_coordinates_and_no_third() {
     assert_eq!(m.base_color_texture.unwrap().uv_set, 0, "the first that is used");
     let normal = material.normal_map.unwrap().texture;
     assert_eq!((normal.uv_set, normal.transform.offset), (1, vec2(0.5, 0.0)));
-    assert_eq!(material.emission.unwrap().texture, None);
+    assert_eq!(material.emission, None, "without its map all of it would glow");
     let mesh = &loaded.description.parts[0].mesh;
     assert_eq!((mesh.uvs.len(), mesh.uvs2.len(), mesh.tangents.len()), (3, 3, 3));
     assert_eq!(mesh.uvs2[0], Vec2::Y);
@@ -321,6 +325,41 @@ fn specular_and_glossiness_are_drawn() {
     assert!(loaded.description.textures[0].has_alpha() && loaded.warnings.is_empty());
 }
 
+/// The older model's picture of a dielectric is that of the newer one with the same reflectance.
+#[test]
+fn specular_glossiness_looks_like_metallic_roughness() {
+    let older = r#"{"extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[0.5,0.25,0.125,1],
+"specularFactor":[0.04,0.04,0.04],"glossinessFactor":0.75,"specularGlossinessTexture":{"index":0}}}}"#;
+    let images = [png([255, 255, 255, 204])];
+    let diffuse = Rgb::new(0.5, 0.25, 0.125) * VERTEX_COLOR;
+    let expected = MetallicRoughness::new(diffuse, 0.0, 1.0 - 0.75 * 0.8);
+    let point = shaded(older, &images);
+    for (x, y) in [(0.0, 0.0), (-0.5, 0.3), (0.2, -0.7), (-0.8, -0.1)] {
+        let wi = vec3(x, y, f32::sqrt(1.0 - x * x - y * y));
+        let (value, expected) = (point.bsdf.eval(point.wo, wi), expected.eval(point.wo, wi));
+        // The older model scales its diffuse part by 1 - 0.04, the newer one by what is reflected.
+        assert!((value - expected).map(f32::abs).max_component() < 0.05 * expected.max_component());
+    }
+}
+
+/// A mirrored node turns its triangles round: its front stays where its normals point, for single-sided materials, too.
+#[test]
+fn mirrored_nodes_keep_their_front() {
+    for (scale, side) in [("[1,1,1]", 1.0), ("[-1,1,1]", 1.0), ("[1,1,-1]", -1.0)] {
+        let more = format!(r#""scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0,"scale":{scale}}}],"#);
+        let scene = Scene::new(loaded(&document(&more, "}")).description).unwrap();
+        let x = if scale == "[-1,1,1]" { -0.25 } else { 0.25 };
+        let sees = |z: f32| {
+            let ray = Ray::new(vec3(x, 0.25, z), vec3(0.0, 0.0, -z));
+            scene.camera_hit(&ray, 0, 0).is_some()
+        };
+        assert!(sees(side) && !sees(-side), "{scale}");
+    }
+}
+
+/// The first bytes of an AVIF file.
+const AVIF: &str = "data:;base64,AAAAIGZ0eXBhdmlmAAAAAA==";
+
 #[test]
 fn images_of_webp_are_read_and_avif_is_named() {
     let webp = image(image::ImageFormat::WebP, [0, 255, 0, 255]);
@@ -334,9 +373,9 @@ fn images_of_webp_are_read_and_avif_is_named() {
     let loaded = loaded(&more(by_extension, &webp));
     assert_eq!(loaded.description.textures[0].texel(1, 1), Rgb::new(0.0, 1.0, 0.0));
     let avif = r#"{"extensions":{"EXT_texture_avif":{"source":0}}}"#;
-    has(&error(&more(avif, &webp)), &["image 0 is AVIF", "gltf-transform"]);
-    let disguised = "data:;base64,AAAAIGZ0eXBhdmlmAAAAAA==";
-    has(&error(&more(r#"{"source":0}"#, disguised)), &["material 0", "image 0 is AVIF"]);
+    has(&error_with(&more(avif, &webp), &strict()), &["image 0 is AVIF", "gltf-transform"]);
+    let disguised = more(r#"{"source":0}"#, AVIF);
+    has(&error_with(&disguised, &strict()), &["material 0", "image 0 is AVIF"]);
 }
 
 /// An image too large for the memory allowed is refused by its header.
@@ -372,7 +411,7 @@ fn huge_images_are_refused_before_they_are_decoded() {
 
 #[test]
 fn extensions_end_a_load_only_if_that_is_asked_for() {
-    let strict = LoadOptions { strict: true, ..LoadOptions::default() };
+    let strict = strict();
     let with = |extension: &str| {
         let list = format!(r#"["{extension}"]"#);
         document(&format!(r#""extensionsUsed":{list},"extensionsRequired":{list},"#), "}")
@@ -515,6 +554,67 @@ fn missing_images_are_left_out_unless_that_is_refused() {
     assert_eq!(loaded.description.materials[0].textures().count(), 0);
     assert_eq!(loaded.warnings.len(), 1);
     has(&loaded.warnings[0], &["gone.png", "image 0", "left out"]);
-    let strict = LoadOptions { strict: true, ..LoadOptions::default() };
-    has(&error_with(&json, &strict), &["gone.png", "image 0"]);
+    has(&error_with(&json, &strict()), &["gone.png", "image 0"]);
+}
+
+/// A material with one sound texture and seven that are of no use, of five kinds.
+#[test]
+fn damaged_unknown_and_remote_images_are_left_out_once_a_kind() {
+    let gif = "data:;base64,R0lGODlhAQABAIAAAAUEBAAAACwAAAAAAQABAAACAkQBADs=";
+    let sound = png([255, 0, 0, 255]);
+    let cut = &sound[..sound.len() - 40];
+    let remote = "https://example.org/x.png";
+    let uris = [&sound, gif, cut, "data:;base64,*", remote, "http://a/b", AVIF];
+    let images: Vec<_> = uris.iter().map(|uri| format!(r#"{{"uri":"{uri}"}}"#)).collect();
+    let textures: Vec<_> = (0..8).map(|i| format!(r#"{{"source":{i}}}"#)).collect();
+    let more = format!(
+        r#""materials":[{{"name":"paint","pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}},
+"metallicRoughnessTexture":{{"index":1}}}},"normalTexture":{{"index":2}},"emissiveFactor":[1,1,1],
+"emissiveTexture":{{"index":3}},"extensions":{{"KHR_materials_clearcoat":{{"clearcoatFactor":1,
+"clearcoatTexture":{{"index":4}},"clearcoatRoughnessTexture":{{"index":5}},"clearcoatNormalTexture":{{"index":6}}}},
+"KHR_materials_transmission":{{"transmissionFactor":1,"transmissionTexture":{{"index":7}}}}}}}}],
+"images":[{}],"textures":[{}],"#,
+        images.join(","),
+        textures.join(",")
+    );
+    let json = document(&more, r#"},"material":0"#);
+    let loaded = loaded(&json);
+    let material = &loaded.description.materials[0];
+    assert_eq!(material.textures().count(), 1);
+    assert!(material.emission.is_none() && material.layers.transmission.is_none());
+    let warnings = &loaded.warnings;
+    assert_eq!(warnings.len(), 4, "{warnings:#?}");
+    has(&warnings[0], &["a.gltf", "'paint'", "image 1", "Gif", "it and 2 more textures like it"]);
+    has(&warnings[1], &["image 4", "https://example.org/x.png", "it and one more"]);
+    has(&warnings[2], &["image 6 is AVIF", "gltf-transform", "it is left out"]);
+    has(&warnings[3], &["image 7", "only 7", "it is left out"]);
+    has(&error_with(&json, &strict()), &["a.gltf", "image 1", "Gif"]);
+}
+
+#[test]
+fn vertices_that_are_not_finite_are_left_out_unless_that_is_refused() {
+    let numbers = |numbers: &[f32]| {
+        STANDARD.encode(numbers.iter().flat_map(|f| f.to_le_bytes()).collect::<Vec<_>>())
+    };
+    let soup = |bad: f32| {
+        let positions = [0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1., 1., 0., 1., 0., bad, 1.];
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+"meshes":[{{"name":"soup","primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":6,"type":"VEC3"}}],
+"bufferViews":[{{"buffer":0,"byteLength":72}}],
+"buffers":[{{"byteLength":72,"uri":"data:;base64,{}"}}]}}"#,
+            numbers(&positions)
+        )
+    };
+    for bad in [f32::NAN, f32::INFINITY] {
+        let loaded = loaded(&soup(bad));
+        assert_eq!(loaded.description.parts[0].mesh.triangles, [[0, 1, 2]]);
+        let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings) };
+        has(warning, &["a.gltf", "vertex 5", "'soup'", "1 of 2 triangles", "left out"]);
+        let refused = load_with(&file(&soup(bad)).path, &strict()).unwrap();
+        let error = Scene::new(refused.description).unwrap_err().to_string();
+        has(&error, &["soup", "vertex 5", "not finite"]);
+    }
+    assert_eq!(loaded(&soup(1.0)).warnings, [""; 0]);
 }

@@ -5,19 +5,21 @@ use domelight::bsdf::{Bsdf, Coat, MaterialSpec, MetallicRoughness, Sheen};
 use domelight::environment::{Environment, Orientation};
 use domelight::math::{Frame, Vec3, from_spherical, vec3};
 use domelight::render::{Background, RenderSettings, Renderer};
+use domelight::rig::RigError;
 use domelight::sampling::{Pcg32, Sampler, SamplerKind};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{Camera, Scene};
 use domelight::strategy::levels::level;
 use domelight::strategy::{
-    Contributions, PixelPoints, PreparedStrategy, ShadingPoint, Strategy, StrategySpec, TileShading,
+    Contributions, PixelPoints, PrepareError, PreparedStrategy, ShadingPoint, Strategy,
+    StrategySpec, TileShading,
 };
 use domelight::{Rgb, RgbImage};
 use rayon::prelude::*;
 use testkit::{Suite, ZTest};
 
 /// Smooth and narrow, black and white, metal and dielectric.
-const LOBES: [(&str, Width); 24] = [
+const LOBES: [(&str, Width); 32] = [
     ("diffuse:1", Width::Wide),
     ("diffuse:0", Width::Wide),
     ("phong:0:1:0", Width::Wide),
@@ -25,7 +27,13 @@ const LOBES: [(&str, Width); 24] = [
     ("phong:50:0.5:0.5", Width::Narrow),
     ("ward:1e-4:1", Width::Narrow),
     ("ward:0.5:0.5", Width::Wide),
+    ("ward:1e-4:1e-4:1:1992", Width::Beyond),
+    ("ward:0.3:0.2:0.5:1992", Width::Beyond),
+    ("ward:1e-4:1e-4:1:duer", Width::Beyond),
+    ("ward:0.3:0.2:0.5:duer", Width::Beyond),
     ("ggx:1e-4", Width::Narrow),
+    ("ggx:1e-4:silver", Width::Narrow),
+    ("ggx:0.3:copper:correlated", Width::Narrow),
     ("ggx:0.05", Width::Narrow),
     ("ggx:10", Width::Beyond),
     ("beckmann:1e-4", Width::Narrow),
@@ -39,6 +47,8 @@ const LOBES: [(&str, Width); 24] = [
     ("gltf:1:0:0:0", Width::Wide),
     ("gltf:1,0.5,0:0.2:0.14:0.5:1,0.2,0", Width::Narrow),
     ("gltf:1:0.5:0.1:1:1:1", Width::Narrow),
+    ("smooth glass", Width::Narrow),
+    ("milk glass under a coat", Width::Narrow),
     ("the narrowest sheen on white", Width::Wide),
     ("the smoothest coat, leaning, on gray", Width::Narrow),
     ("a coat on sheen on a smooth metal", Width::Narrow),
@@ -49,6 +59,11 @@ fn bsdf(text: &str, cos_o: f32) -> Bsdf {
     let base =
         |color, metallic, roughness| MetallicRoughness::new(Rgb::splat(color), metallic, roughness);
     let (base, sheen, coat) = match text {
+        "smooth glass" => (base(1.0, 0.0, 0.0).transmitting(1.0), None, None),
+        "milk glass under a coat" => {
+            let coat = Coat::new(0.0, Vec3::Z);
+            (base(0.8, 0.0, 1.0).transmitting(0.5), None, Some((1.0, coat)))
+        }
         "the narrowest sheen on white" => {
             (base(1.0, 0.0, 1.0), Some(Sheen::new(Rgb::WHITE, 0.0)), None)
         }
@@ -70,8 +85,8 @@ fn bsdf(text: &str, cos_o: f32) -> Bsdf {
 enum Width {
     Wide,
     Narrow,
-    /// Nor do those of the BRDF, most of which fall below the surface, or it is so dark that rays are rare: means of a
-    /// few have no normal distribution.
+    /// Nor do those of the BRDF, most of which fall below the surface or have weights without a bound, or it is so dark
+    /// that rays are rare: means of a few have no normal distribution.
     Beyond,
 }
 
@@ -132,6 +147,9 @@ const STRATEGIES: [(&str, usize, Option<Width>, Option<Light>); 8] = [
     ("product:8", SHORT, None, None),
     ("product:1", LONG, None, None),
 ];
+
+/// Fixed lights, which err by what they leave out: they are only finite.
+const RIGS: [&str; 2] = ["median-cut:4", "variance-minimization:4"];
 
 /// A tile of 3 × 3 pixels, which are of all levels.
 const SIDE: usize = 3;
@@ -223,8 +241,21 @@ fn no_value_is_beyond_any_strategy() {
                     test.two_sample(&label, &batches, &reference).unwrap_or_else(|f| panic!("{f}"));
                 }
             }
+            for rig in RIGS.iter().filter_map(|text| rig(text, env)) {
+                let estimate = estimate(&rig, &at, SHORT, 0);
+                let label = format!("lights, {text}, {name}, view {view}");
+                assert!(estimate.iter().all(|x| x.is_finite()), "{label}: {estimate:?}");
+            }
         }
     });
+}
+
+/// The lights of a map, if it has as many texels with light.
+fn rig<'e>(text: &str, environment: &'e Environment) -> Option<PreparedStrategy<'e>> {
+    match PreparedStrategy::new(text.parse().unwrap(), environment) {
+        Err(PrepareError::Lights(RigError::Black | RigError::TooFewTexels { .. })) => None,
+        rig => Some(rig.unwrap()),
+    }
 }
 
 /// A black metal reflects nothing at normal incidence, and a ten-thousandth of the light by rough slopes.

@@ -474,6 +474,38 @@ fn exr_of_one_channel_of_any_name_is_gray() {
     assert!(matches!(kind(&layers.encode().unwrap()), PictureErrorKind::NoColor { .. }));
 }
 
+/// A file of several parts, as other programs write it: by the part's name, the first with color by default.
+#[test]
+fn exr_parts_are_read_by_name() {
+    let parts = [("depth", "Z", 7.0), ("beauty", "", 0.5), ("diffuse", "", 0.25)];
+    let part = |(name, channel, value): (&str, &str, f32)| {
+        let image = RgbImage::filled(6, 4, Rgb::new(value, 2.0 * value, 3.0 * value));
+        let channels = match channel {
+            "" => rgb_channels(&image, "", SampleType::F32),
+            name => {
+                vec![AnyChannel::new(Text::from(name), plane(&image, |c| c.r, SampleType::F32))]
+            }
+        };
+        let attributes = LayerAttributes::named(name);
+        let channels = AnyChannels::sort(channels.into_iter().collect());
+        Layer::new((6, 4), attributes, Encoding::FAST_LOSSLESS, channels)
+    };
+    let layers: SmallVec<[_; 2]> = parts.map(part).into_iter().collect();
+    let window = exr::meta::attribute::IntegerBounds::from_dimensions((6, 4));
+    let file = Image::from_layers(exr::meta::header::ImageAttributes::new(window), layers);
+    let mut bytes = Cursor::new(Vec::new());
+    file.write().to_buffered(&mut bytes).unwrap();
+    let read = |layer: Option<&str>| {
+        let options = ReadOptions { layer: layer.map(Into::into), ..ReadOptions::default() };
+        read_bytes(bytes.get_ref(), "parts.exr", &options).map(|picture| picture.image.pixels[5])
+    };
+    assert_eq!(read(None).unwrap(), Rgb::new(0.5, 1.0, 1.5));
+    assert_eq!(read(Some("Diffuse")).unwrap(), Rgb::new(0.25, 0.5, 0.75));
+    assert_eq!(read(Some("depth")).unwrap(), Rgb::splat(7.0));
+    let error = read(Some("specular")).unwrap_err().to_string();
+    assert!(error.contains("specular") && error.contains("beauty"), "{error}");
+}
+
 #[test]
 fn exr_layers_are_written_and_found_again() {
     let (color, albedo) = (picture(33, 17), smooth(33, 17));

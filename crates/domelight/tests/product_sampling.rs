@@ -1,7 +1,7 @@
 //! Rejection and resampling: unbiased with every setting, what they keep follows the product of light
 //! and reflectance, and their variance is what theory says.
 
-mod common;
+use crate::common;
 
 use std::cell::RefCell;
 

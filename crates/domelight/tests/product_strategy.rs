@@ -1,7 +1,7 @@
 //! The strategy of product tables and learned visibility: every round of every pass is unbiased, on
 //! every material, with some texels hidden.
 
-mod common;
+use crate::common;
 
 use common::{
     HEIGHT, MATERIALS, WIDTH, batches, bsdf, environment, hidden, integral, point, quadrature,

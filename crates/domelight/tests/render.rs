@@ -491,6 +491,42 @@ fn passes_of_one_two_and_four_samples_go_on_where_they_were_ended() {
     assert!(interrupted.film() == start().finish(), "an interruption changed the picture");
 }
 
+/// Passes of a set length end with the same picture for a strategy that learns nothing, also where an observer left
+/// tiles behind.
+#[test]
+fn short_passes_end_with_the_same_picture() {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    struct SomeTiles(AtomicUsize);
+    impl Observer for SomeTiles {
+        fn tile_finished(&self, _: &domelight::render::Counts) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+        fn canceled(&self) -> bool {
+            self.0.load(Ordering::Relaxed) >= 3
+        }
+    }
+    let (scene, environment) = (scene("diffuse:0.8"), environment());
+    let settings = RenderSettings { n_samples: 11, ..small() };
+    let (camera, strategy) = (camera(&settings), mis(&environment));
+    let whole = render(&scene, &camera, &environment, &strategy, &settings, &());
+    let mut renderer = Renderer::with_strategy(&scene, &camera, &environment, &strategy, settings);
+    assert_eq!((renderer.least_samples(), renderer.share_behind()), (0, 1.0));
+    let ended = SomeTiles(AtomicUsize::new(0));
+    assert!(renderer.step_at_most(7, &ended));
+    assert!(renderer.least_samples() == 0 && renderer.share_behind() < 1.0);
+    let mut least = 0;
+    for most in [2, 3, 1, 0].into_iter().chain(std::iter::repeat(5)) {
+        if !renderer.step_at_most(most, &()) {
+            break;
+        }
+        let now = renderer.least_samples();
+        assert!(now - least <= most.max(1), "{least} to {now}, not more than {most}");
+        least = now;
+    }
+    assert_eq!((renderer.least_samples(), renderer.share_behind()), (11, 0.0));
+    assert!(bits(&renderer.rendering().layers) == bits(&whole.layers));
+}
+
 #[test]
 fn an_empty_scene_and_a_black_probe_render() {
     let environment = Environment::constant(Rgb::BLACK).unwrap();

@@ -8,8 +8,8 @@ use base64::Engine;
 use domelight::Rgb;
 use domelight::math::{Vec2, Vec3, vec2, vec3};
 use domelight::scene::{
-    AlphaMode, EnvironmentSource, LoadOptions, Loaded, MaterialModel, Projection, Reach, Scene,
-    UpAxis, Wrap, load, load_with,
+    AlphaMode, Coverage, EnvironmentSource, LoadOptions, Loaded, Material, MaterialModel,
+    Projection, Reach, Scene, TextureFilter, UpAxis, Wrap, load, load_with,
 };
 use tempfile::TempDir;
 
@@ -52,7 +52,18 @@ fn one(name: &str, contents: impl AsRef<[u8]>) -> Loaded {
 }
 
 fn fails(name: &str, contents: impl AsRef<[u8]>, words: &[&str]) {
-    let message = Folder::new().with(name, contents).error(name);
+    fails_with(&LoadOptions::default(), name, contents, words);
+}
+
+/// What only `--strict` refuses.
+fn fails_if_strict(name: &str, contents: impl AsRef<[u8]>, words: &[&str]) {
+    let strict = LoadOptions { strict: true, ..LoadOptions::default() };
+    fails_with(&strict, name, contents, words);
+}
+
+fn fails_with(options: &LoadOptions, name: &str, contents: impl AsRef<[u8]>, words: &[&str]) {
+    let folder = Folder::new().with(name, contents);
+    let message = load_with(folder.path(name), options).unwrap_err().to_string();
     for word in words.iter().chain([&name]) {
         assert!(message.contains(word), "'{word}' is not in: {message}");
     }
@@ -178,7 +189,8 @@ fn broken_ply_files_name_the_place() {
     fails("a.ply", PLY_QUAD.replace("5 4 0 1", "5 4 -1 1"), &["face 0", "-1"]);
     fails("a.ply", PLY_QUAD.replace("5 4 0 1", "5 -4 0 1"), &["face 0", "-4"]);
     fails("a.ply", PLY_QUAD.replace("1 1 0 1 9", "1 spam 0 1 9"), &["byte", "spam"]);
-    fails("a.ply", PLY_QUAD.replace("1 1 0 1 9", "1 nan 0 1 9"), &["vertex 2", "finite"]);
+    let nan = PLY_QUAD.replace("1 1 0 1 9", "1 nan 0 1 9");
+    fails_if_strict("a.ply", nan, &["vertex 2", "finite", "--strict"]);
     fails("a.ply", PLY_QUAD.replace("float z", "half z"), &["line 7", "half z"]);
     fails("a.ply", PLY_QUAD.replace("float z", "float w"), &["x, y and z"]);
     fails("a.ply", PLY_QUAD.replace("vertex_indices", "indices"), &["vertex_indices"]);
@@ -260,9 +272,9 @@ fn obj_with_materials_polygons_and_relative_indices() {
     assert_eq!(texture.transform.apply(vec2(0.5, 0.0)), vec2(1.0, -2.0));
     assert!(metal.normal_map.is_some());
     assert_eq!(d.textures.len(), 2);
-    for word in ["opacity", "nowhere"] {
-        assert!(loaded.warnings.iter().any(|w| w.contains(word)), "{:?}", loaded.warnings);
-    }
+    let coverage = d.materials[d.parts[0].material].coverage;
+    assert_eq!((coverage.mode, coverage.opacity), (AlphaMode::Blend, 0.5));
+    assert!(loaded.warnings.iter().any(|w| w.contains("nowhere")), "{:?}", loaded.warnings);
 }
 
 #[test]
@@ -344,7 +356,7 @@ fn obj_as_exporters_write_it() {
         v 0 0 0 1.0\r\nv 2 1 0\r\nv\t0 2 0\r\nv 0.5 1 0\r\nvn nan -nan(ind) 0\r\nvt 0.5 -1.#IND 0\r\n\
         usemtl r\xf6t \r\nf 1/1 2/1 3/1 \\\r\n 4/1 # an arrow head\r\nl 1 2\r\np 1\r\ns off\r\n\
         usemtl r\xf6t\r\nf -4//1 -3//1 -1//1\r\n";
-    let mtl = b"newmtl r\xf6t\r\nKd 1 0 0\r\nKe 2 2 2\r\nmap_d a.png\r\nmap_Bump -bm 0.5 n.png\r\n\
+    let mtl = b"newmtl r\xf6t\r\nKd 1 0 0\r\nKe 2 2 2\r\nmap_d a.png\r\nmap_Ks k.png\r\nmap_Bump -bm 0.5 n.png\r\n\
         newmtl b\r\nKd spectral a.rfl\r\nKe 1 0 0\r\nbump heights.png\r\n";
     let loaded = Folder::new()
         .with("a.obj", text)
@@ -371,12 +383,10 @@ fn obj_as_exporters_write_it() {
     assert_eq!(d.materials[0].normal_map.map(|map| map.scale), Some(0.5));
     assert!(d.materials[1].normal_map.is_none());
     assert_eq!(d.textures.len(), 1);
-    for word in [
-        "emission (Ke) is ignored, of material 'r\u{f6}t', 'b'",
-        "opacity map",
-        "heights",
-        "not RGB",
-    ] {
+    assert_eq!(d.materials[0].emission.map(|e| e.radiance), Some(Rgb::splat(2.0)));
+    assert_eq!(d.materials[0].coverage, Coverage::default());
+    for word in ["a map (map_Ks) is ignored, of material 'r\u{f6}t'", "a.png", "heights", "not RGB"]
+    {
         assert_eq!(
             loaded.warnings.iter().filter(|w| w.contains(word)).count(),
             1,
@@ -384,6 +394,119 @@ fn obj_as_exporters_write_it() {
             loaded.warnings
         );
     }
+}
+
+fn mtl(library: &str, pictures: &[(&str, image::RgbaImage)]) -> (Material, Loaded) {
+    let text = "mtllib a.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";
+    let folder = Folder::new().with("a.obj", text).with("a.mtl", format!("newmtl a\n{library}"));
+    for (name, picture) in pictures {
+        picture.save(folder.path(name)).unwrap();
+    }
+    let loaded = folder.load("a.obj");
+    (loaded.description.materials[0].clone(), loaded)
+}
+
+fn picture(side: u32, rgba: [u8; 4]) -> image::RgbaImage {
+    image::RgbaImage::from_pixel(side, side, image::Rgba(rgba))
+}
+
+#[test]
+fn mtl_opacity() {
+    let coverage = |library: &str| mtl(library, &[]).0.coverage;
+    assert_eq!(coverage("d 1\nTr 0.5\n"), Coverage::default());
+    // To some programs Tr is opacity.
+    assert_eq!(coverage("Tr 1\n"), Coverage::default());
+    for library in ["Tr 0.75\n", "d 0.25\n", "d -halo 0.25\n", "Tr 1\nd 0.25\n"] {
+        let Coverage { mode, opacity, texture } = coverage(library);
+        assert_eq!((mode, opacity, texture), (AlphaMode::Blend, 0.25, None), "{library}");
+    }
+    // The alpha of one, the luminance of the other.
+    for rgba in [[255, 0, 255, 51], [51, 51, 51, 255]] {
+        let (material, loaded) = mtl("map_d -s 2 2 leaf.png\n", &[("leaf.png", picture(2, rgba))]);
+        let texture = material.coverage.texture.unwrap();
+        assert_eq!((material.coverage.mode, texture.transform.x.x), (AlphaMode::Blend, 2.0));
+        let texture = &loaded.description.textures[texture.texture];
+        let alpha = texture.sample_alpha(Vec2::ZERO, [Wrap::Repeat; 2], TextureFilter::Linear);
+        assert!(close_f(alpha, 0.2), "{alpha}");
+        assert_eq!(loaded.warnings, [""; 0]);
+    }
+}
+
+#[test]
+fn mtl_emission() {
+    let emission = |library: &str| {
+        let (material, loaded) = mtl(library, &[("e.png", picture(1, [255, 0, 0, 255]))]);
+        assert_eq!(loaded.warnings, [""; 0]);
+        material.emission.map(|e| (e.radiance, e.texture.is_some()))
+    };
+    assert_eq!(emission("Ke 0 0 0\n"), None);
+    assert_eq!(emission("Ke 1 2 3\n"), Some((Rgb::new(1.0, 2.0, 3.0), false)));
+    assert_eq!(emission("Ke 1 2 3\nmap_Ke e.png\n"), Some((Rgb::new(1.0, 2.0, 3.0), true)));
+    assert_eq!(emission("map_Ke e.png\nKe 0 0 0\n"), Some((Rgb::WHITE, true)));
+    // The whole surface would glow without the map.
+    assert!(mtl("map_Ke gone.png\n", &[]).0.emission.is_none());
+}
+
+/// Maps of roughness and metalness stand instead of the numbers, and are one texture.
+#[test]
+fn mtl_maps_of_roughness_and_metalness() {
+    let rough = || ("r.png", picture(4, [51, 51, 51, 255]));
+    let metal = || ("m.png", picture(2, [102, 102, 102, 255]));
+    let read = |library: &str, maps: &[(&str, image::RgbaImage)]| {
+        let (material, loaded) = mtl(library, maps);
+        let MaterialModel::MetallicRoughness(m) = material.model else { panic!() };
+        let texture = &loaded.description.textures[m.metallic_roughness_texture.unwrap().texture];
+        let Rgb { g, b, .. } = texture.texel(1, 1);
+        (m.roughness * g, m.metallic * b)
+    };
+    let close = |(r, m): (f32, f32), expected: (f32, f32)| {
+        assert!(close_f(r, expected.0) && close_f(m, expected.1), "{r}, {m}");
+    };
+    let both = read("Pr 0.9\nmap_Pr r.png\nPm 0\nmap_Pm m.png\n", &[rough(), metal()]);
+    close(both, (0.2, 0.4));
+    close(read("map_Pr r.png\nPm 0.5\n", &[rough()]), (0.2, 0.5));
+    close(read("Pr 0.75\nmap_Pm m.png\n", &[metal()]), (0.75, 0.4));
+    // As glTF packs them.
+    let packed = ("p.png", picture(2, [0, 51, 102, 255]));
+    close(read("map_Pr p.png\nmap_Pm p.png\n", &[packed]), (0.2, 0.4));
+}
+
+#[test]
+fn strict_loads_refuse_textures_and_libraries_that_are_missing() {
+    let strict = LoadOptions { strict: true, ..LoadOptions::default() };
+    let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let folder = Folder::new().with("a.obj", text);
+    let error = || load_with(folder.path("a.obj"), &strict).unwrap_err().to_string();
+    assert!(error().contains("a.mtl"), "{}", error());
+    fs::write(folder.path("a.mtl"), "newmtl a\nmap_Kd gone.png\n").unwrap();
+    assert!(error().contains("gone.png"), "{}", error());
+}
+
+/// A file of two triangles, the second with a vertex at no place.
+#[test]
+fn vertices_at_no_place_take_their_triangles_with_them() {
+    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+        property float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n\
+        0 0 0\n1 0 0\n0 1 0\n0 -1.#IND 1\n3 0 1 2\n3 1 2 3\n";
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 nan 1\nf 1 2 3\nf 2 3 4\n";
+    let off = "OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n0 1e99 1\n3 0 1 2\n3 1 2 3\n";
+    let stl = STL.replace("1.0e0", "-nan(ind)");
+    for (name, text) in [("a.ply", ply), ("a.obj", obj), ("a.off", off), ("a.stl", &stl)] {
+        let loaded = one(name, text);
+        let meshes = || loaded.description.parts.iter().map(|part| &part.mesh);
+        assert_eq!(meshes().map(|mesh| mesh.triangles.len()).sum::<usize>(), 1, "{name}");
+        assert!(meshes().flat_map(|mesh| &mesh.normals).all(|n| *n == Vec3::Z), "{name}");
+        let [warning] = &loaded.warnings[..] else { panic!("{name}: {:?}", loaded.warnings) };
+        for word in [name, "not finite", "1 of 2 triangles", "left out"] {
+            assert!(warning.contains(word), "'{word}' is not in: {warning}");
+        }
+        fails_if_strict(name, text, &["finite"]);
+    }
+    // Where nothing is left, the scene names the vertex.
+    let obj = "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let description = load(Folder::new().with("a.obj", obj).path("a.obj")).unwrap().description;
+    let error = Scene::new(description).unwrap_err().to_string();
+    assert!(error.contains("vertex 0") && error.contains("not finite"), "{error}");
 }
 
 fn close_f(a: f32, b: f32) -> bool {
@@ -403,7 +526,7 @@ fn many_materials_are_neither_slow_nor_loud() {
     assert_eq!((loaded.description.materials.len(), loaded.description.parts.len()), (1, 30_000));
     let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings.len()) };
     assert!(warning.contains("'m0', 'm1', 'm2' and 29997 more"), "{warning}");
-    let material = |i: usize| format!("newmtl m{i}\nKe 1 1 1\nmap_Kd no{i}.png\n");
+    let material = |i: usize| format!("newmtl m{i}\nmap_Ks k.png\nmap_Kd no{i}.png\n");
     let mtl = (0..10_000).map(material).collect::<Vec<_>>().concat();
     let folder = Folder::new().with("a.mtl", mtl).with("a.obj", format!("mtllib a.mtl\n{text}"));
     let warnings = folder.load("a.obj").warnings;
@@ -469,7 +592,7 @@ fn stl_in_both_encodings() {
 #[test]
 fn broken_stl_files_name_the_place() {
     fails("a.stl", STL.replace("1.0e0", "one"), &["line 5", "vertex one 0 0"]);
-    fails("a.stl", STL.replace("1.0e0", "inf"), &["line 5"]);
+    fails_if_strict("a.stl", STL.replace("1.0e0", "inf"), &["line 5"]);
     fails("a.stl", STL.replace("VERTEX 0 0 1\n", ""), &["line 16", "2 vertices"]);
     fails("a.stl", &STL[..100], &["vertices"]);
     fails("a.stl", "solid nothing\nendsolid\n", &["no triangles"]);
@@ -481,7 +604,7 @@ fn broken_stl_files_name_the_place() {
     fails("a.stl", huge, &["4294967295 facets"]);
     let mut nan = whole;
     nan[84 + 50 + 12..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
-    fails("a.stl", nan, &["facet 1", "NaN"]);
+    fails_if_strict("a.stl", nan, &["facet 1", "NaN", "--strict"]);
 }
 
 const OFF: &str = "OFF # a pyramid
@@ -766,11 +889,14 @@ fn broken_gltf_files_are_errors() {
     bad(r#""POSITION":0"#, r#""POSITION":9"#, &["accessor 9", "primitive 0"]);
     bad(r#""children":[1,2]"#, r#""children":[1,0]"#, &["node 0", "tree"]);
     bad(r#""children":[1,2]"#, r#""children":[1,1]"#, &["node 1", "tree"]);
-    bad("my%20paint.png", "https://example.org/x.png", &["example.org"]);
     bad("base64,", "base64,*", &["buffer 0", "decoded"]);
     bad(r#""version":"2.0""#, r#""version":"1.0""#, &["glTF 1.0", "gltf-pipeline"]);
     bad(r#""material":0"#, r#""material":7"#, &["material 7", "only 1"]);
-    bad(r#""sampler":0"#, r#""sampler":7"#, &["material 'paint'", "sampler 7"]);
+    let json = embedded_json();
+    let lacking = json.replace("my%20paint.png", "https://example.org/x.png");
+    fails_if_strict("a.gltf", lacking, &["example.org"]);
+    let lacking = json.replace(r#""sampler":0"#, r#""sampler":7"#);
+    fails_if_strict("a.gltf", lacking, &["material 'paint'", "sampler 7"]);
 }
 
 #[test]
@@ -876,6 +1002,25 @@ fn a_scene_file_combines_everything() {
 }
 
 #[test]
+fn a_scene_files_materials_glow_and_let_through() {
+    let material = |keys: &str| {
+        let materials = format!("roughness = 0.25\n{keys}");
+        let text = TOML.replacen("roughness = 0.25", &materials, 1);
+        let d = toml_folder().with("scene.toml", text).load("scene.toml").description;
+        d.materials[d.parts[0].material].clone()
+    };
+    let plain = material("");
+    assert_eq!((plain.emission, plain.coverage), (None, Coverage::default()));
+    let lamp = material("emission = [5, 0, 2.5]\nopacity = 0.5");
+    assert_eq!(lamp.emission.map(|e| e.radiance), Some(Rgb::new(5.0, 0.0, 2.5)));
+    assert_eq!((lamp.coverage.mode, lamp.coverage.opacity), (AlphaMode::Blend, 0.5));
+    let mapped = material("emission_texture = \"brass.png\"\nopacity_texture = \"normal.png\"");
+    let emission = mapped.emission.unwrap();
+    assert_eq!((emission.radiance, emission.texture.is_some()), (Rgb::WHITE, true));
+    assert_eq!(mapped.coverage.texture.unwrap().transform.x.x, 4.0);
+}
+
+#[test]
 fn built_in_scenes_are_objects_with_a_camera() {
     let text = "[[objects]]\nbuiltin = \"sphere\"\nmaterial = \"ggx:0.3\"\ntranslate = [7, 0, 0]\n";
     let d = one("scene.toml", text).description;
@@ -915,6 +1060,8 @@ fn broken_scene_files_name_the_line_and_the_reason() {
     bad("file = \"probes/sky.exr\"", "", &["environment", "builtin"]);
     bad("diffuse:0.5", "difuse:0.5", &["line 16", "difuse"]);
     bad("roughness = 0.25", "roughness = 25", &["line 18", "roughness", "25"]);
+    bad("roughness = 0.25", "opacity = 1.5", &["line 18", "opacity", "1.5"]);
+    bad("roughness = 0.25", "emission = [0, -1, 0]", &["line 18", "emission", "-1"]);
     bad("roughness = 0.25", "rougness = 0.25", &["line 18", "roughness"]);
     bad("brass.png", "gone.png", &["gone.png", "brass", "line 18"]);
     bad("quad.ply", "gone.ply", &["gone.ply", "line 26"]);
@@ -1042,7 +1189,7 @@ fn many_materials_without_a_definition_are_one_warning() {
     for i in 0..100_000 {
         mesh.extend(["usemtl m", &i.to_string(), "\nf 1 2 3\n"]);
     }
-    let library = "newmtl m7\nKe 1 1 1\n".to_owned() + &"Ke 1 1 1\n".repeat(1000);
+    let library = "newmtl m7\n".to_owned() + &"map_Ks k.png\n".repeat(1000);
     let folder = Folder::new().with("many.obj", mesh).with("a.mtl", library);
     let start = std::time::Instant::now();
     let loaded = folder.load("many.obj");

@@ -1,7 +1,7 @@
 //! Every unbiased strategy estimates ∫ f_r · cos θ · L · V dω: each against quadrature texel by
 //! texel, on every kind of material, with some texels hidden from the point.
 
-mod common;
+use crate::common;
 
 use common::{
     HEIGHT, MATERIALS, WIDTH, batches, bsdf, environment, estimate, point, quadrature,

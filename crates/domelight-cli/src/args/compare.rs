@@ -6,7 +6,9 @@ use clap::Args;
 
 use super::sampling::PixelArguments;
 use super::scene::SceneArguments;
+use super::tone_curve;
 use domelight::picture::exposure::Exposure;
+use domelight::picture::tone::ToneCurve;
 use domelight_lab::NamedStrategy;
 use domelight_lab::compare::Budget;
 
@@ -32,6 +34,8 @@ Examples:
       your choice of strategies
   domelight compare bunny.ply --env studio.hdr --budget time:2s --seeds 8 -o bunny.html
       your mesh under your HDRI at equal time
+  domelight compare robot.glb --env studio.hdr --size 640x480 --pictures others
+      and against the pictures of other renderers in the folder others
   domelight compare scene.toml --reference converged.exr --json=result.json -o report.html
       against your own reference, the numbers as JSON too";
 
@@ -54,6 +58,11 @@ pub(crate) struct CompareArguments {
     /// What all have in common: rays:N, time:T (2s, 500ms, 1m) or spp:N
     #[arg(long, value_name = "BUDGET", default_value = "rays:32", help_heading = "Comparison")]
     pub(crate) budget: Budget,
+    /// Pictures by other renderers: a folder of OpenEXR files of the same size. How long each took is stated by its name
+    /// as in NAME.12.5s.exr, by lines NAME,SECONDS of a file times.csv in the folder, or by an attribute
+    /// domelight.seconds or renderTime
+    #[arg(long, value_name = "DIR", help_heading = "Comparison")]
+    pub(crate) pictures: Option<PathBuf>,
     /// Pictures of each strategy, from --seed on: the spread of the error is that over them
     #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Comparison",
           value_parser = clap::value_parser!(u32).range(1..=1024))]
@@ -61,10 +70,11 @@ pub(crate) struct CompareArguments {
     /// The converged picture [default: rendered once, then kept in the cache]
     #[arg(long, value_name = "FILE", help_heading = "Reference")]
     pub(crate) reference: Option<PathBuf>,
-    /// Camera samples of each pixel of a rendered reference, by product
-    #[arg(long, value_name = "N", default_value_t = 64, help_heading = "Reference",
+    /// Camera samples of each pixel of a rendered reference, by product [default: 64, and more, up to 1024, until its
+    /// error is at most a tenth of the least that is expected of a strategy]
+    #[arg(long, value_name = "N", help_heading = "Reference",
           conflicts_with = "reference", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
-    pub(crate) reference_spp: u32,
+    pub(crate) reference_spp: Option<u32>,
     /// Where references are kept [default: domelight in the user's cache folder]
     #[arg(long, value_name = "FOLDER", help_heading = "Reference")]
     pub(crate) cache: Option<PathBuf>,
@@ -93,4 +103,8 @@ pub(crate) struct CompareArguments {
     #[arg(long, value_name = "EV|auto", default_value_t = Exposure::Auto,
           allow_negative_numbers = true, help_heading = "Output")]
     pub(crate) exposure: Exposure,
+    /// Tone curve with which the page opens and ꟻLIP sees the pictures
+    #[arg(long, default_value_t = ToneCurve::Agx, help_heading = "Output",
+          value_parser = tone_curve())]
+    pub(crate) tone: ToneCurve,
 }

@@ -100,6 +100,16 @@ pub(crate) enum MethodName {
     MedianCut,
 }
 
+impl MethodName {
+    /// The name on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::VarianceMinimization => "variance-minimization",
+            Self::MedianCut => "median-cut",
+        }
+    }
+}
+
 impl From<MethodName> for Method {
     fn from(name: MethodName) -> Self {
         match name {

@@ -242,6 +242,17 @@ pub(crate) enum Metric {
     Flip,
 }
 
+impl Metric {
+    /// What it is called in reports.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Rel => "relative error",
+            Self::Abs => "absolute error",
+            Self::Flip => "ꟻLIP",
+        }
+    }
+}
+
 /// Measure, look at and convert a light probe.
 #[derive(Args, Debug)]
 pub(crate) struct ProbeArguments {

@@ -27,8 +27,9 @@ pub(crate) struct RenderRunArguments {
     /// As --shard, for tiles A to B of the picture
     #[arg(long, value_name = "A-B", requires = "output")]
     pub(crate) tiles: Option<Tiles>,
-    /// End the render after this time with what is there; a part is then saved unfinished, with exit code 75, and the
-    /// same again goes on with it
+    /// End this long after the start of the program with what is there, loading and writing included; a part is then
+    /// saved unfinished, with exit code 75, and the same again goes on with it. A picture has at least one sample of each
+    /// pixel; --denoise takes its time on top
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub(crate) time: Option<Duration>,
 }

@@ -71,8 +71,8 @@ pub(crate) struct EnvironmentArguments {
     #[arg(long, value_name = "ROWS", default_value_t = BUILTIN_ROWS,
           value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(crate) env_rows: u32,
-    /// Refuse what is repaired or left out with a warning otherwise: negative, NaN and infinite texels, and in glTF
-    /// files unknown extensions that are required and images that are missing
+    /// Refuse what is repaired or left out with a warning otherwise: negative, NaN and infinite texels, vertices that are
+    /// not finite, images and material libraries that cannot be read, and unknown extensions that a glTF file requires
     #[arg(long)]
     pub(crate) strict: bool,
     /// What is done without --strict; scripts may still say so.

@@ -4,8 +4,9 @@ mod preview;
 mod report;
 mod written;
 
+use std::fs;
 use std::io::{self, IsTerminal as _};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 use domelight::RgbImage;
@@ -26,6 +27,7 @@ use crate::memory;
 use crate::output::{PictureFormat, PicturePath, print, print_json};
 use crate::terminal::Terminal;
 use domelight_lab::Stopwatch;
+use domelight_lab::names::file_name;
 use preview::Preview;
 use report::{LightsReport, Timings};
 use written::WrittenFiles;
@@ -51,10 +53,11 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
         _ => DomeFiles { written: Vec::new(), of_outputs: vec![None; outputs.len()] },
     };
     let harmonics = found.extraction.residual.as_ref().map(SphericalHarmonics::project);
+    let probe_name = file_name(&probe);
     for (output, dome_file) in outputs.iter().zip(&domes.of_outputs) {
         let file = dome_file.as_ref().map(|dome| refer(output.path, dome)).transpose()?;
         let rig = RigExport {
-            probe: &probe,
+            probe: &probe_name,
             orientation: environment.orientation(),
             lights: &found.extraction.rig.lights,
             dome: harmonics.zip(found.extraction.residual.as_ref()).map(
@@ -308,15 +311,48 @@ fn measure(environment: &Environment, found: &Extraction) -> ShadingError {
     }
 }
 
-/// How a rig's file refers to the dome's: by its name in the same folder, else by its whole path.
+/// How a rig's file refers to the dome's: by its path from the rig's folder, which names no other folder of the machine
+/// than those between the two.
 fn refer(rig: &Path, dome: &Path) -> Result<String, UsageError> {
-    let folder = |path: &Path| path.parent().map(Path::to_path_buf);
-    let name = match (folder(rig) == folder(dome), dome.file_name()) {
-        (true, Some(name)) => PathBuf::from(name),
-        _ => std::path::absolute(dome).unwrap_or_else(|_| dome.to_path_buf()),
+    let folder = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        fs::canonicalize(folder.unwrap_or(Path::new(".")))
+    };
+    // On Windows another drive has no path from here.
+    let name = match (folder(rig), folder(dome), dome.file_name()) {
+        (Ok(from), Ok(to), Some(name)) => path_between(&from, &to).join(name),
+        _ => dome.to_path_buf(),
     };
     let refuse = || UsageError(format!("{}: its name is not UTF-8", name.display()));
     let text = name.to_str().ok_or_else(refuse)?;
     // Elsewhere a backslash is a letter like others.
     Ok(if cfg!(windows) { text.replace('\\', "/") } else { text.to_owned() })
+}
+
+/// The path from one folder to another, both without links.
+fn path_between(from: &Path, to: &Path) -> PathBuf {
+    let (from, to): (Vec<_>, Vec<_>) = (from.components().collect(), to.components().collect());
+    let n_common = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    if n_common == 0 {
+        return to.iter().collect();
+    }
+    let up = from[n_common..].iter().map(|_| Component::ParentDir);
+    up.chain(to[n_common..].iter().copied()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_lead_from_folder_to_folder() {
+        for (from, to, path) in [
+            ("/a/rigs", "/a/rigs", ""),
+            ("/a/rigs", "/a/maps/hdr", "../maps/hdr"),
+            ("/a", "/a/maps", "maps"),
+            ("/a/b/c", "/", "../../.."),
+        ] {
+            assert_eq!(path_between(Path::new(from), Path::new(to)), Path::new(path));
+        }
+    }
 }

@@ -100,7 +100,7 @@ impl LightsReport<'_> {
             "probe": self.probe,
             "width": rig.width,
             "height": rig.height,
-            "method": format!("{:?}", self.arguments.method),
+            "method": self.arguments.method.name(),
             "lights": lights.collect::<Vec<_>>(),
             "irradiance": rig.irradiance().to_array(),
             "error": self.found.error().map(error),

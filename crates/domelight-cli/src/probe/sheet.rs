@@ -80,17 +80,19 @@ impl Sheet<'_> {
             ),
             format!("irradiance {:.3} {:.3} {:.3}", e.r, e.g, e.b),
         ];
-        let size = 17.0;
+        let (size, leading) = (17.0, 22.0);
         let widest = lines.iter().map(|line| text_width(line, size)).fold(0.0, f64::max);
+        let plate = (widest + 16.0, leading * lines.len() as f64 + 12.0);
         let (x, y) = place(environment, sun.direction, map);
         let gap = radius / std::f64::consts::PI * map.height + 14.0;
-        let is_right = x + gap + widest < map.x + map.width;
-        let (left, anchor) =
-            if is_right { (x + gap, Anchor::Start) } else { (x - gap, Anchor::End) };
-        let top = y.clamp(map.y + 30.0, map.y + map.height - 60.0);
+        let is_right = x + gap + plate.0 < map.x + map.width;
+        let left = if is_right { x + gap } else { x - gap - plate.0 };
+        let top = (y - 0.5 * plate.1).clamp(map.y + 8.0, map.y + map.height - plate.1 - 8.0);
+        let plate = Rect::new(left, top, plate.0, plate.1);
+        sheet.rect(plate, Style::fill(Color::WHITE).opacity(0.8));
         for (i, line) in lines.iter().enumerate() {
-            let style = TextStyle::new(size).anchor(anchor).halo();
-            sheet.text((left, top + 22.0 * i as f64 - 14.0), line, style);
+            let baseline = top + leading * (i + 1) as f64;
+            sheet.text((left + 8.0, baseline), line, TextStyle::new(size));
         }
     }
 }

@@ -15,6 +15,7 @@ use super::strategy_run::{
 use super::table::{Table, number};
 use super::{Bench, Peer};
 use crate::measure::{Cache, Goal, MIS, Reference, ReferenceReport};
+use crate::names::file_name;
 use crate::strategy::NamedStrategy;
 use crate::usage::Seconds;
 use crate::{At as _, Error};
@@ -187,8 +188,8 @@ impl CaseRunner<'_> {
             entry,
         });
         Ok(Row {
-            scene: case.scene.clone(),
-            probe: case.probe.clone(),
+            scene: file_name(&case.scene),
+            probe: file_name(&case.probe),
             material: case.material.to_string(),
             size: [settings.width, settings.height],
             triangles: view.scene.triangle_count(),
@@ -324,19 +325,25 @@ pub(super) fn tables(rows: &[Row]) -> Vec<Table> {
 
 /// CPU seconds of each strategy, from the error of that index on.
 fn costs(rows: &[Row], first_error: usize) -> Table {
-    let errors = rows.first().map_or(&[][..], |row| &row.errors[first_error..]);
+    let errors = rows.first().map_or(&[][..], |row| from(&row.errors, first_error));
+    // Files of before have the errors inside alone.
+    let counts_silhouettes = rows.iter().any(Row::counts_silhouettes);
     let mut table = Table::new("CPU seconds to an error", &["case", "strategy"]);
     table.head.extend(errors.iter().map(|&error| format!("to {}", power(error))));
-    table.head.extend(errors.iter().map(|&error| format!("inside, to {}", power(error))));
+    if counts_silhouettes {
+        table.head.extend(errors.iter().map(|&error| format!("inside, to {}", power(error))));
+    }
     table.head.extend(["of bound".to_owned(), "Mrays/CPU-s".to_owned()]);
-    table.notes.push(COSTS_NOTE.to_owned());
+    let which = if counts_silhouettes { OF_ALL } else { OF_INSIDE };
+    table.notes.push(format!("{which} {COSTS_NOTE}"));
     for row in rows {
         for (i, entry) in row.entries().enumerate() {
-            let reached = &entry.reached[first_error..];
+            let reached = from(&entry.reached, first_error);
             let mut cells =
                 vec![if i == 0 { row.name() } else { String::new() }, entry.name.clone()];
-            let inside = &entry.reached_covered[first_error..];
+            let inside = from(&entry.reached_covered, first_error);
             cells.extend(reached.iter().chain(inside).map(|r| cell(r.as_ref())));
+            let inside = if counts_silhouettes { inside } else { reached };
             let near = |r: &&CostAtError| r.rel_mse <= HEADLINE;
             let at = inside.iter().flatten().find(near).or(inside.iter().flatten().last());
             let of_bound = at.and_then(|reached| reached.efficiency_of_bound);
@@ -352,7 +359,16 @@ fn costs(rows: &[Row], first_error: usize) -> Table {
     table
 }
 
-const COSTS_NOTE: &str = "relMSE over all pixels that show any of the scene, silhouettes with them; inside: over those that the scene fills; ~ extrapolated, ≤ cheaper still, – far beyond \
+/// The values of an error of that index and of those after it.
+fn from<T>(of_errors: &[T], first_error: usize) -> &[T] {
+    of_errors.get(first_error..).unwrap_or_default()
+}
+
+const OF_ALL: &str = "relMSE over all pixels that show any of the scene, silhouettes with them; inside: over those that \
+     the scene fills.";
+const OF_INSIDE: &str = "relMSE over the pixels that the scene fills (coverage above 0.999), without silhouettes: the \
+     metric of earlier versions.";
+const COSTS_NOTE: &str = "~ extrapolated, ≤ cheaper still, – far beyond \
      what was measured; in brackets the range over the seeds. Of bound: efficiency 1/(relMSE · CPU-s) at 1e-3, else at the least error, over \
      that of perfect product sampling at the ray kernel's rate, both inside.";
 
@@ -387,6 +403,9 @@ fn ratios(rows: &[Row]) -> Table {
         format!("{}, {}", column.len(), column.iter().filter(|r| r.mark.is_empty()).count())
     });
     table.notes.push(RATIOS_NOTE.to_owned());
+    if !rows.iter().any(Row::counts_silhouettes) {
+        table.notes.push(OF_INSIDE.to_owned());
+    }
     table
 }
 
@@ -429,6 +448,11 @@ fn power(error: f64) -> String {
 impl Row {
     fn name(&self) -> String {
         format!("{} / {} / {}", short(&self.scene), short(&self.probe), self.material)
+    }
+
+    /// Whether errors are over silhouettes, too; in files of before they are not.
+    fn counts_silhouettes(&self) -> bool {
+        self.entries().any(|entry| !entry.reached_covered.is_empty())
     }
 
     /// All who took part.

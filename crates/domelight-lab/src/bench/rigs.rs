@@ -9,6 +9,7 @@ use super::Bench;
 use super::cases::{self, short};
 use super::strategy_run::median;
 use super::table::{Table, number};
+use crate::names::file_name;
 use crate::usage::Stopwatch;
 use crate::{At as _, Error};
 
@@ -53,7 +54,7 @@ pub(super) fn run(bench: &Bench, rows: &mut Vec<Row>) -> Result<(), Error> {
                 let repetitions = bench.settings.n_seeds;
                 let row = Row::measure(environment, &reference, method, n_lights, repetitions)
                     .at(format_args!("{probe}, {n_lights} lights"))?;
-                rows.push(Row { probe: probe.clone(), method: name.to_owned(), ..row });
+                rows.push(Row { probe: file_name(probe), method: name.to_owned(), ..row });
             }
         }
     }

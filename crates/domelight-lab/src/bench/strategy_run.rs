@@ -13,7 +13,7 @@ use super::cases::BuiltCase;
 use super::fit::{Cost, Fit, Point, cost_of};
 use super::mitsuba::Mitsuba;
 use crate::measure::Reference;
-use crate::measure::render::RenderSetup;
+use crate::measure::render::{RenderSetup, Shown};
 use crate::strategy::{NamedStrategy, refuse_repeating_points};
 use crate::usage::{Seconds, Stopwatch};
 use crate::{Error, Host};
@@ -128,7 +128,8 @@ pub(super) struct BudgetPoint {
     pub(super) wall_seconds: Vec<f64>,
     /// Over the pixels that show any of the scene, without that of the reference.
     pub(super) rel_mse: Vec<f64>,
-    /// Over the pixels that the scene fills.
+    /// Over the pixels that the scene fills; files of before had these alone, as `rel_mse`.
+    #[serde(default)]
     pub(super) rel_mse_covered: Vec<f64>,
     /// Camera samples of a pixel, as counted; null where a program does not tell.
     pub(super) camera_samples: Option<f64>,
@@ -193,7 +194,7 @@ impl<'a> StrategyRun<'a> {
     ) -> StrategyRun<'a> {
         let BuiltCase { view, settings, .. } = built;
         let (view, settings, strategy) = (view.view(), *settings, &prepared.strategy);
-        let render_setup = RenderSetup { view, settings, strategy, host, shown: false };
+        let render_setup = RenderSetup { view, settings, strategy, host, shown: Shown::Unseen };
         let source = Source::Ours { prepared, render_setup };
         StrategyRun { source, metric, first: 1, growth: 2, budget_points: Vec::new() }
     }
@@ -333,7 +334,8 @@ pub(super) struct StrategyEntry {
     setup: Seconds,
     /// One for each error that was wanted.
     pub(super) reached: Vec<Option<CostAtError>>,
-    /// The same over the pixels that the scene fills, as tables had it before silhouettes counted.
+    /// The same over the pixels that the scene fills; files of before had these alone, as `reached`.
+    #[serde(default)]
     pub(super) reached_covered: Vec<Option<CostAtError>>,
     pub(super) budget_points: Vec<BudgetPoint>,
 }

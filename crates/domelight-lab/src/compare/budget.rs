@@ -39,7 +39,7 @@ impl FromStr for Budget {
 }
 
 /// A duration with its unit; bare numbers are seconds.
-fn seconds(text: &str) -> Option<f64> {
+pub(super) fn seconds(text: &str) -> Option<f64> {
     let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0), ("", 1.0)];
     units.iter().find_map(|(unit, scale)| positive(text.strip_suffix(unit)?, *scale))
 }

@@ -1,7 +1,9 @@
 //! Strategies on one scene at equal samples, rays or time.
 
 mod budget;
+mod calibrated;
 mod page;
+mod pictures;
 mod pixels;
 mod plots;
 mod report;
@@ -14,22 +16,23 @@ use domelight::picture::flip::{PIXELS_PER_DEGREE, ldr_flip};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::quote::{Code, Html};
 use domelight::render::{RenderSettings, automatic_exposure};
-use domelight::strategy::{Strategy, StrategyKind, StrategySpec};
+use domelight::strategy::Strategy;
 
 pub use budget::{BadBudget, Budget};
+pub use calibrated::CalibratedComparison;
+pub use pictures::{OtherPicture, read_pictures};
 pub use report::{CompareReport, ResultReport, StrategyReport};
 pub use strategy_run::{ConvergencePoint, MeanAndDeviation};
 
-use crate::measure::render::{Picturing, RenderSetup};
-use crate::measure::{Cache, Goal, PRODUCT, Reference, Source};
+use crate::measure::Source;
+use crate::measure::render::Picturing;
 use crate::scene::View;
-use crate::strategy::{NamedStrategy, refuse_repeating_points};
-use crate::usage::Stopwatch;
-use crate::{At as _, Error, Host};
-use strategy_run::{SampleCount, StrategyMeasurement, StrategyRun};
+use crate::strategy::NamedStrategy;
+use crate::{Error, Host};
+use strategy_run::StrategyMeasurement;
 
-/// The relMSE of the reference should be this far below the least that is measured against it.
-const CONVERGED: f64 = 0.2;
+/// The relMSE of the reference should be at most this part of the least that is measured against it.
+const CONVERGED: f64 = 0.1;
 
 /// How far beside its budget a strategy may be without a word.
 const TOLERANCE: f64 = 0.1;
@@ -45,8 +48,13 @@ pub struct ComparisonSettings {
     pub n_seeds: u32,
     /// At which ꟻLIP sees the pictures, and the page opens; automatic is [`automatic_exposure`].
     pub exposure: Exposure,
-    /// Camera samples of each pixel of a rendered reference.
+    /// Through which ꟻLIP sees the pictures, and the page opens.
+    pub tone: ToneCurve,
+    /// Camera samples of each pixel of a rendered reference, at least 2.
     pub reference_spp: u32,
+    /// The reference gets more camera samples, up to as many of each pixel, until its relMSE is at most a tenth of the
+    /// least that is expected of a strategy.
+    pub most_reference_spp: u32,
     /// What makes the report again; for people.
     pub command: String,
 }
@@ -58,30 +66,33 @@ impl Default for ComparisonSettings {
             budget: Budget::Rays(32.0),
             n_seeds: 4,
             exposure: Exposure::Auto,
+            tone: ToneCurve::Agx,
             reference_spp: 64,
+            most_reference_spp: 1024,
             command: String::new(),
         }
     }
 }
 
-/// Strategies on one scene at equal samples, rays or time.
+/// Strategies on one scene at equal samples, rays or time, before any of them has rendered.
 pub struct Comparison<'a> {
     view: View<'a>,
     settings: ComparisonSettings,
-    strategies: Vec<Competitor<'a>>,
+    competitors: Vec<Competitor<'a>>,
 }
 
 /// Who takes part.
 enum Competitor<'a> {
     Named(NamedStrategy),
     Own { name: String, strategy: &'a dyn Picturing },
+    Pictures(OtherPicture),
 }
 
 impl Competitor<'_> {
     fn name(&self) -> &str {
         match self {
             Self::Named(NamedStrategy { text, .. }) => text,
-            Self::Own { name, .. } => name,
+            Self::Own { name, .. } | Self::Pictures(OtherPicture { name, .. }) => name,
         }
     }
 }
@@ -119,9 +130,9 @@ impl ComparisonResult {
 }
 
 impl<'a> Comparison<'a> {
-    /// Of nobody yet.
+    /// A comparison that nobody takes part in yet.
     pub fn new(view: View<'a>, settings: ComparisonSettings) -> Self {
-        Self { view, settings, strategies: Vec::new() }
+        Self { view, settings, competitors: Vec::new() }
     }
 
     /// One of the library's strategies takes part.
@@ -144,113 +155,47 @@ impl<'a> Comparison<'a> {
         self.add_competitor(Competitor::Own { name: name.into(), strategy })
     }
 
+    /// Another renderer's picture takes part.
+    ///
+    /// # Errors
+    /// If it has another size than the comparison, or one of that name takes part already.
+    pub fn add_picture(&mut self, picture: OtherPicture) -> Result<(), Error> {
+        let RenderSettings { width, height, .. } = self.settings.render;
+        let OtherPicture { name, image, seconds } = &picture;
+        if [image.width, image.height] != [width, height] {
+            let (w, h) = (image.width, image.height);
+            let why = format!(
+                "the picture {name} is {w}x{h}, but the comparison renders {width}x{height}: all must be of one size; \
+                 give --size {w}x{h}, or the picture of {name} in {width}x{height}"
+            );
+            return Err(Error::Usage(why));
+        }
+        if !(*seconds > 0.0 && seconds.is_finite()) {
+            let why = format!("the picture {name} took {seconds} s; a time must be above 0");
+            return Err(Error::Usage(why));
+        }
+        self.add_competitor(Competitor::Pictures(picture))
+    }
+
     fn add_competitor(&mut self, competitor: Competitor<'a>) -> Result<(), Error> {
         let name = competitor.name();
-        if self.strategies.iter().any(|other| other.name() == name) {
-            return Err(Error::Usage(format!("--strategies has '{name}' twice")));
+        if self.competitors.iter().any(|other| other.name() == name) {
+            let why = format!("'{name}' takes part twice: leave one out, or give it another name");
+            return Err(Error::Usage(why));
         }
-        self.strategies.push(competitor);
+        self.competitors.push(competitor);
         Ok(())
     }
 
-    /// The converged picture of the view, from the cache if it has it, else rendered.
+    /// Prepares all strategies and finds by pilot pictures how many samples the budget buys of each.
     ///
     /// # Errors
-    /// If the scene is not in sight, or the host ended the work.
-    pub fn reference(&self, cache: Option<&Cache>, host: &dyn Host) -> Result<Reference, Error> {
-        let goal = Goal::Samples(self.settings.reference_spp);
-        Reference::of_view(cache, self.view, PRODUCT, self.settings.render, goal, host)
-    }
-
-    /// Measures all strategies.
-    ///
-    /// # Errors
-    /// If a strategy does not suit the environment, the sizes differ, or the host ended the work.
-    pub fn run(&self, reference: &Reference, host: &dyn Host) -> Result<ComparisonResult, Error> {
-        let exposure = self.exposure();
-        let mut strategies = Vec::new();
-        let mut pictures = Vec::new();
-        for competitor in &self.strategies {
-            let measured = self.measure(competitor, reference, exposure, host);
-            let (report, picture) = measured.at(format_args!("strategy {}", competitor.name()))?;
-            strategies.push(report);
-            pictures.push(picture);
-        }
-        let is_mis = |competitor: &Competitor| matches!(competitor, Competitor::Named(s) if s.spec.kind() == StrategyKind::Mis);
-        compare_with(self.strategies.iter().position(is_mis), &mut strategies);
-        let settings = &self.settings.render;
-        let report = CompareReport {
-            version: env!("CARGO_PKG_VERSION"),
-            command: self.settings.command.clone(),
-            budget: self.settings.budget,
-            scene: self.view.report.clone(),
-            sampler: format!("{:?}", settings.sampler).to_lowercase(),
-            filter: settings.filter.name(),
-            seed: settings.seed,
-            seeds: self.settings.n_seeds,
-            threads: rayon::current_num_threads(),
-            exposure,
-            reference: reference.report.clone(),
-            strategies,
-        };
-        report.warn(host);
-        Ok(ComparisonResult { report, pictures, reference: reference.picture.image.clone() })
-    }
-
-    fn measure(
-        &self,
-        competitor: &Competitor,
-        reference: &Reference,
-        exposure: f32,
-        host: &dyn Host,
-    ) -> Result<(StrategyReport, Option<Picture>), Error> {
-        let View { scene, camera, environment, .. } = self.view;
-        let mut watch = Stopwatch::start();
-        let prepared;
-        let (spec, strategy): (_, &dyn Picturing) = match competitor {
-            Competitor::Named(NamedStrategy { spec, .. }) => {
-                let spec = spec.for_picture(scene, camera, environment, &self.settings.render);
-                prepared = host.prepare(spec, environment)?;
-                (Some(spec), &prepared)
-            }
-            Competitor::Own { strategy, .. } => (None, *strategy),
-        };
-        let setup = watch.lap();
-        let run = StrategyRun {
-            render_setup: RenderSetup {
-                view: self.view,
-                settings: self.settings.render,
-                strategy,
-                host,
-                shown: true,
-            },
-            label: competitor.name().to_owned(),
-            reference: &reference.picture.image,
-            reference_noise: reference.report.rel_mse.unwrap_or(0.0),
-            n_seeds: self.settings.n_seeds,
-        };
-        let mut report = StrategyReport {
-            name: competitor.name().to_owned(),
-            settings: spec
-                .map_or("a strategy of the caller's".to_owned(), StrategySpec::description),
-            unbiased: spec.is_none_or(StrategySpec::is_unbiased),
-            setup_seconds: setup.cpu.unwrap_or(setup.wall),
-            left_out: None,
-            result: None,
-        };
-        match run.calibrate(self.settings.budget)? {
-            SampleCount::OverBudget(why) => {
-                report.left_out = Some(why);
-                Ok((report, None))
-            }
-            SampleCount::Samples(n) => {
-                spec.map_or(Ok(()), |spec| refuse_repeating_points(spec, n))?;
-                let measured = run.measure(n)?;
-                let picture = picture(&measured, &reference.picture.image, exposure)?;
-                report.result = ResultReport::new(&measured, &picture.flip);
-                Ok((report, Some(picture)))
-            }
-        }
+    /// If a strategy does not suit the environment, the scene is not in sight, or the host ended the work.
+    pub fn calibrate<'c>(
+        &'c self,
+        host: &'c dyn Host,
+    ) -> Result<CalibratedComparison<'c, 'a>, Error> {
+        CalibratedComparison::new(self, host)
     }
 
     /// The same for all pictures \[stops\].
@@ -265,34 +210,34 @@ impl<'a> Comparison<'a> {
     }
 }
 
-fn picture(
-    measured: &StrategyMeasurement,
-    reference: &RgbImage,
-    exposure: f32,
-) -> Result<Picture, Error> {
-    let tone = ToneMapping { exposure, curve: ToneCurve::Standard };
+fn picture(image: &RgbImage, reference: &RgbImage, tone: ToneMapping) -> Result<Picture, Error> {
     let shown = |image: &RgbImage| {
         let pixels = image.pixels.iter().map(|&p| tone.apply(p)).collect();
         RgbImage { pixels, ..*image }
     };
-    let image = measured.image.clone();
     Ok(Picture {
-        relative_error: relative_error_map(&image, reference)?,
-        flip: ldr_flip(&shown(reference), &shown(&image), PIXELS_PER_DEGREE)?,
-        image,
+        relative_error: relative_error_map(image, reference)?,
+        flip: ldr_flip(&shown(reference), &shown(image), PIXELS_PER_DEGREE)?,
+        image: image.clone(),
     })
 }
 
+impl Picture {
+    fn mean_flip(&self) -> f64 {
+        self.flip.iter().map(|&e| f64::from(e)).sum::<f64>() / self.flip.len() as f64
+    }
+}
+
 impl ResultReport {
-    fn new(measured: &StrategyMeasurement, flip: &[f32]) -> Option<Self> {
+    fn of_strategy(measured: &StrategyMeasurement, picture: &Picture) -> Option<Self> {
         let last = measured.steps.last()?;
         Some(Self {
-            spp: last.spp,
-            camera_samples: last.camera_samples,
-            rays: last.rays,
+            spp: Some(last.spp),
+            camera_samples: Some(last.camera_samples),
+            rays: Some(last.rays),
             cpu_seconds: last.cpu_seconds,
             rel_mse: last.rel_mse,
-            flip: flip.iter().map(|&e| f64::from(e)).sum::<f64>() / flip.len() as f64,
+            flip: picture.mean_flip(),
             bias: measured.bias.map(|bias| bias.mean),
             bias_interval: measured.bias.map(|bias| bias.interval),
             efficiency: 1.0 / (last.rel_mse.mean * last.cpu_seconds.mean),
@@ -301,6 +246,24 @@ impl ResultReport {
             non_finite_samples: measured.non_finite,
             convergence: measured.steps.clone(),
         })
+    }
+
+    fn of_picture(seconds: f64, rel_mse: f64, picture: &Picture, n_non_finite: u64) -> Self {
+        Self {
+            spp: None,
+            camera_samples: None,
+            rays: None,
+            cpu_seconds: MeanAndDeviation::single(seconds),
+            rel_mse: MeanAndDeviation::single(rel_mse),
+            flip: picture.mean_flip(),
+            bias: None,
+            bias_interval: None,
+            efficiency: 1.0 / (rel_mse * seconds),
+            error_ratio_to_mis: None,
+            efficiency_ratio_to_mis: None,
+            non_finite_samples: n_non_finite,
+            convergence: Vec::new(),
+        }
     }
 }
 
@@ -330,7 +293,7 @@ impl CompareReport {
             host.warn_of_non_finite(&format!("{name}: "), result.non_finite_samples);
             // Noise makes the estimate uncertain, never that much.
             let is_off = result.bias.is_some_and(|bias| bias > 0.5 * result.rel_mse.mean);
-            if *unbiased && is_off && self.reference.source == Source::File {
+            if *unbiased == Some(true) && is_off && self.reference.source == Source::File {
                 host.warn(&format!(
                     "{name} is unbiased, but the mean of its pictures differs from the \
                          reference: is that of another scene, light or filter, or noisy?"
@@ -342,20 +305,22 @@ impl CompareReport {
         if let Some(noise) = self.reference.rel_mse.filter(|&noise| noise > CONVERGED * least) {
             host.warn(&format!(
                 "the reference's own error (relMSE {noise:.1e}) is part of the least one \
-                     measured ({least:.1e}); raise --reference-spp"
+                     measured ({least:.1e}); give a larger --reference-spp"
             ));
         }
     }
 
     /// By how many percent a result is beside the budget, if that is much.
     fn miss(&self, result: &ResultReport) -> Option<(String, f64)> {
+        // Of another renderer's picture nobody knows the samples.
+        let spp = result.spp?;
         let (spent, budget, unit) = match self.budget {
             Budget::Samples(_) => return None,
-            Budget::Rays(rays) => (result.rays, rays, "shadow rays"),
+            Budget::Rays(rays) => (result.rays?, rays, "shadow rays"),
             Budget::Time(seconds) => (result.cpu_seconds.mean, seconds, "CPU seconds"),
         };
         let off = spent / budget - 1.0;
-        let what = format!("{spent:.3} {unit} with {} camera samples a pixel", result.spp);
+        let what = format!("{spent:.3} {unit} with {spp} camera samples a pixel");
         (off.abs() > TOLERANCE).then_some((what, 100.0 * off))
     }
 
@@ -365,12 +330,14 @@ impl CompareReport {
         let line = |StrategyReport { name, result, unbiased, .. }: &StrategyReport| {
             let r = result.as_ref()?;
             let sd = r.rel_mse.sd.map_or(String::new(), |sd| format!(" ± {sd:.0e}"));
-            let bias = if *unbiased { "" } else { ", biased" };
+            let bias = if *unbiased == Some(false) { ", biased" } else { "" };
             let ratio = r.efficiency_ratio_to_mis;
             let ratio = ratio.map_or(String::new(), |x| format!(", efficiency {x:.2} of mis"));
+            let spp = r.spp.map_or("–".to_owned(), |spp| spp.to_string());
+            let rays = r.rays.map_or("–".to_owned(), |rays| format!("{rays:.1}"));
             Some(format!(
-                "{name:width$}  {:>6} spp  {:>7.1} rays  {:>7.3} CPU-s  relMSE {:.2e}{sd}{ratio}{bias}",
-                r.spp, r.rays, r.cpu_seconds.mean, r.rel_mse.mean
+                "{name:width$}  {spp:>6} spp  {rays:>7} rays  {:>7.3} CPU-s  relMSE {:.2e}{sd}{ratio}{bias}",
+                r.cpu_seconds.mean, r.rel_mse.mean
             ))
         };
         self.strategies.iter().filter_map(line).collect()

@@ -30,6 +30,7 @@
   const scientific = (x) => x.toExponential(2).replace("e", " · 10^").replace("^+", "^");
   const superscript = (text) => text.replace(/\^(-?\d+)/, (_, digits) =>
     [...digits].map((d) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(d)]).join(""));
+  const stops = (x) => `${x > 0 ? "+" : ""}${Number(x.toFixed(2))} EV`.replace("-", "−");
   const error = (x) => (x >= 0.1 && x < 1000 ? number(x).toString() : superscript(scientific(x)));
 
   const shown = [{ name: "reference", caption: "converged", packed: { radiance: data.reference } }];
@@ -47,7 +48,7 @@
     entry.stale = true;
   }
 
-  const state = { mode: "radiance", exposure: report.exposure, tone: "srgb", zoom: 1, x: 0.5, y: 0.5, divider: 0.5, left: 1, right: 0 };
+  const state = { mode: "radiance", exposure: report.exposure, tone: report.tone, zoom: 1, x: 0.5, y: 0.5, divider: 0.5, left: 1, right: 0 };
   const best = bestOf((result) => -result.rel_mse.mean);
   if (shown.length > 1) state.left = 1 + measured().findIndex((s) => s.name === "mis" || s.name.startsWith("mis:"));
   if (state.left < 1) state.left = Math.min(1, shown.length - 1);
@@ -60,34 +61,88 @@
   }
   // A biased strategy is as quick as it is wrong.
   function mostEfficient() {
-    return bestOf((result) => result.efficiency, measured().filter((s) => s.unbiased));
+    return bestOf((result) => result.efficiency, measured().filter((s) => s.unbiased !== false));
   }
 
-  // ---- From radiance to the screen. A value is mantissa · 2^(exponent − 136): one byte of each, so a
-  // table of all pairs holds every exposure and curve.
+  // ---- From radiance to the screen: the curves of the program, see picture/tone.rs and picture/agx.rs. A value is
+  // mantissa · 2^(exponent − 136), one byte of each. Curves change the color c in place.
+
+  const c = new Float64Array(3);
+  const luminance = () => 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+  const multiply = (m) => {
+    const [r, g, b] = c;
+    for (let i = 0; i < 3; i++) c[i] = m[3 * i] * r + m[3 * i + 1] * g + m[3 * i + 2] * b;
+  };
+
+  // The sigmoid of AgX over log2 of light, -10 to 6.5 stops around middle gray.
+  const AGX_STEPS = 4096;
+  const agxCurve = Float64Array.from({ length: AGX_STEPS + 2 }, (_, i) => {
+    const d = 2.4 * (i / AGX_STEPS - 10 / 16.5);
+    const scale = d < 0 ? -0.5656756 : 0.7151983;
+    const u = d / scale;
+    return Math.max(scale * u / (1 + u ** 1.5) ** (1 / 1.5) + 0.18 ** (1 / 2.4), 0) ** 2.4;
+  });
+  function agxShaped(light) {
+    const stops = Math.min(Math.max(Math.log2(Math.max(light, 1e-10) / 0.18), -10), 6.5);
+    const at = (stops + 10) / 16.5 * AGX_STEPS, i = Math.floor(at);
+    return agxCurve[i] + (at - i) * (agxCurve[i + 1] - agxCurve[i]);
+  }
+  const agxPurity = (y) => 1 - Math.min(y ** 0.08, 1);
+  const AGX_IN = [0.54481475, 0.3737874, 0.081397855, 0.14041695, 0.75413756, 0.1054455, 0.08881042, 0.17887176, 0.7323178];
+  const AGX_OUT = [1.9648874, -0.8559885, -0.10889892, -0.29931337, 1.326398, -0.0270846, -0.16435274, -0.23818397, 1.4025367];
 
   const curves = {
-    srgb: (x) => x,
-    // Narkowicz 2015, "ACES Filmic Tone Mapping Curve".
-    filmic: (x) => (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14),
-  };
-  const encoded = (x) => x <= 0.0031308 ? 12.92 * x : 1.055 * Math.pow(x, 1 / 2.4) - 0.055;
-  let table = null;
-
-  function toneTable() {
-    if (table && table.exposure === state.exposure && table.tone === state.tone) return table.bytes;
-    const bytes = new Uint8Array(65536);
-    const curve = curves[state.tone];
-    for (let e = 1; e < 256; e++) {
-      const scale = 2 ** (e - 136 + state.exposure);
-      for (let m = 0; m < 256; m++) {
-        const x = Math.min(m * scale, 1e6);
-        bytes[e << 8 | m] = Math.round(255 * encoded(Math.min(Math.max(curve(x), 0), 1)));
+    standard() {},
+    reinhard() {
+      const scale = 1 / (1 + luminance());
+      for (let i = 0; i < 3; i++) c[i] *= scale;
+    },
+    aces() {
+      multiply([0.59719, 0.35458, 0.04823, 0.076, 0.90834, 0.01566, 0.0284, 0.13383, 0.83777]);
+      for (let i = 0; i < 3; i++) {
+        const x = Math.min(c[i], 1e9);
+        c[i] = (x * (x + 0.0245786) - 0.000090537) / (x * (0.983729 * x + 0.432951) + 0.238081);
       }
-    }
-    table = { exposure: state.exposure, tone: state.tone, bytes };
-    return bytes;
-  }
+      multiply([1.60475, -0.53108, -0.07367, -0.10208, 1.10813, -0.00605, -0.00327, -0.07276, 1.07602]);
+    },
+    agx() {
+      multiply(AGX_IN);
+      const [r, g, b] = c;
+      for (let i = 0; i < 3; i++) c[i] = agxShaped(c[i]);
+      const least = Math.min(r, g, b), range = Math.max(r, g, b) - least;
+      const low = Math.min(c[0], c[1], c[2]), formed = Math.max(c[0], c[1], c[2]) - low;
+      if (range > 0 && formed > 0) {
+        // Six tenths of the hue before the curve come back.
+        c[0] = low + 0.6 * formed * (r - least) / range + 0.4 * (c[0] - low);
+        c[1] = low + 0.6 * formed * (g - least) / range + 0.4 * (c[1] - low);
+        c[2] = low + 0.6 * formed * (b - least) / range + 0.4 * (c[2] - low);
+      }
+      multiply(AGX_OUT);
+      const below = -Math.min(c[0], c[1], c[2]);
+      if (below <= 0) return;
+      const y = Math.max(0.2067738 * c[0] + 0.6581298 * c[1] + 0.1350964 * c[2], 0), raised = y + below;
+      const factor = Math.min((y + agxPurity(y) * raised) / (raised + agxPurity(raised) * raised), 1);
+      for (let i = 0; i < 3; i++) c[i] = (c[i] + below) * factor;
+    },
+    neutral() {
+      const least = Math.min(c[0], c[1], c[2]);
+      const offset = least < 0.08 ? least - 6.25 * least * least : 0.04;
+      for (let i = 0; i < 3; i++) c[i] -= offset;
+      const peak = Math.max(c[0], c[1], c[2]);
+      if (peak < 0.76) return;
+      const top = 1 - 0.24 * 0.24 / (peak + 0.24 - 0.76);
+      const white = 1 - 1 / (0.15 * (peak - top) + 1);
+      for (let i = 0; i < 3; i++) c[i] = c[i] * (top / peak) * (1 - white) + top * white;
+    },
+  };
+
+  // Bytes of sRGB from linear light in [0, 1], finer than the eye.
+  const SRGB_STEPS = 4096;
+  const encoded = Uint8Array.from({ length: SRGB_STEPS + 1 }, (_, i) => {
+    const x = i / SRGB_STEPS;
+    return Math.round(255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055));
+  });
+  const byteOf = (x) => encoded[Math.round(SRGB_STEPS * Math.min(Math.max(x, 0), 1))];
 
   const scales = { relative: bytesOf(data.viridis), flip: bytesOf(data.magma) };
 
@@ -95,12 +150,13 @@
     const out = entry.pixels.data, n = width * height;
     const values = entry[state.mode];
     if (state.mode === "radiance") {
-      const bytes = toneTable();
+      const curve = curves[state.tone];
+      const scales = Float64Array.from({ length: 256 }, (_, e) => e && 2 ** (e - 136 + state.exposure));
       for (let i = 0, o = 0; i < n; i++, o += 4) {
-        const e = values[3 * n + i] << 8;
-        out[o] = bytes[e | values[i]];
-        out[o + 1] = bytes[e | values[n + i]];
-        out[o + 2] = bytes[e | values[2 * n + i]];
+        const scale = scales[values[3 * n + i]];
+        for (let channel = 0; channel < 3; channel++) c[channel] = Math.min(values[channel * n + i] * scale, 1e30);
+        curve();
+        for (let channel = 0; channel < 3; channel++) out[o + channel] = byteOf(c[channel]);
         out[o + 3] = 255;
       }
     } else {
@@ -207,7 +263,7 @@
     $("left").value = state.left;
     $("right").value = state.right;
     $("exposure").value = state.exposure;
-    $("exposure-value").textContent = `${state.exposure > 0 ? "+" : ""}${state.exposure} EV`.replace("-", "−");
+    $("exposure-value").textContent = stops(state.exposure);
     $("zoom-value").textContent = `${number(state.zoom, 2)}×`;
     document.body.classList.toggle("zoomed", state.zoom > 1);
   }
@@ -342,13 +398,24 @@
     [state.left, state.right] = [state.right, state.left];
     refresh();
   });
+  // Ten stops to each side of the exposure with which the page opens, and no exposure at all.
+  const RANGE = [Math.min(report.exposure - 10, 0), Math.max(report.exposure + 10, 0)];
+  [$("exposure").min, $("exposure").max] = RANGE;
+  $("exposure").step = "any";
   function expose(exposure) {
-    state.exposure = Math.min(Math.max(exposure, -10), 10);
+    state.exposure = Math.min(Math.max(exposure, RANGE[0]), RANGE[1]);
     if (state.mode === "radiance") for (const entry of shown) entry.stale = true;
     refresh();
   }
   $("exposure").addEventListener("input", () => expose(Number($("exposure").value)));
   $("exposure").addEventListener("dblclick", () => expose(report.exposure));
+  $("exposure").addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: -0.25, ArrowDown: -0.25, ArrowRight: 0.25, ArrowUp: 0.25, PageDown: -1, PageUp: 1 }[event.key];
+    if (step === undefined) return;
+    event.preventDefault();
+    expose(state.exposure + step);
+  });
+  $("tone").value = state.tone;
   $("tone").addEventListener("change", () => { state.tone = $("tone").value; restyle(); });
   for (const radio of document.querySelectorAll("input[name=mode]")) {
     radio.addEventListener("change", () => {
@@ -390,7 +457,11 @@
   }[kind];
 
   function lead() {
-    const parts = [document.createTextNode(`${report.strategies.length} strategies at ${budget}, ${report.seeds} ${report.seeds === 1 ? "picture" : "pictures"} each. `)];
+    const others = report.strategies.filter((s) => s.unbiased === null).length;
+    const n = report.strategies.length - others;
+    const beside = others ? `, beside ${others} ${others === 1 ? "picture" : "pictures"} by other renderers` : "";
+    const parts = [document.createTextNode(`${n} ${n === 1 ? "strategy" : "strategies"} at ${budget}, ${report.seeds} ${report.seeds === 1 ? "picture" : "pictures"} each${beside}. `)];
+    $("other-renderers").hidden = !others;
     if (best) {
       parts.push(document.createTextNode("Least error: "), element("strong", "", best.name));
       const ratio = best.result.error_ratio_to_mis;
@@ -439,7 +510,7 @@
         if (small) made.append(" ", element("small", "", small));
         row.append(made);
       };
-      const off = kind === "rays" ? r.rays / Number(value) - 1 : 0;
+      const off = kind === "rays" && r.rays !== null ? r.rays / Number(value) - 1 : 0;
       const late = kind === "time" ? r.cpu_seconds.mean / parseFloat(value) - 1 : 0;
       const deviation = (part) => Math.abs(part) < 0.02 ? "" : `${part > 0 ? "+" : "−"}${Math.round(100 * Math.abs(part))} %`;
       const ratio = (x) => x === null ? "–" : number(x).toString();
@@ -448,17 +519,18 @@
       cell(r.error_ratio_to_mis === null ? "–" : ratio(1 / r.error_ratio_to_mis));
       cell(biasText(strategy));
       cell(r.flip.toFixed(3), clearest === strategy);
-      cell(r.rays.toFixed(1), false, deviation(off));
-      cell(number(r.cpu_seconds.mean).toString(), false, deviation(late));
+      cell(r.rays === null ? "–" : r.rays.toFixed(1), false, deviation(off));
+      cell(number(r.cpu_seconds.mean).toString(), false, r.spp === null ? "" : deviation(late));
       cell(number(r.efficiency).toLocaleString("en"), fastest === strategy);
       cell(ratio(r.efficiency_ratio_to_mis));
-      cell(r.spp);
+      cell(r.spp === null ? "–" : r.spp);
       body.append(row);
     }
     $("table").append(head, body);
   }
 
   function biasText(strategy) {
+    if (strategy.unbiased === null) return "–";
     if (strategy.unbiased) return "none";
     const { bias, rel_mse } = strategy.result;
     if (bias === null) return "yes";
@@ -472,7 +544,9 @@
     if (kind === "rays") add("Equal rays: as many whole camera samples as come nearest to the budget, by the rays that a pilot traced.");
     if (kind === "time") add("Equal time: the number of camera samples was found by measuring CPU seconds; what the pictures then took is in the table.");
     if (kind === "spp") add("Equal camera samples: rays and time differ.");
-    const biased = report.strategies.filter((s) => !s.unbiased).map((s) => s.name);
+    const biased = report.strategies.filter((s) => s.unbiased === false).map((s) => s.name);
+    const others = report.strategies.filter((s) => s.unbiased === null).map((s) => s.name);
+    if (others.length) add(`By other renderers: ${others.join(", ")}. Their times are as stated, and not measured on this machine by this program.`);
     if (biased.length) add(`Biased: ${biased.join(", ")}. Fixed lights leave an error that more samples do not take away (what does fall is that of edges within pixels); their efficiency says little.`);
     if (measured().every((s) => s.result.error_ratio_to_mis === null)) add("Without mis in the list there is nothing to take ratios to.");
   }
@@ -488,11 +562,11 @@
       ["Budget", report.budget],
       ["Seeds", `${report.seed} to ${report.seed + report.seeds - 1}; the pictures shown are of the first`],
       ["Reference", reference.source === "file" ? reference.file : `${reference.strategy}, ${reference.spp} camera samples a pixel${reference.source === "cache" ? ", from the cache" : ""}`],
-      ["ꟻLIP at", `${report.exposure} EV`],
+      ["ꟻLIP at", `${stops(report.exposure)}, tone curve ${report.tone}`],
       ["Threads", report.threads],
       ["Version", report.version],
     ];
-    for (const strategy of report.strategies) list.push([strategy.name, `${strategy.settings}; setup ${number(strategy.setup_seconds, 2)} CPU s`]);
+    for (const strategy of report.strategies) list.push([strategy.name, strategy.settings + (strategy.unbiased === null ? "" : `; setup ${number(strategy.setup_seconds, 2)} CPU s`)]);
     for (const [term, text] of list) $("settings").append(element("dt", "", term), element("dd", "", String(text)));
   }
 

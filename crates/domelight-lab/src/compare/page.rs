@@ -42,7 +42,7 @@ pub(super) fn page(
         "magma": pixels::colors(ColorScale::Magma),
         "palette": PALETTE.map(|color| color.to_string()),
     });
-    let title = format!("{} under {}", report.scene.scene, report.scene.environment.probe());
+    let title = report.scene.title();
     Ok(fill(
         TEMPLATE,
         &[

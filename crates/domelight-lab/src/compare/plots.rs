@@ -15,28 +15,26 @@ pub(super) enum Cost {
 /// relMSE of every strategy on its way to the budget, both axes logarithmic; bars are ± one standard
 /// deviation over the seeds.
 pub(super) fn convergence(report: &CompareReport, cost: Cost) -> String {
-    let x = |step: &ConvergencePoint| match cost {
-        Cost::Rays => step.rays,
-        Cost::Seconds => step.cpu_seconds.mean,
-    };
     let label = match cost {
         Cost::Rays => "shadow rays a pixel",
         Cost::Seconds => "CPU seconds",
     };
-    let results = || report.strategies.iter().filter_map(|s| Some((s, s.result.as_ref()?)));
-    let steps = || results().flat_map(|(_, result)| &result.convergence);
-    let series = results().enumerate().map(|(i, (strategy, result))| Series {
+    let results = report.strategies.iter().filter_map(|s| Some((s, s.result.as_ref()?)));
+    let series = results.enumerate().map(|(i, (strategy, result))| Series {
         name: strategy.name.clone(),
         color: PALETTE[i % PALETTE.len()],
-        join: if strategy.unbiased { Join::Curve } else { Join::Dashed },
+        join: if strategy.unbiased == Some(false) { Join::Dashed } else { Join::Curve },
         marker: Some(Marker::ALL[i % Marker::ALL.len()]),
-        points: points(result, x),
+        points: points(result, cost),
     });
+    let series: Vec<_> = series.filter(|series| !series.points.is_empty()).collect();
+    let all = || series.iter().flat_map(|series| &series.points);
+    let ends = |datum: &Datum| <[f64; 2]>::from(datum.error.unwrap_or((datum.y, datum.y)));
     let plot = Plot {
         title: String::new(),
-        x: Axis::around(label, Scale::Log, steps().map(x)),
-        y: Axis::around("relMSE", Scale::Log, steps().flat_map(|s| <[f64; 2]>::from(ends(s)))),
-        series: series.collect(),
+        x: Axis::around(label, Scale::Log, all().map(|datum| datum.x)),
+        y: Axis::around("relMSE", Scale::Log, all().flat_map(ends)),
+        series,
         legend: Legend::Above,
     };
     let (width, height) = (500.0, 450.0);
@@ -45,7 +43,19 @@ pub(super) fn convergence(report: &CompareReport, cost: Cost) -> String {
     sheet.to_svg()
 }
 
-fn points(result: &ResultReport, x: impl Fn(&ConvergencePoint) -> f64) -> Vec<Datum> {
+/// The way to the budget; of another renderer's picture one point, and none over rays.
+fn points(result: &ResultReport, cost: Cost) -> Vec<Datum> {
+    if result.convergence.is_empty() {
+        let x = match cost {
+            Cost::Rays => result.rays,
+            Cost::Seconds => Some(result.cpu_seconds.mean),
+        };
+        return x.map(|x| Datum::new(x, result.rel_mse.mean)).into_iter().collect();
+    }
+    let x = |step: &ConvergencePoint| match cost {
+        Cost::Rays => step.rays,
+        Cost::Seconds => step.cpu_seconds.mean,
+    };
     let datum = |step: &ConvergencePoint| Datum {
         error: step.rel_mse.sd.is_some().then(|| ends(step)),
         ..Datum::new(x(step), step.rel_mse.mean)

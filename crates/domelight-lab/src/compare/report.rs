@@ -20,7 +20,7 @@ pub struct CompareReport {
     /// What was rendered.
     pub scene: SceneReport,
     /// Which points a pixel has.
-    pub sampler: String,
+    pub sampler: &'static str,
     /// The pixel filter.
     pub filter: &'static str,
     /// The first one.
@@ -29,8 +29,10 @@ pub struct CompareReport {
     pub seeds: u32,
     /// How many worked.
     pub threads: usize,
-    /// At which ꟻLIP saw the pictures \[stops\].
+    /// At which the page opens and ꟻLIP saw the pictures \[stops\].
     pub exposure: f32,
+    /// The tone curve of both.
+    pub tone: &'static str,
     /// What the pictures were measured against.
     pub reference: ReferenceReport,
     /// In the order in which they were given.
@@ -44,8 +46,8 @@ pub struct StrategyReport {
     pub name: String,
     /// In full.
     pub settings: String,
-    /// If false, its error does not fall to 0.
-    pub unbiased: bool,
+    /// If false, its error does not fall to 0; null of another renderer's picture, of which nothing is known.
+    pub unbiased: Option<bool>,
     /// CPU seconds for tables and lights, once for all pictures.
     pub setup_seconds: f64,
     /// Why it was left out; null if it was not, and then there is a result.
@@ -57,13 +59,13 @@ pub struct StrategyReport {
 /// What a strategy did with the budget.
 #[derive(Clone, Debug, Serialize)]
 pub struct ResultReport {
-    /// As asked for.
-    pub spp: u32,
-    /// Camera samples of a pixel, as counted; the mean over seeds.
-    pub camera_samples: f64,
-    /// Shadow rays of a pixel that the scene covers, as counted; the mean over seeds.
-    pub rays: f64,
-    /// Of rendering alone.
+    /// As asked for; null of another renderer's picture.
+    pub spp: Option<u32>,
+    /// Camera samples of a pixel, as counted; the mean over seeds. Null of another renderer's picture.
+    pub camera_samples: Option<f64>,
+    /// Shadow rays of a pixel that the scene covers, as counted; the mean over seeds. Null of another renderer's picture.
+    pub rays: Option<f64>,
+    /// Of rendering alone; of another renderer's picture as it was stated.
     pub cpu_seconds: MeanAndDeviation,
     /// Against the reference, over all pixels.
     pub rel_mse: MeanAndDeviation,
@@ -82,7 +84,7 @@ pub struct ResultReport {
     pub efficiency_ratio_to_mis: Option<f64>,
     /// Camera samples that were NaN or infinite, over all seeds.
     pub non_finite_samples: u64,
-    /// On the way to the budget.
+    /// On the way to the budget; empty of another renderer's picture.
     pub convergence: Vec<ConvergencePoint>,
 }
 

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::budget::{Budget, MOST_SAMPLES};
 use crate::Error;
+use crate::measure::Reference;
 use crate::measure::render::{Render, RenderSetup};
 
 /// How far beyond its budget a strategy may be where it cannot meet it.
@@ -15,10 +16,44 @@ const MOST_EXCESS: f64 = 1.5;
 const HALVINGS: u32 = 4;
 
 /// How many camera samples of each pixel a budget buys.
+#[derive(Clone, Debug)]
 pub(super) enum SampleCount {
     Samples(u32),
     /// Not one, and why.
     OverBudget(String),
+}
+
+/// What a budget buys, and a picture of about its size.
+pub(super) struct Calibration {
+    pub(super) samples: SampleCount,
+    /// None where the budget buys nothing.
+    pub(super) pilot: Option<Pilot>,
+}
+
+/// A picture that was made to calibrate.
+pub(super) struct Pilot {
+    n_samples: u32,
+    image: RgbImage,
+}
+
+impl Pilot {
+    pub(super) fn new(n_samples: u32, image: RgbImage) -> Self {
+        Self { n_samples, image }
+    }
+
+    /// About the relMSE that a picture of `n_samples` has, where the reference's own is `noise`.
+    pub(super) fn error_at(
+        &self,
+        n_samples: u32,
+        reference: &RgbImage,
+        noise: f64,
+    ) -> Result<f64, Error> {
+        /// The part of a measured error that remains at least.
+        const LEAST_PART: f64 = 0.1;
+        let measured = compare(&self.image, reference, None)?.rel_mse;
+        let own = (measured - noise).max(LEAST_PART * measured);
+        Ok(own * f64::from(self.n_samples) / f64::from(n_samples))
+    }
 }
 
 /// A mean over seeds and its standard deviation.
@@ -31,6 +66,11 @@ pub struct MeanAndDeviation {
 }
 
 impl MeanAndDeviation {
+    /// Of a single value.
+    pub(super) fn single(mean: f64) -> Self {
+        Self { mean, sd: None }
+    }
+
     fn of(values: &[f64]) -> Self {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
@@ -52,6 +92,11 @@ pub struct ConvergencePoint {
     pub cpu_seconds: MeanAndDeviation,
     /// Against the reference, over all pixels.
     pub rel_mse: MeanAndDeviation,
+}
+
+/// Camera samples of each pixel of all pictures that are measured, in multiples of the budget's.
+pub(super) fn samples_to_measure(n_seeds: u32) -> f64 {
+    f64::from(n_seeds) * (2.0 - 0.5f64.powi(HALVINGS as i32))
 }
 
 /// relMSE that no more samples take away. An estimate, which may be below 0.
@@ -78,9 +123,6 @@ pub(super) struct StrategyRun<'a> {
     pub(super) render_setup: RenderSetup<'a>,
     /// For the progress bar.
     pub(super) label: String,
-    pub(super) reference: &'a RgbImage,
-    /// relMSE of the reference itself, as far as it is known.
-    pub(super) reference_noise: f64,
     pub(super) n_seeds: u32,
 }
 
@@ -92,9 +134,12 @@ impl StrategyRun<'_> {
     }
 
     /// What the budget buys.
-    pub(super) fn calibrate(&self, budget: Budget) -> Result<SampleCount, Error> {
+    pub(super) fn calibrate(&self, budget: Budget) -> Result<Calibration, Error> {
         match budget {
-            Budget::Samples(n) => Ok(SampleCount::Samples(n)),
+            Budget::Samples(n) => {
+                let pilot = Some(Pilot::new(n, self.pilot(n)?.layers.color));
+                Ok(Calibration { samples: SampleCount::Samples(n), pilot })
+            }
             Budget::Rays(rays) => self.calibrate_rays(rays),
             Budget::Time(seconds) => self.calibrate_time(seconds),
         }
@@ -102,52 +147,67 @@ impl StrategyRun<'_> {
 
     /// Goes from pilot to pilot, as strategies that learn trace fewer rays for a camera sample the more there are, and
     /// takes the number whose rays came nearest.
-    fn calibrate_rays(&self, rays: f64) -> Result<SampleCount, Error> {
+    fn calibrate_rays(&self, rays: f64) -> Result<Calibration, Error> {
         const MOST_PILOTS: usize = 4;
         let each = self.pilot(4)?.rays() / 4.0;
         let mut purchase = sample_count(rays, each, &format!("traces {each:.1} shadow rays"));
         let mut tried: Vec<(u32, f64)> = Vec::new();
+        let off = |traced: f64| (traced / rays).ln().abs();
+        let mut nearest: Option<(f64, Pilot)> = None;
         while let SampleCount::Samples(n) = purchase {
             if tried.len() == MOST_PILOTS || tried.iter().any(|&(m, _)| m == n) {
                 break;
             }
-            let traced = self.pilot(n)?.rays();
+            let render = self.pilot(n)?;
+            let traced = render.rays();
             tried.push((n, traced));
+            if nearest.as_ref().is_none_or(|(least, _)| off(traced) < *least) {
+                nearest = Some((off(traced), Pilot::new(n, render.layers.color)));
+            }
             purchase = sample_count(rays, traced / f64::from(n), "");
         }
-        let off = |traced: f64| (traced / rays).ln().abs();
-        let nearest = tried.into_iter().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
-        Ok(nearest.map_or(purchase, |(n, _)| SampleCount::Samples(n)))
+        let pilot = nearest.map(|(_, pilot)| pilot);
+        let samples = pilot.as_ref().map(|pilot| SampleCount::Samples(pilot.n_samples));
+        Ok(Calibration { samples: samples.unwrap_or(purchase), pilot })
     }
 
     /// Doubles the samples until they take an eighth of the time, then goes along the line through
     /// the last two.
-    fn calibrate_time(&self, seconds: f64) -> Result<SampleCount, Error> {
+    fn calibrate_time(&self, seconds: f64) -> Result<Calibration, Error> {
         self.pilot(1)?; // warms the caches
-        let mut last = (1, self.pilot(1)?.seconds());
+        let mut render = self.pilot(1)?;
+        let mut last = (1, render.seconds());
         let mut before = (0, 0.0);
         while last.1 < seconds / 8.0 && last.0 < MOST_SAMPLES {
             let n = last.0 * 2;
-            (before, last) = (last, (n, self.pilot(n)?.seconds()));
+            render = self.pilot(n)?;
+            (before, last) = (last, (n, render.seconds()));
         }
         let slope = (last.1 - before.1) / f64::from(last.0 - before.0);
         let each = if slope > 0.0 { slope } else { last.1 / f64::from(last.0) };
         let fixed = (last.1 - each * f64::from(last.0)).max(0.0);
-        Ok(sample_count(seconds - fixed, each, &format!("takes {:.3} CPU seconds", fixed + each)))
+        let one_sample = format!("takes {:.3} CPU seconds", fixed + each);
+        let samples = sample_count(seconds - fixed, each, &one_sample);
+        Ok(Calibration { samples, pilot: Some(Pilot::new(last.0, render.layers.color)) })
     }
 
     /// Renders all seeds at the number of samples and its halves.
-    pub(super) fn measure(&self, n_samples: u32) -> Result<StrategyMeasurement, Error> {
+    pub(super) fn measure(
+        &self,
+        n_samples: u32,
+        reference: &Reference,
+    ) -> Result<StrategyMeasurement, Error> {
+        let image = &reference.picture.image;
         let mut steps = Vec::new();
         for halving in (1..=HALVINGS).rev() {
             let n = n_samples >> halving;
             if n > 0 {
-                steps.push(self.step(n, |_| {})?);
+                steps.push(self.step(n, image, |_| {})?);
             }
         }
         let mut pictures = PictureSum::default();
-        steps.push(self.step(n_samples, |render| pictures.add(render, self.reference))?);
-        let bias = pictures.bias(self.reference_noise);
+        steps.push(self.step(n_samples, image, |render| pictures.add(render, image))?);
+        let bias = pictures.bias(reference.report.rel_mse.unwrap_or(0.0));
         let PictureSum { first, non_finite, .. } = pictures;
         let image = first.unwrap_or_else(|| RgbImage::new(0, 0, Vec::new()));
         Ok(StrategyMeasurement { steps, image, bias, non_finite })
@@ -156,6 +216,7 @@ impl StrategyRun<'_> {
     fn step(
         &self,
         n_samples: u32,
+        reference: &RgbImage,
         mut see: impl FnMut(&Render),
     ) -> Result<ConvergencePoint, Error> {
         let (mut camera_samples, mut rays) = (0.0, 0.0);
@@ -168,7 +229,7 @@ impl StrategyRun<'_> {
             camera_samples += render.camera_samples() / f64::from(of);
             rays += render.rays() / f64::from(of);
             seconds.push(render.seconds());
-            errors.push(compare(&render.layers.color, self.reference, None)?.rel_mse);
+            errors.push(compare(&render.layers.color, reference, None)?.rel_mse);
             see(&render);
         }
         let (cpu_seconds, rel_mse) =

@@ -23,6 +23,7 @@ use domelight::scene::{Camera, EnvironmentSettings, EnvironmentSource, Scene, Sc
 use domelight::strategy::{PreparedStrategy, StrategySpec};
 
 use super::FigureSettings;
+use crate::names::shared_word;
 use crate::scene::{
     BUILTIN_ROWS, FileSettings, LightSettings, close_up, load_scene, probe_name, view_of,
 };
@@ -183,7 +184,8 @@ impl<'a> FigureContext<'a> {
 fn common_arguments(settings: &FigureSettings) -> Code<Shell> {
     let mut text = Code::default();
     let mut add = |flag: &'static str, value: String| {
-        text += code!(Shell, " {flag} {value}", flag = flag, value = shell::word(&value));
+        text +=
+            code!(Shell, " {flag} {value}", flag = flag, value = shell::word(&shared_word(&value)));
     };
     let environment: &LightSettings = &settings.environment;
     if settings.scene != BuiltinScene::Statue.name() {

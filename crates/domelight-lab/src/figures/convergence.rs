@@ -198,19 +198,21 @@ fn outliers(sampled: &[Curve]) -> Code<Html> {
     let steep = sentence(
         &steep,
         "Steeper",
-        "its candidates or tries grow with its rays, or its first counts are too small for the law to hold",
+        "with few rays its errors hang on single samples, as its bars show, so that the slope is not settled",
     );
     html::text(&(flat + &steep))
 }
 
 /// Whether stratification pays here.
 fn verdict(independent: &[Curve], sobol: &[Curve]) -> &'static str {
-    let mean = |curves: &[Curve]| {
-        curves.iter().map(Curve::slope).sum::<f64>() / curves.len().max(1) as f64
+    let median = |curves: &[Curve]| {
+        let mut slopes: Vec<f64> = curves.iter().map(Curve::slope).collect();
+        slopes.sort_by(f64::total_cmp);
+        slopes[slopes.len() / 2]
     };
-    match mean(sobol) - mean(independent) {
-        d if d < -0.03 => ": they fall faster",
-        d if d > 0.03 => ": they fall no faster here",
+    match median(sobol) - median(independent) {
+        d if d < -0.03 => ": most fall faster",
+        d if d > 0.03 => ": most fall no faster here",
         _ => ": about as fast",
     }
 }

@@ -111,7 +111,7 @@ const CAPTION: &str = "<p>One camera ray a pixel, the same in all pictures; what
     multiple importance sampling (power heuristic, compensated), and 15 shadow rays resampled from 800 candidates \
     (SIR), which took the same time in 2005. They no longer do: a shadow ray is now cheaper than a candidate. So MIS \
     stands there once more, with as many samples as it gets in the time of SIR; and so does the product \
-    of light and BRDF from a table of each pixel (the strategy <code>product</code>), with as many rays as SIR. The second row gives \
+    of light and BRDF from a table of each pixel (the strategy <code>product</code>), with as many rays as SIR; it is made for pixels of several camera rays, which share a table. The second row gives \
     all the time of the environment’s 100 samples, their counts calibrated by measurement: SIR with the \
     lecture’s ratio of candidates to rays, and with the ratio that suits what they cost here. Under each picture \
     stand its error against the converged one (relMSE: mean of (I − R)² / (R² + 0.01) over the pixels that show the \

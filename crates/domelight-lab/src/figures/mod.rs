@@ -72,6 +72,30 @@ pub struct DrawnFigure {
     pub seconds: f64,
 }
 
+/// The names of what [`draw`] writes into its folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileNames {
+    /// Of the page and the drawings, and tables that a figure may have.
+    pub files: Vec<String>,
+    /// Of folders of pictures.
+    pub folders: Vec<String>,
+}
+
+/// What [`draw`] may write for `only` these figures, or for all.
+pub fn names_of_files(only: &[u8]) -> FileNames {
+    let numbers = || numbers(only);
+    let of_figure = |n| ["png", "csv", "json"].map(|extension| format!("figure-{n}.{extension}"));
+    FileNames {
+        files: numbers().flat_map(of_figure).chain([page::NAME.to_owned()]).collect(),
+        folders: numbers().map(|n| format!("figure-{n}")).collect(),
+    }
+}
+
+/// The figures that are drawn.
+fn numbers(only: &[u8]) -> impl Iterator<Item = u8> {
+    (1..=N_FIGURES).filter(|n| only.is_empty() || only.contains(n))
+}
+
 /// Draws figures into a folder, with a page that shows them. `only` are the numbers of the figures, from 1 to
 /// [`N_FIGURES`]; none are all. After an error what is done stays, on the page as well.
 ///
@@ -82,7 +106,7 @@ pub fn draw(context: &FigureContext, only: &[u8], folder: &Path) -> Result<Drawn
     let host = context.host;
     let mut figures = Vec::new();
     let mut drawn = DrawnFigures { page: folder.join(page::NAME), figures: Vec::new() };
-    for number in (1..=N_FIGURES).filter(|n| only.is_empty() || only.contains(n)) {
+    for number in numbers(only) {
         let start = Instant::now();
         let made = make(context, number).and_then(|figure| {
             figure.write(folder, context.choose(1.5, 0.75), host)?;

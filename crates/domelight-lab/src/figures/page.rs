@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::Error;
+use crate::names::display_name;
 use domelight::code;
 use domelight::quote::{Code, Html, html};
 use serde_json::Value;
@@ -54,8 +55,8 @@ fn page(context: &FigureContext, figures: &[Figure]) -> Code<Html> {
         font = Code::<Html>::generated(font_face_css()),
         math_font = math_font_css(),
         style = STYLE,
-        scene = html::text(&context.scene),
-        probe = html::text(&context.probe),
+        scene = html::text(&display_name(&context.scene)),
+        probe = html::text(&display_name(&context.probe)),
         width = map.width,
         height = map.height,
         version = env!("CARGO_PKG_VERSION"),

@@ -26,11 +26,7 @@ const SIDE: f64 = 256.0;
 pub(super) fn page(inspection: &Inspection) -> Result<Code<Html>, Error> {
     let report = inspection.report();
     let [x, y] = report.pixel.pixel;
-    let title = format!(
-        "Pixel {x}, {y} of {} under {}",
-        report.scene.scene,
-        report.scene.environment.probe()
-    );
+    let title = format!("Pixel {x}, {y} of {}", report.scene.title());
     let lead = lead(&report);
     let (maps, densities) = match &inspection.hemisphere {
         None => {

@@ -4,8 +4,9 @@
 mod cache;
 mod reference;
 pub(crate) mod render;
+pub(crate) mod work;
 
 pub use cache::Cache;
 pub(crate) use cache::Key;
 pub use reference::{Goal, Reference, ReferencePicture, ReferenceReport, Source};
-pub(crate) use reference::{MIS, PRODUCT};
+pub(crate) use reference::{MIS, PRODUCT, ReferenceRun};

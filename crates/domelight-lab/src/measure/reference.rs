@@ -12,7 +12,8 @@ use domelight::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
 use super::cache::{Cache, Key};
-use super::render::RenderSetup;
+use super::render::{RenderSetup, Shown};
+use crate::names::file_name;
 use crate::scene::View;
 use crate::{At as _, Error, Host};
 
@@ -63,7 +64,7 @@ pub struct ReferencePicture {
 pub struct ReferenceReport {
     /// File, cache or render.
     pub source: Source,
-    /// Where it is kept.
+    /// The name of the file that it is kept in, without the folder.
     pub file: Option<String>,
     /// How it was rendered; null for files.
     pub strategy: Option<String>,
@@ -198,7 +199,7 @@ impl Reference {
         }
         let report = ReferenceReport {
             source: Source::File,
-            file: Some(name),
+            file: Some(file_name(&name)),
             strategy: None,
             spp: None,
             rel_mse: None,
@@ -218,7 +219,7 @@ impl Reference {
     ) -> Result<Self, Error> {
         let report = |source, file: Option<&Path>, noise: Noise, spp| ReferenceReport {
             source,
-            file: file.map(|path| path.display().to_string()),
+            file: file.map(|path| file_name(&path.to_string_lossy())),
             strategy: Some(strategy.to_owned()),
             spp: Some(spp),
             rel_mse: Some(noise.all),
@@ -251,6 +252,25 @@ impl Reference {
         goal: Goal,
         host: &dyn Host,
     ) -> Result<Self, Error> {
+        ReferenceRun { cache, view, strategy, settings, shown: Shown::Alone, host }.reach(goal)
+    }
+}
+
+/// How a reference of a view is made.
+#[derive(Clone, Copy)]
+pub(crate) struct ReferenceRun<'a> {
+    pub(crate) cache: Option<&'a Cache>,
+    pub(crate) view: View<'a>,
+    pub(crate) strategy: StrategySpec,
+    pub(crate) settings: RenderSettings,
+    pub(crate) shown: Shown<'a>,
+    pub(crate) host: &'a dyn Host,
+}
+
+impl ReferenceRun<'_> {
+    /// From the cache, else rendered and kept.
+    pub(crate) fn reach(self, goal: Goal) -> Result<Reference, Error> {
+        let Self { cache, view, strategy, settings, shown, host } = self;
         let settings = RenderSettings { n_samples: 0, seed: SEEDS[0], ..settings };
         let key = |cache| {
             (cache, Key::of_program(cache, view, format_args!("{settings:?}{strategy}{goal:?}")))
@@ -258,8 +278,8 @@ impl Reference {
         let keyed = cache.map(key);
         let keyed = keyed.as_ref().map(|(cache, key)| (*cache, key));
         let prepared = host.prepare(strategy, view.environment)?;
-        let render_setup = RenderSetup { view, settings, strategy: &prepared, host, shown: true };
-        Self::get(keyed, goal, &strategy.description(), host, |n_samples, half| {
+        let render_setup = RenderSetup { view, settings, strategy: &prepared, host, shown };
+        Reference::get(keyed, goal, &strategy.description(), host, |n_samples, half| {
             let label = format!("reference, half {} of 2", half + 1);
             Ok(render_setup.render(&label, n_samples, SEEDS[half])?.layers.into())
         })

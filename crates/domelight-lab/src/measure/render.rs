@@ -3,6 +3,7 @@
 use domelight::render::{Counts, Layers, Observer, RenderSettings, Renderer};
 use domelight::strategy::Strategy;
 
+use super::work::WorkStage;
 use crate::scene::View;
 use crate::usage::{Seconds, Stopwatch};
 use crate::{Error, Host};
@@ -33,6 +34,17 @@ impl<S: Strategy> Picturing for S {
     }
 }
 
+/// How the host shows the progress of a render.
+#[derive(Clone, Copy)]
+pub(crate) enum Shown<'a> {
+    /// Not at all.
+    Unseen,
+    /// Alone.
+    Alone,
+    /// As a part of work of many renders.
+    PartOf(WorkStage<'a>),
+}
+
 /// What all renders of a strategy share.
 #[derive(Clone, Copy)]
 pub(crate) struct RenderSetup<'a> {
@@ -41,8 +53,8 @@ pub(crate) struct RenderSetup<'a> {
     pub(crate) settings: RenderSettings,
     pub(crate) strategy: &'a dyn Picturing,
     pub(crate) host: &'a dyn Host,
-    /// The host shows the progress.
-    pub(crate) shown: bool,
+    /// How the host shows the progress.
+    pub(crate) shown: Shown<'a>,
 }
 
 /// A picture and what it cost.
@@ -76,9 +88,16 @@ impl RenderSetup<'_> {
         let settings = RenderSettings { n_samples, seed, ..self.settings };
         let mut watch = Stopwatch::start();
         let host = self.host;
-        let observer = if self.shown { host.progress(label, &settings) } else { host.unseen() };
+        let observer = match self.shown {
+            Shown::Unseen => host.unseen(),
+            Shown::Alone => host.progress(label, &settings),
+            Shown::PartOf(stage) => stage.progress(label, &settings),
+        };
         let picture = self.strategy.picture(self.view, &settings, &*observer);
         let time = watch.lap();
+        if let Shown::PartOf(stage) = self.shown {
+            stage.measured(n_samples, time.wall);
+        }
         let Some((layers, counts)) = picture else {
             return Err(Error::Interrupted("; no report was written"));
         };

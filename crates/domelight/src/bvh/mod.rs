@@ -226,7 +226,7 @@ impl Bvh {
     }
 
     /// What share of light gets along each ray of a batch, to infinity: the product of `of_hit`, in \[0, 1\], over all
-    /// triangles that it meets; 1 where it meets none.
+    /// triangles that it meets; 1 where it meets none. `of_hit` gets the ray's number in the batch and the hit.
     ///
     /// A ray's answer has the same bits whatever rays go with it. `transmittances` is overwritten, one entry a ray.
     ///
@@ -235,7 +235,7 @@ impl Bvh {
     pub fn transmittances(
         &self,
         rays: &RayBatch,
-        of_hit: &dyn Fn(&Hit) -> f32,
+        of_hit: &dyn Fn(usize, &Hit) -> f32,
         transmittances: &mut Vec<f32>,
     ) {
         assert!(rays.directions.len() >= rays.origins.len(), "a ray without a direction");

@@ -127,7 +127,7 @@ impl Kernel for Occluded<'_> {
 pub(super) struct Transmittances<'a> {
     pub(super) bvh: &'a Bvh,
     pub(super) rays: &'a RayBatch,
-    pub(super) of_hit: &'a dyn Fn(&Hit) -> f32,
+    pub(super) of_hit: &'a dyn Fn(usize, &Hit) -> f32,
     pub(super) answers: &'a mut [f32],
 }
 
@@ -755,7 +755,7 @@ impl Stream for TransmittanceStream {
     };
 
     type Rays<'a> = ShadowRays<'a>;
-    type Context<'a> = &'a dyn Fn(&Hit) -> f32;
+    type Context<'a> = &'a dyn Fn(usize, &Hit) -> f32;
     type Answer = f32;
 
     #[inline(always)]
@@ -774,14 +774,19 @@ impl Stream for TransmittanceStream {
     }
 
     #[inline(always)]
-    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh, of_hit: &dyn Fn(&Hit) -> f32) -> bool {
+    fn advance<S: Simd>(
+        &mut self,
+        simd: S,
+        bvh: &Bvh,
+        of_hit: &dyn Fn(usize, &Hit) -> f32,
+    ) -> bool {
         let Some((child, rays)) = self.stack.pop(self.free) else { return false };
         if child.is_leaf() {
             for i in set_bits(rays) {
                 let mut transmittance = self.transmittances[i];
                 for_hits_in_block(simd, bvh, child, &self.rays, i, f32::MAX, |hit| {
                     if transmittance > 0.0 {
-                        transmittance *= of_hit(&hit);
+                        transmittance *= of_hit(self.members[i], &hit);
                     }
                 });
                 self.transmittances[i] = transmittance;

@@ -99,6 +99,14 @@ impl FileLedger {
         }
     }
 
+    /// A file that was declared as read and lies in a folder, if there is one.
+    pub fn read_in(&self, folder: &Path) -> Option<&Path> {
+        let folder = fs::canonicalize(folder).ok()?;
+        let is_inside =
+            |path: &Path| fs::canonicalize(path).is_ok_and(|path| path.parent() == Some(&*folder));
+        self.read.iter().map(|(path, _)| path.as_path()).find(|path| is_inside(path))
+    }
+
     /// Declares that `path` is written; `-` is standard output.
     ///
     /// # Errors

@@ -108,6 +108,13 @@ impl Mesh {
         bytes as u64
     }
 
+    /// The normal of a triangle's front, twice its area long.
+    #[inline]
+    pub(crate) fn area_normal(&self, triangle: usize) -> Vec3 {
+        let [a, b, c] = self.triangles[triangle].map(|i| self.positions[i as usize]);
+        (b - a).cross(c - a)
+    }
+
     /// The bounds of all vertices.
     pub fn bounds(&self) -> Aabb {
         Aabb::around(self.positions.iter().copied())
@@ -143,13 +150,18 @@ impl Mesh {
         }
     }
 
-    /// Replaces the normals by the area-weighted mean of the faces round each vertex.
+    /// Replaces the normals by the area-weighted mean of the faces round each vertex; a face at a vertex that is not finite
+    /// does not count.
     pub fn compute_normals(&mut self) {
         let mut normals = vec![Vec3::ZERO; self.positions.len()];
-        let unit = power_of_two(self.bounds().size().max_element());
+        let finite = self.positions.iter().copied().filter(|position| position.is_finite());
+        let unit = power_of_two(Aabb::around(finite).size().max_element());
         for &[a, b, c] in &self.triangles {
             let [pa, pb, pc] = [a, b, c].map(|i| self.positions[i as usize] / unit);
             let area = (pb - pa).cross(pc - pa);
+            if !area.is_finite() {
+                continue;
+            }
             for i in [a, b, c] {
                 normals[i as usize] += area;
             }

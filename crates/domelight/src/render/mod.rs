@@ -55,6 +55,16 @@ pub enum Background {
     Hidden,
 }
 
+impl Background {
+    /// The name in checkpoints.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Shown => "shown",
+            Self::Hidden => "hidden",
+        }
+    }
+}
+
 /// How camera samples are divided into passes over the picture.
 ///
 /// Strategies that learn nothing give the same picture with any.
@@ -65,6 +75,16 @@ pub enum Passes {
     Efficient,
     /// 1, 1, 2, 4, … samples, up to the length of [`Passes::Efficient`]: a first picture soon.
     Doubling,
+}
+
+impl Passes {
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Efficient => "efficient",
+            Self::Doubling => "doubling",
+        }
+    }
 }
 
 /// How to render.

@@ -202,13 +202,20 @@ impl<'a, S: Strategy> Renderer<'a, S> {
 
     /// Renders the next pass. Returns false when there was nothing left to render.
     pub fn step(&mut self) -> bool {
-        self.pass(&()) != PassEnd::NothingLeft
+        self.pass(&(), u32::MAX) != PassEnd::NothingLeft
     }
 
     /// Renders the next pass, or what the observer lets be done of it. Returns false when there was nothing left to
     /// render.
     pub fn step_with(&mut self, observer: &impl Observer) -> bool {
-        self.pass(observer) != PassEnd::NothingLeft
+        self.pass(observer, u32::MAX) != PassEnd::NothingLeft
+    }
+
+    /// As [`Self::step_with`], with a pass of no more than `most` camera samples a pixel, at least 1: for renders that
+    /// end at a set time. A strategy that learns within a pass then makes another picture than with passes of full
+    /// length. With a target error passes keep their lengths.
+    pub fn step_at_most(&mut self, most: u32, observer: &impl Observer) -> bool {
+        self.pass(observer, most.max(1)) != PassEnd::NothingLeft
     }
 
     /// Renders all that is missing and returns the film.
@@ -221,7 +228,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     /// from there. Returns whether all samples of all pixels are there.
     pub fn run(&mut self, observer: &(impl Observer + ?Sized)) -> bool {
         loop {
-            match self.pass(observer) {
+            match self.pass(observer, u32::MAX) {
                 PassEnd::Complete => {}
                 PassEnd::Canceled => return false,
                 PassEnd::NothingLeft => return true,
@@ -229,8 +236,8 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         }
     }
 
-    /// Renders one pass over the tiles that are behind.
-    fn pass(&mut self, observer: &(impl Observer + ?Sized)) -> PassEnd {
+    /// Renders one pass of no more than `most` samples over the tiles that are behind.
+    fn pass(&mut self, observer: &(impl Observer + ?Sized), most: u32) -> PassEnd {
         let Some(start) = self.unfinished().map(Tile::n_samples).min() else {
             return PassEnd::NothingLeft;
         };
@@ -239,8 +246,8 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         }
         self.mark.0 += 1;
         let pass = match self.interrupted.take() {
-            Some((of, pass)) if of == start => pass,
-            _ => self.begin_pass(start),
+            Some((of, pass)) if of == start && pass.n_samples <= most => pass,
+            _ => self.begin_pass(start, most),
         };
         observer.pass_started(start..start + pass.n_samples);
         let Self { context, strategy, tiles, mark, .. } = self;
@@ -266,13 +273,16 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         PassEnd::Canceled
     }
 
-    /// Prepares the pass that begins at sample `start`.
-    fn begin_pass(&self, start: u32) -> Pass<S> {
+    /// Prepares the pass that begins at sample `start`, of no more than `most` samples.
+    fn begin_pass(&self, start: u32, most: u32) -> Pass<S> {
         let Self { context, strategy, tiling, .. } = self;
         let (strategy, settings): (&S, _) = (strategy, &context.settings);
         let left = settings.n_samples - start;
         let (samples, set) = match settings.target_error {
-            None => (tiling.pass(strategy, settings.passes, start, left), SampleSet::First),
+            None => {
+                let pass = tiling.pass(strategy, settings.passes, start, left.min(most));
+                (pass, SampleSet::First)
+            }
             Some(_) => paired_pass(start, settings.n_samples),
         };
         let sampler = Sampler::for_pass(settings.sampler, settings.seed, start);
@@ -305,6 +315,20 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         };
         let area: usize = self.tiles.iter().map(|tile| tile.window.area()).sum();
         if area == 0 { 1.0 } else { self.tiles.iter().map(done).sum::<f64>() / area as f64 }
+    }
+
+    /// The share of the pixels that the next pass renders, in [0, 1]: all, unless an observer ended the last pass.
+    pub fn share_behind(&self) -> f64 {
+        let behind = self.unfinished().map(Tile::n_samples).min();
+        let behind = |tile: &&Tile| Some(tile.n_samples()) == behind;
+        let area = |tile: &Tile| tile.window.area() as f64;
+        let all: f64 = self.tiles.iter().map(area).sum();
+        self.unfinished().filter(behind).map(area).sum::<f64>() / all.max(1.0)
+    }
+
+    /// The least number of camera samples that a tile has.
+    pub fn least_samples(&self) -> u32 {
+        self.tiles.iter().map(Tile::n_samples).min().unwrap_or(0)
     }
 
     /// This moment, to ask later which tiles have changed since.

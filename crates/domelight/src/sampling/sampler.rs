@@ -17,6 +17,16 @@ pub enum SamplerKind {
     Independent,
 }
 
+impl SamplerKind {
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sobol => "sobol",
+            Self::Independent => "independent",
+        }
+    }
+}
+
 /// What a set of numbers is for. Each names a padded set of four dimensions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]

@@ -7,8 +7,12 @@
 //! of its own, so that what is seen through several layers is their product. One that transmits is met with the
 //! probability p = max(1 − max(T), ¼) where it is there, and the sample's weight is 1/p if it is met, T/(1 − p) if not. A
 //! shadow ray takes the product of what all surfaces along it let through, without noise, by the mean of T's channels at
-//! normal incidence. A single-sided surface is not there for a camera ray that
-//! comes from behind; its shadow falls from either side, as that of a closed body does.
+//! normal incidence.
+//!
+//! A single-sided surface is not there for a camera ray that comes from behind, so that a closed body is met once. Its
+//! shadow falls from either side, but T counts once a body for light, too: where light comes upon the front, that is
+//! where the shadow ray leaves the body. So light is tinted that falls into a body, through it, or through an open pane
+//! that faces the light.
 
 use std::cell::RefCell;
 
@@ -17,6 +21,7 @@ use super::{AlphaMode, Coverage, Material, Part, Scene};
 use crate::Rgb;
 use crate::bvh::{Bvh, Frustum};
 use crate::geometry::{Hit, Ray, RayBatch};
+use crate::math::Vec3;
 use crate::sampling::{rng::hash2, sobol};
 
 /// The triangles that may not hide what is behind them.
@@ -177,10 +182,10 @@ impl Scene {
         if !material.transmits() {
             return Layer { probability: coverage, ..Layer::default() };
         }
-        let [a, b, c] = part.mesh.triangles[triangle].map(|i| part.mesh.positions[i as usize]);
-        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let normal = part.mesh.area_normal(triangle).normalize_or_zero();
         let cos_theta = normal.dot(ray.direction.normalize()).abs();
-        let through = self.transmittance(part, triangle, hit, coverage, cos_theta);
+        let body = self.transmittance(part, triangle, hit, cos_theta);
+        let through = Rgb::splat(1.0 - coverage) + body * coverage;
         let probability = (1.0 - through.max_component()).max(LEAST_REFLECTED * coverage);
         Layer {
             transmits: true,
@@ -190,21 +195,31 @@ impl Scene {
         }
     }
 
-    /// The share of each channel of light that a surface lets through at a hit, where the share `coverage` of it is there.
-    fn transmittance(
+    /// The share T of each channel of light that a surface lets through at a hit where it is there.
+    fn transmittance(&self, part: &Part, triangle: usize, hit: &Hit, cos_theta: f32) -> Rgb {
+        let corners = Corners::new(&part.mesh, triangle, hit);
+        let tint = corners.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
+        let uvs = corners.uvs(&part.mesh);
+        self.materials[part.material].transmittance(&self.textures, &uvs, tint, cos_theta)
+    }
+
+    /// The mean share of light that a surface that transmits lets through to a shadow ray in `direction`, where it is
+    /// there. Light that leaves a single-sided body has been tinted where it entered; what lets nothing through hides
+    /// light from either side.
+    fn shadow_transmittance(
         &self,
         part: &Part,
         triangle: usize,
         hit: &Hit,
-        coverage: f32,
-        cos_theta: f32,
-    ) -> Rgb {
-        let corners = Corners::new(&part.mesh, triangle, hit);
-        let tint = corners.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
-        let uvs = corners.uvs(&part.mesh);
-        let material = &self.materials[part.material];
-        let body = material.transmittance(&self.textures, &uvs, tint, cos_theta);
-        Rgb::splat(1.0 - coverage) + body * coverage
+        direction: Vec3,
+    ) -> f32 {
+        let through = self.transmittance(part, triangle, hit, 1.0).mean();
+        let is_front = || part.mesh.area_normal(triangle).dot(direction) > 0.0;
+        if self.materials[part.material].double_sided || through <= 0.0 || is_front() {
+            through
+        } else {
+            1.0
+        }
     }
 
     /// Whether a camera ray within the frustum may see anything; false only if none does.
@@ -226,12 +241,14 @@ impl Scene {
             transmittances.resize(rays.len(), 1.0);
             return;
         };
-        let of_hit = |hit: &Hit| {
+        let of_hit = |ray: usize, hit: &Hit| {
             let hit = partial.in_scene(hit);
             let coverage = self.opacity(&hit);
             let (part, triangle) = self.locate(hit.triangle);
             if self.transmits && self.materials[part.material].transmits() {
-                return self.transmittance(part, triangle, &hit, coverage, 1.0).mean();
+                let direction = rays.directions[ray];
+                let body = self.shadow_transmittance(part, triangle, &hit, direction);
+                return 1.0 - coverage + body * coverage;
             }
             1.0 - coverage
         };
@@ -259,8 +276,7 @@ impl Scene {
         if self.materials[part.material].double_sided {
             return true;
         }
-        let [a, b, c] = part.mesh.triangles[triangle].map(|i| part.mesh.positions[i as usize]);
-        (b - a).cross(c - a).dot(ray.direction) <= 0.0
+        part.mesh.area_normal(triangle).dot(ray.direction) <= 0.0
     }
 }
 

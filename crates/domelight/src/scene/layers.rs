@@ -1,7 +1,7 @@
 //! What glTF's material extensions add to metallic-roughness, as a file states it.
 //!
-//! A loader fills these in whole; [`Material::undrawn_features`](super::Material::undrawn_features) says
-//! which of them a picture lacks. Where a number has a texture, the two are multiplied.
+//! A loader fills these in whole; [`Material::approximated_features`](super::Material::approximated_features) says
+//! which of them a picture only approximates. Where a number has a texture, the two are multiplied.
 
 use super::texture::{Texture, TextureRef, Uvs};
 use crate::Rgb;
@@ -37,6 +37,17 @@ pub enum AlphaMode {
 impl Default for Coverage {
     fn default() -> Self {
         Self { mode: AlphaMode::Opaque, opacity: 1.0, texture: None }
+    }
+}
+
+impl Coverage {
+    /// That of a surface that is there by a share, an opacity in \[0, 1\] times the alpha of a texture.
+    #[cfg(feature = "io")]
+    pub(super) fn blend(opacity: f32, texture: Option<TextureRef>) -> Self {
+        if opacity >= 1.0 && texture.is_none() {
+            return Self::default();
+        }
+        Self { mode: AlphaMode::Blend, opacity, texture }
     }
 }
 

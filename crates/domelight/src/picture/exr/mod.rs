@@ -9,4 +9,4 @@ mod write;
 
 pub use read::decode;
 pub(crate) use read::texels;
-pub use write::{Compression, ExrLayers, Layer, Plane, text_attributes};
+pub use write::{Compression, ExrLayers, Layer, Plane, plain_attributes, text_attributes};

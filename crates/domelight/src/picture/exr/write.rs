@@ -219,6 +219,26 @@ pub fn text_attributes(bytes: &[u8]) -> Result<Vec<(String, String)>, PictureErr
     Ok(reader.headers().first().map(string_attributes).unwrap_or_default())
 }
 
+/// The attributes of the first part that are texts or numbers, by name; numbers as text.
+///
+/// # Errors
+/// If these are no OpenEXR bytes.
+pub fn plain_attributes(bytes: &[u8]) -> Result<Vec<(String, String)>, PictureErrorKind> {
+    let reader = block::read(Cursor::new(bytes), false).map_err(PictureErrorKind::Exr)?;
+    let Some(header) = reader.headers().first() else { return Ok(Vec::new()) };
+    let number = |value: &AttributeValue| match value {
+        AttributeValue::F32(value) => Some(value.to_string()),
+        AttributeValue::F64(value) => Some(value.to_string()),
+        AttributeValue::I32(value) => Some(value.to_string()),
+        _ => None,
+    };
+    let other = header.own_attributes.other.iter();
+    let numbers = other.filter_map(|(name, value)| {
+        Some((String::from_utf8_lossy(name.as_slice()).into_owned(), number(value)?))
+    });
+    Ok(string_attributes(header).into_iter().chain(numbers).collect())
+}
+
 /// The string attributes of a part, by name.
 pub(super) fn string_attributes(header: &Header) -> Vec<(String, String)> {
     let utf8 = |text: &Text| String::from_utf8_lossy(text.as_slice()).into_owned();

@@ -3,7 +3,7 @@
 //! | format | geometry | materials | camera |
 //! |---|---|---|---|
 //! | PLY | yes, with triangle strips | colors of vertices and faces | no |
-//! | OBJ + MTL | yes | `Kd Ks Ns Pr Pm map_Kd`, normal maps | no |
+//! | OBJ + MTL | yes | `Kd Ks Ke Ns Pr Pm d Tr`, their maps, normal maps | no |
 //! | STL | ASCII and binary | no | no |
 //! | OFF | also COFF, NOFF, STOFF, 4OFF | colors of vertices and faces | no |
 //! | glTF, GLB | triangles, skins, morph targets | all of the standard's extensions as data | all |
@@ -20,6 +20,7 @@ mod files;
 mod format;
 mod gltf;
 mod mtl;
+mod non_finite;
 mod notes;
 mod obj;
 mod off;
@@ -97,8 +98,9 @@ pub struct LoadOptions {
     pub max_memory: Option<u64>,
     /// Where files may be that the scene refers to.
     pub reach: Reach,
-    /// Whether a file is refused that requires an extension which is not known, or lacks one of its images
-    /// (glTF); else what can be drawn is drawn, with a warning.
+    /// Whether a file is refused that requires an extension which is not known (glTF), refers to an image or a material
+    /// library that cannot be read (glTF, OBJ), or has a vertex whose position is NaN or infinite; else what can be drawn
+    /// is drawn, with a warning.
     pub strict: bool,
     /// The scene of a file with several (glTF), by name or by number from 0.
     pub scene: Option<String>,
@@ -245,9 +247,13 @@ pub enum LoadError {
 }
 
 impl LoadError {
-    /// Whether a file that another one refers to is not there.
-    fn is_missing_file(&self) -> bool {
-        matches!(self, Self::ReadReferenced { source, .. } if source.kind() == io::ErrorKind::NotFound)
+    /// Whether an image cannot be read, without which the rest of a scene can be drawn. What exceeds a limit is not that.
+    fn is_about_one_image(&self) -> bool {
+        match self {
+            Self::ReadReferenced { .. } => true,
+            Self::Image { source, .. } => !matches!(source, image::ImageError::Limits(_)),
+            _ => false,
+        }
     }
 }
 
@@ -346,19 +352,23 @@ fn load_file(
     if let (false, Some((what, _))) = (is_gltf, chosen.into_iter().find(|(_, chosen)| *chosen)) {
         return Err(LoadError::NoChoice { path: path.into(), what });
     }
-    let loaded = match format {
+    let strict = options.strict;
+    let mut loaded = match format {
         // Another file's content is nobody's business.
         SceneFormat::Ply if mesh_only && !bytes.starts_with(b"ply") => return Err(unknown()),
         SceneFormat::Toml if mesh_only => return Err(unknown()),
-        SceneFormat::Ply => ply::load(path, bytes, budget)?,
+        SceneFormat::Ply => ply::load(path, bytes, budget, strict)?,
         SceneFormat::Gltf | SceneFormat::Glb => gltf::load(path, bytes, budget, options)?,
-        SceneFormat::Obj => obj::load(path, bytes, budget)?,
-        SceneFormat::Stl => stl::load(path, bytes, budget)?,
-        SceneFormat::Off => off::load(path, bytes, budget)?,
+        SceneFormat::Obj => obj::load(path, bytes, budget, strict)?,
+        SceneFormat::Stl => stl::load(path, bytes, budget, strict)?,
+        SceneFormat::Off => off::load(path, bytes, budget, strict)?,
         SceneFormat::Toml => toml::load(path, bytes, budget, options)?,
     };
     if loaded.description.parts.iter().all(|p| p.mesh.triangles.is_empty()) {
         return Err(LoadError::NoTriangles { path: path.into() });
+    }
+    if !strict {
+        loaded.warnings.extend(non_finite::leave_out(path, &mut loaded.description.parts));
     }
     Ok(loaded)
 }

@@ -1,22 +1,24 @@
 //! Wavefront MTL, the material libraries of OBJ files.
 //!
-//! `Kd`, `Ks`, `Ns` and `map_Kd` make Lambert with a Phong highlight; where `Pr` or `Pm` stands, the
-//! material is metallic-roughness with `Kd` as the base color. `norm` is a normal map, and so is `map_Bump` or
+//! `Kd`, `Ks`, `Ns` and `map_Kd` make Lambert with a Phong highlight; where `Pr`, `Pm`, `map_Pr` or `map_Pm` stands, the
+//! material is metallic-roughness with `Kd` as the base color, and a map stands instead of its number. `Ke` and `map_Ke` are
+//! emission. `d`, or else `Tr`, is opacity, and `map_d` a factor on it: its alpha channel if it has one, else its luminance.
+//! `norm` is a normal map, and so is `map_Bump` or
 //! `bump` where its picture looks like one, as most exporters write it. Of a texture's options `-s`, `-o`, `-bm` and
-//! `-clamp` count. Emission, opacity, heights, spectra and the other maps are passed over, and so is a texture whose
-//! file is missing, each kind with one warning.
+//! `-clamp` count. Heights, spectra and the other maps are passed over, and so is a texture whose
+//! file cannot be read, each kind with one warning.
 
 use std::path::Path;
 
 use super::LoadError;
 use super::notes::Notes;
-use super::textures::Textures;
+use super::textures::{Content, Textures};
 use super::wavefront::{ObjErrorKind, lines, number, numbers};
 use crate::Rgb;
 use crate::math::{Vec2, vec2};
 use crate::scene::{
-    Encoding, Material, MaterialModel, MetallicRoughnessMaterial, NormalMap, PhongMaterial,
-    TextureRef, UvTransform, Wrap,
+    Coverage, Emission, Material, MaterialModel, MetallicRoughnessMaterial, NormalMap,
+    PhongMaterial, TextureRef, UvTransform, Wrap,
 };
 
 /// Whether the first statement is one of a material library.
@@ -64,111 +66,237 @@ struct Entry {
     exponent: Option<f32>,
     roughness: Option<f32>,
     metallic: Option<f32>,
+    emission: Option<Rgb>,
+    /// Of `d`.
+    opacity: Option<f32>,
+    /// Of `Tr`.
+    transparency: Option<f32>,
     diffuse_texture: Option<TextureRef>,
+    roughness_texture: Option<TextureRef>,
+    metallic_texture: Option<TextureRef>,
+    emission_texture: Option<TextureRef>,
+    opacity_texture: Option<TextureRef>,
     normal_map: Option<NormalMap>,
 }
 
+/// The materials of a library. With `strict` a texture that cannot be read is an error.
 pub(super) fn parse(
     path: &Path,
     bytes: &[u8],
     textures: &mut Textures<'_>,
+    strict: bool,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Material>, LoadError> {
+    let mut reader = Reader { path, textures, strict, notes: Notes::default(), warnings };
     let mut entries: Vec<Entry> = Vec::new();
-    let mut notes = Notes::default();
     for (number, text) in lines(bytes) {
         let text = text.trim();
         let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
-        let rest = rest.trim();
-        let at = |kind| LoadError::Obj { path: path.into(), line: number, kind };
-        if keyword.is_empty() || keyword.starts_with('#') {
-            continue;
-        }
-        if keyword == "newmtl" {
-            entries.push(Entry { name: rest.into(), ..Entry::default() });
-            continue;
-        }
-        let Some(entry) = entries.last_mut() else {
-            return Err(at(ObjErrorKind::NoMaterial { keyword: keyword.into() }));
-        };
-        let name = entry.name.clone();
-        let mut ignored = |what: &str| {
-            let before = format!("{}: {what} ({keyword}) is ignored, of material ", path.display());
-            notes.add(&before, &name, "");
-        };
-        let scalar = || Ok(numbers(keyword, rest, 1).map_err(at)?[0]);
-        let color = || rgb(keyword, rest).map_err(at);
-        let is_spectrum = matches!(rest.split_whitespace().next(), Some("spectral" | "xyz"));
-        if is_spectrum && matches!(keyword, "Ka" | "Kd" | "Ks" | "Ke" | "Tf") {
-            ignored("a color that is not RGB");
-            continue;
-        }
-        let mut map = |encoding| {
-            let (file, mut texture, bump) = options(keyword, rest).map_err(at)?;
-            let referrer = format!("{}, line {number}", path.display());
-            match textures.file(&super::relative(path, file), encoding, &referrer) {
-                Ok(index) => texture.texture = index,
-                // A mesh without a texture is better than none; one beyond the limit of memory is not.
-                Err(error @ (LoadError::ReadReferenced { .. } | LoadError::Image { .. })) => {
-                    warnings.push(format!("{error}; it is left out"));
-                    return Ok(None);
-                }
-                Err(error) => return Err(error),
+        let line = Line { number, keyword, rest: rest.trim() };
+        match (keyword, entries.last_mut()) {
+            ("newmtl", _) => entries.push(Entry { name: line.rest.into(), ..Entry::default() }),
+            (_, Some(entry)) => reader.statement(entry, line)?,
+            ("", None) => {}
+            (_, None) if keyword.starts_with('#') => {}
+            (_, None) => {
+                let kind = ObjErrorKind::NoMaterial { keyword: keyword.into() };
+                return Err(reader.error(line, kind));
             }
-            Ok(Some((texture, bump)))
-        };
-        match keyword {
-            "Kd" => entry.diffuse = Some(color()?),
-            "Ks" => entry.specular = Some(color()?),
-            "Ns" => entry.exponent = Some(scalar()?),
-            "Pr" => entry.roughness = Some(scalar()?),
-            "Pm" => entry.metallic = Some(scalar()?),
-            "map_Kd" => entry.diffuse_texture = map(Encoding::Srgb)?.map(|(texture, _)| texture),
-            "norm" => entry.normal_map = map(Encoding::Linear)?.map(normal_map),
-            "bump" | "map_bump" | "map_Bump" if entry.normal_map.is_none() => {
-                if let Some((texture, scale)) = map(Encoding::Linear)? {
-                    if textures.loaded[texture.texture].looks_like_normals() {
-                        entry.normal_map = Some(normal_map((texture, scale)));
-                    } else {
-                        textures.forget(texture.texture);
-                        ignored("a bump map of heights");
-                    }
-                }
-            }
-            "Ke" if !color()?.is_black() => ignored("emission"),
-            "d" if scalar()? < 1.0 => ignored("opacity"),
-            "Tr" if scalar()? > 0.0 => ignored("transparency"),
-            "map_d" | "map_Tr" => ignored("an opacity map"),
-            "map_Ke" => ignored("an emission map"),
-            "map_Ks" | "map_Ns" | "map_Pr" | "map_Pm" => ignored("a map"),
-            _ => {}
         }
     }
+    let materials = entries.into_iter().map(|entry| reader.material(entry)).collect();
+    let Reader { notes, warnings, .. } = reader;
     warnings.extend(notes.sentences());
-    Ok(entries.into_iter().map(Entry::material).collect())
+    materials
 }
 
-impl Entry {
-    fn material(self) -> Material {
-        let default = if self.diffuse_texture.is_some() { 1.0 } else { 0.8 };
-        let diffuse = self.diffuse.unwrap_or(Rgb::splat(default));
-        let model = if self.roughness.is_some() || self.metallic.is_some() {
+/// A statement of the file.
+#[derive(Clone, Copy)]
+struct Line<'a> {
+    number: usize,
+    keyword: &'a str,
+    rest: &'a str,
+}
+
+struct Reader<'r, 'b> {
+    path: &'r Path,
+    textures: &'r mut Textures<'b>,
+    strict: bool,
+    notes: Notes,
+    warnings: &'r mut Vec<String>,
+}
+
+impl Reader<'_, '_> {
+    fn error(&self, line: Line<'_>, kind: ObjErrorKind) -> LoadError {
+        LoadError::Obj { path: self.path.into(), line: line.number, kind }
+    }
+
+    fn ignored(&mut self, entry: &Entry, line: Line<'_>, what: &str) {
+        let (path, keyword) = (self.path.display(), line.keyword);
+        let before = format!("{path}: {what} ({keyword}) is ignored, of material ");
+        self.notes.add(&before, &entry.name, "");
+    }
+
+    fn scalar(&self, line: Line<'_>) -> Result<f32, LoadError> {
+        let values = numbers(line.keyword, line.rest, 1);
+        Ok(values.map_err(|kind| self.error(line, kind))?[0])
+    }
+
+    fn color(&self, line: Line<'_>) -> Result<Rgb, LoadError> {
+        rgb(line.keyword, line.rest).map_err(|kind| self.error(line, kind))
+    }
+
+    fn statement(&mut self, entry: &mut Entry, line: Line<'_>) -> Result<(), LoadError> {
+        let is_spectrum = matches!(line.rest.split_whitespace().next(), Some("spectral" | "xyz"));
+        if is_spectrum && matches!(line.keyword, "Ka" | "Kd" | "Ks" | "Ke" | "Tf") {
+            self.ignored(entry, line, "a color that is not RGB");
+            return Ok(());
+        }
+        match line.keyword {
+            "Kd" => entry.diffuse = Some(self.color(line)?),
+            "Ks" => entry.specular = Some(self.color(line)?),
+            "Ke" => entry.emission = Some(self.color(line)?),
+            "Ns" => entry.exponent = Some(self.scalar(line)?),
+            "Pr" => entry.roughness = Some(self.scalar(line)?),
+            "Pm" => entry.metallic = Some(self.scalar(line)?),
+            "d" => {
+                // The factor of a halo is of the view, which is not drawn.
+                let rest = line.rest.strip_prefix("-halo").unwrap_or(line.rest).trim_start();
+                entry.opacity = Some(self.scalar(Line { rest, ..line })?);
+            }
+            "Tr" => entry.transparency = Some(self.scalar(line)?),
+            "map_Kd" => entry.diffuse_texture = self.map(line, Content::Color)?,
+            "map_Ke" => entry.emission_texture = self.map(line, Content::Color)?,
+            "map_Pr" => entry.roughness_texture = self.map(line, Content::Numbers)?,
+            "map_Pm" => entry.metallic_texture = self.map(line, Content::Numbers)?,
+            "map_d" => entry.opacity_texture = self.map(line, Content::Opacity)?,
+            "norm" => {
+                entry.normal_map = self.relief(line, Content::Numbers)?.map(normal_map);
+            }
+            "bump" | "map_bump" | "map_Bump" if entry.normal_map.is_none() => {
+                self.bump(entry, line)?;
+            }
+            "map_Tr" => self.ignored(entry, line, "a transparency map"),
+            "map_Ks" | "map_Ns" => self.ignored(entry, line, "a map"),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A relief as a normal map, where its picture looks like one.
+    fn bump(&mut self, entry: &mut Entry, line: Line<'_>) -> Result<(), LoadError> {
+        let Some((texture, scale)) = self.relief(line, Content::Numbers)? else { return Ok(()) };
+        if self.textures.loaded[texture.texture].looks_like_normals() {
+            entry.normal_map = Some(normal_map((texture, scale)));
+        } else {
+            self.textures.forget(texture.texture);
+            self.ignored(entry, line, "a bump map of heights");
+        }
+        Ok(())
+    }
+
+    fn map(&mut self, line: Line<'_>, content: Content) -> Result<Option<TextureRef>, LoadError> {
+        Ok(self.relief(line, content)?.map(|(texture, _)| texture))
+    }
+
+    /// A texture and the factor on a relief; `None`, with a warning, if it cannot be read.
+    fn relief(
+        &mut self,
+        line: Line<'_>,
+        content: Content,
+    ) -> Result<Option<(TextureRef, f32)>, LoadError> {
+        let parsed = options(line.keyword, line.rest);
+        let (file, texture, bump) = parsed.map_err(|kind| self.error(line, kind))?;
+        let referrer = format!("{}, line {}", self.path.display(), line.number);
+        let path = super::relative(self.path, file);
+        match self.textures.file_of(&path, content, &referrer) {
+            Ok(index) => Ok(Some((TextureRef { texture: index, ..texture }, bump))),
+            Err(error) if !self.strict && error.is_about_one_image() => {
+                self.warnings.push(format!("{error}; it is left out"));
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn material(&mut self, entry: Entry) -> Result<Material, LoadError> {
+        let default = if entry.diffuse_texture.is_some() { 1.0 } else { 0.8 };
+        let diffuse = entry.diffuse.unwrap_or(Rgb::splat(default));
+        let maps = [entry.roughness_texture, entry.metallic_texture];
+        let is_physical =
+            entry.roughness.or(entry.metallic).is_some() || maps.iter().any(Option::is_some);
+        let model = if is_physical {
+            let factor = |map: &Option<TextureRef>, value: Option<f32>, default: f32| {
+                map.map_or(value.unwrap_or(default).clamp(0.0, 1.0), |_| 1.0)
+            };
             MaterialModel::MetallicRoughness(MetallicRoughnessMaterial {
                 base_color: diffuse,
-                base_color_texture: self.diffuse_texture,
-                metallic: self.metallic.unwrap_or(0.0).clamp(0.0, 1.0),
-                roughness: self.roughness.unwrap_or(0.5).clamp(0.0, 1.0),
-                metallic_roughness_texture: None,
+                base_color_texture: entry.diffuse_texture,
+                metallic: factor(&maps[1], entry.metallic, 0.0),
+                roughness: factor(&maps[0], entry.roughness, 0.5),
+                metallic_roughness_texture: self.packed(&entry.name, maps)?,
             })
         } else {
             MaterialModel::Phong(PhongMaterial {
                 diffuse,
-                diffuse_texture: self.diffuse_texture,
-                specular: self.specular.unwrap_or(Rgb::BLACK),
-                exponent: self.exponent.unwrap_or(0.0).max(0.0),
+                diffuse_texture: entry.diffuse_texture,
+                specular: entry.specular.unwrap_or(Rgb::BLACK),
+                exponent: entry.exponent.unwrap_or(0.0).max(0.0),
             })
         };
-        Material { normal_map: self.normal_map, ..Material::new(self.name, model) }
+        Ok(Material {
+            normal_map: entry.normal_map,
+            emission: entry.emission(),
+            coverage: entry.coverage(),
+            ..Material::new(entry.name, model)
+        })
+    }
+
+    /// Roughness in green and metalness in blue, out of a texture of each.
+    fn packed(
+        &mut self,
+        material: &str,
+        [roughness, metallic]: [Option<TextureRef>; 2],
+    ) -> Result<Option<TextureRef>, LoadError> {
+        let (first, second) = match (roughness, metallic) {
+            (Some(roughness), Some(metallic)) => (roughness, metallic),
+            // The other is a factor on a map of ones.
+            (Some(only), None) | (None, Some(only)) => (only, only),
+            (None, None) => return Ok(None),
+        };
+        if second != (TextureRef { texture: second.texture, ..first }) {
+            let before = format!(
+                "{}: the options of map_Pm are taken to be those of map_Pr, of material ",
+                self.path.display()
+            );
+            self.notes.add(&before, material, "");
+        }
+        let is_packed =
+            roughness.is_some() && metallic.is_some() && first.texture == second.texture;
+        if is_packed {
+            return Ok(Some(first));
+        }
+        let green = roughness.map(|texture| texture.texture);
+        let blue = metallic.map(|texture| texture.texture);
+        let place = format!("{}: maps of material '{material}'", self.path.display());
+        let texture = self.textures.packed(&place, green, blue)?;
+        Ok(Some(TextureRef { texture, ..first }))
+    }
+}
+
+impl Entry {
+    /// A map stands for itself where the file has no color or, as some programs write it, black.
+    fn emission(&self) -> Option<Emission> {
+        let color = self.emission.filter(|color| !color.is_black());
+        let radiance = color.or(self.emission_texture.map(|_| Rgb::WHITE))?;
+        Some(Emission { radiance, texture: self.emission_texture })
+    }
+
+    fn coverage(&self) -> Coverage {
+        // To some programs Tr is opacity; a surface that is not there is not what one writes down.
+        let transparency = self.transparency.filter(|&t| t < 1.0);
+        let opacity = self.opacity.or(transparency.map(|t| 1.0 - t)).unwrap_or(1.0);
+        Coverage::blend(opacity.clamp(0.0, 1.0), self.opacity_texture)
     }
 }
 

@@ -17,7 +17,7 @@ use super::notes::Notes;
 use super::polygon::Triangulator;
 use super::textures::Textures;
 use super::wavefront::{ObjErrorKind, enough, lines, number, numbers, words};
-use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, mtl, stem};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, mtl, non_finite, stem};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
@@ -27,9 +27,14 @@ use crate::scene::{Material, Part, SceneDescription};
 /// up to 32 as a vertex.
 const MEMORY_PER_BYTE: u64 = 8;
 
-pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
+pub(super) fn load(
+    path: &Path,
+    bytes: &[u8],
+    budget: &Budget,
+    strict: bool,
+) -> Result<Loaded, LoadError> {
     budget.take(&path.display().to_string(), MEMORY_PER_BYTE * bytes.len() as u64)?;
-    let mut reader = Reader::new(path, budget);
+    let mut reader = Reader::new(path, budget, strict);
     for (number, line) in lines(bytes) {
         reader.line(number, &line)?;
     }
@@ -60,6 +65,8 @@ struct Label {
 
 struct Reader<'a> {
     path: &'a Path,
+    /// Whether positions that are not finite and files that cannot be read are errors.
+    strict: bool,
     positions: Vec<Vec3>,
     /// One a position, white where the file gives none; empty if it never does.
     colors: Vec<Rgb>,
@@ -84,9 +91,10 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn new(path: &'a Path, budget: &'a Budget<'a>) -> Self {
+    fn new(path: &'a Path, budget: &'a Budget<'a>, strict: bool) -> Self {
         Self {
             path,
+            strict,
             positions: Vec::new(),
             colors: Vec::new(),
             uvs: Vec::new(),
@@ -113,15 +121,19 @@ impl<'a> Reader<'a> {
         let at = |kind| LoadError::Obj { path: self.path.into(), line: number, kind };
         match keyword {
             "v" => {
-                let numbers = numbers(keyword, rest, 3).map_err(at)?;
-                self.vertex(&numbers);
+                let numbers = if self.strict {
+                    numbers(keyword, rest, 3)
+                } else {
+                    any_numbers(keyword, rest, 3)
+                };
+                self.vertex(&numbers.map_err(at)?);
             }
             "vt" => {
-                let n = numbers_or_nan(keyword, rest, 1).map_err(at)?;
+                let n = numbers_or_zero(keyword, rest, 1).map_err(at)?;
                 self.uvs.push(Vec2::new(n[0], 1.0 - n.get(1).unwrap_or(&0.0)));
             }
             "vn" => {
-                let n = numbers_or_nan(keyword, rest, 3).map_err(at)?;
+                let n = numbers_or_zero(keyword, rest, 3).map_err(at)?;
                 self.normals.push(Vec3::new(n[0], n[1], n[2]).normalize_or_zero());
             }
             // `fo` was the keyword of old.
@@ -213,7 +225,8 @@ impl<'a> Reader<'a> {
             // What is no library is nobody's business.
             Ok(bytes) if !mtl::is_library(&bytes) => "it is no material library (MTL)".to_owned(),
             Ok(bytes) => {
-                for material in mtl::parse(&path, &bytes, &mut self.textures, &mut self.warnings)? {
+                let (textures, warnings) = (&mut self.textures, &mut self.warnings);
+                for material in mtl::parse(&path, &bytes, textures, self.strict, warnings)? {
                     // Of two of a name, the first.
                     let next = self.materials.len();
                     self.material_of.entry(material.name.clone()).or_insert(next);
@@ -221,7 +234,7 @@ impl<'a> Reader<'a> {
                 }
                 return Ok(());
             }
-            Err(LoadError::ReadReferenced { source, .. }) => source.to_string(),
+            Err(LoadError::ReadReferenced { source, .. }) if !self.strict => source.to_string(),
             Err(error) => return Err(error),
         };
         let before = format!("{}: cannot read the material library ", self.path.display());
@@ -319,17 +332,19 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// As [`numbers`]; what exporters write of NaN and infinities (`nan`, `-1.#IND`) is 0.
-fn numbers_or_nan(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjErrorKind> {
-    // `nan`, `-nan(ind)`, `1.#QNAN`, `inf`, and what is too large for a number.
-    let is_none = |word: &str| {
-        let digits = word.trim_start_matches(['+', '-']).to_ascii_lowercase();
-        digits.starts_with("nan")
-            || digits.contains('#')
-            || word.parse().is_ok_and(|v: f32| !v.is_finite())
-    };
-    let value = |word| if is_none(word) { Ok(0.0) } else { number(word) };
+/// As [`numbers`], with what exporters write of NaN and infinities (`nan`, `-1.#IND`).
+fn any_numbers(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjErrorKind> {
+    let value = |word| non_finite::parse(word).map_or_else(|| number(word), Ok);
     enough(keyword, words(rest).map(value).collect::<Result<_, _>>()?, needed)
+}
+
+/// As [`numbers`], with 0 for NaN and infinities.
+fn numbers_or_zero(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjErrorKind> {
+    let mut numbers = any_numbers(keyword, rest, needed)?;
+    for number in numbers.iter_mut().filter(|number| !number.is_finite()) {
+        *number = 0.0;
+    }
+    Ok(numbers)
 }
 
 /// An index of a file, from 1 or relative to the end, as one from 0.

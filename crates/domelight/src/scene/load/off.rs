@@ -11,7 +11,7 @@
 use std::path::Path;
 
 use super::faces::{Polygons, color_triangles};
-use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, non_finite};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
@@ -73,10 +73,15 @@ pub(super) fn is_off(bytes: &[u8]) -> bool {
     std::str::from_utf8(word).is_ok_and(|word| Kind::parse(word).is_some())
 }
 
-pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
+pub(super) fn load(
+    path: &Path,
+    bytes: &[u8],
+    budget: &Budget,
+    strict: bool,
+) -> Result<Loaded, LoadError> {
     budget.take(&path.display().to_string(), MEMORY_PER_BYTE * bytes.len() as u64)?;
     let error = |(line, kind)| LoadError::Off { path: path.into(), line, kind };
-    let mesh = read(bytes).map_err(error)?;
+    let mesh = read(bytes, strict).map_err(error)?;
     Ok(Loaded::of_mesh(path, mesh))
 }
 
@@ -134,14 +139,16 @@ struct Words<'a> {
     rest: std::str::SplitWhitespace<'a>,
     /// Every vertex and every face has a line of its own, which may hold more than is read.
     by_line: bool,
+    /// Whether numbers must be finite.
+    strict: bool,
 }
 
 impl<'a> Words<'a> {
-    fn new(bytes: &'a [u8]) -> Self {
+    fn new(bytes: &'a [u8], strict: bool) -> Self {
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let is_end: fn(&u8) -> bool = |&b| b == b'\n';
         let rest = "".split_whitespace();
-        Self { lines: bytes.split(is_end).enumerate(), line: 0, rest, by_line: true }
+        Self { lines: bytes.split(is_end).enumerate(), line: 0, rest, by_line: true, strict }
     }
 
     /// The next word of this line or of the next.
@@ -160,7 +167,10 @@ impl<'a> Words<'a> {
 
     fn number(&mut self, ended: &impl Fn() -> OffErrorKind) -> Located<f32> {
         let word = self.next().ok_or_else(|| (self.line, ended()))?;
-        number(word).map_err(|kind| (self.line, kind))
+        match non_finite::parse(word) {
+            Some(value) if !self.strict => Ok(value),
+            _ => number(word).map_err(|kind| (self.line, kind)),
+        }
     }
 
     fn vector(&mut self, ended: &impl Fn() -> OffErrorKind) -> Located<Vec3> {
@@ -178,8 +188,8 @@ fn number(word: &str) -> Result<f32, OffErrorKind> {
     value.ok_or_else(|| OffErrorKind::NotANumber { text: word.chars().take(40).collect() })
 }
 
-fn read(bytes: &[u8]) -> Located<Mesh> {
-    let mut words = Words::new(bytes);
+fn read(bytes: &[u8], strict: bool) -> Located<Mesh> {
+    let mut words = Words::new(bytes, strict);
     let lines = bytes.split(|&b| b == b'\n').count();
     let (kind, vertices, faces) = header(&mut words, lines)?;
     let mut mesh = Mesh::default();
@@ -259,7 +269,7 @@ fn read_vertex(
         let w = words.number(ended)?;
         position /= if w == 0.0 { 1.0 } else { w };
     }
-    if !position.is_finite() {
+    if words.strict && !position.is_finite() {
         return Err((words.line, OffErrorKind::NotANumber { text: position.to_string() }));
     }
     mesh.positions.push(position);

@@ -12,7 +12,7 @@ use std::fmt;
 use std::path::Path;
 
 use super::faces::{Polygons, color_triangles};
-use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, non_finite};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
@@ -105,7 +105,7 @@ pub enum PlyErrorKind {
         vertices: usize,
     },
     /// A vertex at no place.
-    #[error("the position is not finite: {position}")]
+    #[error("the position is not finite: {position}; without --strict its triangles are left out")]
     NotFinite {
         /// The position.
         position: Vec3,
@@ -114,25 +114,32 @@ pub enum PlyErrorKind {
 
 type Located<T> = Result<T, (PlyPlace, PlyErrorKind)>;
 
-pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
+pub(super) fn load(
+    path: &Path,
+    bytes: &[u8],
+    budget: &Budget,
+    strict: bool,
+) -> Result<Loaded, LoadError> {
     let error = |(place, kind)| LoadError::Ply { path: path.into(), place, kind: Box::new(kind) };
     let header = Header::parse(bytes).map_err(error)?;
     header.check_size(bytes.len() - header.length).map_err(error)?;
     budget.take(&path.display().to_string(), header.memory(bytes.len() - header.length))?;
-    let mesh = parse(&header, bytes).map_err(error)?;
+    let mesh = parse(&header, bytes, strict).map_err(error)?;
     Ok(Loaded::of_mesh(path, mesh))
 }
 
-fn parse(header: &Header, bytes: &[u8]) -> Located<Mesh> {
+fn parse(header: &Header, bytes: &[u8], strict: bool) -> Located<Mesh> {
     let body = &bytes[header.length..];
     let at = header.length;
     match header.format {
-        Format::Ascii => read_body(header, &mut Ascii { data: body, position: 0, start: at }),
+        Format::Ascii => {
+            read_body(header, &mut Ascii { data: body, position: 0, start: at }, strict)
+        }
         Format::Little => {
-            read_body(header, &mut Binary::<false> { data: body, start: at, position: 0 })
+            read_body(header, &mut Binary::<false> { data: body, start: at, position: 0 }, strict)
         }
         Format::Big => {
-            read_body(header, &mut Binary::<true> { data: body, start: at, position: 0 })
+            read_body(header, &mut Binary::<true> { data: body, start: at, position: 0 }, strict)
         }
     }
 }
@@ -348,7 +355,8 @@ impl Numbers for Ascii<'_> {
             return Err((place(), PlyErrorKind::EndOfFile));
         }
         let text = std::str::from_utf8(token).unwrap_or("");
-        let value = text.parse().map_err(|_| {
+        let value = text.parse().ok().or_else(|| non_finite::parse(text).map(f64::from));
+        let value = value.ok_or_else(|| {
             let text = String::from_utf8_lossy(token).chars().take(40).collect();
             (place(), PlyErrorKind::NotANumber { text })
         })?;
@@ -394,7 +402,7 @@ impl<const BIG: bool> Numbers for Binary<'_, BIG> {
     }
 }
 
-fn read_body(header: &Header, numbers: &mut impl Numbers) -> Located<Mesh> {
+fn read_body(header: &Header, numbers: &mut impl Numbers, strict: bool) -> Located<Mesh> {
     let mut mesh = Mesh::default();
     let mut faces = Faces::default();
     let (mut has_vertices, mut has_faces) = (false, false);
@@ -403,7 +411,7 @@ fn read_body(header: &Header, numbers: &mut impl Numbers) -> Located<Mesh> {
         match element.name.as_str() {
             "vertex" => {
                 has_vertices = true;
-                read_vertices(element, numbers, &mut mesh)?;
+                read_vertices(element, numbers, &mut mesh, strict)?;
             }
             "face" => {
                 has_faces = true;
@@ -472,7 +480,12 @@ impl Colors {
     }
 }
 
-fn read_vertices(element: &Element, numbers: &mut impl Numbers, mesh: &mut Mesh) -> Located<()> {
+fn read_vertices(
+    element: &Element,
+    numbers: &mut impl Numbers,
+    mesh: &mut Mesh,
+    strict: bool,
+) -> Located<()> {
     let slots: Vec<Option<usize>> = element.properties.iter().map(slot_of).collect();
     let has = |wanted: std::ops::Range<usize>| wanted.into_iter().all(|s| slots.contains(&Some(s)));
     let place = PlyPlace::Line(element.line);
@@ -492,7 +505,7 @@ fn read_vertices(element: &Element, numbers: &mut impl Numbers, mesh: &mut Mesh)
         }
         let [x, y, z, nx, ny, nz, u, v, r, g, b] = values;
         let position = Vec3::new(x, y, z);
-        if !position.is_finite() {
+        if strict && !position.is_finite() {
             let place = PlyPlace::Row { element: element.name.clone(), row };
             return Err((place, PlyErrorKind::NotFinite { position }));
         }

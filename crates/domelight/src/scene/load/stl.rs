@@ -11,7 +11,7 @@
 
 use std::path::Path;
 
-use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, stem, text_of};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, non_finite, stem, text_of};
 use crate::geometry::Mesh;
 use crate::math::Vec3;
 use crate::scene::{Material, Part, SceneDescription};
@@ -49,7 +49,9 @@ pub enum StlErrorKind {
         corners: usize,
     },
     /// A vertex of a binary file at no place.
-    #[error("facet {facet}: the position is not finite: {position}")]
+    #[error(
+        "facet {facet}: the position is not finite: {position}; without --strict the facet is left out"
+    )]
     NotFinite {
         /// The facet, from 0.
         facet: usize,
@@ -71,15 +73,20 @@ pub(super) fn is_stl(bytes: &[u8]) -> bool {
     facets(bytes).is_some() || is_text(bytes)
 }
 
-pub(super) fn load(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Loaded, LoadError> {
+pub(super) fn load(
+    path: &Path,
+    bytes: &[u8],
+    budget: &Budget,
+    strict: bool,
+) -> Result<Loaded, LoadError> {
     let error = |kind| LoadError::Stl { path: path.into(), kind };
     let name = path.display().to_string();
     let parts = if let Some(facets) = facets(bytes) {
         budget.take(&name, facets as u64 * (3 * 12 + 12))?;
-        vec![(stem(path), binary(&bytes[HEADER..]).map_err(error)?)]
+        vec![(stem(path), binary(&bytes[HEADER..], strict).map_err(error)?)]
     } else if is_text(bytes) {
         budget.take(&name, MEMORY_PER_BYTE * bytes.len() as u64)?;
-        ascii(path, bytes).map_err(error)?
+        ascii(path, bytes, strict).map_err(error)?
     } else {
         let count = bytes.get(80..HEADER).and_then(|b| b.try_into().ok());
         let facets = count.map_or(0, u32::from_le_bytes);
@@ -108,13 +115,13 @@ fn facets(bytes: &[u8]) -> Option<usize> {
     fits.then_some(count)
 }
 
-fn binary(bytes: &[u8]) -> Result<Mesh, StlErrorKind> {
+fn binary(bytes: &[u8], strict: bool) -> Result<Mesh, StlErrorKind> {
     let mut mesh = Mesh::default();
     for (facet, bytes) in bytes.as_chunks::<FACET>().0.iter().enumerate() {
         let number = |i: usize| f32::from_le_bytes([0, 1, 2, 3].map(|k| bytes[4 * i + k]));
         for i in [3, 6, 9] {
             let position = Vec3::new(number(i), number(i + 1), number(i + 2));
-            if !position.is_finite() {
+            if strict && !position.is_finite() {
                 return Err(StlErrorKind::NotFinite { facet, position });
             }
             mesh.positions.push(position);
@@ -124,7 +131,7 @@ fn binary(bytes: &[u8]) -> Result<Mesh, StlErrorKind> {
     Ok(mesh)
 }
 
-fn ascii(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Mesh)>, StlErrorKind> {
+fn ascii(path: &Path, bytes: &[u8], strict: bool) -> Result<Vec<(String, Mesh)>, StlErrorKind> {
     let mut solids: Vec<(String, Mesh)> = Vec::new();
     let mut corners = 0;
     for (index, line) in bytes.split(|&b| b == b'\n' || b == b'\r').enumerate() {
@@ -140,7 +147,7 @@ fn ascii(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Mesh)>, StlErrorKind>
             solids.push((name, Mesh::default()));
         } else if keyword.eq_ignore_ascii_case("vertex") {
             let Some((_, mesh)) = solids.last_mut() else { continue };
-            mesh.positions.push(vertex(rest).ok_or_else(|| StlErrorKind::Vertex {
+            mesh.positions.push(vertex(rest, strict).ok_or_else(|| StlErrorKind::Vertex {
                 line,
                 text: text.chars().take(60).collect(),
             })?);
@@ -162,10 +169,10 @@ fn ascii(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Mesh)>, StlErrorKind>
     Ok(solids)
 }
 
-fn vertex(text: &str) -> Option<Vec3> {
-    let mut numbers = text.split_whitespace().map(str::parse::<f32>);
-    let position = Vec3::new(numbers.next()?.ok()?, numbers.next()?.ok()?, numbers.next()?.ok()?);
-    position.is_finite().then_some(position)
+fn vertex(text: &str, strict: bool) -> Option<Vec3> {
+    let mut numbers = text.split_whitespace().map(non_finite::parse);
+    let position = Vec3::new(numbers.next()??, numbers.next()??, numbers.next()??);
+    (position.is_finite() || !strict).then_some(position)
 }
 
 /// The last three vertices as a triangle.

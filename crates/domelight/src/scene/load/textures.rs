@@ -10,10 +10,21 @@ use super::{Budget, LoadError, read_referenced};
 use crate::picture;
 use crate::scene::texture::{Encoding, Texture};
 
+/// What an image file is read for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Content {
+    /// A color in sRGB.
+    Color,
+    /// Linear numbers.
+    Numbers,
+    /// A number in the alpha channel: the file's own alpha, or its luminance if it is opaque throughout.
+    Opacity,
+}
+
 /// The textures of one scene while it is loaded.
 pub(super) struct Textures<'b> {
     pub(super) loaded: Vec<Texture>,
-    files: HashMap<(PathBuf, Encoding), usize>,
+    files: HashMap<(PathBuf, Content), usize>,
     pub(super) budget: &'b Budget<'b>,
 }
 
@@ -23,20 +34,60 @@ impl<'b> Textures<'b> {
     }
 
     /// The index of a file's texture.
-    pub(super) fn file(
+    pub(super) fn file_of(
         &mut self,
         path: &Path,
-        encoding: Encoding,
+        content: Content,
         referrer: &str,
     ) -> Result<usize, LoadError> {
-        let key = (path.to_owned(), encoding);
+        let key = (path.to_owned(), content);
         if let Some(&index) = self.files.get(&key) {
             return Ok(index);
         }
         let bytes = read_referenced(path, referrer, self.budget)?;
-        let index = self.bytes(&path.display().to_string(), &bytes, encoding, referrer)?;
-        self.files.insert(key, index);
-        Ok(index)
+        let name = path.display().to_string();
+        let encoding = match content {
+            Content::Color => Encoding::Srgb,
+            Content::Numbers | Content::Opacity => Encoding::Linear,
+        };
+        let is_opacity = content == Content::Opacity;
+        let mut texture = self.decode(&name, &bytes, encoding, is_opacity, referrer)?;
+        if is_opacity && !texture.has_alpha() {
+            let alpha = luminances(&texture);
+            texture = texture.with_alpha(alpha).unwrap_or_else(|_| unreachable!("one a texel"));
+        }
+        self.loaded.push(texture);
+        self.files.insert(key, self.loaded.len() - 1);
+        Ok(self.loaded.len() - 1)
+    }
+
+    /// The index of a new texture with the green of one and the blue of another, as large as the larger one, and 1 for what
+    /// is not given.
+    pub(super) fn packed(
+        &mut self,
+        place: &str,
+        green: Option<usize>,
+        blue: Option<usize>,
+    ) -> Result<usize, LoadError> {
+        let [green, blue] = [green, blue].map(|index| index.map(|index| &self.loaded[index]));
+        let size = |texture: Option<&Texture>| texture.map_or((1, 1), Texture::size);
+        let ((w0, h0), (w1, h1)) = (size(green), size(blue));
+        let (width, height) = (w0.max(w1), h0.max(h1));
+        self.budget.take(place, 3 * u64::from(width) * u64::from(height))?;
+        let byte = |texture: Option<&Texture>, x: u32, y: u32, channel: usize| {
+            let Some(texture) = texture else { return 255 };
+            let (w, h) = texture.size();
+            let along =
+                |i: u32, n: u32, of: u32| (u64::from(i) * u64::from(n) / u64::from(of)) as u32;
+            let texel = texture.texel(along(x, w, width), along(y, h, height)).to_array();
+            (255.0 * texel[channel] + 0.5) as u8
+        };
+        let texel = |x, y| [255, byte(green, x, y, 1), byte(blue, x, y, 2)];
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let texels = texels.map(|(x, y)| texel(x, y)).collect();
+        let texture = Texture::from_rgb8(place, width, height, texels, Encoding::Linear);
+        self.loaded.push(texture.unwrap_or_else(|_| unreachable!("one texel a place")));
+        Ok(self.loaded.len() - 1)
     }
 
     /// Lets go of a texture that nothing refers to, if it is the last.
@@ -45,19 +96,6 @@ impl<'b> Textures<'b> {
             self.loaded.pop();
             self.files.retain(|_, known| *known != index);
         }
-    }
-
-    /// The index of a new texture from the bytes of an image file.
-    pub(super) fn bytes(
-        &mut self,
-        name: &str,
-        bytes: &[u8],
-        encoding: Encoding,
-        referrer: &str,
-    ) -> Result<usize, LoadError> {
-        let texture = self.decode(name, bytes, encoding, false, referrer)?;
-        self.loaded.push(texture);
-        Ok(self.loaded.len() - 1)
     }
 
     /// A texture from the bytes of an image file, with its alpha if that is asked for and not all opaque.
@@ -109,6 +147,13 @@ fn reader<'a>(
         reader.set_format(format);
     }
     Ok(reader)
+}
+
+/// The luminance of each texel as 0 to 255.
+fn luminances(texture: &Texture) -> Vec<u8> {
+    let (width, height) = texture.size();
+    let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    texels.map(|(x, y)| (255.0 * texture.texel(x, y).luminance() + 0.5) as u8).collect()
 }
 
 fn is_deep(color: ColorType) -> bool {

@@ -29,6 +29,10 @@
 //! metallic_roughness_texture = "mr.png"   # linear: green × roughness, blue × metallic
 //! normal_map = "normal.png"           # linear, +Y up as in glTF
 //! normal_scale = 1.0
+//! emission = [0.0, 0.0, 0.0]          # radiance that the camera sees; it lights nothing else
+//! emission_texture = "glow.png"       # sRGB, a factor on emission, whose default is then white
+//! opacity = 1.0                       # the share of the surface in what is seen
+//! opacity_texture = "leaf.png"        # its alpha, or its luminance if it has none, a factor on opacity
 //! wrap = "repeat"                     # or "clamp", "mirror"; of all the material's textures
 //! uv_scale = 1.0                      # how often the textures repeat, default 1
 //!
@@ -51,7 +55,7 @@ use std::path::Path;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::textures::Textures;
+use super::textures::{Content, Textures};
 use super::{Budget, LoadError, LoadOptions, Loaded, load_mesh, relative};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, ParseMaterialError};
@@ -60,7 +64,7 @@ use crate::math::{Mat4, Vec2, Vec3, Vec4, rotation_x, rotation_y, rotation_z};
 use crate::scene::builtin::{BuiltinScene, UnknownScene};
 use crate::scene::camera::{CameraError, CameraSettings, Projection};
 use crate::scene::{
-    Encoding, EnvironmentSettings, EnvironmentSource, Material, MaterialModel,
+    Coverage, Emission, EnvironmentSettings, EnvironmentSource, Material, MaterialModel,
     MetallicRoughnessMaterial, NormalMap, SceneDescription, TextureRef, UpAxis, UvTransform, Wrap,
 };
 
@@ -162,7 +166,7 @@ struct EnvironmentTable {
 #[derive(Deserialize)]
 #[serde(
     untagged,
-    expecting = "a material is notation such as \"ggx:0.2\" or a table of base_color, base_color_texture, metallic, roughness, metallic_roughness_texture, normal_map, normal_scale, wrap and uv_scale"
+    expecting = "a material is notation such as \"ggx:0.2\" or a table of base_color, base_color_texture, metallic, roughness, metallic_roughness_texture, normal_map, normal_scale, emission, emission_texture, opacity, opacity_texture, wrap and uv_scale"
 )]
 enum MaterialEntry {
     Notation(String),
@@ -183,6 +187,11 @@ struct MaterialTable {
     normal_map: Option<String>,
     #[serde(default = "one")]
     normal_scale: f32,
+    emission: Option<[f32; 3]>,
+    emission_texture: Option<String>,
+    #[serde(default = "one")]
+    opacity: f32,
+    opacity_texture: Option<String>,
     #[serde(default)]
     wrap: Wrap,
     #[serde(default = "one")]
@@ -338,10 +347,17 @@ impl Reader<'_> {
             ("base_color", table.base_color[2]),
             ("metallic", table.metallic),
             ("roughness", table.roughness),
+            ("opacity", table.opacity),
         ];
         for (what, value) in ranges {
             if !(0.0..=1.0).contains(&value) {
                 return Err(self.error(at, TomlErrorKind::Range { what, value, range: "[0, 1]" }));
+            }
+        }
+        for value in table.emission.unwrap_or_default() {
+            if !(value.is_finite() && value >= 0.0) {
+                let (what, range) = ("emission", "[0, ∞)");
+                return Err(self.error(at, TomlErrorKind::Range { what, value, range }));
             }
         }
         for (what, value) in [("normal_scale", table.normal_scale), ("uv_scale", table.uv_scale)] {
@@ -353,17 +369,19 @@ impl Reader<'_> {
         let referrer =
             format!("{}, line {}, material '{name}',", self.path.display(), self.lines.of(at));
         let transform = UvTransform::new(Vec2::ZERO, 0.0, Vec2::splat(table.uv_scale));
-        let mut texture = |file: &Option<String>, encoding| {
+        let mut texture = |file: &Option<String>, content| {
             let Some(file) = file else { return Ok(None) };
-            let texture = self.textures.file(&relative(self.path, file), encoding, &referrer)?;
+            let texture = self.textures.file_of(&relative(self.path, file), content, &referrer)?;
             let wrap = [table.wrap; 2];
             Ok(Some(TextureRef { wrap, transform, ..TextureRef::new(texture) }))
         };
-        let base_color_texture = texture(&table.base_color_texture, Encoding::Srgb)?;
+        let base_color_texture = texture(&table.base_color_texture, Content::Color)?;
         let metallic_roughness_texture =
-            texture(&table.metallic_roughness_texture, Encoding::Linear)?;
-        let normal_map = texture(&table.normal_map, Encoding::Linear)?
+            texture(&table.metallic_roughness_texture, Content::Numbers)?;
+        let normal_map = texture(&table.normal_map, Content::Numbers)?
             .map(|texture| NormalMap { texture, scale: table.normal_scale });
+        let emission_texture = texture(&table.emission_texture, Content::Color)?;
+        let opacity_texture = texture(&table.opacity_texture, Content::Opacity)?;
         let model = MaterialModel::MetallicRoughness(MetallicRoughnessMaterial {
             base_color: Rgb::from(table.base_color),
             base_color_texture,
@@ -371,7 +389,12 @@ impl Reader<'_> {
             roughness: table.roughness,
             metallic_roughness_texture,
         });
-        Ok(Material { normal_map, ..Material::new(name, model) })
+        let white = || emission_texture.map(|_| Rgb::WHITE);
+        let radiance = table.emission.map(Rgb::from).or_else(white);
+        let radiance = radiance.filter(|radiance| !radiance.is_black());
+        let emission = radiance.map(|radiance| Emission { radiance, texture: emission_texture });
+        let coverage = Coverage::blend(table.opacity, opacity_texture);
+        Ok(Material { normal_map, coverage, emission, ..Material::new(name, model) })
     }
 
     fn notation(&self, name: &str, text: &str, at: usize) -> Result<Material, LoadError> {

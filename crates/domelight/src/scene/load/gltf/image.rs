@@ -1,13 +1,13 @@
 //! Textures: which of its images a texture takes, and their decoding.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::error::{Failure, GltfErrorKind};
 use super::json;
 use super::ktx2::{Ktx2, is_ktx2};
 use super::source::{Source, View, percent_decoded};
 use crate::scene::load::textures::Textures;
-use crate::scene::load::{read_referenced, relative};
+use crate::scene::load::{LoadError, read_referenced, relative};
 use crate::scene::{Encoding, Texture, TextureFilter, TextureRef, UvTransform, Wrap};
 
 /// What a use of an image needs of it.
@@ -32,15 +32,68 @@ pub(super) struct Images<'a> {
     pub(super) textures: Textures<'a>,
     /// The texture of an image, and whether its alpha was read.
     known: HashMap<(usize, Encoding), (usize, bool)>,
+    /// Textures without which their materials are drawn.
+    unusable: HashSet<usize>,
+    /// The first reason of each kind why a texture is unusable, and how many more there are.
+    reasons: Vec<(Reason, String, usize)>,
+}
+
+/// Why a texture is unusable; each kind is one warning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reason {
+    File,
+    Remote,
+    Decoding,
+    Avif,
+    Document,
 }
 
 impl<'a> Images<'a> {
     pub(super) fn new(textures: Textures<'a>) -> Self {
-        Self { textures, known: HashMap::new() }
+        let (known, unusable) = (HashMap::new(), HashSet::new());
+        Self { textures, known, unusable, reasons: Vec::new() }
     }
 
-    /// A use of a texture, its image decoded; `None`, with a warning, if the texture has no image.
+    /// A use of a texture, its image decoded; `None`, with a warning, if the texture has no image, or one
+    /// that cannot be read and whose absence is not refused.
     pub(super) fn texture(
+        &mut self,
+        source: &Source<'_>,
+        material: &str,
+        info: &json::TextureInfo,
+        uv_set: usize,
+        channels: Channels,
+    ) -> Result<Option<TextureRef>, Failure> {
+        if self.unusable.contains(&info.index) {
+            return Ok(None);
+        }
+        let failure = match self.usable_texture(source, info, uv_set, channels) {
+            Err(failure) if !source.strict => failure,
+            result => return result,
+        };
+        let Some(reason) = Reason::of(&failure) else { return Err(failure) };
+        self.unusable.insert(info.index);
+        match self.reasons.iter_mut().find(|(known, ..)| *known == reason) {
+            Some((.., more)) => *more += 1,
+            None => self.reasons.push((reason, format!("material '{material}': {failure}"), 0)),
+        }
+        Ok(None)
+    }
+
+    /// All textures, and one sentence for each kind of those that are left out.
+    pub(super) fn finish(self, mut warn: impl FnMut(&str)) -> Vec<Texture> {
+        for (_, first, more) in self.reasons {
+            let all = match more {
+                0 => "it is".into(),
+                1 => "it and one more texture like it are".into(),
+                n => format!("it and {n} more textures like it are"),
+            };
+            warn(&format!("{first}; {all} left out"));
+        }
+        self.textures.loaded
+    }
+
+    fn usable_texture(
         &mut self,
         source: &Source<'_>,
         info: &json::TextureInfo,
@@ -69,13 +122,7 @@ impl<'a> Images<'a> {
         let transform = info.extensions.transform.as_ref().map_or(UvTransform::IDENTITY, |t| {
             UvTransform::new(t.offset.into(), t.rotation, t.scale.into())
         });
-        let texture = match self.image(source, image, channels) {
-            Err(Failure::Load(error)) if error.is_missing_file() && !source.strict => {
-                source.warn(&format!("{error}; its textures are left out"));
-                return Ok(None);
-            }
-            texture => texture?,
-        };
+        let texture = self.image(source, image, channels)?;
         Ok(Some(TextureRef { texture, uv_set, wrap, filter, transform }))
     }
 
@@ -136,6 +183,23 @@ impl<'a> Images<'a> {
         }
         let Channels { encoding, alpha } = channels;
         Ok(self.textures.decode(&name, &bytes, encoding, alpha, &referrer)?)
+    }
+}
+
+impl Reason {
+    /// Why a texture is unusable; `None` of what ends the load, such as a limit of memory.
+    fn of(failure: &Failure) -> Option<Self> {
+        match failure {
+            Failure::Load(error) if !error.is_about_one_image() => None,
+            Failure::Load(LoadError::ReadReferenced { .. }) => Some(Self::File),
+            Failure::Load(_) => Some(Self::Decoding),
+            Failure::Problem(problem) => Some(match problem {
+                GltfErrorKind::Uri { .. } => Self::Remote,
+                GltfErrorKind::Avif { .. } => Self::Avif,
+                GltfErrorKind::Ktx2 { .. } | GltfErrorKind::Base64 { .. } => Self::Decoding,
+                _ => Self::Document,
+            }),
+        }
     }
 }
 

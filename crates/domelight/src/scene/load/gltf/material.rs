@@ -93,7 +93,7 @@ impl<'a> Materials<'a> {
                 names[0]
             ));
         }
-        (self.loaded, self.images.textures.loaded)
+        (self.loaded, self.images.finish(warn))
     }
 }
 
@@ -185,7 +185,9 @@ impl Reader<'_, '_, '_> {
             return Ok(None);
         }
         let texture = self.texture(material.emissive_texture.as_ref(), COLOR)?;
-        Ok(Some(Emission { radiance, texture }))
+        // Without its map the whole surface would glow.
+        let is_lost = material.emissive_texture.is_some() && texture.is_none();
+        Ok((!is_lost).then_some(Emission { radiance, texture }))
     }
 
     fn layers(&mut self, e: &json::MaterialExtensions) -> Result<Layers, Failure> {
@@ -237,8 +239,11 @@ impl Reader<'_, '_, '_> {
             });
         }
         if let Some(t) = e.transmission.as_ref().filter(|t| t.transmission_factor > 0.0) {
-            let texture = t.transmission_texture.as_ref();
-            layers.transmission = Some(self.factor(t.transmission_factor, texture, LINEAR)?);
+            let map = t.transmission_texture.as_ref();
+            let share = self.factor(t.transmission_factor, map, LINEAR)?;
+            // Without its map the whole surface would be clear.
+            let is_lost = map.is_some() && share.texture.is_none();
+            layers.transmission = (!is_lost).then_some(share);
         }
         if let Some(v) = e.volume.as_ref().filter(|v| v.thickness_factor > 0.0) {
             let texture = self.texture(v.thickness_texture.as_ref(), LINEAR)?;
@@ -288,7 +293,7 @@ impl Reader<'_, '_, '_> {
             ));
             return Ok(None);
         };
-        let texture = self.images.texture(self.source, info, place, channels)?;
+        let texture = self.images.texture(self.source, self.name, info, place, channels)?;
         if texture.is_some() {
             self.uv_sets[place] = Some(set);
         }

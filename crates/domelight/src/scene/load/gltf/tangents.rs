@@ -68,7 +68,9 @@ impl MikkGeometry for Corners<'_> {
     }
 
     fn position(&self, face: usize, corner: usize) -> [f32; 3] {
-        self.vertices.positions[self.vertex(face, corner)]
+        let position = self.vertices.positions[self.vertex(face, corner)];
+        // Triangles of others are left out later; the algorithm is for numbers.
+        if Vec3::from(position).is_finite() { position } else { [0.0; 3] }
     }
 
     fn normal(&self, face: usize, corner: usize) -> [f32; 3] {
