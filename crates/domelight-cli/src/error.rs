@@ -121,7 +121,9 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
 /// 2 if trying again cannot help: the arguments, the scene or the probe are wrong. 75 if it goes on where it was.
 fn code(error: &anyhow::Error) -> u8 {
     let is_wrong_use = |cause: &(dyn Error + 'static)| {
-        matches!(cause.downcast_ref(), Some(domelight_lab::Error::Usage(_)))
+        // What happened at some place is in a box.
+        let boxed = cause.downcast_ref::<Box<domelight_lab::Error>>().map(|error| &**error);
+        matches!(boxed.or(cause.downcast_ref()), Some(domelight_lab::Error::Usage(_)))
             || cause.is::<UsageError>()
             || cause.is::<LoadError>()
             || cause.is::<ProbeError>()

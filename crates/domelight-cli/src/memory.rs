@@ -43,8 +43,8 @@ pub(crate) const PIXEL: u64 = 308;
 /// The same with a checkpoint, or of a part: the sums again, their bits and the file.
 pub(crate) const SAVED_PIXEL: u64 = 716;
 
-/// For each pixel of a comparison: a render, the reference, and what its page shows.
-pub(crate) const COMPARED_PIXEL: u64 = 884;
+/// For each pixel of a comparison: a render, the reference, what its page shows, and eight pictures to compare in pairs.
+pub(crate) const COMPARED_PIXEL: u64 = 980;
 
 static LIMIT: OnceLock<Option<u64>> = OnceLock::new();
 static TAKEN: AtomicU64 = AtomicU64::new(0);

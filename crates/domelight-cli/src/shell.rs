@@ -1,11 +1,11 @@
 //! `domelight completions` and `domelight man`: what shells and `man` know of the command line, made from its definition.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
 use clap::CommandFactory as _;
 use clap_mangen::Man;
+use domelight::files::create_folder;
 
 use crate::args::{Arguments, CompletionsArguments, ManArguments};
 use crate::error::status;
@@ -27,7 +27,7 @@ pub(crate) fn completions(arguments: &CompletionsArguments) -> Result<()> {
 /// Writes a manual page for the program and one for each subcommand.
 pub(crate) fn man(arguments: &ManArguments, quiet: bool) -> Result<()> {
     let folder = &arguments.folder;
-    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    create_folder(folder).with_context(|| folder.display().to_string())?;
     let mut written = Vec::new();
     for (name, text) in manual_pages()? {
         let path = folder.join(name);

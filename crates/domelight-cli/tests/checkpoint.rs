@@ -92,6 +92,36 @@ fn kill_and_resume(folder: &TempDir, arguments: &[&str], checkpoint: &str, seed:
     }
 }
 
+/// What a run that was killed left of a file is removed by the next one that writes into the folder.
+#[test]
+fn the_next_run_removes_what_a_killed_one_left() {
+    let folder = folder();
+    let left = || {
+        let names = fs::read_dir(&folder).unwrap().flatten().map(|entry| entry.file_name());
+        names.filter(|name| name.to_string_lossy().ends_with(".part")).count()
+    };
+    let render = ["render", "sphere", "--env-rows", "16", "--size", "512x512", "--strategy", "mis"];
+    let save = ["--spp", "1000000", "--checkpoint", "c.exr", "--checkpoint-every", "1ms", "-q"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_domelight"));
+    command.args(render).args(save).args(["-o", "x.exr"]).current_dir(&folder);
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let killed_while_it_writes = || {
+        let mut child = command.spawn().expect("the program starts");
+        while left() == 0 {
+            assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        signal(&child, Signal::SIGKILL);
+        child.wait().unwrap();
+        let _ = fs::remove_file(folder.path().join("c.exr"));
+        left() > 0
+    };
+    // It may have finished the file just before it died.
+    assert!(std::iter::repeat_with(killed_while_it_writes).take(20).any(|killed| killed));
+    ended(&domelight(&folder, &scene(&["--spp", "1", "-o", "y.exr"])), 0, &[]);
+    assert_eq!(left(), 0);
+}
+
 /// A pass whose preparation takes longer than the time to the next checkpoint gets on all the same.
 #[test]
 fn saving_all_the_time_leaves_time_to_render() {

@@ -157,6 +157,12 @@ fn what_is_wrong_with_the_library_is_said_before_the_work() {
     ended(&render(&old), 2, &[how, &["one.so", "version 1.3", "2 or later"]].concat());
     let other = library(&folder, "other.so", &["-DWITHOUT_VERSION_2"]);
     ended(&render(&other), 2, &[how, &["other.so", "not Open Image Denoise 2"]].concat());
+    // A pipe would be waited for, and a folder is no library.
+    nix::unistd::mkfifo(&folder.path().join("pipe.so"), nix::sys::stat::Mode::S_IRWXU).unwrap();
+    for name in ["./pipe.so", "."] {
+        let library = folder.path().join(name);
+        ended(&render(&library), 2, &[how, &["not a plain file"]].concat());
+    }
     assert!(!folder.path().join("a.png").exists());
 }
 

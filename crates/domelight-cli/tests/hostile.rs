@@ -196,6 +196,35 @@ fn an_unusable_cache_costs_nothing_but_a_warning() {
 }
 
 #[test]
+fn a_file_in_the_place_of_a_folder_is_named() {
+    let folder = folder();
+    for arguments in [
+        &["man", "in.hdr"][..],
+        &["man", "in.hdr/pages"],
+        &["figures", "--only", "1", "-o", "in.hdr"],
+    ] {
+        ended(&domelight(&folder, arguments), 1, &["in.hdr", "folder"]);
+    }
+}
+
+/// A pipe under the name of a kept reference is passed over: it might never end.
+#[test]
+fn a_pipe_in_the_cache_is_not_waited_for() {
+    let folder = folder();
+    let compare =
+        ["compare", "sphere", "--size", "24x20", "--env-rows", "16", "--reference-spp", "2"];
+    let more =
+        ["--strategies", "mis", "--budget", "spp:1", "--seeds", "1", "--cache", "cache", "-q"];
+    let compare = [&compare[..], &more].concat();
+    ended(&domelight(&folder, &compare), 0, &[]);
+    let entries = || fs::read_dir(folder.path().join("cache")).unwrap().flatten();
+    let entry = entries().next().unwrap().path();
+    fs::remove_file(&entry).unwrap();
+    nix::unistd::mkfifo(&entry, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    ended(&domelight(&folder, &compare), 0, &[]);
+}
+
+#[test]
 fn names_do_not_command_the_terminal() {
     let folder = folder();
     let name = "a\x1b]0;owned\x07\u{9b}31m\nerror: b\u{202e}.ply";
@@ -324,20 +353,35 @@ fn a_picture_does_not_depend_on_the_units_of_its_scene() {
             let scene = format!("[[objects]]\nbuiltin = \"{builtin}\"\nscale = {scale}\n");
             fs::write(folder.path().join("scene.toml"), scene).unwrap();
             let options =
-                ["--env", "sky", "--hide-env", "--material", "diffuse:0.5", "-o", "x.pfm"];
+                ["--env", "sky", "--hide-env", "--material", "diffuse:0.5", "-o", "x.exr"];
             let output =
                 domelight(&folder, &[&["render", "scene.toml"], &SMALL[..], &options].concat());
             ended(&output, 0, &[]);
-            pictures.push((builtin, scale, common::load(&folder, "x.pfm")));
+            let depth = common::load_layer(&folder, "x.exr", "depth");
+            pictures.push((builtin, scale, common::load(&folder, "x.exr"), depth));
         }
     }
-    for (builtin, scale, picture) in &pictures {
+    for (builtin, scale, picture, depth) in &pictures {
         let mean = |p: &domelight::RgbImage| p.pixels.iter().map(|p| p.luminance()).sum::<f32>();
         let first = pictures.iter().find(|(other, ..)| other == builtin).unwrap();
         let ratio = mean(picture) / mean(&first.2);
         assert!((ratio - 1.0).abs() < 2e-3, "{builtin} {scale}: {ratio}");
         // The sphere's size is a power of two: it is traced at the same one.
         assert!(*builtin != "sphere" || picture == &first.2, "{scale}");
+        // Depths are in the scene's own units.
+        let ratio = mean(depth) / mean(&first.3) / scale.parse::<f32>().unwrap();
+        assert!((ratio - 1.0).abs() < 2e-3, "{builtin} {scale}: depth {ratio}");
+    }
+    for scale in [1e10, 1e-12] {
+        let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                   element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+        let ply = format!("{ply}0 0 0\n{scale:e} 0 0\n0 {scale:e} 0\n3 0 1 2\n");
+        fs::write(folder.path().join("a.ply"), ply).unwrap();
+        let options = ["--env", "constant", "--hide-env", "-o", "y.exr"];
+        ended(&domelight(&folder, &[&["render", "a.ply"], &SMALL[..], &options].concat()), 0, &[]);
+        let depth = common::load_layer(&folder, "y.exr", "depth");
+        let depth = depth.pixels[12 * 24 + 10].g / scale;
+        assert!((1.0..4.0).contains(&depth), "{scale:e}: {depth}");
     }
     fs::write(
         folder.path().join("scene.toml"),

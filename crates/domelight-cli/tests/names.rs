@@ -1,8 +1,6 @@
 //! No page, picture or other exported file names a folder of the machine.
 
-use crate::common;
-
-use common::{domelight, ended};
+use crate::common::{domelight, ended};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;

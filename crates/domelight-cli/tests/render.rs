@@ -26,6 +26,22 @@ fn succeeded(output: &Output) {
 
 const TRIANGLE: &str = "v -1 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n";
 
+/// The pilot chooses so few candidates that a narrow lobe gets none of the environment's: the others find its light.
+#[test]
+fn sir_sees_even_light_in_a_narrow_lobe() {
+    let folder = folder();
+    let mean = |strategy| {
+        let scene = ["render", "sphere", "--material", "beckmann:1e-4", "--env", "constant"];
+        let size = ["--size", "32x32", "--env-rows", "16", "--spp", "16", "--hide-env", "-q"];
+        let output = ["--strategy", strategy, "-o", "x.pfm"];
+        succeeded(&domelight(&folder, &[&scene[..], &size, &output].concat()));
+        let pixels = load(&folder, "x.pfm").pixels;
+        pixels.iter().map(|p| p.luminance()).sum::<f32>() / pixels.len() as f32
+    };
+    let [sir, mis] = ["sir", "mis"].map(mean);
+    assert!(mis > 0.3 && (sir / mis - 1.0).abs() < 0.01, "{sir} {mis}");
+}
+
 #[test]
 fn without_arguments_it_makes_an_exr_and_a_png() {
     let folder = folder();

@@ -163,7 +163,7 @@ pub struct PreparedScene {
     pub scene: Scene,
     /// The view.
     pub camera: Camera,
-    /// The view, in the scene's own units.
+    /// The view, in the units of the scene's file, as `camera`.
     pub camera_settings: CameraSettings,
     /// The light.
     pub environment: Environment,
@@ -263,10 +263,9 @@ impl LoadedScene {
     /// # Errors
     /// If scene, camera or environment cannot be used.
     pub fn build(self, host: &dyn Host) -> Result<PreparedScene, Error> {
-        let Self { mut description, light, map, mut camera, warnings, settings } = self;
+        let Self { description, light, map, camera, warnings, settings } = self;
         let [width, height] = settings.view.size;
         let camera_report = CameraReport::new(&camera);
-        description.rescale(&mut camera);
         let (camera, camera_settings) = (Camera::new(&camera, width, height)?, camera);
         let n_triangles: usize = description.parts.iter().map(|p| p.mesh.triangles.len()).sum();
         let tree = format!("{}: a tree over {n_triangles} triangles", settings.scene);

@@ -415,7 +415,8 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
 /// adaptive : bool, default True
 ///     With 'product', more samples for noisier pixels.
 /// target_error : float, optional
-///     End each tile when the spread of its samples suggests this relMSE, such as 1e-3.
+///     End each tile when two sets of its samples differ no more than this relMSE suggests, such as 1e-3, but not
+///     before 16 samples.
 /// tile_size : int, optional
 ///     Pixels along a tile's edge; 16 by default, 64 for functions. Only 'product' depends on it.
 /// passes : {'efficient', 'doubling'}, default 'efficient'

@@ -156,8 +156,6 @@ pub(crate) enum CameraLike {
 pub(crate) struct SceneData {
     pub(crate) scene: scene::Scene,
     pub(crate) name: String,
-    /// What the scene was scaled by for tracing; cameras are in its own units.
-    factor: f32,
     camera: Option<CameraSettings>,
     cameras: Vec<NamedCamera>,
     subject: Aabb,
@@ -177,11 +175,7 @@ impl SceneData {
     ) -> PyResult<(scene::Camera, CameraSettings)> {
         let aspect = width as f32 / height as f32;
         let settings = self.camera_settings(camera, aspect, up)?;
-        let mut scaled = settings;
-        if self.factor != 1.0 {
-            scaled.scale(self.factor);
-        }
-        let camera = scene::Camera::new(&scaled, width, height).map_err(to_python)?;
+        let camera = scene::Camera::new(&settings, width, height).map_err(to_python)?;
         Ok((camera, settings))
     }
 
@@ -281,14 +275,9 @@ impl Scene {
         }
         let (camera, cameras) = (description.camera, description.cameras.clone());
         let environment = description.environment.clone();
-        let built = parallel(py, move || {
-            let factor =
-                description.rescale(&mut CameraSettings::framing(&subject, 1.0, up.vector()));
-            scene::Scene::new(description).map(|scene| (scene, factor))
-        })?;
-        let (scene, factor) = built.map_err(|error| bad_value(format!("{name}: {error}")))?;
-        let data =
-            SceneData { scene, name, factor, camera, cameras, subject, environment, up, lobes };
+        let built = parallel(py, move || scene::Scene::new(description))?;
+        let scene = built.map_err(|error| bad_value(format!("{name}: {error}")))?;
+        let data = SceneData { scene, name, camera, cameras, subject, environment, up, lobes };
         Ok(Self { inner: Arc::new(data) })
     }
 }

@@ -25,6 +25,7 @@ mod scene_loaders;
 mod tables;
 mod tone;
 mod unbiased;
+mod variance;
 
 #[test]
 fn every_file_of_this_folder_is_a_module() {

@@ -268,7 +268,7 @@ fn a_small_sun_keeps_its_energy() {
             let picture = from_lat_long(&sky, mapping, mapping.size_for(128));
             let back = to_lat_long(&picture, mapping, 128);
             let (a, b) = (energy(&sky)[0], energy(&back)[0]);
-            assert!((a / b - 1.0).abs() < 0.01, "{mapping} {sun}: {a} {b}");
+            assert!((a / b - 1.0).abs() < 1e-5, "{mapping} {sun}: {a} {b}");
         }
     }
 }

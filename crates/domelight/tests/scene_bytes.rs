@@ -5,9 +5,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use domelight::environment::Environment;
+use domelight::math::vec3;
 use domelight::picture::{hdr, pfm};
+use domelight::render::{Layers, RenderSettings, Renderer};
 use domelight::scene::{
-    LoadError, LoadOptions, Reach, Scene, SceneDescription, SceneFormat, load, load_bytes,
+    Camera, LoadError, LoadOptions, Reach, Scene, SceneDescription, SceneError, SceneFormat, load,
+    load_bytes,
 };
 use domelight::{Error, Rgb, RgbImage};
 
@@ -118,6 +121,57 @@ fn bytes_give_the_scene_of_the_files() {
     ]);
     for name in ["models/a.gltf", "models/b.glb", "a.obj", "a.ply", "scene.toml"] {
         assert_same(&files, name);
+    }
+}
+
+/// Meshes of any unit of length have the same picture; bounds, cameras and depths are in that unit.
+#[test]
+fn scenes_of_any_size_are_traced_at_a_usual_one() {
+    let environment = Environment::constant(Rgb::WHITE).unwrap();
+    let settings =
+        RenderSettings { width: 24, height: 20, n_samples: 8, ..RenderSettings::default() };
+    let layers = |scale: f32| {
+        let corners = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.5, 0.0], [0.0, 0.0, 1.0]];
+        let vertex = |c: [f32; 3]| {
+            let [x, y, z] = c.map(|x| x * scale);
+            format!("v {x:e} {y:e} {z:e}\n")
+        };
+        let faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+        let obj: String = corners.map(vertex).concat() + faces;
+        let files = Files::new(&[("a.obj", obj.into_bytes())]);
+        let bytes = fs::read(files.path("a.obj")).unwrap();
+        let nothing = |_: &Path| Err(io::ErrorKind::NotFound.into());
+        let scenes = [
+            Scene::load(files.path("a.obj")).unwrap(),
+            Scene::from_bytes(&bytes, SceneFormat::Obj, &nothing).unwrap(),
+        ];
+        let [layers, of_bytes] = scenes.map(|scene| {
+            assert_eq!(scene.bounds().max, vec3(2.0, 1.5, 1.0) * scale, "{scale:e}");
+            let camera = Camera::framing(&scene, settings.width, settings.height);
+            let spec = "mis".parse().unwrap();
+            let renderer = Renderer::new(&scene, &camera, &environment, spec, settings);
+            renderer.unwrap().finish().layers()
+        });
+        assert!(layers.color == of_bytes.color && layers.depth == of_bytes.depth);
+        layers
+    };
+    let usual = layers(1.0);
+    let mean =
+        |layers: &Layers| layers.color.pixels.iter().map(|p| f64::from(p.luminance())).sum::<f64>();
+    let depth = |layers: &Layers| layers.depth.iter().map(|&d| f64::from(d)).sum::<f64>();
+    assert!(depth(&usual) > 100.0);
+    for scale in [1e-17, 1e-12, 1e-6, 1e-2, 1e2, 1e6, 1e10, 1e17] {
+        let layers = layers(scale);
+        let ratio = mean(&layers) / mean(&usual);
+        assert!((ratio - 1.0).abs() < 2e-3, "{scale:e}: {ratio}");
+        let ratio = depth(&layers) / f64::from(scale) / depth(&usual);
+        assert!((ratio - 1.0).abs() < 1e-2, "{scale:e}: depth {ratio}");
+    }
+    for scale in [1e-19, 1e19] {
+        let vertices = format!("v 0 0 0\nv {scale:e} 0 0\nv 0 {scale:e} 0\nf 1 2 3\n");
+        let nothing = |_: &Path| Err(io::ErrorKind::NotFound.into());
+        let error = Scene::from_bytes(vertices.as_bytes(), SceneFormat::Obj, &nothing).unwrap_err();
+        assert!(matches!(error, Error::Scene(SceneError::Size { .. })), "{error}");
     }
 }
 

@@ -69,7 +69,8 @@ pub(crate) struct SampleArguments {
     #[arg(long, value_enum, value_name = "HOW", default_value_t = PassesName::Efficient,
           conflicts_with = "target_error")]
     pub(crate) passes: PassesName,
-    /// End each tile when the spread of its samples suggests this relMSE, such as 1e-3, but not before 16 samples
+    /// End each tile when two sets of its samples differ no more than this relMSE suggests, such as 1e-3, but not before
+    /// 16 samples
     #[arg(long, value_name = "E", value_parser = positive)]
     pub(crate) target_error: Option<f32>,
 }

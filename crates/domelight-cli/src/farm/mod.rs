@@ -6,12 +6,12 @@ mod openjd;
 mod parallel;
 mod slurm;
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
 use clap::ValueEnum as _;
 use domelight::code;
+use domelight::files::create_folder;
 use domelight::quote::{Code, Shell, Yaml, shell};
 
 use crate::args::farm::{Engine, FarmArguments};
@@ -87,7 +87,7 @@ pub(crate) fn run(arguments: &FarmArguments, quiet: bool) -> Result<()> {
         files::declare(Path::new(&path))?;
     }
     let parts = farm.path("parts");
-    fs::create_dir_all(&parts).with_context(|| parts.clone())?;
+    create_folder(Path::new(&parts)).with_context(|| parts.clone())?;
     for file in &files {
         let path = farm.path(file.name);
         files::write(Path::new(&path), |out| out.write_all(file.text.as_bytes()))?;

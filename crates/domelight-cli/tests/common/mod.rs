@@ -48,6 +48,12 @@ pub fn load(folder: &TempDir, name: &str) -> RgbImage {
     read(&folder.path().join(name), &ReadOptions::default()).expect(name).image
 }
 
+/// A layer of an OpenEXR picture.
+pub fn load_layer(folder: &TempDir, name: &str, layer: &str) -> RgbImage {
+    let options = ReadOptions { layer: Some(layer.to_owned()), ..ReadOptions::default() };
+    read(&folder.path().join(name), &options).expect(name).image
+}
+
 /// What the program says and leaves when it is interrupted while it works.
 #[cfg(unix)]
 pub fn interrupted(folder: &TempDir, arguments: &[&str]) -> Output {

@@ -78,7 +78,7 @@ pub(super) fn occlusion_rate(view: &PreparedScene, settings: &RenderSettings) ->
 
 fn rays(view: &PreparedScene, settings: &RenderSettings) -> RayBatch {
     let mut rng = Pcg32::new(1, 1);
-    let extent = view.scene.bounds().size().max_element();
+    let extent = view.scene.bounds().size().max_element() / view.scene.unit();
     let mut rays = RayBatch::default();
     for point in pilot_points(&view.scene, &view.camera, settings) {
         let origin = offset_origin(point.position, point.ng, extent);

@@ -7,7 +7,8 @@ mod oidn;
 
 use std::env;
 use std::ffi::{CStr, OsString};
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use domelight::RgbImage;
 
@@ -78,6 +79,12 @@ impl Denoiser {
     fn load_first(names: &[OsString]) -> Result<Self, Error> {
         let mut reasons = Vec::new();
         for name in names {
+            // A pipe might never end.
+            let is_path = Path::new(name).components().count() > 1;
+            if is_path && fs::metadata(name).is_ok_and(|there| !there.is_file()) {
+                reasons.push(format!("{}: it is not a plain file", name.to_string_lossy()));
+                continue;
+            }
             match Device::load(name, rayon::current_num_threads()) {
                 Ok(device) => return Ok(Self { device }),
                 Err(why) => reasons.push(format!("{}: {why}", name.to_string_lossy())),

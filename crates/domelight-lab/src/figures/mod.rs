@@ -21,7 +21,6 @@ mod sir_density;
 mod sphere;
 mod variance_minimization;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -102,7 +101,7 @@ fn numbers(only: &[u8]) -> impl Iterator<Item = u8> {
 /// # Errors
 /// If a file cannot be written, or the host ended the work.
 pub fn draw(context: &FigureContext, only: &[u8], folder: &Path) -> Result<DrawnFigures, Error> {
-    fs::create_dir_all(folder).at(folder.display())?;
+    domelight::files::create_folder(folder).at(folder.display())?;
     let host = context.host;
     let mut figures = Vec::new();
     let mut drawn = DrawnFigures { page: folder.join(page::NAME), figures: Vec::new() };

@@ -7,7 +7,7 @@ use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use domelight::files::{remove_abandoned, write_atomically};
+use domelight::files::{create_folder, remove_abandoned, write_atomically};
 use domelight::fingerprint::{Fingerprint, Fingerprinter};
 use etcetera::base_strategy::{BaseStrategy as _, choose_native_strategy};
 
@@ -62,8 +62,7 @@ impl Cache {
 
     fn try_put(&self, key: &Key, bytes: &[u8]) -> Result<PathBuf, Error> {
         let folder = &self.folder;
-        fs::create_dir_all(folder)
-            .at(format!("cannot make the cache folder {}", folder.display()))?;
+        create_folder(folder).at(format!("cannot make the cache folder {}", folder.display()))?;
         let path = folder.join(format!("{}-{}.exr", key.0, of(bytes)));
         remove_abandoned(folder);
         write_atomically(&path, |out| out.write_all(bytes))?;

@@ -195,6 +195,7 @@ mod tests {
     use super::*;
     use crate::bsdf::Lambert;
     use crate::bsdf::test_support::{check_bound, check_lobe, directional_albedo, toward};
+    use crate::math::{vec2, vec3};
 
     #[test]
     fn obeys_the_laws() {
@@ -229,6 +230,22 @@ mod tests {
         for degrees in [0.0, 45.0, 80.0] {
             let (wo, wi) = (toward(degrees, 0.2), toward(30.0, 3.0));
             assert_eq!(lobe.eval_pdf(wo, wi), ggx.eval_pdf(wo, wi));
+        }
+    }
+
+    /// The diffuse part keeps a share of the samples where the specular part reflects nearly all light.
+    #[test]
+    fn weights_of_a_white_dielectric_are_bounded_at_grazing_views() {
+        let lobe = MetallicRoughness::new(Rgb::WHITE, 0.0, 0.02);
+        for cos_o in [1e-5f32, 1e-4, 1e-3, 1e-2] {
+            let wo = vec3((1.0 - cos_o * cos_o).sqrt(), 0.0, cos_o);
+            for i in 0..32_768 {
+                let [u_lobe, u, v] =
+                    [i % 32, i / 32 % 32, i / 1024].map(|i| (i as f32 + 0.5) / 32.0);
+                let Some(sample) = lobe.sample(wo, u_lobe, vec2(u, v)) else { continue };
+                let weight = sample.value.max_component() / sample.pdf;
+                assert!(weight < 1.1 / (1.0 - MOST_SPECULAR), "{cos_o} {u_lobe} {u} {v}: {weight}");
+            }
         }
     }
 

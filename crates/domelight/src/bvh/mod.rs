@@ -24,7 +24,9 @@
 //! # Limits
 //! Coordinates from about 1e-12 to 1e12 in magnitude, and directions from about 1e-18 to 1e20 in
 //! length, keep all intermediate products finite and normal. Beyond that rays may miss; nothing
-//! panics. From further away than some 10⁴ times the scene's size boxes are widened so much that
+//! panics. Shadow rays that leave a surface need more: a size of 1e-6 at least and coordinates up to
+//! 1e7, which [`Scene::new`](crate::scene::Scene::new) sees to by tracing other scenes at a usual
+//! size. From further away than some 10⁴ times the scene's size boxes are widened so much that
 //! rays become slow.
 //!
 //! # Alternatives

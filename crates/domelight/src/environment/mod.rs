@@ -157,6 +157,30 @@ pub struct Environment {
     max_luminance: f32,
 }
 
+/// A change of a map's texels that leaves its radiance as it is, along columns and rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Reshaping {
+    /// So many equal texels become one.
+    merged: [usize; 2],
+    /// Each of these becomes so many.
+    divided: [usize; 2],
+}
+
+/// Into how many columns and rows each texel of a map is divided to be about as wide as high, as far as memory allows.
+fn division([width, height]: [usize; 2]) -> [usize; 2] {
+    /// A map is divided into no more texels than this.
+    const MOST_TEXELS: usize = 1 << 22;
+    let columns = if width < height { (2 * height).div_ceil(width) } else { 1 };
+    let rows = if width > 4 * height { width.div_ceil(2 * height) } else { 1 };
+    let most = (MOST_TEXELS / width.saturating_mul(height)).max(1);
+    [columns.min(most), rows.min(most)]
+}
+
+/// The greatest common divisor.
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
 impl Environment {
     /// The fingerprint of the light: the map's texels times the scale, and how it is turned.
     #[cfg(feature = "io")]
@@ -281,33 +305,58 @@ impl Environment {
         Ok(Self { map, unit, orientation, grid, table, inverse_power, max_luminance })
     }
 
-    /// The same radiance of more texels, each divided into columns and rows of equal ones, if the map is much narrower or
-    /// wider than 2:1; else `None`.
+    /// The same radiance of texels that are about as wide as high, if the map is much narrower or wider than 2:1; else
+    /// `None`. Equal neighbors along the longer side become one texel, then texels are divided along the shorter side.
     ///
     /// Divisions of a map into squares of texels assume that its texels are about as wide as high.
-    pub(crate) fn divided(&self) -> Option<Self> {
-        let RgbImage { width, height, .. } = self.map;
-        let [columns, rows] = self.division()?;
-        let texel = |x: usize, y: usize| self.map.get(x / columns, y / rows);
-        let map = RgbImage::from_fn(width * columns, height * rows, texel);
+    pub(crate) fn reshaped(&self) -> Option<Self> {
+        let Reshaping { merged, divided } = self.reshaping()?;
+        let [width, height] = [0, 1].map(|i| self.size()[i] / merged[i] * divided[i]);
+        let texel = |x: usize, y: usize| {
+            self.map.get(x / divided[0] * merged[0], y / divided[1] * merged[1])
+        };
+        let map = RgbImage::from_fn(width, height, texel);
         Self::in_units(map, self.orientation, self.unit, 1.0).ok()
     }
 
-    /// Into how many columns and rows [`Environment::divided`] divides each texel; `None` if it leaves the map as it is.
-    fn division(&self) -> Option<[usize; 2]> {
-        /// A map beyond is left as it is.
-        const MOST_TEXELS: usize = 1 << 22;
-        let RgbImage { width, height, .. } = self.map;
-        let columns = if width < height { (2 * height).div_ceil(width) } else { 1 };
-        let rows = if width > 4 * height { width.div_ceil(2 * height) } else { 1 };
-        let n_texels = width.checked_mul(height)?.checked_mul(columns)?.checked_mul(rows)?;
-        (columns * rows > 1 && n_texels <= MOST_TEXELS).then_some([columns, rows])
+    /// How [`Environment::reshaped`] changes the texels; `None` if it leaves the map as it is.
+    fn reshaping(&self) -> Option<Reshaping> {
+        let [width, height] = self.size();
+        let merged = match () {
+            () if width < height => [1, self.equal_rows()],
+            () if width > 4 * height => [self.equal_columns(), 1],
+            () => return None,
+        };
+        let divided = division([width / merged[0], height / merged[1]]);
+        (merged != divided).then_some(Reshaping { merged, divided })
     }
 
-    /// Memory that [`Environment::divided`] takes \[bytes\].
-    pub(crate) fn memory_to_divide(&self) -> u64 {
-        let [columns, rows] = self.division().unwrap_or([0; 2]);
-        Self::MEMORY_PER_TEXEL * (self.map.pixels.len() * columns * rows) as u64
+    /// The most rows that the map is made of equal groups of.
+    fn equal_rows(&self) -> usize {
+        let RgbImage { width, height, pixels } = &self.map;
+        let row = |y: usize| &pixels[y * width..][..*width];
+        (1..*height).filter(|&y| row(y) != row(y - 1)).fold(*height, gcd)
+    }
+
+    /// The most columns that the map is made of equal groups of.
+    fn equal_columns(&self) -> usize {
+        let RgbImage { width, pixels, .. } = &self.map;
+        let differs = |x: usize| pixels.chunks_exact(*width).any(|row| row[x] != row[x - 1]);
+        (1..*width).filter(|&x| differs(x)).fold(*width, gcd)
+    }
+
+    /// Columns and rows of the map.
+    fn size(&self) -> [usize; 2] {
+        [self.map.width, self.map.height]
+    }
+
+    /// Memory that [`Environment::reshaped`] takes \[bytes\].
+    pub(crate) fn memory_to_reshape(&self) -> u64 {
+        let n_texels = |Reshaping { merged, divided }: Reshaping| {
+            let along = |i: usize| self.size()[i] / merged[i] * divided[i];
+            (along(0) * along(1)) as u64
+        };
+        Self::MEMORY_PER_TEXEL * self.reshaping().map_or(0, n_texels)
     }
 
     /// Memory that an environment and what is made with it take for each texel \[bytes\], its making included: its map,

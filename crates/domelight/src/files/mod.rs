@@ -1,9 +1,11 @@
 //! Files that are whole or not there, and which file is which.
 
 mod atomic;
+mod folder;
 mod ledger;
 mod temporary;
 
 pub use atomic::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};
+pub use folder::create_folder;
 pub use ledger::{FileConflict, FileLedger};
 pub use temporary::remove_abandoned;

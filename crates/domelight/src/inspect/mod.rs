@@ -86,7 +86,7 @@ pub struct Inspector<'a> {
     /// Luminance that each source adds to the pixel, by multiple importance sampling: what a strategy that misses rare
     /// light is told by.
     light: Vec<f64>,
-    /// The longest extent of the scene.
+    /// The longest extent of the scene, in its units.
     extent: f32,
 }
 
@@ -134,6 +134,7 @@ impl<'a> Inspector<'a> {
         if x >= width || y >= height {
             return Err(InspectError::Outside { x, y, width, height });
         }
+        let camera = scene.camera_inside(camera);
         let sampler = Sampler::new(settings.sampler, settings.seed, (y * width + x) as u64);
         let (film, filter) = (sampler.set(Dimension::Film), FilterSampler::new(settings.filter));
         let see = |ray: &Ray, sample: u32| {
@@ -169,7 +170,7 @@ impl<'a> Inspector<'a> {
             samples,
             regions: Regions::of(environment),
             light: Vec::new(),
-            extent: scene.bounds().size().max_element(),
+            extent: scene.extent(),
         };
         inspector.light = inspector.light_by_source();
         Ok(inspector)
@@ -194,7 +195,7 @@ impl<'a> Inspector<'a> {
         PixelSummary {
             pixel: self.pixel,
             coverage: hits as f64 / self.samples.len() as f64,
-            position: point.map(|p| p.position.to_array()),
+            position: point.map(|p| (p.position * self.scene.unit()).to_array()),
             normal: point.map(|p| p.frame.z.to_array()),
             albedo: point.map(|p| p.bsdf.albedo().to_array()),
         }

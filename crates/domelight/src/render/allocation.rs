@@ -110,11 +110,6 @@ impl Allocation {
         });
     }
 
-    /// Columns of the tile.
-    pub(super) fn width(&self) -> usize {
-        self.width
-    }
-
     /// How many pixels the tile has.
     pub(super) fn n_pixels(&self) -> usize {
         self.counts.len()

@@ -99,9 +99,10 @@ pub struct RenderSettings {
     /// Of strategies that render a tile in rounds, noisier pixels get more samples: `n_samples` are then the mean over
     /// the pixels of a tile, not each pixel's.
     pub adaptive: bool,
-    /// A tile is finished before its samples are, but not before 16, when two independent sets of them differ no more
-    /// than this relMSE suggests: mean of variance over (luminance² + 0.01). To stop on what was
-    /// drawn biases a picture by far less than the error.
+    /// A tile is finished before its samples are, but not before 16, when two independent sets of them suggest no more
+    /// than this relMSE: the mean over its pixels of error² of the luminance over (luminance² + 0.01), and one standard
+    /// error of that. Tiles that stop so have the error within a factor of 1.5 on average; those that 16 samples are
+    /// more than enough for have less. To stop on what was drawn biases a picture by far less than the error.
     pub target_error: Option<f32>,
     /// How samples are divided into passes; with a target error passes have lengths of their own.
     pub passes: Passes,
@@ -198,11 +199,12 @@ pub struct Rendering {
 /// All that tiles share.
 struct RenderContext<'a> {
     scene: &'a Scene,
-    camera: &'a Camera,
+    /// In the scene's own units of length, as all that is traced.
+    camera: Camera,
     environment: &'a Environment,
     settings: RenderSettings,
     filter: FilterSampler,
-    /// The longest extent of the scene.
+    /// The longest extent of the scene, in its units.
     extent: f32,
 }
 
@@ -236,7 +238,7 @@ impl StrategySpec {
         environment: &Environment,
         settings: &RenderSettings,
     ) -> Self {
-        let extent = scene.bounds().size().max_element();
+        let extent = scene.extent();
         let visibility = |at: &ShadingPoint, wi: Vec3| {
             let side = if at.ng.dot(wi) < 0.0 { -at.ng } else { at.ng };
             let ray = Ray::new(offset_origin(at.position, side, extent), wi);
@@ -247,13 +249,14 @@ impl StrategySpec {
     }
 }
 
-/// The shading points of up to 256 pixels' centers, spread over the picture: for pilots.
+/// The shading points of up to 256 pixels' centers, spread over the picture: for pilots. In units of [`Scene::unit`].
 pub fn pilot_points(
     scene: &Scene,
     camera: &Camera,
     settings: &RenderSettings,
 ) -> Vec<ShadingPoint> {
     const ACROSS: usize = 16;
+    let camera = scene.camera_inside(camera);
     let at = |i: usize, n: usize| ((2 * i + 1) * n) as f32 / (2 * ACROSS) as f32;
     let rays = (0..ACROSS * ACROSS)
         .map(|i| camera.ray(at(i % ACROSS, settings.width), at(i / ACROSS, settings.height)));

@@ -146,7 +146,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         settings: RenderSettings,
     ) -> Self {
         let filter = FilterSampler::new(settings.filter);
-        let extent = scene.bounds().size().max_element();
+        let (camera, extent) = (scene.camera_inside(camera), scene.extent());
         let tiling = Tiling::new(&settings, strategy.n_rays());
         let context = RenderContext { scene, camera, environment, settings, filter, extent };
         let empty = Self {

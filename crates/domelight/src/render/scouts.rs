@@ -4,16 +4,17 @@
 use rayon::prelude::*;
 
 use super::allocation::{Allocation, OCTAVES, count, fewest};
-use super::tile::{Pass, Scratch, Tile};
+use super::tile::{Pass, SECOND_SETS, Scratch, Tile};
 use super::tiling::Window;
 use super::{RenderContext, RenderSettings};
 use crate::sampling::{Pcg32, Sampler};
 use crate::strategy::Strategy;
 use crate::strategy::levels::N_LEVELS;
 
-/// Columns and rows of a window of scouts: two steps from one pixel of the first level to the next, so that pixels
-/// within the border have all their neighbors.
-const SCOUT_WINDOW: usize = 9;
+/// Columns and rows of a window of scouts: its corners are pixels of the first level. Many small windows estimate the
+/// mean over the picture better than a few large ones: those of 9 × 9 at equal cost erred twice as much
+/// (docs/experiments.md).
+const SCOUT_WINDOW: usize = 5;
 
 /// The share of a tile's pixels that are of a level.
 fn share(level: u32) -> f64 {
@@ -29,15 +30,11 @@ struct Scout {
 }
 
 impl Scout {
-    /// The pixels of a tile that was rendered, without those at its border that lack neighbors.
+    /// The pixels of a tile that was rendered.
     fn of_tile(allocation: &Allocation) -> impl Iterator<Item = Self> {
         let scout =
             |pixel: usize| Self { level: allocation.level(pixel), log: allocation.log(pixel) };
-        let inner = |i: usize, n: usize| n < SCOUT_WINDOW || (1..n - 1).contains(&i);
-        let (width, n_pixels) = (allocation.width(), allocation.n_pixels());
-        let height = n_pixels / width;
-        let complete = move |i: &usize| inner(i % width, width) && inner(i / width, height);
-        (0..n_pixels).filter(complete).map(scout)
+        (0..allocation.n_pixels()).map(scout)
     }
 
     /// Its samples, if a pixel at `mean_log` has `n`.
@@ -61,9 +58,9 @@ fn spent(scouts: &[Scout], n: u32, mean_log: f32) -> f64 {
     sum / shares / f64::from(n)
 }
 
-/// The logarithm at which a pixel has `n` samples, if pixels like these have `n` on average; `None` if none of them
-/// sees the scene.
-fn mean_log(scouts: &[Scout], n: u32) -> Option<f32> {
+/// The logarithm at which a pixel has `n` samples, if pixels like these have `budget` times `n` on average; `None` if
+/// none of them sees the scene.
+fn mean_log(scouts: &[Scout], n: u32, budget: f64) -> Option<f32> {
     /// The range is halved as often.
     const STEPS: usize = 20;
     let [fewest, most] = OCTAVES.map(|octaves| octaves as f32);
@@ -73,7 +70,7 @@ fn mean_log(scouts: &[Scout], n: u32) -> Option<f32> {
     // `low` spends too much, `high` does not.
     for _ in 0..STEPS {
         let middle = 0.5 * (low + high);
-        if spent(scouts, n, middle) > 1.0 {
+        if spent(scouts, n, middle) > budget {
             low = middle;
         } else {
             high = middle;
@@ -96,9 +93,9 @@ pub(super) fn scale<S: Strategy>(
     /// A window for so many pixels of the picture: scouts cost a twentieth of the render, less in large pictures.
     const PIXELS_PER_WINDOW: usize = 20 * SCOUT_WINDOW * SCOUT_WINDOW;
     /// The fewest and the most.
-    const N_WINDOWS: [usize; 2] = [16, 400];
+    const N_WINDOWS: [usize; 2] = [52, 1296];
     /// Windows for the first scale.
-    const FIRST: usize = 9;
+    const FIRST: usize = 29;
     let RenderSettings { width, height, seed, .. } = context.settings;
     let settings = RenderSettings { seed: !seed, ..context.settings };
     let context = &RenderContext { settings, filter: context.filter.clone(), ..*context };
@@ -115,10 +112,12 @@ pub(super) fn scale<S: Strategy>(
             .flatten_iter()
             .collect()
     };
-    pass.mean_log = Some(mean_log(&scouts(FIRST, &pass), pass.n_samples)?);
+    // Second sets of samples are paid from the same budget.
+    let budget = if settings.target_error.is_none() { 1.0 / (1.0 + SECOND_SETS) } else { 1.0 };
+    pass.mean_log = Some(mean_log(&scouts(FIRST, &pass), pass.n_samples, budget)?);
     let [fewest, most] = N_WINDOWS;
     let n_windows = (width * height / PIXELS_PER_WINDOW).clamp(fewest, most);
-    mean_log(&scouts(n_windows, &pass), pass.n_samples)
+    mean_log(&scouts(n_windows, &pass), pass.n_samples, budget)
 }
 
 /// About `n` windows of `size` × `size` pixels, or what the picture has, one at random in each cell of a grid.
@@ -159,12 +158,12 @@ mod tests {
                         Scout { level, log: (level > 0).then_some(log) }
                     })
                     .collect();
-                let mean_log = mean_log(&scouts, n).unwrap();
+                let mean_log = mean_log(&scouts, n, 1.0).unwrap();
                 let mean = spent(&scouts, n, mean_log);
                 assert!((mean - 1.0).abs() < 0.06, "{n} {range}: {mean}");
             }
         }
-        assert_eq!(mean_log(&[Scout { level: 0, log: None }], 8), None);
+        assert_eq!(mean_log(&[Scout { level: 0, log: None }], 8, 1.0), None);
     }
 
     #[test]

@@ -242,11 +242,15 @@ impl PixelSums {
         }
     }
 
-    /// Error² of the mean's luminance over its own square, by the difference of the two sets; 0 without a second.
-    pub(super) fn relative_variance(&self) -> f32 {
-        let mean = self.mean(self.color).luminance();
+    /// The luminance of the mean.
+    pub(super) fn luminance(&self) -> f32 {
+        self.mean(self.color).luminance()
+    }
+
+    /// Error² of the mean's luminance by the difference of the two sets; 0 without a second.
+    pub(super) fn variance_by_sets(&self) -> f32 {
         let difference = Rgb::from(self.difference().map(|d| d as f32)).luminance();
-        self.balance() as f32 * difference * difference / (mean * mean + 0.01)
+        self.balance() as f32 * difference * difference
     }
 
     /// The mean of the first set less that of the second; 0 if either is empty.

@@ -208,10 +208,31 @@ impl Tile {
         self.pixels.first().map_or(self.n_missed.is_multiple_of(2), even)
     }
 
-    /// The relMSE that the difference of the two sets suggests.
+    /// The relMSE that the differences of the two sets suggest, and one standard error more: a tile whose error is in a
+    /// few pixels would stop on the first lucky estimate.
     fn error(&self) -> f32 {
-        let sum: f32 = self.pixels.iter().map(PixelSums::relative_variance).sum();
-        sum / self.window.area() as f32
+        let luminance: Vec<f32> = self.pixels.iter().map(PixelSums::luminance).collect();
+        let (mut sum, mut sum_of_squares) = (0.0, 0.0);
+        for (i, pixel) in self.pixels.iter().enumerate() {
+            // A pixel with a firefly is as bright as it is wrong: its neighbors say how bright it should be.
+            let mean = self.mean_around(i, &luminance);
+            let error = pixel.variance_by_sets() / (mean * mean + 0.01);
+            sum += error;
+            sum_of_squares += error * error;
+        }
+        // The square of a normal number with variance v has the variance 2 v² and the mean square 3 v².
+        let standard_error = (sum_of_squares * 2.0 / 3.0).sqrt();
+        (sum + standard_error) / self.window.area() as f32
+    }
+
+    /// The mean over pixel `i` and its neighbors in the tile.
+    fn mean_around(&self, i: usize, values: &[f32]) -> f32 {
+        let Window { width, height, .. } = self.window;
+        let near = |center: usize, n: usize| center.saturating_sub(1)..(center + 2).min(n);
+        let (columns, rows) = (near(i % width, width), near(i / width, height));
+        let n = columns.len() * rows.len();
+        let row = |y: usize| values[y * width..][columns.clone()].iter().sum::<f32>();
+        rows.map(row).sum::<f32>() / n as f32
     }
 
     /// Adds the samples of a pass to each pixel.
@@ -456,6 +477,9 @@ impl Tile {
     }
 }
 
+/// The share of the pixels that have a second set of samples in strategies that place the rays of a pixel together.
+pub(super) const SECOND_SETS: f64 = 4.0 / 256.0;
+
 /// Whether a pixel of the picture has a second set of samples in strategies that place the rays of a pixel together:
 /// four pixels in a square of 16 by 16, all of one [`level`], which is each level's as often as it has pixels.
 fn has_second_set(seed: u64, x: usize, y: usize) -> bool {
@@ -608,7 +632,7 @@ impl Batch {
             surface: Some(SurfaceSample {
                 albedo: p.bsdf.albedo(),
                 normal: p.frame.z,
-                depth: context.camera.depth(ray.at(hit.t)),
+                depth: context.camera.depth(ray.at(hit.t)) * context.scene.unit(),
             }),
         }
     }

@@ -232,6 +232,18 @@ impl Camera {
         Self { step_x: self.step_x * x, step_y: self.step_y * y, ..*self }
     }
 
+    /// The same view where all lengths are multiplied by a factor > 0.
+    pub(crate) fn scaled(&self, factor: f32) -> Self {
+        let step = if self.orthographic { factor } else { 1.0 };
+        Self {
+            origin: self.origin * factor,
+            step_x: self.step_x * step,
+            step_y: self.step_y * step,
+            axis: Ray::new(self.axis.origin * factor, self.axis.direction),
+            ..*self
+        }
+    }
+
     /// The ray through the point (`px`, `py`) of the picture in pixels, `px` in [0, width) to the
     /// right and `py` in [0, height) down; its direction is a unit vector.
     #[inline]

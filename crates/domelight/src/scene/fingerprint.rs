@@ -34,6 +34,9 @@ impl Scene {
             f.text(format_args!("{model:?} {normal_map:?} {coverage:?} {double_sided}"));
             f.text(format_args!("{emission:?} {unlit} {layers:?}"));
         }
+        if self.unit != 1.0 {
+            f.numbers([self.unit]);
+        }
         self.textures.iter().for_each(|texture| texture.add_to(&mut f));
         f.finish()
     }

@@ -63,9 +63,12 @@ pub struct Scene {
     emits: bool,
     /// Light passes through some part.
     transmits: bool,
+    /// In units of the description.
     bounds: Aabb,
-    /// The bounds of what is not scenery.
+    /// The bounds of what is not scenery, in units of the description.
     subject_bounds: Aabb,
+    /// The length of one unit of the hierarchy and the parts, in units of the description; a power of two.
+    unit: f32,
     /// The camera and the up axis of the file, if it has them.
     camera: Option<CameraSettings>,
     up: UpAxis,
@@ -108,8 +111,11 @@ pub enum SceneError {
         /// How many there are.
         vertices: usize,
     },
-    /// Rays are traced well between the two alone; [`SceneDescription::rescale`] brings others there.
-    #[error("the scene is {size:e} across, {farthest:e} at its farthest: not between 1e-6 and 1e7")]
+    /// Lengths whose squares leave the range of numbers, or a scene that is a speck at its distance from the origin.
+    #[error(
+        "the scene is {size:e} across, {farthest:e} at its farthest; scale it to a size from 1e-18 to 1e18 and move it \
+         nearer to the origin than some 1e10 times its size"
+    )]
     Size {
         /// The longest edge of the bounds.
         size: f32,
@@ -125,15 +131,24 @@ impl Scene {
     /// Checks every mesh and reference, and builds a hierarchy over the parts that hide all behind them and one over
     /// those that may not; the former are moved before the latter.
     ///
+    /// Scenes that are very small or very large are traced at a usual size, which changes no picture: their
+    /// [`Scene::unit`] is not 1. Bounds, cameras and depths are in the units of the description all the same.
+    ///
     /// # Errors
     /// The first [`SceneError`] found. A scene without triangles is not an error: nothing is hit.
     pub fn new(description: SceneDescription) -> Result<Self, SceneError> {
         check(&description)?;
         let subject_bounds = description.subject_bounds();
+        let bounds = description.bounds();
+        let scale = description.usual_scale();
+        check_size(&bounds, scale)?;
         let SceneDescription { mut parts, materials, textures, camera, up, .. } = description;
         let up = up.unwrap_or_default();
-        let bounds = parts.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()));
-        check_size(&bounds)?;
+        if scale != 1.0 {
+            for part in &mut parts {
+                part.mesh.scale(scale);
+            }
+        }
         parts.sort_by_key(|part| !part.is_opaque(&materials));
         let n_opaque = parts.partition_point(|part| part.is_opaque(&materials));
         let (opaque, others) = parts.split_at(n_opaque);
@@ -158,6 +173,7 @@ impl Scene {
             transmits,
             bounds,
             subject_bounds,
+            unit: 1.0 / scale,
             camera,
             up,
         })
@@ -222,6 +238,25 @@ impl Scene {
         self.camera.unwrap_or_else(framed)
     }
 
+    /// The length of one unit of the hierarchy, of [`Scene::parts`] and of shading points, in units of the description: a
+    /// power of two, and 1 for scenes from 1/16 to 65536. Rays to the hierarchy, to [`Scene::sight`] and
+    /// [`Scene::camera_hit`] have its units; [`Scene::camera_inside`] gives a camera whose rays do.
+    pub fn unit(&self) -> f32 {
+        self.unit
+    }
+
+    /// A camera, which is in the units of the description, in those of the hierarchy; see [`Scene::unit`]. Renders do this
+    /// by themselves.
+    #[must_use]
+    pub fn camera_inside(&self, camera: &Camera) -> Camera {
+        camera.scaled(1.0 / self.unit)
+    }
+
+    /// The longest extent, in units of the hierarchy.
+    pub(crate) fn extent(&self) -> f32 {
+        self.bounds.size().max_element() / self.unit
+    }
+
     /// The least box around all vertices; empty without any.
     pub fn bounds(&self) -> Aabb {
         self.bounds
@@ -238,12 +273,13 @@ impl Scene {
     }
 
     /// The ray-tracing hierarchy over all triangles that hide what is behind them: all but those whose material has a
-    /// [`Coverage`] that is not whole everywhere. [`Scene::sight`] and [`Scene::transmittances`] know both.
+    /// [`Coverage`] that is not whole everywhere. [`Scene::sight`] and [`Scene::transmittances`] know both. Its unit of
+    /// length is [`Scene::unit`].
     pub fn bvh(&self) -> &Bvh {
         &self.bvh
     }
 
-    /// The meshes.
+    /// The meshes, in units of [`Scene::unit`].
     pub fn parts(&self) -> &[Part] {
         &self.parts
     }
@@ -266,12 +302,14 @@ impl Scene {
     }
 }
 
-/// Refuses what is so small or so large that rays would hit the surface that they leave.
-fn check_size(bounds: &Aabb) -> Result<(), SceneError> {
+/// Refuses what is so small or so large, or once scaled so small, that rays would hit the surface that they leave.
+fn check_size(bounds: &Aabb, scale: f32) -> Result<(), SceneError> {
     let size = bounds.size().max_element();
     let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
     // What has no size is not seen.
-    let usable = bounds.is_empty() || size == 0.0 || size >= 1e-6 && farthest <= 1e7;
+    let usable = bounds.is_empty()
+        || size == 0.0
+        || (1e-18..=1e18).contains(&size) && farthest <= 1e18 && size * scale >= 1e-6;
     if usable { Ok(()) } else { Err(SceneError::Size { size, farthest }) }
 }
 

@@ -24,27 +24,34 @@ impl SceneDescription {
     /// Scales scenes that are very small or very large to a usual size, with `view` and the scene's own camera; returns
     /// the factor, a power of two, which is 1 for scenes from 1/16 to 65536. The picture stays the same, for the light is
     /// infinitely far; the distance that rays keep from surfaces is made for usual sizes.
+    ///
+    /// [`Scene::new`](super::Scene::new) scales the meshes of other scenes by itself, and takes a camera in the units of
+    /// the description.
     pub fn rescale(&mut self, view: &mut CameraSettings) -> f32 {
+        let factor = self.usual_scale();
+        if factor != 1.0 {
+            self.parts.iter_mut().for_each(|part| part.mesh.scale(factor));
+            self.camera.iter_mut().chain([view]).for_each(|camera| camera.scale(factor));
+        }
+        factor
+    }
+
+    /// The factor, a power of two, that makes a usual size of the scene's; 1 for what has one.
+    pub(super) fn usual_scale(&self) -> f32 {
         let bounds = self.bounds();
         let size = bounds.size().max_element();
         let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
         if bounds.is_empty() || !farthest.is_finite() || size == 0.0 {
             return 1.0;
         }
-        let unit = match () {
-            () if farthest > USUAL[1] => power_of_two(farthest),
-            // What is far from the origin cannot grow.
-            () if size < USUAL[0] => {
-                (0.5 * power_of_two(size)).max(power_of_two(farthest) / USUAL[1])
-            }
-            () => 1.0,
-        };
-        let factor = 1.0 / unit;
-        if factor != 1.0 {
-            self.parts.iter_mut().for_each(|part| part.mesh.scale(factor));
-            self.camera.iter_mut().chain([view]).for_each(|camera| camera.scale(factor));
+        let unit = if farthest > USUAL[1] { power_of_two(farthest) } else { 1.0 };
+        let (size, farthest) = (size / unit, farthest / unit);
+        if size >= USUAL[0] {
+            return 1.0 / unit;
         }
-        factor
+        // What is far from the origin cannot grow.
+        let least = 2.0 * power_of_two(farthest) / USUAL[1];
+        1.0 / (unit * (0.5 * power_of_two(size)).max(least).min(1.0))
     }
 
     /// Moves the center of the subject's bounds to the origin and scales its longest half-extent
@@ -136,6 +143,7 @@ mod tests {
             let mut view = CameraSettings::framing(&scene.bounds(), 1.0, Vec3::Y);
             let (old, old_view) = (scene.clone(), view);
             let undo = scene.rescale(&mut view);
+            assert_eq!(scene.usual_scale(), 1.0);
             let size = scene.bounds().size().max_element();
             assert!((USUAL[0]..=USUAL[1]).contains(&size), "{factor:e}: {size}");
             let old_size = old.bounds().size().max_element();
@@ -143,6 +151,21 @@ mod tests {
             assert_eq!((view.origin / undo, view.up), (old_view.origin, old_view.up));
             let (new, old) = (&scene.parts[0].mesh, &old.parts[0].mesh);
             assert!(new.positions.iter().zip(&old.positions).all(|(new, old)| new / undo == *old));
+        }
+    }
+
+    #[test]
+    fn scenes_far_from_the_origin_stay_within_the_usual_distance() {
+        for (size, distance) in [(1e-3, 50.0), (1e-6, 5e4), (1.0, 1e7), (1e-3, 1e5), (1e-9, 0.0)] {
+            let mut scene = ball();
+            scene.normalize();
+            let m = Mat4::from_translation(vec3(distance, 0.0, 0.0))
+                * Mat4::from_scale(Vec3::splat(size));
+            scene.parts[0].mesh.transform(&m);
+            let mut view = CameraSettings::framing(&scene.bounds(), 1.0, Vec3::Y);
+            scene.rescale(&mut view);
+            assert_eq!(scene.usual_scale(), 1.0, "{size:e} at {distance}");
+            assert!(scene.bounds().max.max_element() <= USUAL[1], "{size:e} at {distance}");
         }
     }
 

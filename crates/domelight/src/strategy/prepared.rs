@@ -84,7 +84,7 @@ impl<'e> PreparedStrategy<'e> {
     /// product sampling divides the texels of maps that are much wider or narrower than 2:1.
     pub fn memory(spec: StrategySpec, environment: &Environment) -> u64 {
         match spec {
-            StrategySpec::Product { .. } => environment.memory_to_divide(),
+            StrategySpec::Product { .. } => environment.memory_to_reshape(),
             StrategySpec::Brdf { .. }
             | StrategySpec::Environment { .. }
             | StrategySpec::Mis { .. }

@@ -174,6 +174,17 @@ pub enum LoadError {
         /// The file.
         path: PathBuf,
     },
+    /// A scene file in the place of a mesh.
+    #[error(
+        "{}, which {referrer} refers to, is a scene file; objects of a scene file are .ply, .obj, .stl, .off, .gltf and \
+         .glb files", path.display()
+    )]
+    SceneInScene {
+        /// The file.
+        path: PathBuf,
+        /// Which file and what in it.
+        referrer: String,
+    },
     /// A scene or an animation asked of a format that has none.
     #[error("{} is no glTF file and has no {what} to choose", path.display())]
     NoChoice {
@@ -335,6 +346,9 @@ fn load_mesh(
     budget: &Budget,
     options: &LoadOptions,
 ) -> Result<Loaded, LoadError> {
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
+        return Err(LoadError::SceneInScene { path: path.into(), referrer: referrer.into() });
+    }
     load_file(path, &read_referenced(path, referrer, budget)?, true, budget, options)
 }
 

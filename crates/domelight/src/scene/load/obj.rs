@@ -121,12 +121,8 @@ impl<'a> Reader<'a> {
         let at = |kind| LoadError::Obj { path: self.path.into(), line: number, kind };
         match keyword {
             "v" => {
-                let numbers = if self.strict {
-                    numbers(keyword, rest, 3)
-                } else {
-                    any_numbers(keyword, rest, 3)
-                };
-                self.vertex(&numbers.map_err(at)?);
+                let read = if self.strict { numbers } else { any_numbers };
+                self.vertex(&read(keyword, rest, 3).map_err(at)?);
             }
             "vt" => {
                 let n = numbers_or_zero(keyword, rest, 1).map_err(at)?;

@@ -105,7 +105,7 @@ impl<'a> ProductSampling<'a> {
     /// many. It is the number of candidates: those that cannot change the pixel visibly are not traced.
     pub fn new(environment: &'a Environment, n_rays: u32) -> Self {
         let mean = environment.power() / (4.0 * std::f64::consts::PI);
-        let environment = environment.divided().map_or(Cow::Borrowed(environment), Cow::Owned);
+        let environment = environment.reshaped().map_or(Cow::Borrowed(environment), Cow::Owned);
         Self {
             cells: Cells::new(
                 &environment,
