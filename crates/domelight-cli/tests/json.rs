@@ -86,7 +86,7 @@ fn commands(folder: &TempDir) -> BTreeSet<String> {
     let (_, list) = help.split_once("Commands:\n").expect("a list of commands");
     let lines = list.lines().take_while(|line| line.starts_with("  "));
     // The lines of long descriptions stand further to the right.
-    let names = lines.filter(|line| !line.starts_with("   ")).map(|line| line.trim());
+    let names = lines.filter(|line| !line.starts_with("   ")).map(str::trim);
     names
         .map(|line| line.split_whitespace().next().unwrap_or_default().to_owned())
         .filter(|name| name != "help")
