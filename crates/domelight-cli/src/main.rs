@@ -19,6 +19,7 @@ mod files;
 mod inspect;
 mod interrupt;
 mod lights;
+mod map_picture;
 mod memory;
 mod merge;
 mod output;

@@ -262,16 +262,16 @@ pub(crate) struct ProbeArguments {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write a picture to look at, with --exposure and --tone applied.
+    /// Write a picture to look at: the map with its sun, its light by stops, and the noise of each strategy.
     #[arg(long, value_name = "OUT.png")]
-    pub(crate) preview: Option<PicturePath>,
+    pub(crate) preview: Option<PreviewPng>,
     /// The mapping of the file that is written.
     #[arg(long, value_name = "MAPPING", requires = "output", default_value_t = Mapping::LatLong, value_parser = mapping())]
     pub(crate) to: Mapping,
     /// Write the probe (.exr, .hdr, .pfm, .png; - writes OpenEXR to standard output).
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PicturePath>,
-    /// Rows of the lat-long map: of a built-in probe [default: 512], and of what is written.
+    /// Rows of the lat-long map: of a built-in probe [default: 512], and of what -o writes.
     #[arg(long, value_name = "H", value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub(crate) size: Option<u32>,
     /// The mapping of the file [default: guessed from its shape].
@@ -286,9 +286,26 @@ pub(crate) struct ProbeArguments {
     /// The OpenEXR layer.
     #[arg(long, value_name = "NAME")]
     pub(crate) layer: Option<String>,
-    /// How the preview is shown.
+    /// How the preview and PNG output are shown.
     #[command(flatten)]
     pub(crate) tone: Tone,
+}
+
+/// A PNG file or `-`.
+#[derive(Clone, Debug)]
+pub(crate) struct PreviewPng(pub(crate) PicturePath);
+
+impl FromStr for PreviewPng {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let path = text.parse::<PicturePath>()?;
+        if path.is_png() || path.is_standard_output() {
+            Ok(Self(path))
+        } else {
+            Err("its name must end in .png; -o writes the map itself in other formats".into())
+        }
+    }
 }
 
 /// Develop a picture again.

@@ -11,6 +11,7 @@ mod gltf;
 mod json;
 mod mitsuba;
 mod pbrt;
+mod program;
 mod radiance;
 mod sibl;
 mod text;
