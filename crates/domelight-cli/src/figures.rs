@@ -15,7 +15,7 @@ pub(crate) fn run(arguments: &FiguresArguments, quiet: bool) -> Result<()> {
     interrupt::flag();
     let settings = FigureSettings {
         scene: arguments.scene.clone(),
-        environment: arguments.environment.settings(),
+        environment: arguments.environment.settings_without_camera()?,
         quick: arguments.quick,
         seed: arguments.seed,
     };

@@ -37,6 +37,7 @@ mod strategy;
 mod suggest;
 mod terminal;
 mod tone;
+mod turntable;
 
 use args::{Arguments, Command};
 use clap::Parser;

@@ -73,6 +73,13 @@ impl PicturePath {
         self.format
     }
 
+    /// The picture of a frame: its number, of four digits or more, before the extension.
+    pub(crate) fn numbered(&self, frame: u32) -> Self {
+        let extension = self.path.extension().unwrap_or_default().to_string_lossy();
+        let path = self.path.with_extension(format!("{frame:04}.{extension}"));
+        Self { path, format: self.format }
+    }
+
     /// Declares it before the work as a result.
     pub(crate) fn declare(&self) -> anyhow::Result<()> {
         files::writes(&self.path)

@@ -6,7 +6,6 @@ use anyhow::Result;
 use domelight::RgbImage;
 use domelight::picture::tone::ToneMapping;
 use domelight::render::RenderSettings;
-use domelight::scene::Camera;
 use domelight::strategy::PreparedStrategy;
 
 use crate::output::PicturePath;
@@ -26,7 +25,7 @@ pub(crate) fn write(
     let (whole_width, whole_height) = (settings.width, settings.height);
     let (width, height) = (whole_width.div_ceil(2), whole_height.div_ceil(2));
     let settings = &RenderSettings { width, height, n_samples: 1, target_error: None, ..*settings };
-    let camera = &Camera::new(&view.camera_settings, width, height)?;
+    let camera = &view.camera.resized((whole_width, whole_height), (width, height));
     let progress = &RenderProgress::new("", 1, true, interrupted);
     let PreparedScene { scene, environment, .. } = view;
     let job = Job { scene, camera, environment, settings, progress, render_run: None };

@@ -93,6 +93,14 @@ pub(crate) struct RenderReport {
     pub(crate) profile: Option<Vec<StageSeconds>>,
 }
 
+/// The names, of many the first and the last.
+fn listed(names: &[String]) -> String {
+    match names {
+        [first, second, .., last] if names.len() > 6 => format!("{first}, {second} … {last}"),
+        _ => names.join(", "),
+    }
+}
+
 impl RenderReport {
     pub(crate) fn new(
         settings: Settings,
@@ -143,7 +151,7 @@ impl RenderReport {
             build.wall,
             render.wall,
             self.rays_per_second * 1e-6,
-            self.outputs.join(", ")
+            listed(&self.outputs)
         ));
         if self.stopped == Some(StopReason::Time) {
             status(&format!(

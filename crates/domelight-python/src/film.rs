@@ -52,6 +52,7 @@ pub(crate) fn automatic_exposure_of(layers: &Layers) -> f32 {
 /// 'color'       (H, W, 3)  direct light and the background where it is shown [W m^-2 sr^-1], premultiplied by alpha
 /// 'alpha'       (H, W)     the share of camera samples that hit the scene; 1 where the background is shown
 /// 'unoccluded'  (H, W, 3)  as color with every shadow ray free
+/// 'shadow'      (H, W, 3)  the share of the background that shadows take away on ground that catches them
 /// 'albedo'      (H, W, 3)  reflectance of what is seen
 /// 'normal'      (H, W, 3)  mean shading normal in the world, not normalized; 0 where nothing was hit
 /// 'depth'       (H, W)     mean distance from the camera's plane over the samples that hit

@@ -33,6 +33,7 @@ def channels(path):
         "color": rgb(""),
         "alpha": found["A"],
         "unoccluded": rgb("unoccluded."),
+        "shadow": rgb("shadow."),
         "albedo": rgb("albedo."),
         "normal": rgb("normal.", "XYZ"),
         "depth": found["depth.Z"],

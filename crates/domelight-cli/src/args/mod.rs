@@ -10,6 +10,7 @@ pub(crate) mod render;
 pub(crate) mod render_run;
 pub(crate) mod sampling;
 pub(crate) mod scene;
+pub(crate) mod turntable;
 
 use crate::memory::MaxMemory;
 use crate::output::PicturePath;

@@ -214,7 +214,7 @@ impl LightsArguments {
     }
 
     fn load(&self, quiet: bool) -> Result<(Environment, String)> {
-        let settings = self.environment.settings();
+        let settings = self.environment.settings_without_camera()?;
         let light = settings.over(&SceneDescription::default());
         let map = settings.load(&light, &Terminal { quiet })?;
         let probe = self.environment.env.clone().unwrap_or_default();

@@ -264,12 +264,15 @@ impl Case {
             view: ViewSettings {
                 size,
                 camera: None,
+                view: None,
+                all_around: false,
+                depth_of_field: None,
                 origin: usual.then_some(ORIGIN),
                 target: usual.then_some(Vec3::ZERO),
                 up: usual.then_some(Vec3::Y),
                 projection: usual.then_some(Projection::Perspective { fov_y_degrees: FOV }),
             },
-            subject: SubjectSettings { material: None, normalize, ground: false, hide_env: true },
+            subject: SubjectSettings { material: None, normalize, ground: None, hide_env: true },
             ..SceneSettings::new(&self.scene, size)
         }
     }

@@ -11,15 +11,17 @@ mod compensation;
 mod density;
 #[cfg(feature = "io")]
 pub mod io;
+mod key_light;
 pub(crate) mod lat_long;
 pub mod mapping;
 pub mod statistics;
 
 pub use compensation::CompensatedTable;
 pub use density::{DensityError, EnvironmentDensity};
+pub use key_light::key_light_rotation;
 pub use lat_long::LatLongGrid;
 
-use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, vec3};
+use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, vec2, vec3};
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
 use crate::simd::{LANES, SimdF32x8, SimdFloat, SimdI32x8 as _, Vectors};
 use crate::{Rgb, RgbImage};
@@ -208,6 +210,35 @@ impl Environment {
     /// The first bad texel in row order, or an empty map.
     pub fn from_image(map: RgbImage) -> Result<Self, EnvironmentError> {
         Self::new(map, Orientation::default(), 1.0)
+    }
+
+    /// The irradiance ∫ L max(0, n · ω) dω of an unoccluded surface with the world normal n, a unit vector, in multiples of
+    /// [`Environment::unit`] \[W·m⁻²\].
+    pub fn irradiance(&self, normal: Vec3) -> Rgb {
+        /// Columns and rows into which coarse maps are divided.
+        const SIZE: [usize; 2] = [1024, 512];
+        let n = self.orientation.map_to_world().transpose() * normal;
+        let RgbImage { width, height, .. } = self.map;
+        let [fine_x, fine_y] = [SIZE[0].div_ceil(width), SIZE[1].div_ceil(height)];
+        let grid = LatLongGrid::new(width * fine_x, height * fine_y);
+        let row_sum = |y: usize| {
+            let omega = grid.column_angle() * grid.band(y..y + 1);
+            let texels = self.map.row(y / fine_y);
+            let mut sum = [0.0f64; 3];
+            for x in 0..grid.width() {
+                let at = |i: usize, n: usize| (i as f32 + 0.5) / n as f32;
+                let uv = vec2(at(x, grid.width()), at(y, grid.height()));
+                let wi = mapping::Mapping::LatLong.direction(uv).unwrap_or(Vec3::Y);
+                let weight = omega * f64::from(n.dot(wi).max(0.0));
+                let texel = texels[x / fine_x].to_array();
+                sum.iter_mut().zip(texel).for_each(|(s, c)| *s += weight * f64::from(c));
+            }
+            sum
+        };
+        // Add rows in their order, whoever computed them.
+        let rows: Vec<[f64; 3]> = crate::parallel::in_order(grid.height(), row_sum);
+        let sum = rows.iter().fold([0.0; 3], |sum, row| std::array::from_fn(|c| sum[c] + row[c]));
+        Rgb::from(sum.map(|c: f64| c as f32))
     }
 
     /// The same environment rotated further about its up axis \[degrees\]; see [`Orientation::rotation`].

@@ -226,7 +226,7 @@ fn plateau(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Plate
     (is_source && is_sharp && stands_out).then_some(Plateau { value, n_texels, solid_angle, share })
 }
 
-fn texel_direction(map: &RgbImage, x: usize, y: usize) -> Vec3 {
+pub(super) fn texel_direction(map: &RgbImage, x: usize, y: usize) -> Vec3 {
     let uv = vec2((x as f32 + 0.5) / map.width as f32, (y as f32 + 0.5) / map.height as f32);
     Mapping::LatLong.direction(uv).expect("a lat-long map shows every direction")
 }

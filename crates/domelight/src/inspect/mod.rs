@@ -136,7 +136,8 @@ impl<'a> Inspector<'a> {
         }
         let camera = scene.camera_inside(camera);
         let sampler = Sampler::new(settings.sampler, settings.seed, (y * width + x) as u64);
-        let (film, filter) = (sampler.set(Dimension::Film), FilterSampler::new(settings.filter));
+        let [film, lens] = [Dimension::Film, Dimension::Lens].map(|d| sampler.set(d));
+        let filter = FilterSampler::new(settings.filter);
         let see = |ray: &Ray, sample: u32| {
             let Sight { hit, throughput } = scene.sight(ray, settings.seed, sample);
             let known = match (&hit, settings.background) {
@@ -154,7 +155,8 @@ impl<'a> Inspector<'a> {
             .map(|i| {
                 let [[u], [v]] = film.u(i);
                 let at = filter.sample(vec2(u, v));
-                see(&camera.ray(x as f32 + at.x, y as f32 + at.y), i)
+                let [[u], [v]] = lens.u(i);
+                see(&camera.lens_ray(x as f32 + at.x, y as f32 + at.y, [u, v]), i)
             })
             .collect();
         let center = camera.ray(x as f32 + 0.5, y as f32 + 0.5);

@@ -20,7 +20,6 @@ pub(crate) trait Float: Copy {
     fn tan(self) -> Self;
     fn asin(self) -> Self;
     fn acos(self) -> Self;
-    fn atan(self) -> Self;
     fn atan2(self, x: Self) -> Self;
     fn hypot(self, y: Self) -> Self;
     fn cbrt(self) -> Self;
@@ -72,7 +71,6 @@ impl Float for f32 {
         tan = libm::tanf,
         asin = libm::asinf,
         acos = libm::acosf,
-        atan = libm::atanf,
         cbrt = libm::cbrtf,
     );
     powi!();
@@ -138,7 +136,6 @@ impl Float for f64 {
         tan = libm::tan,
         asin = libm::asin,
         acos = libm::acos,
-        atan = libm::atan,
         cbrt = libm::cbrt,
         exp2 = libm::exp2,
         exp_m1 = libm::expm1,
@@ -316,8 +313,6 @@ functions! {
     asin(sine) -> T;
     /// The angle in [0, π] of a cosine in [−1, 1] \[rad\]; NaN of others.
     acos(cosine) -> T;
-    /// The angle in [−π/2, π/2] of a tangent \[rad\].
-    atan(tangent) -> T;
     /// The angle of (x, y) from the x axis in [−π, π] \[rad\].
     atan2(y, x: T) -> T;
     /// √(x² + y²), without overflow on the way.

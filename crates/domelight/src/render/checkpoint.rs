@@ -55,7 +55,7 @@ pub enum CheckpointError {
 }
 
 /// The version of the format; another layout gets another number.
-const FORMAT: &str = "1";
+const FORMAT: &str = "2";
 
 /// Before the names of the identity.
 const IDENTITY: &str = "domelight.render.";

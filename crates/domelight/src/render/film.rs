@@ -151,8 +151,14 @@ mod tests {
                 let x = 0.1 + i as f32 / 3.0 + j as f32;
                 let color = Rgb::new(x, 1e-30 * x, 1e30 * x);
                 let surface = SurfaceSample { albedo: color, normal: Vec3::splat(x), depth: -x };
-                let sample =
-                    CameraSample { color, unoccluded: -color, alpha: x, surface: Some(surface) };
+                let sample = CameraSample {
+                    color,
+                    unoccluded: -color,
+                    alpha: x,
+                    shadow: Rgb::splat(x),
+                    unseen: 0.0,
+                    surface: Some(surface),
+                };
                 let set = if j % 2 == 1 { SampleSet::Second } else { SampleSet::First };
                 pixel.add(&sample, set, 1.0);
             }

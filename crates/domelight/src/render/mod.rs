@@ -42,10 +42,12 @@ pub use tile::{Counts, Mark};
 pub use tiling::{Tiling, Window};
 pub use variance::VarianceSums;
 
+use crate::Rgb;
 use crate::environment::Environment;
 use crate::geometry::{Ray, offset_origin};
-use crate::math::Vec3;
+use crate::math::{FRAC_1_PI, Vec3};
 use crate::sampling::SamplerKind;
+use crate::scene::material::CATCHER_REFLECTANCE;
 use crate::scene::{Camera, Scene};
 use crate::strategy::{ShadingPoint, Strategy, StrategySpec};
 
@@ -210,6 +212,31 @@ struct RenderContext<'a> {
     filter: FilterSampler,
     /// The longest extent of the scene, in its units.
     extent: f32,
+    /// What ground reflects that shows nothing but shadows.
+    catcher: Option<Catcher>,
+}
+
+/// Ground that shows nothing but shadows.
+#[derive(Clone, Copy, Debug)]
+struct Catcher {
+    /// What it reflects of the unoccluded light, in multiples of [`Environment::unit`].
+    radiance: Rgb,
+}
+
+impl Catcher {
+    /// The ground of a scene, if it has any.
+    fn of(scene: &Scene, environment: &Environment) -> Option<Self> {
+        let normal = scene.catcher_normal()?;
+        let reflected = CATCHER_REFLECTANCE * FRAC_1_PI;
+        Some(Self { radiance: environment.irradiance(normal) * reflected })
+    }
+
+    /// The share of each channel that is missing of light of which `missing` does not arrive, in the same multiples.
+    fn shadow(self, missing: Rgb) -> Rgb {
+        let share = |missing: f32, all: f32| if all > 0.0 { missing / all } else { 0.0 };
+        let (Rgb { r, g, b }, all) = (missing, self.radiance);
+        Rgb::new(share(r, all.r), share(g, all.g), share(b, all.b))
+    }
 }
 
 /// Renders a scene under an environment with one strategy, on rayon's current pool of threads.

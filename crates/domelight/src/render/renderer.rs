@@ -13,7 +13,7 @@ use super::sums::PixelSums;
 use super::tile::{Counts, Mark, Pass, Scratch, Tile};
 use super::tiling::{SampleSet, Tiling, Window, paired_pass};
 use super::variance::VarianceSums;
-use super::{Observer, RenderContext, RenderSettings, Rendering};
+use super::{Catcher, Observer, RenderContext, RenderSettings, Rendering};
 use crate::environment::Environment;
 use crate::sampling::Sampler;
 use crate::scene::{Camera, Scene};
@@ -144,7 +144,9 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let filter = FilterSampler::new(settings.filter);
         let (camera, extent) = (scene.camera_inside(camera), scene.extent());
         let tiling = Tiling::new(&settings, strategy.n_rays());
-        let context = RenderContext { scene, camera, environment, settings, filter, extent };
+        let catcher = Catcher::of(scene, environment);
+        let context =
+            RenderContext { scene, camera, environment, settings, filter, extent, catcher };
         let empty = Self {
             context,
             strategy,

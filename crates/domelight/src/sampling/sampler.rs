@@ -43,6 +43,8 @@ pub enum Dimension {
     Sequence = 4,
     /// Samplers derived from a sampler, see [`Sampler::part`].
     Part = 5,
+    /// The place on the camera's lens.
+    Lens = 6,
 }
 
 /// Four uniform numbers of one index of one dimension.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::camera::CameraSettings;
+use super::framing::ViewDirection;
 use super::material::Material;
 use super::texture::Texture;
 use crate::environment::UpAxis;
@@ -22,6 +23,8 @@ pub struct SceneDescription {
     pub camera: Option<CameraSettings>,
     /// All cameras of the file, of which `camera` is one, in the file's order.
     pub cameras: Vec<NamedCamera>,
+    /// From where a camera looks that is framed to the scene; `None` is [`ViewDirection::DEFAULT`].
+    pub view: Option<ViewDirection>,
     /// The environment, if the scene names one.
     pub environment: Option<EnvironmentSettings>,
     /// Parts that are scenery, such as floors and plinths, by index: the camera is not framed to
@@ -121,6 +124,7 @@ impl SceneDescription {
         self.materials.append(&mut other.materials);
         self.textures.append(&mut other.textures);
         self.camera = self.camera.take().or(other.camera);
+        self.view = self.view.or(other.view);
         self.cameras.append(&mut other.cameras);
         self.environment = self.environment.take().or(other.environment);
         self.up = self.up.or(other.up);

@@ -9,6 +9,9 @@ use crate::Rgb;
 use crate::bsdf::{Bsdf, Fresnel, Lambert, MetallicRoughness, Phong};
 use crate::math::Vec3;
 
+/// What surfaces reflect that show nothing but shadows; shadows do not depend on it.
+pub(crate) const CATCHER_REFLECTANCE: f32 = 0.5;
+
 /// What a part of a scene is made of.
 #[derive(Clone, Debug)]
 pub struct Material {
@@ -26,6 +29,9 @@ pub struct Material {
     pub emission: Option<Emission>,
     /// Whether its color is shown as it is, whatever the light (`KHR_materials_unlit`).
     pub unlit: bool,
+    /// Whether it shows nothing but the shadows on it, whatever its model: the background is seen instead, darkened as a
+    /// diffuse surface would be. It casts no shadow. Such surfaces are flat, and all of a scene face the same way.
+    pub catches_shadows: bool,
     /// What glTF's extensions add.
     pub layers: Layers,
 }
@@ -97,6 +103,7 @@ impl Material {
             double_sided: true,
             emission: None,
             unlit: false,
+            catches_shadows: false,
             layers: Layers::default(),
         }
     }
@@ -258,6 +265,10 @@ impl Material {
             |t: &Option<TextureRef>| t.as_ref().map_or(Rgb::WHITE, |t| t.at(textures, uvs));
         if self.unlit {
             *bsdf = Bsdf::single(Lambert::new(Rgb::BLACK));
+            return;
+        }
+        if self.catches_shadows {
+            *bsdf = Bsdf::single(Lambert::new(Rgb::splat(CATCHER_REFLECTANCE)));
             return;
         }
         match &self.model {

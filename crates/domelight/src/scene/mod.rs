@@ -11,20 +11,22 @@ mod description;
 mod emission;
 #[cfg(feature = "io")]
 mod fingerprint;
+mod framing;
 mod layers;
 #[cfg(feature = "io")]
 pub mod load;
-mod material;
+pub(crate) mod material;
 mod shading;
 mod subject;
 mod texture;
 
 pub use crate::environment::UpAxis;
-pub use camera::{Camera, CameraError, CameraSettings, Projection};
+pub use camera::{Camera, CameraError, CameraSettings, Lens, Projection};
 pub use coverage::Sight;
 pub use description::{
     EnvironmentSettings, EnvironmentSource, NamedCamera, Part, SceneDescription,
 };
+pub use framing::{Framing, UnknownView, ViewDirection};
 pub use layers::{
     AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers, NormalMap,
     Sheen, Specular, Volume,
@@ -46,6 +48,7 @@ use coverage::Partial;
 
 /// A scene ready for rays.
 #[derive(Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a property of its own")]
 pub struct Scene {
     parts: Vec<Part>,
     materials: Vec<Material>,
@@ -62,10 +65,18 @@ pub struct Scene {
     emits: bool,
     /// Light passes through some part.
     transmits: bool,
+    /// Some part that does not hide all behind it dims light.
+    dims_light: bool,
+    /// Some part shows nothing but shadows.
+    catches_shadows: bool,
     /// In units of the description.
     bounds: Aabb,
     /// The bounds of what is not scenery, in units of the description.
     subject_bounds: Aabb,
+    /// Of each part, whether it is no scenery.
+    is_subject: Vec<bool>,
+    /// From where a framed camera looks.
+    view: Option<ViewDirection>,
     /// The length of one unit of the hierarchy and the parts, in units of the description; a power of two.
     unit: f32,
     /// The camera and the up axis of the file, if it has them.
@@ -138,17 +149,20 @@ impl Scene {
     pub fn new(description: SceneDescription) -> Result<Self, SceneError> {
         check(&description)?;
         let subject_bounds = description.subject_bounds();
+        let is_subject = description.is_subject();
         let bounds = description.bounds();
         let scale = description.usual_scale();
         check_size(&bounds, &subject_bounds, scale)?;
-        let SceneDescription { mut parts, materials, textures, camera, up, .. } = description;
+        let SceneDescription { mut parts, materials, textures, camera, up, view, .. } = description;
         let up = up.unwrap_or_default();
         if scale != 1.0 {
             for part in &mut parts {
                 part.mesh.scale(scale);
             }
         }
-        parts.sort_by_key(|part| !part.is_opaque(&materials));
+        let mut parts: Vec<_> = parts.into_iter().zip(is_subject).collect();
+        parts.sort_by_key(|(part, _)| !part.is_opaque(&materials));
+        let (parts, is_subject): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
         let n_opaque = parts.partition_point(|part| part.is_opaque(&materials));
         let (opaque, others) = parts.split_at(n_opaque);
         let bvh = build(opaque)?;
@@ -160,6 +174,9 @@ impl Scene {
         let has_single_sided = used().any(|material| !material.double_sided);
         let emits = used().any(|material| material.unlit || material.emission.is_some());
         let transmits = used().any(Material::transmits);
+        let catches_shadows = used().any(|material| material.catches_shadows);
+        let dims = |part: &Part| !materials[part.material].catches_shadows;
+        let dims_light = parts[n_opaque..].iter().any(dims);
         Ok(Self {
             parts,
             materials,
@@ -170,8 +187,12 @@ impl Scene {
             has_single_sided,
             emits,
             transmits,
+            dims_light,
+            catches_shadows,
             bounds,
             subject_bounds,
+            is_subject,
+            view,
             unit: 1.0 / scale,
             camera,
             up,
@@ -206,8 +227,21 @@ impl Scene {
     /// The camera of the file, or else one that frames what is not scenery in a picture of
     /// `aspect` = width / height.
     pub fn camera(&self, aspect: f32) -> CameraSettings {
-        let framed = || CameraSettings::framing(&self.subject_bounds, aspect, self.up.vector());
+        let framed = || self.framed(&Framing::new(aspect, self.up.vector()));
         self.camera.unwrap_or_else(framed)
+    }
+
+    /// A camera that frames what is not scenery, whatever camera the file has; in units of the description.
+    pub fn framed(&self, framing: &Framing) -> CameraSettings {
+        let parts = self.parts.iter().zip(&self.is_subject);
+        let subject = parts.filter(|(_, is_subject)| **is_subject);
+        let framing = Framing { view: framing.view.or(self.view), ..*framing };
+        let vertices = subject.flat_map(|(part, _)| part.mesh.positions.iter().copied());
+        let mut camera = framing.fit(vertices);
+        if self.unit != 1.0 {
+            camera.scale(self.unit);
+        }
+        camera
     }
 
     /// The length of one unit of the hierarchy, of [`Scene::parts`] and of shading points, in units of the description: a

@@ -82,6 +82,26 @@ pub fn disc(radius: f32, segments: u32) -> Mesh {
     mesh
 }
 
+/// A horizontal ring at y = 0 that faces +Y, in `segments` (≥ 3) sectors and `steps` (≥ 1) circles, whose opacity falls
+/// smoothly from 1 at radius `inner` > 0 to 0 at `outer`.
+pub fn fading_ring(inner: f32, outer: f32, segments: u32, steps: u32) -> Mesh {
+    let mut builder = Revolution::new(segments);
+    let mut alphas = Vec::new();
+    let at = |i: u32| {
+        let t = i as f32 / steps as f32;
+        (inner + (outer - inner) * t, 1.0 - t * t * (3.0 - 2.0 * t))
+    };
+    for i in 0..steps {
+        let [(near, near_alpha), (far, far_alpha)] = [at(i), at(i + 1)];
+        builder.strip([vec2(far, 0.0), vec2(near, 0.0)], [Vec2::Y; 2], [1.0, 0.0]);
+        alphas.extend((0..=segments).flat_map(|_| [far_alpha, near_alpha]));
+    }
+    let mut mesh = builder.mesh;
+    mesh.uvs = mesh.positions.iter().map(|p| 0.5 + 0.5 * vec2(p.x, p.z) / outer).collect();
+    mesh.alphas = alphas;
+    mesh
+}
+
 /// The closed surface that a profile of (distance from the axis, height) sweeps round +Y, in
 /// `segments` (≥ 3) sectors.
 ///

@@ -152,10 +152,8 @@ fn the_statue_is_the_same_every_time() {
 #[test]
 fn every_scene_can_be_built_and_is_seen_by_its_camera() {
     for name in BuiltinScene::ALL {
-        let description = name.description();
-        let camera = description.camera.unwrap();
-        let camera = crate::scene::Camera::new(&camera, 64, 64).unwrap();
-        let scene = crate::scene::Scene::new(description).unwrap();
+        let scene = crate::scene::Scene::new(name.description()).unwrap();
+        let camera = crate::scene::Camera::framing(&scene, 64, 64);
         let hit = scene.bvh().closest_hit(&camera.ray(32.0, 32.0));
         assert!(hit.is_some(), "{name}: nothing in the middle of the picture");
     }
