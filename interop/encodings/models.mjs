@@ -205,11 +205,12 @@ function sparse() {
   return model.glb();
 }
 
-// A coat with a map, fibers, a mask and a blended opacity, each with its texture.
+// A coat with a map, fibers, a mask and a blended opacity, each with its texture. No texel is clear: encoders may change
+// the color of those that are.
 async function layered() {
   const model = new Model();
   const surface = torus(64, 32);
-  const stripes = await model.texture(128, (u, v) => [0.8, 0.3 + 0.5 * smooth(3 * v), 0.3, smooth(8 * u) > 0.4 ? 1 : 0], true);
+  const stripes = await model.texture(128, (u, v) => [0.8, 0.3 + 0.5 * smooth(3 * v), 0.3, smooth(8 * u) > 0.4 ? 1 : 0.1], true);
   const veil = await model.texture(128, (u, v) => [0.2, 0.5, 0.9, 0.2 + 0.7 * smooth(4 * v)], true);
   const coat = await model.texture(128, (u) => [smooth(4 * u), 0.2, 0]);
   const extensions = {

@@ -2,12 +2,13 @@
 
 import { $, latest } from "./dom";
 import type { Camera, Engines, Host } from "./engines";
-import { fromHash, isBuiltinProbe, toHash, type State } from "./state";
+import { DEFAULT, SCENES, fileName, fromHash, isBuiltinProbe, toHash, type State } from "./state";
 
 export interface SceneReport {
   triangles: number;
   warnings: string[];
   camera: Camera;
+  cameras: { name: string; camera: Camera }[];
   center: number[];
   radius: number;
   up: number[];
@@ -23,6 +24,12 @@ type Contents = { path: string; bytes: Uint8Array }[];
 
 /** Files that are too large for an instance of WebAssembly with what is made of them. */
 const MAX_FILES = 1 << 30;
+/** What an engine takes without files [bytes], and how much more than their own size files take when they are loaded: a
+ *  guess, from which on it is measured. */
+const ENGINE_MEMORY = 40 * 2 ** 20, DECODED = 8;
+
+/** The engine's settings of a light. */
+const withTurn = (env: string, rotate: number) => JSON.stringify({ ...JSON.parse(env), rotate });
 
 export class App {
   state: State;
@@ -37,6 +44,11 @@ export class App {
   private listeners: ((what: Change) => void)[] = [];
   private hashTimer = 0;
   private loaded = { scene: "", env: "", rotate: NaN };
+  /** The drops that the engines have, and those of which it is known how much memory they take. */
+  private provided: App["drops"] | null = null;
+  private measured: App["drops"] | null = null;
+  /** The scene that is loaded next brings its own light. */
+  private adopts = false;
 
   constructor(readonly engines: Engines) {
     this.state = fromHash(location.hash);
@@ -63,33 +75,43 @@ export class App {
   /** Changes the state; what must be loaded again is. */
   set(change: Partial<State>, what: Change = "render") {
     Object.assign(this.state, change);
+    this.keepInAddress();
+    if (["scene", "material", "ground", "env", "rows", "rotate", "ev", "scale"].some((key) => key in change)) this.load();
+    else this.emit(what);
+  }
+
+  private keepInAddress() {
     clearTimeout(this.hashTimer);
     this.hashTimer = setTimeout(() => history.replaceState(null, "", `#${toHash(this.state)}`), 200) as unknown as number;
-    if (["scene", "material", "ground", "env", "rows", "rotate", "ev"].some((key) => key in change)) this.load();
-    else this.emit(what);
+  }
+
+  /** What the state names, and has to be dropped before it can be shown. */
+  get missing(): { scene: string; env: string } {
+    const { scene, env } = this.state;
+    const has = (name: string) => this.contents().some(({ path }) => fileName(path) === fileName(name));
+    return { scene: SCENES.includes(scene) || has(scene) ? "" : scene, env: isBuiltinProbe(env) || has(env) ? "" : env };
+  }
+
+  /** The camera of the state; none while its scene is missing. */
+  get camera(): Camera | null {
+    return this.missing.scene ? null : this.state.camera;
+  }
+
+  /** The settings of scene and light for the engine; what is missing has a stand-in. */
+  private keys() {
+    const { material, ground, rows, rotate, ev, scale } = this.state, { missing } = this;
+    const scene = missing.scene ? DEFAULT.scene : this.state.scene, probe = missing.env ? DEFAULT.env : this.state.env;
+    return { scene: JSON.stringify({ scene, material, ground }), env: JSON.stringify({ probe, rows, exposure: ev, scale }), rotate };
   }
 
   /** Loads what the state names and is not loaded yet, then says so. */
   readonly load = latest(async () => {
-    const { scene, material, ground, env, rows, rotate, ev } = this.state;
-    const sceneKey = JSON.stringify({ scene, material, ground });
-    const envKey = JSON.stringify({ probe: env, rows, exposure: ev });
     let what: Change = "render";
     try {
-      if (this.loaded.scene !== sceneKey) {
-        this.scene = JSON.parse(await this.engines.all("loadScene", sceneKey));
-        this.loaded.scene = sceneKey;
-        what = "scene";
-        if (this.scene!.warnings.length) this.tell(this.scene!.warnings.join("; "));
-      }
-      if (this.loaded.env !== envKey) {
-        const light = { ...JSON.parse(envKey), rotate, scale: 1 };
-        this.probe = JSON.parse(await this.engines.all("loadEnvironment", JSON.stringify(light)));
-        this.loaded.env = envKey;
-        this.loaded.rotate = rotate;
-        if (what === "render") what = "light";
-        if (this.probe!.warnings.length) this.tell(this.probe!.warnings.join("; "));
-      } else if (this.loaded.rotate !== rotate) {
+      const { scene, env } = this.keys();
+      if (this.loaded.scene !== scene || this.loaded.env !== env) what = await this.loadWhatFits();
+      const { rotate } = this.state;
+      if (this.loaded.rotate !== rotate) {
         await this.engines.all("turnEnvironment", rotate);
         this.loaded.rotate = rotate;
         if (what === "render") what = "turn";
@@ -100,20 +122,86 @@ export class App {
       return;
     }
     this.good = { state: { ...this.state }, files: this.files, drops: this.drops, loaded: { ...this.loaded } };
+    this.tellMissing();
     this.emit(what);
   });
+
+  /** Loads scene and light into as many engines as memory has room for. */
+  private async loadWhatFits(): Promise<Change> {
+    const { engines } = this, all = engines.hosts.length;
+    const bytes = this.contents().reduce((sum, { bytes }) => sum + bytes.length, 0);
+    const isSmall = all * (ENGINE_MEMORY + DECODED * bytes) <= engines.memory;
+    const isMeasured = isSmall || this.measured === this.drops;
+    const fresh = engines.use(isSmall ? all : isMeasured ? engines.active : 1);
+    if (fresh.length) this.loaded = { scene: "", env: "", rotate: NaN };
+    if (this.provided !== this.drops || fresh.length) await this.provide();
+    const what = await this.loadInto(engines.working);
+    if (isMeasured) return what;
+    // The first engine has shown what each will take; a reference wants one more.
+    this.measured = this.drops;
+    const more = engines.use(Math.min(Math.max(Math.floor(engines.memory / engines.hosts[0].memory) - 1, 1), all));
+    await this.provide(more);
+    const { scene, env, rotate } = this.loaded;
+    await Promise.all(more.flatMap((host) => [host.call("loadScene", scene), host.call("loadEnvironment", withTurn(env, rotate))]));
+    return what;
+  }
+
+  /** Loads what is new of scene and light into engines that have the files; what has changed. */
+  private async loadInto(hosts: Host[]): Promise<Change> {
+    const { rotate } = this.state, { scene } = this.keys();
+    let what: Change = "render";
+    const all = async (call: "loadScene" | "loadEnvironment", settings: string) =>
+      JSON.parse((await Promise.all(hosts.map((host) => host.call(call, settings))))[0]);
+    if (this.loaded.scene !== scene) {
+      this.scene = (await all("loadScene", scene)) as SceneReport;
+      this.loaded.scene = scene;
+      what = "scene";
+      if (this.scene.warnings.length) this.tell(this.scene.warnings.join("; "));
+      this.adopt(this.scene);
+    }
+    const { env } = this.keys();
+    if (this.loaded.env !== env) {
+      this.probe = (await all("loadEnvironment", withTurn(env, rotate))) as ProbeReport;
+      this.loaded = { ...this.loaded, env, rotate };
+      if (what === "render") what = "light";
+      if (this.probe.warnings.length) this.tell(this.probe.warnings.join("; "));
+    }
+    return what;
+  }
+
+  /** Takes over the light that a dropped scene names. */
+  private adopt({ environment }: SceneReport) {
+    if (this.adopts && environment) {
+      const { probe, rotate, scale, exposure } = environment;
+      Object.assign(this.state, { env: probe, rotate, scale, ev: exposure });
+      this.keepInAddress();
+    }
+    if (this.adopts) this.emit("files");
+    this.adopts = false;
+  }
+
+  /** Says which files a link wants. */
+  private tellMissing() {
+    const names = Object.values(this.missing).filter(Boolean).map(fileName);
+    const wanted = $("wanted");
+    wanted.hidden = !names.length;
+    if (names.length) wanted.textContent = `This link shows ${names.join(" under ")}, which it does not hold: drop ${names.join(" and ")} here. Until then you see ${this.missing.scene ? DEFAULT.scene : this.state.scene} under ${this.missing.env ? DEFAULT.env : this.envName}.`;
+  }
 
   /** After a file that cannot be loaded: what the engines still have. */
   private async goBack() {
     const { good, state } = this;
+    this.adopts = false;
     if (!good || (good.drops === this.drops && good.state.scene === state.scene && good.state.env === state.env)) return;
-    const { scene, material, camera, pixel, env, rotate, ev, exposure } = good.state;
-    Object.assign(state, { scene, material, camera, pixel, env, rotate, ev, exposure });
+    const { scene, material, camera, pixel, env, rotate, ev, scale, exposure } = good.state;
+    Object.assign(state, { scene, material, camera, pixel, env, rotate, ev, scale, exposure });
     this.files = good.files;
     this.drops = good.drops;
     this.loaded = { ...good.loaded };
     await this.provide();
     this.emit("files");
+    // Engines that were emptied for what did not come begin again.
+    if (this.engines.active < this.engines.hosts.length && this.measured !== this.drops) this.load();
   }
 
   tell(text: string, isError = false) {
@@ -129,8 +217,7 @@ export class App {
       const { scene, env, rotate } = this.loaded;
       // All are sent before anything else is: an engine answers in order.
       const files = this.contents().map(({ path, bytes }) => host.call("addFile", path, bytes));
-      const light = { ...JSON.parse(env), rotate, scale: 1 };
-      await Promise.all([...files, host.call("loadScene", scene), host.call("loadEnvironment", JSON.stringify(light))]);
+      await Promise.all([...files, host.call("loadScene", scene), host.call("loadEnvironment", withTurn(env, rotate))]);
     }
     return host;
   }
@@ -141,10 +228,11 @@ export class App {
     return scene === probe ? scene : [...scene, ...probe];
   }
 
-  /** Gives the engines the dropped files. */
-  private async provide() {
-    await this.engines.all("clearFiles");
-    for (const { path, bytes } of this.contents()) await this.engines.all("addFile", path, bytes);
+  /** Gives engines the dropped files. */
+  private async provide(hosts = this.engines.working) {
+    this.provided = this.drops;
+    await Promise.all(hosts.map((host) => host.call("clearFiles")));
+    for (const { path, bytes } of this.contents()) await Promise.all(hosts.map((host) => host.call("addFile", path, bytes)));
   }
 
   /** Takes files over and shows the first scene and the first probe among them. */
@@ -158,25 +246,27 @@ export class App {
     const isScene = (path: string) => /\.(glb|gltf|obj|ply|stl|off|toml)$/i.test(path);
     const isProbe = (path: string) => /\.(hdr|exr|pfm|pic|rgbe)$/i.test(path);
     const paths = files.map(({ path }) => path);
-    const scenes = paths.filter(isScene), probes = paths.filter(isProbe);
+    // A scene file comes before the meshes that it names.
+    const scenes = paths.filter(isScene).sort((a, b) => Number(/\.toml$/i.test(b)) - Number(/\.toml$/i.test(a))), radiance = paths.filter(isProbe);
+    // Beside a scene, pictures are its textures.
+    const probes = scenes.length || radiance.length ? radiance : paths.filter((path) => /\.(png|jpe?g)$/i.test(path));
     if (!scenes.length && !probes.length) {
-      this.tell(`${paths[0] ?? "nothing"} is neither a scene (GLB, glTF, OBJ, PLY, STL, OFF, TOML) nor a light probe (HDR, EXR, PFM)`, true);
+      this.tell(`${paths[0] ?? "nothing"} is neither a scene (GLB, glTF, OBJ, PLY, STL, OFF, TOML) nor a light probe (HDR, EXR, PFM, PNG, JPEG)`, true);
       return;
     }
     const contents = await Promise.all(files.map(async ({ path, file }) => ({ path, bytes: new Uint8Array(await file.arrayBuffer()) })));
+    const { missing } = this;
     // A probe that is dropped leaves the scene's files, and a scene the probe's.
     this.drops = { scene: scenes.length ? contents : this.drops.scene, probe: probes.length ? contents : this.drops.probe };
     this.files = { scenes: scenes.length ? scenes : this.files.scenes, probes: probes.length ? probes : this.files.probes };
     this.loaded = { scene: scenes.length ? "" : this.loaded.scene, env: probes.length ? "" : this.loaded.env, rotate: this.loaded.rotate };
-    try {
-      await this.provide();
-    } catch (error) {
-      this.tell((error as Error).message, true);
-      return;
-    }
+    const wanted = (paths: string[], name: string) => paths.find((path) => name && fileName(path) === fileName(name));
+    // What a link has waited for is shown as the link says.
+    const [scene, probe] = [wanted(scenes, missing.scene), wanted(probes, missing.env)];
+    this.adopts = scenes.length > 0 && !scene;
     const change: Partial<State> = {
-      ...(scenes.length ? { scene: scenes[0], camera: null, material: "", pixel: null } : {}),
-      ...(probes.length ? { env: probes[0], rotate: 0, ev: 0, exposure: null } : {}),
+      ...(scene ? { scene } : scenes.length ? { scene: scenes[0], camera: null, material: "", pixel: null } : {}),
+      ...(probe ? { env: probe } : probes.length ? { env: probes[0], rotate: 0, ev: 0, scale: 1, exposure: null } : {}),
     };
     Object.assign(this.state, change);
     this.emit("files");
@@ -184,12 +274,12 @@ export class App {
   }
 
   get envName() {
-    return isBuiltinProbe(this.state.env) ? this.state.env : this.state.env.split("/").pop()!;
+    return fileName(this.state.env);
   }
 
   /** The pixel that was picked, for the engine. */
   pixel(): string | null {
-    const { pixel, size, camera } = this.state;
+    const { state: { pixel, size }, camera } = this;
     if (!pixel || pixel[0] >= size || pixel[1] >= size) return null;
     return JSON.stringify({ x: Math.floor(pixel[0]), y: Math.floor(pixel[1]), width: size, height: size, camera });
   }

@@ -3,145 +3,231 @@
 import { fill, h } from "./dom";
 
 interface Slider {
+  kind: "number";
   name: string;
   min: number;
   max: number;
   step: number;
-  value: number;
+  value: string;
+  when?: (values: string[]) => boolean;
 }
+
+interface Choice {
+  kind: "choice";
+  name: string;
+  values: [string, string][];
+  value: string;
+}
+
+/** Linear R, G and B, or one number of all three, in [0, 1]. */
+interface Color {
+  kind: "color";
+  name: string;
+  value: string;
+  when?: (values: string[]) => boolean;
+}
+
+type Field = Slider | Choice | Color;
 
 interface Kind {
   /** Its name in text. */
   key: string;
   label: string;
-  numbers: Slider[];
-  /** Options with names, beside the numbers. */
-  choices?: { name: string; values: [string, string][]; value: string }[];
-  text(numbers: number[], choices: string[]): string;
-  /** Numbers and choices of a text of this kind; none if it is more than the editor can say. */
-  parse(words: string[]): { numbers: number[]; choices: string[] } | null;
+  fields: Field[];
+  /** The text of the fields' values. */
+  text(values: string[]): string;
+  /** The fields' values of a text's parts after the name; none if it is more than the editor can say. */
+  parse(words: string[]): string[] | null;
 }
 
-const whole = (name: string, value: number, max: number): Slider => ({ name, min: 1, max, step: 1, value });
+const isNumber = (text: string) => text.trim() !== "" && isFinite(Number(text));
+const isCount = (text: string) => /^\d+$/.test(text);
+const whole = (name: string, value: number, max: number, min = 1): Slider => ({ kind: "number", name, min, max, step: 1, value: String(value) });
+const choice = (name: string, values: [string, string][]): Choice => ({ kind: "choice", name, values, value: values[0][0] });
+/** The value of an option `name=value` among words. */
+const option = (words: string[], name: string) => words.find((word) => word.startsWith(`${name}=`))?.slice(name.length + 1);
 const one = (key: string, label: string, name: string, value: number, max: number): Kind => ({
-  key, label, numbers: [whole(name, value, max)], text: ([n]) => `${key}:${n}`,
-  parse: (words) => (words.length <= 1 && (!words.length || /^\d+$/.test(words[0])) ? { numbers: [Number(words[0] ?? value)], choices: [] } : null),
+  key, label, fields: [whole(name, value, max)], text: ([n]) => `${key}:${n}`,
+  parse: (words) => (words.length <= 1 && words.every(isCount) ? [words[0] ?? String(value)] : null),
 });
 
 export const STRATEGIES: Kind[] = [
-  one("product", "product sampling", "Rays at most", 8, 64),
+  one("product", "product", "Rays at most", 8, 64),
   {
-    key: "mis", label: "multiple importance sampling",
-    numbers: [whole("Environment", 1, 128), whole("BRDF", 1, 128)],
-    choices: [
-      { name: "Weights", values: [["power", "power heuristic"], ["balance", "balance heuristic"]], value: "power" },
-      { name: "Table", values: [["", "compensated"], ["no-compensation", "whole map"]], value: "" },
+    key: "mis", label: "multiple importance",
+    fields: [
+      whole("Environment", 1, 128, 0), whole("BRDF", 1, 128, 0),
+      choice("Weights", [["power", "power heuristic"], ["balance", "balance heuristic"]]),
+      choice("Table", [["", "compensated"], ["no-compensation", "whole map"]]),
     ],
-    text: ([m, n], [heuristic, table]) => ["mis", m, n, ...(heuristic === "balance" ? ["heuristic=balance"] : []), ...(table ? [table] : [])].join(":"),
+    text: ([m, n, heuristic, table]) =>
+      ["mis", ...(m === "0" && n === "0" ? ["1", "0"] : [m, n]), ...(heuristic === "balance" ? ["heuristic=balance"] : []), ...(table ? [table] : [])].join(":"),
     parse: (words) => {
-      const numbers = words.filter((w) => /^\d+$/.test(w)).map(Number);
-      const rest = words.filter((w) => !/^\d+$/.test(w));
-      const known = rest.every((w) => ["heuristic=balance", "heuristic=power", "no-compensation"].includes(w));
+      const numbers = words.filter(isCount), rest = words.filter((word) => !isCount(word));
+      const known = rest.every((word) => ["heuristic=balance", "heuristic=power", "no-compensation"].includes(word));
       if (!known || ![0, 2].includes(numbers.length)) return null;
-      return {
-        numbers: numbers.length ? numbers : [1, 1],
-        choices: [rest.includes("heuristic=balance") ? "balance" : "power", rest.includes("no-compensation") ? "no-compensation" : ""],
-      };
+      return [...(numbers.length ? numbers : ["1", "1"]), option(rest, "heuristic") ?? "power", rest.includes("no-compensation") ? "no-compensation" : ""];
     },
   },
-  one("environment", "environment sampling", "Samples", 1, 128),
-  one("brdf", "BRDF sampling", "Samples", 1, 128),
+  one("environment", "environment", "Rays", 1, 128),
+  one("brdf", "BRDF", "Rays", 1, 128),
   {
-    key: "sir", label: "sampling importance resampling",
-    numbers: [whole("Rays", 1, 64), whole("Candidates", 32, 1024)],
-    choices: [
-      { name: "From", values: [["mixture", "both"], ["environment", "environment"], ["brdf", "BRDF"]], value: "mixture" },
-      { name: "Picks", values: [["sorted", "sorted"], ["systematic", "systematic"], ["multinomial", "multinomial"], ["reservoir", "reservoirs"]], value: "sorted" },
+    key: "sir", label: "resampling (SIR)",
+    fields: [
+      whole("Rays", 1, 64), choice("Candidates", [["given", "as many as given"], ["pilot", "chosen by a pilot"]]),
+      { ...whole("Number", 32, 1024), when: (values) => values[1] === "given" },
+      choice("From", [["mixture", "both"], ["environment", "environment"], ["brdf", "BRDF"]]),
+      choice("Picks", [["sorted", "sorted"], ["systematic", "systematic"], ["multinomial", "multinomial"], ["reservoir", "reservoirs"]]),
     ],
-    text: ([n, m], [from, picks]) => [`sir:${n}/${Math.max(n, m)}`, ...(from === "mixture" ? [] : [`from=${from}`]), ...(picks === "sorted" ? [] : [`resampling=${picks}`])].join(":"),
+    text: ([n, by, m, from, picks]) =>
+      [`sir:${n}${by === "given" ? `/${Math.max(Number(n), Number(m))}` : ""}`, ...(from === "mixture" ? [] : [`from=${from}`]), ...(picks === "sorted" ? [] : [`resampling=${picks}`])].join(":"),
     parse: (words) => {
-      const match = /^(\d+)\/(\d+)$/.exec(words[0] ?? "1/32");
+      const match = /^(\d+)(?:\/(\d+))?$/.exec(words[0] ?? "1");
       if (!match) return null;
-      const option = (name: string, fallback: string) => words.find((w) => w.startsWith(`${name}=`))?.split("=")[1] ?? fallback;
-      return { numbers: [Number(match[1]), Number(match[2])], choices: [option("from", "mixture"), option("resampling", "sorted")] };
+      return [match[1], match[2] ? "given" : "pilot", match[2] ?? "32", option(words, "from") ?? "mixture", option(words, "resampling") ?? "sorted"];
     },
   },
   {
-    key: "rejection", label: "rejection sampling",
-    numbers: [whole("Tries", 16, 256)],
-    choices: [{ name: "From", values: [["tighter", "the tighter bound"], ["environment", "environment"], ["brdf", "BRDF"]], value: "tighter" }],
-    text: ([n], [from]) => `rejection:${n}${from === "tighter" ? "" : `:proposal=${from}`}`,
+    key: "rejection", label: "rejection",
+    fields: [
+      choice("Ends", [["tries", "after all tries"], ["rays", "when enough are accepted"]]),
+      { ...whole("Accepted", 2, 64), when: (values) => values[0] === "rays" }, whole("Tries", 16, 256),
+      choice("From", [["tighter", "the tighter bound"], ["environment", "environment"], ["brdf", "BRDF"]]),
+    ],
+    text: ([ends, rays, tries, from]) =>
+      [ends === "rays" ? `rejection:rays=${rays}:tries=${tries}` : `rejection:${tries}`, ...(from === "tighter" ? [] : [`proposal=${from}`])].join(":"),
     parse: (words) => {
-      const rest = words.filter((w) => !/^\d+$/.test(w));
-      if (!rest.every((w) => w.startsWith("proposal="))) return null;
-      return { numbers: [Number(words.find((w) => /^\d+$/.test(w)) ?? 16)], choices: [rest[0]?.split("=")[1] ?? "tighter"] };
+      const rest = words.filter((word) => !isCount(word));
+      if (!rest.every((word) => /^(rays|tries|proposal)=/.test(word))) return null;
+      const rays = option(rest, "rays");
+      return [rays ? "rays" : "tries", rays ?? "2", option(rest, "tries") ?? words.find(isCount) ?? "16", option(rest, "proposal") ?? "tighter"];
     },
   },
-  one("median-cut", "median cut lights", "Lights", 64, 1024),
-  one("variance-minimization", "variance minimization lights", "Lights", 64, 1024),
+  one("median-cut", "median cut", "Lights", 64, 1024),
+  one("variance-minimization", "variance minimization", "Lights", 64, 1024),
 ];
 
-const METALS: [string, string][] = ["gold", "copper", "silver", "aluminum", "chromium", "tungsten"].map((m) => [m, m]);
-const unit = (name: string, value: number): Slider => ({ name, min: 0, max: 1, step: 0.01, value });
-const alpha = (name: string, value: number): Slider => ({ name, min: 0.01, max: 1, step: 0.01, value });
-const red = [unit("Red", 0.8), unit("Green", 0.5), unit("Blue", 0.2)];
-const numbersOf = (words: string[]) => words.flatMap((w) => w.split(",")).map(Number);
-const plain = (n: number) => (words: string[]) => {
-  const numbers = numbersOf(words);
-  return numbers.length === n && numbers.every((x) => isFinite(x)) ? { numbers, choices: [] } : null;
+const METALS: [string, string][] = ["gold", "copper", "silver", "aluminum", "chromium", "tungsten"].map((metal) => [metal, metal]);
+const unit = (name: string, value: number): Slider => ({ kind: "number", name, min: 0, max: 1, step: 0.01, value: String(value) });
+const alpha = (name: string, value: number): Slider => ({ kind: "number", name, min: 0.01, max: 1, step: 0.01, value: String(value) });
+const color = (name: string, value: string): Color => ({ kind: "color", name, value });
+/** Four digits at most. */
+const rounded = (x: number) => String(Number(x.toFixed(4)));
+/** Values of parts that follow each other; parts that are left out are as given, but for the first `least`. */
+const inOrder = (least: number, usual: string[]) => (words: string[]) =>
+  (words.length >= least && words.length <= usual.length ? usual.map((value, i) => words[i] ?? value) : null);
+/** Without the parts at the end that say what goes without saying. */
+const trimmed = (words: string[], usual: string[], least: number) => {
+  let n = words.length;
+  while (n > least && words[n - 1] === usual[n - 1]) n--;
+  return words.slice(0, n).join(":");
 };
+
 const microfacet = (key: string, label: string): Kind => ({
-  key, label, numbers: [alpha("Roughness α", 0.2)],
-  choices: [{ name: "Fresnel", values: [["", "none"], ["0.04", "dielectric, 4 %"], ...METALS], value: "gold" }],
-  text: ([a], [f]) => `${key}:${a}${f ? `:${f}` : ""}`,
+  key, label,
+  fields: [
+    alpha("Roughness α", 0.2), { kind: "number", name: "αy : αx", min: 0.1, max: 1, step: 0.05, value: "1" },
+    { ...choice("Fresnel", [["one", "none"], ["0.04", "dielectric, 4 %"], ["color", "of a color"], ...METALS]), value: "gold" },
+    { ...color("Reflectance", "0.9,0.6,0.3"), when: (values) => values[2] === "color" },
+    choice("Masking", [["separable", "separable"], ["correlated", "height-correlated"]]),
+  ],
+  text: ([a, ratio, fresnel, reflectance, masking]) => {
+    const across = rounded(Math.max(Number(a) * Number(ratio), 0.0001));
+    const alphas = Number(ratio) === 1 ? a : `${a},${across}`;
+    return trimmed([key, alphas, fresnel === "color" ? reflectance : fresnel, masking], ["", "", "one", "separable"], 2);
+  },
   parse: (words) => {
-    const known = !words[1] || words[1] === "0.04" || METALS.some(([m]) => m === words[1]);
-    return words.length <= 2 && known && isFinite(Number(words[0])) ? { numbers: [Number(words[0])], choices: [words[1] ?? ""] } : null;
+    const [a, b] = (words[0] ?? "").split(",");
+    if (words.length < 1 || words.length > 3 || !isNumber(a)) return null;
+    const ratio = b === undefined ? "1" : rounded(Number(b) / Number(a));
+    const fresnel = words[1] ?? "one", named = ["one", "0.04", "aluminium", ...METALS.map(([metal]) => metal)].includes(fresnel);
+    return [a, ratio, fresnel === "aluminium" ? "aluminum" : named ? fresnel : "color", named ? "0.9,0.6,0.3" : fresnel, words[2] ?? "separable"];
   },
 });
 
+const GLTF = ["0.8,0.5,0.2", "0", "0.3", "1", "1", "0"], WARD = ["0.3", "0.1", "1", "bounded"];
+
 export const MATERIALS: Kind[] = [
-  { key: "diffuse", label: "diffuse (Lambert)", numbers: red, text: (c) => `diffuse:${c.join(",")}`, parse: plain(3) },
+  { key: "diffuse", label: "diffuse (Lambert)", fields: [color("Albedo", "0.8,0.5,0.2")], text: ([c]) => `diffuse:${c}`, parse: inOrder(1, ["0.8"]) },
   {
-    key: "phong", label: "Phong", numbers: [{ name: "Exponent", min: 1, max: 500, step: 1, value: 50 }, unit("Specular", 0.6), unit("Diffuse", 0.3)],
-    text: (n) => `phong:${n.join(":")}`, parse: plain(3),
+    key: "phong", label: "Phong",
+    fields: [{ kind: "number", name: "Exponent", min: 1, max: 500, step: 1, value: "50" }, color("Specular", "0.6"), color("Diffuse", "0.3")],
+    text: (values) => trimmed(["phong", ...values], ["", "", "1", "0"], 2), parse: inOrder(1, ["50", "1", "0"]),
   },
   {
-    key: "ward", label: "Ward", numbers: [alpha("α along x", 0.3), alpha("α along y", 0.1), unit("Reflectance", 0.9)],
-    text: (n) => `ward:${n.join(":")}`, parse: plain(3),
+    key: "ward", label: "Ward",
+    fields: [
+      alpha("α along x", 0.3), alpha("α along y", 0.1), color("Reflectance", "0.9"),
+      choice("Form", [["bounded", "bounded, 2010"], ["1992", "Ward’s, 1992"], ["duer", "Dür’s, 2006"]]),
+    ],
+    text: (values) => trimmed(["ward", ...values], ["", ...WARD], 3),
+    parse: (words) => inOrder(1, [WARD[0], words[0], WARD[2], WARD[3]])(words),
   },
   microfacet("ggx", "GGX"),
   microfacet("beckmann", "Beckmann"),
   {
-    key: "gltf", label: "metallic-roughness (glTF)", numbers: [...red, unit("Metallic", 0), unit("Roughness", 0.3)],
-    text: (n) => `gltf:${n.slice(0, 3).join(",")}:${n[3]}:${n[4]}`, parse: plain(5),
+    key: "gltf", label: "glTF metallic-roughness",
+    fields: [color("Base color", GLTF[0]), unit("Metallic", 0), unit("Roughness", 0.3), unit("Specular", 1), color("Its color", "1"), unit("Anisotropy", 0)],
+    text: (values) => trimmed(["gltf", ...values], ["", ...GLTF], 4), parse: inOrder(3, GLTF),
   },
-  { key: "mix", label: "half diffuse, half GGX", numbers: [], text: () => "mix", parse: () => ({ numbers: [], choices: [] }) },
+  { key: "mix", label: "half diffuse, half GGX", fields: [], text: () => "mix", parse: () => [] },
 ];
 
 const kindOf = (kinds: Kind[], text: string) => kinds.find((kind) => kind.key === text.split(":")[0]);
+const usual = (kind: Kind) => kind.text(kind.fields.map(({ value }) => value));
 
-/** Sliders and choices of one kind; `change` gets the text. */
-function fields(kind: Kind, text: string, change: (text: string) => void): HTMLElement[] {
-  const parsed = kind.parse(text.split(":").slice(1)) ?? { numbers: kind.numbers.map((n) => n.value), choices: kind.choices?.map((c) => c.value) ?? [] };
-  const inputs: HTMLInputElement[] = [], selects: HTMLSelectElement[] = [];
-  const tell = () => change(kind.text(inputs.map((i) => Number(i.value)), selects.map((s) => s.value)));
-  const rows = kind.numbers.map((slider, i) => {
-    const input = h("input", { type: "range", min: String(slider.min), max: String(Math.max(slider.max, parsed.numbers[i] ?? 0)), step: String(slider.step) });
-    input.value = String(parsed.numbers[i] ?? slider.value);
-    const output = h("output", {}, input.value);
-    input.addEventListener("input", () => { output.textContent = input.value; tell(); });
-    inputs.push(input);
-    return h("label", {}, slider.name, input, output);
-  });
-  const choices = (kind.choices ?? []).map((choice, i) => {
+/** `#rrggbb` of linear numbers, and back. */
+function toHex(linear: string): string {
+  const numbers = linear.split(",").map(Number), channels = numbers.length === 3 ? numbers : [numbers[0], numbers[0], numbers[0]];
+  const encoded = (c: number) => 255 * Math.min(Math.max(c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055, 0), 1);
+  return `#${channels.map((c) => Math.round(encoded(c) || 0).toString(16).padStart(2, "0")).join("")}`;
+}
+function fromHex(hex: string): string {
+  const channels = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
+  const linear = channels.map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)).map((c) => String(Number(c.toFixed(3))));
+  return linear[0] === linear[1] && linear[1] === linear[2] ? linear[0] : linear.join(",");
+}
+
+/** The controls of one kind; `change` gets the text. */
+function controls(kind: Kind, text: string, change: (text: string) => void): HTMLElement[] {
+  const values = kind.parse(text.split(":").slice(1));
+  if (!values) return [h("p", { class: "hint" }, "The text says more than there are controls for.")];
+  const rows: HTMLElement[] = [];
+  const showRows = () => kind.fields.forEach((field, i) => { rows[i].hidden = field.kind !== "choice" && !!field.when && !field.when(values); });
+  const tell = (i: number, value: string) => {
+    values[i] = value;
+    showRows();
+    change(kind.text(values));
+  };
+  kind.fields.forEach((field, i) => rows.push(row(field, values[i], (value) => tell(i, value))));
+  showRows();
+  return rows;
+}
+
+function row(field: Field, value: string, change: (value: string) => void): HTMLElement {
+  if (field.kind === "choice") {
     const select = h("select");
-    fill(select, choice.values, parsed.choices[i] ?? choice.value);
-    select.addEventListener("change", tell);
-    selects.push(select);
-    return h("label", {}, choice.name, select);
+    fill(select, field.values.some(([key]) => key === value) ? field.values : [...field.values, value], value);
+    select.addEventListener("change", () => change(select.value));
+    return h("label", {}, field.name, select);
+  }
+  if (field.kind === "color") {
+    const input = h("input", { type: "color" }), output = h("output", {}, value);
+    input.value = toHex(value);
+    input.addEventListener("input", () => {
+      output.textContent = fromHex(input.value);
+      change(fromHex(input.value));
+    });
+    return h("label", { class: "color" }, field.name, input, output);
+  }
+  const input = h("input", { type: "range", min: String(Math.min(field.min, Number(value))), max: String(Math.max(field.max, Number(value))), step: String(field.step) });
+  input.value = value;
+  const output = h("output", {}, value);
+  input.addEventListener("input", () => {
+    output.textContent = input.value;
+    change(input.value);
   });
-  return [...rows, ...choices];
+  return h("label", {}, field.name, input, output);
 }
 
 /** An editor of a strategy's text in `place`. */
@@ -150,27 +236,26 @@ export function strategyEditor(place: HTMLElement, text: string, change: (text: 
   const select = h("select");
   fill(select, STRATEGIES.map((k) => [k.key, k.label]), kind.key);
   const numbers = h("div", { class: "controls" });
-  numbers.append(...fields(kind, text, change));
+  numbers.append(...controls(kind, text, change));
   select.addEventListener("change", () => {
     const next = kindOf(STRATEGIES, select.value)!;
-    const fresh = next.text(next.numbers.map((n) => n.value), next.choices?.map((c) => c.value) ?? []);
-    numbers.replaceChildren(...fields(next, fresh, change));
-    change(fresh);
+    numbers.replaceChildren(...controls(next, usual(next), change));
+    change(usual(next));
   });
   place.replaceChildren(h("label", {}, "Strategy", select), numbers);
   place.className = "controls";
 }
 
-/** Sliders of a material's text in `place`; the model's name is in `select`. */
+/** Controls of a material's text in `place`; the model's name is in `select`. */
 export function materialEditor(select: HTMLSelectElement, place: HTMLElement, text: string, change: (text: string) => void) {
   const kind = text ? kindOf(MATERIALS, text) : undefined;
   const known = !text || kind;
   fill(select, [["", "as in the scene"], ...MATERIALS.map((k): [string, string] => [k.key, k.label]), ...(known ? [] : [["text", "as the text says"] as [string, string]])], kind?.key ?? (text ? "text" : ""));
   place.className = "controls";
-  place.replaceChildren(...(kind ? fields(kind, text, change) : []));
+  place.replaceChildren(...(kind ? controls(kind, text, change) : []));
   select.onchange = () => {
-    const next = kindOf(MATERIALS, select.value);
-    change(next ? next.text(next.numbers.map((n) => n.value), next.choices?.map((c) => c.value) ?? []) : "");
-    materialEditor(select, place, next ? next.text(next.numbers.map((n) => n.value), next.choices?.map((c) => c.value) ?? []) : "", change);
+    const next = kindOf(MATERIALS, select.value), fresh = next ? usual(next) : "";
+    change(fresh);
+    materialEditor(select, place, fresh, change);
   };
 }

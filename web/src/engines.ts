@@ -16,6 +16,14 @@ async function unpacked(script: string): Promise<[Worker, WebAssembly.Module]> {
   return [worker, module];
 }
 
+/** Half of the computer's memory as far as the browser says how much there is, else 4 GiB; `?memory=` in the address is
+ *  another limit [GiB]. */
+function memoryLimit(): number {
+  const given = Number(new URLSearchParams(location.search).get("memory"));
+  const { deviceMemory = 8 } = navigator as Navigator & { deviceMemory?: number };
+  return 2 ** 30 * (given > 0 ? given : 0.5 * deviceMemory);
+}
+
 /** An engine in a Worker of its own. */
 export class Host {
   private worker!: Worker;
@@ -24,6 +32,9 @@ export class Host {
   onRender: (message: Extract<FromWorker, { token: number }>) => void = () => {};
   /** Called after the engine died and another has taken its place, without scene and light. */
   onRestart: () => void = () => {};
+
+  /** What the engine takes of the memory [bytes]. */
+  memory = 0;
 
   constructor(private module: WebAssembly.Module, private script: string, worker?: Worker) {
     this.boot(worker);
@@ -41,6 +52,7 @@ export class Host {
       case "unpacked":
         return;
       case "result":
+        this.memory = message.memory;
         this.waiting.get(message.id)?.resolve(message.result as never);
         this.waiting.delete(message.id);
         return;
@@ -56,11 +68,23 @@ export class Host {
   }
 
   private restart(why: string) {
+    this.end(why);
+    this.boot();
+    this.onRestart();
+  }
+
+  /** Ends the engine, whose memory is free then. */
+  end(why: string) {
     this.worker.terminate();
     this.waiting.forEach(({ reject }) => reject(new Error(why)));
     this.waiting.clear();
+    this.memory = 0;
+  }
+
+  /** Another engine takes its place, without scene and light. */
+  reset() {
+    this.end("the engine was started again");
     this.boot();
-    this.onRestart();
   }
 
   send(message: ToWorker, transfer: Transferable[] = []) {
@@ -144,7 +168,13 @@ export class Engines {
   events: JobEvents = { update() {}, failed() {} };
   onRestart: () => void = () => {};
 
+  /** How many of the engines have the scene; the others are empty where memory has no room for more. */
+  active: number;
+  /** What all engines together may take of the memory [bytes]. */
+  readonly memory = memoryLimit();
+
   private constructor(readonly hosts: Host[], private another: () => Host) {
+    this.active = hosts.length;
     for (const host of hosts) {
       host.onRender = (message) => this.receive(host, message);
       host.onRestart = () => this.onRestart();
@@ -165,16 +195,39 @@ export class Engines {
     return this.hosts[0].call(call, ...args);
   }
 
-  /** The same for all; the first one's answer. */
+  /** The engines that have the scene. */
+  get working(): Host[] {
+    const hosts = this.hosts.slice(0, this.active);
+    return this.beside ? [...hosts, this.beside] : hosts;
+  }
+
+  /** The same for all that work; the first one's answer. */
   async all<C extends Call>(call: C, ...args: Arguments<C>): Promise<Result<C>> {
-    const hosts = this.beside ? [...this.hosts, this.beside] : this.hosts;
-    return (await Promise.all(hosts.map((host) => host.call(call, ...args))))[0];
+    return (await Promise.all(this.working.map((host) => host.call(call, ...args))))[0];
+  }
+
+  /** That not all work, in words; empty if all do. */
+  get shortage(): string {
+    return this.active < this.hosts.length ? ` by ${this.active} of ${this.hosts.length} Workers, as memory has no room for more` : "";
+  }
+
+  /** Lets so many engines work; those that begin to. What the others had is forgotten. */
+  use(n: number): Host[] {
+    const { active } = this;
+    if (n < active) {
+      this.stop();
+      this.hosts.slice(n).forEach((host) => host.memory && host.reset());
+      this.beside?.end("its memory is wanted for the picture");
+      this.beside = null;
+    }
+    this.active = n;
+    return this.hosts.slice(active, n);
   }
 
   /** Renders pictures side by side, each with its share of the engines. */
   render(pictures: RenderSettings[]): Job[] {
     this.jobs = pictures.map((settings, i) => {
-      const hosts = this.hosts.filter((_, k) => k % pictures.length === i);
+      const hosts = this.hosts.slice(0, this.active).filter((_, k) => k % pictures.length === i);
       const job = new Job(this.nextToken++, hosts, settings);
       hosts.forEach((host, k) =>
         host.send({ kind: "render", token: job.token, settings: JSON.stringify({ ...settings, shard: [k, hosts.length] }) }));

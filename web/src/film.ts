@@ -136,6 +136,7 @@ export class FilmView {
       this.changed = [null, null, null];
       if (this.films[0]) await (this.painter ??= this.makePainter()).paint(this.films, this.look, changed);
       this.busy = false;
+      this.canvas.dispatchEvent(new Event("painted"));
       if (this.stale) this.refresh();
       else this.canvas.removeAttribute("data-stale");
     };

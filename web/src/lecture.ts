@@ -7,20 +7,22 @@ import { STEPS } from "./steps";
 
 /** Controls and a place to draw in; a figure fills them. */
 export class Stage {
+  private inputs: (HTMLInputElement | HTMLSelectElement)[] = [];
   readonly drawing = h("div");
   readonly result = h("p", { class: "result", role: "status" });
   private controls = h("div", { class: "controls" });
 
-  constructor(readonly place: HTMLElement, readonly app: App) {
+  /** `values` are those of the controls in their order; what is missing or out of range is as the figure has it. */
+  constructor(readonly place: HTMLElement, readonly app: App, private values: string[]) {
     place.replaceChildren(this.drawing, this.controls, this.result);
   }
 
   /** A slider; `shown` says how its value is written. */
   slider(name: string, min: number, max: number, step: number, value: number, shown: (x: number) => string = short): () => number {
     const input = h("input", { type: "range", min: String(min), max: String(max), step: String(step) });
-    input.value = String(value);
-    const output = h("output", {}, shown(value));
-    input.addEventListener("input", () => { output.textContent = shown(Number(input.value)); this.redraw(); });
+    input.value = this.begin(input, String(value));
+    const output = h("output", {}, shown(Number(input.value)));
+    input.addEventListener("input", () => { output.textContent = shown(Number(input.value)); this.changed(); });
     this.controls.append(h("label", {}, name, input, output));
     return () => Number(input.value);
   }
@@ -28,9 +30,23 @@ export class Stage {
   choice(name: string, values: [string, string][]): () => string {
     const select = h("select");
     for (const [value, text] of values) select.append(new Option(text, value));
-    select.addEventListener("change", () => this.redraw());
+    select.value = this.begin(select, values[0][0]);
+    if (select.selectedIndex < 0) select.selectedIndex = 0;
+    select.addEventListener("change", () => this.changed());
     this.controls.append(h("label", {}, name, select));
     return () => select.value;
+  }
+
+  /** The value that a control begins with. */
+  private begin(control: HTMLInputElement | HTMLSelectElement, usual: string): string {
+    const given = this.values[this.inputs.push(control) - 1];
+    return given && (control instanceof HTMLSelectElement || isFinite(Number(given))) ? given : usual;
+  }
+
+  /** Draws again, and keeps the values in the address. */
+  private changed() {
+    this.app.set({ figure: this.inputs.map(({ value }) => value).join(";") }, "view");
+    this.redraw();
   }
 
   private drawNow: () => void | Promise<void> = () => {};
@@ -72,6 +88,9 @@ export class Lecture {
     }));
     app.on((what) => this.changed(what));
     this.changed("all");
+    // Paper has no answers to open.
+    const paper = matchMedia("print");
+    paper.addEventListener("change", () => document.querySelectorAll<HTMLDetailsElement>("#step details").forEach((details) => { details.open = paper.matches; }));
   }
 
   private changed(what: Change) {
@@ -81,7 +100,7 @@ export class Lecture {
   }
 
   private go(step: number) {
-    this.app.set({ step: step + 1 }, "panel");
+    this.app.set({ step: step + 1, figure: "" }, "panel");
     this.show(step);
     $("step").scrollIntoView({ block: "start" });
   }
@@ -107,7 +126,7 @@ export class Lecture {
       h("div", { class: "question" }, h("p", {}, question), h("details", {}, h("summary", {}, "What the figure shows"), h("p", {}, answer))),
       h("div", { class: "steps" }, move("← Before", i - 1), move("Next →", i + 1)));
     // Without a map there is nothing to draw yet.
-    if (this.app.probe) FIGURES[i](new Stage(place, this.app));
+    if (this.app.probe) FIGURES[i](new Stage(place, this.app, this.app.state.figure.split(";")));
     document.documentElement.dataset.step = String(i + 1);
   }
 }

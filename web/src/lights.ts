@@ -3,7 +3,7 @@
 import type { App, Change } from "./app";
 import { $, h, latest, save, short } from "./dom";
 import { Film, FilmView } from "./film";
-import { isBuiltinProbe } from "./state";
+import { isBuiltinProbe, quoted } from "./state";
 
 const WIDTH = 768, SPHERE = 160;
 
@@ -76,14 +76,13 @@ export class LightsPanel {
     $("refine").addEventListener("change", () => app.set({ refine: $<HTMLInputElement>("refine").checked }, "panel"));
     $("sun").addEventListener("change", () => {
       const sun = $<HTMLInputElement>("sun").checked;
-      if (!sun) $<HTMLInputElement>("leave").checked = false;
-      app.set({ sun }, "panel");
+      app.set({ sun, leave: app.state.leave && sun }, "panel");
     });
     $("leave").addEventListener("change", () => {
-      if ($<HTMLInputElement>("leave").checked) $<HTMLInputElement>("sun").checked = app.state.sun = true;
-      this.draw();
+      const leave = $<HTMLInputElement>("leave").checked;
+      app.set({ leave, sun: app.state.sun || leave }, "panel");
     });
-    $("gloss").addEventListener("change", () => this.draw());
+    $("gloss").addEventListener("change", () => app.set({ gloss: Number($<HTMLSelectElement>("gloss").value) }, "panel"));
   }
 
   /** Goes to the next number of lights, or the one before; whether there is one. */
@@ -121,6 +120,10 @@ export class LightsPanel {
     if (state.panel !== "lights" || !probe || what === "pixel" || what === "view") return;
     $<HTMLSelectElement>("method").value = state.method;
     $<HTMLInputElement>("sun").checked = state.sun;
+    $<HTMLInputElement>("leave").checked = state.leave;
+    const gloss = $<HTMLSelectElement>("gloss"), exponent = String(state.gloss);
+    if (![...gloss.options].some(({ value }) => value === exponent)) gloss.append(new Option(`glossy, cosⁿ with n = ${exponent}`, exponent));
+    gloss.value = exponent;
     $<HTMLInputElement>("refine").checked = state.refine;
     $<HTMLInputElement>("refine").disabled = state.method !== "variance-minimization";
     $<HTMLInputElement>("n-lights").value = String(place(state.lights));
@@ -130,7 +133,7 @@ export class LightsPanel {
   private readonly draw = latest(async () => {
     const { app } = this, { state } = app;
     $("n-lights-value").textContent = String(state.lights);
-    const leave = $<HTMLInputElement>("leave").checked;
+    const { leave } = state;
     for (const id of ["n-lights", "fewer-lights", "more-lights", "play-lights"]) $<HTMLInputElement>(id).disabled = leave;
     if (leave) this.play(false);
     const settings = { method: state.method, refine: state.refine, n: leave ? null : state.lights, sun: state.sun, lamps: state.lamps };
@@ -139,7 +142,7 @@ export class LightsPanel {
       rig = JSON.parse(await app.engines.call("lights", JSON.stringify(settings)));
       regions = (await app.engines.call("regions", WIDTH)) as Uint32Array;
       view = await app.engines.call("mapView", "lat-long", 0, WIDTH);
-      spheres = (await app.engines.call("spheres", SPHERE, Number($<HTMLSelectElement>("gloss").value))) as Float32Array;
+      spheres = (await app.engines.call("spheres", SPHERE, state.gloss)) as Float32Array;
     } catch (error) {
       app.tell((error as Error).message, true);
       return;
@@ -231,10 +234,10 @@ export class LightsPanel {
     const domes = [...new Set(rig.formats.flatMap((format) => format.dome ?? []))];
     $("dome-files").replaceChildren(...domes.map((name) => button(name, () => app.engines.call("domeFile", name) as Promise<Uint8Array>)));
     const words = ["domelight", "lights", state.env, ...(isBuiltinProbe(state.env) ? [`--env-rows=${state.rows}`] : []),
-      ...(state.rotate ? [`--env-rotate=${state.rotate}`] : []), ...(state.sun ? ["--sun"] : []),
+      ...(state.rotate ? [`--env-rotate=${state.rotate}`] : []), ...(state.scale === 1 ? [] : [`--env-scale=${state.scale}`]), ...(state.ev ? [`--env-exposure=${state.ev}`] : []), ...(state.sun ? ["--sun"] : []),
       ...(leave ? ["--keep-residual", "dome.exr"] : ["-n", String(state.lights)]), "--method", state.method, "-o", "rig.json"];
     // The program refines.
     $("rig-command").hidden = state.method === "variance-minimization" && !state.refine;
-    $("rig-command").textContent = words.map((w) => (/^[\w@%+=:,./-]+$/.test(w) ? w : `'${w}'`)).join(" ");
+    $("rig-command").textContent = words.map(quoted).join(" ");
   }
 }

@@ -1,21 +1,35 @@
 // The Map panel: the probe in any mapping, and what the picked pixel makes of it.
 
 import type { App, Change } from "./app";
-import { $, color, degrees, fill, h, latest, short, stops } from "./dom";
+import { $, degrees, fill, h, latest, short, stops } from "./dom";
 import { Film, FilmView } from "./film";
+import type { MapPicture } from "./protocol";
 
 const MAPPINGS: [string, string][] = [
   ["lat-long", "latitude and longitude"], ["angular", "angular, light probe"], ["mirror-ball", "mirror ball"],
   ["octahedral", "octahedral"], ["cross-horizontal", "cube, lying cross"], ["cross-vertical", "cube, standing cross"], ["strip-horizontal", "cube, strip"],
 ];
 const WIDTH = 768, LAYER = 192;
+/** Layers of the engine's `importance`, in their order. */
+const IMPORTANCE = ["light", "reflectance", "visibility", "environment", "brdf", "mis", "target"];
+/** Strategies whose rays are counted for a layer. */
+const COUNTED: Record<string, string> = { product: "product:8", sir: "sir:2/32", rejection: "rejection:16" };
+/** How long samples take to come [ms]. */
+const ARRIVAL = 900;
 
 export class MapPanel {
   private view = new FilmView($<HTMLCanvasElement>("map-film"), !new URLSearchParams(location.search).has("2d"));
   private exposed = "";
   private samples: Float32Array = new Float32Array();
-  private layers: Float32Array = new Float32Array();
-  private sun: Uint32Array | null = null;
+  /** The samples that have come so far. */
+  private arrived = 0;
+  /** The layers of `importance`, and one of counted rays with what it is of. */
+  private layers: MapPicture | null = null;
+  private counted: { of: string; density: MapPicture } | null = null;
+  private size = [WIDTH, WIDTH / 2];
+  /** A circle around the sun on the map that is not turned, and where it lies on this one. */
+  private sun: Float32Array | null = null;
+  private outline: Float32Array | null = null;
   private sunOf = "";
 
   constructor(private app: App) {
@@ -35,11 +49,9 @@ export class MapPanel {
       $("map-exposure-value").textContent = stops(exposure);
       this.view.set({ exposure });
     });
-    for (const id of ["layer", "show-samples", "show-sun"]) $(id).addEventListener("change", () => this.mark());
-    $("n-samples").addEventListener("input", () => {
-      $("n-samples-value").textContent = String(this.nSamples);
-      this.ask();
-    });
+    for (const id of ["show-samples", "show-sun"]) $(id).addEventListener("change", () => this.mark());
+    $("layer").addEventListener("change", () => app.set({ layer: $<HTMLSelectElement>("layer").value }, "view"));
+    $("n-samples").addEventListener("input", () => app.set({ samples: Number($<HTMLInputElement>("n-samples").value) }, "pixel"));
     const viewer = $("map-viewer");
     let last: number | null = null;
     viewer.addEventListener("pointerdown", (event) => {
@@ -63,7 +75,7 @@ export class MapPanel {
   }
 
   private get nSamples() {
-    return 2 ** Number($<HTMLInputElement>("n-samples").value);
+    return 2 ** this.app.state.samples;
   }
 
   private changed(what: Change) {
@@ -72,7 +84,15 @@ export class MapPanel {
     $<HTMLInputElement>("map-rotate").value = String(state.rotate);
     $("map-rotate-value").textContent = degrees(state.rotate);
     $<HTMLSelectElement>("mapping").value = state.mapping;
-    if (what !== "view" && what !== "pixel") this.draw();
+    $<HTMLSelectElement>("layer").value = state.layer;
+    $<HTMLInputElement>("n-samples").value = String(state.samples);
+    $("n-samples-value").textContent = String(this.nSamples);
+    if (what === "view") {
+      this.mark();
+      this.lay();
+      return;
+    }
+    if (what !== "pixel") this.draw();
     this.ask();
   }
 
@@ -83,6 +103,8 @@ export class MapPanel {
     film.pixels = pixels;
     this.view.show(0, film);
     $("map-viewer").style.aspectRatio = `${width} / ${height}`;
+    $("map-viewer").classList.toggle("tall", height >= width);
+    this.size = [width, height];
     const key = `${state.env} ${state.ev} ${state.rows}`;
     if (this.exposed !== key) {
       this.exposed = key;
@@ -95,11 +117,12 @@ export class MapPanel {
       this.sunOf = key;
       try {
         await app.engines.call("lights", JSON.stringify({ method: "median-cut", refine: true, n: null, sun: true, lamps: 0 }));
-        this.sun = (await app.engines.call("regions", WIDTH)) as Uint32Array;
+        this.sun = circle((await app.engines.call("regions", WIDTH)) as Uint32Array);
       } catch {
         this.sun = null;
       }
     }
+    this.outline = this.sun && ((await app.engines.call("placesOf", state.mapping, state.rotate, this.sun)) as Float32Array);
     const size = app.probe!.size;
     $("map-caption").textContent = `${app.envName}, ${size[0]} × ${size[1]} texels, turned by ${degrees(state.rotate)}${this.sun ? "; its sun is outlined" : "; no sun stands out"}.`;
     this.mark();
@@ -108,91 +131,158 @@ export class MapPanel {
 
   /** Asks what the pixel makes of the light. */
   private readonly ask = latest(async () => {
-    const { app } = this, pixel = app.pixel();
+    const { app } = this, { state } = app, pixel = app.pixel();
     $("map-hint").hidden = !!pixel;
     const body = $("point-table").querySelector("tbody")!;
     if (!pixel) {
-      this.samples = this.layers = new Float32Array();
+      this.samples = new Float32Array();
+      this.layers = this.counted = null;
       body.replaceChildren();
       this.mark();
       return;
     }
     try {
-      this.layers = (await app.engines.call("importance", pixel, LAYER)) as Float32Array;
-      this.samples = (await app.engines.call("samples", pixel, app.state.strategy, this.nSamples, app.state.seed)) as Float32Array;
+      this.layers = await app.engines.call("importance", pixel, state.mapping, LAYER);
+      await this.countRays(pixel);
+      this.samples = (await app.engines.call("samples", pixel, state.strategy, state.mapping, this.nSamples, state.seed)) as Float32Array;
       const point = JSON.parse(await app.engines.call("point", pixel)) as { shadowed: number; unshadowed: number } | null;
-      const rays = this.samples.length / 4;
-      let sum = 0, free = 0;
-      for (let i = 0; i < this.samples.length; i += 4) {
-        sum += this.samples[i + 2] * this.samples[i + 3];
-        free += this.samples[i + 3];
-      }
-      const rows: [string, string][] = point ? [
-        ["Radiance, by quadrature", short(point.shadowed)], ["without shadows", short(point.unshadowed)],
-        [`${app.state.strategy}, ${this.nSamples} camera samples`, app.state.strategy.startsWith("product") ? "—" : short(sum / this.nSamples)],
-        ["shadow rays", String(rays)], ["of these free", rays ? `${Math.round(100 * free / rays)} %` : "—"],
-      ] : [["This pixel shows", "the background"]];
-      body.replaceChildren(...rows.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value))));
+      body.replaceChildren(...this.rows(point).map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value))));
+    } catch (error) {
+      app.tell((error as Error).message, true);
+    }
+    this.arrive();
+    document.documentElement.dataset.samples = String(this.samples.length / 4);
+    this.tellLayer();
+  });
+
+  /** Lays another layer over the map; the samples stay. */
+  private readonly lay = latest(async () => {
+    const { app } = this, pixel = app.pixel();
+    try {
+      if (pixel) await this.countRays(pixel);
     } catch (error) {
       app.tell((error as Error).message, true);
     }
     this.mark();
-    document.documentElement.dataset.samples = String(this.samples.length / 4);
+    this.tellLayer();
   });
+
+  private tellLayer() {
+    const { layer, mapping } = this.app.state;
+    document.documentElement.dataset.layer = `${layer} ${mapping}`;
+  }
+
+  /** The strategy whose rays the chosen layer counts, if it counts any. */
+  private get countedStrategy(): string | undefined {
+    const { layer, strategy } = this.app.state;
+    return layer === "own" || (COUNTED[layer] && strategy.startsWith(`${layer}:`)) ? strategy : COUNTED[layer];
+  }
+
+  private async countRays(pixel: string) {
+    const strategy = this.countedStrategy, { engines, state } = this.app;
+    const { env, ev, rows, rotate, scene, material } = state;
+    const of = JSON.stringify([strategy, pixel, state.mapping, env, ev, rows, rotate, scene, material]);
+    if (!strategy || this.counted?.of === of) return;
+    this.counted = null;
+    this.counted = { of, density: await engines.call("rayDensity", pixel, strategy, state.mapping, LAYER) };
+  }
+
+  /** What the table says of the pixel. */
+  private rows(point: { shadowed: number; unshadowed: number } | null): [string, string][] {
+    if (!point) return [["This pixel shows", "the background"]];
+    const { strategy } = this.app.state, rays = this.samples.length / 4;
+    let sum = 0, free = 0;
+    for (let i = 0; i < this.samples.length; i += 4) {
+      sum += this.samples[i + 2] * this.samples[i + 3];
+      free += this.samples[i + 3];
+    }
+    return [
+      ["Radiance, by quadrature", short(point.shadowed)], ["without shadows", short(point.unshadowed)],
+      [`${strategy}, ${this.nSamples} camera samples`, strategy.startsWith("product") ? "—" : short(sum / this.nSamples)],
+      ["shadow rays", String(rays)], ["of these free", rays ? `${Math.round(100 * free / rays)} %` : "—"],
+    ];
+  }
+
+  /** Lets the samples come one after the other, or at once for who wants no motion. */
+  private arrive() {
+    const all = this.samples.length / 4, start = performance.now(), of = this.samples;
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches || document.hidden || this.app.state.panel !== "map";
+    this.arrived = still ? all : 0;
+    this.mark();
+    if (still || !all) return;
+    const canvas = $<HTMLCanvasElement>("map-marks"), context = canvas.getContext("2d")!;
+    canvas.toggleAttribute("data-stale", true);
+    const next = (now: number) => {
+      if (this.samples !== of) return;
+      const until = Math.min(all, Math.ceil(all * Math.max(now - start, 0) / ARRIVAL));
+      if ($<HTMLInputElement>("show-samples").checked) this.dots(context, this.arrived, until);
+      this.arrived = Math.max(this.arrived, until);
+      if (until < all) requestAnimationFrame(next);
+      else canvas.removeAttribute("data-stale");
+    };
+    requestAnimationFrame(next);
+  }
 
   private mark() {
     const canvas = $<HTMLCanvasElement>("map-marks"), context = canvas.getContext("2d")!;
-    const isLatLong = this.app.state.mapping === "lat-long";
-    canvas.width = WIDTH;
-    canvas.height = WIDTH / 2;
-    canvas.hidden = !isLatLong;
-    if (!isLatLong) return;
-    const layer = Number($<HTMLSelectElement>("layer").value);
-    if (layer >= 0 && this.layers.length) this.heat(context, layer);
-    if (this.sun && $<HTMLInputElement>("show-sun").checked) this.outline(context);
-    if ($<HTMLInputElement>("show-samples").checked) this.dots(context);
+    [canvas.width, canvas.height] = this.size;
+    this.heat(context);
+    if (this.outline && $<HTMLInputElement>("show-sun").checked) this.circle(context, this.outline);
+    if ($<HTMLInputElement>("show-samples").checked) this.dots(context, 0, this.arrived);
   }
 
-  /** A density as the opacity of one color, by the square root: tails are seen, too. */
-  private heat(context: CanvasRenderingContext2D, layer: number) {
-    const n = LAYER * LAYER / 2, values = this.layers.subarray(layer * n, (layer + 1) * n);
-    const most = values.reduce((a, b) => Math.max(a, b), 0);
-    const image = new ImageData(LAYER, LAYER / 2);
-    values.forEach((value, i) => image.data.set([255, 64, 160, most > 0 ? 235 * Math.sqrt(value / most) : 0], 4 * i));
-    const small = h("canvas", { width: String(LAYER), height: String(LAYER / 2) });
+  /** The layer that is laid over the map. */
+  private layer(): { values: Float32Array; width: number; height: number } | null {
+    const { layers, counted } = this, at = IMPORTANCE.indexOf(this.app.state.layer);
+    if (this.countedStrategy && counted) return { ...counted.density, values: counted.density.pixels };
+    if (at < 0 || !layers?.pixels.length) return null;
+    const n = layers.width * layers.height;
+    return { ...layers, values: layers.pixels.subarray(at * n, (at + 1) * n) };
+  }
+
+  /** A density as the opacity of one color, by the square root: tails are seen, too. Full is what all but a hundredth of
+   *  the map stay below, or a sun would leave nothing to be seen of the rest. */
+  private heat(context: CanvasRenderingContext2D) {
+    const layer = this.layer();
+    if (!layer?.values.length) return;
+    const { values, width, height } = layer, sorted = values.filter((value) => value > 0).sort();
+    const most = sorted[Math.floor(0.99 * (sorted.length - 1))] ?? 0;
+    const image = new ImageData(width, height);
+    values.forEach((value, i) => image.data.set([255, 64, 160, most > 0 ? 235 * Math.sqrt(Math.min(value / most, 1)) : 0], 4 * i));
+    const small = h("canvas", { width: String(width), height: String(height) });
     small.getContext("2d")!.putImageData(image, 0, 0);
     context.imageSmoothingEnabled = true;
-    context.drawImage(small, 0, 0, WIDTH, WIDTH / 2);
+    context.drawImage(small, 0, 0, ...(this.size as [number, number]));
   }
 
-  private outline(context: CanvasRenderingContext2D) {
-    let x = 0, y = 0, count = 0, far = 0;
-    const cells: [number, number][] = [];
-    this.sun!.forEach((label, i) => { if (label === 0) cells.push([i % WIDTH, Math.floor(i / WIDTH)]); });
-    for (const [cx, cy] of cells) { x += cx; y += cy; count++; }
-    if (!count) return;
-    [x, y] = [x / count + 0.5, y / count + 0.5];
-    for (const [cx, cy] of cells) far = Math.max(far, Math.hypot(cx + 0.5 - x, cy + 0.5 - y));
-    const shifted = ((x - this.app.state.rotate / 360 * WIDTH) % WIDTH + WIDTH) % WIDTH;
-    for (const [width, style] of [[4, "#000"], [2, "#ffd34d"]] as const) {
-      context.lineWidth = width;
+  /** A closed line, but for where the layout tears it. */
+  private circle(context: CanvasRenderingContext2D, places: Float32Array) {
+    const [width, height] = this.size;
+    for (const [line, style] of [[4, "#000"], [2, "#ffd34d"]] as const) {
+      context.lineWidth = line;
       context.strokeStyle = style;
       context.beginPath();
-      context.arc(shifted, y, far + 7, 0, 2 * Math.PI);
+      for (let i = 0; i <= places.length; i += 2) {
+        const [u, v] = [places[i % places.length], places[(i + 1) % places.length]];
+        const torn = i > 0 && Math.hypot(u - places[i - 2], v - places[i - 1]) > 0.1;
+        if (i === 0 || torn) context.moveTo(u * width, v * height);
+        else context.lineTo(u * width, v * height);
+      }
       context.stroke();
     }
   }
 
-  private dots(context: CanvasRenderingContext2D) {
+  /** Samples from one number to another. */
+  private dots(context: CanvasRenderingContext2D, from: number, to: number) {
     let mean = 0;
     for (let i = 2; i < this.samples.length; i += 4) mean += this.samples[i];
     mean /= this.samples.length / 4 || 1;
-    const [free, blocked] = [color("free"), color("blocked")];
-    for (let i = 0; i < this.samples.length; i += 4) {
+    const [free, blocked] = ["#1f9d57", "#ff6b5e"], [width, height] = this.size;
+    for (let i = 4 * from; i < 4 * to; i += 4) {
       const [u, v, weight, visible] = this.samples.subarray(i, i + 4);
       const radius = Math.min(Math.max(4 * Math.sqrt(Math.abs(weight) / (mean || 1)), 1.5), 16);
       context.beginPath();
-      context.arc(u * WIDTH, v * WIDTH / 2, radius, 0, 2 * Math.PI);
+      context.arc(u * width, v * height, radius, 0, 2 * Math.PI);
       context.lineWidth = 3;
       context.strokeStyle = "#000";
       context.stroke();
@@ -207,4 +297,18 @@ export class MapPanel {
       }
     }
   }
+}
+
+/** A circle around the first region of a map of `WIDTH` columns, as places on it; none if there is no such region. */
+function circle(regions: Uint32Array): Float32Array | null {
+  let x = 0, y = 0, far = 0;
+  const cells: [number, number][] = [];
+  regions.forEach((label, i) => { if (label === 0) cells.push([i % WIDTH + 0.5, Math.floor(i / WIDTH) + 0.5]); });
+  if (!cells.length) return null;
+  for (const [cx, cy] of cells) { x += cx / cells.length; y += cy / cells.length; }
+  for (const [cx, cy] of cells) far = Math.max(far, Math.hypot(cx - x, cy - y));
+  const points = Array.from({ length: 64 }, (_, i) => 2 * Math.PI * i / 64);
+  return Float32Array.from(points.flatMap((t) => [
+    (((x + (far + 7) * Math.cos(t)) / WIDTH) % 1 + 1) % 1, Math.min(Math.max((y + (far + 7) * Math.sin(t)) / (WIDTH / 2), 0.001), 0.999),
+  ]));
 }

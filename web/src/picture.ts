@@ -30,7 +30,10 @@ export class PicturePanel {
   private histories: { rays: number; error: number; samples: number }[][] = [[], []];
   private preview = false;
   private settle = 0;
-  private automatic = true;
+  /** Counts what was begun. */
+  private turn = 0;
+  /** The automatic exposure that was found last, of what, and the light and scene that it suits nearly. */
+  private automatic = { exposure: 0, view: "", light: "" };
   private reference: Reference;
   private lastPlot = 0;
   /** What decides the picture that is rendered. */
@@ -54,27 +57,33 @@ export class PicturePanel {
 
   private changed(what: Change) {
     if (what === "all" || what === "files") this.fillControls();
+    if (what === "scene" || what === "camera") this.fillCameras();
     if (what === "files" || what === "panel") return;
     if (what === "pixel" || what === "view") {
       this.showView();
       return;
     }
-    if (what === "scene" || what === "light") this.automatic = this.app.state.exposure === null;
     this.showView();
     if (!this.app.scene || !this.app.probe) return;
-    const { panel, step, pixel, exposure, curve, view, mapping, method, refine, lights, sun, lamps, ...rendered } = this.app.state;
+    const { panel, step, figure, pixel, compared, exposure, curve, view, mapping, layer, samples, method, refine, lights, sun, lamps, leave, gloss, ...rendered } = this.app.state;
     const key = JSON.stringify(rendered);
     // What came by the hash may be of another panel alone.
     if (what === "all" && key === this.renderedKey) return;
     this.renderedKey = key;
-    this.restart(what !== "render");
+    void this.restart(what !== "render");
   }
 
   // ---- rendering
 
   /** Renders anew: after a change of what is seen first small, so that it is seen at once. */
-  restart(atOnce: boolean) {
+  async restart(atOnce: boolean) {
     clearTimeout(this.settle);
+    // Another scene or light waits for its exposure; another view begins with the last one.
+    const turn = ++this.turn;
+    if (this.app.state.exposure === null && this.automatic.light !== this.lightKey) {
+      await this.expose();
+      if (turn !== this.turn) return;
+    }
     const small = atOnce && this.app.state.size > 1.5 * PREVIEW;
     if (small) {
       this.start(true);
@@ -82,20 +91,26 @@ export class PicturePanel {
     } else this.start(false);
   }
 
+  /** What is rendered by a strategy. */
+  private settings(strategy: string): RenderSettings {
+    const { size, spp, seed, hide } = this.app.state;
+    return { width: size, height: size, spp, strategy, seed, hideEnvironment: hide, camera: this.app.camera };
+  }
+
   private start(preview: boolean) {
-    const { state } = this.app;
+    const { state, engines } = this.app;
     const size = preview ? PREVIEW : state.size;
-    const settings = (strategy: string): RenderSettings => ({
-      width: size, height: size, spp: preview ? 1 : state.spp, strategy: preview ? "mis:1:1:no-compensation" : strategy,
-      seed: state.seed, hideEnvironment: state.hide, camera: state.camera,
-    });
-    const pair = !preview && state.beside;
+    const settings = (strategy: string): RenderSettings =>
+      (preview ? { ...this.settings("mis:1:1:no-compensation"), width: size, height: size, spp: 1 } : this.settings(strategy));
+    const pair = !preview && state.beside && engines.active > 1;
+    if (state.beside && !pair && !preview) this.app.tell("Two pictures side by side need two Workers, and memory has room for one", true);
+    if (!preview && state.exposure === null) void this.expose();
     this.preview = preview;
     this.calibrated = false;
     this.times.start = performance.now();
     this.times.first = this.times.done = 0;
     const right = () => ({ ...settings(state.beside), ...(state.equal === "time" ? { spp: 65536 } : {}) });
-    this.jobs = this.app.engines.render(pair ? [settings(state.strategy), right()] : [settings(state.strategy)]);
+    this.jobs = engines.render(pair ? [settings(state.strategy), right()] : [settings(state.strategy)]);
     // What was seen stays until there is more.
     this.films = this.jobs.map(() => new Film(size, size));
     this.histories = [[], []];
@@ -118,7 +133,6 @@ export class PicturePanel {
       if (side === 0 && this.jobs.length === 1) this.view.show(1, null);
       this.times.first ||= performance.now();
     } else this.view.update(side, windows, pixels);
-    if (this.automatic && (isFirst || job.complete || this.preview)) this.expose(film);
     this.pace();
     if (this.preview) {
       document.documentElement.dataset.preview = String(Math.round(performance.now() - this.times.start));
@@ -134,7 +148,7 @@ export class PicturePanel {
     this.report(job.complete);
     if (this.jobs.every((j) => j.complete)) {
       this.times.done = performance.now();
-      this.app.tell(`Done in ${((this.times.done - this.times.start) / 1000).toFixed(1)} s`);
+      this.app.tell(`Done in ${((this.times.done - this.times.start) / 1000).toFixed(1)} s${this.app.engines.shortage}`);
       $("viewer").toggleAttribute("data-busy", false);
       document.documentElement.dataset.complete = String(job.token);
     }
@@ -204,11 +218,32 @@ export class PicturePanel {
     engines.pause(b, !a.complete && rays[1] > ahead);
   }
 
-  private expose(film: Film) {
-    const exposure = film.exposure();
+  /** The program's automatic exposure of what the state shows, unless it has been found. */
+  private async expose() {
+    const view = JSON.stringify([this.lightKey, this.app.state.material, this.app.state.ground, this.app.state.rotate, this.app.camera]);
+    const light = this.lightKey;
+    if (this.automatic.view === view) {
+      this.showExposure(this.automatic.exposure);
+      return;
+    }
+    try {
+      const exposure = (await this.app.engines.call("automaticExposure", JSON.stringify({ ...this.settings(this.app.state.strategy), shard: [0, 1] }))) as number;
+      this.automatic = { exposure, view, light };
+      if (this.app.state.exposure === null) this.showExposure(exposure);
+    } catch (error) {
+      this.app.tell((error as Error).message, true);
+    }
+  }
+
+  /** Scene and light, whose automatic exposures are near each other for all views and materials. */
+  private get lightKey() {
+    const { scene, env, rows, ev, scale } = this.app.state;
+    return JSON.stringify([scene, env, rows, ev, scale, this.app.missing]);
+  }
+
+  private showExposure(exposure: number) {
     this.view.set({ exposure });
-    const slider = $<HTMLInputElement>("exposure");
-    slider.value = String(exposure);
+    $<HTMLInputElement>("exposure").value = String(exposure);
     $("exposure-value").textContent = stops(exposure);
   }
 
@@ -248,12 +283,8 @@ export class PicturePanel {
     this.view.look.curve = state.curve as Curve;
     this.view.look.errors = state.view === "error";
     if (this.view.look.errors !== !!this.reference.isStarted) this.refer();
-    if (state.exposure !== null) {
-      this.automatic = false;
-      this.view.set({ exposure: state.exposure });
-      $<HTMLInputElement>("exposure").value = String(state.exposure);
-      $("exposure-value").textContent = stops(state.exposure);
-    } else this.view.set({});
+    if (state.exposure !== null) this.showExposure(state.exposure);
+    else this.view.set({});
     const split = !!state.beside;
     $("divider").hidden = !split;
     if (!split) this.view.set({ divider: 1 });
@@ -308,12 +339,13 @@ export class PicturePanel {
   // ---- camera
 
   private camera(): Camera | null {
-    return this.app.state.camera ?? this.app.scene?.camera ?? null;
+    return this.app.camera ?? this.app.scene?.camera ?? null;
   }
 
   private orbit(yaw: number, pitch: number, zoom = 1) {
     const camera = this.camera(), scene = this.app.scene;
-    if (!camera || !scene) return;
+    // What a link shows stays until it is there.
+    if (!camera || !scene || this.app.missing.scene) return;
     const up = unit(scene.up), center = scene.center;
     const turn = (point: number[]) => add(center, turned(sub(point, center), up, yaw));
     let origin = turn(camera.origin), target = turn(camera.target);
@@ -393,6 +425,7 @@ export class PicturePanel {
     const withFile = (known: string[], files: string[], chosen: string) => [...known, ...files, ...([...known, ...files].includes(chosen) ? [] : [chosen])];
     fill($("scene"), withFile(SCENES, app.files.scenes, state.scene), state.scene);
     fill($("env"), withFile(PROBES, app.files.probes, state.env), state.env);
+    this.fillCameras();
     fill($("curve"), CURVES, state.curve);
     $<HTMLSelectElement>("view").value = state.view;
     $<HTMLInputElement>("ground").checked = state.ground;
@@ -406,6 +439,15 @@ export class PicturePanel {
     this.fillMaterial();
     strategyEditor($("strategy-editor"), state.strategy, (strategy) => app.set({ strategy }));
     strategyEditor($("beside-editor"), state.beside || "mis:1:1", (beside) => app.set({ beside }));
+  }
+
+  /** The cameras of a file, where it has any. */
+  private fillCameras() {
+    const { scene, camera } = this.app, cameras = scene?.cameras ?? [];
+    $("cameras").hidden = !cameras.length;
+    const chosen = camera ? cameras.findIndex((of) => JSON.stringify(of.camera) === JSON.stringify(camera)) : 0;
+    const names = cameras.map(({ name }, i): [string, string] => [String(i), name]);
+    fill($("camera"), chosen < 0 ? [...names, ["-1", "turned by hand"]] : names, String(chosen));
   }
 
   private materialTimer = 0;
@@ -458,10 +500,10 @@ export class PicturePanel {
     on("exposure", "input", (i) => app.set({ exposure: Number(i.value) }, "view"));
     on("view", "change", (i) => app.set({ view: i.value }, "view"));
     on("curve", "change", (i) => app.set({ curve: i.value }, "view"));
+    on("camera", "change", (i) => app.set({ camera: app.scene?.cameras[Number(i.value)]?.camera ?? null, pixel: null }, "camera"));
     $("auto").addEventListener("click", () => {
       app.set({ exposure: null }, "view");
-      this.automatic = true;
-      if (this.view.films[0]) this.expose(this.view.films[0]);
+      void this.expose();
     });
     $("reset-camera").addEventListener("click", () => {
       app.state.camera = null;
@@ -495,10 +537,11 @@ export class PicturePanel {
   /** The bytes of the picture as a file. */
   async file(kind: "exr" | "png"): Promise<Uint8Array> {
     const { engines, state } = this.app;
+    const { scene, env, spp, seed } = state, settings = JSON.stringify({ ...this.settings(state.strategy), shard: [0, 1] });
+    const automatic = (await engines.call("automaticExposure", settings)) as number;
     await engines.gather(this.jobs[0]);
-    if (kind === "png") return engines.call("png", this.view.look.exposure, state.curve) as Promise<Uint8Array>;
-    const { scene, env, spp, seed } = state;
-    return engines.call("exr", JSON.stringify({ scene, environment: env, samples: spp, seed })) as Promise<Uint8Array>;
+    if (kind === "png") return engines.call("png", state.exposure ?? automatic, state.curve) as Promise<Uint8Array>;
+    return engines.call("exr", JSON.stringify({ scene, environment: env, samples: spp, seed, exposure: automatic })) as Promise<Uint8Array>;
   }
 
   private async save(kind: "exr" | "png") {

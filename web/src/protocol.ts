@@ -1,6 +1,6 @@
 // What the page and its Workers say to each other.
 
-import type { Engine, lobeSamples, lobeSection } from "../dist/engine/engine.js";
+import type { Engine, MapView, lobeSamples, lobeSection } from "../dist/engine/engine.js";
 
 type Methods = { [K in keyof Engine]: Engine[K] extends (...args: never[]) => unknown ? K : never }[keyof Engine];
 export type Call = Exclude<Methods, "free" | typeof Symbol.dispose> | "lobeSection" | "lobeSamples";
@@ -8,14 +8,15 @@ type Signature<C extends Call> = C extends "lobeSection" ? typeof lobeSection
   : C extends "lobeSamples" ? typeof lobeSamples
   : C extends keyof Engine ? Engine[C] : never;
 export type Arguments<C extends Call> = Signature<C> extends (...args: infer A) => unknown ? A : never;
-/** A map in some mapping: R, G, B and alpha. */
+/** A map in some mapping: R, G, B and alpha, or layer by layer. */
 export interface MapPicture {
   width: number;
   height: number;
   pixels: Float32Array;
 }
 
-export type Result<C extends Call> = C extends "mapView" ? MapPicture : Signature<C> extends (...args: never[]) => infer R ? R : never;
+type Plain<R> = R extends MapView ? MapPicture : R;
+export type Result<C extends Call> = Signature<C> extends (...args: never[]) => infer R ? Plain<R> : never;
 
 /** What was done so far by one Worker, or by several together. */
 export interface Statistics {
@@ -51,7 +52,8 @@ export interface Update {
 export type FromWorker =
   | { kind: "unpacked"; module: WebAssembly.Module }
   | { kind: "booted" }
-  | { kind: "result"; id: number; result: unknown }
+  /** `memory` is what the engine has taken so far [bytes]. */
+  | { kind: "result"; id: number; result: unknown; memory: number }
   | { kind: "error"; id: number; error: string; dead: boolean }
   | { kind: "started"; token: number; strategy: string }
   | { kind: "failed"; token: number; error: string; dead: boolean }

@@ -9,6 +9,8 @@ import type { FromWorker, Statistics } from "./protocol";
 const STRATEGY = "product:16";
 /** The reference has converged when its variance is this share of the picture's error. */
 const CONVERGED = 0.01;
+/** From so many samples of each pixel on, its variance is known well enough to rely on. */
+const RELIABLE = 16;
 
 export class Reference {
   film: Film | null = null;
@@ -79,6 +81,6 @@ export class Reference {
 
   /** Ends when more samples would not change what is measured. */
   settle(error: number) {
-    if (this.variance < CONVERGED * error) this.host?.send({ kind: "stop" });
+    if ((this.statistics?.samples ?? 0) >= RELIABLE && this.variance < CONVERGED * error) this.host?.send({ kind: "stop" });
   }
 }

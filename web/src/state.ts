@@ -12,6 +12,8 @@ export interface State {
   rows: number;
   rotate: number;
   ev: number;
+  /** The light is multiplied by it. */
+  scale: number;
   size: number;
   spp: number;
   seed: number;
@@ -26,21 +28,34 @@ export interface State {
   /** What is shown: the picture, or its error against a reference. */
   view: string;
   mapping: string;
+  /** What is laid over the map, see `LAYERS`; empty for nothing. */
+  layer: string;
+  /** Camera samples whose rays are drawn on the map, as the exponent of a power of two. */
+  samples: number;
   method: string;
   /** Variance minimization gives up the rectangles of its cuts. */
   refine: boolean;
   lights: number;
   sun: boolean;
   lamps: number;
+  /** What is not of compact sources stays on the map. */
+  leave: boolean;
+  /** The exponent of the lobe of the spheres' surface; 0 is matte. */
+  gloss: number;
   pixel: number[] | null;
+  /** The strategies that the X-ray compares with the picture's, separated by spaces. */
+  compared: string;
   step: number;
+  /** The values of the controls of the lecture's figure, separated by semicolons; empty leaves them as they are. */
+  figure: string;
 }
 
 export const DEFAULT: State = {
   panel: "picture", scene: "statue", material: "", ground: false, hide: false,
-  env: "sky", rows: 256, rotate: 125, ev: 0, size: 640, spp: 32, seed: 0,
+  env: "sky", rows: 256, rotate: 125, ev: 0, scale: 1, size: 640, spp: 32, seed: 0,
   strategy: "product:8", beside: "", equal: "rays", camera: null, exposure: null, curve: "agx", view: "picture",
-  mapping: "lat-long", method: "variance-minimization", refine: true, lights: 64, sun: false, lamps: 0, pixel: null, step: 1,
+  mapping: "lat-long", layer: "", samples: 4, method: "variance-minimization", refine: true, lights: 64, sun: false, lamps: 0, leave: false, gloss: 0,
+  pixel: null, compared: "brdf:1 environment:1 mis:1:1 product:8", step: 1, figure: "",
 };
 
 /** What differs from the defaults, as text after `#`. */
@@ -69,13 +84,16 @@ export function fromHash(hash: string): State {
       if (isOfKind(key, value, fallback)) state[key] = value;
     } catch { /* Not JSON: the default. */ }
   }
-  const clamp = (key: "size" | "spp" | "rows" | "lights", most: number) => {
-    state[key] = Math.min(Math.max(1, Math.round(state[key] as number)), most);
+  const clamp = (key: "size" | "spp" | "rows" | "lights" | "samples" | "gloss", most: number, least = 1) => {
+    state[key] = Math.min(Math.max(least, Math.round(state[key] as number)), most);
   };
   clamp("size", 2048);
   clamp("spp", 1 << 16);
   clamp("rows", 4096);
   clamp("lights", 4096);
+  clamp("samples", 8, 0);
+  clamp("gloss", 100, 0);
+  if (!((state.scale as number) >= 0)) state.scale = 1;
   return state as unknown as State;
 }
 
@@ -90,7 +108,7 @@ function isOfKind(key: string, value: unknown, fallback: unknown): boolean {
   return typeof value === typeof fallback && (typeof value !== "number" || Number.isFinite(value));
 }
 
-const quoted = (word: string) => (/^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
+export const quoted = (word: string) => (/^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
 
 /** The command that renders the same picture. */
 export function command(state: State): string {
@@ -99,6 +117,7 @@ export function command(state: State): string {
   if (isBuiltinProbe(state.env)) option("env-rows", String(state.rows));
   if (state.rotate || state.scene === "statue") option("env-rotate", String(state.rotate));
   if (state.ev) option("env-exposure", String(state.ev));
+  if (state.scale !== 1) option("env-scale", String(state.scale));
   if (state.material) option("material", state.material);
   if (state.ground) words.push("--ground");
   if (state.hide) words.push("--hide-env");
@@ -115,6 +134,8 @@ export function command(state: State): string {
   option("spp", String(state.spp));
   option("passes", "doubling");
   if (state.seed) option("seed", String(state.seed));
+  if (state.exposure !== null) option("exposure", String(state.exposure));
+  if (state.curve !== "agx") option("tone", state.curve);
   words.push("-o", "domelight.exr", "-o", "domelight.png");
   return words.map(quoted).join(" ");
 }
@@ -122,3 +143,6 @@ export function command(state: State): string {
 export const PROBES = ["sky", "studio", "cathedral", "constant"];
 export const SCENES = ["statue", "spheres", "material-ball", "sphere", "sphere-orthographic"];
 export const isBuiltinProbe = (name: string) => PROBES.includes(name);
+
+/** The last part of a path. */
+export const fileName = (path: string) => path.split("/").pop()!;

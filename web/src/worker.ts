@@ -1,11 +1,12 @@
 // One engine. Answers calls in their order, and renders between them in slices of time.
 
-import { Engine, initSync, lobeSamples, lobeSection } from "../dist/engine/engine.js";
+import { Engine, MapView, initSync, lobeSamples, lobeSection } from "../dist/engine/engine.js";
 import type { Call, FromWorker, ToWorker } from "./protocol";
 
 const SLICE = 16;
 
 let engine: Engine | undefined;
+let memory: WebAssembly.Memory | undefined;
 let rendering: { token: number; paused: boolean } | undefined;
 /** When the variance may be estimated again, so that it takes no more than a thirtieth of the time. */
 let nextVariance = 0;
@@ -54,7 +55,7 @@ function turn() {
 function answer(message: ToWorker) {
   switch (message.kind) {
     case "boot":
-      initSync({ module: message.module });
+      ({ memory } = initSync({ module: message.module }));
       engine = new Engine();
       post({ kind: "booted" });
       break;
@@ -62,7 +63,7 @@ function answer(message: ToWorker) {
       try {
         const result = call(message.call, message.args);
         const buffer = ArrayBuffer.isView(result) ? [result.buffer as ArrayBuffer] : [];
-        post({ kind: "result", id: message.id, result }, buffer);
+        post({ kind: "result", id: message.id, result, memory: memory!.buffer.byteLength }, buffer);
       } catch (error) {
         fail(message.id, error);
       }
@@ -91,17 +92,18 @@ function answer(message: ToWorker) {
 function call(name: Call, args: unknown[]): unknown {
   if (name === "lobeSection") return lobeSection(...(args as Parameters<typeof lobeSection>));
   if (name === "lobeSamples") return lobeSamples(...(args as Parameters<typeof lobeSamples>));
-  if (name === "mapView") {
-    const view = engine!.mapView(...(args as Parameters<Engine["mapView"]>));
-    const plain = { width: view.width, height: view.height, pixels: view.pixels() };
-    view.free();
-    return plain;
-  }
   const method = engine![name] as (...args: unknown[]) => unknown;
   const result = method.apply(engine, args);
   // What was rendered is of another scene or light. After an error it goes on.
   if (name === "loadScene" || name === "loadEnvironment" || name === "turnEnvironment") rendering = undefined;
-  return result;
+  return result instanceof MapView ? plain(result) : result;
+}
+
+/** A picture of the engine's as a message can carry it. */
+function plain(view: MapView) {
+  const picture = { width: view.width, height: view.height, pixels: view.pixels() };
+  view.free();
+  return picture;
 }
 
 function slice() {

@@ -20,21 +20,12 @@ interface Report {
 const percent = (x: number) => `${short(100 * x)} %`;
 
 export class XrayPanel {
-  private chosen = new Set(["brdf:1", "environment:1", "mis:1:1", "product:8"]);
   private views: FilmView[] = [];
 
   constructor(private app: App) {
     app.on((what) => this.changed(what));
-    $("compared").replaceChildren(...COMPARED.map((name) => {
-      const input = h("input", { type: "checkbox" });
-      input.checked = this.chosen.has(name);
-      input.addEventListener("change", () => {
-        if (input.checked) this.chosen.add(name);
-        else this.chosen.delete(name);
-        this.look();
-      });
-      return h("label", { class: "check" }, input, name);
-    }));
+    this.fillCompared();
+    new PixelPicker(app);
     $("hemispheres").replaceChildren(...LAYERS.map((name) => {
       const canvas = h("canvas", { width: String(SIZE), height: String(SIZE), role: "img", "aria-label": `Hemisphere: ${name}` });
       this.views.push(new FilmView(canvas, false));
@@ -42,7 +33,26 @@ export class XrayPanel {
     }));
   }
 
+  /** The strategies that are compared with the picture's. */
+  private get compared(): string[] {
+    return this.app.state.compared.split(" ").filter(Boolean);
+  }
+
+  private fillCompared() {
+    const { app, compared } = this;
+    $("compared").replaceChildren(...[...new Set([...COMPARED, ...compared])].map((name) => {
+      const input = h("input", { type: "checkbox" });
+      input.checked = compared.includes(name);
+      input.addEventListener("change", () => {
+        const others = this.compared.filter((other) => other !== name);
+        app.set({ compared: [...others, ...(input.checked ? [name] : [])].join(" ") }, "pixel");
+      });
+      return h("label", { class: "check" }, input, name);
+    }));
+  }
+
   private changed(what: Change) {
+    if (what === "all") this.fillCompared();
     if (this.app.state.panel === "xray" && this.app.probe && what !== "view") this.look();
   }
 
@@ -53,7 +63,7 @@ export class XrayPanel {
     if (!pixel) return;
     $("xray-found").setAttribute("aria-busy", "true");
     const own = app.state.strategy;
-    const strategies = [own, ...[...this.chosen].filter((name) => name !== own)];
+    const strategies = [own, ...this.compared.filter((name) => name !== own)];
     const settings = (names: string[]) => JSON.stringify({ ...JSON.parse(pixel), seed: app.state.seed, strategies: names });
     try {
       const maps = (await app.engines.call("hemisphere", settings([]), SIZE)) as Float32Array;
@@ -88,8 +98,10 @@ export class XrayPanel {
     const canvas = h("canvas", { width: String(SIZE), height: String(SIZE), role: "img", "aria-label": `Directions of ${strategy.name}` });
     const context = canvas.getContext("2d")!;
     const small = h("canvas", { width: String(DENSITY), height: String(DENSITY) }), inner = small.getContext("2d")!;
-    const image = inner.createImageData(DENSITY, DENSITY), most = density.reduce((a, b) => Math.max(a, b), 0) || 1;
-    density.forEach((value, i) => image.data.set([255, 96, 176, 255 * Math.sqrt(value / most)], 4 * i));
+    const image = inner.createImageData(DENSITY, DENSITY), sorted = density.filter((value) => value > 0).sort();
+    // Full is what all but a hundredth stays below, or a sun would leave nothing to be seen of the rest.
+    const most = sorted[Math.floor(0.99 * (sorted.length - 1))] ?? 1;
+    density.forEach((value, i) => image.data.set([255, 96, 176, 255 * Math.sqrt(Math.min(value / most, 1))], 4 * i));
     inner.putImageData(image, 0, 0);
     context.drawImage(small, 0, 0, SIZE, SIZE);
     const mean = strategy.samples.reduce((sum, s) => sum + Math.abs(s.weight), 0) / (strategy.samples.length || 1) || 1;
@@ -126,3 +138,85 @@ const sentence = (text: string) => {
   const begin = /^[a-z-]+:/.test(text) ? text.slice(0, 1) : text.slice(0, 1).toUpperCase();
   return text && begin + text.slice(1).replace(/\.?$/, ".");
 };
+
+/** The picture with a cross, to pick a pixel by pointer or keys. */
+class PixelPicker {
+  /** The pixel under the cross. */
+  private at: [number, number] | null = null;
+  private timer = 0;
+
+  constructor(private app: App) {
+    const viewer = $("xray-viewer");
+    app.on((what) => {
+      if (what === "pixel" || what === "all" || what === "scene") this.at = null;
+      if (app.state.panel === "xray") this.show();
+    });
+    viewer.addEventListener("keydown", (event) => {
+      const { size } = app.state, step = event.shiftKey ? 1 : Math.max(1, Math.round(size / 64));
+      const move = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step] }[event.key];
+      if (!move && event.key !== "Enter" && event.key !== " ") return;
+      event.preventDefault();
+      const [x, y] = this.cross();
+      if (move) this.move(x + move[0], y + move[1]);
+      else app.set({ pixel: [x, y] }, "pixel");
+    });
+    viewer.addEventListener("click", (event) => {
+      const box = viewer.getBoundingClientRect(), { size } = app.state;
+      this.move(Math.floor((event.clientX - box.left) / box.width * size), Math.floor((event.clientY - box.top) / box.height * size));
+      app.set({ pixel: this.cross() }, "pixel");
+    });
+    $("film").addEventListener("painted", () => {
+      if (app.state.panel === "xray") this.timer ||= setTimeout(() => this.show(), 300) as unknown as number;
+    });
+    viewer.addEventListener("focus", () => this.mark());
+    viewer.addEventListener("blur", () => this.mark());
+  }
+
+  private cross(): [number, number] {
+    const { pixel, size } = this.app.state;
+    return this.at ?? (pixel as [number, number] | null) ?? [size >> 1, size >> 1];
+  }
+
+  private move(x: number, y: number) {
+    const inside = (c: number) => Math.min(Math.max(c, 0), this.app.state.size - 1);
+    this.at = [inside(x), inside(y)];
+    this.mark();
+  }
+
+  /** Copies the picture. */
+  private show() {
+    clearTimeout(this.timer);
+    this.timer = 0;
+    const film = $<HTMLCanvasElement>("film"), context = $<HTMLCanvasElement>("xray-film").getContext("2d")!;
+    const { width, height } = context.canvas;
+    context.drawImage(film, 0, 0, width, height);
+    this.mark();
+  }
+
+  private mark() {
+    const canvas = $<HTMLCanvasElement>("xray-marks"), context = canvas.getContext("2d")!, { size, pixel } = this.app.state;
+    const { width, height } = canvas, place = (c: number, n: number) => (c + 0.5) / size * n;
+    context.clearRect(0, 0, width, height);
+    const isAiming = document.activeElement === $("xray-viewer");
+    const draw = (path: () => void) => {
+      for (const [line, style] of [[4, "#000"], [1.75, "#fff"]] as const) {
+        context.lineWidth = line;
+        context.strokeStyle = style;
+        context.beginPath();
+        path();
+        context.stroke();
+      }
+    };
+    if (pixel) draw(() => context.arc(place(pixel[0], width), place(pixel[1], height), 9, 0, 2 * Math.PI));
+    const [x, y] = this.cross();
+    if (isAiming) {
+      draw(() => {
+        for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+          context.moveTo(place(x, width) + 5 * dx, place(y, height) + 5 * dy);
+          context.lineTo(place(x, width) + 16 * dx, place(y, height) + 16 * dy);
+        }
+      });
+    }
+    $("xray-place").textContent = isAiming || pixel ? `Column ${x}, row ${y}` : "";
+  }
+}

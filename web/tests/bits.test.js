@@ -6,7 +6,7 @@ import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { close, launch, open, program, rendered } from "./page.js";
+import { close, launch, open, pixelsOf, program, rendered, slide } from "./page.js";
 
 // One for each kind of strategy, and for what differs most within a kind.
 const STRATEGIES = [
@@ -19,13 +19,25 @@ after(close);
 
 const STATE = "scene=material-ball&env=studio&rows=64&rotate=30&ev=0.5&material=phong%3A50%3A0.6%3A0.3&size=72&spp=5&seed=7";
 
-/** What the program makes of the command that the page shows. */
+/** What the program makes of the command that the page shows: the files of the two kinds. */
 function fromProgram(command, folder) {
   const words = command.split(" ").slice(1);
-  const path = join(folder, "program.exr");
+  const paths = ["exr", "png"].map((kind) => join(folder, `program.${kind}`));
   const output = words.indexOf("-o");
-  execFileSync(program, ["-q", ...words.slice(0, output), "-o", path]);
-  return readFileSync(path);
+  execFileSync(program, ["-q", ...words.slice(0, output), ...paths.flatMap((path) => ["-o", path])]);
+  const [exr, png] = paths.map((path) => readFileSync(path));
+  return { exr, png };
+}
+
+/** The page's files, which must be the program's. */
+async function requireTheSame(page, folder) {
+  const command = await page.textContent("#command");
+  const expected = fromProgram(command, folder);
+  for (const kind of ["exr", "png"]) {
+    const bytes = await page.evaluate(async (kind) => [...await window.domelight.picture.file(kind)], kind);
+    assert.ok(expected[kind].equals(Buffer.from(bytes)), `the ${kind} files differ: ${command}`);
+  }
+  return command;
 }
 
 for (const strategy of STRATEGIES) {
@@ -35,10 +47,7 @@ for (const strategy of STRATEGIES) {
     const folder = mkdtempSync(join(tmpdir(), "domelight-web-"));
     try {
       await rendered(page);
-      const bytes = await page.evaluate(async () => [...await window.domelight.picture.file("exr")]);
-      const command = await page.textContent("#command");
-      const expected = fromProgram(command, folder);
-      assert.ok(expected.equals(Buffer.from(bytes)), `the files differ: ${command}`);
+      await requireTheSame(page, folder);
     } finally {
       rmSync(folder, { recursive: true });
     }
@@ -55,12 +64,49 @@ test("an orbited camera is the command line's", async () => {
     for (const key of ["ArrowLeft", "ArrowUp", "+"]) await page.keyboard.press(key);
     await page.waitForTimeout(400);
     await rendered(page);
-    const bytes = await page.evaluate(async () => [...await window.domelight.picture.file("exr")]);
-    const command = await page.textContent("#command");
-    assert.match(command, /--origin=/);
-    assert.ok(fromProgram(command, folder).equals(Buffer.from(bytes)), `the files differ: ${command}`);
+    assert.match(await requireTheSame(page, folder), /--origin=/);
   } finally {
     rmSync(folder, { recursive: true });
   }
   await done();
 });
+
+test("exposure and curve are the command line's", async () => {
+  const { page, done } = await open(`${STATE}&strategy=mis:1:1&exposure=-1.3&curve=neutral&scale=2`);
+  const folder = mkdtempSync(join(tmpdir(), "domelight-web-"));
+  try {
+    await rendered(page);
+    const command = await requireTheSame(page, folder);
+    assert.match(command, /--env-scale=2 .*--exposure=-1\.3 --tone=neutral/);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+  await done();
+});
+
+for (const query of ["", "?2d"]) {
+  test(`what is seen is the picture's PNG, by every curve${query && ", without WebGL2"}`, async () => {
+    // Bright metal and its highlights, and a background.
+    const { page, done } = await open("scene=spheres&env=sky&rows=64&rotate=30&size=96&spp=4&strategy=mis:1:1", { query });
+    await rendered(page);
+    for (const curve of ["agx", "aces", "neutral", "reinhard", "standard"]) {
+      await page.selectOption("#curve", curve);
+      for (const exposure of [-5, -1, 2, 7]) {
+        await slide(page, "#exposure", exposure);
+        const seen = await pixelsOf(page, "film");
+        const expected = await page.evaluate(async () => {
+          const bytes = await window.domelight.picture.file("png");
+          const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+          const canvas = Object.assign(document.createElement("canvas"), { width: bitmap.width, height: bitmap.height });
+          const context = canvas.getContext("2d", { willReadFrequently: true });
+          context.drawImage(bitmap, 0, 0);
+          return [...context.getImageData(0, 0, canvas.width, canvas.height).data].filter((_, i) => i % 4 < 3);
+        });
+        assert.equal(seen.length, expected.length);
+        const most = seen.reduce((most, byte, i) => Math.max(most, Math.abs(byte - expected[i])), 0);
+        assert.ok(most <= 2, `${curve} at ${exposure} EV differs by ${most}`);
+      }
+    }
+    await done();
+  });
+}

@@ -5,7 +5,7 @@ import { mkdirSync, mkdtempSync, rmSync, truncateSync, writeFileSync } from "nod
 import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { after, before, test } from "node:test";
-import { glb, gltf } from "./models.js";
+import { OBJ, SCENE, glb, gltf, png } from "./models.js";
 import { SMALL, close, drop, launch, memory, open, rendered, renderedAnew, text } from "./page.js";
 
 let folder;
@@ -111,5 +111,88 @@ test("memory is bounded while the camera orbits", async () => {
   await orbit(seconds);
   const after = await memory();
   assert.ok(after < before + 100, `from ${Math.round(before)} to ${Math.round(after)} MB`);
+  await done();
+});
+
+test("a link that names files waits for them", async () => {
+  const { page, done } = await open(`${SMALL}&scene=robot.glb&env=yard.hdr&rotate=10&material=diffuse:0.5&spp=3`);
+  await rendered(page);
+  assert.match(await text(page, "#wanted"), /drop robot\.glb and yard\.hdr here.*statue under sky/);
+  assert.match(await text(page, "#command"), /render robot\.glb --env yard\.hdr/);
+  const before = await middle(page);
+  await renderedAnew(page, () => drop(page, [put("robot.glb", glb())]));
+  assert.match(await text(page, "#wanted"), /drop yard\.hdr here.*robot\.glb under sky/);
+  assert.notDeepEqual(await middle(page), before);
+  const hdr = Buffer.concat([Buffer.from("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n"), ...Array(8).fill(Buffer.from([128, 64, 32, 129]))]);
+  await renderedAnew(page, () => drop(page, [put("yard.hdr", hdr)]));
+  assert.ok(await page.isHidden("#wanted"));
+  assert.equal(await page.inputValue("#rotate"), "10", "what the link says of it stays");
+  assert.equal(await page.inputValue("#material"), "diffuse:0.5");
+  await done();
+});
+
+test("PNG and JPEG are light probes, unless they come with a scene", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  await renderedAnew(page, () => drop(page, [put("room.png", png(16, [200, 40, 40]))]));
+  assert.equal(await page.inputValue("#env"), "room.png");
+  const [red, green] = await middle(page);
+  assert.ok(red > 2 * green, `red ${red}, green ${green}`);
+  const jpeg = await page.evaluate(async () => {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 16, height: 8 });
+    const context = canvas.getContext("2d");
+    context.fillStyle = "#2030c0";
+    context.fillRect(0, 0, 16, 8);
+    const blob = await new Promise((done) => canvas.toBlob(done, "image/jpeg"));
+    return [...new Uint8Array(await blob.arrayBuffer())];
+  });
+  await renderedAnew(page, () => drop(page, [put("room.jpg", Buffer.from(jpeg))]));
+  assert.equal(await page.inputValue("#env"), "room.jpg");
+  await renderedAnew(page, () => drop(page, [put("triangle.glb", glb()), put("texture.png", png(16, [0, 0, 0]))]));
+  assert.equal(await page.inputValue("#env"), "room.jpg");
+  await done();
+});
+
+test("a scene file brings its camera and its light", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  await renderedAnew(page, () => drop(page, [put("triangle.obj", OBJ), put("scene.toml", SCENE)]));
+  assert.equal(await page.inputValue("#scene"), "scene.toml");
+  assert.equal(await page.inputValue("#env"), "studio");
+  assert.equal(await page.inputValue("#rotate"), "40");
+  assert.match(await text(page, "#command"), /--env studio .*--env-rotate=40 --env-exposure=1 --env-scale=0\.5/);
+  const [red, green] = await middle(page);
+  assert.ok(red > 3 * green, `red ${red}, green ${green}`);
+  await done();
+});
+
+test("the cameras of a file are chosen from", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  assert.ok(await page.isHidden("#camera"));
+  await renderedAnew(page, () => drop(page, [put("cameras.glb", glb({ cameras: true }))]));
+  assert.deepEqual(await page.$$eval("#camera option", (all) => all.map((option) => option.textContent)), ["near", "far"]);
+  const [near] = await middle(page);
+  await renderedAnew(page, () => page.selectOption("#camera", "1"));
+  assert.match(await text(page, "#command"), /--origin=0,0\.5,40 /);
+  const [far] = await middle(page);
+  assert.notEqual(far, near);
+  await page.focus("#viewer");
+  await renderedAnew(page, () => page.keyboard.press("ArrowLeft"));
+  assert.equal(await page.$eval("#camera option:checked", (option) => option.textContent), "turned by hand");
+  await done();
+});
+
+test("fewer Workers hold a scene that is too large for all", async () => {
+  const { page, done } = await open(SMALL, { query: "?memory=0.08" });
+  await rendered(page);
+  const all = await page.evaluate(() => window.domelight.app.engines.hosts.length);
+  await renderedAnew(page, () => drop(page, [put("large.glb", glb({ padding: 12 << 20 }))]));
+  await page.waitForFunction(() => /Workers, as memory has no room for more/.test(document.getElementById("status").textContent));
+  assert.match(await text(page, "#status"), new RegExp(`by 1 of ${all} Workers`));
+  const [red, green] = await middle(page);
+  assert.ok(red > 3 * green, `red ${red}, green ${green}`);
+  await renderedAnew(page, () => drop(page, [put("triangle.glb", glb())]));
+  assert.equal(await page.evaluate(() => window.domelight.app.engines.active), all, "all work again");
   await done();
 });

@@ -7,6 +7,7 @@ import puppeteer from "puppeteer-core";
 import { SMALL, address } from "./page.js";
 
 const path = [process.env.FIREFOX, "/usr/bin/firefox-esr", "/usr/bin/firefox"].filter(Boolean).find((place) => existsSync(place));
+assert.ok(path || process.env.CI !== "true", "no Firefox: install it, or set FIREFOX");
 const skip = path ? false : "there is no Firefox: install it, or set FIREFOX";
 
 let browser;
@@ -60,5 +61,57 @@ test("orbiting and every panel work", { skip }, async () => {
   }
   await page.click("#tab-lecture");
   await page.waitForFunction(() => Number(document.getElementById("figure")?.dataset.drawn ?? 0) >= 1, { timeout: 60_000 });
+  await done();
+});
+
+/** The mean of a canvas's bytes. */
+const brightness = (page, id) => page.evaluate(async (id) => {
+  const canvas = document.getElementById(id);
+  do await new Promise((done) => setTimeout(done, 20)); while (canvas.hasAttribute("data-stale"));
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  return data.reduce((sum, byte) => sum + byte, 0) / data.length;
+}, id);
+
+/** Sets a control as a person does. */
+const choose = (page, selector, value) => page.$eval(selector, (control, value) => {
+  if (control.type === "checkbox") control.checked = value;
+  else control.value = String(value);
+  for (const kind of ["input", "change"]) control.dispatchEvent(new Event(kind, { bubbles: true }));
+}, value);
+
+test("the controls of the picture work", { skip }, async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  const middle = await brightness(page, "film");
+  await choose(page, "#exposure", -6);
+  assert.ok(await brightness(page, "film") < middle - 20);
+  await page.click("#auto");
+  await page.waitForFunction(() => !/exposure=/.test(location.hash));
+  assert.ok(Math.abs(await brightness(page, "film") - middle) < 1);
+  await choose(page, "#curve", "standard");
+  assert.notEqual(await brightness(page, "film"), middle);
+  const command = () => page.$eval("#command", (e) => e.textContent);
+  assert.match(await command(), /--tone=standard/);
+  await choose(page, "#model", "ggx");
+  await page.waitForFunction(() => /--material=ggx:0\.2:gold/.test(document.getElementById("command").textContent));
+  await choose(page, "#strategy-editor select", "brdf");
+  await page.waitForFunction(() => /--strategy=brdf:1/.test(document.getElementById("command").textContent));
+  await choose(page, "#env", "studio");
+  await choose(page, "#split", true);
+  await rendered(page);
+  await page.waitForFunction(() => document.getElementById("tag-right").textContent === "mis:1:1" && !document.getElementById("divider").hidden);
+  assert.equal(await page.$("#status.error"), null);
+  await done();
+});
+
+test("the X-ray works", { skip }, async () => {
+  const { page, done } = await open(`${SMALL}&panel=xray&strategy=mis:1:1`);
+  await rendered(page);
+  await page.focus("#xray-viewer");
+  for (const key of ["ArrowLeft", "ArrowUp", "Enter"]) await page.keyboard.press(key);
+  await page.waitForSelector("html[data-xray]", { timeout: 60_000 });
+  assert.match(await page.$eval("#xray-summary", (e) => e.textContent), /Pixel 31, 31 of 64 × 64/);
+  assert.ok((await page.$$("#causes .bar")).length >= 4);
+  assert.ok(await brightness(page, "xray-film") > 40);
   await done();
 });

@@ -30,9 +30,10 @@ export async function launch() {
 export const close = () => browser?.close();
 
 /** Opens the page; whatever goes wrong there, or reaches for the network, fails the test. */
-export async function open(hash = SMALL, { query = "", ...options } = {}) {
+export async function open(hash = SMALL, { query = "", script, ready = "html[data-ready]", ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, acceptDownloads: true, ...options });
   const page = await context.newPage();
+  if (script) await page.addInitScript(script);
   page.setDefaultTimeout(60_000);
   const complaints = [];
   page.on("console", (message) => {
@@ -42,7 +43,7 @@ export async function open(hash = SMALL, { query = "", ...options } = {}) {
   page.on("pageerror", (error) => complaints.push(String(error)));
   page.on("request", (request) => /^(file|data|blob):/.test(request.url()) || complaints.push(request.url()));
   await page.goto(`${address}${query}#${hash}`);
-  await page.waitForSelector("html[data-ready]");
+  await page.waitForSelector(ready);
   return { page, done: async () => { await context.close(); assert.deepEqual(complaints, []); } };
 }
 
@@ -75,6 +76,17 @@ export const canvasHash = (page, id) => page.evaluate(async (id) => {
   const context = copy.getContext("2d", { willReadFrequently: true });
   context.drawImage(canvas, 0, 0);
   return context.getImageData(0, 0, copy.width, copy.height).data.reduce((hash, byte) => Math.imul(hash ^ byte, 16777619), 2166136261);
+}, id);
+
+/** R, G and B of a canvas's pixels, row by row. */
+export const pixelsOf = (page, id) => page.evaluate(async (id) => {
+  const frame = () => new Promise(requestAnimationFrame);
+  const canvas = document.getElementById(id);
+  do await frame(); while (canvas.hasAttribute("data-stale"));
+  const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+  const context = copy.getContext("2d", { willReadFrequently: true });
+  context.drawImage(canvas, 0, 0);
+  return [...context.getImageData(0, 0, copy.width, copy.height).data].filter((_, i) => i % 4 < 3);
 }, id);
 
 /** The mean of a canvas's bytes. */

@@ -108,7 +108,7 @@ test("the error view measures the picture against a reference", async () => {
   await rendered(page);
   await page.waitForFunction(() => {
     const { films, reference } = window.domelight.picture;
-    return reference.variance < 0.1 * reference.error(films[1]);
+    return reference.statistics.samples >= 16 && reference.variance < 0.1 * reference.error(films[1]);
   });
   const sides = await page.evaluate(() => {
     const { films, jobs, reference } = window.domelight.picture;
@@ -157,8 +157,58 @@ test("the map turns, shows the sun, and what a pixel samples", async () => {
   await page.waitForFunction(() => Number(document.documentElement.dataset.samples) > 0);
   assert.match(await text(page, "#point-table"), /Radiance, by quadrature/);
   const marks = await canvasHash(page, "map-marks");
-  await page.selectOption("#layer", "6");
+  await page.selectOption("#layer", "target");
   assert.notEqual(await canvasHash(page, "map-marks"), marks);
+  await done();
+});
+
+test("samples and layers are drawn in every layout of the map", async () => {
+  const { page, done } = await open(`${SMALL}&panel=map&pixel=[27,27]&strategy=mis:1:1`, { reducedMotion: "reduce" });
+  const layers = await page.$$eval("#layer option", (all) => all.map((option) => option.value));
+  assert.ok(["product", "sir", "rejection", "own", "target"].every((layer) => layers.includes(layer)));
+  for (const mapping of await page.$$eval("#mapping option", (all) => all.map((option) => option.value))) {
+    await page.selectOption("#mapping", mapping);
+    await page.uncheck("#show-samples");
+    await page.uncheck("#show-sun");
+    await page.selectOption("#layer", "");
+    const shown = (layer) => page.waitForSelector(`html[data-layer="${layer} ${mapping}"]`, { state: "attached" });
+    await shown("");
+    const seen = new Set([await canvasHash(page, "map-marks")]);
+    // All of them in one layout, one of each kind in the others.
+    const some = mapping === "lat-long" ? layers : ["", "target", "sir"];
+    for (const layer of some.slice(1)) {
+      await page.selectOption("#layer", layer);
+      await shown(layer);
+      const hash = await canvasHash(page, "map-marks");
+      assert.ok(!seen.has(hash) || layer === "own", `${layer} of ${mapping} is like another`);
+      seen.add(hash);
+    }
+    const without = await canvasHash(page, "map-marks");
+    await page.check("#show-samples");
+    const samples = await canvasHash(page, "map-marks");
+    assert.notEqual(samples, without, `samples on ${mapping}`);
+    await page.check("#show-sun");
+    assert.notEqual(await canvasHash(page, "map-marks"), samples, `the sun on ${mapping}`);
+    const [map, marks] = await Promise.all(["map-film", "map-marks"].map((id) => page.$eval(`#${id}`, ({ width, height }) => [width, height])));
+    assert.deepEqual(marks, map);
+  }
+  await page.waitForFunction(() => /layer=sir/.test(location.hash) && /mapping=/.test(location.hash));
+  await done();
+});
+
+test("samples come one after the other", async () => {
+  const script = `const { arc } = CanvasRenderingContext2D.prototype;
+    window.arcs = [];
+    CanvasRenderingContext2D.prototype.arc = function (...at) {
+      if (this.canvas.id === "map-marks") window.arcs.push(performance.now());
+      return arc.apply(this, at);
+    };`;
+  const { page, done } = await open(`${SMALL}&panel=map&pixel=[27,27]&strategy=mis:1:1&samples=8`, { script });
+  await page.waitForSelector("html[data-samples]");
+  await page.waitForSelector("#map-marks:not([data-stale])", { state: "attached" });
+  const arcs = await page.evaluate(() => window.arcs);
+  assert.ok(arcs.length >= 400, `${arcs.length} samples`);
+  assert.ok(arcs.at(-1) - arcs[0] > 300, `all within ${arcs.at(-1) - arcs[0]} ms`);
   await done();
 });
 
@@ -221,39 +271,179 @@ test("the X-ray of a pixel names causes whose shares are drawn", async () => {
   await page.check("#compared label:nth-child(5) input");
   await page.waitForSelector("html[data-xray]");
   assert.equal((await page.$$("#densities canvas")).length, densities + 1);
+  // The picture to pick in comes as it is rendered.
+  await rendered(page);
+  await page.waitForTimeout(600);
+  assert.ok(await brightness(page, "xray-film") > 80);
   await done();
 });
 
-test("every step of the lecture has a figure that its controls change", async () => {
+test("a pixel is picked in the X-ray panel, by keys and by a click", async () => {
+  const { page, done } = await open(`${SMALL}&panel=xray&strategy=mis:1:1`);
+  await rendered(page);
+  assert.ok(await page.isVisible("#xray-hint"));
+  await page.focus("#xray-viewer");
+  assert.match(await text(page, "#xray-place"), /Column 32, row 32/);
+  for (const key of ["ArrowLeft", "ArrowLeft", "ArrowUp", "Shift+ArrowRight", "ArrowDown"]) await page.keyboard.press(key);
+  assert.match(await text(page, "#xray-place"), /Column 31, row 32/);
+  const cross = await canvasHash(page, "xray-marks");
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("html[data-xray]");
+  assert.match(await text(page, "#xray-summary"), /Pixel 31, 32 of 64 × 64/);
+  assert.notEqual(await canvasHash(page, "xray-marks"), cross);
+  await page.evaluate(() => delete document.documentElement.dataset.xray);
+  const box = await page.locator("#xray-viewer").boundingBox();
+  await page.mouse.click(box.x + 0.42 * box.width, box.y + 0.42 * box.height);
+  await page.waitForSelector("html[data-xray]");
+  assert.match(await text(page, "#xray-summary"), /Pixel 2[67], 2[67] of 64 × 64/);
+  await page.check("#compared label:nth-child(5) input");
+  await page.waitForFunction(() => /pixel=/.test(location.hash) && /compared=.*sir/.test(location.hash));
+  await done();
+});
+
+/** What the lecture's figure shows. */
+const figureOf = (page) => page.$eval("#figure", (figure) => {
+  const canvases = [...figure.querySelectorAll("canvas")].map((canvas) => {
+    const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+    const context = copy.getContext("2d", { willReadFrequently: true });
+    context.drawImage(canvas, 0, 0);
+    return context.getImageData(0, 0, copy.width, copy.height).data.reduce((hash, byte) => Math.imul(hash ^ byte, 16777619), 7);
+  });
+  return JSON.stringify([[...figure.querySelectorAll("svg")].map((svg) => svg.innerHTML), canvases, figure.querySelector(".result").textContent]);
+});
+
+/** Waits until the lecture's figure was drawn so often. */
+const drawn = (page, n) => page.waitForFunction((n) => Number(document.getElementById("figure")?.dataset.drawn ?? 0) >= n, n);
+
+test("every step of the lecture has a figure that each of its controls changes", async () => {
   const { page, done } = await open(`${SMALL}&panel=lecture`);
   const steps = await page.$$eval("#steps a", (all) => all.length);
   assert.equal(steps, 15);
-  const figure = () => page.$eval("#figure", (figure) => {
-    const canvases = [...figure.querySelectorAll("canvas")].map((canvas) => {
-      const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
-      const context = copy.getContext("2d", { willReadFrequently: true });
-      context.drawImage(canvas, 0, 0);
-      return context.getImageData(0, 0, copy.width, copy.height).data.reduce((hash, byte) => Math.imul(hash ^ byte, 16777619), 7);
-    });
-    return JSON.stringify([[...figure.querySelectorAll("svg")].map((svg) => svg.innerHTML), canvases]);
-  });
-  const drawn = (n) => page.waitForFunction((n) => Number(document.getElementById("figure")?.dataset.drawn ?? 0) >= n, n);
   for (let step = 1; step <= steps; step++) {
     await page.click(`#steps li:nth-child(${step}) a`);
-    await drawn(1);
+    await drawn(page, 1);
     assert.ok(await page.$("#step math"), `step ${step} has a formula`);
     assert.ok((await text(page, "#step .question")).length > 40);
     assert.match(await text(page, "#figure .result"), /\d/, `step ${step} says a number`);
-    await page.waitForTimeout(50);
-    const before = await figure();
-    await page.focus("#figure input[type=range]");
-    const value = await page.$eval("#figure input[type=range]", (i) => i.value);
-    await page.keyboard.press("ArrowRight");
-    if (await page.$eval("#figure input[type=range]", (i) => i.value) === value) await page.keyboard.press("ArrowLeft");
-    await drawn(2);
-    await page.waitForTimeout(50);
-    assert.notEqual(await figure(), before, `the figure of step ${step} changes`);
+    const controls = await page.$$("#figure input, #figure select");
+    assert.ok(controls.length > 0, `step ${step} has a control`);
+    let times = Number(await page.$eval("#figure", (figure) => figure.dataset.drawn));
+    for (const control of controls) {
+      await page.waitForTimeout(50);
+      const before = await figureOf(page), value = await control.inputValue();
+      const name = await control.evaluate((control) => control.closest("label").textContent);
+      if (await control.evaluate((control) => control.localName) === "select") {
+        const other = await control.$$eval("option", (all) => all.map((option) => option.value).find((_, i) => i === 1));
+        await control.selectOption(other);
+      } else {
+        await control.focus();
+        await page.keyboard.press("ArrowRight");
+        if (await control.inputValue() === value) await page.keyboard.press("ArrowLeft");
+      }
+      await drawn(page, ++times);
+      await page.waitForTimeout(50);
+      assert.notEqual(await figureOf(page), before, `“${name}” changes the figure of step ${step}`);
+    }
   }
+  await done();
+});
+
+test("a link shows the lecture's figure as it was left", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lecture&step=8&figure=-0.5;3;2`);
+  await drawn(page, 1);
+  const values = () => page.$$eval("#figure input, #figure select", (all) => all.map((control) => control.value));
+  assert.deepEqual(await values(), ["-0.5", "3", "2"]);
+  await slide(page, "#figure input", -1);
+  await page.waitForFunction(() => /figure=-1%3B3%3B2/.test(location.hash));
+  await page.click("#steps li:nth-child(9) a");
+  await page.waitForFunction(() => /step=9/.test(location.hash) && !/figure/.test(location.hash));
+  await page.goto("about:blank");
+  await page.goto(`${address}#${SMALL}&panel=lecture&step=8&figure=x;;9`);
+  await drawn(page, 1);
+  assert.deepEqual(await values(), ["-1.3", "8", "1"], "what is none is as the figure has it");
+  await done();
+});
+
+test("on paper the answers are open and the page is light", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lecture&step=2`, { colorScheme: "dark" });
+  await drawn(page, 1);
+  const paper = () => page.evaluate(() => getComputedStyle(document.documentElement).backgroundColor);
+  const dark = await paper();
+  assert.ok(await page.isHidden("#step details p"));
+  await page.emulateMedia({ media: "print", colorScheme: "dark" });
+  await page.waitForFunction(() => document.querySelector("#step details").open);
+  assert.ok(await page.isVisible("#step details p"));
+  assert.notEqual(await paper(), dark);
+  for (const hidden of ["#tabs", "#figure .controls", "#steps", "#status"]) assert.ok(await page.isHidden(hidden), hidden);
+  assert.ok((await page.pdf()).length > 10_000);
+  await page.emulateMedia({ media: "screen", colorScheme: "dark" });
+  await page.waitForFunction(() => !document.querySelector("#step details").open);
+  await done();
+});
+
+test("what the page cannot do without is named", async () => {
+  const script = "WebAssembly.validate = () => false;";
+  const { page, done } = await open(SMALL, { script, ready: "#status.error" });
+  assert.match(await text(page, "#status"), /This browser lacks WebAssembly SIMD, which domelight needs/);
+  await done();
+});
+
+test("the command, the link and both pictures are taken away", async () => {
+  const { page, done } = await open(`${SMALL}&strategy=brdf:2`);
+  await rendered(page);
+  await page.evaluate(() => {
+    window.copied = [];
+    navigator.clipboard.writeText = async (text) => { window.copied.push(text); };
+  });
+  await page.click("#copy-command");
+  await page.waitForFunction(() => document.getElementById("status").textContent === "The command is copied");
+  await slide(page, "#exposure", -2);
+  await page.selectOption("#curve", "aces");
+  await page.click("#copy-command");
+  await page.click("#copy-link");
+  await page.waitForFunction(() => document.getElementById("status").textContent === "The link is copied");
+  const [plain, developed, link] = await page.evaluate(() => window.copied);
+  assert.match(plain, /^domelight render statue --env sky --env-rows=64 .*--strategy=brdf:2 --spp=4 --passes=doubling -o domelight\.exr -o domelight\.png$/);
+  assert.match(developed, /--exposure=-2 --tone=aces -o/);
+  assert.match(link, /^file:.*#.*exposure=-2&curve=aces/);
+  for (const [kind, magic] of [["exr", [0x76, 0x2f, 0x31, 0x01]], ["png", [0x89, 0x50, 0x4e, 0x47]]]) {
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click(`#save-${kind}`)]);
+    assert.equal(download.suggestedFilename(), `domelight.${kind}`);
+    assert.deepEqual([...readFileSync(await download.path()).subarray(0, 4)], magic);
+    await page.waitForTimeout(250);
+  }
+  await done();
+});
+
+test("every material has controls for all that its text says", async () => {
+  const { page, done } = await open(`${SMALL}&scene=sphere&size=24&spp=1&strategy=brdf:1`);
+  await rendered(page);
+  const models = await page.$$eval("#model option", (all) => all.map((option) => option.value).filter(Boolean));
+  assert.deepEqual(models, ["diffuse", "phong", "ward", "ggx", "beckmann", "gltf", "mix"]);
+  for (const model of models) {
+    await page.selectOption("#model", model);
+    const n = (await page.$$("#material-numbers :is(input, select)")).length;
+    for (let i = 0; i < n; i++) {
+      const control = (await page.$$("#material-numbers :is(input, select)"))[i];
+      if (!await control.isVisible()) continue;
+      const before = await page.inputValue("#material");
+      await control.evaluate((control) => {
+        if (control.type === "color") control.value = "#4080c0";
+        else if (control.type === "range") control.value = String(Number(control.min) + 0.6 * (Number(control.max) - Number(control.min)));
+        else control.selectedIndex = (control.selectedIndex + 1) % control.options.length;
+        control.dispatchEvent(new Event("input", { bubbles: true }));
+        control.dispatchEvent(new Event("change", { bubbles: true }));
+      });
+      const after = await page.inputValue("#material");
+      assert.notEqual(after, before, `${model}, control ${i}`);
+      await page.waitForFunction((material) => document.getElementById("command").textContent.includes(material.split(":")[1] ?? material), after);
+      await rendered(page);
+      assert.equal(await page.$("#status.error"), null, `${after}: ${await text(page, "#status")}`);
+    }
+  }
+  // What the text says is on the controls.
+  await renderedAnew(page, () => page.fill("#material", "ggx:0.2,0.1:0.9,0.5,0.1:correlated").then(() => page.keyboard.press("Enter")));
+  assert.deepEqual(await page.$$eval("#material-numbers :is(input, select)", (all) => all.map(({ value }) => value)), ["0.2", "0.5", "color", "#f3bc59", "correlated"]);
   await done();
 });
 
@@ -294,6 +484,11 @@ test("the hash keeps the state", async () => {
   await page.waitForSelector("html[data-rig='median-cut:16']");
   await show(page, "picture");
   assert.equal(await page.inputValue("#scene"), "sphere");
+  await page.click("#tab-lights");
+  await page.check("#leave");
+  await page.selectOption("#gloss", "20");
+  await page.waitForFunction(() => /leave=true/.test(location.hash) && /gloss=20/.test(location.hash));
+  await show(page, "picture");
   await page.waitForTimeout(300);
   const hash = await page.evaluate(() => location.hash);
   assert.match(hash, /scene=sphere/);
@@ -302,6 +497,10 @@ test("the hash keeps the state", async () => {
   await page.goto(`${address}${hash}`);
   await page.waitForSelector("html[data-ready]");
   assert.equal(await page.inputValue("#env"), "cathedral");
+  await show(page, "lights");
+  await page.waitForSelector("html[data-rig]");
+  assert.ok(await page.isChecked("#leave"));
+  assert.equal(await page.inputValue("#gloss"), "20");
   await done();
 });
 
@@ -312,9 +511,9 @@ test("a hash of nonsense is the default picture", async () => {
   await done();
 });
 
-for (const colorScheme of ["light", "dark"]) {
-  test(`every panel fits a phone and has no violations of accessibility, ${colorScheme}`, async () => {
-    const { page, done } = await open(SMALL, { viewport: { width: 390, height: 844 }, colorScheme });
+for (const [colorScheme, width] of ["light", "dark"].flatMap((scheme) => [390, 820, 1440].map((width) => [scheme, width]))) {
+  test(`every panel fits ${width} pixels and has no violations of accessibility, ${colorScheme}`, async () => {
+    const { page, done } = await open(`${SMALL}&pixel=[27,27]&scene=statue`, { viewport: { width, height: 844 }, colorScheme });
     await rendered(page);
     for (const panel of ["picture", "map", "xray", "lights", "lecture"]) {
       await show(page, panel);

@@ -118,7 +118,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     // A full disk under one file must not cost the others.
     let write = |path: &PicturePath| {
         let mut attributes = attributes.clone();
-        // If not, the layer of sample counts tells how many there are.
+        // If not, the layer of sample counts states how many there are.
         attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
         let denoised = denoised.as_ref().map(|(color, _)| color);
         path.write_layers(&rendering.layers, denoised, &shown_as, report.hide_env, &attributes)

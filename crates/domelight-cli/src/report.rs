@@ -7,7 +7,7 @@ use domelight_lab::{Acceptance, Host as _, Seconds, peak_memory};
 use serde::Serialize;
 use std::path::Path;
 
-use crate::error::{InterruptedAndSaved, status, tell_lines};
+use crate::error::{InterruptedAndSaved, status, status_lines};
 use crate::output::{self, PicturePath};
 use crate::profile::{self, StageSeconds};
 use crate::terminal::Terminal;
@@ -30,7 +30,7 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
-    /// What OpenEXR files tell of their making.
+    /// The provenance that OpenEXR files state.
     pub(crate) fn provenance(&self) -> Vec<(String, String)> {
         let mut attributes =
             vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
@@ -85,7 +85,7 @@ pub(crate) struct RenderReport {
     rays_per_second: f64,
     peak_memory_bytes: Option<u64>,
     non_finite_samples: u64,
-    /// Of the strategy rejection, at the centers of pixels spread over the picture.
+    /// The acceptance of the strategy rejection, at the centers of pixels spread over the picture.
     rejection: Option<Acceptance>,
     complete: bool,
     stopped: Option<StopReason>,
@@ -164,7 +164,7 @@ impl RenderReport {
             status(&tone::denoised_line(by));
         }
         if let Some(profile) = &self.profile {
-            tell_lines(&profile::lines(profile));
+            status_lines(&profile::lines(profile));
         }
     }
 

@@ -56,7 +56,7 @@ impl EnvironmentReport {
         &self.probe
     }
 
-    /// Of a probe by its name, without folders, used as `light` says.
+    /// The report of a probe with this name, without folders, used as `light` says.
     pub fn new(probe: String, light: &EnvironmentSettings, environment: &Environment) -> Self {
         Self {
             probe,
@@ -83,7 +83,7 @@ pub struct CameraReport {
 }
 
 impl CameraReport {
-    /// Of a camera in the scene's own units.
+    /// The report of a camera, in the scene's own units.
     pub fn new(view: &CameraSettings) -> Self {
         let (fov, ortho) = match view.projection {
             Projection::Perspective { fov_y_degrees } => (Some(fov_y_degrees), None),

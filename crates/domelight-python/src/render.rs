@@ -11,7 +11,7 @@ use domelight::sampling::SamplerKind;
 use domelight::scene::{self, CameraSettings, EnvironmentSettings, EnvironmentSource};
 use domelight::strategy::{Strategy, StrategyKind, StrategySpec};
 use domelight_lab::report::{CameraReport, EnvironmentReport, SceneReport};
-use domelight_lab::scene::View;
+use domelight_lab::scene::PreparedSceneRef;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
@@ -210,15 +210,15 @@ impl Job {
         spec.for_picture(&scene.scene, camera, environment, settings)
     }
 
-    /// Of each picture.
+    /// Settings of each picture.
     pub(crate) fn settings(&self) -> &RenderSettings {
         &self.settings
     }
 
     /// The scene under its light, with a report on it.
-    pub(crate) fn view<'a>(&'a self, report: &'a SceneReport) -> View<'a> {
+    pub(crate) fn view<'a>(&'a self, report: &'a SceneReport) -> PreparedSceneRef<'a> {
         let Self { scene, camera, environment, .. } = self;
-        View { scene: &scene.scene, camera, environment, report }
+        PreparedSceneRef { scene: &scene.scene, camera, environment, report }
     }
 
     /// The scene in words and numbers.

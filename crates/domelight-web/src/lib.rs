@@ -74,12 +74,6 @@ impl Engine {
     }
 }
 
-/// The version of the program that the page belongs to.
-#[wasm_bindgen]
-pub fn version() -> String {
-    env!("CARGO_PKG_VERSION").to_owned()
-}
-
 #[wasm_bindgen]
 extern "C" {
     #[wasm_bindgen(js_namespace = console, js_name = error)]

@@ -3,8 +3,8 @@
 use std::rc::Rc;
 
 use domelight::Rgb;
-use domelight::environment::{LatLongGrid, Orientation};
-use domelight::environment::mapping::Mapping;
+use domelight::environment::mapping::{Mapping, UnknownMapping};
+use domelight::environment::{LatLongGrid, Orientation, UpAxis};
 use domelight::geometry::{Ray, RayBatch, offset_origin};
 use domelight::math::{Vec3, vec2};
 use domelight::sampling::{Sampler, SamplerKind};
@@ -66,17 +66,113 @@ impl Picked {
     }
 }
 
-/// The directions of the texels' centers of a lat-long map that stands upright in the world, with their solid angles.
+/// A picture's size and the directions of its texels' centers in a mapping, upright in the world; `None` beside the
+/// mapping's picture. A lat-long map has `width` columns; others have their shape for as many rows.
+struct Texels {
+    size: [usize; 2],
+    directions: Vec<Option<Vec3>>,
+}
+
+impl Texels {
+    fn new(mapping: Mapping, width: usize, up: UpAxis) -> Self {
+        let (width, height) = size(mapping, width);
+        let to_world = up.from_y_up();
+        let at = |i: usize, n: usize| (i as f32 + 0.5) / n as f32;
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| [x, y]));
+        let direction = |[x, y]: [usize; 2]| mapping.direction(vec2(at(x, width), at(y, height)));
+        let directions = texels.map(|texel| direction(texel).map(|d| to_world * d)).collect();
+        Self { size: [width, height], directions }
+    }
+
+    /// Layers of as many values for each texel, 0 where it has no direction.
+    fn layers<const N: usize>(&self, mut of: impl FnMut(Vec3) -> [f32; N]) -> MapView {
+        let mut layers = vec![Vec::with_capacity(self.directions.len()); N];
+        for direction in &self.directions {
+            let values = direction.map_or([0.0; N], &mut of);
+            layers.iter_mut().zip(values).for_each(|(layer, value)| layer.push(value));
+        }
+        let [width, height] = self.size;
+        MapView { width, height, pixels: layers.concat() }
+    }
+}
+
+fn size(mapping: Mapping, width: usize) -> (usize, usize) {
+    match mapping {
+        Mapping::LatLong => (width, width / 2),
+        _ => mapping.size_for(width / 2),
+    }
+}
+
+fn mapping_of(name: &str) -> Result<Mapping, JsError> {
+    name.parse().map_err(|e: UnknownMapping| JsError::new(&e.to_string()))
+}
+
+/// The directions of the texels' centers of a lat-long map, with their solid angles.
 fn directions(width: usize) -> impl Iterator<Item = (Vec3, f64)> {
-    let height = width / 2;
-    let grid = LatLongGrid::new(width, height);
-    (0..height).flat_map(move |y| {
-        let solid_angle = grid.solid_angle(y);
-        (0..width).map(move |x| {
-            let uv = vec2((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
-            (Mapping::LatLong.direction(uv).unwrap_or(Vec3::Y), solid_angle)
-        })
-    })
+    let grid = LatLongGrid::new(width, width / 2);
+    let texels = Texels::new(Mapping::LatLong, width, UpAxis::Y).directions;
+    let solid_angle = move |i: usize| grid.solid_angle(i / width);
+    texels.into_iter().enumerate().filter_map(move |(i, d)| Some((d?, solid_angle(i))))
+}
+
+/// Shadow rays counted in cells of a lat-long map.
+struct RayCounts {
+    grid: LatLongGrid,
+    size: [usize; 2],
+    counts: Vec<f32>,
+    n_rays: f32,
+}
+
+impl RayCounts {
+    fn new(width: usize) -> Self {
+        let size = [width, width / 2];
+        let counts = vec![0.0; width * width / 2];
+        Self { grid: LatLongGrid::new(width, width / 2), size, counts, n_rays: 0.0 }
+    }
+
+    fn cell(&self, direction: Vec3) -> [usize; 2] {
+        let uv = Mapping::LatLong.uv(direction);
+        let [width, height] = self.size;
+        let at = |c: f32, n: usize| ((c * n as f32) as usize).min(n - 1);
+        [at(uv.x, width), at(uv.y, height)]
+    }
+
+    fn add(&mut self, direction: Vec3) {
+        let [x, y] = self.cell(direction);
+        self.counts[y * self.size[0] + x] += 1.0;
+        self.n_rays += 1.0;
+    }
+
+    /// Rays per solid angle and ray \[sr⁻¹\].
+    fn density(&self, direction: Vec3) -> f32 {
+        let [x, y] = self.cell(direction);
+        let solid_angle = self.grid.solid_angle(y) as f32;
+        self.counts[y * self.size[0] + x] / (self.n_rays.max(1.0) * solid_angle)
+    }
+}
+
+/// The shadow rays that a strategy asks for at a point in `n` camera samples, to `found`: directions, weights and
+/// visibility.
+fn shadow_rays(
+    at: &ShadingPoint,
+    strategy: &PreparedStrategy<'_>,
+    n: u32,
+    seed: u64,
+    visible: impl Fn(&[Vec3]) -> Vec<f32>,
+    mut found: impl FnMut(Vec3, Rgb, f32),
+) {
+    let points = vec![*at; n as usize];
+    let samples: Vec<u32> = (0..n).collect();
+    let sampler = Sampler::new(SamplerKind::default(), seed, 0);
+    let pixels = [PixelPoints::new(0..n as usize, n, sampler)];
+    let tile = TileShading { points: &points, samples: &samples, pixels: &pixels, width: 1 };
+    let pass = strategy.begin_pass(Sampler::for_pass(SamplerKind::default(), seed, 0), n);
+    Estimator::new(strategy).estimate(&pass, &tile, |rays, visibility| {
+        visibility.copy_from_slice(&visible(&rays.wi));
+        for ((&wi, &weight), &v) in rays.wi.iter().zip(&rays.weight).zip(&*visibility) {
+            found(wi, weight, v);
+        }
+    });
 }
 
 impl Engine {
@@ -93,9 +189,24 @@ impl Engine {
             scene: scene.clone(),
         }))
     }
+
+    /// A strategy with what a pilot chooses for one point.
+    fn prepared(
+        &self,
+        strategy: &str,
+        picked: &Picked,
+        seed: u64,
+    ) -> Result<PreparedStrategy<'_>, JsError> {
+        let spec: StrategySpec = strategy.parse().map_err(error)?;
+        let environment = self.environment()?;
+        let at = picked.at;
+        let v = |_: &ShadingPoint, wi: Vec3| picked.visibility(&[wi])[0];
+        let spec = spec.for_scene(|| vec![at], v, environment, seed);
+        PreparedStrategy::new(spec, environment).map_err(error)
+    }
 }
 
-/// A picture of the map.
+/// A picture on the sphere of directions.
 #[wasm_bindgen]
 pub struct MapView {
     /// Columns.
@@ -105,9 +216,15 @@ pub struct MapView {
     pixels: Vec<f32>,
 }
 
+impl MapView {
+    fn empty() -> Self {
+        Self { width: 0, height: 0, pixels: Vec::new() }
+    }
+}
+
 #[wasm_bindgen]
 impl MapView {
-    /// R, G, B and alpha, row by row.
+    /// R, G, B and alpha, or layer by layer, row by row.
     pub fn pixels(&self) -> Vec<f32> {
         self.pixels.clone()
     }
@@ -151,17 +268,11 @@ impl Engine {
     /// If there is no environment or no such mapping.
     #[wasm_bindgen(js_name = mapView)]
     pub fn map_view(&self, mapping: &str, rotate: f32, width: usize) -> Result<MapView, JsError> {
-        let mapping: Mapping =
-            mapping.parse().map_err(|e: domelight::environment::mapping::UnknownMapping| {
-                JsError::new(&e.to_string())
-            })?;
+        let mapping = mapping_of(mapping)?;
         let environment = self.environment()?;
         let orientation = Orientation { rotation: rotate, ..environment.orientation() };
         let to_map = orientation.map_to_world().transpose();
-        let (width, height) = match mapping {
-            Mapping::LatLong => (width, width / 2),
-            _ => mapping.size_for(width / 2),
-        };
+        let (width, height) = size(mapping, width);
         let map = environment.map();
         // Several places of each texel, so that no lamp falls between them.
         let across = (2 * map.width).div_ceil(width).clamp(1, 4);
@@ -187,38 +298,91 @@ impl Engine {
         Ok(MapView { width, height, pixels })
     }
 
-    /// What the light, the material and visibility are of every direction at a pixel: seven layers, each `width` by
-    /// `width` / 2 on a lat-long map that stands upright in the world: L, f · cos θ and V (luminance), the densities of
-    /// environment, BRDF and multiple importance sampling with as many samples of each, and f · cos θ · L over its
-    /// integral \[sr⁻¹\]. Empty where the pixel shows no surface.
+    /// Where places of the map as the probe has it lie in a mapping, upright in the world, if the map is turned by
+    /// `rotate` degrees: u and v, each by each, of both.
     ///
     /// # Errors
-    /// If scene or environment are missing.
-    pub fn importance(&self, pixel: &str, width: usize) -> Result<Vec<f32>, JsError> {
-        let Some(picked) = self.pick(pixel)? else { return Ok(Vec::new()) };
+    /// If there is no environment or no such mapping.
+    #[wasm_bindgen(js_name = placesOf)]
+    pub fn places_of(
+        &self,
+        mapping: &str,
+        rotate: f32,
+        places: &[f32],
+    ) -> Result<Vec<f32>, JsError> {
+        let mapping = mapping_of(mapping)?;
+        let orientation = self.environment()?.orientation();
+        let turned = Orientation { rotation: rotate, ..orientation };
+        let upright = orientation.up.from_y_up().transpose() * turned.map_to_world();
+        let place = |uv: &[f32]| {
+            let direction = Mapping::LatLong.direction(vec2(uv[0], uv[1])).unwrap_or(Vec3::Y);
+            mapping.uv(upright * direction).to_array()
+        };
+        Ok(places.chunks_exact(2).flat_map(place).collect())
+    }
+
+    /// What the light, the material and visibility are of every direction at a pixel: seven layers in a mapping, upright
+    /// in the world: L, f · cos θ and V (luminance), the densities of environment, BRDF and multiple importance sampling
+    /// with as many samples of each, and f · cos θ · L over its integral \[sr⁻¹\]. Empty where the pixel shows no
+    /// surface.
+    ///
+    /// # Errors
+    /// If scene or environment are missing, or there is no such mapping.
+    pub fn importance(&self, pixel: &str, mapping: &str, width: usize) -> Result<MapView, JsError> {
+        let mapping = mapping_of(mapping)?;
+        let Some(picked) = self.pick(pixel)? else { return Ok(MapView::empty()) };
         let environment = self.environment()?;
-        let (all, solid_angles): (Vec<Vec3>, Vec<f64>) = directions(width).unzip();
-        let visibility = picked.visibility(&all);
-        let mut layers: [Vec<f32>; 7] = Default::default();
-        for (&wi, &v) in all.iter().zip(&visibility) {
+        let unit = environment.unit() as f32;
+        let light = |wi: Vec3| (picked.at.eval(wi) * environment.le(wi)).luminance();
+        let integral: f64 = directions(256).map(|(wi, w)| f64::from(light(wi)) * w).sum();
+        let scale = if integral > 0.0 { (1.0 / integral) as f32 } else { 0.0 };
+        let texels = Texels::new(mapping, width, environment.orientation().up);
+        let all: Vec<Vec3> = texels.directions.iter().flatten().copied().collect();
+        let mut visibility = picked.visibility(&all).into_iter();
+        Ok(texels.layers(|wi| {
             let (le, of_light) = environment.le_pdf(wi);
             let (f, of_brdf) = picked.at.eval_pdf(wi);
-            let values = [
-                le.luminance(),
+            [
+                le.luminance() * unit,
                 f.luminance(),
-                v,
+                visibility.next().unwrap_or(0.0),
                 of_light,
                 of_brdf,
                 0.5 * (of_light + of_brdf),
-                (f * le).luminance(),
-            ];
-            layers.iter_mut().zip(values).for_each(|(layer, value)| layer.push(value));
+                (f * le).luminance() * scale,
+            ]
+        }))
+    }
+
+    /// Where a strategy sends its shadow rays from a pixel, counted over many camera samples: rays per solid angle and
+    /// ray \[sr⁻¹\] in a mapping, upright in the world. Empty where the pixel shows no surface.
+    ///
+    /// # Errors
+    /// If scene or environment are missing, the strategy does not suit them, or there is no such mapping.
+    #[wasm_bindgen(js_name = rayDensity)]
+    pub fn ray_density(
+        &self,
+        pixel: &str,
+        strategy: &str,
+        mapping: &str,
+        width: usize,
+    ) -> Result<MapView, JsError> {
+        /// Pixels with other random numbers, camera samples of each, and columns of the cells that are counted in.
+        const REPLICATES: u64 = 64;
+        const SAMPLES: u32 = 32;
+        const CELLS: usize = 64;
+        let mapping = mapping_of(mapping)?;
+        let Some(picked) = self.pick(pixel)? else { return Ok(MapView::empty()) };
+        let environment = self.environment()?;
+        let strategy = self.prepared(strategy, &picked, 0)?;
+        let mut counts = RayCounts::new(CELLS);
+        let visible = |wi: &[Vec3]| picked.visibility(wi);
+        for seed in 0..REPLICATES {
+            let count = |wi, _, _| counts.add(wi);
+            shadow_rays(&picked.at, &strategy, SAMPLES, seed, visible, count);
         }
-        let integral: f64 =
-            layers[6].iter().zip(&solid_angles).map(|(&x, w)| f64::from(x) * w).sum();
-        let scale = if integral > 0.0 { (1.0 / integral) as f32 } else { 0.0 };
-        layers[6].iter_mut().for_each(|x| *x *= scale);
-        Ok(layers.concat())
+        let texels = Texels::new(mapping, width, environment.orientation().up);
+        Ok(texels.layers(|wi| [counts.density(wi)]))
     }
 
     /// The surface at a pixel and its light, as JSON; `null` where there is none.
@@ -232,7 +396,8 @@ impl Engine {
         let visibility = picked.visibility(&all);
         let (mut shadowed, mut unshadowed) = (0.0, 0.0);
         for ((&wi, w), &v) in all.iter().zip(&solid_angles).zip(&visibility) {
-            let light = f64::from((picked.at.eval(wi) * environment.le(wi)).luminance()) * w;
+            let radiance = (picked.at.eval(wi) * environment.le(wi)).luminance();
+            let light = f64::from(radiance) * environment.unit() * w;
             unshadowed += light;
             shadowed += light * f64::from(v);
         }
@@ -245,39 +410,28 @@ impl Engine {
         }))
     }
 
-    /// The shadow rays that a strategy asks for at a pixel in `n` camera samples: u, v on the upright lat-long map,
-    /// luminance of the weight times `n`, and V of each.
+    /// The shadow rays that a strategy asks for at a pixel in `n` camera samples: u, v in a mapping, upright in the
+    /// world, luminance of the weight times `n`, and V of each.
     ///
     /// # Errors
-    /// If scene or environment are missing, or the strategy does not suit them.
+    /// If scene or environment are missing, the strategy does not suit them, or there is no such mapping.
     pub fn samples(
         &self,
         pixel: &str,
         strategy: &str,
+        mapping: &str,
         n: u32,
         seed: u32,
     ) -> Result<Vec<f32>, JsError> {
+        let mapping = mapping_of(mapping)?;
         let Some(picked) = self.pick(pixel)? else { return Ok(Vec::new()) };
-        let spec: StrategySpec = strategy.parse().map_err(error)?;
-        let environment = self.environment()?;
-        let at = &picked.at;
-        let v = |_: &ShadingPoint, wi: Vec3| picked.visibility(&[wi])[0];
-        let spec = spec.for_scene(|| vec![*at], v, environment, seed.into());
-        let strategy = PreparedStrategy::new(spec, environment).map_err(error)?;
-        let points = vec![*at; n as usize];
-        let samples: Vec<u32> = (0..n).collect();
-        let sampler = Sampler::new(SamplerKind::default(), seed.into(), 0);
-        let pixels = [PixelPoints::new(0..n as usize, n, sampler)];
-        let tile = TileShading { points: &points, samples: &samples, pixels: &pixels, width: 1 };
-        let pass =
-            strategy.begin_pass(Sampler::for_pass(SamplerKind::default(), seed.into(), 0), n);
+        let strategy = self.prepared(strategy, &picked, seed.into())?;
+        let from_world = self.environment()?.orientation().up.from_y_up().transpose();
+        let visible = |wi: &[Vec3]| picked.visibility(wi);
         let mut out = Vec::new();
-        Estimator::new(&strategy).estimate(&pass, &tile, |rays, visibility| {
-            visibility.copy_from_slice(&picked.visibility(&rays.wi));
-            for ((&wi, weight), &v) in rays.wi.iter().zip(&rays.weight).zip(&*visibility) {
-                let uv = Mapping::LatLong.uv(wi);
-                out.extend([uv.x, uv.y, weight.luminance(), v]);
-            }
+        shadow_rays(&picked.at, &strategy, n, seed.into(), visible, |wi, weight, v| {
+            let uv = mapping.uv(from_world * wi);
+            out.extend([uv.x, uv.y, weight.luminance(), v]);
         });
         Ok(out)
     }

@@ -3,10 +3,10 @@
 use std::io::Cursor;
 use std::str::FromStr;
 
-use domelight::picture::png::{self, Depth};
 use domelight::picture::exposure::Exposure;
+use domelight::picture::png::{self, Depth};
 use domelight::picture::tone::{ToneCurve, ToneMapping};
-use domelight::render::{Checkpoint, Layers, VarianceSums};
+use domelight::render::{Checkpoint, Layers, Passes, Provenance, RenderSettings, VarianceSums};
 use domelight::strategy::StrategySpec;
 use serde::Deserialize;
 use wasm_bindgen::prelude::*;
@@ -15,13 +15,16 @@ use crate::Engine;
 use crate::session::nothing_started;
 use crate::setup::parse;
 
-/// What a picture tells of its making.
+/// The provenance of a picture, as the page knows it.
 #[derive(Deserialize)]
-struct Provenance {
+#[serde(deny_unknown_fields)]
+struct Making {
     scene: String,
     environment: String,
     samples: u32,
     seed: u64,
+    /// From [`Engine::automatic_exposure`] \[stops\].
+    exposure: f32,
 }
 
 #[wasm_bindgen]
@@ -58,27 +61,31 @@ impl Engine {
         Ok(())
     }
 
-    /// The OpenEXR file of the parts with all layers, as `domelight render` writes it; they are forgotten.
+    /// The OpenEXR file of the parts with all layers, as `domelight render` writes it, made as `{"scene", "environment",
+    /// "samples", "seed", "exposure"}` says; they are forgotten.
     ///
     /// # Errors
     /// If there are no parts.
-    pub fn exr(&mut self, provenance: &str) -> Result<Vec<u8>, JsError> {
-        let Provenance { scene, environment, samples, seed } = parse(provenance)?;
+    pub fn exr(&mut self, making: &str) -> Result<Vec<u8>, JsError> {
+        let Making { scene, environment, samples, seed, exposure } = parse(making)?;
         let (layers, parts) = self.merged()?;
         let strategy = parts[0].provenance.iter().find(|(name, _)| name == "strategy");
-        let attributes = [
-            ("version", crate::version()),
-            ("scene", scene),
-            ("environment", environment),
-            ("strategy", strategy.map(|(_, text)| text.clone()).unwrap_or_default()),
-            ("samples", samples.to_string()),
-            ("passes", "doubling".to_owned()),
-            ("sampler", "sobol".to_owned()),
-            ("filter", "gaussian".to_owned()),
-            ("seed", seed.to_string()),
-            ("complete", parts.iter().all(|part| part.complete).to_string()),
-        ];
-        let attributes = attributes.map(|(name, value)| (format!("domelight.{name}"), value));
+        let settings = RenderSettings {
+            n_samples: samples,
+            passes: Passes::Doubling,
+            seed,
+            ..RenderSettings::default()
+        };
+        let provenance = Provenance {
+            scene: &scene,
+            environment: &environment,
+            strategy: strategy.map_or("", |(_, text)| text),
+            settings: &settings,
+            exposure,
+        };
+        let mut attributes = provenance.attributes();
+        let complete = parts.iter().all(|part| part.complete);
+        attributes.push(("domelight.complete".to_owned(), complete.to_string()));
         let mut bytes = Cursor::new(Vec::new());
         let written = layers.write_exr(&attributes, &mut bytes);
         written.map_err(|e| JsError::new(&e.to_string()))?;

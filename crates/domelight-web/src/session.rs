@@ -5,6 +5,7 @@ use std::rc::Rc;
 use domelight::environment::Environment;
 use domelight::render::{
     Background, Counts, Filter, Observer, Passes, RenderSettings, Renderer, Window,
+    automatic_exposure,
 };
 use domelight::sampling::SamplerKind;
 use domelight::scene::{Camera, Scene};
@@ -136,8 +137,33 @@ impl Session {
     }
 }
 
+impl Engine {
+    /// What a picture of these settings shows.
+    fn borrowed(&self, state: &RenderState) -> Result<Borrowed, JsError> {
+        let [k, n] = state.shard;
+        if state.width == 0 || state.height == 0 || state.spp == 0 || k >= n {
+            return Err(JsError::new("settings: a picture has pixels, samples and shards"));
+        }
+        let (scene, loaded) = self.scene()?;
+        let view = loaded.camera(state.camera, state.width as f32 / state.height as f32);
+        let camera = Camera::new(&view, state.width, state.height).map_err(error)?;
+        Ok(Borrowed { scene: scene.clone(), environment: self.environment()?.clone(), camera })
+    }
+}
+
 #[wasm_bindgen]
 impl Engine {
+    /// The exposure \[stops\] that the program chooses for a picture of the settings of [`Engine::start`].
+    ///
+    /// # Errors
+    /// If scene or environment are missing, or the camera makes no picture.
+    #[wasm_bindgen(js_name = automaticExposure)]
+    pub fn automatic_exposure(&self, json: &str) -> Result<f32, JsError> {
+        let state: RenderState = parse(json)?;
+        let Borrowed { scene, environment, camera } = self.borrowed(&state)?;
+        Ok(automatic_exposure(&scene, &camera, &environment, &Session::settings(&state)))
+    }
+
     /// Begins a picture, or a shard of it: `{"width", "height", "spp", "strategy", "seed", "hideEnvironment", "camera",
     /// "shard"}`.
     ///
@@ -146,16 +172,8 @@ impl Engine {
     pub fn start(&mut self, json: &str) -> Result<String, JsError> {
         let state: RenderState = parse(json)?;
         let [k, n] = state.shard;
-        if state.width == 0 || state.height == 0 || state.spp == 0 || k >= n {
-            return Err(JsError::new("settings: a picture has pixels, samples and shards"));
-        }
         self.session = None;
-        let (scene, loaded) = self.scene()?;
-        let aspect = state.width as f32 / state.height as f32;
-        let view = loaded.camera(state.camera, aspect);
-        let camera = Camera::new(&view, state.width, state.height).map_err(error)?;
-        let borrowed =
-            Borrowed { scene: scene.clone(), environment: self.environment()?.clone(), camera };
+        let borrowed = self.borrowed(&state)?;
         let settings = Session::settings(&state);
         let session = Session::try_new(borrowed, |borrowed| {
             let Borrowed { scene, environment, camera } = borrowed;

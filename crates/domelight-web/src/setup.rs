@@ -99,11 +99,21 @@ struct SceneReport {
     triangles: usize,
     warnings: Vec<String>,
     camera: CameraState,
+    /// All of the file, the first of which is `camera`.
+    cameras: Vec<CameraReport>,
     /// Center and half diagonal of what the camera orbits.
     center: [f32; 3],
     radius: f32,
     up: [f32; 3],
     environment: Option<LightReport>,
+}
+
+/// One of a scene's cameras.
+#[derive(Serialize)]
+struct CameraReport {
+    /// Its name, or its number.
+    name: String,
+    camera: CameraState,
 }
 
 /// The light that a scene names.
@@ -121,7 +131,7 @@ struct LightReport {
 struct Light {
     /// A built-in probe, or a file.
     probe: String,
-    /// Of a built-in probe.
+    /// Rows of a built-in probe.
     rows: usize,
     /// \[degrees\]
     rotate: f32,
@@ -191,12 +201,18 @@ impl Engine {
         });
         let mut view = camera.unwrap_or_else(|| CameraSettings::framing(&framed, 1.0, up.vector()));
         let report_camera = CameraState::new(&view);
+        let cameras = description.cameras.iter().enumerate().map(|(i, of_file)| CameraReport {
+            name: if of_file.name.is_empty() { i.to_string() } else { of_file.name.clone() },
+            camera: CameraState::new(&of_file.settings),
+        });
+        let cameras = cameras.collect();
         let scale = description.rescale(&mut view);
         let scene = Scene::new(description).map_err(error)?;
         let report = SceneReport {
             triangles: scene.triangle_count(),
             warnings,
             camera: report_camera,
+            cameras,
             center: framed.center().to_array(),
             radius: 0.5 * framed.size().length(),
             up: up.vector().to_array(),

@@ -60,7 +60,7 @@ pub(crate) struct LightsArguments {
     /// The rig, its format by its extension; several times for several files; - is standard output
     #[arg(short, long = "output", value_name = "RIG", help_heading = "Output")]
     pub(crate) output: Vec<RigPath>,
-    /// The format where no extension tells it [of standard output: json]
+    /// The format where no extension determines it [of standard output: json]
     #[arg(long, value_name = "FORMAT", help_heading = "Output", value_parser = format(),
           requires = "output")]
     pub(crate) format: Option<Format>,

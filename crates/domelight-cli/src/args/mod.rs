@@ -62,7 +62,7 @@ pub(crate) struct Arguments {
 /// How much memory the program may take.
 #[derive(Args, Debug)]
 pub(crate) struct MemoryArguments {
-    /// Refuse what would take more memory, such as 4GiB or none [default: nine tenths of what there is]
+    /// Refuse work that would need more memory, such as 4GiB or none [default: nine tenths of the memory that there is]
     #[arg(long, global = true, value_name = "SIZE")]
     pub(crate) max_memory: Option<MaxMemory>,
 }
@@ -349,18 +349,18 @@ pub(crate) enum Bits {
 /// Exposure and tone curve of what is looked at.
 #[derive(Args, Debug)]
 pub(crate) struct Tone {
-    /// Exposure of what is looked at, in stops, or auto: the median of what the picture covers becomes middle gray
+    /// Exposure of pictures to look at, in stops, or auto: the median of what the picture covers becomes middle gray
     /// [default: auto; of differences 0]
     #[arg(long, value_name = "EV|auto", allow_negative_numbers = true)]
     exposure: Option<Exposure>,
-    /// Tone curve of what is looked at; agx is that of Blender, standard cuts off at 1 [default: agx; of differences
+    /// Tone curve of pictures to look at; agx is Blender's, standard clips at 1 [default: agx; of differences
     /// standard]
     #[arg(long, value_name = "CURVE", value_parser = tone_curve())]
     tone: Option<ToneCurve>,
 }
 
 impl Tone {
-    /// Of pictures to look at; `automatic` is the exposure where none was given.
+    /// The tone mapping of pictures to look at; `automatic` is the exposure where none was given.
     pub(crate) fn of_picture(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
         let exposure = match self.exposure.unwrap_or(Exposure::Auto) {
             Exposure::Auto => automatic(),
@@ -369,7 +369,7 @@ impl Tone {
         ToneMapping { exposure, curve: self.tone.unwrap_or(ToneCurve::Agx) }
     }
 
-    /// Of pictures that are measured or used again: as they are, unless something else was asked for.
+    /// The tone mapping of pictures that are measured or used again: none, unless something else was asked for.
     pub(crate) fn of_measurement(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
         let exposure = match self.exposure.unwrap_or(Exposure::Stops(0.0)) {
             Exposure::Auto => automatic(),

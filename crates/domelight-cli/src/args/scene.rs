@@ -61,7 +61,7 @@ pub(crate) struct EnvironmentArguments {
     /// The world axis that the top of the map points to
     #[arg(long, value_enum, value_name = "AXIS")]
     pub(crate) env_up: Option<Up>,
-    /// The map's layout, where shape and attributes do not tell it rightly
+    /// The map's layout, where shape and attributes of the file do not determine it
     #[arg(long, value_name = "MAPPING", value_parser = mapping())]
     pub(crate) env_mapping: Option<Mapping>,
     /// The layer of an OpenEXR map
@@ -71,7 +71,7 @@ pub(crate) struct EnvironmentArguments {
     #[arg(long, value_name = "ROWS", default_value_t = BUILTIN_ROWS,
           value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(crate) env_rows: u32,
-    /// Refuse what is repaired or left out with a warning otherwise: negative, NaN and infinite texels, vertices that are
+    /// Refuse input that is otherwise repaired or left out with a warning: negative, NaN and infinite texels, vertices that are
     /// not finite, images and material libraries that cannot be read, and unknown extensions that a glTF file requires
     #[arg(long)]
     pub(crate) strict: bool,
@@ -89,19 +89,19 @@ pub(crate) struct CameraArguments {
     /// One of the scene's cameras, by name or number from 0 [default: the first]
     #[arg(long, value_name = "NAME|N")]
     pub(crate) camera: Option<String>,
-    /// Where the camera is [default: framed to the scene]
+    /// Position of the camera [default: framed to the scene]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) origin: Option<Triple>,
-    /// What it looks at
+    /// Point that the camera looks at
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) target: Option<Triple>,
-    /// The direction that is up in the picture
+    /// Direction that points up in the picture
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) up: Option<Triple>,
     /// Vertical field of view [degrees]
     #[arg(long, value_name = "DEG", value_parser = not_negative, allow_negative_numbers = true, conflicts_with = "ortho")]
     pub(crate) fov: Option<f32>,
-    /// Orthographic, with this height of the picture in the world
+    /// Make the camera orthographic, with this height of the picture in the world
     #[arg(long, value_name = "HEIGHT", value_parser = not_negative, allow_negative_numbers = true)]
     pub(crate) ortho: Option<f32>,
 }
@@ -118,7 +118,7 @@ pub(crate) struct SubjectArguments {
     /// Put a diffuse disk (reflectance 0.5) under the scene
     #[arg(long)]
     pub(crate) ground: bool,
-    /// Leave the background out: transparent where nothing is
+    /// Leave the background out: pixels without a surface are transparent
     #[arg(long)]
     pub(crate) hide_env: bool,
 }

@@ -1,4 +1,4 @@
-//! What is told of a rig: a table for people, JSON for programs.
+//! The report of a rig: a table for people, JSON for programs.
 
 use std::fmt::Write as _;
 

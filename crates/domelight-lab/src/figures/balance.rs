@@ -5,7 +5,7 @@ use domelight::quote::Html;
 use domelight::sampling::Heuristic;
 use domelight::strategy::StrategySpec;
 
-use super::context::{FigureContext, FigureScene, Measurement, Subject};
+use super::context::{FigureContext, FigureMeasurement, FigureScene, Subject};
 use super::figure::{Figure, Row, Table, plot_panel};
 use super::formulas;
 use super::four_ways::sir;
@@ -29,9 +29,9 @@ const OF_LIGHT: [u32; 9] = [0, 1, 4, 8, 16, 24, 28, 31, 32];
 struct Curve {
     name: &'static str,
     /// Over M/N.
-    resampled: Vec<(f64, Measurement)>,
+    resampled: Vec<(f64, FigureMeasurement)>,
     /// Over the share of the light's samples.
-    combined: Vec<(f64, Measurement)>,
+    combined: Vec<(f64, FigureMeasurement)>,
 }
 
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
@@ -73,9 +73,9 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         }
         curves.push(curve);
     }
-    let error = |m: &Measurement| m.rel_mse;
-    let work = |m: &Measurement| m.rel_mse * m.render.seconds;
-    let over_ratio = |title: &str, label: &str, value: fn(&Measurement) -> f64| {
+    let error = |m: &FigureMeasurement| m.rel_mse;
+    let work = |m: &FigureMeasurement| m.rel_mse * m.render.seconds;
+    let over_ratio = |title: &str, label: &str, value: fn(&FigureMeasurement) -> f64| {
         plot(
             title,
             "candidates of each ray, M/N",
@@ -157,8 +157,8 @@ fn plot(
     scale: Scale,
     y: &str,
     curves: &[Curve],
-    points: impl Fn(&Curve) -> &Vec<(f64, Measurement)>,
-    value: impl Fn(&Measurement) -> f64,
+    points: impl Fn(&Curve) -> &Vec<(f64, FigureMeasurement)>,
+    value: impl Fn(&FigureMeasurement) -> f64,
 ) -> Document {
     let series = |(i, curve): (usize, &Curve)| Series {
         name: curve.name.to_owned(),

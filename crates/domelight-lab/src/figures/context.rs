@@ -245,12 +245,12 @@ pub(crate) struct FigureRender {
     pub(crate) strategy: String,
     pub(crate) shadow_rays: u64,
     pub(crate) points: u64,
-    /// CPU seconds of all threads; wall-clock seconds where the system does not tell.
+    /// CPU seconds of all threads; wall-clock seconds where the system does not report them.
     pub(crate) seconds: f64,
 }
 
 /// A picture and how far it is from the converged one.
-pub(crate) struct Measurement {
+pub(crate) struct FigureMeasurement {
     pub(crate) render: FigureRender,
     /// Mean over pixels that show the scene of (I − R)² / (R² + 0.01).
     pub(crate) rel_mse: f64,
@@ -301,7 +301,7 @@ impl FigureScene<'_> {
     }
 
     /// Renders the picture and compares it with the converged one.
-    pub(crate) fn measure(&self, spec: StrategySpec) -> Result<Measurement, Error> {
+    pub(crate) fn measure(&self, spec: StrategySpec) -> Result<FigureMeasurement, Error> {
         self.measure_with(spec, self.settings.seed, SamplerKind::Sobol)
     }
 
@@ -311,12 +311,12 @@ impl FigureScene<'_> {
         spec: StrategySpec,
         seed: u64,
         sampler: SamplerKind,
-    ) -> Result<Measurement, Error> {
+    ) -> Result<FigureMeasurement, Error> {
         let reference = self.reference(seed, sampler)?;
         let render = self.render_with(spec, seed, sampler)?;
         let covered: Vec<bool> = reference.depth.iter().map(|&d| d > 0.0).collect();
         let error = compare(&render.layers.color, &reference.color, Some(&covered))?;
-        Ok(Measurement { render, rel_mse: error.rel_mse })
+        Ok(FigureMeasurement { render, rel_mse: error.rel_mse })
     }
 
     /// The converged picture with the camera rays of that seed: many samples of both kinds, by

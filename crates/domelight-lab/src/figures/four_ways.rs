@@ -6,7 +6,7 @@ use domelight::quote::Code;
 use domelight::sampling::Heuristic;
 use domelight::strategy::{Candidates, Resampling, StrategySpec};
 
-use super::context::{FigureContext, FigureScene, Measurement, Subject};
+use super::context::{FigureContext, FigureMeasurement, FigureScene, Subject};
 use super::figure::{
     Figure, Picture, Radiance, Row, Table, count, number, picture_panel, plot_panel, png_bytes,
 };
@@ -124,7 +124,7 @@ const CAPTION: &str = "<p>One camera ray a pixel, the same in all pictures; what
 struct ShownStrategy {
     title: String,
     spec: StrategySpec,
-    measured: Measurement,
+    measured: FigureMeasurement,
 }
 
 impl ShownStrategy {
@@ -270,7 +270,7 @@ fn add(
             Ok(())
         };
     for s in shown {
-        let Measurement { render, rel_mse } = s.measured;
+        let FigureMeasurement { render, rel_mse } = s.measured;
         let notes = [
             format!("relMSE {}", number(rel_mse)),
             format!("{} shadow rays", count(render.shadow_rays)),

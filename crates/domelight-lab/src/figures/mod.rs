@@ -39,7 +39,7 @@ pub const N_FIGURES: u8 = 14;
 pub struct FigureSettings {
     /// A built-in scene or a file.
     pub scene: String,
-    /// The light; a built-in scene is lit by the cathedral unless told otherwise.
+    /// The light; a built-in scene is lit by the cathedral by default.
     pub environment: LightSettings,
     /// Small pictures, few samples, poor references.
     pub quick: bool,
@@ -74,9 +74,9 @@ pub struct DrawnFigure {
 /// The names of what [`draw`] writes into its folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileNames {
-    /// Of the page and the drawings, and tables that a figure may have.
+    /// The page and the drawings, and tables that a figure may have.
     pub files: Vec<String>,
-    /// Of folders of pictures.
+    /// Folders of pictures.
     pub folders: Vec<String>,
 }
 

@@ -26,8 +26,8 @@ pub use description::{
     EnvironmentSettings, EnvironmentSource, NamedCamera, Part, SceneDescription,
 };
 pub use layers::{
-    AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers, Sheen,
-    Specular, Volume,
+    AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers, NormalMap,
+    Sheen, Specular, Volume,
 };
 #[cfg(feature = "io")]
 pub use load::{
@@ -35,8 +35,7 @@ pub use load::{
     load_with,
 };
 pub use material::{
-    Material, MaterialModel, MetallicRoughnessMaterial, NormalMap, PhongMaterial,
-    SpecularGlossinessMaterial,
+    Material, MaterialModel, MetallicRoughnessMaterial, PhongMaterial, SpecularGlossinessMaterial,
 };
 pub use texture::{Encoding, Texture, TextureError, TextureFilter, TextureRef, UvTransform, Wrap};
 
@@ -51,11 +50,11 @@ pub struct Scene {
     parts: Vec<Part>,
     materials: Vec<Material>,
     textures: Vec<Texture>,
-    /// Of each part its first triangle in the hierarchy.
+    /// The first triangle of each part in the hierarchy.
     first_triangle: Vec<u32>,
-    /// Of the parts that hide all behind them, which come first.
+    /// The hierarchy of the opaque parts, which come first.
     bvh: Bvh,
-    /// Of the others, if there are any.
+    /// The parts that are not opaque, if there are any.
     partial: Option<Partial>,
     /// Some part is not seen from behind.
     has_single_sided: bool,
@@ -179,33 +178,6 @@ impl Scene {
         })
     }
 
-    /// Loads a mesh or a scene file of any known format and builds it.
-    ///
-    /// # Errors
-    /// If the file cannot be read, is damaged, or makes no scene. [`load()`] gives the loader's warnings as well, and
-    /// a description to change before it is built.
-    #[cfg(feature = "io")]
-    pub fn load(path: impl AsRef<std::path::Path>) -> Result<Self, crate::Error> {
-        Ok(Self::new(load(path)?.description)?)
-    }
-
-    /// Builds a scene from the bytes of a file, for instance where there is no file system; `resolver` gives the bytes of
-    /// the files that it refers to.
-    ///
-    /// # Errors
-    /// If the file is damaged or makes no scene. [`load_bytes`] gives the loader's warnings as well, and a description to
-    /// change before it is built.
-    #[cfg(feature = "io")]
-    pub fn from_bytes(
-        bytes: &[u8],
-        format: SceneFormat,
-        resolver: &Resolver<'_>,
-    ) -> Result<Self, crate::Error> {
-        let name = format!("scene.{format}");
-        let loaded = load_bytes(name, bytes, resolver, &LoadOptions::default())?;
-        Ok(Self::new(loaded.description)?)
-    }
-
     /// The same scene, traced with another instruction set; `None` if this processor lacks it. Pictures are the same.
     #[must_use]
     pub fn with_instruction_set(mut self, instruction_set: InstructionSet) -> Option<Self> {
@@ -289,7 +261,7 @@ impl Scene {
         &self.materials
     }
 
-    /// How many triangles all meshes have together.
+    /// The number of triangles of all meshes.
     pub fn triangle_count(&self) -> usize {
         self.parts.iter().map(|p| p.mesh.triangles.len()).sum()
     }
