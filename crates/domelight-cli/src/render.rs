@@ -109,8 +109,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let render = |camera: &Camera| {
         Job { scene, camera, environment, settings, progress, render_run: running }.render(strategy)
     };
-    let denoiser = denoiser.as_ref();
-    let pictures = Pictures { described: &described, settings, denoiser, shown_as };
+    let pictures =
+        Pictures { described: &described, settings, denoiser: denoiser.as_ref(), shown_as };
     let mut denoised = None;
     let rendering = match &turntable {
         None => render(camera)?,
@@ -173,7 +173,7 @@ impl Pictures<'_> {
         let denoised = self.denoiser.map(|d| d.denoise_layers(layers)).transpose()?;
         let (color, by) = denoised.unzip();
         let mut attributes = self.described.provenance(self.settings);
-        // If not, the layer of sample counts tells how many there are.
+        // If not, the layer of sample counts states how many there are.
         attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
         if let Some(Frame { index, n_frames, .. }) = frame {
             attributes.push(("domelight.frame".into(), format!("{index} of {n_frames}")));

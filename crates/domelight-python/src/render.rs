@@ -249,10 +249,10 @@ impl Job {
             warnings: Vec::new(),
             material: None,
             normalize: false,
-            ground: false,
+            ground: None,
             hide_env: settings.background == Background::Hidden,
             environment: EnvironmentReport::new(probe.clone(), &light, environment),
-            camera: CameraReport::new(camera_settings),
+            camera: CameraReport::new(camera_settings, None),
             size: [settings.width, settings.height],
         }
     }
