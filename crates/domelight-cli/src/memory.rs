@@ -38,10 +38,10 @@ pub(crate) const MAP_TEXEL: u64 = 24;
 pub(crate) const WRITTEN_TEXEL: u64 = 24;
 
 /// For each pixel of a render: its sums, and the layers that they become.
-pub(crate) const PIXEL: u64 = 308;
+pub(crate) const PIXEL: u64 = 332;
 
 /// The same with a checkpoint, or of a part: the sums again, their bits and the file.
-pub(crate) const SAVED_PIXEL: u64 = 716;
+pub(crate) const SAVED_PIXEL: u64 = 776;
 
 /// For each pixel of a comparison: a render, the reference, what its page shows, and eight pictures to compare in pairs.
 pub(crate) const COMPARED_PIXEL: u64 = 980;
@@ -95,7 +95,7 @@ pub(crate) fn hint(error: &OverLimit) -> String {
 }
 
 /// Bytes of the machine's memory, or those that its control groups leave to the process; none where the system does not
-/// tell.
+/// report them.
 fn granted() -> Option<u64> {
     let machine = proc_meminfo();
     machine.into_iter().chain(control_groups()).min()

@@ -70,6 +70,39 @@ impl FromStr for Triple {
     }
 }
 
+/// How an environment is turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Rotation {
+    /// So that its key light falls on what the camera sees.
+    Auto,
+    /// By an angle.
+    Degrees(f32),
+}
+
+impl Rotation {
+    /// The angle, if one was given.
+    pub(crate) fn degrees(self) -> Option<f32> {
+        match self {
+            Self::Auto => None,
+            Self::Degrees(degrees) => Some(degrees),
+        }
+    }
+}
+
+impl FromStr for Rotation {
+    type Err = BadValue;
+
+    fn from_str(s: &str) -> Result<Self, BadValue> {
+        if s == "auto" {
+            return Ok(Self::Auto);
+        }
+        match s.parse::<f32>() {
+            Ok(degrees) if degrees.is_finite() => Ok(Self::Degrees(degrees)),
+            _ => Err(bad(s, "an angle in degrees or auto")),
+        }
+    }
+}
+
 /// Samples of the environment and of the BRDF, `M:N`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Split {
@@ -148,6 +181,25 @@ impl FromStr for Tiles {
     }
 }
 
+/// Frames from the first to the last, `A-B` or `A`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Frames {
+    pub(crate) first: u32,
+    pub(crate) last: u32,
+}
+
+impl FromStr for Frames {
+    type Err = BadValue;
+
+    fn from_str(s: &str) -> Result<Self, BadValue> {
+        let (first, last) = s.split_once('-').unwrap_or((s, s));
+        match (first.parse(), last.parse()) {
+            (Ok(first), Ok(last)) if first <= last => Ok(Self { first, last }),
+            _ => Err(bad(s, "frames such as 0-11, first and last, counted from 0")),
+        }
+    }
+}
+
 /// A finite number that is not negative.
 pub(crate) fn not_negative(s: &str) -> Result<f32, BadValue> {
     match s.parse::<f32>() {
@@ -180,6 +232,11 @@ mod tests {
         assert_eq!("3-5".parse(), Ok(Tiles { first: 3, last: 5 }));
         assert_eq!("7".parse(), Ok(Tiles { first: 7, last: 7 }));
         assert!(["5-3", "-", "a-b"].iter().all(|s| s.parse::<Tiles>().is_err()));
+        assert_eq!("3-5".parse(), Ok(Frames { first: 3, last: 5 }));
+        assert!(["5-3", "-1", "a"].iter().all(|s| s.parse::<Frames>().is_err()));
+        assert_eq!("auto".parse(), Ok(Rotation::Auto));
+        assert_eq!("-30".parse(), Ok(Rotation::Degrees(-30.0)));
+        assert!(["", "x", "inf"].iter().all(|s| s.parse::<Rotation>().is_err()));
         assert_eq!("3:1".parse(), Ok(Split { environment: 3, brdf: 1 }));
         assert!(["0:0", "1", "-1:2", "1:2:3"].iter().all(|s| s.parse::<Split>().is_err()));
     }

@@ -6,7 +6,6 @@ use anyhow::Result;
 use domelight::RgbImage;
 use domelight::picture::tone::ToneMapping;
 use domelight::render::RenderSettings;
-use domelight::scene::Camera;
 use domelight::strategy::PreparedStrategy;
 
 use crate::output::PicturePath;
@@ -26,7 +25,7 @@ pub(crate) fn write(
     let (whole_width, whole_height) = (settings.width, settings.height);
     let (width, height) = (whole_width.div_ceil(2), whole_height.div_ceil(2));
     let settings = &RenderSettings { width, height, n_samples: 1, target_error: None, ..*settings };
-    let camera = &Camera::new(&view.camera_settings, width, height)?;
+    let camera = &view.camera.resized((whole_width, whole_height), (width, height));
     let progress = &RenderProgress::new("", 1, true, interrupted);
     let PreparedScene { scene, environment, .. } = view;
     let job = Job { scene, camera, environment, settings, progress, render_run: None };
@@ -39,7 +38,7 @@ pub(crate) fn write(
         .collect();
     let alpha = view.report.hide_env.then_some(&alpha[..]);
     outputs.iter().filter(|path| path.is_png()).try_for_each(|path| {
-        // What it shows is not the render that the attributes would tell of.
+        // The attributes would describe another render than this picture shows.
         path.write_color(&color, alpha, tone)
     })
 }

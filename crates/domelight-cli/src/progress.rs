@@ -22,6 +22,9 @@ pub(crate) struct RenderProgress {
     /// What is rendered; empty where that is plain.
     label: String,
     interrupted: &'static AtomicBool,
+    /// Pictures to render, and those begun.
+    n_pictures: u64,
+    begun: AtomicU64,
     rays: AtomicU64,
     /// Whole percent told last.
     told: Mutex<Option<u64>>,
@@ -54,6 +57,8 @@ impl RenderProgress {
             label,
             openjd: false,
             interrupted,
+            n_pictures: 1,
+            begun: AtomicU64::new(0),
             rays,
             told,
             started: Instant::now(),
@@ -70,6 +75,12 @@ impl RenderProgress {
         self
     }
 
+    /// Of `n` pictures, one after the other.
+    pub(crate) fn pictures(mut self, n: u64) -> Self {
+        self.n_pictures = n.max(1);
+        self
+    }
+
     /// Measures which stages the time goes to, if `on`.
     pub(crate) fn profiled(mut self, on: bool) -> Self {
         self.profile = on.then(Profile::default);
@@ -81,11 +92,14 @@ impl RenderProgress {
         self.profile.as_ref().map(Profile::seconds)
     }
 
-    /// Sets the bar to `done` of `total` camera rays.
+    /// Begins a picture: sets the bar to `done` of its `total` camera rays, behind the pictures before it.
     pub(crate) fn begin(&self, total: u64, done: u64) {
-        self.bar.set_length(total);
-        self.bar.set_position(done);
-        self.bar.reset_eta();
+        let before = self.begun.fetch_add(1, Ordering::Relaxed);
+        self.bar.set_length(total * self.n_pictures.max(before + 1));
+        self.bar.set_position(total * before + done);
+        if before == 0 {
+            self.bar.reset_eta();
+        }
         self.tell_farm();
     }
 
@@ -118,6 +132,10 @@ impl Drop for RenderProgress {
 impl Observer for RenderProgress {
     fn pass_started(&self, samples: Range<u32>) {
         let samples = format!("samples {}–{}", samples.start + 1, samples.end);
+        let samples = match self.n_pictures {
+            1 => samples,
+            n => format!("frame {} of {n}, {samples}", self.begun.load(Ordering::Relaxed)),
+        };
         if self.openjd {
             print_progress(&format!("openjd_status: {samples}"));
         }

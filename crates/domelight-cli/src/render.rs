@@ -4,7 +4,9 @@ use std::str::FromStr as _;
 use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, bail};
-use domelight::render::{Layers, RenderSettings, automatic_exposure, pilot_points};
+use domelight::picture::tone::ToneMapping;
+use domelight::render::{Layers, RenderSettings, Rendering, automatic_exposure, pilot_points};
+use domelight::scene::Camera;
 use domelight::strategy::PreparedStrategy;
 
 use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
@@ -21,7 +23,8 @@ use crate::report::{RenderReport, Settings, StopReason, Timings};
 use crate::scene::start_threads;
 use crate::strategy::{Job, acceptance};
 use crate::terminal::Terminal;
-use crate::tone::{self, Shown};
+use crate::tone::Shown;
+use crate::turntable::{Frame, Turntable};
 use domelight_lab::denoise::Denoiser;
 use domelight_lab::scene::PreparedScene;
 use domelight_lab::{Stopwatch, refuse_repeating_points};
@@ -40,6 +43,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let spec = arguments.strategy.spec()?;
     refuse_repeating_points(spec, arguments.samples.spp)?;
     let outputs = arguments.output.paths()?;
+    let turntable = arguments.turntable.turntable(&outputs)?;
+    let outputs = turntable.as_ref().map_or(outputs, Turntable::outputs);
     arguments.render_run.check(&outputs)?;
     outputs.iter().try_for_each(PicturePath::declare)?;
     if !arguments.render_run.is_part() {
@@ -54,7 +59,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let loading = interrupt::nothing_to_keep(arguments.render_run.code_of_an_early_end());
     let mut watch = Stopwatch::start();
 
-    let loaded = arguments.scene.load(quiet)?;
+    let loaded = arguments.scene.load_for(quiet, turntable.is_some())?;
     let load = watch.lap();
 
     let view = &loaded.build(&Terminal { quiet })?;
@@ -94,14 +99,25 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let total = n_pixels * u64::from(settings.n_samples);
     let openjd = arguments.output.progress == ProgressKind::Openjd;
     let progress = RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
+    let progress = progress.pictures(turntable.as_ref().map_or(1, Turntable::len));
     let progress = &progress.profiled(arguments.output.profile);
-    let attributes = described.provenance();
+    let attributes = described.provenance(settings);
     let try_writing = &|layers: &Layers| {
         output::time_to_write(&outputs, layers, &shown_as, report.hide_env, &attributes)
     };
     let running = Some((&render_run, try_writing as TryWriting));
-    let job = Job { scene, camera, environment, settings, progress, render_run: running };
-    let rendering = job.render(strategy)?;
+    let render = |camera: &Camera| {
+        Job { scene, camera, environment, settings, progress, render_run: running }.render(strategy)
+    };
+    let pictures = Pictures { described: &described, denoiser: denoiser.as_ref(), shown_as };
+    let mut denoised = None;
+    let rendering = match &turntable {
+        None => render(camera)?,
+        Some(turntable) => turntable.render(view, render, |rendering, frame| {
+            denoised = pictures.write(rendering, Some(frame), &frame.outputs)?;
+            Ok(())
+        })?,
+    };
     progress.finish();
     let stopped = match () {
         () if rendering.complete => None,
@@ -114,18 +130,9 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     }
     let render = watch.lap();
 
-    let denoised = denoiser.as_ref().map(|d| tone::denoise(d, &rendering.layers)).transpose()?;
-    // A full disk under one file must not cost the others.
-    let write = |path: &PicturePath| {
-        let mut attributes = attributes.clone();
-        // If not, the layer of sample counts tells how many there are.
-        attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
-        let denoised = denoised.as_ref().map(|(color, _)| color);
-        path.write_layers(&rendering.layers, denoised, &shown_as, report.hide_env, &attributes)
-    };
     // A part is its own checkpoint, and written.
-    if !arguments.render_run.is_part() {
-        outputs.iter().map(write).fold(Ok(()), Result::and)?;
+    if turntable.is_none() && !arguments.render_run.is_part() {
+        denoised = pictures.write(&rendering, None, &outputs)?;
     }
     let total = clock::elapsed().as_secs_f64();
     let stages = Timings { load, build, render, write: watch.lap(), total };
@@ -133,7 +140,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let rejection = acceptance(spec, points, environment, settings.seed)?;
     let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
     report.profile = progress.profile();
-    report.denoised = denoised.map(|(_, by)| by);
+    report.denoised = denoised;
     if outputs.iter().any(PicturePath::is_png) {
         report.png = Some(Shown::new(&arguments.output.tone, &shown_as));
     }
@@ -143,6 +150,40 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         report.print_summary();
     }
     report.check(saved, arguments.render_run.is_part(), quiet)
+}
+
+/// How pictures are written.
+struct Pictures<'a> {
+    described: &'a Settings,
+    denoiser: Option<&'a Denoiser>,
+    shown_as: ToneMapping,
+}
+
+impl Pictures<'_> {
+    /// Writes a picture, or the picture of a frame, to all `outputs`; returns what denoised it.
+    fn write(
+        &self,
+        rendering: &Rendering,
+        frame: Option<&Frame>,
+        outputs: &[PicturePath],
+    ) -> Result<Option<String>> {
+        let layers = &rendering.layers;
+        let denoised = self.denoiser.map(|d| d.denoise_layers(layers)).transpose()?;
+        let (color, by) = denoised.unzip();
+        let mut attributes = self.described.provenance();
+        // If not, the layer of sample counts tells how many there are.
+        attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
+        if let Some(Frame { index, n_frames, .. }) = frame {
+            attributes.push(("domelight.frame".into(), format!("{index} of {n_frames}")));
+        }
+        let hide_env = self.described.scene.hide_env;
+        // A full disk under one file must not cost the others.
+        let write = |path: &PicturePath| {
+            path.write_layers(layers, color.as_ref(), &self.shown_as, hide_env, &attributes)
+        };
+        outputs.iter().map(write).fold(Ok(()), Result::and)?;
+        Ok(by)
+    }
 }
 
 impl OutputArguments {

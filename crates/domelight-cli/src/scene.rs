@@ -9,15 +9,17 @@ use domelight::render::{Background, RenderSettings};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{AnimationTime, Projection};
 use domelight_lab::scene::{
-    FileSettings, LightSettings, LoadedScene, SceneSettings, SubjectSettings, ViewSettings,
+    FileSettings, Ground, LightSettings, LoadedScene, SceneSettings, SubjectSettings, ViewSettings,
 };
 
 use crate::args::sampling::PixelArguments;
 use crate::args::scene::{
-    CameraArguments, EnvironmentArguments, FileArguments, SceneArguments, SubjectArguments,
+    CameraArguments, EnvironmentArguments, FileArguments, GroundName, SceneArguments,
+    SubjectArguments,
 };
+use crate::error::UsageError;
 use crate::files;
-use crate::parse::{Size, Triple};
+use crate::parse::{Rotation, Size, Triple};
 use crate::terminal::Terminal;
 
 impl SceneArguments {
@@ -36,11 +38,16 @@ impl SceneArguments {
 
     /// Reads scene and probe.
     pub(crate) fn load(&self, quiet: bool) -> Result<LoadedScene> {
+        self.load_for(quiet, false)
+    }
+
+    /// Reads scene and probe; a framed camera keeps the subject in the picture `all_around` it.
+    pub(crate) fn load_for(&self, quiet: bool, all_around: bool) -> Result<LoadedScene> {
         let settings = SceneSettings {
             scene: self.scene.clone(),
             file: self.file.settings(),
             environment: self.environment.settings(),
-            view: self.camera.settings(),
+            view: ViewSettings { all_around, ..self.camera.settings() },
             subject: self.subject.settings(),
         };
         Ok(settings.load(&Terminal { quiet })?)
@@ -76,7 +83,8 @@ impl EnvironmentArguments {
     pub(crate) fn settings(&self) -> LightSettings {
         LightSettings {
             probe: self.env.clone(),
-            rotate: self.env_rotate,
+            rotate: self.env_rotate.and_then(Rotation::degrees),
+            rotate_to_camera: self.env_rotate == Some(Rotation::Auto),
             scale: self.env_scale,
             exposure: self.env_exposure,
             up: self.env_up.map(Into::into),
@@ -89,6 +97,17 @@ impl EnvironmentArguments {
     }
 }
 
+impl EnvironmentArguments {
+    /// The same for commands that have no camera, or several.
+    pub(crate) fn settings_without_camera(&self) -> Result<LightSettings> {
+        if self.env_rotate == Some(Rotation::Auto) {
+            let text = "--env-rotate auto turns the light to a camera, and this command has none; give degrees";
+            return Err(UsageError(text.into()).into());
+        }
+        Ok(self.settings())
+    }
+}
+
 impl CameraArguments {
     fn settings(&self) -> ViewSettings {
         let Size { width, height } = self.size;
@@ -98,6 +117,9 @@ impl CameraArguments {
         ViewSettings {
             size: [width, height],
             camera: self.camera.clone(),
+            view: self.view,
+            all_around: false,
+            depth_of_field: self.dof,
             origin: point(self.origin),
             target: point(self.target),
             up: point(self.up),
@@ -109,6 +131,10 @@ impl CameraArguments {
 impl SubjectArguments {
     fn settings(&self) -> SubjectSettings {
         let Self { ref material, normalize, ground, hide_env } = *self;
+        let ground = ground.map(|ground| match ground {
+            GroundName::Plate => Ground::Plate,
+            GroundName::Shadow => Ground::Shadow,
+        });
         SubjectSettings { material: material.clone(), normalize, ground, hide_env }
     }
 }

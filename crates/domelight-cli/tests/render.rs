@@ -4,6 +4,7 @@ use crate::common;
 
 use common::{domelight, ended as refused, json, load, stderr, stdout, write_exr};
 use domelight::picture::exr::text_attributes;
+use domelight::picture::{ReadOptions, read};
 use domelight::{Rgb, RgbImage};
 use std::fs;
 use std::process::Output;
@@ -147,6 +148,139 @@ fn own_meshes_render_under_own_probes() {
     let ortho =
         ["triangle.obj", "--env", "constant", "--ortho", "3", "--env-up", "z", "-o", "c.exr"];
     succeeded(&render(&folder, &ortho));
+}
+
+/// Named views and angles place the camera, and the light is turned to where it falls on what is seen.
+#[test]
+fn views_frame_the_subject_and_light_is_turned_to_them() {
+    let folder = folder();
+    let settings = |arguments: &[&str]| {
+        let quiet = ["sphere", "--env", "sky", "-q", "--json", "-o", "x.pfm"];
+        json(&render(&folder, &[&quiet[..], arguments].concat()))["settings"].clone()
+    };
+    let origin = |view: &str| -> Vec<f64> {
+        let camera = settings(&["--view", view])["camera"].clone();
+        let all = |key: &str| -> Vec<f64> {
+            camera[key].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+        };
+        assert!(all("target").iter().all(|x| x.abs() < 1e-2), "a sphere stands in the middle");
+        all("origin")
+    };
+    let (front, right, angles) = (origin("front"), origin("right"), origin("-90,30"));
+    assert!(front[2] > 3.0 && front[0].abs() < 1e-3);
+    assert!(right[0] > 3.0 && (right[0] - front[2]).abs() < 1e-2);
+    assert!(angles[0] < -2.0 && angles[1] > 1.0, "{angles:?}");
+
+    let rotation = |view: &str| {
+        let turned = settings(&["--view", view, "--env-rotate", "auto"]);
+        turned["environment"]["rotate"].as_f64().unwrap()
+    };
+    let turn = (rotation("right") - rotation("front")).rem_euclid(360.0);
+    assert!((turn - 90.0).abs() < 0.1, "{turn}");
+
+    refused(&render(&folder, &["sphere", "--view", "side"]), 2, &["side", "three-quarter"]);
+    refused(
+        &render(&folder, &["sphere", "--view", "front", "--origin", "0,0,4"]),
+        2,
+        &["--origin"],
+    );
+    refused(&render(&folder, &["sphere", "--env-rotate", "left"]), 2, &["left", "auto"]);
+    let lights = domelight(&folder, &["lights", "sky", "--env-rotate", "auto", "-o", "rig.json"]);
+    refused(&lights, 2, &["--env-rotate auto", "degrees"]);
+}
+
+/// The frames of a turntable are the pictures of a camera that goes around, and some of them are the same as all.
+#[test]
+fn a_turntable_goes_around_in_numbered_frames() {
+    let folder = folder();
+    let turn = ["material-ball", "--view", "0,10", "--strategy", "mis", "--turntable", "4"];
+    let report = json(&render(&folder, &[&turn[..], &["--json", "-q", "-o", "a.exr"]].concat()));
+    let names = ["a.0000.exr", "a.0001.exr", "a.0002.exr", "a.0003.exr"];
+    assert_eq!(report["outputs"], serde_json::json!(names));
+    assert_eq!(report["camera_rays"], 4 * 24 * 18 * 4);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 4);
+    let frames = names.map(|name| load(&folder, name));
+    assert!((1..4).all(|i| frames[i].pixels != frames[0].pixels));
+
+    let part = ["--frames", "2-3", "-o", "b.png", "-o", "b.exr"];
+    succeeded(&render(&folder, &[&turn[..], &part].concat()));
+    assert_eq!(load(&folder, "b.0002.exr").pixels, frames[2].pixels);
+    assert!(
+        folder.path().join("b.0003.png").exists() && !folder.path().join("b.0001.exr").exists()
+    );
+    let bytes = fs::read(folder.path().join("b.0003.exr")).unwrap();
+    let attributes = text_attributes(&bytes).unwrap();
+    assert!(attributes.contains(&("domelight.frame".to_owned(), "3 of 4".to_owned())));
+
+    for (arguments, why) in [
+        (&["--turntable", "1"][..], "1"),
+        (&["--turntable", "4", "--frames", "2-4"], "0-3"),
+        (&["--frames", "0"], "--turntable"),
+        (&["--turntable", "4", "--checkpoint", "c.exr"], "--checkpoint"),
+        (&["--turntable", "4", "-o", "-"], "-"),
+    ] {
+        refused(&render(&folder, arguments), 2, &[why]);
+    }
+}
+
+/// Ground is a plate, also without a value, or shows nothing but shadows.
+#[test]
+fn ground_is_a_plate_or_catches_shadows() {
+    let folder = folder();
+    let picture = |arguments: &[&str]| {
+        let scene = ["sphere", "--env", "sky", "--view", "0,25", "--hide-env", "-o", "x.exr", "-q"];
+        succeeded(&render(&folder, &[&scene[..], arguments].concat()));
+        let picture = read_with_alpha(&folder, "x.exr");
+        let (mut black, mut covered) = (0, 0);
+        for (color, alpha) in picture {
+            covered += u32::from(alpha > 0.99);
+            black += u32::from(alpha > 0.05 && color == Rgb::BLACK);
+        }
+        (covered, black)
+    };
+    let (ball, none) = picture(&[]);
+    assert_eq!(none, 0);
+    let plate = picture(&["--ground"]);
+    assert!(4 * plate.0 > 5 * ball && plate.1 == 0, "{plate:?}");
+    assert_eq!(picture(&["--ground", "plate"]), plate);
+    let (covered, black) = picture(&["--ground", "shadow"]);
+    assert!(covered >= ball && covered < plate.0 && black > 5, "{covered} {black}");
+    refused(&render(&folder, &["--ground", "grass"]), 2, &["grass", "shadow"]);
+}
+
+/// What is out of focus is blurred, and the report says how.
+#[test]
+fn a_lens_blurs_what_is_out_of_focus() {
+    let folder = folder();
+    let settings = |name: &str, dof: &[&str]| {
+        let scene = ["sphere", "--env", "sky", "--json", "-q", "-o", name];
+        json(&render(&folder, &[&scene[..], dof].concat()))["settings"]["camera"].clone()
+    };
+    assert!(settings("sharp.exr", &[]).get("dof").is_none());
+    let camera = settings("auto.exr", &["--dof", "0.02,auto,6"]);
+    assert!((camera["dof"]["focus_distance"].as_f64().unwrap() - 4.4).abs() < 1e-3);
+    assert_eq!(camera["dof"]["blades"], 6);
+    settings("blurred.exr", &["--dof", "0.02,1.5"]);
+    let [sharp, blurred] = ["sharp.exr", "blurred.exr"].map(|name| {
+        let picture = load(&folder, name);
+        let steps = (0..18 * 23).map(|i| {
+            let at = |x: usize| picture.pixels[i / 23 * 24 + x].g;
+            (at(i % 23 + 1) - at(i % 23)).abs()
+        });
+        steps.fold(0.0, f32::max)
+    });
+    assert!(blurred < 0.7 * sharp, "{blurred} {sharp}");
+    for dof in ["2.8", "0,auto", "2.8,-1", "2.8,auto,2"] {
+        refused(&render(&folder, &["--dof", dof]), 2, &[dof, "2.8,auto,6"]);
+    }
+    refused(&render(&folder, &["--dof", "2,auto", "--ortho", "3"]), 2, &["--ortho"]);
+    refused(&render(&folder, &["sphere-orthographic", "--dof", "2,auto"]), 2, &["orthographic"]);
+}
+
+/// Colors and alpha of a file.
+fn read_with_alpha(folder: &TempDir, name: &str) -> Vec<(Rgb, f32)> {
+    let picture = read(&folder.path().join(name), &ReadOptions::default()).unwrap();
+    picture.image.pixels.into_iter().zip(picture.alpha.unwrap()).collect()
 }
 
 #[test]

@@ -5,6 +5,7 @@ use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
 use serde::Serialize;
 
 use crate::names::display_name;
+use crate::scene::{DepthOfField, Ground};
 
 /// A scene under its light, seen by a camera.
 #[derive(Clone, Debug, Serialize)]
@@ -19,8 +20,8 @@ pub struct SceneReport {
     pub material: Option<String>,
     /// The scene was moved and scaled to the unit cube.
     pub normalize: bool,
-    /// A disk lies under the scene.
-    pub ground: bool,
+    /// What was put under the subject.
+    pub ground: Option<Ground>,
     /// The background is left out.
     pub hide_env: bool,
     /// The light.
@@ -56,7 +57,7 @@ impl EnvironmentReport {
         &self.probe
     }
 
-    /// Of a probe by its name, without folders, used as `light` says.
+    /// The report of a probe with this name, without folders, used as `light` says.
     pub fn new(probe: String, light: &EnvironmentSettings, environment: &Environment) -> Self {
         Self {
             probe,
@@ -80,16 +81,19 @@ pub struct CameraReport {
     up: [f32; 3],
     fov: Option<f32>,
     ortho: Option<f32>,
+    /// What the lens blurs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dof: Option<DepthOfField>,
 }
 
 impl CameraReport {
-    /// Of a camera in the scene's own units.
-    pub fn new(view: &CameraSettings) -> Self {
+    /// The report of a camera, in the scene's own units, and of what its lens blurs.
+    pub fn new(view: &CameraSettings, dof: Option<DepthOfField>) -> Self {
         let (fov, ortho) = match view.projection {
             Projection::Perspective { fov_y_degrees } => (Some(fov_y_degrees), None),
             Projection::Orthographic { height } => (None, Some(height)),
         };
         let [origin, target, up] = [view.origin, view.target, view.up].map(|v| v.to_array());
-        Self { origin, target, up, fov, ortho }
+        Self { origin, target, up, fov, ortho, dof }
     }
 }

@@ -8,20 +8,21 @@ use domelight::bsdf::{Bsdf, MaterialSpec, ParseMaterialError};
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::ProbeOptions;
 use domelight::environment::mapping::Mapping;
-use domelight::environment::{Environment, Orientation, UpAxis};
-use domelight::geometry::Aabb;
+use domelight::environment::{Environment, Orientation, UpAxis, key_light_rotation};
 use domelight::math::Vec3;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
-    AnimationTime, Camera, CameraSettings, EnvironmentSettings, EnvironmentSource, LoadOptions,
-    NamedCamera, Projection, Scene, SceneDescription, load_with,
+    AnimationTime, Camera, CameraSettings, EnvironmentSettings, EnvironmentSource, Framing, Lens,
+    LoadOptions, NamedCamera, Projection, Scene, SceneDescription, ViewDirection, load_with,
 };
+
+use serde::Serialize;
 
 use crate::names::{file_name, without_folders};
 use crate::report::{CameraReport, EnvironmentReport, SceneReport};
 use crate::{At as _, Error, Host};
 
-/// Rows of a built-in probe unless told otherwise.
+/// Rows of a built-in probe by default.
 pub const BUILTIN_ROWS: u32 = 1024;
 
 /// For each triangle \[bytes\]: the tree, and what it is built from.
@@ -58,17 +59,19 @@ pub struct LightSettings {
     pub probe: Option<String>,
     /// About the up axis, counter-clockwise seen from above \[degrees\].
     pub rotate: Option<f32>,
+    /// Turn the map instead so that its key light falls from the left on what the camera sees.
+    pub rotate_to_camera: bool,
     /// The radiance is multiplied by it.
     pub scale: Option<f32>,
     /// The radiance is multiplied by 2 to the power of it.
     pub exposure: Option<f32>,
     /// Where the top of the map points to.
     pub up: Option<UpAxis>,
-    /// The map's layout, where shape and attributes do not tell it rightly.
+    /// The map's layout, where shape and attributes of the file do not determine it.
     pub mapping: Option<Mapping>,
     /// The layer of an OpenEXR map.
     pub layer: Option<String>,
-    /// Of a built-in probe.
+    /// Rows of a built-in probe.
     pub rows: u32,
     /// Refuses scenes that would be repaired or shown in part.
     pub strict_scene: bool,
@@ -81,6 +84,7 @@ impl Default for LightSettings {
         Self {
             probe: None,
             rotate: None,
+            rotate_to_camera: false,
             scale: None,
             exposure: None,
             up: None,
@@ -100,6 +104,12 @@ pub struct ViewSettings {
     pub size: [usize; 2],
     /// One of the scene's cameras, by name or number; none is the first.
     pub camera: Option<String>,
+    /// From where a camera looks that is framed to the scene, whatever cameras the scene has.
+    pub view: Option<ViewDirection>,
+    /// A framed camera keeps the subject in the picture while it goes around it.
+    pub all_around: bool,
+    /// What is blurred; none is sharp everywhere.
+    pub depth_of_field: Option<DepthOfField>,
     /// Where the camera is.
     pub origin: Option<Vec3>,
     /// What it looks at.
@@ -117,10 +127,67 @@ pub struct SubjectSettings {
     pub material: Option<NamedMaterial>,
     /// Move and scale the scene: center of the bounds to 0, longest half-extent to 1.
     pub normalize: bool,
-    /// Put a diffuse disk under the scene.
-    pub ground: bool,
+    /// What is put under the subject.
+    pub ground: Option<Ground>,
     /// Leave the background out.
     pub hide_env: bool,
+}
+
+/// What is put under a subject.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Ground {
+    /// A diffuse plate that fades to nothing toward its rim.
+    Plate,
+    /// Ground that shows nothing but shadows on the background.
+    Shadow,
+}
+
+/// What a camera's lens blurs, as `--dof` has it: `F,DIST` or `F,DIST,BLADES`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DepthOfField {
+    /// The f-number, > 0: less blurs more.
+    pub f_number: f32,
+    /// Distance of what is sharp, along the camera's axis, > 0; none is that of the subject's center.
+    pub focus_distance: Option<f32>,
+    /// Blades of the aperture, 3 or more; 0 is a round one.
+    pub blades: u32,
+}
+
+/// A text that is no depth of field.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "'{0}' is not an f-number and a distance or auto, such as 2.8,auto or 1.4,3.5, with a number of blades from 3 to 64 \
+     if wanted, as in 2.8,auto,6"
+)]
+pub struct BadDepthOfField(String);
+
+impl std::str::FromStr for DepthOfField {
+    type Err = BadDepthOfField;
+
+    fn from_str(text: &str) -> Result<Self, BadDepthOfField> {
+        let bad = || BadDepthOfField(text.to_owned());
+        let positive = |text: &str| match text.trim().parse::<f32>() {
+            Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+            _ => Err(bad()),
+        };
+        let parts: Vec<&str> = text.split(',').collect();
+        let (f_number, distance, blades) = match parts[..] {
+            [f_number, distance] => (f_number, distance, None),
+            [f_number, distance, blades] => (f_number, distance, Some(blades)),
+            _ => return Err(bad()),
+        };
+        let blades = match blades.map(|blades| blades.trim().parse()) {
+            None => 0,
+            Some(Ok(blades)) if (3..=64).contains(&blades) => blades,
+            Some(_) => return Err(bad()),
+        };
+        let focus_distance = match distance.trim() {
+            "auto" => None,
+            distance => Some(positive(distance)?),
+        };
+        Ok(Self { f_number: positive(f_number)?, focus_distance, blades })
+    }
 }
 
 /// A material in the notation of `--material`, and the text that it was given as.
@@ -165,6 +232,10 @@ pub struct PreparedScene {
     pub camera: Camera,
     /// The view, in the units of the scene's file, as `camera`.
     pub camera_settings: CameraSettings,
+    /// The lens of a camera that blurs.
+    lens: Option<Lens>,
+    /// The axis that the camera goes around.
+    up: Vec3,
     /// The light.
     pub environment: Environment,
     /// The probe as it was named: a built-in one or a file, for messages.
@@ -175,7 +246,7 @@ pub struct PreparedScene {
 
 /// A scene under its light, seen by a camera, that somebody else owns.
 #[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
+pub struct PreparedSceneRef<'a> {
     /// Geometry and materials.
     pub scene: &'a Scene,
     /// The view.
@@ -188,10 +259,27 @@ pub struct View<'a> {
 
 impl PreparedScene {
     /// What a render needs of it.
-    pub fn view(&self) -> View<'_> {
+    pub fn view(&self) -> PreparedSceneRef<'_> {
         let Self { scene, camera, environment, report, .. } = self;
-        View { scene, camera, environment, report }
+        PreparedSceneRef { scene, camera, environment, report }
     }
+
+    /// The camera after it has gone around the subject by an angle, counter-clockwise seen from above \[degrees\].
+    ///
+    /// # Errors
+    /// If it would make no picture.
+    pub fn camera_around(&self, degrees: f32) -> Result<Camera, Error> {
+        let center = self.scene.subject_bounds().center();
+        let center = if center.is_finite() { center } else { self.camera_settings.target };
+        let settings = self.camera_settings.orbited(center, self.up, degrees);
+        let [width, height] = self.report.size;
+        Ok(through(Camera::new(&settings, width, height)?, self.lens))
+    }
+}
+
+/// The camera with the lens, if there is one.
+fn through(camera: Camera, lens: Option<Lens>) -> Camera {
+    lens.map_or(camera, |lens| camera.with_lens(lens))
 }
 
 impl SceneSettings {
@@ -204,6 +292,9 @@ impl SceneSettings {
             view: ViewSettings {
                 size,
                 camera: None,
+                view: None,
+                all_around: false,
+                depth_of_field: None,
                 origin: None,
                 target: None,
                 up: None,
@@ -219,7 +310,7 @@ impl SceneSettings {
     /// If one cannot be read, or the view is not to be had.
     pub fn load(self, host: &dyn Host) -> Result<LoadedScene, Error> {
         let is_builtin = BuiltinScene::from_str(&self.scene);
-        let (mut description, light, map, warnings) = if let Ok(scene) = is_builtin {
+        let (mut description, mut light, map, warnings) = if let Ok(scene) = is_builtin {
             self.file.check_builtin(&self.scene)?;
             // It takes no memory to speak of, so that its light may be read meanwhile.
             let environment = Some(scene.environment());
@@ -237,23 +328,24 @@ impl SceneSettings {
         };
         self.view.choose(&self.scene, &mut description)?;
         let camera = self.frame(&mut description, light.up.vector())?;
+        if self.environment.rotate_to_camera {
+            let side = camera.side(light.up.vector());
+            light.rotate_degrees = key_light_rotation(&map, light.up, side);
+        }
         Ok(LoadedScene { description, light, map, camera, warnings, settings: self })
     }
 
     /// Changes the scene as the settings say; the camera frames what is not scenery.
     fn frame(&self, scene: &mut SceneDescription, up: Vec3) -> Result<CameraSettings, Error> {
-        let [width, height] = self.view.size;
-        let bounds = self.subject.apply(scene, up);
+        self.subject.apply(scene, up);
         // Squares of lengths must be finite.
-        let extent = bounds.size().max_element();
+        let extent = scene.subject_bounds().size().max_element();
         if extent > 1e18 || extent > 0.0 && extent < 1e-18 {
             let how = if extent < 1.0 { "small" } else { "large" };
             let text = format!("{}: the scene is too {how}: {extent:e} across", self.scene);
             return Err(Error::Usage(text));
         }
-        Ok(self.view.over(scene.camera.as_ref(), || {
-            CameraSettings::framing(&bounds, width as f32 / height as f32, up)
-        }))
+        Ok(self.view.over(scene, up))
     }
 }
 
@@ -265,8 +357,13 @@ impl LoadedScene {
     pub fn build(self, host: &dyn Host) -> Result<PreparedScene, Error> {
         let Self { description, light, map, camera, warnings, settings } = self;
         let [width, height] = settings.view.size;
-        let camera_report = CameraReport::new(&camera);
+        let dof = settings.view.depth_of_field.map(|dof| dof.focused(&camera, &description));
+        let lens = dof.map(|(dof, focus)| dof.lens(&camera, focus)).transpose()?;
+        let focused =
+            |(dof, focus): (DepthOfField, f32)| DepthOfField { focus_distance: Some(focus), ..dof };
+        let camera_report = CameraReport::new(&camera, dof.map(focused));
         let (camera, camera_settings) = (Camera::new(&camera, width, height)?, camera);
+        let camera = through(camera, lens);
         let n_triangles: usize = description.parts.iter().map(|p| p.mesh.triangles.len()).sum();
         let tree = format!("{}: a tree over {n_triangles} triangles", settings.scene);
         host.take_memory(&tree, TRIANGLE * n_triangles as u64)?;
@@ -287,14 +384,29 @@ impl LoadedScene {
             camera: camera_report,
             size: [width, height],
         };
-        Ok(PreparedScene { scene, camera, camera_settings, environment, probe, report })
+        let up = light.up.vector();
+        Ok(PreparedScene { scene, camera, camera_settings, lens, up, environment, probe, report })
+    }
+}
+
+impl DepthOfField {
+    /// With the distance of what is sharp: of the subject's center, if that is before the camera, else of its target.
+    fn focused(self, camera: &CameraSettings, scene: &SceneDescription) -> (Self, f32) {
+        let forward = (camera.target - camera.origin).normalize_or_zero();
+        let center = (scene.subject_bounds().center() - camera.origin).dot(forward);
+        let target = (camera.target - camera.origin).length();
+        let automatic = if center > 0.0 && center.is_finite() { center } else { target };
+        (self, self.focus_distance.unwrap_or(automatic))
+    }
+
+    fn lens(self, camera: &CameraSettings, focus_distance: f32) -> Result<Lens, Error> {
+        Ok(Lens::new(camera, self.f_number, focus_distance, self.blades)?)
     }
 }
 
 /// The scene's own camera, or one framed to it.
 pub(crate) fn view_of(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
-    let framed = || CameraSettings::framing(&description.subject_bounds(), aspect, up);
-    description.camera.unwrap_or_else(framed)
+    description.camera.unwrap_or_else(|| description.framed(&Framing::new(aspect, up)))
 }
 
 /// That view, moved until the scene just fits.
@@ -426,19 +538,19 @@ impl LightSettings {
 }
 
 impl SubjectSettings {
-    /// Changes the scene as it says; returns the bounds of what the camera should frame.
-    fn apply(&self, scene: &mut SceneDescription, up: Vec3) -> Aabb {
+    /// Changes the scene as it says.
+    fn apply(&self, scene: &mut SceneDescription, up: Vec3) {
         if self.normalize {
             scene.normalize();
         }
         if let Some(material) = &self.material {
             scene.set_subject_material(Bsdf::from(material.spec));
         }
-        let bounds = scene.subject_bounds();
-        if self.ground {
-            scene.add_ground(up);
+        match self.ground {
+            None => {}
+            Some(Ground::Plate) => scene.add_ground(up),
+            Some(Ground::Shadow) => scene.add_shadow_catcher(up),
         }
-        bounds
     }
 }
 
@@ -462,13 +574,20 @@ impl ViewSettings {
         Err(Error::Usage(format!("{name} {known}")))
     }
 
-    /// These over the scene's own camera, or over one framed to the scene.
-    fn over(
-        &self,
-        of_scene: Option<&CameraSettings>,
-        framed: impl FnOnce() -> CameraSettings,
-    ) -> CameraSettings {
-        let camera = of_scene.copied().unwrap_or_else(framed);
+    /// These over the scene's own camera, or over one framed to the scene with the wanted field of view.
+    fn over(&self, scene: &SceneDescription, up: Vec3) -> CameraSettings {
+        let [width, height] = self.size;
+        let framed = || {
+            let usual = Framing::new(width as f32 / height as f32, up);
+            let fov_y_degrees = match self.projection {
+                Some(Projection::Perspective { fov_y_degrees }) => fov_y_degrees,
+                _ => usual.fov_y_degrees,
+            };
+            let Self { view, all_around, .. } = *self;
+            scene.framed(&Framing { view, fov_y_degrees, all_around, ..usual })
+        };
+        let own = scene.camera.filter(|_| self.view.is_none());
+        let camera = own.unwrap_or_else(framed);
         CameraSettings {
             origin: self.origin.unwrap_or(camera.origin),
             target: self.target.unwrap_or(camera.target),

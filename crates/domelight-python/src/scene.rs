@@ -10,8 +10,8 @@ use domelight::math::{Vec2, Vec3};
 use domelight::picture::MAX_TEXELS;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
-    self, AnimationTime, CameraSettings, EnvironmentSettings, EnvironmentSource, LoadOptions,
-    Material, NamedCamera, Part, Projection, SceneDescription,
+    self, AnimationTime, CameraSettings, EnvironmentSettings, EnvironmentSource, Framing,
+    LoadOptions, Material, NamedCamera, Part, Projection, SceneDescription,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -185,8 +185,8 @@ impl SceneData {
         aspect: f32,
         up: Vec3,
     ) -> PyResult<CameraSettings> {
-        let own =
-            || self.camera.unwrap_or_else(|| CameraSettings::framing(&self.subject, aspect, up));
+        let framed = || self.scene.framed(&Framing::new(aspect, up));
+        let own = || self.camera.unwrap_or_else(framed);
         let by_number = |i: usize| self.cameras.get(i).map(|camera| camera.settings);
         let by_name = |name: &str| self.cameras.iter().find(|c| c.name == name).map(|c| c.settings);
         let (found, asked) = match camera {

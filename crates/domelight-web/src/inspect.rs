@@ -60,7 +60,7 @@ impl Engine {
         let (scene, loaded) = self.scene()?;
         let environment = self.environment()?;
         let (width, height) = (state.width, state.height);
-        let view = loaded.camera(state.camera, width as f32 / height.max(1) as f32);
+        let view = loaded.camera(scene, state.camera, width as f32 / height.max(1) as f32);
         let camera = Camera::new(&view, width, height).map_err(error)?;
         let settings =
             RenderSettings { width, height, seed: state.seed, ..RenderSettings::default() };

@@ -179,7 +179,7 @@ impl Engine {
     fn pick(&self, json: &str) -> Result<Option<Picked>, JsError> {
         let Pixel { x, y, width, height, camera } = parse(json)?;
         let (scene, loaded) = self.scene()?;
-        let view = loaded.camera(camera, width as f32 / height.max(1) as f32);
+        let view = loaded.camera(scene, camera, width as f32 / height.max(1) as f32);
         let camera = Camera::new(&view, width, height).map_err(error)?;
         let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
         let hit = scene.camera_hit(&ray, 0, 0);

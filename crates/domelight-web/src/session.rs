@@ -145,7 +145,8 @@ impl Engine {
             return Err(JsError::new("settings: a picture has pixels, samples and shards"));
         }
         let (scene, loaded) = self.scene()?;
-        let view = loaded.camera(state.camera, state.width as f32 / state.height as f32);
+        let aspect = state.width as f32 / state.height as f32;
+        let view = loaded.camera(scene, state.camera, aspect);
         let camera = Camera::new(&view, state.width, state.height).map_err(error)?;
         Ok(Borrowed { scene: scene.clone(), environment: self.environment()?.clone(), camera })
     }

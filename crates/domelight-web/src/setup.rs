@@ -8,12 +8,11 @@ use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::io::{ProbeOptions, probe_from_bytes};
 use domelight::environment::{Environment, Orientation, UpAxis};
-use domelight::geometry::Aabb;
 use domelight::math::Vec3;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
-    CameraSettings, EnvironmentSettings, EnvironmentSource, LoadOptions, Projection, Scene,
-    load_bytes,
+    CameraSettings, EnvironmentSettings, EnvironmentSource, Framing, LoadOptions, Projection,
+    Scene, load_bytes,
 };
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
@@ -41,7 +40,6 @@ pub(crate) struct Setup {
 pub(crate) struct LoadedScene {
     up: UpAxis,
     camera: Option<CameraSettings>,
-    framed: Aabb,
     /// What the scene was scaled by.
     scale: f32,
 }
@@ -81,11 +79,17 @@ impl CameraState {
 }
 
 impl LoadedScene {
-    /// The camera that was asked for, or else the scene's own, or one framed to it.
-    pub(crate) fn camera(&self, asked: Option<CameraState>, aspect: f32) -> CameraSettings {
-        let framed = || CameraSettings::framing(&self.framed, aspect, self.up.vector());
-        let mut camera =
-            asked.map_or_else(|| self.camera.unwrap_or_else(framed), CameraState::settings);
+    /// The camera that was asked for, or else the scene's own, or one framed to `scene`.
+    pub(crate) fn camera(
+        &self,
+        scene: &Scene,
+        asked: Option<CameraState>,
+        aspect: f32,
+    ) -> CameraSettings {
+        let own = asked.map(CameraState::settings).or(self.camera);
+        let Some(mut camera) = own else {
+            return scene.framed(&Framing::new(aspect, self.up.vector()));
+        };
         if self.scale != 1.0 {
             camera.scale(self.scale);
         }
@@ -131,7 +135,7 @@ struct LightReport {
 struct Light {
     /// A built-in probe, or a file.
     probe: String,
-    /// Of a built-in probe.
+    /// Rows of a built-in probe.
     rows: usize,
     /// \[degrees\]
     rotate: f32,
@@ -199,7 +203,8 @@ impl Engine {
             scale: light.scale,
             exposure: light.exposure,
         });
-        let mut view = camera.unwrap_or_else(|| CameraSettings::framing(&framed, 1.0, up.vector()));
+        let mut view =
+            camera.unwrap_or_else(|| description.framed(&Framing::new(1.0, up.vector())));
         let report_camera = CameraState::new(&view);
         let cameras = description.cameras.iter().enumerate().map(|(i, of_file)| CameraReport {
             name: if of_file.name.is_empty() { i.to_string() } else { of_file.name.clone() },
@@ -219,7 +224,7 @@ impl Engine {
             environment: light,
         };
         self.session = None;
-        self.scene = Some((Rc::new(scene), LoadedScene { up, camera, framed, scale }));
+        self.scene = Some((Rc::new(scene), LoadedScene { up, camera, scale }));
         self.setup = setup;
         Ok(to_json(&report))
     }

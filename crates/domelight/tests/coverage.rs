@@ -2,8 +2,9 @@
 
 use domelight::environment::{Environment, Orientation};
 use domelight::geometry::{Mesh, Ray, RayBatch};
-use domelight::math::{Vec2, Vec3, vec2, vec3};
+use domelight::math::{Mat4, Vec2, Vec3, vec2, vec3};
 use domelight::render::{Background, Layers, RenderSettings, render};
+use domelight::scene::builtin::shapes;
 use domelight::scene::{
     AlphaMode, Camera, CameraSettings, ColorFactor, Coverage, Emission, Encoding, Factor,
     Layers as MaterialLayers, Material, MaterialModel, MetallicRoughnessMaterial, Part, Projection,
@@ -120,6 +121,134 @@ fn check_every_strategy(scene: &Scene, environment: &Environment, expected: &[[f
 
 const STRATEGIES: [&str; 6] =
     ["brdf:4", "environment:4", "mis:2:2", "rejection:4", "sir:2/8", "product:2"];
+
+/// A ball over ground at y = −1; a description of the ball alone with no ground.
+fn ball_over(ground: Option<Material>) -> Scene {
+    let mut ball = shapes::icosphere(3);
+    ball.transform(&Mat4::from_translation(vec3(0.0, 0.6, 0.0)));
+    let mut parts = vec![Part { name: "ball".into(), mesh: ball, material: 0 }];
+    let mut materials = vec![Material::diffuse("ball", Rgb::splat(0.6))];
+    if let Some(ground) = ground {
+        parts.push(Part { name: "ground".into(), mesh: card(-1.0), material: 1 });
+        materials.push(ground);
+    }
+    Scene::new(SceneDescription { parts, materials, ..SceneDescription::default() }).unwrap()
+}
+
+fn catcher() -> Material {
+    Material { catches_shadows: true, double_sided: false, ..Material::diffuse("g", Rgb::BLACK) }
+}
+
+/// A blue sky with a warm lamp, over ground of one color.
+fn lamp() -> Environment {
+    let map = RgbImage::from_fn(32, 16, |x, y| match (x, y) {
+        (6..10, 3..6) => Rgb::new(20.0, 15.0, 5.0),
+        (_, ..8) => Rgb::new(0.2, 0.5, 1.0),
+        _ => Rgb::new(0.7, 0.5, 0.3),
+    });
+    Environment::new(map, Orientation::default(), 1.0).unwrap()
+}
+
+/// Draws the ground beside the ball, where the lamp's shadow is, or all of it.
+fn draw_ground<S: Strategy>(
+    scene: &Scene,
+    environment: &Environment,
+    strategy: &S,
+    fov_y_degrees: f32,
+    settings: &RenderSettings,
+) -> Layers {
+    let camera = CameraSettings {
+        projection: Projection::Perspective { fov_y_degrees },
+        origin: vec3(5.0, 3.0, 5.0),
+        target: vec3(1.9, -1.0, 0.0),
+        up: Vec3::Y,
+    };
+    let camera = Camera::new(&camera, settings.width, settings.height).unwrap();
+    render(scene, &camera, environment, strategy, settings, &()).layers
+}
+
+/// Of the ground in the shadow alone.
+const SHADOW: f32 = 14.0;
+/// Of ball, shadow and ground.
+const ALL: f32 = 45.0;
+
+/// The shadow on ground that shows nothing else is that of a diffuse plate, by every strategy.
+#[test]
+fn caught_shadows_are_those_of_a_diffuse_plate() {
+    let environment = lamp();
+    let unoccluded = environment.irradiance(Vec3::Y) * (0.5 / std::f32::consts::PI);
+    let seeds = |of: &dyn Fn(&RenderSettings) -> [f64; 3]| -> Vec<[f64; 3]> {
+        (0..24).map(|seed| of(&RenderSettings { seed, ..settings() })).collect()
+    };
+    let plate = ball_over(Some(Material::diffuse("plate", Rgb::splat(0.5))));
+    let light = EnvironmentSampling { environment: &environment, n_samples: 4 };
+    let expected = seeds(&|settings| {
+        let layers = draw_ground(&plate, &environment, &light, SHADOW, settings);
+        assert!(layers.alpha.iter().all(|&alpha| alpha == 1.0));
+        let (mean, all) = (mean(&layers.color), unoccluded.to_array());
+        std::array::from_fn(|c| 1.0 - mean[c] / f64::from(all[c]))
+    });
+    assert!(expected[0].iter().all(|&shadow| shadow > 0.1), "it is dark there");
+    let scene = ball_over(Some(catcher()));
+    let test = ZTest { suite: Suite::of(STRATEGIES.len()), ..ZTest::default() };
+    for name in STRATEGIES {
+        let strategy = PreparedStrategy::new(name.parse().unwrap(), &environment).unwrap();
+        let means = seeds(&|settings| {
+            mean(&draw_ground(&scene, &environment, &strategy, SHADOW, settings).shadow)
+        });
+        test.two_sample(name, &means, &expected).unwrap_or_else(|f| panic!("{f}"));
+    }
+}
+
+/// With a hidden background, color over any background is the picture with it: exactly so by the layer of shadows, and by
+/// alpha alone where shadows are gray.
+#[test]
+fn caught_shadows_composite_to_the_picture_with_the_background() {
+    let environment = lamp();
+    let behind = environment.le_interpolated(Vec3::NEG_Y);
+    let strategy = EnvironmentSampling { environment: &environment, n_samples: 2 };
+    let scene = ball_over(Some(catcher()));
+    let hidden = RenderSettings { width: 24, height: 24, ..settings() };
+    let shown = RenderSettings { background: Background::Shown, ..hidden };
+    let [hidden, shown] = [hidden, shown]
+        .map(|settings| draw_ground(&scene, &environment, &strategy, ALL, &settings));
+    let (mut dark, mut bright) = (0, 0);
+    for i in 0..hidden.alpha.len() {
+        let (alpha, shadow) = (hidden.alpha[i], hidden.shadow.pixels[i]);
+        let over =
+            hidden.color.pixels[i] + behind * (1.0 - alpha + shadow.mean()) - behind * shadow;
+        let difference = over - shown.color.pixels[i];
+        assert!(difference.to_array().iter().all(|d| d.abs() < 1e-4), "{i}: {difference:?}");
+        assert_eq!((shown.alpha[i], shown.shadow.pixels[i]), (1.0, shadow));
+        if hidden.n_hits[i] == 0 {
+            assert_eq!(hidden.color.pixels[i], Rgb::BLACK);
+            assert!((alpha - shadow.mean()).abs() < 1e-5);
+            dark += u32::from(alpha > 0.3);
+            bright += u32::from(alpha < 0.1);
+        }
+    }
+    assert!(dark > 10 && bright > 10, "{dark} {bright}");
+}
+
+/// Ground that shows nothing but shadows hides no light: the ball has the bits that it has without it.
+#[test]
+fn ground_that_catches_shadows_leaves_the_subject_as_it_is() {
+    let environment = lamp();
+    let strategy = EnvironmentSampling { environment: &environment, n_samples: 2 };
+    let settings = RenderSettings { width: 24, height: 24, ..settings() };
+    let [with, without] = [Some(catcher()), None]
+        .map(|ground| draw_ground(&ball_over(ground), &environment, &strategy, ALL, &settings));
+    let ball = (0..without.alpha.len()).filter(|&i| without.alpha[i] == 1.0);
+    let mut n = 0;
+    for i in ball {
+        assert_eq!(with.color.pixels[i], without.color.pixels[i], "{i}");
+        assert_eq!(with.depth[i], without.depth[i]);
+        n += 1;
+    }
+    assert!(n > 20, "{n}");
+    assert!(without.shadow.pixels.iter().all(|&shadow| shadow == Rgb::BLACK));
+    assert_eq!(with.n_hits, without.n_hits);
+}
 
 /// A material that lets the share `transmission` of each channel of `color` pass, and reflects the rest of it diffusely.
 fn pane(color: Rgb, transmission: f32, opacity: f32) -> Material {

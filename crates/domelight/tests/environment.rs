@@ -1,5 +1,6 @@
 //! Every environment table draws what it says, in cells finer than its texels.
 
+use domelight::environment::statistics::ProbeStatistics;
 use domelight::environment::{CompensatedTable, Environment, Orientation, UpAxis};
 use domelight::math::{Vec2, Vec3, vec2};
 use domelight::sampling::Pcg32;
@@ -67,6 +68,22 @@ fn check(
     );
     let report = report.unwrap_or_else(|failure| panic!("{failure}"));
     assert!((report.mass - 1.0).abs() < 1e-4, "{name}: the density integrates to {}", report.mass);
+}
+
+/// The irradiance of a surface is that of its hemisphere, however the map is turned.
+#[test]
+fn irradiance_is_the_integral_over_the_hemisphere() {
+    let map = RgbImage::from_fn(7, 5, |x, y| Rgb::new((x + 2 * y) as f32, 1.0, 0.1 * y as f32));
+    let above = ProbeStatistics::new(&map).irradiance_up;
+    for (up, rotation) in [(UpAxis::Y, 0.0), (UpAxis::Y, 77.0), (UpAxis::Z, -10.0)] {
+        let environment = Environment::new(map.clone(), Orientation { up, rotation }, 1.0).unwrap();
+        let found = environment.irradiance(up.vector());
+        for (found, expected) in found.to_array().into_iter().zip(above.to_array()) {
+            assert!((found / expected - 1.0).abs() < 1e-4, "{found} is not {expected}");
+        }
+        let aside = environment.irradiance(Vec3::X).g;
+        assert!((aside / std::f32::consts::PI - 1.0).abs() < 1e-4, "{aside}");
+    }
 }
 
 #[test]

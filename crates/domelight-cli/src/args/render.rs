@@ -6,6 +6,7 @@ use super::Tone;
 use super::render_run::RenderRunArguments;
 use super::sampling::{PixelArguments, SampleArguments, StrategyArguments};
 use super::scene::SceneArguments;
+use super::turntable::TurntableArguments;
 use crate::output::PicturePath;
 
 pub(super) const EXAMPLES: &str = "\
@@ -16,6 +17,10 @@ Examples:
       your mesh under your HDRI
   domelight render scene.toml --strategy mis --split 3:1 --spp 256 -o out.exr -o out.png
       a scene file, three environment samples for each BRDF sample
+  domelight render robot.glb --env studio.hdr --view three-quarter --env-rotate auto --ground shadow
+      seen from the right side, lit from the left, with its shadow on the map
+  domelight render robot.glb --env studio.hdr --turntable 36 -o robot.png
+      robot.0000.png to robot.0035.png, once around it
   domelight render spheres --env cathedral --strategy brdf --rays 4 --json > stats.json
       another built-in scene, its statistics as JSON
   domelight render --spp 4096 --checkpoint long.exr
@@ -37,6 +42,8 @@ pub(crate) struct RenderArguments {
     pub(crate) pixel: PixelArguments,
     #[command(flatten)]
     pub(crate) render_run: RenderRunArguments,
+    #[command(flatten)]
+    pub(crate) turntable: TurntableArguments,
     #[command(flatten)]
     pub(crate) output: OutputArguments,
 }
@@ -62,10 +69,10 @@ pub(crate) struct OutputArguments {
     /// Write PNG output first in half the size, after one sample, to look at while the rest is rendered
     #[arg(long)]
     pub(crate) preview: bool,
-    /// Say which stages the time goes to: CPU seconds on standard error, and in --json
+    /// Report the CPU seconds of each stage on standard error, and in --json
     #[arg(long)]
     pub(crate) profile: bool,
-    /// How progress is shown
+    /// Form of the progress report
     #[arg(long, value_enum, value_name = "HOW", default_value_t = ProgressKind::Bar)]
     pub(crate) progress: ProgressKind,
 }

@@ -3,10 +3,11 @@
 use clap::{Args, ValueEnum};
 use domelight::environment::UpAxis;
 use domelight::environment::mapping::Mapping;
+use domelight::scene::ViewDirection;
 
 use super::{finite, mapping};
-use crate::parse::{Size, Triple, not_negative};
-use domelight_lab::scene::{BUILTIN_ROWS, NamedMaterial};
+use crate::parse::{Rotation, Size, Triple, not_negative};
+use domelight_lab::scene::{BUILTIN_ROWS, DepthOfField, NamedMaterial};
 
 /// A scene under its light, seen by a camera: for every command that renders.
 #[derive(Args, Debug)]
@@ -49,9 +50,10 @@ pub(crate) struct EnvironmentArguments {
     /// - reads standard input) [default: the scene's, else sky]
     #[arg(long, value_name = "PROBE")]
     pub(crate) env: Option<String>,
-    /// Turn the environment about the up axis, counter-clockwise seen from above [degrees]
-    #[arg(long, value_name = "DEG", value_parser = finite, allow_negative_numbers = true)]
-    pub(crate) env_rotate: Option<f32>,
+    /// Turn the environment about the up axis, counter-clockwise seen from above [degrees], or auto: its sun or
+    /// brightest side shines from the left on what the camera sees
+    #[arg(long, value_name = "DEG|auto", allow_negative_numbers = true)]
+    pub(crate) env_rotate: Option<Rotation>,
     /// Multiply the environment's radiance
     #[arg(long, value_name = "X", value_parser = not_negative, allow_negative_numbers = true)]
     pub(crate) env_scale: Option<f32>,
@@ -61,7 +63,7 @@ pub(crate) struct EnvironmentArguments {
     /// The world axis that the top of the map points to
     #[arg(long, value_enum, value_name = "AXIS")]
     pub(crate) env_up: Option<Up>,
-    /// The map's layout, where shape and attributes do not tell it rightly
+    /// The map's layout, where shape and attributes of the file do not determine it
     #[arg(long, value_name = "MAPPING", value_parser = mapping())]
     pub(crate) env_mapping: Option<Mapping>,
     /// The layer of an OpenEXR map
@@ -71,7 +73,7 @@ pub(crate) struct EnvironmentArguments {
     #[arg(long, value_name = "ROWS", default_value_t = BUILTIN_ROWS,
           value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(crate) env_rows: u32,
-    /// Refuse what is repaired or left out with a warning otherwise: negative, NaN and infinite texels, vertices that are
+    /// Refuse input that is otherwise repaired or left out with a warning: negative, NaN and infinite texels, vertices that are
     /// not finite, images and material libraries that cannot be read, and unknown extensions that a glTF file requires
     #[arg(long)]
     pub(crate) strict: bool,
@@ -89,21 +91,29 @@ pub(crate) struct CameraArguments {
     /// One of the scene's cameras, by name or number from 0 [default: the first]
     #[arg(long, value_name = "NAME|N")]
     pub(crate) camera: Option<String>,
-    /// Where the camera is [default: framed to the scene]
+    /// Frame the camera to the subject, seen from front, back, left, right, top, bottom, three-quarter, or from an azimuth
+    /// (90 is its right) and an elevation [degrees], such as 30,15 [default: the scene's camera, else 0,20]
+    #[arg(long, value_name = "VIEW|AZ,EL", allow_hyphen_values = true, conflicts_with_all = ["camera", "origin"])]
+    pub(crate) view: Option<ViewDirection>,
+    /// Position of the camera [default: framed to the scene]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) origin: Option<Triple>,
-    /// What it looks at
+    /// Point that the camera looks at
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) target: Option<Triple>,
-    /// The direction that is up in the picture
+    /// Direction that points up in the picture
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) up: Option<Triple>,
     /// Vertical field of view [degrees]
     #[arg(long, value_name = "DEG", value_parser = not_negative, allow_negative_numbers = true, conflicts_with = "ortho")]
     pub(crate) fov: Option<f32>,
-    /// Orthographic, with this height of the picture in the world
+    /// Make the camera orthographic, with this height of the picture in the world
     #[arg(long, value_name = "HEIGHT", value_parser = not_negative, allow_negative_numbers = true)]
     pub(crate) ortho: Option<f32>,
+    /// Depth of field: the f-number of a full-frame camera in a world of meters, the distance of what is sharp or auto
+    /// (the subject's center), and the blades of the aperture [default: a round one], such as 2.8,auto or 1.4,3.5,6
+    #[arg(long, value_name = "F,DIST[,BLADES]", conflicts_with = "ortho")]
+    pub(crate) dof: Option<DepthOfField>,
 }
 
 #[derive(Args, Debug)]
@@ -115,12 +125,22 @@ pub(crate) struct SubjectArguments {
     /// Move and scale the scene: center of the bounds to 0, longest half-extent to 1
     #[arg(long)]
     pub(crate) normalize: bool,
-    /// Put a diffuse disk (reflectance 0.5) under the scene
-    #[arg(long)]
-    pub(crate) ground: bool,
-    /// Leave the background out: transparent where nothing is
+    /// Put ground under the subject: a plate, diffuse (reflectance 0.5), that fades toward its rim, or shadow: nothing is
+    /// seen of it but shadows on the environment, or in alpha with --hide-env
+    #[arg(long, value_enum, value_name = "KIND", num_args = 0..=1, default_missing_value = "plate")]
+    pub(crate) ground: Option<GroundName>,
+    /// Leave the background out: pixels without a surface are transparent
     #[arg(long)]
     pub(crate) hide_env: bool,
+}
+
+/// What is put under a subject.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum GroundName {
+    /// A diffuse plate that fades toward its rim
+    Plate,
+    /// Nothing but shadows
+    Shadow,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

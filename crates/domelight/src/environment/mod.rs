@@ -11,15 +11,17 @@ mod compensation;
 mod density;
 #[cfg(feature = "io")]
 pub mod io;
+mod key_light;
 pub(crate) mod lat_long;
 pub mod mapping;
 pub mod statistics;
 
 pub use compensation::CompensatedTable;
 pub use density::{DensityError, EnvironmentDensity};
+pub use key_light::key_light_rotation;
 pub use lat_long::LatLongGrid;
 
-use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, vec3};
+use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, vec2, vec3};
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
 use crate::simd::{LANES, SimdF32x8, SimdFloat, SimdI32x8 as _, Vectors};
 use crate::{Rgb, RgbImage};
@@ -68,7 +70,7 @@ impl UpAxis {
     }
 }
 
-/// How a map stands in the world.
+/// The orientation of a map in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Orientation {
     /// The axis of the top row.
@@ -120,7 +122,7 @@ pub enum EnvironmentError {
 /// A direction drawn from the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvironmentSample {
-    /// Toward the light, world frame.
+    /// Unit direction toward the light, world frame.
     pub wi: Vec3,
     /// Radiance from there, [`Environment::le`] of `wi`.
     pub le: Rgb,
@@ -195,27 +197,6 @@ impl Environment {
         fingerprinter.finish()
     }
 
-    /// Loads a light probe of any known format and mapping.
-    ///
-    /// # Errors
-    /// If the file cannot be read or is damaged, or holds negative or non-finite values;
-    /// [`io::load_probe`] takes options for these.
-    #[cfg(feature = "io")]
-    pub fn load(path: impl AsRef<std::path::Path>) -> Result<Self, crate::Error> {
-        let probe = io::load_probe(path.as_ref(), &io::ProbeOptions::default())?;
-        Ok(Self::from_image(probe.image)?)
-    }
-
-    /// The light probe in the bytes of a picture file of any known format and mapping.
-    ///
-    /// # Errors
-    /// If the bytes are damaged or no picture; [`io::probe_from_bytes`] takes options.
-    #[cfg(feature = "io")]
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, crate::Error> {
-        let probe = io::probe_from_bytes(bytes, "the map", &io::ProbeOptions::default())?;
-        Ok(Self::from_image(probe.image)?)
-    }
-
     /// A built-in probe with 512 rows.
     pub fn builtin(probe: builtin::BuiltinProbe) -> Self {
         const ROWS: usize = 512;
@@ -223,12 +204,41 @@ impl Environment {
             .unwrap_or_else(|_| unreachable!("built-in probes are valid"))
     }
 
-    /// From a lat-long map that stands upright: [`Environment::new`] without rotation and scale.
+    /// An environment from a lat-long map that stands upright: [`Environment::new`] without rotation and scale.
     ///
     /// # Errors
     /// The first bad texel in row order, or an empty map.
     pub fn from_image(map: RgbImage) -> Result<Self, EnvironmentError> {
         Self::new(map, Orientation::default(), 1.0)
+    }
+
+    /// The irradiance ∫ L max(0, n · ω) dω of an unoccluded surface with the world normal n, a unit vector, in multiples of
+    /// [`Environment::unit`] \[W·m⁻²\].
+    pub fn irradiance(&self, normal: Vec3) -> Rgb {
+        /// Columns and rows into which coarse maps are divided.
+        const SIZE: [usize; 2] = [1024, 512];
+        let n = self.orientation.map_to_world().transpose() * normal;
+        let RgbImage { width, height, .. } = self.map;
+        let [fine_x, fine_y] = [SIZE[0].div_ceil(width), SIZE[1].div_ceil(height)];
+        let grid = LatLongGrid::new(width * fine_x, height * fine_y);
+        let row_sum = |y: usize| {
+            let omega = grid.column_angle() * grid.band(y..y + 1);
+            let texels = self.map.row(y / fine_y);
+            let mut sum = [0.0f64; 3];
+            for x in 0..grid.width() {
+                let at = |i: usize, n: usize| (i as f32 + 0.5) / n as f32;
+                let uv = vec2(at(x, grid.width()), at(y, grid.height()));
+                let wi = mapping::Mapping::LatLong.direction(uv).unwrap_or(Vec3::Y);
+                let weight = omega * f64::from(n.dot(wi).max(0.0));
+                let texel = texels[x / fine_x].to_array();
+                sum.iter_mut().zip(texel).for_each(|(s, c)| *s += weight * f64::from(c));
+            }
+            sum
+        };
+        // Add rows in their order, whoever computed them.
+        let rows: Vec<[f64; 3]> = crate::parallel::in_order(grid.height(), row_sum);
+        let sum = rows.iter().fold([0.0; 3], |sum, row| std::array::from_fn(|c| sum[c] + row[c]));
+        Rgb::from(sum.map(|c: f64| c as f32))
     }
 
     /// The same environment rotated further about its up axis \[degrees\]; see [`Orientation::rotation`].
@@ -248,7 +258,7 @@ impl Environment {
         Self::in_units(self.map, self.orientation, self.unit, scale)
     }
 
-    /// From a lat-long map: row 0 up, texel centers at +½, every texel finite and not negative;
+    /// An environment from a lat-long map: row 0 up, texel centers at +½, every texel finite and not negative;
     /// radiance is multiplied by `scale`.
     ///
     /// # Errors
@@ -388,7 +398,7 @@ impl Environment {
         &self.map
     }
 
-    /// How the map stands in the world.
+    /// The orientation of the map in the world.
     pub fn orientation(&self) -> Orientation {
         self.orientation
     }

@@ -65,9 +65,9 @@ pub enum InspectError {
         x: usize,
         /// Its row.
         y: usize,
-        /// Of the picture.
+        /// Columns of the picture.
         width: usize,
-        /// Of the picture.
+        /// Rows of the picture.
         height: usize,
     },
 }
@@ -83,8 +83,8 @@ pub struct Inspector<'a> {
     /// The hit nearest to the pixel's center.
     representative: Option<ShadingPoint>,
     regions: Regions,
-    /// Luminance that each source adds to the pixel, by multiple importance sampling: what a strategy that misses rare
-    /// light is told by.
+    /// Luminance that each source adds to the pixel, by multiple importance sampling: it reveals a strategy that
+    /// misses rare light.
     light: Vec<f64>,
     /// The longest extent of the scene, in its units.
     extent: f32,
@@ -109,7 +109,7 @@ pub struct PixelSummary {
     pub pixel: [usize; 2],
     /// Share of the camera samples that hit the scene.
     pub coverage: f64,
-    /// Of the hit nearest to the pixel's center, in the world; none of a pixel without a hit.
+    /// World position of the hit nearest to the pixel's center; none where the pixel has no hit.
     pub position: Option<[f32; 3]>,
     /// The shading normal there.
     pub normal: Option<[f32; 3]>,
@@ -136,7 +136,8 @@ impl<'a> Inspector<'a> {
         }
         let camera = scene.camera_inside(camera);
         let sampler = Sampler::new(settings.sampler, settings.seed, (y * width + x) as u64);
-        let (film, filter) = (sampler.set(Dimension::Film), FilterSampler::new(settings.filter));
+        let [film, lens] = [Dimension::Film, Dimension::Lens].map(|d| sampler.set(d));
+        let filter = FilterSampler::new(settings.filter);
         let see = |ray: &Ray, sample: u32| {
             let Sight { hit, throughput } = scene.sight(ray, settings.seed, sample);
             let known = match (&hit, settings.background) {
@@ -154,7 +155,8 @@ impl<'a> Inspector<'a> {
             .map(|i| {
                 let [[u], [v]] = film.u(i);
                 let at = filter.sample(vec2(u, v));
-                see(&camera.ray(x as f32 + at.x, y as f32 + at.y), i)
+                let [[u], [v]] = lens.u(i);
+                see(&camera.lens_ray(x as f32 + at.x, y as f32 + at.y, [u, v]), i)
             })
             .collect();
         let center = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
@@ -201,7 +203,7 @@ impl<'a> Inspector<'a> {
         }
     }
 
-    /// The suns and lamps that causes are told by, and the rest of the map.
+    /// The suns and lamps that causes are divided by, and the rest of the map.
     pub fn sources(&self) -> &[Source] {
         self.regions.sources()
     }

@@ -5,22 +5,21 @@
 //! forbids all of these here (`clippy.toml`). Square roots and rounding are exact everywhere and need no care.
 //!
 //! Exponentials and logarithms of f32 are computed in f64 and rounded once: a Taylor polynomial after a reduction of the
-//! argument, without tables, so that loops over them vectorize. Those that lobes use are kept out of line: of what has no
-//! effects the compiler computes that of all lobes before it asks which. All others are those of the `libm` crate, which
-//! are about as fast as the platform's. [`super::atan2`] and its neighbors are for vectors, and less accurate.
+//! argument, without tables, so that loops over them vectorize. Those that lobes use are kept out of line, because the
+//! compiler treats them as pure and hoists them above the branch on the lobe. All others are those of the `libm` crate,
+//! which are about as fast as the platform's. [`super::atan2`] and its neighbors are for vectors, and less accurate.
 #![cfg_attr(not(feature = "io"), allow(dead_code))] // Some serve files alone.
 
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2, LOG2_E, LOG10_2};
 
 /// f32 or f64.
-pub(crate) trait Real: Copy {
+pub(crate) trait Float: Copy {
     fn sin(self) -> Self;
     fn cos(self) -> Self;
     fn sin_cos(self) -> (Self, Self);
     fn tan(self) -> Self;
     fn asin(self) -> Self;
     fn acos(self) -> Self;
-    fn atan(self) -> Self;
     fn atan2(self, x: Self) -> Self;
     fn hypot(self, y: Self) -> Self;
     fn cbrt(self) -> Self;
@@ -65,14 +64,13 @@ macro_rules! powi {
     };
 }
 
-impl Real for f32 {
+impl Float for f32 {
     from_libm!(
         sin = libm::sinf,
         cos = libm::cosf,
         tan = libm::tanf,
         asin = libm::asinf,
         acos = libm::acosf,
-        atan = libm::atanf,
         cbrt = libm::cbrtf,
     );
     powi!();
@@ -121,7 +119,7 @@ impl Real for f32 {
     fn log10(self) -> f32 {
         (log2_kernel(self) * LOG10_2) as f32
     }
-    /// Of numbers not less than zero; NaN of others.
+    /// A power of a base ≥ 0; NaN for other bases.
     #[inline(always)]
     fn powf(self, exponent: f32) -> f32 {
         if exponent == 0.0 || self == 1.0 {
@@ -131,14 +129,13 @@ impl Real for f32 {
     }
 }
 
-impl Real for f64 {
+impl Float for f64 {
     from_libm!(
         sin = libm::sin,
         cos = libm::cos,
         tan = libm::tan,
         asin = libm::asin,
         acos = libm::acos,
-        atan = libm::atan,
         cbrt = libm::cbrt,
         exp2 = libm::exp2,
         exp_m1 = libm::expm1,
@@ -296,7 +293,7 @@ macro_rules! functions {
         $(
             $(#[$doc])*
             #[inline(always)]
-            pub(crate) fn $name<T: Real>($first: T $(, $second: $type)?) -> $result {
+            pub(crate) fn $name<T: Float>($first: T $(, $second: $type)?) -> $result {
                 T::$name($first $(, $second)?)
             }
         )*
@@ -316,8 +313,6 @@ functions! {
     asin(sine) -> T;
     /// The angle in [0, π] of a cosine in [−1, 1] \[rad\]; NaN of others.
     acos(cosine) -> T;
-    /// The angle in [−π/2, π/2] of a tangent \[rad\].
-    atan(tangent) -> T;
     /// The angle of (x, y) from the x axis in [−π, π] \[rad\].
     atan2(y, x: T) -> T;
     /// √(x² + y²), without overflow on the way.

@@ -14,7 +14,7 @@ pub struct Film {
     pub width: usize,
     /// Rows of the whole picture.
     pub height: usize,
-    /// Which pixels these are; those that nobody rendered have no samples.
+    /// The pixels of the picture that it holds; those that were not rendered have no samples.
     pub window: Window,
     pixels: Vec<PixelSums>,
 }
@@ -25,9 +25,9 @@ pub enum FilmMismatch {
     /// Another picture or part of it.
     #[error("it is window {found} of the picture, not {expected}")]
     Window {
-        /// Of the sums.
+        /// The window of the sums.
         found: Window,
-        /// Of the render.
+        /// The window of the render.
         expected: Window,
     },
     /// Some pixels of a tile have samples and others none.
@@ -151,8 +151,14 @@ mod tests {
                 let x = 0.1 + i as f32 / 3.0 + j as f32;
                 let color = Rgb::new(x, 1e-30 * x, 1e30 * x);
                 let surface = SurfaceSample { albedo: color, normal: Vec3::splat(x), depth: -x };
-                let sample =
-                    CameraSample { color, unoccluded: -color, alpha: x, surface: Some(surface) };
+                let sample = CameraSample {
+                    color,
+                    unoccluded: -color,
+                    alpha: x,
+                    shadow: Rgb::splat(x),
+                    unseen: 0.0,
+                    surface: Some(surface),
+                };
                 let set = if j % 2 == 1 { SampleSet::Second } else { SampleSet::First };
                 pixel.add(&sample, set, 1.0);
             }

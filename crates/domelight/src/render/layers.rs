@@ -61,7 +61,7 @@ macro_rules! layers {
         }),*];
 
         impl Layers {
-            /// Of pixels without samples.
+            /// The layers of a picture without samples.
             pub fn new(width: usize, height: usize) -> Self {
                 Self { $($field: LayerData::zero(width, height),)* }
             }
@@ -92,12 +92,16 @@ layers! {
     color: RgbImage = "color" {
         file: Some(""), channels: ["R", "G", "B"], |sums, _scale| sums.mean(sums.color)
     }
-    /// Coverage: the share of camera samples that hit the scene, or 1 where the background is shown.
+    /// Coverage: the share of camera samples that hit the scene, with the mean of `shadow`; 1 where the background is shown.
     alpha: Vec<f32> = "alpha" { file: Some(""), channels: ["A"], |sums, _scale| sums.alpha() }
     /// As `color` with every shadow ray free: the lecture's L_ns.
     unoccluded: RgbImage = "unoccluded" {
         file: Some("unoccluded"), channels: ["R", "G", "B"],
         |sums, _scale| sums.mean(sums.unoccluded)
+    }
+    /// The share of the background that shadows take away on ground that catches them; zero without such ground.
+    shadow: RgbImage = "shadow" {
+        file: Some("shadow"), channels: ["R", "G", "B"], |sums, _scale| sums.shadow()
     }
     /// Reflectance of the surfaces seen.
     albedo: RgbImage = "albedo" {

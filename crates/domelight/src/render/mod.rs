@@ -37,15 +37,17 @@ pub use layers::{LAYERS, LayerInfo, LayerValues, Layers};
 pub use output::Developed;
 #[cfg(feature = "io")]
 pub use provenance::{Provenance, kept_exposure};
-pub use renderer::{Mark, Renderer};
-pub use tile::Counts;
+pub use renderer::Renderer;
+pub use tile::{Counts, Mark};
 pub use tiling::{Tiling, Window};
 pub use variance::VarianceSums;
 
+use crate::Rgb;
 use crate::environment::Environment;
 use crate::geometry::{Ray, offset_origin};
-use crate::math::Vec3;
+use crate::math::{FRAC_1_PI, Vec3};
 use crate::sampling::SamplerKind;
+use crate::scene::material::CATCHER_REFLECTANCE;
 use crate::scene::{Camera, Scene};
 use crate::strategy::{ShadingPoint, Strategy, StrategySpec};
 
@@ -69,15 +71,15 @@ impl Background {
     }
 }
 
-/// How camera samples are divided into passes over the picture.
+/// The division of camera samples into passes over the picture.
 ///
 /// Strategies that learn nothing give the same picture with any.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Passes {
-    /// As long as the strategy works best with.
+    /// The length that the strategy works best with.
     #[default]
     Efficient,
-    /// 1, 1, 2, 4, … samples, up to the length of [`Passes::Efficient`]: a first picture soon.
+    /// Passes of 1, 1, 2, 4, … samples, up to the length of [`Passes::Efficient`]: the first picture comes soon.
     Doubling,
 }
 
@@ -91,7 +93,7 @@ impl Passes {
     }
 }
 
-/// How to render.
+/// Size, samples and further settings of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
     /// Columns, at least 1.
@@ -100,21 +102,21 @@ pub struct RenderSettings {
     pub height: usize,
     /// Camera samples of each pixel, at least 1.
     pub n_samples: u32,
-    /// Of strategies that render a tile in rounds, noisier pixels get more samples: `n_samples` are then the mean over
-    /// the pixels of a tile, not each pixel's.
+    /// Gives noisier pixels more samples, with strategies that render a tile in rounds: `n_samples` is then the mean over
+    /// the picture instead of the number of each pixel.
     pub adaptive: bool,
     /// A tile is finished before its samples are, but not before 16, when two independent sets of them suggest no more
     /// than this relMSE: the mean over its pixels of error² of the luminance over (luminance² + 0.01), and one standard
     /// error of that. Tiles that stop so have the error within a factor of 1.5 on average; those that 16 samples are
     /// more than enough for have less. To stop on what was drawn biases a picture by far less than the error.
     pub target_error: Option<f32>,
-    /// How samples are divided into passes; with a target error passes have lengths of their own.
+    /// Division of the samples into passes; with a target error, passes have lengths of their own.
     pub passes: Passes,
     /// Names the whole set of random numbers.
     pub seed: u64,
     /// Pixel filter.
     pub filter: Filter,
-    /// Which points.
+    /// The point sets that samples are drawn from.
     pub sampler: SamplerKind,
     /// What camera rays see that leave the scene.
     pub background: Background,
@@ -210,6 +212,31 @@ struct RenderContext<'a> {
     filter: FilterSampler,
     /// The longest extent of the scene, in its units.
     extent: f32,
+    /// What ground reflects that shows nothing but shadows.
+    catcher: Option<Catcher>,
+}
+
+/// Ground that shows nothing but shadows.
+#[derive(Clone, Copy, Debug)]
+struct Catcher {
+    /// What it reflects of the unoccluded light, in multiples of [`Environment::unit`].
+    radiance: Rgb,
+}
+
+impl Catcher {
+    /// The ground of a scene, if it has any.
+    fn of(scene: &Scene, environment: &Environment) -> Option<Self> {
+        let normal = scene.catcher_normal()?;
+        let reflected = CATCHER_REFLECTANCE * FRAC_1_PI;
+        Some(Self { radiance: environment.irradiance(normal) * reflected })
+    }
+
+    /// The share of each channel that is missing of light of which `missing` does not arrive, in the same multiples.
+    fn shadow(self, missing: Rgb) -> Rgb {
+        let share = |missing: f32, all: f32| if all > 0.0 { missing / all } else { 0.0 };
+        let (Rgb { r, g, b }, all) = (missing, self.radiance);
+        Rgb::new(share(r, all.r), share(g, all.g), share(b, all.b))
+    }
 }
 
 /// Renders a scene under an environment with one strategy, on rayon's current pool of threads.

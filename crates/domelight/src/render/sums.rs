@@ -11,6 +11,10 @@ pub(super) struct CameraSample {
     pub(super) color: Rgb,
     pub(super) unoccluded: Rgb,
     pub(super) alpha: f32,
+    /// The share of each channel of the background that shadows take away, on ground that shows nothing else.
+    pub(super) shadow: Rgb,
+    /// Luminance of such ground, where the background is hidden: its noise is that of the picture to be composited.
+    pub(super) unseen: f32,
     /// None where the ray left the scene.
     pub(super) surface: Option<SurfaceSample>,
 }
@@ -24,6 +28,8 @@ impl CameraSample {
             color: self.color * throughput,
             unoccluded: self.unoccluded * throughput,
             alpha: 1.0 - (1.0 - self.alpha) * behind,
+            shadow: self.shadow * throughput,
+            unseen: self.unseen * throughput.luminance(),
             surface: self.surface,
         }
     }
@@ -94,6 +100,7 @@ pixel_sums! {
         depth: f64 = ["depth.Z.high" "depth.Z.low"],
         /// `color` after the first n and n/2 samples, with n the greatest power of two so far.
         prefixes: [Rgb; 2] = ["whole.R" "whole.G" "whole.B" "half.R" "half.G" "half.B"],
+        shadow: Rgb = ["shadow.R" "shadow.G" "shadow.B"],
         albedo: Rgb = ["albedo.R" "albedo.G" "albedo.B"],
         normal: Vec3 = ["normal.X" "normal.Y" "normal.Z"],
         alpha: f32 = ["alpha.A"],
@@ -192,8 +199,10 @@ impl PixelSums {
     /// Adds a sample of a set, with colors in multiples of `unit`. A sample that is not finite counts as black and is
     /// reported: it returns false.
     pub(super) fn add(&mut self, sample: &CameraSample, set: SampleSet, unit: f64) -> bool {
-        let finite = sample.color.is_finite() && sample.unoccluded.is_finite();
+        let colors = [sample.color, sample.unoccluded, sample.shadow];
+        let finite = colors.iter().all(|color| color.is_finite());
         if finite {
+            self.shadow += sample.shadow;
             let in_units = |color: Rgb| color.to_array().map(|c| f64::from(c) * unit);
             for (c, x) in in_units(sample.color).into_iter().enumerate() {
                 self.color[c] += x;
@@ -203,7 +212,9 @@ impl PixelSums {
                 self.unoccluded[c] += x;
             }
         }
-        self.alpha += sample.alpha;
+        if sample.alpha.is_finite() {
+            self.alpha += sample.alpha;
+        }
         self.n_samples += 1;
         if set == SampleSet::Second {
             self.n_second += 1;
@@ -298,12 +309,18 @@ impl PixelSums {
     /// A sum over the number of samples.
     pub(super) fn mean(&self, sum: [f64; 3]) -> Rgb {
         let n = f64::from(self.n_samples.max(1));
-        Rgb::from(sum.map(|c| narrowed(c / n)))
+        // Shadows on ground are differences, whose few samples may overshoot.
+        Rgb::from(sum.map(|c| narrowed((c / n).max(0.0))))
+    }
+
+    /// The share of the background that shadows take away.
+    pub(super) fn shadow(&self) -> Rgb {
+        (self.shadow * self.scale()).map(|c| c.clamp(0.0, 1.0))
     }
 
     /// The share of camera samples that show something.
     pub(super) fn alpha(&self) -> f32 {
-        self.alpha * self.scale()
+        (self.alpha * self.scale()).clamp(0.0, 1.0)
     }
 
     /// The mean over the samples that hit.
@@ -323,7 +340,7 @@ impl PixelSums {
         })
     }
 
-    /// Of the mean, `scale` being [`super::variance::VarianceSums::scale`] of its samples.
+    /// The variance of the mean; `scale` is [`super::variance::VarianceSums::scale`] of its samples.
     pub(super) fn variance(&self, scale: f64) -> Rgb {
         Rgb::from(self.independent_variance().map(|v| narrowed(scale * v)))
     }

@@ -9,7 +9,7 @@ use super::layers::Layers;
 use super::sums::{CameraSample, PixelSums, SurfaceSample};
 use super::tiling::{SampleSet, Window};
 use super::variance::VarianceSums;
-use super::{Background, Mark, Observer, RenderContext, RenderSettings, Stage, visibility};
+use super::{Background, Catcher, Observer, RenderContext, RenderSettings, Stage, visibility};
 use crate::Rgb;
 use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
 use crate::math::{Vec3, vec2};
@@ -23,6 +23,17 @@ const FEWEST_SAMPLES: u32 = 16;
 
 /// Names the random numbers that decide which surfaces camera rays see.
 const COVERAGE: u64 = 0x636f_7665_7261_6765;
+
+/// A moment between passes; see [`Renderer::changed_since`](super::Renderer::changed_since).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Mark(u64);
+
+impl Mark {
+    /// The mark of the pass that follows.
+    pub(super) fn next(self) -> Self {
+        Self(self.0 + 1)
+    }
+}
 
 /// A rectangle of the picture and the sums of its pixels.
 #[derive(Clone, Debug)]
@@ -103,7 +114,7 @@ pub(super) struct Pass<S: Strategy> {
 /// A round of a pass over a tile.
 #[derive(Default)]
 struct Batch {
-    /// Of each pixel of the tile, whether it may see anything.
+    /// Whether each pixel of the tile may see anything.
     seen: Vec<bool>,
     /// Whether it takes a second set of samples in the pass.
     has_second: Vec<bool>,
@@ -116,12 +127,12 @@ struct Batch {
     hits: Vec<Option<Hit>>,
     /// Factors on what the rays see; none in scenes where nothing transmits.
     throughputs: Vec<Rgb>,
-    /// Of each pixel.
+    /// The camera rays of each pixel.
     camera_rays: Vec<CameraRays>,
     points: Vec<ShadingPoint>,
     samples: Vec<u32>,
     pixels: Vec<PixelPoints>,
-    /// Of each point, moved off the surface to the viewer's side.
+    /// The origin of each point's shadow rays, off the surface on the viewer's side.
     origins: Vec<Vec3>,
     round: ShadowRays,
     radiance: Vec<Rgb>,
@@ -351,8 +362,9 @@ impl Tile {
             let samples = start..start + n_samples;
             let first = seen.then_some(rays.len());
             if first.is_some() {
-                let set = sampler.set(Dimension::Film);
-                rays.extend(samples.clone().map(|sample| camera_ray(context, x, y, &set, sample)));
+                let numbers = CameraNumbers::of(context, &sampler);
+                let ray = |sample| camera_ray(context, x, y, &numbers, sample);
+                rays.extend(samples.clone().map(ray));
             }
             camera_rays.push(CameraRays { samples, first });
             pixels.push(PixelPoints { points: 0..0, n_samples, sampler, one_material: true });
@@ -457,15 +469,16 @@ impl Tile {
                     }
                     Some((ray, None)) => background_sample(ray.direction),
                     None => {
-                        let set = batch.pixels[i].sampler.set(Dimension::Film);
-                        let ray = camera_ray(context, x, y, &set, sample);
+                        let numbers = CameraNumbers::of(context, &batch.pixels[i].sampler);
+                        let ray = camera_ray(context, x, y, &numbers, sample);
                         background_sample(ray.direction)
                     }
                 };
                 let throughput = ray.and_then(|ray| batch.throughputs.get(ray));
                 let sample = throughput.map_or(sample, |&through| sample.through(through));
                 if adaptive {
-                    sums.add(sample.color.luminance(), sample.surface.is_some());
+                    let luminance = sample.color.luminance() + sample.unseen;
+                    sums.add(luminance, sample.surface.is_some());
                 }
                 non_finite += u64::from(!self.pixels[i].add(&sample, set, unit));
             }
@@ -502,18 +515,39 @@ fn has_second_set(seed: u64, x: usize, y: usize) -> bool {
     place(x, y) == Some((hash >> 8) as usize % n)
 }
 
-/// Camera sample `sample` of the pixel at (`x`, `y`), by its numbers for the film.
+/// The numbers of a pixel's camera rays.
+struct CameraNumbers {
+    film: SampleSequence,
+    /// None of a camera without a lens.
+    lens: Option<SampleSequence>,
+}
+
+impl CameraNumbers {
+    fn of(context: &RenderContext, sampler: &Sampler) -> Self {
+        let lens = context.camera.has_lens().then(|| sampler.set(Dimension::Lens));
+        Self { film: sampler.set(Dimension::Film), lens }
+    }
+}
+
+/// Camera sample `sample` of the pixel at (`x`, `y`).
 #[inline]
 fn camera_ray(
     context: &RenderContext,
     x: usize,
     y: usize,
-    set: &SampleSequence,
+    numbers: &CameraNumbers,
     sample: u32,
 ) -> Ray {
-    let [[u], [v]] = set.u(sample);
+    let [[u], [v]] = numbers.film.u(sample);
     let at = context.filter.sample(vec2(u, v));
-    context.camera.ray(x as f32 + at.x, y as f32 + at.y)
+    let (px, py) = (x as f32 + at.x, y as f32 + at.y);
+    match &numbers.lens {
+        None => context.camera.ray(px, py),
+        Some(lens) => {
+            let [[u], [v]] = lens.u(sample);
+            context.camera.lens_ray(px, py, [u, v])
+        }
+    }
 }
 
 /// What a ray sees behind the scene, in multiples of `unit`.
@@ -524,7 +558,7 @@ fn background_sample(context: &RenderContext, direction: Vec3, unit: f64) -> Cam
             let le = context.environment.le_interpolated(direction);
             let own = context.environment.unit();
             let le = if own == unit { le } else { le * (own / unit) as f32 };
-            CameraSample { color: le, unoccluded: le, alpha: 1.0, surface: None }
+            CameraSample { color: le, unoccluded: le, alpha: 1.0, ..CameraSample::default() }
         }
     }
 }
@@ -620,6 +654,11 @@ impl Batch {
         hit: &Hit,
         unit: f64,
     ) -> CameraSample {
+        if context.scene.catches_shadows(hit)
+            && let Some(catcher) = context.catcher
+        {
+            return self.shadow_sample(context, catcher, point, ray, unit);
+        }
         let p = &self.points[point];
         // In multiples of the unit, as the rest.
         let in_units = |c: f32| (f64::from(c) / unit).min(f64::from(f32::MAX)) as f32;
@@ -629,11 +668,44 @@ impl Batch {
             color: self.radiance[point] + emitted,
             unoccluded: self.unoccluded[point] + emitted,
             alpha: 1.0,
+            shadow: Rgb::BLACK,
+            unseen: 0.0,
             surface: Some(SurfaceSample {
                 albedo: p.bsdf.albedo(),
                 normal: p.frame.z,
                 depth: context.camera.depth(ray.at(hit.t)) * context.scene.unit(),
             }),
+        }
+    }
+}
+
+impl Batch {
+    /// The background, darkened by what the light does not reach. The estimate of the light that is missing is zero
+    /// where every ray is free, so that no noise is laid over the background.
+    fn shadow_sample(
+        &self,
+        context: &RenderContext,
+        catcher: Catcher,
+        point: usize,
+        ray: &Ray,
+        unit: f64,
+    ) -> CameraSample {
+        let missing = self.unoccluded[point] - self.radiance[point];
+        let own = context.environment.unit();
+        let missing = if own == unit { missing } else { missing * (unit / own) as f32 };
+        let shadow = catcher.shadow(missing);
+        let behind = background_sample(context, ray.direction, unit);
+        let is_hidden = context.settings.background == Background::Hidden;
+        CameraSample {
+            color: behind.color * (Rgb::WHITE - shadow),
+            shadow,
+            alpha: if is_hidden { shadow.mean() } else { 1.0 },
+            unseen: if is_hidden {
+                (catcher.radiance * (Rgb::WHITE - shadow)).luminance()
+            } else {
+                0.0
+            },
+            ..behind
         }
     }
 }

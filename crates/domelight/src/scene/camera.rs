@@ -1,4 +1,4 @@
-//! The pinhole and the orthographic camera.
+//! The pinhole, the thin lens and the orthographic camera.
 //!
 //! The picture's basis is f = normalize(target − origin), r = normalize(f × up), u = r × f. The
 //! point (px, py) of a W × H picture, px to the right and py **down** from the top left corner in
@@ -10,16 +10,18 @@
 //! orthographic camera moves the origin instead, with height/2 in the place of tan(fov/2).
 
 use super::Scene;
+use super::framing::{Framing, corners};
 use crate::bvh::Frustum;
 use crate::geometry::{Aabb, Ray, power_of_two};
-use crate::math::{Mat4, Vec3, functions};
+use crate::math::{Mat4, TAU, Vec2, Vec3, functions, vec2};
+use crate::sampling::warp::concentric_disk;
 
 /// A camera before the size of its picture is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraSettings {
     /// Perspective or orthographic.
     pub projection: Projection,
-    /// Where the camera is.
+    /// Position of the camera.
     pub origin: Vec3,
     /// What it looks at: any point on its axis but the origin.
     pub target: Vec3,
@@ -27,7 +29,7 @@ pub struct CameraSettings {
     pub up: Vec3,
 }
 
-/// How the camera maps directions to the picture.
+/// The projection of the scene onto the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
     /// All rays start at the origin.
@@ -40,6 +42,67 @@ pub enum Projection {
         /// Height of the picture in world units, > 0.
         height: f32,
     },
+}
+
+/// A thin lens with an aperture: what is not at its focus distance is blurred.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lens {
+    /// Radius of the aperture in world units, ≥ 0.
+    pub radius: f32,
+    /// Distance from the camera, along its axis, of what is sharp, > 0.
+    pub focus_distance: f32,
+    /// Blades of the aperture, 3 or more; fewer mean a round one.
+    pub blades: u32,
+}
+
+impl Lens {
+    /// Height of the sensor of a full-frame camera \[m\].
+    const SENSOR: f32 = 0.024;
+
+    /// A lens of a full-frame camera at an f-number > 0, in a world whose unit is a meter: the sensor's height of 24 mm and
+    /// the field of view of `settings` give the focal length, and the aperture is the focal length over the f-number.
+    ///
+    /// # Errors
+    /// If the camera is orthographic, or a number is not positive and finite.
+    pub fn new(
+        settings: &CameraSettings,
+        f_number: f32,
+        focus_distance: f32,
+        blades: u32,
+    ) -> Result<Self, CameraError> {
+        let Projection::Perspective { .. } = settings.projection else {
+            return Err(CameraError::NoLens);
+        };
+        for (name, value) in [("f-number", f_number), ("focus distance", focus_distance)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(CameraError::Lens { name, value });
+            }
+        }
+        let focal_length = 0.5 * Self::SENSOR / half_height(settings.projection)?;
+        Ok(Self { radius: 0.5 * focal_length / f_number, focus_distance, blades })
+    }
+
+    /// Scales the lens with the scene by a factor > 0.
+    pub fn scale(&mut self, factor: f32) {
+        self.radius *= factor;
+        self.focus_distance *= factor;
+    }
+
+    /// A point of the aperture, in \[−1, 1\]² times its radius, from uniform numbers in \[0, 1).
+    fn point(&self, [u, v]: [f32; 2]) -> Vec2 {
+        if self.blades < 3 {
+            return concentric_disk(vec2(u, v));
+        }
+        // Choose one of the triangles from the center to an edge, and a point of it by its area.
+        let n = self.blades as f32;
+        let blade = (u * n).floor().min(n - 1.0);
+        let corner = |i: f32| {
+            let (sin, cos) = functions::sin_cos(TAU * i / n);
+            vec2(sin, cos)
+        };
+        let out = (u * n - blade).clamp(0.0, 1.0).sqrt();
+        out * ((1.0 - v) * corner(blade) + v * corner(blade + 1.0))
+    }
 }
 
 /// A camera that makes no picture.
@@ -81,6 +144,17 @@ pub enum CameraError {
         /// The height.
         height: f32,
     },
+    /// An orthographic camera with a lens.
+    #[error("an orthographic camera has no lens; give a field of view, or no depth of field")]
+    NoLens,
+    /// A lens that is none.
+    #[error("the lens's {name} {value} is not a positive finite number")]
+    Lens {
+        /// Which number.
+        name: &'static str,
+        /// Its value.
+        value: f32,
+    },
     /// A picture without pixels.
     #[error("a picture of {width} x {height} has no pixels")]
     Size {
@@ -95,34 +169,13 @@ impl CameraSettings {
     /// The vertical field of view of [`CameraSettings::framing`] \[degrees\].
     pub const DEFAULT_FOV_Y_DEGREES: f32 = 35.0;
 
-    /// A view from the +Z side (for `up` = +Y), 20° from above, that fits the bounding sphere of
-    /// `bounds` into a picture of `aspect` = width / height with a small margin.
+    /// A view from the front, 20° from above, that fits `bounds` into a picture of `aspect` = width / height with a
+    /// small margin; [`Framing`] has other views, and [`Scene::framed`] fits the scene's vertices, which is tighter.
     ///
     /// Empty or infinite bounds are taken as the cube from −1 to 1, an `up` of zero as +Y.
     pub fn framing(bounds: &Aabb, aspect: f32, up: Vec3) -> Self {
-        const MARGIN: f32 = 1.05;
-        let usable = !bounds.is_empty() && bounds.min.is_finite() && bounds.max.is_finite();
-        let cube = Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE };
-        let bounds = if usable { *bounds } else { cube };
-        let center = bounds.center();
-        let radius = 0.5 * bounds.size().length();
-        let radius = if radius > 0.0 { radius } else { 1.0 };
-
-        let half_y = 0.5 * Self::DEFAULT_FOV_Y_DEGREES.to_radians();
-        let half_x = functions::atan(functions::tan(half_y) * aspect.max(1e-3));
-        let distance = MARGIN * radius / functions::sin(half_y.min(half_x));
-
-        let up = up.try_normalize().unwrap_or(Vec3::Y);
-        let back = Vec3::Z - up * up.z;
-        let back = back.try_normalize().filter(|_| up.z.abs() < 0.9).unwrap_or(-Vec3::Y);
-        let back = (back - up * up.dot(back)).normalize();
-        let (sin, cos) = functions::sin_cos(20f32.to_radians());
-        Self {
-            projection: Projection::Perspective { fov_y_degrees: Self::DEFAULT_FOV_Y_DEGREES },
-            origin: center + distance * (cos * back + sin * up),
-            target: center,
-            up,
-        }
+        let corners = if bounds.is_empty() { None } else { Some(corners(bounds)) };
+        Framing::new(aspect, up).fit(corners.into_iter().flatten())
     }
 
     /// Checks that the settings make a picture.
@@ -131,6 +184,32 @@ impl CameraSettings {
     /// The [`CameraError`] that says which one does not.
     pub fn check(&self) -> Result<(), CameraError> {
         basis(self).and(half_height(self.projection)).map(|_| ())
+    }
+
+    /// The direction to the camera from what it sees, along the ground: around the axis `up`, of any length. A camera
+    /// that looks along the axis has the bottom of its picture in front.
+    pub fn side(&self, up: Vec3) -> Vec3 {
+        let flat = |v: Vec3| v - up * (v.dot(up) / up.length_squared().max(f32::MIN_POSITIVE));
+        let toward = (self.origin - self.target).normalize_or_zero();
+        let along = flat(toward);
+        if along.length() > 1e-2 {
+            return along;
+        }
+        if toward.dot(up) > 0.0 { -flat(self.up) } else { flat(self.up) }
+    }
+
+    /// The same camera moved around `center` about `axis`, counter-clockwise seen from its tip by an angle \[degrees\].
+    #[must_use]
+    pub fn orbited(&self, center: Vec3, axis: Vec3, degrees: f32) -> Self {
+        let Some(axis) = direction(axis) else { return *self };
+        let (sin, cos) = functions::sin_cos(degrees.to_radians());
+        let turn = |v: Vec3| cos * v + sin * axis.cross(v) + (1.0 - cos) * axis.dot(v) * axis;
+        Self {
+            origin: center + turn(self.origin - center),
+            target: center + turn(self.target - center),
+            up: turn(self.up),
+            ..*self
+        }
     }
 
     /// Scales the camera's place and, of an orthographic one, the height of its picture by a factor > 0.
@@ -156,9 +235,9 @@ impl CameraSettings {
 /// A camera of one picture: camera rays from pixel positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Of the perspective camera: all rays'; of the orthographic one: the top left corner.
+    /// The origin of all rays (perspective), or of the ray through the top left corner (orthographic).
     origin: Vec3,
-    /// Of the perspective camera: toward the top left corner; of the orthographic one: all rays'.
+    /// The direction toward the top left corner (perspective), or of all rays (orthographic).
     direction: Vec3,
     /// One pixel to the right, as a change of direction or of origin.
     step_x: Vec3,
@@ -167,6 +246,16 @@ pub struct Camera {
     /// The camera's axis through its place, to measure depth along.
     axis: Ray,
     orthographic: bool,
+    lens: Option<LensPlane>,
+}
+
+/// A lens in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LensPlane {
+    lens: Lens,
+    /// Unit vectors to the right and down.
+    right: Vec3,
+    down: Vec3,
 }
 
 impl Camera {
@@ -179,7 +268,7 @@ impl Camera {
         assert!(width > 0 && height > 0, "a picture of {width} x {height} has no pixels");
         let aspect = width as f32 / height as f32;
         let up = scene.up_axis().vector();
-        let framed = || CameraSettings::framing(&scene.subject_bounds(), aspect, up);
+        let framed = || scene.framed(&Framing::new(aspect, up));
         Self::new(&scene.camera(aspect), width, height)
             .or_else(|_| Self::new(&framed(), width, height))
             .expect("framing settings make a picture")
@@ -213,6 +302,7 @@ impl Camera {
                 step_y,
                 axis,
                 orthographic: false,
+                lens: None,
             },
             Projection::Orthographic { .. } => Self {
                 origin: settings.origin + corner,
@@ -221,8 +311,25 @@ impl Camera {
                 step_y,
                 axis,
                 orthographic: true,
+                lens: None,
             },
         })
+    }
+
+    /// The same view through a lens; an orthographic camera stays as it is.
+    #[must_use]
+    pub fn with_lens(mut self, lens: Lens) -> Self {
+        if !self.orthographic && lens.radius > 0.0 {
+            let [right, down] = [self.step_x, self.step_y].map(Vec3::normalize);
+            self.lens = Some(LensPlane { lens, right, down });
+        }
+        self
+    }
+
+    /// Whether rays through a point of the picture differ by where they meet the lens.
+    #[inline]
+    pub fn has_lens(&self) -> bool {
+        self.lens.is_some()
     }
 
     /// The same view in a picture of another size: both sizes are (columns, rows), at least 1.
@@ -235,7 +342,12 @@ impl Camera {
     /// The same view where all lengths are multiplied by a factor > 0.
     pub(crate) fn scaled(&self, factor: f32) -> Self {
         let step = if self.orthographic { factor } else { 1.0 };
+        let mut lens = self.lens;
+        if let Some(plane) = &mut lens {
+            plane.lens.scale(factor);
+        }
         Self {
+            lens,
             origin: self.origin * factor,
             step_x: self.step_x * step,
             step_y: self.step_y * step,
@@ -256,12 +368,29 @@ impl Camera {
         }
     }
 
+    /// The ray through a point of the picture, as [`Camera::ray`], that passes the lens where the numbers `u` in \[0, 1) say;
+    /// they count only if there is a lens.
+    pub fn lens_ray(&self, px: f32, py: f32, u: [f32; 2]) -> Ray {
+        let Some(LensPlane { lens, right, down }) = self.lens else { return self.ray(px, py) };
+        let at = lens.radius * lens.point(u);
+        let aside = at.x * right + at.y * down;
+        let step = px * self.step_x + py * self.step_y;
+        let direction = lens.focus_distance * (self.direction + step) - aside;
+        Ray::new(self.origin + aside, direction.normalize())
+    }
+
     /// What the rays see through the rectangle of the picture from (`x[0]`, `y[0]`) to
     /// (`x[1]`, `y[1]`) \[pixels\].
     pub fn frustum(&self, x: [f32; 2], y: [f32; 2]) -> Frustum {
         let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
         let steps = corners.map(|[x, y]| x * self.step_x + y * self.step_y);
-        if self.orthographic {
+        if let Some(LensPlane { lens, right, down }) = self.lens {
+            // A ray starts no farther aside than the aperture's rim, and strays from the pinhole's no faster than from there.
+            let signs = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+            let out = signs.map(|[x, y]| lens.radius * (x * right + y * down));
+            let toward = |i: usize| self.direction + steps[i] + out[i] / lens.focus_distance;
+            Frustum::new(out.map(|out| self.origin + out), std::array::from_fn(toward))
+        } else if self.orthographic {
             Frustum::new(steps.map(|step| self.origin + step), [self.direction; 4])
         } else {
             Frustum::new([self.origin; 4], steps.map(|step| self.direction + step))
@@ -363,7 +492,7 @@ mod tests {
     }
 
     #[test]
-    fn framing_fits_the_bounding_sphere() {
+    fn framing_fits_the_bounds() {
         let bounds = Aabb { min: vec3(-3.0, 1.0, 2.0), max: vec3(4.0, 2.0, 9.0) };
         for up in [Vec3::Y, Vec3::Z, vec3(0.0, 1.0, 1.0)] {
             for (w, h) in [(300, 100), (100, 100), (100, 300)] {
@@ -390,6 +519,53 @@ mod tests {
         for odd in [Aabb::EMPTY, Aabb { min: Vec3::ONE, max: Vec3::ONE }] {
             Camera::new(&CameraSettings::framing(&odd, 1.0, Vec3::ZERO), 4, 4).unwrap();
         }
+    }
+
+    /// Rays through one point of the picture meet at the focus distance, and start all over the aperture.
+    #[test]
+    fn rays_through_a_lens_meet_where_it_is_focused() {
+        let s = settings();
+        for blades in [0, 5, 7] {
+            let lens = Lens { radius: 0.2, focus_distance: 3.0, blades };
+            let pinhole = Camera::new(&s, 30, 20).unwrap();
+            let camera = pinhole.with_lens(lens);
+            let ray = camera.ray(4.25, 17.5);
+            assert_eq!(ray, pinhole.ray(4.25, 17.5));
+            let focus = ray.at(3.0 / ray.direction.dot(camera.axis.direction));
+            let mut farthest = 0.0f32;
+            let mut mean = Vec3::ZERO;
+            for i in 0..1024 {
+                let u = [(i % 32) as f32 / 32.0 + 0.015, (i / 32) as f32 / 32.0 + 0.015];
+                let through = camera.lens_ray(4.25, 17.5, u);
+                let toward = (focus - through.origin).normalize();
+                assert!((toward - through.direction).length() < 1e-5);
+                let aside = through.origin - s.origin;
+                assert!(aside.dot(camera.axis.direction).abs() < 1e-5);
+                farthest = farthest.max(aside.length());
+                mean += aside / 1024.0;
+            }
+            assert!(farthest <= 0.2 + 1e-5 && farthest > 0.17, "{blades}: {farthest}");
+            assert!(mean.length() < 0.01, "{blades}: {mean}");
+        }
+    }
+
+    #[test]
+    fn a_lens_takes_its_aperture_from_the_field_of_view() {
+        let fov = |fov_y_degrees| CameraSettings {
+            projection: Projection::Perspective { fov_y_degrees },
+            ..settings()
+        };
+        // A normal lens of 50 mm sees 27° of 24 mm.
+        let lens = Lens::new(&fov(26.991), 2.0, 5.0, 0).unwrap();
+        assert!((lens.radius - 0.0125).abs() < 1e-5, "{}", lens.radius);
+        for (f_number, distance) in [(0.0, 1.0), (2.0, -1.0), (f32::NAN, 1.0), (2.0, f32::INFINITY)]
+        {
+            let error = Lens::new(&settings(), f_number, distance, 0).unwrap_err();
+            assert!(matches!(error, CameraError::Lens { .. }));
+        }
+        let flat =
+            CameraSettings { projection: Projection::Orthographic { height: 1.0 }, ..settings() };
+        assert_eq!(Lens::new(&flat, 2.0, 1.0, 0), Err(CameraError::NoLens));
     }
 
     #[test]

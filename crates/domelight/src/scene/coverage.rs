@@ -66,7 +66,7 @@ const LEAST_REFLECTED: f32 = 0.25;
 #[derive(Clone, Copy, Debug)]
 struct Layer {
     transmits: bool,
-    /// Of being met.
+    /// The probability that a ray meets it.
     probability: f32,
     /// Factors on the radiance of a ray that meets it, and of one that does not.
     if_met: Rgb,
@@ -115,7 +115,7 @@ impl Part {
     /// Whether it hides all behind it, everywhere.
     pub(super) fn is_opaque(&self, materials: &[Material]) -> bool {
         let material = &materials[self.material];
-        if material.transmits() {
+        if material.transmits() || material.catches_shadows {
             return false;
         }
         let coverage = &material.coverage;
@@ -230,19 +230,37 @@ impl Scene {
     /// Whether anything lets a share of light through.
     #[inline]
     pub(crate) fn has_partial(&self) -> bool {
-        self.partial.is_some()
+        self.dims_light
+    }
+
+    /// Whether the surface of a hit shows nothing but shadows.
+    #[inline]
+    pub(crate) fn catches_shadows(&self, hit: &Hit) -> bool {
+        self.catches_shadows && self.materials[self.locate(hit.triangle).0.material].catches_shadows
+    }
+
+    /// The directions that surfaces face which show nothing but shadows, if there are any: that of the first triangle of
+    /// the first of them.
+    pub(crate) fn catcher_normal(&self) -> Option<Vec3> {
+        let catches = |part: &&Part| self.materials[part.material].catches_shadows;
+        let mesh = &self.parts.iter().find(catches)?.mesh;
+        let [a, b, c] = mesh.triangles.first()?.map(|i| mesh.positions[i as usize]);
+        (b - a).cross(c - a).try_normalize()
     }
 
     /// What share of light, in \[0, 1\], the surfaces that are not in [`Scene::bvh`] let through along each shadow ray:
     /// a product over all of them. `transmittances` is overwritten, one entry a ray.
     pub fn transmittances(&self, rays: &RayBatch, transmittances: &mut Vec<f32>) {
-        let Some(partial) = &self.partial else {
+        let Some(partial) = self.partial.as_ref().filter(|_| self.dims_light) else {
             transmittances.clear();
             transmittances.resize(rays.len(), 1.0);
             return;
         };
         let of_hit = |ray: usize, hit: &Hit| {
             let hit = partial.in_scene(hit);
+            if self.catches_shadows(&hit) {
+                return 1.0;
+            }
             let coverage = self.opacity(&hit);
             let (part, triangle) = self.locate(hit.triangle);
             if self.transmits && self.materials[part.material].transmits() {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::camera::CameraSettings;
+use super::framing::ViewDirection;
 use super::material::Material;
 use super::texture::Texture;
 use crate::environment::UpAxis;
@@ -22,12 +23,14 @@ pub struct SceneDescription {
     pub camera: Option<CameraSettings>,
     /// All cameras of the file, of which `camera` is one, in the file's order.
     pub cameras: Vec<NamedCamera>,
+    /// From where a camera looks that is framed to the scene; `None` is [`ViewDirection::DEFAULT`].
+    pub view: Option<ViewDirection>,
     /// The environment, if the scene names one.
     pub environment: Option<EnvironmentSettings>,
     /// Parts that are scenery, such as floors and plinths, by index: the camera is not framed to
     /// them and a material for the subject does not reach them.
     pub scenery: Vec<usize>,
-    /// Which axis of the file points up; `None` if the format does not say.
+    /// The axis of the file that points up; `None` if the format does not say.
     ///
     /// The geometry is given as it is in the file: turning it is the caller's choice.
     pub up: Option<UpAxis>,
@@ -56,7 +59,7 @@ pub struct NamedCamera {
 /// The light around a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnvironmentSettings {
-    /// Where the map comes from.
+    /// The source of the map.
     pub source: EnvironmentSource,
     /// Rotation about the up axis \[degrees\].
     pub rotate_degrees: f32,
@@ -75,7 +78,7 @@ impl EnvironmentSettings {
     }
 }
 
-/// Where a light probe comes from.
+/// The source of a light probe.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum EnvironmentSource {
     /// A file, its path already relative to the working directory.
@@ -121,6 +124,7 @@ impl SceneDescription {
         self.materials.append(&mut other.materials);
         self.textures.append(&mut other.textures);
         self.camera = self.camera.take().or(other.camera);
+        self.view = self.view.or(other.view);
         self.cameras.append(&mut other.cameras);
         self.environment = self.environment.take().or(other.environment);
         self.up = self.up.or(other.up);

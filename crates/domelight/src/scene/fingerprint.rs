@@ -29,10 +29,14 @@ impl Scene {
                 double_sided,
                 emission,
                 unlit,
+                catches_shadows,
                 layers,
             } = material;
             f.text(format_args!("{model:?} {normal_map:?} {coverage:?} {double_sided}"));
             f.text(format_args!("{emission:?} {unlit} {layers:?}"));
+            if *catches_shadows {
+                f.text("catches shadows");
+            }
         }
         if self.unit != 1.0 {
             f.numbers([self.unit]);

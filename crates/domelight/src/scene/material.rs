@@ -3,22 +3,25 @@
 //! A [`Material`] becomes a [`Bsdf`], a sum of reflectance lobes, at each hit:
 //! textures are looked up there and vertex colors multiplied in.
 
-use super::layers::{Channel, Coverage, Emission, Layers};
+use super::layers::{Channel, Coverage, Emission, Layers, NormalMap};
 use super::texture::{Texture, TextureRef, Uvs};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Fresnel, Lambert, MetallicRoughness, Phong};
 use crate::math::Vec3;
+
+/// What surfaces reflect that show nothing but shadows; shadows do not depend on it.
+pub(crate) const CATCHER_REFLECTANCE: f32 = 0.5;
 
 /// What a part of a scene is made of.
 #[derive(Clone, Debug)]
 pub struct Material {
     /// Its name in the file, for messages.
     pub name: String,
-    /// How it reflects.
+    /// Its reflectance model.
     pub model: MaterialModel,
     /// Its fine relief.
     pub normal_map: Option<NormalMap>,
-    /// What lies behind it and shows.
+    /// How much of the background shows through it.
     pub coverage: Coverage,
     /// Whether it is seen from behind, too. Its shadow falls from either side.
     pub double_sided: bool,
@@ -26,11 +29,14 @@ pub struct Material {
     pub emission: Option<Emission>,
     /// Whether its color is shown as it is, whatever the light (`KHR_materials_unlit`).
     pub unlit: bool,
+    /// Whether it shows nothing but the shadows on it, whatever its model: the background is seen instead, darkened as a
+    /// diffuse surface would be. It casts no shadow. Such surfaces are flat, and all of a scene face the same way.
+    pub catches_shadows: bool,
     /// What glTF's extensions add.
     pub layers: Layers,
 }
 
-/// How a material reflects.
+/// The reflectance model of a material, with its parameters.
 #[derive(Clone, Debug)]
 pub enum MaterialModel {
     /// The same BSDF everywhere; vertex colors do not touch it.
@@ -86,16 +92,6 @@ pub struct SpecularGlossinessMaterial {
     pub specular_glossiness_texture: Option<TextureRef>,
 }
 
-/// A tangent-space normal map.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NormalMap {
-    /// A linear texture: red along the tangent, green along the bitangent, blue along the normal,
-    /// each from −1 at 0 to 1 at 1.
-    pub texture: TextureRef,
-    /// Factor on the first two.
-    pub scale: f32,
-}
-
 impl Material {
     /// An opaque, two-sided surface.
     pub fn new(name: impl Into<String>, model: MaterialModel) -> Self {
@@ -107,6 +103,7 @@ impl Material {
             double_sided: true,
             emission: None,
             unlit: false,
+            catches_shadows: false,
             layers: Layers::default(),
         }
     }
@@ -270,6 +267,10 @@ impl Material {
             *bsdf = Bsdf::single(Lambert::new(Rgb::BLACK));
             return;
         }
+        if self.catches_shadows {
+            *bsdf = Bsdf::single(Lambert::new(Rgb::splat(CATCHER_REFLECTANCE)));
+            return;
+        }
         match &self.model {
             MaterialModel::Fixed(fixed) => bsdf.set(fixed, wo),
             MaterialModel::Phong(p) => {
@@ -327,15 +328,6 @@ impl MaterialModel {
             specular: Rgb::BLACK,
             exponent: 0.0,
         })
-    }
-}
-
-impl NormalMap {
-    /// The normal in the frame (tangent, bitangent, normal), not of unit length.
-    #[inline]
-    pub(crate) fn normal(&self, textures: &[Texture], uvs: &Uvs) -> Vec3 {
-        let c = self.texture.at(textures, uvs).map(|c| 2.0 * c - 1.0);
-        Vec3::new(self.scale * c.r, self.scale * c.g, c.b)
     }
 }
 

@@ -11,23 +11,25 @@ mod description;
 mod emission;
 #[cfg(feature = "io")]
 mod fingerprint;
+mod framing;
 mod layers;
 #[cfg(feature = "io")]
 pub mod load;
-mod material;
+pub(crate) mod material;
 mod shading;
 mod subject;
 mod texture;
 
 pub use crate::environment::UpAxis;
-pub use camera::{Camera, CameraError, CameraSettings, Projection};
+pub use camera::{Camera, CameraError, CameraSettings, Lens, Projection};
 pub use coverage::Sight;
 pub use description::{
     EnvironmentSettings, EnvironmentSource, NamedCamera, Part, SceneDescription,
 };
+pub use framing::{Framing, UnknownView, ViewDirection};
 pub use layers::{
-    AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers, Sheen,
-    Specular, Volume,
+    AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers, NormalMap,
+    Sheen, Specular, Volume,
 };
 #[cfg(feature = "io")]
 pub use load::{
@@ -35,8 +37,7 @@ pub use load::{
     load_with,
 };
 pub use material::{
-    Material, MaterialModel, MetallicRoughnessMaterial, NormalMap, PhongMaterial,
-    SpecularGlossinessMaterial,
+    Material, MaterialModel, MetallicRoughnessMaterial, PhongMaterial, SpecularGlossinessMaterial,
 };
 pub use texture::{Encoding, Texture, TextureError, TextureFilter, TextureRef, UvTransform, Wrap};
 
@@ -47,15 +48,16 @@ use coverage::Partial;
 
 /// A scene ready for rays.
 #[derive(Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a property of its own")]
 pub struct Scene {
     parts: Vec<Part>,
     materials: Vec<Material>,
     textures: Vec<Texture>,
-    /// Of each part its first triangle in the hierarchy.
+    /// The first triangle of each part in the hierarchy.
     first_triangle: Vec<u32>,
-    /// Of the parts that hide all behind them, which come first.
+    /// The hierarchy of the opaque parts, which come first.
     bvh: Bvh,
-    /// Of the others, if there are any.
+    /// The parts that are not opaque, if there are any.
     partial: Option<Partial>,
     /// Some part is not seen from behind.
     has_single_sided: bool,
@@ -63,10 +65,18 @@ pub struct Scene {
     emits: bool,
     /// Light passes through some part.
     transmits: bool,
+    /// Some part that does not hide all behind it dims light.
+    dims_light: bool,
+    /// Some part shows nothing but shadows.
+    catches_shadows: bool,
     /// In units of the description.
     bounds: Aabb,
     /// The bounds of what is not scenery, in units of the description.
     subject_bounds: Aabb,
+    /// Of each part, whether it is no scenery.
+    is_subject: Vec<bool>,
+    /// From where a framed camera looks.
+    view: Option<ViewDirection>,
     /// The length of one unit of the hierarchy and the parts, in units of the description; a power of two.
     unit: f32,
     /// The camera and the up axis of the file, if it has them.
@@ -139,17 +149,20 @@ impl Scene {
     pub fn new(description: SceneDescription) -> Result<Self, SceneError> {
         check(&description)?;
         let subject_bounds = description.subject_bounds();
+        let is_subject = description.is_subject();
         let bounds = description.bounds();
         let scale = description.usual_scale();
         check_size(&bounds, &subject_bounds, scale)?;
-        let SceneDescription { mut parts, materials, textures, camera, up, .. } = description;
+        let SceneDescription { mut parts, materials, textures, camera, up, view, .. } = description;
         let up = up.unwrap_or_default();
         if scale != 1.0 {
             for part in &mut parts {
                 part.mesh.scale(scale);
             }
         }
-        parts.sort_by_key(|part| !part.is_opaque(&materials));
+        let mut parts: Vec<_> = parts.into_iter().zip(is_subject).collect();
+        parts.sort_by_key(|(part, _)| !part.is_opaque(&materials));
+        let (parts, is_subject): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
         let n_opaque = parts.partition_point(|part| part.is_opaque(&materials));
         let (opaque, others) = parts.split_at(n_opaque);
         let bvh = build(opaque)?;
@@ -161,6 +174,9 @@ impl Scene {
         let has_single_sided = used().any(|material| !material.double_sided);
         let emits = used().any(|material| material.unlit || material.emission.is_some());
         let transmits = used().any(Material::transmits);
+        let catches_shadows = used().any(|material| material.catches_shadows);
+        let dims = |part: &Part| !materials[part.material].catches_shadows;
+        let dims_light = parts[n_opaque..].iter().any(dims);
         Ok(Self {
             parts,
             materials,
@@ -171,39 +187,16 @@ impl Scene {
             has_single_sided,
             emits,
             transmits,
+            dims_light,
+            catches_shadows,
             bounds,
             subject_bounds,
+            is_subject,
+            view,
             unit: 1.0 / scale,
             camera,
             up,
         })
-    }
-
-    /// Loads a mesh or a scene file of any known format and builds it.
-    ///
-    /// # Errors
-    /// If the file cannot be read, is damaged, or makes no scene. [`load()`] gives the loader's warnings as well, and
-    /// a description to change before it is built.
-    #[cfg(feature = "io")]
-    pub fn load(path: impl AsRef<std::path::Path>) -> Result<Self, crate::Error> {
-        Ok(Self::new(load(path)?.description)?)
-    }
-
-    /// Builds a scene from the bytes of a file, for instance where there is no file system; `resolver` gives the bytes of
-    /// the files that it refers to.
-    ///
-    /// # Errors
-    /// If the file is damaged or makes no scene. [`load_bytes`] gives the loader's warnings as well, and a description to
-    /// change before it is built.
-    #[cfg(feature = "io")]
-    pub fn from_bytes(
-        bytes: &[u8],
-        format: SceneFormat,
-        resolver: &Resolver<'_>,
-    ) -> Result<Self, crate::Error> {
-        let name = format!("scene.{format}");
-        let loaded = load_bytes(name, bytes, resolver, &LoadOptions::default())?;
-        Ok(Self::new(loaded.description)?)
     }
 
     /// The same scene, traced with another instruction set; `None` if this processor lacks it. Pictures are the same.
@@ -234,8 +227,21 @@ impl Scene {
     /// The camera of the file, or else one that frames what is not scenery in a picture of
     /// `aspect` = width / height.
     pub fn camera(&self, aspect: f32) -> CameraSettings {
-        let framed = || CameraSettings::framing(&self.subject_bounds, aspect, self.up.vector());
+        let framed = || self.framed(&Framing::new(aspect, self.up.vector()));
         self.camera.unwrap_or_else(framed)
+    }
+
+    /// A camera that frames what is not scenery, whatever camera the file has; in units of the description.
+    pub fn framed(&self, framing: &Framing) -> CameraSettings {
+        let parts = self.parts.iter().zip(&self.is_subject);
+        let subject = parts.filter(|(_, is_subject)| **is_subject);
+        let framing = Framing { view: framing.view.or(self.view), ..*framing };
+        let vertices = subject.flat_map(|(part, _)| part.mesh.positions.iter().copied());
+        let mut camera = framing.fit(vertices);
+        if self.unit != 1.0 {
+            camera.scale(self.unit);
+        }
+        camera
     }
 
     /// The length of one unit of the hierarchy, of [`Scene::parts`] and of shading points, in units of the description: a
@@ -289,7 +295,7 @@ impl Scene {
         &self.materials
     }
 
-    /// How many triangles all meshes have together.
+    /// The number of triangles of all meshes.
     pub fn triangle_count(&self) -> usize {
         self.parts.iter().map(|p| p.mesh.triangles.len()).sum()
     }

@@ -8,6 +8,10 @@
 //! Such a normal is **bent toward the viewer** until `wo` lies just above the shading horizon:
 //! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Black pixels
 //! along silhouettes would be the alternative.
+//!
+//! A smooth surface is shaded as such also where its triangles are coarse: shadow rays start where it would be, above the
+//! triangle, and reach as far down as it would let them. Otherwise triangles shade one another near the terminator, in
+//! stair-steps. (Hanika 2021, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4.)
 
 use super::{Layers, Material, NormalMap, Part, Scene};
 use crate::Rgb;
@@ -18,6 +22,12 @@ use crate::strategy::ShadingPoint;
 
 /// The least cosine between the shading normal and the direction to the viewer.
 const MIN_COS_THETA_O: f32 = 1e-3;
+
+/// Vertex normals within this cosine of the geometric one belong to a flat triangle: 0.1°, far more than rounding.
+const COS_FLAT: f32 = 0.999_998;
+
+/// Vertex normals beyond this cosine say nothing of a smooth surface over the triangle: 60°.
+const COS_ROUGH: f32 = 0.5;
 
 impl Scene {
     /// All that shading needs of a hit that [`Scene::bvh`] reported for `ray`.
@@ -67,7 +77,12 @@ impl Scene {
         let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
         material.set_bsdf(&self.textures, &uvs, tint, [wo, coat_normal], &mut point.bsdf);
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
-        (point.position, point.ng, point.frame, point.wo) = (position, ng, frame, wo);
+        let side = if smooth.dot(ng) < 0.0 { -1.0 } else { 1.0 };
+        (point.position, point.ng) = match corner.rise(&part.mesh, position, ng, side) {
+            Some(rise) => (position + rise, to_viewer(smooth)),
+            None => (position, ng),
+        };
+        (point.frame, point.wo) = (frame, wo);
     }
 
     /// The material of a hit, if its BSDF is the same all over.
@@ -182,6 +197,28 @@ impl Corners {
         Some(a * wa + b * wb + c * wc)
     }
 
+    /// The way from `position` on the triangle up to the smooth surface that the vertex normals describe, each of them times
+    /// `side`, if that bulges to the side of the geometric normal `ng`: Σ bᵢ max(0, (pᵢ − p) · nᵢ) nᵢ, of which each term
+    /// leads to the tangent plane of a vertex. `None` for flat triangles and hollows.
+    #[inline]
+    fn rise(&self, mesh: &Mesh, position: Vec3, ng: Vec3, side: f32) -> Option<Vec3> {
+        if mesh.normals.is_empty() {
+            return None;
+        }
+        let normals = self.of(&mesh.normals).map(|n| side * n.normalize_or_zero());
+        let cosines = normals.map(|n| n.dot(ng));
+        if cosines.iter().all(|&cos| cos > COS_FLAT) || cosines.iter().any(|&cos| cos < COS_ROUGH) {
+            return None;
+        }
+        let corners = self.of(&mesh.positions);
+        let terms = (0..3).map(|i| {
+            let height = (corners[i] - position).dot(normals[i]).max(0.0);
+            self.weights[i] * height * normals[i]
+        });
+        let rise = terms.fold(Vec3::ZERO, |sum, term| sum + term);
+        (rise != Vec3::ZERO).then_some(rise)
+    }
+
     /// The texture coordinates; 0 of a set that the mesh lacks.
     #[inline]
     pub(super) fn uvs(&self, mesh: &Mesh) -> Uvs {
@@ -209,7 +246,11 @@ impl Corners {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::offset_origin;
     use crate::math::{vec2, vec3};
+    use crate::sampling::Pcg32;
+    use crate::sampling::warp::uniform_sphere;
+    use crate::scene::builtin::shapes;
     use crate::scene::{Encoding, MaterialModel, NormalMap, SceneDescription, Texture, TextureRef};
 
     /// The triangle (0,0,0), (1,0,0), (0,1,0) with its image's v axis pointing down.
@@ -269,6 +310,48 @@ mod tests {
         let p = look(&scene(mesh, None), vec3(3.0, 0.25, 0.5));
         assert!(p.wo.z > 0.5 * MIN_COS_THETA_O && p.wo.z < 2.0 * MIN_COS_THETA_O);
         assert!((p.frame.z.length() - 1.0).abs() < 1e-5);
+    }
+
+    /// Triangles of a coarse ball do not shade one another: rays start on the ball, and leave it wherever its normal says.
+    #[test]
+    fn a_coarse_ball_is_shaded_as_a_ball() {
+        let scene = scene(shapes::icosphere(1), None);
+        let mut pcg = Pcg32::new(1, 2);
+        let mut direction = || {
+            let u = vec2(pcg.next_f32(), pcg.next_f32());
+            uniform_sphere(u)
+        };
+        let mut lowest = 1.0f32;
+        for _ in 0..4000 {
+            let (from, wi) = (direction(), direction());
+            let ray = Ray::new(3.0 * from, -from);
+            let Some(hit) = scene.bvh().closest_hit(&ray) else { continue };
+            let p = scene.shading_point(&ray, &hit);
+            assert_eq!(p.ng, p.frame.z);
+            assert!(p.ng.dot(p.position.normalize()) > 0.99);
+            lowest = lowest.min(p.position.length());
+            let origin = offset_origin(p.position, p.ng, 2.0);
+            let is_seen = !scene.bvh().any_hit(&Ray::new(origin, wi));
+            assert!(is_seen || p.ng.dot(wi) < 0.15, "{} at {}", p.ng.dot(wi), p.position);
+        }
+        // The triangles themselves come as near to the center as 0.93.
+        assert!(lowest > 0.985, "{lowest}");
+    }
+
+    #[test]
+    fn flat_triangles_and_hollows_stay_where_they_are() {
+        let mut flat = triangle();
+        flat.normals = vec![vec3(1e-4, 0.0, 2.0); 3];
+        let p = look(&scene(flat, None), vec3(0.3, 0.2, 2.0));
+        let bare = look(&scene(triangle(), None), vec3(0.3, 0.2, 2.0));
+        assert_eq!((p.position, p.ng), (bare.position, bare.ng));
+        let ball = shapes::icosphere(1);
+        let within = scene(ball, None);
+        let ray = Ray::new(vec3(0.1, 0.2, 0.0), vec3(0.4, 0.2, -0.9).normalize());
+        let hit = within.bvh().closest_hit(&ray).unwrap();
+        let p = within.shading_point(&ray, &hit);
+        assert!((p.position - ray.at(hit.t)).length() < 1e-5);
+        assert!(p.ng.dot(ray.direction) < 0.0);
     }
 
     #[test]

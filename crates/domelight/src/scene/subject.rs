@@ -1,7 +1,8 @@
 //! The subject of a scene: its bounds, its scale, another BSDF, the ground under it.
 
 use super::builtin::shapes;
-use super::{CameraSettings, Material, Part, SceneDescription};
+use super::material::CATCHER_REFLECTANCE;
+use super::{AlphaMode, CameraSettings, Coverage, Framing, Material, Part, SceneDescription};
 use crate::Rgb;
 use crate::bsdf::Bsdf;
 use crate::geometry::{Aabb, Mesh, power_of_two};
@@ -10,15 +11,34 @@ use crate::math::{Frame, Mat4, Vec3};
 /// Sizes of scenes that are traced as they are: from the one, and no coordinate beyond the other.
 const USUAL: [f32; 2] = [1.0 / 16.0, 65536.0];
 
-/// The radius of the ground, in half-extents of the scene.
-const GROUND_RADIUS: f32 = 5.0;
+/// The radii between which a plate fades to nothing, in half-extents of the subject.
+const PLATE_RADII: [f32; 2] = [3.0, 8.0];
+
+/// The radii between which ground that catches shadows fades, in half-extents of the subject: those of low suns are long.
+const CATCHER_RADII: [f32; 2] = [12.0, 32.0];
 
 impl SceneDescription {
     /// The least box around the parts that are not scenery; around all if there is nothing else.
     pub fn subject_bounds(&self) -> Aabb {
-        let subject = self.parts.iter().enumerate().filter(|(i, _)| !self.scenery.contains(i));
-        let bounds = subject.fold(Aabb::EMPTY, |b, (_, p)| b.union(p.mesh.bounds()));
-        if bounds.is_empty() { self.bounds() } else { bounds }
+        let subject =
+            self.parts.iter().zip(self.is_subject()).filter(|(_, is_subject)| *is_subject);
+        subject.fold(Aabb::EMPTY, |b, (p, _)| b.union(p.mesh.bounds()))
+    }
+
+    /// Of each part, whether it is no scenery; all are the subject if there is nothing else.
+    pub(super) fn is_subject(&self) -> Vec<bool> {
+        let is_scenery = |i: usize| self.scenery.contains(&i);
+        let part = |i: usize| !is_scenery(i) && !self.parts[i].mesh.positions.is_empty();
+        let all = !(0..self.parts.len()).any(part);
+        (0..self.parts.len()).map(|i| all || !is_scenery(i)).collect()
+    }
+
+    /// A camera that frames what is not scenery, whatever camera the scene has.
+    pub fn framed(&self, framing: &Framing) -> CameraSettings {
+        let is_subject = self.is_subject();
+        let subject = self.parts.iter().zip(&is_subject).filter(|(_, is_subject)| **is_subject);
+        let framing = Framing { view: framing.view.or(self.view), ..*framing };
+        framing.fit(subject.flat_map(|(part, _)| part.mesh.positions.iter().copied()))
     }
 
     /// Scales scenes that are very small or very large to a usual size, with `view` and the scene's own camera; returns
@@ -83,9 +103,27 @@ impl SceneDescription {
         }
     }
 
-    /// Puts a diffuse disk of reflectance 0.5 under the scene, facing `up`, five times as wide as
-    /// the subject's longest extent. An empty scene gets none.
+    /// Puts a diffuse plate of reflectance 0.5 under the subject, facing `up`, which fades to nothing toward its rim. It is
+    /// eight times as wide as the subject's longest extent. An empty scene gets none.
     pub fn add_ground(&mut self, up: Vec3) {
+        self.add_disc(up, PLATE_RADII, &Material::diffuse("ground", Rgb::splat(0.5)));
+    }
+
+    /// Puts ground under the subject, facing `up`, that shows nothing but shadows
+    /// ([`Material::catches_shadows`](super::Material::catches_shadows)). An empty scene gets none.
+    pub fn add_shadow_catcher(&mut self, up: Vec3) {
+        let ground = Material {
+            catches_shadows: true,
+            double_sided: false,
+            ..Material::diffuse("ground", Rgb::splat(CATCHER_REFLECTANCE))
+        };
+        self.add_disc(up, CATCHER_RADII, &ground);
+    }
+
+    /// Puts a disk of `material` under the subject that fades between two radii.
+    fn add_disc(&mut self, up: Vec3, radii: [f32; 2], material: &Material) {
+        const SEGMENTS: u32 = 256;
+        const CIRCLES: u32 = 24;
         let bounds = self.subject_bounds();
         if bounds.is_empty() {
             return;
@@ -101,11 +139,19 @@ impl SceneDescription {
             (-frame.y).extend(0.0),
             (center - depth * up).extend(1.0),
         );
-        let mut mesh = shapes::disc(GROUND_RADIUS * half, 512);
-        mesh.transform(&turn);
-        self.scenery.push(self.parts.len());
-        self.parts.push(Part { name: "ground".to_owned(), mesh, material: self.materials.len() });
-        self.materials.push(Material::diffuse("ground", Rgb::splat(0.5)));
+        let [inner, outer] = radii.map(|radius| radius * half);
+        let rim = Coverage { mode: AlphaMode::Blend, ..Coverage::default() };
+        for (mesh, coverage) in [
+            (shapes::disc(inner, SEGMENTS), Coverage::default()),
+            (shapes::fading_ring(inner, outer, SEGMENTS, CIRCLES), rim),
+        ] {
+            let mut mesh = mesh;
+            mesh.transform(&turn);
+            self.scenery.push(self.parts.len());
+            let (name, index) = ("ground".to_owned(), self.materials.len());
+            self.parts.push(Part { name, mesh, material: index });
+            self.materials.push(Material { coverage, ..material.clone() });
+        }
     }
 }
 
@@ -180,7 +226,10 @@ mod tests {
             let [a, b, c] = ground.triangles[0].map(|i| ground.positions[i as usize]);
             assert!((b - a).cross(c - a).dot(up) > 0.0, "it faces up");
             assert!((scene.subject_bounds().size().max_element() - 2.0).abs() < 1e-3);
-            assert!((scene.bounds().size().max_element() - 10.0).abs() < 1e-2);
+            let rim = &scene.parts[2].mesh;
+            let most = rim.alphas.iter().copied().fold(0.0, f32::max);
+            assert_eq!((rim.alphas.len(), most), (rim.positions.len(), 1.0));
+            assert!((scene.bounds().size().max_element() - 16.0).abs() < 1e-2);
         }
     }
 
@@ -189,7 +238,8 @@ mod tests {
         let mut scene = ball();
         scene.add_ground(Vec3::Y);
         scene.set_subject_material(Bsdf::BLACK);
-        assert_eq!((scene.parts[0].material, scene.parts[1].material), (2, 1));
+        let of = [0, 1, 2].map(|i: usize| scene.parts[i].material);
+        assert_eq!(of, [3, 1, 2]);
     }
 
     #[test]

@@ -3,15 +3,16 @@
 //! Each shows what one question needs: self-shadowing, roughness, a material, or a plain sphere whose
 //! every normal is seen. [`BuiltinScene::environment`] is the light that suits.
 
-pub mod material_ball;
+pub(crate) mod material_ball;
 pub mod shapes;
-pub mod statue;
+pub(crate) mod statue;
 mod surface_nets;
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::camera::{CameraSettings, Projection};
+use super::framing::ViewDirection;
 use super::material::{Material, MaterialModel, MetallicRoughnessMaterial};
 use super::{EnvironmentSettings, EnvironmentSource, Part, SceneDescription, UpAxis};
 use crate::Rgb;
@@ -24,6 +25,8 @@ const SPHERES: usize = 7;
 const SPHERE_RADIUS: f32 = 0.5;
 /// Distance between their centers.
 const SPHERE_SPACING: f32 = 1.12;
+/// Azimuth and elevation from which the row is seen \[degrees\]: along it, so that it fills pictures of any shape.
+const SPHERES_VIEW: [f32; 2] = [-52.0, 16.0];
 /// Roughness of the first; the last has 1.
 const LEAST_ROUGHNESS: f32 = 0.1;
 /// Radius of the floors.
@@ -113,7 +116,7 @@ impl BuiltinScene {
         }
     }
 
-    /// The scene, with a camera for a square picture and the probe that suits it.
+    /// The scene, with its camera, or the view to frame it from, and the probe that suits it.
     pub fn description(self) -> SceneDescription {
         SceneDescription { environment: Some(self.environment()), ..self.geometry() }
     }
@@ -173,8 +176,8 @@ fn spheres_scene() -> SceneDescription {
         let roughness = LEAST_ROUGHNESS + (1.0 - LEAST_ROUGHNESS) * t;
         ("sphere", mesh, glossy("metal", Rgb::new(0.93, 0.88, 0.80), 1.0, roughness))
     });
-    let eye = camera(24.0, vec3(0.0, 5.2, 19.5), vec3(0.0, 0.45, 0.0));
-    scene(eye, balls.chain([floor()]))
+    let view = ViewDirection::new(SPHERES_VIEW[0], SPHERES_VIEW[1]).ok();
+    SceneDescription { view, ..scene(None, balls.chain([floor()])) }
 }
 
 fn material_ball_scene() -> SceneDescription {
@@ -204,11 +207,11 @@ fn floor() -> (&'static str, Mesh, Material) {
 }
 
 fn scene(
-    camera: CameraSettings,
+    camera: impl Into<Option<CameraSettings>>,
     things: impl IntoIterator<Item = (&'static str, Mesh, Material)>,
 ) -> SceneDescription {
     let mut description = SceneDescription {
-        camera: Some(camera),
+        camera: camera.into(),
         up: Some(UpAxis::Y),
         ..SceneDescription::default()
     };

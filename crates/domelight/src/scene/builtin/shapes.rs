@@ -1,4 +1,4 @@
-//! Elementary shapes as meshes: spheres, a disc, a bevelled box, surfaces of revolution.
+//! Elementary shapes as meshes: spheres, a disc, a beveled box, surfaces of revolution.
 //!
 //! All triangles are counter-clockwise seen from outside and all normals are those of the exact
 //! surface. Where two patches meet (a seam of texture coordinates, a crease) vertices are doubled
@@ -79,6 +79,26 @@ pub fn disc(radius: f32, segments: u32) -> Mesh {
     builder.strip([vec2(radius, 0.0), Vec2::ZERO], [Vec2::Y, Vec2::Y], [1.0, 0.0]);
     let mut mesh = builder.mesh;
     mesh.uvs = mesh.positions.iter().map(|p| 0.5 + 0.5 * vec2(p.x, p.z) / radius).collect();
+    mesh
+}
+
+/// A horizontal ring at y = 0 that faces +Y, in `segments` (≥ 3) sectors and `steps` (≥ 1) circles, whose opacity falls
+/// smoothly from 1 at radius `inner` > 0 to 0 at `outer`.
+pub fn fading_ring(inner: f32, outer: f32, segments: u32, steps: u32) -> Mesh {
+    let mut builder = Revolution::new(segments);
+    let mut alphas = Vec::new();
+    let at = |i: u32| {
+        let t = i as f32 / steps as f32;
+        (inner + (outer - inner) * t, 1.0 - t * t * (3.0 - 2.0 * t))
+    };
+    for i in 0..steps {
+        let [(near, near_alpha), (far, far_alpha)] = [at(i), at(i + 1)];
+        builder.strip([vec2(far, 0.0), vec2(near, 0.0)], [Vec2::Y; 2], [1.0, 0.0]);
+        alphas.extend((0..=segments).flat_map(|_| [far_alpha, near_alpha]));
+    }
+    let mut mesh = builder.mesh;
+    mesh.uvs = mesh.positions.iter().map(|p| 0.5 + 0.5 * vec2(p.x, p.z) / outer).collect();
+    mesh.alphas = alphas;
     mesh
 }
 
@@ -171,21 +191,21 @@ fn seam_u(i: u32, segments: u32) -> f32 {
 
 /// A box of the given half extents round the origin, its edges and corners rounded by `bevel`
 /// (less than the least half extent) in `steps` (≥ 1) pieces either side of each edge.
-pub fn bevelled_box(half: Vec3, bevel: f32, steps: u32) -> Mesh {
+pub fn beveled_box(half: Vec3, bevel: f32, steps: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for axis in 0..3 {
         for sign in [1.0, -1.0] {
-            bevelled_face(&mut mesh, half, bevel, steps, axis, sign);
+            beveled_face(&mut mesh, half, bevel, steps, axis, sign);
         }
     }
     mesh
 }
 
-/// The side of a bevelled box that faces `sign` along `axis`, out to the middle of its bevels.
+/// The side of a beveled box that faces `sign` along `axis`, out to the middle of its bevels.
 ///
 /// A point q of the sharp box goes to core + bevel · (q − core)/|q − core|, core the nearest point
 /// of the box of half extents half − bevel.
-fn bevelled_face(mesh: &mut Mesh, half: Vec3, bevel: f32, steps: u32, axis: usize, sign: f32) {
+fn beveled_face(mesh: &mut Mesh, half: Vec3, bevel: f32, steps: u32, axis: usize, sign: f32) {
     let (b_axis, c_axis) = ((axis + 1) % 3, (axis + 2) % 3);
     let core_half = half - bevel;
     let ticks = bevel_ticks(steps);

@@ -64,7 +64,7 @@ fn solids() -> Vec<(&'static str, Mesh)> {
     vec![
         ("icosphere", shapes::icosphere(3)),
         ("uv sphere", shapes::uv_sphere(31, 17)),
-        ("box", shapes::bevelled_box(vec3(1.0, 0.5, 0.7), 0.1, 4)),
+        ("box", shapes::beveled_box(vec3(1.0, 0.5, 0.7), 0.1, 4)),
         ("ring", shapes::lathe(&square, 24)),
         ("figure", statue::figure()),
         ("plinth", statue::plinth()),
@@ -96,7 +96,7 @@ fn shapes_have_the_volumes_of_the_solids_they_approach() {
     for (mesh, expected) in [
         (shapes::icosphere(5), 4.0 / 3.0 * PI),
         (shapes::uv_sphere(256, 128), 4.0 / 3.0 * PI),
-        (shapes::bevelled_box(vec3(1.0, 0.5, 0.7), 1e-3, 2), 8.0 * 0.35),
+        (shapes::beveled_box(vec3(1.0, 0.5, 0.7), 1e-3, 2), 8.0 * 0.35),
         (shapes::lathe(&square, 256), ring),
         (shapes::lathe(&slab, 256), 0.5 * PI),
     ] {
@@ -152,10 +152,8 @@ fn the_statue_is_the_same_every_time() {
 #[test]
 fn every_scene_can_be_built_and_is_seen_by_its_camera() {
     for name in BuiltinScene::ALL {
-        let description = name.description();
-        let camera = description.camera.unwrap();
-        let camera = crate::scene::Camera::new(&camera, 64, 64).unwrap();
-        let scene = crate::scene::Scene::new(description).unwrap();
+        let scene = crate::scene::Scene::new(name.description()).unwrap();
+        let camera = crate::scene::Camera::framing(&scene, 64, 64);
         let hit = scene.bvh().closest_hit(&camera.ray(32.0, 32.0));
         assert!(hit.is_some(), "{name}: nothing in the middle of the picture");
     }

@@ -92,9 +92,8 @@ fn read(
         textures,
         camera: cameras.first().map(|camera| camera.settings),
         cameras,
-        environment: None,
         up: Some(UpAxis::Y),
-        scenery: Vec::new(),
+        ..SceneDescription::default()
     };
     Ok(Loaded { description, warnings: source.into_warnings(), ..Loaded::default() })
 }
