@@ -109,7 +109,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let render = |camera: &Camera| {
         Job { scene, camera, environment, settings, progress, render_run: running }.render(strategy)
     };
-    let pictures = Pictures { described: &described, denoiser: denoiser.as_ref(), shown_as };
+    let pictures =
+        Pictures { described: &described, settings, denoiser: denoiser.as_ref(), shown_as };
     let mut denoised = None;
     let rendering = match &turntable {
         None => render(camera)?,
@@ -155,6 +156,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
 /// How pictures are written.
 struct Pictures<'a> {
     described: &'a Settings,
+    settings: &'a RenderSettings,
     denoiser: Option<&'a Denoiser>,
     shown_as: ToneMapping,
 }
@@ -170,8 +172,8 @@ impl Pictures<'_> {
         let layers = &rendering.layers;
         let denoised = self.denoiser.map(|d| d.denoise_layers(layers)).transpose()?;
         let (color, by) = denoised.unzip();
-        let mut attributes = self.described.provenance();
-        // If not, the layer of sample counts tells how many there are.
+        let mut attributes = self.described.provenance(self.settings);
+        // If not, the layer of sample counts states how many there are.
         attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
         if let Some(Frame { index, n_frames, .. }) = frame {
             attributes.push(("domelight.frame".into(), format!("{index} of {n_frames}")));

@@ -103,7 +103,7 @@ impl<'a> SphereView<'a> {
         png_bytes(&RgbImage::new(self.n, self.n, shown), AS_IT_IS)
     }
 
-    /// The mapping knows the map's own frame: the map tells where that is in the world.
+    /// The mapping knows the map's own frame: the orientation places it in the world.
     fn direction(&self, uv: Vec2) -> Option<Vec3> {
         let middle = Vec2::splat(0.5);
         let in_map = Mapping::Angular.direction(middle + (uv - middle) * self.radius)?;
