@@ -219,6 +219,34 @@ def check_radiance(table, rigs):
             picture = radiance.render(rig.file("rad"), view, rig.residual is not None)
             expected = rig.expected["parallel"][view]
             table.compare(f"Radiance {radiance.VERSION}", rig, view, picture, expected, 0.01)
+    check_odd_dome(table)
+
+
+def check_odd_dome(table):
+    """A dome that is not twice as wide as high: toward the middle of each texel it has that texel's radiance."""
+    folder, height, width = OUT / "odd", 50, 173
+    folder.mkdir(parents=True, exist_ok=True)
+    # Smooth: Radiance interpolates between texels.
+    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width, indexing="ij")
+    theta, phi = np.pi * v, 2 * np.pi * (u - 0.5)
+    wave = np.stack([np.sin(phi), np.cos(phi), np.cos(2 * phi)], -1) * np.sin(theta)[..., None]
+    texels = (1 + 0.5 * wave + 0.2 * np.cos(theta)[..., None]).astype(np.float32)
+    texels[20:22, 70:72] = 400.0
+    probe.write_pfm(folder / "odd.pfm", texels)
+    outputs = ["-o", folder / "rig.rad", "-o", folder / "rig.json", "--keep-residual", folder / "residual.exr"]
+    world = ["--env-mapping", "lat-long", "--env-up", "z", "--env-rotate", "25"]
+    domelight("lights", folder / "odd.pfm", "--lamps", "1", *world, *outputs)
+    domelight("probe", folder / "residual.exr", "--mapping", "lat-long", "-o", folder / "residual.pfm")
+    residual = probe.read_pfm(folder / "residual.pfm")
+    lamp = np.array(json.loads((folder / "rig.json").read_text())["lights"][0]["direction"])
+    # The middle column looks toward +Y, and u grows to the right as seen from inside.
+    phi -= np.radians(25)
+    world = np.stack([np.sin(theta) * np.sin(phi), np.sin(theta) * np.cos(phi), np.cos(theta)], -1)
+    seen = world @ lamp < np.cos(np.radians(12))
+    read = radiance.trace(folder / "rig.rad", world[seen])
+    off = np.abs(read - residual[seen]).max() / residual[seen].max()
+    # Radiance's interpolation is half a texel off: 0.5 · 2 · 2π/173 · ½ of the greatest radiance.
+    table.check(f"Radiance {radiance.VERSION}", f"a dome of {width}x{height}: radiance of its texels", off, 0.02)
 
 
 def check_usd(table, rigs):
@@ -261,7 +289,7 @@ def check_web(table, rigs):
     for rig in rigs.values():
         calls = [("three", "module", "js"), ("three", "gltf", "glb"), ("three", "gltf", "gltf")]
         if rig.residual is not None:
-            calls += [("three", "dome", "js"), ("babylon", "gltf", "glb")]
+            calls += [("three", "dome", "js"), ("three", "rig", "js"), ("babylon", "gltf", "glb")]
         for page, call, extension in calls:
             for view in reference.VIEWS:
                 out = rig.folder / f"{page}-{call}-{extension}-{view}.raw"
@@ -276,6 +304,7 @@ def check_web(table, rigs):
     names = {
         ("three", "module"): f"three.js {versions['three']}, module",
         ("three", "dome"): f"three.js {versions['three']}, module with setDome",
+        ("three", "rig"): f"three.js {versions['three']}, module with its dome",
         ("three", "gltf"): f"three.js {versions['three']}, GLTFLoader",
         ("babylon", "gltf"): f"Babylon.js {versions['babylon']}, glTF",
     }
@@ -305,6 +334,10 @@ def check_blender(table, rigs):
             read = json.loads(out.with_suffix(".json").read_text())
             name = f"Blender {read['version']}, " + ("script" if view == "front" else "pasted")
             table.compare(name, rig, view, np.load(out), rig.expected["discs"][view], 0.01)
+            dome = int(rig.residual is not None)
+            once = {"suns": len(rig.lights), "collections": 1, "worlds": dome, "pictures": dome}
+            for what, n in once.items():
+                table.count(name, f"{rig.name}: run twice, {what} too many", abs(read["counts"][what] - n))
         z_up = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
         pairs = [(light, read["lights"][light["name"]]) for light in rig.lights]
         off = max(angle(z_up @ light["direction"], np.array(sun["toward"])) for light, sun in pairs)

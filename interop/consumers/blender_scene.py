@@ -1,4 +1,4 @@
-"""Inside Blender: runs a rig's script, renders the sphere by Cycles, prints what the lights are.
+"""Inside Blender: runs a rig's script twice, renders the sphere by Cycles, prints what the lights are.
 
 python blender_scene.py RIG OUT.npy FRONT|BACK SIZE SAMPLES [paste]
 """
@@ -44,10 +44,18 @@ def main():
     bpy.ops.object.shade_smooth()
     ball.data.materials.append(white())
 
-    if how == ["paste"]:
-        paste(pathlib.Path(rig))
-    else:
-        runpy.run_path(rig, run_name="__main__")
+    # The second run replaces what the first one made.
+    for _ in range(2):
+        if how == ["paste"]:
+            paste(pathlib.Path(rig))
+        else:
+            runpy.run_path(rig, run_name="__main__")
+    counts = {
+        "suns": len(bpy.data.lights),
+        "collections": len(bpy.data.collections),
+        "worlds": len(bpy.data.worlds),
+        "pictures": len(bpy.data.images),
+    }
 
     side = 1 if view == "front" else -1
     camera = bpy.data.cameras.new("camera")
@@ -81,7 +89,7 @@ def main():
         }
         for o in suns
     }
-    pathlib.Path(out).with_suffix(".json").write_text(json.dumps({"version": bpy.app.version_string, "lights": lights}))
+    pathlib.Path(out).with_suffix(".json").write_text(json.dumps({"version": bpy.app.version_string, "lights": lights, "counts": counts}))
 
 
 main()

@@ -42,3 +42,17 @@ def render(rig, view, dome):
     path.write_bytes(picture)
     picture = np.array(mi.Bitmap(str(path)), float)[..., :3]
     return picture.reshape(reference.SIZE, fine, reference.SIZE, fine, 3).mean((1, 3))
+
+
+def trace(rig, directions):
+    """Radiance from these directions, (n, 3) over the world's axes."""
+    octree = subprocess.run(
+        ["oconv", rig.name], cwd=rig.parent, env=ENVIRONMENT, capture_output=True, check=True
+    ).stdout
+    (rig.parent / "dome.oct").write_bytes(octree)
+    rays = "".join(f"0 0 0 {x:.9f} {y:.9f} {z:.9f}\n" for x, y, z in directions)
+    traced = subprocess.run(
+        ["rtrace", "-h", "-w", "-ab", "0", "dome.oct"],
+        cwd=rig.parent, env=ENVIRONMENT, input=rays.encode(), capture_output=True, check=True,
+    ).stdout
+    return np.array([line.split() for line in traced.decode().splitlines() if line.strip()], float)

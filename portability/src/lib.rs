@@ -1,4 +1,7 @@
-//! Films of every strategy and material, and a checksum of their bits for each: the same wherever the library runs.
+//! Films of every strategy, material and kind of surface, and a checksum of their bits for each: the same wherever the
+//! library runs.
+
+mod surfaces;
 
 use std::fmt::Write as _;
 use std::sync::OnceLock;
@@ -7,7 +10,9 @@ use domelight::Rgb;
 use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::bvh::InstructionSet;
 use domelight::environment::{Environment, Orientation, builtin::BuiltinProbe};
-use domelight::render::{Background, Filter, Layers, RenderSettings, render};
+use domelight::render::{
+    Background, Filter, LAYERS, LayerValues, Layers, Passes, RenderSettings, render,
+};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{Camera, EnvironmentSource, Material, Scene};
 use domelight::strategy::{PreparedStrategy, StrategySpec};
@@ -54,7 +59,7 @@ const SCENES: [BuiltinScene; 4] = [
 /// Pixels along an edge: not a multiple of a tile.
 const SIZE: usize = 37;
 
-/// A line for each strategy and each material: its name, a space and sixteen hexadecimal digits.
+/// A line for each strategy, material, surface and for short passes: its name, a space and sixteen hexadecimal digits.
 ///
 /// # Panics
 /// If a name above is none, a scene cannot be rendered, or the processor lacks the instructions.
@@ -77,6 +82,22 @@ pub fn report(instruction_set: InstructionSet) -> String {
             checksum.layers(&stage.render(strategy));
         }
         writeln!(report, "{material} {:016x}", checksum.0).expect("text has room");
+    }
+    for (surface, material) in surfaces::surfaces() {
+        stage.make_of(material);
+        let mut checksum = Checksum::new();
+        for strategy in ["mis:2:2", "product:4", "sir:2/16:from=brdf"] {
+            checksum.layers(&stage.render(strategy));
+        }
+        writeln!(report, "{surface} {:016x}", checksum.0).expect("text has room");
+    }
+    for strategy in ["mis:2:2", "product:4"] {
+        let mut checksum = Checksum::new();
+        for stage in &stages {
+            checksum.layers(&stage.render_in(Passes::Doubling, strategy));
+        }
+        writeln!(report, "{strategy} in doubling passes {:016x}", checksum.0)
+            .expect("text has room");
     }
     report
 }
@@ -110,13 +131,23 @@ impl Stage {
         self.scene = scene.with_instruction_set(self.instruction_set).expect("instructions");
     }
 
+    fn make_of(&mut self, material: Material) {
+        let scene = Scene::new(surfaces::made_of(self.builtin, material)).expect("a scene");
+        self.scene = scene.with_instruction_set(self.instruction_set).expect("instructions");
+    }
+
     fn render(&self, strategy: &str) -> Layers {
+        self.render_in(Passes::Efficient, strategy)
+    }
+
+    fn render_in(&self, passes: Passes, strategy: &str) -> Layers {
         let settings = RenderSettings {
             width: SIZE,
             height: SIZE,
             n_samples: 6,
             filter: Filter::BlackmanHarris,
             background: Background::Shown,
+            passes,
             ..RenderSettings::default()
         };
         let camera = Camera::framing(&self.scene, SIZE, SIZE);
@@ -150,13 +181,18 @@ impl Checksum {
     }
 
     fn layers(&mut self, layers: &Layers) {
-        for image in [&layers.color, &layers.unoccluded, &layers.albedo, &layers.variance] {
-            self.numbers(image.pixels.iter().flat_map(|&Rgb { r, g, b }| [r, g, b]));
-        }
-        self.numbers(layers.normal.iter().flat_map(|v| v.to_array()));
-        self.numbers(layers.alpha.iter().chain(&layers.depth).copied());
-        for &n in layers.n_samples.iter().chain(&layers.n_hits) {
-            self.word(n);
+        for layer in LAYERS {
+            match (layer.values)(layers) {
+                LayerValues::Colors(image) => {
+                    self.numbers(image.pixels.iter().flat_map(|&Rgb { r, g, b }| [r, g, b]));
+                }
+                LayerValues::Vectors(vectors) => {
+                    self.numbers(vectors.iter().flat_map(|v| v.to_array()));
+                }
+                LayerValues::Numbers(numbers) => self.numbers(numbers.iter().copied()),
+                LayerValues::Counts(counts) => counts.iter().for_each(|&n| self.word(n)),
+                _ => panic!("layer {} has values of a kind that has no checksum", layer.name),
+            }
         }
     }
 }

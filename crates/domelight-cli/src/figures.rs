@@ -7,6 +7,7 @@ use domelight_lab::figures::{FigureContext, FigureSettings, draw, names_of_files
 use crate::args::figures::FiguresArguments;
 use crate::files;
 use crate::interrupt;
+use crate::output::print_json;
 use crate::terminal::Terminal;
 
 /// Runs the subcommand.
@@ -23,8 +24,11 @@ pub(crate) fn run(arguments: &FiguresArguments, quiet: bool) -> Result<()> {
     let context = FigureContext::load(&settings, host)?;
     drop(loading);
     declare(arguments)?;
-    let page = draw(&context, &arguments.only, &arguments.output)?;
-    host.status(&format!("-> {}", page.display()));
+    let drawn = draw(&context, &arguments.only, &arguments.output)?;
+    if arguments.json {
+        return print_json(&drawn);
+    }
+    host.status(&format!("-> {}", drawn.page.display()));
     Ok(())
 }
 

@@ -12,12 +12,14 @@ mod command_line;
 mod compare;
 mod diff;
 mod error;
+mod exit;
 mod farm;
 mod figures;
 mod files;
 mod inspect;
 mod interrupt;
 mod lights;
+mod map_picture;
 mod memory;
 mod merge;
 mod output;
@@ -45,7 +47,7 @@ fn main() -> ExitCode {
     clock::start();
     let Arguments { command, quiet, memory } = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) => return error::report_usage(error),
+        Err(error) => return exit::report_usage(error),
     };
     memory::limit(memory.max_memory);
     let done = match command {
@@ -65,6 +67,6 @@ fn main() -> ExitCode {
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => error::report(&error),
+        Err(error) => exit::report(&error),
     }
 }

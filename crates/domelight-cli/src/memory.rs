@@ -95,7 +95,7 @@ pub(crate) fn hint(error: &OverLimit) -> String {
 }
 
 /// Bytes of the machine's memory, or those that its control groups leave to the process; none where the system does not
-/// tell.
+/// report them.
 fn granted() -> Option<u64> {
     let machine = proc_meminfo();
     machine.into_iter().chain(control_groups()).min()

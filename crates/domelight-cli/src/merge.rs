@@ -12,7 +12,9 @@ use std::slice;
 use anyhow::{Context as _, Result};
 use domelight::picture::exposure::Exposure;
 use domelight::picture::exr::bands::BAND_ROWS;
-use domelight::render::{Checkpoint, CheckpointError, Counts, Film, Layers, VarianceSums};
+use domelight::render::{
+    Checkpoint, CheckpointError, Counts, Film, Layers, VarianceSums, kept_exposure,
+};
 use domelight::{Rgb, RgbImage};
 use serde::Serialize;
 
@@ -22,7 +24,7 @@ use crate::memory;
 use crate::output::{PicturePath, print_json, require_one_on_standard_output};
 use crate::render_run::read;
 use crate::terminal::Terminal;
-use crate::tone::{Shown, kept};
+use crate::tone::Shown;
 use domelight_lab::Host as _;
 
 /// Memory of a pixel of a band: its layers, as channels, and compressed.
@@ -260,7 +262,7 @@ impl Merged {
         let color = RgbImage::new(self.width, self.height, picture.color);
         let alpha = hidden.then_some(&picture.alpha[..]);
         let median = || Exposure::Auto.stops(&color, alpha);
-        let automatic = || kept(&self.provenance).unwrap_or_else(median);
+        let automatic = || kept_exposure(&self.provenance).unwrap_or_else(median);
         let tone = arguments.tone.of_picture(automatic);
         flat.iter().try_for_each(|output| output.write_color(&color, alpha, &tone))?;
         let is_shown = flat.iter().any(|output| output.is_png());

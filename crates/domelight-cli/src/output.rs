@@ -12,6 +12,7 @@ use domelight::picture::tone::ToneMapping;
 use domelight::picture::{PictureErrorKind, hdr, pfm, png};
 use domelight::quote::{Code, Shell, terminal};
 use domelight::render::Layers;
+use domelight_lab::denoise::write_exr;
 use serde::Serialize;
 use std::fmt;
 use std::io::{self, Cursor, IsTerminal as _, Write as _};
@@ -139,16 +140,12 @@ impl PicturePath {
             let color = denoised.unwrap_or(&layers.color);
             return self.write_color(color, hidden.then_some(&layers.alpha[..]), tone);
         }
-        let Some(denoised) = denoised else {
-            return files::write_seeking(&self.path, |out| {
-                layers.write_exr(attributes, out).map_err(into_io)
-            });
-        };
-        self.write_bands(layers.height(), |y| {
-            let rows = y..layers.height().min(y + BAND_ROWS);
-            let mut exr = layers.rows(rows.clone()).to_exr(attributes.to_vec());
-            exr.push_rgb("denoised", &band(denoised, rows), None);
-            Ok(exr)
+        files::write_seeking(&self.path, |out| {
+            let written = match denoised {
+                Some(denoised) => write_exr(layers, denoised, attributes, out),
+                None => layers.write_exr(attributes, out),
+            };
+            written.map_err(into_io)
         })
     }
 

@@ -38,7 +38,7 @@ pub(crate) fn write(
         .collect();
     let alpha = view.report.hide_env.then_some(&alpha[..]);
     outputs.iter().filter(|path| path.is_png()).try_for_each(|path| {
-        // What it shows is not the render that the attributes would tell of.
+        // The attributes would describe another render than this picture shows.
         path.write_color(&color, alpha, tone)
     })
 }

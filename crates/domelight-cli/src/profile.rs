@@ -24,7 +24,7 @@ pub(crate) struct Profile {
 pub(crate) struct StageSeconds {
     stage: &'static str,
     cpu: f64,
-    /// Of all stages together.
+    /// Share of all stages together.
     share: f64,
 }
 

@@ -23,7 +23,7 @@ use crate::report::{RenderReport, Settings, StopReason, Timings};
 use crate::scene::start_threads;
 use crate::strategy::{Job, acceptance};
 use crate::terminal::Terminal;
-use crate::tone::{self, Shown};
+use crate::tone::Shown;
 use crate::turntable::{Frame, Turntable};
 use domelight_lab::denoise::Denoiser;
 use domelight_lab::scene::PreparedScene;
@@ -101,7 +101,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let progress = RenderProgress::new("", total, quiet, interrupted).openjd(openjd);
     let progress = progress.pictures(turntable.as_ref().map_or(1, Turntable::len));
     let progress = &progress.profiled(arguments.output.profile);
-    let attributes = described.provenance();
+    let attributes = described.provenance(settings);
     let try_writing = &|layers: &Layers| {
         output::time_to_write(&outputs, layers, &shown_as, report.hide_env, &attributes)
     };
@@ -109,7 +109,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let render = |camera: &Camera| {
         Job { scene, camera, environment, settings, progress, render_run: running }.render(strategy)
     };
-    let pictures = Pictures { described: &described, denoiser: denoiser.as_ref(), shown_as };
+    let pictures =
+        Pictures { described: &described, settings, denoiser: denoiser.as_ref(), shown_as };
     let mut denoised = None;
     let rendering = match &turntable {
         None => render(camera)?,
@@ -155,6 +156,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
 /// How pictures are written.
 struct Pictures<'a> {
     described: &'a Settings,
+    settings: &'a RenderSettings,
     denoiser: Option<&'a Denoiser>,
     shown_as: ToneMapping,
 }
@@ -168,10 +170,10 @@ impl Pictures<'_> {
         outputs: &[PicturePath],
     ) -> Result<Option<String>> {
         let layers = &rendering.layers;
-        let denoised = self.denoiser.map(|d| tone::denoise(d, layers)).transpose()?;
+        let denoised = self.denoiser.map(|d| d.denoise_layers(layers)).transpose()?;
         let (color, by) = denoised.unzip();
-        let mut attributes = self.described.provenance();
-        // If not, the layer of sample counts tells how many there are.
+        let mut attributes = self.described.provenance(self.settings);
+        // If not, the layer of sample counts states how many there are.
         attributes.push(("domelight.complete".into(), rendering.complete.to_string()));
         if let Some(Frame { index, n_frames, .. }) = frame {
             attributes.push(("domelight.frame".into(), format!("{index} of {n_frames}")));

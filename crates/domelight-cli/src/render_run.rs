@@ -127,7 +127,7 @@ impl RenderRunArguments {
         };
         let Self { checkpoint_every: every, time, .. } = *self;
         let end = time.and_then(|time| clock::start().checked_add(time));
-        let provenance = report.provenance();
+        let provenance = report.provenance(settings);
         Ok(RenderRun { tiles, save, every, from, end, interrupted, quiet, identity, provenance })
     }
 }

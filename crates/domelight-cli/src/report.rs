@@ -1,17 +1,17 @@
 //! What a render did: as JSON or as two lines for people.
 
 use anyhow::{Result, bail};
-use domelight::render::Rendering;
+use domelight::render::{Provenance, RenderSettings, Rendering};
 use domelight_lab::report::SceneReport;
 use domelight_lab::{Acceptance, Host as _, Seconds, peak_memory};
 use serde::Serialize;
 use std::path::Path;
 
-use crate::error::{InterruptedAndSaved, status, tell_lines};
+use crate::error::{InterruptedAndSaved, status, status_lines};
 use crate::output::{self, PicturePath};
 use crate::profile::{self, StageSeconds};
 use crate::terminal::Terminal;
-use crate::tone::{self, Shown};
+use crate::tone::{Shown, denoised_line};
 
 /// What was rendered, and how: enough to make the same picture again.
 #[derive(Serialize)]
@@ -30,24 +30,16 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
-    /// What OpenEXR files tell of their making.
-    pub(crate) fn provenance(&self) -> Vec<(String, String)> {
-        let mut attributes =
-            vec![("domelight.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
-        let settings = [
-            ("scene", self.scene.scene.clone()),
-            ("environment", self.scene.environment.probe().to_owned()),
-            ("strategy", self.strategy.clone()),
-            ("samples", self.spp.to_string()),
-            ("passes", self.passes.to_owned()),
-            ("sampler", self.sampler.to_owned()),
-            ("filter", self.filter.to_owned()),
-            ("seed", self.seed.to_string()),
-        ];
-        let named = settings.map(|(name, value)| (format!("domelight.{name}"), value));
-        attributes.extend(named);
-        attributes.push(tone::attribute(self.automatic_exposure));
-        attributes
+    /// The provenance that OpenEXR files state.
+    pub(crate) fn provenance(&self, settings: &RenderSettings) -> Vec<(String, String)> {
+        let provenance = Provenance {
+            scene: &self.scene.scene,
+            environment: self.scene.environment.probe(),
+            strategy: &self.strategy,
+            settings,
+            exposure: self.automatic_exposure,
+        };
+        provenance.attributes()
     }
 }
 
@@ -85,7 +77,7 @@ pub(crate) struct RenderReport {
     rays_per_second: f64,
     peak_memory_bytes: Option<u64>,
     non_finite_samples: u64,
-    /// Of the strategy rejection, at the centers of pixels spread over the picture.
+    /// The acceptance of the strategy rejection, at the centers of pixels spread over the picture.
     rejection: Option<Acceptance>,
     complete: bool,
     stopped: Option<StopReason>,
@@ -169,10 +161,10 @@ impl RenderReport {
             ));
         }
         if let Some(by) = &self.denoised {
-            status(&tone::denoised_line(by));
+            status(&denoised_line(by));
         }
         if let Some(profile) = &self.profile {
-            tell_lines(&profile::lines(profile));
+            status_lines(&profile::lines(profile));
         }
     }
 

@@ -1,7 +1,5 @@
 //! From the flags to a strategy.
 
-use std::str::FromStr;
-
 use anyhow::Result;
 use domelight::environment::Environment;
 use domelight::render::{RenderSettings, Renderer, Rendering};
@@ -13,26 +11,10 @@ use domelight::strategy::{
 
 use domelight_lab::{Acceptance, count_tries};
 
-use crate::args::sampling::StrategyArguments;
+use crate::args::sampling::{StrategyArguments, StrategyText};
 use crate::error::UsageError;
 use crate::progress::RenderProgress;
 use crate::render_run::{RenderRun, TryWriting};
-
-/// A strategy's name and the options that go with it in one text.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StrategyText {
-    kind: StrategyKind,
-    options: StrategyOptions,
-}
-
-impl FromStr for StrategyText {
-    type Err = StrategyError;
-
-    fn from_str(text: &str) -> Result<Self, StrategyError> {
-        let (kind, options) = StrategyOptions::parse(text)?;
-        Ok(Self { kind, options })
-    }
-}
 
 impl StrategyArguments {
     /// The strategy of the flags, which take precedence over the options in its text.

@@ -3,14 +3,14 @@
 use std::fmt;
 
 use anyhow::Result;
+use domelight::RgbImage;
 use domelight::picture::exposure::Exposure;
 use domelight::picture::png::Depth;
 use domelight::picture::tone::ToneMapping;
 use domelight::picture::{
     Format, Picture, PictureError, PictureErrorKind, ReadOptions, png, read_bytes, read_file,
 };
-use domelight::render::Layers;
-use domelight::{Rgb, RgbImage};
+use domelight::render::kept_exposure;
 use domelight_lab::denoise::{Denoiser, Features};
 use serde::Serialize;
 
@@ -19,9 +19,6 @@ use crate::error::{UsageError, status};
 use crate::files;
 use crate::memory;
 use crate::output::{PictureFormat, print_json, require_one_on_standard_output};
-
-/// The attribute of OpenEXR files that holds the automatic exposure of a render.
-const EXPOSURE: &str = "domelight.exposure";
 
 /// Memory of a texel: color, alpha, and as PNG.
 const TEXEL: u64 = 16 + 8 + 4;
@@ -48,20 +45,6 @@ impl fmt::Display for Shown {
         let Self { exposure, automatic, tone } = self;
         let automatic = if *automatic { " (automatic)" } else { "" };
         write!(f, "{exposure:+.2} EV{automatic}, {tone}")
-    }
-}
-
-/// The attribute that keeps a render's automatic exposure.
-pub(crate) fn attribute(exposure: f32) -> (String, String) {
-    (EXPOSURE.to_owned(), exposure.to_string())
-}
-
-/// The automatic exposure that a render kept.
-pub(crate) fn kept(attributes: &[(String, String)]) -> Option<f32> {
-    let (_, value) = attributes.iter().find(|(name, _)| name == EXPOSURE)?;
-    match value.parse() {
-        Ok(Exposure::Stops(stops)) => Some(stops),
-        _ => None,
     }
 }
 
@@ -126,16 +109,7 @@ fn layer_of(bytes: &[u8], name: &str, layer: Option<&str>) -> Result<Picture, Pi
     read_bytes(bytes, name, &ReadOptions { layer, max_memory: memory::left() })
 }
 
-/// What a denoiser makes of a render, and how, in words.
-pub(crate) fn denoise(denoiser: &Denoiser, layers: &Layers) -> Result<(RgbImage, String)> {
-    let normals = layers.normal.iter().map(|n| Rgb::from(n.to_array())).collect();
-    let normal = &RgbImage::new(layers.width(), layers.height(), normals);
-    let features = Features { albedo: Some(&layers.albedo), normal: Some(normal) };
-    let by = format!("{} {}", denoiser.name(), features.description());
-    Ok((denoiser.denoise(&layers.color, features)?, by))
-}
-
-/// The same of a file's picture, with the layers that the file has.
+/// What a denoiser makes of a file's picture, with the layers that the file has, and how, in words.
 fn denoise_file(
     denoiser: &Denoiser,
     picture: &Picture,
@@ -196,7 +170,7 @@ fn develop(arguments: &ToneArguments, picture: &Picture) -> (ExposureSource, Ton
     let of_light =
         |layer: &str| ["unoccluded", "denoised"].iter().any(|l| l.eq_ignore_ascii_case(layer));
     let is_light = arguments.layer.as_deref().is_none_or(of_light);
-    let kept = kept(&picture.attributes).filter(|_| is_light);
+    let kept = kept_exposure(&picture.attributes).filter(|_| is_light);
     let automatic =
         || kept.unwrap_or_else(|| Exposure::Auto.stops(&picture.image, picture.alpha.as_deref()));
     let source = match (arguments.tone.is_automatic(), kept) {

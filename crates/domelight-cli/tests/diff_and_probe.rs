@@ -165,7 +165,7 @@ fn a_probe_goes_to_another_mapping_and_back() {
 }
 
 #[test]
-fn a_preview_is_resized_and_exposed() {
+fn a_preview_shows_the_map_exposed_and_what_is_known_of_it() {
     let folder = pictures();
     for (exposure, name) in [("0", "dark.png"), ("3", "bright.png")] {
         let size =
@@ -173,8 +173,51 @@ fn a_preview_is_resized_and_exposed() {
         done(&domelight(&folder, &size));
     }
     let [dark, bright] = ["dark.png", "bright.png"].map(|name| load(&folder, name));
-    assert_eq!((dark.width, dark.height), (80, 40));
-    assert!(bright.get(40, 30).luminance() > 2.0 * dark.get(40, 30).luminance());
+    assert!(dark.width == 1320 && dark.height > 1000);
+    assert!(bright.get(660, 560).luminance() > 2.0 * dark.get(660, 560).luminance());
+    // The map alone is what -o writes.
+    done(&domelight(&folder, &["probe", "cathedral", "--size", "40", "-o", "map.png", "-q"]));
+    let map = load(&folder, "map.png");
+    assert_eq!((map.width, map.height), (80, 40));
+    let refused = domelight(&folder, &["probe", "sky", "--preview", "sky.exr"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains(".png"), "{}", stderr(&refused));
+}
+
+#[test]
+fn the_sun_is_described_and_the_noise_of_each_strategy_measured() {
+    let folder = pictures();
+    let text = domelight(&folder, &["probe", "sky", "--size", "256"]);
+    let text = done(&text);
+    for name in ["sun, irradiance", "sun, diameter", "sun, share", "stops", "product:8", "brdf:8"] {
+        assert!(text.contains(name), "{name} is not in: {text}");
+    }
+    let report = json(&domelight(&folder, &["probe", "sky", "--size", "256", "--json"]));
+    let diameter = report["sun"]["angular_diameter"].as_f64().expect("a sun");
+    assert!((0.2..3.0).contains(&diameter), "{diameter}");
+    let noise = report["noise"]["strategies"].as_array().expect("strategies");
+    let matte = |name: &str| {
+        let of = noise.iter().find(|n| n["strategy"].as_str().unwrap().starts_with(name));
+        of.expect(name)["matte"].as_f64().expect("an error")
+    };
+    assert!(matte("product") < matte("mis") && matte("environment") < matte("brdf"));
+}
+
+#[test]
+fn a_clipped_sun_is_warned_of() {
+    let folder = pictures();
+    let mut map = RgbImage::filled(128, 64, Rgb::splat(0.5));
+    for i in [20 * 128 + 40, 20 * 128 + 41, 21 * 128 + 40, 21 * 128 + 41] {
+        map.pixels[i] = Rgb::splat(64.0);
+    }
+    write_exr(&folder.path().join("clipped.exr"), &map, None);
+    let output = domelight(&folder, &["probe", "clipped.exr"]);
+    assert_eq!(output.status.code(), Some(0));
+    assert!(stderr(&output).contains("4 texels side by side have the greatest value, 64"));
+    assert!(stdout(&output).contains("greatest value"), "{}", stdout(&output));
+    map.pixels[20 * 128 + 40] = Rgb::splat(6000.0);
+    write_exr(&folder.path().join("whole.exr"), &map, None);
+    done(&domelight(&folder, &["probe", "whole.exr"]));
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn all_figures_are_written() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let out = folder.path().join("out");
     let page = text(&out.join("index.html"));
-    for n in 1..=8 {
+    for n in 1..=14 {
         let picture = load(&folder, &format!("out/figure-{n}.png"));
         assert!(picture.width > 800 && picture.height > 300);
         assert!(page.contains(&format!("<section id=\"figure-{n}\">")));
@@ -50,7 +50,11 @@ fn all_figures_are_written() {
     }
     assert!(!without_data(&page).contains("NaN") && page.contains("<math"));
 
-    for (n, columns) in [(4, ["strategy", "relMSE"]), (8, ["method", "RMS relative error"])] {
+    for (n, columns) in [
+        (4, ["strategy", "relMSE"]),
+        (8, ["method", "RMS relative error"]),
+        (11, ["strategy", "relMSE × seconds"]),
+    ] {
         let csv = text(&out.join(format!("figure-{n}.csv")));
         let json: Value =
             serde_json::from_str(&text(&out.join(format!("figure-{n}.json")))).unwrap();
@@ -92,6 +96,24 @@ fn some_figures_can_be_made_alone() {
 }
 
 #[test]
+fn json_names_every_file() {
+    let folder = TempDir::new().unwrap();
+    let output = run(&folder, &["--only", "3,1", "--json", "-q"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["page"], "figures/index.html");
+    let figures = report["figures"].as_array().unwrap();
+    let numbers: Vec<_> = figures.iter().map(|figure| figure["number"].clone()).collect();
+    assert_eq!(numbers, [1, 3]);
+    assert_eq!(figures[0]["files"], serde_json::json!(["figures/figure-1.png"]));
+    assert!(figures[1]["seconds"].as_f64().unwrap() > 0.0);
+    let pictures = figures[1]["pictures"].as_array().unwrap();
+    assert!(pictures.len() > 1);
+    for file in pictures {
+        assert!(folder.path().join(file.as_str().unwrap()).is_file(), "{file}");
+    }
+}
+
+#[test]
 fn what_cannot_be_shown_is_refused() {
     let folder = TempDir::new().unwrap();
     let refused = |arguments: &[&str], code: i32, words: &str| {
@@ -99,7 +121,7 @@ fn what_cannot_be_shown_is_refused() {
         assert_eq!(output.status.code(), Some(code), "{}", stderr(&output));
         assert!(stderr(&output).contains(words), "{}", stderr(&output));
     };
-    refused(&["--only", "9"], 2, "9");
+    refused(&["--only", "15"], 2, "15");
     refused(&["--env-scale", "0"], 1, "black");
     refused(&["--env", "nothing.hdr"], 2, "nothing.hdr");
     fs::write(folder.path().join("file"), "").unwrap();

@@ -122,6 +122,65 @@ fn a_preview_shows_the_lights() {
 }
 
 #[test]
+fn what_was_written_is_listed_with_the_way_to_open_it() {
+    let folder = probes();
+    let outputs = ["-o", "my rig.py", "-o", "rig.js", "-o", "rig.usda"];
+    let arguments = [&["lights", "sun.exr", "--sun"], &outputs[..]].concat();
+    let output = domelight(&folder, &arguments);
+    let text = done(&output);
+    for line in [
+        "-> my rig.py for Blender 4.2 or later: blender --python 'my rig.py'",
+        "-> rig.usda for OpenUSD: usdview rig.usda",
+        "-> my rig_dome.exr: the light that is left",
+        "await addRig(scene)",
+    ] {
+        assert!(text.contains(line), "{line} is not in: {text}");
+    }
+    let report = json(&domelight(&folder, &[&arguments[..], &["--json"]].concat()));
+    let written = &report["written"];
+    assert_eq!(written["rigs"][0]["open"], "blender --python 'my rig.py'");
+    assert_eq!(written["rigs"][2]["format"], "usd");
+    assert_eq!(written["domes"], serde_json::json!(["my rig_dome.exr"]));
+    assert!(written["preview"].is_null());
+    // On standard output there is nothing but the result.
+    let more = ["lights", "sun.exr", "--sun", "-o", "-", "-o", "rig.rad"];
+    let output = domelight(&folder, &more);
+    assert!(stderr(&output).contains("-> rig.rad for Radiance: oconv"), "{}", stderr(&output));
+    assert!(!stdout(&output).contains("->"));
+}
+
+/// Runs it in a terminal of its own; none where `script` is missing.
+#[cfg(unix)]
+fn in_a_terminal(folder: &TempDir, arguments: &str) -> Option<()> {
+    let command = format!("{} {arguments}", env!("CARGO_BIN_EXE_domelight"));
+    let mut script = std::process::Command::new("script");
+    let started = script.args(["-qec", &command, "/dev/null"]).current_dir(folder).output();
+    let Ok(output) = started else {
+        eprintln!("not tested: there is no program script");
+        return None;
+    };
+    assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
+    Some(())
+}
+
+#[test]
+#[cfg(unix)]
+fn a_preview_beside_the_rig_on_a_terminal() {
+    let folder = probes();
+    let here = |name: &str| folder.path().join(name).is_file();
+    if in_a_terminal(&folder, "lights sun.exr --sun -o sun.py").is_none() {
+        return;
+    }
+    assert!(here("sun.py") && load(&folder, "sun_preview.png").width > 1000);
+    in_a_terminal(&folder, "lights sun.exr --sun -o none.py --preview none");
+    in_a_terminal(&folder, "lights sun.exr --sun -o quiet.py -q");
+    done(&domelight(&folder, &["lights", "sun.exr", "--sun", "-o", "batch.py"]));
+    for name in ["none", "quiet", "batch"] {
+        assert!(here(&format!("{name}.py")) && !here(&format!("{name}_preview.png")), "{name}");
+    }
+}
+
+#[test]
 fn nothing_to_extract_is_exit_code_1_and_writes_nothing() {
     let folder = probes();
     let before = files(&folder);

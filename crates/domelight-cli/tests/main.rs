@@ -10,6 +10,7 @@ mod farm;
 mod figures;
 mod hostile;
 mod inspect;
+mod json;
 mod lights;
 mod limits;
 mod names;

@@ -36,6 +36,7 @@ pub mod inspect;
 pub mod measure;
 pub mod names;
 mod page;
+pub mod probe;
 pub mod report;
 pub mod scene;
 mod strategy;

@@ -57,7 +57,7 @@ impl EnvironmentReport {
         &self.probe
     }
 
-    /// Of a probe by its name, without folders, used as `light` says.
+    /// The report of a probe with this name, without folders, used as `light` says.
     pub fn new(probe: String, light: &EnvironmentSettings, environment: &Environment) -> Self {
         Self {
             probe,
@@ -87,7 +87,7 @@ pub struct CameraReport {
 }
 
 impl CameraReport {
-    /// Of a camera in the scene's own units, and what its lens blurs.
+    /// The report of a camera, in the scene's own units, and of what its lens blurs.
     pub fn new(view: &CameraSettings, dof: Option<DepthOfField>) -> Self {
         let (fov, ortho) = match view.projection {
             Projection::Perspective { fov_y_degrees } => (Some(fov_y_degrees), None),

@@ -22,7 +22,7 @@ use crate::names::{file_name, without_folders};
 use crate::report::{CameraReport, EnvironmentReport, SceneReport};
 use crate::{At as _, Error, Host};
 
-/// Rows of a built-in probe unless told otherwise.
+/// Rows of a built-in probe by default.
 pub const BUILTIN_ROWS: u32 = 1024;
 
 /// For each triangle \[bytes\]: the tree, and what it is built from.
@@ -67,11 +67,11 @@ pub struct LightSettings {
     pub exposure: Option<f32>,
     /// Where the top of the map points to.
     pub up: Option<UpAxis>,
-    /// The map's layout, where shape and attributes do not tell it rightly.
+    /// The map's layout, where shape and attributes of the file do not determine it.
     pub mapping: Option<Mapping>,
     /// The layer of an OpenEXR map.
     pub layer: Option<String>,
-    /// Of a built-in probe.
+    /// Rows of a built-in probe.
     pub rows: u32,
     /// Refuses scenes that would be repaired or shown in part.
     pub strict_scene: bool,
@@ -246,7 +246,7 @@ pub struct PreparedScene {
 
 /// A scene under its light, seen by a camera, that somebody else owns.
 #[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
+pub struct PreparedSceneRef<'a> {
     /// Geometry and materials.
     pub scene: &'a Scene,
     /// The view.
@@ -259,9 +259,9 @@ pub struct View<'a> {
 
 impl PreparedScene {
     /// What a render needs of it.
-    pub fn view(&self) -> View<'_> {
+    pub fn view(&self) -> PreparedSceneRef<'_> {
         let Self { scene, camera, environment, report, .. } = self;
-        View { scene, camera, environment, report }
+        PreparedSceneRef { scene, camera, environment, report }
     }
 
     /// The camera after it has gone around the subject by an angle, counter-clockwise seen from above \[degrees\].

@@ -1,6 +1,6 @@
 //! What the process has used: CPU time and memory.
 
-/// CPU seconds of all threads so far; none where the system does not tell.
+/// CPU seconds of all threads so far; none where the system does not report them.
 pub fn cpu_seconds() -> Option<f64> {
     #[cfg(unix)]
     {
@@ -13,7 +13,7 @@ pub fn cpu_seconds() -> Option<f64> {
     None
 }
 
-/// CPU seconds of this thread since some moment; wall-clock where the system does not tell.
+/// CPU seconds of this thread since some moment; wall-clock seconds where the system does not report them.
 pub fn thread_seconds() -> f64 {
     use std::{sync::LazyLock, time::Instant};
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
@@ -27,7 +27,7 @@ pub fn thread_seconds() -> f64 {
     START.elapsed().as_secs_f64()
 }
 
-/// The most memory that was ever resident \[bytes\]; none where the system does not tell.
+/// The most memory that was ever resident \[bytes\]; none where the system does not report it.
 pub fn peak_memory() -> Option<u64> {
     #[cfg(unix)]
     {
@@ -46,7 +46,7 @@ pub fn peak_memory() -> Option<u64> {
 pub struct Seconds {
     /// By the clock.
     pub wall: f64,
-    /// Of all threads; none where the system does not tell.
+    /// CPU seconds of all threads; none where the system does not report them.
     pub cpu: Option<f64>,
 }
 

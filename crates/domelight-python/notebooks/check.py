@@ -1,10 +1,24 @@
-"""Runs notebooks and looks at what they show: check.py [--write=FOLDER] NOTEBOOK..."""
+"""Runs notebooks, looks at what they show, and interrupts one: check.py [--write=FOLDER] NOTEBOOK..."""
 
 import pathlib
 import sys
+import threading
+import time
 
 import nbformat
 from nbclient import NotebookClient
+from nbclient.exceptions import CellExecutionError
+
+INTERRUPTED = """
+import domelight as dl
+scene, env = dl.Scene.builtin("statue"), dl.Environment.builtin("sky")
+print("ready", flush=True)
+try:
+    dl.render(scene, env, spp=1 << 20)
+except dl.RenderInterrupted as stopped:
+    film = stopped.film
+film
+"""
 
 
 def check(path: pathlib.Path, folder: pathlib.Path | None) -> None:
@@ -26,6 +40,32 @@ def check(path: pathlib.Path, folder: pathlib.Path | None) -> None:
         nbformat.write(notebook, folder / path.name)
 
 
+def check_interrupt() -> None:
+    """The kernel's interrupt ends a render, and the cell goes on with its film."""
+    cell = nbformat.v4.new_code_cell(INTERRUPTED)
+    client = NotebookClient(nbformat.v4.new_notebook(cells=[cell]), timeout=120, kernel_name="python3")
+    interrupted: list[float] = []
+
+    def interrupt() -> None:
+        # The render has begun a moment after the cell says that it does.
+        while not any(output.get("text", "").startswith("ready") for output in cell.get("outputs", [])):
+            time.sleep(0.05)
+        time.sleep(1.0)
+        interrupted.append(time.monotonic())
+        client.km.interrupt_kernel()
+
+    thread = threading.Thread(target=interrupt, daemon=True)
+    thread.start()
+    try:
+        client.execute()
+    except CellExecutionError as error:
+        sys.exit(f"the interrupted cell fails: {error}")
+    seconds = time.monotonic() - interrupted[0]
+    if not any("image/png" in output.get("data", {}) for output in cell.outputs):
+        sys.exit(f"the interrupted cell shows no film: {cell.outputs}")
+    print(f"interrupt of a kernel: the cell had ended {seconds:.2f} s later")
+
+
 def main() -> None:
     folder = None
     for argument in sys.argv[1:]:
@@ -34,6 +74,7 @@ def main() -> None:
             folder.mkdir(parents=True, exist_ok=True)
         else:
             check(pathlib.Path(argument), folder)
+    check_interrupt()
 
 
 if __name__ == "__main__":

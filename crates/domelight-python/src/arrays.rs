@@ -17,7 +17,7 @@ pub(crate) struct Floats<'py> {
 }
 
 impl<'py> Floats<'py> {
-    /// Of anything that `numpy.asarray` makes real numbers of.
+    /// From anything that `numpy.asarray` makes real numbers of.
     pub(crate) fn new(name: &'static str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
         let array = as_array(name, value, "float32", "fiub", "real numbers")?;
         Ok(Self { name, array: array.cast_into::<PyArrayDyn<f32>>()?.try_readonly()? })

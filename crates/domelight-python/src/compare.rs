@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use domelight::RgbImage;
 use domelight::render::RenderSettings;
 use domelight_lab::compare::{Budget, Comparison, ComparisonResult, ComparisonSettings};
-use domelight_lab::{Error, Host, NamedStrategy};
+use domelight_lab::{Error, Host, NamedStrategy, WorkProgress};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -24,11 +24,32 @@ struct PythonHost<'a> {
     choices: &'a [(String, Choice)],
     cancel: &'a AtomicBool,
     warnings: Mutex<Vec<String>>,
+    /// The share of the work that is done, in [0, 1], and what is at work.
+    state: Mutex<(f64, String)>,
+}
+
+impl PythonHost<'_> {
+    fn state(&self) -> (f64, String) {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// Keeps how far the work is.
+struct Progress<'a>(&'a PythonHost<'a>);
+
+impl WorkProgress for Progress<'_> {
+    fn advance(&self, share: f64, _seconds_left: f64, label: &str) {
+        *self.0.state.lock().unwrap_or_else(PoisonError::into_inner) = (share, label.to_owned());
+    }
 }
 
 impl Host for PythonHost<'_> {
     fn warn(&self, text: &str) {
         self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
+    }
+
+    fn work_progress<'a>(&'a self) -> Option<Box<dyn WorkProgress + 'a>> {
+        Some(Box::new(Progress(self)))
     }
 
     fn canceled(&self) -> bool {
@@ -56,6 +77,7 @@ pub(crate) fn compare<'py>(
     camera: Option<CameraLike>,
     hide_env: bool,
     tile_size: Option<usize>,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let Some((_, first)) = strategies.first() else {
         return Err(bad_value("there is no strategy to compare"));
@@ -89,7 +111,17 @@ pub(crate) fn compare<'py>(
         .collect::<PyResult<Vec<_>>>()?;
     let report = &job.scene_report();
     let cancel = &AtomicBool::new(false);
-    let host = &PythonHost { job, choices, cancel, warnings: Mutex::new(Vec::new()) };
+    let host = &PythonHost {
+        job,
+        choices,
+        cancel,
+        warnings: Mutex::new(Vec::new()),
+        state: Mutex::new((0.0, String::new())),
+    };
+    let report_progress = |py: Python<'_>| match &progress {
+        Some(progress) => progress.bind(py).call1(host.state()).map(drop),
+        None => Ok(()),
+    };
     let run = || -> Result<ComparisonResult, Error> {
         let view = job.view(report);
         let render = *job.settings();
@@ -122,7 +154,7 @@ pub(crate) fn compare<'py>(
                 // Whoever waits is there.
                 let _ = sender.send(compared);
             });
-            wait(&results, cancel, &|_| Ok(()))
+            wait(&results, cancel, &report_progress)
         })
     })?;
     let of_choices = choices.iter().find_map(|(_, choice)| match choice {

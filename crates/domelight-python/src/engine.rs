@@ -40,7 +40,16 @@ pub(crate) fn alone<T: Send>(py: Python<'_>, f: impl FnOnce() -> T + Send) -> Py
 
 /// Computes without holding the interpreter, on all cores.
 pub(crate) fn parallel<T: Send>(py: Python<'_>, f: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let n = n_threads(None)?;
+    parallel_on(py, None, f)
+}
+
+/// Computes without holding the interpreter, on as many threads as asked for, else on all cores.
+pub(crate) fn parallel_on<T: Send>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    f: impl FnOnce() -> T + Send,
+) -> PyResult<T> {
+    let n = n_threads(threads)?;
     py.detach(|| {
         let pool = pool(n)?;
         caught(|| pool.install(f))

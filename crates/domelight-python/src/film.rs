@@ -1,20 +1,26 @@
 //! Films: rendered pictures in layers.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use domelight::RgbImage;
 use domelight::math::Vec3;
-use domelight::picture::write_atomically_seeking;
-use domelight::render::{self, Checkpoint, Counts, LAYERS, LayerInfo, LayerValues, Layers};
+use domelight::picture::exposure::Exposure;
+use domelight::picture::tone::ToneMapping;
+use domelight::picture::{PictureError, write_atomically_seeking};
+use domelight::render::{
+    self, Checkpoint, Counts, LAYERS, LayerInfo, LayerValues, Layers, kept_exposure,
+};
+use domelight_lab::denoise::{Denoiser, LIBRARY_VARIABLE, write_exr};
 use numpy::PyArrayDyn;
-use pyo3::exceptions::PyKeyError;
+use pyo3::exceptions::{PyImportError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
 
 use crate::arrays::{array, from_image, rows};
 use crate::engine::parallel;
 use crate::error::{bad_value, from_source, to_python};
-use crate::picture::{Format, into_io, to_png, tone, write_image};
+use crate::picture::{Format, depth, into_io, to_png, tone, write_image};
 
 /// The values of a layer as a new array.
 fn layer<'py>(py: Python<'py>, layers: &Layers, layer: &LayerInfo) -> PyResult<Bound<'py, PyAny>> {
@@ -28,6 +34,12 @@ fn layer<'py>(py: Python<'py>, layers: &Layers, layer: &LayerInfo) -> PyResult<B
         LayerValues::Counts(counts) => array(py, counts.to_vec(), &size)?.into_any(),
         _ => unreachable!("a kind of layer that this package does not know"),
     })
+}
+
+/// The exposure [stops] that makes the median of what a picture covers middle gray.
+pub(crate) fn automatic_exposure_of(layers: &Layers) -> f32 {
+    let coverage: Vec<f32> = layers.n_hits.iter().map(|&n| n as f32).collect();
+    Exposure::Auto.stops(&layers.color, Some(&coverage))
 }
 
 /// A rendered picture in layers. `render` and `progressive` make them.
@@ -57,25 +69,29 @@ pub(crate) struct Film {
     pub(crate) counts: Counts,
     pub(crate) complete: bool,
     /// Camera samples that each pixel is to have.
-    pub(crate) n_samples: u32,
-    /// What the picture is of: names and values.
-    pub(crate) provenance: Vec<(String, String)>,
+    n_samples: u32,
+    /// The strategy's text, with what a pilot chose.
+    strategy: String,
+    /// How the picture was made: names and values.
+    provenance: Vec<(String, String)>,
     /// The background was left out.
-    pub(crate) hidden: bool,
+    hidden: bool,
     layers: OnceLock<Layers>,
 }
 
+/// What a film is of.
+pub(crate) struct Making {
+    pub(crate) n_samples: u32,
+    pub(crate) strategy: String,
+    pub(crate) provenance: Vec<(String, String)>,
+    pub(crate) hidden: bool,
+}
+
 impl Film {
-    pub(crate) fn new(
-        sums: render::Film,
-        counts: Counts,
-        complete: bool,
-        n_samples: u32,
-        provenance: Vec<(String, String)>,
-        hidden: bool,
-    ) -> Self {
+    pub(crate) fn new(sums: render::Film, counts: Counts, complete: bool, making: Making) -> Self {
+        let Making { n_samples, strategy, provenance, hidden } = making;
         let layers = OnceLock::new();
-        Self { sums, counts, complete, n_samples, provenance, hidden, layers }
+        Self { sums, counts, complete, n_samples, strategy, provenance, hidden, layers }
     }
 
     fn layers(&self) -> &Layers {
@@ -86,12 +102,47 @@ impl Film {
         self.hidden.then(|| &self.layers().alpha[..])
     }
 
+    /// The tone mapping at an exposure, by default the automatic one.
+    fn tone(&self, exposure: Option<f32>, curve: &str) -> PyResult<ToneMapping> {
+        tone(&self.layers().color, None, exposure.or_else(|| Some(self.exposure())), curve)
+    }
+
+    /// Color without noise, computed without holding the interpreter.
+    fn denoised(&self, py: Python<'_>) -> PyResult<RgbImage> {
+        // The package's library, unless the user names another one.
+        let file: Option<PathBuf> =
+            match std::env::var_os(LIBRARY_VARIABLE).filter(|path| !path.is_empty()) {
+                Some(_) => None,
+                None => py.import("domelight._interop")?.call_method0("oidn_library")?.extract()?,
+            };
+        let layers = self.layers();
+        parallel(py, || {
+            let denoiser = file.map_or_else(Denoiser::load, Denoiser::load_file);
+            let denoiser = denoiser.map_err(|e| PyImportError::new_err(e.to_string()))?;
+            let (color, _) = denoiser.denoise_layers(layers).map_err(|e| from_source(&e))?;
+            Ok(color)
+        })?
+    }
+
+    /// Writes all layers, and a denoised one if there is one.
+    fn write_exr(&self, path: &Path, denoised: Option<&RgbImage>) -> Result<(), PictureError> {
+        let mut attributes = self.provenance.clone();
+        attributes.push(("domelight.complete".into(), self.complete.to_string()));
+        write_atomically_seeking(path, |out| {
+            let written = match denoised {
+                Some(denoised) => write_exr(self.layers(), denoised, &attributes, out),
+                None => self.layers().write_exr(&attributes, out),
+            };
+            written.map_err(into_io)
+        })
+    }
+
     fn checkpoint(&self) -> Checkpoint {
         Checkpoint {
-            identity: vec![(
-                "background".into(),
-                if self.hidden { "hidden" } else { "shown" }.into(),
-            )],
+            identity: vec![
+                ("background".into(), if self.hidden { "hidden" } else { "shown" }.into()),
+                ("strategy".into(), self.strategy.clone()),
+            ],
             provenance: self.provenance.clone(),
             tiles: 0..1,
             n_tiles: 1,
@@ -153,11 +204,17 @@ impl Film {
         self.complete
     }
 
-    /// str: the strategy that rendered.
+    /// str: the strategy that rendered, as `render` takes it; 'python' for a function.
     #[getter]
     fn strategy(&self) -> &str {
-        let of_strategy = self.provenance.iter().find(|(name, _)| name == "domelight.strategy");
-        of_strategy.map_or("", |(_, value)| value)
+        &self.strategy
+    }
+
+    /// float: the automatic exposure [stops], which makes the median of what the scene covers middle gray; 0 shows
+    /// radiance as it is. The program's renders of the same scene, light and view have the same one.
+    #[getter]
+    fn exposure(&self) -> f32 {
+        kept_exposure(&self.provenance).unwrap_or_else(|| automatic_exposure_of(self.layers()))
     }
 
     /// int: camera rays, with those of which it is known that they meet nothing.
@@ -191,36 +248,58 @@ impl Film {
     /// path : str or os.PathLike
     ///     .exr gets all layers, .hdr and .pfm color alone, .png what a screen shows, with alpha if the background was
     ///     left out. The file is the old one or the whole new one.
-    /// exposure : float or None, default 0
-    ///     Of PNG [stops]; None makes the median middle gray.
+    /// exposure : float or None, default None
+    ///     Of PNG [stops]; None is the film's `exposure`, 0 shows radiance as it is.
     /// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
     ///     The tone curve of PNG.
+    /// bits : {8, 16}, default 8
+    ///     Of a channel of PNG.
+    /// denoise : bool, default False
+    ///     As `--denoise` of the program: .exr gets one more layer, others `denoise()` in place of color.
     ///
     /// Raises
     /// ------
     /// OSError, ValueError
-    ///     If the file cannot be written, or its name says no format.
-    #[pyo3(signature = (path, *, exposure = Some(0.0), curve = "agx"),
-    text_signature = "($self, path, *, exposure=0.0, curve='agx')")]
+    ///     If the file cannot be written, its name says no format, or a setting is wrong.
+    /// ImportError
+    ///     If there is no denoiser.
+    #[pyo3(signature = (path, *, exposure = None, curve = "agx", bits = 8, denoise = false))]
     fn save(
         &self,
         py: Python<'_>,
         path: PathBuf,
         exposure: Option<f32>,
         curve: &str,
+        bits: i64,
+        denoise: bool,
     ) -> PyResult<()> {
         let format = Format::of(&path)?;
-        let layers = self.layers();
-        let tone = tone(&layers.color, Some(&layers.alpha), exposure, curve)?;
+        let (tone, depth) = (self.tone(exposure, curve)?, depth(bits)?);
+        let denoised = denoise.then(|| self.denoised(py)).transpose()?;
+        let color = denoised.as_ref().unwrap_or(&self.layers().color);
         let written = parallel(py, || match format {
-            Format::Exr => write_atomically_seeking(&path, |out| {
-                let mut attributes = self.provenance.clone();
-                attributes.push(("domelight.complete".into(), self.complete.to_string()));
-                layers.write_exr(&attributes, out).map_err(into_io)
-            }),
-            _ => write_image(&path, format, &layers.color, self.alpha_to_show(), &tone),
+            Format::Exr => self.write_exr(&path, denoised.as_ref()),
+            _ => write_image(&path, format, color, self.alpha_to_show(), &tone, depth),
         })?;
         written.map_err(to_python)
+    }
+
+    /// Color without noise, by Intel's Open Image Denoise with albedo and normals.
+    ///
+    /// A denoised picture is to look at, not to measure: the filter trades noise for bias. The library is that of the
+    /// file that the environment variable OIDN_LIBRARY names, else of the package pyoidn, else the system's.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (H, W, 3)
+    ///     As `color`.
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     If there is no such library; `pip install pyoidn` gets it.
+    fn denoise<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        from_image(py, &self.denoised(py)?)
     }
 
     /// The bytes of a PNG file as a screen shows it.
@@ -228,25 +307,32 @@ impl Film {
     /// Parameters
     /// ----------
     /// exposure : float or None, default None
-    ///     In stops; None makes the median middle gray.
+    ///     In stops; None is the film's `exposure`, 0 shows radiance as it is.
     /// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
     ///     The tone curve.
-    #[pyo3(signature = (*, exposure = None, curve = "agx"))]
+    /// bits : {8, 16}, default 8
+    ///     Of a channel.
+    ///
+    /// Returns
+    /// -------
+    /// bytes
+    ///     With alpha if the background was left out.
+    #[pyo3(signature = (*, exposure = None, curve = "agx", bits = 8))]
     fn to_png<'py>(
         &self,
         py: Python<'py>,
         exposure: Option<f32>,
         curve: &str,
+        bits: i64,
     ) -> PyResult<Bound<'py, PyBytes>> {
-        let layers = self.layers();
-        let alpha = self.alpha_to_show();
-        let tone = tone(&layers.color, alpha, exposure, curve)?;
-        let bytes = parallel(py, || to_png(&layers.color, alpha, &tone))?;
+        let (tone, depth) = (self.tone(exposure, curve)?, depth(bits)?);
+        let color = &self.layers().color;
+        let bytes = parallel(py, || to_png(color, self.alpha_to_show(), &tone, depth))?;
         Ok(PyBytes::new(py, &bytes.map_err(|e| from_source(&e))?))
     }
 
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        self.to_png(py, None, "agx")
+        self.to_png(py, None, "agx", 8)
     }
 
     /// The film as an `xarray.Dataset` with the dimensions y, x and channel; needs the package xarray.
@@ -271,7 +357,7 @@ impl Film {
     fn __repr__(&self) -> String {
         let (height, width) = self.shape();
         let state = if self.complete { "" } else { ", not complete" };
-        format!("<Film {width} x {height}: {}, {} samples{state}>", self.strategy(), self.n_samples)
+        format!("<Film {width} x {height}: {}, {} samples{state}>", self.strategy, self.n_samples)
     }
 
     fn __reduce__<'py>(
@@ -287,15 +373,13 @@ impl Film {
     fn _restore(cls: &Bound<'_, PyType>, bytes: &[u8]) -> PyResult<Self> {
         let read = parallel(cls.py(), || Checkpoint::decode(bytes))?;
         let state = read.map_err(|error| bad_value(format!("the pickled film: {error}")))?;
-        let hidden =
-            state.identity.iter().any(|(name, value)| name == "background" && value == "hidden");
-        Ok(Self::new(
-            state.film,
-            state.counts,
-            state.complete,
-            state.n_samples,
-            state.provenance,
-            hidden,
-        ))
+        let of = |key: &str| state.identity.iter().find(|(name, _)| name == key);
+        let making = Making {
+            n_samples: state.n_samples,
+            strategy: of("strategy").map_or(String::new(), |(_, value)| value.clone()),
+            hidden: of("background").is_some_and(|(_, value)| value == "hidden"),
+            provenance: state.provenance,
+        };
+        Ok(Self::new(state.film, state.counts, state.complete, making))
     }
 }

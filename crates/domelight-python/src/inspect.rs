@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{array, rows};
-use crate::engine::parallel;
+use crate::engine::parallel_on;
 use crate::environment::Environment;
 use crate::error::{bad_value, from_source, to_python};
 use crate::render::{Choice, Job, Keywords, choose};
@@ -30,6 +30,7 @@ pub(crate) fn inspect<'py>(
     pixel: (i64, i64),
     size: (i64, i64),
     seed: u64,
+    threads: Option<usize>,
     camera: Option<CameraLike>,
     hide_env: bool,
     resolution: usize,
@@ -45,7 +46,7 @@ pub(crate) fn inspect<'py>(
         spp: 1,
         size,
         seed,
-        threads: None,
+        threads,
         camera,
         filter: "gaussian",
         sampler: "sobol",
@@ -64,7 +65,7 @@ pub(crate) fn inspect<'py>(
         .into_iter()
         .map(|(name, strategy)| Ok((name, choose(&strategy, 1, lobes)?)))
         .collect::<PyResult<Vec<_>>>()?;
-    let found = parallel(py, || -> PyResult<Found> {
+    let found = parallel_on(py, threads, || -> PyResult<Found> {
         let inspector = job.inspector(pixel).map_err(|e| from_source(&e))?;
         let one = |(name, choice): &(String, Choice)| match choice {
             Choice::Builtin(spec) => {

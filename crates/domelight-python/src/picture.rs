@@ -61,6 +61,15 @@ pub(crate) fn tone(
     Ok(ToneMapping { exposure: exposure.stops(image, alpha), curve })
 }
 
+/// Bits of a channel of PNG.
+pub(crate) fn depth(bits: i64) -> PyResult<Depth> {
+    match bits {
+        8 => Ok(Depth::Eight),
+        16 => Ok(Depth::Sixteen),
+        _ => Err(bad_value(format!("bits is {bits}; it must be 8 or 16"))),
+    }
+}
+
 /// Writes color alone, PNG with alpha if there is one.
 pub(crate) fn write_image(
     path: &Path,
@@ -68,6 +77,7 @@ pub(crate) fn write_image(
     image: &RgbImage,
     alpha: Option<&[f32]>,
     tone: &ToneMapping,
+    depth: Depth,
 ) -> Result<(), PictureError> {
     match format {
         Format::Exr => write_bands(path, image.height, |y| {
@@ -78,9 +88,7 @@ pub(crate) fn write_image(
         }),
         Format::Hdr => write_atomically(path, |out| hdr::encode(image, out)),
         Format::Pfm => write_atomically(path, |out| pfm::encode(image, out)),
-        Format::Png => {
-            write_atomically(path, |out| png::encode(image, alpha, tone, Depth::Eight, out))
-        }
+        Format::Png => write_atomically(path, |out| png::encode(image, alpha, tone, depth, out)),
     }
 }
 
@@ -141,33 +149,36 @@ pub(crate) fn read(
 ///     The file: it is the old one or the whole new one.
 /// picture : array_like, shape (H, W, 3)
 ///     Linear Rec. 709, top row first.
-/// exposure : float or None, default 0
-///     Of PNG [stops]; None makes the median middle gray.
+/// exposure : float or None, default None
+///     Of PNG [stops]; None makes the median middle gray, 0 shows radiance as it is.
 /// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
 ///     The tone curve of PNG.
+/// bits : {8, 16}, default 8
+///     Of a channel of PNG.
 ///
 /// Raises
 /// ------
 /// OSError, ValueError
-///     If the file cannot be written, or the shape or the name is wrong.
+///     If the file cannot be written, or the shape, the name or a setting is wrong.
 #[pyfunction]
-#[pyo3(signature = (path, picture, *, exposure = Some(0.0), curve = "agx"),
-    text_signature = "(path, picture, *, exposure=0.0, curve='agx')")]
+#[pyo3(signature = (path, picture, *, exposure = None, curve = "agx", bits = 8))]
 pub(crate) fn write(
     path: PathBuf,
     picture: &Bound<'_, PyAny>,
     exposure: Option<f32>,
     curve: &str,
+    bits: i64,
 ) -> PyResult<()> {
     let py = picture.py();
     let format = Format::of(&path)?;
+    let depth = depth(bits)?;
     let floats = Floats::new("picture", picture)?;
     let image = image(&floats)?;
     if image.pixels.is_empty() {
         return Err(floats.bad_shape("(height, width, 3) with at least one pixel"));
     }
     let tone = tone(&image, None, exposure, curve)?;
-    parallel(py, || write_image(&path, format, &image, None, &tone))?.map_err(to_python)
+    parallel(py, || write_image(&path, format, &image, None, &tone, depth))?.map_err(to_python)
 }
 
 /// What a screen shows of linear light.
@@ -203,14 +214,15 @@ pub(crate) fn tone_map<'py>(
     from_image(py, &image)
 }
 
-/// The bytes of a PNG file of 8 bits.
+/// The bytes of a PNG file.
 pub(crate) fn to_png(
     image: &RgbImage,
     alpha: Option<&[f32]>,
     tone: &ToneMapping,
+    depth: Depth,
 ) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let out: &mut dyn Write = &mut bytes;
-    png::encode(image, alpha, tone, Depth::Eight, out)?;
+    png::encode(image, alpha, tone, depth, out)?;
     Ok(bytes)
 }

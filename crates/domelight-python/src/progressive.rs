@@ -26,6 +26,9 @@ type Step = PyResult<Option<Film>>;
 pub(crate) struct Progressive {
     job: Arc<Job>,
     cancel: Arc<AtomicBool>,
+    /// Camera samples so far.
+    done: Arc<AtomicU64>,
+    progress: Option<Py<PyAny>>,
     /// Asks the render's thread for a step.
     questions: Sender<()>,
     /// What it answers.
@@ -39,6 +42,7 @@ pub(crate) struct Progressive {
 struct Steps<'a> {
     job: &'a Job,
     cancel: &'a AtomicBool,
+    done: &'a AtomicU64,
     questions: Receiver<()>,
     answers: Sender<Step>,
 }
@@ -47,9 +51,8 @@ impl Visitor for Steps<'_> {
     type Output = ();
 
     fn visit<S: Strategy>(self, mut renderer: Renderer<S>) {
-        let Self { job, cancel, questions, answers } = self;
-        let done = AtomicU64::new(0);
-        let watch = Watch { job, cancel, done: &done };
+        let Self { job, cancel, done, questions, answers } = self;
+        let watch = Watch { job, cancel, done, end: None };
         while questions.recv().is_ok() {
             if renderer.is_complete() {
                 let _ = answers.send(Ok(None));
@@ -61,6 +64,12 @@ impl Visitor for Steps<'_> {
             });
             let _ = answers.send(step);
         }
+    }
+}
+
+impl Progressive {
+    fn report(&self, py: Python<'_>, share: f64) -> PyResult<()> {
+        self.progress.as_ref().map_or(Ok(()), |f| f.bind(py).call1((share,)).map(drop))
     }
 }
 
@@ -81,7 +90,7 @@ impl Progressive {
             self.cancel.store(false, Ordering::Relaxed);
             // A thread that has ended is noticed by its missing answer.
             let _ = self.questions.send(());
-            wait(&answers, &self.cancel, &|_| Ok(()))
+            wait(&answers, &self.cancel, &|py| self.report(py, self.job.share(&self.done)))
         })?;
         if let Some(error) = self.job.take_failure() {
             return Err(error);
@@ -91,6 +100,7 @@ impl Progressive {
             return Err(interrupted(py, error, film)?);
         }
         if film.complete {
+            self.report(py, 1.0)?;
             warn_of(py, &film)?;
         }
         let film = Py::new(py, film)?;
@@ -115,6 +125,8 @@ impl Progressive {
 /// passes : {'doubling', 'efficient'}, default 'doubling'
 ///     As of `render`: films of 1, 2, 4, 8, … samples, up to one for each 64 with 'product'; or as few films as the
 ///     strategy works best with.
+/// progress : bool or callable, default False
+///     As of `render`; the share is that of all samples.
 ///
 /// Yields
 /// ------
@@ -125,11 +137,11 @@ impl Progressive {
 /// ------
 /// RenderInterrupted
 ///     A `KeyboardInterrupt` whose attribute `film` holds what was done; a later `next` goes on from there.
-#[pyfunction]
+#[pyfunction(name = "_progressive")]
 #[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = (640, 640), seed = 0, threads = None,
     camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,
-    tile_size = None, passes = "doubling"),
-    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, passes='doubling')")]
+    tile_size = None, passes = "doubling", progress = None),
+    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, passes='doubling', progress=None)")]
 pub(crate) fn progressive<'py>(
     py: Python<'py>,
     scene: &Bound<'py, Scene>,
@@ -147,6 +159,7 @@ pub(crate) fn progressive<'py>(
     target_error: Option<f32>,
     tile_size: Option<usize>,
     passes: &str,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<Progressive> {
     let strategy = strategy.unwrap_or_else(|| pyo3::types::PyString::new(py, "product").into_any());
     let keywords = Keywords {
@@ -165,13 +178,13 @@ pub(crate) fn progressive<'py>(
         passes,
     };
     let job = Arc::new(Job::new(py, scene.get(), env, keywords)?);
-    let cancel = Arc::new(AtomicBool::new(false));
+    let (cancel, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
     let (ask, questions) = mpsc::channel();
     let (answers, answered) = mpsc::channel();
-    let on_thread = (job.clone(), cancel.clone());
+    let on_thread = (job.clone(), cancel.clone(), done.clone());
     let body = move || {
-        let (job, cancel) = (&*on_thread.0, &*on_thread.1);
-        let steps = Steps { job, cancel, questions, answers: answers.clone() };
+        let (job, cancel, done) = (&*on_thread.0, &*on_thread.1, &*on_thread.2);
+        let steps = Steps { job, cancel, done, questions, answers: answers.clone() };
         let served = pool(job.n_threads())
             .and_then(|pool| caught(|| pool.install(|| job.with_renderer(steps)))?);
         if let Err(error) = served {
@@ -181,5 +194,6 @@ pub(crate) fn progressive<'py>(
     let started = thread::Builder::new().name("domelight".into()).spawn(body);
     started.map_err(|e| PyRuntimeError::new_err(format!("cannot start a thread: {e}")))?;
     let (answers, last) = (Mutex::new(answered), Mutex::new(None));
-    Ok(Progressive { job, cancel, questions: ask, answers, last, process: std::process::id() })
+    let process = std::process::id();
+    Ok(Progressive { job, cancel, done, progress, questions: ask, answers, last, process })
 }

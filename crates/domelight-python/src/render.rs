@@ -1,24 +1,28 @@
 //! Rendering: settings from Python, a render that signals may end, and its film.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc;
+use std::sync::{Arc, OnceLock, mpsc};
+use std::time::{Duration, Instant};
 
 use domelight::environment;
 use domelight::inspect::{InspectError, Inspector};
-use domelight::render::{Background, Counts, Filter, Observer, Passes, RenderSettings, Renderer};
+use domelight::render::{
+    Background, Counts, Filter, Observer, Passes, Provenance, RenderSettings, Renderer,
+    automatic_exposure,
+};
 use domelight::sampling::SamplerKind;
 use domelight::scene::{self, CameraSettings, EnvironmentSettings, EnvironmentSource};
-use domelight::strategy::{Strategy, StrategyKind, StrategySpec};
+use domelight::strategy::{PreparedStrategy, Strategy, StrategyKind, StrategySpec};
+use domelight_lab::names::file_name;
 use domelight_lab::report::{CameraReport, EnvironmentReport, SceneReport};
-use domelight_lab::scene::View;
+use domelight_lab::scene::PreparedSceneRef;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
 use crate::engine::{caught, n_threads, pool, wait};
 use crate::environment::Environment;
 use crate::error::{RenderInterrupted, bad_value, from_source, to_python, warn};
-use crate::film::Film;
+use crate::film::{Film, Making, automatic_exposure_of};
 use crate::lobe::PythonLobe;
 use crate::scene::{CameraLike, Scene, SceneData, size};
 use crate::strategy::PythonStrategy;
@@ -44,8 +48,10 @@ pub(crate) struct Job {
     settings: RenderSettings,
     strategy: Choice,
     n_threads: usize,
-    /// Attributes of the film, but for the strategy.
-    provenance: Vec<(String, String)>,
+    /// The built-in strategy with what a pilot chose.
+    chosen: OnceLock<StrategySpec>,
+    /// Of all films [stops].
+    exposure: OnceLock<f32>,
 }
 
 /// The keywords of `render` and `progressive`.
@@ -138,18 +144,6 @@ impl Job {
             background: if keywords.hide_env { Background::Hidden } else { Background::Shown },
             tile_size: keywords.tile_size.unwrap_or(default_tile),
         };
-        let provenance = [
-            ("version", env!("CARGO_PKG_VERSION").to_owned()),
-            ("scene", scene.inner.name.clone()),
-            ("environment", probe.clone()),
-            ("samples", spp.to_string()),
-            ("passes", keywords.passes.to_owned()),
-            ("sampler", keywords.sampler.to_owned()),
-            ("filter", filter.name().to_owned()),
-            ("seed", keywords.seed.to_string()),
-        ];
-        let provenance =
-            provenance.map(|(name, value)| (format!("domelight.{name}"), value)).to_vec();
         Ok(Self {
             scene: scene.inner.clone(),
             environment,
@@ -159,18 +153,27 @@ impl Job {
             settings,
             strategy: choice,
             n_threads,
-            provenance,
+            chosen: OnceLock::new(),
+            exposure: OnceLock::new(),
         })
     }
 
     /// Hands a renderer over; on the calling thread's pool.
     pub(crate) fn with_renderer<V: Visitor>(&self, visitor: V) -> PyResult<V::Output> {
         let Self { scene, environment, camera, settings, .. } = self;
+        // The pilot would call Python's BSDFs direction by direction.
+        if scene.lobes.is_empty() {
+            let found = || automatic_exposure(&scene.scene, camera, environment, settings);
+            self.exposure.get_or_init(found);
+        }
         let scene = &scene.scene;
         match &self.strategy {
             Choice::Builtin(spec) => {
-                let renderer = Renderer::new(scene, camera, environment, *spec, *settings);
-                Ok(visitor.visit(renderer.map_err(to_python)?))
+                let spec = *self.chosen.get_or_init(|| self.for_picture(*spec));
+                let strategy = &PreparedStrategy::new(spec, environment).map_err(to_python)?;
+                let renderer =
+                    Renderer::with_strategy(scene, camera, environment, strategy, *settings);
+                Ok(visitor.visit(renderer))
             }
             Choice::Python(strategy) => {
                 let renderer =
@@ -182,20 +185,28 @@ impl Job {
 
     /// The film of a renderer so far.
     pub(crate) fn film<S: Strategy>(&self, renderer: &Renderer<S>) -> Film {
-        let strategy = match &self.strategy {
-            Choice::Builtin(spec) => spec.to_string(),
-            Choice::Python(_) => "python".to_owned(),
+        let sums = renderer.film();
+        let exposure = *self.exposure.get_or_init(|| automatic_exposure_of(&sums.layers()));
+        let (strategy, description) = match (&self.strategy, self.chosen.get()) {
+            (Choice::Builtin(spec), None) | (_, Some(spec)) => {
+                (spec.to_string(), spec.description())
+            }
+            (Choice::Python(_), None) => ("python".to_owned(), "python".to_owned()),
         };
-        let mut provenance = self.provenance.clone();
-        provenance.insert(3, ("domelight.strategy".to_owned(), strategy));
-        Film::new(
-            renderer.film(),
-            renderer.counts(),
-            renderer.is_complete(),
-            self.settings.n_samples,
-            provenance,
-            self.settings.background == Background::Hidden,
-        )
+        let provenance = Provenance {
+            scene: &file_name(&self.scene.name),
+            environment: &file_name(&self.probe),
+            strategy: &description,
+            settings: &self.settings,
+            exposure,
+        };
+        let making = Making {
+            n_samples: self.settings.n_samples,
+            strategy,
+            provenance: provenance.attributes(),
+            hidden: self.settings.background == Background::Hidden,
+        };
+        Film::new(sums, renderer.counts(), renderer.is_complete(), making)
     }
 
     /// A pixel under the microscope.
@@ -210,15 +221,15 @@ impl Job {
         spec.for_picture(&scene.scene, camera, environment, settings)
     }
 
-    /// Of each picture.
+    /// Settings of each picture.
     pub(crate) fn settings(&self) -> &RenderSettings {
         &self.settings
     }
 
     /// The scene under its light, with a report on it.
-    pub(crate) fn view<'a>(&'a self, report: &'a SceneReport) -> View<'a> {
+    pub(crate) fn view<'a>(&'a self, report: &'a SceneReport) -> PreparedSceneRef<'a> {
         let Self { scene, camera, environment, .. } = self;
-        View { scene: &scene.scene, camera, environment, report }
+        PreparedSceneRef { scene: &scene.scene, camera, environment, report }
     }
 
     /// The scene in words and numbers.
@@ -238,10 +249,10 @@ impl Job {
             warnings: Vec::new(),
             material: None,
             normalize: false,
-            ground: false,
+            ground: None,
             hide_env: settings.background == Background::Hidden,
             environment: EnvironmentReport::new(probe.clone(), &light, environment),
-            camera: CameraReport::new(camera_settings),
+            camera: CameraReport::new(camera_settings, None),
             size: [settings.width, settings.height],
         }
     }
@@ -257,9 +268,14 @@ impl Job {
     }
 
     /// Camera samples of all pixels.
-    pub(crate) fn total_samples(&self) -> u64 {
+    fn total_samples(&self) -> u64 {
         let RenderSettings { width, height, n_samples, .. } = self.settings;
         width as u64 * height as u64 * u64::from(n_samples)
+    }
+
+    /// The share that is done, in [0, 1].
+    pub(crate) fn share(&self, done: &AtomicU64) -> f64 {
+        (done.load(Ordering::Relaxed) as f64 / self.total_samples().max(1) as f64).min(1.0)
     }
 
     /// What functions of Python's raised while they rendered.
@@ -330,11 +346,13 @@ pub(crate) trait Visitor {
     fn visit<S: Strategy>(self, renderer: Renderer<S>) -> Self::Output;
 }
 
-/// Ends a render that was canceled or whose functions failed, and counts its samples.
+/// Ends a render that was canceled, whose functions failed or whose time is over, and counts its samples.
 pub(crate) struct Watch<'a> {
     pub(crate) job: &'a Job,
     pub(crate) cancel: &'a AtomicBool,
     pub(crate) done: &'a AtomicU64,
+    /// However short the time, a tile is finished.
+    pub(crate) end: Option<Instant>,
 }
 
 impl Observer for Watch<'_> {
@@ -343,21 +361,26 @@ impl Observer for Watch<'_> {
     }
 
     fn canceled(&self) -> bool {
-        self.cancel.load(Ordering::Relaxed) || self.job.has_failed()
+        let is_late = || self.end.is_some_and(|end| Instant::now() >= end);
+        self.cancel.load(Ordering::Relaxed)
+            || self.job.has_failed()
+            || (self.done.load(Ordering::Relaxed) > 0 && is_late())
     }
 }
 
-/// Renders until the end or until it is canceled.
+/// Renders until the end or until it is canceled, for that long.
 struct ToTheEnd<'a> {
     job: &'a Job,
     watch: Watch<'a>,
+    time: Option<Duration>,
 }
 
 impl Visitor for ToTheEnd<'_> {
     type Output = Film;
 
     fn visit<S: Strategy>(self, mut renderer: Renderer<S>) -> Film {
-        renderer.run(&self.watch);
+        let end = self.time.map(|time| Instant::now() + time);
+        renderer.run(&Watch { end, ..self.watch });
         self.job.film(&renderer)
     }
 }
@@ -422,8 +445,11 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
 /// passes : {'efficient', 'doubling'}, default 'efficient'
 ///     How samples are divided: as the strategy works best, or 1, 1, 2, 4, …, as `--passes doubling` of the program.
 ///     Only 'product' depends on it.
-/// progress : callable, optional
-///     Called every hundredth of a second with the share that is done, in [0, 1].
+/// time : float, optional
+///     End the render after so many seconds of rendering; `film.complete` says whether all samples are there.
+/// progress : bool or callable, default False
+///     True shows a bar if tqdm is installed; a callable gets the share that is done, in [0, 1], every hundredth of a
+///     second.
 ///
 /// Returns
 /// -------
@@ -444,8 +470,8 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
 #[pyfunction(name = "_render")]
 #[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = (640, 640), seed = 0, threads = None,
     camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,
-    tile_size = None, passes = "efficient", progress = None),
-    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, passes='efficient', progress=None)")]
+    tile_size = None, passes = "efficient", time = None, progress = None),
+    text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, passes='efficient', time=None, progress=None)")]
 pub(crate) fn render<'py>(
     py: Python<'py>,
     scene: &Bound<'py, Scene>,
@@ -463,8 +489,10 @@ pub(crate) fn render<'py>(
     target_error: Option<f32>,
     tile_size: Option<usize>,
     passes: &str,
+    time: Option<f64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Film> {
+    let time = time.map(duration).transpose()?;
     let strategy = strategy.unwrap_or_else(|| pyo3::types::PyString::new(py, "product").into_any());
     let keywords = Keywords {
         strategy,
@@ -483,12 +511,8 @@ pub(crate) fn render<'py>(
     };
     let job = &Job::new(py, scene.get(), env, keywords)?;
     let (cancel, done) = (&AtomicBool::new(false), &AtomicU64::new(0));
-    let total = job.total_samples().max(1) as f64;
     let report = |py: Python<'_>| match &progress {
-        Some(progress) => {
-            let share = (done.load(Ordering::Relaxed) as f64 / total).min(1.0);
-            progress.bind(py).call1((share,)).map(drop)
-        }
+        Some(progress) => progress.bind(py).call1((job.share(done),)).map(drop),
         None => Ok(()),
     };
     let (result, stopped) = py.detach(|| {
@@ -496,7 +520,8 @@ pub(crate) fn render<'py>(
             let (sender, results) = mpsc::channel();
             scope.spawn(move || {
                 let rendered = pool(job.n_threads()).and_then(|pool| {
-                    let visitor = ToTheEnd { job, watch: Watch { job, cancel, done } };
+                    let watch = Watch { job, cancel, done, end: None };
+                    let visitor = ToTheEnd { job, watch, time };
                     caught(|| pool.install(|| job.with_renderer(visitor)))?
                 });
                 // Whoever waits is there.
@@ -512,12 +537,23 @@ pub(crate) fn render<'py>(
     if let Some(error) = stopped {
         return Err(interrupted(py, error, film)?);
     }
-    if progress.is_some() {
-        done.store(total as u64, Ordering::Relaxed);
+    if film.complete {
+        done.store(job.total_samples(), Ordering::Relaxed);
         report(py)?;
     }
     warn_of(py, &film)?;
     Ok(film)
+}
+
+/// Seconds as Python gives them.
+fn duration(seconds: f64) -> PyResult<Duration> {
+    let time = Duration::try_from_secs_f64(seconds).ok();
+    // Beyond a year the clock may not reach.
+    time.filter(|time| !time.is_zero() && *time <= Duration::from_secs(1 << 25)).ok_or_else(|| {
+        bad_value(format!(
+            "time is {seconds}; it must be a positive number of seconds, up to a year"
+        ))
+    })
 }
 
 /// The names of the built-in strategies, with a line for each.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use domelight::environment::mapping::{Mapping, from_lat_long};
 use domelight::environment::{self, Orientation};
+use domelight::picture::png::Depth;
 use domelight::picture::tone::ToneMapping;
 use domelight::picture::write_atomically;
 use domelight::rig::export::{Dome, DomePicture, Format, RigExport};
@@ -18,7 +19,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyType;
 
 use crate::arrays::{Floats, array, indices, rows};
-use crate::engine::parallel;
+use crate::engine::{parallel, parallel_on};
 use crate::environment::{Environment, up_axis, up_name};
 use crate::error::{bad_value, from_source, to_python};
 use crate::picture::{Format as PictureFormat, write_image};
@@ -83,7 +84,7 @@ impl Rig {
             .then(|| from_lat_long(map, mapping, mapping.size_for(map.height)));
         let tone = ToneMapping::default();
         let map = converted.as_ref().unwrap_or(map);
-        write_image(&path.with_file_name(&name), format, map, None, &tone)?;
+        write_image(&path.with_file_name(&name), format, map, None, &tone, Depth::default())?;
         Ok(Some(name))
     }
 }
@@ -332,6 +333,8 @@ type Pickled<'py> = (
 ///     Take so many other compact sources out.
 /// min_share : float, optional
 ///     Share of the luminance below which a light stays on the residual, in [0, 1].
+/// threads : int, optional
+///     By default the cores that the process may use. The lights do not depend on it.
 ///
 /// Returns
 /// -------
@@ -343,8 +346,9 @@ type Pickled<'py> = (
 /// ValueError
 ///     If the map is black, has no sun or lamp where they were asked for alone, or fewer lit texels than lights.
 #[pyfunction]
-#[pyo3(signature = (env, n = Some(64), *, method = "variance-minimization", sun = false, lamps = 0, min_share = None),
-    text_signature = "(env, n=64, *, method='variance-minimization', sun=False, lamps=0, min_share=None)")]
+#[pyo3(signature = (env, n = Some(64), *, method = "variance-minimization", sun = false, lamps = 0, min_share = None,
+    threads = None),
+    text_signature = "(env, n=64, *, method='variance-minimization', sun=False, lamps=0, min_share=None, threads=None)")]
 pub(crate) fn lights(
     env: &Bound<'_, Environment>,
     n: Option<usize>,
@@ -352,6 +356,7 @@ pub(crate) fn lights(
     sun: bool,
     lamps: usize,
     min_share: Option<f32>,
+    threads: Option<usize>,
 ) -> PyResult<Rig> {
     const MOST: usize = 1 << 20;
     let py = env.py();
@@ -376,7 +381,7 @@ pub(crate) fn lights(
     let Environment { inner, name } = env.get();
     let settings = ExtractionSettings { sun, n_lamps: lamps, n_lights: n, method, min_share };
     let Extraction { rig, residual } =
-        parallel(py, || extract(inner, settings))?.map_err(to_python)?;
+        parallel_on(py, threads, || extract(inner, settings))?.map_err(to_python)?;
     let residual = residual.map(Arc::new);
     Ok(Rig { inner: rig, residual, orientation: inner.orientation(), name: name.clone() })
 }

@@ -39,6 +39,19 @@ def test_what_is_raised_comes_back(sphere, env, tmp_path):
     assert (tmp_path / "a.html").read_text(encoding="utf-8") == found.page
 
 
+@pytest.mark.filterwarnings("ignore::domelight.DomelightWarning")
+def test_progress_is_reported(sphere, env, capfd):
+    seen = []
+    report = lambda share, label: seen.append((share, label))
+    dl.compare(sphere, env, ["mis"], budget="spp:512", progress=report, **SMALL)
+    assert any("mis" in label for _, label in seen), seen
+    shares = [share for share, _ in seen]
+    assert shares == sorted(shares) and 0 < shares[-1] <= 1
+    pytest.importorskip("tqdm")
+    dl.compare(sphere, env, ["mis"], budget="spp:512", progress=True, **SMALL)
+    assert "mis" in capfd.readouterr().err
+
+
 @pytest.mark.parametrize(
     "wrong, words",
     [

@@ -10,6 +10,8 @@ import domelight as dl
 
 ENV = dl.Environment(np.random.default_rng(3).random((6, 12, 3)))
 BSDF = dl.Bsdf.parse("ggx:0.3")
+SPHERE = dl.Scene.builtin("sphere")
+FILM = dl.render(SPHERE, ENV, spp=1, size=(4, 4))
 DTYPES = [np.float16, np.float32, np.float64, np.int8, np.uint16, np.int64, ">f4", ">f8"]
 
 arrays = st.one_of(
@@ -44,6 +46,9 @@ FUNCTIONS = [
     lambda a, b: dl.tone_map(a, exposure=b),
     lambda a, b: dl.render(dl.Scene([[0, 0, 0]], []), ENV, a, size=b),
     lambda a, b: dl.lights(ENV, a, min_share=b),
+    lambda a, b: dl.lights(ENV, 2, threads=a, lamps=b),
+    lambda a, b: FILM.to_png(exposure=a, bits=b),
+    lambda a, b: dl.render(SPHERE, ENV, spp=1, size=(2, 2), time=a, progress=b),
 ]
 
 

@@ -36,6 +36,14 @@ def test_a_notebook_shows_the_figure(sphere, env):
     assert found._repr_png_().startswith(b"\x89PNG")
 
 
+def test_threads_change_nothing(sphere, env):
+    settings = dict(pixel=(20, 20), size=(40, 40), strategies=["mis"], resolution=16)
+    found = [dl.inspect(sphere, env, threads=threads, **settings) for threads in (1, 3)]
+    assert found[0].strategies[0].variance == found[1].strategies[0].variance
+    with pytest.raises(ValueError, match="threads is 0"):
+        dl.inspect(sphere, env, threads=0, **settings)
+
+
 @pytest.mark.parametrize(
     "wrong, words",
     [

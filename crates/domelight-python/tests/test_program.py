@@ -1,5 +1,6 @@
 """Films are those of the program, to the bit."""
 
+import pathlib
 import subprocess
 
 import numpy as np
@@ -41,6 +42,12 @@ def channels(path):
     }
 
 
+def attributes(path):
+    """How an OpenEXR file says that it was made."""
+    with OpenEXR.File(str(path)) as file:
+        return {name: value for name, value in file.header().items() if name.startswith("domelight.")}
+
+
 def assert_same(film, path):
     for name, expected in channels(path).items():
         values = film[name].astype(np.float32) if name == "samples" else film[name]
@@ -64,9 +71,13 @@ def test_films_equal_the_programs(program, tmp_path, strategy):
     env = dl.Environment.builtin("cathedral", rows=128)
     film = dl.render(scene, env, strategy, spp=8, size=(48, 40), seed=5)
     assert_same(film, path)
-    # What Python writes is that, too.
+    # What Python writes is that, too: layers and attributes, byte by byte.
     film.save(tmp_path / "python.exr")
     assert_same(film, tmp_path / "python.exr")
+    assert attributes(tmp_path / "python.exr") == attributes(path)
+    assert (tmp_path / "python.exr").read_bytes() == path.read_bytes()
+    # The pilot's choices are in the strategy's text.
+    assert film == dl.render(scene, env, film.strategy, spp=8, size=(48, 40), seed=5)
 
 
 def test_all_options_equal_the_programs(program, tmp_path):
@@ -94,11 +105,12 @@ def test_the_scenes_own_light_and_camera_are_the_programs(program, tmp_path, sce
     assert_same(dl.render(dl.Scene.builtin(scene), spp=2, size=(32, 32)), path)
 
 
-def test_files_equal_the_programs(program, tmp_path):
-    mesh = tmp_path / "tiny.obj"
+def test_files_equal_the_programs(program, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mesh = pathlib.Path("tiny.obj")
     # So small that it is scaled for tracing.
     mesh.write_text("v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nv 0 0 -0.01\nf 1 2 3\nf 1 3 4\n")
-    probe = tmp_path / "probe.pfm"
+    probe = pathlib.Path("probe.pfm")
     dl.write(probe, np.random.default_rng(1).random((8, 16, 3), np.float32))
     arguments = ["render", str(mesh), "--env", str(probe), "--size", "24x24", "--spp", "4"]
     for extension in ("exr", "png", "hdr", "pfm"):
@@ -110,3 +122,27 @@ def test_files_equal_the_programs(program, tmp_path):
         film.save(tmp_path / f"python.{extension}")
         bytes_of = lambda who: (tmp_path / f"{who}.{extension}").read_bytes()
         assert bytes_of("python") == bytes_of("program"), extension
+    film.save(tmp_path / "python.exr")
+    assert attributes(tmp_path / "python.exr") == attributes(tmp_path / "program.exr")
+    # Pictures name no folder of this machine.
+    film = dl.render(dl.Scene.load(tmp_path / mesh), dl.Environment.load(tmp_path / probe), spp=1, size=(8, 8))
+    film.save("absolute.exr")
+    assert attributes("absolute.exr")["domelight.scene"] == "tiny.obj"
+    assert attributes("absolute.exr")["domelight.environment"] == "probe.pfm"
+
+
+def test_pictures_are_developed_as_the_program_does(program, tmp_path, sphere, env):
+    film = dl.render(sphere, env, "mis", spp=2, size=(24, 16), hide_env=True)
+    film.save(tmp_path / "film.exr")
+    kept = attributes(tmp_path / "film.exr")["domelight.exposure"]
+    assert kept == f"{film.exposure:g}" and film.exposure != 0
+    for name, arguments, settings in [
+        ("automatic", [], {}),
+        ("as_it_is", ["--exposure", "0", "--tone", "standard"], dict(exposure=0, curve="standard")),
+        ("fine", ["--exposure", "1.5", "--bits", "16"], dict(exposure=1.5, bits=16)),
+    ]:
+        path = tmp_path / f"{name}.png"
+        command = [program, "--quiet", "tone", str(tmp_path / "film.exr"), *arguments, "-o", str(path)]
+        subprocess.run(command, check=True)
+        film.save(tmp_path / "python.png", **settings)
+        assert path.read_bytes() == (tmp_path / "python.png").read_bytes() == film.to_png(**settings), name

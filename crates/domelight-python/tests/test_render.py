@@ -40,14 +40,65 @@ def test_a_notebook_shows_the_picture(sphere, env, tmp_path):
     assert png.startswith(b"\x89PNG") and png == film.to_png()
     assert film.to_png(exposure=2) != png
     assert film.alpha.min() == 0
-    film.save(tmp_path / "a.png", exposure=None)
+    assert film.to_png(bits=16)[24] == 16 and film.to_png(exposure=film.exposure) == png
+    film.save(tmp_path / "a.png")
     assert (tmp_path / "a.png").read_bytes() == png
     with pytest.raises(ValueError, match="must end in"):
         film.save(tmp_path / "a.tiff")
     with pytest.raises(ValueError, match="velvet"):
         film.to_png(curve="velvet")
+    with pytest.raises(ValueError, match="bits is 12"):
+        film.to_png(bits=12)
+    with pytest.raises(ValueError, match="exposure is NaN"):
+        film.save(tmp_path / "a.png", exposure=np.nan)
     with pytest.raises(OSError):
         film.save(tmp_path / "nowhere" / "a.exr")
+
+
+def test_the_exposure_is_the_scenes(sphere, env):
+    film = dl.render(sphere, env, **SMALL)
+    assert film.exposure == dl.render(sphere, env, "brdf", spp=1, size=(32, 24), seed=7).exposure
+    dim = dl.render(sphere, env.scaled(0.25), **SMALL)
+    assert dim.exposure == pytest.approx(film.exposure + 2, abs=0.02)
+    assert pickle.loads(pickle.dumps(dim)).exposure == dim.exposure
+    steps = dl.progressive(sphere, env, **SMALL)
+    assert {step.exposure for step in steps} == {film.exposure}
+    # Of a BSDF in Python the first film decides.
+    own = dl.Bsdf.custom(lambda wo, wi: np.float32(0.1) * wi[:, 2])
+    scene = dl.Scene([[-1, 0, 0], [1, 0, 0], [0, 2, 0]], [[0, 1, 2]], material=own)
+    films = list(dl.progressive(scene, env, dl.strategies.Environment(env), spp=4, size=(16, 16)))
+    assert len(films) > 1 and len({film.exposure for film in films}) == 1 and films[0].exposure != 0
+
+
+def test_time_ends_a_render(sphere, env):
+    film = dl.render(sphere, env, "mis", spp=1 << 20, size=(48, 48), time=0.1)
+    assert not film.complete and 0 < film.camera_rays < 48 * 48 << 20
+    assert dl.render(sphere, env, time=1000, **SMALL) == dl.render(sphere, env, **SMALL)
+    for wrong in (0, -1, np.inf, np.nan, 1e300):
+        with pytest.raises(ValueError, match="time is"):
+            dl.render(sphere, env, time=wrong, **SMALL)
+
+
+def test_a_film_without_noise(sphere, env, tmp_path, monkeypatch):
+    film = dl.render(sphere, env, "brdf", hide_env=True, spp=1, size=(64, 64))
+    with monkeypatch.context() as patch:
+        patch.setenv("OIDN_LIBRARY", str(tmp_path / "nothing.so"))
+        with pytest.raises(ImportError, match="nothing.so.*pyoidn"):
+            film.denoise()
+        with pytest.raises(ImportError):
+            film.save(tmp_path / "a.png", denoise=True)
+        assert not (tmp_path / "a.png").exists()
+    pytest.importorskip("pyoidn", reason="needs `pip install pyoidn`")
+    clean = film.denoise()
+    reference = dl.render(sphere, env, "mis:4:4", hide_env=True, spp=64, size=(64, 64)).color
+    assert clean.shape == film.color.shape and clean.dtype == np.float32
+    error = lambda picture: dl.metrics.rel_mse_trimmed(picture, reference)
+    assert error(clean) < 0.5 * error(film.color)
+    film.save(tmp_path / "a.exr", denoise=True)
+    assert np.array_equal(dl.read(tmp_path / "a.exr", layer="denoised"), clean)
+    assert np.array_equal(dl.read(tmp_path / "a.exr"), film.color)
+    film.save(tmp_path / "a.pfm", denoise=True)
+    assert np.array_equal(dl.read(tmp_path / "a.pfm"), clean)
 
 
 def test_threads_and_tiles_change_no_bit(sphere, env):
@@ -192,6 +243,12 @@ def test_wrong_settings_are_named(sphere, env, wrong, words):
         dl.progressive(sphere, env, **{**SMALL, **wrong})
 
 
+def interrupt(share):
+    """Ctrl-C as soon as there is something to keep."""
+    if 0 < share < 1:
+        os.kill(os.getpid(), signal.SIGINT)
+
+
 def interrupt_after(seconds):
     timer = threading.Timer(seconds, lambda: os.kill(os.getpid(), signal.SIGINT))
     timer.start()
@@ -202,19 +259,33 @@ def interrupt_after(seconds):
 def test_interruption_keeps_what_was_done(sphere, env, strategy):
     if strategy == "python":
         strategy = dl.strategies.Environment(env)
-    at = interrupt_after(0.3)
     with pytest.raises(dl.RenderInterrupted) as stopped:
-        dl.render(sphere, env, strategy, spp=1 << 20, size=(64, 64), tile_size=16)
-    print(f"\n{strategy}: {time.monotonic() - at:.3f} s from the interrupt to its exception; wanted: 0.2 s")
+        dl.render(sphere, env, strategy, spp=1 << 20, size=(64, 64), tile_size=16, progress=interrupt)
     film = stopped.value.film
     assert not film.complete and film.camera_rays > 0 and np.isfinite(film.color).all()
     assert isinstance(stopped.value, KeyboardInterrupt)
 
 
+@pytest.mark.timing
+@pytest.mark.parametrize("strategy", ["product", "mis", "sir:8/800", "python"])
+def test_interruption_is_quick(strategy):
+    """Within two tenths of a second, of the default size."""
+    env = dl.Environment.builtin("sky")
+    chosen = dl.strategies.Environment(env) if strategy == "python" else strategy
+    scene = dl.Scene.builtin("statue")
+    at = interrupt_after(1.5)
+    with pytest.raises(dl.RenderInterrupted):
+        dl.render(scene, env, chosen, spp=1 << 20)
+    seconds = time.monotonic() - at
+    print(f"\n{strategy}: {seconds:.3f} s from the interrupt to its exception")
+    assert seconds < 0.2
+
+
 def test_progressive_goes_on_after_an_interruption(sphere, env):
     settings = dict(spp=512, size=(96, 96))
-    steps = dl.progressive(sphere, env, "mis", **settings)
-    interrupt_after(0.3)
+    interruptions = [interrupt]
+    report = lambda share: interruptions and 0 < share < 1 and interruptions.pop()(share)
+    steps = dl.progressive(sphere, env, "mis", progress=report, **settings)
     with pytest.raises(dl.RenderInterrupted) as stopped:
         for _ in steps:
             pass
@@ -260,12 +331,24 @@ def test_progress_is_reported(sphere, env):
     dl.render(sphere, env, "mis", spp=512, size=(96, 96), progress=shares.append)
     assert shares == sorted(shares) and shares[-1] == 1.0
     dl.render(sphere, env, progress=True, **SMALL)
+    shares.clear()
+    for _ in dl.progressive(sphere, env, "mis", spp=512, size=(96, 96), progress=shares.append):
+        pass
+    assert shares == sorted(shares) and shares[-1] == 1.0
 
     def broken(share):
         raise LookupError("no more")
 
     with pytest.raises(LookupError, match="no more"):
         dl.render(sphere, env, "mis", spp=1 << 16, size=(64, 64), progress=broken)
+
+
+def test_bars_end_with_the_work(sphere, env, capfd):
+    pytest.importorskip("tqdm")
+    dl.render(sphere, env, progress=True, **SMALL)
+    list(dl.progressive(sphere, env, progress=True, **SMALL))
+    bars = capfd.readouterr().err
+    assert bars.count("100%") >= 2 and bars.endswith("\n"), bars
 
 
 def _render_in_a_child(queue):
@@ -296,6 +379,21 @@ def test_forked_processes_render(sphere, env):
         os._exit(1)
     assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 7
     assert next(steps) is not None
+
+
+def _render_for_joblib(seed):
+    return dl.render(dl.Scene.builtin("sphere"), dl.Environment.builtin("studio", rows=64), seed=seed, **SMALL)
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.parametrize("backend", ["loky", "multiprocessing", "threading"])
+def test_joblib_renders(sphere, env, backend):
+    joblib = pytest.importorskip("joblib")
+    here = _render_for_joblib(0)
+    films = joblib.Parallel(n_jobs=2, backend=backend, timeout=120)(
+        joblib.delayed(_render_for_joblib)(seed) for seed in range(4)
+    )
+    assert films[0] == here and films[3] == dl.render(sphere, env, seed=3, **SMALL)
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="no /proc here")

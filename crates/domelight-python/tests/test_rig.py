@@ -13,6 +13,7 @@ import domelight as dl
 def test_lights_add_up_to_the_map(env, method):
     rig = dl.lights(env, 16, method=method)
     assert len(rig) == 16 and rig.residual is None
+    assert rig == dl.lights(env, 16, method=method, threads=1)
     assert rig.directions.shape == rig.irradiance.shape == (16, 3)
     total = (env.map * env.solid_angles[:, None, None]).sum(axis=(0, 1))
     assert np.allclose(rig.irradiance.sum(axis=0), total, rtol=1e-4)
@@ -89,6 +90,7 @@ def test_rigs_are_pickled(env):
     [
         (dict(n=0), "n is 0"),
         (dict(method="velvet"), "velvet"),
+        (dict(threads=0), "threads is 0"),
         (dict(min_share=2), "min_share is 2"),
         (dict(n=None), "0 were asked for"),
     ],

@@ -15,7 +15,7 @@ use crate::Engine;
 use crate::session::nothing_started;
 use crate::setup::parse;
 
-/// What the page knows of a picture's making.
+/// The provenance of a picture, as the page knows it.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Making {

@@ -135,7 +135,7 @@ struct LightReport {
 struct Light {
     /// A built-in probe, or a file.
     probe: String,
-    /// Of a built-in probe.
+    /// Rows of a built-in probe.
     rows: usize,
     /// \[degrees\]
     rotate: f32,

@@ -21,7 +21,7 @@ impl Rgb {
     /// (1, 1, 1).
     pub const WHITE: Self = Self::splat(1.0);
 
-    /// From three channels.
+    /// A color from its three channels.
     pub const fn new(r: f32, g: f32, b: f32) -> Self {
         Self { r, g, b }
     }

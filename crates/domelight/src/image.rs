@@ -14,7 +14,7 @@ pub struct RgbImage {
 }
 
 impl RgbImage {
-    /// From rows of pixels.
+    /// An image from its rows of pixels.
     ///
     /// # Panics
     /// If `pixels.len() != width * height`.

@@ -1,6 +1,24 @@
 //! Direct illumination under measured light: every sampling strategy of the field for
 //! ∫ f_r · cos θ · L · V dω under an HDR environment, a renderer around them, and light rigs.
 //!
+//! ```no_run
+//! use domelight::prelude::*;
+//!
+//! let scene = Scene::load("robot.glb")?;
+//! let environment = Environment::load("studio.hdr")?;
+//! let settings = RenderSettings { width: 640, height: 640, n_samples: 32, ..Default::default() };
+//! let camera = Camera::framing(&scene, settings.width, settings.height);
+//! let strategy = StrategySpec::default();
+//! let film = Renderer::new(&scene, &camera, &environment, strategy, settings)?.finish();
+//! film.write("robot.exr")?;
+//! film.develop(Exposure::Auto, ToneCurve::Agx).write("robot.png")?;
+//! # Ok::<(), domelight::Error>(())
+//! ```
+//!
+//! [`Renderer`](render::Renderer) also renders in steps, with progress, checkpoints and strategies of your own;
+//! [`inspect`] explains the noise of a pixel, [`rig`] turns an environment into lights, and the folder `examples/` has a
+//! program for each.
+//!
 //! # Conventions
 //! - `wo` points toward the viewer, `wi` toward the light; both are unit vectors away from the surface.
 //!   BRDFs work in the local frame with z the shading normal.
@@ -10,7 +28,7 @@
 //!   −Z and u grows to the right as seen from inside.
 //! - Uniform numbers lie in [0, 1), never 1. A sampler is a pure function of them.
 //!
-//! # Example
+//! # The sampling core
 //! A strategy turns a shading point into pairs (wi, weight); the estimate is Σ weight · V(wi).
 //!
 //! ```
@@ -72,6 +90,8 @@ pub mod prelude;
 pub mod files;
 #[cfg(feature = "io")]
 pub mod fingerprint;
+#[cfg(feature = "io")]
+mod load;
 #[cfg(feature = "io")]
 pub mod memory;
 #[cfg(feature = "io")]

@@ -1,18 +1,5 @@
 //! What most programs need: load a scene and an environment, render, write.
-//!
-//! ```no_run
-//! use domelight::prelude::*;
-//!
-//! let scene = Scene::load("robot.glb")?;
-//! let environment = Environment::load("studio.hdr")?;
-//! let settings = RenderSettings { width: 640, height: 640, n_samples: 32, ..Default::default() };
-//! let camera = Camera::framing(&scene, settings.width, settings.height);
-//! let strategy = StrategySpec::default();
-//! let film = Renderer::new(&scene, &camera, &environment, strategy, settings)?.finish();
-//! film.write("robot.exr")?;
-//! film.develop(Exposure::Auto, ToneCurve::Agx).write("robot.png")?;
-//! # Ok::<(), domelight::Error>(())
-//! ```
+//! The first page of this library, [`crate`], shows it in use.
 
 pub use crate::environment::builtin::BuiltinProbe;
 pub use crate::environment::{Environment, Orientation, UpAxis};

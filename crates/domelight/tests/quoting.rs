@@ -8,10 +8,15 @@ use std::io::Write as _;
 use std::process::{Command, Stdio};
 
 use domelight::code;
+use domelight::environment::{Environment, Orientation};
+use domelight::math::Vec3;
 use domelight::quote::{
     Code, Html, JavaScript, Python, Shell, Xml, html, javascript, pbrt, python, radiance, shell,
     sibl, usd, xml, yaml,
 };
+use domelight::rig::export::{Dome, Format, RigExport};
+use domelight::rig::{Region, RigLight, SphericalHarmonics};
+use domelight::{Rgb, RgbImage};
 use testkit::Pcg;
 
 /// What has a meaning somewhere.
@@ -170,6 +175,59 @@ fn python_reads_strings_and_passes_over_comments() {
         );
     }
     assert_read(run("python3", &["-"], script.as_str()), &texts);
+}
+
+/// Rigs of a dome and one light, of probes and files of these names.
+fn rigs(format: Format, texts: &[String]) -> Vec<String> {
+    let map = RgbImage::filled(4, 2, Rgb::WHITE);
+    let environment = Environment::from_image(map).unwrap();
+    let harmonics = SphericalHarmonics::project(&environment);
+    let lights = [RigLight {
+        direction: Vec3::Y,
+        irradiance: Rgb::WHITE,
+        angular_radius: 0.1,
+        share: 0.5,
+        solid_angle: 0.03,
+        region: Region::Sun,
+    }];
+    let rig = |text: &String| {
+        let file = format!("{text}.exr");
+        let dome = Some(Dome { environment: &environment, harmonics, file: Some(&file) });
+        let orientation = Orientation::default();
+        let rig = RigExport { probe: text, orientation, lights: &lights, dome };
+        String::from_utf8(format.encode(&rig).unwrap()).unwrap()
+    };
+    texts.iter().map(rig).collect()
+}
+
+#[test]
+fn a_rig_for_blender_is_the_same_python_whatever_the_probe_is_called() {
+    const READER: &str = "
+import ast, json, sys
+trees = [ast.parse(script) for script in json.loads(sys.stdin.read())]
+shapes = {tuple(type(node).__name__ for node in ast.walk(tree)) for tree in trees}
+assert len(shapes) == 1, shapes
+print(len(trees))
+";
+    let scripts = rigs(Format::Blender, &texts());
+    let read = run("python3", &["-c", READER], &serde_json::to_string(&scripts).unwrap());
+    let Some(read) = read else { return };
+    assert_eq!(String::from_utf8(read).unwrap().trim(), scripts.len().to_string());
+}
+
+#[test]
+fn a_rig_for_three_js_is_a_module_whatever_the_probe_is_called() {
+    const READER: &str = "
+const { SourceTextModule } = require('vm');
+const scripts = JSON.parse(require('fs').readFileSync(0, 'utf8'));
+for (const script of scripts) new SourceTextModule(script);
+console.log(scripts.length);
+";
+    let scripts = rigs(Format::Three, &texts());
+    let arguments = ["--no-warnings", "--experimental-vm-modules", "-e", READER];
+    let read = run("node", &arguments, &serde_json::to_string(&scripts).unwrap());
+    let Some(read) = read else { return };
+    assert_eq!(String::from_utf8(read).unwrap().trim(), scripts.len().to_string());
 }
 
 #[test]

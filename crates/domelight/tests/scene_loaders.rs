@@ -536,7 +536,8 @@ fn many_materials_are_neither_slow_nor_loud() {
     assert!(warnings.len() <= 30, "{}", warnings.len());
 
     // As many names, each once, and as many lines of the library.
-    let faces = (0..100_000).map(|i| format!("usemtl n{i}\nf 1 2 3\n")).collect::<String>();
+    let faces =
+        (0..100_000).map(|i| format!("usemtl n{i}\nf 1 2 3\n")).collect::<Vec<_>>().concat();
     let text = "mtllib b.mtl\n".repeat(1000) + "v 0 0 0\nv 1 0 0\nv 0 1 0\n" + &faces;
     let library = "newmtl n7\n".to_owned() + &"map_Ks k.png\n".repeat(1000);
     let loaded = Folder::new().with("b.obj", text).with("b.mtl", library).load("b.obj");

@@ -1,6 +1,7 @@
 //! The arguments of `domelight figures`.
 
 use clap::Args;
+use domelight_lab::figures::N_FIGURES;
 use std::path::PathBuf;
 
 use super::scene::EnvironmentArguments;
@@ -23,13 +24,16 @@ pub(crate) struct FiguresArguments {
     /// A built-in scene (statue, spheres, material-ball, sphere, …), a mesh or a scene file
     #[arg(long, value_name = "SCENE", default_value = "statue")]
     pub(crate) scene: String,
-    /// The figures to make [default: all, 1 to 8]
+    /// The figures to make [default: all, 1 to 14]
     #[arg(long, value_name = "LIST", value_delimiter = ',',
-          value_parser = clap::value_parser!(u8).range(1..=8))]
+          value_parser = clap::value_parser!(u8).range(1..=i64::from(N_FIGURES)))]
     pub(crate) only: Vec<u8>,
     /// Small pictures, few samples, poor references: seconds instead of a minute
     #[arg(long)]
     pub(crate) quick: bool,
+    /// Print numbers, titles, files and times as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
     /// Names the random numbers
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,

@@ -22,8 +22,8 @@ Examples:
       64 lights, as a table
   domelight lights road.hdr --sun --keep-residual dome.exr -o sun.json
       the sun, and the probe without it
-  domelight lights studio.hdr --lamps 4 --preview lamps.png
-      up to four lamps, and a picture of what was found
+  domelight lights studio.hdr --lamps 4 -o lamps.py --preview lamps.png
+      up to four lamps for Blender, and a picture of what was found
   domelight lights chapel.hdr --error 5 -o rig.json -o rig.csv
       as many lights as shade with an error of 5 %
   domelight lights sky --sun -n 16 -o - --format csv
@@ -60,16 +60,17 @@ pub(crate) struct LightsArguments {
     /// The rig, its format by its extension; several times for several files; - is standard output
     #[arg(short, long = "output", value_name = "RIG", help_heading = "Output")]
     pub(crate) output: Vec<RigPath>,
-    /// The format where no extension tells it [of standard output: json]
+    /// The format where no extension determines it [of standard output: json]
     #[arg(long, value_name = "FORMAT", help_heading = "Output", value_parser = format(),
           requires = "output")]
     pub(crate) format: Option<Format>,
     /// Write the probe without the light that the rig took (.exr, .hdr, .pfm)
     #[arg(long, value_name = "FILE.exr", help_heading = "Output")]
     pub(crate) keep_residual: Option<PicturePath>,
-    /// Write a picture of the rig: regions, lights, and a sphere under probe and rig
-    #[arg(long, value_name = "FILE.png", help_heading = "Output")]
-    pub(crate) preview: Option<PngPath>,
+    /// Write a picture of the rig: regions, lights, and a sphere under probe and rig; or none [default: on a terminal
+    /// RIG_preview.png beside the first rig, else none]
+    #[arg(long, value_name = "FILE.png|none", help_heading = "Output")]
+    pub(crate) preview: Option<PreviewPath>,
     /// Print lights, error and times as JSON
     #[arg(long, help_heading = "Output")]
     pub(crate) json: bool,
@@ -144,22 +145,28 @@ impl RigPath {
     }
 }
 
-/// A PNG to write; `-` is standard output.
+/// Whether and where the preview is written; `-` is standard output.
 #[derive(Clone, Debug)]
-pub(crate) struct PngPath(pub(crate) PathBuf);
+pub(crate) enum PreviewPath {
+    /// Nowhere.
+    None,
+    /// Into a PNG file.
+    Png(PathBuf),
+}
 
-impl FromStr for PngPath {
+impl FromStr for PreviewPath {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        if text == "none" {
+            return Ok(Self::None);
+        }
         let path = PathBuf::from(text);
         let is_png = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
-        if is_png || text == "-" { Ok(Self(path)) } else { Err("its name must end in .png".into()) }
-    }
-}
-
-impl PngPath {
-    pub(crate) fn is_standard_output(&self) -> bool {
-        self.0 == Path::new("-")
+        if is_png || text == "-" {
+            Ok(Self::Png(path))
+        } else {
+            Err("its name must end in .png, or be none".into())
+        }
     }
 }

@@ -63,7 +63,7 @@ pub(crate) struct Arguments {
 /// How much memory the program may take.
 #[derive(Args, Debug)]
 pub(crate) struct MemoryArguments {
-    /// Refuse what would take more memory, such as 4GiB or none [default: nine tenths of what there is]
+    /// Refuse work that would need more memory, such as 4GiB or none [default: nine tenths of the memory that there is]
     #[arg(long, global = true, value_name = "SIZE")]
     pub(crate) max_memory: Option<MaxMemory>,
 }
@@ -263,16 +263,16 @@ pub(crate) struct ProbeArguments {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write a picture to look at, with --exposure and --tone applied.
+    /// Write a picture to look at: the map with its sun, its light by stops, and the noise of each strategy.
     #[arg(long, value_name = "OUT.png")]
-    pub(crate) preview: Option<PicturePath>,
+    pub(crate) preview: Option<PreviewPng>,
     /// The mapping of the file that is written.
     #[arg(long, value_name = "MAPPING", requires = "output", default_value_t = Mapping::LatLong, value_parser = mapping())]
     pub(crate) to: Mapping,
     /// Write the probe (.exr, .hdr, .pfm, .png; - writes OpenEXR to standard output).
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PicturePath>,
-    /// Rows of the lat-long map: of a built-in probe [default: 512], and of what is written.
+    /// Rows of the lat-long map: of a built-in probe [default: 512], and of what -o writes.
     #[arg(long, value_name = "H", value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub(crate) size: Option<u32>,
     /// The mapping of the file [default: guessed from its shape].
@@ -287,9 +287,26 @@ pub(crate) struct ProbeArguments {
     /// The OpenEXR layer.
     #[arg(long, value_name = "NAME")]
     pub(crate) layer: Option<String>,
-    /// How the preview is shown.
+    /// How the preview and PNG output are shown.
     #[command(flatten)]
     pub(crate) tone: Tone,
+}
+
+/// A PNG file or `-`.
+#[derive(Clone, Debug)]
+pub(crate) struct PreviewPng(pub(crate) PicturePath);
+
+impl FromStr for PreviewPng {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let path = text.parse::<PicturePath>()?;
+        if path.is_png() || path.is_standard_output() {
+            Ok(Self(path))
+        } else {
+            Err("its name must end in .png; -o writes the map itself in other formats".into())
+        }
+    }
 }
 
 /// Develop a picture again.
@@ -333,18 +350,18 @@ pub(crate) enum Bits {
 /// Exposure and tone curve of what is looked at.
 #[derive(Args, Debug)]
 pub(crate) struct Tone {
-    /// Exposure of what is looked at, in stops, or auto: the median of what the picture covers becomes middle gray
+    /// Exposure of pictures to look at, in stops, or auto: the median of what the picture covers becomes middle gray
     /// [default: auto; of differences 0]
     #[arg(long, value_name = "EV|auto", allow_negative_numbers = true)]
     exposure: Option<Exposure>,
-    /// Tone curve of what is looked at; agx is that of Blender, standard cuts off at 1 [default: agx; of differences
+    /// Tone curve of pictures to look at; agx is Blender's, standard clips at 1 [default: agx; of differences
     /// standard]
     #[arg(long, value_name = "CURVE", value_parser = tone_curve())]
     tone: Option<ToneCurve>,
 }
 
 impl Tone {
-    /// Of pictures to look at; `automatic` is the exposure where none was given.
+    /// The tone mapping of pictures to look at; `automatic` is the exposure where none was given.
     pub(crate) fn of_picture(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
         let exposure = match self.exposure.unwrap_or(Exposure::Auto) {
             Exposure::Auto => automatic(),
@@ -353,7 +370,7 @@ impl Tone {
         ToneMapping { exposure, curve: self.tone.unwrap_or(ToneCurve::Agx) }
     }
 
-    /// Of pictures that are measured or used again: as they are, unless something else was asked for.
+    /// The tone mapping of pictures that are measured or used again: none, unless something else was asked for.
     pub(crate) fn of_measurement(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
         let exposure = match self.exposure.unwrap_or(Exposure::Stops(0.0)) {
             Exposure::Auto => automatic(),

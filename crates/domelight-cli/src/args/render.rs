@@ -69,10 +69,10 @@ pub(crate) struct OutputArguments {
     /// Write PNG output first in half the size, after one sample, to look at while the rest is rendered
     #[arg(long)]
     pub(crate) preview: bool,
-    /// Say which stages the time goes to: CPU seconds on standard error, and in --json
+    /// Report the CPU seconds of each stage on standard error, and in --json
     #[arg(long)]
     pub(crate) profile: bool,
-    /// How progress is shown
+    /// Form of the progress report
     #[arg(long, value_enum, value_name = "HOW", default_value_t = ProgressKind::Bar)]
     pub(crate) progress: ProgressKind,
 }

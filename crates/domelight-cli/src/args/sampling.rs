@@ -1,19 +1,38 @@
 //! How directions and points are chosen.
 
+use std::str::FromStr;
+
 use clap::{Args, ValueEnum};
 use domelight::render::{Filter, Passes};
 use domelight::sampling::{Heuristic, SamplerKind};
-use domelight::strategy::{Candidates, Proposal, Resampling, StrategyKind};
+use domelight::strategy::{
+    Candidates, Proposal, Resampling, StrategyError, StrategyKind, StrategyOptions,
+};
 
 use super::{one_of, positive};
 use crate::parse::Split;
-use crate::strategy::StrategyText;
 
-/// A strategy, and what it may be told.
+/// A strategy's name and the options that go with it in one text.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StrategyText {
+    pub(crate) kind: StrategyKind,
+    pub(crate) options: StrategyOptions,
+}
+
+impl FromStr for StrategyText {
+    type Err = StrategyError;
+
+    fn from_str(text: &str) -> Result<Self, StrategyError> {
+        let (kind, options) = StrategyOptions::parse(text)?;
+        Ok(Self { kind, options })
+    }
+}
+
+/// A strategy and its options.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Sampling")]
 pub(crate) struct StrategyArguments {
-    /// How directions are chosen: brdf, environment, mis, product, rejection, sir, median-cut or
+    /// Sampling strategy: brdf, environment, mis, product, rejection, sir, median-cut or
     /// variance-minimization, also with numbers and options as in mis:3:1, sir:15/800 or product:8
     #[arg(long, value_name = "NAME[:OPTIONS]", default_value = "product",
           long_help = strategy_help())]
@@ -32,20 +51,20 @@ pub(crate) struct StrategyArguments {
     /// Candidates of each camera sample, with sir [default: by a pilot, for the least error in time]
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub(crate) candidates: Option<u32>,
-    /// Where sir draws its candidates from [default: mixture]
+    /// Density that sir draws its candidates from [default: mixture]
     #[arg(long, value_enum, value_name = "SOURCE")]
     pub(crate) from: Option<SourceName>,
-    /// How sir picks rays from candidates [default: sorted]
+    /// Method by which sir picks rays from candidates [default: sorted]
     #[arg(long, value_enum, value_name = "HOW")]
     pub(crate) resampling: Option<ResamplingName>,
     /// Tries of each camera sample, with rejection; with --rays the most tries [default: 16; with
     /// --rays N 64 N]
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub(crate) tries: Option<u32>,
-    /// What rejection draws its tries from [default: tighter]
+    /// Factor of the product that rejection draws its tries from [default: tighter]
     #[arg(long, value_enum, value_name = "SOURCE")]
     pub(crate) proposal: Option<ProposalName>,
-    /// How mis weighs its samples [default: power]
+    /// Heuristic that weights the samples of mis [default: power]
     #[arg(long, value_enum)]
     pub(crate) heuristic: Option<HeuristicName>,
     /// With mis, draw from the environment's whole table; by default what is dimmer than the mean
@@ -65,7 +84,7 @@ pub(crate) struct SampleArguments {
     /// With product, as many camera samples for every pixel
     #[arg(long)]
     pub(crate) no_adaptive: bool,
-    /// How camera samples are divided into passes over the picture
+    /// Division of camera samples into passes over the picture
     #[arg(long, value_enum, value_name = "HOW", default_value_t = PassesName::Efficient,
           conflicts_with = "target_error")]
     pub(crate) passes: PassesName,
@@ -79,7 +98,7 @@ pub(crate) struct SampleArguments {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Sampling")]
 pub(crate) struct PixelArguments {
-    /// Which points: Owen-scrambled Sobol' or independent random numbers
+    /// Point sets: Owen-scrambled Sobol' or independent random numbers
     #[arg(long, value_enum, default_value_t = SamplerName::Sobol)]
     pub(crate) sampler: SamplerName,
     /// Pixel filter
@@ -105,7 +124,7 @@ pub(crate) enum SourceName {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum ResamplingName {
-    /// Each ray by a number of its own
+    /// A random number for each ray
     Multinomial,
     /// Equally spaced picks
     Systematic,
@@ -135,7 +154,7 @@ pub(crate) enum HeuristicName {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum PassesName {
-    /// As long as the strategy works best with
+    /// The length that the strategy works best with
     Efficient,
     /// 1, 1, 2, 4, … samples, as the browser edition has them: with product another picture
     Doubling,
@@ -154,7 +173,7 @@ fn strategy_help() -> String {
     let line = |kind: StrategyKind| format!("- {}: {}", kind.name(), kind.summary());
     let lines: Vec<String> = StrategyKind::ALL.into_iter().map(line).collect();
     format!(
-        "How directions are chosen, also with numbers and options as in mis:3:1, sir:15/800, product:8 or \
+        "Sampling strategy, also with numbers and options as in mis:3:1, sir:15/800, product:8 or \
          rejection:16:proposal=brdf\n\nStrategies:\n{}\n",
         lines.join("\n")
     )

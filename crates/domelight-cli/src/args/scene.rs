@@ -63,7 +63,7 @@ pub(crate) struct EnvironmentArguments {
     /// The world axis that the top of the map points to
     #[arg(long, value_enum, value_name = "AXIS")]
     pub(crate) env_up: Option<Up>,
-    /// The map's layout, where shape and attributes do not tell it rightly
+    /// The map's layout, where shape and attributes of the file do not determine it
     #[arg(long, value_name = "MAPPING", value_parser = mapping())]
     pub(crate) env_mapping: Option<Mapping>,
     /// The layer of an OpenEXR map
@@ -73,7 +73,7 @@ pub(crate) struct EnvironmentArguments {
     #[arg(long, value_name = "ROWS", default_value_t = BUILTIN_ROWS,
           value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(crate) env_rows: u32,
-    /// Refuse what is repaired or left out with a warning otherwise: negative, NaN and infinite texels, vertices that are
+    /// Refuse input that is otherwise repaired or left out with a warning: negative, NaN and infinite texels, vertices that are
     /// not finite, images and material libraries that cannot be read, and unknown extensions that a glTF file requires
     #[arg(long)]
     pub(crate) strict: bool,
@@ -95,19 +95,19 @@ pub(crate) struct CameraArguments {
     /// (90 is its right) and an elevation [degrees], such as 30,15 [default: the scene's camera, else 0,20]
     #[arg(long, value_name = "VIEW|AZ,EL", allow_hyphen_values = true, conflicts_with_all = ["camera", "origin"])]
     pub(crate) view: Option<ViewDirection>,
-    /// Where the camera is [default: framed to the scene]
+    /// Position of the camera [default: framed to the scene]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) origin: Option<Triple>,
-    /// What it looks at
+    /// Point that the camera looks at
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) target: Option<Triple>,
-    /// The direction that is up in the picture
+    /// Direction that points up in the picture
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) up: Option<Triple>,
     /// Vertical field of view [degrees]
     #[arg(long, value_name = "DEG", value_parser = not_negative, allow_negative_numbers = true, conflicts_with = "ortho")]
     pub(crate) fov: Option<f32>,
-    /// Orthographic, with this height of the picture in the world
+    /// Make the camera orthographic, with this height of the picture in the world
     #[arg(long, value_name = "HEIGHT", value_parser = not_negative, allow_negative_numbers = true)]
     pub(crate) ortho: Option<f32>,
     /// Depth of field: the f-number of a full-frame camera in a world of meters, the distance of what is sharp or auto
@@ -129,7 +129,7 @@ pub(crate) struct SubjectArguments {
     /// seen of it but shadows on the environment, or in alpha with --hide-env
     #[arg(long, value_enum, value_name = "KIND", num_args = 0..=1, default_missing_value = "plate")]
     pub(crate) ground: Option<GroundName>,
-    /// Leave the background out: transparent where nothing is
+    /// Leave the background out: pixels without a surface are transparent
     #[arg(long)]
     pub(crate) hide_env: bool,
 }

@@ -20,7 +20,7 @@ use crate::files;
 use crate::output::{PicturePath, print_code, print_json};
 use domelight_lab::refuse_repeating_points;
 
-/// What every engine is told.
+/// The settings that every engine gets.
 struct Farm {
     /// The program, as this machine calls it.
     program: String,

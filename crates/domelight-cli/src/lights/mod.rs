@@ -2,8 +2,10 @@
 
 mod preview;
 mod report;
+mod written;
 
 use std::fs;
+use std::io::{self, IsTerminal as _};
 use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context as _, Result};
@@ -18,8 +20,8 @@ use domelight::rig::{
 };
 use domelight::scene::SceneDescription;
 
-use crate::args::lights::{LightsArguments, PngPath, RigPath};
-use crate::error::UsageError;
+use crate::args::lights::{LightsArguments, PreviewPath, RigPath};
+use crate::error::{UsageError, status};
 use crate::files;
 use crate::memory;
 use crate::output::{PictureFormat, PicturePath, print, print_json};
@@ -28,6 +30,7 @@ use domelight_lab::Stopwatch;
 use domelight_lab::names::file_name;
 use preview::Preview;
 use report::{LightsReport, Timings};
+use written::WrittenFiles;
 
 /// Lights where nothing else is said.
 const N_LIGHTS: usize = 64;
@@ -35,22 +38,24 @@ const N_LIGHTS: usize = 64;
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
     let outputs = arguments.outputs()?;
-    let dome_path = arguments.declare(&outputs)?;
+    let preview = arguments.preview_path(&outputs, quiet);
+    let dome_path = arguments.declare(&outputs, preview.as_deref())?;
     let mut watch = Stopwatch::start();
 
     let (environment, probe) = arguments.load(quiet)?;
     let load = watch.lap();
-    let found = arguments.find(&environment).with_context(|| probe.clone())?;
+    let measured = preview.is_some() || arguments.json;
+    let found = arguments.find(&environment, measured).with_context(|| probe.clone())?;
     let extract = watch.lap();
 
-    let dome_files = match (&dome_path, &found.extraction.residual) {
+    let domes = match (&dome_path, &found.extraction.residual) {
         (Some(path), Some(dome)) => arguments.write_dome(path, dome.map(), &outputs)?,
-        _ => vec![None; outputs.len()],
+        _ => DomeFiles { written: Vec::new(), of_outputs: vec![None; outputs.len()] },
     };
     let harmonics = found.extraction.residual.as_ref().map(SphericalHarmonics::project);
     let probe_name = file_name(&probe);
-    for (output, dome_file) in outputs.iter().zip(&dome_files) {
-        let file = dome_file.as_ref().map(|dome| refer(output.path, &dome.path)).transpose()?;
+    for (output, dome_file) in outputs.iter().zip(&domes.of_outputs) {
+        let file = dome_file.as_ref().map(|dome| refer(output.path, dome)).transpose()?;
         let rig = RigExport {
             probe: &probe_name,
             orientation: environment.orientation(),
@@ -62,20 +67,39 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
         let bytes = output.format.encode(&rig).with_context(|| probe.clone())?;
         files::write(output.path, |out| out.write_all(&bytes))?;
     }
-    if let Some(path) = &arguments.preview {
+    if let Some(path) = &preview {
         let tone = arguments.tone.of_picture(|| Exposure::Auto.stops(environment.map(), None));
         let preview = Preview { environment: &environment, found: &found, probe: &probe, tone };
         let bytes = preview.png()?;
-        files::write(&path.0, |out| out.write_all(&bytes))?;
+        files::write(path, |out| out.write_all(&bytes))?;
     }
     let timings = Timings { load, extract, write: watch.lap() };
-    let report = LightsReport { arguments, probe: &probe, found: &found, timings, dome: harmonics };
+    let written =
+        WrittenFiles { rigs: &outputs, domes: &domes.written, preview: preview.as_deref() };
+    let report = LightsReport {
+        arguments,
+        probe: &probe,
+        found: &found,
+        timings,
+        dome: harmonics,
+        written: &written,
+    };
     if arguments.json {
         print_json(&report.json())?;
     } else if !quiet && arguments.n_on_standard_output() == 0 {
         print(&report.table())?;
+    } else if !quiet {
+        written.lines().iter().for_each(|line| status(line));
     }
     Ok(())
+}
+
+/// The pictures of a dome.
+struct DomeFiles {
+    /// All of them.
+    written: Vec<PathBuf>,
+    /// The one that each output names.
+    of_outputs: Vec<Option<PathBuf>>,
 }
 
 /// A rig and what is known of its error.
@@ -155,14 +179,28 @@ impl LightsArguments {
     fn n_on_standard_output(&self) -> usize {
         let rigs = self.output.iter().filter(|o| o.is_standard_output()).count();
         let residual = self.keep_residual.as_ref().is_some_and(PicturePath::is_standard_output);
-        let preview = self.preview.as_ref().is_some_and(PngPath::is_standard_output);
+        let preview =
+            matches!(&self.preview, Some(PreviewPath::Png(path)) if path == Path::new("-"));
         rigs + [residual, preview, self.json].map(usize::from).iter().sum::<usize>()
     }
 
+    /// Where the preview goes, if there is one: as asked for, or on a terminal beside the first rig.
+    fn preview_path(&self, outputs: &[Output], quiet: bool) -> Option<PathBuf> {
+        match &self.preview {
+            Some(PreviewPath::None) => return None,
+            Some(PreviewPath::Png(path)) => return Some(path.clone()),
+            None if quiet || self.json || !io::stderr().is_terminal() => return None,
+            None => {}
+        }
+        let first = outputs.iter().find(|output| output.path != Path::new("-"))?;
+        let stem = first.path.file_stem().unwrap_or_default().to_string_lossy();
+        Some(first.path.with_file_name(format!("{stem}_preview.png")))
+    }
+
     /// Declares all that may be written; the file of the dome's map, if there may be one.
-    fn declare(&self, outputs: &[Output]) -> Result<Option<PicturePath>> {
+    fn declare(&self, outputs: &[Output], preview: Option<&Path>) -> Result<Option<PicturePath>> {
         outputs.iter().try_for_each(|o| files::writes(o.path))?;
-        self.preview.as_ref().map_or(Ok(()), |p| files::writes(&p.0))?;
+        preview.map_or(Ok(()), files::writes)?;
         let Some(dome) = self.dome_path(outputs)? else { return Ok(None) };
         let mut pictures = vec![dome.path.clone()];
         for picture in outputs.iter().filter_map(|output| output.format.dome_picture()) {
@@ -189,7 +227,8 @@ impl LightsArguments {
         Ok((environment, probe))
     }
 
-    fn find(&self, environment: &Environment) -> Result<ExtractedRig> {
+    /// The rig; its error if it was searched for by error, or is to be `measured`.
+    fn find(&self, environment: &Environment, measured: bool) -> Result<ExtractedRig> {
         let settings = self.settings();
         if let Some(percent) = self.error {
             let found = smallest_rig(environment, settings, 0.01 * percent)?;
@@ -197,7 +236,7 @@ impl LightsArguments {
         }
         let extraction = extract(environment, settings)?;
         let mut errors = Vec::new();
-        if self.preview.is_some() || self.json {
+        if measured {
             errors.push((extraction.rig.lights.len(), measure(environment, &extraction)));
         }
         Ok(ExtractedRig { extraction, errors })
@@ -221,20 +260,20 @@ impl LightsArguments {
 }
 
 impl LightsArguments {
-    /// Writes the dome's map and what else outputs need of it; the picture of each output.
+    /// Writes the dome's map and what else outputs need of it.
     fn write_dome(
         &self,
         path: &PicturePath,
         map: &RgbImage,
         outputs: &[Output],
-    ) -> Result<Vec<Option<PicturePath>>> {
+    ) -> Result<DomeFiles> {
         let tone = self.tone.of_measurement(|| Exposure::Auto.stops(map, None));
         path.write(map, tone, PictureFormat::Exr, None)?;
-        let mut pictures = Vec::new();
+        let mut domes = DomeFiles { written: vec![path.path.clone()], of_outputs: Vec::new() };
         for output in outputs {
             let picture = output.format.dome_picture().unwrap_or(DomePicture::LatLong);
             let file = picture_path(path, picture)?;
-            if file.path != path.path {
+            if !domes.written.contains(&file.path) {
                 let mapping = picture.mapping();
                 let size = match mapping {
                     Mapping::LatLong => (map.width, map.height),
@@ -242,10 +281,11 @@ impl LightsArguments {
                 };
                 let converted = from_lat_long(map, mapping, size);
                 file.write(&converted, tone, PictureFormat::Exr, Some(mapping))?;
+                domes.written.push(file.path.clone());
             }
-            pictures.push(Some(file));
+            domes.of_outputs.push(Some(file.path));
         }
-        Ok(pictures)
+        Ok(domes)
     }
 }
 

@@ -4,8 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use domelight::environment::Environment;
-use domelight::math::{Frame, Vec2, Vec3, vec2, vec3};
-use domelight::picture::png::{self, Depth};
+use domelight::math::{Vec2, Vec3, vec2};
 use domelight::picture::tone::{ToneCurve, ToneMapping, srgb_from_linear};
 use domelight::rig::{Rig, RigLight, quadrature};
 use domelight::{Rgb, RgbImage};
@@ -13,6 +12,7 @@ use rayon::prelude::*;
 
 use super::ExtractedRig;
 use super::report::error_text;
+use crate::map_picture::{MAP, circle, map_picture, place, png_bytes};
 use domelight_lab::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use domelight_lab::svg::{
     Anchor, Color, Document, PALETTE, Pixels, Rect, Style, TextStyle, rasterize,
@@ -20,8 +20,6 @@ use domelight_lab::svg::{
 
 const WIDTH: f64 = 1320.0;
 const MARGIN: f64 = 20.0;
-/// Of the picture of the probe.
-const MAP: (usize, usize) = (1280, 640);
 /// Pixels along the edge of the picture of a sphere.
 const SPHERE: usize = 300;
 /// Its edge on the sheet, and beside a plot of errors.
@@ -85,34 +83,15 @@ impl Preview<'_> {
             let (column, row) = (x * rig.width / width, y * rig.height / height);
             rig.labels[row * rig.width + column]
         };
-        let pixel = |x: usize, y: usize| {
+        map_picture(self.environment.map(), |x, y, radiance| {
             let here = label(x, y);
             let border =
                 label((x + 1) % width, y) != here || label(x, (y + 1).min(height - 1)) != here;
-            let le = self.tone.apply(self.footprint(x, y));
+            let le = self.tone.apply(radiance);
             // Seen on dark and on bright ground.
             let bright = le.luminance() > 0.2;
             if border { le.map(|c| if bright { 0.25 * c } else { c + 0.3 }) } else { le }
-        };
-        let rows: Vec<Rgb> = (0..height)
-            .into_par_iter()
-            .flat_map_iter(|y| (0..width).map(move |x| (x, y)))
-            .map(|(x, y)| pixel(x, y))
-            .collect();
-        RgbImage::new(width, height, rows)
-    }
-
-    /// Mean radiance of the texels behind a pixel of the picture.
-    fn footprint(&self, x: usize, y: usize) -> Rgb {
-        let map = self.environment.map();
-        let range = |i: usize, n: usize, of: usize| {
-            let start = i * of / n;
-            start..((i + 1) * of / n).max(start + 1)
-        };
-        let (columns, rows) = (range(x, MAP.0, map.width), range(y, MAP.1, map.height));
-        let n = (columns.len() * rows.len()) as f32;
-        let sum: Rgb = rows.flat_map(|y| map.row(y)[columns.clone()].iter().copied()).sum();
-        sum / n
+        })
     }
 
     /// Each light as the outline of its disc, and a point in its color with its number.
@@ -121,7 +100,7 @@ impl Preview<'_> {
         // The brightest on top.
         for (i, light) in lights.iter().enumerate().rev() {
             let color = hue(light.irradiance);
-            for run in self.outline(light, map) {
+            for run in circle(self.environment, light.direction, light.angular_radius, map) {
                 sheet.polyline(run.iter().copied(), Style::stroke(Color::INK, 3.2).opacity(0.5));
                 sheet.polyline(run, Style::stroke(color, 1.6));
             }
@@ -135,27 +114,6 @@ impl Preview<'_> {
                 sheet.text((at.0, at.1 + 4.5), &number, style.anchor(Anchor::Middle).bold());
             }
         }
-    }
-
-    /// The circle around a light's disc on the map, cut where it runs across the seam.
-    fn outline(&self, light: &RigLight, map: Rect) -> Vec<Vec<(f64, f64)>> {
-        const STEPS: usize = 96;
-        let frame = Frame::from_z(light.direction);
-        let (sin, cos) = light.angular_radius.sin_cos();
-        let mut runs: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
-        for i in 0..=STEPS {
-            let (sin_phi, cos_phi) = (std::f32::consts::TAU * i as f32 / STEPS as f32).sin_cos();
-            let direction = frame.to_world(vec3(sin * cos_phi, sin * sin_phi, cos));
-            let at = place(self.environment, direction, map);
-            let last = runs.last().and_then(|run| run.last());
-            if last.is_some_and(|last| (last.0 - at.0).abs() > 0.5 * map.width) {
-                runs.push(Vec::new());
-            }
-            if let Some(run) = runs.last_mut() {
-                run.push(at);
-            }
-        }
-        runs
     }
 
     /// A white matte sphere under the probe and under the rig, and how much they differ.
@@ -226,12 +184,6 @@ impl Preview<'_> {
     }
 }
 
-/// Where a direction is on the picture of the probe.
-fn place(environment: &Environment, direction: Vec3, map: Rect) -> (f64, f64) {
-    let uv = environment.uv(direction);
-    (map.x + f64::from(uv.x) * map.width, map.y + f64::from(uv.y) * map.height)
-}
-
 /// The color of light at full brightness, not darker than can be seen.
 fn hue(light: Rgb) -> Color {
     let shown = light / light.max_component().max(f32::MIN_POSITIVE);
@@ -264,11 +216,4 @@ fn sphere(environment: &Environment, lights: &[RigLight]) -> RgbImage {
     };
     let pixels = (0..SPHERE * SPHERE).into_par_iter().map(pixel).collect();
     RgbImage::new(SPHERE, SPHERE, pixels)
-}
-
-/// A picture whose values are already those to be shown.
-fn png_bytes(image: &RgbImage) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    png::encode(image, None, &ToneMapping::default(), Depth::Eight, &mut bytes)?;
-    Ok(bytes)
 }

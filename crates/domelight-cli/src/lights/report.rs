@@ -1,4 +1,4 @@
-//! What is told of a rig: a table for people, JSON for programs.
+//! The report of a rig: a table for people, JSON for programs.
 
 use std::fmt::Write as _;
 
@@ -9,6 +9,7 @@ use domelight::rig::{RigLight, ShadingError, SphericalHarmonics};
 use serde_json::{Value, json};
 
 use super::ExtractedRig;
+use super::written::WrittenFiles;
 use crate::args::lights::LightsArguments;
 use domelight_lab::{Seconds, peak_memory};
 
@@ -26,6 +27,7 @@ pub(super) struct LightsReport<'a> {
     pub(super) found: &'a ExtractedRig,
     pub(super) timings: Timings,
     pub(super) dome: Option<SphericalHarmonics>,
+    pub(super) written: &'a WrittenFiles<'a>,
 }
 
 impl LightsReport<'_> {
@@ -55,6 +57,9 @@ impl LightsReport<'_> {
         let _ = writeln!(text, "\n{}", self.summary());
         for (n, error) in self.found.errors.iter().filter(|_| self.arguments.error.is_some()) {
             let _ = writeln!(text, "{n:>6} lights   {}", error_text(*error));
+        }
+        for line in self.written.lines() {
+            let _ = writeln!(text, "{line}");
         }
         text
     }
@@ -101,6 +106,7 @@ impl LightsReport<'_> {
             "error": self.found.error().map(error),
             "tried": tried.collect::<Vec<_>>(),
             "dome": self.dome.map(|h| h.coefficients.map(domelight::Rgb::to_array)),
+            "written": self.written.json(),
             "seconds": self.timings,
             "peak_memory": peak_memory(),
         })

@@ -19,7 +19,7 @@ use domelight::render::{RenderSettings, pilot_points};
 /// the pixel and directions together, and channel by channel where the light has one color.)
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Bound {
-    /// Of one thread's CPU time, by the ray kernel on the case.
+    /// Occlusion rays in a CPU second of one thread, by the ray kernel on the case.
     pub(super) occlusion_rays_per_cpu_second: f64,
     /// relMSE of one ray a pixel.
     pub(super) rel_mse_of_a_ray: f64,
@@ -56,7 +56,7 @@ impl Bound {
 
 /// Directions from each point.
 const DIRECTIONS: usize = 256;
-/// Of which the median counts.
+/// How often the kernel is timed; the median counts.
 const ROUNDS: usize = 9;
 
 /// Occlusion rays a CPU second of this thread, from points all over the picture toward the light.

@@ -28,7 +28,7 @@ const MATERIALS: &str = "diffuse:0.8,ggx:0.2,ggx:0.05,phong:50:0.5:0.5";
 const MESH: BuiltinScene = BuiltinScene::Statue;
 const PROBES: [BuiltinProbe; 3] =
     [BuiltinProbe::Sky, BuiltinProbe::Studio, BuiltinProbe::Cathedral];
-/// Of a built-in probe.
+/// Rows of a built-in probe.
 const ROWS: u32 = 512;
 
 /// Where normalized meshes are looked at from, and how wide.
@@ -255,7 +255,7 @@ impl Case {
         Ok(BuiltCase { view, camera, settings, time: watch.lap() })
     }
 
-    /// As `render` would be told.
+    /// The arguments of `render` for it.
     fn scene_settings(&self, settings: &BenchSettings, size: [usize; 2]) -> SceneSettings {
         let normalize = self.material != CaseMaterial::Own;
         let usual = normalize && self.placement == CameraPlacement::Standard;
@@ -278,7 +278,7 @@ impl Case {
     }
 }
 
-/// A probe as `render` would be told.
+/// The argument of `render` for a probe.
 fn light(probe: &str, rotate: f32, rows: u32) -> LightSettings {
     LightSettings {
         probe: Some(probe.to_owned()),

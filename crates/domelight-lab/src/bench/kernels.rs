@@ -79,7 +79,7 @@ struct Scaling {
     wall: MedianAndRange,
 }
 
-/// Of the rounds.
+/// The median of the rounds, and the least and the greatest.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct MedianAndRange {
     median: f64,

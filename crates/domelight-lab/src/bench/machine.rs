@@ -11,11 +11,11 @@ const RUSTFLAGS: &str = env!("DOMELIGHT_RUSTFLAGS");
 /// The computer and the build of this program.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Machine {
-    /// Null where the system does not tell.
+    /// Null where the system does not report it.
     cpu: Option<String>,
     /// Cores that the process may use.
     cores: usize,
-    /// That the ray kernel runs with.
+    /// The one that the ray kernel runs with.
     instruction_set: String,
     target: String,
     rustc: String,
@@ -24,7 +24,7 @@ pub(super) struct Machine {
     /// Flags beside those of the profile.
     rustflags: String,
     /// Processes that wanted to run in the last minute, before the first measurement; null where the system
-    /// does not tell. What is above 0 was there beside us.
+    /// does not report it. Above 0, other programs ran beside the bench.
     load_average: Option<f64>,
 }
 

@@ -1,5 +1,6 @@
 //! What error costs, in CPU time.
 
+mod bench_run;
 mod bound;
 mod cases;
 mod embree;
@@ -11,7 +12,6 @@ mod ply;
 mod renders;
 mod results;
 mod rigs;
-mod strategy_run;
 mod table;
 
 use std::path::PathBuf;

@@ -4,14 +4,13 @@ use std::cell::RefCell;
 
 use serde::{Deserialize, Serialize};
 
+use super::bench_run::{
+    BenchRun, BenchStrategy, BudgetPoint, CostAtError, ErrorMetric, HEADLINE, Limits, StrategyEntry,
+};
 use super::bound::{Bound, occlusion_rate};
 use super::cases::{self, BuiltCase, Case, short};
 use super::fit::Fit;
 use super::mitsuba::Mitsuba;
-use super::strategy_run::{
-    BenchStrategy, BudgetPoint, CostAtError, ErrorMetric, HEADLINE, Limits, StrategyEntry,
-    StrategyRun,
-};
 use super::table::{Table, number};
 use super::{Bench, Peer};
 use crate::measure::{Cache, Goal, MIS, Reference, ReferenceReport};
@@ -34,7 +33,7 @@ const OURS: &str = "product";
 
 /// Camera samples of a reference at the most.
 const MOST_REFERENCE_SAMPLES: u32 = 2048;
-/// Of another program's, which takes two rays for each.
+/// The most samples of another program, which traces two rays for each.
 const MOST_PEER_SAMPLES: u32 = 4096;
 /// The relMSE of a reference, unless the errors that are to be reached are so great that a part of them suffices.
 const REFERENCE_ERROR: f64 = 5e-5;
@@ -170,10 +169,10 @@ impl CaseRunner<'_> {
         }
         let prepared = self.strategies.iter().map(|s| BenchStrategy::new(s, &built, bench.seed));
         let prepared = prepared.collect::<Result<Vec<_>, Error>>()?;
-        let mut runs: Vec<StrategyRun> =
-            prepared.iter().map(|p| StrategyRun::ours(p, &built, &metric, host)).collect();
+        let mut runs: Vec<BenchRun> =
+            prepared.iter().map(|p| BenchRun::ours(p, &built, &metric, host)).collect();
         if let (Some(peer), Some(metric)) = (&self.peer, &peer_metric) {
-            runs.push(StrategyRun::mitsuba(peer, metric));
+            runs.push(BenchRun::mitsuba(peer, metric));
         }
         let errors = self.measure_all(&mut runs)?;
         let mut entries: Vec<StrategyEntry> = Vec::new();
@@ -205,7 +204,7 @@ impl CaseRunner<'_> {
     }
 
     /// All pictures of all, seed by seed in turn; the errors that are to be reached.
-    fn measure_all(&self, runs: &mut [StrategyRun]) -> Result<Vec<f64>, Error> {
+    fn measure_all(&self, runs: &mut [BenchRun]) -> Result<Vec<f64>, Error> {
         let Bench { settings, host, .. } = *self.bench;
         let seeds = || (0..u64::from(settings.n_seeds)).map(|i| settings.seed.wrapping_add(i));
         let mut errors = self.errors.clone();
@@ -264,7 +263,7 @@ fn bound(built: &BuiltCase, metric: &ErrorMetric) -> Bound {
     Bound::new(&picture.image, unoccluded, &metric.covered, rate)
 }
 
-/// Of the luminance of the covered pixels.
+/// The mean luminance of the covered pixels.
 fn mean(metric: &ErrorMetric) -> f64 {
     let pixels = metric.reference.picture.image.pixels.iter().zip(&metric.covered);
     let covered = pixels.filter(|(_, covered)| **covered);

@@ -19,7 +19,7 @@ const SCHEMA: u32 = 1;
 #[derive(Serialize, Deserialize)]
 pub struct Results {
     schema: u32,
-    /// Of domelight.
+    /// Version of domelight.
     version: String,
     /// When it began, RFC 3339.
     date: String,

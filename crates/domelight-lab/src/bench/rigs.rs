@@ -6,8 +6,8 @@ use domelight::rig::{MedianCut, Method, Rig, ShadingReference, VarianceMinimizat
 use serde::{Deserialize, Serialize};
 
 use super::Bench;
+use super::bench_run::median;
 use super::cases::{self, short};
-use super::strategy_run::median;
 use super::table::{Table, number};
 use crate::names::file_name;
 use crate::usage::Stopwatch;
@@ -22,11 +22,11 @@ const ROWS: [u32; 2] = [128, 512];
 #[derive(Serialize, Deserialize)]
 pub(super) struct Row {
     probe: String,
-    /// Of the map.
+    /// Columns and rows of the map.
     size: [usize; 2],
     method: String,
     lights: usize,
-    /// To extract them; one value a repetition, wall-clock seconds where the system does not tell.
+    /// To extract them; one value a repetition, wall-clock seconds where the system does not report them.
     cpu_seconds: Vec<f64>,
     /// The irradiance of all lights against that of the map, the greatest difference of a channel relative to it.
     flux_error: f64,

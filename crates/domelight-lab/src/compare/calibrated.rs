@@ -44,14 +44,14 @@ struct CalibratedStrategy<'a> {
 
 /// A strategy that was made for the comparison, or one of the caller's.
 enum Held<'a> {
-    Prepared(PreparedStrategy<'a>),
+    Prepared(Box<PreparedStrategy<'a>>),
     Lent(&'a dyn Picturing),
 }
 
 impl<'a> Held<'a> {
     fn get(&self) -> &dyn Picturing {
         match self {
-            Self::Prepared(strategy) => strategy,
+            Self::Prepared(strategy) => &**strategy,
             Self::Lent(strategy) => *strategy,
         }
     }
@@ -61,7 +61,7 @@ impl<'a> Held<'a> {
         environment: &'a Environment,
         host: &dyn Host,
     ) -> Result<Self, Error> {
-        Ok(Self::Prepared(host.prepare(spec, environment)?))
+        Ok(Self::Prepared(Box::new(host.prepare(spec, environment)?)))
     }
 }
 
@@ -343,7 +343,7 @@ fn grown(spp: u32, noise: f64, least: f64, most: u32) -> u32 {
     /// Errors are estimates.
     const MARGIN: f64 = 1.2;
     let ratio = noise / (CONVERGED * least);
-    if !(ratio > 1.0) {
+    if ratio.is_nan() || ratio <= 1.0 {
         return spp;
     }
     let doublings = (MARGIN * ratio).log2().ceil().clamp(1.0, 24.0);

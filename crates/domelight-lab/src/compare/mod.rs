@@ -26,7 +26,7 @@ pub use strategy_run::{ConvergencePoint, MeanAndDeviation};
 
 use crate::measure::Source;
 use crate::measure::render::Picturing;
-use crate::scene::View;
+use crate::scene::PreparedSceneRef;
 use crate::strategy::NamedStrategy;
 use crate::{Error, Host};
 use strategy_run::StrategyMeasurement;
@@ -40,7 +40,7 @@ const TOLERANCE: f64 = 0.1;
 /// What all strategies of a comparison have in common.
 #[derive(Clone, Debug)]
 pub struct ComparisonSettings {
-    /// Of each picture, but for the number of samples.
+    /// Settings of each picture, except for the number of samples.
     pub render: RenderSettings,
     /// What each picture may cost.
     pub budget: Budget,
@@ -76,7 +76,7 @@ impl Default for ComparisonSettings {
 
 /// Strategies on one scene at equal samples, rays or time, before any of them has rendered.
 pub struct Comparison<'a> {
-    view: View<'a>,
+    view: PreparedSceneRef<'a>,
     settings: ComparisonSettings,
     competitors: Vec<Competitor<'a>>,
 }
@@ -131,7 +131,7 @@ impl ComparisonResult {
 
 impl<'a> Comparison<'a> {
     /// A comparison that nobody takes part in yet.
-    pub fn new(view: View<'a>, settings: ComparisonSettings) -> Self {
+    pub fn new(view: PreparedSceneRef<'a>, settings: ComparisonSettings) -> Self {
         Self { view, settings, competitors: Vec::new() }
     }
 
@@ -203,7 +203,7 @@ impl<'a> Comparison<'a> {
         match self.settings.exposure {
             Exposure::Stops(stops) => stops,
             Exposure::Auto => {
-                let View { scene, camera, environment, .. } = self.view;
+                let PreparedSceneRef { scene, camera, environment, .. } = self.view;
                 automatic_exposure(scene, camera, environment, &self.settings.render)
             }
         }

@@ -10,7 +10,7 @@ use crate::report::SceneReport;
 /// All numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct CompareReport {
-    /// Of domelight.
+    /// Version of domelight.
     pub version: &'static str,
     /// As it was typed.
     pub command: String,
@@ -65,7 +65,7 @@ pub struct ResultReport {
     pub camera_samples: Option<f64>,
     /// Shadow rays of a pixel that the scene covers, as counted; the mean over seeds. Null of another renderer's picture.
     pub rays: Option<f64>,
-    /// Of rendering alone; of another renderer's picture as it was stated.
+    /// CPU seconds of rendering alone; for another renderer's picture, as stated.
     pub cpu_seconds: MeanAndDeviation,
     /// Against the reference, over all pixels.
     pub rel_mse: MeanAndDeviation,

@@ -66,7 +66,7 @@ pub struct MeanAndDeviation {
 }
 
 impl MeanAndDeviation {
-    /// Of a single value.
+    /// The mean of a single value.
     pub(super) fn single(mean: f64) -> Self {
         Self { mean, sd: None }
     }
@@ -88,7 +88,7 @@ pub struct ConvergencePoint {
     pub camera_samples: f64,
     /// Shadow rays of a pixel that the scene covers, as counted; the mean over seeds.
     pub rays: f64,
-    /// Of rendering alone.
+    /// CPU seconds of rendering alone.
     pub cpu_seconds: MeanAndDeviation,
     /// Against the reference, over all pixels.
     pub rel_mse: MeanAndDeviation,
@@ -103,7 +103,7 @@ pub(super) fn samples_to_measure(n_seeds: u32) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bias {
     pub(super) mean: f64,
-    /// Of 95 %.
+    /// The 95 % confidence interval.
     pub(super) interval: [f64; 2],
 }
 
@@ -255,7 +255,7 @@ fn sample_count(budget: f64, each: f64, one_sample: &str) -> SampleCount {
 #[derive(Default)]
 struct PictureSum {
     first: Option<RgbImage>,
-    /// Of each pixel and channel the differences d from the reference R, over √(R² + 0.01): Σ d and Σ d².
+    /// Σ d and Σ d² of each pixel and channel, d the difference from the reference R over √(R² + 0.01).
     sums: Vec<[[f64; 2]; 3]>,
     /// The differences d of the first pictures.
     differences: Vec<Vec<[f32; 3]>>,
@@ -387,7 +387,7 @@ mod tests {
         assert!(MeanAndDeviation::of(&[4.0]).sd.is_none());
     }
 
-    /// Of noisy pictures without bias against a noisy reference, and of pictures with bias.
+    /// Noisy pictures without bias against a noisy reference, and pictures with bias.
     #[test]
     fn the_noise_of_the_reference_is_no_bias() {
         let (width, height, n_seeds) = (64, 64, 5);

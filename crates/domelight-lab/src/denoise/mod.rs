@@ -10,7 +10,10 @@ use std::ffi::{CStr, OsString};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use domelight::RgbImage;
+use domelight::picture::exr::bands::{self, BAND_ROWS};
+use domelight::picture::{PictureErrorKind, WriteSeek};
+use domelight::render::Layers;
+use domelight::{Rgb, RgbImage};
 
 use crate::Error;
 use oidn::Device;
@@ -121,4 +124,37 @@ impl Denoiser {
         }
         Ok(filtered)
     }
+
+    /// A render's color without noise, by its albedo and normals, and how it was made, in words.
+    ///
+    /// # Errors
+    /// If the library fails.
+    pub fn denoise_layers(&self, layers: &Layers) -> Result<(RgbImage, String), Error> {
+        let normals = layers.normal.iter().map(|n| Rgb::from(n.to_array())).collect();
+        let normal = &RgbImage::new(layers.width(), layers.height(), normals);
+        let features = Features { albedo: Some(&layers.albedo), normal: Some(normal) };
+        let by = format!("{} {}", self.name(), features.description());
+        Ok((self.denoise(&layers.color, features)?, by))
+    }
+}
+
+/// Writes a render's OpenEXR file with what a denoiser made of its color as the layer `denoised` beside the others.
+///
+/// # Errors
+/// If `out` does not take it, or a name of an attribute cannot be one of OpenEXR.
+pub fn write_exr(
+    layers: &Layers,
+    denoised: &RgbImage,
+    attributes: &[(String, String)],
+    out: &mut dyn WriteSeek,
+) -> Result<(), PictureErrorKind> {
+    let width = layers.width();
+    bands::write(layers.height(), out, |y| {
+        let rows = y..layers.height().min(y + BAND_ROWS);
+        let pixels = denoised.pixels[rows.start * width..rows.end * width].to_vec();
+        let denoised = RgbImage::new(width, rows.len(), pixels);
+        let mut exr = layers.rows(rows).to_exr(attributes.to_vec());
+        exr.push_rgb("denoised", &denoised, None);
+        Ok(exr)
+    })
 }

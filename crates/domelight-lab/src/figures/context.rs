@@ -10,9 +10,10 @@ use domelight::bsdf::Bsdf;
 use domelight::code;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::mapping::{Mapping, to_lat_long};
-use domelight::environment::{Environment, Orientation};
+use domelight::environment::{Environment, LatLongGrid, Orientation};
 use domelight::math::{Vec3, vec2};
 use domelight::picture::compare::compare;
+use domelight::picture::exposure::Exposure;
 use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::quote::{Code, Shell, shell};
 use domelight::render::{Layers, RenderSettings, Renderer};
@@ -109,12 +110,9 @@ impl<'a> FigureContext<'a> {
         if self.quick { quick } else { full }
     }
 
-    /// How the map is shown: the mean of its logarithms, which lamps and suns hardly move, a little
-    /// below middle gray.
+    /// How the map is shown: exposed automatically, as everywhere.
     pub(crate) fn map_tone(&self) -> ToneMapping {
-        let lit = self.map.pixels.iter().map(|p| p.luminance()).filter(|&y| y > 0.0);
-        let (sum, n) = lit.fold((0.0, 0.0f32), |(sum, n), y| (sum + y.ln(), n + 1.0));
-        exposed((sum / n.max(1.0)).exp(), 0.09)
+        exposed(Exposure::Auto.stops(&self.map, None))
     }
 
     /// The direction of the map's brightest texel.
@@ -126,6 +124,17 @@ impl<'a> FigureContext<'a> {
         let (x, y) = (brightest % map.width, brightest / map.width);
         let at = |i: usize, n: usize| (i as f32 + 0.5) / n as f32;
         self.environment.direction(vec2(at(x, map.width), at(y, map.height)))
+    }
+
+    /// The middles of the texels of the map as it is shown, in the world, with their solid angles [sr].
+    pub(crate) fn directions(&self) -> impl Iterator<Item = (Vec3, f64)> + '_ {
+        let (width, height) = (self.map.width, self.map.height);
+        let grid = LatLongGrid::new(width, height);
+        (0..width * height).map(move |i| {
+            let (x, y) = (i % width, i / width);
+            let uv = vec2((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
+            (self.environment.direction(uv), grid.solid_angle(y))
+        })
     }
 
     /// Sets up the camera.
@@ -236,12 +245,12 @@ pub(crate) struct FigureRender {
     pub(crate) strategy: String,
     pub(crate) shadow_rays: u64,
     pub(crate) points: u64,
-    /// CPU seconds of all threads; wall-clock seconds where the system does not tell.
+    /// CPU seconds of all threads; wall-clock seconds where the system does not report them.
     pub(crate) seconds: f64,
 }
 
 /// A picture and how far it is from the converged one.
-pub(crate) struct Measurement {
+pub(crate) struct FigureMeasurement {
     pub(crate) render: FigureRender,
     /// Mean over pixels that show the scene of (I − R)² / (R² + 0.01).
     pub(crate) rel_mse: f64,
@@ -292,7 +301,7 @@ impl FigureScene<'_> {
     }
 
     /// Renders the picture and compares it with the converged one.
-    pub(crate) fn measure(&self, spec: StrategySpec) -> Result<Measurement, Error> {
+    pub(crate) fn measure(&self, spec: StrategySpec) -> Result<FigureMeasurement, Error> {
         self.measure_with(spec, self.settings.seed, SamplerKind::Sobol)
     }
 
@@ -302,12 +311,12 @@ impl FigureScene<'_> {
         spec: StrategySpec,
         seed: u64,
         sampler: SamplerKind,
-    ) -> Result<Measurement, Error> {
+    ) -> Result<FigureMeasurement, Error> {
         let reference = self.reference(seed, sampler)?;
         let render = self.render_with(spec, seed, sampler)?;
         let covered: Vec<bool> = reference.depth.iter().map(|&d| d > 0.0).collect();
         let error = compare(&render.layers.color, &reference.color, Some(&covered))?;
-        Ok(Measurement { render, rel_mse: error.rel_mse })
+        Ok(FigureMeasurement { render, rel_mse: error.rel_mse })
     }
 
     /// The converged picture with the camera rays of that seed: many samples of both kinds, by
@@ -330,17 +339,10 @@ impl FigureScene<'_> {
         Ok(made)
     }
 
-    /// How pictures of this scene are shown: the scene's mean in the reference at middle gray.
+    /// How pictures of this scene are shown: the exposure of the reference, as `render` chooses it.
     pub(crate) fn tone(&self) -> Result<ToneMapping, Error> {
         let reference = self.reference(self.settings.seed, SamplerKind::Sobol)?;
-        let covered =
-            reference.color.pixels.iter().zip(&reference.depth).filter(|(_, d)| **d > 0.0);
-        let (mut sum, mut n) = (0.0, 0.0f32);
-        for (color, _) in covered {
-            sum += color.luminance().min(1e6);
-            n += 1.0;
-        }
-        Ok(exposed(sum / n.max(1.0), 0.4))
+        Ok(exposed(Exposure::Auto.stops(&reference.color, Some(&reference.alpha))))
     }
 }
 
@@ -355,8 +357,7 @@ fn split(environment: u32, brdf: u32) -> Split {
     Split { environment, brdf }
 }
 
-/// Exposure that takes `mean` to `gray`, before the curve.
-fn exposed(mean: f32, gray: f32) -> ToneMapping {
-    let exposure = if mean > 0.0 { (gray / mean).log2().clamp(-30.0, 30.0) } else { 0.0 };
+/// Blender's curve at that exposure.
+fn exposed(exposure: f32) -> ToneMapping {
     ToneMapping { exposure, curve: ToneCurve::Agx }
 }

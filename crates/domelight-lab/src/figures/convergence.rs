@@ -2,7 +2,7 @@
 
 use crate::Error;
 use domelight::code;
-use domelight::quote::Html;
+use domelight::quote::{Code, Html, html};
 use domelight::sampling::SamplerKind;
 use domelight::strategy::{Proposal, StoppingRule, StrategySpec};
 
@@ -130,22 +130,91 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         number: 8,
         title: "Bias against variance",
         slides: "slides 3 and 30",
-        caption: code!(
-            Html,
-            "<p>Error of every method over its shadow rays or lights at each point, for the statue of {MATERIAL}; bars are \
-             the standard deviation over {n_seeds} seeds. Sampling is right on average, and its error falls \
-             with 1/√N: a slope of −½ for independent numbers, whatever the method (the variance falls with \
-             1/N, not with 1/N²). Stratified points fall faster. Fixed lights have no noise; what they have instead is \
-             bias, which falls as lights are added, but which no average over pictures takes away.</p>",
-            MATERIAL = MATERIAL,
-            n_seeds = n_seeds,
-        ),
+        caption: caption(&independent, &sobol, n_seeds),
         formulas: formulas::convergence(),
         rows: vec![Row::new("", plots), Row::new("", vec![over_time])],
         tables: vec![table, slopes],
         has_data: true,
         pictures: Vec::new(),
     })
+}
+
+/// Methods that sample; the others are fixed lights.
+const N_SAMPLED: usize = 5;
+
+/// What the slopes say, whatever they came out as.
+fn caption(independent: &[Curve], sobol: &[Curve], n_seeds: u64) -> Code<Html> {
+    let (sampled, fixed) = independent.split_at(N_SAMPLED);
+    let mut text = code!(
+        Html,
+        "<p>Error of every method over its shadow rays or lights at each point, for the statue of {MATERIAL}; bars are \
+         the standard deviation over {n_seeds} seeds. Once samples have met all the light, errors of independent \
+         numbers fall with 1/√N, a slope of −½ (the variance falls with 1/N, not with 1/N²). Here they fall with slopes \
+         of {range}.{outliers} Stratified points have slopes of {sobol}{verdict}. Fixed lights have no noise; what they have \
+         instead is bias, which falls as lights are added (slopes of {fixed}), but which no average over pictures takes \
+         away.</p>",
+        MATERIAL = MATERIAL,
+        n_seeds = n_seeds,
+        range = range_of(sampled),
+        outliers = outliers(sampled),
+        sobol = range_of(&sobol[..N_SAMPLED]),
+        verdict = verdict(sampled, &sobol[..N_SAMPLED]),
+        fixed = range_of(fixed),
+    );
+    if n_seeds < 3 {
+        text += "<p>Two seeds of a small picture: these slopes are rough.</p>";
+    }
+    text
+}
+
+/// The flattest and the steepest slope.
+fn range_of(curves: &[Curve]) -> Code<Html> {
+    let slopes = || curves.iter().map(Curve::slope).filter(|slope| slope.is_finite());
+    let (flat, steep) =
+        (slopes().fold(f64::NEG_INFINITY, f64::max), slopes().fold(f64::INFINITY, f64::min));
+    html::text(&format!("{} to {}", number_of(flat), number_of(steep)))
+}
+
+/// The methods whose slope is not −½, and why that may be.
+fn outliers(sampled: &[Curve]) -> Code<Html> {
+    const NEAR: f64 = 0.1;
+    let named = |is: &dyn Fn(f64) -> bool| {
+        let of = |curve: &&Curve| is(curve.slope());
+        let name = |curve: &Curve| format!("{} ({})", curve.name, number_of(curve.slope()));
+        let names: Vec<String> = sampled.iter().filter(of).map(name).collect();
+        names.join(", ")
+    };
+    let (flat, steep) = (named(&|s| s > -0.5 + NEAR), named(&|s| s < -0.5 - NEAR));
+    let sentence = |methods: &str, before: &str, why: &str| match methods {
+        "" => String::new(),
+        methods => format!(" {before} at these counts: {methods}: {why}."),
+    };
+    let flat = sentence(
+        &flat,
+        "Flatter",
+        "a small bright light that is rarely met makes pictures of few rays look better than the method is, and where \
+         candidates or tries set the error, rays gain less",
+    );
+    let steep = sentence(
+        &steep,
+        "Steeper",
+        "with few rays its errors hang on single samples, as its bars show, so that the slope is not settled",
+    );
+    html::text(&(flat + &steep))
+}
+
+/// Whether stratification pays here.
+fn verdict(independent: &[Curve], sobol: &[Curve]) -> &'static str {
+    let median = |curves: &[Curve]| {
+        let mut slopes: Vec<f64> = curves.iter().map(Curve::slope).collect();
+        slopes.sort_by(f64::total_cmp);
+        slopes[slopes.len() / 2]
+    };
+    match median(sobol) - median(independent) {
+        d if d < -0.03 => ": most fall faster",
+        d if d > 0.03 => ": most fall no faster here",
+        _ => ": about as fast",
+    }
 }
 
 fn curves(

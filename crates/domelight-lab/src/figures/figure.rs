@@ -104,6 +104,15 @@ impl Figure {
         names
     }
 
+    /// The names of the files of radiance, in a folder of the figure's own.
+    pub(crate) fn picture_files(&self) -> Vec<String> {
+        let n = self.number;
+        let both = |p: &Radiance| {
+            [format!("figure-{n}/{}.exr", p.name), format!("figure-{n}/{}.png", p.name)]
+        };
+        self.pictures.iter().flat_map(both).collect()
+    }
+
     /// Writes all files of the figure; the PNG has `scale` pixels for each of the sheet's.
     pub(crate) fn write(&self, folder: &Path, scale: f32, host: &dyn Host) -> Result<(), Error> {
         let n = self.number;

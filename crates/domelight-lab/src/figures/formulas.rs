@@ -349,6 +349,103 @@ pub(crate) fn region_variance() -> String {
     ])
 }
 
+/// Figure 9: the half vector, and what it does to a solid angle.
+pub(crate) fn half_vector() -> Vec<String> {
+    let both = row([omega("o"), mo("+"), omega("i")]);
+    let d = |index: &str| row([mi("d"), omega(index)]);
+    let four = row([mn("4"), paren(&row([omega("h"), mo("·"), omega("i")]))]);
+    vec![math([
+        omega("h"),
+        mo("="),
+        frac(&both, &row([mo("‖"), both.clone(), mo("‖")])),
+        and(),
+        frac(&d("h"), &d("i")),
+        mo("="),
+        frac(&mn("1"), &four),
+        and(),
+        mi("p"),
+        paren(&omega("i")),
+        mo("="),
+        frac(&row([mi("p"), paren(&omega("h"))]), &four),
+    ])]
+}
+
+/// Figure 10: the two heuristics.
+pub(crate) fn mis_weights() -> Vec<String> {
+    let np = |index: &str| row([sub(&mi("n"), &mi(index)), sub(&mi("p"), &mi(index))]);
+    let square = |index: &str| sup(&paren(&np(index)), &mn("2"));
+    let w = sub(&mi("w"), &mi("L"));
+    vec![math([
+        mi("balance:"),
+        thin(),
+        w.clone(),
+        mo("="),
+        frac(&np("L"), &row([np("L"), mo("+"), np("f")])),
+        and(),
+        mi("power:"),
+        thin(),
+        w,
+        mo("="),
+        frac(&square("L"), &row([square("L"), mo("+"), square("f")])),
+        and(),
+        sub(&mi("w"), &mi("L")),
+        mo("+"),
+        sub(&mi("w"), &mi("f")),
+        mo("="),
+        mn("1"),
+    ])]
+}
+
+/// Figure 12: the density of what resampling keeps.
+pub(crate) fn sir_density() -> Vec<String> {
+    let ratio = frac(&mi("p"), &mi("q"));
+    let of = |x: &str| paren(&sub(&mi("ω"), &mi(x)));
+    let all = format!(
+        "<munder><mo movablelimits=\"false\">∑</mo>{}</munder>",
+        row([mi("k"), mo("≤"), mi("M")])
+    );
+    vec![math([
+        mi("P"),
+        paren(&row([mi("keep"), thin(), sub(&mi("ω"), &mi("j"))])),
+        mo("="),
+        frac(&row([ratio.clone(), of("j")]), &row([all, ratio, of("k")])),
+        and(),
+        sub(&mi("q"), &mi("M")),
+        mo("→"),
+        mi("p"),
+        thin(),
+        mi("for"),
+        thin(),
+        mi("M"),
+        mo("→"),
+        mi("∞"),
+    ])]
+}
+
+/// Figure 13: the two envelopes, and how much of them is the product.
+pub(crate) fn envelope() -> Vec<String> {
+    let light = mi("L");
+    let max = |f: &str| row([sub(&mi("max"), &mi("ω")), thin(), f.to_owned()]);
+    let over = |f: &str| row([integral(&mi("Ω")), f.to_owned(), thin(), mi("d"), mi("ω")]);
+    let product = row([f_cos(), light.clone()]);
+    vec![math([
+        product.clone(),
+        mo("≤"),
+        paren(&max(&f_cos())),
+        light.clone(),
+        and(),
+        product.clone(),
+        mo("≤"),
+        paren(&max(&light)),
+        f_cos(),
+        and(),
+        mi("P"),
+        paren(&mi("accept")),
+        mo("="),
+        frac(&over(&product), &row([paren(&max(&f_cos())), over(&light)])),
+    ])]
+}
+
 /// Figure 8.
 pub(crate) fn convergence() -> Vec<String> {
     let sigma = sup(&mi("σ"), &mn("2"));

@@ -1,12 +1,12 @@
-//! Figure 4: the environment's samples, the BRDF's, both, and their product, at the lecture's counts and
-//! in equal time.
+//! Figure 4: the environment's samples, the BRDF's, both, and their product by resampling and by a table, at the
+//! lecture's counts and in equal time.
 
 use crate::Error;
 use domelight::quote::Code;
 use domelight::sampling::Heuristic;
 use domelight::strategy::{Candidates, Resampling, StrategySpec};
 
-use super::context::{FigureContext, FigureScene, Measurement, Subject};
+use super::context::{FigureContext, FigureMeasurement, FigureScene, Subject};
 use super::figure::{
     Figure, Picture, Radiance, Row, Table, count, number, picture_panel, plot_panel, png_bytes,
 };
@@ -21,6 +21,10 @@ const EM: u32 = 100;
 const BRDF: u32 = 75;
 const MIS: u32 = 37;
 const SIR: (u32, u32) = (15, 800);
+/// Rays of the product's table, which the lecture did not have: those of resampling.
+const PRODUCT: u32 = SIR.0;
+/// More are of no use to it, however much time there is.
+const MAX_PRODUCT_RAYS: u32 = 1024;
 
 /// The lecture's materials.
 const MATERIALS: [(&str, &str); 2] = [
@@ -35,6 +39,11 @@ const MORE: [(&str, &str); 2] =
 pub(super) fn sir(n: u32, n_candidates: Option<u32>) -> StrategySpec {
     let (candidates, resampling) = (Candidates::Mixture, Resampling::SystematicSorted);
     StrategySpec::Sir { n_candidates, n_samples: n, candidates, resampling }
+}
+
+/// The product from a table, with up to so many rays a camera sample.
+fn product(n_rays: u32) -> StrategySpec {
+    StrategySpec::Product { n_rays: n_rays.min(MAX_PRODUCT_RAYS) }
 }
 
 /// As many samples of the environment as of the BRDF, weighed as the program does by default.
@@ -90,7 +99,9 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         let heading =
             format!("{name}: environment against product, {} CPU s each", number(seconds));
         let resampled = ShownStrategy::new("Bidirectional: SIR", &figure_scene, resampled)?;
-        add(&mut figure, &figure_scene, name, "equal time", &heading, vec![em, resampled])?;
+        let table = product_in(&figure_scene, seconds)?;
+        let table = ShownStrategy::new("Product", &figure_scene, table)?;
+        add(&mut figure, &figure_scene, name, "equal time", &heading, vec![em, resampled, table])?;
     }
     Ok(figure)
 }
@@ -99,7 +110,8 @@ const CAPTION: &str = "<p>One camera ray a pixel, the same in all pictures; what
     light alone. First at the lecture's counts: 100 samples of the environment (EM), 75 of the BRDF, 37 of each by \
     multiple importance sampling (power heuristic, compensated), and 15 shadow rays resampled from 800 candidates \
     (SIR), which took the same time in 2005. They no longer do: a shadow ray is now cheaper than a candidate. So MIS \
-    stands there once more, with as many samples as it gets in the time of SIR; and the second row gives \
+    stands there once more, with as many samples as it gets in the time of SIR; and so does the product \
+    of light and BRDF from a table of each pixel (the strategy <code>product</code>), with as many rays as SIR; it is made for pixels of several camera rays, which share a table. The second row gives \
     all the time of the environment’s 100 samples, their counts calibrated by measurement: SIR with the \
     lecture’s ratio of candidates to rays, and with the ratio that suits what they cost here. Under each picture \
     stand its error against the converged one (relMSE: mean of (I − R)² / (R² + 0.01) over the pixels that show the \
@@ -112,7 +124,7 @@ const CAPTION: &str = "<p>One camera ray a pixel, the same in all pictures; what
 struct ShownStrategy {
     title: String,
     spec: StrategySpec,
-    measured: Measurement,
+    measured: FigureMeasurement,
 }
 
 impl ShownStrategy {
@@ -128,6 +140,7 @@ impl ShownStrategy {
             StrategySpec::Sir { n_samples: n, n_candidates, .. } => {
                 format!("{n}/{}", n_candidates.unwrap_or(n))
             }
+            StrategySpec::Product { n_rays } => n_rays.to_string(),
             _ => String::new(),
         };
         Ok(Self { title: format!("{name} {counts}"), spec, measured: figure_scene.measure(spec)? })
@@ -139,6 +152,7 @@ impl ShownStrategy {
             StrategySpec::Environment { .. } => 0,
             StrategySpec::Brdf { .. } => 1,
             StrategySpec::Mis { .. } => 2,
+            StrategySpec::Product { .. } => 5,
             StrategySpec::Sir { n_samples: n, n_candidates, .. }
                 if n_candidates == Some(scaled_candidates(n)) =>
             {
@@ -164,7 +178,7 @@ fn tuned_sir(figure_scene: &FigureScene) -> impl Fn(u32) -> StrategySpec + use<>
     move |n| sir(n, Some(n * ratio.max(1)))
 }
 
-/// The lecture's four, and how far both factors come in the time of the last.
+/// The lecture's four, how far both factors come in the time of the last, and the product with its rays.
 fn at_lectures_counts(figure_scene: &FigureScene) -> Result<Vec<ShownStrategy>, Error> {
     let mut shown = vec![
         ShownStrategy::new("EM", figure_scene, StrategySpec::Environment { n_samples: EM })?,
@@ -178,10 +192,11 @@ fn at_lectures_counts(figure_scene: &FigureScene) -> Result<Vec<ShownStrategy>, 
         figure_scene,
         equal_time(figure_scene, seconds, MIS, mis)?,
     )?);
+    shown.push(ShownStrategy::new("Product", figure_scene, product(PRODUCT))?);
     Ok(shown)
 }
 
-/// The four again with `seconds` for each, and resampling with the ratio that suits.
+/// The four again with `seconds` for each, resampling with the ratio that suits, and the product.
 fn in_equal_time(figure_scene: &FigureScene, seconds: f64) -> Result<Vec<ShownStrategy>, Error> {
     let lectures_ratio = |n: u32| sir(n, Some(scaled_candidates(n)));
     Ok(vec![
@@ -206,7 +221,13 @@ fn in_equal_time(figure_scene: &FigureScene, seconds: f64) -> Result<Vec<ShownSt
             figure_scene,
             equal_time(figure_scene, seconds, SIR.0, tuned_sir(figure_scene))?,
         )?,
+        ShownStrategy::new("Product", figure_scene, product_in(figure_scene, seconds)?)?,
     ])
+}
+
+/// The product's table with as many rays as `seconds` pay for.
+fn product_in(figure_scene: &FigureScene, seconds: f64) -> Result<StrategySpec, Error> {
+    equal_time(figure_scene, seconds, PRODUCT, product)
 }
 
 /// The strategy with the count that takes `seconds`, by measurement from `start` on.
@@ -249,7 +270,7 @@ fn add(
             Ok(())
         };
     for s in shown {
-        let Measurement { render, rel_mse } = s.measured;
+        let FigureMeasurement { render, rel_mse } = s.measured;
         let notes = [
             format!("relMSE {}", number(rel_mse)),
             format!("{} shadow rays", count(render.shadow_rays)),
@@ -295,8 +316,8 @@ pub(super) fn file_name(text: &str) -> String {
 
 /// Error over CPU seconds, at the lecture's counts and at equal time.
 fn plot(name: &str, lecture: &[ShownStrategy], equal: &[ShownStrategy]) -> Document {
-    const KINDS: [&str; 5] =
-        ["EM", "BRDF", "MIS", "SIR, the lecture's ratio", "SIR, measured ratio"];
+    const KINDS: [&str; 6] =
+        ["EM", "BRDF", "MIS", "SIR, the lecture's ratio", "SIR, measured ratio", "product"];
     let all = || lecture.iter().chain(equal);
     let series = KINDS.iter().enumerate().map(|(kind, name)| {
         let datum = |s: &ShownStrategy| Datum::new(s.measured.render.seconds, s.measured.rel_mse);

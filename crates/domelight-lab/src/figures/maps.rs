@@ -70,8 +70,25 @@ pub(crate) fn mark(sheet: &mut Document, (x, y): (f64, f64)) {
     sheet.rect(Rect::new(x - 2.5, y - 2.5, 5.0, 5.0), style);
 }
 
+/// A picture of the size of the map.
+pub(crate) fn image_panel(context: &FigureContext, png: Vec<u8>, title: &str) -> Document {
+    panel_of(&context.map, png, title, &[], |_, _| {})
+}
+
 /// White lines between the regions of a rig, which are drawn for `part` of the map in [0, 1]².
 pub(crate) fn borders(sheet: &mut Document, r: Rect, rig: &Rig, part: Rect) {
+    borders_in(sheet, r, rig, part, Color::WHITE, 1.3);
+}
+
+/// The same in a color and width.
+pub(crate) fn borders_in(
+    sheet: &mut Document,
+    r: Rect,
+    rig: &Rig,
+    part: Rect,
+    color: Color,
+    width: f64,
+) {
     // A line for each run of texels whose neighbor belongs to another light.
     let (w, h) = (rig.width, rig.height);
     // Finer than the sheet's pixels no border is seen.
@@ -96,7 +113,7 @@ pub(crate) fn borders(sheet: &mut Document, r: Rect, rig: &Rig, part: Rect) {
     for x in (x0..x1).step_by(step).skip(1) {
         runs(y0, y1, step, |y| label(x, y) != label(x - step, y), |a, b| line(at(x, a), at(x, b)));
     }
-    sheet.path(&path, Style::stroke(Color::WHITE, 1.3));
+    sheet.path(&path, Style::stroke(color, width));
 }
 
 /// Calls `found(a, b)` for each longest run a..b in which `is` holds.

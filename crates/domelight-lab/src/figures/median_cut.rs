@@ -6,7 +6,7 @@ use domelight::quote::Code;
 use domelight::rig::{LightPosition, MedianCut, Rig, ShadingReference, median_cut};
 use domelight::strategy::StrategySpec;
 
-use super::context::{FigureContext, FigureScene, Measurement, Subject};
+use super::context::{FigureContext, FigureMeasurement, FigureScene, Subject};
 use super::figure::{Figure, Picture, Radiance, Row, Table, number, picture_panel, png_bytes};
 use super::formulas;
 use super::maps::{black_panel, borders, map_panel, mark, on_map, shown_color};
@@ -147,7 +147,7 @@ fn lights_panel(context: &FigureContext, rig: &Rig, title: &str) -> Result<Docum
 /// A picture that fixed lights made, and its error.
 pub(super) fn lit_panel(
     title: &str,
-    measured: &Measurement,
+    measured: &FigureMeasurement,
     tone: ToneMapping,
 ) -> Result<Document, Error> {
     let notes = [format!("relMSE {}", number(measured.rel_mse))];

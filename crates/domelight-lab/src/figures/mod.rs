@@ -1,21 +1,30 @@
 //! The figures of a lecture on sampling direct illumination, one a file, and a page that shows them.
 
+mod balance;
 mod context;
 mod convergence;
+mod envelope;
 mod figure;
 mod formulas;
 mod four_ways;
+mod half_vector;
 mod inversion;
 mod lobes;
 mod maps;
 mod median_cut;
+mod median_cut_steps;
+mod mis_weights;
 mod page;
 mod product;
 mod rejection;
+mod sir_density;
+mod sphere;
 mod variance_minimization;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+use serde::Serialize;
 
 use crate::scene::LightSettings;
 use crate::{At as _, Error};
@@ -23,14 +32,14 @@ pub use context::FigureContext;
 use figure::Figure;
 
 /// How many figures there are.
-pub const N_FIGURES: u8 = 8;
+pub const N_FIGURES: u8 = 14;
 
 /// What the figures show.
 #[derive(Clone, Debug)]
 pub struct FigureSettings {
     /// A built-in scene or a file.
     pub scene: String,
-    /// The light; a built-in scene is lit by the cathedral unless told otherwise.
+    /// The light; a built-in scene is lit by the cathedral by default.
     pub environment: LightSettings,
     /// Small pictures, few samples, poor references.
     pub quick: bool,
@@ -38,12 +47,36 @@ pub struct FigureSettings {
     pub seed: u64,
 }
 
+/// What was drawn.
+#[derive(Clone, Debug, Serialize)]
+pub struct DrawnFigures {
+    /// The page that shows all figures.
+    pub page: PathBuf,
+    /// In the order of their numbers.
+    pub figures: Vec<DrawnFigure>,
+}
+
+/// A figure and its files.
+#[derive(Clone, Debug, Serialize)]
+pub struct DrawnFigure {
+    /// From 1 to [`N_FIGURES`].
+    pub number: u8,
+    /// What it shows.
+    pub title: String,
+    /// The drawing, and its data where there are.
+    pub files: Vec<PathBuf>,
+    /// Radiance as OpenEXR and PNG; empty if there is none.
+    pub pictures: Vec<PathBuf>,
+    /// Wall-clock time that it took \[s\].
+    pub seconds: f64,
+}
+
 /// The names of what [`draw`] writes into its folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileNames {
-    /// Of the page and the drawings, and tables that a figure may have.
+    /// The page and the drawings, and tables that a figure may have.
     pub files: Vec<String>,
-    /// Of folders of pictures.
+    /// Folders of pictures.
     pub folders: Vec<String>,
 }
 
@@ -62,15 +95,16 @@ fn numbers(only: &[u8]) -> impl Iterator<Item = u8> {
     (1..=N_FIGURES).filter(|n| only.is_empty() || only.contains(n))
 }
 
-/// Draws figures into a folder, with a page that shows them; returns the page's name. `only` are the numbers of the
-/// figures, from 1 to [`N_FIGURES`]; none are all. After an error what is done stays, on the page as well.
+/// Draws figures into a folder, with a page that shows them. `only` are the numbers of the figures, from 1 to
+/// [`N_FIGURES`]; none are all. After an error what is done stays, on the page as well.
 ///
 /// # Errors
 /// If a file cannot be written, or the host ended the work.
-pub fn draw(context: &FigureContext, only: &[u8], folder: &Path) -> Result<PathBuf, Error> {
+pub fn draw(context: &FigureContext, only: &[u8], folder: &Path) -> Result<DrawnFigures, Error> {
     domelight::files::create_folder(folder).at(folder.display())?;
     let host = context.host;
     let mut figures = Vec::new();
+    let mut drawn = DrawnFigures { page: folder.join(page::NAME), figures: Vec::new() };
     for number in numbers(only) {
         let start = Instant::now();
         let made = make(context, number).and_then(|figure| {
@@ -81,6 +115,7 @@ pub fn draw(context: &FigureContext, only: &[u8], folder: &Path) -> Result<PathB
             Ok(figure) => {
                 let seconds = start.elapsed().as_secs_f64();
                 host.status(&format!("figure {number}: {} ({seconds:.1} s)", figure.title));
+                drawn.figures.push(drawn_figure(&figure, folder, seconds));
                 figures.push(figure);
             }
             Err(error) => {
@@ -90,7 +125,18 @@ pub fn draw(context: &FigureContext, only: &[u8], folder: &Path) -> Result<PathB
         }
     }
     page::write(context, folder, &figures)?;
-    Ok(folder.join(page::NAME))
+    Ok(drawn)
+}
+
+fn drawn_figure(figure: &Figure, folder: &Path, seconds: f64) -> DrawnFigure {
+    let in_folder = |names: Vec<String>| names.iter().map(|name| folder.join(name)).collect();
+    DrawnFigure {
+        number: figure.number,
+        title: figure.title.to_owned(),
+        files: in_folder(figure.files()),
+        pictures: in_folder(figure.picture_files()),
+        seconds,
+    }
 }
 
 fn make(context: &FigureContext, number: u8) -> Result<Figure, Error> {
@@ -102,6 +148,12 @@ fn make(context: &FigureContext, number: u8) -> Result<Figure, Error> {
         5 => rejection::make(context),
         6 => median_cut::make(context),
         7 => variance_minimization::make(context),
-        _ => convergence::make(context),
+        8 => convergence::make(context),
+        9 => half_vector::make(context),
+        10 => mis_weights::make(context),
+        11 => balance::make(context),
+        12 => sir_density::make(context),
+        13 => envelope::make(context),
+        _ => median_cut_steps::make(context),
     }
 }

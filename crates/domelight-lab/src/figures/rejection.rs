@@ -3,7 +3,6 @@
 use crate::Error;
 use domelight::code;
 use domelight::picture::compare::ColorScale;
-use domelight::picture::tone::{ToneCurve, ToneMapping};
 use domelight::quote::Html;
 use domelight::sampling::Pcg32;
 use domelight::strategy::{
@@ -16,6 +15,7 @@ use super::figure::{
     Figure, Picture, Row, Table, number, picture_panel, plot_panel, png_bytes, scale_panel,
 };
 use super::formulas;
+use super::sphere::AS_IT_IS;
 use crate::acceptance::{Acceptance, count_tries};
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE, Pixels, superscript};
@@ -129,9 +129,6 @@ fn points(figure_scene: &FigureScene) -> Vec<Option<ShadingPoint>> {
     };
     (0..width * height).map(point).collect()
 }
-
-/// Colors are already what is to be seen.
-const AS_IT_IS: ToneMapping = ToneMapping { exposure: 0.0, curve: ToneCurve::Standard };
 
 fn map(
     points: &[Option<ShadingPoint>],

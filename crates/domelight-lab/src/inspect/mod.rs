@@ -11,17 +11,17 @@ use domelight::strategy::Strategy;
 use serde::Serialize;
 
 use crate::report::SceneReport;
-use crate::scene::View;
+use crate::scene::PreparedSceneRef;
 use crate::{At as _, Error, Host, NamedStrategy};
 
 /// Pixels along an edge of the maps of light and reflectance.
 const RESOLUTION: usize = 128;
-/// Of the maps of densities, whose pixels need some rays each.
+/// The resolution of the maps of densities, whose pixels need some rays each.
 const DENSITY_RESOLUTION: usize = 64;
 
 /// One pixel of a view under some strategies.
 pub struct Inspection<'a> {
-    view: View<'a>,
+    view: PreparedSceneRef<'a>,
     settings: RenderSettings,
     inspector: Inspector<'a>,
     command: String,
@@ -39,7 +39,7 @@ struct InspectedStrategy {
 /// All numbers.
 #[derive(Debug, Serialize)]
 pub struct InspectionReport<'a> {
-    /// Of domelight.
+    /// Version of domelight.
     pub version: &'static str,
     /// As it was typed.
     pub command: &'a str,
@@ -99,12 +99,12 @@ impl<'a> Inspection<'a> {
     /// # Errors
     /// If the pixel is not in the picture.
     pub fn new(
-        view: View<'a>,
+        view: PreparedSceneRef<'a>,
         settings: RenderSettings,
         pixel: [usize; 2],
         command: impl Into<String>,
     ) -> Result<Self, Error> {
-        let View { scene, camera, environment, .. } = view;
+        let PreparedSceneRef { scene, camera, environment, .. } = view;
         let inspector = Inspector::new(scene, camera, environment, &settings, pixel)
             .map_err(|error| Error::Usage(error.to_string()))?;
         let hemisphere = inspector.hemisphere(RESOLUTION);
@@ -118,7 +118,7 @@ impl<'a> Inspection<'a> {
     /// If it does not suit the environment, or the host ended the work.
     pub fn add_named(&mut self, strategy: &NamedStrategy, host: &dyn Host) -> Result<(), Error> {
         host.check_canceled()?;
-        let View { scene, camera, environment, .. } = self.view;
+        let PreparedSceneRef { scene, camera, environment, .. } = self.view;
         let spec = strategy.spec.for_picture(scene, camera, environment, &self.settings);
         let prepared = host.prepare(spec, environment).at(&strategy.text)?;
         self.measure(&strategy.text, spec.description(), &prepared);

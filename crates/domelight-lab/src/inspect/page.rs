@@ -19,7 +19,7 @@ const STYLE: &str = include_str!("page.css");
 const DECADES: f32 = 6.0;
 /// Causes that a list shows.
 const SHOWN_CAUSES: usize = 5;
-/// Of a drawing of a map, and of the disk in it \[pixels\].
+/// The edge of a drawing of a map, and the diameter of the disk in it \[pixels\].
 const SIDE: f64 = 256.0;
 
 /// The whole page.

@@ -11,7 +11,7 @@ use domelight::files::{create_folder, remove_abandoned, write_atomically};
 use domelight::fingerprint::{Fingerprint, Fingerprinter};
 use etcetera::base_strategy::{BaseStrategy as _, choose_native_strategy};
 
-use crate::scene::View;
+use crate::scene::PreparedSceneRef;
 use crate::{At as _, Error, Host};
 
 /// A folder of references.
@@ -78,21 +78,25 @@ impl Cache {
 pub(crate) struct Key(String);
 
 impl Key {
-    /// Of what this program makes: scene, light and view, the program itself, and what `settings` say.
-    pub(crate) fn of_program(cache: &Cache, view: View, settings: impl Display) -> Self {
+    /// The key of what this program makes: scene, light and view, the program itself, and what `settings` say.
+    pub(crate) fn of_program(
+        cache: &Cache,
+        view: PreparedSceneRef,
+        settings: impl Display,
+    ) -> Self {
         let mut key = Fingerprinter::default();
         key.text(env!("CARGO_PKG_VERSION"));
         key.text(&cache.program);
         Self::of(key, view, settings)
     }
 
-    /// Of what another program makes, which `settings` name.
-    pub(crate) fn of_other(view: View, settings: impl Display) -> Self {
+    /// The key of what another program makes, which `settings` name.
+    pub(crate) fn of_other(view: PreparedSceneRef, settings: impl Display) -> Self {
         Self::of(Fingerprinter::default(), view, settings)
     }
 
-    fn of(mut key: Fingerprinter, view: View, settings: impl Display) -> Self {
-        let View { scene, camera, environment, .. } = view;
+    fn of(mut key: Fingerprinter, view: PreparedSceneRef, settings: impl Display) -> Self {
+        let PreparedSceneRef { scene, camera, environment, .. } = view;
         key.text(scene.fingerprint());
         key.text(environment.fingerprint());
         // Debug's text of a number is exact.
@@ -100,7 +104,7 @@ impl Key {
         Self(key.finish().to_string())
     }
 
-    /// The sum that the name of an entry of this key tells.
+    /// The checksum in the name of an entry of this key.
     fn sum_in<'a>(&self, path: &'a Path) -> Option<&'a str> {
         let name = path.file_name()?.to_str()?;
         name.strip_prefix(&self.0)?.strip_prefix('-')?.strip_suffix(".exr")

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::cache::{Cache, Key};
 use super::render::{RenderSetup, Shown};
 use crate::names::file_name;
-use crate::scene::View;
+use crate::scene::PreparedSceneRef;
 use crate::{At as _, Error, Host};
 
 /// How a reference with a picture without shadows is rendered.
@@ -105,9 +105,9 @@ pub enum Goal {
 /// relMSE of a reference.
 #[derive(Clone, Copy, Debug)]
 struct Noise {
-    /// Of all pixels, or of those that show any of the scene where that was the goal.
+    /// The relMSE of all pixels, or of those that show any of the scene where that was the goal.
     all: f64,
-    /// Of those that the scene fills.
+    /// The relMSE of the pixels that the scene fills.
     covered: Option<f64>,
 }
 
@@ -240,13 +240,13 @@ impl Reference {
         Ok(Self { picture, report: report(Source::Rendered, path.as_deref(), noise, spp) })
     }
 
-    /// Of a view, by an unbiased strategy.
+    /// Renders the reference of a view, by an unbiased strategy.
     ///
     /// # Errors
     /// If the strategy does not suit the environment, the scene is not in sight, or the host ended the work.
     pub fn of_view(
         cache: Option<&Cache>,
-        view: View,
+        view: PreparedSceneRef,
         strategy: StrategySpec,
         settings: RenderSettings,
         goal: Goal,
@@ -260,7 +260,7 @@ impl Reference {
 #[derive(Clone, Copy)]
 pub(crate) struct ReferenceRun<'a> {
     pub(crate) cache: Option<&'a Cache>,
-    pub(crate) view: View<'a>,
+    pub(crate) view: PreparedSceneRef<'a>,
     pub(crate) strategy: StrategySpec,
     pub(crate) settings: RenderSettings,
     pub(crate) shown: Shown<'a>,

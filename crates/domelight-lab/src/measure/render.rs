@@ -4,7 +4,7 @@ use domelight::render::{Counts, Layers, Observer, RenderSettings, Renderer};
 use domelight::strategy::Strategy;
 
 use super::work::WorkStage;
-use crate::scene::View;
+use crate::scene::PreparedSceneRef;
 use crate::usage::{Seconds, Stopwatch};
 use crate::{Error, Host};
 
@@ -13,7 +13,7 @@ pub(crate) trait Picturing {
     /// The picture and what was done for it; none if the observer ended it.
     fn picture(
         &self,
-        view: View,
+        view: PreparedSceneRef,
         settings: &RenderSettings,
         observer: &dyn Observer,
     ) -> Option<(Layers, Counts)>;
@@ -22,11 +22,11 @@ pub(crate) trait Picturing {
 impl<S: Strategy> Picturing for S {
     fn picture(
         &self,
-        view: View,
+        view: PreparedSceneRef,
         settings: &RenderSettings,
         observer: &dyn Observer,
     ) -> Option<(Layers, Counts)> {
-        let View { scene, camera, environment, .. } = view;
+        let PreparedSceneRef { scene, camera, environment, .. } = view;
         let mut renderer = Renderer::with_strategy(scene, camera, environment, self, *settings);
         let complete = renderer.run(observer);
         let rendering = renderer.rendering();
@@ -48,7 +48,7 @@ pub(crate) enum Shown<'a> {
 /// What all renders of a strategy share.
 #[derive(Clone, Copy)]
 pub(crate) struct RenderSetup<'a> {
-    pub(crate) view: View<'a>,
+    pub(crate) view: PreparedSceneRef<'a>,
     /// But for the number of samples and the seed.
     pub(crate) settings: RenderSettings,
     pub(crate) strategy: &'a dyn Picturing,
@@ -61,12 +61,12 @@ pub(crate) struct RenderSetup<'a> {
 pub(crate) struct Render {
     pub(crate) layers: Layers,
     pub(crate) counts: Counts,
-    /// Of rendering alone.
+    /// Seconds of rendering alone.
     pub(crate) time: Seconds,
 }
 
 impl Render {
-    /// CPU seconds of rendering; wall-clock seconds where the system does not tell.
+    /// CPU seconds of rendering; wall-clock seconds where the system does not report them.
     pub(crate) fn seconds(&self) -> f64 {
         self.time.cpu.unwrap_or(self.time.wall)
     }

@@ -33,7 +33,7 @@ pub(crate) struct WorkStage<'w> {
 #[derive(Debug, Default)]
 struct Plan {
     stages: Vec<Stage>,
-    /// Of a stage that nothing is known of.
+    /// The pace of a stage that nothing is known of.
     usual_pace: f64,
     /// The greatest share that was shown.
     share: f64,

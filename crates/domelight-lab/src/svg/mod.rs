@@ -21,9 +21,9 @@ pub type Point = (f64, f64);
 /// A rectangle of the sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rect {
-    /// Of the left edge.
+    /// The left edge.
     pub x: f64,
-    /// Of the upper edge.
+    /// The upper edge.
     pub y: f64,
     /// Along x.
     pub width: f64,
@@ -45,11 +45,11 @@ pub struct Color(pub u8, pub u8, pub u8);
 impl Color {
     /// Paper.
     pub const WHITE: Self = Self(255, 255, 255);
-    /// Of text and axes.
+    /// Text and axes.
     pub const INK: Self = Self(0x1c, 0x1f, 0x24);
-    /// Of what should stand back.
+    /// Captions and other secondary text.
     pub const GRAY: Self = Self(0x6b, 0x72, 0x7c);
-    /// Of grid lines.
+    /// Grid lines.
     pub const FAINT: Self = Self(0xe0, 0xe3, 0xe8);
 }
 
@@ -59,7 +59,7 @@ impl Display for Color {
     }
 }
 
-/// Colors that the color-blind tell apart, on white: Okabe & Ito 2008, "Color Universal Design",
+/// Colors that the color-blind distinguish, on white: Okabe & Ito 2008, "Color Universal Design",
 /// without the yellow, the sky blue a little darker; then black and a brown.
 pub const PALETTE: [Color; 8] = [
     Color(0x00, 0x72, 0xb2),

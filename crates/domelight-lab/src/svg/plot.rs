@@ -124,7 +124,7 @@ pub enum Join {
 pub struct Series {
     /// In the legend; empty for none.
     pub name: String,
-    /// Of line and markers.
+    /// Color of the line and the markers.
     pub color: Color,
     /// How the points are joined.
     pub join: Join,
@@ -241,7 +241,7 @@ impl Plot {
                 let style = Style::fill(series.color).opacity(0.4);
                 for pair in points.windows(2) {
                     let ((x, y), width) = (pair[0], pair[1].0 - pair[0].0);
-                    // A hair narrower, that bars can be told apart.
+                    // Leave a gap, so that bars are distinct.
                     sheet.rect(
                         Rect::new(x, y, (width - 0.8).max(0.4), (bottom - y).max(0.0)),
                         style,

@@ -37,7 +37,6 @@ from ._domelight import (
     ShadingPoints,
     __version__,
     lights,
-    progressive,
     read,
     strategy_names,
     tone_map,
@@ -45,7 +44,7 @@ from ._domelight import (
 )
 from ._compare import Comparison, compare
 from ._inspect import Inspection, inspect
-from ._render import render
+from ._render import progressive, render
 
 __all__ = [
     "Bsdf",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from . import _domelight
 from ._inspect import named
+from ._progress import bar, callback
 
 if TYPE_CHECKING:
     from ._domelight import Camera, Environment, Scene
@@ -89,6 +90,7 @@ def compare(
     camera: Camera | str | int | None = None,
     hide_env: bool = False,
     tile_size: int | None = None,
+    progress: bool | Callable[[float, str], object] = False,
 ) -> Comparison:
     """Compare strategies at equal samples, shadow rays or time.
 
@@ -108,6 +110,9 @@ def compare(
         Camera samples of the rendered reference.
     size, seed, threads, camera, hide_env, tile_size
         As of `render`; tiles are of 16 pixels unless said otherwise, for functions too.
+    progress : bool or callable, default False
+        True shows a bar if tqdm is installed; a callable gets the share of the work that is done, in [0, 1], and the name
+        of the picture that is rendered, every hundredth of a second.
 
     Returns
     -------
@@ -123,7 +128,25 @@ def compare(
     DomelightWarning
         If a strategy is left out or misses the budget, or the reference is too noisy to tell.
     """
-    found = _domelight.compare(
-        scene, env, named(strategies), budget, seeds, reference_spp, size, seed, threads, camera, hide_env, tile_size
-    )
+    shown = bar(progress, "compare")
+    report = callback(progress) if shown is None else shown.labeled
+    try:
+        found = _domelight.compare(
+            scene,
+            env,
+            named(strategies),
+            budget,
+            seeds,
+            reference_spp,
+            size,
+            seed,
+            threads,
+            camera,
+            hide_env,
+            tile_size,
+            report,
+        )
+    finally:
+        if shown is not None:
+            shown.close()
     return Comparison(**found)

@@ -215,6 +215,8 @@ class Film:
     @property
     def strategy(self) -> str: ...
     @property
+    def exposure(self) -> float: ...
+    @property
     def camera_rays(self) -> int: ...
     @property
     def shading_points(self) -> int: ...
@@ -223,9 +225,18 @@ class Film:
     @property
     def non_finite(self) -> int: ...
     def save(
-        self, path: _Path, *, exposure: float | None = 0.0, curve: str = "agx"
+        self,
+        path: _Path,
+        *,
+        exposure: float | None = None,
+        curve: str = "agx",
+        bits: int = 8,
+        denoise: bool = False,
     ) -> None: ...
-    def to_png(self, *, exposure: float | None = None, curve: str = "agx") -> bytes: ...
+    def denoise(self) -> _Floats: ...
+    def to_png(
+        self, *, exposure: float | None = None, curve: str = "agx", bits: int = 8
+    ) -> bytes: ...
     def to_xarray(self) -> Any: ...
     def _repr_png_(self) -> bytes: ...
 
@@ -297,9 +308,10 @@ def _render(
     target_error: float | None = None,
     tile_size: int | None = None,
     passes: str = "efficient",
+    time: float | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Film: ...
-def progressive(
+def _progressive(
     scene: Scene,
     env: Environment | None = None,
     strategy: str | Strategy | None = None,
@@ -316,6 +328,7 @@ def progressive(
     target_error: float | None = None,
     tile_size: int | None = None,
     passes: str = "doubling",
+    progress: Callable[[float], object] | None = None,
 ) -> Progressive: ...
 def compare(
     scene: Scene,
@@ -330,6 +343,7 @@ def compare(
     camera: Camera | str | int | None,
     hide_env: bool,
     tile_size: int | None,
+    progress: Callable[[float, str], object] | None,
 ) -> dict[str, Any]: ...
 def inspect(
     scene: Scene,
@@ -338,6 +352,7 @@ def inspect(
     pixel: tuple[int, int],
     size: tuple[int, int],
     seed: int,
+    threads: int | None,
     camera: Camera | str | int | None,
     hide_env: bool,
     resolution: int,
@@ -350,10 +365,16 @@ def lights(
     sun: bool = False,
     lamps: int = 0,
     min_share: float | None = None,
+    threads: int | None = None,
 ) -> Rig: ...
 def read(path: _Path, *, layer: str | None = None) -> _Floats: ...
 def write(
-    path: _Path, picture: npt.ArrayLike, *, exposure: float | None = 0.0, curve: str = "agx"
+    path: _Path,
+    picture: npt.ArrayLike,
+    *,
+    exposure: float | None = None,
+    curve: str = "agx",
+    bits: int = 8,
 ) -> None: ...
 def tone_map(
     picture: npt.ArrayLike, *, exposure: float | None = None, curve: str = "agx"

@@ -170,6 +170,7 @@ def inspect(
     strategies: Sequence[str | Strategy] | Mapping[str, str | Strategy] = ("brdf", "environment", "mis", "product"),
     size: tuple[int, int] = (640, 640),
     seed: int = 0,
+    threads: int | None = None,
     camera: Camera | str | int | None = None,
     hide_env: bool = False,
     resolution: int = 64,
@@ -186,7 +187,7 @@ def inspect(
         Column and row of a picture of `size`, from the upper left.
     strategies : sequence or mapping
         Strategies as of `render`; a mapping names them.
-    size, seed, camera, hide_env
+    size, seed, threads, camera, hide_env
         As of `render`.
     resolution : int, default 64
         Pixels along the edge of a map.
@@ -200,6 +201,8 @@ def inspect(
     ValueError
         If the pixel is not in the picture, or a setting is wrong.
     """
-    found = _domelight.inspect(scene, env, named(strategies), pixel, size, seed, camera, hide_env, resolution)
+    found = _domelight.inspect(
+        scene, env, named(strategies), pixel, size, seed, threads, camera, hide_env, resolution
+    )
     found["strategies"] = [Decomposition(**s) for s in found["strategies"]]
     return Inspection(**found)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import math
+import pathlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,8 +25,22 @@ def film_to_xarray(film: Film) -> Any:
         values = film[name]
         dimensions = ("y", "x") if values.ndim == 2 else ("y", "x", "channel")
         layers[name] = (dimensions, values)
-    attributes = {"strategy": film.strategy, "complete": film.complete}
+    attributes = {"strategy": film.strategy, "complete": film.complete, "exposure": film.exposure}
     return xarray.Dataset(layers, coords={"channel": ["r", "g", "b"]}, attrs=attributes)
+
+
+def oidn_library() -> str | None:
+    """The file of Open Image Denoise in the package pyoidn, if that is installed."""
+    package = importlib.util.find_spec("pyoidn")
+    for folder in (package and package.submodule_search_locations) or ():
+        for file in sorted(pathlib.Path(folder).rglob("*OpenImageDenoise*")):
+            if file.is_file() and file.name in OIDN_NAMES:
+                return str(file)
+    return None
+
+
+OIDN_NAMES = ("libOpenImageDenoise.so.2", "libOpenImageDenoise.2.dylib", "OpenImageDenoise.dll")
+"""What the library is called on Linux, macOS and Windows."""
 
 
 # Mitsuba's map has its first column toward -Z of its own space, where ours has its center column.
@@ -31,7 +48,7 @@ def film_to_xarray(film: Film) -> Any:
 
 def environment_to_mitsuba(environment: Environment) -> dict[str, Any]:
     """A description of an environment for `mitsuba.load_dict`."""
-    import mitsuba
+    mitsuba: Any = importlib.import_module("mitsuba")
 
     # Where the axes of Mitsuba's map point to in the world.
     back, left = environment.directions([[0.5, 0.5], [0.25, 0.5]]).astype(np.float64)
@@ -47,7 +64,7 @@ def environment_to_mitsuba(environment: Environment) -> dict[str, Any]:
 
 def environment_from_mitsuba(source: Any) -> Environment:
     """The environment of a Mitsuba emitter, or of a picture in its layout."""
-    import mitsuba
+    mitsuba: Any = importlib.import_module("mitsuba")
 
     from ._domelight import Environment
 

@@ -162,7 +162,7 @@ class Mis:
             raise ValueError(
                 f"n_light is {n_light} and n_brdf {n_brdf}; they must be at least 0 and 1"
             )
-        self.n_rays = n_light + n_brdf
+        self.n_rays: int = n_light + n_brdf
         self._counts = (n_light, n_brdf)
         self._env = env
         self._light: _Sampler = env if density is None else density

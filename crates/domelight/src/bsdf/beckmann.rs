@@ -17,8 +17,8 @@ use crate::simd::{SimdFloat, Vectors};
 pub type Beckmann = Microfacet<BeckmannNormals>;
 
 impl Beckmann {
-    /// Of the roughness α along x and y (equal for an isotropic lobe), clamped to [`super::MIN_ALPHA`] to
-    /// [`super::MAX_ALPHA`].
+    /// The lobe with roughness α along x and y (equal for an isotropic lobe), clamped to
+    /// \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
     pub fn new(alpha: [f32; 2], fresnel: Fresnel, masking: Masking) -> Self {
         Self::with_normals(BeckmannNormals::new(alpha), fresnel, masking)
     }
@@ -31,7 +31,7 @@ pub struct BeckmannNormals {
 }
 
 impl BeckmannNormals {
-    /// Of the roughness along x and y, clamped to [`super::MIN_ALPHA`] to [`super::MAX_ALPHA`].
+    /// Normals with this roughness along x and y, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
     pub fn new(alpha: [f32; 2]) -> Self {
         Self { alpha: range::alpha(alpha) }
     }

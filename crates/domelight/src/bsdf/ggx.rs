@@ -14,8 +14,8 @@ use crate::simd::{SimdFloat, Vectors};
 pub type Ggx = Microfacet<GgxNormals>;
 
 impl Ggx {
-    /// Of the roughness α along x and y (equal for an isotropic lobe), clamped to [`super::MIN_ALPHA`] to
-    /// [`super::MAX_ALPHA`].
+    /// The lobe with roughness α along x and y (equal for an isotropic lobe), clamped to
+    /// \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
     pub fn new(alpha: [f32; 2], fresnel: Fresnel, masking: Masking) -> Self {
         Self::with_normals(GgxNormals::new(alpha), fresnel, masking)
     }
@@ -28,7 +28,7 @@ pub struct GgxNormals {
 }
 
 impl GgxNormals {
-    /// Of the roughness along x and y, clamped to [`super::MIN_ALPHA`] to [`super::MAX_ALPHA`].
+    /// Normals with this roughness along x and y, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
     pub fn new(alpha: [f32; 2]) -> Self {
         Self { alpha: range::alpha(alpha) }
     }

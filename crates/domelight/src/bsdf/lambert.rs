@@ -13,7 +13,7 @@ pub struct Lambert {
 }
 
 impl Lambert {
-    /// Of the albedo ρ, clamped to [0, 1].
+    /// The lobe with albedo ρ, clamped to [0, 1].
     pub const fn new(albedo: Rgb) -> Self {
         Self { albedo: range::reflectance(albedo) }
     }

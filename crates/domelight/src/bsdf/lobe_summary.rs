@@ -16,7 +16,7 @@ pub enum GlossyLobe {
         /// The normal that the lobe is about, where it is not the surface's: a unit vector in the local frame.
         leaning: Option<Vec3>,
     },
-    /// About the mirror direction, cosⁿ.
+    /// A cosⁿ lobe about the mirror direction.
     Mirror {
         /// The exponent n.
         exponent: f32,

@@ -36,7 +36,7 @@ macro_rules! lobes {
 lobes! {
     /// Ideal diffuse.
     Lambert,
-    /// About the mirror direction.
+    /// A power of the cosine to the mirror direction.
     Phong,
     /// Anisotropic Gaussian.
     Ward,
@@ -110,7 +110,7 @@ pub struct Bsdf {
 struct Term {
     lobe: Lobe,
     weight: f32,
-    /// Of choosing this lobe; positive, and 1 in sum.
+    /// The probability of choosing this lobe: positive, and those of all lobes sum to 1.
     probability: f32,
 }
 
@@ -118,7 +118,7 @@ struct Term {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a material is a sum of at most {MAX_LOBES} lobes that are not black, not {count}")]
 pub struct TooManyLobes {
-    /// How many were given.
+    /// The number of lobes given.
     pub count: usize,
 }
 

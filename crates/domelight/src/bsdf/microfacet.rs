@@ -62,7 +62,7 @@ pub struct Microfacet<D> {
 }
 
 impl<D: NormalDistribution> Microfacet<D> {
-    /// Of a distribution of normals; the reflectance is clamped to the range that Fresnel's formulas bear.
+    /// The lobe with this distribution of normals. The reflectance is clamped to the range that Fresnel's formulas accept.
     pub fn with_normals(normals: D, fresnel: Fresnel, masking: Masking) -> Self {
         Self { normals, fresnel: fresnel.in_range(), masking }
     }

@@ -120,7 +120,7 @@ pub trait Brdf: Copy + Send + Sync {
 /// A direction drawn from a lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrdfSample {
-    /// Toward the light, local frame, above the surface.
+    /// Unit direction toward the light, local frame, above the surface.
     pub wi: Vec3,
     /// [`Brdf::eval`] at `wi` \[sr⁻¹\].
     pub value: Rgb,

@@ -22,7 +22,7 @@ pub struct Phong {
 }
 
 impl Phong {
-    /// Of the reflectance k_s in [0, 1] and the exponent n in [0, [`super::MAX_EXPONENT`]]; both are clamped.
+    /// The lobe with reflectance k_s, clamped to [0, 1], and exponent n, clamped to [0, [`super::MAX_EXPONENT`]].
     pub fn new(specular: Rgb, exponent: f32) -> Self {
         Self { specular: range::reflectance(specular), exponent: range::exponent(exponent) }
     }

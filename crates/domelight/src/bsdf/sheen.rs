@@ -31,7 +31,7 @@ pub struct Sheen {
 }
 
 impl Sheen {
-    /// Of a color, clamped to \[0, 1\], and a perceptual roughness, clamped to \[0.1, 1\].
+    /// The lobe with this color, clamped to \[0, 1\], and this perceptual roughness, clamped to \[0.1, 1\].
     pub fn new(color: Rgb, roughness: f32) -> Self {
         let roughness = range::unit(roughness).max(MIN_ROUGHNESS);
         Self { color: range::reflectance(color), roughness }

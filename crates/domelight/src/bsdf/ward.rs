@@ -25,7 +25,7 @@ use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3, functions, sqr};
 use crate::simd::{Colors, SimdFloat, Vectors};
 
-/// Which normalization of Ward's model.
+/// The normalization of Ward's model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WardForm {
     /// Ward 1992: loses energy at grazing angles.
@@ -46,8 +46,8 @@ pub struct Ward {
 }
 
 impl Ward {
-    /// Of the reflectance ρ in [0, 1] and the root-mean-square slopes `alpha` along x and y (equal
-    /// for an isotropic lobe), clamped to [`super::MIN_ALPHA`] to [`super::MAX_ALPHA`]; ρ is clamped, too.
+    /// The lobe with reflectance ρ, clamped to [0, 1], and root-mean-square slopes `alpha` along x and y (equal for an
+    /// isotropic lobe), clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
     pub fn new(rho: Rgb, alpha: [f32; 2], form: WardForm) -> Self {
         Self { rho: range::reflectance(rho), alpha: range::alpha(alpha), form }
     }

@@ -117,7 +117,7 @@ impl<F: SimdF32x8> Points<F> {
         Self { x: simd.load(&lanes[0]), y: simd.load(&lanes[1]), z: simd.load(&lanes[2]) }
     }
 
-    /// Of numbers of ray `i`.
+    /// Splats the numbers of ray `i`.
     #[inline(always)]
     fn of_ray<S: Simd<F32x8 = F>, const N: usize>(
         simd: S,
@@ -128,7 +128,7 @@ impl<F: SimdF32x8> Points<F> {
         Self { x: simd.splat(x[i]), y: simd.splat(y[i]), z: simd.splat(z[i]) }
     }
 
-    /// Of three rows of numbers, those of the axes x, y and z.
+    /// Loads the rows of the axes x, y and z.
     #[inline(always)]
     fn along<S: Simd<F32x8 = F>>(simd: S, lanes: &[Lanes; 3], [x, y, z]: [usize; 3]) -> Self {
         Self { x: simd.load(&lanes[x]), y: simd.load(&lanes[y]), z: simd.load(&lanes[z]) }

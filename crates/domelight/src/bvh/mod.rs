@@ -177,7 +177,7 @@ impl Bvh {
         self.bounds
     }
 
-    /// How many triangles have an area and are thus in the tree.
+    /// The number of triangles that have an area and are thus in the tree.
     pub fn triangle_count(&self) -> usize {
         self.triangle_count
     }
@@ -189,8 +189,8 @@ impl Bvh {
 
     /// The first triangle that the ray meets in its open interval (0, `t_max`), from either side.
     ///
-    /// Of several at the same distance the one with the least index. A ray that is not finite, or
-    /// has a zero direction, meets nothing.
+    /// Among hits at the same distance, the triangle with the least index is returned. A ray that is not finite or has a
+    /// zero direction meets nothing.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         simd::dispatch(self.instruction_set, traverse::ClosestHit { bvh: self, ray })
     }

@@ -11,7 +11,7 @@ use crate::picture::{self, DataWindow, Format, PictureError, ReadOptions};
 use crate::{Rgb, RgbImage};
 use std::path::Path;
 
-/// How to understand a probe's file.
+/// Options for reading a probe's file.
 #[derive(Clone, Debug, Default)]
 pub struct ProbeOptions {
     /// The mapping; by default guessed from attribute, shape and, of a square, its corners.
@@ -35,7 +35,7 @@ pub struct LoadedProbe {
     pub file_size: (usize, usize),
     /// What was repaired.
     pub sanitized: SanitizeReport,
-    /// How the map differs from the light that was there, one sentence each.
+    /// Differences between the map and the light that was there, one sentence each.
     pub warnings: Vec<String>,
 }
 

@@ -131,7 +131,7 @@ impl Mapping {
     ///
     /// The attribute decides where its shape can be true. Then 1:1 is an angular map, 4:3 and 3:4 a cross, 6:1 and
     /// 1:6 a strip of faces, and everything else, a single texel included, lat-long. A square can as well be a
-    /// mirror ball or octahedral: nothing in the size tells.
+    /// mirror ball or octahedral: the size does not distinguish them.
     pub fn guess(width: usize, height: usize, envmap: Option<EnvmapKind>) -> Self {
         let has_shape = |mapping: &Self| mapping.check_shape(width, height).is_ok();
         match envmap {

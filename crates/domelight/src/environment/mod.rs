@@ -70,7 +70,7 @@ impl UpAxis {
     }
 }
 
-/// How a map stands in the world.
+/// The orientation of a map in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Orientation {
     /// The axis of the top row.
@@ -122,7 +122,7 @@ pub enum EnvironmentError {
 /// A direction drawn from the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvironmentSample {
-    /// Toward the light, world frame.
+    /// Unit direction toward the light, world frame.
     pub wi: Vec3,
     /// Radiance from there, [`Environment::le`] of `wi`.
     pub le: Rgb,
@@ -197,27 +197,6 @@ impl Environment {
         fingerprinter.finish()
     }
 
-    /// Loads a light probe of any known format and mapping.
-    ///
-    /// # Errors
-    /// If the file cannot be read or is damaged, or holds negative or non-finite values;
-    /// [`io::load_probe`] takes options for these.
-    #[cfg(feature = "io")]
-    pub fn load(path: impl AsRef<std::path::Path>) -> Result<Self, crate::Error> {
-        let probe = io::load_probe(path.as_ref(), &io::ProbeOptions::default())?;
-        Ok(Self::from_image(probe.image)?)
-    }
-
-    /// The light probe in the bytes of a picture file of any known format and mapping.
-    ///
-    /// # Errors
-    /// If the bytes are damaged or no picture; [`io::probe_from_bytes`] takes options.
-    #[cfg(feature = "io")]
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, crate::Error> {
-        let probe = io::probe_from_bytes(bytes, "the map", &io::ProbeOptions::default())?;
-        Ok(Self::from_image(probe.image)?)
-    }
-
     /// A built-in probe with 512 rows.
     pub fn builtin(probe: builtin::BuiltinProbe) -> Self {
         const ROWS: usize = 512;
@@ -225,7 +204,7 @@ impl Environment {
             .unwrap_or_else(|_| unreachable!("built-in probes are valid"))
     }
 
-    /// From a lat-long map that stands upright: [`Environment::new`] without rotation and scale.
+    /// An environment from a lat-long map that stands upright: [`Environment::new`] without rotation and scale.
     ///
     /// # Errors
     /// The first bad texel in row order, or an empty map.
@@ -279,7 +258,7 @@ impl Environment {
         Self::in_units(self.map, self.orientation, self.unit, scale)
     }
 
-    /// From a lat-long map: row 0 up, texel centers at +½, every texel finite and not negative;
+    /// An environment from a lat-long map: row 0 up, texel centers at +½, every texel finite and not negative;
     /// radiance is multiplied by `scale`.
     ///
     /// # Errors
@@ -419,7 +398,7 @@ impl Environment {
         &self.map
     }
 
-    /// How the map stands in the world.
+    /// The orientation of the map in the world.
     pub fn orientation(&self) -> Orientation {
         self.orientation
     }

@@ -32,6 +32,22 @@ pub struct ProbeStatistics {
     pub brightest_share: f64,
     /// The sun, if there is one.
     pub sun: Option<Sun>,
+    /// Texels of the greatest value side by side, if there are: a source that the camera clipped, or one that is evenly
+    /// bright.
+    pub plateau: Option<Plateau>,
+}
+
+/// Texels that share the greatest value of the map, sharply bounded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plateau {
+    /// Their greatest channel.
+    pub value: f32,
+    /// How many there are.
+    pub n_texels: usize,
+    /// Their solid angle \[sr\].
+    pub solid_angle: f64,
+    /// Their part of ∫ L dω (in luminance), in \[0, 1\].
+    pub share: f64,
 }
 
 /// The compact source that is taken for the sun: what exceeds the radiance around it.
@@ -39,8 +55,10 @@ pub struct ProbeStatistics {
 pub struct Sun {
     /// Its center of energy, a unit vector.
     pub direction: Vec3,
-    /// Solid angle of its texels \[sr\].
+    /// Solid angle of its texels \[sr\], glare around it included.
     pub solid_angle: f64,
+    /// Angular radius of the even disc whose light is spread as widely \[rad\].
+    pub angular_radius: f64,
     /// Irradiance at normal incidence \[W·m⁻²\].
     pub irradiance: Rgb,
     /// Its part of ∫ L dω (in luminance), in \[0, 1\].
@@ -66,6 +84,7 @@ impl ProbeStatistics {
             irradiance_up: weighted_sum(map, |y| weights.projected_up(y)),
             brightest_share: brightest_share(map, &luminance, &weights),
             sun: sun(map, &luminance, &weights),
+            plateau: plateau(map, &luminance, &weights),
         }
     }
 
@@ -164,10 +183,47 @@ fn sun(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Sun> {
         solid_angle += omega;
     }
     let direction = Vec3::from_array(moment.map(|m| (m / energy) as f32)).try_normalize()?;
+    // An even disc of angular radius r has a mean direction of length (1 + cos r) / 2.
+    let concentration = (moment.map(|m| m * m).iter().sum::<f64>().sqrt() / energy).min(1.0);
+    let angular_radius = functions::acos(2.0 * concentration - 1.0);
     let power = |(i, &l): (usize, &f32)| l as f64 * weights.solid_angle(i / map.width);
     let all: f64 = luminance.iter().enumerate().map(power).sum();
     let irradiance = Rgb::from(irradiance.map(|e| e as f32));
-    Some(Sun { direction, solid_angle, irradiance, share: energy / all })
+    Some(Sun { direction, solid_angle, angular_radius, irradiance, share: energy / all })
+}
+
+/// The texels of the greatest value, if they are several, small, bright, and end sharply.
+fn plateau(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Plateau> {
+    /// What is at least so bright belongs to a peak that has no sharp edge.
+    const NEAR: f32 = 0.98;
+    const LEAST_TEXELS: usize = 4;
+    /// A cap of 7° \[sr\]: what is wider is a lamp or a window, which may well be even.
+    const WIDEST: f64 = 0.047;
+    let value = map.pixels.iter().map(|p| p.max_component()).fold(0.0, f32::max);
+    let (mut n_texels, mut n_near) = (0, 0);
+    let [mut solid_angle, mut energy, mut all] = [0.0; 3];
+    for y in 0..map.height {
+        let omega = weights.solid_angle(y);
+        let row = y * map.width..(y + 1) * map.width;
+        for (texel, &l) in map.row(y).iter().zip(&luminance[row]) {
+            let power = f64::from(l) * omega;
+            all += power;
+            let brightest = texel.max_component();
+            if brightest == value {
+                n_texels += 1;
+                solid_angle += omega;
+                energy += power;
+            } else if brightest > NEAR * value {
+                n_near += 1;
+            }
+        }
+    }
+    let is_source = value > 0.0 && n_texels >= LEAST_TEXELS && solid_angle <= WIDEST;
+    let is_sharp = n_texels >= 2 * n_near;
+    let share = energy / all;
+    // As bright as its surroundings it is no source.
+    let stands_out = share > 4.0 * solid_angle / (4.0 * PI);
+    (is_source && is_sharp && stands_out).then_some(Plateau { value, n_texels, solid_angle, share })
 }
 
 pub(super) fn texel_direction(map: &RgbImage, x: usize, y: usize) -> Vec3 {
@@ -232,6 +288,42 @@ mod tests {
         let sun = ProbeStatistics::new(&map).sun.expect("two bright texels");
         assert!(sun.direction.z > 0.0 && sun.direction.x.abs() < 1e-5, "{:?}", sun.direction);
         assert!((sun.azimuth().abs() - 180.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_angular_radius_is_that_of_an_even_disc() {
+        let height = 512;
+        let radius = 0.05f64;
+        let axis = texel_direction(&RgbImage::filled(2 * height, height, Rgb::BLACK), 300, 200);
+        let mut map = RgbImage::filled(2 * height, height, Rgb::splat(0.01));
+        for i in 0..map.pixels.len() {
+            let d = texel_direction(&map, i % (2 * height), i / (2 * height));
+            if f64::from(d.dot(axis)) > radius.cos() {
+                map.pixels[i] = Rgb::splat(500.0);
+            }
+        }
+        let s = ProbeStatistics::new(&map);
+        let sun = s.sun.expect("a sun");
+        assert!((sun.angular_radius / radius - 1.0).abs() < 0.02, "{}", sun.angular_radius);
+        let plateau = s.plateau.expect("even texels");
+        let disc = 2.0 * PI * (1.0 - radius.cos());
+        assert!((plateau.solid_angle / disc - 1.0).abs() < 0.02 && plateau.value == 500.0);
+        assert!((plateau.share - sun.share).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_peak_that_fades_is_no_plateau() {
+        // Rounded as Radiance pictures are: many texels of a smooth peak share a value.
+        let rounded = |x: f32| (x * 128.0).round() / 128.0;
+        let map = RgbImage::from_fn(256, 128, |x, y| {
+            let d = (x as f32 - 100.0).hypot(y as f32 - 50.0);
+            Rgb::splat(rounded(1.0 + 127.0 * (-d * d / 200.0).exp()))
+        });
+        assert_eq!(ProbeStatistics::new(&map).plateau, None);
+        let clipped =
+            RgbImage { pixels: map.pixels.iter().map(|p| p.map(|c| c.min(20.0))).collect(), ..map };
+        assert!(ProbeStatistics::new(&clipped).plateau.is_some_and(|p| p.value == 20.0));
+        assert_eq!(ProbeStatistics::new(&RgbImage::filled(8, 4, Rgb::WHITE)).plateau, None);
     }
 
     #[test]

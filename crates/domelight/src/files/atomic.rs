@@ -32,7 +32,7 @@ pub trait WriteSeek: Write + Seek {}
 
 impl<T: Write + Seek> WriteSeek for T {}
 
-/// As [`write_atomically`], for what is not written from beginning to end. Where one cannot go back (standard output, a
+/// Does what [`write_atomically`] does, for formats that are not written from beginning to end. Where one cannot go back (standard output, a
 /// device, a pipe) the bytes are gathered in memory first.
 ///
 /// # Errors

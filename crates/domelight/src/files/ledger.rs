@@ -1,4 +1,4 @@
-//! What is read and what is written, told apart by what the system knows of files, not by their names.
+//! The files that are read and written, identified by what the system knows of them, not by their names.
 
 use std::ffi::OsString;
 use std::fs::{self, Metadata};

@@ -2,7 +2,7 @@
 //!
 //! A writer holds a lock on its file, which the system takes from it however it ends. Folders of farms are shared, and
 //! not every file system hands locks from one machine to another: so the name has the machine and the start of its
-//! system, and nobody touches files of other machines. Process numbers and ages tell nothing.
+//! system, and nobody touches files of other machines. Process numbers and ages prove nothing.
 
 use std::ffi::OsStr;
 use std::fs::{self, File, TryLockError};
@@ -99,7 +99,7 @@ struct Machine {
     boot: String,
 }
 
-/// Stands where the system does not tell.
+/// Stands where the system does not report it.
 const UNKNOWN: &str = "00000000";
 
 impl Machine {

@@ -54,7 +54,7 @@ impl RayBatch {
         self.directions.push(direction);
     }
 
-    /// How many rays.
+    /// The number of rays.
     pub fn len(&self) -> usize {
         self.origins.len()
     }

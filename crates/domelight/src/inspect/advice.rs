@@ -77,7 +77,7 @@ pub enum Advice {
     },
     /// The strategy needs the fewest rays to the same error.
     Strategy {
-        /// Of the best strategy.
+        /// Name of the best strategy.
         name: String,
         /// How many times fewer rays than the next that is much worse.
         times_fewer: f64,

@@ -63,7 +63,7 @@ impl fmt::Display for Cause {
 pub struct Share {
     /// Why.
     pub cause: Cause,
-    /// Of the variance; all of them sum to 1.
+    /// Share of the variance; all shares sum to 1.
     pub share: f64,
 }
 
@@ -87,7 +87,7 @@ pub struct SourceStatistics {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize))]
 pub struct Decomposition {
-    /// Of the strategy.
+    /// Name of the strategy.
     pub name: String,
     /// Luminance of the pixel.
     pub mean: f64,
@@ -164,15 +164,15 @@ impl Decomposition {
 
 /// Means over replicates, and over the pixel.
 struct Means {
-    /// Of each camera sample: what needs no estimate, and its place among the hits.
+    /// For each camera sample, the luminance that needs no estimate, and its index among the hits.
     samples: Vec<(f64, Option<usize>)>,
-    /// Of each hit and part, with visibility and without.
+    /// The sum of each hit and part, with visibility and without.
     seen: Vec<Vec<f64>>,
     unoccluded: Vec<Vec<f64>>,
-    /// Of each part over the pixel: how much of it is visible.
+    /// The visible share of each part, over the pixel.
     visible: Vec<f64>,
-    /// Of each part: mean over the hits of the covariance, over replicates, of a hit's sum with its part, divided by
-    /// their number; what the means of finitely many replicates vary by themselves.
+    /// For each part, the mean over the hits of the covariance (over replicates) of a hit's sum with its part, divided by
+    /// the number of replicates: the variation that the means of finitely many replicates have by themselves.
     seen_noise: Vec<f64>,
     unoccluded_noise: Vec<f64>,
     coverage: f64,
@@ -379,7 +379,7 @@ fn covariance(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
     population_covariance(a, b) * n / (n - 1.0)
 }
 
-/// Of all that there are.
+/// The covariance of a whole population.
 fn population_covariance(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
     let b: Vec<f64> = (0..a.len()).map(b).collect();
     let (mean_a, mean_b) = (average(a), average(&b));

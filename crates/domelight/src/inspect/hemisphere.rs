@@ -80,7 +80,7 @@ impl Hemisphere {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize))]
 pub struct DirectionSample {
-    /// Where it is on the maps: x to the right and y up, in \[−1, 1\].
+    /// Position on the maps: x to the right and y up, in \[−1, 1\].
     pub place: [f32; 2],
     /// Luminance of what it adds if it is free.
     pub weight: f32,
@@ -88,14 +88,14 @@ pub struct DirectionSample {
     pub visibility: f32,
 }
 
-/// Where a strategy sends its rays from a point.
+/// The distribution of the rays that a strategy sends from a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DirectionHistogram {
     /// Pixels along an edge.
     pub resolution: usize,
     /// Rays per solid angle and ray \[sr⁻¹\], estimated by counting.
     pub density: Vec<f32>,
-    /// How many were counted.
+    /// The number of rays counted.
     pub n_rays: usize,
     /// Some of them.
     pub samples: Vec<DirectionSample>,

@@ -65,9 +65,9 @@ pub enum InspectError {
         x: usize,
         /// Its row.
         y: usize,
-        /// Of the picture.
+        /// Columns of the picture.
         width: usize,
-        /// Of the picture.
+        /// Rows of the picture.
         height: usize,
     },
 }
@@ -83,8 +83,8 @@ pub struct Inspector<'a> {
     /// The hit nearest to the pixel's center.
     representative: Option<ShadingPoint>,
     regions: Regions,
-    /// Luminance that each source adds to the pixel, by multiple importance sampling: what a strategy that misses rare
-    /// light is told by.
+    /// Luminance that each source adds to the pixel, by multiple importance sampling: it reveals a strategy that
+    /// misses rare light.
     light: Vec<f64>,
     /// The longest extent of the scene, in its units.
     extent: f32,
@@ -109,7 +109,7 @@ pub struct PixelSummary {
     pub pixel: [usize; 2],
     /// Share of the camera samples that hit the scene.
     pub coverage: f64,
-    /// Of the hit nearest to the pixel's center, in the world; none of a pixel without a hit.
+    /// World position of the hit nearest to the pixel's center; none where the pixel has no hit.
     pub position: Option<[f32; 3]>,
     /// The shading normal there.
     pub normal: Option<[f32; 3]>,
@@ -203,7 +203,7 @@ impl<'a> Inspector<'a> {
         }
     }
 
-    /// The suns and lamps that causes are told by, and the rest of the map.
+    /// The suns and lamps that causes are divided by, and the rest of the map.
     pub fn sources(&self) -> &[Source] {
         self.regions.sources()
     }

@@ -4,7 +4,7 @@ use crate::environment::Environment;
 use crate::environment::compact::{SourceCriteria, compact_sources};
 use crate::math::Vec3;
 
-/// Lamps that are told apart.
+/// The most lamps that are distinguished.
 const N_LAMPS: usize = 3;
 /// The least share of the map's luminance that makes a source.
 const MIN_SHARE: f64 = 0.01;

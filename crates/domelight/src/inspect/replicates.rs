@@ -138,7 +138,7 @@ impl Replicates {
     }
 }
 
-/// Of each hit its number in its pixel, and of each pixel its range of hits.
+/// The number of each hit in its pixel, and the range of hits of each pixel.
 fn pixels(samples: &[CameraSample]) -> (Vec<u32>, Vec<std::ops::Range<usize>>) {
     let (mut numbers, mut ranges) = (Vec::new(), Vec::new());
     for of_pixel in samples.chunks(SAMPLES_PER_PIXEL) {

@@ -5,15 +5,15 @@
 //! forbids all of these here (`clippy.toml`). Square roots and rounding are exact everywhere and need no care.
 //!
 //! Exponentials and logarithms of f32 are computed in f64 and rounded once: a Taylor polynomial after a reduction of the
-//! argument, without tables, so that loops over them vectorize. Those that lobes use are kept out of line: of what has no
-//! effects the compiler computes that of all lobes before it asks which. All others are those of the `libm` crate, which
-//! are about as fast as the platform's. [`super::atan2`] and its neighbors are for vectors, and less accurate.
+//! argument, without tables, so that loops over them vectorize. Those that lobes use are kept out of line, because the
+//! compiler treats them as pure and hoists them above the branch on the lobe. All others are those of the `libm` crate,
+//! which are about as fast as the platform's. [`super::atan2`] and its neighbors are for vectors, and less accurate.
 #![cfg_attr(not(feature = "io"), allow(dead_code))] // Some serve files alone.
 
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2, LOG2_E, LOG10_2};
 
 /// f32 or f64.
-pub(crate) trait Real: Copy {
+pub(crate) trait Float: Copy {
     fn sin(self) -> Self;
     fn cos(self) -> Self;
     fn sin_cos(self) -> (Self, Self);
@@ -64,7 +64,7 @@ macro_rules! powi {
     };
 }
 
-impl Real for f32 {
+impl Float for f32 {
     from_libm!(
         sin = libm::sinf,
         cos = libm::cosf,
@@ -119,7 +119,7 @@ impl Real for f32 {
     fn log10(self) -> f32 {
         (log2_kernel(self) * LOG10_2) as f32
     }
-    /// Of numbers not less than zero; NaN of others.
+    /// A power of a base ≥ 0; NaN for other bases.
     #[inline(always)]
     fn powf(self, exponent: f32) -> f32 {
         if exponent == 0.0 || self == 1.0 {
@@ -129,7 +129,7 @@ impl Real for f32 {
     }
 }
 
-impl Real for f64 {
+impl Float for f64 {
     from_libm!(
         sin = libm::sin,
         cos = libm::cos,
@@ -293,7 +293,7 @@ macro_rules! functions {
         $(
             $(#[$doc])*
             #[inline(always)]
-            pub(crate) fn $name<T: Real>($first: T $(, $second: $type)?) -> $result {
+            pub(crate) fn $name<T: Float>($first: T $(, $second: $type)?) -> $result {
                 T::$name($first $(, $second)?)
             }
         )*

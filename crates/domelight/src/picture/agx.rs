@@ -5,9 +5,8 @@
 //! hold of the result is brought into it at nearly constant luminance. Blender tabulates this in a cube of 57³ values;
 //! here the formulas are evaluated themselves.
 
-use super::tone::rows;
 use crate::Rgb;
-use crate::math::{Vec3, functions};
+use crate::math::{Mat3, Vec3, functions};
 
 /// Stops below and above middle gray that the sigmoid shows.
 const DARKEST: f32 = -10.0;
@@ -50,6 +49,11 @@ pub(super) fn agx(light: Rgb, shape: impl Fn(f32) -> f32) -> Rgb {
     Rgb::from(into_gamut(from_gray * formed).to_array())
 }
 
+/// The matrix with these rows.
+pub(super) fn rows(r: [f32; 3], g: [f32; 3], b: [f32; 3]) -> Mat3 {
+    Mat3::from_cols(r.into(), g.into(), b.into()).transpose()
+}
+
 /// The curve of one channel, from light to light on the screen.
 pub(super) fn shaped(light: f32) -> f32 {
     let stops = functions::log2(light.max(1e-10) / MIDDLE_GRAY).clamp(DARKEST, BRIGHTEST);
@@ -62,7 +66,7 @@ pub(super) fn shaped(light: f32) -> f32 {
     functions::powf(encoded.max(0.0), GAMMA)
 }
 
-/// Least and greatest light that [`shaped`] tells from black and white.
+/// Least and greatest light that [`shaped`] distinguishes from black and white.
 pub(super) fn range() -> (f32, f32) {
     (MIDDLE_GRAY * functions::exp2(DARKEST), MIDDLE_GRAY * functions::exp2(BRIGHTEST))
 }

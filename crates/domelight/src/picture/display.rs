@@ -48,7 +48,7 @@ struct FloatTable {
 const SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - 8;
 
 impl FloatTable {
-    /// Of `f` between `least` and `greatest`, both above 0; beyond them it is as at the ends.
+    /// Tabulates `f` between `least` and `greatest`, both above 0; beyond them it has the value of the end.
     fn new(least: f32, greatest: f32, f: impl Fn(f32) -> f32) -> Self {
         let (first, last) = (least.to_bits() >> SHIFT, (greatest.to_bits() >> SHIFT) + 1);
         let mut values: Vec<f32> = (first..=last).map(|i| f(f32::from_bits(i << SHIFT))).collect();

@@ -7,12 +7,12 @@ use std::str::FromStr;
 /// The luminance that the median of an automatically exposed picture has.
 pub const MIDDLE_GRAY: f32 = 0.18;
 
-/// How exposure is chosen.
+/// An exposure, or the rule that chooses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exposure {
     /// The median luminance of what is covered becomes [`MIDDLE_GRAY`].
     Auto,
-    /// In stops: radiance times 2^stops.
+    /// A number of stops: radiance times 2^stops.
     Stops(f32),
 }
 

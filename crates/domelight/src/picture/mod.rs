@@ -1,6 +1,6 @@
 //! Pictures in files: Radiance `.hdr`, OpenEXR, `.pfm`, PNG, JPEG (read only); and what a tone curve makes of them.
 //!
-//! The format is told from the first bytes, never from the name. What comes out is linear Rec. 709, top row first.
+//! The format is recognized by the first bytes, never by the name. What comes out is linear Rec. 709, top row first.
 //! A header that promises more texels than its file can hold is refused before memory is taken for them; truncated
 //! and corrupt files give a [`PictureError`] that names file, place and value.
 //!
@@ -48,10 +48,10 @@ pub enum Format {
     Jpeg,
 }
 
-/// Where OpenEXR's data window, which is the picture, lies in the display window.
+/// Position of OpenEXR's data window, which is the picture, in the display window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DataWindow {
-    /// Of its top left texel, in texels right and down from the display window's.
+    /// Position of its top left texel, in texels right and down from the display window's.
     pub position: (i64, i64),
     /// Width and height of the display window \[texels\].
     pub display: (usize, usize),
@@ -66,7 +66,7 @@ pub struct Picture {
     pub alpha: Option<Vec<f32>>,
     /// What OpenEXR's `envmap` attribute says.
     pub envmap: Option<EnvmapKind>,
-    /// Where the picture lies in OpenEXR's display window, if it is not the same.
+    /// Position of the picture in OpenEXR's display window, if the two differ.
     pub window: Option<DataWindow>,
     /// The format it was read from.
     pub format: Format,

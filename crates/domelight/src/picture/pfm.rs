@@ -1,6 +1,6 @@
 //! Portable float maps (`.pfm`): `PF` (RGB) and `Pf` (gray), bottom row first, either byte order.
 //!
-//! Debevec's format. The sign of the scale tells the byte order (negative: little endian), its magnitude is
+//! Debevec's format. The sign of the scale is the byte order (negative: little endian), its magnitude is
 //! multiplied in.
 
 use super::{PictureErrorKind, allocate, checked_area};

@@ -102,7 +102,7 @@ pub(crate) fn texels(bytes: &[u8], format: Format) -> Result<usize, PictureError
         let (width, height) = reader.into_dimensions().map_err(PictureErrorKind::Image)?;
         return checked_area(width as usize, height as usize);
     }
-    // By hand: the decoder unpacks a color profile before it tells the size.
+    // By hand: the decoder unpacks a color profile before it reports the size.
     let at = |i: usize| bytes.get(i..i + 4).and_then(|b| b.try_into().ok()).map(u32::from_be_bytes);
     if let (Some(b"IHDR"), Some(width), Some(height)) = (bytes.get(12..16), at(16), at(20)) {
         return checked_area(width as usize, height as usize);

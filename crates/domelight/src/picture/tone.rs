@@ -1,11 +1,11 @@
 //! From scene-linear radiance to what a screen shows: exposure, tone curve, sRGB encoding.
 
-use super::agx;
+use super::agx::{self, rows};
 use crate::Rgb;
-use crate::math::{Mat3, Vec3, functions};
+use crate::math::{Vec3, functions};
 use std::str::FromStr;
 
-/// How radiance beyond the screen's range is brought into it. All curves take and give linear Rec. 709.
+/// A curve that brings radiance into the range of a screen. All curves take and give linear Rec. 709.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ToneCurve {
     /// None: values beyond \[0, 1\] are cut off. Comparable, as values in range are shown as they are; Blender's view
@@ -94,7 +94,7 @@ impl std::fmt::Display for ToneCurve {
 /// Exposure, then a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToneMapping {
-    /// In stops: radiance times 2^exposure.
+    /// Exposure \[stops\]: radiance is multiplied by 2^exposure.
     pub exposure: f32,
     /// Applied after it.
     pub curve: ToneCurve,
@@ -123,10 +123,6 @@ pub fn linear_from_srgb(encoded: f32) -> f32 {
     } else {
         functions::powf((encoded + 0.055) / 1.055, 2.4)
     }
-}
-
-pub(super) fn rows(r: [f32; 3], g: [f32; 3], b: [f32; 3]) -> Mat3 {
-    Mat3::from_cols(r.into(), g.into(), b.into()).transpose()
 }
 
 fn aces(c: Rgb) -> Rgb {

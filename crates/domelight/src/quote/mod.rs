@@ -139,7 +139,7 @@ impl<L> Code<L> {
         Self { text, language: PhantomData }
     }
 
-    /// For [`code!`](crate::code), which checks the values.
+    /// Wraps the text that [`code!`](crate::code) assembles from checked values.
     #[doc(hidden)]
     pub fn assembled(text: fmt::Arguments) -> Self {
         Self::generated(fmt::format(text))

@@ -26,7 +26,7 @@ pub fn kubernetes_argument(text: &str) -> Code<Yaml> {
 pub fn script(script: &Code<Shell>, indent: usize) -> Code<Yaml> {
     let text = script.as_str();
     let kept = |line: &str| !line.contains(|c| c != '\t' && is_invisible(c));
-    // The first line tells how far the block is indented, and the block ends with one line break.
+    // The first line sets the indentation of the block, and the block ends with one line break.
     let one_end = text.ends_with('\n') && !text.ends_with("\n\n");
     if !one_end || text.starts_with([' ', '\n']) || !text.split('\n').all(kept) {
         return string(text);

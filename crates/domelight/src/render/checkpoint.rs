@@ -1,7 +1,7 @@
 //! Checkpoints and parts: a render's sums in an OpenEXR file that other programs can open.
 //!
 //! R, G, B, A are the picture so far; the layers below `state` are the exact bits of the sums, from which all
-//! other layers follow, and the attributes say of which render they are. A fingerprint over both tells a damaged
+//! other layers follow, and the attributes identify the render. A fingerprint over both reveals a damaged
 //! file.
 
 use std::ops::Range;
@@ -18,9 +18,9 @@ pub struct Checkpoint {
     /// What decides the picture, but for the number of samples: names and values, by name. Only a render of
     /// which all are equal may go on from here.
     pub identity: Vec<(String, String)>,
-    /// What the finished picture tells of its making: further attributes, by name.
+    /// Provenance of the finished picture: further attributes, by name.
     pub provenance: Vec<(String, String)>,
-    /// Which tiles.
+    /// The tiles.
     pub tiles: Range<usize>,
     /// Tiles of the whole picture.
     pub n_tiles: usize,

@@ -14,7 +14,7 @@ pub struct Film {
     pub width: usize,
     /// Rows of the whole picture.
     pub height: usize,
-    /// Which pixels these are; those that nobody rendered have no samples.
+    /// The pixels of the picture that it holds; those that were not rendered have no samples.
     pub window: Window,
     pixels: Vec<PixelSums>,
 }
@@ -25,9 +25,9 @@ pub enum FilmMismatch {
     /// Another picture or part of it.
     #[error("it is window {found} of the picture, not {expected}")]
     Window {
-        /// Of the sums.
+        /// The window of the sums.
         found: Window,
-        /// Of the render.
+        /// The window of the render.
         expected: Window,
     },
     /// Some pixels of a tile have samples and others none.

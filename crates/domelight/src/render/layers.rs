@@ -61,7 +61,7 @@ macro_rules! layers {
         }),*];
 
         impl Layers {
-            /// Of pixels without samples.
+            /// The layers of a picture without samples.
             pub fn new(width: usize, height: usize) -> Self {
                 Self { $($field: LayerData::zero(width, height),)* }
             }

@@ -37,8 +37,8 @@ pub use layers::{LAYERS, LayerInfo, LayerValues, Layers};
 pub use output::Developed;
 #[cfg(feature = "io")]
 pub use provenance::{Provenance, kept_exposure};
-pub use renderer::{Mark, Renderer};
-pub use tile::Counts;
+pub use renderer::Renderer;
+pub use tile::{Counts, Mark};
 pub use tiling::{Tiling, Window};
 pub use variance::VarianceSums;
 
@@ -71,15 +71,15 @@ impl Background {
     }
 }
 
-/// How camera samples are divided into passes over the picture.
+/// The division of camera samples into passes over the picture.
 ///
 /// Strategies that learn nothing give the same picture with any.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Passes {
-    /// As long as the strategy works best with.
+    /// The length that the strategy works best with.
     #[default]
     Efficient,
-    /// 1, 1, 2, 4, … samples, up to the length of [`Passes::Efficient`]: a first picture soon.
+    /// Passes of 1, 1, 2, 4, … samples, up to the length of [`Passes::Efficient`]: the first picture comes soon.
     Doubling,
 }
 
@@ -93,7 +93,7 @@ impl Passes {
     }
 }
 
-/// How to render.
+/// Size, samples and further settings of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
     /// Columns, at least 1.
@@ -102,21 +102,21 @@ pub struct RenderSettings {
     pub height: usize,
     /// Camera samples of each pixel, at least 1.
     pub n_samples: u32,
-    /// Of strategies that render a tile in rounds, noisier pixels get more samples: `n_samples` are then the mean over
-    /// the pixels of a tile, not each pixel's.
+    /// Gives noisier pixels more samples, with strategies that render a tile in rounds: `n_samples` is then the mean over
+    /// the picture instead of the number of each pixel.
     pub adaptive: bool,
     /// A tile is finished before its samples are, but not before 16, when two independent sets of them suggest no more
     /// than this relMSE: the mean over its pixels of error² of the luminance over (luminance² + 0.01), and one standard
     /// error of that. Tiles that stop so have the error within a factor of 1.5 on average; those that 16 samples are
     /// more than enough for have less. To stop on what was drawn biases a picture by far less than the error.
     pub target_error: Option<f32>,
-    /// How samples are divided into passes; with a target error passes have lengths of their own.
+    /// Division of the samples into passes; with a target error, passes have lengths of their own.
     pub passes: Passes,
     /// Names the whole set of random numbers.
     pub seed: u64,
     /// Pixel filter.
     pub filter: Filter,
-    /// Which points.
+    /// The point sets that samples are drawn from.
     pub sampler: SamplerKind,
     /// What camera rays see that leave the scene.
     pub background: Background,

@@ -10,7 +10,7 @@ use super::filter::FilterSampler;
 use super::layers::Layers;
 use super::scouts::scale;
 use super::sums::PixelSums;
-use super::tile::{Counts, Pass, Scratch, Tile};
+use super::tile::{Counts, Mark, Pass, Scratch, Tile};
 use super::tiling::{SampleSet, Tiling, Window, paired_pass};
 use super::variance::VarianceSums;
 use super::{Catcher, Observer, RenderContext, RenderSettings, Rendering};
@@ -75,10 +75,6 @@ impl<S> Deref for Held<'_, S> {
         }
     }
 }
-
-/// A moment between passes; see [`Renderer::changed_since`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Mark(u64);
 
 /// How a pass ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,12 +183,12 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         self.only(tiles)
     }
 
-    /// How to render.
+    /// The settings of the render.
     pub fn settings(&self) -> &RenderSettings {
         &self.context.settings
     }
 
-    /// How the picture is divided.
+    /// The division of the picture into tiles.
     pub fn tiling(&self) -> Tiling {
         self.tiling
     }
@@ -246,7 +242,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         if observer.canceled() {
             return PassEnd::Canceled;
         }
-        self.mark.0 += 1;
+        self.mark = self.mark.next();
         let pass = match self.interrupted.take() {
             Some((of, pass)) if of == start && pass.n_samples <= most => pass,
             _ => self.begin_pass(start, most),
@@ -378,7 +374,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     /// If they are of another part or size of picture, or of no whole number of passes.
     pub fn restore(&mut self, film: &Film, counts: Counts) -> Result<(), FilmMismatch> {
         film.require_window(&self.context.settings, self.tiling.window(&self.range))?;
-        self.mark.0 += 1;
+        self.mark = self.mark.next();
         self.interrupted = None;
         for tile in &mut self.tiles {
             let pixels: Vec<PixelSums> = film.get(tile.window);

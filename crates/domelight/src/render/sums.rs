@@ -340,7 +340,7 @@ impl PixelSums {
         })
     }
 
-    /// Of the mean, `scale` being [`super::variance::VarianceSums::scale`] of its samples.
+    /// The variance of the mean; `scale` is [`super::variance::VarianceSums::scale`] of its samples.
     pub(super) fn variance(&self, scale: f64) -> Rgb {
         Rgb::from(self.independent_variance().map(|v| narrowed(scale * v)))
     }

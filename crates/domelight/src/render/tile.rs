@@ -9,9 +9,7 @@ use super::layers::Layers;
 use super::sums::{CameraSample, PixelSums, SurfaceSample};
 use super::tiling::{SampleSet, Window};
 use super::variance::VarianceSums;
-use super::{
-    Background, Catcher, Mark, Observer, RenderContext, RenderSettings, Stage, visibility,
-};
+use super::{Background, Catcher, Observer, RenderContext, RenderSettings, Stage, visibility};
 use crate::Rgb;
 use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
 use crate::math::{Vec3, vec2};
@@ -25,6 +23,17 @@ const FEWEST_SAMPLES: u32 = 16;
 
 /// Names the random numbers that decide which surfaces camera rays see.
 const COVERAGE: u64 = 0x636f_7665_7261_6765;
+
+/// A moment between passes; see [`Renderer::changed_since`](super::Renderer::changed_since).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Mark(u64);
+
+impl Mark {
+    /// The mark of the pass that follows.
+    pub(super) fn next(self) -> Self {
+        Self(self.0 + 1)
+    }
+}
 
 /// A rectangle of the picture and the sums of its pixels.
 #[derive(Clone, Debug)]
@@ -105,7 +114,7 @@ pub(super) struct Pass<S: Strategy> {
 /// A round of a pass over a tile.
 #[derive(Default)]
 struct Batch {
-    /// Of each pixel of the tile, whether it may see anything.
+    /// Whether each pixel of the tile may see anything.
     seen: Vec<bool>,
     /// Whether it takes a second set of samples in the pass.
     has_second: Vec<bool>,
@@ -118,12 +127,12 @@ struct Batch {
     hits: Vec<Option<Hit>>,
     /// Factors on what the rays see; none in scenes where nothing transmits.
     throughputs: Vec<Rgb>,
-    /// Of each pixel.
+    /// The camera rays of each pixel.
     camera_rays: Vec<CameraRays>,
     points: Vec<ShadingPoint>,
     samples: Vec<u32>,
     pixels: Vec<PixelPoints>,
-    /// Of each point, moved off the surface to the viewer's side.
+    /// The origin of each point's shadow rays, off the surface on the viewer's side.
     origins: Vec<Vec3>,
     round: ShadowRays,
     radiance: Vec<Rgb>,

@@ -20,7 +20,7 @@ pub struct Window {
 }
 
 impl Window {
-    /// How many pixels.
+    /// The number of pixels.
     pub fn area(&self) -> usize {
         self.width * self.height
     }
@@ -86,7 +86,7 @@ impl Tiling {
         Self { width, height, size: tile_size.min(most) }
     }
 
-    /// How many tiles.
+    /// The number of tiles.
     pub fn n_tiles(&self) -> usize {
         self.across() * self.height.div_ceil(self.size)
     }

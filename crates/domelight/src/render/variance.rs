@@ -32,9 +32,9 @@ pub struct VarianceSums {
 /// What a pixel adds to [`VarianceSums`]; channels added up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Contrast {
-    /// Of two independent sets: s²/n, and the variance by their difference.
+    /// Two independent sets: s²/n, and the variance by their difference.
     Sets([f64; 2]),
-    /// Of a sequence: s²/N of its longest prefix of a power of two N, and D² of the halves of that.
+    /// One sequence: s²/N of its longest prefix of N = 2^k samples, and D² of the halves of that.
     Halves([f64; 2]),
 }
 

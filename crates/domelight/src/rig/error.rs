@@ -22,9 +22,9 @@ const CELLS: [usize; 2] = [512, 256];
 /// The root mean square error of a rig's shading, relative to the root mean square of the map's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadingError {
-    /// Of a matte surface; 0.01 is one percent.
+    /// The error on a matte surface; 0.01 is one percent.
     pub diffuse: f64,
-    /// Of the lobe cos²⁰.
+    /// The error of the lobe cos²⁰.
     pub glossy: f64,
 }
 

@@ -14,7 +14,7 @@ use crate::environment::Environment;
 use crate::environment::compact::{CompactSource, SourceCriteria, compact_sources};
 use crate::{Rgb, RgbImage};
 
-/// How a map is divided into regions.
+/// The algorithm that divides a map into regions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Regions of even energy.
@@ -55,7 +55,7 @@ pub struct ExtractionSettings {
     /// Make so many lights, compact ones included, and put all light into them; none leaves what is
     /// not of compact sources to the residual.
     pub n_lights: Option<usize>,
-    /// How what compact sources leave is divided.
+    /// The algorithm that divides the map without the compact sources.
     pub method: Method,
     /// Share of the environment's luminance below which a light is left on the residual, in \[0, 1\];
     /// by default 0 of regions and 0.001 of compact sources.
@@ -140,7 +140,7 @@ impl<'a> CompactExtraction<'a> {
         Ok(Self { environment, settings, lights, sources, residual })
     }
 
-    /// How many compact sources were found.
+    /// The number of compact sources found.
     pub fn n_compact(&self) -> usize {
         self.lights.len()
     }

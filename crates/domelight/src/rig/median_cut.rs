@@ -10,7 +10,7 @@ use super::texels::Texels;
 use super::{Order, Region, Rig, RigError, TexelRect};
 use crate::environment::Environment;
 
-/// Where in its region a light stands.
+/// The position of a light in its region.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightPosition {
     /// The direction of ∫ L ω dω: what the method asks for.
@@ -26,9 +26,9 @@ pub struct MedianCut {
     /// Compare widths to heights after scaling them by the cosine of the inclination, as the paper
     /// says. Without it regions near the poles are cut as if the map were flat.
     pub scale_width: bool,
-    /// Where a light stands.
+    /// The position of each light in its region.
     pub position: LightPosition,
-    /// Which region is cut next; [`Order::Levels`] in the paper.
+    /// The order in which regions are cut; [`Order::Levels`] in the paper.
     pub order: Order,
 }
 

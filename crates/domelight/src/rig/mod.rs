@@ -121,7 +121,7 @@ pub struct Rig {
 /// A distant light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigLight {
-    /// Toward the light, unit vector in the world.
+    /// Unit direction toward the light, in the world.
     pub direction: Vec3,
     /// ∫ L dω over the region \[W·m⁻²\]: what a surface that faces the light receives. All lights
     /// together have the integral of the map, channel by channel.
@@ -169,7 +169,7 @@ pub struct TexelRect {
 }
 
 impl TexelRect {
-    /// How many texels.
+    /// The number of texels.
     pub fn area(&self) -> usize {
         (self.x1 - self.x0) * (self.y1 - self.y0)
     }

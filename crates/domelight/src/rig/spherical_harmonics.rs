@@ -49,7 +49,7 @@ impl SphericalHarmonics {
         basis(wi).into_iter().zip(self.coefficients).map(|(y, l)| l * y).sum()
     }
 
-    /// Those of the radiance that `rotation` turns.
+    /// The coefficients of the same radiance turned by `rotation`.
     ///
     /// By the rule of 14 points, the corners and the faces' centers of a cube, which integrates
     /// polynomials of degree 5 over the sphere exactly.

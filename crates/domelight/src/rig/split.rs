@@ -7,7 +7,7 @@ use std::collections::BinaryHeap;
 use super::TexelRect;
 use super::regions::{Moments, Profile, SummedArea};
 
-/// Which region is cut next.
+/// The order in which regions are cut.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
     /// The worst first: that of the greatest energy (median cut) or variance.
@@ -21,7 +21,7 @@ pub enum Order {
 /// Where a region is cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Criterion {
-    /// Along the longest dimension, energies as equal as can be.
+    /// A cut across the longest dimension, energies as equal as can be.
     EvenEnergy {
         /// The width counts times the sine of the polar angle at the region's middle.
         scale_width: bool,

@@ -49,7 +49,7 @@ impl Rule {
 pub struct VarianceMinimization {
     /// What a cut minimizes.
     pub rule: Rule,
-    /// Which region is cut next.
+    /// The order in which regions are cut.
     pub order: Order,
     /// Steps of Lloyd's refinement on the sphere; at 0 regions stay rectangles.
     pub lloyd_steps: u32,

@@ -21,7 +21,7 @@ struct Bin {
 }
 
 impl AliasTable {
-    /// From non-negative finite weights.
+    /// A table from non-negative finite weights.
     ///
     /// # Errors
     /// No weights, a negative or non-finite one, or all zero.

@@ -38,7 +38,7 @@ struct Level {
 }
 
 impl HierarchicalTable {
-    /// From `width · height` weights, row by row: `weight(row, out)` writes those of one row.
+    /// A hierarchy from `width · height` weights, row by row: `weight(row, out)` writes those of one row.
     ///
     /// Rows are independent; they are filled in parallel with the feature `render`.
     ///
@@ -78,7 +78,7 @@ impl HierarchicalTable {
         self.total
     }
 
-    /// How many levels of halving lead from the whole to a cell: the square of 2^`depth` cells at the
+    /// The number of levels of halving from the whole to a cell: the square of 2^`depth` cells at the
     /// upper left holds all.
     pub fn depth(&self) -> usize {
         self.levels.len()

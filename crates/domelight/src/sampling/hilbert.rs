@@ -37,9 +37,9 @@ const fn steps() -> [u8; 64] {
     steps
 }
 
-/// Which of its four turns the curve takes through a square.
+/// The turn, one of four, that the curve takes through a square.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct HilbertState {
+pub(crate) struct HilbertState {
     swap: bool,
     reverse: bool,
 }
@@ -47,14 +47,14 @@ pub struct HilbertState {
 impl HilbertState {
     /// The turn that visits the quadrants (0, 0), (1, 0), (1, 1), (0, 1); the default one visits
     /// (0, 0), (0, 1), (1, 1), (1, 0).
-    pub const SWAPPED: Self = Self { swap: true, reverse: false };
+    pub(crate) const SWAPPED: Self = Self { swap: true, reverse: false };
 
     /// The quadrant (x, y) that is visited as number `i` of four, and the curve's turn there.
     ///
     /// # Panics
     /// If `i` exceeds 3.
     #[inline]
-    pub fn quadrant(self, i: usize) -> (usize, usize, Self) {
+    pub(crate) fn quadrant(self, i: usize) -> (usize, usize, Self) {
         let (x, y) = [(false, false), (false, true), (true, true), (true, false)][i];
         let inner = Self { swap: self.swap ^ !y, reverse: self.reverse ^ (!y & x) };
         let (x, y) = if self.swap { (y, x) } else { (x, y) };
@@ -62,8 +62,8 @@ impl HilbertState {
     }
 }
 
-/// Where along the curve the cell (`x`, `y`) of a square of 4096² cells lies, from 0 to 4096² − 1.
-pub fn index(x: u32, y: u32) -> u32 {
+/// The index along the curve of the cell (`x`, `y`) of a square of 4096² cells, from 0 to 4096² − 1.
+pub(crate) fn index(x: u32, y: u32) -> u32 {
     let (mut state, mut index) = (0, 0);
     let mut shift = BITS;
     while shift > 0 {
@@ -76,10 +76,10 @@ pub fn index(x: u32, y: u32) -> u32 {
     index
 }
 
-/// Where along the curve the unit direction `w` of the upper hemisphere lies: [`index`] of its cell
+/// The index along the curve of the unit direction `w` of the upper hemisphere: [`index`] of its cell
 /// in the octahedral map of the hemisphere (Cigolle et al. 2014, "A Survey of Efficient
 /// Representations for Independent Unit Vectors").
-pub fn hemisphere_index(w: Vec3) -> u32 {
+pub(crate) fn hemisphere_index(w: Vec3) -> u32 {
     let scale = 1.0 / (w.x.abs() + w.y.abs() + w.z.max(0.0));
     let (x, y) = ((w.x + w.y) * scale, (w.x - w.y) * scale);
     let cell = |t: f32| (((0.5 * t + 0.5) * (1 << BITS) as f32) as u32).min((1 << BITS) - 1);

@@ -5,7 +5,7 @@
 //! sum to one do not go with a common factor 1/(M + N): two techniques with M = N samples would
 //! then give exactly half the answer.
 
-/// How a sample's weight follows from the densities of the techniques.
+/// The rule that gives a sample's weight from the densities of the techniques.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Heuristic {
     /// wᵢ = nᵢ pᵢ / Σₖ nₖ pₖ.

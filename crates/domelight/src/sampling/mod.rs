@@ -1,14 +1,14 @@
 //! Drawing from densities: uniform numbers, warps, tables, and the weights that combine them.
 
-pub mod alias;
-pub mod hierarchy;
-pub mod hilbert;
-pub mod mis;
-pub mod reservoir;
+pub(crate) mod alias;
+pub(crate) mod hierarchy;
+pub(crate) mod hilbert;
+pub(crate) mod mis;
+pub(crate) mod reservoir;
 pub mod rng;
-pub mod sampler;
-pub mod sobol;
-pub mod table;
+pub(crate) mod sampler;
+pub(crate) mod sobol;
+pub(crate) mod table;
 pub mod warp;
 
 pub use alias::AliasTable;
@@ -16,7 +16,7 @@ pub use hierarchy::HierarchicalTable;
 pub use mis::Heuristic;
 pub use reservoir::WeightedReservoirs;
 pub use rng::Pcg32;
-pub use sampler::{Dimension, SampleSequence, Sampler, SamplerKind};
+pub use sampler::{Dimension, SamplePoint, SampleSequence, Sampler, SamplerKind};
 pub use table::{Table1d, Table2d, TableError, TableSample};
 
 /// The greatest number below 1 in single precision.

@@ -7,7 +7,7 @@ use super::rng::{Pcg32, hash2};
 use super::{sobol, unit_f32};
 use crate::math::{Vec2, vec2};
 
-/// Which points a sampler gives.
+/// The point sets of a sampler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SamplerKind {
     /// Owen-scrambled Sobol' points.
@@ -205,7 +205,7 @@ mod tests {
         }
     }
 
-    /// Of numbers that are independent, the mean of n has the variance 1/12n over all streams.
+    /// The mean of n independent numbers has the variance 1/12n over all streams.
     #[test]
     fn independent_numbers_average_like_independent_numbers() {
         let (n_streams, n) = (1000u32, 1024u32);

@@ -92,7 +92,7 @@ fn laine_karras(mut x: u32, seed: u32) -> u32 {
 ///
 /// The index is shuffled by an Owen scramble of its own, so that sets do not line up; then each
 /// dimension is scrambled by itself.
-pub fn point(index: u32, seed: u64) -> [u32; 4] {
+pub(crate) fn point(index: u32, seed: u64) -> [u32; 4] {
     let bytes = shuffled(index, seed).to_le_bytes();
     let mut point = [0u32; 4];
     for (table, byte) in BYTES.iter().zip(bytes) {
@@ -112,7 +112,7 @@ pub fn point(index: u32, seed: u64) -> [u32; 4] {
 /// Dimension 0 is the index. The columns of dimension 1 are the binomials: it is the index as a polynomial over
 /// GF(2), moved by one, where (1 + x)^2ᵏ = 1 + x^2ᵏ.
 #[inline(always)]
-pub fn first_two(index: u32, seed: u64) -> [u32; 2] {
+pub(crate) fn first_two(index: u32, seed: u64) -> [u32; 2] {
     let x = shuffled(index, seed).reverse_bits();
     let mut y = x;
     y ^= (y & 0xffff_0000) >> 16;

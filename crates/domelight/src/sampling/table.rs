@@ -4,7 +4,7 @@
 //! difference of its two neighbors over the total, so what [`Table2d::sample`] draws and what
 //! [`Table2d::pmf`] says agree exactly, on maps of any size. Inversion keeps the order of the
 //! uniform numbers, so stratified points stay stratified (an alias table would be faster and lose
-//! the strata). A guide (Chen & Asau 1974's cutpoints) tells where to begin the search.
+//! the strata). A guide (Chen & Asau 1974's cutpoints) gives the start of the search.
 
 use super::ONE_MINUS_EPSILON;
 use crate::math::{Vec2, vec2};
@@ -92,7 +92,7 @@ pub struct Table1d {
 }
 
 impl Table1d {
-    /// From non-negative finite weights, not all zero.
+    /// A table from non-negative finite weights, not all zero.
     ///
     /// # Errors
     /// See [`TableError`].
@@ -122,7 +122,7 @@ impl Table1d {
         }
     }
 
-    /// How many cells.
+    /// The number of cells.
     pub fn len(&self) -> usize {
         self.sums.len()
     }
@@ -176,7 +176,7 @@ pub struct Table2d {
 }
 
 impl Table2d {
-    /// From `width · height` weights, row by row: `weight(row, out)` writes those of one row.
+    /// A table from `width · height` weights, row by row: `weight(row, out)` writes those of one row.
     ///
     /// Rows are independent; they are filled in parallel with the feature `render`.
     ///
@@ -226,7 +226,7 @@ impl Table2d {
         Ok(Self { width, rows: Table1d::from_sums(sums)?, columns, guides })
     }
 
-    /// From weights row by row.
+    /// A table from weights, row by row.
     ///
     /// # Errors
     /// See [`TableError`].

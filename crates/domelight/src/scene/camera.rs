@@ -21,7 +21,7 @@ use crate::sampling::warp::concentric_disk;
 pub struct CameraSettings {
     /// Perspective or orthographic.
     pub projection: Projection,
-    /// Where the camera is.
+    /// Position of the camera.
     pub origin: Vec3,
     /// What it looks at: any point on its axis but the origin.
     pub target: Vec3,
@@ -29,7 +29,7 @@ pub struct CameraSettings {
     pub up: Vec3,
 }
 
-/// How the camera maps directions to the picture.
+/// The projection of the scene onto the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
     /// All rays start at the origin.
@@ -235,9 +235,9 @@ impl CameraSettings {
 /// A camera of one picture: camera rays from pixel positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Of the perspective camera: all rays'; of the orthographic one: the top left corner.
+    /// The origin of all rays (perspective), or of the ray through the top left corner (orthographic).
     origin: Vec3,
-    /// Of the perspective camera: toward the top left corner; of the orthographic one: all rays'.
+    /// The direction toward the top left corner (perspective), or of all rays (orthographic).
     direction: Vec3,
     /// One pixel to the right, as a change of direction or of origin.
     step_x: Vec3,

@@ -66,7 +66,7 @@ const LEAST_REFLECTED: f32 = 0.25;
 #[derive(Clone, Copy, Debug)]
 struct Layer {
     transmits: bool,
-    /// Of being met.
+    /// The probability that a ray meets it.
     probability: f32,
     /// Factors on the radiance of a ray that meets it, and of one that does not.
     if_met: Rgb,

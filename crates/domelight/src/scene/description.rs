@@ -30,7 +30,7 @@ pub struct SceneDescription {
     /// Parts that are scenery, such as floors and plinths, by index: the camera is not framed to
     /// them and a material for the subject does not reach them.
     pub scenery: Vec<usize>,
-    /// Which axis of the file points up; `None` if the format does not say.
+    /// The axis of the file that points up; `None` if the format does not say.
     ///
     /// The geometry is given as it is in the file: turning it is the caller's choice.
     pub up: Option<UpAxis>,
@@ -59,7 +59,7 @@ pub struct NamedCamera {
 /// The light around a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnvironmentSettings {
-    /// Where the map comes from.
+    /// The source of the map.
     pub source: EnvironmentSource,
     /// Rotation about the up axis \[degrees\].
     pub rotate_degrees: f32,
@@ -78,7 +78,7 @@ impl EnvironmentSettings {
     }
 }
 
-/// Where a light probe comes from.
+/// The source of a light probe.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum EnvironmentSource {
     /// A file, its path already relative to the working directory.

@@ -8,7 +8,7 @@ use crate::Rgb;
 use crate::bsdf::{self, Coat};
 use crate::math::{Vec2, Vec3, functions, sqr, vec2};
 
-/// How much of what lies behind a surface shows through it.
+/// Alpha coverage: how much of the background shows through a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coverage {
     /// What the opacity means.
@@ -78,6 +78,25 @@ pub struct ColorFactor {
     pub texture: Option<TextureRef>,
 }
 
+/// A tangent-space normal map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NormalMap {
+    /// A linear texture: red along the tangent, green along the bitangent, blue along the normal,
+    /// each from −1 at 0 to 1 at 1.
+    pub texture: TextureRef,
+    /// Factor on the first two.
+    pub scale: f32,
+}
+
+impl NormalMap {
+    /// The normal in the frame (tangent, bitangent, normal), not of unit length.
+    #[inline]
+    pub(crate) fn normal(&self, textures: &[Texture], uvs: &Uvs) -> Vec3 {
+        let c = self.texture.at(textures, uvs).map(|c| 2.0 * c - 1.0);
+        Vec3::new(self.scale * c.r, self.scale * c.g, c.b)
+    }
+}
+
 /// A channel of a texture that holds a number.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Channel {
@@ -142,7 +161,7 @@ pub struct Clearcoat {
     /// Perceptual roughness in \[0, 1\]; the texture's green channel.
     pub roughness: Factor,
     /// The coat's own relief.
-    pub normal_map: Option<super::NormalMap>,
+    pub normal_map: Option<NormalMap>,
 }
 
 /// `KHR_materials_sheen`.

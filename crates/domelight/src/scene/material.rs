@@ -3,7 +3,7 @@
 //! A [`Material`] becomes a [`Bsdf`], a sum of reflectance lobes, at each hit:
 //! textures are looked up there and vertex colors multiplied in.
 
-use super::layers::{Channel, Coverage, Emission, Layers};
+use super::layers::{Channel, Coverage, Emission, Layers, NormalMap};
 use super::texture::{Texture, TextureRef, Uvs};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, Fresnel, Lambert, MetallicRoughness, Phong};
@@ -17,11 +17,11 @@ pub(crate) const CATCHER_REFLECTANCE: f32 = 0.5;
 pub struct Material {
     /// Its name in the file, for messages.
     pub name: String,
-    /// How it reflects.
+    /// Its reflectance model.
     pub model: MaterialModel,
     /// Its fine relief.
     pub normal_map: Option<NormalMap>,
-    /// What lies behind it and shows.
+    /// How much of the background shows through it.
     pub coverage: Coverage,
     /// Whether it is seen from behind, too. Its shadow falls from either side.
     pub double_sided: bool,
@@ -36,7 +36,7 @@ pub struct Material {
     pub layers: Layers,
 }
 
-/// How a material reflects.
+/// The reflectance model of a material, with its parameters.
 #[derive(Clone, Debug)]
 pub enum MaterialModel {
     /// The same BSDF everywhere; vertex colors do not touch it.
@@ -90,16 +90,6 @@ pub struct SpecularGlossinessMaterial {
     pub glossiness: f32,
     /// A texture: its color is a factor on `specular`, its alpha on `glossiness`.
     pub specular_glossiness_texture: Option<TextureRef>,
-}
-
-/// A tangent-space normal map.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NormalMap {
-    /// A linear texture: red along the tangent, green along the bitangent, blue along the normal,
-    /// each from −1 at 0 to 1 at 1.
-    pub texture: TextureRef,
-    /// Factor on the first two.
-    pub scale: f32,
 }
 
 impl Material {
@@ -338,15 +328,6 @@ impl MaterialModel {
             specular: Rgb::BLACK,
             exponent: 0.0,
         })
-    }
-}
-
-impl NormalMap {
-    /// The normal in the frame (tangent, bitangent, normal), not of unit length.
-    #[inline]
-    pub(crate) fn normal(&self, textures: &[Texture], uvs: &Uvs) -> Vec3 {
-        let c = self.texture.at(textures, uvs).map(|c| 2.0 * c - 1.0);
-        Vec3::new(self.scale * c.r, self.scale * c.g, c.b)
     }
 }
 

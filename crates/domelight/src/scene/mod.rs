@@ -28,8 +28,8 @@ pub use description::{
 };
 pub use framing::{Framing, UnknownView, ViewDirection};
 pub use layers::{
-    AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers, Sheen,
-    Specular, Volume,
+    AlphaMode, Anisotropy, Clearcoat, ColorFactor, Coverage, Emission, Factor, Layers, NormalMap,
+    Sheen, Specular, Volume,
 };
 #[cfg(feature = "io")]
 pub use load::{
@@ -37,8 +37,7 @@ pub use load::{
     load_with,
 };
 pub use material::{
-    Material, MaterialModel, MetallicRoughnessMaterial, NormalMap, PhongMaterial,
-    SpecularGlossinessMaterial,
+    Material, MaterialModel, MetallicRoughnessMaterial, PhongMaterial, SpecularGlossinessMaterial,
 };
 pub use texture::{Encoding, Texture, TextureError, TextureFilter, TextureRef, UvTransform, Wrap};
 
@@ -54,11 +53,11 @@ pub struct Scene {
     parts: Vec<Part>,
     materials: Vec<Material>,
     textures: Vec<Texture>,
-    /// Of each part its first triangle in the hierarchy.
+    /// The first triangle of each part in the hierarchy.
     first_triangle: Vec<u32>,
-    /// Of the parts that hide all behind them, which come first.
+    /// The hierarchy of the opaque parts, which come first.
     bvh: Bvh,
-    /// Of the others, if there are any.
+    /// The parts that are not opaque, if there are any.
     partial: Option<Partial>,
     /// Some part is not seen from behind.
     has_single_sided: bool,
@@ -128,7 +127,7 @@ pub enum SceneError {
          nearer to the origin than some 1e10 times its size"
     )]
     Size {
-        /// The longest edge of the bounds.
+        /// The longest edge of the bounds of what is not scenery.
         size: f32,
         /// The greatest coordinate.
         farthest: f32,
@@ -153,7 +152,7 @@ impl Scene {
         let is_subject = description.is_subject();
         let bounds = description.bounds();
         let scale = description.usual_scale();
-        check_size(&bounds, scale)?;
+        check_size(&bounds, &subject_bounds, scale)?;
         let SceneDescription { mut parts, materials, textures, camera, up, view, .. } = description;
         let up = up.unwrap_or_default();
         if scale != 1.0 {
@@ -198,33 +197,6 @@ impl Scene {
             camera,
             up,
         })
-    }
-
-    /// Loads a mesh or a scene file of any known format and builds it.
-    ///
-    /// # Errors
-    /// If the file cannot be read, is damaged, or makes no scene. [`load()`] gives the loader's warnings as well, and
-    /// a description to change before it is built.
-    #[cfg(feature = "io")]
-    pub fn load(path: impl AsRef<std::path::Path>) -> Result<Self, crate::Error> {
-        Ok(Self::new(load(path)?.description)?)
-    }
-
-    /// Builds a scene from the bytes of a file, for instance where there is no file system; `resolver` gives the bytes of
-    /// the files that it refers to.
-    ///
-    /// # Errors
-    /// If the file is damaged or makes no scene. [`load_bytes`] gives the loader's warnings as well, and a description to
-    /// change before it is built.
-    #[cfg(feature = "io")]
-    pub fn from_bytes(
-        bytes: &[u8],
-        format: SceneFormat,
-        resolver: &Resolver<'_>,
-    ) -> Result<Self, crate::Error> {
-        let name = format!("scene.{format}");
-        let loaded = load_bytes(name, bytes, resolver, &LoadOptions::default())?;
-        Ok(Self::new(loaded.description)?)
     }
 
     /// The same scene, traced with another instruction set; `None` if this processor lacks it. Pictures are the same.
@@ -323,7 +295,7 @@ impl Scene {
         &self.materials
     }
 
-    /// How many triangles all meshes have together.
+    /// The number of triangles of all meshes.
     pub fn triangle_count(&self) -> usize {
         self.parts.iter().map(|p| p.mesh.triangles.len()).sum()
     }
@@ -337,13 +309,14 @@ impl Scene {
 }
 
 /// Refuses what is so small or so large, or once scaled so small, that rays would hit the surface that they leave.
-fn check_size(bounds: &Aabb, scale: f32) -> Result<(), SceneError> {
-    let size = bounds.size().max_element();
+fn check_size(bounds: &Aabb, subject: &Aabb, scale: f32) -> Result<(), SceneError> {
+    let size = subject.size().max_element();
     let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
-    // What has no size is not seen.
-    let usable = bounds.is_empty()
-        || size == 0.0
-        || (1e-18..=1e18).contains(&size) && farthest <= 1e18 && size * scale >= 1e-6;
+    let scaled = bounds.size().max_element() * scale;
+    // What has no size is not seen. Squares of the subject's lengths must be finite.
+    let is_squarable = size == 0.0 || (1e-18..=1e18).contains(&size);
+    let is_empty = bounds.is_empty() || scaled == 0.0;
+    let usable = is_empty || is_squarable && farthest.is_finite() && scaled >= 1e-6;
     if usable { Ok(()) } else { Err(SceneError::Size { size, farthest }) }
 }
 

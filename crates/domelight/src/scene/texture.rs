@@ -8,7 +8,7 @@
 use crate::Rgb;
 use crate::math::{Vec2, functions, vec2};
 
-/// How texel values map to numbers.
+/// The mapping from texel values to numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Encoding {
     /// Color with the transfer curve of IEC 61966-2-1.
@@ -72,9 +72,9 @@ pub struct TextureRef {
     pub uv_set: usize,
     /// Wrapping in u and in v.
     pub wrap: [Wrap; 2],
-    /// Between texel centers.
+    /// The filter between texel centers.
     pub filter: TextureFilter,
-    /// From the mesh's texture coordinates to the image's.
+    /// The transform from the mesh's texture coordinates to the image's.
     pub transform: UvTransform,
 }
 
@@ -94,11 +94,11 @@ impl TextureRef {
 /// An affine map of texture coordinates: uv ↦ u · x + v · y + offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UvTransform {
-    /// Where one step in u leads.
+    /// The step in the image for one step in u.
     pub x: Vec2,
-    /// Where one step in v leads.
+    /// The step in the image for one step in v.
     pub y: Vec2,
-    /// Where (0, 0) leads.
+    /// The image coordinates of (0, 0).
     pub offset: Vec2,
 }
 
@@ -130,12 +130,12 @@ pub struct TextureError {
     pub width: u32,
     /// Its height.
     pub height: u32,
-    /// How many texels were given.
+    /// The number of texels given.
     pub count: usize,
 }
 
 impl Texture {
-    /// From 8-bit texels, the first row on top.
+    /// A texture from 8-bit texels, the first row on top.
     ///
     /// # Errors
     /// The number of texels is not width · height, or there are none.
@@ -149,7 +149,7 @@ impl Texture {
         Self::new(name.into(), width, height, Texels::Bits8(texels), encoding)
     }
 
-    /// From 16-bit texels, the first row on top.
+    /// A texture from 16-bit texels, the first row on top.
     ///
     /// # Errors
     /// The number of texels is not width · height, or there are none.
@@ -198,7 +198,7 @@ impl Texture {
         Ok(Self { name, width, height, texels, decode, alpha: Vec::new() })
     }
 
-    /// With an alpha for each texel.
+    /// The same texture with an alpha for each texel.
     ///
     /// # Errors
     /// The number of alphas is not that of the texels.

@@ -10,9 +10,9 @@ use crate::sampling::{Dimension, Heuristic};
 /// The density that directions toward the light are drawn from.
 #[derive(Clone, Debug)]
 pub enum LightTable {
-    /// In proportion to luminance.
+    /// A density proportional to luminance.
     Full,
-    /// In proportion to what exceeds the mean; needs BRDF samples beside it.
+    /// A density proportional to the luminance above the mean; it needs BRDF samples beside it.
     Compensated(CompensatedTable),
 }
 

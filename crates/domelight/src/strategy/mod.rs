@@ -48,7 +48,7 @@ use crate::sampling::sampler::SamplePoint;
 use crate::sampling::{Dimension, Pcg32, Sampler};
 use crate::simd::{Colors, SimdFloat, Vectors};
 
-/// Where a camera ray met an opaque surface.
+/// A point where a camera ray met an opaque surface.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadingPoint {
     /// World position.
@@ -57,7 +57,7 @@ pub struct ShadingPoint {
     pub ng: Vec3,
     /// Shading frame; its z axis is the shading normal, toward the viewer's side.
     pub frame: Frame,
-    /// Toward the viewer, in the shading frame.
+    /// Unit direction toward the viewer, in the shading frame.
     pub wo: Vec3,
     /// The BSDF, in the shading frame.
     pub bsdf: Bsdf,
@@ -112,7 +112,7 @@ impl ShadingPoint {
 /// A world direction drawn from the BSDF of a point.
 #[derive(Clone, Copy, Debug)]
 pub struct DirectionSample {
-    /// Toward the light.
+    /// Unit direction toward the light, in the world.
     pub wi: Vec3,
     /// f_r · cos θ_i \[sr⁻¹\].
     pub value: Rgb,
@@ -164,7 +164,7 @@ impl Contributions {
         self.base.resize(n_points, Rgb::BLACK);
     }
 
-    /// How many shadow rays.
+    /// The number of shadow rays.
     pub fn len(&self) -> usize {
         self.wi.len()
     }
@@ -245,7 +245,7 @@ impl PixelPoints {
         Self { points, n_samples, sampler, one_material: false }
     }
 
-    /// Of a pixel of another round.
+    /// A pixel of another round, which has no points.
     #[cfg(feature = "render")]
     pub(crate) const NONE: Self =
         Self { points: 0..0, n_samples: 0, sampler: Sampler::NONE, one_material: true };

@@ -74,7 +74,14 @@ impl StrategySpec {
                 let n_candidates = Some(pilot.optimal_number(&sir));
                 Self::Sir { n_candidates, n_samples, candidates, resampling }
             }
-            spec => spec,
+            Self::Sir { n_candidates: Some(_), .. }
+            | Self::Brdf { .. }
+            | Self::Environment { .. }
+            | Self::Mis { .. }
+            | Self::Product { .. }
+            | Self::Rejection { .. }
+            | Self::MedianCut { .. }
+            | Self::VarianceMinimization { .. } => self,
         }
     }
 }
@@ -157,7 +164,12 @@ impl PreparedStrategy<'_> {
             Self::Product(product) => {
                 product.with_instruction_set(instruction_set).map(Self::Product)
             }
-            other => instruction_set.is_available().then_some(other),
+            Self::Brdf(_)
+            | Self::Environment(_)
+            | Self::Mis(_)
+            | Self::Rejection(_)
+            | Self::Sir(_)
+            | Self::Lights(_) => instruction_set.is_available().then_some(self),
         }
     }
 }
@@ -209,7 +221,12 @@ impl Strategy for PreparedStrategy<'_> {
     fn begin_pass(&self, sampler: Sampler, n_samples: u32) -> Self::Pass {
         match self {
             Self::Product(product) => Some(product.begin_pass(sampler, n_samples)),
-            _ => None,
+            Self::Brdf(_)
+            | Self::Environment(_)
+            | Self::Mis(_)
+            | Self::Rejection(_)
+            | Self::Sir(_)
+            | Self::Lights(_) => None,
         }
     }
 
@@ -242,8 +259,14 @@ impl Strategy for PreparedStrategy<'_> {
         visibility: &[f32],
         scratch: &mut PreparedScratch,
     ) {
-        if let Self::Product(product) = self {
-            product.learn(tile, pushed, visibility, &mut scratch.product);
+        match self {
+            Self::Product(product) => product.learn(tile, pushed, visibility, &mut scratch.product),
+            Self::Brdf(_)
+            | Self::Environment(_)
+            | Self::Mis(_)
+            | Self::Rejection(_)
+            | Self::Sir(_)
+            | Self::Lights(_) => {}
         }
     }
 }

@@ -42,14 +42,14 @@ use crate::math::Vec3;
 use crate::sampling::sampler::SamplePoint;
 use crate::sampling::{Dimension, Pcg32};
 
-/// Which factor of the product directions are drawn from.
+/// The factor of the product that directions are drawn from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Proposal {
     /// The environment, kept by the BRDF.
     Environment,
     /// The BRDF, kept by the environment.
     Brdf,
-    /// At each point the one that keeps more.
+    /// The factor that keeps more samples, chosen at each point.
     ///
     /// With ρ = ∫ f_r cos θ dω, the BRDF's envelope as one of the product has the mass ρ · L_max
     /// (exact where the density follows f_r cos θ), so the environment is better where
@@ -58,12 +58,12 @@ pub enum Proposal {
     Tighter,
 }
 
-/// When to stop.
+/// The rule that ends the tries at a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoppingRule {
     /// After this many tries, at least 1. As many shadow rays as are kept.
     Tries(u32),
-    /// When enough are kept, or after a number of tries. Tries are independent numbers.
+    /// A number of accepted samples, or a number of tries if that is reached first. Tries use independent numbers.
     Accepted {
         /// Directions to keep, at least 2.
         n: u32,
@@ -133,7 +133,7 @@ pub struct RejectionSampling<'a> {
 struct Envelope {
     /// Never [`Proposal::Tighter`].
     proposal: Proposal,
-    /// Of the factor that is not drawn from.
+    /// The bound on the factor that is not drawn from.
     bound: f32,
     /// C.
     mass: f32,

@@ -40,7 +40,7 @@ use crate::sampling::hilbert::hemisphere_index;
 use crate::sampling::rng::hash2;
 use crate::sampling::{Dimension, ONE_MINUS_EPSILON, Sampler, SamplerKind, WeightedReservoirs};
 
-/// Where candidates come from.
+/// The density that candidates are drawn from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Candidates {
     /// The environment, in proportion to luminance.
@@ -63,10 +63,10 @@ impl Candidates {
     }
 }
 
-/// How N of the candidates are picked.
+/// The method that picks N of the candidates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Resampling {
-    /// Each pick by a number of its own; stratified as far as the numbers are.
+    /// A random number for each pick; the picks are stratified as far as the numbers are.
     Multinomial,
     /// N equally spaced picks from one random offset: candidate j is picked ⌊N Wⱼ/ΣW⌋ times or once
     /// more.
@@ -88,9 +88,9 @@ pub struct SamplingImportanceResampling<'a> {
     pub n_candidates: u32,
     /// Picks at each point, at least 1: the most shadow rays.
     pub n_samples: u32,
-    /// Where candidates come from.
+    /// The density that candidates are drawn from.
     pub candidates: Candidates,
-    /// How picks are made.
+    /// The method that picks candidates.
     pub resampling: Resampling,
 }
 

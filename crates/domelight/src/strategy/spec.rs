@@ -42,7 +42,7 @@ pub enum StrategySpec {
         n_environment: u32,
         /// BRDF samples of each camera sample, up to 65,536.
         n_brdf: u32,
-        /// How samples are weighted.
+        /// The heuristic that weights the samples.
         heuristic: Heuristic,
         /// Leaves what is dimmer than the mean radiance to the BRDF samples; needs at least one.
         compensation: bool,
@@ -56,7 +56,7 @@ pub enum StrategySpec {
     Rejection {
         /// The factor of the product that tries are drawn from.
         proposal: Proposal,
-        /// When to stop.
+        /// The rule that ends the tries at a point.
         stop: StoppingRule,
     },
     /// Sampling importance resampling of the product.
@@ -65,19 +65,19 @@ pub enum StrategySpec {
         n_candidates: Option<u32>,
         /// Shadow rays of each camera sample, 1 to 65,536, no more than candidates.
         n_samples: u32,
-        /// Where candidates come from.
+        /// The density that candidates are drawn from.
         candidates: Candidates,
-        /// How rays are picked from candidates.
+        /// The method that picks rays from candidates.
         resampling: Resampling,
     },
     /// The directional lights of median cut; biased.
     MedianCut {
-        /// How many, 1 to 1,048,576.
+        /// The number of lights, 1 to 1,048,576.
         n_lights: u32,
     },
     /// The directional lights of variance minimization; biased.
     VarianceMinimization {
-        /// How many, 1 to 1,048,576.
+        /// The number of lights, 1 to 1,048,576.
         n_lights: u32,
     },
 }
@@ -198,12 +198,18 @@ impl StrategyKind {
     pub fn aliases(self) -> &'static [&'static str] {
         match self {
             Self::Environment => &["env", "em"],
-            _ => &[],
+            Self::Brdf
+            | Self::Mis
+            | Self::Product
+            | Self::Rejection
+            | Self::Sir
+            | Self::MedianCut
+            | Self::VarianceMinimization => &[],
         }
     }
 }
 
-/// What may be said about a strategy beside its name; `None` stands for the default.
+/// The options of a strategy; `None` stands for the default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StrategyOptions {
     /// Shadow rays of each camera sample; samples to accept of rejection.
@@ -214,21 +220,21 @@ pub struct StrategyOptions {
     pub lights: Option<u32>,
     /// Candidates of `sir`.
     pub candidates: Option<u32>,
-    /// Where `sir` draws candidates from.
+    /// The density that `sir` draws candidates from.
     pub from: Option<Candidates>,
-    /// How `sir` picks rays from candidates.
+    /// The method by which `sir` picks rays from candidates.
     pub resampling: Option<Resampling>,
     /// Tries of rejection.
     pub tries: Option<u32>,
     /// What rejection draws its tries from.
     pub proposal: Option<Proposal>,
-    /// How `mis` weights its samples.
+    /// The heuristic that weights the samples of `mis`.
     pub heuristic: Option<Heuristic>,
     /// `mis` draws from the environment's whole table.
     pub no_compensation: bool,
 }
 
-/// Why a text or a set of options is no strategy.
+/// The error of a text or a set of options that describe no strategy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StrategyError {
@@ -323,12 +329,22 @@ impl StrategyOptions {
                 self.rays = Some(number("rays", n, MAX_RAYS)?);
                 self.candidates = Some(number("candidates", m, MAX_CANDIDATES)?);
             }
-            (_, Some(_)) => return Err(StrategyError::TwoNumbers),
+            (
+                K::Brdf
+                | K::Environment
+                | K::Product
+                | K::Rejection
+                | K::MedianCut
+                | K::VarianceMinimization,
+                Some(_),
+            ) => return Err(StrategyError::TwoNumbers),
             (K::Rejection, None) => self.tries = Some(number("tries", first, MAX_CANDIDATES)?),
             (K::MedianCut | K::VarianceMinimization, None) => {
                 self.lights = Some(number("lights", first, MAX_CANDIDATES)?);
             }
-            (_, None) => self.rays = Some(number("rays", first, MAX_RAYS)?),
+            (K::Brdf | K::Environment | K::Mis | K::Product | K::Sir, None) => {
+                self.rays = Some(number("rays", first, MAX_RAYS)?);
+            }
         }
         Ok(())
     }

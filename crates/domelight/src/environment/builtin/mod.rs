@@ -28,7 +28,7 @@ pub enum BuiltinProbe {
     /// A dark room with soft boxes.
     Studio,
     /// A dim nave with small bright windows and lamps: two thirds of the energy in 0.1 % of the pixels
-    /// (62 % at 256 rows, 67 % at 512, 72 % at 1024; finer texels tell glass from lead).
+    /// (62 % at 256 rows, 67 % at 512, 72 % at 1024; finer texels separate glass from lead).
     Cathedral,
     /// Radiance 1 from everywhere, the white furnace.
     Constant,

@@ -172,7 +172,7 @@ impl Sky {
 }
 
 /// Perez 1993 (Preetham et al., equation 3): (1 + A e^{B/cos θ})(1 + C e^{Dγ} + E cos² γ).
-/// Of γ and its cosine.
+/// The luminance distribution, given γ and its cosine.
 fn distribution([a, b, c, d, e]: &[f64; 5], cos_theta: f64, (gamma, cos_gamma): (f64, f64)) -> f64 {
     (1.0 + a * functions::exp(b / cos_theta.max(1e-3)))
         * (1.0 + c * functions::exp(d * gamma) + e * cos_gamma * cos_gamma)

@@ -29,7 +29,7 @@ struct RimCell {
 }
 
 /// Radiance of each of `cells`, continued from the cells of their `rim`; black if there is none.
-/// `is_outside` tells cells that belong neither to a source nor to the rim.
+/// `is_outside` selects cells that belong neither to a source nor to the rim.
 pub(super) fn continue_rim(
     grid: &Grid,
     cells: &[u32],

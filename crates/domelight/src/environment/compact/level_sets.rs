@@ -27,7 +27,7 @@ const BLUR: f64 = 9.0;
 pub(super) struct Peak {
     pub(super) seed: u32,
     pub(super) level: f32,
-    /// Of those cells \[sr\].
+    /// The solid angle of those cells \[sr\].
     pub(super) solid_angle: f64,
     /// ∫ (L − level) dω over them, without the peaks that were found within.
     pub(super) excess: f64,

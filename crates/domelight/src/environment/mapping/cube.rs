@@ -2,7 +2,7 @@
 
 use crate::math::{Vec2, Vec3, vec2};
 
-/// How the faces of a cube are laid out in a picture.
+/// The arrangement of a cube's faces in a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CubeLayout {
     /// 4 × 3 faces: +Y above −Z; then −X, −Z, +X, +Z from left to right; −Y below −Z.
@@ -76,7 +76,7 @@ impl CubeLayout {
     pub const ALL: [Self; 4] =
         [Self::CrossHorizontal, Self::CrossVertical, Self::StripHorizontal, Self::StripVertical];
 
-    /// As in `--mapping`.
+    /// The name that `--mapping` understands.
     pub const fn name(self) -> &'static str {
         match self {
             Self::CrossHorizontal => "cross-horizontal",

@@ -23,7 +23,7 @@ pub(super) type Share = (usize, f64);
 pub(super) struct Overlap<'a> {
     grid: &'a LatLongGrid,
     mapping: Mapping,
-    /// Of the picture whose texels are laid over the grid.
+    /// The size of the picture whose texels are laid over the grid.
     width: usize,
     height: usize,
     /// The texel's outline in columns (unwrapped) and cos θ.
@@ -262,7 +262,7 @@ const POLE: f64 = 1e-13;
 /// The middle of two straight lines from `a` to `b` on the plane with the area of the parabola through `m` (Simpson's
 /// rule); none if the curve bends too much for that.
 fn arc(a: &Vertex, m: &Vertex, b: &Vertex) -> Option<Vertex> {
-    /// Of the triangle (a, m, b) to the square over the line: what is missed is some 4 times its cube.
+    /// The greatest area of the triangle (a, m, b) over the square of the line; the area missed is about 4 times its cube.
     const BEND: f64 = 2e-3;
     let (Some(_), Some(longitude), Some(_)) = (a.longitude, m.longitude, b.longitude) else {
         return is_meridian(&[a, m, b].map(|v| v.longitude)).then_some(*m);

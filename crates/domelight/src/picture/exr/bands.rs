@@ -17,7 +17,7 @@ use std::io::{Cursor, Seek, SeekFrom, Write};
 /// Rows of a band, if it is not the last: whole blocks, some for each of several cores.
 pub const BAND_ROWS: usize = 4 * BLOCK_ROWS;
 
-/// Of deflated blocks; the others have a divisor of it.
+/// Rows of a deflated block; other compressions have a divisor of it.
 const BLOCK_ROWS: usize = 16;
 
 /// Blocks compressed together: enough for all cores, few enough to need little memory.

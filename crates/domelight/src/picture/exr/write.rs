@@ -31,7 +31,7 @@ pub enum Plane {
 }
 
 impl Plane {
-    /// How many values.
+    /// The number of values.
     pub fn len(&self) -> usize {
         match self {
             Self::Float(values) => values.len(),
@@ -45,7 +45,7 @@ impl Plane {
     }
 }
 
-/// How much time is spent on a smaller file; nothing is lost either way.
+/// The lossless compression of a file: speed or size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compression {
     /// Deflate: the smaller file.
@@ -75,17 +75,17 @@ pub struct ExrLayers {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Where the first column and row lie in the whole picture: the data window's corner.
+    /// Position of the first column and row in the whole picture: the data window's corner.
     pub origin: (usize, usize),
     /// Columns and rows of the whole picture, the display window; by default the data window.
     pub whole: Option<(usize, usize)>,
-    /// In any order; the file sorts channels by name.
+    /// The layers, in any order; the file sorts channels by name.
     pub layers: Vec<Layer>,
     /// String attributes (name, value), for provenance.
     pub attributes: Vec<(String, String)>,
     /// The `envmap` attribute.
     pub envmap: Option<EnvmapKind>,
-    /// How the file is compressed; not kept by [`ExrLayers::decode`].
+    /// The compression of the file; not kept by [`ExrLayers::decode`].
     pub compression: Compression,
 }
 

@@ -5,7 +5,8 @@
 //! irradiance as the angle changes. The dome becomes the world: an environment texture, whose
 //! middle Blender shows at +X where ours is at +Y. The world is Z-up.
 //!
-//! A script that runs again replaces the collection and the world "domelight" of its former run.
+//! A script that runs again replaces the collection and the world "domelight" of its former run, the world's picture
+//! included; without a dome that world stays, black.
 //!
 //! The console runs a line at a time: blocks have no empty lines within, and one after them.
 
@@ -31,8 +32,18 @@ def remove_former_lights():
             bpy.data.lights.remove(light)
     bpy.data.collections.remove(former)
 
+def remove_former_world():
+    world = bpy.data.worlds.get("domelight")
+    if world is None or world.node_tree is None:
+        return
+    nodes = world.node_tree.nodes
+    pictures = {node.image for node in nodes if node.type == "TEX_ENVIRONMENT" and node.image is not None}
+    nodes.clear()
+    for picture in pictures:
+        if picture.users == 0:
+            bpy.data.images.remove(picture)
+
 def add_lights():
-    remove_former_lights()
     collection = bpy.data.collections.new("domelight")
     bpy.context.scene.collection.children.link(collection)
     for name, toward, color, strength, angle in LIGHTS:
@@ -42,6 +53,8 @@ def add_lights():
         sun.rotation_euler = Vector(toward).to_track_quat("Z", "Y").to_euler()
         collection.objects.link(sun)
 
+remove_former_lights()
+remove_former_world()
 add_lights()
 "#;
 
@@ -58,7 +71,7 @@ def set_world():
     world = bpy.data.worlds.get("domelight") or bpy.data.worlds.new("domelight")
     world.use_nodes = True
     nodes, link = world.node_tree.nodes, world.node_tree.links.new
-    nodes.clear()
+    nodes.clear()  # What Blender puts into a new one.
     place = nodes.new("ShaderNodeTexCoord")
     turn = nodes.new("ShaderNodeMapping")
     turn.inputs["Rotation"].default_value = (0, 0, DOME_ROTATION)

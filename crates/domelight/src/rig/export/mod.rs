@@ -11,6 +11,7 @@ mod gltf;
 mod json;
 mod mitsuba;
 mod pbrt;
+mod program;
 mod radiance;
 mod sibl;
 mod text;
@@ -30,7 +31,7 @@ use crate::environment::{Environment, Orientation};
 pub struct RigExport<'a> {
     /// The probe's name, for comments.
     pub probe: &'a str,
-    /// How the probe stands in the world, whose axes [`RigLight::direction`] is over.
+    /// The orientation of the probe in the world, whose axes [`RigLight::direction`] refers to.
     pub orientation: Orientation,
     /// The lights: compact ones first.
     pub lights: &'a [RigLight],
@@ -246,7 +247,14 @@ impl Format {
             Self::Mitsuba => "'$' and control characters",
             Self::Sibl => "'\"' and control characters",
             Self::Radiance => "control characters and with quotes of one kind at the most",
-            _ => "control characters",
+            Self::Json
+            | Self::Csv
+            | Self::Gltf
+            | Self::Glb
+            | Self::Usd
+            | Self::Blender
+            | Self::Pbrt
+            | Self::Three => "control characters",
         }
     }
 

@@ -1,10 +1,10 @@
-//! A three.js module: `addLights(scene)` puts the lights into a scene.
+//! A three.js module: `await addRig(scene)` puts the lights and the dome into a scene.
 //!
 //! A light is a `DirectionalLight`: color times intensity is the irradiance of a surface that
 //! faces it \[W·m⁻²\]; it shines from its position to its target. It has no size. The dome is a
 //! `LightProbe` of nine harmonics of radiance, whose order and signs are ours; it lights matte
-//! surfaces. `setDome(scene, texture)` lights by a picture of the dome instead, reflections
-//! included, whose middle three.js expects at +X where ours is at −Z. +Y is up.
+//! surfaces. Where the picture of the dome was written beside the module, `addRig` loads it and lights by it instead,
+//! reflections included; three.js expects its middle at +X where ours is at −Z. +Y is up.
 
 use super::RigExport;
 use super::axes::Axes;
@@ -46,18 +46,58 @@ export function setDome(scene, texture) {
   scene.environmentRotation.set(0, domeRotation, 0);
   scene.backgroundRotation.copy(scene.environmentRotation);
 }
+
+/**
+ * Adds the rig to the scene and returns it. The dome is its picture, if there is one: it is loaded from beside this
+ * module, lights the scene and is seen behind it.
+ */
+export async function addRig(scene) {
+  const rig = addLights(scene, { probe: dome === null });
+  if (dome !== null) setDome(scene, await loadDome());
+  return rig;
+}
 "#;
+
+/// Where there is a picture of the dome.
+const LOAD_DOME: &str = r#"
+async function loadDome() {
+  const path = dome.split("/").map(encodeURIComponent).join("/");
+  return new PictureLoader().setDataType(THREE.FloatType).loadAsync(new URL(path, import.meta.url).href);
+}
+"#;
+
+/// Where there is none.
+const NO_DOME: &str = "\nexport const dome = null;\n";
+
+/// The loader of three.js that reads a picture of that name, its module; none of formats that it has no loader for.
+fn loader(file: &str) -> Option<&'static str> {
+    let (_, extension) = file.rsplit_once('.')?;
+    match extension.to_ascii_lowercase().as_str() {
+        "exr" => Some("EXRLoader"),
+        "hdr" | "pic" | "rgbe" => Some("HDRLoader"),
+        _ => None,
+    }
+}
 
 pub(super) fn encode(rig: &RigExport) -> Code<JavaScript> {
     let axes = Axes::with_up(rig, UpAxis::Y);
+    let picture = rig.dome_file().and_then(|file| Some((file, loader(file)?)));
+    let import = picture.map_or(Code::default(), |(_, loader)| {
+        code!(
+            JavaScript,
+            "import {{ {loader} as PictureLoader }} from \"three/addons/loaders/{loader}.js\";\n",
+            loader = loader,
+        )
+    });
     let mut text = code!(
         JavaScript,
         "// The lights of {probe}, by domelight.\n\
-         // import {{ addLights }} from \"./rig.js\"; addLights(scene);\n\
-         import * as THREE from \"three\";\n\n\
+         // import {{ addRig }} from \"./rig.js\"; await addRig(scene);\n\
+         import * as THREE from \"three\";\n{import}\n\
          // Toward the light; linear color times intensity is irradiance.\n\
          export const lights = [\n",
-        probe = javascript::comment(rig.probe)
+        probe = javascript::comment(rig.probe),
+        import = import,
     );
     for (light, name) in rig.lights.iter().zip(rig.names()) {
         let (color, intensity) = color_and_strength(light.irradiance);
@@ -90,12 +130,23 @@ pub(super) fn encode(rig: &RigExport) -> Code<JavaScript> {
          const domeRotation = {turn};\n",
         turn = turn,
     );
+    match picture {
+        None => text += NO_DOME,
+        Some((file, _)) => {
+            text += code!(
+                JavaScript,
+                "\n// The picture of the residual map, beside this module.\nexport const dome = {file};\n",
+                file = javascript::string(file),
+            );
+            text += LOAD_DOME;
+        }
+    }
     text + FUNCTIONS
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests_support::with_example;
+    use super::super::tests_support::{with_dome_file, with_example};
     use super::*;
     use crate::environment::Orientation;
     use crate::rig::SphericalHarmonics;
@@ -127,6 +178,25 @@ mod tests {
                 row.trim_start_matches("  [").split(',').next().unwrap().parse().unwrap()
             };
             assert!((first(rows[1]) - 1.0).abs() < 1e-6 && first(rows[2]).abs() < 1e-6, "{rows:?}");
+        });
+    }
+
+    #[test]
+    fn a_picture_of_the_dome_is_loaded_where_three_js_can() {
+        for (file, loader) in [("d.exr", "EXRLoader"), ("my \"d\".HDR", "HDRLoader")] {
+            with_dome_file(file, |rig| {
+                let text = encode(rig).into_string();
+                let import = format!(
+                    "import {{ {loader} as PictureLoader }} from \"three/addons/loaders/{loader}.js\";"
+                );
+                assert!(text.contains(&import), "{text}");
+                let name = file.replace('"', "\\\"");
+                assert!(text.contains(&format!("export const dome = \"{name}\";")), "{text}");
+            });
+        }
+        with_dome_file("d.pfm", |rig| {
+            let text = encode(rig).into_string();
+            assert!(text.contains("export const dome = null;") && !text.contains("addons"));
         });
     }
 

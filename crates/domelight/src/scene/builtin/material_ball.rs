@@ -8,7 +8,7 @@ use crate::geometry::Mesh;
 use crate::math::{FRAC_PI_2, Mat4, PI, Vec2, Vec3, functions, rotation_x, rotation_z, vec2};
 
 /// Height of the ball's center above the floor; its radius is 1.
-pub const CENTER_HEIGHT: f32 = 1.14;
+pub(crate) const CENTER_HEIGHT: f32 = 1.14;
 
 /// Half the width of the girdle.
 const GIRDLE: f32 = 0.17;
@@ -22,7 +22,7 @@ const RECESS: f32 = 0.36;
 const SEGMENTS: u32 = 192;
 
 /// The ball: a sphere of radius 1 cut in at its girdle and recessed at its upper pole.
-pub fn ball() -> Mesh {
+pub(crate) fn ball() -> Mesh {
     let lower = lip(GIRDLE, -1.0);
     let upper = lip(GIRDLE, 1.0);
     let mut profile = arc(Vec2::ZERO, 1.0, -FRAC_PI_2, lower.angle, 48);
@@ -37,14 +37,14 @@ pub fn ball() -> Mesh {
 }
 
 /// The core, seen in the girdle.
-pub fn core() -> Mesh {
+pub(crate) fn core() -> Mesh {
     let mut mesh = uv_sphere(SEGMENTS, SEGMENTS / 2);
     mesh.transform(&Mat4::from_scale(Vec3::splat(CORE)));
     placed(mesh)
 }
 
 /// The cradle, standing on y = 0.
-pub fn cradle() -> Mesh {
+pub(crate) fn cradle() -> Mesh {
     let mut profile = vec![Vec2::ZERO];
     profile.extend(arc(vec2(0.80, 0.02), 0.02, -FRAC_PI_2, 0.0, 6));
     profile.extend(arc(vec2(0.80, 0.06), 0.02, 0.0, FRAC_PI_2, 6));

@@ -3,9 +3,9 @@
 //! Each shows what one question needs: self-shadowing, roughness, a material, or a plain sphere whose
 //! every normal is seen. [`BuiltinScene::environment`] is the light that suits.
 
-pub mod material_ball;
+pub(crate) mod material_ball;
 pub mod shapes;
-pub mod statue;
+pub(crate) mod statue;
 mod surface_nets;
 
 use std::fmt;

@@ -1,4 +1,4 @@
-//! Elementary shapes as meshes: spheres, a disc, a bevelled box, surfaces of revolution.
+//! Elementary shapes as meshes: spheres, a disc, a beveled box, surfaces of revolution.
 //!
 //! All triangles are counter-clockwise seen from outside and all normals are those of the exact
 //! surface. Where two patches meet (a seam of texture coordinates, a crease) vertices are doubled
@@ -191,21 +191,21 @@ fn seam_u(i: u32, segments: u32) -> f32 {
 
 /// A box of the given half extents round the origin, its edges and corners rounded by `bevel`
 /// (less than the least half extent) in `steps` (≥ 1) pieces either side of each edge.
-pub fn bevelled_box(half: Vec3, bevel: f32, steps: u32) -> Mesh {
+pub fn beveled_box(half: Vec3, bevel: f32, steps: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for axis in 0..3 {
         for sign in [1.0, -1.0] {
-            bevelled_face(&mut mesh, half, bevel, steps, axis, sign);
+            beveled_face(&mut mesh, half, bevel, steps, axis, sign);
         }
     }
     mesh
 }
 
-/// The side of a bevelled box that faces `sign` along `axis`, out to the middle of its bevels.
+/// The side of a beveled box that faces `sign` along `axis`, out to the middle of its bevels.
 ///
 /// A point q of the sharp box goes to core + bevel · (q − core)/|q − core|, core the nearest point
 /// of the box of half extents half − bevel.
-fn bevelled_face(mesh: &mut Mesh, half: Vec3, bevel: f32, steps: u32, axis: usize, sign: f32) {
+fn beveled_face(mesh: &mut Mesh, half: Vec3, bevel: f32, steps: u32, axis: usize, sign: f32) {
     let (b_axis, c_axis) = ((axis + 1) % 3, (axis + 2) % 3);
     let core_half = half - bevel;
     let ticks = bevel_ticks(steps);

@@ -12,7 +12,7 @@ use crate::geometry::{Aabb, Mesh};
 use crate::math::{FRAC_PI_2, PI, Vec2, Vec3, functions, vec2, vec3};
 
 /// Height of the plinth's top above the floor.
-pub const PLINTH_HEIGHT: f32 = 0.8;
+pub(crate) const PLINTH_HEIGHT: f32 = 0.8;
 
 /// Edge of a grid cell.
 const CELL: f32 = 0.0178;
@@ -28,7 +28,7 @@ const FLUTES: f32 = 24.0;
 const FLUTE_DEPTH: f32 = 0.034;
 
 /// The sculpture, standing on y = 0 (on the plinth: move it up by [`PLINTH_HEIGHT`]).
-pub fn figure() -> Mesh {
+pub(crate) fn figure() -> Mesh {
     let bounds = Aabb { min: vec3(-0.85, -0.12, -0.85), max: vec3(0.85, 2.5, 0.85) };
     surface_nets(&figure_distance, &bounds, CELL, LIPSCHITZ)
 }
@@ -125,8 +125,8 @@ fn smooth_step(from: f32, to: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// A round plinth on y = 0: a foot, a torus, a drum between two hollows and a slab, all bevelled.
-pub fn plinth() -> Mesh {
+/// A round plinth on y = 0: a foot, a torus, a drum between two hollows and a slab, all beveled.
+pub(crate) fn plinth() -> Mesh {
     let top = PLINTH_HEIGHT;
     let mut profile = vec![Vec2::ZERO];
     // Foot.

@@ -146,9 +146,9 @@ impl Grid {
 
 /// The crossed cells.
 struct Cells {
-    /// Of each grid cell its entry in `sheets`, or [`NO_CELL`].
+    /// The entry in `sheets` of each grid cell, or [`NO_CELL`].
     index: Vec<u32>,
-    /// Of each edge of a crossed cell 12 more than the vertex of the sheet that crosses it.
+    /// For each edge of a crossed cell, 12 more than the vertex of the sheet that crosses it.
     sheets: Vec<[u32; 12]>,
 }
 

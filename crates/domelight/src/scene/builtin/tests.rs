@@ -64,7 +64,7 @@ fn solids() -> Vec<(&'static str, Mesh)> {
     vec![
         ("icosphere", shapes::icosphere(3)),
         ("uv sphere", shapes::uv_sphere(31, 17)),
-        ("box", shapes::bevelled_box(vec3(1.0, 0.5, 0.7), 0.1, 4)),
+        ("box", shapes::beveled_box(vec3(1.0, 0.5, 0.7), 0.1, 4)),
         ("ring", shapes::lathe(&square, 24)),
         ("figure", statue::figure()),
         ("plinth", statue::plinth()),
@@ -96,7 +96,7 @@ fn shapes_have_the_volumes_of_the_solids_they_approach() {
     for (mesh, expected) in [
         (shapes::icosphere(5), 4.0 / 3.0 * PI),
         (shapes::uv_sphere(256, 128), 4.0 / 3.0 * PI),
-        (shapes::bevelled_box(vec3(1.0, 0.5, 0.7), 1e-3, 2), 8.0 * 0.35),
+        (shapes::beveled_box(vec3(1.0, 0.5, 0.7), 1e-3, 2), 8.0 * 0.35),
         (shapes::lathe(&square, 256), ring),
         (shapes::lathe(&slab, 256), 0.5 * PI),
     ] {

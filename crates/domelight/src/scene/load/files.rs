@@ -12,7 +12,7 @@ pub type Resolver<'r> = dyn Fn(&Path) -> io::Result<Vec<u8>> + 'r;
 
 /// The files that a scene refers to.
 pub(super) enum Files<'r> {
-    /// Of the file system.
+    /// Files of the file system.
     System,
     /// Those that the caller gives.
     Given(&'r Resolver<'r>),

@@ -9,7 +9,7 @@
 //! | glTF, GLB | triangles, skins, morph targets | all of the standard's extensions as data | all |
 //! | TOML | the above and built-in meshes | by text or table | yes |
 //!
-//! The format is told by the first bytes where they are telling (PLY, GLB), else by the extension, else by the first
+//! The format is recognized by the first bytes where they are unambiguous (PLY, GLB), else by the extension, else by the first
 //! word (`OFF`, `solid`).
 //! Every loader checks what it reads before it takes memory for it; bad input is a [`LoadError`]
 //! that names the file and the place, never a panic.
@@ -81,22 +81,22 @@ impl Loaded {
 /// The albedo of meshes that come without a material.
 const DEFAULT_ALBEDO: Rgb = Rgb::splat(0.6);
 
-/// Where the files may be that a scene refers to.
+/// The folders that a scene's files may be in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reach {
     /// Anywhere; files outside of the scene's folder are read with one warning.
     #[default]
     Anywhere,
-    /// In the scene's folder and the folders in it, links followed: for programs that serve others.
+    /// The scene's folder and the folders in it, links followed: for programs that serve others.
     OwnFolder,
 }
 
-/// How a file is read.
+/// Options for reading a scene's file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
     /// The most that meshes and textures together take of the memory \[bytes\]; by default there is no limit.
     pub max_memory: Option<u64>,
-    /// Where files may be that the scene refers to.
+    /// The folders that the scene's files may be in.
     pub reach: Reach,
     /// Whether a file is refused that requires an extension which is not known (glTF), refers to an image or a material
     /// library that cannot be read (glTF, OBJ), or has a vertex whose position is NaN or infinite; else what can be drawn
@@ -276,7 +276,7 @@ pub fn load(path: impl AsRef<Path>) -> Result<Loaded, LoadError> {
     load_with(path, &LoadOptions::default())
 }
 
-/// As [`load`], within limits.
+/// Does what [`load`] does, within limits.
 ///
 /// # Errors
 /// As [`load`]; what would exceed the memory allowed is refused before it is taken, and a file before it is read. Also
@@ -288,8 +288,8 @@ pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
     Ok(finish(load_file(path, &bytes, false, budget, options)?, path, budget))
 }
 
-/// As [`load_with`], from a file's bytes. `name` is the file's own path, for messages and for a format that the
-/// content does not tell; `resolver` gives the bytes of the files that it refers to, whose paths are relative to the
+/// Does what [`load_with`] does, from a file's bytes. `name` is the file's own path, for messages and for a format that the
+/// content does not determine; `resolver` gives the bytes of the files that it refers to, whose paths are relative to the
 /// folder of `name`.
 ///
 /// ```

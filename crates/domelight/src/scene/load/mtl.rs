@@ -67,9 +67,9 @@ struct Entry {
     roughness: Option<f32>,
     metallic: Option<f32>,
     emission: Option<Rgb>,
-    /// Of `d`.
+    /// Opacity by `d`.
     opacity: Option<f32>,
-    /// Of `Tr`.
+    /// Transparency by `Tr`.
     transparency: Option<f32>,
     diffuse_texture: Option<TextureRef>,
     roughness_texture: Option<TextureRef>,

@@ -1,8 +1,8 @@
-//! What a loader passes over, told once for each kind.
+//! The features that a loader ignores, reported once for each kind.
 
 use std::collections::HashMap;
 
-/// Names that are told of a kind; of more, only how many.
+/// The most names reported of a kind; beyond them only their number is.
 const MAX_NAMES: usize = 3;
 
 /// Kinds of what is passed over, in the order of their first appearance, each with what it befell.

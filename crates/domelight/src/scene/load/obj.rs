@@ -7,7 +7,7 @@
 //! A corner without normal gets the smooth one of its position, computed over the whole file, so
 //! that seams of texture coordinates and materials do not show.
 //!
-//! Written for this program: the crate tobj tells no line numbers, and its arithmetic overflows on
+//! Written for this program: the crate tobj reports no line numbers, and its arithmetic overflows on
 //! relative indices out of range.
 
 use std::collections::{HashMap, HashSet};

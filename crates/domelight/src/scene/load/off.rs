@@ -94,7 +94,7 @@ struct Kind {
     coordinates: Coordinates,
 }
 
-/// Of a position.
+/// How many coordinates a position has.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Coordinates {
     #[default]

@@ -1,8 +1,13 @@
 //! Candidates from the material: samples of several hits side by side.
 
-use super::candidates::{Candidate, Hits, PixelSamples, Sources};
+use super::candidate::Candidate;
+use super::cells::Cells;
+use super::hits::Hits;
+use super::strata::PixelSamples;
+use super::table::Table;
 use crate::Rgb;
 use crate::bsdf::Brdf as _;
+use crate::environment::Environment;
 use crate::math::Vec3;
 use crate::sampling::Dimension;
 use crate::simd::{
@@ -108,6 +113,18 @@ pub(super) struct BrdfSampleBatch {
     texels: [[i32; LANES]; 2],
 }
 
+/// What the samples of the material are weighted against: the strata of a table.
+#[derive(Clone, Copy)]
+pub(super) struct BesideStrata<'a> {
+    pub(super) environment: &'a Environment,
+    pub(super) cells: &'a Cells,
+    pub(super) table: &'a Table,
+    /// Number of strata M over the total of the table.
+    pub(super) strata: f32,
+    /// Number of samples of the material N.
+    pub(super) n_brdf: f32,
+}
+
 /// What samples of the material meet on the map.
 #[derive(Default)]
 struct LightLookup {
@@ -126,20 +143,20 @@ impl LightLookup {
     }
 }
 
-impl Sources<'_> {
-    /// Draws `n` samples of the material, and asks for the texels that they look at: far from each other, and seldom in
-    /// a near cache.
+impl BrdfSampleBatch {
+    /// Draws `n` samples of the material, and prefetches the texels that they look at, which are far from each other and
+    /// seldom in a near cache.
     #[inline(always)]
-    pub(super) fn draw_samples<S: Simd>(
-        &self,
+    pub(super) fn draw<S: Simd>(
         simd: S,
+        environment: &Environment,
         hits: Hits,
         numbers: &PixelSamples,
         n: usize,
-        drawn: &mut Vec<BrdfSampleBatch>,
+        drawn: &mut Vec<Self>,
     ) {
         drawn.clear();
-        let map = self.environment.map();
+        let map = environment.map();
         for first in (0..n).step_by(LANES) {
             let samples = BrdfSamples::new(hits, numbers, first..n.min(first + LANES));
             let wi = samples.sample(simd, hits);
@@ -149,40 +166,40 @@ impl Sources<'_> {
             let above = zero.lt(wi.dot_each(Vectors::load(simd, &samples.ng)));
             let possible = zero.lt(pdf) & pdf.le(simd.splat(f32::MAX)) & above;
             let possible = possible.bits() & ((1 << samples.n) - 1);
-            let texels = self.environment.texels_at(wi);
+            let texels = environment.texels_at(wi);
             for lane in set_bits(possible) {
                 let [column, row] = [texels[0][lane], texels[1][lane]].map(|i| i as usize);
                 simd.prefetch(&map.row(row)[column]);
             }
             let (wi, f, pdf) = (wi.store(), f.store(), pdf.store());
-            drawn.push(BrdfSampleBatch { possible, hits: samples.hits, wi, f, pdf, texels });
+            drawn.push(Self { possible, hits: samples.hits, wi, f, pdf, texels });
         }
     }
 
-    /// Adds samples of the material, weighed with `counts`: M over the total of the table, and N.
+    /// Adds the samples as candidates, weighted beside the strata of the table by the balance heuristic.
     #[inline(always)]
-    pub(super) fn weigh_samples<S: Simd>(
+    pub(super) fn weigh<S: Simd>(
         &self,
         simd: S,
-        drawn: &BrdfSampleBatch,
-        counts: [f32; 2],
+        beside: &BesideStrata,
         candidates: &mut Vec<Candidate>,
     ) {
+        let BesideStrata { environment, cells, table, strata, n_brdf } = *beside;
         let mut found = LightLookup::default();
-        let at = |lane: usize| Vec3::from(drawn.wi.map(|c| c[lane]));
-        for lane in set_bits(drawn.possible) {
-            let texel = drawn.texels.map(|i| i[lane] as usize);
-            let Some(cell) = self.cells.at_texel(self.environment, texel, at(lane)) else {
+        let at = |lane: usize| Vec3::from(self.wi.map(|c| c[lane]));
+        for lane in set_bits(self.possible) {
+            let texel = self.texels.map(|i| i[lane] as usize);
+            let Some(cell) = cells.at_texel(environment, texel, at(lane)) else {
                 continue;
             };
-            let le = self.environment.map().get(texel[0], texel[1]);
-            found.push(lane, self.cells.slot(cell), le);
+            let le = environment.map().get(texel[0], texel[1]);
+            found.push(lane, cells.slot(cell), le);
         }
-        let (le, f) = (Colors::load(simd, &found.le), Colors::load(simd, &drawn.f));
+        let (le, f) = (Colors::load(simd, &found.le), Colors::load(simd, &self.f));
         let slots = simd.load_i32(&found.slots);
-        let within = le.luminance() / S::F32x8::gather(&self.cells.mass, slots);
-        let density = simd.splat(counts[0]) * self.table.widths(slots) * within
-            + simd.splat(counts[1]) * simd.load(&drawn.pdf);
+        let within = le.luminance() / S::F32x8::gather(&cells.mass, slots);
+        let density = simd.splat(strata) * table.widths(slots) * within
+            + simd.splat(n_brdf) * simd.load(&self.pdf);
         let value = f.zip(le, |f, le| f * le).scaled(simd.splat(1.0) / density);
         let (value, luminance) = (value.store(), value.luminance().store());
         for lane in set_bits(found.lanes) {
@@ -191,7 +208,7 @@ impl Sources<'_> {
                 value: Rgb::from(value.map(|c| c[lane])),
                 luminance: luminance[lane],
                 slot: found.slots[lane] as u32,
-                hit: drawn.hits[lane] as u32,
+                hit: self.hits[lane] as u32,
                 selection_probability: 0,
             });
         }

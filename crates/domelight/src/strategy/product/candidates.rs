@@ -14,63 +14,18 @@
 //! N/n in expectation.
 
 use super::super::ShadingPoint;
-use super::brdf_samples::BrdfSampleBatch;
+use super::brdf_samples::{BesideStrata, BrdfSampleBatch};
+use super::candidate::{Candidate, CandidateBlock};
 use super::cells::Cells;
 use super::control_variate::ControlVariate;
+use super::hits::Hits;
 use super::light_samples::{LightSamplePool, LightSamples};
+use super::strata::{Counts, PixelSamples, Strata, StratumAssignment};
 use super::table::Table;
 use crate::Rgb;
 use crate::bsdf::Bsdf;
 use crate::environment::Environment;
-use crate::math::Vec3;
-use crate::sampling::{Dimension, Sampler};
-use crate::simd::{LANES, Lanes, Simd, SimdF32x8, SimdFloat, SimdI32x8};
-
-/// A direction that may become a shadow ray.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Candidate {
-    /// World direction.
-    pub(super) wi: Vec3,
-    /// W.
-    pub(super) value: Rgb,
-    /// Its luminance.
-    pub(super) luminance: f32,
-    /// The slot of the cell where its light is.
-    pub(super) slot: u32,
-    /// Which hit of the pixel.
-    pub(super) hit: u32,
-    /// π, as [`choose`](super::systematic) has it.
-    pub(super) selection_probability: u32,
-}
-
-/// Candidates of one hit side by side.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct CandidateBlock {
-    pub(super) wi: [Lanes; 3],
-    /// Black in a lane without a candidate.
-    pub(super) value: [Lanes; 3],
-    /// W without what the control variate knows of it.
-    pub(super) residual: [Lanes; 3],
-    pub(super) luminance: Lanes,
-    pub(super) slots: [i32; LANES],
-    /// π of each.
-    pub(super) selection_probabilities: [i32; LANES],
-}
-
-impl CandidateBlock {
-    /// One of them, of hit `hit`.
-    #[inline(always)]
-    pub(super) fn get(&self, lane: usize, hit: u32) -> Candidate {
-        Candidate {
-            wi: Vec3::from(self.wi.map(|c| c[lane])),
-            value: Rgb::from(self.value.map(|c| c[lane])),
-            luminance: self.luminance[lane],
-            slot: self.slots[lane] as u32,
-            hit,
-            selection_probability: self.selection_probabilities[lane] as u32,
-        }
-    }
-}
+use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat, SimdI32x8};
 
 /// The candidates of a pixel.
 #[derive(Clone, Debug, Default)]
@@ -89,104 +44,6 @@ pub(super) struct Candidates {
     drawn: Vec<BrdfSampleBatch>,
 }
 
-/// The assignment of strata to hits: stratum k belongs to hit (k − r) mod n.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct StratumAssignment {
-    /// M.
-    n_strata: usize,
-    /// n.
-    pub(super) n_hits: usize,
-    /// r.
-    shift: usize,
-}
-
-impl StratumAssignment {
-    /// Of M strata to n hits, shifted by a number in [0, 1).
-    pub(super) fn new(n_strata: usize, n_hits: usize, shift: f32) -> Self {
-        Self { n_strata, n_hits, shift: (shift * n_hits as f32) as usize % n_hits.max(1) }
-    }
-
-    /// Blocks of each hit.
-    pub(super) fn blocks(self) -> usize {
-        self.n_strata.div_ceil(self.n_hits.max(1)).div_ceil(LANES)
-    }
-
-    /// The first stratum of a hit; every n-th follows.
-    #[inline(always)]
-    fn first(self, hit: usize) -> usize {
-        let k = hit + self.shift;
-        if k < self.n_hits { k } else { k - self.n_hits }
-    }
-
-    /// The places of strata 0 to M − 1 in blocks of hits that follow each other.
-    #[inline(always)]
-    pub(super) fn indices(self) -> impl Iterator<Item = CandidateIndex> {
-        let (n, stride) = (self.n_hits, self.blocks() * LANES);
-        let start = if self.shift == 0 { 0 } else { n - self.shift };
-        let mut next = CandidateIndex { hit: start, lane: start * stride };
-        let mut left = n;
-        (0..self.n_strata).map(move |_| {
-            let index = next;
-            next.hit += 1;
-            next.lane += stride;
-            if next.hit == n {
-                next = CandidateIndex { hit: 0, lane: next.lane - n * stride };
-            }
-            left -= 1;
-            if left == 0 {
-                next.lane += 1;
-                left = n;
-            }
-            index
-        })
-    }
-}
-
-/// Where a stratum's candidate is.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct CandidateIndex {
-    pub(super) hit: usize,
-    /// Counted through all blocks.
-    pub(super) lane: usize,
-}
-
-/// Strata of a table that share one random offset.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Strata {
-    /// M.
-    pub(super) n: usize,
-    /// ξ in [0, 1).
-    pub(super) offset: f32,
-    /// Their width in the running sum.
-    pub(super) width: f32,
-    /// What none may reach.
-    total: f32,
-}
-
-impl Strata {
-    /// `n` strata of a table of the given total.
-    pub(super) fn new(n: usize, offset: f32, total: f32) -> Self {
-        Self { n, offset, width: total / n as f32, total }
-    }
-
-    /// Where strata `first`, `first` + `step`, … fall in the running sum.
-    #[inline(always)]
-    pub(super) fn positions<S: Simd>(&self, simd: S, first: usize, step: usize) -> S::F32x8 {
-        let k = simd.iota().to_f32() * simd.splat(step as f32) + simd.splat(first as f32);
-        let last = simd.splat(self.total * (1.0 - f32::EPSILON));
-        ((k + simd.splat(self.offset)) * simd.splat(self.width)).min(last)
-    }
-}
-
-/// How many candidates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Counts {
-    /// Strata of the table.
-    pub(super) light: usize,
-    /// Samples of the material.
-    pub(super) brdf: usize,
-}
-
 /// Where candidates come from.
 pub(super) struct Sources<'a> {
     pub(super) environment: &'a Environment,
@@ -195,31 +52,6 @@ pub(super) struct Sources<'a> {
     pub(super) table: &'a Table,
     /// None if visibility is not known.
     pub(super) control_variate: Option<&'a ControlVariate>,
-}
-
-/// The random numbers of a pixel in a pass.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PixelSamples {
-    /// The offset of all strata.
-    pub(super) strata: f32,
-    /// The offset of the choice of rays.
-    pub(super) choice: f32,
-    /// Shifts of the hits against the strata and against the samples of the material.
-    shift: [f32; 2],
-    pub(super) sampler: Sampler,
-}
-
-impl PixelSamples {
-    /// From a sampler that serves this pixel in this pass alone.
-    pub(super) fn new(sampler: Sampler) -> Self {
-        let [strata, choice, a, b] = sampler.numbers(Dimension::Resampling, 0).0;
-        Self { strata, choice, shift: [a, b], sampler }
-    }
-
-    /// The hit of sample `j` of the material, of `n` hits.
-    pub(super) fn brdf_hit(&self, j: usize, n: usize) -> usize {
-        (j + (self.shift[1] * n as f32) as usize) % n
-    }
 }
 
 impl Sources<'_> {
@@ -236,12 +68,14 @@ impl Sources<'_> {
     ) {
         let total = self.table.total();
         let n_strata = if total > 0.0 { counts.light } else { 0 };
-        let assignment = StratumAssignment::new(n_strata, hits.points.len(), numbers.shift[0]);
+        let assignment =
+            StratumAssignment::new(n_strata, hits.points.len(), numbers.strata_shift());
         let strata = Strata::new(n_strata, numbers.strata, total);
         let scale = if n_strata > 0 { n_strata as f32 / total } else { 0.0 };
         candidates.assignment = assignment;
-        // First, for what they look at comes from far.
-        self.draw_samples(simd, hits, numbers, counts.brdf, &mut candidates.drawn);
+        // Begin with the samples of the material: the texels that they look at take long to arrive.
+        let drawn = &mut candidates.drawn;
+        BrdfSampleBatch::draw(simd, self.environment, hits, numbers, counts.brdf, drawn);
         candidates.lights.clear();
         if n_strata > 0 {
             let Candidates { slots, cell_starts, .. } = &mut *candidates;
@@ -259,9 +93,11 @@ impl Sources<'_> {
             }
         }
         candidates.brdf.clear();
+        let Self { environment, cells, table, .. } = *self;
+        let n_brdf = counts.brdf as f32;
+        let beside = BesideStrata { environment, cells, table, strata: scale, n_brdf };
         for drawn in &candidates.drawn {
-            let counts = [scale, counts.brdf as f32];
-            self.weigh_samples(simd, drawn, counts, &mut candidates.brdf);
+            drawn.weigh(simd, &beside, &mut candidates.brdf);
         }
     }
 
@@ -302,21 +138,6 @@ impl Sources<'_> {
             slots: slots.store(),
             selection_probabilities: [0; LANES],
         }
-    }
-}
-
-/// The camera hits of a pixel.
-#[derive(Clone, Copy)]
-pub(super) struct Hits<'a> {
-    pub(super) points: &'a [ShadingPoint],
-    /// The material of the first is that of all.
-    pub(super) one_material: bool,
-}
-
-impl<'a> Hits<'a> {
-    /// The material that a hit is sampled by.
-    pub(super) fn bsdf(self, hit: usize) -> &'a Bsdf {
-        &self.points[if self.one_material { 0 } else { hit }].bsdf
     }
 }
 

@@ -129,7 +129,7 @@ enum Link {
 /// The cells of an environment.
 #[derive(Clone, Debug)]
 pub(super) struct Cells {
-    /// Of each lane.
+    /// Rows of each lane.
     rows: usize,
     /// Along the curve.
     squares: Vec<Square>,

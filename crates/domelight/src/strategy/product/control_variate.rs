@@ -170,9 +170,10 @@ impl ControlVariate {
 
 #[cfg(test)]
 mod tests {
-    use super::super::candidates::{Candidates, Counts, Hits, PixelSamples, Sources};
-    use super::super::hits::Groups;
+    use super::super::candidates::{Candidates, Sources};
+    use super::super::hits::{Groups, Hits};
     use super::super::light_samples::PassLength;
+    use super::super::strata::{Counts, PixelSamples};
     use super::super::table::Table;
     use super::super::test_support::{hit, sky};
     use super::*;

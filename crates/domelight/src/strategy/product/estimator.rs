@@ -9,9 +9,11 @@
 //!
 //! The terms of V alone are rays; all others are the pixel's base, known without them.
 
-use super::candidates::{Counts, Hits, PixelSamples, Sources};
+use super::candidates::Sources;
 use super::cells::Cells;
+use super::hits::Hits;
 use super::rays::Rays;
+use super::strata::{Counts, PixelSamples};
 use super::systematic::SystematicSampler;
 use super::visibility::{Blocks, VisibilityStats};
 use super::{LightSamplePool, ProductSampling, ProductScratch, TOLERANCE};
@@ -20,19 +22,19 @@ use crate::simd::{Kernel, Simd};
 use crate::strategy::levels::coarser;
 use crate::strategy::{Contributions, PixelPoints, ShadingPoint, TileShading};
 
-/// A round over a tile.
-pub(super) struct Round<'a, 'e> {
+/// Estimates a tile in one round.
+pub(super) struct TileEstimator<'a, 'e> {
     pub(super) strategy: &'a ProductSampling<'e>,
     pub(super) cells: &'a Cells,
     pub(super) pool: &'a LightSamplePool,
     pub(super) tile: &'a TileShading<'a>,
-    /// Of the first level: nothing is known of visibility yet.
+    /// The first level, where nothing is known of visibility yet.
     pub(super) pilots: bool,
     pub(super) scratch: &'a mut ProductScratch,
     pub(super) out: &'a mut Contributions,
 }
 
-impl Kernel for Round<'_, '_> {
+impl Kernel for TileEstimator<'_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -54,7 +56,7 @@ impl Kernel for Round<'_, '_> {
     }
 }
 
-impl Round<'_, '_> {
+impl TileEstimator<'_, '_> {
     /// Chooses the rays of a pixel, and gives its points what they reflect without them.
     #[inline(always)]
     fn sample_pixel<S: Simd>(&mut self, simd: S, i: usize, pixel: &PixelPoints, block: usize) {
@@ -85,8 +87,8 @@ impl Round<'_, '_> {
 
     /// Fills the table, and beside pilots the control variate.
     ///
-    /// Of a diffuse pixel, whose reflected light the control variate knows exactly, the table is proportional to what is
-    /// left: the standard deviation of visibility.
+    /// For diffuse pixels, where the control variate is exact, the density is proportional to the uncertainty of
+    /// visibility.
     #[inline(always)]
     fn tabulate_product<S: Simd>(&mut self, simd: S, block: usize, counts: Counts) {
         let cells = self.cells;
@@ -107,7 +109,7 @@ impl Round<'_, '_> {
 
     /// The random numbers of a pixel in the pass.
     fn pixel_numbers(&self, pixel: &PixelPoints) -> PixelSamples {
-        // The first camera sample that hits tells passes apart.
+        // The first camera sample that hits distinguishes passes.
         PixelSamples::new(pixel.sampler.part(self.tile.samples[pixel.points.start]))
     }
 
@@ -190,8 +192,8 @@ impl TileShading<'_> {
 }
 
 impl ProductSampling<'_> {
-    /// How bright a pixel will be: the harmonic mean over those of lower levels about it, for a dark one among
-    /// them tells of a shadow's edge.
+    /// How bright a pixel will be: the harmonic mean over those of lower levels about it, because a dark one
+    /// among them marks the edge of a shadow.
     fn expected_brightness(
         &self,
         tile: &TileShading,

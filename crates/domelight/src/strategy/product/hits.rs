@@ -1,9 +1,25 @@
-//! The camera hits of a pixel in groups that look alike: one table serves a group.
+//! The camera hits of a pixel, in groups of like normals and materials: one table serves a group.
 
-use super::candidates::{Counts, Hits};
+use super::super::ShadingPoint;
+use super::strata::Counts;
 use crate::Rgb;
-use crate::bsdf::{GlossyLobe, LobeSummary};
+use crate::bsdf::{Bsdf, GlossyLobe, LobeSummary};
 use crate::math::{Frame, Vec3};
+
+/// The camera hits of a pixel.
+#[derive(Clone, Copy)]
+pub(super) struct Hits<'a> {
+    pub(super) points: &'a [ShadingPoint],
+    /// The material of the first is that of all.
+    pub(super) one_material: bool,
+}
+
+impl<'a> Hits<'a> {
+    /// The material that a hit is sampled by.
+    pub(super) fn bsdf(self, hit: usize) -> &'a Bsdf {
+        &self.points[if self.one_material { 0 } else { hit }].bsdf
+    }
+}
 
 /// Hits of like normals and materials.
 #[derive(Clone, Debug)]
@@ -155,7 +171,7 @@ fn near_normals(a: Option<Vec3>, b: Option<Vec3>) -> bool {
     }
 }
 
-/// Of the same kinds of lobes, about as rough.
+/// Whether both have the same kinds of lobes, of about the same roughness.
 fn alike(a: &LobeSummary, b: &LobeSummary) -> bool {
     let near = |a: f32, b: f32| a < LIKE_ROUGHNESS * b && b < LIKE_ROUGHNESS * a;
     // The width of the lobe falls as the square root of the exponent.

@@ -17,13 +17,13 @@ pub(super) const PER_CELL: usize = 32;
 /// How long a pass is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PassLength {
-    /// Up to 8 camera samples: the pixels' own errors hide what coarser cells and fewer directions err by.
+    /// A pass of up to 8 camera samples: the error of coarser cells and fewer directions is small beside the pixels' own.
     Short,
     Long,
 }
 
 impl PassLength {
-    /// Of a pass of so many camera samples.
+    /// The length of a pass with this number of camera samples.
     pub(super) fn new(n_samples: usize) -> Self {
         if n_samples <= 8 { Self::Short } else { Self::Long }
     }
@@ -74,7 +74,7 @@ pub(super) struct LightSamples<F> {
 }
 
 impl LightSamplePool {
-    /// Of no light.
+    /// The pool of a black environment.
     pub(super) fn empty() -> Self {
         let lights = vec![LightSample([0.0; LANES]); N_LIGHT_SAMPLES].into_boxed_slice();
         let lights = lights.try_into().expect("as many as asked for");

@@ -15,7 +15,8 @@
 //! base = Σ_c V̂_c ∫ h L + Σ_j V̂_j (W_j − h_j L_j/p_j) − Σ_chosen (W_j/π_j) V̂_j        rays: weight W_j/π_j
 //! ```
 //!
-//!    The table of a diffuse pixel, whose light h knows, is proportional to the uncertainty of visibility.
+//!    For diffuse pixels, where the control variate is exact, the density is proportional to the uncertainty of
+//!    visibility.
 //!
 //! The expectation is ∫ f L V dω for every V̂, brightness and pool, given that they do not depend on
 //! the numbers that strata, samples and choice are drawn with: V̂ and brightness come from pixels of lower levels,
@@ -29,6 +30,7 @@
 //! Sampling on CPU and GPU", learns visibility for the density.
 
 mod brdf_samples;
+mod candidate;
 mod candidates;
 mod cells;
 mod control_variate;
@@ -36,6 +38,7 @@ mod estimator;
 mod hits;
 mod light_samples;
 mod rays;
+mod strata;
 mod systematic;
 mod table;
 #[cfg(test)]
@@ -53,12 +56,13 @@ use crate::environment::Environment;
 use crate::math::functions;
 use crate::sampling::Sampler;
 use crate::simd::{InstructionSet, dispatch};
-use candidates::{CandidateIndex, Candidates, Counts};
+use candidates::Candidates;
 use cells::Cells;
 use control_variate::ControlVariate;
-use estimator::Round;
+use estimator::TileEstimator;
 use hits::Groups;
 use light_samples::PassLength;
+use strata::{CandidateIndex, Counts};
 use table::Table;
 use visibility::{VisibilityEstimate, VisibilityStats};
 
@@ -73,8 +77,8 @@ const PILOT: usize = 2;
 /// Candidates of a pixel in a pass, for the sake of memory.
 const MAX_CANDIDATES: u32 = 1 << 14;
 
-/// Of the candidates one in this many comes from the material, where the table does not know it well: where normals
-/// spread or the view is oblique, and of lobes narrower than most cells.
+/// One candidate in this many comes from the material where the table approximates it badly: where normals spread or
+/// the view is oblique, and for lobes narrower than most cells.
 const BRDF_SHARE: [usize; 2] = [8, 4];
 
 /// The roughness below which a lobe is narrower than most cells.
@@ -87,12 +91,12 @@ const TOLERANCE: [f32; 2] = [0.15, 0.35];
 /// Pixels darker than this share of the environment's mean are not held to their own brightness.
 const DARK: f32 = 0.15;
 
-/// Up to N rays a camera sample, where light, reflectance and visibility say.
+/// Product sampling: up to N rays for each camera sample, in proportion to light, reflectance and learned visibility.
 #[derive(Clone, Debug)]
 pub struct ProductSampling<'a> {
-    /// Of texels that are about as wide as high, so that cells are.
+    /// The environment with texels about as wide as high, so that cells are.
     environment: Cow<'a, Environment>,
-    /// Of short passes and of long ones; none under a black sky.
+    /// The cells of short passes and of long ones; none under a black sky.
     cells: Option<[Cells; 2]>,
     /// Luminance below which brightness does not count.
     dark: f32,
@@ -101,8 +105,9 @@ pub struct ProductSampling<'a> {
 }
 
 impl<'a> ProductSampling<'a> {
-    /// With at most `n_rays` ≥ 1 shadow rays for each camera sample that hits, in pilots (one pixel of 16) twice as
-    /// many. It is the number of candidates: those that cannot change the pixel visibly are not traced.
+    /// Product sampling with at most `n_rays` ≥ 1 shadow rays for each camera sample that hits, and twice as many in
+    /// pilots (one pixel of 16). This is the number of candidates; those that cannot change the pixel visibly are not
+    /// traced.
     pub fn new(environment: &'a Environment, n_rays: u32) -> Self {
         let mean = environment.power() / (4.0 * std::f64::consts::PI);
         let environment = environment.reshaped().map_or(Cow::Borrowed(environment), Cow::Owned);
@@ -163,7 +168,7 @@ pub struct ProductScratch {
     /// The chosen strata's candidates.
     chosen: Vec<CandidateIndex>,
     visibility: VisibilityEstimate,
-    /// Of each ray of the round the slot of the cell that it goes to.
+    /// The slot of the cell that each ray of the round goes to.
     targets: Vec<u16>,
     /// The pixels of the round that have hits.
     sampled_pixels: Vec<usize>,
@@ -213,8 +218,8 @@ impl Strategy for ProductSampling<'_> {
             return;
         }
         let pilots = round == 0;
-        let context = Round { strategy: self, cells, pool, tile, pilots, scratch, out };
-        dispatch(self.instruction_set, context);
+        let estimator = TileEstimator { strategy: self, cells, pool, tile, pilots, scratch, out };
+        dispatch(self.instruction_set, estimator);
     }
 
     fn learn(

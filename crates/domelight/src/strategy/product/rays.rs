@@ -3,8 +3,10 @@
 //! Systematic sampling with unequal probabilities π and the estimator Σ W/π: Horvitz & Thompson 1952, "A
 //! Generalization of Sampling Without Replacement from a Finite Universe".
 
-use super::candidates::{Candidate, CandidateIndex, Candidates};
+use super::candidate::Candidate;
+use super::candidates::Candidates;
 use super::cells::{CellArray, get};
+use super::strata::CandidateIndex;
 use super::systematic::{SystematicSampler, probabilities, probability, weight};
 use crate::Rgb;
 use crate::simd::{Colors, LANES, Simd, SimdF32x8};
@@ -14,7 +16,7 @@ use crate::strategy::{Contributions, PixelPoints};
 pub(super) struct Rays<'a> {
     pub(super) pixel: &'a PixelPoints,
     pub(super) out: &'a mut Contributions,
-    /// Of each ray the slot of the cell that it goes to.
+    /// The slot of the cell that each ray goes to.
     pub(super) targets: &'a mut Vec<u16>,
 }
 

@@ -89,7 +89,7 @@ mod tests {
         }
     }
 
-    /// Of n candidates with π = p, n p are chosen, give or take one.
+    /// The number chosen of n candidates with π = p is n p, give or take one.
     #[test]
     fn the_choice_is_systematic() {
         let mut sampler = SystematicSampler::new(0.3);

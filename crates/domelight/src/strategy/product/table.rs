@@ -14,10 +14,10 @@
 //! The running sum of the table is a distribution along the curve. Its M strata share one random
 //! offset: stratum k falls at u = (k + ξ)/M.
 
-use super::candidates::{Strata, StratumAssignment};
 use super::cells::{CellArray, Cells, MAX_ROWS, TABLE_ROWS, ZERO_CELLS};
 use super::control_variate::ControlVariate;
 use super::hits::Group;
+use super::strata::{Strata, StratumAssignment};
 use crate::bsdf::GlossyLobe;
 use crate::math::{FRAC_1_PI, Frame, Vec3, sqr};
 use crate::simd::{LANES, LaneMask, Simd, SimdF32x8, SimdFloat, SimdI32x8, Vectors};
@@ -114,7 +114,7 @@ impl Table {
         visible: &CellArray,
         std_dev: &CellArray,
     ) {
-        /// Of the light of a cell across the horizon, the variance that its control variate leaves.
+        /// The relative variance that the control variate leaves in the light of a cell across the horizon.
         const ACROSS: f32 = 0.1;
         let one = |x| simd.splat_f32x16(x);
         for pair in cells.pairs() {
@@ -404,9 +404,8 @@ fn center<S: Simd>(simd: S, cells: &Cells, pair: usize) -> Vectors<S::F32x16> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::candidates::Hits;
     use super::super::cells::{MAX_ROWS, get};
-    use super::super::hits::Groups;
+    use super::super::hits::{Groups, Hits};
     use super::super::test_support::{hit, sky};
     use super::*;
     use crate::math::vec3;

@@ -45,7 +45,7 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Of a tile of pixels.
+    /// The blocks of a tile of this size \[pixels\].
     pub(super) fn new(width: usize, height: usize) -> Self {
         Self { width: width.div_ceil(BLOCK), height: height.div_ceil(BLOCK) }
     }

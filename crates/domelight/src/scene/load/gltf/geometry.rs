@@ -20,7 +20,7 @@ pub(super) struct Vertices {
     /// Joints and weights, four a vertex and a set.
     pub(super) joints: Vec<Vec<[u32; 4]>>,
     pub(super) weights: Vec<Vec<[f32; 4]>>,
-    /// Of the morph targets that any placement uses.
+    /// The morph targets that any placement uses, by index.
     pub(super) targets: BTreeMap<usize, Target>,
 }
 

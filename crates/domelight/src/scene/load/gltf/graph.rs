@@ -19,7 +19,7 @@ const MAX_DEPTH: usize = 200;
 pub(super) struct Placement {
     pub(super) world: Mat4,
     pub(super) skin: Option<usize>,
-    /// Of the morph targets; empty: the mesh's own.
+    /// Weights of the morph targets; where empty, the mesh's own apply.
     pub(super) weights: Vec<f32>,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct Graph<'g, 's> {
     /// The places of each mesh.
     pub(super) placements: BTreeMap<usize, Vec<Placement>>,
     pub(super) cameras: Vec<NamedCamera>,
-    /// Of the nodes that were reached.
+    /// World transforms of the nodes that were reached.
     worlds: Vec<Option<Mat4>>,
     /// The joints of skins.
     skins: RefCell<HashMap<usize, Rc<[Mat4]>>>,

@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use super::error::{Failure, GltfErrorKind};
 use super::json;
 use super::ktx2::{Ktx2, is_ktx2};
-use super::source::{Source, View, percent_decoded};
+use super::source::{Source, ViewBytes, percent_decoded};
 use crate::scene::load::textures::Textures;
 use crate::scene::load::{LoadError, read_referenced, relative};
 use crate::scene::{Encoding, Texture, TextureFilter, TextureRef, UvTransform, Wrap};
@@ -164,11 +164,11 @@ impl<'a> Images<'a> {
             (Some(uri), _) if in_file(uri) => {
                 let path = relative(source.path, &percent_decoded(uri));
                 let bytes = read_referenced(&path, &referrer, source.budget)?;
-                (path.display().to_string(), View::Decoded(bytes.into()))
+                (path.display().to_string(), ViewBytes::Decoded(bytes.into()))
             }
             (Some(uri), _) => {
                 let bytes = source.uri("image", index, uri)?;
-                (format!("image {index}"), View::Decoded(bytes.into()))
+                (format!("image {index}"), ViewBytes::Decoded(bytes.into()))
             }
             (None, Some(view)) => (format!("image {index}"), source.view(view)?.0),
             (None, None) => {

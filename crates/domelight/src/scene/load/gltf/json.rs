@@ -182,7 +182,7 @@ pub(super) struct SparseData {
     pub(super) buffer_view: usize,
     #[serde(default)]
     pub(super) byte_offset: u64,
-    /// Of the indices; values are of their accessor's type.
+    /// The type of the indices; values have the type of their accessor.
     pub(super) component_type: Option<u32>,
 }
 
@@ -413,7 +413,7 @@ pub(super) struct TextureInfo {
     pub(super) index: usize,
     #[serde(default)]
     pub(super) tex_coord: u32,
-    /// Of a normal map.
+    /// The factor on a normal map's x and y.
     #[serde(default = "one")]
     pub(super) scale: f32,
     #[serde(default)]

@@ -34,18 +34,18 @@ pub(super) struct Source<'a> {
     buffers: Vec<OnceCell<Cow<'a, [u8]>>>,
     /// Decompressed views.
     decoded: RefCell<HashMap<usize, Rc<[u8]>>>,
-    /// Of [`MAX_ZEROS`].
+    /// What is left of [`MAX_ZEROS`].
     zeros_left: Cell<usize>,
     warnings: RefCell<Vec<String>>,
 }
 
 /// The bytes of a buffer view.
-pub(super) enum View<'b> {
+pub(super) enum ViewBytes<'b> {
     Plain(&'b [u8]),
     Decoded(Rc<[u8]>),
 }
 
-impl Deref for View<'_> {
+impl Deref for ViewBytes<'_> {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
@@ -163,16 +163,16 @@ impl<'a> Source<'a> {
     }
 
     /// The bytes of a buffer view, decompressed, and their stride if it has one.
-    pub(super) fn view(&self, index: usize) -> Result<(View<'_>, Option<usize>), Failure> {
+    pub(super) fn view(&self, index: usize) -> Result<(ViewBytes<'_>, Option<usize>), Failure> {
         let view: BufferView = self.document.get(index)?;
         let BufferView { buffer, byte_offset, byte_length, byte_stride, extensions } = &view;
         let Some(c) = extensions.compression() else {
             let bytes = self.buffer(*buffer)?;
             let bytes = slice(bytes, *byte_offset, *byte_length, "buffer view", index)?;
-            return Ok((View::Plain(bytes), *byte_stride));
+            return Ok((ViewBytes::Plain(bytes), *byte_stride));
         };
         if let Some(bytes) = self.decoded.borrow().get(&index) {
-            return Ok((View::Decoded(bytes.clone()), *byte_stride));
+            return Ok((ViewBytes::Decoded(bytes.clone()), *byte_stride));
         }
         let stream = self.buffer(c.buffer)?;
         let stream = slice(stream, c.byte_offset, c.byte_length, "buffer view", index)?;
@@ -181,7 +181,7 @@ impl<'a> Source<'a> {
         let problem = |source| GltfErrorKind::Meshopt { view: index, source };
         let bytes: Rc<[u8]> = meshopt::decode(stream, c).map_err(problem)?.into();
         self.decoded.borrow_mut().insert(index, bytes.clone());
-        Ok((View::Decoded(bytes), *byte_stride))
+        Ok((ViewBytes::Decoded(bytes), *byte_stride))
     }
 }
 

@@ -104,7 +104,7 @@ impl<'e> BenchStrategy<'e> {
 }
 
 /// Measures one renderer at increasing sample counts.
-pub(super) struct StrategyRun<'a> {
+pub(super) struct BenchRun<'a> {
     source: Source<'a>,
     metric: &'a ErrorMetric,
     /// Camera samples of the least budget, and the factor from one to the next.
@@ -123,7 +123,7 @@ enum Source<'a> {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct BudgetPoint {
     pub(super) spp: u32,
-    /// Of rendering alone; wall-clock seconds where the system does not tell.
+    /// CPU seconds of rendering alone; wall-clock seconds where the system does not report them.
     pub(super) cpu_seconds: Vec<f64>,
     pub(super) wall_seconds: Vec<f64>,
     /// Over the pixels that show any of the scene, without that of the reference.
@@ -131,9 +131,9 @@ pub(super) struct BudgetPoint {
     /// Over the pixels that the scene fills; files of before had these alone, as `rel_mse`.
     #[serde(default)]
     pub(super) rel_mse_covered: Vec<f64>,
-    /// Camera samples of a pixel, as counted; null where a program does not tell.
+    /// Camera samples of a pixel, as counted; null where a program does not report them.
     pub(super) camera_samples: Option<f64>,
-    /// Of a pixel that the scene covers; null where a program does not tell.
+    /// Shadow rays of a pixel that the scene covers; null where a program does not report them.
     pub(super) shadow_rays: Option<f64>,
     /// Camera and shadow rays a CPU second.
     pub(super) rays_per_cpu_second: Option<f64>,
@@ -185,27 +185,24 @@ pub(super) struct Limits {
     pub(super) n_seeds: u32,
 }
 
-impl<'a> StrategyRun<'a> {
+impl<'a> BenchRun<'a> {
     pub(super) fn ours(
         prepared: &'a BenchStrategy<'a>,
         built: &'a BuiltCase,
         metric: &'a ErrorMetric,
         host: &'a dyn Host,
-    ) -> StrategyRun<'a> {
+    ) -> BenchRun<'a> {
         let BuiltCase { view, settings, .. } = built;
         let (view, settings, strategy) = (view.view(), *settings, &prepared.strategy);
         let render_setup = RenderSetup { view, settings, strategy, host, shown: Shown::Unseen };
         let source = Source::Ours { prepared, render_setup };
-        StrategyRun { source, metric, first: 1, growth: 2, budget_points: Vec::new() }
+        BenchRun { source, metric, first: 1, growth: 2, budget_points: Vec::new() }
     }
 
     /// Its correlated points are made for square numbers.
-    pub(super) fn mitsuba(
-        mitsuba: &'a RefCell<Mitsuba>,
-        metric: &'a ErrorMetric,
-    ) -> StrategyRun<'a> {
+    pub(super) fn mitsuba(mitsuba: &'a RefCell<Mitsuba>, metric: &'a ErrorMetric) -> BenchRun<'a> {
         let source = Source::Mitsuba(mitsuba);
-        StrategyRun { source, metric, first: 4, growth: 4, budget_points: Vec::new() }
+        BenchRun { source, metric, first: 4, growth: 4, budget_points: Vec::new() }
     }
 
     fn measure(&self, n_samples: u32, seed: u64) -> Result<Measurement, Error> {
