@@ -4,8 +4,9 @@ use domelight::environment::{Environment, UpAxis};
 use domelight::scene::{CameraSettings, EnvironmentSettings, Projection};
 use serde::Serialize;
 
+use crate::depth_of_field::DepthOfField;
+use crate::ground::Ground;
 use crate::names::display_name;
-use crate::scene::{DepthOfField, Ground};
 
 /// A scene under its light, seen by a camera.
 #[derive(Clone, Debug, Serialize)]

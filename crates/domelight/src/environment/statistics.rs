@@ -313,16 +313,19 @@ mod tests {
 
     #[test]
     fn a_peak_that_fades_is_no_plateau() {
-        // Rounded as Radiance pictures are: many texels of a smooth peak share a value.
-        let rounded = |x: f32| (x * 128.0).round() / 128.0;
-        let map = RgbImage::from_fn(256, 128, |x, y| {
-            let d = (x as f32 - 100.0).hypot(y as f32 - 50.0);
-            Rgb::splat(rounded(1.0 + 127.0 * (-d * d / 200.0).exp()))
-        });
-        assert_eq!(ProbeStatistics::new(&map).plateau, None);
-        let clipped =
-            RgbImage { pixels: map.pixels.iter().map(|p| p.map(|c| c.min(20.0))).collect(), ..map };
-        assert!(ProbeStatistics::new(&clipped).plateau.is_some_and(|p| p.value == 20.0));
+        // Rounded, more coarsely than Radiance pictures are: several texels of a smooth peak share the greatest value.
+        let rounded = |x: f32| 2.0 * (0.5 * x).round();
+        let peak = |variance: f32, clip: f32| {
+            RgbImage::from_fn(256, 128, |x, y| {
+                let d = (x as f32 - 100.0).hypot(y as f32 - 50.0);
+                Rgb::splat(rounded(1.0 + 127.0 * (-0.5 * d * d / variance).exp()).min(clip))
+            })
+        };
+        assert_eq!(ProbeStatistics::new(&peak(100.0, f32::INFINITY)).plateau, None);
+        let clipped = ProbeStatistics::new(&peak(5.0, 20.0)).plateau;
+        assert!(clipped.is_some_and(|p| p.value == 20.0), "{clipped:?}");
+        // As wide as this it may well be a window.
+        assert_eq!(ProbeStatistics::new(&peak(100.0, 20.0)).plateau, None);
         assert_eq!(ProbeStatistics::new(&RgbImage::filled(8, 4, Rgb::WHITE)).plateau, None);
     }
 

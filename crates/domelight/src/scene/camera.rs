@@ -9,10 +9,8 @@
 //! so pixel centers lie at +½, pixels are square and `fov` is the vertical field of view. The
 //! orthographic camera moves the origin instead, with height/2 in the place of tan(fov/2).
 
-use super::Scene;
-use super::framing::{Framing, corners};
 use crate::bvh::Frustum;
-use crate::geometry::{Aabb, Ray, power_of_two};
+use crate::geometry::{Ray, power_of_two};
 use crate::math::{Mat4, TAU, Vec2, Vec3, functions, vec2};
 use crate::sampling::warp::concentric_disk;
 
@@ -169,15 +167,6 @@ impl CameraSettings {
     /// The vertical field of view of [`CameraSettings::framing`] \[degrees\].
     pub const DEFAULT_FOV_Y_DEGREES: f32 = 35.0;
 
-    /// A view from the front, 20° from above, that fits `bounds` into a picture of `aspect` = width / height with a
-    /// small margin; [`Framing`] has other views, and [`Scene::framed`] fits the scene's vertices, which is tighter.
-    ///
-    /// Empty or infinite bounds are taken as the cube from −1 to 1, an `up` of zero as +Y.
-    pub fn framing(bounds: &Aabb, aspect: f32, up: Vec3) -> Self {
-        let corners = if bounds.is_empty() { None } else { Some(corners(bounds)) };
-        Framing::new(aspect, up).fit(corners.into_iter().flatten())
-    }
-
     /// Checks that the settings make a picture.
     ///
     /// # Errors
@@ -259,21 +248,6 @@ struct LensPlane {
 }
 
 impl Camera {
-    /// The scene's own camera, or one that frames the scene, for a picture of `width` × `height` pixels, each at
-    /// least 1. A camera of the file that makes no picture gives way to the framing one.
-    ///
-    /// # Panics
-    /// If width or height are zero.
-    pub fn framing(scene: &Scene, width: usize, height: usize) -> Self {
-        assert!(width > 0 && height > 0, "a picture of {width} x {height} has no pixels");
-        let aspect = width as f32 / height as f32;
-        let up = scene.up_axis().vector();
-        let framed = || scene.framed(&Framing::new(aspect, up));
-        Self::new(&scene.camera(aspect), width, height)
-            .or_else(|_| Self::new(&framed(), width, height))
-            .expect("framing settings make a picture")
-    }
-
     /// The camera of a picture of `width` × `height` pixels.
     ///
     /// # Errors
@@ -409,7 +383,7 @@ fn direction(v: Vec3) -> Option<Vec3> {
 }
 
 /// Forward, right and up as an orthonormal basis.
-fn basis(settings: &CameraSettings) -> Result<[Vec3; 3], CameraError> {
+pub(super) fn basis(settings: &CameraSettings) -> Result<[Vec3; 3], CameraError> {
     let CameraSettings { origin, target, up, .. } = *settings;
     for (name, value) in [("origin", origin), ("target", target), ("up vector", up)] {
         if !value.is_finite() {
@@ -489,36 +463,6 @@ mod tests {
         assert!((camera.ray(10.0, 5.0).origin - s.origin).length() < 1e-6);
         let width = (camera.ray(0.0, 5.0).origin - camera.ray(20.0, 5.0).origin).length();
         assert!((width - 6.0).abs() < 1e-5);
-    }
-
-    #[test]
-    fn framing_fits_the_bounds() {
-        let bounds = Aabb { min: vec3(-3.0, 1.0, 2.0), max: vec3(4.0, 2.0, 9.0) };
-        for up in [Vec3::Y, Vec3::Z, vec3(0.0, 1.0, 1.0)] {
-            for (w, h) in [(300, 100), (100, 100), (100, 300)] {
-                let s = CameraSettings::framing(&bounds, w as f32 / h as f32, up);
-                Camera::new(&s, w, h).unwrap();
-                let [f, r, u] = basis(&s).unwrap();
-                let t = 17.5f32.to_radians().tan();
-                for i in 0..8 {
-                    let pick = |k: i32, lo: f32, hi: f32| if i >> k & 1 == 0 { lo } else { hi };
-                    let corner = vec3(
-                        pick(0, bounds.min.x, bounds.max.x),
-                        pick(1, bounds.min.y, bounds.max.y),
-                        pick(2, bounds.min.z, bounds.max.z),
-                    ) - s.origin;
-                    let z = f.dot(corner);
-                    assert!(z > 0.0);
-                    assert!(r.dot(corner).abs() < z * t * w as f32 / h as f32);
-                    assert!(u.dot(corner).abs() < z * t);
-                }
-            }
-        }
-        let s = CameraSettings::framing(&bounds, 1.0, Vec3::Y);
-        assert!(s.origin.z > bounds.max.z && s.origin.y > bounds.max.y);
-        for odd in [Aabb::EMPTY, Aabb { min: Vec3::ONE, max: Vec3::ONE }] {
-            Camera::new(&CameraSettings::framing(&odd, 1.0, Vec3::ZERO), 4, 4).unwrap();
-        }
     }
 
     /// Rays through one point of the picture meet at the focus distance, and start all over the aperture.

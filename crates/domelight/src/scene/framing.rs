@@ -8,7 +8,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::camera::{CameraSettings, Projection};
+use super::Scene;
+use super::camera::{Camera, CameraSettings, Projection};
 use crate::geometry::Aabb;
 use crate::math::{Vec3, functions};
 
@@ -268,11 +269,38 @@ pub(super) fn corners(bounds: &Aabb) -> [Vec3; 8] {
     std::array::from_fn(|i| Vec3::new(ends[i & 1].x, ends[i >> 1 & 1].y, ends[i >> 2 & 1].z))
 }
 
+impl CameraSettings {
+    /// A view from the front, 20° from above, that fits `bounds` into a picture of `aspect` = width / height with a
+    /// small margin; [`Framing`] has other views, and [`Scene::framed`] fits the scene's vertices, which is tighter.
+    ///
+    /// Empty or infinite bounds are taken as the cube from −1 to 1, an `up` of zero as +Y.
+    pub fn framing(bounds: &Aabb, aspect: f32, up: Vec3) -> Self {
+        let corners = if bounds.is_empty() { None } else { Some(corners(bounds)) };
+        Framing::new(aspect, up).fit(corners.into_iter().flatten())
+    }
+}
+
+impl Camera {
+    /// The scene's own camera, or one that frames the scene, for a picture of `width` × `height` pixels, each at
+    /// least 1. A camera of the file that makes no picture gives way to the framing one.
+    ///
+    /// # Panics
+    /// If width or height are zero.
+    pub fn framing(scene: &Scene, width: usize, height: usize) -> Self {
+        assert!(width > 0 && height > 0, "a picture of {width} x {height} has no pixels");
+        let aspect = width as f32 / height as f32;
+        let up = scene.up_axis().vector();
+        let framed = || scene.framed(&Framing::new(aspect, up));
+        Self::new(&scene.camera(aspect), width, height)
+            .or_else(|_| Self::new(&framed(), width, height))
+            .expect("framing settings make a picture")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::vec3;
-    use crate::scene::Camera;
     use crate::scene::builtin::shapes;
 
     /// The least and the greatest of the picture's coordinates, from −1 to 1, at which points are seen.
@@ -394,5 +422,35 @@ mod tests {
         assert_eq!(wide.fit([Vec3::ZERO, Vec3::ONE].into_iter()), {
             framing.fit([Vec3::ZERO, Vec3::ONE].into_iter())
         });
+    }
+
+    #[test]
+    fn framing_fits_the_bounds() {
+        let bounds = Aabb { min: vec3(-3.0, 1.0, 2.0), max: vec3(4.0, 2.0, 9.0) };
+        for up in [Vec3::Y, Vec3::Z, vec3(0.0, 1.0, 1.0)] {
+            for (w, h) in [(300, 100), (100, 100), (100, 300)] {
+                let s = CameraSettings::framing(&bounds, w as f32 / h as f32, up);
+                Camera::new(&s, w, h).unwrap();
+                let [f, r, u] = crate::scene::camera::basis(&s).unwrap();
+                let t = 17.5f32.to_radians().tan();
+                for i in 0..8 {
+                    let pick = |k: i32, lo: f32, hi: f32| if i >> k & 1 == 0 { lo } else { hi };
+                    let corner = vec3(
+                        pick(0, bounds.min.x, bounds.max.x),
+                        pick(1, bounds.min.y, bounds.max.y),
+                        pick(2, bounds.min.z, bounds.max.z),
+                    ) - s.origin;
+                    let z = f.dot(corner);
+                    assert!(z > 0.0);
+                    assert!(r.dot(corner).abs() < z * t * w as f32 / h as f32);
+                    assert!(u.dot(corner).abs() < z * t);
+                }
+            }
+        }
+        let s = CameraSettings::framing(&bounds, 1.0, Vec3::Y);
+        assert!(s.origin.z > bounds.max.z && s.origin.y > bounds.max.y);
+        for odd in [Aabb::EMPTY, Aabb { min: Vec3::ONE, max: Vec3::ONE }] {
+            Camera::new(&CameraSettings::framing(&odd, 1.0, Vec3::ZERO), 4, 4).unwrap();
+        }
     }
 }
