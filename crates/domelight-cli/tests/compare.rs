@@ -327,7 +327,7 @@ fn pictures_of_other_renderers_take_part() {
     // The same picture but for its noise, by this program.
     let render = ["render", "sphere", "--env", "sky", "--env-rows", "16", "--size", "20x16", "-q"];
     let render = |name: &str| {
-        let more = ["--spp", "8", "--strategy", "brdf", "-o", name];
+        let more = ["--spp", "32", "--strategy", "product", "-o", name];
         common::done(&domelight(&folder, &[&render[..], &more].concat()));
     };
     render("others/cycles.1.5s.exr");

@@ -185,7 +185,7 @@ mod tests {
             ),
             (
                 &["farm", "slurm", "--shards", "2", "--spp", "4", "--ground", "--spp=5"],
-                "--ground --spp=5",
+                "--ground=plate --spp=5",
             ),
             (&["farm", "slurm", "--shards", "2", "--env=--shards"], "--env=--shards"),
         ] {

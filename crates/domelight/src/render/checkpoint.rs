@@ -156,7 +156,9 @@ impl Checkpoint {
         let get = |of: &'a [(String, String)], name: &str| {
             of.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value)
         };
-        let names = self.identity.iter().chain(identity).map(|(name, _)| name.as_str());
+        // First the size: a camera that frames the scene depends on it.
+        let all = self.identity.iter().chain(identity).map(|(name, _)| name.as_str());
+        let names = std::iter::once("size").chain(all);
         names
             .map(|name| Difference {
                 name,
