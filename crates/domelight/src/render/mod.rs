@@ -107,7 +107,7 @@ pub struct RenderSettings {
     pub adaptive: bool,
     /// A tile is finished before its samples are, but not before 16, when two independent sets of them suggest no more
     /// than this relMSE: the mean over its pixels of error² of the luminance over (luminance² + 0.01), and one standard
-    /// error of that. Tiles that stop so have the error within a factor of 1.5 on average; those that 16 samples are
+    /// error of that. Tiles that stop so have the error within a factor of 2 on average; those that 16 samples are
     /// more than enough for have less. To stop on what was drawn biases a picture by far less than the error.
     pub target_error: Option<f32>,
     /// Division of the samples into passes; with a target error, passes have lengths of their own.
