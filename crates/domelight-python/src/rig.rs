@@ -14,6 +14,7 @@ use domelight::rig::{
     SphericalHarmonics, TexelRect, VarianceMinimization, extract,
 };
 use domelight::{Rgb, RgbImage};
+use domelight_lab::names::file_name;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
@@ -383,5 +384,5 @@ pub(crate) fn lights(
     let Extraction { rig, residual } =
         parallel_on(py, threads, || extract(inner, settings))?.map_err(to_python)?;
     let residual = residual.map(Arc::new);
-    Ok(Rig { inner: rig, residual, orientation: inner.orientation(), name: name.clone() })
+    Ok(Rig { inner: rig, residual, orientation: inner.orientation(), name: file_name(name) })
 }
