@@ -1,5 +1,6 @@
 """Runs notebooks, looks at what they show, and interrupts one: check.py [--write=FOLDER] NOTEBOOK..."""
 
+import asyncio
 import pathlib
 import sys
 import threading
@@ -52,7 +53,7 @@ def check_interrupt() -> None:
             time.sleep(0.05)
         time.sleep(1.0)
         interrupted.append(time.monotonic())
-        client.km.interrupt_kernel()
+        asyncio.run(client.km.interrupt_kernel())
 
     thread = threading.Thread(target=interrupt, daemon=True)
     thread.start()
