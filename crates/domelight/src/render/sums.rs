@@ -309,8 +309,8 @@ impl PixelSums {
     /// A sum over the number of samples.
     pub(super) fn mean(&self, sum: [f64; 3]) -> Rgb {
         let n = f64::from(self.n_samples.max(1));
-        // Shadows on ground are differences, whose few samples may overshoot.
-        Rgb::from(sum.map(|c| narrowed((c / n).max(0.0))))
+        // Means of differences may be negative; clamping them would introduce bias.
+        Rgb::from(sum.map(|c| narrowed(c / n)))
     }
 
     /// The share of the background that shadows take away.
@@ -349,4 +349,22 @@ impl PixelSums {
 /// The nearest finite number of single precision.
 fn narrowed(x: f64) -> f32 {
     x.min(f64::from(f32::MAX)) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mean of an estimate that is sometimes negative is unbiased as it is, and not when it is clamped.
+    #[test]
+    fn negative_means_are_kept() {
+        let mut pixel = PixelSums::missed(0);
+        for x in [0.25, -0.75] {
+            let color = Rgb::splat(x);
+            let sample = CameraSample { color, unoccluded: color, ..CameraSample::default() };
+            assert!(pixel.add(&sample, SampleSet::First, 1.0));
+        }
+        assert_eq!(pixel.mean(pixel.color), Rgb::splat(-0.25));
+        assert_eq!(pixel.mean(pixel.unoccluded), Rgb::splat(-0.25));
+    }
 }
