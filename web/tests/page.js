@@ -67,30 +67,8 @@ export async function renderedAnew(page, act) {
   }, before);
 }
 
-/** A hash (FNV-1a) of a canvas. */
-export const canvasHash = (page, id) => page.evaluate(async (id) => {
-  const frame = () => new Promise(requestAnimationFrame);
-  const canvas = document.getElementById(id);
-  do await frame(); while (canvas.hasAttribute("data-stale"));
-  const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
-  const context = copy.getContext("2d", { willReadFrequently: true });
-  context.drawImage(canvas, 0, 0);
-  return context.getImageData(0, 0, copy.width, copy.height).data.reduce((hash, byte) => Math.imul(hash ^ byte, 16777619), 2166136261);
-}, id);
-
-/** R, G and B of a canvas's pixels, row by row. */
-export const pixelsOf = (page, id) => page.evaluate(async (id) => {
-  const frame = () => new Promise(requestAnimationFrame);
-  const canvas = document.getElementById(id);
-  do await frame(); while (canvas.hasAttribute("data-stale"));
-  const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
-  const context = copy.getContext("2d", { willReadFrequently: true });
-  context.drawImage(canvas, 0, 0);
-  return [...context.getImageData(0, 0, copy.width, copy.height).data].filter((_, i) => i % 4 < 3);
-}, id);
-
-/** The mean of a canvas's bytes. */
-export const brightness = (page, id) => page.evaluate(async (id) => {
+/** What `of` makes, in the page, of a canvas's bytes once it is painted. */
+const ofCanvas = (page, id, of) => page.evaluate(async ([id, of]) => {
   const frame = () => new Promise(requestAnimationFrame);
   const canvas = document.getElementById(id);
   do await frame(); while (canvas.hasAttribute("data-stale"));
@@ -98,8 +76,22 @@ export const brightness = (page, id) => page.evaluate(async (id) => {
   const context = copy.getContext("2d", { willReadFrequently: true });
   context.drawImage(canvas, 0, 0);
   const { data } = context.getImageData(0, 0, copy.width, copy.height);
-  return data.reduce((sum, byte) => sum + byte, 0) / data.length;
-}, id);
+  switch (of) {
+    case "hash": return data.reduce((hash, byte) => Math.imul(hash ^ byte, 16777619), 2166136261);
+    case "pixels": return [...data].filter((_, i) => i % 4 < 3);
+    case "mean": return data.reduce((sum, byte) => sum + byte, 0) / data.length;
+    default: throw new Error(`nothing is known of ${of}`);
+  }
+}, [id, of]);
+
+/** A hash (FNV-1a) of a canvas. */
+export const canvasHash = (page, id) => ofCanvas(page, id, "hash");
+
+/** R, G and B of a canvas's pixels, row by row. */
+export const pixelsOf = (page, id) => ofCanvas(page, id, "pixels");
+
+/** The mean of a canvas's bytes. */
+export const brightness = (page, id) => ofCanvas(page, id, "mean");
 
 export const text = (page, selector) => page.$eval(selector, (e) => e.textContent);
 

@@ -1,11 +1,14 @@
 //! Rays a second through a bumpy sphere: camera rays, and shadow rays one by one and in batches.
 
+mod rays;
+
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use domelight::bvh::Bvh;
-use domelight::geometry::{Ray, RayBatch};
-use domelight::math::{PI, TAU, Vec3, from_spherical, vec3};
+use domelight::geometry::Ray;
+use domelight::math::{PI, TAU, from_spherical};
+use rays::{camera_rays, shadow_rays};
 
 const WIDTH: u32 = 256;
 
@@ -31,36 +34,9 @@ fn bumpy_sphere() -> Bvh {
     Bvh::build(&positions, &triangles).expect("the mesh is valid")
 }
 
-/// In tiles of 8 × 8 pixels.
-fn camera_rays() -> Vec<Ray> {
-    let pixel = |i: u32| {
-        let (tile, within) = (i / 64, i % 64);
-        let (x, y) = (tile % (WIDTH / 8) * 8 + within % 8, tile / (WIDTH / 8) * 8 + within / 8);
-        let to_unit = |k: u32| 2.0 * (k as f32 + 0.5) / WIDTH as f32 - 1.0;
-        vec3(to_unit(x), -to_unit(y), -2.5).normalize()
-    };
-    (0..WIDTH * WIDTH).map(|i| Ray::new(vec3(0.0, 0.0, 3.0), pixel(i))).collect()
-}
-
-/// Two a hit, spread over the whole sphere of directions.
-fn shadow_rays(bvh: &Bvh, rays: &[Ray]) -> RayBatch {
-    let mut batch = RayBatch::default();
-    for (i, ray) in rays.iter().enumerate() {
-        let Some(hit) = bvh.closest_hit(ray) else { continue };
-        for k in 0..2 {
-            let golden = (2 * i + k) as f32 * 0.618_034;
-            let direction =
-                from_spherical(1.0 - 2.0 * (golden * 7.3).fract(), TAU * golden.fract());
-            let origin: Vec3 = ray.at(hit.t * 0.9999);
-            batch.push(origin, direction);
-        }
-    }
-    batch
-}
-
 fn trace(c: &mut Criterion) {
     let bvh = bumpy_sphere();
-    let camera = camera_rays();
+    let camera = camera_rays(WIDTH, 3.0, 2.5);
     let shadow = shadow_rays(&bvh, &camera);
     let singles: Vec<_> =
         shadow.origins.iter().zip(&shadow.directions).map(|(&o, &d)| Ray::new(o, d)).collect();

@@ -1,13 +1,16 @@
 //! Rays a second through a million cards, opaque and with leaves cut out of them: camera rays and shadow rays.
 
+mod rays;
+
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use domelight::Rgb;
-use domelight::geometry::{Mesh, Ray, RayBatch};
-use domelight::math::{TAU, Vec3, from_spherical, vec2, vec3};
+use domelight::geometry::Mesh;
+use domelight::math::{TAU, from_spherical, vec2, vec3};
 use domelight::sampling::Pcg32;
 use domelight::scene::{
     AlphaMode, Coverage, Encoding, Material, Part, Scene, SceneDescription, Texture, TextureRef,
 };
+use rays::{camera_rays, shadow_rays};
 
 const CARDS: usize = 1_000_000;
 /// In a cube of edge 1: a ray through all of it meets eight cards.
@@ -59,40 +62,13 @@ fn scene(mesh: Mesh, mode: AlphaMode) -> Scene {
     Scene::new(description).expect("the scene is valid")
 }
 
-/// In tiles of 8 × 8 pixels.
-fn camera_rays() -> Vec<Ray> {
-    let pixel = |i: u32| {
-        let (tile, within) = (i / 64, i % 64);
-        let (x, y) = (tile % (WIDTH / 8) * 8 + within % 8, tile / (WIDTH / 8) * 8 + within / 8);
-        let to_unit = |k: u32| 2.0 * (k as f32 + 0.5) / WIDTH as f32 - 1.0;
-        vec3(to_unit(x), -to_unit(y), -4.0).normalize()
-    };
-    (0..WIDTH * WIDTH).map(|i| Ray::new(vec3(0.0, 0.0, 2.0), pixel(i))).collect()
-}
-
-/// Two from each opaque hit, over the whole sphere of directions.
-fn shadow_rays(scene: &Scene, rays: &[Ray]) -> RayBatch {
-    let mut batch = RayBatch::default();
-    for (i, ray) in rays.iter().enumerate() {
-        let Some(hit) = scene.bvh().closest_hit(ray) else { continue };
-        for k in 0..2 {
-            let golden = (2 * i + k) as f32 * 0.618_034;
-            let direction =
-                from_spherical(1.0 - 2.0 * (golden * 7.3).fract(), TAU * golden.fract());
-            let origin: Vec3 = ray.at(hit.t * 0.9999);
-            batch.push(origin, direction);
-        }
-    }
-    batch
-}
-
 fn foliage(c: &mut Criterion) {
     let mesh = cards();
-    let camera = camera_rays();
+    let camera = camera_rays(WIDTH, 2.0, 4.0);
     let opaque = scene(mesh.clone(), AlphaMode::Opaque);
     let masked = scene(mesh.clone(), AlphaMode::Mask { cutoff: 0.5 });
     let blended = scene(mesh, AlphaMode::Blend);
-    let shadow = shadow_rays(&opaque, &camera);
+    let shadow = shadow_rays(opaque.bvh(), &camera);
     let (mut hits, mut occluded, mut transmittances) = (Vec::new(), Vec::new(), Vec::new());
 
     let mut group = c.benchmark_group("foliage");

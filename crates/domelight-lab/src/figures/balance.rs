@@ -160,12 +160,10 @@ fn plot(
     points: impl Fn(&Curve) -> &Vec<(f64, FigureMeasurement)>,
     value: impl Fn(&FigureMeasurement) -> f64,
 ) -> Document {
-    let series = |(i, curve): (usize, &Curve)| Series {
-        name: curve.name.to_owned(),
-        color: PALETTE[i],
-        join: Join::Curve,
-        marker: Some(Marker::ALL[i % Marker::ALL.len()]),
-        points: points(curve).iter().map(|(x, m)| Datum::new(*x, value(m))).collect(),
+    let series = |(i, curve): (usize, &Curve)| {
+        let points = points(curve).iter().map(|(x, m)| Datum::new(*x, value(m))).collect();
+        let marker = Marker::ALL[i % Marker::ALL.len()];
+        Series::new(curve.name, PALETTE[i], Join::Curve, points).marked(marker)
     };
     let series: Vec<Series> = curves.iter().enumerate().map(series).collect();
     let all = || series.iter().flat_map(|s| &s.points);

@@ -139,13 +139,6 @@ fn along_the_circle(
         envelope.push(Datum::new(x, bound));
     }
     let top = envelope.iter().map(|d| d.y).fold(f64::MIN_POSITIVE, f64::max);
-    let series = |name: &str, color: usize, join, points| Series {
-        name: name.to_owned(),
-        color: PALETTE[color],
-        join,
-        marker: None,
-        points,
-    };
     let (title, name) = if from_environment {
         ("From the environment", "envelope: greatest BRDF × light")
     } else {
@@ -161,8 +154,8 @@ fn along_the_circle(
         ),
         y: Axis::new("BRDF × cosine × light", Scale::Log, 1e-5 * top, 2.0 * top),
         series: vec![
-            series(name, 6, Join::Dashed, envelope),
-            series("product", 2, Join::Curve, product),
+            Series::new(name, PALETTE[6], Join::Dashed, envelope),
+            Series::new("product", PALETTE[2], Join::Curve, product),
         ],
         legend: Legend::Above,
     };
@@ -170,12 +163,8 @@ fn along_the_circle(
 }
 
 fn acceptance_plot([environment, brdf]: [Vec<Datum>; 2]) -> Document {
-    let series = |name: &str, color: usize, points: &[Datum]| Series {
-        name: name.to_owned(),
-        color: PALETTE[color],
-        join: Join::Curve,
-        marker: Some(Marker::ALL[color]),
-        points: points.to_vec(),
+    let series = |name, color: usize, points: &[Datum]| {
+        Series::new(name, PALETTE[color], Join::Curve, points.to_vec()).marked(Marker::ALL[color])
     };
     let all = || environment.iter().chain(&brdf);
     let plot = Plot {

@@ -289,13 +289,6 @@ fn densities(bsdf: &Bsdf, wo: Vec3, n: usize, seed: u64) -> Document {
     let without = curve(&|wi| f64::from(bsdf.pdf(wo, wi)) * jacobian(wo, wi));
     let bars = histogram(bsdf, wo, n, seed);
     let top = without.iter().chain(&bars).map(|d| d.y).fold(0.0, f64::max);
-    let series = |name: &str, color: usize, join, points| Series {
-        name: name.to_owned(),
-        color: PALETTE[color],
-        join,
-        marker: None,
-        points,
-    };
     let plot = Plot {
         title: String::new(),
         x: Axis::new(
@@ -306,9 +299,9 @@ fn densities(bsdf: &Bsdf, wo: Vec3, n: usize, seed: u64) -> Document {
         ),
         y: Axis::new("density [1/sr]", Scale::Linear, 0.0, 1.08 * top),
         series: vec![
-            series("directions that were drawn", 0, Join::Bars, bars),
-            series("p(ωh) / 4 (ωh · ωi)", 1, Join::Curve, with),
-            series("p(ωh), the Jacobian forgotten", 6, Join::Dashed, without),
+            Series::new("directions that were drawn", PALETTE[0], Join::Bars, bars),
+            Series::new("p(ωh) / 4 (ωh · ωi)", PALETTE[1], Join::Curve, with),
+            Series::new("p(ωh), the Jacobian forgotten", PALETTE[6], Join::Dashed, without),
         ],
         legend: Legend::Above,
     };

@@ -153,10 +153,6 @@ fn share(table: &Table2d) -> f64 {
     (1000.0 * sum).round() / 10.0
 }
 
-fn curve(name: &str, color: Color, join: Join, points: Vec<Datum>) -> Series {
-    Series { name: name.to_owned(), color, join, marker: None, points }
-}
-
 /// Cells as bars of total height 1.
 fn bars(weights: &[f64]) -> Vec<Datum> {
     let total: f64 = weights.iter().sum();
@@ -175,7 +171,7 @@ fn density_plot(weights: &[f64]) -> Document {
         title: "Density p(x)".to_owned(),
         x: Axis::new("x", Scale::Linear, 0.0, 1.0),
         y: Axis::new("p(x)", Scale::Linear, 0.0, 1.08 * top),
-        series: vec![curve("", PALETTE[0], Join::Bars, bars)],
+        series: vec![Series::new("", PALETTE[0], Join::Bars, bars)],
         legend: Legend::Above,
     };
     plot_panel(&plot, 730.0, 360.0)
@@ -197,7 +193,7 @@ fn cdf_plot(weights: &[f64]) -> Result<Document, Error> {
             let (cell, inside) = table.sample(u as f32);
             let x = (cell as f64 + f64::from(inside)) / table.len() as f64;
             let path = [(0.0, u), (x, u), (x, 0.0)].map(|(x, y)| Datum::new(x, y)).to_vec();
-            curve(
+            Series::new(
                 if i == 0 { "equally spaced u, and their x" } else { "" },
                 PALETTE[1],
                 Join::Dashed,
@@ -205,7 +201,7 @@ fn cdf_plot(weights: &[f64]) -> Result<Document, Error> {
             )
         })
         .collect();
-    series.push(curve("P(x) = ∫ p", PALETTE[0], Join::Curve, cdf));
+    series.push(Series::new("P(x) = ∫ p", PALETTE[0], Join::Curve, cdf));
     let plot = Plot {
         title: "Distribution function P(x), inverted".to_owned(),
         x: Axis::new("x", Scale::Linear, 0.0, 1.0),
@@ -234,8 +230,8 @@ fn row_plot(context: &FigureContext, table: &Table2d) -> Document {
         x: Axis::new("polar angle θ of the row [°]", Scale::Linear, 0.0, 180.0),
         y: Axis::new("density [1/°]", Scale::Linear, 0.0, 1.08 * top),
         series: vec![
-            curve("energy × sin θ", PALETTE[0], Join::Curve, with),
-            curve("without sin θ: wrong", PALETTE[1], Join::Dashed, without),
+            Series::new("energy × sin θ", PALETTE[0], Join::Curve, with),
+            Series::new("without sin θ: wrong", PALETTE[1], Join::Dashed, without),
         ],
         legend: Legend::Above,
     };
@@ -257,7 +253,7 @@ fn column_plot(table: &Table2d, row: usize) -> Document {
         title: format!("Columns of the brightest row (elevation {elevation:.0}°): p(x | y)"),
         x: Axis::new("azimuth φ [°]", Scale::Linear, -180.0, 180.0),
         y: Axis::around("density [1/°]", Scale::Log, positive),
-        series: vec![curve("", PALETTE[2], Join::Curve, points)],
+        series: vec![Series::new("", PALETTE[2], Join::Curve, points)],
         legend: Legend::Above,
     };
     plot_panel(&plot, 730.0, 380.0)

@@ -168,20 +168,13 @@ impl Lobe {
             .map(|x| Datum::new(x, density(x)))
             .collect();
         let top = bars.iter().chain(&curve).map(|d| d.y).fold(0.0, f64::max);
-        let series = |name: &str, color, join, points| Series {
-            name: name.to_owned(),
-            color,
-            join,
-            marker: None,
-            points,
-        };
         let plot = Plot {
             title: String::new(),
             x: Axis::new(label, Scale::Linear, min, max),
             y: Axis::new("density [1/°]", Scale::Linear, 0.0, 1.08 * top),
             series: vec![
-                series("histogram", PALETTE[0], Join::Bars, bars),
-                series("density", PALETTE[1], Join::Curve, curve),
+                Series::new("histogram", PALETTE[0], Join::Bars, bars),
+                Series::new("density", PALETTE[1], Join::Curve, curve),
             ],
             legend: Legend::Above,
         };

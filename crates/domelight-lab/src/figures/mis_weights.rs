@@ -122,13 +122,6 @@ fn along_the_circle(context: &FigureContext, point: &ShadingPoint) -> Document {
     let light = curve(&|wi| f64::from(environment.pdf(wi)));
     let brdf = curve(&|wi| f64::from(point.eval_pdf(wi).1));
     let top = light.iter().chain(&brdf).map(|d| d.y).fold(0.0, f64::max);
-    let series = |name: &str, color: usize, join, points| Series {
-        name: name.to_owned(),
-        color: PALETTE[color],
-        join,
-        marker: None,
-        points,
-    };
     let reach = 0.5 * f64::from(REACH);
     let x = || {
         Axis::new("angle from the lobe’s axis toward the light [°]", Scale::Linear, -reach, reach)
@@ -138,8 +131,8 @@ fn along_the_circle(context: &FigureContext, point: &ShadingPoint) -> Document {
         x: x(),
         y: Axis::new("density [1/sr]", Scale::Log, 1e-4 * top, 1.5 * top),
         series: vec![
-            series("environment", 0, Join::Curve, light),
-            series("BRDF", 1, Join::Curve, brdf),
+            Series::new("environment", PALETTE[0], Join::Curve, light),
+            Series::new("BRDF", PALETTE[1], Join::Curve, brdf),
         ],
         legend: Legend::Above,
     };
@@ -148,8 +141,8 @@ fn along_the_circle(context: &FigureContext, point: &ShadingPoint) -> Document {
         x: x(),
         y: Axis::new("weight", Scale::Linear, 0.0, 1.05),
         series: vec![
-            series("balance", 2, Join::Dashed, weight(Heuristic::Balance)),
-            series("power", 3, Join::Curve, weight(Heuristic::Power)),
+            Series::new("balance", PALETTE[2], Join::Dashed, weight(Heuristic::Balance)),
+            Series::new("power", PALETTE[3], Join::Curve, weight(Heuristic::Power)),
         ],
         legend: Legend::Above,
     };

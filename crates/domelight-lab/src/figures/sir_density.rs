@@ -163,27 +163,15 @@ fn plot(distances: &[Datum], floor: f64) -> Document {
     let most = CANDIDATES[CANDIDATES.len() - 1] as f64;
     let guide = |m: f64| Datum::new(m, 1.3 * distances[0].y / m);
     let series = vec![
-        Series {
-            name: "resampled directions".to_owned(),
-            color: PALETTE[3],
-            join: Join::Curve,
-            marker: Some(Marker::Disc),
-            points: distances.to_vec(),
-        },
-        Series {
-            name: "1/M".to_owned(),
-            color: PALETTE[7],
-            join: Join::Dashed,
-            marker: None,
-            points: vec![guide(1.0), guide(most)],
-        },
-        Series {
-            name: "noise of the counts".to_owned(),
-            color: PALETTE[6],
-            join: Join::Dashed,
-            marker: None,
-            points: vec![Datum::new(0.5, floor), Datum::new(2.0 * most, floor)],
-        },
+        Series::new("resampled directions", PALETTE[3], Join::Curve, distances.to_vec())
+            .marked(Marker::Disc),
+        Series::new("1/M", PALETTE[7], Join::Dashed, vec![guide(1.0), guide(most)]),
+        Series::new(
+            "noise of the counts",
+            PALETTE[6],
+            Join::Dashed,
+            vec![Datum::new(0.5, floor), Datum::new(2.0 * most, floor)],
+        ),
     ];
     let values = distances.iter().map(|d| d.y).chain([floor, 0.5 * floor, 100.0]);
     let plot = Plot {

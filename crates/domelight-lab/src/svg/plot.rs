@@ -134,6 +134,19 @@ pub struct Series {
     pub points: Vec<Datum>,
 }
 
+impl Series {
+    /// Points without markers.
+    pub fn new(name: impl Into<String>, color: Color, join: Join, points: Vec<Datum>) -> Self {
+        Self { name: name.into(), color, join, marker: None, points }
+    }
+
+    /// The same with a marker at each point.
+    #[must_use]
+    pub fn marked(self, marker: Marker) -> Self {
+        Self { marker: Some(marker), ..self }
+    }
+}
+
 /// Where names of series stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Legend {

@@ -244,8 +244,7 @@ impl Scene {
     pub(crate) fn catcher_normal(&self) -> Option<Vec3> {
         let catches = |part: &&Part| self.materials[part.material].catches_shadows;
         let mesh = &self.parts.iter().find(catches)?.mesh;
-        let [a, b, c] = mesh.triangles.first()?.map(|i| mesh.positions[i as usize]);
-        (b - a).cross(c - a).try_normalize()
+        if mesh.triangles.is_empty() { None } else { mesh.area_normal(0).try_normalize() }
     }
 
     /// What share of light, in \[0, 1\], the surfaces that are not in [`Scene::bvh`] let through along each shadow ray:
