@@ -459,11 +459,13 @@ impl Environment {
     }
 
     /// Draws a direction in proportion to luminance; none from a black map.
+    #[inline]
     pub fn sample(&self, u: Vec2) -> Option<EnvironmentSample> {
         self.sample_table(self.table.as_ref()?, u, |le| self.density(le))
     }
 
     /// Draws from any table over this map's texels; `density` is that of a texel by its radiance.
+    #[inline]
     fn sample_table(
         &self,
         table: &HierarchicalTable,
@@ -596,6 +598,7 @@ impl Grid {
     }
 
     /// The direction at `inside` a texel, uniform in solid angle: linear in φ and cos θ.
+    #[inline]
     fn direction_in(&self, t: Texel, inside: Vec2) -> Vec3 {
         let u = (t.column as f64 + f64::from(inside.x)) / self.texels.width() as f64;
         let (top, bottom) = (self.texels.cos_edge(t.row), self.texels.cos_edge(t.row + 1));
@@ -604,6 +607,7 @@ impl Grid {
 
     /// As [`Grid::direction_in`], but never rounded into a neighbor: the look-up of the direction
     /// is the texel that was drawn.
+    #[inline]
     fn direction_inside(&self, t: Texel, inside: Vec2) -> Vec3 {
         let wi = self.direction_in(t, inside);
         let (low, high) = (self.margin, Vec2::ONE - self.margin);

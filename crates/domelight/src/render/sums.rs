@@ -198,6 +198,7 @@ impl PixelSums {
 
     /// Adds a sample of a set, with colors in multiples of `unit`. A sample that is not finite counts as black and is
     /// reported: it returns false.
+    #[inline]
     pub(super) fn add(&mut self, sample: &CameraSample, set: SampleSet, unit: f64) -> bool {
         let colors = [sample.color, sample.unoccluded, sample.shadow];
         let finite = colors.iter().all(|color| color.is_finite());

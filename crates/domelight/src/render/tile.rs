@@ -646,6 +646,7 @@ impl Batch {
         strategy_context.strategy.learn(&tile, rays, visibility, scratch);
     }
 
+    #[inline]
     fn surface_sample(
         &self,
         context: &RenderContext,
