@@ -26,7 +26,7 @@ fn without_arguments_the_program_shows_five_things_to_do() {
     let folder = pictures();
     let output = domelight(&folder, &[]);
     assert_eq!(output.status.code(), Some(2));
-    let (_, steps) = stderr(&output).split_once("Five things to do:\n").expect("first steps");
+    let (_, steps) = stderr(&output).split_once("Five things to try:\n").expect("first steps");
     let commands: Vec<_> = steps.lines().filter(|line| line.starts_with("  domelight ")).collect();
     assert_eq!(commands.len(), 5, "{steps}");
     for command in ["render", "probe", "lights", "compare"] {
