@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &BenchArguments, quiet: bool) -> Result<()> {
     let (results, done) = bench::run(&settings, host);
     show(arguments, &results, quiet)?;
     if host.canceled() {
-        bail!("interrupted; the results are what was done");
+        bail!("interrupted; the results are partial");
     }
     Ok(done?)
 }
@@ -105,7 +105,7 @@ fn check(arguments: &BenchArguments) -> Result<(), UsageError> {
     for (flag, given, suites) in given {
         if given && !suites.contains(&arguments.suite) {
             let names: Vec<&str> = suites.iter().map(|&s| bench::Suite::from(s).name()).collect();
-            return Err(UsageError(format!("{flag} goes with --suite {}", names.join(" or "))));
+            return Err(UsageError(format!("{flag} requires --suite {}", names.join(" or "))));
         }
     }
     Ok(())

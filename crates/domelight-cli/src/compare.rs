@@ -91,7 +91,7 @@ fn check(arguments: &CompareArguments) -> Result<(), UsageError> {
     // Before anything is rendered.
     let names: Vec<&str> = arguments.strategies.iter().map(|s| s.text.as_str()).collect();
     match names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
-        Some((_, name)) => Err(UsageError(format!("--strategies has '{name}' twice"))),
+        Some((_, name)) => Err(UsageError(format!("--strategies lists '{name}' twice"))),
         None => Ok(()),
     }
 }

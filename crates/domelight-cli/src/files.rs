@@ -45,7 +45,7 @@ pub(crate) fn require_unread(folder: &Path) -> Result<()> {
     let Some(input) = input else { return Ok(()) };
     let (folder, input) = (folder.display(), input.display());
     let why =
-        format!("{input} might be written over: results go to {folder}; choose another folder");
+        format!("{input} might be overwritten: results go to {folder}; choose another folder");
     Err(UsageError(why).into())
 }
 

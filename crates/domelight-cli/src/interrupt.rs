@@ -55,7 +55,7 @@ pub(crate) fn nothing_to_keep(code: i32) -> EndsAtOnce {
 
 /// From now on a pipe is waited for at its other end.
 pub(crate) fn while_waiting() -> EndsAtOnce {
-    EndsAtOnce::new(ENDED, "while the other end of a pipe was waited for")
+    EndsAtOnce::new(ENDED, "while waiting for the other end of a pipe")
 }
 
 impl EndsAtOnce {
@@ -87,7 +87,7 @@ pub(crate) fn unless_interrupted<T: Send + 'static>(
             Ok(done) => return Ok(done),
             Err(RecvTimeoutError::Disconnected) => bail!("{name}: reading it failed"),
             Err(RecvTimeoutError::Timeout) if RAISED.load(Ordering::SeqCst) => {
-                bail!("{name}: interrupted while it was waited for")
+                bail!("{name}: interrupted while waiting for it")
             }
             Err(RecvTimeoutError::Timeout) => {}
         }

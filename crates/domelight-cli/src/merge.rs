@@ -167,7 +167,7 @@ impl Merged {
         let foreign = |what: &str, here: &str, there: &str| {
             let first = &self.name;
             let text = format!(
-                "{name} is of another render: its {what} is {here}, that of {first} {there}"
+                "{name} belongs to another render: its {what} is {here}, that of {first} {there}"
             );
             Err(MergeError::Foreign(text))
         };
@@ -219,7 +219,7 @@ impl Merged {
         }
         if !unfinished.is_empty() {
             let names = unfinished.join(", ");
-            text.push(format!("unfinished: {names}: run the same render again to go on"));
+            text.push(format!("unfinished: {names}: run the same render again to continue"));
         }
         if text.is_empty() { Ok(()) } else { Err(MergeError::Missing(text.join("; "))) }
     }

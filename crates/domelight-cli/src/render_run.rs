@@ -173,7 +173,7 @@ pub(crate) fn read(path: &Path) -> Result<Checkpoint> {
     if let Ok(there) = fs::metadata(path) {
         // A pipe might never end.
         if !there.is_file() {
-            return Err(UsageError(format!("{}: it is not a plain file", name())).into());
+            return Err(UsageError(format!("{}: not a regular file", name())).into());
         }
         memory::allow(&name(), there.len())?;
     }
@@ -191,7 +191,7 @@ fn require_same(path: &Path, checkpoint: &Checkpoint, identity: &[(String, Strin
     let Some(difference) = checkpoint.difference(identity) else { return Ok(()) };
     let or_none = |value: &str| if value.is_empty() { "none".to_owned() } else { value.to_owned() };
     let text = format!(
-        "{} is of another render: its {} is {}, that of this render {}",
+        "{} belongs to another render: its {} is {}, that of this render {}",
         path.display(),
         difference.name,
         or_none(difference.here),
@@ -205,7 +205,7 @@ fn require_more(path: &Path, checkpoint: &Checkpoint, n_samples: u32) -> Result<
         return Ok(());
     }
     let text = format!(
-        "{} is of a render with {} samples a pixel: --spp {n_samples} is less; give as many or more",
+        "{} belongs to a render with {} samples per pixel, but --spp is {n_samples}; give at least as many",
         path.display(),
         checkpoint.n_samples
     );
@@ -218,7 +218,7 @@ fn refuse_to_replace(path: &Path) -> Result<()> {
         return Ok(());
     }
     let text = format!(
-        "{} is there and not a finished checkpoint: go on with --resume, or remove it",
+        "{} exists and is not a finished checkpoint: continue with --resume, or remove it",
         path.display()
     );
     Err(UsageError(text).into())

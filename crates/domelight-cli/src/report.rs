@@ -176,15 +176,15 @@ impl RenderReport {
         Terminal { quiet }.warn_of_non_finite("", self.non_finite_samples);
         match (self.stopped, saved) {
             (Some(StopReason::Interrupted), None) => {
-                bail!("interrupted; what was done so far is in {}", self.outputs.join(", "))
+                bail!("interrupted; the picture so far is in {}", self.outputs.join(", "))
             }
             (Some(StopReason::Interrupted), Some(saved)) => Err(InterruptedAndSaved(format!(
-                "interrupted; {} holds the state to go on from",
+                "interrupted; {} holds the state to resume from",
                 saved.display()
             ))
             .into()),
             (Some(StopReason::Time), Some(part)) if is_part => Err(InterruptedAndSaved(format!(
-                "the time is over; {} holds the state to go on from",
+                "the time is up; {} holds the state to resume from",
                 part.display()
             ))
             .into()),

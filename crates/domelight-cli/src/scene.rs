@@ -101,7 +101,7 @@ impl EnvironmentArguments {
     /// The same for commands that have no camera, or several.
     pub(crate) fn settings_without_camera(&self) -> Result<LightSettings> {
         if self.env_rotate == Some(Rotation::Auto) {
-            let text = "--env-rotate auto turns the light to a camera, and this command has none; give degrees";
+            let text = "--env-rotate auto needs a camera, and this command has none; give degrees";
             return Err(UsageError(text.into()).into());
         }
         Ok(self.settings())

@@ -41,7 +41,7 @@ impl StrategyArguments {
 fn message(kind: StrategyKind, error: &StrategyError) -> String {
     match error {
         StrategyError::Misplaced { option, strategies } => {
-            format!("--{option} goes with {strategies}, not with --strategy {}", kind.name())
+            format!("--{option} applies to {strategies}, not to --strategy {}", kind.name())
         }
         error => format!("--strategy {}: {error}", kind.name()),
     }

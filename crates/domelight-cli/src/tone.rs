@@ -135,8 +135,7 @@ fn denoise_file(
 /// What people should know of a denoised picture.
 pub(crate) fn denoised_line(by: &str) -> String {
     format!(
-        "denoised with {by}: to look at, not to measure; the filter trades noise for bias, and how much bias one \
-         picture cannot show"
+        "denoised with {by}: for viewing, not for measurement; the filter trades noise for bias, and one picture cannot show how much"
     )
 }
 

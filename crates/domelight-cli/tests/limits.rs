@@ -99,8 +99,8 @@ fn what_is_no_plain_file_is_named() {
         ("empty.ply", ""),
         ("dangling.ply", "No such file"),
         ("loop.ply", "symbolic links"),
-        ("null.ply", "not a plain file"),
-        ("pipe.ply", "not a plain file"),
+        ("null.ply", "not a regular file"),
+        ("pipe.ply", "not a regular file"),
     ];
     for (name, why) in odd {
         // A circle might be mended: it may be tried again.
@@ -116,7 +116,7 @@ fn what_is_no_plain_file_is_named() {
 
         // A pipe may be a probe or a picture; with nobody who writes it would wait.
         if name != "pipe.ply" {
-            let why = why.replace("not a plain file", "the file is empty");
+            let why = why.replace("not a regular file", "the file is empty");
             ended(&render(&folder, &["spheres", "--env", name]), code, &[name, &why]);
             ended(
                 &domelight(&folder, &["lights", name, "-n", "2", "-o", "x.json"]),

@@ -308,7 +308,7 @@ impl LoadedScene {
         let (camera, camera_settings) = (Camera::new(&camera, width, height)?, camera);
         let camera = through(camera, lens);
         let n_triangles: usize = description.parts.iter().map(|p| p.mesh.triangles.len()).sum();
-        let tree = format!("{}: a tree over {n_triangles} triangles", settings.scene);
+        let tree = format!("{}: a BVH over {n_triangles} triangles", settings.scene);
         host.take_memory(&tree, TRIANGLE * n_triangles as u64)?;
         let scene = Scene::new(description).at(&settings.scene)?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };

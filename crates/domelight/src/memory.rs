@@ -10,7 +10,7 @@ pub struct MemorySize(pub u64);
 
 /// A text that is no amount of memory.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{text}' is no amount of memory such as 4GiB, 500MB or 1.5G")]
+#[error("'{text}' is not an amount of memory such as 4GiB, 500MB or 1.5G")]
 pub struct ParseMemorySizeError {
     text: String,
 }
@@ -58,7 +58,7 @@ impl FromStr for MemorySize {
 
 /// More memory than is allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("it takes some {needed} of memory, more than the {allowed} that are left to it")]
+#[error("needs some {needed} of memory, but only {allowed} are left")]
 pub struct OverLimit {
     /// An estimate, before the memory is taken.
     pub needed: MemorySize,

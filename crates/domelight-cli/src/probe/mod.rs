@@ -93,8 +93,7 @@ fn measure(arguments: &ProbeArguments, probe: LoadedProbe) -> anyhow::Result<Mea
 fn clipping_warning(measured: &MeasuredProbe) -> Option<String> {
     let plateau = measured.statistics.plateau.filter(|_| !measured.is_builtin)?;
     Some(format!(
-        "{}: {} texels side by side have the greatest value, {}: a sun or lamp is clipped, unless it is evenly bright; a \
-         clipped one lights too little, and its shadows are too faint",
+        "{}: {} adjacent texels have the maximum value, {}: a sun or lamp is clipped, unless it is evenly bright; a clipped light is too dim, and its shadows are too faint",
         measured.name, plateau.n_texels, plateau.value
     ))
 }
@@ -168,7 +167,7 @@ fn table(measured: &MeasuredProbe) -> String {
     }
     if let Some(plateau) = s.plateau {
         let (n, share) = (plateau.n_texels, 100.0 * plateau.share);
-        let what = if measured.is_builtin { "even" } else { "clipped, or even" };
+        let what = if measured.is_builtin { "even" } else { "clipped, or evenly bright" };
         row(
             "greatest value",
             format!("{} in {n} texels, {share:.1} % of the energy: {what}", plateau.value),

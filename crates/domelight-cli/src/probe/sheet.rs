@@ -56,7 +56,7 @@ impl Sheet<'_> {
             s.peak_to_mean()
         );
         if s.plateau.is_some() && !self.measured.is_builtin {
-            facts += "; the greatest value is clipped, or even";
+            facts += "; the greatest value is clipped, or evenly bright";
         }
         sheet.text((MARGIN, 54.0), &facts, TextStyle::new(17.0).color(Color::GRAY));
     }

@@ -405,7 +405,7 @@ fn rays(rows: &[Row], title: &str, traces: impl Fn(&Row) -> &[Trace]) -> Table {
 
 fn builds(rows: &[Row]) -> Table {
     let head = ["mesh", "engine", "triangles", "CPU s", "ratio", "bytes/triangle"];
-    let mut table = Table::new("Build of the tree on one thread", &head);
+    let mut table = Table::new("BVH build on one thread", &head);
     for row in rows {
         table.rows.extend(row.builds.iter().map(|build| {
             vec![

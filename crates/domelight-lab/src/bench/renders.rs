@@ -247,11 +247,11 @@ impl CaseRunner<'_> {
             host.warn(&text);
         }
         if let Some(why) = &row.peer_left_out {
-            host.warn(&format!("left out of the other program: {why}"));
+            host.warn(&format!("not measured with the other program: {why}"));
         }
         if let Some(peer) = row.peer.as_ref().filter(|peer| (peer.mean_ratio - 1.0).abs() > 0.02) {
             let percent = 100.0 * (peer.mean_ratio - 1.0);
-            host.warn(&format!("its converged picture is {percent:+.1} % as bright as ours"));
+            host.warn(&format!("its converged picture differs from ours by {percent:+.1} % in brightness"));
         }
     }
 }

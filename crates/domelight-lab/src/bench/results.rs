@@ -75,14 +75,14 @@ impl Results {
         })?;
         let usage = |why: String| Error::Usage(format!("{name}: {why}"));
         let value: serde_json::Value = serde_json::from_str(&text)
-            .map_err(|e| usage(format!("it is no JSON of domelight bench ({e})")))?;
+            .map_err(|e| usage(format!("it is not JSON from domelight bench ({e})")))?;
         match value["schema"].as_u64() {
             Some(schema) if schema == u64::from(SCHEMA) => {}
             Some(schema) => {
                 let why = format!("its schema is {schema}, that of this version {SCHEMA}");
                 return Err(usage(why));
             }
-            None => return Err(usage("it is no JSON of domelight bench".into())),
+            None => return Err(usage("it is not JSON from domelight bench".into())),
         }
         let results = serde_json::from_value(value);
         results.map_err(|e| usage(format!("it is damaged ({e})")))
@@ -100,7 +100,7 @@ impl Results {
     pub fn describe(&self) -> String {
         let day = self.date.split('T').next().unwrap_or(&self.date);
         let threads = if self.threads == 1 { "thread" } else { "threads" };
-        let complete = if self.complete { "" } else { "; not all of it was done" };
+        let complete = if self.complete { "" } else { "; incomplete" };
         format!(
             "domelight {}, {day}, {} {threads} on {}{complete}",
             self.version,

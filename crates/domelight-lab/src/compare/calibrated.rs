@@ -269,7 +269,7 @@ impl<'c, 'a> CalibratedComparison<'c, 'a> {
         let mut report = StrategyReport {
             name: competitor.name().to_owned(),
             settings: spec
-                .map_or("a strategy of the caller's".to_owned(), StrategySpec::description),
+                .map_or("a custom strategy".to_owned(), StrategySpec::description),
             unbiased: Some(spec.is_none_or(StrategySpec::is_unbiased)),
             setup_seconds: *setup_seconds,
             left_out: None,
@@ -321,8 +321,7 @@ impl<'c, 'a> CalibratedComparison<'c, 'a> {
         let off = sum(image) / sum(reference) - 1.0;
         if off.abs() > MEAN_TOLERANCE {
             self.host.warn(&format!(
-                "the picture {name} is {:+.1} % as bright as the reference: its error is that of another light, \
-                 exposure or material, too",
+                "the picture {name} differs from the reference by {:+.1} % in brightness: part of its error comes from another light, exposure or material",
                 100.0 * off
             ));
         }

@@ -165,7 +165,7 @@ impl<'a> Comparison<'a> {
         if [image.width, image.height] != [width, height] {
             let (w, h) = (image.width, image.height);
             let why = format!(
-                "the picture {name} is {w}x{h}, but the comparison renders {width}x{height}: all must be of one size; \
+                "the picture {name} is {w}x{h}, but the comparison renders {width}x{height}: all must have the same size; \
                  give --size {w}x{h}, or the picture of {name} in {width}x{height}"
             );
             return Err(Error::Usage(why));
@@ -180,7 +180,7 @@ impl<'a> Comparison<'a> {
     fn add_competitor(&mut self, competitor: Competitor<'a>) -> Result<(), Error> {
         let name = competitor.name();
         if self.competitors.iter().any(|other| other.name() == name) {
-            let why = format!("'{name}' takes part twice: leave one out, or give it another name");
+            let why = format!("'{name}' takes part twice: remove one, or rename it");
             return Err(Error::Usage(why));
         }
         self.competitors.push(competitor);
@@ -295,8 +295,7 @@ impl CompareReport {
             let is_off = result.bias.is_some_and(|bias| bias > 0.5 * result.rel_mse.mean);
             if *unbiased == Some(true) && is_off && self.reference.source == Source::File {
                 host.warn(&format!(
-                    "{name} is unbiased, but the mean of its pictures differs from the \
-                         reference: is that of another scene, light or filter, or noisy?"
+                    "{name} is unbiased, but the mean of its pictures differs from the reference: does the reference show another scene, light or filter, or is it noisy?"
                 ));
             }
         }

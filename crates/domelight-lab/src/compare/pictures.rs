@@ -85,7 +85,7 @@ fn read_picture(path: &Path, times: &Times, host: &dyn Host) -> Result<OtherPict
     let seconds = times.0.get(&stem).copied().or(of_name).or_else(of_attributes);
     let seconds = seconds.ok_or_else(|| {
         let why = format!(
-            "nothing states how long it took: name it {stem}.12.5s.exr, add a line {stem},12.5 to {TIMES} in its \
+            "its render time is unknown: name it {stem}.12.5s.exr, add a line {stem},12.5 to {TIMES} in its \
              folder, or write an attribute domelight.seconds into it"
         );
         Error::Usage(why)
@@ -126,7 +126,7 @@ impl Times {
                 if i == 0 {
                     continue;
                 }
-                return Err(usage(format!("'{time}' is no number of seconds above 0")));
+                return Err(usage(format!("'{time}' is not a number of seconds above 0")));
             };
             let stem = name.strip_suffix(".exr").unwrap_or(&name).to_owned();
             if !pictures.contains(&stem) {

@@ -52,9 +52,9 @@ impl Features<'_> {
     /// The features in words.
     pub fn description(&self) -> &'static str {
         match (self.albedo, self.normal) {
-            (Some(_), Some(_)) => "by color, albedo and normals",
-            (Some(_), None) => "by color and albedo",
-            _ => "by color alone",
+            (Some(_), Some(_)) => "from color, albedo and normals",
+            (Some(_), None) => "from color and albedo",
+            _ => "from color alone",
         }
     }
 }
@@ -85,7 +85,7 @@ impl Denoiser {
             // A pipe might never end.
             let is_path = Path::new(name).components().count() > 1;
             if is_path && fs::metadata(name).is_ok_and(|there| !there.is_file()) {
-                reasons.push(format!("{}: it is not a plain file", name.to_string_lossy()));
+                reasons.push(format!("{}: not a regular file", name.to_string_lossy()));
                 continue;
             }
             match Device::load(name, rayon::current_num_threads()) {

@@ -29,7 +29,7 @@ impl Cache {
             .map(Path::to_path_buf)
             .or_else(|| Some(choose_native_strategy().ok()?.cache_dir().join("domelight")));
         if folder.is_none() {
-            host.warn("this user has no home to keep references in; --cache FOLDER names a place");
+            host.warn("there is no home folder for the cache of references; name one with --cache FOLDER");
         }
         Some(Self { folder: folder?, program: program.to_owned() })
     }
@@ -46,7 +46,7 @@ impl Cache {
             match fs::read(&path) {
                 Ok(bytes) if of(&bytes).to_string() == sum => return Some((path, bytes)),
                 _ => {
-                    host.warn(&format!("{}: damaged; it is made again", path.display()));
+                    host.warn(&format!("{}: damaged; it is rendered again", path.display()));
                     let _ = fs::remove_file(&path);
                 }
             }
@@ -57,7 +57,7 @@ impl Cache {
     /// Keeps the bytes, if that is possible; else warns, for what was rendered is there all the same.
     pub(crate) fn put(&self, key: &Key, bytes: &[u8], host: &dyn Host) -> Option<PathBuf> {
         let kept = self.try_put(key, bytes);
-        kept.inspect_err(|error| host.warn(&format!("the reference is not kept: {error}"))).ok()
+        kept.inspect_err(|error| host.warn(&format!("the reference cannot be cached: {error}"))).ok()
     }
 
     fn try_put(&self, key: &Key, bytes: &[u8]) -> Result<PathBuf, Error> {
@@ -67,7 +67,7 @@ impl Cache {
         remove_abandoned(folder);
         // A pipe would be written to directly, and wait for its reader.
         if fs::metadata(&path).is_ok_and(|there| !there.is_file()) {
-            return Err(Error::Failed(format!("{}: it is not a plain file", path.display())));
+            return Err(Error::Failed(format!("{}: not a regular file", path.display())));
         }
         write_atomically(&path, |out| out.write_all(bytes))?;
         Ok(path)

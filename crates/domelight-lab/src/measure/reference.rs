@@ -194,7 +194,7 @@ impl Reference {
         if let Some(i) = image.pixels.iter().position(|pixel| !pixel.is_finite()) {
             let (x, y) = (i % image.width, i / image.width);
             let why =
-                format!("{name}: pixel ({x}, {y}) is NaN or infinite; a reference must not be");
+                format!("{name}: pixel ({x}, {y}) is NaN or infinite; a reference must be finite");
             return Err(Error::Failed(why));
         }
         let report = ReferenceReport {

@@ -116,7 +116,7 @@ struct Term {
 
 /// More lobes than a material holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a material is a sum of at most {MAX_LOBES} lobes that are not black, not {count}")]
+#[error("a material is a sum of at most {MAX_LOBES} non-black lobes, not {count}")]
 pub struct TooManyLobes {
     /// The number of lobes given.
     pub count: usize,

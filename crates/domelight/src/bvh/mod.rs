@@ -122,7 +122,7 @@ impl Block {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BvhError {
     /// A coordinate that is NaN or infinite.
-    #[error("vertex {vertex} has a coordinate that is not finite: {position}")]
+    #[error("vertex {vertex} has a non-finite coordinate: {position}")]
     NotFinite {
         /// The vertex.
         vertex: usize,
@@ -130,7 +130,7 @@ pub enum BvhError {
         position: Vec3,
     },
     /// An index beyond the vertices.
-    #[error("triangle {triangle} names vertex {index}, but there are only {vertices} vertices")]
+    #[error("triangle {triangle} refers to vertex {index}, but there are only {vertices} vertices")]
     Index {
         /// The triangle.
         triangle: usize,
@@ -141,7 +141,7 @@ pub enum BvhError {
     },
     /// More triangles than indices.
     #[error(
-        "{count} triangles are too many: at most {max} fit into one hierarchy; split the scene"
+        "{count} triangles are too many: at most {max} fit in one BVH; split the scene"
     )]
     TooManyTriangles {
         /// How many there are.

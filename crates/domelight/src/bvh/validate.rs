@@ -9,7 +9,7 @@ use crate::math::Vec3;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BvhDefect {
     /// A child's box does not hold a triangle or box below it.
-    #[error("child {child} of node {node} does not hold what is below it: {bounds:?}")]
+    #[error("child {child} of node {node} does not contain its subtree: {bounds:?}")]
     Bounds {
         /// The node.
         node: usize,
@@ -43,7 +43,7 @@ pub enum BvhDefect {
         count: usize,
     },
     /// A triangle that is in two blocks.
-    #[error("triangle {triangle} is in the tree twice")]
+    #[error("triangle {triangle} is in the BVH twice")]
     Repeated {
         /// The triangle.
         triangle: u32,

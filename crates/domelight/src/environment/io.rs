@@ -127,15 +127,14 @@ pub fn probe_from_picture(
             in_display_window(&image, window, options).map_err(|problem| problem.in_file(file))?
     {
         warnings.push(format!(
-            "{file}: the data window of {}x{} texels is shown in the display window of {}x{}; what lies outside the \
-             one is black, outside the other is cut off",
+            "{file}: the data window of {}x{} texels differs from the display window of {}x{}; texels outside the data window are black, texels outside the display window are cropped",
             image.width, image.height, framed.width, framed.height
         ));
         image = framed;
     }
     if matches!(picture.format, Format::Png | Format::Jpeg) {
         warnings.push(format!(
-            "{file}: {} holds nothing brighter than white, so that suns and lamps are cut off; use .exr or .hdr",
+            "{file}: {} holds nothing brighter than white, so suns and lamps are clipped; use .exr or .hdr",
             if picture.format == Format::Png { "PNG" } else { "JPEG" }
         ));
     }

@@ -31,7 +31,7 @@ pub struct FileLedger {
 pub enum FileConflict {
     /// What is to be written would take the place of what is read.
     #[error(
-        "{} would be written over {}, which is read: choose another name",
+        "{} would overwrite {}, which is an input: choose another name",
         name(output),
         if input == output { "itself".to_owned() } else { name(input) }
     )]

@@ -29,7 +29,7 @@ pub struct Mesh {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// An index beyond the vertices.
-    #[error("triangle {triangle} names vertex {index}, but there are only {vertices} vertices")]
+    #[error("triangle {triangle} refers to vertex {index}, but there are only {vertices} vertices")]
     Index {
         /// The triangle.
         triangle: usize,
@@ -49,7 +49,7 @@ pub enum MeshError {
         vertices: usize,
     },
     /// A coordinate that is NaN or infinite.
-    #[error("vertex {vertex} has a coordinate that is not finite: {position}")]
+    #[error("vertex {vertex} has a non-finite coordinate: {position}")]
     NotFinite {
         /// The vertex.
         vertex: usize,

@@ -19,7 +19,7 @@ impl fmt::Display for Diagnosis<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(decomposition) = self;
         let Some(&Share { cause, share }) = decomposition.shares.first() else {
-            return f.write_str("no error: all estimates of this pixel are alike");
+            return f.write_str("no error: all estimates of this pixel are equal");
         };
         if share >= 0.995 {
             f.write_str("nearly all of the error: ")?;
@@ -34,12 +34,12 @@ impl fmt::Display for Diagnosis<'_> {
                 percent(decomposition.coverage)
             ),
             Cause::Background => {
-                f.write_str("what is behind the scene differs between camera samples")
+                f.write_str("the background differs between camera samples")
             }
             Cause::Emission => {
-                f.write_str("the light that surfaces emit differs between camera samples")
+                f.write_str("emission differs between camera samples")
             }
-            Cause::Known => f.write_str("what is known without rays differs from pass to pass"),
+            Cause::Known => f.write_str("the part known without rays differs from pass to pass"),
             Cause::Shading(kind) => {
                 write!(f, "the surfaces that the pixel shows reflect {kind} differently")
             }
@@ -55,7 +55,7 @@ impl fmt::Display for Diagnosis<'_> {
             }
             Cause::Penumbra(kind) => {
                 let free = of(kind).and_then(|statistics| statistics.free).unwrap_or(0.0);
-                write!(f, "{kind} is hidden in part: {} of the rays to it are free", percent(free))
+                write!(f, "{kind} is partly hidden: {} of the rays to it are unoccluded", percent(free))
             }
         }
     }
@@ -131,7 +131,7 @@ impl fmt::Display for Advice {
             Self::Strategy { name, .. } => {
                 write!(f, "{name} would help: it has no error at this pixel")
             }
-            Self::Rays => f.write_str("more rays would help; the strategies are about alike here"),
+            Self::Rays => f.write_str("more rays would help; the strategies are about equal here"),
         }
     }
 }

@@ -127,10 +127,10 @@ impl Checkpoint {
         let planes = PixelSums::WORDS.iter().filter_map(|name| plane(&exr, name));
         planes.for_each(|words| digest.words(words.iter().copied()));
         if digest.finish().to_string() != written {
-            return Err(CheckpointError::Damaged("its digest does not fit its content"));
+            return Err(CheckpointError::Damaged("its digest does not match its content"));
         }
 
-        let missing = || CheckpointError::Damaged("an attribute is missing or no number");
+        let missing = || CheckpointError::Damaged("an attribute is missing or not a number");
         let mut number = |name: &str| take(name).and_then(|text| text.parse().ok());
         let mut count = |name: &str| number(name).ok_or_else(missing);
         let tiles = count("domelight.state.first-tile")? as usize

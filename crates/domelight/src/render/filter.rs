@@ -67,7 +67,7 @@ impl Filter {
 
 /// A name that is not a filter's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no filter is called '{0}'; there are box, tent, gaussian and blackman-harris")]
+#[error("there is no filter '{0}'; the filters are box, tent, gaussian and blackman-harris")]
 pub struct UnknownFilter(pub String);
 
 impl FromStr for Filter {

@@ -14,7 +14,7 @@ pub struct Provenance<'a> {
     /// What a user calls the environment.
     pub environment: &'a str,
     /// [`StrategySpec::description`](crate::strategy::StrategySpec::description) with the pilot's choices, or the name
-    /// of a strategy of the caller's own.
+    /// of a custom strategy own.
     pub strategy: &'a str,
     /// How it was rendered.
     pub settings: &'a RenderSettings,

@@ -48,13 +48,13 @@ use texels::Texels;
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RigError {
     /// A rig of no lights.
-    #[error("a rig has at least one light; 0 were asked for")]
+    #[error("a rig has at least one light; 0 were requested")]
     NoLights,
     /// A map without light.
     #[error("the map is black; there is no light to extract")]
     Black,
     /// More lights than texels that could be one.
-    #[error("{n_lights} lights were asked for, but only {lit} texels of the map are not black")]
+    #[error("{n_lights} lights were requested, but only {lit} texels of the map are not black")]
     TooFewTexels {
         /// Lights asked for.
         n_lights: usize,
@@ -63,18 +63,16 @@ pub enum RigError {
     },
     /// No sun.
     #[error(
-        "there is no sun: no compact source of 0.1 % of the map's light or more stands out of its \
-         surroundings by a factor of 4"
+        "there is no sun: no compact source with at least 0.1 % of the map's light stands out from its surroundings by a factor of 4"
     )]
     NoSun,
     /// No lamp.
     #[error(
-        "there is no lamp: no compact source of 0.1 % of the map's light or more stands out of its \
-         surroundings by a factor of 4"
+        "there is no lamp: no compact source with at least 0.1 % of the map's light stands out from its surroundings by a factor of 4"
     )]
     NoLamp,
     /// Lights too dim to be kept.
-    #[error("no light holds the least share of the map's light that was asked for")]
+    #[error("no light has the requested minimum share of the map's light")]
     TooDim,
     /// No rig is good enough.
     #[error("even {n_lights} lights have a shading error of {} %", digits(*percent))]

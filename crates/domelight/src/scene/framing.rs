@@ -26,7 +26,7 @@ pub struct ViewDirection {
 /// A text that names no view.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no view is called {text:?}; there are front, back, left, right, top, bottom and three-quarter, or azimuth and \
+    "there is no view {text:?}; the views are front, back, left, right, top, bottom and three-quarter, or azimuth and \
      elevation in degrees such as 30,15, the elevation from -90 to 90"
 )]
 pub struct UnknownView {

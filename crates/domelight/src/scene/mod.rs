@@ -96,7 +96,7 @@ pub enum SceneError {
         source: MeshError,
     },
     /// A part of a surface that does not exist.
-    #[error("mesh {part} is made of surface {material}, but there are only {materials}")]
+    #[error("mesh {part} uses material {material}, but there are only {materials}")]
     NoSurface {
         /// The part's name.
         part: String,
@@ -106,7 +106,7 @@ pub enum SceneError {
         materials: usize,
     },
     /// A surface with a texture that does not exist.
-    #[error("surface {material} refers to texture {texture}, but there are only {textures}")]
+    #[error("material {material} refers to texture {texture}, but there are only {textures}")]
     NoTexture {
         /// The surface's name.
         material: String,

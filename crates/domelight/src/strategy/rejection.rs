@@ -80,7 +80,7 @@ pub enum RejectionError {
     NoTries,
     /// One kept direction says nothing about how rare it is.
     #[error(
-        "stopping after {n} accepted directions: at least 2 are needed to estimate without bias how rare they are"
+        "stopping after {n} accepted directions: at least 2 are needed for an unbiased estimate of the acceptance rate"
     )]
     TooFewAccepted {
         /// The number asked for.

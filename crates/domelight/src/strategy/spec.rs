@@ -180,16 +180,15 @@ impl StrategyKind {
             Self::Environment => "samples the environment's radiance",
             Self::Mis => "samples both and weights them by multiple importance sampling",
             Self::Product => {
-                "samples the product of both by a table for each pixel, with learned visibility; traces rays \
-                 where they matter"
+                "samples the product of both from a table for each pixel, with learned visibility; traces rays where they matter"
             }
             Self::Rejection => {
                 "samples the product by rejection from one factor with a bound on the other"
             }
             Self::Sir => "samples the product by resampling candidates to rays",
-            Self::MedianCut => "directional lights by median cut: no noise, but bias",
+            Self::MedianCut => "directional lights by median cut: noise-free, but biased",
             Self::VarianceMinimization => {
-                "directional lights by variance minimization: no noise, but bias"
+                "directional lights by variance minimization: noise-free, but biased"
             }
         }
     }
@@ -255,10 +254,10 @@ pub enum StrategyError {
         expected: String,
     },
     /// Two numbers for a strategy that takes one.
-    #[error("two numbers go with mis:M:N and sir:N/M only")]
+    #[error("only mis:M:N and sir:N/M take two numbers")]
     TwoNumbers,
     /// An option of another strategy.
-    #[error("{option} goes with {strategies}")]
+    #[error("{option} applies only to {strategies}")]
     Misplaced {
         /// The option.
         option: &'static str,

@@ -36,7 +36,7 @@ pub enum BuiltinProbe {
 
 /// A name that is no built-in probe.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no built-in probe is called {name:?}; there are sky, studio, cathedral and constant")]
+#[error("there is no built-in probe {name:?}; the probes are sky, studio, cathedral and constant")]
 pub struct UnknownProbe {
     /// The name that was given.
     pub name: String,

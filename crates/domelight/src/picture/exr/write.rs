@@ -143,7 +143,7 @@ impl ExrLayers {
             if !name.is_ascii() || name.is_empty() || name.len() > 255 {
                 return refuse(name, "its name must be ASCII and 1 to 255 characters long");
             } else if values.len() != area {
-                return refuse(name, "it has not one value for each texel");
+                return refuse(name, "it does not have one value per texel");
             }
         }
         if let Some(pair) = planes.windows(2).find(|pair| pair[0].0 == pair[1].0) {

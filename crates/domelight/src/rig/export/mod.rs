@@ -147,7 +147,7 @@ pub enum ExportError {
 
 /// No format has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{name}' is no format of light rigs: {}", Format::ALL.map(Format::name).join(", "))]
+#[error("'{name}' is not a light rig format: {}", Format::ALL.map(Format::name).join(", "))]
 pub struct UnknownFormat {
     name: String,
 }

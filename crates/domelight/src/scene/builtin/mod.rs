@@ -53,7 +53,7 @@ pub enum BuiltinScene {
 /// A name that is no built-in scene.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no built-in scene is called {name:?}; there are statue, spheres, material-ball, sphere and \
+    "there is no built-in scene {name:?}; the scenes are statue, spheres, material-ball, sphere and \
      sphere-orthographic"
 )]
 pub struct UnknownScene {

@@ -36,7 +36,7 @@ impl Files<'_> {
             return Err(error(io::ErrorKind::IsADirectory.into()));
         }
         if !metadata.is_file() {
-            let what = "it is not a plain file";
+            let what = "not a regular file";
             return Err(error(io::Error::new(io::ErrorKind::InvalidInput, what)));
         }
         allow(metadata.len())?;

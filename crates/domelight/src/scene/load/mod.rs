@@ -168,7 +168,7 @@ pub enum LoadError {
     },
     /// Neither content nor extension is known.
     #[error(
-        "{} is none of the scene formats known: .ply, .obj, .stl, .off, .gltf, .glb and .toml", path.display()
+        "{} is not in a known scene format: .ply, .obj, .stl, .off, .gltf, .glb and .toml", path.display()
     )]
     UnknownFormat {
         /// The file.
@@ -186,7 +186,7 @@ pub enum LoadError {
         referrer: String,
     },
     /// A scene or an animation asked of a format that has none.
-    #[error("{} is no glTF file and has no {what} to choose", path.display())]
+    #[error("{} is not a glTF file and has no {what} to choose", path.display())]
     NoChoice {
         /// The file.
         path: PathBuf,

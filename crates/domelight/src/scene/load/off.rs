@@ -27,14 +27,14 @@ pub enum OffErrorKind {
         kind: String,
     },
     /// No numbers of vertices and faces.
-    #[error("'{text}' are no numbers of vertices, faces and edges")]
+    #[error("'{text}' are not the numbers of vertices, faces and edges")]
     Counts {
         /// What stands there.
         text: String,
     },
     /// The file ends too early.
     #[error(
-        "the file ends after {found} of {promised} {what}; it is cut short or its header wrong"
+        "the file ends after {found} of {promised} {what}; it is truncated or its header is wrong"
     )]
     EndOfFile {
         /// Vertices or faces.
@@ -51,7 +51,7 @@ pub enum OffErrorKind {
         text: String,
     },
     /// An index that names no vertex.
-    #[error("index {text} names no vertex; there are {vertices}")]
+    #[error("index {text} refers to no vertex; there are {vertices}")]
     Index {
         /// The index.
         text: String,

@@ -48,10 +48,10 @@ impl fmt::Display for PlyPlace {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlyErrorKind {
     /// The header does not end.
-    #[error("the header has no end_header line; the file is cut short or not PLY")]
+    #[error("the header has no end_header line; the file is truncated or not PLY")]
     NoEndOfHeader,
     /// A header line that is not PLY.
-    #[error("'{text}' is no valid header line")]
+    #[error("'{text}' is not a valid header line")]
     HeaderLine {
         /// The line.
         text: String,
@@ -69,7 +69,7 @@ pub enum PlyErrorKind {
     },
     /// More rows than the file can hold.
     #[error(
-        "the header promises {count} rows of {element}, at least {needed} bytes, but only {left} bytes follow; the file is cut short or its header wrong"
+        "the header promises {count} rows of {element}, at least {needed} bytes, but only {left} bytes follow; the file is truncated or its header is wrong"
     )]
     TooManyRows {
         /// The element.
@@ -97,7 +97,7 @@ pub enum PlyErrorKind {
         value: f64,
     },
     /// An index that names no vertex.
-    #[error("index {value} names no vertex; there are {vertices}")]
+    #[error("index {value} refers to no vertex; there are {vertices}")]
     Index {
         /// The index.
         value: f64,

@@ -22,7 +22,7 @@ pub enum StlErrorKind {
     /// Neither text nor a binary file of the right length.
     #[error(
         "neither text that begins with 'solid' nor a binary file: its header promises {facets} facets, \
-         {needed} bytes, but it has {held}; the file is cut short or not STL"
+         {needed} bytes, but it has {held}; the file is truncated or not STL"
     )]
     Length {
         /// The count in the header.
@@ -33,7 +33,7 @@ pub enum StlErrorKind {
         held: usize,
     },
     /// A vertex that cannot be read.
-    #[error("line {line}: '{text}' is no vertex; it needs three finite numbers")]
+    #[error("line {line}: '{text}' is not a vertex; it needs three finite numbers")]
     Vertex {
         /// The line, from 1.
         line: usize,
@@ -161,7 +161,7 @@ fn ascii(path: &Path, bytes: &[u8], strict: bool) -> Result<Vec<(String, Mesh)>,
             corners = 0;
         }
     }
-    // A facet without its end belongs to a file that was cut short.
+    // A facet without its end belongs to a file that was truncated.
     if corners > 0 {
         let line = bytes.split(|&b| b == b'\n' || b == b'\r').count();
         return Err(StlErrorKind::Facet { line, corners });

@@ -72,7 +72,7 @@ use crate::scene::{
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TomlErrorKind {
     /// Not UTF-8.
-    #[error("not a text in UTF-8; the first bad byte is byte {byte}")]
+    #[error("not UTF-8 text; the first bad byte is byte {byte}")]
     Encoding {
         /// The first bad byte.
         byte: usize,
@@ -115,10 +115,10 @@ pub enum TomlErrorKind {
     #[error("the transform of this object is singular or not finite; no scale may be 0")]
     Singular,
     /// A matrix beside other transforms.
-    #[error("'matrix' stands instead of 'scale', 'rotate' and 'translate', not beside them")]
+    #[error("'matrix' replaces 'scale', 'rotate' and 'translate'; give one or the other")]
     MatrixAndOthers,
     /// A matrix that is not affine.
-    #[error("the last row of 'matrix' must be [0, 0, 0, 1]; give the matrix by rows")]
+    #[error("the last row of 'matrix' must be [0, 0, 0, 1]; give the matrix row by row")]
     NotAffine,
     /// A camera that makes no picture.
     #[error(transparent)]

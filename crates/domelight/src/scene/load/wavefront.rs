@@ -24,13 +24,13 @@ pub enum ObjErrorKind {
         text: String,
     },
     /// A face with a corner that cannot be read.
-    #[error("'{text}' is no corner of a face; write v, v/vt, v//vn or v/vt/vn")]
+    #[error("'{text}' is not a face corner; write v, v/vt, v//vn or v/vt/vn")]
     Corner {
         /// The corner.
         text: String,
     },
     /// An index that names nothing yet.
-    #[error("index {index} names no {what}; {count} are defined so far")]
+    #[error("index {index} refers to no {what}; {count} are defined so far")]
     Index {
         /// The index as written.
         index: i64,
@@ -52,7 +52,7 @@ pub enum ObjErrorKind {
         keyword: String,
     },
     /// A material's property before any material.
-    #[error("{keyword} stands before the first newmtl")]
+    #[error("{keyword} comes before the first newmtl")]
     NoMaterial {
         /// The keyword.
         keyword: String,

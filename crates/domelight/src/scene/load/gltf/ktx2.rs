@@ -12,10 +12,10 @@ use basisu::{DecodeFlags, TargetFormat, Transcoder};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Ktx2Error {
     /// No KTX2 file at all.
-    #[error("it does not begin as one")]
+    #[error("it lacks the KTX2 signature")]
     Magic,
     /// The file ends too early, or a table lies outside of it.
-    #[error("its {0} lies outside of the file, which is cut short or damaged")]
+    #[error("its {0} lies outside the file, which is truncated or damaged")]
     OutOfRange(&'static str),
     /// A number in the header that a glTF texture cannot have.
     #[error("its {what} is {value}; {wanted}")]
