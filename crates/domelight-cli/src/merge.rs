@@ -301,7 +301,7 @@ impl Merged {
             let Report { parts, size: [w, h], spp, outputs, .. } = report;
             let outputs = outputs.join(", ");
             let png = png.map_or(String::new(), |shown| format!(" (PNG at {shown})"));
-            status(&format!("{parts} parts: {w}x{h}, {spp} samples a pixel -> {outputs}{png}"));
+            status(&format!("{parts} parts: {w}x{h}, {spp} samples per pixel -> {outputs}{png}"));
         }
         Ok(())
     }

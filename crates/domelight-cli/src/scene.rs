@@ -53,7 +53,7 @@ impl SceneArguments {
         Ok(settings.load(&Terminal { quiet })?)
     }
 
-    /// With so many camera samples a pixel.
+    /// With so many camera samples per pixel.
     pub(crate) fn render_settings(&self, pixel: &PixelArguments, n_samples: u32) -> RenderSettings {
         RenderSettings {
             width: self.camera.size.width,

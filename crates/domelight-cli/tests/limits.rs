@@ -205,7 +205,7 @@ fn too_large_a_picture_is_refused_before_it_is_made() {
     ended(&render(&folder, &["spheres", "--max-memory", "none"]), 0, &[]);
 }
 
-/// A map of one bit a texel, in few bytes if they are alike; `eight` gives eight texels in a row by their number.
+/// A map of one bit per texel, in few bytes if they are alike; `eight` gives eight texels in a row by their number.
 fn png_of(width: u32, height: u32, eight: impl Fn(u32) -> u8) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(Cursor::new(&mut bytes), width, height);

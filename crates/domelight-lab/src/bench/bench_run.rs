@@ -119,7 +119,7 @@ enum Source<'a> {
     Mitsuba(&'a RefCell<Mitsuba>),
 }
 
-/// All pictures with a number of camera samples a pixel; one value a seed.
+/// All pictures with a number of camera samples per pixel; one value a seed.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct BudgetPoint {
     pub(super) spp: u32,

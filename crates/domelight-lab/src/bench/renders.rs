@@ -292,7 +292,7 @@ fn mark(fit: Fit) -> &'static str {
 /// Tables of the suite `lecture`, whose first error is that of SIR's picture.
 pub(super) fn lecture_tables(rows: &[Row]) -> Vec<Table> {
     let mut table = Table::new(
-        format!("Seconds to the quality of {LECTURE_OPTIMUM} with one camera sample a pixel"),
+        format!("Seconds to the quality of {LECTURE_OPTIMUM} with one camera sample per pixel"),
         &["case", "strategy", "relMSE", "CPU-s", "wall s"],
     );
     for row in rows {

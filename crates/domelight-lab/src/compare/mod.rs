@@ -34,7 +34,7 @@ use strategy_run::StrategyMeasurement;
 /// The relMSE of the reference should be at most this part of the least that is measured against it.
 const CONVERGED: f64 = 0.1;
 
-/// How far beside its budget a strategy may be without a word.
+/// How far a strategy may miss its budget without a warning.
 const TOLERANCE: f64 = 0.1;
 
 /// What all strategies of a comparison have in common.
@@ -319,7 +319,7 @@ impl CompareReport {
             Budget::Time(seconds) => (result.cpu_seconds.mean, seconds, "CPU seconds"),
         };
         let off = spent / budget - 1.0;
-        let what = format!("{spent:.3} {unit} with {spp} camera samples a pixel");
+        let what = format!("{spent:.3} {unit} with {spp} camera samples per pixel");
         (off.abs() > TOLERANCE).then_some((what, 100.0 * off))
     }
 

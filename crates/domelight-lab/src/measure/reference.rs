@@ -91,9 +91,9 @@ pub enum Source {
 /// When a reference is good enough.
 #[derive(Clone, Copy, Debug)]
 pub enum Goal {
-    /// With so many camera samples a pixel.
+    /// With so many camera samples per pixel.
     Samples(u32),
-    /// When the relMSE of the pixels that show any of the scene is no greater than `noise`, or after `most` camera samples a pixel.
+    /// When the relMSE of the pixels that show any of the scene is no greater than `noise`, or after `most` camera samples per pixel.
     Noise {
         /// relMSE.
         noise: f64,
@@ -208,7 +208,7 @@ impl Reference {
         Ok(Self { picture: ReferencePicture { image, alpha: None, unoccluded: None }, report })
     }
 
-    /// From the cache, else taken half by half by `render`, which is given camera samples a pixel and 0 or 1,
+    /// From the cache, else taken half by half by `render`, which is given camera samples per pixel and 0 or 1,
     /// and kept.
     pub(crate) fn get(
         cache: Option<(&Cache, &Key)>,
@@ -287,7 +287,7 @@ impl ReferenceRun<'_> {
 }
 
 impl Goal {
-    /// The mean of two halves, its relMSE and its camera samples a pixel.
+    /// The mean of two halves, its relMSE and its camera samples per pixel.
     fn reach(
         self,
         mut render: impl FnMut(u32, usize) -> Result<ReferencePicture, Error>,

@@ -1,7 +1,7 @@
 //! Reflectance: lobes and the materials that they add up to.
 //!
 //! A [`Bsdf`] is a small sum of [`Lobe`]s: [`Lambert`], [`Phong`], [`Ward`], [`Ggx`],
-//! [`Beckmann`], and glTF's [`MetallicRoughness`], [`Sheen`] and [`Coat`], one model a file. All work in the local frame,
+//! [`Beckmann`], and glTF's [`MetallicRoughness`], [`Sheen`] and [`Coat`], one model per file. All work in the local frame,
 //! are plain `Copy` data and evaluate value and density together, because multiple importance
 //! sampling always needs both.
 //!

@@ -1,6 +1,6 @@
-//! Ray tracing: a bounding volume hierarchy with eight children a node.
+//! Ray tracing: a bounding volume hierarchy with eight children per node.
 //!
-//! A [`Bvh`] answers two questions: which triangle a ray meets first, and whether a ray to the
+//! A [`Bvh`] answers two questions: which triangle a ray hits first, and whether a ray to the
 //! environment is blocked. The second is asked far more often, for whole tiles of shadow rays at a
 //! time ([`Bvh::occluded`]), and the layout serves it.
 //!
@@ -52,7 +52,7 @@ pub use crate::simd::InstructionSet;
 pub use frustum::Frustum;
 pub use validate::BvhDefect;
 
-/// How many children a node and how many triangles a block has: the width of a vector.
+/// The number of children of a node and of triangles in a block: the width of a vector.
 const WIDTH: usize = 8;
 
 /// One number a lane.
@@ -203,7 +203,7 @@ impl Bvh {
 
     /// [`Bvh::closest_hit`] of many rays; quickest for neighbors, such as a tile's camera rays.
     ///
-    /// `hits` is overwritten, one entry a ray.
+    /// `hits` is overwritten, one entry per ray.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
         hits.clear();
         hits.resize(rays.len(), None);
@@ -213,7 +213,7 @@ impl Bvh {
     /// Whether each ray of a batch meets any triangle, to infinity: V = 0.
     ///
     /// The same answers as [`Bvh::any_hit`]; much quicker for some thousand rays at a time. Their
-    /// order matters little: they are sorted inside. `occluded` is overwritten, one entry a ray.
+    /// order matters little: they are sorted inside. `occluded` is overwritten, one entry per ray.
     ///
     /// # Panics
     /// If the batch has fewer directions than origins.
@@ -230,7 +230,7 @@ impl Bvh {
     /// What share of light gets along each ray of a batch, to infinity: the product of `of_hit`, in \[0, 1\], over all
     /// triangles that it meets; 1 where it meets none. `of_hit` gets the ray's number in the batch and the hit.
     ///
-    /// A ray's answer has the same bits whatever rays go with it. `transmittances` is overwritten, one entry a ray.
+    /// A ray's answer has the same bits whatever rays go with it. `transmittances` is overwritten, one entry per ray.
     ///
     /// # Panics
     /// If the batch has fewer directions than origins.

@@ -142,7 +142,7 @@ struct Texel {
 /// Radiance, power and map are multiples of [`Environment::unit`] W·m⁻²·sr⁻¹, which is 1 unless the brightest texel
 /// lies outside 2^±64: then only ratios matter, and neither weights nor their squares overflow or vanish.
 ///
-/// Resident memory is 17⅓ bytes a texel: three floats of radiance and a pyramid of weights.
+/// Resident memory is 17⅓ bytes per texel: three floats of radiance and a pyramid of weights.
 #[derive(Clone, Debug)]
 pub struct Environment {
     /// In multiples of the unit.

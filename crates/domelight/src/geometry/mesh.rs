@@ -4,7 +4,7 @@ use super::Aabb;
 use crate::color::Rgb;
 use crate::math::{Mat3, Mat4, Vec2, Vec3, Vec4};
 
-/// An indexed triangle mesh. Every attribute array is empty or has one entry a vertex.
+/// An indexed triangle mesh. Every attribute array is empty or has one entry per vertex.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Vertex positions.

@@ -27,7 +27,7 @@ pub struct BadExposure {
 impl Exposure {
     /// The exposure of a picture \[stops\], in hundredths if it is automatic, so that it can be typed again.
     ///
-    /// `coverage` says which pixels count, a value a pixel: those above 0; all count if it is `None` or nothing is
+    /// `coverage` says which pixels count, a value per pixel: those above 0; all count if it is `None` or nothing is
     /// covered. Pixels that are black or not finite do not count; a picture of such pixels alone has 0.
     ///
     /// # Panics

@@ -62,7 +62,7 @@ pub struct DataWindow {
 pub struct Picture {
     /// Linear Rec. 709. Where there is alpha, premultiplied by it.
     pub image: RgbImage,
-    /// Coverage in \[0, 1\], a value a texel, if the file has it.
+    /// Coverage in \[0, 1\], a value per texel, if the file has it.
     pub alpha: Option<Vec<f32>>,
     /// What OpenEXR's `envmap` attribute says.
     pub envmap: Option<EnvmapKind>,

@@ -1,4 +1,4 @@
-//! PNG: writes sRGB in 8 or 16 bits a channel, reads it back as linear color; reads JPEG likewise.
+//! PNG: writes sRGB in 8 or 16 bits per channel, reads it back as linear color; reads JPEG likewise.
 //!
 //! PNG keeps color and alpha apart (straight, unassociated); pictures here are premultiplied. The writer divides by
 //! alpha before the tone curve, so that what a viewer composes over black is the tone-mapped object; light that does
@@ -11,7 +11,7 @@ use crate::{Rgb, RgbImage, parallel};
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::{self, Cursor, Write};
 
-/// Bits a channel.
+/// Bits per channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Depth {
     /// 8 bits.

@@ -93,7 +93,7 @@ impl Film {
         Err(FilmMismatch::Window { found, expected })
     }
 
-    /// The bits of the sums: for each of [`PixelSums::WORDS`] one word a pixel.
+    /// The bits of the sums: for each of [`PixelSums::WORDS`] one word per pixel.
     #[cfg(feature = "io")]
     pub(super) fn words(&self) -> impl Iterator<Item = (&'static str, Vec<u32>)> {
         let plane = || Vec::with_capacity(self.pixels.len());

@@ -209,7 +209,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         self.pass(observer, u32::MAX) != PassEnd::NothingLeft
     }
 
-    /// As [`Self::step_with`], with a pass of no more than `most` camera samples a pixel, at least 1: for renders that
+    /// As [`Self::step_with`], with a pass of no more than `most` camera samples per pixel, at least 1: for renders that
     /// end at a set time. A strategy that learns within a pass then makes another picture than with passes of full
     /// length. With a target error passes keep their lengths.
     pub fn step_at_most(&mut self, most: u32, observer: &impl Observer) -> bool {

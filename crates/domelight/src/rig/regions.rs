@@ -1,6 +1,6 @@
 //! Summed-area tables of luminance and of where it lies, and rectangles measured by them.
 //!
-//! Sums are in double precision. Tables of one entry a texel would take 40 bytes each, more than a
+//! Sums are in double precision. Tables of one entry per texel would take 40 bytes each, more than a
 //! gigabyte for 8192×4096, so on large maps an entry is a block of texels. Large regions are then
 //! cut between blocks; small ones are summed texel by texel, which costs less than the cut of a
 //! large one.

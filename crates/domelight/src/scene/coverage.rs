@@ -248,7 +248,7 @@ impl Scene {
     }
 
     /// What share of light, in \[0, 1\], the surfaces that are not in [`Scene::bvh`] let through along each shadow ray:
-    /// a product over all of them. `transmittances` is overwritten, one entry a ray.
+    /// a product over all of them. `transmittances` is overwritten, one entry per ray.
     pub fn transmittances(&self, rays: &RayBatch, transmittances: &mut Vec<f32>) {
         let Some(partial) = self.partial.as_ref().filter(|_| self.dims_light) else {
             transmittances.clear();

@@ -118,7 +118,7 @@ impl Material {
         Self::new(name, MaterialModel::Fixed(bsdf))
     }
 
-    /// What of this surface a picture only approximates, in glTF's terms.
+    /// What of this surface per picture only approximates, in glTF's terms.
     pub fn approximated_features(&self) -> impl Iterator<Item = &'static str> {
         let Layers { transmission, volume, .. } = &self.layers;
         let transmits = self.transmits();

@@ -1,8 +1,8 @@
 //! Textures: images on surfaces, of reflectance, roughness or normals.
 //!
-//! Texels are kept as the file has them, 8 or 16 bits a channel, and decoded through a table of the
+//! Texels are kept as the file has them, 8 or 16 bits per channel, and decoded through a table of the
 //! 2⁸ or 2¹⁶ values; alpha has 8 bits, and is kept where a surface needs it. Look-ups are bilinear
-//! between texel centers, or take the nearest one. There are no mip maps: a renderer that takes many samples a pixel averages the
+//! between texel centers, or take the nearest one. There are no mip maps: a renderer that takes many samples per pixel averages the
 //! texture by itself, and without ray differentials a mip level would be a guess.
 
 use crate::Rgb;

@@ -279,7 +279,7 @@ pub trait Strategy: Sync {
         None
     }
 
-    /// Prepares a pass of `n_samples` camera samples a pixel, as a rule; `sampler` is its own, independent of those of
+    /// Prepares a pass of `n_samples` camera samples per pixel, as a rule; `sampler` is its own, independent of those of
     /// pixels and other passes.
     fn begin_pass(&self, sampler: Sampler, n_samples: u32) -> Self::Pass;
 

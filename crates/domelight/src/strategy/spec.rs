@@ -541,7 +541,7 @@ impl StrategySpec {
         !matches!(self, Self::MedianCut { .. } | Self::VarianceMinimization { .. })
     }
 
-    /// The most points that one camera sample takes from a sequence of 2³² points a pixel.
+    /// The most points that one camera sample takes from a sequence of 2³² points per pixel.
     pub fn points_per_sample(self) -> u32 {
         match self {
             Self::Brdf { n_samples } | Self::Environment { n_samples } => n_samples,

@@ -64,7 +64,7 @@ pub fn write<B: Borrow<ExrLayers>, E: From<PictureErrorKind>>(
 }
 
 impl ExrLayers {
-    /// The file's bytes: 32 bits a sample, scanlines.
+    /// The file's bytes: 32 bits per sample, scanlines.
     ///
     /// # Errors
     /// If there are no texels or no channels, two channels have one name, a name is not ASCII or too long, or a

@@ -17,7 +17,7 @@ use std::io::Cursor;
 pub struct Layer {
     /// What stands before the dot in the file; empty for the picture itself.
     pub name: String,
-    /// Name (R, G, B, A, X, Y, Z …) and a value a texel, row by row.
+    /// Name (R, G, B, A, X, Y, Z …) and a value per texel, row by row.
     pub channels: Vec<(String, Plane)>,
 }
 

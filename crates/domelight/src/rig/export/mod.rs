@@ -1,4 +1,4 @@
-//! Rigs as files of other programs: one format a file.
+//! Rigs as files of other programs: one format per file.
 //!
 //! Functions here make bytes and do no I/O. What a format needs of the outside, the name of the
 //! file that holds the residual map, is given as text.

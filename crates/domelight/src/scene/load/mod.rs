@@ -1,4 +1,4 @@
-//! Loaders: meshes and scenes from files, one format a file.
+//! Loaders: meshes and scenes from files, one format per file.
 //!
 //! | format | geometry | materials | camera |
 //! |---|---|---|---|

@@ -315,7 +315,7 @@ impl Header {
             let slack = u128::from(self.format == Format::Ascii);
             let needed = u128::from(element.count) * row as u128;
             total += needed;
-            // Rows without properties take no bytes; one byte a row bounds the loop over them.
+            // Rows without properties take no bytes; one byte per row bounds the loop over them.
             let rows = u128::from(element.count);
             if total > left as u128 + slack || rows > (left as u128 + slack) {
                 let kind = PlyErrorKind::TooManyRows {

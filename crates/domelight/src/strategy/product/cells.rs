@@ -35,7 +35,7 @@ pub(super) const TABLE_ROWS: usize = MAX_ROWS.next_power_of_two();
 /// Places in a table; those of rows that the cells do not fill are nobody's.
 pub(super) const N_SLOTS: usize = TABLE_ROWS * LANES;
 
-/// One number a cell, at [`Cells::slot`], by row.
+/// One number per cell, at [`Cells::slot`], by row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
 pub(super) struct CellArray([Lanes; TABLE_ROWS]);

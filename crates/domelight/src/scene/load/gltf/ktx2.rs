@@ -105,7 +105,7 @@ impl<'a> Ktx2<'a> {
                 [0, 8, 16].map(|i| u64::from_le_bytes(std::array::from_fn(|j| entry[i + j])));
             inside(offset, length, "level")?;
             if level == 0 && is_uastc {
-                let (what, wanted) = ("length of the first level", "16 bytes a block fit the size");
+                let (what, wanted) = ("length of the first level", "16 bytes per block fit the size");
                 let value = if scheme == 0 { length } else { uncompressed };
                 if value != 16 * blocks {
                     return Err(Ktx2Error::Header { what, value, wanted });
@@ -187,7 +187,7 @@ mod tests {
         assert!(error(48, 0xffff_fff0).contains("descriptor"));
         assert!(error(80, u64::MAX - 3).contains("level"));
         assert!(error(88, 1 << 55).contains("level"));
-        assert!(error(20, 16384).contains("16 bytes a block"));
+        assert!(error(20, 16384).contains("16 bytes per block"));
         assert_eq!(Ktx2::new(b"PNG"), Err(Ktx2Error::Magic));
     }
 
