@@ -200,7 +200,7 @@ fn sun_rows(sun: &Sun) -> [(&'static str, String); 4] {
 /// The error of each strategy, and what a small one takes.
 fn noise_table(noise: &[StrategyNoise]) -> String {
     let mut text = format!(
-        "noise of a sphere, {RAYS_A_PIXEL} shadow rays per pixel       rays for an error of 1 %\n\
+        "noise of a sphere, {RAYS_A_PIXEL} shadow rays per pixel     rays for an error of 1 %\n\
          strategy                matte    glossy         matte      glossy\n"
     );
     for n in noise {
