@@ -118,7 +118,7 @@ impl Material {
         Self::new(name, MaterialModel::Fixed(bsdf))
     }
 
-    /// What of this surface per picture only approximates, in glTF's terms.
+    /// The features of this surface that a picture only approximates, in glTF terms.
     pub fn approximated_features(&self) -> impl Iterator<Item = &'static str> {
         let Layers { transmission, volume, .. } = &self.layers;
         let transmits = self.transmits();
