@@ -1,19 +1,19 @@
-//! How the camera samples of a pass are divided among pixels: more for noisier pixels, about as many altogether as
-//! were asked for.
+//! Divides the camera samples of a pass among pixels: noisier pixels get more, and the total is about the number
+//! requested.
 //!
-//! The relative variance of a pixel is the variance of its camera samples' luminance, hits and misses alike, over
-//! their squared mean (and a hundredth: a black pixel needs no care). The mean of n stratified samples keeps a part
-//! of it that falls like n⁻² for a smooth integrand and n⁻¹ for a rough one, so the least sum over all pixels of
-//! variance · n⁻ᵏ asks for n in proportion to variance^(1/(k+1)), with an exponent between 1/3 and 1/2; a little
-//! less is best for a variance that is estimated from a few samples.
+//! The relative variance of a pixel is the variance of the luminance of its camera samples, including misses, divided
+//! by their squared mean plus 0.01 (black pixels need few samples). The variance of the mean of n stratified samples
+//! falls like n⁻² for a smooth integrand and like n⁻¹ for a rough one. The sum over all pixels of variance · n⁻ᵏ is
+//! smallest for n proportional to variance^(1/(k+1)), an exponent between 1/3 and 1/2. A slightly smaller exponent is
+//! best for a variance estimated from few samples.
 //!
-//! A pixel's number follows from the samples of pixels of lower levels, never from its own, so the mean of its
-//! samples stays unbiased. (A number that grows with the pixel's own samples would prefer what it saw: Kirk & Arvo
-//! 1991, "Unbiased Sampling Techniques for Image Synthesis".) Pixels of lower levels find silhouettes by what their
-//! samples saw of the background, and by the difference of their means where one is covered more than another.
+//! The number of samples of a pixel depends on the samples of pixels of lower levels, never on its own, so the mean of
+//! its samples stays unbiased. (A number that depends on the pixel's own samples would introduce bias: Kirk & Arvo
+//! 1991, "Unbiased Sampling Techniques for Image Synthesis".) Pixels of lower levels reveal silhouettes by the
+//! background in their samples, and by differences of their means if their coverage differs.
 //!
 //! One scale serves the whole picture, so that samples move from quiet tiles to noisy ones; scouts find it ([`super::scouts`]).
-//! Exact budgets for tiles would cost a quarter to three quarters more error at equal rays (docs/experiments.md).
+//! Exact budgets per tile would increase the error at equal rays by a quarter to three quarters (docs/experiments.md).
 
 use crate::math::functions;
 use crate::strategy::levels::{N_LEVELS, coarser, level};

@@ -1,7 +1,7 @@
 //! Checkpoints and parts: a render's sums in an OpenEXR file that other programs can open.
 //!
-//! R, G, B, A are the picture so far; the layers below `state` are the exact bits of the sums, from which all
-//! other layers follow, and the attributes identify the render. A fingerprint over both reveals a damaged
+//! R, G, B, A hold the picture so far. The layers below `state` hold the exact bits of the sums, from which all
+//! other layers are computed. The attributes identify the render. A fingerprint over both reveals a damaged
 //! file.
 
 use std::ops::Range;
@@ -15,32 +15,32 @@ use crate::picture::exr::{Compression, ExrLayers, Plane};
 /// The state of a render, or of a shard of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
-    /// What decides the picture, but for the number of samples: names and values, by name. Only a render of
-    /// which all are equal may go on from here.
+    /// Everything that decides the picture except the number of samples: names and values, sorted by name. Only a
+    /// render with an equal identity may continue from this checkpoint.
     pub identity: Vec<(String, String)>,
-    /// Provenance of the finished picture: further attributes, by name.
+    /// Provenance of the finished picture: further attributes, sorted by name.
     pub provenance: Vec<(String, String)>,
     /// The tiles.
     pub tiles: Range<usize>,
-    /// Tiles of the whole picture.
+    /// The number of tiles of the whole picture.
     pub n_tiles: usize,
-    /// Camera samples that each pixel is to have.
+    /// The target number of camera samples per pixel.
     pub n_samples: u32,
-    /// All tiles are finished.
+    /// Whether all tiles are finished.
     pub complete: bool,
-    /// What was done.
+    /// Counts of the work done so far.
     pub counts: Counts,
     /// The sums.
     pub film: Film,
 }
 
-/// Why a file is no checkpoint to go on from.
+/// An error in reading a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// It is no whole OpenEXR file.
+    /// The file is not a complete OpenEXR file.
     #[error(transparent)]
     Picture(#[from] PictureErrorKind),
-    /// It is a picture of something else.
+    /// The file is some other picture.
     #[error("it is not a checkpoint or part of a render by domelight")]
     Foreign,
     /// Another version of the program wrote it.
@@ -49,7 +49,7 @@ pub enum CheckpointError {
         /// What the file says.
         found: String,
     },
-    /// Its content is not what was written.
+    /// The content was altered after it was written.
     #[error("it is damaged: {0}")]
     Damaged(&'static str),
 }
@@ -64,10 +64,10 @@ const IDENTITY: &str = "domelight.render.";
 const STATE: &str = "state.";
 
 impl Checkpoint {
-    /// The file's bytes; the same for the same state.
+    /// Encodes the checkpoint as a file. Equal states give equal bytes.
     ///
     /// # Errors
-    /// If the picture is too large, or a name of the provenance cannot be one of OpenEXR.
+    /// If the picture is too large, or a name of the provenance is not a valid OpenEXR name.
     pub fn encode(&self) -> Result<Vec<u8>, PictureErrorKind> {
         let Film { width, height, window, .. } = self.film;
         let (color, alpha) = self.film.picture();
@@ -87,20 +87,20 @@ impl Checkpoint {
         exr.encode()
     }
 
-    /// An estimate of the memory that [`Checkpoint::decode`] takes, the bytes themselves included.
+    /// An estimate of the memory that [`Checkpoint::decode`] needs \[bytes\], including `bytes` itself.
     ///
     /// # Errors
-    /// If they are no OpenEXR file.
+    /// If `bytes` is not an OpenEXR file.
     pub fn memory_to_decode(bytes: &[u8]) -> Result<u64, CheckpointError> {
         // The channels as they are read and the sums that they become.
         let pixel = 4 * (4 + PixelSums::WORDS.len()) + size_of::<PixelSums>();
         Ok(bytes.len() as u64 + crate::picture::exr::texels(bytes)? as u64 * pixel as u64)
     }
 
-    /// Reads the bytes of [`Checkpoint::encode`].
+    /// Decodes the bytes from [`Checkpoint::encode`].
     ///
     /// # Errors
-    /// If they are anything else, incomplete or damaged.
+    /// If `bytes` is anything else, incomplete or damaged.
     pub fn decode(bytes: &[u8]) -> Result<Self, CheckpointError> {
         let exr = ExrLayers::decode(bytes)?;
         let mut attributes = exr.attributes.clone();
@@ -151,7 +151,7 @@ impl Checkpoint {
         Ok(Self { identity, provenance, tiles, n_tiles, n_samples, complete, counts, film })
     }
 
-    /// The first entry of the identity that is not the same here and there: its name, here, there.
+    /// The first entry that differs between this checkpoint's identity and `identity`.
     pub fn difference<'a>(&'a self, identity: &'a [(String, String)]) -> Option<Difference<'a>> {
         let get = |of: &'a [(String, String)], name: &str| {
             of.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value)

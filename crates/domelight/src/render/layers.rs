@@ -1,4 +1,4 @@
-//! The layers of a rendered picture: one table of what they are, from which files, Python and the page are made.
+//! The layers of a rendered picture, in one table that files, Python and the page use.
 
 use std::ops::Range;
 
@@ -11,16 +11,16 @@ use crate::{Rgb, RgbImage};
 /// A layer of [`Layers`].
 #[derive(Clone, Copy, Debug)]
 pub struct LayerInfo {
-    /// Its name in Python, such as `depth`.
+    /// The name in Python, such as `depth`.
     pub name: &'static str,
-    /// What stands before the dot in the names of its channels in a file: empty for the picture itself. `None` if files
+    /// The part before the dot in the names of its channels in a file, empty for the picture itself. `None` if files
     /// do not have the layer.
     pub file_layer: Option<&'static str>,
-    /// Its channels, such as `["R", "G", "B"]`.
+    /// The channels, such as `["R", "G", "B"]`.
     pub channels: &'static [&'static str],
-    /// What it shows, in a sentence or two.
+    /// A description in a sentence or two.
     pub description: &'static str,
-    /// Its values, row by row.
+    /// Returns the values, row by row.
     pub values: fn(&Layers) -> LayerValues<'_>,
 }
 
@@ -61,12 +61,12 @@ macro_rules! layers {
         }),*];
 
         impl Layers {
-            /// The layers of a picture without samples.
+            /// Creates the layers of a picture without samples.
             pub fn new(width: usize, height: usize) -> Self {
                 Self { $($field: LayerData::zero(width, height),)* }
             }
 
-            /// Some of the rows.
+            /// Copies some of the rows.
             ///
             /// # Panics
             /// If there are no such rows.
@@ -138,8 +138,8 @@ impl Layers {
         self.color.height
     }
 
-    /// The part of the picture that the scene covers \[pixels\]: the sum over all pixels of the share of camera samples
-    /// that hit it.
+    /// The area that the scene covers \[pixels\]: the sum over all pixels of the fraction of camera samples that hit
+    /// the scene.
     pub fn covered_pixels(&self) -> f64 {
         let coverage = |(&hits, &n): (&u32, &u32)| f64::from(hits) / f64::from(n.max(1));
         self.n_hits.iter().zip(&self.n_samples).map(coverage).sum()

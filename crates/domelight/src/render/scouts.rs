@@ -1,5 +1,5 @@
-//! Finds the scale by which the camera samples of a picture are divided: small windows, spread over it, are rendered
-//! ahead of it and show how many samples its pixels will get.
+//! Determines the scale of the sample allocation of a picture: small windows, spread over the picture, are rendered
+//! first and show how many samples its pixels will get.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Sums of the camera samples of a pixel: what a film consists of, and what a checkpoint keeps bit by bit.
+//! The sums over the camera samples of a pixel, which make up a film and which a checkpoint stores bit by bit.
 
 use super::tiling::SampleSet;
 use super::variance::Contrast;

@@ -1,5 +1,5 @@
-//! The unit of work: a tile's camera rays, its shading points grouped by pixel, a strategy's rounds
-//! of shadow rays, and their sums.
+//! The unit of work, a tile: its camera rays, its shading points grouped by pixel, the strategy's rounds
+//! of shadow rays, and the sums.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -49,16 +49,16 @@ pub(super) struct Tile {
     pub(super) changed: Mark,
 }
 
-/// What was done, for the statistics.
+/// Counts of the work done, for statistics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Camera rays, with those of which it is known that they meet nothing.
+    /// Camera rays, including those known to hit nothing.
     pub camera_rays: u64,
     /// Camera rays that hit the scene.
     pub shading_points: u64,
     /// Shadow rays traced.
     pub shadow_rays: u64,
-    /// Camera samples whose value was NaN or infinite; they count as black.
+    /// Camera samples with a NaN or infinite value, which count as black.
     pub non_finite: u64,
 }
 

@@ -1,4 +1,4 @@
-//! How a picture is divided into tiles, and tiles into shards.
+//! Divides a picture into tiles, and tiles into shards.
 
 use std::fmt;
 use std::ops::Range;
@@ -9,13 +9,13 @@ use crate::strategy::Strategy;
 /// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
-    /// First column.
+    /// The first column.
     pub x: usize,
-    /// First row.
+    /// The first row.
     pub y: usize,
-    /// Columns.
+    /// The number of columns.
     pub width: usize,
-    /// Rows.
+    /// The number of rows.
     pub height: usize,
 }
 
@@ -62,7 +62,7 @@ pub(super) enum SampleSet {
     Second,
 }
 
-/// The tiles of a picture, in row order; those at the right and lower border may be smaller.
+/// The tiles of a picture, in row order. Tiles at the right and lower border may be smaller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tiling {
     width: usize,
@@ -74,8 +74,8 @@ pub struct Tiling {
 const RAYS_PER_TILE: usize = 1 << 15;
 
 impl Tiling {
-    /// The tiles of a render by a strategy that asks for up to `n_rays` shadow rays at a point:
-    /// smaller than set where one sample of each pixel asks for too many.
+    /// The tiles of a render with a strategy that requests up to `n_rays` shadow rays per point. Tiles are
+    /// smaller than set if one sample per pixel requests too many rays.
     ///
     /// # Panics
     /// If width, height or tile size are zero.
@@ -91,7 +91,7 @@ impl Tiling {
         self.across() * self.height.div_ceil(self.size)
     }
 
-    /// The tiles of shard `k` of `n`: ranges that follow each other and differ by one tile at the most.
+    /// The tiles of shard `k` of `n`. Shards are consecutive ranges whose lengths differ by at most one tile.
     ///
     /// # Panics
     /// Unless k < n.
@@ -112,7 +112,7 @@ impl Tiling {
         Window { x, y, width, height: self.size.min(self.height - y) }
     }
 
-    /// The least rectangle around a range of tiles; of an empty range, the first pixel: a file needs one.
+    /// The smallest rectangle around a range of tiles. For an empty range, the first pixel, because a file needs one.
     ///
     /// # Panics
     /// If there are no such tiles.

@@ -1,27 +1,28 @@
-//! How much less than independent samples the samples of a render err.
+//! Estimates how much less the samples of a render err than independent samples.
 //!
-//! The mean of n independent samples of variance s² has the variance s²/n. Stratified samples err less, and their own
-//! spread does not show by how much. What does show it:
+//! The mean of n independent samples with variance s² has the variance s²/n. Stratified samples err less, but their
+//! sample variance does not show by how much. Two measurements do:
 //!
-//! - **A second set** of samples of some pixels, independent of the first: the squared difference of two such means is
-//!   their variances' sum, whatever the samples have in common within a set. Strategies that place all the rays of a
-//!   pixel together have it in one pixel of 64, renders with a target error in all.
+//! - **A second set** of samples in some pixels, independent of the first. The squared difference of the two means is
+//!   the sum of their variances in expectation, however the samples within a set depend on each other. Strategies that
+//!   place all the rays of a pixel together use it in one pixel of 64, and renders with a target error in all pixels.
 //! - **Halves of a sequence.** Let the mean of the first 2ʲ samples and that of the next 2ʲ differ by Dⱼ. The Dⱼ are
-//!   the details of a Haar expansion over the index, taken as uncorrelated under Owen's scrambling (Owen 1997, "Monte
-//!   Carlo variance of scrambled net quadrature"), and the mean over many pixels of Dⱼ² as proportional to rʲ. Then
+//!   the details of a Haar expansion over the index. They are assumed to be uncorrelated under Owen scrambling (Owen
+//!   1997, "Monte Carlo variance of scrambled net quadrature"), and the mean of Dⱼ² over many pixels is assumed to be
+//!   proportional to rʲ. Then
 //!
 //! ```text
 //! Var(mean of n) = Σⱼ E[Dⱼ²]/4 · (min(x, 2ʲ⁺¹ − x) / n)²        x = n mod 2ʲ⁺¹
 //! ```
 //!
-//!   r is ½ for independent samples, whose D₀² is 2 s², and follows from s² and the greatest j that was drawn.
+//!   r is ½ for independent samples, whose D₀² is 2 s², and follows from s² and the greatest j available.
 //!
-//! Either is too noisy in a single pixel. So the quotient of this variance and of s²/n, both summed over all pixels of
-//! the picture, scales the s²/n of each.
+//! Both are too noisy in a single pixel. So the ratio of this variance to s²/n, both summed over all pixels of the
+//! picture, scales the s²/n of each pixel.
 
 use crate::math::functions;
 
-/// Sums over pixels of what their variance is estimated from. In whole numbers, so that the sums of parts of a
+/// Sums over pixels from which their variance is estimated. They hold whole numbers, so that the sums of parts of a
 /// picture add up to those of the whole in any order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VarianceSums {
@@ -32,9 +33,9 @@ pub struct VarianceSums {
 /// What a pixel adds to [`VarianceSums`]; channels added up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Contrast {
-    /// Two independent sets: s²/n, and the variance by their difference.
+    /// Two independent sets: s²/n, and the variance from their difference.
     Sets([f64; 2]),
-    /// One sequence: s²/N of its longest prefix of N = 2^k samples, and D² of the halves of that.
+    /// One sequence: s²/N of its longest prefix of N = 2^k samples, and D² of the halves of this prefix.
     Halves([f64; 2]),
 }
 

@@ -1,4 +1,4 @@
-//! The one place where shadow rays are traced.
+//! Traces shadow rays; no other module does.
 
 use crate::geometry::RayBatch;
 use crate::scene::Scene;

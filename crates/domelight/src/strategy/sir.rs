@@ -2,35 +2,37 @@
 //! 2005, "Bidirectional Importance Sampling for Direct Illumination"; the same estimator with one
 //! pick is the resampled importance sampling of Talbot, Cline & Egbert 2005.
 //!
-//! M candidates xⱼ come from an easy density; each has a weight Wⱼ, its unshadowed contribution
-//! p̂(xⱼ) over M times the density. N of them are picked in proportion to their weights, and only those
+//! M candidates xⱼ are drawn from an easy density. Each has a weight Wⱼ, its unshadowed contribution
+//! p̂(xⱼ) divided by M times the density. N of them are picked in proportion to their weights, and only those
 //! are traced:
 //!
 //! ```text
 //! (Σ W) · (1/N) Σ V(pick)        Σ W estimates L_ns, the unshadowed integral
 //! ```
 //!
-//! The expectation over the picks is Σ Wⱼ V(xⱼ), the estimate had all candidates been traced, so it is
-//! unbiased for every M, N ≥ 1. With independent candidates and picks its variance is
+//! The expectation over the picks is Σ Wⱼ V(xⱼ), the estimate from tracing all candidates, so it is
+//! unbiased for every M, N ≥ 1. With independent candidates and picks, its variance is
 //!
 //! ```text
 //! A/M + (1 − 1/M) B/N     A = Var(p̂ V / q),  B = I (L_ns − I)
 //! ```
 //!
-//! The first term is that of plain importance sampling with M rays, the second what is unknown of
-//! visibility: no better than tracing all candidates, but a candidate costs less than a ray. See
+//! The first term is that of plain importance sampling with M rays. The second comes from the unknown
+//! visibility. This is no better than tracing all candidates, but a candidate costs less than a ray. See
 //! [`Candidates::optimal_number`].
 //!
-//! Weights are luminances, and a pick carries its color over its luminance: the luminance of the
-//! weights adds up to Σ W exactly, colors do in expectation. A candidate picked k times is one ray
-//! of k times the weight.
+//! Weights are luminances, and a pick carries its color divided by its luminance. The luminances of the
+//! weights add up to Σ W exactly, and the colors do so in expectation. A candidate picked k times is one
+//! ray with k times the weight.
 //!
-//! Candidates from both factors are weighed by Veach's balance heuristic: the density is the mixture
-//! with the expected counts. An odd candidate comes from either factor by the toss of a coin. Candidates sorted along a curve through space make a systematic
-//! choice a stratified one, for the picks spread over what lights the point.
+//! Candidates from both factors are weighted by Veach's balance heuristic: the density is the mixture
+//! with the expected counts. An odd candidate comes from either factor at random. If the candidates are
+//! sorted along a space-filling curve, systematic resampling becomes stratified, because the picks spread
+//! over the light that reaches the point.
 //!
-//! Rejected: a number of candidates that adapts to the estimate itself (a bias, for when to stop
-//! would know the values), or from pixel to pixel (their points would no longer form one sequence).
+//! Rejected: a number of candidates that adapts to the estimate itself (biased, because the decision to
+//! stop would depend on the values), or from pixel to pixel (the points would no longer form one
+//! sequence).
 
 use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
@@ -40,14 +42,14 @@ use crate::sampling::hilbert::hemisphere_index;
 use crate::sampling::rng::hash2;
 use crate::sampling::{Dimension, ONE_MINUS_EPSILON, Sampler, SamplerKind, WeightedReservoirs};
 
-/// The density that candidates are drawn from.
+/// The density from which candidates are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Candidates {
     /// The environment, in proportion to luminance.
     Environment,
     /// The BRDF.
     Brdf,
-    /// Half from each, an odd one from either at random, weighed by the balance heuristic.
+    /// Half from each, an odd one from either at random, weighted by the balance heuristic.
     #[default]
     Mixture,
 }
@@ -66,12 +68,12 @@ impl Candidates {
 /// The method that picks N of the candidates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Resampling {
-    /// A random number for each pick; the picks are stratified as far as the numbers are.
+    /// One random number per pick. The picks are as well stratified as the numbers.
     Multinomial,
     /// N equally spaced picks from one random offset: candidate j is picked ⌊N Wⱼ/ΣW⌋ times or once
     /// more.
     Systematic,
-    /// The same from candidates sorted along Hilbert's curve over the hemisphere.
+    /// The same, with candidates sorted along a Hilbert curve over the hemisphere.
     #[default]
     SystematicSorted,
     /// N independent reservoirs over the stream of candidates (Chao 1982; Bitterli et al. 2020):
@@ -84,11 +86,11 @@ pub enum Resampling {
 pub struct SamplingImportanceResampling<'a> {
     /// The light.
     pub environment: &'a Environment,
-    /// Candidates at each point, at least 1.
+    /// The number of candidates per point, at least 1.
     pub n_candidates: u32,
-    /// Picks at each point, at least 1: the most shadow rays.
+    /// The number of picks per point, at least 1; the maximum number of shadow rays.
     pub n_samples: u32,
-    /// The density that candidates are drawn from.
+    /// The density from which candidates are drawn.
     pub candidates: Candidates,
     /// The method that picks candidates.
     pub resampling: Resampling,
@@ -106,7 +108,7 @@ struct Candidate {
     index: u32,
 }
 
-/// Memory of [`SamplingImportanceResampling`].
+/// Scratch memory of [`SamplingImportanceResampling`].
 #[derive(Clone, Debug, Default)]
 pub struct SirScratch {
     candidates: Vec<Candidate>,
@@ -279,9 +281,9 @@ impl PointStrategy for SamplingImportanceResampling<'_> {
     }
 }
 
-/// The cost of a shadow ray over that of a candidate, as measured with this library on scenes of a
-/// hundred thousand triangles under a map of 1024 × 512 texels: 0.05 to 0.08 µs against 0.2 µs, of
-/// which the look-up in the map and its table is the most. Rays cost more in larger scenes.
+/// The cost of a shadow ray divided by that of a candidate. Measured with this library on scenes with a
+/// hundred thousand triangles under a map of 1024 × 512 texels: 0.05 to 0.08 µs against 0.2 µs, most of it
+/// for the look-up in the map and its table. Rays cost more in larger scenes.
 pub const RAY_COST: f64 = 0.3;
 
 /// Estimates of a pilot at each point.
@@ -342,8 +344,8 @@ impl<'p, V: Fn(&ShadingPoint, Vec3) -> f32> CandidatePilot<'p, V> {
         }
     }
 
-    /// Error² times cost of N of M candidates at each point that sees light: the mean squared relative error of an
-    /// estimate, times M + [`RAY_COST`] N.
+    /// The squared error times the cost at each point that sees light: the mean squared relative error of an estimate,
+    /// times M + [`RAY_COST`] N.
     pub fn work(&self, sir: &SamplingImportanceResampling) -> Vec<f64> {
         let cost = f64::from(sir.n_candidates) + RAY_COST * f64::from(sir.n_samples);
         let mut work = vec![0.0; self.points.len()];
@@ -354,11 +356,11 @@ impl<'p, V: Fn(&ShadingPoint, Vec3) -> f32> CandidatePilot<'p, V> {
         work
     }
 
-    /// The number of candidates M, N or a power of two above it, with the least [`CandidatePilot::work`] for the picks
-    /// of `sir`, whose own M does not matter.
+    /// The number of candidates M, which is N or a power of two above it, with the least [`CandidatePilot::work`] for the
+    /// picks of `sir`. The M of `sir` itself is ignored.
     ///
-    /// The search doubles M until two doublings in turn have won nothing. More candidates must win by more than two
-    /// standard errors over the points.
+    /// The search doubles M until two doublings in a row bring no gain. A gain must exceed two standard errors over the
+    /// points.
     pub fn optimal_number(&self, sir: &SamplingImportanceResampling) -> u32 {
         const MOST: u32 = 1 << 14;
         let work = |n_candidates| self.work(&SamplingImportanceResampling { n_candidates, ..*sir });

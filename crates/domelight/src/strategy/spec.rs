@@ -3,13 +3,13 @@
 //! | text | strategy |
 //! |---|---|
 //! | `brdf:4`, `environment:4` | 4 samples of one density |
-//! | `mis:3:1` | 3 environment and 1 BRDF sample by multiple importance sampling |
+//! | `mis:3:1` | multiple importance sampling with 3 environment samples and 1 BRDF sample |
 //! | `product:8` | product sampling with at most 8 shadow rays |
 //! | `rejection:16`, `rejection:rays=4:tries=256` | 16 tries; until 4 of at most 256 tries are accepted |
-//! | `sir:15/800`, `sir:15` | 15 of 800 candidates; of as many as a pilot finds best |
+//! | `sir:15/800`, `sir:15` | 15 of 800 candidates; a pilot chooses the number of candidates |
 //! | `median-cut:64`, `variance-minimization:64` | 64 directional lights |
 //!
-//! Numbers may be left out. Further keys are `heuristic=balance|power` and `no-compensation` of `mis`,
+//! Numbers are optional. Further keys are `heuristic=balance|power` and `no-compensation` of `mis`,
 //! `proposal=environment|brdf|tighter` of `rejection`, and `from=environment|brdf|mixture` and
 //! `resampling=multinomial|systematic|sorted|reservoir` of `sir`. [`StrategySpec`] displays as the shortest
 //! such text, which parses to the same value.
@@ -22,7 +22,7 @@ use crate::sampling::Heuristic;
 
 /// A strategy with its parameters, independent of scene and environment.
 ///
-/// [`PreparedStrategy::new`](super::PreparedStrategy::new) turns it into one that runs.
+/// [`PreparedStrategy::new`](super::PreparedStrategy::new) prepares it for an environment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StrategySpec {
@@ -159,7 +159,7 @@ impl StrategyKind {
         Self::VarianceMinimization,
     ];
 
-    /// Its name in text, such as `median-cut`.
+    /// The name in text form, such as `median-cut`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Brdf => "brdf",
@@ -173,7 +173,7 @@ impl StrategyKind {
         }
     }
 
-    /// What the strategy does, in a line.
+    /// A one-line description of the strategy.
     pub fn summary(self) -> &'static str {
         match self {
             Self::Brdf => "samples the BRDF",
@@ -193,7 +193,7 @@ impl StrategyKind {
         }
     }
 
-    /// Other names that are understood.
+    /// Alternative names.
     pub fn aliases(self) -> &'static [&'static str] {
         match self {
             Self::Environment => &["env", "em"],
@@ -211,7 +211,7 @@ impl StrategyKind {
 /// The options of a strategy; `None` stands for the default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StrategyOptions {
-    /// Shadow rays of each camera sample; samples to accept of rejection.
+    /// Shadow rays per camera sample; for rejection, samples to accept.
     pub rays: Option<u32>,
     /// Environment and BRDF samples of `mis`.
     pub split: Option<[u32; 2]>,
@@ -219,21 +219,21 @@ pub struct StrategyOptions {
     pub lights: Option<u32>,
     /// Candidates of `sir`.
     pub candidates: Option<u32>,
-    /// The density that `sir` draws candidates from.
+    /// The density from which `sir` draws candidates.
     pub from: Option<Candidates>,
-    /// The method by which `sir` picks rays from candidates.
+    /// How `sir` picks rays from its candidates.
     pub resampling: Option<Resampling>,
     /// Tries of rejection.
     pub tries: Option<u32>,
-    /// What rejection draws its tries from.
+    /// The density from which rejection draws its tries.
     pub proposal: Option<Proposal>,
-    /// The heuristic that weights the samples of `mis`.
+    /// The heuristic for the weights of `mis`.
     pub heuristic: Option<Heuristic>,
-    /// `mis` draws from the environment's whole table.
+    /// Whether `mis` samples the whole environment, without compensation.
     pub no_compensation: bool,
 }
 
-/// The error of a text or a set of options that describe no strategy.
+/// An invalid strategy text or set of options.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StrategyError {
@@ -243,7 +243,7 @@ pub enum StrategyError {
     /// No option has that name.
     #[error("there is no option '{0}' of strategies")]
     UnknownOption(String),
-    /// A value that an option does not take.
+    /// An invalid value of an option.
     #[error("{option} is '{value}'; it must be {expected}")]
     BadValue {
         /// The option.
@@ -368,7 +368,7 @@ impl StrategyOptions {
         Ok(())
     }
 
-    /// These options where they are given, else those of `other`.
+    /// These options, with those of `other` where they are not given.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self {
@@ -448,8 +448,8 @@ fn named<T: Copy>(option: &'static str, names: Names<T>, text: &str) -> Result<T
 }
 
 impl StrategySpec {
-    /// The strategy with those options; defaults are 1 ray, 1:1 of `mis`, 8 rays of `product`, 16 tries and 64
-    /// lights.
+    /// Creates the strategy with these options. The defaults are 1 ray, 1:1 for `mis`, 8 rays for `product`, 16 tries
+    /// and 64 lights.
     ///
     /// # Errors
     /// If an option belongs to another strategy, or options contradict each other.
@@ -541,7 +541,7 @@ impl StrategySpec {
         !matches!(self, Self::MedianCut { .. } | Self::VarianceMinimization { .. })
     }
 
-    /// The most points that one camera sample takes from a sequence of 2³² points per pixel.
+    /// The maximum number of points that one camera sample takes from the pixel's sequence of 2³² points.
     pub fn points_per_sample(self) -> u32 {
         match self {
             Self::Brdf { n_samples } | Self::Environment { n_samples } => n_samples,
@@ -556,7 +556,7 @@ impl StrategySpec {
         }
     }
 
-    /// A sentence for readers of reports.
+    /// A description for reports.
     pub fn description(self) -> String {
         match self {
             Self::Brdf { n_samples } => format!("brdf, {n_samples} per camera sample"),
