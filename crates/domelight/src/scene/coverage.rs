@@ -1,17 +1,17 @@
-//! What rays see and pass through: surfaces that do not hide all behind them, or are not seen from behind.
+//! Coverage, transmission and single-sided surfaces: what rays hit and what they pass through.
 //!
-//! A surface with coverage a, the share of it that is there, that transmits T lets 1 − a + a T through, a color where T is
-//! one. T is that of `KHR_materials_transmission`: the base color, for light that is not reflected, straight through.
+//! A surface with coverage a and transmittance T lets 1 − a + a T through, a color if T is a color. T is that of
+//! `KHR_materials_transmission`: the base color, for light that is not reflected, straight through.
 //!
-//! A camera ray meets a surface with a probability that is its coverage; each triangle along the ray has a random number
-//! of its own, so that what is seen through several layers is their product. One that transmits is met with the
-//! probability p = max(1 − max(T), ¼) where it is there, and the sample's weight is 1/p if it is met, T/(1 − p) if not. A
-//! shadow ray takes the product of what all surfaces along it let through, without noise, by the mean of T's channels at
-//! normal incidence.
+//! A camera ray hits a surface with a probability equal to its coverage. Each triangle along the ray has its own random
+//! number, so that the transmittances of several layers multiply. A covered point of a transmissive surface is hit with
+//! probability p = max(1 − max(T), ¼); the sample's weight is 1/p if the surface is hit, and T/(1 − p) if not. A shadow
+//! ray multiplies the transmittances of all surfaces along it, without noise, using the mean of T's channels at normal
+//! incidence.
 //!
-//! A single-sided surface is not there for a camera ray that comes from behind, so that a closed body is met once. Its
-//! shadow falls from either side, but T counts once a body for light, too: where light comes upon the front, that is
-//! where the shadow ray leaves the body. So light is tinted that falls into a body, through it, or through an open pane
+//! A single-sided surface is invisible to a camera ray that comes from behind, so that a closed body is hit once. It casts
+//! a shadow from either side, but T also counts only once per body for light: where light reaches the front, that is,
+//! where the shadow ray leaves the body. So light is tinted if it falls into a body, through it, or through an open pane
 //! that faces the light.
 
 use std::cell::RefCell;
@@ -24,11 +24,11 @@ use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
 use crate::sampling::{rng::hash2, sobol};
 
-/// The triangles that may not hide what is behind them.
+/// The triangles that may not be opaque.
 #[derive(Debug)]
 pub(super) struct Partial {
     bvh: Bvh,
-    /// The number in the scene of the first.
+    /// The index in the scene of the first of these triangles.
     first_triangle: u32,
 }
 
@@ -37,7 +37,7 @@ impl Partial {
         Self { bvh, first_triangle }
     }
 
-    /// The hit with the triangle's number in the scene.
+    /// The hit with the triangle's index in the scene.
     fn in_scene(&self, hit: &Hit) -> Hit {
         Hit { triangle: hit.triangle + self.first_triangle, ..*hit }
     }
@@ -46,9 +46,9 @@ impl Partial {
 /// What a camera ray sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sight {
-    /// The surface that it meets; `None`: what is behind the scene.
+    /// The surface that the ray hits; `None` for the background.
     pub hit: Option<Hit>,
-    /// A factor ≥ 0 on the radiance that comes from there; one where nothing transmits.
+    /// A factor ≥ 0 on the radiance from there; 1 without transmission.
     pub throughput: Rgb,
 }
 
@@ -99,8 +99,8 @@ fn throughput(mut layers: Vec<(Hit, Layer, bool)>, seen: Option<Hit>) -> Rgb {
 }
 
 impl Coverage {
-    /// The share in \[0, 1\] of the surface in what is seen, where the product of factor, texture and vertices is
-    /// `opacity`; 0 if that is NaN.
+    /// The effective opacity in \[0, 1\], where `opacity` is the product of factor, texture and vertices; 0 if that is
+    /// NaN.
     pub fn of(&self, opacity: f32) -> f32 {
         match self.mode {
             AlphaMode::Opaque => 1.0,
@@ -125,9 +125,9 @@ impl Part {
 }
 
 impl Scene {
-    /// What a camera ray sees first. A surface that covers only a share of what is behind it, or lets light through, is
-    /// seen with a probability, by random numbers that are a function of `key`, `sample` and the triangle; a single-sided
-    /// one not from behind. Numbers of many samples of one key, which may be a pixel, are stratified.
+    /// The first surface that a camera ray sees. A surface with partial coverage or transmission is seen with a
+    /// probability, using random numbers that are a function of `key`, `sample` and the triangle. A single-sided surface
+    /// is not seen from behind. The numbers for many samples of one key, such as a pixel, are stratified.
     pub fn sight(&self, ray: &Ray, key: u64, sample: u32) -> Sight {
         self.seen(ray, self.bvh.closest_hit(ray), key, sample)
     }
@@ -247,8 +247,8 @@ impl Scene {
         if mesh.triangles.is_empty() { None } else { mesh.area_normal(0).try_normalize() }
     }
 
-    /// What share of light, in \[0, 1\], the surfaces that are not in [`Scene::bvh`] let through along each shadow ray:
-    /// a product over all of them. `transmittances` is overwritten, one entry per ray.
+    /// The transmittance in \[0, 1\] along each shadow ray of the surfaces that are not in [`Scene::bvh`]: a product over
+    /// all of them. `transmittances` is overwritten, one entry per ray.
     pub fn transmittances(&self, rays: &RayBatch, transmittances: &mut Vec<f32>) {
         let Some(partial) = self.partial.as_ref().filter(|_| self.dims_light) else {
             transmittances.clear();
@@ -272,7 +272,7 @@ impl Scene {
         partial.bvh.transmittances(rays, &of_hit, transmittances);
     }
 
-    /// The share in \[0, 1\] of the surface in what is seen at a hit.
+    /// The opacity in \[0, 1\] of the surface at a hit.
     pub fn opacity(&self, hit: &Hit) -> f32 {
         let (part, triangle) = self.locate(hit.triangle);
         let (mesh, coverage) = (&part.mesh, &self.materials[part.material].coverage);

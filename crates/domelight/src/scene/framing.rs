@@ -1,6 +1,6 @@
-//! Framing: where a camera stands so that a subject fills its picture.
+//! Framing: places a camera so that the subject fills its picture.
 //!
-//! Four planes through the camera's place bound the picture. For a viewing direction f with right r and up u, a point
+//! Four planes through the camera's position bound the picture. For a viewing direction f with right r and up u, a point
 //! p is within the left and right ones if |x − c_x| ≤ t_x (z − c_z), with (x, y, z) the coordinates of p along (r, u, f),
 //! c those of the camera and t_x the tangent of half the horizontal field of view. The greatest values of x − t_x z and
 //! −x − t_x z over all points give c_x and the largest c_z, so one pass over the vertices finds the nearest camera.
@@ -16,7 +16,7 @@ use crate::math::{Vec3, functions};
 /// The share of the picture's height or width that a subject fills, whichever is tighter.
 const FILL: f32 = 0.86;
 
-/// From which side a framed camera looks at its subject.
+/// The direction from which a framed camera views its subject.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewDirection {
     azimuth: f32,
@@ -35,7 +35,7 @@ pub struct UnknownView {
 }
 
 impl ViewDirection {
-    /// The views that have names.
+    /// The named views.
     pub const NAMED: [(&'static str, Self); 7] = [
         ("front", Self { azimuth: 0.0, elevation: 0.0 }),
         ("back", Self { azimuth: 180.0, elevation: 0.0 }),
@@ -49,11 +49,11 @@ impl ViewDirection {
     /// From the front, 20° from above.
     pub const DEFAULT: Self = Self { azimuth: 0.0, elevation: 20.0 };
 
-    /// A camera at an azimuth \[degrees\], 0 in front of the subject and 90 on its right seen from there, and an
-    /// elevation from −90 (below) to 90 (above) \[degrees\]. The front is +Z where +Y is up, and −Y where +Z is.
+    /// A view from an azimuth \[degrees\], where 0 is in front of the subject and 90 to its right as seen from there, and an
+    /// elevation from −90 (below) to 90 (above) \[degrees\]. The front is +Z if +Y is up, and −Y if +Z is up.
     ///
     /// # Errors
-    /// If an angle is not finite, or the elevation outside of its range.
+    /// If an angle is not finite, or the elevation is outside its range.
     pub fn new(azimuth: f32, elevation: f32) -> Result<Self, UnknownView> {
         if azimuth.is_finite() && (-90.0..=90.0).contains(&elevation) {
             Ok(Self { azimuth, elevation })
@@ -62,12 +62,12 @@ impl ViewDirection {
         }
     }
 
-    /// Around the subject \[degrees\].
+    /// The azimuth around the subject \[degrees\].
     pub fn azimuth(self) -> f32 {
         self.azimuth
     }
 
-    /// Above it \[degrees\], in \[−90, 90\].
+    /// The elevation above the subject \[degrees\], in \[−90, 90\].
     pub fn elevation(self) -> f32 {
         self.elevation
     }
@@ -117,32 +117,32 @@ impl fmt::Display for ViewDirection {
     }
 }
 
-/// How a camera is framed to a subject.
+/// How a camera frames a subject.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Framing {
-    /// From where it looks; `None` is what the scene says, or else [`ViewDirection::DEFAULT`].
+    /// The direction of the view; `None` is the scene's own, or else [`ViewDirection::DEFAULT`].
     pub view: Option<ViewDirection>,
     /// Width / height of the picture, > 0.
     pub aspect: f32,
-    /// The direction that points up; zero is taken as +Y.
+    /// The direction that points up; zero means +Y.
     pub up: Vec3,
-    /// Vertical field of view \[degrees\]; values outside (0, 180) are taken as
+    /// The vertical field of view \[degrees\]; values outside (0, 180) mean
     /// [`CameraSettings::DEFAULT_FOV_Y_DEGREES`].
     pub fov_y_degrees: f32,
-    /// Whether the subject stays in the picture while the camera goes around it, about an axis along `up` through the
+    /// Whether the subject must stay in the picture while the camera goes around it, about an axis along `up` through the
     /// center of the bounds.
     pub all_around: bool,
 }
 
 impl Framing {
-    /// The usual view, in a picture of `aspect` = width / height.
+    /// The default view, for a picture with `aspect` = width / height.
     pub fn new(aspect: f32, up: Vec3) -> Self {
         let fov_y_degrees = CameraSettings::DEFAULT_FOV_Y_DEGREES;
         Self { view: None, aspect, up, fov_y_degrees, all_around: false }
     }
 
-    /// The nearest camera that sees all points, with a margin of 7 % of the picture's height or width, whichever is
-    /// tighter, at either side. Without points, or with infinite ones, it sees the cube from −1 to 1.
+    /// The nearest camera that sees all points, with a margin on either side of 7 % of the picture's height or width,
+    /// whichever is tighter. Without points, or with infinite ones, it frames the cube from −1 to 1.
     pub fn fit(&self, points: impl Iterator<Item = Vec3> + Clone) -> CameraSettings {
         let bounds = Aabb::around(points.clone());
         if bounds.is_empty() || !(bounds.min.is_finite() && bounds.max.is_finite()) {
@@ -273,7 +273,7 @@ impl CameraSettings {
     /// A view from the front, 20° from above, that fits `bounds` into a picture of `aspect` = width / height with a
     /// small margin; [`Framing`] has other views, and [`Scene::framed`] fits the scene's vertices, which is tighter.
     ///
-    /// Empty or infinite bounds are taken as the cube from −1 to 1, an `up` of zero as +Y.
+    /// Empty or infinite bounds mean the cube from −1 to 1, and an `up` of zero means +Y.
     pub fn framing(bounds: &Aabb, aspect: f32, up: Vec3) -> Self {
         let corners = if bounds.is_empty() { None } else { Some(corners(bounds)) };
         Framing::new(aspect, up).fit(corners.into_iter().flatten())
@@ -282,7 +282,7 @@ impl CameraSettings {
 
 impl Camera {
     /// The scene's own camera, or one that frames the scene, for a picture of `width` × `height` pixels, each at
-    /// least 1. A camera of the file that makes no picture gives way to the framing one.
+    /// least 1. If the file's camera is invalid, a framing camera replaces it.
     ///
     /// # Panics
     /// If width or height are zero.

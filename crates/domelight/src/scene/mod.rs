@@ -1,8 +1,7 @@
-//! Scenes: meshes, what they are made of, and the camera; built in code or loaded from files.
+//! Scenes: meshes, materials and cameras, built in code or loaded from files.
 //!
-//! A loader or a built-in scene gives a [`SceneDescription`]; [`Scene::new`] checks it and builds
-//! the ray-tracing hierarchy; after that nothing fails. [`Scene::shading_point`] turns a hit into
-//! all that shading needs.
+//! A loader or a built-in scene returns a [`SceneDescription`]. [`Scene::new`] checks it and builds
+//! the BVH; after that nothing fails. [`Scene::shading_point`] turns a hit into a shading point.
 
 pub mod builtin;
 mod camera;
@@ -46,7 +45,7 @@ use crate::bvh::{Bvh, BvhError, InstructionSet};
 use crate::geometry::{Aabb, Mesh, MeshError};
 use coverage::Partial;
 
-/// A scene ready for rays.
+/// A scene ready for ray tracing.
 #[derive(Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a property of its own")]
 pub struct Scene {
@@ -84,10 +83,10 @@ pub struct Scene {
     up: UpAxis,
 }
 
-/// A description that makes no scene.
+/// An invalid scene description.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
-    /// A mesh that cannot be used.
+    /// An invalid mesh.
     #[error("mesh {part}: {source}")]
     Mesh {
         /// The part's name.
@@ -95,7 +94,7 @@ pub enum SceneError {
         /// What is wrong with it.
         source: MeshError,
     },
-    /// A part of a surface that does not exist.
+    /// A part with a material that does not exist.
     #[error("mesh {part} uses material {material}, but there are only {materials}")]
     NoSurface {
         /// The part's name.
@@ -105,7 +104,7 @@ pub enum SceneError {
         /// How many there are.
         materials: usize,
     },
-    /// A surface with a texture that does not exist.
+    /// A material with a texture that does not exist.
     #[error("material {material} refers to texture {texture}, but there are only {textures}")]
     NoTexture {
         /// The surface's name.
@@ -115,7 +114,7 @@ pub enum SceneError {
         /// How many there are.
         textures: usize,
     },
-    /// More vertices than indices can name.
+    /// More vertices than an index can address.
     #[error("the scene has {vertices} vertices; at most {} fit", u32::MAX)]
     TooManyVertices {
         /// How many there are.
@@ -132,20 +131,20 @@ pub enum SceneError {
         /// The greatest coordinate.
         farthest: f32,
     },
-    /// The hierarchy cannot be built.
+    /// The BVH cannot be built.
     #[error(transparent)]
     Bvh(#[from] BvhError),
 }
 
 impl Scene {
-    /// Checks every mesh and reference, and builds a hierarchy over the parts that hide all behind them and one over
-    /// those that may not; the former are moved before the latter.
+    /// Checks every mesh and reference, and builds one BVH over the opaque parts and one over the others. The opaque parts
+    /// are moved before the others.
     ///
-    /// Scenes that are very small or very large are traced at a usual size, which changes no picture: their
-    /// [`Scene::unit`] is not 1. Bounds, cameras and depths are in the units of the description all the same.
+    /// Scenes that are very small or very large are traced at a moderate size, which does not change pictures; their
+    /// [`Scene::unit`] is not 1. Bounds, cameras and depths are still in the units of the description.
     ///
     /// # Errors
-    /// The first [`SceneError`] found. A scene without triangles is not an error: nothing is hit.
+    /// The first [`SceneError`] found. A scene without triangles is valid: nothing is hit.
     pub fn new(description: SceneDescription) -> Result<Self, SceneError> {
         check(&description)?;
         let subject_bounds = description.subject_bounds();
@@ -199,7 +198,7 @@ impl Scene {
         })
     }
 
-    /// The same scene, traced with another instruction set; `None` if this processor lacks it. Pictures are the same.
+    /// The same scene traced with another instruction set; `None` if this processor lacks it. The pictures are the same.
     #[must_use]
     pub fn with_instruction_set(mut self, instruction_set: InstructionSet) -> Option<Self> {
         self.bvh = self.bvh.with_instruction_set(instruction_set)?;
@@ -211,7 +210,7 @@ impl Scene {
         Self::new(scene.description()).unwrap_or_else(|_| unreachable!("built-in scenes are valid"))
     }
 
-    /// A single mesh of one material.
+    /// Creates a scene from a single mesh with one BSDF.
     ///
     /// # Errors
     /// If the mesh is invalid.
@@ -224,14 +223,14 @@ impl Scene {
         })
     }
 
-    /// The camera of the file, or else one that frames what is not scenery in a picture of
+    /// The camera of the file, or else one that frames the subject in a picture with
     /// `aspect` = width / height.
     pub fn camera(&self, aspect: f32) -> CameraSettings {
         let framed = || self.framed(&Framing::new(aspect, self.up.vector()));
         self.camera.unwrap_or_else(framed)
     }
 
-    /// A camera that frames what is not scenery, whatever camera the file has; in units of the description.
+    /// A camera that frames the subject, regardless of the file's camera, in units of the description.
     pub fn framed(&self, framing: &Framing) -> CameraSettings {
         let parts = self.parts.iter().zip(&self.is_subject);
         let subject = parts.filter(|(_, is_subject)| **is_subject);
@@ -244,15 +243,15 @@ impl Scene {
         camera
     }
 
-    /// The length of one unit of the hierarchy, of [`Scene::parts`] and of shading points, in units of the description: a
-    /// power of two, and 1 for scenes from 1/16 to 65536. Rays to the hierarchy, to [`Scene::sight`] and
-    /// [`Scene::camera_hit`] have its units; [`Scene::camera_inside`] gives a camera whose rays do.
+    /// The length of one unit of the BVH, of [`Scene::parts`] and of shading points, in units of the description: a power
+    /// of two, and 1 for scenes from 1/16 to 65536. Rays for the BVH, for [`Scene::sight`] and for [`Scene::camera_hit`]
+    /// are in its units; [`Scene::camera_inside`] returns a camera whose rays are.
     pub fn unit(&self) -> f32 {
         self.unit
     }
 
-    /// A camera, which is in the units of the description, in those of the hierarchy; see [`Scene::unit`]. Renders do this
-    /// by themselves.
+    /// Converts a camera from the units of the description to those of the BVH; see [`Scene::unit`]. Renders do this
+    /// automatically.
     #[must_use]
     pub fn camera_inside(&self, camera: &Camera) -> Camera {
         camera.scaled(1.0 / self.unit)
@@ -263,24 +262,23 @@ impl Scene {
         self.bounds.size().max_element() / self.unit
     }
 
-    /// The least box around all vertices; empty without any.
+    /// The bounding box of all vertices; empty without vertices.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// The least box around what is not scenery; around everything if there is nothing else.
+    /// The bounding box of the subject, or of everything if there is only scenery.
     pub fn subject_bounds(&self) -> Aabb {
         self.subject_bounds
     }
 
-    /// The axis that points up; +Y if the file does not say.
+    /// The up axis; +Y if the file does not specify it.
     pub fn up_axis(&self) -> UpAxis {
         self.up
     }
 
-    /// The ray-tracing hierarchy over all triangles that hide what is behind them: all but those whose material has a
-    /// [`Coverage`] that is not whole everywhere. [`Scene::sight`] and [`Scene::transmittances`] know both. Its unit of
-    /// length is [`Scene::unit`].
+    /// The BVH over all opaque triangles, which excludes those whose material has a partial [`Coverage`] anywhere.
+    /// [`Scene::sight`] and [`Scene::transmittances`] account for both. Its unit of length is [`Scene::unit`].
     pub fn bvh(&self) -> &Bvh {
         &self.bvh
     }
@@ -290,12 +288,12 @@ impl Scene {
         &self.parts
     }
 
-    /// What they are made of.
+    /// The materials of the parts.
     pub fn materials(&self) -> &[Material] {
         &self.materials
     }
 
-    /// The number of triangles of all meshes.
+    /// The total number of triangles.
     pub fn triangle_count(&self) -> usize {
         self.parts.iter().map(|p| p.mesh.triangles.len()).sum()
     }

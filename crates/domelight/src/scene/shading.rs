@@ -1,16 +1,16 @@
-//! From a hit to what shading needs: position, normals, frame and BSDF.
+//! Turns a hit into a shading point: position, normals, frame and BSDF.
 //!
-//! Surfaces are shaded from either side: both normals are turned to the viewer's side. The position comes from
-//! the barycentric coordinates, whose error is that of the vertices, rather than from
-//! origin + t · direction, whose error grows with the distance.
+//! Surfaces are shaded from either side: both normals are flipped to the viewer's side. The position is computed from
+//! the barycentric coordinates, with the error of the vertices, rather than from origin + t · direction, whose error
+//! grows with the distance.
 //!
 //! An interpolated or mapped normal may face away from the viewer although the surface does not.
 //! Such a normal is **bent toward the viewer** until `wo` lies just above the shading horizon:
-//! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Black pixels
-//! along silhouettes would be the alternative.
+//! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Otherwise there
+//! would be black pixels along silhouettes.
 //!
-//! A smooth surface is shaded as such also where its triangles are coarse: shadow rays start where it would be, above the
-//! triangle, and reach as far down as it would let them. Otherwise triangles shade one another near the terminator, in
+//! A smooth surface with coarse triangles is shaded as smooth: shadow rays start where the smooth surface would be, above
+//! the triangle, and may point as far down as it allows. Otherwise triangles shadow one another near the terminator, in
 //! stair-steps. (Hanika 2021, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4.)
 
 use super::{Layers, Material, NormalMap, Part, Scene};
@@ -20,17 +20,17 @@ use crate::math::{Frame, Vec2, Vec3, Vec4};
 use crate::scene::texture::Uvs;
 use crate::strategy::ShadingPoint;
 
-/// The least cosine between the shading normal and the direction to the viewer.
+/// The minimum cosine between the shading normal and the direction to the viewer.
 const MIN_COS_THETA_O: f32 = 1e-3;
 
 /// Vertex normals within this cosine of the geometric one belong to a flat triangle: 0.1°, far more than rounding.
 const COS_FLAT: f32 = 0.999_998;
 
-/// Vertex normals beyond this cosine say nothing of a smooth surface over the triangle: 60°.
+/// Vertex normals beyond this cosine do not describe a smooth surface over the triangle: 60°.
 const COS_ROUGH: f32 = 0.5;
 
 impl Scene {
-    /// All that shading needs of a hit that [`Scene::bvh`] reported for `ray`.
+    /// The shading point of a hit that [`Scene::bvh`] reported for `ray`.
     ///
     /// # Panics
     /// If `hit.triangle` is not one of this scene's.
@@ -197,8 +197,8 @@ impl Corners {
         Some(a * wa + b * wb + c * wc)
     }
 
-    /// The way from `position` on the triangle up to the smooth surface that the vertex normals describe, each of them times
-    /// `side`, if that bulges to the side of the geometric normal `ng`: Σ bᵢ max(0, (pᵢ − p) · nᵢ) nᵢ, of which each term
+    /// The offset from `position` on the triangle up to the smooth surface that the vertex normals, times `side`, describe,
+    /// if that surface bulges to the side of the geometric normal `ng`: Σ bᵢ max(0, (pᵢ − p) · nᵢ) nᵢ, where each term
     /// leads to the tangent plane of a vertex. `None` for flat triangles and hollows.
     #[inline]
     fn rise(&self, mesh: &Mesh, position: Vec3, ng: Vec3, side: f32) -> Option<Vec3> {

@@ -1,4 +1,4 @@
-//! The subject of a scene: its bounds, its scale, another BSDF, the ground under it.
+//! The subject of a scene: its bounds, its scale, its BSDF, and the ground under it.
 
 use super::builtin::shapes;
 use super::material::CATCHER_REFLECTANCE;
@@ -18,7 +18,7 @@ const PLATE_RADII: [f32; 2] = [3.0, 8.0];
 const CATCHER_RADII: [f32; 2] = [12.0, 32.0];
 
 impl SceneDescription {
-    /// The least box around the parts that are not scenery; around all if there is nothing else.
+    /// The bounding box of the parts that are not scenery, or of all parts if there are no others.
     pub fn subject_bounds(&self) -> Aabb {
         let subject =
             self.parts.iter().zip(self.is_subject()).filter(|(_, is_subject)| *is_subject);
@@ -33,7 +33,7 @@ impl SceneDescription {
         (0..self.parts.len()).map(|i| all || !is_scenery(i)).collect()
     }
 
-    /// A camera that frames what is not scenery, whatever camera the scene has.
+    /// A camera that frames the subject, regardless of the scene's camera.
     pub fn framed(&self, framing: &Framing) -> CameraSettings {
         let is_subject = self.is_subject();
         let subject = self.parts.iter().zip(&is_subject).filter(|(_, is_subject)| **is_subject);
@@ -41,12 +41,12 @@ impl SceneDescription {
         framing.fit(subject.flat_map(|(part, _)| part.mesh.positions.iter().copied()))
     }
 
-    /// Scales scenes that are very small or very large to a usual size, with `view` and the scene's own camera; returns
-    /// the factor, a power of two, which is 1 for scenes from 1/16 to 65536. The picture stays the same, for the light is
-    /// infinitely far; the distance that rays keep from surfaces is made for usual sizes.
+    /// Scales a very small or very large scene to a moderate size, together with `view` and the scene's own camera. Returns
+    /// the factor, a power of two, which is 1 for scenes from 1/16 to 65536. The picture stays the same, because the light
+    /// is infinitely far away. The distance that rays keep from surfaces is chosen for moderate sizes.
     ///
-    /// [`Scene::new`](super::Scene::new) scales the meshes of other scenes by itself, and takes a camera in the units of
-    /// the description.
+    /// [`Scene::new`](super::Scene::new) scales the meshes of other scenes automatically, and takes a camera in the units
+    /// of the description.
     pub fn rescale(&mut self, view: &mut CameraSettings) -> f32 {
         let factor = self.usual_scale();
         if factor != 1.0 {
@@ -75,7 +75,7 @@ impl SceneDescription {
     }
 
     /// Moves the center of the subject's bounds to the origin and scales its longest half-extent
-    /// to 1; everything else moves along.
+    /// to 1. Everything else is transformed with it.
     pub fn normalize(&mut self) {
         let bounds = self.subject_bounds();
         if !bounds.is_empty() {
@@ -83,7 +83,7 @@ impl SceneDescription {
         }
     }
 
-    /// Gives one BSDF to every part that is not scenery.
+    /// Sets the BSDF of every part that is not scenery.
     pub fn set_subject_material(&mut self, bsdf: Bsdf) {
         let material = self.materials.len();
         self.materials.push(Material::fixed("subject", bsdf));
@@ -103,13 +103,13 @@ impl SceneDescription {
         }
     }
 
-    /// Puts a diffuse plate of reflectance 0.5 under the subject, facing `up`, which fades to nothing toward its rim. It is
-    /// eight times as wide as the subject's longest extent. An empty scene gets none.
+    /// Adds a diffuse plate with reflectance 0.5 under the subject, facing `up`, which fades out toward its rim. It is eight
+    /// times as wide as the subject's longest extent. An empty scene gets none.
     pub fn add_ground(&mut self, up: Vec3) {
         self.add_disc(up, PLATE_RADII, &Material::diffuse("ground", Rgb::splat(0.5)));
     }
 
-    /// Puts ground under the subject, facing `up`, that shows nothing but shadows
+    /// Adds a shadow catcher under the subject, facing `up`
     /// ([`Material::catches_shadows`](super::Material::catches_shadows)). An empty scene gets none.
     pub fn add_shadow_catcher(&mut self, up: Vec3) {
         let ground = Material {

@@ -299,9 +299,9 @@ pub struct CandidatePilot<'p, V> {
 }
 
 impl<'p, V: Fn(&ShadingPoint, Vec3) -> f32> CandidatePilot<'p, V> {
-    /// A pilot at 64 of the points, spread over their order; `visibility` is V of a point and a direction, in [0, 1].
+    /// Creates a pilot at 64 of the points, spread evenly over them. `visibility` returns V in [0, 1].
     ///
-    /// Its random numbers are other ones than a render's with the same seed.
+    /// The random numbers differ from those of a render with the same seed.
     pub fn new(
         environment: &'p Environment,
         points: &'p [ShadingPoint],

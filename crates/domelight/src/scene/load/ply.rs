@@ -1,12 +1,12 @@
 //! Stanford PLY: ASCII and both binary byte orders.
 //!
-//! Read are, of the element `vertex`, the properties `x y z`, `nx ny nz`, texture coordinates
+//! The reader supports, for the element `vertex`, the properties `x y z`, `nx ny nz`, texture coordinates
 //! (`s t`, `u v` or `texture_u texture_v`, v upward) and `red green blue` (integers: sRGB, floats:
-//! linear); of the element `face` the list `vertex_indices` or `vertex_index`, polygons of any shape, and colors as of
-//! vertices, which count where vertices have none; of `tristrips` that list, a strip ending at −1. Elements and
-//! properties may stand in any order. All else is passed over. A file without normals gets smooth ones.
+//! linear); for the element `face`, the list `vertex_indices` or `vertex_index` with polygons of any shape, and colors as
+//! for vertices, which are used if vertices have none; for `tristrips`, the same list, where −1 ends a strip. Elements
+//! and properties may come in any order. Everything else is ignored. A file without normals gets smooth ones.
 //!
-//! Written for this program: the crates that read PLY build a map of properties for every row.
+//! We do not use a PLY crate, because the existing ones build a map of properties for every row.
 
 use std::fmt;
 use std::path::Path;
@@ -18,7 +18,7 @@ use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
 use crate::scene::texture::{Encoding, decode};
 
-/// A place in a PLY file.
+/// A position in a PLY file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PlyPlace {
     /// A line of the header, from 1.
@@ -44,7 +44,7 @@ impl fmt::Display for PlyPlace {
     }
 }
 
-/// What is wrong with a PLY file.
+/// An error in a PLY file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlyErrorKind {
     /// The header does not end.
@@ -61,7 +61,7 @@ pub enum PlyErrorKind {
         "the header names no format; it needs ascii, binary_little_endian or binary_big_endian"
     )]
     NoFormat,
-    /// An element or a property that is needed is absent.
+    /// A required element or property is missing.
     #[error("the header declares no {what}")]
     Missing {
         /// What is absent.
@@ -81,7 +81,7 @@ pub enum PlyErrorKind {
         /// The bytes there are.
         left: usize,
     },
-    /// The data end too early.
+    /// The data ends too early.
     #[error("the file ends in the middle of the data")]
     EndOfFile,
     /// A token that is not a number.
@@ -96,7 +96,7 @@ pub enum PlyErrorKind {
         /// The length.
         value: f64,
     },
-    /// An index that names no vertex.
+    /// An index that is out of range.
     #[error("index {value} refers to no vertex; there are {vertices}")]
     Index {
         /// The index.
@@ -104,7 +104,7 @@ pub enum PlyErrorKind {
         /// How many vertices there are.
         vertices: usize,
     },
-    /// A vertex at no place.
+    /// A vertex with a non-finite position.
     #[error("the position is not finite: {position}; without --strict its triangles are left out")]
     NotFinite {
         /// The position.

@@ -1,10 +1,10 @@
-//! Polygons of any shape as triangles, by cutting off ears.
+//! Triangulates polygons of any shape by ear clipping.
 //!
-//! Meisters 1975, "Polygons Have Ears"; Eberly, "Triangulation by Ear Clipping". A convex polygon is a fan round its
-//! first corner. A hole that a polygon is slit open to, as files of polygons write it, is followed round.
+//! Meisters 1975, "Polygons Have Ears"; Eberly, "Triangulation by Ear Clipping". A convex polygon is a fan around
+//! its first corner. A hole connected to the outline by a slit, as in many polygon files, is followed around.
 //!
-//! Written for this program: the crate earcut tries every diagonal of a polygon that it cannot clip, which takes
-//! hours for a hostile one. Here the work on a file is bounded; what exceeds it is cut into fans.
+//! We do not use the crate earcut, because it tries every diagonal of a polygon that it cannot clip, which takes hours
+//! for a hostile one. Here the work per file is bounded; polygons beyond the bound become fans.
 
 use crate::math::Vec3;
 

@@ -1,13 +1,13 @@
-//! STL, the format of 3D printers: ASCII, one part a solid, and binary.
+//! STL, the format of 3D printers: ASCII, with one part per solid, and binary.
 //!
-//! Facets share no vertices and shade flat; their normals are those of their corners' order, as most programs take
-//! them, for files often have others or none. Colors in the two bytes after a binary facet mean different things to
-//! different programs and are passed over.
+//! Facets share no vertices and shade flat. Their normals follow from the order of their corners, as in most programs,
+//! because files often have wrong normals or none. The colors in the two bytes after a binary facet mean different
+//! things to different programs and are ignored.
 //!
 //! 3D Systems 1989, "StereoLithography Interface Specification". A binary file may begin with `solid`, too: a file is
 //! binary if it is as long as its count of facets says.
 //!
-//! Written for this program: the crate stl_io reads one solid and takes memory for as many facets as a header says.
+//! We do not use the crate stl_io, because it reads one solid and allocates memory for as many facets as a header claims.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::geometry::Mesh;
 use crate::math::Vec3;
 use crate::scene::{Material, Part, SceneDescription};
 
-/// What is wrong with an STL file.
+/// An error in an STL file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StlErrorKind {
     /// Neither text nor a binary file of the right length.
@@ -40,7 +40,7 @@ pub enum StlErrorKind {
         /// What stands there.
         text: String,
     },
-    /// A facet that is no triangle.
+    /// A facet that is not a triangle.
     #[error("line {line}: a facet of {corners} vertices; it needs three")]
     Facet {
         /// The line at which the facet ends, from 1.

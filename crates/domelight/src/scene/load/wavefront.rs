@@ -1,10 +1,10 @@
-//! Lines of Wavefront's text formats, OBJ and MTL: a keyword, and numbers or names.
+//! Lines of Wavefront's text formats OBJ and MTL: a keyword followed by numbers or names.
 
 use std::borrow::Cow;
 
 use super::text_of;
 
-/// What is wrong with a line of an OBJ or MTL file.
+/// An error in a line of an OBJ or MTL file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ObjErrorKind {
     /// Not enough numbers.
@@ -29,7 +29,7 @@ pub enum ObjErrorKind {
         /// The corner.
         text: String,
     },
-    /// An index that names nothing yet.
+    /// An index that is not defined yet.
     #[error("index {index} refers to no {what}; {count} are defined so far")]
     Index {
         /// The index as written.
@@ -39,7 +39,7 @@ pub enum ObjErrorKind {
         /// How many there are.
         count: usize,
     },
-    /// A face with less than three corners.
+    /// A face with fewer than three corners.
     #[error("a face needs three corners or more, but there are {corners}")]
     Face {
         /// How many it has.
