@@ -1,15 +1,15 @@
 //! The clear coat of glTF (`KHR_materials_clearcoat`): a thin dielectric layer of refractive index 1.5.
 //!
-//! f_r = F D G₂/(4 cos θ_i cos θ_o), GGX with f0 = 0.04, about a normal of its own: a coat is often smooth where the
-//! layer below it has relief. Cosines are those to the coat's normal. What lies below keeps the share
-//! 1 − strength · F(cos θ_o), as the specification has it; see [`super::Bsdf::layered`].
+//! f_r = F D G₂/(4 cos θ_i cos θ_o), GGX with f0 = 0.04, about its own normal, because a coat is often smooth where the
+//! layer below has relief. Cosines are with respect to the coat's normal. The layers below are scaled by
+//! 1 − strength · F(cos θ_o), as in the specification; see [`super::Bsdf::layered`].
 
 use super::{Brdf, Fresnel, Ggx, HORIZON, Masking, where_above};
 use crate::Rgb;
 use crate::math::{Frame, Vec3};
 use crate::simd::{Colors, SimdFloat, Vectors};
 
-/// A clear coat of full strength.
+/// A clear coat with full strength.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coat {
     frame: Frame,
@@ -20,7 +20,7 @@ impl Coat {
     /// The coat's reflectance at normal incidence.
     pub const F0: f32 = 0.04;
 
-    /// The coat with GGX roughness `alpha`, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\], about a unit `normal`
+    /// Creates the coat with GGX roughness `alpha`, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\], about a unit `normal`
     /// in the local frame of the layer below. A normal that is not finite or not above that layer is replaced by +z.
     pub fn new(alpha: f32, normal: Vec3) -> Self {
         let normal = normal.try_normalize().filter(|n| n.z > 0.0).unwrap_or(Vec3::Z);

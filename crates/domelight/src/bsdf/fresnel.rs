@@ -1,17 +1,17 @@
 //! Fresnel reflectance as a function of the angle of incidence on a microfacet.
 //!
 //! - Schlick 1994, "An Inexpensive BRDF Model for Physically-based Rendering", eq. 15.
-//! - The exact unpolarized reflectance of a conductor of complex refractive index η + ik, per
+//! - The exact unpolarized reflectance of a conductor with complex refractive index η + ik, per
 //!   color channel; for its arithmetic see Lagarde 2013, "Memo on Fresnel equations".
 
 use super::range;
 use crate::Rgb;
 use crate::simd::{Colors, SimdFloat};
 
-/// What a microfacet reflects.
+/// The Fresnel reflectance of a microfacet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Fresnel {
-    /// Everything: F = 1.
+    /// A perfect mirror: F = 1.
     #[default]
     One,
     /// f0 + (1 − f0)(1 − cos θ)⁵.
@@ -35,7 +35,7 @@ impl Fresnel {
         }
     }
 
-    /// F at the cosine between direction and microfacet normal, in [0, 1].
+    /// F at the cosine in [0, 1] between direction and microfacet normal.
     #[inline(always)]
     pub fn eval(&self, cos_theta: f32) -> Rgb {
         self.eval_lanes(cos_theta).single()
@@ -88,14 +88,14 @@ fn unit<F: SimdFloat>(x: F) -> F {
 /// A complex refractive index per color channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conductor {
-    /// Real part.
+    /// The real part.
     pub eta: Rgb,
-    /// Imaginary part, the extinction coefficient.
+    /// The imaginary part, the extinction coefficient.
     pub k: Rgb,
 }
 
 impl Conductor {
-    /// Silver. These indices are measured spectra brought to linear Rec. 709.
+    /// Silver. These indices are measured spectra converted to linear Rec. 709.
     pub const SILVER: Self = Self {
         eta: Rgb::new(0.155265, 0.116723, 0.138381),
         k: Rgb::new(4.828343, 3.122246, 2.147050),
@@ -137,7 +137,7 @@ impl Conductor {
         ("tungsten", Self::TUNGSTEN),
     ];
 
-    /// Unpolarized reflectance per channel at the cosine of incidence in [0, 1].
+    /// The unpolarized reflectance per channel at a cosine of incidence in [0, 1].
     #[inline]
     pub fn reflectance(&self, cos_theta: f32) -> Rgb {
         self.reflectance_lanes(cos_theta).single()

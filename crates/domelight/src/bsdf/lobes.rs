@@ -1,7 +1,7 @@
-//! Materials: weighted sums of a few lobes.
+//! BSDFs: weighted sums of a few lobes.
 //!
-//! A material is sampled by choosing one lobe and drawing from it; its density is that of the
-//! mixture, so no sample is worse than the chosen lobes' own by more than the choice.
+//! A BSDF is sampled by choosing one lobe and sampling it. The density is that of the mixture, so the
+//! weight of a sample is bounded by the lobes' own weights divided by the probabilities of the choice.
 
 use super::{
     Beckmann, Brdf, Coat, CustomLobe, Ggx, Lambert, MetallicRoughness, Phong, Sheen, Ward, range,
@@ -17,7 +17,7 @@ macro_rules! lobes {
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub enum Lobe {
             $($(#[$doc])* $model($model),)*
-            /// A lobe of the caller's own.
+            /// A custom lobe.
             Custom(CustomLobe),
         }
 
@@ -96,7 +96,7 @@ impl From<CustomLobe> for Lobe {
     }
 }
 
-/// The most lobes of a [`Bsdf`].
+/// The maximum number of lobes of a [`Bsdf`].
 pub const MAX_LOBES: usize = 3;
 
 /// A sum of at most [`MAX_LOBES`] weighted lobes: plain data of 160 bytes, no heap.
@@ -114,7 +114,7 @@ struct Term {
     probability: f32,
 }
 
-/// More lobes than a material holds.
+/// The error of too many lobes for a [`Bsdf`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a material is a sum of at most {MAX_LOBES} non-black lobes, not {count}")]
 pub struct TooManyLobes {
@@ -130,38 +130,38 @@ const TYPICAL_COSINE: f32 = 2.0 / 3.0;
 const LEAST_SHARE: f32 = 0.05;
 
 impl Bsdf {
-    /// Reflects nothing.
+    /// A BSDF that reflects nothing.
     pub const BLACK: Self = {
         let lobe = Lobe::Lambert(Lambert::new(Rgb::BLACK));
         let term = Term { lobe, weight: 0.0, probability: 0.0 };
         Self { terms: [term; MAX_LOBES], n_terms: 0 }
     };
 
-    /// One lobe.
+    /// Creates a BSDF with a single lobe.
     pub fn single(lobe: impl Into<Lobe>) -> Self {
         Self::of_terms([(1.0, lobe.into())])
     }
 
-    /// The sum of lobes.
+    /// Creates the sum of lobes.
     ///
     /// # Errors
-    /// [`TooManyLobes`] when more than [`MAX_LOBES`] are not black.
+    /// [`TooManyLobes`] if more than [`MAX_LOBES`] lobes are not black.
     pub fn new(lobes: &[Lobe]) -> Result<Self, TooManyLobes> {
         Self::checked(lobes.iter().map(|&lobe| (1.0, lobe)))
     }
 
-    /// The sum of lobes times weights in [0, 1000]; greater ones are clamped, and a weight that is not positive
-    /// drops its lobe.
+    /// Creates the sum of lobes times weights in [0, 1000]. Greater weights are clamped, and a lobe whose weight is not
+    /// positive is dropped.
     ///
     /// # Errors
-    /// [`TooManyLobes`] when more than [`MAX_LOBES`] are not black.
+    /// [`TooManyLobes`] if more than [`MAX_LOBES`] lobes are not black.
     pub fn weighted(lobes: &[(f32, Lobe)]) -> Result<Self, TooManyLobes> {
         Self::checked(lobes.iter().copied())
     }
 
-    /// glTF's layers as seen from `wo`: sheen on the `base`, and a coat of a strength in \[0, 1\] on both. A layer takes
-    /// from those below it what it reflects toward `wo`, whatever the direction of light, so that the result is good
-    /// for this view alone.
+    /// Creates glTF's layers as seen from `wo`: sheen on the `base`, and a coat with a strength in \[0, 1\] on both. A layer
+    /// dims those below by what it reflects toward `wo`, regardless of the direction of light, so the result is valid only
+    /// for this view.
     #[must_use]
     pub fn layered(
         base: impl Into<Lobe>,
@@ -198,8 +198,8 @@ impl Bsdf {
         bsdf
     }
 
-    /// The same material with its lobes chosen in proportion to their albedos toward `wo`: Fresnel's
-    /// reflectance then has the right share at every angle. Worth its cost from a few samples up.
+    /// The same BSDF with its lobes chosen in proportion to their albedos toward `wo`, which accounts for the
+    /// Fresnel reflectance at every angle. Worth its cost from a few samples up.
     #[must_use]
     #[inline]
     pub fn for_view(&self, wo: Vec3) -> Self {
@@ -234,7 +234,7 @@ impl Bsdf {
         }
     }
 
-    /// The color of the surface, roughly: its albedo seen from above.
+    /// The approximate color of the surface: its albedo as seen from above.
     pub fn albedo(&self) -> Rgb {
         self.directional_albedo(1.0)
     }

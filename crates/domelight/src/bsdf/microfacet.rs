@@ -1,10 +1,10 @@
-//! What the microfacet lobes share: f_r = F D G₂ / (4 cos θ_i cos θ_o).
+//! The base of the microfacet lobes: f_r = F D G₂ / (4 cos θ_i cos θ_o).
 //!
 //! Torrance & Sparrow 1967; Cook & Torrance 1982; Walter et al. 2007, "Microfacet Models for
 //! Refraction through Rough Surfaces"; Heitz 2014, "Understanding the Masking-Shadowing Function in
 //! Microfacet-Based BRDFs".
 //!
-//! Masking is written through σ(w) = cos θ (1 + Λ(w)), the projected area of the microfacets that
+//! Masking is expressed through σ(w) = cos θ (1 + Λ(w)), the projected area of the microfacets that
 //! face w (Heitz 2014, eq. 22 with G₁ = cos θ/σ). Unlike Λ and G₁ it stays finite and away from 0/0
 //! at grazing angles:
 //!
@@ -14,7 +14,7 @@
 //! The half vector stays unnormalized, H = wo + wi with |H| = 2 h·wi, so that neither a square root
 //! nor 1 − cos² appears where a lobe is narrow.
 //!
-//! Single scattering only: rough lobes lose the light that bounces twice.
+//! Single scattering only: rough lobes lose the light that is scattered more than once.
 
 use super::{Brdf, Fresnel, HORIZON, ROUNDING, where_above};
 use crate::Rgb;
@@ -31,7 +31,7 @@ pub enum Masking {
     Separable,
 }
 
-/// A distribution of microfacet normals and how to draw from it.
+/// A distribution of microfacet normals with sampling.
 pub trait NormalDistribution: Copy + Send + Sync {
     /// The roughness along x and y.
     fn alpha(&self) -> [f32; 2];
@@ -62,7 +62,7 @@ pub struct Microfacet<D> {
 }
 
 impl<D: NormalDistribution> Microfacet<D> {
-    /// The lobe with this distribution of normals. The reflectance is clamped to the range that Fresnel's formulas accept.
+    /// Creates the lobe with a distribution of normals. The reflectance is clamped to the range that the Fresnel formulas accept.
     pub fn with_normals(normals: D, fresnel: Fresnel, masking: Masking) -> Self {
         Self { normals, fresnel: fresnel.in_range(), masking }
     }

@@ -1,4 +1,4 @@
-//! Materials as text: what a command line and a scene file accept.
+//! Materials as text, the notation of the command line and of scene files.
 //!
 //! ```text
 //! material = "diffuse" ":" color
@@ -18,7 +18,7 @@
 //! ```
 //!
 //! The default masking of this notation is *separable*, not the library's correlated one, so that
-//! `ggx:0.2` is the same surface as in renderers that it is compared with.
+//! `ggx:0.2` is the same surface as in the renderers that we compare with.
 
 use super::{
     Beckmann, Bsdf, Conductor, Fresnel, Ggx, Lambert, Lobe, MAX_ALPHA, MAX_EXPONENT, MIN_ALPHA,
@@ -27,7 +27,7 @@ use super::{
 use crate::Rgb;
 use std::str::FromStr;
 
-/// A material as a user names it; [`Bsdf::from`] makes it.
+/// A material in text notation; [`Bsdf::from`] converts it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MaterialSpec {
     /// `diffuse:0.8` or `diffuse:R,G,B`.
@@ -90,7 +90,7 @@ pub enum MaterialSpec {
     Mix,
 }
 
-/// Why a text is not a material.
+/// An error in the text of a material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ParseMaterialError {
     /// An unknown model.
@@ -117,7 +117,7 @@ pub enum ParseMaterialError {
         /// A right one.
         example: &'static str,
     },
-    /// A part that is no value of its kind.
+    /// A part that is not a valid value.
     #[error("the {parameter} of «{model}» is «{text}», but should be {expected}")]
     Value {
         /// The model.
@@ -142,7 +142,7 @@ const WARD_FORM: &str = "«bounded», «1992» or «duer»";
 const MASKING: &str = "«separable» or «correlated»";
 
 impl MaterialSpec {
-    /// The names of the models, as their texts begin.
+    /// The names of the models, with which their texts begin.
     pub const MODELS: [&'static str; 7] =
         ["diffuse", "phong", "ward", "ggx", "beckmann", "gltf", "mix"];
 }

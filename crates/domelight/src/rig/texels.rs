@@ -1,4 +1,4 @@
-//! The texels of a lat-long map with the exact integrals over each.
+//! The texels of a lat-long map, with exact integrals over each.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;

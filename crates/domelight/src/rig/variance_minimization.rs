@@ -26,11 +26,11 @@ const MAX_JOINED: usize = 4096;
 /// What a cut minimizes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rule {
-    /// The greater of the two halves' variances; distance in texels of the map, where the seam
-    /// divides. The poster's.
+    /// The larger of the two halves' variances, with distances in texels of the map, divided at the
+    /// seam, as in the poster.
     Poster,
-    /// The sum of the two halves' variances; distance on the sphere. The first cut starts
-    /// opposite the map's center of light, so turning the map turns the rig.
+    /// The sum of the two halves' variances, with distances on the sphere. The first cut starts
+    /// opposite the map's center of light, so rotating the map rotates the rig.
     #[default]
     Spherical,
 }
@@ -51,7 +51,7 @@ pub struct VarianceMinimization {
     pub rule: Rule,
     /// The order in which regions are cut.
     pub order: Order,
-    /// Steps of Lloyd's refinement on the sphere; at 0 regions stay rectangles.
+    /// The number of steps of Lloyd's refinement on the sphere; with 0, regions stay rectangles.
     pub lloyd_steps: u32,
 }
 
@@ -62,16 +62,16 @@ impl Default for VarianceMinimization {
 }
 
 impl VarianceMinimization {
-    /// The poster's own: planar distance, level by level, rectangles.
+    /// The settings of the poster: planar distance, level by level, rectangles.
     pub fn poster() -> Self {
         Self { rule: Rule::Poster, order: Order::Levels, lloyd_steps: 0 }
     }
 }
 
-/// `n_lights` lights with as little spread of energy around them as can be found.
+/// Divides the environment into `n_lights` lights with as little variance of the light around each as possible.
 ///
-/// Where all steps of the refinement would leave a light without energy, fewer are taken; where
-/// even none would, regions stay rectangles.
+/// If all steps of the refinement would leave a light without energy, fewer steps are taken. If even
+/// zero steps would, regions stay rectangles.
 ///
 /// # Errors
 /// [`RigError::NoLights`] for `n_lights` = 0, [`RigError::Black`] for a map without light, and

@@ -80,8 +80,8 @@ impl BuiltinScene {
     /// A one-line description for a list of scenes.
     pub const fn summary(self) -> &'static str {
         match self {
-            Self::Statue => "pierced, fluted marble on a plinth, with strong shadows of itself",
-            Self::Spheres => "seven metal spheres of rising roughness on a floor",
+            Self::Statue => "pierced, fluted marble on a plinth, with strong self-shadowing",
+            Self::Spheres => "seven metal spheres with increasing roughness on a floor",
             Self::MaterialBall => "grooved ball in a cradle: curvature, edges, contact shadows",
             Self::Sphere => "a single diffuse sphere in perspective",
             Self::SphereOrthographic => "a single diffuse sphere that fills the picture",
