@@ -1,4 +1,4 @@
-//! Where the key light of a map comes from, to turn the map so that it falls on what the camera sees.
+//! Finds the key light of a map, to rotate the map so that this light falls on the visible side of the subject.
 
 use super::statistics::{ProbeStatistics, Sun, texel_direction};
 use super::{LatLongGrid, UpAxis};
@@ -18,11 +18,11 @@ const LEAST_ANISOTROPY: f64 = 1e-3;
 /// From the direction to the camera, around the up axis \[degrees\]: negative is on the picture's left.
 const BESIDE_CAMERA: f32 = -45.0;
 
-/// The rotation \[degrees\], in (−180, 180\], of [`Orientation`](super::Orientation) at which the key light of a lat-long map falls from
-/// the left onto what a camera sees: around the up axis 45° from the direction `toward_camera`, of any length.
+/// The rotation \[degrees\] of [`Orientation`](super::Orientation), in (−180, 180\], at which the key light of a lat-long map
+/// comes from the left of a camera: 45° around the up axis from the direction `toward_camera`, which may have any length.
 ///
-/// The key light is the sun of the map, or without one the direction from which most light comes, in the plane of the
-/// horizon. Maps without such a direction are not turned.
+/// The key light is the sun of the map or, without a sun, the direction in the plane of the horizon from which most light
+/// comes. Maps without such a direction are not rotated.
 ///
 /// # Panics
 /// If the map has no texels.

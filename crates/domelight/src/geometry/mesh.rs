@@ -9,23 +9,23 @@ use crate::math::{Mat3, Mat4, Vec2, Vec3, Vec4};
 pub struct Mesh {
     /// Vertex positions.
     pub positions: Vec<Vec3>,
-    /// Unit shading normals; empty: the flat geometric normal shades.
+    /// Unit shading normals. If empty, the geometric normal is used.
     pub normals: Vec<Vec3>,
-    /// Texture coordinates, (0, 0) the first texel of the first row as in glTF.
+    /// Texture coordinates, with (0, 0) at the first texel of the first row as in glTF.
     pub uvs: Vec<Vec2>,
     /// A second set of texture coordinates.
     pub uvs2: Vec<Vec2>,
     /// Unit tangents with the bitangent's sign in w, as in glTF.
     pub tangents: Vec<Vec4>,
-    /// Linear vertex colors, a factor on the base color.
+    /// Linear vertex colors, multiplied by the base color.
     pub colors: Vec<Rgb>,
-    /// Vertex opacity in \[0, 1\], a factor on the surface's.
+    /// Vertex opacity in \[0, 1\], multiplied by that of the material.
     pub alphas: Vec<f32>,
-    /// Triangles as counter-clockwise vertex indices.
+    /// Triangles as counterclockwise vertex indices.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// What makes a mesh unusable.
+/// An error in a mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// An index beyond the vertices.
@@ -115,13 +115,13 @@ impl Mesh {
         (b - a).cross(c - a)
     }
 
-    /// The bounds of all vertices.
+    /// The bounding box of all vertices.
     pub fn bounds(&self) -> Aabb {
         Aabb::around(self.positions.iter().copied())
     }
 
-    /// Moves the mesh by an affine matrix: normals by the inverse transpose, tangents by the matrix;
-    /// a reflection also turns the triangles round.
+    /// Transforms the mesh by an affine matrix: normals by the inverse transpose, tangents by the matrix.
+    /// A reflection also flips the triangles.
     pub fn transform(&mut self, m: &Mat4) {
         let linear = linear_part(m);
         let normal_matrix = linear.inverse().transpose();
@@ -150,8 +150,8 @@ impl Mesh {
         }
     }
 
-    /// Replaces the normals by the area-weighted mean of the faces round each vertex; a face at a vertex that is not finite
-    /// does not count.
+    /// Replaces the normals by the area-weighted mean over the faces around each vertex. Faces with a non-finite vertex do
+    /// not count.
     pub fn compute_normals(&mut self) {
         let mut normals = vec![Vec3::ZERO; self.positions.len()];
         let finite = self.positions.iter().copied().filter(|position| position.is_finite());
@@ -169,7 +169,7 @@ impl Mesh {
         self.normals = normals.into_iter().map(Vec3::normalize_or_zero).collect();
     }
 
-    /// Puts the center of the bounds at the origin and scales the longest half-extent to 1.
+    /// The transform that moves the center of the bounds to the origin and scales the longest half-extent to 1.
     pub fn normalization(bounds: &Aabb) -> Mat4 {
         let scale = 2.0 / bounds.size().max_element();
         let scale = if scale.is_finite() { scale } else { 1.0 };

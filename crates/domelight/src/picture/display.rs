@@ -1,4 +1,4 @@
-//! The encoding of a whole picture for a screen, faster than pixel by pixel with the formulas of [`super::tone`].
+//! Encodes a whole picture for display, faster than pixel by pixel with the formulas of [`super::tone`].
 
 use super::agx;
 use super::tone::{ToneCurve, ToneMapping, srgb_from_linear};

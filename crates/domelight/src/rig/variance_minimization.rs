@@ -1,13 +1,13 @@
 //! Viriyothai & Debevec 2009, "Variance Minimization Light Probe Sampling".
 //!
-//! Cut regions such that the light in each lies close together: the variance of a region is
-//! ∫ L d² dω, d the distance to its energy centroid. It is not the variance of the texels' values.
+//! Cut regions so that the light in each is close together: the variance of a region is ∫ L d² dω, where
+//! d is the distance to its energy centroid. It is not the variance of the texels' values.
 //!
-//! The poster measures d on the map and takes the cut whose worse half is best. The default here
-//! measures chords on the sphere, where the variance is W − |R|²/W with W = ∫ L dω and
-//! R = ∫ L ω dω and no pole or seam matters; it takes the cut whose halves sum to the least, cuts
-//! the worst region first. Then it gives up rectangles: of twice as many parts as there are lights
-//! it joins those that belong together, and lets the lights move (Lloyd's refinement).
+//! The poster measures d on the map and minimizes the variance of the worse half. The default here
+//! measures chords on the sphere, where the variance is W − |R|²/W with W = ∫ L dω and R = ∫ L ω dω,
+//! independent of poles and the seam. It minimizes the sum of both halves' variances and cuts the worst
+//! region first. Then it abandons rectangles: it makes twice as many parts as lights, merges parts that
+//! belong together, and moves the lights (Lloyd's refinement).
 
 use super::cells::{Piece, assign, refine};
 use super::merge::merge;
@@ -18,7 +18,7 @@ use super::{Order, Region, RegionSums, Rig, RigError, TexelRect};
 use crate::environment::Environment;
 use crate::math::Vec3;
 
-/// Parts that the map is cut into for each light, to be joined again before the refinement.
+/// The number of parts per light into which the map is cut, before parts are merged and refined.
 const PARTS_PER_LIGHT: usize = 2;
 /// Lights above which no parts are joined: joining takes time in proportion to their square.
 const MAX_JOINED: usize = 4096;
