@@ -1,23 +1,23 @@
-//! One ray against eight boxes or eight triangles.
+//! Intersects one ray with eight boxes or eight triangles.
 //!
-//! The triangle test moves the ray's origin to 0 and shears its direction to the axis along which
-//! it is longest (Woop, Benthin & Wald 2013). Each vertex is sheared on its own, so neighbors see
-//! the same corners, and what remains is whether the origin lies in a triangle of the plane. The
-//! sign of an edge function is that of the exact one or it is zero, because rounding is monotone;
-//! where it is zero it is computed again in f64, which holds a product of two f32 exactly. So the
-//! answer is exact for the sheared corners, which lie within 7·2⁻²⁴·m of where they should, m being
-//! the greatest distance from the origin to the scene along an axis.
+//! The triangle test translates the ray's origin to 0 and shears its direction to its longest axis
+//! (Woop, Benthin & Wald 2013). Each vertex is sheared independently, so adjacent triangles have the same
+//! corners, and the test is whether the origin lies in a triangle in the plane. An edge function has the
+//! sign of the exact one or is zero, because rounding is monotone. If it is zero, it is recomputed in
+//! f64, which holds a product of two f32 exactly. So the answer is exact for the sheared corners, which
+//! are within 7·2⁻²⁴·m of their exact positions, where m is the largest distance from the origin to the
+//! scene along an axis.
 //!
-//! The box test asks about the unsheared ray. To let everything through that the triangle test would
-//! accept, planes move outward by 16·2⁻²⁴·m + 4·2⁻²⁴·|o|, o being the origin's coordinate (after Ize 2013, "Robust BVH
+//! The box test uses the unsheared ray. To pass everything that the triangle test would accept, planes
+//! move outward by 16·2⁻²⁴·m + 4·2⁻²⁴·|o|, where o is the origin's coordinate (after Ize 2013, "Robust BVH
 //! Ray Traversal", and the section on traversal of the paper above).
-//! Of the former the shear needs 7, a component of the direction that counts as greater than it is 1, and the box test 4:
-//! of the distance p/d − o/d to a plane p, its own rounding, that of 1/d on two axes that meet, and that of the
-//! product p/d, since |p| ≤ |o| + m. Of the latter o ± margin, its product with 1/d, and p/d again need one each.
-//! So it does not matter how often p/d − o/d is rounded: which boxes are entered may differ, hits do not. Instruction
-//! sets that fuse do so ([`SimdF32x8::mul_sub`]), the others do not; the tests compare all of them with a loop over all
-//! triangles. The product must not overflow, though, where the difference would not, nor underflow: rays of which that
-//! cannot be said (`is_moderate`) have it exact.
+//! In the first term, the shear needs 7 units, a direction component that is overestimated needs 1, and the box test needs
+//! 4: in the distance p/d − o/d to a plane p, for its own rounding, for 1/d on two axes that are compared, and for the
+//! product p/d, since |p| ≤ |o| + m. In the second term, o ± margin, its product with 1/d, and p/d need one each.
+//! So it does not matter how often p/d − o/d is rounded: the boxes entered may differ, but the hits do not. Instruction
+//! sets with fused operations use them ([`SimdF32x8::mul_sub`]), the others do not. Tests compare all of them with a loop
+//! over all triangles. However, the product must not overflow where the difference would not, nor underflow. Rays for
+//! which this is not guaranteed (see `is_moderate`) compute it exactly.
 
 use super::prepare::PreparedRays;
 use super::{Block, Lanes, Node, WIDTH};

@@ -1,4 +1,4 @@
-//! What the tests need of rays, computed for eight at a time.
+//! Precomputes ray data for the intersection tests, eight rays at a time.
 
 use super::{Lanes, WIDTH};
 use crate::geometry::Aabb;

@@ -1,4 +1,4 @@
-//! Walking the tree: one ray to its closest or any hit, and streams of rays.
+//! Traversal: one ray to its closest or any hit, and streams of rays.
 //!
 //! Everything here is generic over the instruction set and inlined into it.
 #![allow(clippy::large_stack_arrays)] // Some streams, 50 KiB.

@@ -2,10 +2,10 @@
 //! Techniques for Monte Carlo Rendering".
 //!
 //! The multi-sample estimator is Σᵢ (1/nᵢ) Σⱼ wᵢ(xᵢⱼ) f(xᵢⱼ) / pᵢ(xᵢⱼ) with Σᵢ wᵢ = 1. Weights that
-//! sum to one do not go with a common factor 1/(M + N): two techniques with M = N samples would
-//! then give exactly half the answer.
+//! sum to one must not be combined with a common factor 1/(M + N): two techniques with M = N samples
+//! would then give exactly half the result.
 
-/// The rule that gives a sample's weight from the densities of the techniques.
+/// The heuristic that computes a sample's weight from the densities of the techniques.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Heuristic {
     /// wᵢ = nᵢ pᵢ / Σₖ nₖ pₖ.

@@ -210,7 +210,7 @@ fn split_attribute(header: &[u8]) -> Option<(&[u8], &[u8])> {
     header.split_at_checked(value + length as usize)
 }
 
-/// The string attributes of the first part: what [`ExrLayers::attributes`] wrote.
+/// Reads the string attributes of the first part, as written from [`ExrLayers::attributes`].
 ///
 /// # Errors
 /// If the file's headers are damaged.
@@ -219,10 +219,10 @@ pub fn text_attributes(bytes: &[u8]) -> Result<Vec<(String, String)>, PictureErr
     Ok(reader.headers().first().map(string_attributes).unwrap_or_default())
 }
 
-/// The attributes of the first part that are texts or numbers, by name; numbers as text.
+/// Reads the text and number attributes of the first part, by name. Numbers become text.
 ///
 /// # Errors
-/// If these are no OpenEXR bytes.
+/// If the bytes are not OpenEXR.
 pub fn plain_attributes(bytes: &[u8]) -> Result<Vec<(String, String)>, PictureErrorKind> {
     let reader = block::read(Cursor::new(bytes), false).map_err(PictureErrorKind::Exr)?;
     let Some(header) = reader.headers().first() else { return Ok(Vec::new()) };
