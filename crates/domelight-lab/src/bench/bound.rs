@@ -1,5 +1,5 @@
-//! What the lecture's optimum would cost: perfect samples of the product of reflectance and light, of
-//! which only the visibility is unknown.
+//! The cost of the lecture's optimum: perfect samples of the product of reflectance and light, where only
+//! the visibility is unknown.
 
 use domelight::RgbImage;
 use domelight::geometry::{RayBatch, offset_origin};

@@ -1,4 +1,4 @@
-//! Embree 4, loaded while the program runs: what the ray kernel is measured against.
+//! Embree 4, loaded at run time, as the peer of the ray kernel.
 //!
 //! The declarations follow the headers of Embree 4 (rtcore_device.h, rtcore_scene.h, rtcore_ray.h); one
 //! thread, default build quality, no flags.

@@ -1,4 +1,4 @@
-//! From errors at rising budgets to the cost of a wanted error.
+//! Computes the cost of a target error from errors at increasing budgets.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,9 +1,9 @@
 //! Mitsuba 3 (Jakob et al. 2022), on the same cases.
 //!
-//! One Python serves all cases: a line asks for a picture, a line answers what it cost. So its pictures and
-//! ours can be taken in turn. It is configured as strongly as it can be for this task: one sample of the
-//! light with MIS compensation and one of the BRDF, weighed by the power heuristic, correlated
-//! multi-jittered points, compiled by LLVM for all cores.
+//! One Python process serves all cases: a line requests a picture, and a line returns its cost. So its pictures and
+//! ours can be rendered in turns. Mitsuba is configured as strongly as possible for this task: one light sample with
+//! MIS compensation and one BRDF sample, weighted by the power heuristic, correlated multi-jittered points, compiled
+//! by LLVM for all cores.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};

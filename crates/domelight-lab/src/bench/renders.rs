@@ -1,4 +1,4 @@
-//! The suites `lecture` and `probes`: what strategies cost on scenes, case by case.
+//! The suites `lecture` and `probes`: the cost of strategies on scenes, case by case.
 
 use std::cell::RefCell;
 

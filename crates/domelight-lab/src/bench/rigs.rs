@@ -1,4 +1,4 @@
-//! The suite `rigs`: what rigs of lights cost, and how well they shade.
+//! The suite `rigs`: the cost of light rigs, and their shading error.
 
 use domelight::Rgb;
 use domelight::environment::Environment;

@@ -1,4 +1,4 @@
-//! A comparison whose strategies are prepared and calibrated: the reference that suits them, and their pictures.
+//! A comparison with prepared and calibrated strategies: renders the reference and the pictures.
 
 use domelight::environment::Environment;
 use domelight::picture::compare::compare;
@@ -25,7 +25,7 @@ const PILOTS: f64 = 2.0;
 /// A mean of another renderer's picture may differ by this part of the reference's without a word.
 const MEAN_TOLERANCE: f64 = 0.02;
 
-/// A comparison whose strategies know how many samples the budget buys.
+/// A comparison in which the number of samples of each strategy is known.
 pub struct CalibratedComparison<'c, 'a> {
     comparison: &'c Comparison<'a>,
     host: &'c dyn Host,
@@ -157,11 +157,11 @@ impl<'c, 'a> CalibratedComparison<'c, 'a> {
         }
     }
 
-    /// The converged picture of the view, from the cache if it has it, else rendered: with more samples until its error
-    /// is at most a tenth of the least that is expected of a strategy, as far as the settings allow.
+    /// The converged picture of the view, from the cache if available, otherwise rendered with more samples until its error
+    /// is at most a tenth of the smallest error expected of a strategy, as far as the settings allow.
     ///
     /// # Errors
-    /// If the scene is not in sight, or the host ended the work.
+    /// If the camera does not see the scene, or the host ended the work.
     pub fn reference(&self, cache: Option<&Cache>) -> Result<Reference, Error> {
         let settings = &self.comparison.settings;
         let mut spp = settings.reference_spp;

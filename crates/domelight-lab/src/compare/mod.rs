@@ -1,4 +1,4 @@
-//! Strategies on one scene at equal samples, rays or time.
+//! Compares strategies on one scene at equal samples, rays or time.
 
 mod budget;
 mod calibrated;
@@ -37,25 +37,25 @@ const CONVERGED: f64 = 0.1;
 /// How far a strategy may miss its budget without a warning.
 const TOLERANCE: f64 = 0.1;
 
-/// What all strategies of a comparison have in common.
+/// The settings common to all strategies of a comparison.
 #[derive(Clone, Debug)]
 pub struct ComparisonSettings {
     /// Settings of each picture, except for the number of samples.
     pub render: RenderSettings,
-    /// What each picture may cost.
+    /// The budget of each picture.
     pub budget: Budget,
-    /// Pictures of each strategy, from the seed of `render` on.
+    /// The number of pictures per strategy, with seeds from that of `render` on.
     pub n_seeds: u32,
-    /// At which ꟻLIP sees the pictures, and the page opens; automatic is [`automatic_exposure`].
+    /// The exposure for ꟻLIP and of the page when it opens; automatic is [`automatic_exposure`].
     pub exposure: Exposure,
-    /// Through which ꟻLIP sees the pictures, and the page opens.
+    /// The tone curve for ꟻLIP and of the page when it opens.
     pub tone: ToneCurve,
-    /// Camera samples of each pixel of a rendered reference, at least 2.
+    /// The number of camera samples per pixel of a rendered reference, at least 2.
     pub reference_spp: u32,
-    /// The reference gets more camera samples, up to as many of each pixel, until its relMSE is at most a tenth of the
-    /// least that is expected of a strategy.
+    /// The maximum number of camera samples per pixel of the reference, which gets more samples until its relMSE is at most
+    /// a tenth of the smallest error expected of a strategy.
     pub most_reference_spp: u32,
-    /// What makes the report again; for people.
+    /// The command that makes the report again, for readers.
     pub command: String,
 }
 
@@ -97,14 +97,14 @@ impl Competitor<'_> {
     }
 }
 
-/// What a comparison found.
+/// The results of a comparison.
 #[derive(Debug)]
 pub struct ComparisonResult {
     /// All numbers.
     pub report: CompareReport,
-    /// The first seed's picture of each strategy and its errors; none of those that were left out.
+    /// The first seed's picture of each strategy and its errors; `None` for strategies that were left out.
     pub pictures: Vec<Option<Picture>>,
-    /// What they were measured against.
+    /// The reference of the errors.
     pub reference: RgbImage,
 }
 
@@ -113,7 +113,7 @@ pub struct ComparisonResult {
 pub struct Picture {
     /// Radiance.
     pub image: RgbImage,
-    /// |I − R| / √(R² + 0.01), the mean of the channels, row by row.
+    /// |I − R| / √(R² + 0.01), averaged over the channels, row by row.
     pub relative_error: Vec<f32>,
     /// ꟻLIP of each pixel, in \[0, 1\].
     pub flip: Vec<f32>,
@@ -130,12 +130,12 @@ impl ComparisonResult {
 }
 
 impl<'a> Comparison<'a> {
-    /// A comparison that nobody takes part in yet.
+    /// Creates a comparison without strategies.
     pub fn new(view: PreparedSceneRef<'a>, settings: ComparisonSettings) -> Self {
         Self { view, settings, competitors: Vec::new() }
     }
 
-    /// One of the library's strategies takes part.
+    /// Adds a built-in strategy.
     ///
     /// # Errors
     /// If one of that name does already.
@@ -143,7 +143,7 @@ impl<'a> Comparison<'a> {
         self.add_competitor(Competitor::Named(strategy))
     }
 
-    /// A strategy of any type takes part. It counts as unbiased: the report complains if it turns out not to be.
+    /// Adds a strategy of any type. It counts as unbiased; the report has a warning if it is not.
     ///
     /// # Errors
     /// If one of that name does already.
@@ -155,7 +155,7 @@ impl<'a> Comparison<'a> {
         self.add_competitor(Competitor::Own { name: name.into(), strategy })
     }
 
-    /// Another renderer's picture takes part.
+    /// Adds a picture by another renderer.
     ///
     /// # Errors
     /// If it has another size than the comparison, or one of that name takes part already.
@@ -187,7 +187,7 @@ impl<'a> Comparison<'a> {
         Ok(())
     }
 
-    /// Prepares all strategies and finds by pilot pictures how many samples the budget buys of each.
+    /// Prepares all strategies and determines with pilot pictures how many samples of each the budget allows.
     ///
     /// # Errors
     /// If a strategy does not suit the environment, the scene is not in sight, or the host ended the work.
@@ -323,7 +323,7 @@ impl CompareReport {
         (off.abs() > TOLERANCE).then_some((what, 100.0 * off))
     }
 
-    /// A line for each strategy that took part.
+    /// One line per strategy.
     pub fn summary(&self) -> Vec<String> {
         let width = self.strategies.iter().map(|s| s.name.chars().count()).max().unwrap_or(0);
         let line = |StrategyReport { name, result, unbiased, .. }: &StrategyReport| {

@@ -1,4 +1,4 @@
-//! Pictures by other renderers, each with what it cost: a folder of OpenEXR files.
+//! Pictures by other renderers with their cost: a folder of OpenEXR files.
 
 use std::collections::HashMap;
 use std::fs;
@@ -14,19 +14,19 @@ use crate::{At as _, Error, Host};
 /// The file that may state the times of a folder's pictures.
 const TIMES: &str = "times.csv";
 
-/// A picture that another renderer made, and what it cost.
+/// A picture by another renderer, and its cost.
 #[derive(Clone, Debug)]
 pub struct OtherPicture {
-    /// What it is called in tables and plots.
+    /// The name in tables and plots.
     pub name: String,
-    /// Radiance, of the comparison's size.
+    /// Radiance, with the size of the comparison.
     pub image: RgbImage,
-    /// CPU seconds of rendering, as they were stated; above 0.
+    /// The stated CPU seconds of rendering, > 0.
     pub seconds: f64,
 }
 
-/// Reads all OpenEXR pictures of a folder, by name. The time of each is stated by a line `NAME,SECONDS` of `times.csv`
-/// in the folder, else by the end of its name as in `NAME.12.5s.exr`, else by an attribute `domelight.seconds` or
+/// Reads all OpenEXR pictures of a folder, sorted by name. The time of each comes from a line `NAME,SECONDS` of `times.csv`
+/// in the folder, or else from the end of its name as in `NAME.12.5s.exr`, or else from an attribute `domelight.seconds` or
 /// `renderTime` (also Blender's), in seconds or as `MM:SS`.
 ///
 /// # Errors

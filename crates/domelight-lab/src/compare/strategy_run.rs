@@ -1,4 +1,4 @@
-//! One strategy of a comparison: as many samples as its budget buys, pictures, and their errors.
+//! One strategy of a comparison: the number of samples in its budget, its pictures, and their errors.
 
 use domelight::RgbImage;
 use domelight::picture::compare::{REGULARIZER, compare};

@@ -1,4 +1,4 @@
-//! Intel's Open Image Denoise 2, loaded while the program runs.
+//! Intel's Open Image Denoise 2, loaded at run time.
 //!
 //! The declarations follow the library's header oidn.h of version 2.
 #![allow(unsafe_code)]

@@ -163,9 +163,9 @@ impl Bvh {
         build::build(positions, triangles)
     }
 
-    /// The same hierarchy, traced with another instruction set; `None` if this processor lacks it.
+    /// The same BVH traced with another instruction set; `None` if this processor lacks it.
     ///
-    /// All give the same answers. [`Bvh::build`] chooses the fastest; this is for comparing them.
+    /// All give the same answers. [`Bvh::build`] chooses the fastest; this is for comparisons.
     #[must_use]
     pub fn with_instruction_set(mut self, instruction_set: InstructionSet) -> Option<Self> {
         self.instruction_set = instruction_set;

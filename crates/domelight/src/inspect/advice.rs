@@ -1,17 +1,17 @@
-//! Why a pixel is noisy and what would help, in sentences with numbers.
+//! Explains in sentences with numbers why a pixel is noisy and what would help.
 
 use std::fmt;
 
 use super::decomposition::{Cause, Decomposition, Share};
 
 impl Decomposition {
-    /// Why the pixel is noisy, in a sentence with numbers.
+    /// Explains why the pixel is noisy, in a sentence with numbers.
     pub fn diagnosis(&self) -> Diagnosis<'_> {
         Diagnosis(self)
     }
 }
 
-/// Why the pixel is noisy under one strategy; its text is a sentence.
+/// Why the pixel is noisy with one strategy. It displays as a sentence.
 #[derive(Clone, Copy, Debug)]
 pub struct Diagnosis<'a>(&'a Decomposition);
 
@@ -61,7 +61,7 @@ impl fmt::Display for Diagnosis<'_> {
     }
 }
 
-/// What would help at a pixel; its text is a sentence.
+/// What would help at a pixel. It displays as a sentence.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 #[non_exhaustive]
@@ -75,7 +75,7 @@ pub enum Advice {
         /// Share of its variance between camera samples.
         between: f64,
     },
-    /// The strategy needs the fewest rays to the same error.
+    /// This strategy needs the fewest rays for the same error.
     Strategy {
         /// Name of the best strategy.
         name: String,
@@ -84,11 +84,11 @@ pub enum Advice {
         /// That one.
         than: String,
     },
-    /// All strategies are about alike: more rays.
+    /// All strategies perform about the same; more rays would help.
     Rays,
 }
 
-/// What would help at a pixel, given the variance of some strategies there.
+/// Advice for a pixel, given the variance of some strategies there.
 pub fn advice(strategies: &[Decomposition]) -> Advice {
     /// A factor that is worth changing the strategy for.
     const WORTH: f64 = 1.5;

@@ -16,10 +16,10 @@ pub enum Heuristic {
 }
 
 impl Heuristic {
-    /// The weight in [0, 1] of a sample that one technique drew, `n_pdf` being its count times its
-    /// density and `other` the same of the other technique; both non-negative, in the same measure.
+    /// The weight in [0, 1] of a sample from one technique. `n_pdf` is its count times its density, and
+    /// `other` the same for the other technique; both are non-negative and in the same measure.
     ///
-    /// A technique with an infinite density takes all, an impossible sample counts nothing.
+    /// A technique with an infinite density gets weight 1, and an impossible sample gets 0.
     pub fn weight(self, n_pdf: f32, other: f32) -> f32 {
         if n_pdf <= 0.0 {
             return 0.0;

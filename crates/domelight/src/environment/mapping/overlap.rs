@@ -1,12 +1,11 @@
-//! Which texels of a lat-long map a texel of any mapping covers, and how much of the sphere they share.
+//! The exact overlap on the sphere between texels of a lat-long map and texels of any mapping.
 //!
-//! In the plane of longitude and height (φ, y = cos θ) areas are solid angles (Archimedes) and the texels of a
-//! lat-long map are rectangles. A texel of another mapping is drawn into that plane as a polygon, its edges refined
-//! until parabolas will do, and the polygon's area within each rectangle is summed edge by edge, as rasterizers of
-//! fonts do. Neighboring texels share their edges, so what one loses the other gains: all of the sphere is shared
-//! out, none of it twice.
+//! In the plane of longitude and height (φ, y = cos θ), areas equal solid angles (Archimedes), and the texels of a
+//! lat-long map are rectangles. A texel of another mapping becomes a polygon in that plane, with its edges refined
+//! until parabolas suffice. The polygon's area within each rectangle is summed edge by edge, as in font rasterizers.
+//! Neighboring texels share their edges, so the whole sphere is covered exactly once.
 //!
-//! Everything here is in double precision: at 4096 rows a coordinate in single precision is off by 10⁻⁴ of a texel.
+//! Everything is in double precision: at 4096 rows, a single-precision coordinate is off by 10⁻⁴ of a texel.
 
 use super::{CubeLayout, Mapping};
 use crate::environment::LatLongGrid;

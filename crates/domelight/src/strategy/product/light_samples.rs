@@ -59,7 +59,7 @@ const N_LIGHT_SAMPLES: usize = N_SLOTS * PER_CELL;
 pub struct LightSamplePool {
     /// By slot.
     lights: Box<[LightSample; N_LIGHT_SAMPLES]>,
-    /// The directions of a cell come first in its slots.
+    /// Determines how many directions each slot holds, at its start.
     pub(super) length: PassLength,
     /// By channel of the radiance L: ∫ L dω, and ∫ L ω dω by component, as the directions estimate it.
     pub(super) moments: Box<[[CellArray; 4]; 3]>,

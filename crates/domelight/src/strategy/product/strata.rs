@@ -69,7 +69,7 @@ impl StratumAssignment {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CandidateIndex {
     pub(super) hit: usize,
-    /// The block, counted over all hits.
+    /// The lane, counted over all blocks.
     pub(super) lane: usize,
 }
 
