@@ -205,7 +205,8 @@ fn require_more(path: &Path, checkpoint: &Checkpoint, n_samples: u32) -> Result<
         return Ok(());
     }
     let text = format!(
-        "{} belongs to a render with {} samples per pixel, but --spp is {n_samples}; give at least as many",
+        "{} belongs to a render with {} samples per pixel, but --spp is {n_samples}; give at \
+         least as many",
         path.display(),
         checkpoint.n_samples
     );

@@ -143,7 +143,9 @@ impl RenderReport {
         let environment = environment.probe();
         let Timings { load, build, render, write, total } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
-        status(&format!("{scene} under {environment}: {w}x{h}, {spp} samples per pixel, {strategy}"));
+        status(&format!(
+            "{scene} under {environment}: {w}x{h}, {spp} samples per pixel, {strategy}"
+        ));
         let png = self.png.map_or(String::new(), |shown| format!(" (PNG at {shown})"));
         status(&format!(
             "loaded in {:.2} s, built in {:.2} s, rendered in {:.2} s{cpu}, {:.1} Mrays/s -> {}{png}",

@@ -135,7 +135,8 @@ fn denoise_file(
 /// What people should know of a denoised picture.
 pub(crate) fn denoised_line(by: &str) -> String {
     format!(
-        "denoised with {by}: for viewing, not for measurement; the filter trades noise for bias, and one picture cannot show how much"
+        "denoised with {by}: for viewing, not for measurement; the filter trades noise for bias, \
+         and one picture cannot show how much"
     )
 }
 

@@ -306,7 +306,11 @@ fn incomplete_doubled_and_foreign_parts_are_named() {
     };
     ended(&merge(&["a.exr", "c.exr"]), 3, &["tiles 5-11 of 0-19", "--tiles"]);
     ended(&merge(&["a.exr", "b.exr"]), 4, &["a.exr and b.exr both hold tile 4"]);
-    ended(&merge(&["a.exr", "d.exr"]), 5, &["d.exr belongs to another render", "seed is 7", "a.exr 0"]);
+    ended(
+        &merge(&["a.exr", "d.exr"]),
+        5,
+        &["d.exr belongs to another render", "seed is 7", "a.exr 0"],
+    );
     ended(&merge(&["a.exr", "e.exr"]), 5, &["e.exr"]);
     ended(&merge(&["a.exr", "gone.exr"]), 2, &["gone.exr"]);
     fs::create_dir(folder.path().join("empty")).unwrap();

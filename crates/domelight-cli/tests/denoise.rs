@@ -114,7 +114,8 @@ fn a_render_is_denoised_where_it_is_looked_at() {
     done(&render(&["-q", "-o", "plain.exr", "-o", "plain.pfm"]));
     let output = render(&["--denoise", "-o", "a.exr", "-o", "a.pfm", "-o", "a.png"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let line = "denoised with Open Image Denoise 2.3.1 from color, albedo and normals: for viewing, not for measurement";
+    let line = "denoised with Open Image Denoise 2.3.1 from color, albedo and normals: for \
+     viewing, not for measurement";
     assert!(stderr(&output).contains(line), "{}", stderr(&output));
     let color = load(&folder, "plain.pfm");
     let [albedo, normal] = ["albedo", "normal"].map(|name| layer(&folder, "plain.exr", name));

@@ -21,7 +21,8 @@ pub struct DepthOfField {
 /// A text that is no depth of field.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "'{0}' is not an f-number and a distance or auto, such as 2.8,auto or 1.4,3.5, optionally with 3 to 64 blades as in 2.8,auto,6"
+    "'{0}' is not an f-number and a distance or auto, such as 2.8,auto or 1.4,3.5, optionally \
+     with 3 to 64 blades as in 2.8,auto,6"
 )]
 pub struct BadDepthOfField(String);
 

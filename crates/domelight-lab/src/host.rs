@@ -30,7 +30,8 @@ pub trait Host: Sync {
     fn warn_of_non_finite(&self, label: &str, n: u64) {
         if n > 0 {
             self.warn(&format!(
-                "{label}{n} camera samples were NaN or infinite and count as black; this is a bug in domelight: please report this command with its scene and probe"
+                "{label}{n} camera samples were NaN or infinite and count as black; this is a bug \
+                 in domelight: please report this command with its scene and probe"
             ));
         }
     }

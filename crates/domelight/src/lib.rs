@@ -16,8 +16,8 @@
 //! ```
 //!
 //! [`Renderer`](render::Renderer) also renders in steps, with progress, checkpoints and your own strategies.
-//! [`inspect`] explains the noise of a pixel, and [`rig`] turns an environment into lights. The folder `examples/` has a
-//! program for each.
+//! [`inspect`] explains the noise of a pixel, and [`rig`] turns an environment into lights. The folder `examples/`
+//! has a program for each.
 //!
 //! # Conventions
 //! - `wo` points toward the viewer, `wi` toward the light; both are unit vectors away from the surface.

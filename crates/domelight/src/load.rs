@@ -32,8 +32,8 @@ impl Scene {
     /// Loads a mesh or a scene file of any known format and builds it.
     ///
     /// # Errors
-    /// If the file cannot be read, is damaged, or holds no valid scene. [`scene::load()`] also returns the loader's warnings,
-    /// and a description that you can change before building it.
+    /// If the file cannot be read, is damaged, or holds no valid scene. [`scene::load()`] also returns the loader's
+    /// warnings, and a description that you can change before building it.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         Ok(Self::new(scene::load(path)?.description)?)
     }

@@ -63,7 +63,8 @@ pub(crate) struct Arguments {
 /// The memory limit of the program.
 #[derive(Args, Debug)]
 pub(crate) struct MemoryArguments {
-    /// Refuse work that needs more memory than SIZE, such as 4GiB or none [default: nine tenths of the machine's or the control group's memory]
+    /// Refuse work that needs more memory than SIZE, such as 4GiB or none [default: nine tenths of the machine's or
+    /// the control group's memory]
     #[arg(long, global = true, value_name = "SIZE")]
     pub(crate) max_memory: Option<MaxMemory>,
 }
@@ -321,8 +322,8 @@ pub(crate) struct ToneArguments {
     /// The OpenEXR layer, such as unoccluded or albedo
     #[arg(long, value_name = "NAME")]
     pub(crate) layer: Option<String>,
-    /// Denoise the picture with Open Image Denoise, if its library is installed or $OIDN_LIBRARY names it; uses the layers
-    /// albedo and normal of the file, if present
+    /// Denoise the picture with Open Image Denoise, if its library is installed or $OIDN_LIBRARY names it; uses the
+    /// layers albedo and normal of the file, if present
     #[arg(long)]
     pub(crate) denoise: bool,
     /// Bits per channel

@@ -91,8 +91,8 @@ pub(crate) struct CameraArguments {
     /// Camera of the scene, by name or by number from 0 [default: the first]
     #[arg(long, value_name = "NAME|N")]
     pub(crate) camera: Option<String>,
-    /// Frame the subject from front, back, left, right, top, bottom, three-quarter, or from an azimuth (90 is its right)
-    /// and an elevation [degrees], such as 30,15 [default: the scene's camera, otherwise 0,20]
+    /// Frame the subject from front, back, left, right, top, bottom, three-quarter, or from an azimuth (90 is its
+    /// right) and an elevation [degrees], such as 30,15 [default: the scene's camera, otherwise 0,20]
     #[arg(long, value_name = "VIEW|AZ,EL", allow_hyphen_values = true, conflicts_with_all = ["camera", "origin"])]
     pub(crate) view: Option<ViewDirection>,
     /// Position of the camera [default: frames the scene]
@@ -125,8 +125,8 @@ pub(crate) struct SubjectArguments {
     /// Move and scale the scene: center of the bounds to 0, longest half-extent to 1
     #[arg(long)]
     pub(crate) normalize: bool,
-    /// Put ground under the subject: plate, a diffuse plate (reflectance 0.5) that fades out toward its rim, or shadow, a
-    /// shadow catcher that shows only shadows, on the environment or, with --hide-env, in alpha
+    /// Put ground under the subject: plate, a diffuse plate (reflectance 0.5) that fades out toward its rim, or
+    /// shadow, a shadow catcher that shows only shadows, on the environment or, with --hide-env, in alpha
     #[arg(long, value_enum, value_name = "KIND", num_args = 0..=1, default_missing_value = "plate")]
     pub(crate) ground: Option<GroundName>,
     /// Hide the environment behind the scene: pixels without a surface are transparent

@@ -147,7 +147,9 @@ impl LightsArguments {
             return Err(UsageError(message.into()).into());
         }
         if self.keep_residual.is_some() && self.has_regions() && self.min_energy.is_none() {
-            let message = "nothing is left for --keep-residual: the lights use the whole probe. Omit -n and --error to keep the light that --sun and --lamps do not use, or leave dim lights in the map with --min-energy";
+            let message = "nothing is left for --keep-residual: the lights use the whole probe. \
+             Omit -n and --error to keep the light that --sun and --lamps do not use, or leave \
+             dim lights in the map with --min-energy";
             return Err(UsageError(message.into()).into());
         }
         let outputs: Vec<_> = self.output.iter().map(|o| self.output(o)).collect::<Result<_>>()?;

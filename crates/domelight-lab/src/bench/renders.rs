@@ -251,7 +251,9 @@ impl CaseRunner<'_> {
         }
         if let Some(peer) = row.peer.as_ref().filter(|peer| (peer.mean_ratio - 1.0).abs() > 0.02) {
             let percent = 100.0 * (peer.mean_ratio - 1.0);
-            host.warn(&format!("its converged picture differs from ours by {percent:+.1} % in brightness"));
+            host.warn(&format!(
+                "its converged picture differs from ours by {percent:+.1} % in brightness"
+            ));
         }
     }
 }

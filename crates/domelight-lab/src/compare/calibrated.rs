@@ -157,8 +157,8 @@ impl<'c, 'a> CalibratedComparison<'c, 'a> {
         }
     }
 
-    /// The converged picture of the view, from the cache if available, otherwise rendered with more samples until its error
-    /// is at most a tenth of the smallest error expected of a strategy, as far as the settings allow.
+    /// The converged picture of the view, from the cache if available, otherwise rendered with more samples until its
+    /// error is at most a tenth of the smallest error expected of a strategy, as far as the settings allow.
     ///
     /// # Errors
     /// If the camera does not see the scene, or the host ended the work.
@@ -268,8 +268,7 @@ impl<'c, 'a> CalibratedComparison<'c, 'a> {
         let CalibratedStrategy { spec, strategy, setup_seconds, calibration } = strategy;
         let mut report = StrategyReport {
             name: competitor.name().to_owned(),
-            settings: spec
-                .map_or("a custom strategy".to_owned(), StrategySpec::description),
+            settings: spec.map_or("a custom strategy".to_owned(), StrategySpec::description),
             unbiased: Some(spec.is_none_or(StrategySpec::is_unbiased)),
             setup_seconds: *setup_seconds,
             left_out: None,
@@ -321,7 +320,8 @@ impl<'c, 'a> CalibratedComparison<'c, 'a> {
         let off = sum(image) / sum(reference) - 1.0;
         if off.abs() > MEAN_TOLERANCE {
             self.host.warn(&format!(
-                "the picture {name} differs from the reference by {:+.1} % in brightness: part of its error comes from another light, exposure or material",
+                "the picture {name} differs from the reference by {:+.1} % in brightness: part of \
+                 its error comes from another light, exposure or material",
                 100.0 * off
             ));
         }

@@ -52,8 +52,8 @@ pub struct ComparisonSettings {
     pub tone: ToneCurve,
     /// The number of camera samples per pixel of a rendered reference, at least 2.
     pub reference_spp: u32,
-    /// The maximum number of camera samples per pixel of the reference, which gets more samples until its relMSE is at most
-    /// a tenth of the smallest error expected of a strategy.
+    /// The maximum number of camera samples per pixel of the reference, which gets more samples until its relMSE is
+    /// at most a tenth of the smallest error expected of a strategy.
     pub most_reference_spp: u32,
     /// The command that makes the report again, for readers.
     pub command: String,
@@ -165,8 +165,9 @@ impl<'a> Comparison<'a> {
         if [image.width, image.height] != [width, height] {
             let (w, h) = (image.width, image.height);
             let why = format!(
-                "the picture {name} is {w}x{h}, but the comparison renders {width}x{height}: all must have the same size; \
-                 give --size {w}x{h}, or the picture of {name} in {width}x{height}"
+                "the picture {name} is {w}x{h}, but the comparison renders {width}x{height}: all \
+                 must have the same size; give --size {w}x{h}, or the picture of {name} in \
+                 {width}x{height}"
             );
             return Err(Error::Usage(why));
         }
@@ -295,7 +296,8 @@ impl CompareReport {
             let is_off = result.bias.is_some_and(|bias| bias > 0.5 * result.rel_mse.mean);
             if *unbiased == Some(true) && is_off && self.reference.source == Source::File {
                 host.warn(&format!(
-                    "{name} is unbiased, but the mean of its pictures differs from the reference: does the reference show another scene, light or filter, or is it noisy?"
+                    "{name} is unbiased, but the mean of its pictures differs from the reference: \
+                     does the reference show another scene, light or filter, or is it noisy?"
                 ));
             }
         }

@@ -25,9 +25,9 @@ pub struct OtherPicture {
     pub seconds: f64,
 }
 
-/// Reads all OpenEXR pictures of a folder, sorted by name. The time of each comes from a line `NAME,SECONDS` of `times.csv`
-/// in the folder, or else from the end of its name as in `NAME.12.5s.exr`, or else from an attribute `domelight.seconds` or
-/// `renderTime` (also Blender's), in seconds or as `MM:SS`.
+/// Reads all OpenEXR pictures of a folder, sorted by name. The time of each comes from a line `NAME,SECONDS` of
+/// `times.csv` in the folder, or else from the end of its name as in `NAME.12.5s.exr`, or else from an attribute
+/// `domelight.seconds` or `renderTime` (also Blender's), in seconds or as `MM:SS`.
 ///
 /// # Errors
 /// If the folder has no picture, one cannot be read, or one has no time.
@@ -85,8 +85,8 @@ fn read_picture(path: &Path, times: &Times, host: &dyn Host) -> Result<OtherPict
     let seconds = times.0.get(&stem).copied().or(of_name).or_else(of_attributes);
     let seconds = seconds.ok_or_else(|| {
         let why = format!(
-            "its render time is unknown: name it {stem}.12.5s.exr, add a line {stem},12.5 to {TIMES} in its \
-             folder, or write an attribute domelight.seconds into it"
+            "its render time is unknown: name it {stem}.12.5s.exr, add a line {stem},12.5 to \
+             {TIMES} in its folder, or write an attribute domelight.seconds into it"
         );
         Error::Usage(why)
     })?;

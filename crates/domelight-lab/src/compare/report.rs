@@ -71,8 +71,8 @@ pub struct ResultReport {
     pub rel_mse: MeanAndDeviation,
     /// Mean ꟻLIP of the first seed's picture.
     pub flip: f64,
-    /// The estimated part of relMSE that more samples do not remove. It may be negative, excludes the reference's own error
-    /// if known, and is null for a single seed.
+    /// The estimated part of relMSE that more samples do not remove. It may be negative, excludes the reference's own
+    /// error if known, and is null for a single seed.
     pub bias: Option<f64>,
     /// The 95 % interval of `bias`.
     pub bias_interval: Option<[f64; 2]>,

@@ -1,7 +1,7 @@
 //! Denoising with Intel's Open Image Denoise, if its library is installed.
 //!
-//! A denoised picture is biased: the filter may mistake texture for noise, and invented detail may be wrong. The picture
-//! itself does not reveal by how much, so denoised pictures are for viewing, not for measurement.
+//! A denoised picture is biased: the filter may mistake texture for noise, and invented detail may be wrong. The
+//! picture itself does not reveal by how much, so denoised pictures are for viewing, not for measurement.
 
 mod oidn;
 
@@ -103,8 +103,8 @@ impl Denoiser {
         format!("Open Image Denoise {major}.{minor}.{patch}")
     }
 
-    /// Denoises HDR radiance, which may be premultiplied by coverage. The library cannot use normals without albedo. Pixels
-    /// without a normal show no surface and are unchanged.
+    /// Denoises HDR radiance, which may be premultiplied by coverage. The library cannot use normals without albedo.
+    /// Pixels without a normal show no surface and are unchanged.
     ///
     /// # Errors
     /// If sizes differ, or the library fails.

@@ -29,7 +29,9 @@ impl Cache {
             .map(Path::to_path_buf)
             .or_else(|| Some(choose_native_strategy().ok()?.cache_dir().join("domelight")));
         if folder.is_none() {
-            host.warn("there is no home folder for the cache of references; name one with --cache FOLDER");
+            host.warn(
+                "there is no home folder for the cache of references; name one with --cache FOLDER",
+            );
         }
         Some(Self { folder: folder?, program: program.to_owned() })
     }
@@ -57,7 +59,8 @@ impl Cache {
     /// Keeps the bytes, if that is possible; else warns, for what was rendered is there all the same.
     pub(crate) fn put(&self, key: &Key, bytes: &[u8], host: &dyn Host) -> Option<PathBuf> {
         let kept = self.try_put(key, bytes);
-        kept.inspect_err(|error| host.warn(&format!("the reference cannot be cached: {error}"))).ok()
+        kept.inspect_err(|error| host.warn(&format!("the reference cannot be cached: {error}")))
+            .ok()
     }
 
     fn try_put(&self, key: &Key, bytes: &[u8]) -> Result<PathBuf, Error> {

@@ -93,7 +93,8 @@ pub enum Source {
 pub enum Goal {
     /// With so many camera samples per pixel.
     Samples(u32),
-    /// When the relMSE of the pixels that show any of the scene is no greater than `noise`, or after `most` camera samples per pixel.
+    /// When the relMSE of the pixels that show any of the scene is no greater than `noise`, or after `most` camera
+    /// samples per pixel.
     Noise {
         /// relMSE.
         noise: f64,

@@ -20,8 +20,9 @@ impl Coat {
     /// The coat's reflectance at normal incidence.
     pub const F0: f32 = 0.04;
 
-    /// Creates the coat with GGX roughness `alpha`, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\], about a unit `normal`
-    /// in the local frame of the layer below. A normal that is not finite or not above that layer is replaced by +z.
+    /// Creates the coat with GGX roughness `alpha`, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\], about
+    /// a unit `normal` in the local frame of the layer below. A normal that is not finite or not above that layer is
+    /// replaced by +z.
     pub fn new(alpha: f32, normal: Vec3) -> Self {
         let normal = normal.try_normalize().filter(|n| n.z > 0.0).unwrap_or(Vec3::Z);
         let [alpha, _] = super::range::alpha([alpha; 2]);

@@ -10,8 +10,8 @@ use crate::simd::{Colors, SimdFloat, Vectors};
 /// A custom reflectance lobe. One implementation serves every strategy.
 ///
 /// Directions are unit vectors in the local frame, where z is the shading normal, and those passed to
-/// [`Bxdf::eval_pdf`] lie above the surface. The density must be positive wherever the value is, and must be the density
-/// of [`Bxdf::sample`]; `testkit`'s χ² test proves it.
+/// [`Bxdf::eval_pdf`] lie above the surface. The density must be positive wherever the value is, and must be the
+/// density of [`Bxdf::sample`]; `testkit`'s χ² test proves it.
 pub trait Bxdf: Debug + Send + Sync {
     /// f_r(wo, wi) · cos θ_i ≥ 0 \[sr⁻¹\], the cosine inside, and the density of [`Bxdf::sample`] \[sr⁻¹\].
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32);

@@ -159,9 +159,9 @@ impl Bsdf {
         Self::checked(lobes.iter().copied())
     }
 
-    /// Creates glTF's layers as seen from `wo`: sheen on the `base`, and a coat with a strength in \[0, 1\] on both. A layer
-    /// dims those below by what it reflects toward `wo`, regardless of the direction of light, so the result is valid only
-    /// for this view.
+    /// Creates glTF's layers as seen from `wo`: sheen on the `base`, and a coat with a strength in \[0, 1\] on both.
+    /// A layer dims those below by what it reflects toward `wo`, regardless of the direction of light, so the result
+    /// is valid only for this view.
     #[must_use]
     pub fn layered(
         base: impl Into<Lobe>,

@@ -36,8 +36,8 @@ pub struct MetallicRoughness {
 }
 
 impl MetallicRoughness {
-    /// Creates the lobe with a base color, metalness and perceptual roughness. All are clamped to [0, 1], as glTF requires for
-    /// products of factors and textures, and α = roughness² to at least [`super::MIN_ALPHA`].
+    /// Creates the lobe with a base color, metalness and perceptual roughness. All are clamped to [0, 1], as glTF
+    /// requires for products of factors and textures, and α = roughness² to at least [`super::MIN_ALPHA`].
     pub fn new(base_color: Rgb, metallic: f32, roughness: f32) -> Self {
         Self::with_dielectric(base_color, metallic, roughness, 0.04)
     }

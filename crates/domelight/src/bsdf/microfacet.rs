@@ -62,7 +62,8 @@ pub struct Microfacet<D> {
 }
 
 impl<D: NormalDistribution> Microfacet<D> {
-    /// Creates the lobe with a distribution of normals. The reflectance is clamped to the range that the Fresnel formulas accept.
+    /// Creates the lobe with a distribution of normals. The reflectance is clamped to the range that the Fresnel
+    /// formulas accept.
     pub fn with_normals(normals: D, fresnel: Fresnel, masking: Masking) -> Self {
         Self { normals, fresnel: fresnel.in_range(), masking }
     }

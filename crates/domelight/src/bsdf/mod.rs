@@ -1,8 +1,8 @@
 //! Reflectance: lobes, and BSDFs as sums of lobes.
 //!
 //! A [`Bsdf`] is a small sum of [`Lobe`]s: [`Lambert`], [`Phong`], [`Ward`], [`Ggx`],
-//! [`Beckmann`], and glTF's [`MetallicRoughness`], [`Sheen`] and [`Coat`], one model per file. All work in the local frame,
-//! are plain `Copy` data, and evaluate value and density together, because multiple importance
+//! [`Beckmann`], and glTF's [`MetallicRoughness`], [`Sheen`] and [`Coat`], one model per file. All work in the local
+//! frame, are plain `Copy` data, and evaluate value and density together, because multiple importance
 //! sampling always needs both.
 //!
 //! ```
@@ -18,9 +18,9 @@
 //! # Ok::<(), domelight::bsdf::ParseMaterialError>(())
 //! ```
 //!
-//! All lobes are reciprocal: f_r(wo, wi) = f_r(wi, wo). (glTF's layers are not: the fraction that a coat or sheen leaves
-//! to the layer below depends only on `wo`, as in the specification.) Constructors clamp every parameter to the range
-//! in which the formulas are valid, so no lobe evaluates to NaN or infinity.
+//! All lobes are reciprocal: f_r(wo, wi) = f_r(wi, wo). (glTF's layers are not: the fraction that a coat or sheen
+//! leaves to the layer below depends only on `wo`, as in the specification.) Constructors clamp every parameter to
+//! the range in which the formulas are valid, so no lobe evaluates to NaN or infinity.
 //!
 //! Rejected: trait objects (the set is closed, and the sample loop should inline); tabulated
 //! energy compensation (its tables would have to enter the bounds of [`Brdf::max_eval`]).

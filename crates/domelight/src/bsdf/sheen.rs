@@ -8,8 +8,8 @@
 //! Samples are uniform over the hemisphere. f_r cos θ_i is at most color · D/4 for any view, so the weights are bounded
 //! by (2 + 1/α)/4; cosine-weighted samples would have unbounded weights at grazing views.
 //!
-//! The layers below are scaled by 1 − max(color) E(cos θ_o), where E is the albedo of white sheen, and by 0 where that is
-//! negative. E exceeds one by a tenth at 85° and roughness 0.1, because this V does not conserve energy.
+//! The layers below are scaled by 1 − max(color) E(cos θ_o), where E is the albedo of white sheen, and by 0 where
+//! that is negative. E exceeds one by a tenth at 85° and roughness 0.1, because this V does not conserve energy.
 
 use std::sync::LazyLock;
 

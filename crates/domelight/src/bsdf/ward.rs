@@ -46,8 +46,8 @@ pub struct Ward {
 }
 
 impl Ward {
-    /// Creates the lobe with reflectance ρ, clamped to [0, 1], and root-mean-square slopes `alpha` along x and y (equal for an
-    /// isotropic lobe), clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
+    /// Creates the lobe with reflectance ρ, clamped to [0, 1], and root-mean-square slopes `alpha` along x and y
+    /// (equal for an isotropic lobe), clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
     pub fn new(rho: Rgb, alpha: [f32; 2], form: WardForm) -> Self {
         Self { rho: range::reflectance(rho), alpha: range::alpha(alpha), form }
     }

@@ -11,13 +11,13 @@
 //! The box test uses the unsheared ray. To pass everything that the triangle test would accept, planes
 //! move outward by 16·2⁻²⁴·m + 4·2⁻²⁴·|o|, where o is the origin's coordinate (after Ize 2013, "Robust BVH
 //! Ray Traversal", and the section on traversal of the paper above).
-//! In the first term, the shear needs 7 units, a direction component that is overestimated needs 1, and the box test needs
-//! 4: in the distance p/d − o/d to a plane p, for its own rounding, for 1/d on two axes that are compared, and for the
-//! product p/d, since |p| ≤ |o| + m. In the second term, o ± margin, its product with 1/d, and p/d need one each.
-//! So it does not matter how often p/d − o/d is rounded: the boxes entered may differ, but the hits do not. Instruction
-//! sets with fused operations use them ([`SimdF32x8::mul_sub`]), the others do not. Tests compare all of them with a loop
-//! over all triangles. However, the product must not overflow where the difference would not, nor underflow. Rays for
-//! which this is not guaranteed (see `is_moderate`) compute it exactly.
+//! In the first term, the shear needs 7 units, a direction component that is overestimated needs 1, and the box test
+//! needs 4: in the distance p/d − o/d to a plane p, for its own rounding, for 1/d on two axes that are compared, and
+//! for the product p/d, since |p| ≤ |o| + m. In the second term, o ± margin, its product with 1/d, and p/d need one
+//! each. So it does not matter how often p/d − o/d is rounded: the boxes entered may differ, but the hits do not.
+//! Instruction sets with fused operations use them ([`SimdF32x8::mul_sub`]), the others do not. Tests compare all of
+//! them with a loop over all triangles. However, the product must not overflow where the difference would not, nor
+//! underflow. Rays for which this is not guaranteed (see `is_moderate`) compute it exactly.
 
 use super::prepare::PreparedRays;
 use super::{Block, Lanes, Node, WIDTH};

@@ -140,9 +140,7 @@ pub enum BvhError {
         vertices: usize,
     },
     /// More triangles than indices.
-    #[error(
-        "{count} triangles are too many: at most {max} fit in one BVH; split the scene"
-    )]
+    #[error("{count} triangles are too many: at most {max} fit in one BVH; split the scene")]
     TooManyTriangles {
         /// How many there are.
         count: usize,
@@ -189,14 +187,14 @@ impl Bvh {
 
     /// The first triangle that the ray hits in its open interval (0, `t_max`), from either side.
     ///
-    /// Among hits at the same distance, the triangle with the smallest index is returned. A ray that is not finite or has a
-    /// zero direction hits nothing.
+    /// Among hits at the same distance, the triangle with the smallest index is returned. A ray that is not finite or
+    /// has a zero direction hits nothing.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         simd::dispatch(self.instruction_set, traverse::ClosestHit { bvh: self, ray })
     }
 
-    /// [`Bvh::closest_hit`] among the hits for which `accept` returns true; other hits are ignored. `accept` may be called
-    /// in any order, and must return the same answer each time.
+    /// [`Bvh::closest_hit`] among the hits for which `accept` returns true; other hits are ignored. `accept` may be
+    /// called in any order, and must return the same answer each time.
     pub fn closest_hit_where(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
         simd::dispatch(self.instruction_set, traverse::ClosestHitWhere { bvh: self, ray, accept })
     }
@@ -227,10 +225,11 @@ impl Bvh {
         );
     }
 
-    /// The transmittance along each ray of a batch up to infinity: the product of `of_hit`, in \[0, 1\], over all triangles
-    /// that the ray hits; 1 if it hits none. `of_hit` receives the index of the ray in the batch and the hit.
+    /// The transmittance along each ray of a batch up to infinity: the product of `of_hit`, in \[0, 1\], over all
+    /// triangles that the ray hits; 1 if it hits none. `of_hit` receives the index of the ray in the batch and the hit.
     ///
-    /// A ray's result has the same bits regardless of the other rays. `transmittances` is overwritten, one entry per ray.
+    /// A ray's result has the same bits regardless of the other rays. `transmittances` is overwritten, one entry per
+    /// ray.
     ///
     /// # Panics
     /// If the batch has fewer directions than origins.

@@ -49,11 +49,12 @@ pub enum DensityError {
 }
 
 impl EnvironmentDensity {
-    /// Creates the density per solid angle proportional to `weights`, one for each texel of [`Environment::map`], row by row.
+    /// Creates the density per solid angle proportional to `weights`, one for each texel of [`Environment::map`], row
+    /// by row.
     ///
     /// # Errors
-    /// The first weight in row order that is negative or not finite, a number of weights that differs from the number of
-    /// texels, or weights that are all 0.
+    /// The first weight in row order that is negative or not finite, a number of weights that differs from the number
+    /// of texels, or weights that are all 0.
     pub fn new(environment: &Environment, weights: Vec<f32>) -> Result<Self, DensityError> {
         let grid = &environment.grid;
         let (width, height) = (grid.texels.width(), grid.texels.height());

@@ -1,8 +1,8 @@
 //! Loads light probes from any picture format and mapping, converted to the lat-long working map.
 //!
 //! Sampling tables require finite, non-negative radiance. Lossy compression leaves negative texels in most maps, and
-//! stitching leaves NaN in some. They are repaired and counted in a warning, because a NaN may be where the sun was. With
-//! [`ProbeOptions::strict`], they are an error that names the first bad texel.
+//! stitching leaves NaN in some. They are repaired and counted in a warning, because a NaN may be where the sun was.
+//! With [`ProbeOptions::strict`], they are an error that names the first bad texel.
 
 use super::mapping::{Mapping, ShapeError, to_lat_long};
 use crate::math::{Vec2, vec2};
@@ -88,8 +88,8 @@ pub enum ProbeError {
 /// Lat-long maps keep their texels bit for bit. Other mappings are converted at the height that keeps their detail.
 ///
 /// # Errors
-/// If the picture cannot be read, does not have the shape of the mapping, or, with [`ProbeOptions::strict`], has invalid
-/// radiance.
+/// If the picture cannot be read, does not have the shape of the mapping, or, with [`ProbeOptions::strict`], has
+/// invalid radiance.
 pub fn load_probe(path: &Path, options: &ProbeOptions) -> Result<LoadedProbe, ProbeError> {
     let read = ReadOptions { layer: options.layer.clone(), max_memory: options.max_memory };
     let picture = picture::read(path, &read)?;
@@ -127,14 +127,17 @@ pub fn probe_from_picture(
             in_display_window(&image, window, options).map_err(|problem| problem.in_file(file))?
     {
         warnings.push(format!(
-            "{file}: the data window of {}x{} texels differs from the display window of {}x{}; texels outside the data window are black, texels outside the display window are cropped",
+            "{file}: the data window of {}x{} texels differs from the display window of {}x{}; \
+             texels outside the data window are black, texels outside the display window are \
+             cropped",
             image.width, image.height, framed.width, framed.height
         ));
         image = framed;
     }
     if matches!(picture.format, Format::Png | Format::Jpeg) {
         warnings.push(format!(
-            "{file}: {} holds nothing brighter than white, so suns and lamps are clipped; use .exr or .hdr",
+            "{file}: {} holds nothing brighter than white, so suns and lamps are clipped; use \
+             .exr or .hdr",
             if picture.format == Format::Png { "PNG" } else { "JPEG" }
         ));
     }

@@ -18,11 +18,12 @@ const LEAST_ANISOTROPY: f64 = 1e-3;
 /// From the direction to the camera, around the up axis \[degrees\]: negative is on the picture's left.
 const BESIDE_CAMERA: f32 = -45.0;
 
-/// The rotation \[degrees\] of [`Orientation`](super::Orientation), in (−180, 180\], at which the key light of a lat-long map
-/// comes from the left of a camera: 45° around the up axis from the direction `toward_camera`, which may have any length.
+/// The rotation \[degrees\] of [`Orientation`](super::Orientation), in (−180, 180\], at which the key light of a
+/// lat-long map comes from the left of a camera: 45° around the up axis from the direction `toward_camera`, which may
+/// have any length.
 ///
-/// The key light is the sun of the map or, without a sun, the direction in the plane of the horizon from which most light
-/// comes. Maps without such a direction are not rotated.
+/// The key light is the sun of the map or, without a sun, the direction in the plane of the horizon from which most
+/// light comes. Maps without such a direction are not rotated.
 ///
 /// # Panics
 /// If the map has no texels.

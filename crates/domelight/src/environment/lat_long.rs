@@ -6,7 +6,8 @@ use crate::math::functions;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-/// Columns uniform in longitude and rows uniform in the polar angle θ, from θ = 0 at the upper edge of the first row to π.
+/// Columns uniform in longitude and rows uniform in the polar angle θ, from θ = 0 at the upper edge of the first row
+/// to π.
 #[derive(Clone, Debug)]
 pub struct LatLongGrid {
     width: usize,

@@ -139,8 +139,8 @@ struct Texel {
 
 /// Radiance over all directions, with importance sampling proportional to its luminance.
 ///
-/// Radiance, power and map are in multiples of [`Environment::unit`] W·m⁻²·sr⁻¹. The unit is 1 unless the brightest texel
-/// lies outside 2^±64; with such maps, it keeps weights and their squares from overflowing or vanishing.
+/// Radiance, power and map are in multiples of [`Environment::unit`] W·m⁻²·sr⁻¹. The unit is 1 unless the brightest
+/// texel lies outside 2^±64; with such maps, it keeps weights and their squares from overflowing or vanishing.
 ///
 /// Resident memory is 17⅓ bytes per texel: three floats of radiance and a pyramid of weights.
 #[derive(Clone, Debug)]
@@ -212,8 +212,8 @@ impl Environment {
         Self::new(map, Orientation::default(), 1.0)
     }
 
-    /// The irradiance ∫ L max(0, n · ω) dω of an unoccluded surface with the unit normal n in world space, in multiples of
-    /// [`Environment::unit`] \[W·m⁻²\].
+    /// The irradiance ∫ L max(0, n · ω) dω of an unoccluded surface with the unit normal n in world space, in
+    /// multiples of [`Environment::unit`] \[W·m⁻²\].
     pub fn irradiance(&self, normal: Vec3) -> Rgb {
         /// Columns and rows into which coarse maps are divided.
         const SIZE: [usize; 2] = [1024, 512];
@@ -258,8 +258,8 @@ impl Environment {
         Self::in_units(self.map, self.orientation, self.unit, scale)
     }
 
-    /// Creates an environment from a lat-long map with row 0 at the top and texel centers at +½. Every texel must be finite
-    /// and not negative. The radiance is multiplied by `scale`.
+    /// Creates an environment from a lat-long map with row 0 at the top and texel centers at +½. Every texel must be
+    /// finite and not negative. The radiance is multiplied by `scale`.
     ///
     /// # Errors
     /// The first bad texel in row order, an empty map, or a bad scale or rotation.
@@ -315,8 +315,8 @@ impl Environment {
         Ok(Self { map, unit, orientation, grid, table, inverse_power, max_luminance })
     }
 
-    /// The same radiance with about square texels, if the map is much narrower or wider than 2:1; otherwise `None`. Equal
-    /// neighbors along the longer side are merged, then texels are divided along the shorter side.
+    /// The same radiance with about square texels, if the map is much narrower or wider than 2:1; otherwise `None`.
+    /// Equal neighbors along the longer side are merged, then texels are divided along the shorter side.
     ///
     /// Algorithms that divide a map into squares of texels assume that the texels are about square.
     pub(crate) fn reshaped(&self) -> Option<Self> {
@@ -369,8 +369,8 @@ impl Environment {
         Self::MEMORY_PER_TEXEL * self.reshaping().map_or(0, n_texels)
     }
 
-    /// The memory per texel \[bytes\] of an environment and everything built from it, including during construction: the
-    /// map, its tables, fixed lights.
+    /// The memory per texel \[bytes\] of an environment and everything built from it, including during construction:
+    /// the map, its tables, fixed lights.
     pub const MEMORY_PER_TEXEL: u64 = 36;
 
     /// Creates an environment with constant radiance.

@@ -6,12 +6,13 @@ use std::fs::{self, File, Metadata};
 use std::io::{self, BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// Runs `write` on a new file next to `path` and renames it to `path` once it is completely on disk, so that a crash never
-/// leaves an incomplete file; `-` is standard output. A device or a pipe is written to directly, and a symbolic link keeps
-/// its target. A replaced file keeps its permissions and, if allowed, its owner.
+/// Runs `write` on a new file next to `path` and renames it to `path` once it is completely on disk, so that a crash
+/// never leaves an incomplete file; `-` is standard output. A device or a pipe is written to directly, and a symbolic
+/// link keeps its target. A replaced file keeps its permissions and, if allowed, its owner.
 ///
 /// # Errors
-/// If the file cannot be created, written or renamed, or the existing file is read-only. The old file is then unchanged.
+/// If the file cannot be created, written or renamed, or the existing file is read-only. The old file is then
+/// unchanged.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -31,8 +32,8 @@ pub trait WriteSeek: Write + Seek {}
 
 impl<T: Write + Seek> WriteSeek for T {}
 
-/// Like [`write_atomically`], for formats that are not written sequentially. If seeking is not possible (standard output, a
-/// device, a pipe), the bytes are collected in memory first.
+/// Like [`write_atomically`], for formats that are not written sequentially. If seeking is not possible (standard
+/// output, a device, a pipe), the bytes are collected in memory first.
 ///
 /// # Errors
 /// Those of [`write_atomically`].

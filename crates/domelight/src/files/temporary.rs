@@ -1,7 +1,7 @@
 //! Temporary files that reveal whether their writer is alive.
 //!
-//! A writer holds a lock on its file, which the system releases however the writer ends. Folders of farms are shared, and
-//! not every file system shares locks between machines. So the name contains the machine and its boot time, and no
+//! A writer holds a lock on its file, which the system releases however the writer ends. Folders of farms are shared,
+//! and not every file system shares locks between machines. So the name contains the machine and its boot time, and no
 //! program touches the files of other machines. Process numbers and ages prove nothing.
 
 use std::ffi::OsStr;

@@ -150,8 +150,8 @@ impl Mesh {
         }
     }
 
-    /// Replaces the normals by the area-weighted mean over the faces around each vertex. Faces with a non-finite vertex do
-    /// not count.
+    /// Replaces the normals by the area-weighted mean over the faces around each vertex. Faces with a non-finite
+    /// vertex do not count.
     pub fn compute_normals(&mut self) {
         let mut normals = vec![Vec3::ZERO; self.positions.len()];
         let finite = self.positions.iter().copied().filter(|position| position.is_finite());

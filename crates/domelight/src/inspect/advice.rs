@@ -33,12 +33,8 @@ impl fmt::Display for Diagnosis<'_> {
                 "the pixel lies on an edge, and {} of its camera samples show the scene",
                 percent(decomposition.coverage)
             ),
-            Cause::Background => {
-                f.write_str("the background differs between camera samples")
-            }
-            Cause::Emission => {
-                f.write_str("emission differs between camera samples")
-            }
+            Cause::Background => f.write_str("the background differs between camera samples"),
+            Cause::Emission => f.write_str("emission differs between camera samples"),
             Cause::Known => f.write_str("the part known without rays differs from pass to pass"),
             Cause::Shading(kind) => {
                 write!(f, "the surfaces that the pixel shows reflect {kind} differently")
@@ -55,7 +51,11 @@ impl fmt::Display for Diagnosis<'_> {
             }
             Cause::Penumbra(kind) => {
                 let free = of(kind).and_then(|statistics| statistics.free).unwrap_or(0.0);
-                write!(f, "{kind} is partly hidden: {} of the rays to it are unoccluded", percent(free))
+                write!(
+                    f,
+                    "{kind} is partly hidden: {} of the rays to it are unoccluded",
+                    percent(free)
+                )
             }
         }
     }

@@ -1,11 +1,11 @@
 //! Decomposes the variance of a strategy at a pixel by cause.
 //!
 //! Let t be the estimate from one camera sample, a sum of parts: the contributions of rays toward each source, and the
-//! part known without rays. By the law of total variance, Var\[t\] = Var\[E\[t | p\]\] + E\[Var\[t | p\]\] over points p of
-//! the pixel. Both terms are sums of covariances with the parts, Var\[t\] = Σ Cov\[t, tᵣ\], so that the shares sum to 1.
-//! Each part is split once more, tᵣ = v uᵣ + (tᵣ − v uᵣ), where uᵣ is the same part with all rays unoccluded and
-//! v = E\[tᵣ\] / E\[uᵣ\]: the first term varies with light, reflectance and densities, the second with visibility. A cause
-//! with a negative share offsets others.
+//! part known without rays. By the law of total variance, Var\[t\] = Var\[E\[t | p\]\] + E\[Var\[t | p\]\] over
+//! points p of the pixel. Both terms are sums of covariances with the parts, Var\[t\] = Σ Cov\[t, tᵣ\], so that the
+//! shares sum to 1. Each part is split once more, tᵣ = v uᵣ + (tᵣ − v uᵣ), where uᵣ is the same part with all rays
+//! unoccluded and v = E\[tᵣ\] / E\[uᵣ\]: the first term varies with light, reflectance and densities, the second with
+//! visibility. A cause with a negative share offsets others.
 
 use std::fmt;
 
@@ -92,8 +92,8 @@ pub struct Decomposition {
     pub name: String,
     /// The luminance of the pixel.
     pub mean: f64,
-    /// The variance of the estimate from one camera sample. Directions are as well distributed as in a pass of 16 samples
-    /// per pixel; camera samples count as independent.
+    /// The variance of the estimate from one camera sample. Directions are as well distributed as in a pass of 16
+    /// samples per pixel; camera samples count as independent.
     pub variance: f64,
     /// The number of shadow rays per camera sample.
     pub rays_per_sample: f64,

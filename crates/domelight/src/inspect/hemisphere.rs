@@ -1,7 +1,7 @@
 //! The hemisphere above a point as maps.
 //!
-//! A map is the disk of Lambert's azimuthal equal-area projection in a square. The normal is in the center, the horizon is
-//! the circle, and every pixel has the same solid angle. Rows run from +y of the local frame down.
+//! A map is the disk of Lambert's azimuthal equal-area projection in a square. The normal is in the center, the
+//! horizon is the circle, and every pixel has the same solid angle. Rows run from +y of the local frame down.
 
 use crate::Rgb;
 use crate::environment::Environment;

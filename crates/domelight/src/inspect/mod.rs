@@ -118,8 +118,8 @@ pub struct PixelSummary {
 }
 
 impl<'a> Inspector<'a> {
-    /// Takes camera samples of the pixel in the given column and row, counted from the upper left. `settings` provide the
-    /// picture's size, filter, background and seed.
+    /// Takes camera samples of the pixel in the given column and row, counted from the upper left. `settings` provide
+    /// the picture's size, filter, background and seed.
     ///
     /// # Errors
     /// If the pixel is outside the picture.
@@ -208,16 +208,16 @@ impl<'a> Inspector<'a> {
         self.regions.sources()
     }
 
-    /// The hemisphere above the hit nearest to the pixel's center, as maps of `resolution` by `resolution` pixels; `None`
-    /// for a pixel without a hit.
+    /// The hemisphere above the hit nearest to the pixel's center, as maps of `resolution` by `resolution` pixels;
+    /// `None` for a pixel without a hit.
     pub fn hemisphere(&self, resolution: usize) -> Option<Hemisphere> {
         let point = self.representative.as_ref()?;
         let trace = |point: &ShadingPoint, wi: &[Vec3]| self.trace(point, wi);
         Some(Hemisphere::new(point, self.environment, resolution, trace))
     }
 
-    /// The distribution of a strategy's rays from that hit, as a map of `resolution` by `resolution` pixels; `None` for a
-    /// pixel without a hit.
+    /// The distribution of a strategy's rays from that hit, as a map of `resolution` by `resolution` pixels; `None`
+    /// for a pixel without a hit.
     pub fn directions<S: Strategy>(
         &self,
         strategy: &S,

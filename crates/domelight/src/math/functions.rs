@@ -6,8 +6,8 @@
 //!
 //! Exponentials and logarithms of f32 are computed in f64 and rounded once. They use argument reduction and a Taylor
 //! polynomial without tables, so that loops over them vectorize. Functions used by lobes are not inlined, because the
-//! compiler treats them as pure and would hoist them above the branch on the lobe. All others come from the `libm` crate,
-//! which is about as fast as the platform's library. [`super::atan2`] and its neighbors are for vectors and less
+//! compiler treats them as pure and would hoist them above the branch on the lobe. All others come from the `libm`
+//! crate, which is about as fast as the platform's library. [`super::atan2`] and its neighbors are for vectors and less
 //! accurate.
 #![cfg_attr(not(feature = "io"), allow(dead_code))] // Some serve files alone.
 

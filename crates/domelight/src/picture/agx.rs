@@ -2,8 +2,8 @@
 //!
 //! A matrix (the inset) moves colors toward gray, a sigmoid over 16.5 stops shapes each channel, part of the hue shift
 //! that this causes is reverted, and a second matrix (the outset) restores purity. Colors outside Rec. 709 are mapped
-//! into it at nearly constant luminance. Blender tabulates this in a cube of 57³ values; here the formulas are evaluated
-//! directly.
+//! into it at nearly constant luminance. Blender tabulates this in a cube of 57³ values; here the formulas are
+//! evaluated directly.
 
 use crate::Rgb;
 use crate::math::{Mat3, Vec3, functions};

@@ -27,8 +27,8 @@ pub struct BadExposure {
 impl Exposure {
     /// The exposure of a picture \[stops\], rounded to hundredths if it is automatic, so that it can be typed.
     ///
-    /// `coverage` has one value per pixel, and pixels with a value above 0 count. All pixels count if it is `None` or nothing
-    /// is covered. Black and non-finite pixels do not count; if there are no others, the exposure is 0.
+    /// `coverage` has one value per pixel, and pixels with a value above 0 count. All pixels count if it is `None` or
+    /// nothing is covered. Black and non-finite pixels do not count; if there are no others, the exposure is 0.
     ///
     /// # Panics
     /// If `coverage` has fewer values than the picture has pixels.

@@ -1,8 +1,8 @@
 //! PNG: writes sRGB with 8 or 16 bits per channel, and reads it as linear color; reads JPEG the same way.
 //!
 //! PNG has straight (unassociated) alpha; pictures here are premultiplied. The writer divides by alpha before the tone
-//! curve, so that a viewer that composites over black shows the tone-mapped object. Light with alpha 0 is lost. There is
-//! no dithering: the same color gives the same byte everywhere.
+//! curve, so that a viewer that composites over black shows the tone-mapped object. Light with alpha 0 is lost. There
+//! is no dithering: the same color gives the same byte everywhere.
 
 use super::display::DisplayEncoder;
 use super::tone::{ToneMapping, linear_from_srgb};

@@ -8,12 +8,12 @@ use std::str::FromStr;
 /// A curve that maps radiance to the range of a display. All curves map linear Rec. 709 to linear Rec. 709.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ToneCurve {
-    /// No curve: values outside \[0, 1\] are clipped, and others are unchanged, so that pictures can be compared. Blender's
-    /// view Standard.
+    /// No curve: values outside \[0, 1\] are clipped, and others are unchanged, so that pictures can be compared.
+    /// Blender's view Standard.
     #[default]
     Standard,
-    /// c / (1 + Y), where Y is the luminance: Reinhard et al. 2002, "Photographic Tone Reproduction for Digital Images",
-    /// equation 3, without the key, which the exposure replaces.
+    /// c / (1 + Y), where Y is the luminance: Reinhard et al. 2002, "Photographic Tone Reproduction for Digital
+    /// Images", equation 3, without the key, which the exposure replaces.
     Reinhard,
     /// The ACES 1.0 reference and sRGB output transforms as fitted by Stephen Hill (2016, in "BakingLab" of Pettineo
     /// and Neubelt).

@@ -1,7 +1,7 @@
 //! Names and paths as data in files of other languages: shell, JavaScript, Python, YAML, XML, ….
 //!
-//! [`Code<L>`](Code) is text of the language `L`. It consists of literals of this program, numbers, and text quoted by a
-//! function of this module; [`code!`](crate::code) assembles them. Text from outside, such as a file's
+//! [`Code<L>`](Code) is text of the language `L`. It consists of literals of this program, numbers, and text quoted
+//! by a function of this module; [`code!`](crate::code) assembles them. Text from outside, such as a file's
 //! name, is a `String`, which [`code!`](crate::code) does not take:
 //!
 //! ```

@@ -10,12 +10,12 @@ use crate::strategy::StrategySpec;
 /// Rows or columns of the pilot picture, whichever are more.
 const PILOT_SIZE: usize = 64;
 
-/// The exposure \[stops\] that [`Exposure::Auto`] gives a small picture of the scene. It maps the median luminance over the
-/// pixels that the scene covers, or over the background if it covers none, to middle gray.
+/// The exposure \[stops\] that [`Exposure::Auto`] gives a small picture of the scene. It maps the median luminance
+/// over the pixels that the scene covers, or over the background if it covers none, to middle gray.
 ///
-/// It depends only on scene, light, view and the aspect ratio, not on seed, samples or strategy. So it is the same for all
-/// parts of a picture, for a render resumed with more samples, and for a preview. The frames of an animation may share
-/// the exposure of the first. It costs about 100,000 shadow rays, and is 0 if there is no light.
+/// It depends only on scene, light, view and the aspect ratio, not on seed, samples or strategy. So it is the same
+/// for all parts of a picture, for a render resumed with more samples, and for a preview. The frames of an animation
+/// may share the exposure of the first. It costs about 100,000 shadow rays, and is 0 if there is no light.
 pub fn automatic_exposure(
     scene: &Scene,
     camera: &Camera,

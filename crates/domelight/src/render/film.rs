@@ -123,8 +123,8 @@ impl Film {
 }
 
 impl Layers {
-    /// Copies the pixels that have samples in a part of the picture. `self` is a band of rows of the picture that begins
-    /// with row `y`, and `variance` is the sum over all parts of the picture.
+    /// Copies the pixels that have samples in a part of the picture. `self` is a band of rows of the picture that
+    /// begins with row `y`, and `variance` is the sum over all parts of the picture.
     ///
     /// # Panics
     /// If a pixel lies outside the picture.

@@ -102,13 +102,14 @@ pub struct RenderSettings {
     pub height: usize,
     /// The number of camera samples per pixel, at least 1.
     pub n_samples: u32,
-    /// Whether noisier pixels get more samples, with strategies that render a tile in rounds. `n_samples` is then the mean
-    /// over the picture.
+    /// Whether noisier pixels get more samples, with strategies that render a tile in rounds. `n_samples` is then the
+    /// mean over the picture.
     pub adaptive: bool,
-    /// The target relMSE of a tile: the mean over its pixels of error² / (luminance² + 0.01), plus one standard error. A
-    /// tile stops early, but not before 16 samples, when two independent sets of its samples indicate at most this error.
-    /// The error of tiles that stop this way is within a factor of 2 of the target on average; it is smaller if 16 samples
-    /// are more than enough. Stopping based on the samples biases a picture by far less than the error.
+    /// The target relMSE of a tile: the mean over its pixels of error² / (luminance² + 0.01), plus one standard
+    /// error. A tile stops early, but not before 16 samples, when two independent sets of its samples indicate at
+    /// most this error. The error of tiles that stop this way is within a factor of 2 of the target on average; it is
+    /// smaller if 16 samples are more than enough. Stopping based on the samples biases a picture by far less than
+    /// the error.
     pub target_error: Option<f32>,
     /// The division of the samples into passes. Ignored with a target error, which sets the lengths of passes.
     pub passes: Passes,
@@ -260,7 +261,8 @@ pub fn render<S: Strategy>(
 }
 
 impl StrategySpec {
-    /// Sets the parameters that were left open, with a pilot at points that the picture shows; see [`StrategySpec::for_scene`].
+    /// Sets the parameters that were left open, with a pilot at points that the picture shows; see
+    /// [`StrategySpec::for_scene`].
     #[must_use]
     pub fn for_picture(
         self,
@@ -280,7 +282,8 @@ impl StrategySpec {
     }
 }
 
-/// The shading points at the centers of up to 256 pixels, spread over the picture, for pilots. In units of [`Scene::unit`].
+/// The shading points at the centers of up to 256 pixels, spread over the picture, for pilots. In units of
+/// [`Scene::unit`].
 pub fn pilot_points(
     scene: &Scene,
     camera: &Camera,

@@ -72,8 +72,8 @@ impl Film {
 }
 
 impl Layers {
-    /// All layers that files have, in one part, with the names in [`LAYERS`]: the picture itself as R, G, B, A, and others
-    /// such as `depth.Z`. Counts become floats.
+    /// All layers that files have, in one part, with the names in [`LAYERS`]: the picture itself as R, G, B, A, and
+    /// others such as `depth.Z`. Counts become floats.
     ///
     /// `attributes` are written as strings, for provenance.
     pub fn to_exr(&self, attributes: Vec<(String, String)>) -> ExrLayers {

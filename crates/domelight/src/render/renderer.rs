@@ -209,9 +209,9 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         self.pass(observer, u32::MAX) != PassEnd::NothingLeft
     }
 
-    /// Like [`Self::step_with`], but with a pass of at most `most` ≥ 1 camera samples per pixel, for renders with a time
-    /// limit. A strategy that learns within a pass then gives another picture than with passes of full length. With a
-    /// target error, passes keep their lengths.
+    /// Like [`Self::step_with`], but with a pass of at most `most` ≥ 1 camera samples per pixel, for renders with a
+    /// time limit. A strategy that learns within a pass then gives another picture than with passes of full length.
+    /// With a target error, passes keep their lengths.
     pub fn step_at_most(&mut self, most: u32, observer: &impl Observer) -> bool {
         self.pass(observer, most.max(1)) != PassEnd::NothingLeft
     }

@@ -59,8 +59,8 @@ impl Shading {
 }
 
 impl ShadingReference {
-    /// Sums over cells of at most 0.7°, because the light of a texel comes from its whole area; on maps with more than 2¹⁷
-    /// texels, over the energy centroids of blocks.
+    /// Sums over cells of at most 0.7°, because the light of a texel comes from its whole area; on maps with more
+    /// than 2¹⁷ texels, over the energy centroids of blocks.
     pub fn new(environment: &Environment) -> Self {
         let texels = Texels::new(environment);
         let blocks = Blocks::at_most(MAX_BLOCKS, texels.width(), texels.height());

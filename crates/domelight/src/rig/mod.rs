@@ -63,12 +63,14 @@ pub enum RigError {
     },
     /// No sun.
     #[error(
-        "there is no sun: no compact source with at least 0.1 % of the map's light stands out from its surroundings by a factor of 4"
+        "there is no sun: no compact source with at least 0.1 % of the map's light stands out \
+         from its surroundings by a factor of 4"
     )]
     NoSun,
     /// No lamp.
     #[error(
-        "there is no lamp: no compact source with at least 0.1 % of the map's light stands out from its surroundings by a factor of 4"
+        "there is no lamp: no compact source with at least 0.1 % of the map's light stands out \
+         from its surroundings by a factor of 4"
     )]
     NoLamp,
     /// All lights are too dim to keep.

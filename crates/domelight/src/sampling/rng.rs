@@ -15,7 +15,8 @@ impl Pcg32 {
 
     /// Creates the generator of a stream with a seed.
     ///
-    /// Neighboring streams with the same seed start similarly. For many short sequences, hash the index into the seed instead.
+    /// Neighboring streams with the same seed start similarly. For many short sequences, hash the index into the seed
+    /// instead.
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut pcg = Self { state: 0, increment: (stream << 1) | 1 };
         pcg.next_u32();

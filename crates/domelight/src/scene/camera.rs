@@ -57,9 +57,9 @@ impl Lens {
     /// Height of the sensor of a full-frame camera \[m\].
     const SENSOR: f32 = 0.024;
 
-    /// Creates the lens of a full-frame camera with an f-number > 0, in a world measured in meters. The sensor height of
-    /// 24 mm and the field of view of `settings` give the focal length; the aperture diameter is the focal length divided
-    /// by the f-number.
+    /// Creates the lens of a full-frame camera with an f-number > 0, in a world measured in meters. The sensor height
+    /// of 24 mm and the field of view of `settings` give the focal length; the aperture diameter is the focal length
+    /// divided by the f-number.
     ///
     /// # Errors
     /// If the camera is orthographic, or a number is not positive and finite.
@@ -343,8 +343,8 @@ impl Camera {
         }
     }
 
-    /// Like [`Camera::ray`], for a ray through the point of the lens that `u` in \[0, 1)² samples. `u` is ignored if there is
-    /// no lens.
+    /// Like [`Camera::ray`], for a ray through the point of the lens that `u` in \[0, 1)² samples. `u` is ignored if
+    /// there is no lens.
     pub fn lens_ray(&self, px: f32, py: f32, u: [f32; 2]) -> Ray {
         let Some(LensPlane { lens, right, down }) = self.lens else { return self.ray(px, py) };
         let at = lens.radius * lens.point(u);

@@ -9,10 +9,10 @@
 //! ray multiplies the transmittances of all surfaces along it, without noise, using the mean of T's channels at normal
 //! incidence.
 //!
-//! A single-sided surface is invisible to a camera ray that comes from behind, so that a closed body is hit once. It casts
-//! a shadow from either side, but T also counts only once per body for light: where light reaches the front, that is,
-//! where the shadow ray leaves the body. So light is tinted if it falls into a body, through it, or through an open pane
-//! that faces the light.
+//! A single-sided surface is invisible to a camera ray that comes from behind, so that a closed body is hit once. It
+//! casts a shadow from either side, but T also counts only once per body for light: where light reaches the front,
+//! that is, where the shadow ray leaves the body. So light is tinted if it falls into a body, through it, or through
+//! an open pane that faces the light.
 
 use std::cell::RefCell;
 
@@ -126,8 +126,8 @@ impl Part {
 
 impl Scene {
     /// The first surface that a camera ray sees. A surface with partial coverage or transmission is seen with a
-    /// probability, using random numbers that are a function of `key`, `sample` and the triangle. A single-sided surface
-    /// is not seen from behind. The numbers for many samples of one key, such as a pixel, are stratified.
+    /// probability, using random numbers that are a function of `key`, `sample` and the triangle. A single-sided
+    /// surface is not seen from behind. The numbers for many samples of one key, such as a pixel, are stratified.
     pub fn sight(&self, ray: &Ray, key: u64, sample: u32) -> Sight {
         self.seen(ray, self.bvh.closest_hit(ray), key, sample)
     }
@@ -247,8 +247,8 @@ impl Scene {
         if mesh.triangles.is_empty() { None } else { mesh.area_normal(0).try_normalize() }
     }
 
-    /// The transmittance in \[0, 1\] along each shadow ray of the surfaces that are not in [`Scene::bvh`]: a product over
-    /// all of them. `transmittances` is overwritten, one entry per ray.
+    /// The transmittance in \[0, 1\] along each shadow ray of the surfaces that are not in [`Scene::bvh`]: a product
+    /// over all of them. `transmittances` is overwritten, one entry per ray.
     pub fn transmittances(&self, rays: &RayBatch, transmittances: &mut Vec<f32>) {
         let Some(partial) = self.partial.as_ref().filter(|_| self.dims_light) else {
             transmittances.clear();

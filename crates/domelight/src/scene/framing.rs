@@ -1,9 +1,10 @@
 //! Framing: places a camera so that the subject fills its picture.
 //!
-//! Four planes through the camera's position bound the picture. For a viewing direction f with right r and up u, a point
-//! p is within the left and right ones if |x − c_x| ≤ t_x (z − c_z), with (x, y, z) the coordinates of p along (r, u, f),
-//! c those of the camera and t_x the tangent of half the horizontal field of view. The greatest values of x − t_x z and
-//! −x − t_x z over all points give c_x and the largest c_z, so one pass over the vertices finds the nearest camera.
+//! Four planes through the camera's position bound the picture. For a viewing direction f with right r and up u, a
+//! point p is within the left and right ones if |x − c_x| ≤ t_x (z − c_z), with (x, y, z) the coordinates of p along
+//! (r, u, f), c those of the camera and t_x the tangent of half the horizontal field of view. The greatest values of
+//! x − t_x z and −x − t_x z over all points give c_x and the largest c_z, so one pass over the vertices finds the
+//! nearest camera.
 
 use std::fmt;
 use std::str::FromStr;
@@ -26,7 +27,8 @@ pub struct ViewDirection {
 /// A text that names no view.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "there is no view {text:?}; the views are front, back, left, right, top, bottom and three-quarter, or azimuth and \
+    "there is no view {text:?}; the views are front, back, left, right, top, bottom and \
+     three-quarter, or azimuth and \
      elevation in degrees such as 30,15, the elevation from -90 to 90"
 )]
 pub struct UnknownView {
@@ -49,8 +51,8 @@ impl ViewDirection {
     /// From the front, 20° from above.
     pub const DEFAULT: Self = Self { azimuth: 0.0, elevation: 20.0 };
 
-    /// A view from an azimuth \[degrees\], where 0 is in front of the subject and 90 to its right as seen from there, and an
-    /// elevation from −90 (below) to 90 (above) \[degrees\]. The front is +Z if +Y is up, and −Y if +Z is up.
+    /// A view from an azimuth \[degrees\], where 0 is in front of the subject and 90 to its right as seen from there,
+    /// and an elevation from −90 (below) to 90 (above) \[degrees\]. The front is +Z if +Y is up, and −Y if +Z is up.
     ///
     /// # Errors
     /// If an angle is not finite, or the elevation is outside its range.
@@ -129,8 +131,8 @@ pub struct Framing {
     /// The vertical field of view \[degrees\]; values outside (0, 180) mean
     /// [`CameraSettings::DEFAULT_FOV_Y_DEGREES`].
     pub fov_y_degrees: f32,
-    /// Whether the subject must stay in the picture while the camera goes around it, about an axis along `up` through the
-    /// center of the bounds.
+    /// Whether the subject must stay in the picture while the camera goes around it, about an axis along `up` through
+    /// the center of the bounds.
     pub all_around: bool,
 }
 

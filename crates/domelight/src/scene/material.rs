@@ -29,9 +29,9 @@ pub struct Material {
     pub emission: Option<Emission>,
     /// Whether the color is shown unchanged, regardless of the light (`KHR_materials_unlit`).
     pub unlit: bool,
-    /// Whether the surface is a shadow catcher, which shows only the shadows on it, regardless of its model: the background
-    /// is seen instead, darkened as a diffuse surface would be. It casts no shadow. Shadow catchers are flat, and all of
-    /// them in a scene face the same way.
+    /// Whether the surface is a shadow catcher, which shows only the shadows on it, regardless of its model: the
+    /// background is seen instead, darkened as a diffuse surface would be. It casts no shadow. Shadow catchers are
+    /// flat, and all of them in a scene face the same way.
     pub catches_shadows: bool,
     /// The layers that glTF's extensions add.
     pub layers: Layers,

@@ -137,8 +137,8 @@ pub enum SceneError {
 }
 
 impl Scene {
-    /// Checks every mesh and reference, and builds one BVH over the opaque parts and one over the others. The opaque parts
-    /// are moved before the others.
+    /// Checks every mesh and reference, and builds one BVH over the opaque parts and one over the others. The opaque
+    /// parts are moved before the others.
     ///
     /// Scenes that are very small or very large are traced at a moderate size, which does not change pictures; their
     /// [`Scene::unit`] is not 1. Bounds, cameras and depths are still in the units of the description.
@@ -198,7 +198,8 @@ impl Scene {
         })
     }
 
-    /// The same scene traced with another instruction set; `None` if this processor lacks it. The pictures are the same.
+    /// The same scene traced with another instruction set; `None` if this processor lacks it. The pictures are the
+    /// same.
     #[must_use]
     pub fn with_instruction_set(mut self, instruction_set: InstructionSet) -> Option<Self> {
         self.bvh = self.bvh.with_instruction_set(instruction_set)?;
@@ -243,9 +244,9 @@ impl Scene {
         camera
     }
 
-    /// The length of one unit of the BVH, of [`Scene::parts`] and of shading points, in units of the description: a power
-    /// of two, and 1 for scenes from 1/16 to 65536. Rays for the BVH, for [`Scene::sight`] and for [`Scene::camera_hit`]
-    /// are in its units; [`Scene::camera_inside`] returns a camera whose rays are.
+    /// The length of one unit of the BVH, of [`Scene::parts`] and of shading points, in units of the description: a
+    /// power of two, and 1 for scenes from 1/16 to 65536. Rays for the BVH, for [`Scene::sight`] and for
+    /// [`Scene::camera_hit`] are in its units; [`Scene::camera_inside`] returns a camera whose rays are.
     pub fn unit(&self) -> f32 {
         self.unit
     }

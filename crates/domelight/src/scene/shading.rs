@@ -9,9 +9,9 @@
 //! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Otherwise there
 //! would be black pixels along silhouettes.
 //!
-//! A smooth surface with coarse triangles is shaded as smooth: shadow rays start where the smooth surface would be, above
-//! the triangle, and may point as far down as it allows. Otherwise triangles shadow one another near the terminator, in
-//! stair-steps. (Hanika 2021, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4.)
+//! A smooth surface with coarse triangles is shaded as smooth: shadow rays start where the smooth surface would be,
+//! above the triangle, and may point as far down as it allows. Otherwise triangles shadow one another near the
+//! terminator, in stair-steps. (Hanika 2021, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4.)
 
 use super::{Layers, Material, NormalMap, Part, Scene};
 use crate::Rgb;
@@ -197,9 +197,9 @@ impl Corners {
         Some(a * wa + b * wb + c * wc)
     }
 
-    /// The offset from `position` on the triangle up to the smooth surface that the vertex normals, times `side`, describe,
-    /// if that surface bulges to the side of the geometric normal `ng`: Σ bᵢ max(0, (pᵢ − p) · nᵢ) nᵢ, where each term
-    /// leads to the tangent plane of a vertex. `None` for flat triangles and hollows.
+    /// The offset from `position` on the triangle up to the smooth surface that the vertex normals, times `side`,
+    /// describe, if that surface bulges to the side of the geometric normal `ng`: Σ bᵢ max(0, (pᵢ − p) · nᵢ) nᵢ,
+    /// where each term leads to the tangent plane of a vertex. `None` for flat triangles and hollows.
     #[inline]
     fn rise(&self, mesh: &Mesh, position: Vec3, ng: Vec3, side: f32) -> Option<Vec3> {
         if mesh.normals.is_empty() {

@@ -41,12 +41,13 @@ impl SceneDescription {
         framing.fit(subject.flat_map(|(part, _)| part.mesh.positions.iter().copied()))
     }
 
-    /// Scales a very small or very large scene to a moderate size, together with `view` and the scene's own camera. Returns
-    /// the factor, a power of two, which is 1 for scenes from 1/16 to 65536. The picture stays the same, because the light
-    /// is infinitely far away. The distance that rays keep from surfaces is chosen for moderate sizes.
+    /// Scales a very small or very large scene to a moderate size, together with `view` and the scene's own camera.
+    /// Returns the factor, a power of two, which is 1 for scenes from 1/16 to 65536. The picture stays the same,
+    /// because the light is infinitely far away. The distance that rays keep from surfaces is chosen for moderate
+    /// sizes.
     ///
-    /// [`Scene::new`](super::Scene::new) scales the meshes of other scenes automatically, and takes a camera in the units
-    /// of the description.
+    /// [`Scene::new`](super::Scene::new) scales the meshes of other scenes automatically, and takes a camera in the
+    /// units of the description.
     pub fn rescale(&mut self, view: &mut CameraSettings) -> f32 {
         let factor = self.usual_scale();
         if factor != 1.0 {
@@ -103,8 +104,8 @@ impl SceneDescription {
         }
     }
 
-    /// Adds a diffuse plate with reflectance 0.5 under the subject, facing `up`, which fades out toward its rim. It is eight
-    /// times as wide as the subject's longest extent. An empty scene gets none.
+    /// Adds a diffuse plate with reflectance 0.5 under the subject, facing `up`, which fades out toward its rim. It
+    /// is eight times as wide as the subject's longest extent. An empty scene gets none.
     pub fn add_ground(&mut self, up: Vec3) {
         self.add_disc(up, PLATE_RADII, &Material::diffuse("ground", Rgb::splat(0.5)));
     }

@@ -2,9 +2,9 @@
 //!
 //! A [`Kernel`] is written once over the vectors of a [`Simd`], whose operators are one IEEE
 //! operation per lane. Nothing fuses or reorders them, so a kernel gives the same bits on every instruction set; only
-//! [`SimdF32x8::mul_sub`] may differ. [`dispatch`] compiles a kernel for each instruction set and picks one at run time,
-//! so that a portable binary traces as fast as one built for the machine. Another instruction set takes one file like
-//! `avx2.rs`, or like `neon.rs` for half the width, and one line each in [`InstructionSet`] and [`dispatch`].
+//! [`SimdF32x8::mul_sub`] may differ. [`dispatch`] compiles a kernel for each instruction set and picks one at run
+//! time, so that a portable binary traces as fast as one built for the machine. Another instruction set takes one
+//! file like `avx2.rs`, or like `neon.rs` for half the width, and one line each in [`InstructionSet`] and [`dispatch`].
 //!
 //! Formulas are written over [`SimdFloat`], a scalar or a vector.
 #![cfg_attr(not(feature = "render"), allow(dead_code))] // Some of it serves rays alone.

@@ -32,9 +32,9 @@ impl<'s, S: Strategy> Estimator<'s, S> {
 
     /// Estimates ∫ f_r · cos θ · L · V dω at each point of a tile, over all rounds.
     ///
-    /// `pass` comes from [`Strategy::begin_pass`], once for all tiles of a picture. `trace` receives the rays of a round,
-    /// world directions `wi` from the shading points `point` to infinity, and sets V in [0, 1] for each. If the strategy is
-    /// unbiased, the expected value over `pass` and the pixels' samplers is the integral.
+    /// `pass` comes from [`Strategy::begin_pass`], once for all tiles of a picture. `trace` receives the rays of a
+    /// round, world directions `wi` from the shading points `point` to infinity, and sets V in [0, 1] for each. If
+    /// the strategy is unbiased, the expected value over `pass` and the pixels' samplers is the integral.
     pub fn estimate(
         &mut self,
         pass: &S::Pass,

@@ -20,8 +20,8 @@ pub fn level(x: usize, y: usize) -> u32 {
     LEVELS[y % 4][x % 4]
 }
 
-/// The pixels of lower levels next to pixel `i` of a tile with `width` columns and `n` pixels: four, or fewer at the border
-/// of the tile; none for a pixel of the first level.
+/// The pixels of lower levels next to pixel `i` of a tile with `width` columns and `n` pixels: four, or fewer at the
+/// border of the tile; none for a pixel of the first level.
 pub fn coarser(i: usize, width: usize, n: usize) -> impl Iterator<Item = usize> {
     /// Columns and rows from a pixel in the middle of four, and from one between two rows or columns.
     const DIAGONAL: [(isize, isize); 4] = [(-1, -1), (1, -1), (-1, 1), (1, 1)];

@@ -28,7 +28,9 @@ pub struct MultipleImportanceSampling<'a> {
 
 /// A compensated table without BRDF samples would lose the dim light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("MIS compensation needs at least one BRDF sample: a compensated table alone omits all dim light")]
+#[error(
+    "MIS compensation needs at least one BRDF sample: a compensated table alone omits all dim light"
+)]
 pub struct CompensationNeedsBrdf;
 
 impl<'a> MultipleImportanceSampling<'a> {

@@ -195,8 +195,8 @@ pub trait PointStrategy: Sync {
     /// The maximum number of shadow rays per point.
     fn n_rays(&self) -> u32;
 
-    /// The unit of the weights: [`Environment::unit`](crate::environment::Environment::unit) for a strategy whose weights are
-    /// proportional to [`Environment::le`](crate::environment::Environment::le).
+    /// The unit of the weights: [`Environment::unit`](crate::environment::Environment::unit) for a strategy whose
+    /// weights are proportional to [`Environment::le`](crate::environment::Environment::le).
     fn unit(&self) -> f64 {
         1.0
     }
@@ -251,8 +251,8 @@ impl PixelPoints {
         Self { points: 0..0, n_samples: 0, sampler: Sampler::NONE, one_material: true };
 }
 
-/// A strategy that processes one tile at a time, in rounds: all its pixels at once, or one of their [`levels`] after the
-/// other. Every [`PointStrategy`] is a `Strategy` with a single round that learns nothing.
+/// A strategy that processes one tile at a time, in rounds: all its pixels at once, or one of their [`levels`] after
+/// the other. Every [`PointStrategy`] is a `Strategy` with a single round that learns nothing.
 pub trait Strategy: Sync {
     /// Data shared by all tiles of a pass.
     type Pass: Sync;

@@ -50,8 +50,8 @@ pub enum PrepareError {
 
 impl StrategySpec {
     /// Sets the parameters that were left open, with a pilot at some points of the scene: the number of SIR candidates
-    /// with the least error for its cost ([`CandidatePilot`]). `points` is called only if needed. `visibility` returns V
-    /// in [0, 1] for a point and a direction.
+    /// with the least error for its cost ([`CandidatePilot`]). `points` is called only if needed. `visibility`
+    /// returns V in [0, 1] for a point and a direction.
     #[must_use]
     pub fn for_scene(
         self,
@@ -87,8 +87,9 @@ impl StrategySpec {
 }
 
 impl<'e> PreparedStrategy<'e> {
-    /// An estimate of the memory that [`PreparedStrategy::new`] needs \[bytes\] beyond [`Environment::MEMORY_PER_TEXEL`].
-    /// Product sampling divides the texels of maps that are much wider or narrower than 2:1.
+    /// An estimate of the memory that [`PreparedStrategy::new`] needs \[bytes\] beyond
+    /// [`Environment::MEMORY_PER_TEXEL`]. Product sampling divides the texels of maps that are much wider or narrower
+    /// than 2:1.
     pub fn memory(spec: StrategySpec, environment: &Environment) -> u64 {
         match spec {
             StrategySpec::Product { .. } => environment.memory_to_reshape(),

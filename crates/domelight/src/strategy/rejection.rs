@@ -64,7 +64,8 @@ pub enum Proposal {
 pub enum StoppingRule {
     /// Stop after this many tries, at least 1. Each accepted direction is one shadow ray.
     Tries(u32),
-    /// Stop at a number of accepted samples or a number of tries, whichever comes first. Tries use independent random numbers.
+    /// Stop at a number of accepted samples or a number of tries, whichever comes first. Tries use independent random
+    /// numbers.
     Accepted {
         /// Directions to keep, at least 2.
         n: u32,
@@ -81,7 +82,8 @@ pub enum RejectionError {
     NoTries,
     /// One kept direction says nothing about how rare it is.
     #[error(
-        "stopping after {n} accepted directions: at least 2 are needed for an unbiased estimate of the acceptance rate"
+        "stopping after {n} accepted directions: at least 2 are needed for an unbiased estimate \
+         of the acceptance rate"
     )]
     TooFewAccepted {
         /// The number asked for.

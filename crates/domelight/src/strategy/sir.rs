@@ -356,8 +356,8 @@ impl<'p, V: Fn(&ShadingPoint, Vec3) -> f32> CandidatePilot<'p, V> {
         work
     }
 
-    /// The number of candidates M, which is N or a power of two above it, with the least [`CandidatePilot::work`] for the
-    /// picks of `sir`. The M of `sir` itself is ignored.
+    /// The number of candidates M, which is N or a power of two above it, with the least [`CandidatePilot::work`] for
+    /// the picks of `sir`. The M of `sir` itself is ignored.
     ///
     /// The search doubles M until two doublings in a row bring no gain. A gain must exceed two standard errors over the
     /// points.

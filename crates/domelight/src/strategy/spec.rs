@@ -180,7 +180,8 @@ impl StrategyKind {
             Self::Environment => "samples the environment's radiance",
             Self::Mis => "samples both and weights them by multiple importance sampling",
             Self::Product => {
-                "samples the product of both from a table for each pixel, with learned visibility; traces rays where they matter"
+                "samples the product of both from a table for each pixel, with learned \
+                 visibility; traces rays where they matter"
             }
             Self::Rejection => {
                 "samples the product by rejection from one factor with a bound on the other"

@@ -2,12 +2,12 @@
 //!
 //! The `exr` crate parses and decompresses: scanlines and tiles, half, float and uint, every compression
 //! it supports (none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB). The largest level of mip- and rip-mapped
-//! files is read. The picture is the data window, wherever it lies in the display window ([`DataWindow`]). Colors with a
-//! `chromaticities` attribute other than Rec. 709 are converted, including the white point.
+//! files is read. The picture is the data window, wherever it lies in the display window ([`DataWindow`]). Colors
+//! with a `chromaticities` attribute other than Rec. 709 are converted, including the white point.
 //!
-//! Blocks are decompressed in batches on the program's own threads. The crate's parallel reader starts a new thread pool
-//! for each file, in which a panic over a corrupt block would abort the process. Assertions of the crate that replace
-//! errors are caught here and become [`PictureErrorKind::ExrPanic`].
+//! Blocks are decompressed in batches on the program's own threads. The crate's parallel reader starts a new thread
+//! pool for each file, in which a panic over a corrupt block would abort the process. Assertions of the crate that
+//! replace errors are caught here and become [`PictureErrorKind::ExrPanic`].
 
 use super::attributes::{to_rec709, window};
 use super::luminance_chroma::LuminanceChroma;
@@ -31,10 +31,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Decodes one layer of a complete file.
 ///
-/// By default, this is the unnamed R, G, B channels, or else the first layer with R, G, B, or else one with only Y, or else
-/// the only channel, whatever its name except depth and coverage. `layer` names another: a part, the part of the channel
-/// names before the last dot, or both joined by a dot, case-insensitive. X, Y, Z or a single channel of any name then also
-/// count as color.
+/// By default, this is the unnamed R, G, B channels, or else the first layer with R, G, B, or else one with only Y,
+/// or else the only channel, whatever its name except depth and coverage. `layer` names another: a part, the part of
+/// the channel names before the last dot, or both joined by a dot, case-insensitive. X, Y, Z or a single channel of
+/// any name then also count as color.
 ///
 /// # Errors
 /// If the file is damaged, incomplete or deep, or has no such layer.

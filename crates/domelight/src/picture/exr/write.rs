@@ -1,7 +1,7 @@
 //! Writes OpenEXR: layers in one part.
 //!
-//! Blender, Nuke and OpenImageIO show one part with dotted channel names as layers. Several parts were rejected, because
-//! Blender and older viewers show only the first.
+//! Blender, Nuke and OpenImageIO show one part with dotted channel names as layers. Several parts were rejected,
+//! because Blender and older viewers show only the first.
 
 use crate::environment::mapping::EnvmapKind;
 use crate::picture::{PictureErrorKind, checked_area};

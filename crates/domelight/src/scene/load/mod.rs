@@ -98,8 +98,9 @@ pub struct LoadOptions {
     pub max_memory: Option<u64>,
     /// The folders that the scene's files may be in.
     pub reach: Reach,
-    /// Whether to reject files that require an unknown extension (glTF), refer to an image or a material library that cannot
-    /// be read (glTF, OBJ), or have a vertex with a NaN or infinite position. Otherwise the rest is drawn, with a warning.
+    /// Whether to reject files that require an unknown extension (glTF), refer to an image or a material library that
+    /// cannot be read (glTF, OBJ), or have a vertex with a NaN or infinite position. Otherwise the rest is drawn,
+    /// with a warning.
     pub strict: bool,
     /// The scene in a file with several scenes (glTF), by name or by number from 0.
     pub scene: Option<String>,
@@ -167,7 +168,8 @@ pub enum LoadError {
     },
     /// Neither content nor extension is known.
     #[error(
-        "{} is not in a known scene format: .ply, .obj, .stl, .off, .gltf, .glb and .toml", path.display()
+        "{} is not in a known scene format: .ply, .obj, .stl, .off, .gltf, .glb and \
+         .toml", path.display()
     )]
     UnknownFormat {
         /// The file.
@@ -278,8 +280,8 @@ pub fn load(path: impl AsRef<Path>) -> Result<Loaded, LoadError> {
 /// Like [`load`], within limits.
 ///
 /// # Errors
-/// Those of [`load`]. Also if the scene would exceed the memory limit, which is checked before allocating memory or reading
-/// a file, if the options reject the file, or if it lacks the requested scene or animation.
+/// Those of [`load`]. Also if the scene would exceed the memory limit, which is checked before allocating memory or
+/// reading a file, if the options reject the file, or if it lacks the requested scene or animation.
 pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let path = path.as_ref();
     let budget = &Budget::new(path, Files::System, options.max_memory, options.reach);
@@ -287,9 +289,9 @@ pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
     Ok(finish(load_file(path, &bytes, false, budget, options)?, path, budget))
 }
 
-/// Like [`load_with`], from the bytes of a file. `name` is the path of the file, for messages and to recognize the format if
-/// the content does not determine it. `resolver` returns the bytes of the files that it refers to, with paths relative to
-/// the folder of `name`.
+/// Like [`load_with`], from the bytes of a file. `name` is the path of the file, for messages and to recognize the
+/// format if the content does not determine it. `resolver` returns the bytes of the files that it refers to, with
+/// paths relative to the folder of `name`.
 ///
 /// ```
 /// use std::io;

@@ -219,7 +219,9 @@ impl<'a> Reader<'a> {
         let place = format!("{}, line {line}", self.path.display());
         let why = match super::read_referenced(&path, &place, self.textures.budget) {
             // What is no library is nobody's business.
-            Ok(bytes) if !mtl::is_library(&bytes) => "it is not a material library (MTL)".to_owned(),
+            Ok(bytes) if !mtl::is_library(&bytes) => {
+                "it is not a material library (MTL)".to_owned()
+            }
             Ok(bytes) => {
                 let (textures, warnings) = (&mut self.textures, &mut self.warnings);
                 for material in mtl::parse(&path, &bytes, textures, self.strict, warnings)? {

@@ -1,12 +1,14 @@
 //! OFF, the Object File Format of Geomview and of collections of meshes.
 //!
-//! The reader supports the header words `OFF`, `COFF` (colors of vertices), `NOFF` (normals), `STOFF` (texture coordinates),
-//! `4OFF` (homogeneous coordinates) and their compounds, or none; the counts on the same line or even in the same
-//! word; comments after `#`; polygons of any shape; and face colors after the indices, with one number for gray, three
-//! or four. Colors are sRGB from 0 to 255 if all colors of a file are whole numbers and some exceed 1, otherwise
-//! linear from 0 to 1. Opacity and indices into color maps are ignored. Vertices without normals get smooth ones.
+//! The reader supports the header words `OFF`, `COFF` (colors of vertices), `NOFF` (normals), `STOFF` (texture
+//! coordinates), `4OFF` (homogeneous coordinates) and their compounds, or none; the counts on the same line or even
+//! in the same word; comments after `#`; polygons of any shape; and face colors after the indices, with one number
+//! for gray, three or four. Colors are sRGB from 0 to 255 if all colors of a file are whole numbers and some exceed
+//! 1, otherwise linear from 0 to 1. Opacity and indices into color maps are ignored. Vertices without normals get
+//! smooth ones.
 //!
-//! <http://www.geomview.org/docs/html/OFF.html>. Binary files and files with other dimensions are rejected with a message.
+//! <http://www.geomview.org/docs/html/OFF.html>. Binary files and files with other dimensions are rejected with a
+//! message.
 
 use std::path::Path;
 

@@ -2,9 +2,10 @@
 //!
 //! The reader supports, for the element `vertex`, the properties `x y z`, `nx ny nz`, texture coordinates
 //! (`s t`, `u v` or `texture_u texture_v`, v upward) and `red green blue` (integers: sRGB, floats:
-//! linear); for the element `face`, the list `vertex_indices` or `vertex_index` with polygons of any shape, and colors as
-//! for vertices, which are used if vertices have none; for `tristrips`, the same list, where −1 ends a strip. Elements
-//! and properties may come in any order. Everything else is ignored. A file without normals gets smooth ones.
+//! linear); for the element `face`, the list `vertex_indices` or `vertex_index` with polygons of any shape, and
+//! colors as for vertices, which are used if vertices have none; for `tristrips`, the same list, where −1 ends a
+//! strip. Elements and properties may come in any order. Everything else is ignored. A file without normals gets
+//! smooth ones.
 //!
 //! We do not use a PLY crate, because the existing ones build a map of properties for every row.
 
@@ -69,7 +70,8 @@ pub enum PlyErrorKind {
     },
     /// More rows than the file can hold.
     #[error(
-        "the header promises {count} rows of {element}, at least {needed} bytes, but only {left} bytes follow; the file is truncated or its header is wrong"
+        "the header promises {count} rows of {element}, at least {needed} bytes, but only {left} \
+         bytes follow; the file is truncated or its header is wrong"
     )]
     TooManyRows {
         /// The element.

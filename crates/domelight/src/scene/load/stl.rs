@@ -7,7 +7,8 @@
 //! 3D Systems 1989, "StereoLithography Interface Specification". A binary file may begin with `solid`, too: a file is
 //! binary if it is as long as its count of facets says.
 //!
-//! We do not use the crate stl_io, because it reads one solid and allocates memory for as many facets as a header claims.
+//! We do not use the crate stl_io, because it reads one solid and allocates memory for as many facets as a header
+//! claims.
 
 use std::path::Path;
 

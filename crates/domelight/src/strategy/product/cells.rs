@@ -166,8 +166,8 @@ pub(super) struct Ramp {
 const NORMAL_SPREADS: [f32; 7] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28];
 
 impl Cells {
-    /// Divides an environment into as many cells as fit in each of the given numbers of rows, which are even and at most
-    /// [`MAX_ROWS`]. Empty for a black environment.
+    /// Divides an environment into as many cells as fit in each of the given numbers of rows, which are even and at
+    /// most [`MAX_ROWS`]. Empty for a black environment.
     pub(super) fn new<const N: usize>(
         environment: &Environment,
         rows: [usize; N],
@@ -278,8 +278,8 @@ impl Cells {
         0..self.rows.min(MAX_ROWS) / 2
     }
 
-    /// The slot of a cell, row by row. Lane l has the l-th eighth of the curve, so that one running sum per lane and one over
-    /// the lanes give the sum along the curve.
+    /// The slot of a cell, row by row. Lane l has the l-th eighth of the curve, so that one running sum per lane and
+    /// one over the lanes give the sum along the curve.
     pub(super) fn slot(&self, cell: usize) -> usize {
         cell % self.rows * LANES + cell / self.rows
     }

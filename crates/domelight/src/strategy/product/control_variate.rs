@@ -1,13 +1,13 @@
-//! A control variate for the reflected light: a function h of the direction that approximates the pixel's reflectance in
-//! each cell and whose integral is known.
+//! A control variate for the reflected light: a function h of the direction that approximates the pixel's reflectance
+//! in each cell and whose integral is known.
 //!
 //! ```text
 //! h(ω) = k_d/π · n·ω, if the whole cell is above the horizon      + k_s (a_c + b_c·ω)
 //! ```
 //!
-//! The first term is the exact reflectance of a diffuse surface. The second is a first-order expansion of the glossy lobes
-//! about the center of cell c. Both are linear in ω, so that ∫ h L dω over a cell follows from the moments ∫ L dω and
-//! ∫ L ω dω of its light. Then
+//! The first term is the exact reflectance of a diffuse surface. The second is a first-order expansion of the glossy
+//! lobes about the center of cell c. Both are linear in ω, so that ∫ h L dω over a cell follows from the moments ∫ L
+//! dω and ∫ L ω dω of its light. Then
 //!
 //! ```text
 //! Σ_j W_j V̂_j     becomes     Σ_c V̂_c ∫ h L dω + Σ_j V̂_j (W_j − h(ω_j) L_j/(M p_table(ω_j)))
@@ -15,10 +15,11 @@
 //!
 //! with the same expectation for any h. The closer h is to f, the lower the variance of the second sum.
 //!
-//! The moments are those of the pass's pool: given the pool, strata draw only its directions. The moments of the map would
-//! introduce bias, because V̂ was also learned from the pool, and the mean of a product of correlated estimates is not the
-//! product of their means. BRDF samples do not use h, because their expectation is the integral over the map, not over the
-//! pool. For that reason, h is also weighted as the balance heuristic weights strata at the center of the cell.
+//! The moments are those of the pass's pool: given the pool, strata draw only its directions. The moments of the map
+//! would introduce bias, because V̂ was also learned from the pool, and the mean of a product of correlated estimates
+//! is not the product of their means. BRDF samples do not use h, because their expectation is the integral over the
+//! map, not over the pool. For that reason, h is also weighted as the balance heuristic weights strata at the center
+//! of the cell.
 
 use super::cells::{CellArray, Cells, ZERO_CELLS};
 use super::hits::Group;
@@ -87,8 +88,8 @@ impl ControlVariate {
         }
     }
 
-    /// Weights the glossy part as strata are weighted against BRDF samples: a cell whose light is as dense as `share` times
-    /// the pixel's mean counts half.
+    /// Weights the glossy part as strata are weighted against BRDF samples: a cell whose light is as dense as `share`
+    /// times the pixel's mean counts half.
     #[inline(always)]
     pub(super) fn balance<S: Simd>(&mut self, simd: S, cells: &Cells, share: f32) {
         if self.tint.is_none() || share == 0.0 {

@@ -152,8 +152,8 @@ impl TileEstimator<'_, '_> {
         known.luminance().max(0.0) / points.len() as f32
     }
 
-    /// The factor from a candidate's standard deviation to its selection probability π: the reciprocal of the error that the
-    /// pixel's brightness tolerates.
+    /// The factor from a candidate's standard deviation to its selection probability π: the reciprocal of the error
+    /// that the pixel's brightness tolerates.
     fn importance(&self, i: usize, pixel: &PixelPoints, known: f32, counts: Counts) -> f32 {
         let Self { strategy, tile, .. } = *self;
         let n_points = pixel.points.len() as f32;
@@ -192,8 +192,8 @@ impl TileShading<'_> {
 }
 
 impl ProductSampling<'_> {
-    /// The predicted brightness of a pixel: the harmonic mean over its neighbors of lower levels, because a dark neighbor
-    /// marks the edge of a shadow.
+    /// The predicted brightness of a pixel: the harmonic mean over its neighbors of lower levels, because a dark
+    /// neighbor marks the edge of a shadow.
     fn expected_brightness(
         &self,
         tile: &TileShading,

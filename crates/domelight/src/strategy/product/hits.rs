@@ -146,8 +146,8 @@ impl Groups {
             .all(|g| g.normal_spread <= SMALL_NORMAL_SPREAD * roughness && g.wo.z >= STEEP_COSINE)
     }
 
-    /// The density of BRDF samples relative to strata of a table with this total, where the light of a cell has density 1:
-    /// the ratio of their numbers, times the light that the pixel reflects, averaged over its lobes.
+    /// The density of BRDF samples relative to strata of a table with this total, where the light of a cell has
+    /// density 1: the ratio of their numbers, times the light that the pixel reflects, averaged over its lobes.
     pub(super) fn brdf_share(&self, counts: Counts, total: f32) -> f32 {
         let lobes = self.all.iter().flat_map(|g| {
             let diffuse = std::iter::once(g.lobe_summary.diffuse);

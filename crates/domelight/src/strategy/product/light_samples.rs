@@ -17,7 +17,8 @@ pub(super) const PER_CELL: usize = 32;
 /// The length of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PassLength {
-    /// A pass of up to 8 camera samples, where the error of coarser cells and fewer directions is small relative to the pixels' own.
+    /// A pass of up to 8 camera samples, where the error of coarser cells and fewer directions is small relative to
+    /// the pixels' own.
     Short,
     Long,
 }

@@ -1,14 +1,16 @@
 //! Product sampling: rays follow light times reflectance, and visibility is learned during the render.
 //!
 //! Once per environment, the map is divided into a few hundred `cells` along a Hilbert curve. Each pass draws
-//! `light_samples`, a pool of directions in every cell. Then each pixel is processed, with all its camera hits together:
+//! `light_samples`, a pool of directions in every cell. Then each pixel is processed, with all its camera hits
+//! together:
 //!
 //! 1. A `table` holds the light times the reflectance of each cell.
 //! 2. `candidates` are strata along the curve, each with one direction from the pool, and BRDF samples where the table
 //!    approximates the BRDF badly, weighted by the balance heuristic.
-//! 3. The tile's pixels are processed in [levels](super::levels). Those of the first level, the *pilots*, trace all their
-//!    candidates. From the rays of each level, the tile learns the `visibility` V̂ of each cell and the brightness of its
-//!    pixels.
+//! 3. The tile's pixels are processed in [levels](super::levels). Those of the first level, the *pilots*, trace all
+//! their
+//!    candidates. From the rays of each level, the tile learns the `visibility` V̂ of each cell and the brightness of
+//!    its pixels.
 //! 4. In the next levels, the integral of a `control_variate` h over all cells, seen through V̂, approximates the
 //!    reflected light. `systematic` sampling traces the candidates whose visibility matters:
 //!
@@ -20,10 +22,10 @@
 //!    visibility.
 //!
 //! The expectation is ∫ f L V dω for every V̂, brightness and pool, provided that they do not depend on the random
-//! numbers of strata, BRDF samples and selection. V̂ and brightness come from pixels of lower levels, and each pixel and
-//! pass has its own sampler. V̂ and the candidates share the pool, which does no harm: given the pool, strata draw only
-//! from it, and the expectation of their part is a sum over the pool for any V̂ and any density derived from it. BRDF
-//! samples do not come from the pool, so if there are any, the density depends only on the pixel's hits.
+//! numbers of strata, BRDF samples and selection. V̂ and brightness come from pixels of lower levels, and each pixel
+//! and pass has its own sampler. V̂ and the candidates share the pool, which does no harm: given the pool, strata
+//! draw only from it, and the expectation of their part is a sum over the pool for any V̂ and any density derived
+//! from it. BRDF samples do not come from the pool, so if there are any, the density depends only on the pixel's hits.
 //!
 //! Related: Clarberg & Akenine-Möller 2008, "Practical Product Importance Sampling for Direct
 //! Illumination", multiplies trees of BRDF and map; Atanasov et al. 2018, "Adaptive Environment
@@ -77,15 +79,15 @@ const PILOT: usize = 2;
 /// The maximum number of candidates per pixel and pass, which limits memory.
 const MAX_CANDIDATES: u32 = 1 << 14;
 
-/// One candidate in this many is a BRDF sample where the table approximates the BRDF badly: if normals vary or the view is
-/// oblique, and for lobes narrower than most cells.
+/// One candidate in this many is a BRDF sample where the table approximates the BRDF badly: if normals vary or the
+/// view is oblique, and for lobes narrower than most cells.
 const BRDF_SHARE: [usize; 2] = [8, 4];
 
 /// The roughness below which a lobe is narrower than most cells.
 const NARROW: f32 = 0.1;
 
-/// The tolerated error of a candidate, as a fraction of the pixel's brightness over the number of candidates: for a diffuse
-/// pixel, where nothing else is random, and for a glossy pixel.
+/// The tolerated error of a candidate, as a fraction of the pixel's brightness over the number of candidates: for a
+/// diffuse pixel, where nothing else is random, and for a glossy pixel.
 const TOLERANCE: [f32; 2] = [0.15, 0.35];
 
 /// For pixels darker than this fraction of the environment's mean, the tolerated error stops shrinking.
@@ -105,8 +107,9 @@ pub struct ProductSampling<'a> {
 }
 
 impl<'a> ProductSampling<'a> {
-    /// Creates the strategy with at most `n_rays` ≥ 1 shadow rays per camera sample that hits, and twice as many in pilots
-    /// (one pixel of 16). This is the number of candidates; those that cannot change the pixel visibly are not traced.
+    /// Creates the strategy with at most `n_rays` ≥ 1 shadow rays per camera sample that hits, and twice as many in
+    /// pilots (one pixel of 16). This is the number of candidates; those that cannot change the pixel visibly are not
+    /// traced.
     pub fn new(environment: &'a Environment, n_rays: u32) -> Self {
         let mean = environment.power() / (4.0 * std::f64::consts::PI);
         let environment = environment.reshaped().map_or(Cow::Borrowed(environment), Cow::Owned);

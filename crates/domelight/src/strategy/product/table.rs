@@ -52,8 +52,8 @@ impl Default for Table {
 }
 
 impl Table {
-    /// Fills the table for groups of hits and, with `CONTROL_VARIATE`, their control variate. [`Table::accumulate`] then makes
-    /// it a distribution.
+    /// Fills the table for groups of hits and, with `CONTROL_VARIATE`, their control variate. [`Table::accumulate`]
+    /// then makes it a distribution.
     #[inline(always)]
     pub(super) fn fill<S: Simd, const CONTROL_VARIATE: bool>(
         &mut self,
@@ -102,8 +102,8 @@ impl Table {
         }
     }
 
-    /// Weights the table of a diffuse pixel by uncertainty: that of visibility, `std_dev`, and that of the light of cells
-    /// across the horizon.
+    /// Weights the table of a diffuse pixel by uncertainty: that of visibility, `std_dev`, and that of the light of
+    /// cells across the horizon.
     #[inline(always)]
     pub(super) fn weight_by_variance<S: Simd>(
         &mut self,
@@ -292,9 +292,9 @@ impl Table {
 
     /// Sets the slot of each stratum's cell, at the stratum's position.
     ///
-    /// Stratum k is at or after a cell's start s if k ≥ s/w − ξ, so a cell has the strata from the first for which this holds
-    /// to the first for which it holds for the next cell. Each cell marks its first stratum in `cell_starts`; the marks, which
-    /// increase along the curve, then propagate to the right.
+    /// Stratum k is at or after a cell's start s if k ≥ s/w − ξ, so a cell has the strata from the first for which
+    /// this holds to the first for which it holds for the next cell. Each cell marks its first stratum in
+    /// `cell_starts`; the marks, which increase along the curve, then propagate to the right.
     #[inline(always)]
     pub(super) fn assign_strata<S: Simd>(
         &self,

@@ -10,12 +10,12 @@
 //! ```
 //!
 //! p is the visibility of the cell over the whole tile, with K of N rays unoccluded, and v₀ that of all cells. g is the
-//! standard deviation of a ray around V̂ combined with the uncertainty of V̂ itself, which is large if the tile's rays to
-//! the cell differ.
+//! standard deviation of a ray around V̂ combined with the uncertainty of V̂ itself, which is large if the tile's
+//! rays to the cell differ.
 //!
-//! V̂ is a control variate: the pixel's estimate is the light seen through V̂ that it reflects, plus Σ W (V − V̂)/π. Its
-//! expectation does not depend on V̂, provided that V̂ does not depend on the random numbers of strata and selection. For
-//! that reason, V̂ comes only from pixels of lower levels.
+//! V̂ is a control variate: the pixel's estimate is the light seen through V̂ that it reflects, plus Σ W (V − V̂)/π.
+//! Its expectation does not depend on V̂, provided that V̂ does not depend on the random numbers of strata and
+//! selection. For that reason, V̂ comes only from pixels of lower levels.
 
 use super::cells::{CellArray, Cells, MAX_ROWS, ZERO_CELLS, get_mut};
 use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat};

@@ -80,7 +80,9 @@ pub enum GltfErrorKind {
         used_for: String,
     },
     /// Accessors that promise zeros without end.
-    #[error("accessor {index} has {count} values but no data, too many zeros for a file without data")]
+    #[error(
+        "accessor {index} has {count} values but no data, too many zeros for a file without data"
+    )]
     NoData {
         /// The accessor.
         index: usize,

@@ -87,7 +87,9 @@ pub(super) fn check(
     for name in all {
         match effect(name) {
             Effect::Read => {}
-            Effect::Harmless(text) => warn(&format!("the extension {name} is not supported; {text}")),
+            Effect::Harmless(text) => {
+                warn(&format!("the extension {name} is not supported; {text}"))
+            }
             Effect::Unknown if !required.contains(name) => {
                 warn(&format!("the extension {name} is unknown and ignored"));
             }

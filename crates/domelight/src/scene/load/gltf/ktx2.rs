@@ -105,7 +105,8 @@ impl<'a> Ktx2<'a> {
                 [0, 8, 16].map(|i| u64::from_le_bytes(std::array::from_fn(|j| entry[i + j])));
             inside(offset, length, "level")?;
             if level == 0 && is_uastc {
-                let (what, wanted) = ("length of the first level", "16 bytes per block fit the size");
+                let (what, wanted) =
+                    ("length of the first level", "16 bytes per block fit the size");
                 let value = if scheme == 0 { length } else { uncompressed };
                 if value != 16 * blocks {
                     return Err(Ktx2Error::Header { what, value, wanted });
