@@ -12,11 +12,11 @@ use crate::sampling::HierarchicalTable;
 /// that only multiple importance sampling with BRDF samples accepts.
 #[derive(Clone, Debug)]
 pub struct CompensatedTable {
-    /// None where nothing exceeds the mean, on a constant or black map: all is left to the BRDF.
+    /// `None` if nothing exceeds the mean, on a constant or black map; everything is left to the BRDF.
     table: Option<HierarchicalTable>,
-    /// What is taken off the luminance.
+    /// The value subtracted from the luminance.
     floor: f32,
-    /// One over the table's total; 0 without a table.
+    /// The reciprocal of the table's total; 0 without a table.
     inverse_total: f32,
 }
 

@@ -62,7 +62,7 @@ pub enum ProbeError {
         /// What does not fit.
         shape: ShapeError,
     },
-    /// Some values are no radiance.
+    /// Some values are not valid radiance.
     #[error(
         "{file}: texel ({x}, {y}) has {channel} = {value}, and {count} value(s) in all are negative, NaN or infinite; \
          without --strict they are repaired"
@@ -70,15 +70,15 @@ pub enum ProbeError {
     BadTexel {
         /// The file.
         file: String,
-        /// Column of the first bad texel.
+        /// The column of the first bad texel.
         x: usize,
-        /// Row of the first bad texel.
+        /// The row of the first bad texel.
         y: usize,
         /// `R`, `G` or `B`.
         channel: char,
         /// Its value there.
         value: f32,
-        /// Number of bad values in the whole picture.
+        /// The number of bad values in the whole picture.
         count: usize,
     },
 }
@@ -167,7 +167,7 @@ pub fn probe_from_picture(
     Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings })
 }
 
-/// The display window's picture, if that has the shape of a map and the data window has not.
+/// The picture in the display window, if it has the shape of a map and the data window does not.
 ///
 /// Cropped maps and those with borders beyond the frame keep their directions so. But the display windows of many
 /// files are whatever their makers had open, so a data window that looks like a map is one.
@@ -202,7 +202,7 @@ fn in_display_window(
     Ok(Some(framed))
 }
 
-/// An angular map is black outside its disc; a square that is not is taken as octahedral.
+/// An angular map is black outside its disc; any other square is interpreted as octahedral.
 fn guess_of_square(image: &RgbImage) -> Mapping {
     let n = image.width as f32;
     let is_outside = |x: usize, y: usize| {

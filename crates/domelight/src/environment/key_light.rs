@@ -9,10 +9,10 @@ use crate::math::{Vec3, functions};
 /// Rows of the reduced map on which the sun is looked for.
 const ROWS: usize = 256;
 
-/// The least share of the map's light of a compact source that is the key light by itself.
+/// The minimum share of the map's light for a compact source to be the key light.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Below this share of all light, the horizontal light vector has no direction worth the name.
+/// Below this share of all light, the direction of the horizontal light vector is not meaningful.
 const LEAST_ANISOTROPY: f64 = 1e-3;
 
 /// From the direction to the camera, around the up axis \[degrees\]: negative is on the picture's left.
@@ -33,7 +33,7 @@ pub fn key_light_rotation(map: &RgbImage, up: UpAxis, toward_camera: Vec3) -> f3
     let key = sun.map(|Sun { direction, .. }| direction).or_else(|| light_vector(&map));
     let Some(key) = key else { return 0.0 };
     let toward_camera = up.from_y_up().transpose() * toward_camera;
-    // Counter-clockwise seen from above.
+    // Counterclockwise as seen from above.
     let angle = |v: Vec3| functions::atan2(v.x, v.z).to_degrees();
     let turn = angle(toward_camera) + BESIDE_CAMERA - angle(key);
     180.0 - (180.0 - turn).rem_euclid(360.0)

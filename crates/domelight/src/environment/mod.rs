@@ -108,7 +108,7 @@ pub enum EnvironmentError {
         x: usize,
         /// Row.
         y: usize,
-        /// Its value, scale included.
+        /// The value, including the scale.
         value: Rgb,
     },
     /// A scale that is negative, NaN or infinite.
@@ -122,7 +122,7 @@ pub enum EnvironmentError {
 /// A direction sampled from the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvironmentSample {
-    /// Unit direction toward the light, world frame.
+    /// The unit direction toward the light, in world space.
     pub wi: Vec3,
     /// Radiance from `wi`, equal to [`Environment::le`].
     pub le: Rgb,
@@ -155,16 +155,16 @@ pub struct Environment {
     table: Option<HierarchicalTable>,
     /// The reciprocal of the table's total; 0 for a black map.
     inverse_power: f32,
-    /// The greatest luminance of a texel.
+    /// The maximum luminance of a texel.
     max_luminance: f32,
 }
 
 /// A change of resolution along columns and rows that preserves the map's radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Reshaping {
-    /// So many equal texels become one.
+    /// This many equal texels become one.
     merged: [usize; 2],
-    /// Each of these becomes so many.
+    /// Each of these texels becomes this many.
     divided: [usize; 2],
 }
 
@@ -235,7 +235,7 @@ impl Environment {
             }
             sum
         };
-        // Add rows in their order, whoever computed them.
+        // Add rows in order, whichever thread computed them.
         let rows: Vec<[f64; 3]> = crate::parallel::in_order(grid.height(), row_sum);
         let sum = rows.iter().fold([0.0; 3], |sum, row| std::array::from_fn(|c| sum[c] + row[c]));
         Rgb::from(sum.map(|c: f64| c as f32))
@@ -393,7 +393,7 @@ impl Environment {
         self.unit
     }
 
-    /// The map, scale included.
+    /// The map, including the scale.
     pub fn map(&self) -> &RgbImage {
         &self.map
     }
@@ -421,7 +421,7 @@ impl Environment {
         self.table.as_ref().map_or(0.0, HierarchicalTable::total)
     }
 
-    /// The greatest luminance of [`Environment::le`] over all directions; 0 for a black map.
+    /// The maximum luminance of [`Environment::le`] over all directions; 0 for a black map.
     pub fn max_luminance(&self) -> f32 {
         self.max_luminance
     }
@@ -502,7 +502,7 @@ impl Environment {
     #[inline(always)]
     pub(crate) fn texels_at<F: SimdF32x8>(&self, wi: Vectors<F>) -> [[i32; LANES]; 2] {
         let [u, v] = self.grid.uv(self.orientation.up.to_map(wi));
-        // What is rounded up to the edge is of the last texel; these are exact.
+        // Values rounded up to the edge belong to the last texel; these are exact.
         let [width, height] = [self.map.width as f32, self.map.height as f32];
         let column = (u * u.splat(width)).min(u.splat(width - 1.0));
         let row = (v * v.splat(height)).min(v.splat(height - 1.0));

@@ -46,7 +46,7 @@ pub enum CheckpointError {
     /// Another version of the program wrote it.
     #[error("it is a checkpoint of format {found}; this program reads format {FORMAT}")]
     Format {
-        /// What the file says.
+        /// The format of the file.
         found: String,
     },
     /// The content was altered after it was written.
@@ -54,13 +54,13 @@ pub enum CheckpointError {
     Damaged(&'static str),
 }
 
-/// The version of the format; another layout gets another number.
+/// The version of the format, which changes with the layout.
 const FORMAT: &str = "2";
 
-/// Before the names of the identity.
+/// The prefix of identity attributes.
 const IDENTITY: &str = "domelight.render.";
 
-/// Before the names of the planes of bits.
+/// The prefix of bit planes.
 const STATE: &str = "state.";
 
 impl Checkpoint {
@@ -73,7 +73,7 @@ impl Checkpoint {
         let (color, alpha) = self.film.picture();
         let mut exr = ExrLayers::from_image(&color, Some(&alpha));
         exr.attributes = self.attributes();
-        // Random bits: deflate takes five times as long to save a third.
+        // The bits are random: deflate would take five times as long to save a third.
         exr.compression = Compression::Rle;
         exr.origin = (window.x, window.y);
         exr.whole = Some((width, height));
@@ -92,7 +92,7 @@ impl Checkpoint {
     /// # Errors
     /// If `bytes` is not an OpenEXR file.
     pub fn memory_to_decode(bytes: &[u8]) -> Result<u64, CheckpointError> {
-        // The channels as they are read and the sums that they become.
+        // The decoded channels and the resulting sums.
         let pixel = 4 * (4 + PixelSums::WORDS.len()) + size_of::<PixelSums>();
         Ok(bytes.len() as u64 + crate::picture::exr::texels(bytes)? as u64 * pixel as u64)
     }
@@ -156,7 +156,7 @@ impl Checkpoint {
         let get = |of: &'a [(String, String)], name: &str| {
             of.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value)
         };
-        // First the size: a camera that frames the scene depends on it.
+        // Compare the size first, because a camera that frames the scene depends on it.
         let all = self.identity.iter().chain(identity).map(|(name, _)| name.as_str());
         let names = std::iter::once("size").chain(all);
         names
@@ -202,7 +202,7 @@ pub struct Difference<'a> {
     pub there: &'a str,
 }
 
-/// A digest that has taken the attributes in; the words follow.
+/// A digest of the attributes, to be continued with the words.
 fn digest(attributes: &[(String, String)]) -> Fingerprinter {
     let mut digest = Fingerprinter::default();
     for (name, value) in attributes {

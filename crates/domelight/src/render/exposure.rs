@@ -7,7 +7,7 @@ use crate::sampling::Heuristic;
 use crate::scene::{Camera, Scene};
 use crate::strategy::StrategySpec;
 
-/// Rows or columns of the pilot picture, whichever are more.
+/// The larger dimension of the pilot picture.
 const PILOT_SIZE: usize = 64;
 
 /// The exposure \[stops\] that [`Exposure::Auto`] gives a small picture of the scene. It maps the median luminance
@@ -36,7 +36,7 @@ pub fn automatic_exposure(
         ..RenderSettings::default()
     };
     let camera = camera.resized(size, (settings.width, settings.height));
-    // Each pixel is nearly right under any light, which the median asks for, rather than the mean of all.
+    // The median requires each pixel to be nearly right under any light, not just the mean.
     let strategy = StrategySpec::Mis {
         n_environment: 4,
         n_brdf: 2,

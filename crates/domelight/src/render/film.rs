@@ -33,9 +33,9 @@ pub enum FilmMismatch {
     /// Some pixels of a tile have samples and others none.
     #[error("the tile at ({x}, {y}) is torn: some of its pixels have samples and others none")]
     Samples {
-        /// Column of the tile's corner.
+        /// The column of the tile's corner.
         x: usize,
-        /// Row of the tile's corner.
+        /// The row of the tile's corner.
         y: usize,
     },
 }
@@ -105,7 +105,7 @@ impl Film {
         planes.into_iter()
     }
 
-    /// From the words of [`Film::words`], found by name; none if one is missing or too short.
+    /// Restores a film from the words of [`Film::words`], looked up by name; `None` if one is missing or too short.
     #[cfg(feature = "io")]
     pub(super) fn from_words<'w>(
         width: usize,

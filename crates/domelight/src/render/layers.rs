@@ -38,9 +38,8 @@ pub enum LayerValues<'a> {
     Counts(&'a [u32]),
 }
 
-/// Defines [`Layers`] and [`LAYERS`]: for each layer what it shows, its field and type, its layer and channels in files,
-/// and its value at a pixel, from the pixel's sums and the
-/// scale of its variance ([`VarianceSums::scale`]).
+/// Defines [`Layers`] and [`LAYERS`]: for each layer, its description, its field and type, its layer and channels in files,
+/// and its value at a pixel, computed from the pixel's sums and the scale of its variance ([`VarianceSums::scale`]).
 macro_rules! layers {
     ($($(#[doc = $doc:literal])+ $field:ident: $type:ty = $name:literal {
         file: $file:expr, channels: $channels:expr, |$sums:ident, $scale:ident| $value:expr
@@ -51,7 +50,7 @@ macro_rules! layers {
             $($(#[doc = $doc])+ pub $field: $type,)*
         }
 
-        /// What the layers of a film are.
+        /// The layers of a film.
         pub const LAYERS: &[LayerInfo] = &[$(LayerInfo {
             name: $name,
             file_layer: $file,
@@ -76,7 +75,7 @@ macro_rules! layers {
                 Self { $($field: LayerData::rows(&self.$field, width, rows.clone()),)* }
             }
 
-            /// Sets pixel `i` to what its sums give.
+            /// Sets pixel `i` from its sums.
             fn set(&mut self, i: usize, sums: &PixelSums, variance_scale: f64) {
                 $({
                     let ($sums, $scale) = (sums, variance_scale);
@@ -145,7 +144,7 @@ impl Layers {
         self.n_hits.iter().zip(&self.n_samples).map(coverage).sum()
     }
 
-    /// Sets the samples of the pixels of a tile, which saw nothing in any of them; `self` is of the pixels of `window`.
+    /// Sets the number of samples for a tile that saw nothing; `self` has the pixels of `window`.
     pub(super) fn set_misses(&mut self, n: u32, tile: Window, window: Window) {
         for y in tile.y..tile.y + tile.height {
             let start = window.index(tile.x, y);
@@ -153,8 +152,8 @@ impl Layers {
         }
     }
 
-    /// Takes the pixels over that have samples, of the rows of `from` that are in `window`; `pixels` are those of `from`,
-    /// or none, and `self` is of the pixels of `window`.
+    /// Copies the pixels that have samples from the rows of `from` that are in `window`. `pixels` are those of `from`, or empty,
+    /// and `self` has the pixels of `window`.
     pub(super) fn put(
         &mut self,
         pixels: &[PixelSums],
@@ -166,7 +165,7 @@ impl Layers {
         let end = (from.y + from.height).min(window.y + window.height).max(start);
         let inside = (start - from.y) * from.width..(end - from.y) * from.width;
         let pixels = pixels.get(inside.clone()).unwrap_or_default().iter().zip(inside);
-        // Neighbors often have as many samples, and the scale costs a power.
+        // Reuse the scale for neighbors with the same number of samples, because it costs a power.
         let mut scale_of = (0, 1.0);
         for (p, i) in pixels.filter(|(p, _)| p.n_samples > 0) {
             let (x, y) = (from.x + i % from.width, from.y + i / from.width);
@@ -209,7 +208,7 @@ impl LayerData for RgbImage {
     }
 }
 
-/// A value at a pixel, of which a vector is a layer.
+/// The type of a layer's value at a pixel.
 trait Element: Copy + Default {
     fn values(values: &[Self]) -> LayerValues<'_>;
 }

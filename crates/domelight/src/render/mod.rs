@@ -167,16 +167,16 @@ impl Stage {
 
 /// Watches a render and can end it. Called from many threads.
 pub trait Observer: Sync {
-    /// A pass over the picture begins: camera samples `samples` of each pixel.
+    /// Called when a pass over the picture begins, with the range of camera samples in each pixel.
     fn pass_started(&self, _samples: std::ops::Range<u32>) {}
 
-    /// The calling thread begins a stage of a tile.
+    /// Called when the calling thread begins a stage of a tile.
     fn stage_started(&self, _stage: Stage) {}
 
-    /// A tile of a pass is complete, and with it the thread's last stage.
+    /// Called when a tile of a pass is complete, which also ends the thread's last stage.
     fn tile_finished(&self, _counts: &Counts) {}
 
-    /// True ends the render: running tiles are finished, the others keep what they have.
+    /// Returns true to end the render: running tiles are finished, and others keep their samples.
     fn canceled(&self) -> bool {
         false
     }
@@ -203,36 +203,36 @@ pub struct Rendering {
     pub complete: bool,
 }
 
-/// All that tiles share.
+/// The data shared by all tiles.
 struct RenderContext<'a> {
     scene: &'a Scene,
-    /// In the scene's own units of length, as all that is traced.
+    /// The camera, in the scene's internal units of length.
     camera: Camera,
     environment: &'a Environment,
     settings: RenderSettings,
     filter: FilterSampler,
     /// The longest extent of the scene, in its units.
     extent: f32,
-    /// What ground reflects that shows nothing but shadows.
+    /// The reflectance of shadow catchers.
     catcher: Option<Catcher>,
 }
 
-/// Ground that shows nothing but shadows.
+/// A shadow catcher.
 #[derive(Clone, Copy, Debug)]
 struct Catcher {
-    /// What it reflects of the unoccluded light, in multiples of [`Environment::unit`].
+    /// The unoccluded light that it reflects, in multiples of [`Environment::unit`].
     radiance: Rgb,
 }
 
 impl Catcher {
-    /// The ground of a scene, if it has any.
+    /// The shadow catcher of a scene, if it has one.
     fn of(scene: &Scene, environment: &Environment) -> Option<Self> {
         let normal = scene.catcher_normal()?;
         let reflected = CATCHER_REFLECTANCE * FRAC_1_PI;
         Some(Self { radiance: environment.irradiance(normal) * reflected })
     }
 
-    /// The share of each channel that is missing of light of which `missing` does not arrive, in the same multiples.
+    /// The missing fraction of each channel, if `missing` of the light does not arrive, in the same multiples.
     fn shadow(self, missing: Rgb) -> Rgb {
         let share = |missing: f32, all: f32| if all > 0.0 { missing / all } else { 0.0 };
         let (Rgb { r, g, b }, all) = (missing, self.radiance);

@@ -51,15 +51,15 @@ pub struct Renderer<'a, S: Strategy = PreparedStrategy<'a>> {
     /// The tiles to render.
     range: Range<usize>,
     tiles: Vec<Tile>,
-    /// What was done before the renderer was restored.
+    /// Counts of the work before the renderer was restored.
     before: Counts,
-    /// Passes begun so far.
+    /// The number of passes begun so far.
     mark: Mark,
-    /// The pass that the observer ended, to go on with.
+    /// The pass that the observer ended, to be continued.
     interrupted: Option<(u32, Pass<S>)>,
 }
 
-/// A strategy of the renderer's own, or the caller's.
+/// A strategy owned by the renderer, or the caller's.
 enum Held<'a, S> {
     Own(Box<S>),
     Lent(&'a S),
@@ -83,7 +83,7 @@ enum PassEnd {
     Complete,
     /// The observer ended it.
     Canceled,
-    /// There was nothing to render.
+    /// Nothing was left to render.
     NothingLeft,
 }
 
@@ -234,7 +234,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         }
     }
 
-    /// Renders one pass of no more than `most` samples over the tiles that are behind.
+    /// Renders one pass of at most `most` samples over the tiles that lack samples.
     fn pass(&mut self, observer: &(impl Observer + ?Sized), most: u32) -> PassEnd {
         let Some(start) = self.unfinished().map(Tile::n_samples).min() else {
             return PassEnd::NothingLeft;
@@ -271,7 +271,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         PassEnd::Canceled
     }
 
-    /// Prepares the pass that begins at sample `start`, of no more than `most` samples.
+    /// Prepares the pass that begins at sample `start`, with at most `most` samples.
     fn begin_pass(&self, start: u32, most: u32) -> Pass<S> {
         let Self { context, strategy, tiling, .. } = self;
         let (strategy, settings): (&S, _) = (strategy, &context.settings);

@@ -25,7 +25,7 @@ impl Window {
         self.width * self.height
     }
 
-    /// The quarters that have pixels.
+    /// The non-empty quarters.
     pub(super) fn quarters(self) -> impl Iterator<Item = Self> {
         let halves = |start: usize, n: usize| [(start, n / 2), (start + n / 2, n - n / 2)];
         let rows = halves(self.y, self.height);
@@ -36,25 +36,25 @@ impl Window {
         windows.filter(|window| window.area() > 0)
     }
 
-    /// Whether a pixel of the picture lies within.
+    /// Whether the window contains a pixel of the picture.
     pub(super) fn contains(&self, x: usize, y: usize) -> bool {
         (self.x..self.x + self.width).contains(&x) && (self.y..self.y + self.height).contains(&y)
     }
 
-    /// The index, row by row, of a pixel of the picture that lies within.
+    /// The index, row by row, of a pixel of the picture in the window.
     pub(super) fn index(&self, x: usize, y: usize) -> usize {
         (y - self.y) * self.width + x - self.x
     }
 }
 
-/// As in `640x16+0+32`: columns, rows, and the corner.
+/// Formats as `640x16+0+32`: columns, rows, and the corner.
 impl fmt::Display for Window {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}x{}+{}+{}", self.width, self.height, self.x, self.y)
     }
 }
 
-/// One of two independent sets of a pixel's samples; most pixels have the first alone.
+/// One of two independent sets of a pixel's samples. Most pixels have only the first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum SampleSet {
     #[default]
@@ -70,7 +70,7 @@ pub struct Tiling {
     size: usize,
 }
 
-/// Shadow rays of a tile in one pass that the caches hold.
+/// The number of shadow rays of a tile and pass that fit in the caches.
 const RAYS_PER_TILE: usize = 1 << 15;
 
 impl Tiling {

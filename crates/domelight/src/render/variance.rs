@@ -30,7 +30,7 @@ pub struct VarianceSums {
     halves: [i128; 2],
 }
 
-/// What a pixel adds to [`VarianceSums`]; channels added up.
+/// A pixel's contribution to [`VarianceSums`], summed over channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Contrast {
     /// Two independent sets: s²/n, and the variance from their difference.
@@ -47,7 +47,7 @@ impl VarianceSums {
         sums.zip(others).for_each(|(sum, x)| *sum = sum.saturating_add(*x));
     }
 
-    /// The sums of what some pixels add.
+    /// Sums the contributions of some pixels.
     pub(super) fn of(contrasts: impl Iterator<Item = Contrast>) -> Self {
         let mut sums = Self::default();
         for contrast in contrasts {
@@ -61,7 +61,7 @@ impl VarianceSums {
         sums
     }
 
-    /// The variance of the mean of `n` samples over s²/n.
+    /// The ratio of the variance of the mean of `n` samples to s²/n.
     pub(super) fn scale(&self, n: u32) -> f64 {
         let [independent, measured] = self.sets.map(|sum| sum as f64);
         if independent > 0.0 {
@@ -77,7 +77,7 @@ fn fixed(x: f64) -> i128 {
     (x * functions::powi(2f64, 64)) as i128
 }
 
-/// The variance of the mean of n samples over s²/n, given D² of the halves of the first N over s²/N.
+/// The ratio of the variance of the mean of n samples to s²/n, given the ratio of D² of the halves of the first N to s²/N.
 fn of_mean(n: u32, halves: f64) -> f64 {
     let last = n.max(2).ilog2() as i32 - 1;
     let prefix = functions::powi(2f64, last + 1);
@@ -99,11 +99,11 @@ fn of_mean(n: u32, halves: f64) -> f64 {
     0.25 * halves * sum * f64::from(n) / prefix
 }
 
-/// By which part of what is left of ½ the ratio of two details rises from one to the next beyond the samples: rough
-/// pixels remain. As measured on three scenes.
+/// Beyond the samples, the ratio of successive details approaches ½ by this fraction of the remaining distance from one to
+/// the next, because rough pixels remain. Measured on three scenes.
 const RISE: f64 = 0.0625;
 
-/// The last detail; each beyond the samples is at the most half the one before.
+/// The last detail. Each detail beyond the samples is at most half the previous one.
 const LAST: i32 = 60;
 
 #[cfg(test)]

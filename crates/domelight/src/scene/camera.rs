@@ -92,7 +92,7 @@ impl Lens {
         if self.blades < 3 {
             return concentric_disk(vec2(u, v));
         }
-        // Choose one of the triangles from the center to an edge, and a point of it by its area.
+        // Choose one of the triangles from the center to an edge, and sample it uniformly by area.
         let n = self.blades as f32;
         let blade = (u * n).floor().min(n - 1.0);
         let corner = |i: f32| {
@@ -233,13 +233,13 @@ pub struct Camera {
     step_x: Vec3,
     /// One pixel down.
     step_y: Vec3,
-    /// The camera's axis through its place, to measure depth along.
+    /// The camera's axis through its position, along which depth is measured.
     axis: Ray,
     orthographic: bool,
     lens: Option<LensPlane>,
 }
 
-/// A lens in the world.
+/// A lens in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LensPlane {
     lens: Lens,
@@ -314,7 +314,7 @@ impl Camera {
         Self { step_x: self.step_x * x, step_y: self.step_y * y, ..*self }
     }
 
-    /// The same view where all lengths are multiplied by a factor > 0.
+    /// The same view with all lengths multiplied by a factor > 0.
     pub(crate) fn scaled(&self, factor: f32) -> Self {
         let step = if self.orthographic { factor } else { 1.0 };
         let mut lens = self.lens;
@@ -360,7 +360,7 @@ impl Camera {
         let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
         let steps = corners.map(|[x, y]| x * self.step_x + y * self.step_y);
         if let Some(LensPlane { lens, right, down }) = self.lens {
-            // A ray starts no farther aside than the aperture's rim, and strays from the pinhole's no faster than from there.
+            // A ray starts at most at the rim of the aperture, and diverges from the pinhole ray at most as fast as from there.
             let signs = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
             let out = signs.map(|[x, y]| lens.radius * (x * right + y * down));
             let toward = |i: usize| self.direction + steps[i] + out[i] / lens.focus_distance;

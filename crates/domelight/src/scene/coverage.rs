@@ -58,17 +58,17 @@ impl Sight {
     }
 }
 
-/// The least probability with which a camera ray meets a surface that transmits. What it reflects is a few percent of
-/// the light, but may be a sun.
+/// The minimum probability with which a camera ray hits a transmissive surface. It reflects only a few percent of the
+/// light, but that may include a sun.
 const LEAST_REFLECTED: f32 = 0.25;
 
-/// How a camera ray meets a surface that is not opaque.
+/// How a camera ray interacts with a surface that is not opaque.
 #[derive(Clone, Copy, Debug)]
 struct Layer {
     transmits: bool,
-    /// The probability that a ray meets it.
+    /// The probability that a ray hits it.
     probability: f32,
-    /// Factors on the radiance of a ray that meets it, and of one that does not.
+    /// Factors on the radiance of a ray that hits it, and of one that does not.
     if_met: Rgb,
     if_not: Rgb,
 }
@@ -112,7 +112,7 @@ impl Coverage {
 }
 
 impl Part {
-    /// Whether it hides all behind it, everywhere.
+    /// Whether it is opaque everywhere.
     pub(super) fn is_opaque(&self, materials: &[Material]) -> bool {
         let material = &materials[self.material];
         if material.transmits() || material.catches_shadows {
@@ -137,7 +137,7 @@ impl Scene {
         self.sight(ray, key, sample).hit
     }
 
-    /// Whether [`Scene::sight`] may differ from the closest hit of the hierarchy of [`Scene::bvh`].
+    /// Whether [`Scene::sight`] may differ from the closest hit in [`Scene::bvh`].
     #[inline]
     pub(crate) fn has_see_through(&self) -> bool {
         self.has_single_sided || self.partial.is_some()
@@ -149,7 +149,7 @@ impl Scene {
         self.transmits
     }
 
-    /// [`Scene::sight`], given the closest `hit` of what is opaque.
+    /// [`Scene::sight`], given the closest opaque `hit`.
     pub(crate) fn seen(&self, ray: &Ray, mut hit: Option<Hit>, key: u64, sample: u32) -> Sight {
         if hit.is_some_and(|hit| !self.faces(ray, &hit)) {
             hit = self.bvh.closest_hit_where(ray, |hit| self.faces(ray, hit));
@@ -174,7 +174,7 @@ impl Scene {
         Sight { hit, throughput: throughput(layers.into_inner(), hit) }
     }
 
-    /// How a camera ray meets a surface that is not opaque.
+    /// How a camera ray interacts with a surface that is not opaque.
     fn layer(&self, ray: &Ray, hit: &Hit) -> Layer {
         let coverage = self.opacity(hit);
         let (part, triangle) = self.locate(hit.triangle);
@@ -195,7 +195,7 @@ impl Scene {
         }
     }
 
-    /// The share T of each channel of light that a surface lets through at a hit where it is there.
+    /// The transmittance T of a surface at a hit, per channel, where the surface exists.
     fn transmittance(&self, part: &Part, triangle: usize, hit: &Hit, cos_theta: f32) -> Rgb {
         let corners = Corners::new(&part.mesh, triangle, hit);
         let tint = corners.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
@@ -227,13 +227,13 @@ impl Scene {
         self.bvh.may_hit(frustum) || self.partial.as_ref().is_some_and(|p| p.bvh.may_hit(frustum))
     }
 
-    /// Whether anything lets a share of light through.
+    /// Whether any surface transmits a fraction of the light.
     #[inline]
     pub(crate) fn has_partial(&self) -> bool {
         self.dims_light
     }
 
-    /// Whether the surface of a hit shows nothing but shadows.
+    /// Whether the surface at a hit is a shadow catcher.
     #[inline]
     pub(crate) fn catches_shadows(&self, hit: &Hit) -> bool {
         self.catches_shadows && self.materials[self.locate(hit.triangle).0.material].catches_shadows
@@ -284,7 +284,7 @@ impl Scene {
         coverage.of(opacity)
     }
 
-    /// Whether the surface is seen from the ray's side.
+    /// Whether the surface is visible from the ray's side.
     fn faces(&self, ray: &Ray, hit: &Hit) -> bool {
         if !self.has_single_sided {
             return true;

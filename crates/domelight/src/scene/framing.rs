@@ -14,7 +14,7 @@ use super::camera::{Camera, CameraSettings, Projection};
 use crate::geometry::Aabb;
 use crate::math::{Vec3, functions};
 
-/// The share of the picture's height or width that a subject fills, whichever is tighter.
+/// The fraction of the picture's height or width that a subject fills, whichever is tighter.
 const FILL: f32 = 0.86;
 
 /// The direction from which a framed camera views its subject.
@@ -24,7 +24,7 @@ pub struct ViewDirection {
     elevation: f32,
 }
 
-/// A text that names no view.
+/// A text that is not a view.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "there is no view {text:?}; the views are front, back, left, right, top, bottom and \
@@ -76,7 +76,7 @@ impl ViewDirection {
 
     /// The unit vector from the subject to the camera, and the direction that is up in the picture.
     fn axes(self, up: Vec3) -> [Vec3; 2] {
-        /// Elevations from here on look along the up axis.
+        /// From this elevation on, the view is along the up axis.
         const STEEP: f32 = 89.9;
         let up = up.try_normalize().unwrap_or(Vec3::Y);
         let front = Vec3::Z - up * up.z;
@@ -222,7 +222,7 @@ impl Reach {
         nearest: f32::INFINITY,
     };
 
-    /// Of points with coordinates along right, up and forward.
+    /// The extremes of points with coordinates along right, up and forward.
     fn of(points: impl Iterator<Item = Vec3>, tan_x: f32, tan_y: f32) -> Self {
         points.fold(Self::NONE, |reach, p| Self {
             right: reach.right.max(p.x - tan_x * p.z),
@@ -233,7 +233,7 @@ impl Reach {
         })
     }
 
-    /// Of the circles that points describe about `axis`, a unit vector without an x.
+    /// The extremes of the circles of points around `axis`, a unit vector with x = 0.
     ///
     /// Each value is a linear function g · p, whose greatest value on a circle of radius ρ about the axis a at height h is
     /// h (g · a) + ρ |g − (g · a) a|.

@@ -9,7 +9,7 @@ use crate::Rgb;
 use crate::bsdf::{Bsdf, Fresnel, Lambert, MetallicRoughness, Phong};
 use crate::math::Vec3;
 
-/// What surfaces reflect that show nothing but shadows; shadows do not depend on it.
+/// The reflectance of shadow catchers, on which shadows do not depend.
 pub(crate) const CATCHER_REFLECTANCE: f32 = 0.5;
 
 /// The material of a part of a scene.
@@ -131,7 +131,7 @@ impl Material {
         .filter_map(|(is_used, feature)| is_used.then_some(feature))
     }
 
-    /// Whether light passes through it where it is there.
+    /// Whether the surface transmits light.
     #[inline]
     pub(crate) fn transmits(&self) -> bool {
         self.layers.transmission.is_some()
@@ -195,7 +195,7 @@ impl Material {
         of_model.chain(self.normal_map.as_ref().map(|n| &n.texture)).chain(self.layers.textures())
     }
 
-    /// Whether it matters which way the tangent points.
+    /// Whether the direction of the tangent matters.
     #[inline]
     pub(crate) fn needs_tangent(&self) -> bool {
         let fixed = match &self.model {
@@ -208,7 +208,7 @@ impl Material {
         fixed || self.normal_map.is_some() || self.layers.anisotropy.is_some() || coat_relief
     }
 
-    /// Which set of texture coordinates tangents follow: 0 or 1.
+    /// The set of texture coordinates for tangents: 0 or 1.
     #[inline]
     pub(crate) fn tangent_set(&self) -> usize {
         let Layers { anisotropy, clearcoat, .. } = &self.layers;
@@ -340,7 +340,7 @@ impl TextureRef {
         textures[self.texture].sample_by(uv, self.wrap, self.filter)
     }
 
-    /// The alpha there; 1 if the texture has none.
+    /// The alpha at these coordinates; 1 if the texture has none.
     #[inline]
     pub(crate) fn alpha_at(&self, textures: &[Texture], uvs: &Uvs) -> f32 {
         let uv = self.transform.apply(uvs[self.uv_set]);

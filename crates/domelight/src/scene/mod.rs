@@ -52,31 +52,31 @@ pub struct Scene {
     parts: Vec<Part>,
     materials: Vec<Material>,
     textures: Vec<Texture>,
-    /// The first triangle of each part in the hierarchy.
+    /// The first triangle of each part in the BVH.
     first_triangle: Vec<u32>,
-    /// The hierarchy of the opaque parts, which come first.
+    /// The BVH over the opaque parts, which come first.
     bvh: Bvh,
     /// The parts that are not opaque, if there are any.
     partial: Option<Partial>,
-    /// Some part is not seen from behind.
+    /// Whether some part is invisible from behind.
     has_single_sided: bool,
-    /// Some part sends out light.
+    /// Whether some part emits light.
     emits: bool,
-    /// Light passes through some part.
+    /// Whether some part transmits light.
     transmits: bool,
-    /// Some part that does not hide all behind it dims light.
+    /// Whether some part with partial coverage dims light.
     dims_light: bool,
-    /// Some part shows nothing but shadows.
+    /// Whether some part is a shadow catcher.
     catches_shadows: bool,
     /// In units of the description.
     bounds: Aabb,
-    /// The bounds of what is not scenery, in units of the description.
+    /// The bounds of the subject, in units of the description.
     subject_bounds: Aabb,
-    /// Of each part, whether it is no scenery.
+    /// Whether each part belongs to the subject.
     is_subject: Vec<bool>,
-    /// From where a framed camera looks.
+    /// The direction of a framed camera.
     view: Option<ViewDirection>,
-    /// The length of one unit of the hierarchy and the parts, in units of the description; a power of two.
+    /// The length of one unit of the BVH and the parts, in units of the description; a power of two.
     unit: f32,
     /// The camera and the up axis of the file, if it has them.
     camera: Option<CameraSettings>,
@@ -91,7 +91,7 @@ pub enum SceneError {
     Mesh {
         /// The part's name.
         part: String,
-        /// What is wrong with it.
+        /// The error in the mesh.
         source: MeshError,
     },
     /// A part with a material that does not exist.
@@ -99,36 +99,36 @@ pub enum SceneError {
     NoSurface {
         /// The part's name.
         part: String,
-        /// The surface's index.
+        /// The index of the material.
         material: usize,
-        /// How many there are.
+        /// The number available.
         materials: usize,
     },
     /// A material with a texture that does not exist.
     #[error("material {material} refers to texture {texture}, but there are only {textures}")]
     NoTexture {
-        /// The surface's name.
+        /// The name of the material.
         material: String,
-        /// The texture's index.
+        /// The index of the texture.
         texture: usize,
-        /// How many there are.
+        /// The number available.
         textures: usize,
     },
     /// More vertices than an index can address.
     #[error("the scene has {vertices} vertices; at most {} fit", u32::MAX)]
     TooManyVertices {
-        /// How many there are.
+        /// The number available.
         vertices: usize,
     },
-    /// Lengths whose squares leave the range of numbers, or a scene that is a speck at its distance from the origin.
+    /// Lengths whose squares overflow or underflow, or a scene that is tiny relative to its distance from the origin.
     #[error(
         "the scene is {size:e} across, {farthest:e} at its farthest; scale it to a size from 1e-18 to 1e18 and move it \
          nearer to the origin than some 1e10 times its size"
     )]
     Size {
-        /// The longest edge of the bounds of what is not scenery.
+        /// The longest edge of the subject's bounds.
         size: f32,
-        /// The greatest coordinate.
+        /// The largest coordinate.
         farthest: f32,
     },
     /// The BVH cannot be built.
@@ -258,7 +258,7 @@ impl Scene {
         camera.scaled(1.0 / self.unit)
     }
 
-    /// The longest extent, in units of the hierarchy.
+    /// The longest extent, in units of the BVH.
     pub(crate) fn extent(&self) -> f32 {
         self.bounds.size().max_element() / self.unit
     }
@@ -299,7 +299,7 @@ impl Scene {
         self.parts.iter().map(|p| p.mesh.triangles.len()).sum()
     }
 
-    /// The part that a triangle of the hierarchy belongs to, and the triangle's index in its mesh.
+    /// The part of a triangle of the BVH, and the triangle's index in its mesh.
     #[inline]
     pub(crate) fn locate(&self, triangle: u32) -> (&Part, usize) {
         let part = self.first_triangle.partition_point(|&first| first <= triangle) - 1;
@@ -307,12 +307,12 @@ impl Scene {
     }
 }
 
-/// Refuses what is so small or so large, or once scaled so small, that rays would hit the surface that they leave.
+/// Rejects scenes so small or so large, or so small after scaling, that rays would hit the surface where they start.
 fn check_size(bounds: &Aabb, subject: &Aabb, scale: f32) -> Result<(), SceneError> {
     let size = subject.size().max_element();
     let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
     let scaled = bounds.size().max_element() * scale;
-    // What has no size is not seen. Squares of the subject's lengths must be finite.
+    // A scene without size is invisible. Squares of the subject's lengths must be finite.
     let is_squarable = size == 0.0 || (1e-18..=1e18).contains(&size);
     let is_empty = bounds.is_empty() || scaled == 0.0;
     let usable = is_empty || is_squarable && farthest.is_finite() && scaled >= 1e-6;
@@ -337,7 +337,7 @@ fn check(description: &SceneDescription) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// The hierarchy over the parts one after the other.
+/// Builds the BVH over consecutive parts.
 fn build(parts: &[Part]) -> Result<Bvh, SceneError> {
     let vertices: usize = parts.iter().map(|p| p.mesh.positions.len()).sum();
     if vertices > u32::MAX as usize {

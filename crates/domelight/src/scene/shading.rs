@@ -40,7 +40,7 @@ impl Scene {
         point
     }
 
-    /// Sets `point` to [`Scene::shading_point`]: a point is large, and need not be copied.
+    /// Sets `point` to [`Scene::shading_point`] in place, because a point is large.
     #[inline]
     pub(crate) fn shade(&self, ray: &Ray, hit: &Hit, point: &mut ShadingPoint) {
         let (part, triangle) = self.locate(hit.triangle);
@@ -85,7 +85,7 @@ impl Scene {
         (point.frame, point.wo) = (frame, wo);
     }
 
-    /// The material of a hit, if its BSDF is the same all over.
+    /// The material of a hit, if its BSDF is the same everywhere.
     #[inline]
     pub(crate) fn constant_material(&self, hit: &Hit) -> Option<usize> {
         let (part, _) = self.locate(hit.triangle);
@@ -136,12 +136,12 @@ impl Scene {
     }
 }
 
-/// What maps say of a surface at a point, on its front side. Which side the viewer is on follows from the interpolated
-/// normal, for relief may tip others over.
+/// The normals and tangent from maps at a point, on the front side of the surface. The interpolated normal determines the
+/// viewer's side, because a normal map may tilt others over.
 struct Relief {
     /// The interpolated normal with the normal map applied.
     normal: Vec3,
-    /// The same of a clear coat.
+    /// The same for a clear coat.
     coat_normal: Vec3,
     /// The x axis of anisotropic lobes, of any length.
     tangent: Option<Vec3>,
@@ -183,7 +183,7 @@ impl Corners {
         self.indices.map(|i| attribute[i])
     }
 
-    /// An attribute interpolated; `None` if the mesh lacks it.
+    /// An interpolated attribute; `None` if the mesh lacks it.
     #[inline]
     pub(super) fn mix<T>(&self, attribute: &[T]) -> Option<T>
     where
@@ -219,7 +219,7 @@ impl Corners {
         (rise != Vec3::ZERO).then_some(rise)
     }
 
-    /// The texture coordinates; 0 of a set that the mesh lacks.
+    /// The texture coordinates; 0 for a set that the mesh lacks.
     #[inline]
     pub(super) fn uvs(&self, mesh: &Mesh) -> Uvs {
         [&mesh.uvs, &mesh.uvs2].map(|set| self.mix(set).unwrap_or_default())

@@ -8,7 +8,7 @@ use crate::bsdf::Bsdf;
 use crate::geometry::{Aabb, Mesh, power_of_two};
 use crate::math::{Frame, Mat4, Vec3};
 
-/// Sizes of scenes that are traced as they are: from the one, and no coordinate beyond the other.
+/// The range of scenes that are traced unscaled: the minimum size, and the maximum coordinate.
 const USUAL: [f32; 2] = [1.0 / 16.0, 65536.0];
 
 /// The radii between which a plate fades to nothing, in half-extents of the subject.
@@ -25,7 +25,7 @@ impl SceneDescription {
         subject.fold(Aabb::EMPTY, |b, (p, _)| b.union(p.mesh.bounds()))
     }
 
-    /// Of each part, whether it is no scenery; all are the subject if there is nothing else.
+    /// Whether each part belongs to the subject: it is not scenery, or there is nothing else.
     pub(super) fn is_subject(&self) -> Vec<bool> {
         let is_scenery = |i: usize| self.scenery.contains(&i);
         let part = |i: usize| !is_scenery(i) && !self.parts[i].mesh.positions.is_empty();
@@ -57,7 +57,7 @@ impl SceneDescription {
         factor
     }
 
-    /// The factor, a power of two, that makes a usual size of the scene's; 1 for what has one.
+    /// The factor, a power of two, that scales a scene to a moderate size; 1 if it has one.
     pub(super) fn usual_scale(&self) -> f32 {
         let bounds = self.bounds();
         let size = bounds.size().max_element();
@@ -70,7 +70,7 @@ impl SceneDescription {
         if size >= USUAL[0] {
             return 1.0 / unit;
         }
-        // What is far from the origin cannot grow.
+        // A scene far from the origin cannot be enlarged.
         let least = 2.0 * power_of_two(farthest) / USUAL[1];
         1.0 / (unit * (0.5 * power_of_two(size)).max(least).min(1.0))
     }
@@ -121,7 +121,7 @@ impl SceneDescription {
         self.add_disc(up, CATCHER_RADII, &ground);
     }
 
-    /// Puts a disk of `material` under the subject that fades between two radii.
+    /// Adds a disk of `material` under the subject that fades between two radii.
     fn add_disc(&mut self, up: Vec3, radii: [f32; 2], material: &Material) {
         const SEGMENTS: u32 = 256;
         const CIRCLES: u32 = 24;
@@ -130,7 +130,7 @@ impl SceneDescription {
             return;
         }
         let half = 0.5 * bounds.size().max_element();
-        // The disk is made about +Y at height 0; the lowest corner says how deep it goes.
+        // Create the disk around +Y at height 0, and move it down to the lowest corner.
         let center = bounds.center();
         let depth = 0.5 * bounds.size().abs().dot(up.abs());
         let frame = Frame::from_z(up);

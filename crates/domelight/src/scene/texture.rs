@@ -26,7 +26,7 @@ pub struct Texture {
     texels: Texels,
     /// The number for each texel value.
     decode: Vec<f32>,
-    /// 0 to 255 from transparent to opaque; empty: opaque.
+    /// 0 to 255 from transparent to opaque; empty if opaque.
     alpha: Vec<u8>,
 }
 
@@ -163,7 +163,7 @@ impl Texture {
         Self::new(name.into(), width, height, Texels::Bits16(texels), encoding)
     }
 
-    /// The texels as they are kept, byte by byte, and everything else in words.
+    /// The stored texels, byte by byte, and everything else as text.
     #[cfg(feature = "io")]
     pub(crate) fn add_to(&self, fingerprinter: &mut crate::fingerprint::Fingerprinter) {
         let Self { name: _, width, height, texels, decode, alpha } = self;
@@ -239,7 +239,7 @@ impl Texture {
         Rgb::new(self.decode[r], self.decode[g], self.decode[b])
     }
 
-    /// Whether it is, going by its mean, a normal map in the tangents' space: half red, half green, all blue.
+    /// Whether the mean suggests a tangent-space normal map: half red, half green, full blue.
     #[cfg(feature = "io")]
     pub(crate) fn looks_like_normals(&self) -> bool {
         // Enough texels for a mean, in all parts of the image.
@@ -336,7 +336,7 @@ fn neighbors(t: f32, n: u32, wrap: Wrap) -> (u32, u32, f32) {
     (wrap_index(i, n, wrap), wrap_index(i + 1, n, wrap), x - floor)
 }
 
-/// The texel index `i` in [-1, n] brought into [0, n).
+/// Wraps the texel index `i` in [-1, n] into [0, n).
 #[inline]
 fn wrap_index(i: i64, n: u32, wrap: Wrap) -> u32 {
     match wrap {

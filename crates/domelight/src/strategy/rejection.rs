@@ -67,9 +67,9 @@ pub enum StoppingRule {
     /// Stop at a number of accepted samples or a number of tries, whichever comes first. Tries use independent random
     /// numbers.
     Accepted {
-        /// Directions to keep, at least 2.
+        /// The number of directions to accept, at least 2.
         n: u32,
-        /// The most tries, at least 1.
+        /// The maximum number of tries, at least 1.
         max_tries: u32,
     },
 }
@@ -80,13 +80,13 @@ pub enum RejectionError {
     /// No tries.
     #[error("rejection sampling needs at least one try")]
     NoTries,
-    /// One kept direction says nothing about how rare it is.
+    /// One accepted direction does not determine the acceptance rate.
     #[error(
         "stopping after {n} accepted directions: at least 2 are needed for an unbiased estimate \
          of the acceptance rate"
     )]
     TooFewAccepted {
-        /// The number asked for.
+        /// The requested number.
         n: u32,
     },
 }
@@ -111,11 +111,11 @@ impl RejectionStatistics {
     }
 }
 
-/// A shadow ray to be weighed when the number of tries is known.
+/// A shadow ray to be weighted once the number of tries is known.
 #[derive(Clone, Copy, Debug)]
 struct AcceptedSample {
     wi: Vec3,
-    /// Its value over that of the envelope.
+    /// The ratio of its value to the envelope.
     value: Rgb,
 }
 
@@ -131,12 +131,12 @@ pub struct RejectionSampling<'a> {
     stop: StoppingRule,
 }
 
-/// What tries at a point are made under.
+/// The setup of the tries at a point.
 #[derive(Clone, Copy, Debug)]
 struct Envelope {
     /// Never [`Proposal::Tighter`].
     proposal: Proposal,
-    /// The bound on the factor that is not drawn from.
+    /// The bound on the other factor.
     bound: f32,
     /// C.
     mass: f32,

@@ -55,7 +55,7 @@ pub enum Candidates {
 }
 
 impl Candidates {
-    /// How many of `m` come from the environment and from the BRDF for certain; one more may come from either.
+    /// The fixed numbers out of `m` from the environment and from the BRDF; one more may come from either.
     fn split(self, m: u32) -> (u32, u32) {
         match self {
             Self::Environment => (m, 0),
@@ -104,7 +104,7 @@ struct Candidate {
     value: Rgb,
     /// Its luminance, positive.
     weight: f32,
-    /// Its place among the candidates of the point.
+    /// Its index among the candidates of the point.
     index: u32,
 }
 
@@ -112,9 +112,9 @@ struct Candidate {
 #[derive(Clone, Debug, Default)]
 pub struct SirScratch {
     candidates: Vec<Candidate>,
-    /// Place on the curve in the upper half, place among the candidates in the lower.
+    /// The position on the curve in the upper half, the index of the candidate in the lower half.
     order: Vec<u64>,
-    /// Where picks fall, as shares of the total, rising.
+    /// The positions of picks as fractions of the total, in ascending order.
     ticks: Vec<f32>,
     reservoirs: WeightedReservoirs<Candidate>,
 }
@@ -127,10 +127,10 @@ impl SamplingImportanceResampling<'_> {
         let is_odd = m + n < self.n_candidates;
         let odd = if is_odd { 0.5 } else { 0.0 };
         let (expected_m, expected_n) = (expected(m, odd), expected(n, odd));
-        // Samples of the pixel share a sequence, so each reserves as many numbers.
+        // All samples of the pixel share a sequence, so each reserves the same number of points.
         let (numbers_m, numbers_n) = (m + u32::from(is_odd), n + u32::from(is_odd));
         if is_odd {
-            // Toss a coin for the odd candidate, by a number that no direction uses.
+            // Choose the source of the odd candidate with a number that no direction uses.
             let coin = sample_index.get(Dimension::Environment, m, numbers_m).u_lobe();
             if coin < 0.5 { m += 1 } else { n += 1 }
         }
@@ -182,7 +182,7 @@ impl SamplingImportanceResampling<'_> {
         self.draw(at, sample_index, |c| candidates.push(c));
         let total = candidates.iter().map(|c| f64::from(c.weight)).sum();
         if !f64::is_finite(total) {
-            // Overflow is handed on, for the film to count.
+            // Pass overflow on to the film, which counts it.
             candidates.iter().take(1).for_each(|c| push(c.wi, c.value * f32::INFINITY));
             return;
         }
@@ -250,7 +250,7 @@ fn pick<'a>(
             ticks = &ticks[count..];
         }
     }
-    // A tick is below 1 by more than sums in double precision are off.
+    // A tick is below 1 by more than the rounding error of double-precision sums.
     debug_assert!(ticks.is_empty() || total == 0.0);
 }
 
@@ -294,7 +294,7 @@ const REPEATS: u32 = 16;
 pub struct CandidatePilot<'p, V> {
     visibility: V,
     seed: u64,
-    /// Points that see light, and what they reflect of it, nearly.
+    /// Points that see light, with an approximation of the light they reflect.
     points: Vec<(&'p ShadingPoint, f64)>,
 }
 

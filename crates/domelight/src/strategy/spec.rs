@@ -28,46 +28,46 @@ use crate::sampling::Heuristic;
 pub enum StrategySpec {
     /// BRDF sampling.
     Brdf {
-        /// Shadow rays of each camera sample, 1 to 65,536.
+        /// Shadow rays per camera sample, 1 to 65,536.
         n_samples: u32,
     },
     /// Environment sampling.
     Environment {
-        /// Shadow rays of each camera sample, 1 to 65,536.
+        /// Shadow rays per camera sample, 1 to 65,536.
         n_samples: u32,
     },
     /// Multiple importance sampling of environment and BRDF.
     Mis {
-        /// Environment samples of each camera sample, up to 65,536; not both counts are zero.
+        /// Environment samples per camera sample, up to 65,536. The two counts must not both be zero.
         n_environment: u32,
-        /// BRDF samples of each camera sample, up to 65,536.
+        /// BRDF samples per camera sample, up to 65,536.
         n_brdf: u32,
-        /// The heuristic that weights the samples.
+        /// The heuristic for the MIS weights.
         heuristic: Heuristic,
-        /// Leaves what is dimmer than the mean radiance to the BRDF samples; needs at least one.
+        /// Whether radiance below the mean is left to the BRDF samples, which requires at least one.
         compensation: bool,
     },
     /// Product sampling with learned visibility.
     Product {
-        /// Shadow rays of each camera sample at the most, 1 to 65,536.
+        /// The maximum number of shadow rays per camera sample, 1 to 65,536.
         n_rays: u32,
     },
     /// Rejection sampling of the product.
     Rejection {
-        /// The factor of the product that tries are drawn from.
+        /// The factor of the product from which tries are drawn.
         proposal: Proposal,
         /// The rule that ends the tries at a point.
         stop: StoppingRule,
     },
     /// Sampling importance resampling of the product.
     Sir {
-        /// Candidates of each camera sample, 1 to 1,048,576; `None` lets a pilot choose.
+        /// Candidates per camera sample, 1 to 1,048,576; with `None`, a pilot chooses.
         n_candidates: Option<u32>,
-        /// Shadow rays of each camera sample, 1 to 65,536, no more than candidates.
+        /// Shadow rays per camera sample, 1 to 65,536, at most the number of candidates.
         n_samples: u32,
-        /// The density that candidates are drawn from.
+        /// The density from which candidates are drawn.
         candidates: Candidates,
-        /// The method that picks rays from candidates.
+        /// How rays are picked from candidates.
         resampling: Resampling,
     },
     /// The directional lights of median cut; biased.
@@ -110,10 +110,10 @@ pub enum StrategyKind {
     VarianceMinimization,
 }
 
-/// The most shadow rays of a camera sample.
+/// The maximum number of shadow rays per camera sample.
 const MAX_RAYS: u32 = 1 << 16;
 
-/// The most candidates, tries or lights.
+/// The maximum number of candidates, tries or lights.
 const MAX_CANDIDATES: u32 = 1 << 20;
 
 /// The values of one option by name; names of a value other than the first are aliases.
@@ -262,10 +262,10 @@ pub enum StrategyError {
     Misplaced {
         /// The option.
         option: &'static str,
-        /// The strategies that take it.
+        /// The strategies that accept it.
         strategies: &'static str,
     },
-    /// Numbers that contradict each other.
+    /// Contradictory numbers.
     #[error("{0}")]
     Contradiction(&'static str),
 }
@@ -311,7 +311,7 @@ impl StrategyOptions {
         Ok((kind, options))
     }
 
-    /// Sets what the numbers after a strategy's name stand for.
+    /// Sets the options given by the numbers after a strategy's name.
     fn set_numbers(
         &mut self,
         kind: StrategyKind,
@@ -386,7 +386,7 @@ impl StrategyOptions {
         }
     }
 
-    /// Refuses options of other strategies.
+    /// Rejects options of other strategies.
     fn check(&self, kind: StrategyKind) -> Result<(), StrategyError> {
         use StrategyKind as K;
         let is_rig = matches!(kind, K::MedianCut | K::VarianceMinimization);
@@ -492,7 +492,7 @@ impl StrategySpec {
             n_environment,
             n_brdf,
             heuristic: options.heuristic.unwrap_or(Heuristic::Power),
-            // Without BRDF samples nothing would catch the dim light.
+            // Without BRDF samples, the dim light would be lost.
             compensation: !options.no_compensation && n_brdf > 0,
         })
     }
@@ -550,7 +550,7 @@ impl StrategySpec {
             Self::Rejection { stop: StoppingRule::Tries(n), .. } => n,
             Self::Mis { n_environment, n_brdf, .. } => n_environment.max(n_brdf),
             Self::Sir { n_candidates, n_samples, .. } => n_candidates.unwrap_or(n_samples),
-            // These draw independent numbers, or none.
+            // These use independent random numbers, or none.
             Self::Rejection { stop: StoppingRule::Accepted { .. }, .. }
             | Self::MedianCut { .. }
             | Self::VarianceMinimization { .. } => 1,
