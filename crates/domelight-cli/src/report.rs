@@ -1,4 +1,4 @@
-//! What a render did: as JSON or as two lines for people.
+//! The report of a render, as JSON or as two lines of text.
 
 use anyhow::{Result, bail};
 use domelight::render::{Provenance, RenderSettings, Rendering};
@@ -13,7 +13,7 @@ use crate::profile::{self, StageSeconds};
 use crate::terminal::Terminal;
 use crate::tone::{Shown, denoised_line};
 
-/// What was rendered, and how: enough to make the same picture again.
+/// The settings of the render, enough to make the same picture again.
 #[derive(Serialize)]
 pub(crate) struct Settings {
     #[serde(flatten)]
@@ -25,12 +25,12 @@ pub(crate) struct Settings {
     pub(crate) filter: &'static str,
     pub(crate) seed: u64,
     pub(crate) threads: usize,
-    /// What brings the median of the picture to middle gray \[stops\].
+    /// The exposure that maps the median of the picture to middle gray \[stops\].
     pub(crate) automatic_exposure: f32,
 }
 
 impl Settings {
-    /// The provenance that OpenEXR files state.
+    /// The provenance stored in OpenEXR files.
     pub(crate) fn provenance(&self, settings: &RenderSettings) -> Vec<(String, String)> {
         let provenance = Provenance {
             scene: &self.scene.scene,
@@ -46,14 +46,14 @@ impl Settings {
 /// Where the time went.
 #[derive(Serialize)]
 pub(crate) struct Timings {
-    /// Reading or making scene and probe.
+    /// Reading or creating the scene and the probe.
     pub(crate) load: Seconds,
     /// The BVH and the environment's table.
     pub(crate) build: Seconds,
     pub(crate) render: Seconds,
     /// Encoding and writing pictures.
     pub(crate) write: Seconds,
-    /// By the clock, since the program began.
+    /// The wall-clock time since the program began.
     pub(crate) total: f64,
 }
 
@@ -65,7 +65,7 @@ pub(crate) enum StopReason {
     Time,
 }
 
-/// All that `--json` prints.
+/// The output of `--json`.
 #[derive(Serialize)]
 pub(crate) struct RenderReport {
     version: &'static str,
@@ -82,13 +82,13 @@ pub(crate) struct RenderReport {
     complete: bool,
     stopped: Option<StopReason>,
     outputs: Vec<String>,
-    /// How PNG output is shown, if there is any.
+    /// How PNG output is developed, if there is any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) png: Option<Shown>,
     /// How output was denoised, if it was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) denoised: Option<String>,
-    /// CPU seconds by stage of the render, if they were asked for.
+    /// CPU seconds by stage of the render, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) profile: Option<Vec<StageSeconds>>,
 }
@@ -170,7 +170,7 @@ impl RenderReport {
         }
     }
 
-    /// Complains about what the picture does not show.
+    /// Warns about what the picture lacks.
     ///
     /// # Errors
     /// If the render was interrupted, or time ended it before a part was whole.

@@ -1,4 +1,4 @@
-//! From the flags to a strategy.
+//! Converts the flags to a strategy.
 
 use anyhow::Result;
 use domelight::environment::Environment;
@@ -47,7 +47,7 @@ fn message(kind: StrategyKind, error: &StrategyError) -> String {
     }
 }
 
-/// What rejection would accept at those points; `None` for other strategies.
+/// The acceptance of rejection sampling at these points; `None` for other strategies.
 ///
 /// # Errors
 /// If its stopping rule has no estimate.

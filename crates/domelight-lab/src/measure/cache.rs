@@ -1,7 +1,7 @@
 //! References in the user's cache folder, by content.
 //!
 //! An entry is `KEY-SUM.exr`: KEY is the fingerprint of everything that decides the picture, SUM that of
-//! the file itself, so that a damaged entry is known and made again.
+//! the file itself, so that a damaged entry is detected and rendered again.
 
 use std::fmt::Display;
 use std::fs;
@@ -22,8 +22,8 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// The folder that was asked for, else that of the platform; none, with a warning, where there is none. `program`
-    /// is the fingerprint of what renders: another build may make other pictures.
+    /// The requested folder, or else that of the platform; `None` with a warning if there is none. `program` is the fingerprint
+    /// of the renderer, because another build may make other pictures.
     pub fn new(folder: Option<&Path>, program: &str, host: &dyn Host) -> Option<Self> {
         let folder = folder
             .map(Path::to_path_buf)
@@ -36,7 +36,7 @@ impl Cache {
         Some(Self { folder: folder?, program: program.to_owned() })
     }
 
-    /// The entry and its bytes, if it is there and sound; a damaged one is removed.
+    /// The entry and its bytes, if it exists and is valid. A damaged entry is removed.
     pub(crate) fn get(&self, key: &Key, host: &dyn Host) -> Option<(PathBuf, Vec<u8>)> {
         let entries = fs::read_dir(&self.folder).ok()?.flatten().map(|entry| entry.path());
         for path in entries {
@@ -56,7 +56,7 @@ impl Cache {
         None
     }
 
-    /// Keeps the bytes, if that is possible; else warns, for what was rendered is there all the same.
+    /// Stores the bytes if possible. Otherwise it only warns, because the render is still available.
     pub(crate) fn put(&self, key: &Key, bytes: &[u8], host: &dyn Host) -> Option<PathBuf> {
         let kept = self.try_put(key, bytes);
         kept.inspect_err(|error| host.warn(&format!("the reference cannot be cached: {error}")))
@@ -77,11 +77,11 @@ impl Cache {
     }
 }
 
-/// Names everything that decides a picture.
+/// The key of everything that decides a picture.
 pub(crate) struct Key(String);
 
 impl Key {
-    /// The key of what this program makes: scene, light and view, the program itself, and what `settings` say.
+    /// The key of a picture by this program: scene, light and view, the program itself, and `settings`.
     pub(crate) fn of_program(
         cache: &Cache,
         view: PreparedSceneRef,
@@ -93,7 +93,7 @@ impl Key {
         Self::of(key, view, settings)
     }
 
-    /// The key of what another program makes, which `settings` name.
+    /// The key of a picture by another program, described by `settings`.
     pub(crate) fn of_other(view: PreparedSceneRef, settings: impl Display) -> Self {
         Self::of(Fingerprinter::default(), view, settings)
     }

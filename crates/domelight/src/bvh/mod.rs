@@ -69,7 +69,7 @@ pub struct Bvh {
     instruction_set: InstructionSet,
 }
 
-/// Eight children: their boxes, and where they are.
+/// A node with the boxes and references of eight children.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
 struct Node {
@@ -78,7 +78,7 @@ struct Node {
     children: [Child; WIDTH],
 }
 
-/// Where a child is: a node, or the one block of a leaf.
+/// The reference of a child: a node, or the single block of a leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Child(u32);
 
@@ -104,13 +104,13 @@ impl Child {
     }
 }
 
-/// Up to eight triangles; a missing one has NaN vertices, which no ray meets.
+/// Up to eight triangles. A missing one has NaN vertices, which no ray hits.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 struct Block {
     /// By vertex, then axis.
     vertices: [[Lanes; 3]; 3],
-    /// The triangles' numbers, [`Block::NONE`] where one is missing.
+    /// The indices of the triangles; [`Block::NONE`] for a missing one.
     ids: [u32; WIDTH],
 }
 
@@ -136,13 +136,13 @@ pub enum BvhError {
         triangle: usize,
         /// Its index.
         index: u32,
-        /// How many vertices there are.
+        /// The number of vertices.
         vertices: usize,
     },
     /// More triangles than indices.
     #[error("{count} triangles are too many: at most {max} fit in one BVH; split the scene")]
     TooManyTriangles {
-        /// How many there are.
+        /// The number of triangles.
         count: usize,
         /// How many fit.
         max: usize,
