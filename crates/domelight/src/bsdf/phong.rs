@@ -22,8 +22,8 @@ pub struct Phong {
 }
 
 impl Phong {
-    /// Creates the lobe with reflectance k_s, clamped to [0, 1], and exponent n, clamped to [0,
-    /// [`super::MAX_EXPONENT`]].
+    /// Creates the lobe with reflectance k_s, clamped to [0, 1], and exponent n, clamped to
+    /// [0, [`super::MAX_EXPONENT`]].
     pub fn new(specular: Rgb, exponent: f32) -> Self {
         Self { specular: range::reflectance(specular), exponent: range::exponent(exponent) }
     }
