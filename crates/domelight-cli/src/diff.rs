@@ -132,7 +132,7 @@ impl Difference {
             "relMSE trimmed",
             format!("{:.6e}   (without the worst 0.1 % of the pixels)", c.rel_mse_trimmed),
         );
-        row("PSNR", format!("{:.2} dB   (peak: greatest value of the reference)", c.psnr));
+        row("PSNR", format!("{:.2} dB   (peak: largest value of the reference)", c.psnr));
         row("mean ratio", rgb(c.mean_ratio));
         row("mean", rgb(c.mean));
         row("mean reference", rgb(c.mean_reference));

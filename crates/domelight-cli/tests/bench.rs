@@ -41,7 +41,7 @@ fn results_hold_what_was_measured_and_become_tables() {
     assert_eq!(row["material"], "diffuse:0.8");
     assert!(row["covered_pixels"].as_u64().unwrap() > 20);
     assert!(row["reference"]["rel_mse"].as_f64().unwrap() <= 2e-3);
-    // The greatest error first, however they were typed.
+    // The largest error first, however they were typed.
     assert_eq!(row["errors"], serde_json::json!([0.1, 0.01]));
     let strategies = row["strategies"].as_array().unwrap();
     assert_eq!([&strategies[0]["name"], &strategies[1]["name"]], ["mis", "product:4"]);

@@ -487,7 +487,7 @@ fn a_frustum_sees_what_its_rays_hit() {
     assert!(empty > 5_000 && hits > 5_000, "{empty} {hits}");
 }
 
-/// Any bits, and those that go wrong: NaN, infinities, denormals, zeros of both signs, the greatest.
+/// Any bits, and those that go wrong: NaN, infinities, denormals, zeros of both signs, the largest.
 fn hostile_number(random: &mut Random) -> f32 {
     let special = [
         0.0,

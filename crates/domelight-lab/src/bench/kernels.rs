@@ -79,7 +79,7 @@ struct Scaling {
     wall: MedianAndRange,
 }
 
-/// The median of the rounds, and the least and the greatest.
+/// The median of the rounds, and the least and the largest.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct MedianAndRange {
     median: f64,

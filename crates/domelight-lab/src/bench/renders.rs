@@ -57,7 +57,7 @@ pub(super) struct Row {
     build: Seconds,
     reference: ReferenceReport,
     bound: Bound,
-    /// That are to be reached, the greatest first; in the suite `lecture` after that of SIR's picture.
+    /// That are to be reached, the largest first; in the suite `lecture` after that of SIR's picture.
     errors: Vec<f64>,
     strategies: Vec<StrategyEntry>,
     /// Null if none was asked for, or it cannot show the case.
@@ -131,7 +131,7 @@ struct CaseRunner<'a> {
     bench: &'a Bench<'a>,
     strategies: Vec<NamedStrategy>,
     quality_of: Option<&'a str>,
-    /// That are to be reached, the greatest first.
+    /// That are to be reached, the largest first.
     errors: Vec<f64>,
     reference_error: f64,
     peer: Option<RefCell<Mitsuba>>,

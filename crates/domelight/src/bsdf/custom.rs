@@ -13,24 +13,24 @@ use crate::simd::{Colors, SimdFloat, Vectors};
 /// [`Bxdf::eval_pdf`] lie above the surface. The density must be positive wherever the value is, and must be the
 /// density of [`Bxdf::sample`]; `testkit`'s χ² test proves it.
 pub trait Bxdf: Debug + Send + Sync {
-    /// f_r(wo, wi) · cos θ_i ≥ 0 \[sr⁻¹\], the cosine inside, and the density of [`Bxdf::sample`] \[sr⁻¹\].
+    /// f_r(wo, wi) · cos θ_i ≥ 0 \[sr⁻¹\], including the cosine, and the density of [`Bxdf::sample`] \[sr⁻¹\].
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32);
 
-    /// Draws `wi` from uniform numbers in [0, 1); `None` is a sample of value zero. By default cosine-weighted, for
+    /// Samples `wi` from uniform numbers in [0, 1); `None` is a sample with value zero. The default is cosine-weighted, for
     /// densities of cos θ / π.
     fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Vec3> {
         let _ = (wo, u_lobe);
         Some(crate::sampling::warp::cosine_hemisphere(u))
     }
 
-    /// An upper bound over all `wi` of the greatest channel of the value \[sr⁻¹\]; rejection sampling stands on it.
+    /// An upper bound over all `wi` on the largest channel of the value \[sr⁻¹\], which rejection sampling requires.
     fn max_eval(&self, wo: Vec3) -> f32;
 
-    /// The fraction of uniform light that is reflected toward `wo` = (·, ·, `cos_theta_o`), roughly; not negative.
+    /// The approximate, non-negative fraction of uniform light that is reflected toward `wo` = (·, ·, `cos_theta_o`).
     fn albedo(&self, cos_theta_o: f32) -> Rgb;
 
-    /// The GGX roughness α of a lobe about the mirror direction that is as wide, or `None` if the lobe resembles a
-    /// diffuse one. It guides `product`; a poor guess costs rays, not bias.
+    /// The GGX roughness α of an equally wide lobe around the mirror direction, or `None` if the lobe resembles a diffuse one.
+    /// It guides `product`; a poor guess costs rays but adds no bias.
     fn roughness(&self) -> Option<f32> {
         None
     }

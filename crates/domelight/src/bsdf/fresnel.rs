@@ -24,7 +24,7 @@ pub enum Fresnel {
 }
 
 impl Fresnel {
-    /// The same with its parameters clamped to the range that the formulas bear.
+    /// The same with parameters clamped to the range in which the formulas are valid.
     pub(super) fn in_range(self) -> Self {
         match self {
             Self::One => Self::One,
@@ -51,7 +51,7 @@ impl Fresnel {
         }
     }
 
-    /// The greatest channel of F over all cosines from `cos_theta` to 1.
+    /// The largest channel of F over all cosines from `cos_theta` to 1.
     pub fn max_from(&self, cos_theta: f32) -> f32 {
         // All three fall, or fall and rise once, from grazing to normal incidence.
         self.eval(cos_theta).max_component().max(self.eval(1.0).max_component())

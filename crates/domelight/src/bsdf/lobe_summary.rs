@@ -11,9 +11,9 @@ pub enum GlossyLobe {
     Slopes {
         /// The roughness.
         alpha: [f32; 2],
-        /// Whether tails fall as a Gaussian.
+        /// Whether the tails fall like a Gaussian.
         gaussian: bool,
-        /// The normal that the lobe is about, where it is not the surface's: a unit vector in the local frame.
+        /// The normal around which the lobe lies, if it is not the surface's: a unit vector in the local frame.
         leaning: Option<Vec3>,
     },
     /// A cosⁿ lobe around the mirror direction.
@@ -54,7 +54,7 @@ impl LobeSummary {
 }
 
 impl Bsdf {
-    /// Whether it looks the same when it turns about the normal.
+    /// Whether the BSDF is isotropic: invariant under rotation about the normal.
     #[cfg(feature = "render")]
     pub(crate) fn is_isotropic(&self) -> bool {
         self.lobes().all(|(_, lobe)| match lobe {
@@ -78,7 +78,7 @@ impl Bsdf {
         };
         let mut diffuse = Rgb::BLACK;
         for (weight, lobe) in self.lobes() {
-            // One that reflects nothing toward this view by Fresnel's factor at the normal still does at others.
+            // One that reflects nothing toward this view by the Fresnel factor at the normal still does at others.
             let albedo = lobe.directional_albedo(wo.z);
             let albedo = if albedo.is_black() { Rgb::splat(LEAST_ALBEDO) } else { albedo } * weight;
             match lobe {

@@ -52,7 +52,7 @@ lobes! {
     Coat
 }
 
-/// The same expression for the lobe inside, whatever it is.
+/// Evaluates the same expression for any lobe.
 macro_rules! each {
     ($lobe:expr, $l:ident => $body:expr) => {
         match $lobe {
@@ -122,11 +122,11 @@ pub struct TooManyLobes {
     pub count: usize,
 }
 
-/// The cosine at which lobes are weighed while the view is unknown: the mean of cos θ over
-/// directions that a diffuse surface receives light from.
+/// The cosine at which lobes are weighted while the view is unknown: the mean of cos θ over the
+/// directions from which a diffuse surface receives light.
 const TYPICAL_COSINE: f32 = 2.0 / 3.0;
 
-/// The least share of a lobe, relative to the sum of all: its albedo is only an estimate.
+/// The minimum share of a lobe relative to the sum of all, because its albedo is only an estimate.
 const LEAST_SHARE: f32 = 0.05;
 
 impl Bsdf {
@@ -208,7 +208,7 @@ impl Bsdf {
         seen
     }
 
-    /// Makes it what [`Bsdf::for_view`] makes of `other`, in place.
+    /// Sets this to [`Bsdf::for_view`] of `other`, in place.
     #[inline]
     pub(crate) fn set(&mut self, other: &Self, wo: Vec3) {
         self.n_terms = other.n_terms;
@@ -239,7 +239,7 @@ impl Bsdf {
         self.directional_albedo(1.0)
     }
 
-    /// Whether samples choose among lobes or parts of them: if not, `u_lobe` does not matter.
+    /// Whether samples choose among lobes or parts of them; if not, `u_lobe` is unused.
     pub(crate) fn has_choice(&self) -> bool {
         let mut terms = self.terms().iter();
         self.n_terms > 1
@@ -257,7 +257,7 @@ impl Bsdf {
     }
 }
 
-/// Not black from every direction.
+/// Whether the lobe is not black from every direction.
 fn reflects(&(weight, lobe): &(f32, Lobe)) -> bool {
     let albedo = lobe.directional_albedo(0.0) + lobe.directional_albedo(1.0);
     weight > 0.0 && !albedo.is_black()
@@ -295,7 +295,7 @@ impl Brdf for Bsdf {
         (value, pdf)
     }
 
-    /// What is left of `u_lobe` after the choice of a lobe is uniform again, and chooses within the lobe.
+    /// The remainder of `u_lobe` after the choice of a lobe is uniform again, and chooses within the lobe.
     #[inline(always)]
     fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
         let one = |x| wo.z.splat(x);
@@ -490,7 +490,7 @@ mod tests {
         assert_eq!(error, TooManyLobes { count: 4 });
     }
 
-    /// The share of samples drawn from the glossy lobe follows Fresnel's reflectance.
+    /// The share of samples drawn from the glossy lobe follows the Fresnel reflectance.
     #[test]
     fn a_view_refines_the_choice() {
         let bsdf = Bsdf::new(&[Lambert::new(Rgb::splat(0.5)).into(), glossy(0.04)]).unwrap();

@@ -28,10 +28,10 @@ use crate::simd::{Colors, LaneMask as _, SimdFloat, Vectors};
 pub struct MetallicRoughness {
     diffuse: Rgb,
     f0: Rgb,
-    /// No less than any channel of `f0`.
+    /// At least as large as any channel of `f0`.
     f90: f32,
     alpha: [f32; 2],
-    /// Whether the diffuse part loses the greatest channel of F from every channel.
+    /// Whether the diffuse part loses the largest channel of F from every channel.
     keeps_hue: bool,
 }
 
@@ -87,7 +87,7 @@ impl MetallicRoughness {
         Self { diffuse: self.diffuse * (1.0 - range::unit(transmission)), ..self }
     }
 
-    /// With f90 ≥ f0 to the last bit, whatever was rounded.
+    /// Ensures f90 ≥ f0 to the last bit, regardless of rounding.
     fn ordered(self) -> Self {
         Self { f90: self.f90.max(self.f0.max_component()), ..self }
     }
@@ -108,21 +108,21 @@ impl MetallicRoughness {
         self.alpha
     }
 
-    /// The specular part over `f90`.
+    /// The specular part divided by `f90`.
     fn specular(&self) -> Ggx {
         let f0 = if self.f90 > 0.0 { self.f0 / self.f90 } else { Rgb::BLACK };
         Ggx::new(self.alpha, Fresnel::Schlick { f0 }, Masking::Correlated)
     }
 
-    /// What the diffuse part loses to reflection, where that is `f`.
+    /// The fraction that the diffuse part loses to reflection `f`.
     #[inline(always)]
     fn lost<F: SimdFloat>(&self, f: Colors<F>) -> Colors<F> {
         let Colors([r, g, b]) = f;
         if self.keeps_hue { Colors([r.max(g).max(b); 3]) } else { f }
     }
 
-    /// The probability of drawing from the specular part: at most [`MOST_SPECULAR`] beside a diffuse one, whose weights
-    /// would have no bound at grazing views.
+    /// The probability of sampling the specular part: at most [`MOST_SPECULAR`] if there is a diffuse part, whose weights would
+    /// otherwise be unbounded at grazing views.
     #[inline]
     pub(super) fn specular_share<F: SimdFloat>(&self, cos_theta_o: F) -> F {
         let one = |x| cos_theta_o.splat(x);
@@ -137,7 +137,7 @@ impl MetallicRoughness {
     }
 }
 
-/// The greatest probability of drawing from the specular part beside a diffuse one.
+/// The maximum probability of sampling the specular part if there is a diffuse part.
 const MOST_SPECULAR: f32 = 0.95;
 
 impl Brdf for MetallicRoughness {

@@ -73,7 +73,7 @@ pub trait Brdf: Copy + Send + Sync {
     /// or is not finite is the sample of value zero.
     fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F>;
 
-    /// An upper bound over all `wi` of the greatest channel of [`Brdf::eval`] \[sr⁻¹\].
+    /// An upper bound over all `wi` of the largest channel of [`Brdf::eval`] \[sr⁻¹\].
     fn max_eval(&self, wo: Vec3) -> f32;
 
     /// The fraction of light toward `wo` = (·, ·, `cos_theta_o`) under uniform light, roughly: what

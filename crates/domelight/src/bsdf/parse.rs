@@ -79,11 +79,11 @@ pub enum MaterialSpec {
         metallic: f32,
         /// Perceptual roughness.
         roughness: f32,
-        /// The strength of the dielectric's reflection.
+        /// The strength of the dielectric reflection.
         specular: f32,
         /// Its color at normal incidence.
         specular_color: Rgb,
-        /// How much the highlight is drawn out along x.
+        /// The strength with which the highlight is stretched along x.
         anisotropy: f32,
     },
     /// `mix`: half `diffuse:0.5`, half `ggx:0.1`.
@@ -110,9 +110,9 @@ pub enum ParseMaterialError {
     Count {
         /// The model.
         model: &'static str,
-        /// How many it takes, in words.
+        /// The expected number, in words.
         expected: &'static str,
-        /// How many were given.
+        /// The given number.
         given: usize,
         /// A right one.
         example: &'static str,
@@ -126,7 +126,7 @@ pub enum ParseMaterialError {
         parameter: &'static str,
         /// What stands there.
         text: String,
-        /// What may stand there.
+        /// The expected value.
         expected: &'static str,
     },
 }
@@ -375,7 +375,7 @@ impl From<MaterialSpec> for Bsdf {
 impl FromStr for Bsdf {
     type Err = ParseMaterialError;
 
-    /// As [`MaterialSpec`].
+    /// Those of [`MaterialSpec`].
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         text.parse::<MaterialSpec>().map(Self::from)
     }

@@ -24,13 +24,13 @@ pub const MAX_ALPHA: f32 = 10.0;
 /// The maximum exponent of a Phong lobe.
 pub const MAX_EXPONENT: f32 = 1e5;
 
-/// The least real part of a refractive index.
+/// The minimum real part of a refractive index.
 const MIN_INDEX: f32 = 1e-3;
 
-/// The greatest real or imaginary part of a refractive index.
+/// The maximum real or imaginary part of a refractive index.
 const MAX_INDEX: f32 = 1e3;
 
-/// The greatest weight of a lobe in a material.
+/// The maximum weight of a lobe in a BSDF.
 const MAX_WEIGHT: f32 = 1e3;
 
 /// `x` clamped to [`low`, `high`]; `low` for NaN.

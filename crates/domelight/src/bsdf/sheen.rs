@@ -84,7 +84,7 @@ impl Brdf for Sheen {
         Vectors { x: sin_theta * cos_phi, y: sin_theta * sin_phi, z: one - u }
     }
 
-    /// Bounded slice by slice of cos θ_i: the visibility grows with it, and the greatest θ_h = (θ_i + θ_o)/2 shrinks.
+    /// Bounded slice by slice of cos θ_i: the visibility grows with it, and the largest θ_h = (θ_i + θ_o)/2 shrinks.
     fn max_eval(&self, wo: Vec3) -> f32 {
         const SLICES: usize = 24;
         if wo.z <= HORIZON {

@@ -200,7 +200,7 @@ mod tests {
         assert_eq!(counts, [n / 4; 4]);
     }
 
-    /// u = 0 is the normal itself, and the greatest u below one is finite: the logarithm is of
+    /// u = 0 is the normal itself, and the largest u below one is finite: the logarithm is of
     /// 1 − u, never of zero.
     #[test]
     fn the_logarithm_is_never_of_zero() {

@@ -212,7 +212,7 @@ impl Mapping {
             // sin θ dθ = 4 r dr for θ = 2 asin r: the reflection in a ball preserves area.
             Self::MirrorBall => 16.0,
             Self::Octahedral => 4.0 * PI,
-            // dω = ds dt / (1 + s² + t²)^{3/2}, and 1/√(1 + s² + t²) is the greatest component.
+            // dω = ds dt / (1 + s² + t²)^{3/2}, and 1/√(1 + s² + t²) is the largest component.
             Self::Cube(layout) => {
                 let (columns, rows) = layout.faces_across_and_down();
                 4.0 * (columns * rows) as f32 * functions::powi(direction.abs().max_element(), 3)

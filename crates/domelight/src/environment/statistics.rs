@@ -192,7 +192,7 @@ fn sun(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Sun> {
     Some(Sun { direction, solid_angle, angular_radius, irradiance, share: energy / all })
 }
 
-/// The texels of the greatest value, if they are several, small, bright, and end sharply.
+/// The texels of the largest value, if they are several, small, bright, and end sharply.
 fn plateau(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Plateau> {
     /// What is at least so bright belongs to a peak that has no sharp edge.
     const NEAR: f32 = 0.98;
@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn a_peak_that_fades_is_no_plateau() {
-        // Rounded, more coarsely than Radiance pictures are: several texels of a smooth peak share the greatest value.
+        // Rounded, more coarsely than Radiance pictures are: several texels of a smooth peak share the largest value.
         let rounded = |x: f32| 2.0 * (0.5 * x).round();
         let peak = |variance: f32, clip: f32| {
             RgbImage::from_fn(256, 128, |x, y| {

@@ -177,7 +177,7 @@ impl Mesh {
     }
 }
 
-/// The linear part of an affine matrix, divided by a power of two so that its greatest entry is in [1, 2): products of
+/// The linear part of an affine matrix, divided by a power of two so that its largest entry is in [1, 2): products of
 /// its entries neither overflow nor vanish, and all digits stay.
 pub(crate) fn linear_part(m: &Mat4) -> Mat3 {
     let linear = Mat3::from_mat4(*m);
@@ -186,7 +186,7 @@ pub(crate) fn linear_part(m: &Mat4) -> Mat3 {
     Mat3::from_cols_array(&linear.to_cols_array().map(|entry| entry / unit))
 }
 
-/// The greatest power of two that is not greater than a size; 1 of 0 and of what is not finite. Nothing that is finite
+/// The largest power of two that is not greater than a size; 1 of 0 and of what is not finite. Nothing that is finite
 /// leaves the range of numbers when it is divided by it, as long as it is no greater than the size.
 pub(crate) fn power_of_two(size: f32) -> f32 {
     if size.is_normal() && size > 0.0 { f32::from_bits(size.to_bits() & (0xff << 23)) } else { 1.0 }

@@ -342,7 +342,7 @@ functions! {
 mod tests {
     use super::*;
 
-    /// The greatest distance between a function of f32 and the same of f64, in units of the last place of the result.
+    /// The largest distance between a function of f32 and the same of f64, in units of the last place of the result.
     fn worst(
         arguments: impl Iterator<Item = f32>,
         f: fn(f32) -> f32,

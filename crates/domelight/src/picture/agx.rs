@@ -66,7 +66,7 @@ pub(super) fn shaped(light: f32) -> f32 {
     functions::powf(encoded.max(0.0), GAMMA)
 }
 
-/// Least and greatest light that [`shaped`] distinguishes from black and white.
+/// Least and largest light that [`shaped`] distinguishes from black and white.
 pub(super) fn range() -> (f32, f32) {
     (MIDDLE_GRAY * functions::exp2(DARKEST), MIDDLE_GRAY * functions::exp2(BRIGHTEST))
 }

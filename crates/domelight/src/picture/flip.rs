@@ -25,7 +25,7 @@ pub const PIXELS_PER_DEGREE: f32 = 67.020_64;
 const Q_COLOR: f32 = 0.7;
 /// Exponent of the feature difference.
 const Q_FEATURE: f32 = 0.5;
-/// Color differences up to this part of the greatest ...
+/// Color differences up to this part of the largest ...
 const P_COLOR: f32 = 0.4;
 /// ... are spread over this part of the scale.
 const P_TOP: f32 = 0.95;
@@ -125,7 +125,7 @@ fn tone_map(radiance: Rgb) -> Rgb {
     })
 }
 
-/// From where the greatest to where the median luminance is shown at 85 % \[stops\].
+/// From where the largest to where the median luminance is shown at 85 % \[stops\].
 ///
 /// The median is at least [`f32::EPSILON`], as in the authors' program: where most of the picture is black it is shown
 /// at up to 24 stops. A picture without any light is shown as it is.

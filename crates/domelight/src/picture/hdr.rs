@@ -426,7 +426,7 @@ pub fn rgbe(color: Rgb) -> [u8; 4] {
     // max before min: NaN becomes 0.
     let color = color.map(|c| f32::min(c.max(0.0), f32::MAX));
     let greatest = f64::from(color.max_component());
-    // 2^(e−136) · 127.5 ≤ greatest < 2^(e−136) · 255.5, so that the greatest mantissa rounds to 128 ..= 255.
+    // 2^(e−136) · 127.5 ≤ largest < 2^(e−136) · 255.5, so that the largest mantissa rounds to 128 ..= 255.
     let exponent = |value: f64| (functions::log2(value / 255.5).floor() as i32 + 137).clamp(0, 255);
     let mut e = if greatest > 0.0 { exponent(greatest) } else { 0 };
     if e > 0 && e < 255 && greatest / functions::powi(2.0, e - 136) >= 255.5 {

@@ -15,7 +15,7 @@
 //! Var(mean of n) = Σⱼ E[Dⱼ²]/4 · (min(x, 2ʲ⁺¹ − x) / n)²        x = n mod 2ʲ⁺¹
 //! ```
 //!
-//!   r is ½ for independent samples, whose D₀² is 2 s², and follows from s² and the greatest j available.
+//!   r is ½ for independent samples, whose D₀² is 2 s², and follows from s² and the largest j available.
 //!
 //! Both are too noisy in a single pixel. So the ratio of this variance to s²/n, both summed over all pixels of the
 //! picture, scales the s²/n of each pixel.

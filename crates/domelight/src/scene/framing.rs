@@ -2,7 +2,7 @@
 //!
 //! Four planes through the camera's position bound the picture. For a viewing direction f with right r and up u, a
 //! point p is within the left and right ones if |x − c_x| ≤ t_x (z − c_z), with (x, y, z) the coordinates of p along
-//! (r, u, f), c those of the camera and t_x the tangent of half the horizontal field of view. The greatest values of
+//! (r, u, f), c those of the camera and t_x the tangent of half the horizontal field of view. The largest values of
 //! x − t_x z and −x − t_x z over all points give c_x and the largest c_z, so one pass over the vertices finds the
 //! nearest camera.
 
@@ -204,7 +204,7 @@ impl Framing {
     }
 }
 
-/// The greatest values of ±x − t_x z and ±y − t_y z, and the least z.
+/// The largest values of ±x − t_x z and ±y − t_y z, and the least z.
 struct Reach {
     right: f32,
     left: f32,
@@ -235,7 +235,7 @@ impl Reach {
 
     /// The extremes of the circles of points around `axis`, a unit vector with x = 0.
     ///
-    /// Each value is a linear function g · p, whose greatest value on a circle of radius ρ about the axis a at height h is
+    /// Each value is a linear function g · p, whose largest value on a circle of radius ρ about the axis a at height h is
     /// h (g · a) + ρ |g − (g · a) a|.
     fn all_around(points: impl Iterator<Item = Vec3>, axis: Vec3, tan_x: f32, tan_y: f32) -> Self {
         let gradients = [
@@ -305,7 +305,7 @@ mod tests {
     use crate::math::vec3;
     use crate::scene::builtin::shapes;
 
-    /// The least and the greatest of the picture's coordinates, from −1 to 1, at which points are seen.
+    /// The least and the largest of the picture's coordinates, from −1 to 1, at which points are seen.
     fn seen(s: &CameraSettings, aspect: f32, points: &[Vec3]) -> [[f32; 2]; 2] {
         let Projection::Perspective { fov_y_degrees } = s.projection else { panic!() };
         let f = (s.target - s.origin).normalize();

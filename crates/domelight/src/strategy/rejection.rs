@@ -10,7 +10,7 @@
 //! from the BRDF          q = p_brdf     keep with L_y / L_max                         C = L_max
 //! ```
 //!
-//! Here y is luminance, Q = ∫ L_y dω and g_max bounds the greatest channel of f_r cos θ
+//! Here y is luminance, Q = ∫ L_y dω and g_max bounds the largest channel of f_r cos θ
 //! ([`Brdf::max_eval`]), hence (g · L)_y ≤ g_max · L_y for any colors. The first accepts directions in
 //! proportion to the luminance of the product. The second accepts them in proportion to p_brdf · L_y,
 //! because f_r cos θ / p_brdf has no bound in general; that quotient stays in the weight, and so does the

@@ -41,7 +41,7 @@ struct Component {
     seed: u32,
     area: f64,
     energy: f64,
-    /// The greatest t·A so far.
+    /// The largest t·A so far.
     most: f64,
     /// The least t·A since then, and the peak that would end there.
     least: f64,

@@ -94,7 +94,7 @@ impl<'a> Overlap<'a> {
         self.outline.extend([[left, top], [right, top], [right, bottom], [left, bottom]]);
     }
 
-    /// The outline, counter-clockwise or clockwise, its longitudes continuous.
+    /// The outline, counterclockwise or clockwise, its longitudes continuous.
     fn trace(&mut self, chart: &Chart, size: [f64; 2], at: Point) {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
             .map(|c: Point| [(at[0] + c[0]) / size[0], (at[1] + c[1]) / size[1]]);
@@ -261,7 +261,7 @@ const POLE: f64 = 1e-13;
 /// The middle of two straight lines from `a` to `b` on the plane with the area of the parabola through `m` (Simpson's
 /// rule); none if the curve bends too much for that.
 fn arc(a: &Vertex, m: &Vertex, b: &Vertex) -> Option<Vertex> {
-    /// The greatest area of the triangle (a, m, b) over the square of the line; the area missed is about 4 times its cube.
+    /// The largest area of the triangle (a, m, b) over the square of the line; the area missed is about 4 times its cube.
     const BEND: f64 = 2e-3;
     let (Some(_), Some(longitude), Some(_)) = (a.longitude, m.longitude, b.longitude) else {
         return is_meridian(&[a, m, b].map(|v| v.longitude)).then_some(*m);

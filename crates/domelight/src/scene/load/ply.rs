@@ -189,7 +189,7 @@ impl Scalar {
         }
     }
 
-    /// The greatest value of an integer type.
+    /// The largest value of an integer type.
     fn max(self) -> Option<f32> {
         match self {
             Self::U8 => Some(255.0),
@@ -462,7 +462,7 @@ fn slot_of(property: &Property) -> Option<usize> {
 /// How an element's red, green and blue are written.
 #[derive(Clone, Copy)]
 struct Colors {
-    /// The greatest value of an integer type.
+    /// The largest value of an integer type.
     max: Option<f32>,
 }
 

@@ -43,13 +43,13 @@ impl Triangulator {
         self.triangles.extend((2..n).map(|i| [0, i - 1, i]));
     }
 
-    /// Drops the axis along which the polygon's area is greatest; true if it has no area.
+    /// Drops the axis along which the polygon's area is largest; true if it has no area.
     fn project(&mut self, n: usize, position: impl Fn(usize) -> Vec3) -> bool {
         let at = |i: usize| (position(i) - position(0)).as_dvec3();
         // Newell's normal.
         let normal = (1..n - 1).map(|i| at(i).cross(at(i + 1))).sum::<glam::DVec3>();
         let axis = normal.abs().max_position();
-        // Counter-clockwise in the plane.
+        // Counterclockwise in the plane.
         let (u, v) = match (axis, normal[axis] > 0.0) {
             (0, true) => (1, 2),
             (0, false) => (2, 1),

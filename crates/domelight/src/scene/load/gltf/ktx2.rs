@@ -34,7 +34,7 @@ pub enum Ktx2Error {
 
 const MAGIC: [u8; 12] = *b"\xabKTX 20\xbb\r\n\x1a\n";
 
-/// The greatest width and height, as graphics processors have it.
+/// The largest width and height, as graphics processors have it.
 const MAX_SIZE: u32 = 16384;
 
 /// Color models of the data format descriptor (Khronos, "Data Format Specification" 1.4).
