@@ -109,7 +109,7 @@ test("the page shows every strategy, the table and the plots", async () => {
   assert.equal(rows.length, 5);
   assert.match(rows[4], /^cycles.*–.*1\.5/);
   assert.match(await text(page, "#lead"), /beside 1 picture by other renderers/);
-  assert.match(rows[3], /left out: one camera sample a pixel traces/);
+  assert.match(rows[3], /left out: one camera sample per pixel traces/);
   assert.equal(await page.$$eval(".plots figure > svg", (all) => all.length), 2);
   assert.match(await text(page, "pre"), /^domelight -q compare sphere/);
   await done();

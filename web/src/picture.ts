@@ -256,7 +256,7 @@ export class PicturePanel {
     const one = (job: Job) => {
       const s = job.statistics;
       const bad = s.nonFinite ? `, ${s.nonFinite} not finite` : "";
-      return `${s.samples.toFixed(s.samples < 10 ? 1 : 0)} samples a pixel, ${count(s.shadowRays)} shadow rays${bad}`;
+      return `${s.samples.toFixed(s.samples < 10 ? 1 : 0)} samples per pixel, ${count(s.shadowRays)} shadow rays${bad}`;
     };
     $("counts").textContent = this.jobs.map((job) => (this.jobs.length > 1 ? `${job.strategy}: ` : "") + one(job)).join(" · ");
     const errors = this.tellError();

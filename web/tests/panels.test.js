@@ -24,7 +24,7 @@ test("the first picture is small, then it is refined", async () => {
   await rendered(page);
   assert.equal(await page.$eval("#film", (canvas) => canvas.width), 256);
   assert.ok(await brightness(page, "film") > 80);
-  assert.match(await text(page, "#counts"), /2(\.\d)? samples a pixel/);
+  assert.match(await text(page, "#counts"), /2(\.\d)? samples per pixel/);
   await done();
 });
 

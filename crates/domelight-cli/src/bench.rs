@@ -1,4 +1,4 @@
-//! `domelight bench`: what error costs, in CPU time.
+//! `domelight bench`: the CPU time that strategies need to reach a given error.
 
 use anyhow::{Result, bail};
 use domelight_lab::Host as _;
@@ -29,11 +29,11 @@ pub(crate) fn run(arguments: &BenchArguments, quiet: bool) -> Result<()> {
     bench::declare(&settings, host)?;
     start_threads(arguments.threads)?;
     interrupt::flag();
-    // What is done is kept, whatever ends the work.
+    // Keep the results so far, however the work ends.
     let (results, done) = bench::run(&settings, host);
     show(arguments, &results, quiet)?;
     if host.canceled() {
-        bail!("interrupted; the results are what was done");
+        bail!("interrupted; the results are partial");
     }
     Ok(done?)
 }
@@ -89,7 +89,7 @@ impl From<Suite> for bench::Suite {
     }
 }
 
-/// Refuses what the suite has no use for.
+/// Rejects options that the suite does not use.
 fn check(arguments: &BenchArguments) -> Result<(), UsageError> {
     use Suite::{Kernels, Lecture, Probes, Rigs};
     let BenchArguments { meshes, probes, materials, cases, strategies, vs, embree, .. } = arguments;
@@ -105,7 +105,7 @@ fn check(arguments: &BenchArguments) -> Result<(), UsageError> {
     for (flag, given, suites) in given {
         if given && !suites.contains(&arguments.suite) {
             let names: Vec<&str> = suites.iter().map(|&s| bench::Suite::from(s).name()).collect();
-            return Err(UsageError(format!("{flag} goes with --suite {}", names.join(" or "))));
+            return Err(UsageError(format!("{flag} requires --suite {}", names.join(" or "))));
         }
     }
     Ok(())

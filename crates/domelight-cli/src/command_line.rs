@@ -1,4 +1,4 @@
-//! The command line as it was typed, for reports that others read.
+//! The command line as typed, for reports that others read.
 
 use domelight::fingerprint::Fingerprinter;
 use domelight::quote::shell;
@@ -6,11 +6,11 @@ use domelight_lab::names::shared_word;
 
 /// The command line of this process, without folders of this machine.
 pub(crate) fn command() -> String {
-    // A name may be no UTF-8.
+    // A name may not be UTF-8.
     quoted(std::env::args_os().skip(1).map(|word| shared_word(&word.to_string_lossy())))
 }
 
-/// The fingerprint of this program's file: another build may make other pictures.
+/// The fingerprint of this program's file, because another build may make other pictures.
 pub(crate) fn program() -> String {
     let mut fingerprint = Fingerprinter::default();
     if let Ok(program) = std::env::current_exe().and_then(std::fs::read) {
@@ -19,7 +19,7 @@ pub(crate) fn program() -> String {
     fingerprint.finish().to_string()
 }
 
-/// As it may be typed again.
+/// Quoted, so that it can be typed again.
 fn quoted(arguments: impl Iterator<Item = String>) -> String {
     let words = std::iter::once("domelight".to_owned()).chain(arguments);
     shell::words(words).into_string()

@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     Ok(())
 }
 
-/// The cache of references, if one is wanted.
+/// The cache of references, if enabled.
 pub(crate) fn cache(no_cache: bool, folder: Option<&Path>, host: &Terminal) -> Option<Cache> {
     (!no_cache).then(|| Cache::new(folder, &command_line::program(), host)).flatten()
 }
@@ -81,7 +81,7 @@ impl CompareArguments {
     }
 }
 
-/// Refuses what does not go together.
+/// Rejects incompatible options.
 fn check(arguments: &CompareArguments) -> Result<(), UsageError> {
     let standard_output = Path::new("-");
     if arguments.output == standard_output && arguments.json.as_deref() == Some(standard_output) {
@@ -91,7 +91,7 @@ fn check(arguments: &CompareArguments) -> Result<(), UsageError> {
     // Before anything is rendered.
     let names: Vec<&str> = arguments.strategies.iter().map(|s| s.text.as_str()).collect();
     match names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
-        Some((_, name)) => Err(UsageError(format!("--strategies has '{name}' twice"))),
+        Some((_, name)) => Err(UsageError(format!("--strategies lists '{name}' twice"))),
         None => Ok(()),
     }
 }

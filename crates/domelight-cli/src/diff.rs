@@ -18,10 +18,10 @@ use domelight::picture::{ReadOptions, read};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Memory of a texel of a picture: color and alpha.
+/// Memory per texel of a picture: color and alpha.
 const PICTURE_TEXEL: u64 = 16;
 
-/// Memory of a texel while two pictures are compared, beside the pictures.
+/// Additional memory per texel while two pictures are compared.
 const COMPARISON_TEXEL: u64 = 112;
 
 /// Alpha above which a pixel counts as covered.
@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &DiffArguments, quiet: bool) -> anyhow::Result<()> 
 
 struct Difference {
     comparison: Comparison,
-    /// LDR-ꟻLIP of every pixel, also of those that the mask leaves out.
+    /// LDR-ꟻLIP of every pixel, including those outside the mask.
     flip: Vec<f32>,
     hdr_flip: Option<HdrFlip>,
     mask: Option<Vec<bool>>,
@@ -84,7 +84,7 @@ impl Difference {
         Ok(Self { comparison, flip, hdr_flip: hdr.transpose()?, mask: mask.map(<[bool]>::to_vec) })
     }
 
-    /// Writes the error picture, if one was asked for; the error at the upper end of its scale.
+    /// Writes the error picture, if requested. Returns the error at the upper end of its scale.
     fn write_picture(
         &self,
         arguments: &DiffArguments,
@@ -132,7 +132,7 @@ impl Difference {
             "relMSE trimmed",
             format!("{:.6e}   (without the worst 0.1 % of the pixels)", c.rel_mse_trimmed),
         );
-        row("PSNR", format!("{:.2} dB   (peak: greatest value of the reference)", c.psnr));
+        row("PSNR", format!("{:.2} dB   (peak: largest value of the reference)", c.psnr));
         row("mean ratio", rgb(c.mean_ratio));
         row("mean", rgb(c.mean));
         row("mean reference", rgb(c.mean_reference));
@@ -186,7 +186,7 @@ fn rgb([r, g, b]: [f64; 3]) -> String {
     format!("{r:.6} {g:.6} {b:.6}")
 }
 
-/// The error that the part `p` of the finite errors does not exceed; the greatest if that is 0.
+/// The quantile `p` of the finite errors, or the maximum if that quantile is 0.
 fn percentile(errors: &[f32], p: f64) -> f32 {
     let mut sorted: Vec<f32> = errors.iter().copied().filter(|e| e.is_finite()).collect();
     sorted.sort_unstable_by(f32::total_cmp);

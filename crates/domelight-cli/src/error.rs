@@ -1,10 +1,10 @@
-//! Errors of the program's own, and lines on standard error.
+//! Errors of the program, and lines on standard error.
 
 use domelight::quote::terminal;
 use std::error::Error;
 use std::io::{self, IsTerminal, Write as _};
 
-/// Arguments that each are right but do not go together; exit code 2.
+/// Arguments that are valid but incompatible; exit code 2.
 #[derive(Debug)]
 pub(crate) struct UsageError(pub(crate) String);
 
@@ -16,7 +16,7 @@ impl std::fmt::Display for UsageError {
 
 impl Error for UsageError {}
 
-/// The work was interrupted and its state saved: run it again; exit code 75, the EX_TEMPFAIL of sysexits.h.
+/// The work was interrupted and its state saved, so that it can be run again; exit code 75, EX_TEMPFAIL of sysexits.h.
 #[derive(Debug)]
 pub(crate) struct InterruptedAndSaved(pub(crate) String);
 
@@ -28,8 +28,8 @@ impl std::fmt::Display for InterruptedAndSaved {
 
 impl Error for InterruptedAndSaved {}
 
-/// Prints a line to standard error, in which nothing commands the terminal. If that is closed or full, the line is
-/// lost, and the work goes on.
+/// Prints a line to standard error, with terminal control characters escaped. If standard error is closed or full, the line
+/// is lost and the work continues.
 pub(crate) fn status(line: &str) {
     let _ = writeln!(io::stderr(), "{}", terminal::line(line));
 }
@@ -54,7 +54,7 @@ pub(crate) fn print_labeled(label: Label, text: &str) {
     };
 }
 
-/// What a line begins with.
+/// The label of a line.
 #[derive(Clone, Copy)]
 pub(crate) enum Label {
     Error,
@@ -62,7 +62,7 @@ pub(crate) enum Label {
     Warning,
 }
 
-/// Prints a warning unless asked for quiet.
+/// Prints a warning unless --quiet is set.
 pub(crate) fn warn(quiet: bool, text: &str) {
     if !quiet {
         print_labeled(Label::Warning, text);

@@ -1,4 +1,4 @@
-//! How the program ends: what is wrong as the user sees it, and the exit code.
+//! Error messages for the user, and exit codes.
 
 use crate::args::FIRST_STEPS;
 use crate::error::{InterruptedAndSaved, Label, UsageError, print_labeled, status_lines};
@@ -25,7 +25,7 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Prints what is wrong with the command line, or the help that was asked for; the exit code.
+/// Prints the error in the command line, or the requested help. Returns the exit code.
 pub(crate) fn report_usage(mut error: clap::Error) -> ExitCode {
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         status_lines(FIRST_STEPS);
@@ -42,9 +42,9 @@ pub(crate) fn report_usage(mut error: clap::Error) -> ExitCode {
     ExitCode::from(error.exit_code() as u8)
 }
 
-/// Prints `error` with its causes on one line and a hint where there is one; the exit code.
+/// Prints `error` with its causes on one line, and a hint if there is one. Returns the exit code.
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
-    // Whoever read our report has seen enough.
+    // The reader of the report is gone, which is not an error.
     if error.is::<NobodyReads>() {
         return ExitCode::SUCCESS;
     }
@@ -55,10 +55,10 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
     ExitCode::from(code(error))
 }
 
-/// 2 if trying again cannot help: the arguments, the scene or the probe are wrong. 75 if it goes on where it was.
+/// 2 if retrying cannot help, because the arguments, the scene or the probe are invalid. 75 if a retry continues the work.
 fn code(error: &anyhow::Error) -> u8 {
     let is_wrong_use = |cause: &(dyn Error + 'static)| {
-        // What happened at some place is in a box.
+        // An error with a location is boxed.
         let boxed = cause.downcast_ref::<Box<domelight_lab::Error>>().map(|error| &**error);
         matches!(boxed.or(cause.downcast_ref()), Some(domelight_lab::Error::Usage(_)))
             || cause.is::<UsageError>()
@@ -74,7 +74,7 @@ fn code(error: &anyhow::Error) -> u8 {
         || error.is::<FileConflict>()
         || error.chain().any(is_wrong_use)
         || over_limit(error).is_some();
-    // What is not there or no plain file was asked for wrongly; other troubles of the system may pass.
+    // A missing file or one that is not a regular file is a usage error; other system errors may be temporary.
     let passing = io_kind(error).is_some_and(|kind| {
         use io::ErrorKind::{InvalidInput, IsADirectory, NotADirectory, NotFound};
         !matches!(kind, NotFound | InvalidInput | IsADirectory | NotADirectory)
@@ -89,7 +89,7 @@ fn code(error: &anyhow::Error) -> u8 {
     }
 }
 
-/// The error and its causes, but for causes that the message above them already contains.
+/// The error and its causes, except for causes that the message above already contains.
 fn chain(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {
@@ -126,18 +126,18 @@ fn hint(error: &anyhow::Error) -> Option<String> {
     }
 }
 
-/// What the built-in names are, and which one was meant.
+/// Lists the built-in names and suggests the intended one.
 fn known(what: &str, names: &str, meant: Option<&str>) -> String {
     let text = format!("{what} is a file or one of {names}");
     meant.map_or(text.clone(), |name| format!("{text}; did you mean '{name}'?"))
 }
 
-/// The cause of that type.
+/// The first cause of a given type.
 fn find<T: Error + Send + Sync + 'static>(error: &anyhow::Error) -> Option<&T> {
     error.downcast_ref().or_else(|| error.chain().find_map(|cause| cause.downcast_ref()))
 }
 
-/// More memory than is allowed: the same again would not help.
+/// The memory limit was exceeded; retrying would not help.
 fn over_limit(error: &anyhow::Error) -> Option<&OverLimit> {
     error.chain().find_map(|cause| match cause.downcast_ref() {
         Some(PictureErrorKind::Memory(error)) => Some(error),

@@ -1,5 +1,5 @@
-//! The files that the program reads and writes: a command declares them here before its work, so that no result takes
-//! the place of what is read, or of another result.
+//! The files that the program reads and writes. A command declares them here before its work, so that no result overwrites
+//! an input or another result.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -20,15 +20,15 @@ fn with_ledger<T>(f: impl FnOnce(&mut FileLedger) -> T) -> T {
     f(ledger.get_or_insert_default())
 }
 
-/// Declares a file that is read; to be called before it is.
+/// Declares a file that will be read.
 ///
 /// # Errors
-/// If it is to be written.
+/// If it is declared as written.
 pub(crate) fn reads(path: &Path) -> Result<(), FileConflict> {
     with_ledger(|ledger| ledger.read(path))
 }
 
-/// Declares a result of other runs.
+/// Declares a result of another run.
 ///
 /// # Errors
 /// If it is read or written already.
@@ -36,7 +36,7 @@ pub(crate) fn declare(path: &Path) -> Result<(), FileConflict> {
     with_ledger(|ledger| ledger.write(path))
 }
 
-/// Declares a folder that is filled with results.
+/// Declares a folder that will be filled with results.
 ///
 /// # Errors
 /// If a file in it is read.
@@ -45,11 +45,11 @@ pub(crate) fn require_unread(folder: &Path) -> Result<()> {
     let Some(input) = input else { return Ok(()) };
     let (folder, input) = (folder.display(), input.display());
     let why =
-        format!("{input} might be written over: results go to {folder}; choose another folder");
+        format!("{input} might be overwritten: results go to {folder}; choose another folder");
     Err(UsageError(why).into())
 }
 
-/// Declares a result, and asks whether it can be written.
+/// Declares a result, and checks that it can be written.
 ///
 /// # Errors
 /// If it is read or written already, or cannot be written.
@@ -61,15 +61,15 @@ pub(crate) fn writes(path: &Path) -> Result<()> {
     Ok(files::require_writable(path)?)
 }
 
-/// Writes a result, whole or not at all.
+/// Writes a result atomically.
 ///
 /// # Errors
-/// If the file was read, or what [`files::write_atomically`] says.
+/// If the file was read, or those of [`files::write_atomically`].
 pub(crate) fn write(path: &Path, f: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
     with_waiting(path, || files::write_atomically(path, f))
 }
 
-/// As [`write`], for what is not written from beginning to end.
+/// Like [`write`], for formats that are not written sequentially.
 ///
 /// # Errors
 /// As [`write`].
@@ -82,12 +82,12 @@ pub(crate) fn write_seeking(
 
 fn with_waiting(path: &Path, write: impl FnOnce() -> Result<(), PictureError>) -> Result<()> {
     with_ledger(|ledger| ledger.check_unread(path))?;
-    // A pipe may wait for its reader for ever.
+    // A pipe may wait forever for its reader.
     let _waiting = waits(path).then(interrupt::while_waiting);
     Ok(write()?)
 }
 
-/// Whether reading or writing may take for ever: standard streams, pipes, devices.
+/// Whether reading or writing may block forever: standard streams, pipes, devices.
 pub(crate) fn waits(path: &Path) -> bool {
     path == Path::new("-") || std::fs::metadata(path).is_ok_and(|there| !there.is_file())
 }

@@ -1,5 +1,5 @@
-//! Ctrl-C: the first asks the work to end with what is done, the second ends the process; while there is nothing
-//! to keep, so does the first.
+//! Ctrl-C: the first asks the work to stop and keep its results, and the second ends the process. While there is nothing to
+//! keep, the first ends the process too.
 
 use std::process::exit;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,20 +12,20 @@ use anyhow::{Result, bail};
 
 use crate::error::status;
 
-/// The shell's code for what Ctrl-C has ended.
+/// The shell's exit code after Ctrl-C.
 pub(crate) const ENDED: i32 = 130;
 
-/// EX_TEMPFAIL of sysexits.h: run the same again.
+/// EX_TEMPFAIL of sysexits.h: retry.
 pub(crate) const RUN_AGAIN: i32 = 75;
 
 static RAISED: AtomicBool = AtomicBool::new(false);
 
-/// How the first Ctrl-C ends the process: the exit code, and what is said. None while there is something to keep.
+/// How the first Ctrl-C ends the process: the exit code and the message. `None` while there is something to keep.
 static ENDS: Mutex<Option<(i32, &str)>> = Mutex::new(None);
 
 /// The flag that the first Ctrl-C (or SIGTERM) raises. Installs the handler on the first call.
 ///
-/// Where no handler can be installed the flag stays down and the system's own action holds.
+/// If no handler can be installed, the flag is never raised and the system's default action applies.
 pub(crate) fn flag() -> &'static AtomicBool {
     static INSTALLED: OnceLock<bool> = OnceLock::new();
     INSTALLED.get_or_init(|| {
@@ -44,7 +44,7 @@ pub(crate) fn flag() -> &'static AtomicBool {
     &RAISED
 }
 
-/// While this lives the first Ctrl-C ends the process too.
+/// While this value lives, the first Ctrl-C ends the process.
 pub(crate) struct EndsAtOnce(Option<(i32, &'static str)>);
 
 /// From now on there is nothing to keep, for what reads a pipe or builds a tree looks at no flag; `code` is the exit code
@@ -53,9 +53,9 @@ pub(crate) fn nothing_to_keep(code: i32) -> EndsAtOnce {
     EndsAtOnce::new(code, "before the first sample; nothing was written")
 }
 
-/// From now on a pipe is waited for at its other end.
+/// From now on, the process waits for the other end of a pipe.
 pub(crate) fn while_waiting() -> EndsAtOnce {
-    EndsAtOnce::new(ENDED, "while the other end of a pipe was waited for")
+    EndsAtOnce::new(ENDED, "while waiting for the other end of a pipe")
 }
 
 impl EndsAtOnce {
@@ -71,7 +71,7 @@ impl Drop for EndsAtOnce {
     }
 }
 
-/// Runs what may wait for a pipe or a device, and waits no longer once Ctrl-C was pressed.
+/// Runs work that may block on a pipe or a device, and stops waiting after Ctrl-C.
 ///
 /// # Errors
 /// If it was; what waits is left behind.
@@ -87,7 +87,7 @@ pub(crate) fn unless_interrupted<T: Send + 'static>(
             Ok(done) => return Ok(done),
             Err(RecvTimeoutError::Disconnected) => bail!("{name}: reading it failed"),
             Err(RecvTimeoutError::Timeout) if RAISED.load(Ordering::SeqCst) => {
-                bail!("{name}: interrupted while it was waited for")
+                bail!("{name}: interrupted while waiting for it")
             }
             Err(RecvTimeoutError::Timeout) => {}
         }

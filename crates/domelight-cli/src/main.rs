@@ -1,4 +1,4 @@
-//! The program `domelight`: one module a subcommand, their arguments in [`args`].
+//! The program `domelight`: one module per subcommand, their arguments in [`args`].
 //!
 //! Exit codes: 0 done (also when the reader of a report went away), 1 failed, 2 bad usage or input, 75
 //! interrupted and saved; `merge` has three of its own.

@@ -86,10 +86,10 @@ pub(crate) fn hint(error: &OverLimit) -> String {
     let rest = if rest == 0 {
         String::new()
     } else {
-        format!(", {} of it for what was loaded before", MemorySize(rest))
+        format!(", of which {} is already in use", MemorySize(rest))
     };
     format!(
-        "the limit is {}{rest}; --max-memory SIZE sets another, --max-memory none takes it away",
+        "the limit is {}{rest}; --max-memory SIZE sets another, --max-memory none removes it",
         MemorySize(limit)
     )
 }

@@ -1,7 +1,7 @@
-//! `domelight merge`: from parts to the picture.
+//! `domelight merge`: merges parts into a picture.
 //!
-//! The parts are read twice: first to see that they are whole, of one render, and all there, then band by band from
-//! top to bottom, each part only while its rows are written.
+//! The parts are read twice: first to check that they are complete, belong to one render and cover the picture, then band by
+//! band from top to bottom, each part only while its rows are written.
 
 use std::fs;
 use std::iter::Peekable;
@@ -27,22 +27,22 @@ use crate::terminal::Terminal;
 use crate::tone::Shown;
 use domelight_lab::Host as _;
 
-/// Memory of a pixel of a band: its layers, as channels, and compressed.
+/// Memory per pixel of a band: its layers, as channels, and compressed.
 const BAND_PIXEL: u64 = 300;
 
-/// Memory of a pixel of which color and alpha are kept: themselves, and as PNG.
+/// Memory per pixel whose color and alpha are kept, including as PNG.
 const FLAT_PIXEL: u64 = 20;
 
-/// Why parts make no picture.
+/// An error in merging parts.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum MergeError {
-    /// Tiles that no part has; parts that were interrupted.
+    /// Tiles that no part has, or interrupted parts.
     #[error("{0}")]
     Missing(String),
     /// A tile in two parts.
     #[error("{first} and {second} both hold tile {tile}")]
     Doubled { first: String, second: String, tile: usize },
-    /// A damaged file, or one of another render.
+    /// A damaged file, or one that belongs to another render.
     #[error("{0}")]
     Foreign(String),
 }
@@ -58,9 +58,9 @@ impl MergeError {
     }
 }
 
-/// What the parts have in common, and where they are.
+/// The common data of the parts, and their files.
 struct Merged {
-    /// The first part's file; the others are held against it.
+    /// The first part's file, with which the others are compared.
     name: String,
     identity: Vec<(String, String)>,
     provenance: Vec<(String, String)>,
@@ -71,11 +71,11 @@ struct Merged {
     counts: Counts,
     /// Over all parts.
     variance: VarianceSums,
-    /// In the order of their tiles once all are there.
+    /// The parts, sorted by tile once all are read.
     parts: Vec<Part>,
 }
 
-/// A part that was read and found whole.
+/// A part that was read and is complete.
 struct Part {
     path: PathBuf,
     name: String,
@@ -167,7 +167,7 @@ impl Merged {
         let foreign = |what: &str, here: &str, there: &str| {
             let first = &self.name;
             let text = format!(
-                "{name} is of another render: its {what} is {here}, that of {first} {there}"
+                "{name} belongs to another render: its {what} is {here}, that of {first} {there}"
             );
             Err(MergeError::Foreign(text))
         };
@@ -219,7 +219,7 @@ impl Merged {
         }
         if !unfinished.is_empty() {
             let names = unfinished.join(", ");
-            text.push(format!("unfinished: {names}: run the same render again to go on"));
+            text.push(format!("unfinished: {names}: run the same render again to continue"));
         }
         if text.is_empty() { Ok(()) } else { Err(MergeError::Missing(text.join("; "))) }
     }
@@ -301,7 +301,7 @@ impl Merged {
             let Report { parts, size: [w, h], spp, outputs, .. } = report;
             let outputs = outputs.join(", ");
             let png = png.map_or(String::new(), |shown| format!(" (PNG at {shown})"));
-            status(&format!("{parts} parts: {w}x{h}, {spp} samples a pixel -> {outputs}{png}"));
+            status(&format!("{parts} parts: {w}x{h}, {spp} samples per pixel -> {outputs}{png}"));
         }
         Ok(())
     }
@@ -311,7 +311,7 @@ impl Merged {
 struct Bands<'m> {
     merged: &'m Merged,
     waiting: Peekable<slice::Iter<'m, Part>>,
-    /// Parts that have rows here.
+    /// The parts that have rows in the current band.
     open: Vec<Film>,
 }
 
@@ -336,7 +336,7 @@ impl<'m> Bands<'m> {
     }
 }
 
-/// Color and alpha alone, row by row.
+/// Only color and alpha, row by row.
 #[derive(Default)]
 struct Flat {
     color: Vec<Rgb>,

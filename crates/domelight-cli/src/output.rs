@@ -1,4 +1,4 @@
-//! Where results go: pictures by their file's extension, reports to standard output.
+//! Output: pictures by file extension, reports to standard output.
 
 use crate::error::UsageError;
 use crate::files;
@@ -68,7 +68,7 @@ impl PicturePath {
         self.path == Path::new("-")
     }
 
-    /// What its name says; none for standard output.
+    /// The format of the extension; `None` for standard output.
     pub(crate) fn format(&self) -> Option<PictureFormat> {
         self.format
     }
@@ -80,12 +80,12 @@ impl PicturePath {
         Self { path, format: self.format }
     }
 
-    /// Declares it before the work as a result.
+    /// Declares it as a result before the work.
     pub(crate) fn declare(&self) -> anyhow::Result<()> {
         files::writes(&self.path)
     }
 
-    /// Writes the picture; the tone curve matters to PNG alone.
+    /// Writes the picture. Only PNG uses the tone curve.
     pub(crate) fn write(
         &self,
         image: &RgbImage,
@@ -174,7 +174,7 @@ impl PicturePath {
         self.format.unwrap_or(PictureFormat::Exr) == PictureFormat::Exr
     }
 
-    /// Writes color alone, into PNG with alpha if there is one.
+    /// Writes only color, and alpha to PNG if there is any.
     pub(crate) fn write_color(
         &self,
         color: &RgbImage,
@@ -228,7 +228,7 @@ fn band(image: &RgbImage, rows: Range<usize>) -> RgbImage {
     RgbImage::new(width, height, image.pixels[rows.start * width..rows.end * width].to_vec())
 }
 
-/// What the system says stays what the system says.
+/// Keep I/O errors as they are.
 pub(crate) fn into_io(kind: PictureErrorKind) -> io::Error {
     match kind {
         PictureErrorKind::Io(error) => error,
@@ -236,7 +236,7 @@ pub(crate) fn into_io(kind: PictureErrorKind) -> io::Error {
     }
 }
 
-/// Refuses two results on standard output.
+/// Rejects two results on standard output.
 pub(crate) fn require_one_on_standard_output(
     pictures: &[Option<&PicturePath>],
     json: bool,
@@ -250,15 +250,15 @@ pub(crate) fn require_one_on_standard_output(
     Ok(())
 }
 
-/// Whoever was to read a report is gone. Half a picture is another matter.
+/// The reader of a report is gone. (For a picture, that is an error.)
 #[derive(Debug, thiserror::Error)]
 #[error("nobody reads the report")]
 pub(crate) struct NobodyReads;
 
-/// Prints a report, in which nothing commands the terminal.
+/// Prints a report with terminal control characters escaped.
 ///
 /// # Errors
-/// [`NobodyReads`] if that is so, or what the system says.
+/// [`NobodyReads`] if the reader is gone, or an I/O error.
 pub(crate) fn print(report: &str) -> anyhow::Result<()> {
     let _waiting = interrupt::while_waiting();
     print_raw(&terminal::lines(report))
@@ -269,7 +269,7 @@ pub(crate) fn print_progress(line: &str) {
     let _ = print_raw(&terminal::line(line));
 }
 
-/// Prints a report as JSON, in which nothing commands the terminal.
+/// Prints a report as JSON with terminal control characters escaped.
 ///
 /// # Errors
 /// As [`print`].

@@ -36,7 +36,7 @@ impl FromStr for Size {
     type Err = BadValue;
 
     fn from_str(s: &str) -> Result<Self, BadValue> {
-        let expected = "a size such as 800x600, each from 1 to 65536, of 2^28 pixels at the most";
+        let expected = "a size such as 800x600, each from 1 to 65536, with at most 2^28 pixels";
         let (w, h) = s.split_once(['x', 'X']).ok_or_else(|| bad(s, expected))?;
         match (w.parse(), h.parse()) {
             (Ok(width), Ok(height))
@@ -139,7 +139,7 @@ pub(crate) fn duration(s: &str) -> Result<Duration, BadValue> {
     let seconds = number.trim().parse::<f64>().unwrap_or(f64::NAN) * unit;
     match Duration::try_from_secs_f64(seconds) {
         Ok(duration) if !duration.is_zero() => Ok(duration),
-        _ => Err(bad(s, "a span of time such as 30s, 500ms, 5m or 2h")),
+        _ => Err(bad(s, "a duration such as 30s, 500ms, 5m or 2h")),
     }
 }
 

@@ -13,7 +13,7 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::output::print_progress;
 use crate::profile::{Profile, StageSeconds};
 
-/// Shows camera samples done, passes, rays a second and the time left on standard error, if that is
+/// Shows camera samples done, passes, rays per second and the time left on standard error, if that is
 /// a terminal and nobody asked for quiet, or tells a farm on standard output; passes the interrupt flag
 /// on to the renderer.
 pub(crate) struct RenderProgress {

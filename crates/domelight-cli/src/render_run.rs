@@ -1,4 +1,4 @@
-//! How a render proceeds: which tiles, from which checkpoint, saved where and how often, until when.
+//! The course of a render: its tiles, its checkpoint, where and how often it is saved, and its time limit.
 
 use std::fs;
 use std::io;
@@ -32,16 +32,16 @@ use timed::{Pace, PassWatch, TimeLimit};
 /// Says how long it takes to write a rendering.
 pub(crate) type TryWriting<'a> = &'a dyn Fn(&Layers) -> Result<Duration>;
 
-/// How a render proceeds.
+/// The course of a render.
 pub(crate) struct RenderRun {
-    /// Which tiles; all of them make a picture, others a part.
+    /// The tiles; all tiles give a picture, fewer give a part.
     tiles: TileSelection,
-    /// Where its state is saved.
+    /// The file to which its state is saved.
     save: Option<PathBuf>,
     every: Duration,
-    /// Where its state came from.
+    /// The file from which its state was restored.
     from: Option<(PathBuf, Checkpoint)>,
-    /// When it ends, written and all.
+    /// Its time limit, including writing.
     end: Option<Instant>,
     interrupted: &'static AtomicBool,
     quiet: bool,
@@ -57,7 +57,7 @@ enum TileSelection {
 }
 
 impl RenderRunArguments {
-    /// The render makes a part, not pictures.
+    /// Whether the render makes a part instead of pictures.
     pub(crate) fn is_part(&self) -> bool {
         self.shard.is_some() || self.tiles.is_some()
     }
@@ -68,7 +68,7 @@ impl RenderRunArguments {
         if saves { interrupt::RUN_AGAIN } else { interrupt::ENDED }
     }
 
-    /// Checks, before the work, what the flags say together with the outputs.
+    /// Checks the flags against the outputs before the work.
     pub(crate) fn check(&self, outputs: &[PicturePath]) -> Result<()> {
         if self.is_part() {
             let exr = |p: &PicturePath| p.format() == Some(PictureFormat::Exr);
@@ -84,7 +84,7 @@ impl RenderRunArguments {
             }
         }
         match (&self.checkpoint, &self.resume) {
-            // One that goes on in another file is only read.
+            // If it continues in another file, this one is only read.
             (Some(to), Some(from)) if !same_file(to, from) => {
                 files::reads(from)?;
                 files::writes(to)
@@ -94,7 +94,7 @@ impl RenderRunArguments {
         }
     }
 
-    /// Reads the checkpoint to go on from, if there is one.
+    /// Reads the checkpoint to resume from, if there is one.
     pub(crate) fn render_run(
         &self,
         view: &PreparedScene,
@@ -113,7 +113,7 @@ impl RenderRunArguments {
         let part = self.is_part().then(|| outputs[0].path.clone());
         let existing = part.clone().filter(|path| path.exists());
         let save = part.or_else(|| self.checkpoint.clone()).or_else(|| self.resume.clone());
-        // To know scene and environment by their content takes time.
+        // Fingerprinting the scene and the environment takes time.
         let identity =
             if save.is_some() { identity(view, settings, report, strategy) } else { Vec::new() };
         let from = if let Some(path) = self.resume.clone().or(existing) {
@@ -138,7 +138,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
     a == b || real(a).is_some_and(|a| Some(a) == real(b))
 }
 
-/// What decides the picture, but for the number of samples; by name.
+/// Everything that decides the picture except the number of samples, by name.
 fn identity(
     view: &PreparedScene,
     settings: &RenderSettings,
@@ -173,7 +173,7 @@ pub(crate) fn read(path: &Path) -> Result<Checkpoint> {
     if let Ok(there) = fs::metadata(path) {
         // A pipe might never end.
         if !there.is_file() {
-            return Err(UsageError(format!("{}: it is not a plain file", name())).into());
+            return Err(UsageError(format!("{}: not a regular file", name())).into());
         }
         memory::allow(&name(), there.len())?;
     }
@@ -191,7 +191,7 @@ fn require_same(path: &Path, checkpoint: &Checkpoint, identity: &[(String, Strin
     let Some(difference) = checkpoint.difference(identity) else { return Ok(()) };
     let or_none = |value: &str| if value.is_empty() { "none".to_owned() } else { value.to_owned() };
     let text = format!(
-        "{} is of another render: its {} is {}, that of this render {}",
+        "{} belongs to another render: its {} is {}, that of this render {}",
         path.display(),
         difference.name,
         or_none(difference.here),
@@ -205,27 +205,28 @@ fn require_more(path: &Path, checkpoint: &Checkpoint, n_samples: u32) -> Result<
         return Ok(());
     }
     let text = format!(
-        "{} is of a render with {} samples a pixel: --spp {n_samples} is less; give as many or more",
+        "{} belongs to a render with {} samples per pixel, but --spp is {n_samples}; give at \
+         least as many",
         path.display(),
         checkpoint.n_samples
     );
     Err(UsageError(text).into())
 }
 
-/// Refuses to write over the state of an unfinished render.
+/// Refuses to overwrite the state of an unfinished render.
 fn refuse_to_replace(path: &Path) -> Result<()> {
     if !path.exists() || read(path).is_ok_and(|checkpoint| checkpoint.complete) {
         return Ok(());
     }
     let text = format!(
-        "{} is there and not a finished checkpoint: go on with --resume, or remove it",
+        "{} exists and is not a finished checkpoint: continue with --resume, or remove it",
         path.display()
     );
     Err(UsageError(text).into())
 }
 
 impl RenderRun {
-    /// Renders a session to its end or to the end of the time, or until it is interrupted.
+    /// Renders until the session is complete, the time is up, or an interruption.
     pub(crate) fn run<S: Strategy>(
         &self,
         session: Renderer<S>,
@@ -257,7 +258,7 @@ impl RenderRun {
         Ok(session.rendering())
     }
 
-    /// Renders, and saves from time to time.
+    /// Renders and saves periodically.
     fn advance<S: Strategy>(
         &self,
         session: &mut Renderer<S>,
@@ -342,7 +343,7 @@ impl RenderRun {
         }
     }
 
-    /// How long it takes to save and to write what there is.
+    /// Measures how long saving and writing take.
     fn try_writing<S: Strategy>(
         &self,
         session: &Renderer<S>,
@@ -376,7 +377,7 @@ impl RenderRun {
         files::write(path, |out| out.write_all(&bytes))
     }
 
-    /// Refuses more pixels than there is memory for.
+    /// Rejects more pixels than fit in memory.
     fn allow(&self, width: usize, height: usize) -> Result<()> {
         let pixel = if self.save.is_some() { memory::SAVED_PIXEL } else { memory::PIXEL };
         memory::allow_picture(width, height, pixel)
@@ -398,13 +399,13 @@ impl RenderRun {
         }
     }
 
-    /// Where the state is, if it was saved.
+    /// The file of the state, if it was saved.
     pub(crate) fn saved(&self) -> Option<&Path> {
         self.save.as_deref()
     }
 }
 
-/// Gives a session the state of a checkpoint that is of the same tiles.
+/// Restores a session from a checkpoint of the same tiles.
 fn restore<S: Strategy>(
     session: &mut Renderer<S>,
     path: &Path,
@@ -428,7 +429,7 @@ fn restore<S: Strategy>(
     restored.with_context(|| path.display().to_string())
 }
 
-/// Ends a run at a moment.
+/// Ends a run at a given time.
 struct Deadline<'a> {
     progress: &'a RenderProgress,
     pause: Option<Instant>,

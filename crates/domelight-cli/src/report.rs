@@ -1,4 +1,4 @@
-//! What a render did: as JSON or as two lines for people.
+//! The report of a render, as JSON or as two lines of text.
 
 use anyhow::{Result, bail};
 use domelight::render::{Provenance, RenderSettings, Rendering};
@@ -13,7 +13,7 @@ use crate::profile::{self, StageSeconds};
 use crate::terminal::Terminal;
 use crate::tone::{Shown, denoised_line};
 
-/// What was rendered, and how: enough to make the same picture again.
+/// The settings of the render, enough to make the same picture again.
 #[derive(Serialize)]
 pub(crate) struct Settings {
     #[serde(flatten)]
@@ -25,12 +25,12 @@ pub(crate) struct Settings {
     pub(crate) filter: &'static str,
     pub(crate) seed: u64,
     pub(crate) threads: usize,
-    /// What brings the median of the picture to middle gray \[stops\].
+    /// The exposure that maps the median of the picture to middle gray \[stops\].
     pub(crate) automatic_exposure: f32,
 }
 
 impl Settings {
-    /// The provenance that OpenEXR files state.
+    /// The provenance stored in OpenEXR files.
     pub(crate) fn provenance(&self, settings: &RenderSettings) -> Vec<(String, String)> {
         let provenance = Provenance {
             scene: &self.scene.scene,
@@ -46,14 +46,14 @@ impl Settings {
 /// Where the time went.
 #[derive(Serialize)]
 pub(crate) struct Timings {
-    /// Reading or making scene and probe.
+    /// Reading or creating the scene and the probe.
     pub(crate) load: Seconds,
     /// The BVH and the environment's table.
     pub(crate) build: Seconds,
     pub(crate) render: Seconds,
     /// Encoding and writing pictures.
     pub(crate) write: Seconds,
-    /// By the clock, since the program began.
+    /// The wall-clock time since the program began.
     pub(crate) total: f64,
 }
 
@@ -65,7 +65,7 @@ pub(crate) enum StopReason {
     Time,
 }
 
-/// All that `--json` prints.
+/// The output of `--json`.
 #[derive(Serialize)]
 pub(crate) struct RenderReport {
     version: &'static str,
@@ -82,13 +82,13 @@ pub(crate) struct RenderReport {
     complete: bool,
     stopped: Option<StopReason>,
     outputs: Vec<String>,
-    /// How PNG output is shown, if there is any.
+    /// How PNG output is developed, if there is any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) png: Option<Shown>,
     /// How output was denoised, if it was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) denoised: Option<String>,
-    /// CPU seconds by stage of the render, if they were asked for.
+    /// CPU seconds by stage of the render, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) profile: Option<Vec<StageSeconds>>,
 }
@@ -143,7 +143,9 @@ impl RenderReport {
         let environment = environment.probe();
         let Timings { load, build, render, write, total } = &self.seconds;
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
-        status(&format!("{scene} under {environment}: {w}x{h}, {spp} samples a pixel, {strategy}"));
+        status(&format!(
+            "{scene} under {environment}: {w}x{h}, {spp} samples per pixel, {strategy}"
+        ));
         let png = self.png.map_or(String::new(), |shown| format!(" (PNG at {shown})"));
         status(&format!(
             "loaded in {:.2} s, built in {:.2} s, rendered in {:.2} s{cpu}, {:.1} Mrays/s -> {}{png}",
@@ -168,7 +170,7 @@ impl RenderReport {
         }
     }
 
-    /// Complains about what the picture does not show.
+    /// Warns about what the picture lacks.
     ///
     /// # Errors
     /// If the render was interrupted, or time ended it before a part was whole.
@@ -176,15 +178,15 @@ impl RenderReport {
         Terminal { quiet }.warn_of_non_finite("", self.non_finite_samples);
         match (self.stopped, saved) {
             (Some(StopReason::Interrupted), None) => {
-                bail!("interrupted; what was done so far is in {}", self.outputs.join(", "))
+                bail!("interrupted; the picture so far is in {}", self.outputs.join(", "))
             }
             (Some(StopReason::Interrupted), Some(saved)) => Err(InterruptedAndSaved(format!(
-                "interrupted; {} holds the state to go on from",
+                "interrupted; {} holds the state to resume from",
                 saved.display()
             ))
             .into()),
             (Some(StopReason::Time), Some(part)) if is_part => Err(InterruptedAndSaved(format!(
-                "the time is over; {} holds the state to go on from",
+                "the time is up; {} holds the state to resume from",
                 part.display()
             ))
             .into()),

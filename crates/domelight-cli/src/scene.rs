@@ -1,4 +1,4 @@
-//! From the flags to a scene under its light, seen by a camera.
+//! Converts the flags to a scene with its light and a camera.
 
 use std::path::Path;
 use std::str::FromStr as _;
@@ -23,7 +23,7 @@ use crate::parse::{Rotation, Size, Triple};
 use crate::terminal::Terminal;
 
 impl SceneArguments {
-    /// Declares what is read where the scene is rendered later.
+    /// Declares the files that a later render of the scene reads.
     pub(crate) fn declare(&self) -> Result<()> {
         if BuiltinScene::from_str(&self.scene).is_err() {
             files::reads(Path::new(&self.scene))?;
@@ -53,7 +53,7 @@ impl SceneArguments {
         Ok(settings.load(&Terminal { quiet })?)
     }
 
-    /// With so many camera samples a pixel.
+    /// With so many camera samples per pixel.
     pub(crate) fn render_settings(&self, pixel: &PixelArguments, n_samples: u32) -> RenderSettings {
         RenderSettings {
             width: self.camera.size.width,
@@ -79,7 +79,7 @@ impl FileArguments {
 }
 
 impl EnvironmentArguments {
-    /// As the lab takes them.
+    /// Converts them to the lab's settings.
     pub(crate) fn settings(&self) -> LightSettings {
         LightSettings {
             probe: self.env.clone(),
@@ -101,7 +101,7 @@ impl EnvironmentArguments {
     /// The same for commands that have no camera, or several.
     pub(crate) fn settings_without_camera(&self) -> Result<LightSettings> {
         if self.env_rotate == Some(Rotation::Auto) {
-            let text = "--env-rotate auto turns the light to a camera, and this command has none; give degrees";
+            let text = "--env-rotate auto needs a camera, and this command has none; give degrees";
             return Err(UsageError(text.into()).into());
         }
         Ok(self.settings())
@@ -139,12 +139,12 @@ impl SubjectArguments {
     }
 }
 
-/// Starts as many threads as asked for.
+/// Starts the requested number of threads.
 pub(crate) fn start_threads(asked: Option<u32>) -> Result<()> {
     // Slurm grants threads that only some of its set-ups enforce.
     let granted = std::env::var("SLURM_CPUS_PER_TASK").ok();
     let granted = granted.and_then(|n| n.parse::<u32>().ok()).filter(|&n| n > 0);
-    // More threads than cores win nothing, and too many end the process.
+    // More threads than cores gain nothing, and too many end the process.
     let cores = std::thread::available_parallelism().map_or(1024, |n| n.get() as u32);
     if let Some(threads) = asked.or(granted.map(|n| n.min(cores))) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);

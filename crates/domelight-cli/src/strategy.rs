@@ -1,4 +1,4 @@
-//! From the flags to a strategy.
+//! Converts the flags to a strategy.
 
 use anyhow::Result;
 use domelight::environment::Environment;
@@ -41,13 +41,13 @@ impl StrategyArguments {
 fn message(kind: StrategyKind, error: &StrategyError) -> String {
     match error {
         StrategyError::Misplaced { option, strategies } => {
-            format!("--{option} goes with {strategies}, not with --strategy {}", kind.name())
+            format!("--{option} applies to {strategies}, not to --strategy {}", kind.name())
         }
         error => format!("--strategy {}: {error}", kind.name()),
     }
 }
 
-/// What rejection would accept at those points; `None` for other strategies.
+/// The acceptance of rejection sampling at these points; `None` for other strategies.
 ///
 /// # Errors
 /// If its stopping rule has no estimate.

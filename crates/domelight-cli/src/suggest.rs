@@ -1,4 +1,4 @@
-//! "Did you mean": the known name that a misspelled one is nearest to.
+//! "Did you mean": suggests the known name closest to a misspelled one.
 
 use std::error::Error;
 use std::path::Path;
@@ -9,10 +9,10 @@ use domelight::environment::builtin::BuiltinProbe;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::strategy::{StrategyError, StrategyKind};
 
-/// Names that are less alike have nothing to do with each other, in [0, 1]; clap asks as much of options.
+/// The minimum similarity of names, in [0, 1], as in clap for options.
 const ALIKE: f64 = 0.7;
 
-/// The name that is most like `text`, if any is much like it.
+/// The name most similar to `text`, if any is similar enough.
 pub(crate) fn nearest<'a>(text: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let text = text.to_lowercase();
     let alike = names.into_iter().map(|name| (strsim::jaro(&text, name), name));
@@ -30,7 +30,7 @@ pub(crate) fn probe(path: &Path) -> Option<&'static str> {
     builtin(path, BuiltinProbe::ALL.map(BuiltinProbe::name))
 }
 
-/// What has a folder or an extension was meant as a file.
+/// A name with a folder or an extension is meant as a file.
 fn builtin<const N: usize>(path: &Path, names: [&'static str; N]) -> Option<&'static str> {
     let is_file = path.extension().is_some() || path.components().count() != 1;
     path.to_str().filter(|_| !is_file).and_then(|text| nearest(text, names))

@@ -1,4 +1,4 @@
-//! `domelight tone`: from linear light to a picture to look at; and how all commands report that.
+//! `domelight tone`: develops linear light to a picture for viewing, with the report that all commands share.
 
 use std::fmt;
 
@@ -23,12 +23,12 @@ use crate::output::{PictureFormat, print_json, require_one_on_standard_output};
 /// Memory of a texel: color, alpha, and as PNG.
 const TEXEL: u64 = 16 + 8 + 4;
 
-/// At which exposure and by which curve a picture is shown.
+/// The exposure and the tone curve of a picture.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(crate) struct Shown {
     /// In stops.
     exposure: f32,
-    /// The exposure was chosen, not given.
+    /// Whether the exposure was automatic.
     automatic: bool,
     tone: &'static str,
 }
@@ -132,11 +132,11 @@ fn denoise_file(
     Ok((denoiser.denoise(&picture.image, features)?, by))
 }
 
-/// What people should know of a denoised picture.
+/// A note about denoised pictures.
 pub(crate) fn denoised_line(by: &str) -> String {
     format!(
-        "denoised with {by}: to look at, not to measure; the filter trades noise for bias, and how much bias one \
-         picture cannot show"
+        "denoised with {by}: for viewing, not for measurement; the filter trades noise for bias, \
+         and one picture cannot show how much"
     )
 }
 
@@ -147,7 +147,7 @@ struct Report<'a> {
     size: [usize; 2],
     #[serde(flatten)]
     shown: Shown,
-    /// Where the automatic exposure comes from.
+    /// The source of the automatic exposure.
     exposure_from: ExposureSource,
     #[serde(skip_serializing_if = "Option::is_none")]
     denoised: Option<&'a str>,
@@ -159,14 +159,14 @@ struct Report<'a> {
 #[serde(rename_all = "lowercase")]
 enum ExposureSource {
     Given,
-    /// What the render chose, kept in the file.
+    /// The render's own exposure, stored in the file.
     Render,
     /// The median of the picture.
     Median,
 }
 
 fn develop(arguments: &ToneArguments, picture: &Picture) -> (ExposureSource, ToneMapping) {
-    // Reflectance and normals are no light.
+    // Reflectance and normals are not light.
     let of_light =
         |layer: &str| ["unoccluded", "denoised"].iter().any(|l| l.eq_ignore_ascii_case(layer));
     let is_light = arguments.layer.as_deref().is_none_or(of_light);

@@ -25,7 +25,7 @@ pub(crate) struct Frame {
     pub(crate) index: u32,
     /// Of the whole turn.
     pub(crate) n_frames: u32,
-    /// Where its pictures go.
+    /// The outputs of the frame.
     pub(crate) outputs: Vec<PicturePath>,
 }
 
@@ -51,7 +51,7 @@ impl TurntableArguments {
 }
 
 impl Turntable {
-    /// How many frames are rendered.
+    /// The number of frames to render.
     pub(crate) fn len(&self) -> u64 {
         u64::from(self.range.end - self.range.start)
     }
@@ -69,7 +69,7 @@ impl Turntable {
     /// Renders and writes one frame after the other; returns the last, with the work of all.
     ///
     /// # Errors
-    /// If a picture cannot be written, or the render was interrupted: finished frames are there then.
+    /// If a picture cannot be written, or the render was interrupted; finished frames are kept.
     pub(crate) fn render(
         &self,
         view: &PreparedScene,
@@ -90,7 +90,7 @@ impl Turntable {
         last.map_or_else(|| bail!("a turntable without frames"), Ok)
     }
 
-    /// What is there and what is missing from frame `index` on.
+    /// Describes the finished frames and those missing from frame `index` on.
     fn left(&self, index: u32) -> String {
         let Range { start, end } = self.range;
         let rest = format!("--frames {index}-{} renders the rest", end - 1);

@@ -243,7 +243,7 @@ fn another_render_is_not_gone_on_with() {
 
     let pipe = folder.path().join("pipe.exr");
     nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
-    ended(&render(&folder, &["--resume", "pipe.exr"]), 2, &["pipe.exr", "not a plain file"]);
+    ended(&render(&folder, &["--resume", "pipe.exr"]), 2, &["pipe.exr", "not a regular file"]);
 
     let bytes = fs::read(folder.path().join("c.exr")).unwrap();
     fs::write(folder.path().join("cut.exr"), &bytes[..bytes.len() / 2]).unwrap();
@@ -306,7 +306,11 @@ fn incomplete_doubled_and_foreign_parts_are_named() {
     };
     ended(&merge(&["a.exr", "c.exr"]), 3, &["tiles 5-11 of 0-19", "--tiles"]);
     ended(&merge(&["a.exr", "b.exr"]), 4, &["a.exr and b.exr both hold tile 4"]);
-    ended(&merge(&["a.exr", "d.exr"]), 5, &["d.exr is of another render", "seed is 7", "a.exr 0"]);
+    ended(
+        &merge(&["a.exr", "d.exr"]),
+        5,
+        &["d.exr belongs to another render", "seed is 7", "a.exr 0"],
+    );
     ended(&merge(&["a.exr", "e.exr"]), 5, &["e.exr"]);
     ended(&merge(&["a.exr", "gone.exr"]), 2, &["gone.exr"]);
     fs::create_dir(folder.path().join("empty")).unwrap();

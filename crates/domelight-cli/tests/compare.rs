@@ -287,7 +287,7 @@ fn bad_usage_is_named() {
     refused(
         &compare(&["--strategies", "brdf:lights=3"]),
         2,
-        &["brdf:lights=3", "lights goes with"],
+        &["brdf:lights=3", "lights applies only to"],
     );
     refused(&compare(&["--strategies", "mis,mis"]), 2, &["mis", "twice"]);
     refused(&compare(&["--budget", "watts:3"]), 2, &["watts:3", "rays:N"]);
@@ -358,7 +358,7 @@ fn pictures_of_other_renderers_take_part() {
     // A picture of another light is told apart, one of another size refused.
     let bright = load(&folder, "others/pbrt.exr").pixels.iter().map(|&p| p * 1.5).collect();
     write_exr(&others.join("bright.3s.exr"), &RgbImage::new(20, 16, bright), None);
-    refused(&run(&[]), 0, &["the picture bright is +", "as bright as the reference"]);
+    refused(&run(&[]), 0, &["the picture bright differs from the reference by +", "in brightness"]);
     write_exr(&others.join("small.3s.exr"), &RgbImage::filled(10, 8, Rgb::splat(0.5)), None);
     refused(&run(&[]), 2, &["picture small is 10x8", "renders 20x16", "--size 10x8"]);
 }

@@ -114,7 +114,8 @@ fn a_render_is_denoised_where_it_is_looked_at() {
     done(&render(&["-q", "-o", "plain.exr", "-o", "plain.pfm"]));
     let output = render(&["--denoise", "-o", "a.exr", "-o", "a.pfm", "-o", "a.png"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let line = "denoised with Open Image Denoise 2.3.1 by color, albedo and normals: to look at, not to measure";
+    let line = "denoised with Open Image Denoise 2.3.1 from color, albedo and normals: for \
+     viewing, not for measurement";
     assert!(stderr(&output).contains(line), "{}", stderr(&output));
     let color = load(&folder, "plain.pfm");
     let [albedo, normal] = ["albedo", "normal"].map(|name| layer(&folder, "plain.exr", name));
@@ -138,10 +139,10 @@ fn a_render_is_denoised_where_it_is_looked_at() {
     let (of_layer, by) = tone(&["a.exr", "--layer", "denoised"]);
     assert_eq!(by, None);
     let (again, by) = tone(&["plain.exr", "--denoise"]);
-    assert_eq!(by.as_deref(), Some("Open Image Denoise 2.3.1 by color, albedo and normals"));
+    assert_eq!(by.as_deref(), Some("Open Image Denoise 2.3.1 from color, albedo and normals"));
     assert_eq!(again, of_layer);
     let (_, by) = tone(&["plain.pfm", "--denoise"]);
-    assert_eq!(by.as_deref(), Some("Open Image Denoise 2.3.1 by color alone"));
+    assert_eq!(by.as_deref(), Some("Open Image Denoise 2.3.1 from color alone"));
 }
 
 #[test]
@@ -161,7 +162,7 @@ fn what_is_wrong_with_the_library_is_said_before_the_work() {
     nix::unistd::mkfifo(&folder.path().join("pipe.so"), nix::sys::stat::Mode::S_IRWXU).unwrap();
     for name in ["./pipe.so", "."] {
         let library = folder.path().join(name);
-        ended(&render(&library), 2, &[how, &["not a plain file"]].concat());
+        ended(&render(&library), 2, &[how, &["not a regular file"]].concat());
     }
     assert!(!folder.path().join("a.png").exists());
 }

@@ -26,7 +26,7 @@ fn without_arguments_the_program_shows_five_things_to_do() {
     let folder = pictures();
     let output = domelight(&folder, &[]);
     assert_eq!(output.status.code(), Some(2));
-    let (_, steps) = stderr(&output).split_once("Five things to do:\n").expect("first steps");
+    let (_, steps) = stderr(&output).split_once("Five things to try:\n").expect("first steps");
     let commands: Vec<_> = steps.lines().filter(|line| line.starts_with("  domelight ")).collect();
     assert_eq!(commands.len(), 5, "{steps}");
     for command in ["render", "probe", "lights", "compare"] {
@@ -214,7 +214,7 @@ fn a_clipped_sun_is_warned_of() {
     write_exr(&folder.path().join("clipped.exr"), &map, None);
     let output = domelight(&folder, &["probe", "clipped.exr"]);
     assert_eq!(output.status.code(), Some(0));
-    assert!(stderr(&output).contains("4 texels side by side have the greatest value, 64"));
+    assert!(stderr(&output).contains("4 adjacent texels have the maximum value, 64"));
     assert!(stdout(&output).contains("greatest value"), "{}", stdout(&output));
     map.pixels[20 * 128 + 40] = Rgb::splat(6000.0);
     write_exr(&folder.path().join("whole.exr"), &map, None);

@@ -38,7 +38,7 @@ fn no_result_takes_the_place_of_what_is_read_or_of_another() {
     ended(&domelight(&folder, &["probe", "sky", "-q", "-o", "figures/figure-1.png"]), 0, &[]);
     let before = snapshot(&folder);
     let render = |more: &[&'static str]| [&["render"][..], &SMALL, more].concat();
-    let over = "written over";
+    let over = "overwrit";
     let cases = [
         (render(&["sphere", "--env", "in.hdr", "-o", "in.hdr"]), over),
         (render(&["sphere", "--env", "in.hdr", "-o", "hard.hdr"]), over),
@@ -191,7 +191,7 @@ fn an_unusable_cache_costs_nothing_but_a_warning() {
     let more =
         ["--strategies", "mis", "--budget", "spp:1", "--seeds", "1", "--cache", "in.hdr/cache"];
     let output = domelight(&folder, &[&compare[..], &more].concat());
-    ended(&output, 0, &["the reference is not kept", "in.hdr/cache"]);
+    ended(&output, 0, &["the reference cannot be cached", "in.hdr/cache"]);
     assert!(folder.path().join("compare.html").exists());
 }
 

@@ -188,8 +188,11 @@ fn nothing_to_extract_is_exit_code_1_and_writes_nothing() {
         (&["black.exr"][..], "black.exr: the map is black; there is no light to extract"),
         (&["gray.exr", "--sun"], "gray.exr: there is no sun: "),
         (&["gray.exr", "--lamps", "3"], "gray.exr: there is no lamp: "),
-        (&["gray.exr", "-n", "5000"], "5000 lights were asked for, but only 2048 texels"),
-        (&["gray.exr", "-n", "4", "--min-energy", "90"], "no light holds the least share"),
+        (&["gray.exr", "-n", "5000"], "5000 lights were requested, but only 2048 texels"),
+        (
+            &["gray.exr", "-n", "4", "--min-energy", "90"],
+            "no light has the requested minimum share",
+        ),
         (&["sun.exr", "-o", "no/folder/rig.json"], "no/folder/rig.json: "),
         (&["sun.exr", "--preview", "no/rig.png"], "no/rig.png: "),
         (&["sun.exr", "--sun", "--keep-residual", "no/dome.exr"], "no/dome.exr: "),

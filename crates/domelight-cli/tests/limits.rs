@@ -99,8 +99,8 @@ fn what_is_no_plain_file_is_named() {
         ("empty.ply", ""),
         ("dangling.ply", "No such file"),
         ("loop.ply", "symbolic links"),
-        ("null.ply", "not a plain file"),
-        ("pipe.ply", "not a plain file"),
+        ("null.ply", "not a regular file"),
+        ("pipe.ply", "not a regular file"),
     ];
     for (name, why) in odd {
         // A circle might be mended: it may be tried again.
@@ -116,7 +116,7 @@ fn what_is_no_plain_file_is_named() {
 
         // A pipe may be a probe or a picture; with nobody who writes it would wait.
         if name != "pipe.ply" {
-            let why = why.replace("not a plain file", "the file is empty");
+            let why = why.replace("not a regular file", "the file is empty");
             ended(&render(&folder, &["spheres", "--env", name]), code, &[name, &why]);
             ended(
                 &domelight(&folder, &["lights", name, "-n", "2", "-o", "x.json"]),
@@ -205,7 +205,7 @@ fn too_large_a_picture_is_refused_before_it_is_made() {
     ended(&render(&folder, &["spheres", "--max-memory", "none"]), 0, &[]);
 }
 
-/// A map of one bit a texel, in few bytes if they are alike; `eight` gives eight texels in a row by their number.
+/// A map of one bit per texel, in few bytes if they are alike; `eight` gives eight texels in a row by their number.
 fn png_of(width: u32, height: u32, eight: impl Fn(u32) -> u8) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(Cursor::new(&mut bytes), width, height);

@@ -1,4 +1,4 @@
-//! The tests of the program: one test program, a subject a file.
+//! The tests of the program: one test program, a subject per file.
 
 mod bench;
 mod checkpoint;

@@ -17,7 +17,7 @@ fn folder() -> TempDir {
 #[test]
 fn the_program_alone_shows_things_to_do() {
     let output = domelight(&folder(), &[]);
-    ended(&output, 2, &["Five things to do", "domelight compare", "domelight --help"]);
+    ended(&output, 2, &["Five things to try", "domelight compare", "domelight --help"]);
     assert!(stderr(&output).lines().count() < 20, "{}", stderr(&output));
 }
 

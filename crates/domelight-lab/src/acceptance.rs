@@ -1,4 +1,4 @@
-//! What rejection accepts and how long it takes, over some points.
+//! The acceptance rate and the number of tries of rejection sampling over some points.
 
 use domelight::sampling::{Sampler, SamplerKind};
 use domelight::strategy::{
@@ -6,7 +6,7 @@ use domelight::strategy::{
 };
 use rayon::prelude::*;
 
-/// Runs rejection at each point; nothing is traced.
+/// Runs rejection sampling at each point without tracing rays.
 pub fn count_tries(
     rejection: &RejectionSampling,
     points: &[ShadingPoint],
@@ -20,21 +20,21 @@ pub fn count_tries(
     points.par_iter().enumerate().map(count).collect()
 }
 
-/// Rejection over all points.
+/// The acceptance of rejection sampling over all points.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Acceptance {
-    /// Points that were looked at.
+    /// The number of points.
     pub points: usize,
-    /// Accepted per try, averaged over the points.
+    /// The mean acceptance rate over the points.
     pub mean: f64,
-    /// Tries at the point in the middle.
+    /// The median number of tries.
     pub median_tries: u32,
-    /// Share of the points whose tries ran out before enough were accepted.
+    /// The share of the points whose tries ran out before enough were accepted.
     pub gave_up: f64,
 }
 
 impl Acceptance {
-    /// The mean, the median and the share of what was counted.
+    /// Computes the acceptance from per-point statistics.
     pub fn of(statistics: &[RejectionStatistics]) -> Self {
         let n = statistics.len().max(1) as f64;
         let mut tries: Vec<u32> = statistics.iter().map(|s| s.tries).collect();

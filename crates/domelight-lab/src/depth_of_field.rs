@@ -1,4 +1,4 @@
-//! Depth of field as a user says it: an f-number, a distance, and the blades of the aperture.
+//! Depth of field in the user's terms: an f-number, a focus distance, and the number of aperture blades.
 
 use std::str::FromStr;
 
@@ -7,22 +7,22 @@ use serde::Serialize;
 
 use crate::Error;
 
-/// What a camera's lens blurs, as `--dof` has it: `F,DIST` or `F,DIST,BLADES`.
+/// Depth of field in the notation of `--dof`: `F,DIST` or `F,DIST,BLADES`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DepthOfField {
-    /// The f-number, > 0: less blurs more.
+    /// The f-number, > 0; a smaller number blurs more.
     pub f_number: f32,
-    /// Distance of what is sharp, along the camera's axis, > 0; none is that of the subject's center.
+    /// The focus distance along the camera's axis, > 0; `None` is the distance of the subject's center.
     pub focus_distance: Option<f32>,
-    /// Blades of the aperture, 3 or more; 0 is a round one.
+    /// The number of aperture blades, at least 3; 0 is a round aperture.
     pub blades: u32,
 }
 
 /// A text that is no depth of field.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "'{0}' is not an f-number and a distance or auto, such as 2.8,auto or 1.4,3.5, with a number of blades from 3 to 64 \
-     if wanted, as in 2.8,auto,6"
+    "'{0}' is not an f-number and a distance or auto, such as 2.8,auto or 1.4,3.5, optionally \
+     with 3 to 64 blades as in 2.8,auto,6"
 )]
 pub struct BadDepthOfField(String);
 

@@ -1,4 +1,4 @@
-//! Everything that can go wrong in the lab.
+//! The errors of the lab.
 
 use domelight::bsdf::ParseMaterialError;
 use domelight::bvh::BvhError;
@@ -13,25 +13,25 @@ use domelight::sampling::TableError;
 use domelight::scene::{CameraError, LoadError, SceneError};
 use domelight::strategy::{PrepareError, RejectionError, StrategyError};
 
-/// Any error of the lab. Its cause, if it has one, is its source, also where the text repeats it.
+/// Any error of the lab. Its cause, if there is one, is its source, even if the text repeats it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// What was asked for cannot be: the same again would fail again.
+    /// An invalid request, which would fail again.
     #[error("{0}")]
     Usage(String),
     /// The host ended the work.
     #[error("interrupted{0}")]
     Interrupted(&'static str),
-    /// What went wrong, in words.
+    /// A description of the error.
     #[error("{0}")]
     Failed(String),
-    /// An error and where it happened.
+    /// An error and its location.
     #[error("{place}: {error}")]
     At {
         /// A file, a strategy or a case.
         place: String,
-        /// What happened there.
+        /// The error at this location.
         #[source]
         error: Box<Self>,
     },
@@ -41,31 +41,31 @@ pub enum Error {
     /// A probe that cannot be loaded.
     #[error("{0}")]
     Probe(#[source] ProbeError),
-    /// A description that makes no scene.
+    /// An invalid scene description.
     #[error("{0}")]
     Scene(#[source] SceneError),
-    /// A camera that makes no picture.
+    /// An invalid camera.
     #[error("{0}")]
     Camera(#[source] CameraError),
-    /// A map that makes no environment.
+    /// An invalid environment map.
     #[error("{0}")]
     Environment(#[source] EnvironmentError),
-    /// A text that names no strategy.
+    /// An invalid strategy text.
     #[error("{0}")]
     Strategy(#[source] StrategyError),
     /// A strategy that does not suit its environment.
     #[error("{0}")]
     Prepare(#[source] PrepareError),
-    /// A text that names no material.
+    /// An invalid material text.
     #[error("{0}")]
     Material(#[source] ParseMaterialError),
-    /// Rejection sampling that has no estimate.
+    /// Rejection sampling without an estimate.
     #[error("{0}")]
     Rejection(#[source] RejectionError),
-    /// Weights that make no table.
+    /// Invalid weights of a table.
     #[error("{0}")]
     Table(#[source] TableError),
-    /// Triangles that make no tree.
+    /// Triangles for which a BVH cannot be built.
     #[error("{0}")]
     Bvh(#[source] BvhError),
     /// Lights that cannot be extracted.
@@ -74,7 +74,7 @@ pub enum Error {
     /// A picture that cannot be read or written.
     #[error("{0}")]
     Picture(#[source] PictureError),
-    /// The same, of bytes without a name.
+    /// The same for bytes without a name.
     #[error("{0}")]
     PictureBytes(#[source] PictureErrorKind),
     /// Pictures of different sizes.
@@ -83,13 +83,13 @@ pub enum Error {
     /// More memory than is allowed.
     #[error("{0}")]
     Memory(#[source] OverLimit),
-    /// A file that is read and written.
+    /// A file that is both read and written.
     #[error("{0}")]
     Conflict(#[source] FileConflict),
     /// A failure of the system.
     #[error("{0}")]
     Io(#[source] std::io::Error),
-    /// A text that is no JSON, or values that make none.
+    /// Invalid JSON, or values that cannot be written as JSON.
     #[error("{0}")]
     Json(#[source] serde_json::Error),
     /// An error of the front end.
@@ -114,9 +114,9 @@ from! {
     Json(serde_json::Error), Rejection(RejectionError), Table(TableError), Bvh(BvhError),
 }
 
-/// Says where an error happened.
+/// Adds the location of an error.
 pub trait At<T> {
-    /// The error at that place.
+    /// Adds the location to the error.
     ///
     /// # Errors
     /// If there was one.

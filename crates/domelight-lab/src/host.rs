@@ -1,4 +1,4 @@
-//! What a front end decides for the work that is done for it.
+//! The decisions of a front end about the work done for it.
 
 use std::path::Path;
 
@@ -13,16 +13,17 @@ use crate::Error;
 
 /// Shows the progress of work that consists of many renders.
 pub trait WorkProgress: Sync {
-    /// A share in [0, 1] of the work is done, the rest takes about `seconds_left`, and `label` is at work.
+    /// Reports the fraction of the work that is done, in [0, 1], the remaining time `seconds_left`, and what is running,
+    /// `label`.
     fn advance(&self, share: f64, seconds_left: f64, label: &str);
 }
 
-/// A front end: where messages go, who sees the progress, when to stop, which files and how much memory may be taken.
+/// A front end: where messages go, how progress is shown, when to stop, and which files and how much memory may be used.
 pub trait Host: Sync {
     /// Shows a warning.
     fn warn(&self, _text: &str) {}
 
-    /// Shows how the work goes.
+    /// Shows the progress of the work.
     fn status(&self, _text: &str) {}
 
     /// Warns of `n` camera samples that were NaN or infinite, of the picture named by `label`: they are black in it,
@@ -30,28 +31,28 @@ pub trait Host: Sync {
     fn warn_of_non_finite(&self, label: &str, n: u64) {
         if n > 0 {
             self.warn(&format!(
-                "{label}{n} camera samples were NaN or infinite and count as black, which is a defect of \
-                 domelight: please report this command with its scene and probe"
+                "{label}{n} camera samples were NaN or infinite and count as black; this is a bug \
+                 in domelight: please report this command with its scene and probe"
             ));
         }
     }
 
-    /// Shows a render, named by `label`; what is returned is told of each tile and may end the render.
+    /// Shows a render, named by `label`. The returned observer is notified of each tile and may end the render.
     fn progress<'a>(&'a self, _label: &str, _settings: &RenderSettings) -> Box<dyn Observer + 'a> {
         Box::new(CanceledBy(|| self.canceled()))
     }
 
-    /// Shows work of many renders as a whole; a host that has none is shown render by render, by [`Host::progress`].
+    /// Shows the progress of many renders as a whole. Without it, each render is shown by [`Host::progress`].
     fn work_progress<'a>(&'a self) -> Option<Box<dyn WorkProgress + 'a>> {
         None
     }
 
-    /// True ends the work.
+    /// Returns true to end the work.
     fn canceled(&self) -> bool {
         false
     }
 
-    /// A file is about to be read.
+    /// Called before a file is read.
     ///
     /// # Errors
     /// If it must not be.
@@ -59,7 +60,7 @@ pub trait Host: Sync {
         Ok(())
     }
 
-    /// Writes a result, whole or not at all.
+    /// Writes a result atomically.
     ///
     /// # Errors
     /// If it cannot be written, or must not be.
@@ -75,17 +76,17 @@ pub trait Host: Sync {
         Ok(load_probe(path, options)?)
     }
 
-    /// What may still be taken \[bytes\]; none if there is no limit.
+    /// The remaining memory \[bytes\]; `None` if there is no limit.
     fn memory_left(&self) -> Option<u64> {
         None
     }
 
-    /// So many bytes were taken and are kept.
+    /// Records that this many bytes were allocated and are kept.
     fn keeps_memory(&self, _bytes: u64) {}
 }
 
 impl dyn Host + '_ {
-    /// Refuses, by the name of what takes it, more memory than is left; else counts it.
+    /// Records memory needed for `what`, or rejects it if more than the remaining memory is needed.
     pub(crate) fn take_memory(&self, what: &str, bytes: u64) -> Result<(), Error> {
         use crate::At as _;
         require(bytes, self.memory_left()).at(what)?;
@@ -93,7 +94,7 @@ impl dyn Host + '_ {
         Ok(())
     }
 
-    /// Makes a strategy's tables and lights, if there is memory for them.
+    /// Builds a strategy's tables and lights, if there is memory for them.
     pub(crate) fn prepare<'e>(
         &self,
         spec: StrategySpec,
@@ -110,13 +111,13 @@ impl dyn Host + '_ {
         Box::new(CanceledBy(|| self.canceled()))
     }
 
-    /// Ends the work if the host says so.
+    /// Returns an error if the host ends the work.
     pub(crate) fn check_canceled(&self) -> Result<(), Error> {
         if self.canceled() { Err(Error::Interrupted("")) } else { Ok(()) }
     }
 }
 
-/// A host that says nothing and never stops.
+/// A host that shows nothing and never stops.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

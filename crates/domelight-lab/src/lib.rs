@@ -1,8 +1,8 @@
-//! What is done with renders of [`domelight`]: comparisons of strategies, converged references and their cache,
-//! benchmarks, the lecture's figures, and the pages that show them.
+//! Builds on renders of [`domelight`]: comparisons of strategies, converged references and their cache, benchmarks, the
+//! lecture's figures, and the pages that show them.
 //!
-//! Every entry takes a [`Host`], which is what a front end decides: where messages go, who sees the progress, when to
-//! stop. [`Silent`] is the host of programs that want results alone.
+//! Every entry point takes a [`Host`], which makes the decisions of a front end: where messages go, how progress is shown,
+//! and when to stop. [`Silent`] is the host for programs that want only results.
 //!
 //! ```no_run
 //! use domelight_lab::compare::{Budget, Comparison, ComparisonSettings};

@@ -1,8 +1,8 @@
-//! The names of files on pages, in pictures and in other exported files, which must not name a folder of this machine.
+//! File names on pages, in pictures and in other exported files, which must not reveal folders of this machine.
 
 use std::path::{Component, Path};
 
-/// The name of a file without its folders; names that are no paths stay as they are.
+/// The name of a file without its folders. Names that are not paths are unchanged.
 pub fn file_name(path: &str) -> String {
     let normal = |component| match component {
         Component::Normal(name) => Some(name),
@@ -19,8 +19,8 @@ pub fn display_name(path: &str) -> String {
     Path::new(&name).file_stem().map_or(name.clone(), |stem| stem.to_string_lossy().into_owned())
 }
 
-/// A word of a command line as others may read it: of paths that are absolute or lead out of the working folder, the
-/// name of the file alone.
+/// A word of a command line for other readers. Paths that are absolute or lead out of the working folder are reduced to the
+/// file name.
 pub fn shared_word(word: &str) -> String {
     if let Some((flag, value)) = word.split_once('=')
         && flag.starts_with('-')

@@ -75,7 +75,7 @@ pub fn strategy_noise(environment: &Environment) -> Result<Vec<StrategyNoise>, E
     Ok(found)
 }
 
-/// All at [`N_RAYS`] rays a camera sample; resampling with the number of candidates that suits.
+/// All at [`N_RAYS`] rays per camera sample; resampling with the number of candidates that suits.
 fn specs(environment: &Environment, points: &[ShadingPoint]) -> [StrategySpec; 5] {
     let sir = StrategySpec::Sir {
         n_candidates: None,

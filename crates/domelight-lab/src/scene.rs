@@ -1,4 +1,4 @@
-//! From what a user says of a scene, its light and its view to what can be rendered.
+//! Turns the user's settings for a scene, its light and its view into a renderable scene.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr as _;
@@ -22,60 +22,60 @@ use crate::names::{file_name, without_folders};
 use crate::report::{CameraReport, EnvironmentReport, SceneReport};
 use crate::{At as _, Error, Host};
 
-/// Rows of a built-in probe by default.
+/// The default number of rows of a built-in probe.
 pub const BUILTIN_ROWS: u32 = 1024;
 
-/// For each triangle \[bytes\]: the tree, and what it is built from.
+/// Memory per triangle \[bytes\] of the BVH and its construction.
 pub const TRIANGLE: u64 = 140;
 
-/// A scene under its light, seen by a camera, as a user says it.
+/// The user's settings for a scene, its light and a camera.
 #[derive(Clone, Debug)]
 pub struct SceneSettings {
     /// A built-in scene or a file.
     pub scene: String,
-    /// What of the file is shown.
+    /// The part of the file to show.
     pub file: FileSettings,
     /// The light.
     pub environment: LightSettings,
     /// The view.
     pub view: ViewSettings,
-    /// What is changed about the scene.
+    /// The changes to the scene.
     pub subject: SubjectSettings,
 }
 
-/// What of a file is shown.
+/// The part of a file to show.
 #[derive(Clone, Debug, Default)]
 pub struct FileSettings {
-    /// The scene of a glTF file with several, by name or number; none is the file's own.
+    /// The scene of a glTF file, by name or number; `None` is the file's default scene.
     pub scene: Option<String>,
-    /// An animation of a glTF file and the moment that is shown; none is at rest.
+    /// The animation of a glTF file and the time in it; `None` is the rest pose.
     pub animation: Option<AnimationTime>,
 }
 
-/// The light: what is none is as the scene says.
+/// The light. `None` means the scene's own setting.
 #[derive(Clone, Debug)]
 pub struct LightSettings {
     /// A built-in probe or a file.
     pub probe: Option<String>,
-    /// About the up axis, counter-clockwise seen from above \[degrees\].
+    /// The rotation about the up axis, counterclockwise as seen from above \[degrees\].
     pub rotate: Option<f32>,
-    /// Turn the map instead so that its key light falls from the left on what the camera sees.
+    /// Whether to rotate the map instead so that its key light comes from the left of the camera.
     pub rotate_to_camera: bool,
-    /// The radiance is multiplied by it.
+    /// A factor on the radiance.
     pub scale: Option<f32>,
-    /// The radiance is multiplied by 2 to the power of it.
+    /// Exposure: multiplies the radiance by 2 to this power.
     pub exposure: Option<f32>,
-    /// Where the top of the map points to.
+    /// The direction of the top of the map.
     pub up: Option<UpAxis>,
-    /// The map's layout, where shape and attributes of the file do not determine it.
+    /// The layout of the map, if the shape and the attributes of the file do not determine it.
     pub mapping: Option<Mapping>,
     /// The layer of an OpenEXR map.
     pub layer: Option<String>,
-    /// Rows of a built-in probe.
+    /// The number of rows of a built-in probe.
     pub rows: u32,
-    /// Refuses scenes that would be repaired or shown in part.
+    /// Whether to reject scenes that would be repaired or shown in part.
     pub strict_scene: bool,
-    /// Refuses maps that would be repaired.
+    /// Whether to reject maps that would be repaired.
     pub strict_map: bool,
 }
 
@@ -97,20 +97,20 @@ impl Default for LightSettings {
     }
 }
 
-/// The view: what is none is as the scene's camera has it, else framed to the scene.
+/// The view. `None` means the setting of the scene's camera, or else of a framing camera.
 #[derive(Clone, Debug)]
 pub struct ViewSettings {
     /// Width and height of the picture \[pixels\].
     pub size: [usize; 2],
-    /// One of the scene's cameras, by name or number; none is the first.
+    /// One of the scene's cameras, by name or number; `None` is the first.
     pub camera: Option<String>,
-    /// From where a camera looks that is framed to the scene, whatever cameras the scene has.
+    /// The direction of a camera that frames the scene, regardless of the scene's cameras.
     pub view: Option<ViewDirection>,
-    /// A framed camera keeps the subject in the picture while it goes around it.
+    /// Whether a framed camera keeps the subject in the picture while it goes around it.
     pub all_around: bool,
-    /// What is blurred; none is sharp everywhere.
+    /// The depth of field; `None` is sharp everywhere.
     pub depth_of_field: Option<DepthOfField>,
-    /// Where the camera is.
+    /// The position of the camera.
     pub origin: Option<Vec3>,
     /// What it looks at.
     pub target: Option<Vec3>,
@@ -120,20 +120,20 @@ pub struct ViewSettings {
     pub projection: Option<Projection>,
 }
 
-/// What is changed about the scene.
+/// The changes to the scene.
 #[derive(Clone, Debug, Default)]
 pub struct SubjectSettings {
-    /// What the subject is made of; none is its own.
+    /// The material of the subject; `None` is its own.
     pub material: Option<NamedMaterial>,
-    /// Move and scale the scene: center of the bounds to 0, longest half-extent to 1.
+    /// Whether to move and scale the scene: center of the bounds to 0, longest half-extent to 1.
     pub normalize: bool,
-    /// What is put under the subject.
+    /// The ground under the subject.
     pub ground: Option<Ground>,
-    /// Leave the background out.
+    /// Whether to hide the background.
     pub hide_env: bool,
 }
 
-/// A material in the notation of `--material`, and the text that it was given as.
+/// A material in the notation of `--material`, with its original text.
 #[derive(Clone, Debug)]
 pub struct NamedMaterial {
     /// As it was given.
@@ -150,18 +150,18 @@ impl std::str::FromStr for NamedMaterial {
     }
 }
 
-/// What was read, changed as the settings say; nothing is built yet.
+/// A loaded scene, changed according to the settings but not yet built.
 #[derive(Debug)]
 pub struct LoadedScene {
     /// Geometry and materials.
     pub description: SceneDescription,
-    /// How the map is used.
+    /// The use of the map.
     pub light: EnvironmentSettings,
     /// The map, lat-long.
     pub map: RgbImage,
     /// The camera.
     pub camera: CameraSettings,
-    /// What the picture lacks of the files, one sentence each.
+    /// What the picture will lack of the files, one sentence per item.
     pub warnings: Vec<String>,
     settings: SceneSettings,
 }
@@ -175,19 +175,19 @@ pub struct PreparedScene {
     pub camera: Camera,
     /// The view, in the units of the scene's file, as `camera`.
     pub camera_settings: CameraSettings,
-    /// The lens of a camera that blurs.
+    /// The lens of a camera with depth of field.
     lens: Option<Lens>,
-    /// The axis that the camera goes around.
+    /// The axis around which the camera goes.
     up: Vec3,
     /// The light.
     pub environment: Environment,
-    /// The probe as it was named: a built-in one or a file, for messages.
+    /// The name of the probe, built-in or a file, for messages.
     pub probe: String,
-    /// In words and numbers.
+    /// A report in words and numbers.
     pub report: SceneReport,
 }
 
-/// A scene under its light, seen by a camera, that somebody else owns.
+/// A borrowed scene with its light and camera.
 #[derive(Clone, Copy, Debug)]
 pub struct PreparedSceneRef<'a> {
     /// Geometry and materials.
@@ -196,21 +196,21 @@ pub struct PreparedSceneRef<'a> {
     pub camera: &'a Camera,
     /// The light.
     pub environment: &'a Environment,
-    /// In words and numbers.
+    /// A report in words and numbers.
     pub report: &'a SceneReport,
 }
 
 impl PreparedScene {
-    /// What a render needs of it.
+    /// The parts that a render needs.
     pub fn view(&self) -> PreparedSceneRef<'_> {
         let Self { scene, camera, environment, report, .. } = self;
         PreparedSceneRef { scene, camera, environment, report }
     }
 
-    /// The camera after it has gone around the subject by an angle, counter-clockwise seen from above \[degrees\].
+    /// The camera rotated around the subject by an angle, counterclockwise as seen from above \[degrees\].
     ///
     /// # Errors
-    /// If it would make no picture.
+    /// If the camera would be invalid.
     pub fn camera_around(&self, degrees: f32) -> Result<Camera, Error> {
         let center = self.scene.subject_bounds().center();
         let center = if center.is_finite() { center } else { self.camera_settings.target };
@@ -226,7 +226,7 @@ fn through(camera: Camera, lens: Option<Lens>) -> Camera {
 }
 
 impl SceneSettings {
-    /// A scene as it is, under its own light or the built-in sky.
+    /// An unchanged scene under its own light or the built-in sky.
     pub fn new(scene: impl Into<String>, size: [usize; 2]) -> Self {
         Self {
             scene: scene.into(),
@@ -250,12 +250,12 @@ impl SceneSettings {
     /// Reads scene and probe.
     ///
     /// # Errors
-    /// If one cannot be read, or the view is not to be had.
+    /// If one cannot be read, or the view is not available.
     pub fn load(self, host: &dyn Host) -> Result<LoadedScene, Error> {
         let is_builtin = BuiltinScene::from_str(&self.scene);
         let (mut description, mut light, map, warnings) = if let Ok(scene) = is_builtin {
             self.file.check_builtin(&self.scene)?;
-            // It takes no memory to speak of, so that its light may be read meanwhile.
+            // It takes little memory, so its light can be read in parallel.
             let environment = Some(scene.environment());
             let of_scene = SceneDescription { environment, ..SceneDescription::default() };
             let light = self.environment.over(&of_scene);
@@ -278,7 +278,7 @@ impl SceneSettings {
         Ok(LoadedScene { description, light, map, camera, warnings, settings: self })
     }
 
-    /// Changes the scene as the settings say; the camera frames what is not scenery.
+    /// Changes the scene according to the settings. The camera frames the subject.
     fn frame(&self, scene: &mut SceneDescription, up: Vec3) -> Result<CameraSettings, Error> {
         self.subject.apply(scene, up);
         // Squares of lengths must be finite.
@@ -293,10 +293,10 @@ impl SceneSettings {
 }
 
 impl LoadedScene {
-    /// Builds tree and tables.
+    /// Builds the BVH and the tables.
     ///
     /// # Errors
-    /// If scene, camera or environment cannot be used.
+    /// If the scene, the camera or the environment is invalid.
     pub fn build(self, host: &dyn Host) -> Result<PreparedScene, Error> {
         let Self { description, light, map, camera, warnings, settings } = self;
         let [width, height] = settings.view.size;
@@ -308,7 +308,7 @@ impl LoadedScene {
         let (camera, camera_settings) = (Camera::new(&camera, width, height)?, camera);
         let camera = through(camera, lens);
         let n_triangles: usize = description.parts.iter().map(|p| p.mesh.triangles.len()).sum();
-        let tree = format!("{}: a tree over {n_triangles} triangles", settings.scene);
+        let tree = format!("{}: a BVH over {n_triangles} triangles", settings.scene);
         host.take_memory(&tree, TRIANGLE * n_triangles as u64)?;
         let scene = Scene::new(description).at(&settings.scene)?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
@@ -332,7 +332,7 @@ impl LoadedScene {
     }
 }
 
-/// The scene's own camera, or one framed to it.
+/// The scene's own camera, or one that frames it.
 pub(crate) fn view_of(description: &SceneDescription, aspect: f32, up: Vec3) -> CameraSettings {
     description.camera.unwrap_or_else(|| description.framed(&Framing::new(aspect, up)))
 }
@@ -345,7 +345,7 @@ pub(crate) fn close_up(description: &SceneDescription, aspect: f32, up: Vec3) ->
     let (center, size) = (bounds.center(), bounds.size());
     let toward = (view.origin - view.target).normalize_or(Vec3::Z);
     let height = size.abs().dot(up.abs());
-    // The widest side, whichever way it is turned.
+    // The widest side, in any orientation.
     let width = (size - up.abs() * height).max_element();
     let extent = height.max(width / aspect) * 1.08;
     let distance = 0.5 * extent / (0.5 * FOV.to_radians()).tan() + 0.5 * width;
@@ -357,7 +357,7 @@ pub(crate) fn close_up(description: &SceneDescription, aspect: f32, up: Vec3) ->
     }
 }
 
-/// A built-in scene by its name, else a file, and what of it is not shown, one sentence each, without folders.
+/// A built-in scene by its name, or else a file, with what will not be shown, one sentence per item, without folders.
 pub(crate) fn load_scene(
     name: &str,
     file: &FileSettings,
@@ -388,7 +388,7 @@ pub(crate) fn load_scene(
 }
 
 impl FileSettings {
-    /// Refuses what a built-in scene does not have.
+    /// Rejects options that a built-in scene does not have.
     fn check_builtin(&self, scene: &str) -> Result<(), Error> {
         match (&self.scene, &self.animation) {
             (None, None) => Ok(()),
@@ -399,7 +399,7 @@ impl FileSettings {
     }
 }
 
-/// The probe as it was named, for messages.
+/// The name of the probe, for messages.
 pub(crate) fn probe_name(source: &EnvironmentSource) -> String {
     match source {
         EnvironmentSource::File(path) => path.display().to_string(),
@@ -408,7 +408,7 @@ pub(crate) fn probe_name(source: &EnvironmentSource) -> String {
 }
 
 impl LightSettings {
-    /// The scene's own settings with these over them.
+    /// The scene's own settings, overridden by these.
     pub fn over(&self, scene: &SceneDescription) -> EnvironmentSettings {
         let source = |name: &str| match BuiltinProbe::from_str(name) {
             Ok(probe) => EnvironmentSource::Builtin(probe.name().to_owned()),
@@ -422,7 +422,7 @@ impl LightSettings {
             up: scene.up.unwrap_or_default(),
         };
         let mut settings = match (&self.probe, &scene.environment) {
-            // Another probe takes none of the first one's adjustments over.
+            // Another probe does not inherit the first one's adjustments.
             (Some(name), _) => plain(source(name)),
             (None, Some(of_scene)) => of_scene.clone(),
             (None, None) => plain(source(BuiltinProbe::Sky.name())),
@@ -434,10 +434,10 @@ impl LightSettings {
         settings
     }
 
-    /// Reads or makes the map, lat-long.
+    /// Reads or creates the lat-long map.
     ///
     /// # Errors
-    /// If it cannot be read, or takes too much memory.
+    /// If it cannot be read, or needs too much memory.
     pub fn load(&self, light: &EnvironmentSettings, host: &dyn Host) -> Result<RgbImage, Error> {
         let path = match &light.source {
             EnvironmentSource::Builtin(name) => {
@@ -466,7 +466,7 @@ impl LightSettings {
 }
 
 impl SubjectSettings {
-    /// Changes the scene as it says.
+    /// Applies the changes to the scene.
     fn apply(&self, scene: &mut SceneDescription, up: Vec3) {
         if self.normalize {
             scene.normalize();
@@ -483,7 +483,7 @@ impl SubjectSettings {
 }
 
 impl ViewSettings {
-    /// Makes the camera that was asked for the scene's.
+    /// Makes the requested camera the scene's.
     fn choose(&self, name: &str, scene: &mut SceneDescription) -> Result<(), Error> {
         let Some(asked) = &self.camera else { return Ok(()) };
         let cameras = &scene.cameras;
@@ -502,7 +502,7 @@ impl ViewSettings {
         Err(Error::Usage(format!("{name} {known}")))
     }
 
-    /// These over the scene's own camera, or over one framed to the scene with the wanted field of view.
+    /// The scene's own camera, or one that frames the scene with the requested field of view, overridden by these settings.
     fn over(&self, scene: &SceneDescription, up: Vec3) -> CameraSettings {
         let [width, height] = self.size;
         let framed = || {

@@ -6,7 +6,7 @@ use domelight::strategy::{StrategyError, StrategySpec};
 
 use crate::Error;
 
-/// A strategy and the text that it was given as.
+/// A strategy with its original text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedStrategy {
     /// As it was given.
@@ -23,7 +23,7 @@ impl FromStr for NamedStrategy {
     }
 }
 
-/// Refuses more points than the 2³² that the sequence of a pixel has.
+/// Rejects more points than the 2³² in the sequence of a pixel.
 ///
 /// # Errors
 /// If there are more.

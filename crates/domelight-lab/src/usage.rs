@@ -29,7 +29,7 @@ pub fn thread_seconds() -> f64 {
 
 /// The most memory that was ever resident \[bytes\]; none where the system does not report it.
 pub fn peak_memory() -> Option<u64> {
-    // Linux hands the greatest value of `getrusage` on to what a process becomes: a small program that a large one
+    // Linux hands the largest value of `getrusage` on to what a process becomes: a small program that a large one
     // starts would report the large one's memory.
     #[cfg(target_os = "linux")]
     if let Some(peak) =

@@ -45,7 +45,7 @@ pub(crate) fn up_name(up: UpAxis) -> &'static str {
 ///     The first row faces the up axis; the center column looks toward -Z (toward +Y where z is up), and
 ///     columns go to the right as seen from inside.
 /// rotation : float, default 0
-///     Rotation about the up axis [degrees], counter-clockwise seen from above.
+///     Rotation about the up axis [degrees], counterclockwise seen from above.
 /// scale : float, default 1
 ///     Factor on the radiance, not negative.
 /// up : {'y', 'z'}, default 'y'
@@ -295,7 +295,7 @@ impl Environment {
     /// Parameters
     /// ----------
     /// degrees : float
-    ///     Counter-clockwise seen from above.
+    ///     Counterclockwise seen from above.
     fn rotated(&self, py: Python<'_>, degrees: f32) -> PyResult<Self> {
         let inner = self.inner.clone();
         let inner = parallel(py, || (*inner).clone().rotated(degrees))?.map_err(to_python)?;

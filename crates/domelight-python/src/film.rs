@@ -286,7 +286,7 @@ impl Film {
 
     /// Color without noise, by Intel's Open Image Denoise with albedo and normals.
     ///
-    /// A denoised picture is to look at, not to measure: the filter trades noise for bias. The library is that of the
+    /// A denoised picture is for viewing, not for measurement: the filter trades noise for bias. The library is that of the
     /// file that the environment variable OIDN_LIBRARY names, else of the package pyoidn, else the system's.
     ///
     /// Returns

@@ -27,7 +27,7 @@ use crate::picture::{Format as PictureFormat, write_image};
 
 /// Directional lights that stand for an environment, and what they leave of it. `lights` makes them.
 ///
-/// Lights come compact ones first, of each kind those of the greatest luminance first.
+/// Lights come compact ones first, of each kind those of the largest luminance first.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Rig {
     inner: rig::Rig,

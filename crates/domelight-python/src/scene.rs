@@ -213,7 +213,7 @@ impl SceneData {
 /// vertices : array_like, shape (V, 3)
 ///     Positions, finite.
 /// faces : array_like of int, shape (F, 3)
-///     Triangles as counter-clockwise indices of vertices.
+///     Triangles as counterclockwise indices of vertices.
 /// normals : array_like, shape (V, 3), optional
 ///     Shading normals, of any length but 0; faces are flat without.
 /// colors : array_like, shape (V, 3), optional
@@ -447,7 +447,7 @@ impl Scene {
         self.inner.scene.triangle_count()
     }
 
-    /// ndarray, shape (2, 3), or None: least and greatest coordinates of what the camera frames.
+    /// ndarray, shape (2, 3), or None: least and largest coordinates of what the camera frames.
     #[getter]
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArrayDyn<f32>>>> {
         let Aabb { min, max } = self.inner.subject;

@@ -160,7 +160,7 @@ impl ShadingPoints {
     /// Parameters
     /// ----------
     /// n : int, default 1
-    ///     Numbers for so many samples a point.
+    ///     Numbers for so many samples per point.
     /// purpose : {'environment', 'brdf', 'resampling'}, default 'environment'
     ///     Sequences of different purposes are independent.
     ///

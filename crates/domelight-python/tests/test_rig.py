@@ -92,7 +92,7 @@ def test_rigs_are_pickled(env):
         (dict(method="velvet"), "velvet"),
         (dict(threads=0), "threads is 0"),
         (dict(min_share=2), "min_share is 2"),
-        (dict(n=None), "0 were asked for"),
+        (dict(n=None), "0 were requested"),
     ],
 )
 def test_wrong_wishes_are_named(env, wrong, words):

@@ -168,5 +168,5 @@ def test_a_strategy_in_python_is_fast_enough(sphere, env):
 
     built_in = rate("environment")
     python = rate(dl.strategies.Environment(env), tile_size=64)
-    print(f"\nshadow rays a second: built in {built_in:.3g}, Python {python:.3g}, {python / built_in:.0%}")
+    print(f"\nshadow rays per second: built in {built_in:.3g}, Python {python:.3g}, {python / built_in:.0%}")
     assert python > 0.25 * built_in

@@ -150,7 +150,7 @@ impl Engine {
         Ok(to_json(&report))
     }
 
-    /// The number of the light of each texel of the map, not turned, `width` by `width` / 2; the greatest number where
+    /// The number of the light of each texel of the map, not turned, `width` by `width` / 2; the largest number where
     /// there is none.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! Rays a second through a bumpy sphere: camera rays, and shadow rays one by one and in batches.
+//! Rays per second through a bumpy sphere: camera rays, and shadow rays one by one and in batches.
 
 mod rays;
 

@@ -1,4 +1,4 @@
-//! Rays a second through a million cards, opaque and with leaves cut out of them: camera rays and shadow rays.
+//! Rays per second through a million cards, opaque and with leaves cut out of them: camera rays and shadow rays.
 
 mod rays;
 

@@ -3,7 +3,7 @@
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub};
 
-/// Linear RGB with Rec. 709 primaries: radiance, irradiance or reflectance by context.
+/// Linear RGB with Rec. 709 primaries: radiance, irradiance or reflectance, depending on context.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct Rgb {
@@ -21,12 +21,12 @@ impl Rgb {
     /// (1, 1, 1).
     pub const WHITE: Self = Self::splat(1.0);
 
-    /// A color from its three channels.
+    /// Creates a color from its three channels.
     pub const fn new(r: f32, g: f32, b: f32) -> Self {
         Self { r, g, b }
     }
 
-    /// A gray.
+    /// Creates a gray.
     pub const fn splat(v: f32) -> Self {
         Self { r: v, g: v, b: v }
     }
@@ -50,22 +50,22 @@ impl Rgb {
         (self.r + self.g + self.b) / 3.0
     }
 
-    /// The greatest channel.
+    /// The largest channel.
     pub fn max_component(self) -> f32 {
         self.r.max(self.g).max(self.b)
     }
 
-    /// The least channel.
+    /// The smallest channel.
     pub fn min_component(self) -> f32 {
         self.r.min(self.g).min(self.b)
     }
 
-    /// All channels are exactly zero.
+    /// Whether all channels are exactly zero.
     pub fn is_black(self) -> bool {
         self == Self::BLACK
     }
 
-    /// No channel is NaN or infinite.
+    /// Whether no channel is NaN or infinite.
     pub fn is_finite(self) -> bool {
         self.r.is_finite() && self.g.is_finite() && self.b.is_finite()
     }
@@ -76,7 +76,7 @@ impl Rgb {
         Self::new(f(self.r), f(self.g), f(self.b))
     }
 
-    /// self at t = 0, `other` at t = 1.
+    /// Interpolates linearly: `self` at t = 0, `other` at t = 1.
     #[must_use]
     pub fn lerp(self, other: Self, t: f32) -> Self {
         self * (1.0 - t) + other * t

@@ -1,29 +1,29 @@
-//! One error for programs that do not care which part of the library failed.
+//! One error type for programs that do not care which part of the library failed.
 
-/// Any error of the library; `?` converts each module's own.
+/// Any error of the library; `?` converts the errors of all modules.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An environment that cannot be used.
+    /// An invalid environment.
     #[error(transparent)]
     Environment(#[from] crate::environment::EnvironmentError),
-    /// A text that names no strategy.
+    /// An invalid strategy text.
     #[error(transparent)]
     Strategy(#[from] crate::strategy::StrategyError),
     /// A strategy that does not suit its environment.
     #[error(transparent)]
     Prepare(#[from] crate::strategy::PrepareError),
-    /// A text that names no material.
+    /// An invalid material text.
     #[error(transparent)]
     Bsdf(#[from] crate::bsdf::ParseMaterialError),
     /// Lights that cannot be extracted.
     #[error(transparent)]
     Rig(#[from] crate::rig::RigError),
-    /// A description that makes no scene.
+    /// An invalid scene description.
     #[cfg(feature = "render")]
     #[error(transparent)]
     Scene(#[from] crate::scene::SceneError),
-    /// A camera that makes no picture.
+    /// An invalid camera.
     #[cfg(feature = "render")]
     #[error(transparent)]
     Camera(#[from] crate::scene::CameraError),
@@ -31,15 +31,15 @@ pub enum Error {
     #[cfg(feature = "render")]
     #[error(transparent)]
     Inspect(#[from] crate::inspect::InspectError),
-    /// A film that does not belong to a render.
+    /// A film that does not match a render.
     #[cfg(feature = "render")]
     #[error(transparent)]
     Film(#[from] crate::render::FilmMismatch),
-    /// A file that makes no scene.
+    /// A file that is not a valid scene.
     #[cfg(feature = "io")]
     #[error(transparent)]
     Load(#[from] crate::scene::LoadError),
-    /// A file that makes no environment.
+    /// A file that is not a valid environment.
     #[cfg(feature = "io")]
     #[error(transparent)]
     Probe(#[from] crate::environment::io::ProbeError),
@@ -47,7 +47,7 @@ pub enum Error {
     #[cfg(feature = "io")]
     #[error(transparent)]
     Picture(#[from] crate::picture::PictureError),
-    /// A file that is no checkpoint.
+    /// A file that is not a valid checkpoint.
     #[cfg(feature = "io")]
     #[error(transparent)]
     Checkpoint(#[from] crate::render::CheckpointError),

@@ -1,5 +1,5 @@
-//! Fingerprints of what decides a picture: two scenes or environments with the same one are the same,
-//! wherever their files lie.
+//! Fingerprints of the content that decides a picture. Two scenes or environments with the same fingerprint
+//! are equal, wherever their files are.
 
 use std::fmt;
 
@@ -14,14 +14,14 @@ impl fmt::Display for Fingerprint {
     }
 }
 
-/// Takes content in, one array after the other; each is set off from the next by its length.
+/// Hashes content, one array after the other, each with its length.
 #[derive(Clone, Debug, Default)]
 pub struct Fingerprinter {
     hasher: blake3::Hasher,
 }
 
 impl Fingerprinter {
-    /// Takes bytes in.
+    /// Hashes bytes.
     pub fn bytes(&mut self, bytes: impl IntoIterator<Item = u8>) {
         let mut buffer = [0; 4096];
         let (mut filled, mut length) = (0, 0u64);
@@ -38,22 +38,22 @@ impl Fingerprinter {
         self.hasher.update(&length.to_le_bytes());
     }
 
-    /// Takes the bits of numbers in.
+    /// Hashes the bits of floats.
     pub fn numbers(&mut self, numbers: impl IntoIterator<Item = f32>) {
         self.words(numbers.into_iter().map(f32::to_bits));
     }
 
-    /// Takes whole numbers in.
+    /// Hashes integers.
     pub fn words(&mut self, words: impl IntoIterator<Item = u32>) {
         self.bytes(words.into_iter().flat_map(u32::to_le_bytes));
     }
 
-    /// Takes text in; the `Debug` text of numbers is exact in Rust, so that of plain data will do.
+    /// Hashes text. The `Debug` text of numbers is exact in Rust, so the `Debug` text of plain data is suitable.
     pub fn text(&mut self, text: impl fmt::Display) {
         self.bytes(text.to_string().into_bytes());
     }
 
-    /// The fingerprint of all that was taken in.
+    /// The fingerprint of the content so far.
     pub fn finish(&self) -> Fingerprint {
         let mut short = [0; 16];
         short.copy_from_slice(&self.hasher.finalize().as_bytes()[..16]);

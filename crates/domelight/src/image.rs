@@ -5,16 +5,16 @@ use crate::color::Rgb;
 /// A row-major picture of linear radiance or reflectance; row 0 is the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RgbImage {
-    /// Columns.
+    /// The number of columns.
     pub width: usize,
-    /// Rows.
+    /// The number of rows.
     pub height: usize,
     /// `width · height` pixels, row by row.
     pub pixels: Vec<Rgb>,
 }
 
 impl RgbImage {
-    /// An image from its rows of pixels.
+    /// Creates an image from its pixels, row by row.
     ///
     /// # Panics
     /// If `pixels.len() != width * height`.
@@ -23,12 +23,12 @@ impl RgbImage {
         Self { width, height, pixels }
     }
 
-    /// One color everywhere.
+    /// Creates an image with one color.
     pub fn filled(width: usize, height: usize, color: Rgb) -> Self {
         Self { width, height, pixels: vec![color; width * height] }
     }
 
-    /// The value of `f(x, y)` at each pixel.
+    /// Creates an image with the value `f(x, y)` at each pixel.
     pub fn from_fn(width: usize, height: usize, mut f: impl FnMut(usize, usize) -> Rgb) -> Self {
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         Self { width, height, pixels: pixels.map(|(x, y)| f(x, y)).collect() }

@@ -1,5 +1,5 @@
-//! Direct illumination under measured light: every sampling strategy of the field for
-//! ∫ f_r · cos θ · L · V dω under an HDR environment, a renderer around them, and light rigs.
+//! Direct illumination under measured light: the field's sampling strategies for
+//! ∫ f_r · cos θ · L · V dω under an HDR environment, a renderer built on them, and light rigs.
 //!
 //! ```no_run
 //! use domelight::prelude::*;
@@ -15,18 +15,18 @@
 //! # Ok::<(), domelight::Error>(())
 //! ```
 //!
-//! [`Renderer`](render::Renderer) also renders in steps, with progress, checkpoints and strategies of your own;
-//! [`inspect`] explains the noise of a pixel, [`rig`] turns an environment into lights, and the folder `examples/` has a
-//! program for each.
+//! [`Renderer`](render::Renderer) also renders in steps, with progress, checkpoints and your own strategies.
+//! [`inspect`] explains the noise of a pixel, and [`rig`] turns an environment into lights. The folder `examples/`
+//! has a program for each.
 //!
 //! # Conventions
 //! - `wo` points toward the viewer, `wi` toward the light; both are unit vectors away from the surface.
 //!   BRDFs work in the local frame with z the shading normal.
-//! - `eval` is f_r · max(0, cos θ_i): the cosine is inside. `pdf` is per solid angle \[sr⁻¹\].
+//! - `eval` is f_r · max(0, cos θ_i): it includes the cosine. `pdf` is per solid angle \[sr⁻¹\].
 //! - Radiance `le` is in W·m⁻²·sr⁻¹, linear Rec. 709.
 //! - The world is right-handed, +Y up. On a lat-long map row 0 is +Y, the center column looks toward
 //!   −Z and u grows to the right as seen from inside.
-//! - Uniform numbers lie in [0, 1), never 1. A sampler is a pure function of them.
+//! - Uniform random numbers lie in [0, 1) and are never 1. A sampler is a pure function of them.
 //!
 //! # The sampling core
 //! A strategy turns a shading point into pairs (wi, weight); the estimate is Σ weight · V(wi).
@@ -55,9 +55,9 @@
 //! ```
 //!
 //! # Features
-//! `render` (default): scenes, ray tracing, the renderer. `io` (default): readers and writers of
-//! pictures, probes and scenes. Without either the library is the sampling core alone: [`math`],
-//! [`sampling`], [`bsdf`], [`environment`], [`strategy`], [`rig`].
+//! `render` (default): scenes, ray tracing, the renderer. `io` (default): readers and writers for
+//! pictures, probes and scenes. Without these features, the library is only the sampling core:
+//! [`math`], [`sampling`], [`bsdf`], [`environment`], [`strategy`], [`rig`].
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))] // See `math::functions`.
 

@@ -1,4 +1,4 @@
-//! From a file to a scene or an environment in one call.
+//! Loads a scene or an environment from a file in one call.
 
 use std::path::Path;
 
@@ -11,17 +11,17 @@ impl Environment {
     /// Loads a light probe of any known format and mapping.
     ///
     /// # Errors
-    /// If the file cannot be read or is damaged, or holds negative or non-finite values;
-    /// [`load_probe`] takes options for these.
+    /// If the file cannot be read, is damaged, or holds negative or non-finite values.
+    /// [`load_probe`] has options for such files.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let probe = load_probe(path.as_ref(), &ProbeOptions::default())?;
         Ok(Self::from_image(probe.image)?)
     }
 
-    /// The light probe in the bytes of a picture file of any known format and mapping.
+    /// Reads a light probe from the bytes of a picture file in any known format and mapping.
     ///
     /// # Errors
-    /// If the bytes are damaged or no picture; [`probe_from_bytes`] takes options.
+    /// If the bytes are damaged or not a picture. [`probe_from_bytes`] has options for such files.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
         let probe = probe_from_bytes(bytes, "the map", &ProbeOptions::default())?;
         Ok(Self::from_image(probe.image)?)
@@ -32,18 +32,18 @@ impl Scene {
     /// Loads a mesh or a scene file of any known format and builds it.
     ///
     /// # Errors
-    /// If the file cannot be read, is damaged, or makes no scene. [`scene::load()`] gives the loader's warnings as well, and
-    /// a description to change before it is built.
+    /// If the file cannot be read, is damaged, or holds no valid scene. [`scene::load()`] also returns the loader's
+    /// warnings, and a description that you can change before building it.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         Ok(Self::new(scene::load(path)?.description)?)
     }
 
-    /// Builds a scene from the bytes of a file, for instance where there is no file system; `resolver` gives the bytes of
-    /// the files that it refers to.
+    /// Builds a scene from the bytes of a file, for instance without a file system. `resolver` returns the bytes of the
+    /// files that the scene refers to.
     ///
     /// # Errors
-    /// If the file is damaged or makes no scene. [`scene::load_bytes`] gives the loader's warnings as well, and a description to
-    /// change before it is built.
+    /// If the file is damaged or holds no valid scene. [`scene::load_bytes`] also returns the loader's warnings, and a
+    /// description that you can change before building it.
     pub fn from_bytes(
         bytes: &[u8],
         format: SceneFormat,

@@ -83,24 +83,24 @@ pub const FRAC_1_4PI: f32 = 0.25 * FRAC_1_PI;
 /// BRDF code works in the local frame, where the cosine to the normal is the z component.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
-    /// Tangent, the direction of `alpha_x` of an anisotropic lobe.
+    /// The tangent, the direction of `alpha_x` of an anisotropic lobe.
     pub x: Vec3,
-    /// Bitangent, `z × x`.
+    /// The bitangent, `z × x`.
     pub y: Vec3,
-    /// Normal.
+    /// The normal.
     pub z: Vec3,
 }
 
 impl Frame {
-    /// A frame around the unit vector `z`, continuous everywhere but at z = −Z.
+    /// Creates a frame around the unit vector `z`, continuous everywhere except at z = −Z.
     pub fn from_z(z: Vec3) -> Self {
         let [x, y] = tangents(z.into()).map(Vec3::from);
         Self { x, y, z }
     }
 
-    /// A frame around the unit vector `z` whose x axis lies as near to `tangent` as it can.
+    /// Creates a frame around the unit vector `z` whose x axis is as close to `tangent` as possible.
     ///
-    /// Falls back to [`Frame::from_z`] where `tangent` is parallel to `z`, zero or not finite.
+    /// Falls back to [`Frame::from_z`] if `tangent` is parallel to `z`, zero or not finite.
     pub fn from_z_and_tangent(z: Vec3, tangent: Vec3) -> Self {
         let x = tangent - z * z.dot(tangent);
         match x.try_normalize() {
@@ -109,12 +109,12 @@ impl Frame {
         }
     }
 
-    /// World to local.
+    /// Transforms from world to local space.
     pub fn to_local(&self, v: Vec3) -> Vec3 {
         vec3(self.x.dot(v), self.y.dot(v), self.z.dot(v))
     }
 
-    /// Local to world.
+    /// Transforms from local to world space.
     pub fn to_world(&self, v: Vec3) -> Vec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }

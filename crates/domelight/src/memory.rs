@@ -1,16 +1,16 @@
-//! Memory: amounts as text, and what would exceed a limit.
+//! Amounts of memory as text, and memory limits.
 
 use crate::math::functions;
 use std::fmt;
 use std::str::FromStr;
 
-/// A number of bytes; as text `1.5 GiB`, read also as `1536M`, `1.5GB` or `1610612736`.
+/// A number of bytes. It displays as `1.5 GiB`, and also parses from `1536M`, `1.5GB` or `1610612736`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct MemorySize(pub u64);
 
-/// A text that is no amount of memory.
+/// A text that is not an amount of memory.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{text}' is no amount of memory such as 4GiB, 500MB or 1.5G")]
+#[error("'{text}' is not an amount of memory such as 4GiB, 500MB or 1.5G")]
 pub struct ParseMemorySizeError {
     text: String,
 }
@@ -56,17 +56,17 @@ impl FromStr for MemorySize {
     }
 }
 
-/// More memory than is allowed.
+/// An allocation that would exceed the limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("it takes some {needed} of memory, more than the {allowed} that are left to it")]
+#[error("needs some {needed} of memory, but only {allowed} are left")]
 pub struct OverLimit {
-    /// An estimate, before the memory is taken.
+    /// An estimate of the memory needed.
     pub needed: MemorySize,
-    /// What there may be.
+    /// The memory left under the limit.
     pub allowed: MemorySize,
 }
 
-/// Refuses more than is allowed; without a limit nothing.
+/// Checks `needed` bytes against a limit, if there is one.
 ///
 /// # Errors
 /// If `needed` exceeds `allowed`.

@@ -1,4 +1,4 @@
-//! Loops whose result does not depend on the number of threads.
+//! Parallel loops whose result does not depend on the number of threads.
 
 /// `f(0)`, …, `f(n − 1)`, in parallel with the feature `render`.
 pub(crate) fn in_order<R: Send>(n: usize, f: impl Fn(usize) -> R + Sync) -> Vec<R> {

@@ -1,5 +1,5 @@
-//! What most programs need: load a scene and an environment, render, write.
-//! The first page of this library, [`crate`], shows it in use.
+//! The items that most programs need to load a scene and an environment, render, and write.
+//! The crate documentation, [`crate`], has an example.
 
 pub use crate::environment::builtin::BuiltinProbe;
 pub use crate::environment::{Environment, Orientation, UpAxis};

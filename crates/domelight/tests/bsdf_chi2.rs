@@ -66,7 +66,7 @@ fn ward() {
 
 #[test]
 fn ggx() {
-    // Masking and Fresnel's factor do not enter the density.
+    // Masking and the Fresnel factor do not enter the density.
     for alpha in [[0.05, 0.05], [0.1, 0.5], [0.3, 0.3], [0.6, 0.05], [1.0, 1.0]] {
         check(&format!("ggx {alpha:?}"), &Ggx::new(alpha, Fresnel::One, Masking::Correlated));
     }

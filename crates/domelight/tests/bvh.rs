@@ -487,7 +487,7 @@ fn a_frustum_sees_what_its_rays_hit() {
     assert!(empty > 5_000 && hits > 5_000, "{empty} {hits}");
 }
 
-/// Any bits, and those that go wrong: NaN, infinities, denormals, zeros of both signs, the greatest.
+/// Any bits, and those that go wrong: NaN, infinities, denormals, zeros of both signs, the largest.
 fn hostile_number(random: &mut Random) -> f32 {
     let special = [
         0.0,
@@ -660,7 +660,7 @@ fn bad_meshes_are_refused() {
     assert!(matches!(error, BvhError::NotFinite { vertex: 2, .. }));
     let error = Bvh::build(&positions[..2], &[[0, 1, 0], [0, 7, 1]]).unwrap_err();
     assert_eq!(error, BvhError::Index { triangle: 1, index: 7, vertices: 2 });
-    assert!(error.to_string().contains("triangle 1 names vertex 7"));
+    assert!(error.to_string().contains("triangle 1 refers to vertex 7"));
 }
 
 #[test]

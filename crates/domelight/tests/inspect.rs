@@ -138,7 +138,7 @@ fn a_penumbra() {
     assert!(matches!(main_cause(&found[0], 0.8), Cause::Penumbra(_)));
     let of_lamp = &found[0].sources[0];
     assert!((of_lamp.free.unwrap() - 0.5).abs() < 0.1, "{of_lamp:?}");
-    assert!(found[0].diagnosis().to_string().contains("hidden in part"));
+    assert!(found[0].diagnosis().to_string().contains("partly hidden"));
 }
 
 #[test]

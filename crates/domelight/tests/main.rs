@@ -1,4 +1,4 @@
-//! The tests of the library's public items: one program, a subject a file.
+//! The tests of the library's public items: one program, a subject per file.
 
 mod bsdf_chi2;
 mod bsdf_furnace;

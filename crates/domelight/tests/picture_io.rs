@@ -75,7 +75,7 @@ fn hdr_rounds_to_the_nearest_and_then_stays() {
         let once = decode(&hdr_bytes(&image)).unwrap();
         assert_eq!((once.format, &once.alpha), (Format::Hdr, &None));
         for (a, b) in image.pixels.iter().zip(&once.image.pixels) {
-            // Half a step of a mantissa that is at least 128 for the greatest channel.
+            // Half a step of a mantissa that is at least 128 for the largest channel.
             let step = 0.5 / 127.75 * a.max_component();
             assert!((*a - *b).map(f32::abs).max_component() <= step, "{a:?} {b:?}");
         }

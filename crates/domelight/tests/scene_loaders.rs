@@ -609,7 +609,7 @@ fn broken_stl_files_name_the_place() {
     fails("a.stl", STL.replace("VERTEX 0 0 1\n", ""), &["line 16", "2 vertices"]);
     fails("a.stl", &STL[..100], &["vertices"]);
     fails("a.stl", "solid nothing\nendsolid\n", &["no triangles"]);
-    fails("a.stl", "", &["cut short"]);
+    fails("a.stl", "", &["truncated"]);
     let whole = binary_stl(b"");
     fails("a.stl", &whole[..150], &["2 facets", "184 bytes", "150"]);
     let mut huge = whole.clone();
@@ -1174,7 +1174,7 @@ fn other_files_are_nobodys_business() {
     let folder = folder.with("sub/mesh.obj", mesh).with("scene.toml", scene);
     let loaded = folder.load("sub/mesh.obj");
     let text = loaded.warnings.join("\n");
-    assert!(text.contains("no material library") && !text.contains("root:"), "{text}");
+    assert!(text.contains("not a material library") && !text.contains("root:"), "{text}");
     assert!(text.contains("outside of its folder"), "{text}");
     assert_eq!(loaded.files.len(), 1);
     let error = folder.error("scene.toml");

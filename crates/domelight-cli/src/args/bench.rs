@@ -9,28 +9,28 @@ use crate::parse::Size;
 use domelight_lab::NamedStrategy;
 
 pub(super) const EXAMPLES: &str = "\
-Strategies are written as for compare: NAME[:OPTION]…, such as mis:3/1 or sir:15/800. Materials are those
-of render's --material, or own for the scene's own. In the tables ~ stands before what was extrapolated and
-≤ before what is cheaper still; in brackets is the range over the seeds.
+Strategies are written as for compare: NAME[:OPTION]…, such as mis:3/1 or sir:15/800. Materials are written
+as for render's --material; own is the scene's own. In the tables, ~ marks an extrapolated value and ≤ an
+upper bound; brackets hold the range over the seeds.
 
 Examples:
   domelight bench
       the lecture's statue: CPU time of its strategies to the quality of its SIR picture
   domelight bench --suite probes
-      the built-in statue of four materials under the built-in probes
+      the built-in statue with four materials under the built-in probes
   domelight bench --suite probes --meshes bunny.ply --probes hdris/ --materials diffuse:0.8,ggx:0.2
       your mesh under all probes of a folder
   domelight bench --suite probes --case blob.ply sky.exr ggx:0.05 --case helmet.glb studio.hdr own
       cases of your choice
   domelight bench --suite probes --strategies product,mis --vs mitsuba --python venv/bin/python
-      the same pictures by Mitsuba 3, in turn
+      the same pictures rendered by Mitsuba 3, in turns
   domelight bench --suite rigs -o rigs.json && domelight bench --table rigs.json
       results as a file, and its tables as Markdown";
 
-/// Measure what error costs.
+/// Measure the CPU time that each strategy needs to reach a given error.
 #[derive(Args, Debug)]
 pub(crate) struct BenchArguments {
-    /// What is measured
+    /// What to measure
     #[arg(long, value_enum, default_value_t = Suite::Lecture)]
     pub(crate) suite: Suite,
 
@@ -38,76 +38,75 @@ pub(crate) struct BenchArguments {
     /// statue]
     #[arg(long, value_name = "SCENE", num_args = 1.., value_delimiter = ',', help_heading = "Inputs")]
     pub(crate) meshes: Vec<String>,
-    /// Probes: files, folders of them, built-in ones [default: sky, studio, cathedral]
+    /// Probes: files, folders of files, or built-in probes [default: sky, studio, cathedral]
     #[arg(long, value_name = "PROBE", num_args = 1.., value_delimiter = ',', help_heading = "Inputs")]
     pub(crate) probes: Vec<String>,
     /// Materials, separated by commas; own is the scene's own [default: diffuse:0.8, ggx:0.2, ggx:0.05,
-    /// phong:50:0.5:0.5; of glTF and scene files own]
+    /// phong:50:0.5:0.5; own for glTF and scene files]
     #[arg(long, value_name = "LIST", help_heading = "Inputs")]
     pub(crate) materials: Option<String>,
-    /// Cases of these scenes, probes and materials, each a list with commas; may be given several times
+    /// Cases of these scenes, probes and materials, each a comma-separated list; may be repeated
     #[arg(long = "case", num_args = 3, action = ArgAction::Append,
           value_names = ["SCENES", "PROBES", "MATERIALS"], help_heading = "Inputs")]
     pub(crate) cases: Vec<String>,
-    /// Turn the probes about the up axis [degrees]
+    /// Rotate the probes about the up axis [degrees]
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = finite,
           allow_negative_numbers = true, help_heading = "Inputs")]
     pub(crate) env_rotate: f32,
-    /// Size of the pictures [default: 256x256, of the lecture 176x248]
+    /// Size of the pictures [default: 256x256; 176x248 for the lecture]
     #[arg(long, value_name = "WxH", help_heading = "Inputs")]
     pub(crate) size: Option<Size>,
 
-    /// Strategies [default: brdf, environment, mis, sir, rejection, product; of the lecture its own
-    /// counts]
+    /// Strategies [default: brdf, environment, mis, sir, rejection, product; for the lecture, with its
+    /// own counts]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Measurement")]
     pub(crate) strategies: Vec<NamedStrategy>,
-    /// Pictures at each budget, each of another seed
+    /// Pictures per budget, each with its own seed
     #[arg(long, value_name = "N", default_value_t = 5, help_heading = "Measurement",
           value_parser = clap::value_parser!(u32).range(1..=256))]
     pub(crate) seeds: u32,
     /// The first seed
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Measurement")]
     pub(crate) seed: u64,
-    /// CPU seconds that the pictures of a strategy's last budget may take together; four times as many
-    /// where an error of 1e-3 is wanted and near
+    /// CPU seconds that the pictures of a strategy's last budget may take in total; four times as many
+    /// if an error of 1e-3 is a target and near
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = positive,
           help_heading = "Measurement")]
     pub(crate) most: f32,
-    /// The errors (relMSE) that strategies are to reach [default: 4e-3,1e-3,1e-4; of the lecture 1e-2]
+    /// Target errors (relMSE) [default: 4e-3,1e-3,1e-4; 1e-2 for the lecture]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = error,
           help_heading = "Measurement")]
     pub(crate) errors: Vec<f64>,
-    /// Threads [default: SLURM_CPUS_PER_TASK, else the cores that the process may use]
+    /// Number of threads [default: SLURM_CPUS_PER_TASK, otherwise the cores available to the process]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024),
           help_heading = "Measurement")]
     pub(crate) threads: Option<u32>,
 
-    /// Measure another renderer on the same cases, in turn with this one
+    /// Also measure another renderer on the same cases, in turns with this one
     #[arg(long, value_enum, help_heading = "Others")]
     pub(crate) vs: Option<Peer>,
-    /// The Python whose module mitsuba is used
+    /// Python interpreter that has the module mitsuba
     #[arg(long, value_name = "PROGRAM", default_value = "python3", help_heading = "Others")]
     pub(crate) python: PathBuf,
-    /// Embree 4, such as libembree4.so, for the suite kernels to measure against; loaded while
-    /// the program runs
+    /// Embree 4, such as libembree4.so, as the peer of the suite kernels; loaded at run time
     #[arg(long, value_name = "LIBRARY", help_heading = "Others")]
     pub(crate) embree: Option<PathBuf>,
 
-    /// The relMSE of the converged pictures, if 2048 camera samples of 4 environment and 4 BRDF samples suffice;
-    /// it is taken off what is measured against them [default: a tenth of the least of --errors, but 5e-5 or more]
+    /// Target relMSE of the references, which have at most 2048 camera samples with 4 environment and 4 BRDF samples;
+    /// it is subtracted from measured errors [default: a tenth of the smallest of --errors, but at least 5e-5]
     #[arg(long, value_name = "E", value_parser = error, help_heading = "Reference")]
     pub(crate) reference_error: Option<f64>,
-    /// Where references are kept [default: domelight in the user's cache folder]
+    /// Folder for references [default: domelight in the user's cache folder]
     #[arg(long, value_name = "FOLDER", help_heading = "Reference")]
     pub(crate) cache: Option<PathBuf>,
-    /// Neither look for references in the cache nor keep them
+    /// Do not use the cache for references
     #[arg(long, help_heading = "Reference", conflicts_with = "cache")]
     pub(crate) no_cache: bool,
 
     /// Print the results as JSON instead of tables
     #[arg(long, help_heading = "Output")]
     pub(crate) json: bool,
-    /// Write the results as JSON to a file, too
+    /// Also write the results as JSON to a file
     #[arg(short, long, value_name = "FILE.json", help_heading = "Output")]
     pub(crate) output: Option<PathBuf>,
     /// Measure nothing: print the tables of a results file as Markdown
@@ -123,22 +122,22 @@ fn error(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What is measured.
+/// A set of measurements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Suite {
-    /// The lecture's statue at 176x248: what its strategies cost
+    /// The lecture's statue at 176x248: the cost of its strategies
     Lecture,
-    /// Rays a second of the ray kernel, and the build of its tree
+    /// Rays per second of the ray kernel, and the time to build its BVH
     Kernels,
-    /// Probes x meshes x materials: CPU time of each strategy to the same error
+    /// Probes x meshes x materials: CPU time of each strategy to reach the same error
     Probes,
-    /// Rigs of lights: time to extract them, and how well they shade
+    /// Light rigs: the time to extract them, and their shading error
     Rigs,
 }
 
 /// Another renderer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Peer {
-    /// Mitsuba 3, its module for Python: MIS with compensation and multijitter, compiled by LLVM
+    /// Mitsuba 3 through its Python module: MIS with compensation and multijitter, compiled by LLVM
     Mitsuba,
 }

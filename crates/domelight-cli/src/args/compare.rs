@@ -13,19 +13,19 @@ use domelight_lab::NamedStrategy;
 use domelight_lab::compare::Budget;
 
 pub(super) const EXAMPLES: &str = "\
-Strategies are NAME[:OPTION]…, separated by commas; an option is a flag of render without its
-dashes, KEY=VALUE or a bare word. A first number, or two, stand for the usual options:
-  brdf:4  environment:4  rejection:rays=2     so many --rays
+Strategies are NAME[:OPTION]…, separated by commas. An option is a flag of render without its
+dashes, KEY=VALUE or a bare word. One or two leading numbers set the usual options:
+  brdf:4  environment:4  rejection:rays=2     --rays
   mis:3/1                                     --split 3:1
   sir:15/800                                  --rays 15 --candidates 800
   rejection:32                                --tries 32
   median-cut:64  variance-minimization:64     --lights 64
   mis:heuristic=balance:no-compensation  sir:4/64:from=brdf:resampling=reservoir
 
-Budgets are of each picture: spp:N camera samples a pixel; rays:N shadow rays traced for a pixel
-that the scene covers; time:T CPU seconds of rendering, by measurement. Camera samples are whole: a
-strategy that cannot meet the budget with a whole number of them is reported, and left out if even
-one sample is far beyond it.
+Budgets are per picture: spp:N is camera samples per pixel, rays:N is shadow rays traced per pixel
+that the scene covers, time:T is CPU seconds of rendering, measured. Camera samples are whole: the
+report says if a strategy cannot meet the budget with a whole number of samples, and leaves it out
+if even one sample is far above the budget.
 
 Examples:
   domelight compare
@@ -35,9 +35,9 @@ Examples:
   domelight compare bunny.ply --env studio.hdr --budget time:2s --seeds 8 -o bunny.html
       your mesh under your HDRI at equal time
   domelight compare robot.glb --env studio.hdr --size 640x480 --pictures others
-      and against the pictures of other renderers in the folder others
+      also against the pictures of other renderers in the folder others
   domelight compare scene.toml --reference converged.exr --json=result.json -o report.html
-      against your own reference, the numbers as JSON too";
+      against your own reference, with the numbers as JSON too";
 
 /// Compare strategies on one scene at equal samples, rays or time.
 #[derive(Args, Debug)]
@@ -46,7 +46,7 @@ pub(crate) struct CompareArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
 
-    /// The strategies, as described below
+    /// Strategies, as described below
     #[arg(
         long,
         value_name = "LIST",
@@ -55,37 +55,37 @@ pub(crate) struct CompareArguments {
         default_value = "product,mis,environment,brdf,sir"
     )]
     pub(crate) strategies: Vec<NamedStrategy>,
-    /// What all have in common: rays:N, time:T (2s, 500ms, 1m) or spp:N
+    /// Budget of every strategy: rays:N, time:T (2s, 500ms, 1m) or spp:N
     #[arg(long, value_name = "BUDGET", default_value = "rays:32", help_heading = "Comparison")]
     pub(crate) budget: Budget,
-    /// Pictures by other renderers: a folder of OpenEXR files of the same size. How long each took is stated by its name
-    /// as in NAME.12.5s.exr, by lines NAME,SECONDS of a file times.csv in the folder, or by an attribute
+    /// Pictures by other renderers: a folder of OpenEXR files of the same size. The render time of each comes from its
+    /// name as in NAME.12.5s.exr, from lines NAME,SECONDS in a file times.csv in the folder, or from an attribute
     /// domelight.seconds or renderTime
     #[arg(long, value_name = "DIR", help_heading = "Comparison")]
     pub(crate) pictures: Option<PathBuf>,
-    /// Pictures of each strategy, from --seed on: the spread of the error is that over them
+    /// Pictures per strategy, starting at --seed; they give the spread of the error
     #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Comparison",
           value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub(crate) seeds: u32,
-    /// The converged picture [default: rendered once, then kept in the cache]
+    /// Converged picture [default: rendered once, then cached]
     #[arg(long, value_name = "FILE", help_heading = "Reference")]
     pub(crate) reference: Option<PathBuf>,
-    /// Camera samples of each pixel of a rendered reference, by product [default: 64, and more, up to 1024, until its
-    /// error is at most a tenth of the least that is expected of a strategy]
+    /// Camera samples per pixel of the reference, rendered by product [default: 64 to 1024, until its error is at most
+    /// a tenth of the smallest error expected of a strategy]
     #[arg(long, value_name = "N", help_heading = "Reference",
           conflicts_with = "reference", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
     pub(crate) reference_spp: Option<u32>,
-    /// Where references are kept [default: domelight in the user's cache folder]
+    /// Folder for references [default: domelight in the user's cache folder]
     #[arg(long, value_name = "FOLDER", help_heading = "Reference")]
     pub(crate) cache: Option<PathBuf>,
-    /// Neither look for the reference in the cache nor keep it
+    /// Do not use the cache for the reference
     #[arg(long, help_heading = "Reference", conflicts_with = "cache")]
     pub(crate) no_cache: bool,
 
     #[command(flatten)]
     pub(crate) pixel: PixelArguments,
 
-    /// The report; - writes it to standard output
+    /// Output file; - writes the report to standard output
     #[arg(
         short,
         long,
@@ -98,12 +98,12 @@ pub(crate) struct CompareArguments {
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true,
           default_missing_value = "-", help_heading = "Output")]
     pub(crate) json: Option<PathBuf>,
-    /// Exposure at which the page opens and ꟻLIP sees the pictures, in stops, or auto: the median of what the
-    /// scene covers becomes middle gray
+    /// Initial exposure of the page, also used for ꟻLIP, in stops; auto maps the median over the scene's pixels
+    /// to middle gray
     #[arg(long, value_name = "EV|auto", default_value_t = Exposure::Auto,
           allow_negative_numbers = true, help_heading = "Output")]
     pub(crate) exposure: Exposure,
-    /// Tone curve with which the page opens and ꟻLIP sees the pictures
+    /// Initial tone curve of the page, also used for ꟻLIP
     #[arg(long, default_value_t = ToneCurve::Agx, help_heading = "Output",
           value_parser = tone_curve())]
     pub(crate) tone: ToneCurve,

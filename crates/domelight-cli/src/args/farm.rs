@@ -14,23 +14,23 @@ use crate::output::PicturePath;
 pub(super) const EXAMPLES: &str = "\
 Examples:
   domelight farm slurm scene.toml --spp 1024 --shards 64 -o farm && sh farm/submit.sh
-      an array of 64 tasks and the merge that waits for it
+      an array of 64 tasks, and a merge that waits for it
   domelight farm openjd scene.toml --spp 1024 --shards 64 -o farm && openjd run farm/job.yaml
-      a template for Deadline Cloud and other engines of Open Job Description
+      a template for Deadline Cloud and other Open Job Description engines
   domelight farm parallel scene.toml --shards 8 --cpus 2 && sh farm/render.sh
       eight parts on this machine, as many at a time as it has cores";
 
 /// Write the files that render a picture in parts on a farm, and print the command that submits them.
 ///
-/// The arguments are those of render. There is no --time: a part must be whole before it is merged, and how far a
-/// machine comes in a time must not decide how a picture looks. Limits of time are the engine's: what it ends with
-/// SIGTERM is saved and goes on when it is run again. --target-error ends each tile by itself.
+/// The arguments are those of render. There is no --time, because a part must be complete before it is merged, and the
+/// speed of a machine must not affect the picture. Time limits belong to the engine: a task that it ends with SIGTERM
+/// saves its state and continues when it is run again. --target-error applies to each tile separately.
 #[derive(Args, Debug)]
 pub(crate) struct FarmArguments {
-    // First, for the others take their values out of what was parsed.
+    // First, because the others remove their values from the matches.
     #[command(flatten)]
     pub(crate) render: RenderWords,
-    /// What runs the jobs
+    /// Engine that runs the jobs
     #[arg(value_enum)]
     pub(crate) engine: Engine,
     #[command(flatten)]
@@ -41,24 +41,24 @@ pub(crate) struct FarmArguments {
     pub(crate) samples: SampleArguments,
     #[command(flatten)]
     pub(crate) pixel: PixelArguments,
-    /// In how many parts
+    /// Number of parts
     #[arg(long, value_name = "N", help_heading = "Farm",
           value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(crate) shards: u32,
-    /// The folder for the files and the parts; the machines of the farm must see it
+    /// Folder for the files and the parts; the machines of the farm must have access to it
     #[arg(short, long, value_name = "DIR", default_value = "farm", help_heading = "Farm")]
     pub(crate) output: PathBuf,
-    /// The merged picture [default: picture.exr in the folder]
+    /// Merged picture [default: picture.exr in the folder]
     #[arg(long, value_name = "FILE", help_heading = "Farm")]
     pub(crate) picture: Option<PicturePath>,
-    /// Cores of each task
+    /// Cores per task
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Farm",
           value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub(crate) cpus: u32,
-    /// The container image, for kubernetes
+    /// Container image, for kubernetes
     #[arg(long, value_name = "IMAGE", default_value = "domelight:latest", help_heading = "Farm")]
     pub(crate) image: String,
-    /// Print what was written, and the command that submits it, as JSON
+    /// Print the files written and the command that submits them as JSON
     #[arg(long, help_heading = "Farm")]
     pub(crate) json: bool,
 }
@@ -67,22 +67,22 @@ pub(crate) struct FarmArguments {
 pub(crate) enum Engine {
     /// An array job and a merge that waits for it
     Slurm,
-    /// A template of Open Job Description
+    /// An Open Job Description template
     Openjd,
-    /// An Indexed Job and a Job that merges
+    /// An Indexed Job, and a Job that merges
     Kubernetes,
     /// GNU parallel
     Parallel,
 }
 
-/// The arguments of `render` that were given, as words that say the same to `render`; the scene comes last.
+/// The given arguments of `render`, as words that `render` parses to the same values; the scene comes last.
 #[derive(Clone, Debug)]
 pub(crate) struct RenderWords {
     pub(crate) words: Vec<OsString>,
 }
 
 impl RenderWords {
-    /// The arguments that are written into jobs as they are.
+    /// The arguments that are passed to jobs unchanged.
     fn command() -> Command {
         let command = SceneArguments::augment_args(Command::new("render"));
         let command = StrategyArguments::augment_args(command);
@@ -107,11 +107,11 @@ impl FromArgMatches for RenderWords {
         let mut scene = Vec::new();
         for argument in Self::command().get_arguments() {
             let id = argument.get_id().as_str();
-            // Threads are each engine's to set.
+            // Each engine sets the number of threads.
             if id == "threads" || matches.value_source(id) != Some(ValueSource::CommandLine) {
                 continue;
             }
-            // What is given twice counts as it was given last.
+            // If an argument is repeated, the last value counts.
             let value = matches.get_raw(id).and_then(Iterator::last).unwrap_or_default();
             match (argument.get_long(), argument.get_action()) {
                 (Some(long), ArgAction::SetTrue) => words.push(format!("--{long}").into()),
@@ -146,7 +146,7 @@ mod tests {
         let Subcommand::Farm(farm) = Arguments::try_parse_from(all).unwrap().command else {
             panic!("no farm")
         };
-        // Render understands them, and alike.
+        // Render parses them to the same values.
         let render =
             ["domelight", "render"].map(Into::into).into_iter().chain(farm.render.words.clone());
         let Subcommand::Render(render) = Arguments::try_parse_from(render).unwrap().command else {

@@ -13,20 +13,20 @@ Examples:
   domelight inspect
       the pixel in the middle of the built-in statue, into inspect.html
   domelight inspect robot.glb --env studio.hdr --pixel 120,88 --size 640x640
-      why that pixel of that picture is noisy, and which strategy helps
+      why that pixel is noisy, and which strategy helps
   domelight inspect --pixel 300,200 --strategies mis:4:4,product -o pixel.json
       the numbers and maps as JSON";
 
-/// Look into one pixel: its hemisphere, where each strategy sends its rays, and why it is noisy.
+/// Inspect one pixel: its hemisphere, where each strategy sends its rays, and why it is noisy.
 #[derive(Args, Debug)]
 pub(crate) struct InspectArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
 
-    /// Column and row of the pixel, counted from 0 at the upper left [default: the middle]
+    /// Column and row of the pixel, counted from 0 at the upper left [default: the center]
     #[arg(long, value_name = "X,Y", help_heading = "Inspection", value_parser = pixel)]
     pub(crate) pixel: Option<[usize; 2]>,
-    /// The strategies, as compare takes them
+    /// Strategies, in the notation of compare
     #[arg(
         long,
         value_name = "LIST",
@@ -39,7 +39,7 @@ pub(crate) struct InspectArguments {
     #[command(flatten)]
     pub(crate) sampling: PixelArguments,
 
-    /// The report, .html or .json; - writes JSON to standard output
+    /// Output file, .html or .json; - writes JSON to standard output
     #[arg(
         short,
         long,
@@ -48,7 +48,7 @@ pub(crate) struct InspectArguments {
         help_heading = "Output"
     )]
     pub(crate) output: PathBuf,
-    /// Print the report as JSON, too
+    /// Also print the report as JSON
     #[arg(long, help_heading = "Output")]
     pub(crate) json: bool,
 }

@@ -13,68 +13,68 @@ use super::{Tone, one_of, percent};
 use crate::output::PicturePath;
 
 pub(super) const EXAMPLES: &str = "\
-The rig is the sun (--sun) and lamps (--lamps) first, then regions of what they leave (-n,
---error). Without -n and --error all else stays on the map: a dome beside the lights, which
---keep-residual writes. Lights and dome together are the probe.
+The rig consists of the sun (--sun) and lamps (--lamps), then of regions of the remaining light
+(-n, --error). Without -n and --error, the remaining light stays in the map as a dome, which
+--keep-residual writes. Lights and dome together reproduce the probe.
 
 Examples:
   domelight lights venice.hdr
       64 lights, as a table
   domelight lights road.hdr --sun --keep-residual dome.exr -o sun.json
-      the sun, and the probe without it
+      the sun, and the probe without the sun
   domelight lights studio.hdr --lamps 4 -o lamps.py --preview lamps.png
-      up to four lamps for Blender, and a picture of what was found
+      up to four lamps for Blender, and a picture of them
   domelight lights chapel.hdr --error 5 -o rig.json -o rig.csv
-      as many lights as shade with an error of 5 %
+      as many lights as a shading error of 5 % requires
   domelight lights sky --sun -n 16 -o - --format csv
       the sun and 15 regions, to standard output";
 
-/// Turn a light probe into a rig of lights.
+/// Convert a light probe to a light rig.
 #[derive(Args, Debug)]
 pub(crate) struct LightsArguments {
     #[command(flatten)]
     pub(crate) environment: EnvironmentArguments,
 
-    /// Lights of the rig, sun and lamps included [default: 64, with --sun or --lamps those alone]
+    /// Number of lights, including sun and lamps [default: 64; with --sun or --lamps, only those]
     #[arg(short = 'n', long = "lights", value_name = "N", help_heading = "Lights",
           conflicts_with = "error", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub(crate) n_lights: Option<u32>,
-    /// The fewest lights whose shading, matte and glossy, is off by this much at the most [%]
+    /// Use the fewest lights whose matte and glossy shading errors are at most PERCENT [%]
     #[arg(long, value_name = "PERCENT", help_heading = "Lights", value_parser = percent)]
     pub(crate) error: Option<f64>,
-    /// Take the sun out first: the brightest compact source no wider than 14°
+    /// Extract the sun first: the brightest compact source no wider than 14°
     #[arg(long, help_heading = "Lights")]
     pub(crate) sun: bool,
-    /// Take up to K lamps and windows out first: compact bright sources no wider than 56°
+    /// Extract up to K lamps and windows first: compact bright sources no wider than 56°
     #[arg(long, value_name = "K", help_heading = "Lights", default_value_t = 0,
           hide_default_value = true, value_parser = clap::value_parser!(u32).range(0..=4096))]
     pub(crate) lamps: u32,
-    /// How the rest is divided
+    /// How to divide the remaining light
     #[arg(long, value_enum, help_heading = "Lights",
           default_value_t = MethodName::VarianceMinimization)]
     pub(crate) method: MethodName,
-    /// Leave lights with less of the probe's light on the map [%; default: 0.1 of sun and lamps]
+    /// Leave lights with a smaller share of the probe's light in the map [%; default: 0.1 for sun and lamps]
     #[arg(long, value_name = "PERCENT", help_heading = "Lights", value_parser = percent)]
     pub(crate) min_energy: Option<f64>,
 
-    /// The rig, its format by its extension; several times for several files; - is standard output
+    /// Output file, whose extension sets the format; may be repeated; - is standard output
     #[arg(short, long = "output", value_name = "RIG", help_heading = "Output")]
     pub(crate) output: Vec<RigPath>,
-    /// The format where no extension determines it [of standard output: json]
+    /// Format if the extension does not determine it [default for standard output: json]
     #[arg(long, value_name = "FORMAT", help_heading = "Output", value_parser = format(),
           requires = "output")]
     pub(crate) format: Option<Format>,
-    /// Write the probe without the light that the rig took (.exr, .hdr, .pfm)
+    /// Write the probe without the light of the rig (.exr, .hdr, .pfm)
     #[arg(long, value_name = "FILE.exr", help_heading = "Output")]
     pub(crate) keep_residual: Option<PicturePath>,
     /// Write a picture of the rig: regions, lights, and a sphere under probe and rig; or none [default: on a terminal
-    /// RIG_preview.png beside the first rig, else none]
+    /// RIG_preview.png next to the first rig, otherwise none]
     #[arg(long, value_name = "FILE.png|none", help_heading = "Output")]
     pub(crate) preview: Option<PreviewPath>,
     /// Print lights, error and times as JSON
     #[arg(long, help_heading = "Output")]
     pub(crate) json: bool,
-    /// How the preview is shown.
+    /// How the preview is developed.
     #[command(flatten, next_help_heading = "Output")]
     pub(crate) tone: Tone,
 }
@@ -91,12 +91,12 @@ fn format() -> impl TypedValueParser<Value = Format> {
     one_of(Format::ALL.map(Format::name))
 }
 
-/// How a map is divided into regions.
+/// How to divide a map into regions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum MethodName {
-    /// Regions of little spread (Viriyothai & Debevec 2009, on the sphere)
+    /// Regions of small variance (Viriyothai & Debevec 2009, on the sphere)
     VarianceMinimization,
-    /// Regions of even energy (Debevec 2005)
+    /// Regions of equal energy (Debevec 2005)
     MedianCut,
 }
 
@@ -121,11 +121,11 @@ impl From<MethodName> for Method {
     }
 }
 
-/// A rig's file to write; `-` is standard output.
+/// The output file of a rig; `-` is standard output.
 #[derive(Clone, Debug)]
 pub(crate) struct RigPath {
     pub(crate) path: PathBuf,
-    /// What its extension says.
+    /// The format of its extension.
     pub(crate) format: Option<Format>,
 }
 
@@ -145,7 +145,7 @@ impl RigPath {
     }
 }
 
-/// Whether and where the preview is written; `-` is standard output.
+/// The output of the preview; `-` is standard output.
 #[derive(Clone, Debug)]
 pub(crate) enum PreviewPath {
     /// Nowhere.

@@ -24,19 +24,19 @@ use std::str::FromStr;
 
 /// Shown when the program starts without arguments, and at the end of `--help`.
 pub(crate) const FIRST_STEPS: &str = "\
-Five things to do:
+Five things to try:
   domelight render
       the built-in statue under the built-in sky, into domelight.exr and domelight.png
   domelight render robot.glb --env studio.hdr -o robot.png
       your model under your HDRI
   domelight probe studio.hdr --preview studio.png
-      what is in an HDRI, and a picture of it
+      the statistics of an HDRI, and a picture of it
   domelight lights studio.hdr -o rig.json
       an HDRI as lights for other programs
   domelight compare
-      how noisy each strategy is on one scene, as a page to look at; takes half a minute
+      how noisy each strategy is on one scene, as an HTML page; takes half a minute
 
-domelight --help lists the commands, domelight COMMAND --help every option of a command.";
+domelight --help lists the commands; domelight COMMAND --help lists every option of a command.";
 
 /// Direct illumination under measured light.
 #[derive(Debug, Parser)]
@@ -50,62 +50,63 @@ domelight --help lists the commands, domelight COMMAND --help every option of a 
     after_help = FIRST_STEPS
 )]
 pub(crate) struct Arguments {
-    /// What to do.
+    /// The command to run.
     #[command(subcommand)]
     pub(crate) command: Command,
-    /// Print nothing but errors and what --json asks for.
+    /// Print only errors and the output of --json.
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
     #[command(flatten)]
     pub(crate) memory: MemoryArguments,
 }
 
-/// How much memory the program may take.
+/// The memory limit of the program.
 #[derive(Args, Debug)]
 pub(crate) struct MemoryArguments {
-    /// Refuse work that would need more memory, such as 4GiB or none [default: nine tenths of the memory that there is]
+    /// Refuse work that needs more memory than SIZE, such as 4GiB or none [default: nine tenths of the machine's or
+    /// the control group's memory]
     #[arg(long, global = true, value_name = "SIZE")]
     pub(crate) max_memory: Option<MaxMemory>,
 }
 
-/// One variant a subcommand.
+/// One variant per subcommand.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Render a scene lit by an HDR environment.
     #[command(after_help = render::EXAMPLES)]
     Render(Box<render::RenderArguments>),
-    /// Put the parts of a picture together that `render --shard` or `--tiles` made.
+    /// Merge the parts of a picture made by `render --shard` or `--tiles`.
     #[command(after_help = MERGE_EXAMPLES)]
     Merge(MergeArguments),
-    /// Render a picture in parts on a farm: files for Slurm, Open Job Description, Kubernetes, parallel.
+    /// Write files that render a picture in parts on a farm: Slurm, Open Job Description, Kubernetes, parallel.
     #[command(after_help = farm::EXAMPLES)]
     Farm(Box<farm::FarmArguments>),
-    /// Compare strategies on one scene at equal samples, rays or time, in a report to look at.
+    /// Compare strategies on one scene at equal samples, rays or time, in an HTML report.
     #[command(after_help = compare::EXAMPLES)]
     Compare(Box<compare::CompareArguments>),
-    /// Look into one pixel: its hemisphere, where each strategy sends its rays, and why it is noisy.
+    /// Inspect one pixel: its hemisphere, where each strategy sends its rays, and why it is noisy.
     #[command(after_help = inspect::EXAMPLES)]
     Inspect(Box<inspect::InspectArguments>),
-    /// Measure what error costs: CPU time of each strategy to a wanted error, rays a second, rigs; also
-    /// against other programs.
+    /// Measure the CPU time that each strategy needs to reach a given error, rays per second and light
+    /// rigs; also against other programs.
     #[command(after_help = bench::EXAMPLES)]
     Bench(Box<bench::BenchArguments>),
-    /// Turn a light probe into a rig of lights, and the probe without them.
+    /// Convert a light probe to a light rig and a residual map.
     #[command(after_help = lights::EXAMPLES, mut_arg("env", lights::positional))]
     Lights(Box<lights::LightsArguments>),
     /// Compare a picture with its reference: MSE, relMSE, PSNR, ꟻLIP.
     #[command(after_help = DIFF_EXAMPLES)]
     Diff(DiffArguments),
-    /// Measure, look at and convert a light probe.
+    /// Measure, preview and convert a light probe.
     #[command(after_help = PROBE_EXAMPLES)]
     Probe(ProbeArguments),
-    /// Develop a picture again, with another exposure or tone curve, without rendering it.
+    /// Develop a picture again with another exposure or tone curve, without rendering it again.
     #[command(after_help = TONE_EXAMPLES)]
     Tone(ToneArguments),
     /// Draw the figures of a lecture on sampling direct illumination, and a page that shows them.
     #[command(after_help = figures::EXAMPLES)]
     Figures(Box<figures::FiguresArguments>),
-    /// Print the script that completes command lines in a shell.
+    /// Print a shell completion script.
     #[command(after_help = COMPLETIONS_EXAMPLES)]
     Completions(CompletionsArguments),
     /// Write manual pages: domelight.1 and one for each command.
@@ -128,7 +129,7 @@ Examples:
       then: man domelight, man domelight-render
   domelight man . && man -l domelight.1";
 
-/// Print the script that completes command lines in a shell.
+/// Print a shell completion script.
 #[derive(Args, Debug)]
 pub(crate) struct CompletionsArguments {
     /// The shell
@@ -142,10 +143,10 @@ pub(crate) struct CompletionsArguments {
 /// Write manual pages.
 #[derive(Args, Debug)]
 pub(crate) struct ManArguments {
-    /// The folder to write into, made if it is not there
+    /// Output folder, created if it does not exist
     #[arg(value_name = "FOLDER")]
     pub(crate) folder: PathBuf,
-    /// Print the names of the files as JSON
+    /// Print the file names as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -168,8 +169,8 @@ Examples:
   domelight merge part-*.exr -o whole.exr -o whole.png
   domelight merge parts/ -o whole.exr
 
-Exit codes: 3 if parts are missing or unfinished, 4 if two hold the same tile, 5 if one is damaged or
-of another render.";
+Exit codes: 3 if parts are missing or unfinished, 4 if two parts hold the same tile, 5 if a part is
+damaged or belongs to another render.";
 
 const PROBE_EXAMPLES: &str = "\
 Examples:
@@ -179,20 +180,20 @@ Examples:
   domelight probe grace.hdr --to cross-vertical -o cross.hdr
   domelight probe cathedral --size 256 -o - | domelight probe -";
 
-/// Put the parts of a picture together.
+/// Merge the parts of a picture.
 #[derive(Args, Debug)]
 pub(crate) struct MergeArguments {
-    /// Parts (.exr), or folders of them
+    /// Parts (.exr), or folders that contain them
     #[arg(value_name = "PART", required = true)]
     pub(crate) parts: Vec<PathBuf>,
-    /// Where to: .exr (all layers), .png, .hdr or .pfm; several times for several files; - writes
-    /// OpenEXR to standard output
+    /// Output file: .exr (all layers), .png, .hdr or .pfm; may be repeated; - writes OpenEXR to
+    /// standard output
     #[arg(short, long, value_name = "FILE", required = true)]
     pub(crate) output: Vec<PicturePath>,
-    /// Print what was merged as JSON.
+    /// Print a summary of the merge as JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// How PNG output is shown.
+    /// How PNG output is developed.
     #[command(flatten)]
     pub(crate) tone: Tone,
 }
@@ -212,39 +213,39 @@ pub(crate) struct DiffArguments {
     /// Write a false-color picture of the error.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PicturePath>,
-    /// What the error picture shows.
+    /// The quantity that the error picture shows.
     #[arg(long, value_enum, default_value_t = Metric::Rel, requires = "output")]
     pub(crate) metric: Metric,
-    /// Error at the upper end of the error picture's colors [default: 99.9th percentile; flip: 1].
+    /// Error at the upper end of the color scale [default: the 99.9th percentile; with flip 1].
     #[arg(long, value_name = "ERROR", value_parser = positive, requires = "output")]
     pub(crate) scale: Option<f32>,
     /// Compare only pixels that the reference covers (alpha > 0.999).
     #[arg(long)]
     pub(crate) covered: bool,
-    /// Compute HDR-ꟻLIP, over all exposures that the reference needs, too.
+    /// Also compute HDR-ꟻLIP, over all exposures that the reference needs.
     #[arg(long)]
     pub(crate) hdr_flip: bool,
     /// The OpenEXR layer to compare.
     #[arg(long, value_name = "NAME")]
     pub(crate) layer: Option<String>,
-    /// Exposure at which ꟻLIP sees the pictures.
+    /// Exposure and tone curve applied for ꟻLIP.
     #[command(flatten)]
     pub(crate) tone: Tone,
 }
 
-/// What an error picture shows.
+/// The quantity that an error picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Metric {
     /// Relative error √((I−R)² / (R² + 0.01))
     Rel,
     /// Absolute error |I−R|, in radiance
     Abs,
-    /// ꟻLIP, what the eye sees when it flips between the two
+    /// ꟻLIP, the difference that an observer sees when flipping between the pictures
     Flip,
 }
 
 impl Metric {
-    /// What it is called in reports.
+    /// The name in reports.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Rel => "relative error",
@@ -254,40 +255,40 @@ impl Metric {
     }
 }
 
-/// Measure, look at and convert a light probe.
+/// Measure, preview and convert a light probe.
 #[derive(Args, Debug)]
 pub(crate) struct ProbeArguments {
-    /// A file (.hdr, .exr, .pfm, .png, .jpg; - reads standard input) or sky, studio, cathedral, constant.
+    /// A probe file (.hdr, .exr, .pfm, .png, .jpg; - reads standard input) or sky, studio, cathedral, constant.
     #[arg(value_name = "FILE|NAME")]
     pub(crate) probe: PathBuf,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write a picture to look at: the map with its sun, its light by stops, and the noise of each strategy.
+    /// Write a preview: the map with its sun, the distribution of its light over stops, and the noise of each strategy.
     #[arg(long, value_name = "OUT.png")]
     pub(crate) preview: Option<PreviewPng>,
-    /// The mapping of the file that is written.
+    /// Mapping of the output file.
     #[arg(long, value_name = "MAPPING", requires = "output", default_value_t = Mapping::LatLong, value_parser = mapping())]
     pub(crate) to: Mapping,
     /// Write the probe (.exr, .hdr, .pfm, .png; - writes OpenEXR to standard output).
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PicturePath>,
-    /// Rows of the lat-long map: of a built-in probe [default: 512], and of what -o writes.
+    /// Rows of the lat-long map, for a built-in probe [default: 512] and for the output of -o.
     #[arg(long, value_name = "H", value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub(crate) size: Option<u32>,
-    /// The mapping of the file [default: guessed from its shape].
+    /// Mapping of the input file [default: inferred from its shape].
     #[arg(long, value_parser = mapping())]
     pub(crate) mapping: Option<Mapping>,
-    /// Refuse what is repaired with a warning otherwise: negative, NaN and infinite values.
+    /// Refuse values that are otherwise repaired with a warning: negative, NaN and infinite ones.
     #[arg(long)]
     pub(crate) strict: bool,
-    /// What is done without --strict; scripts may still say so.
+    /// The behavior without --strict; kept for existing scripts.
     #[arg(long, hide = true, conflicts_with = "strict")]
     pub(crate) sanitize: bool,
     /// The OpenEXR layer.
     #[arg(long, value_name = "NAME")]
     pub(crate) layer: Option<String>,
-    /// How the preview and PNG output are shown.
+    /// How the preview and PNG output are developed.
     #[command(flatten)]
     pub(crate) tone: Tone,
 }
@@ -315,28 +316,28 @@ pub(crate) struct ToneArguments {
     /// The picture (.exr, .hdr, .pfm, .png; - reads standard input)
     #[arg(value_name = "IN")]
     pub(crate) picture: PathBuf,
-    /// Where to (.png; - writes PNG to standard output)
+    /// Output file (.png; - writes PNG to standard output)
     #[arg(short, long, value_name = "OUT.png")]
     pub(crate) output: PicturePath,
     /// The OpenEXR layer, such as unoccluded or albedo
     #[arg(long, value_name = "NAME")]
     pub(crate) layer: Option<String>,
-    /// Denoise the picture by Open Image Denoise, if its library is installed or $OIDN_LIBRARY names it; with the layers
-    /// albedo and normal of the file, if it has them
+    /// Denoise the picture with Open Image Denoise, if its library is installed or $OIDN_LIBRARY names it; uses the
+    /// layers albedo and normal of the file, if present
     #[arg(long)]
     pub(crate) denoise: bool,
-    /// Bits of each channel
+    /// Bits per channel
     #[arg(long, value_enum, default_value_t = Bits::Eight)]
     pub(crate) bits: Bits,
-    /// Print what was done as JSON
+    /// Print a summary as JSON
     #[arg(long)]
     pub(crate) json: bool,
-    /// How the picture is shown.
+    /// How the picture is developed.
     #[command(flatten)]
     pub(crate) tone: Tone,
 }
 
-/// Bits of a channel of a PNG file.
+/// Bits per channel of a PNG file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Bits {
     /// 8
@@ -347,21 +348,21 @@ pub(crate) enum Bits {
     Sixteen,
 }
 
-/// Exposure and tone curve of what is looked at.
+/// Exposure and tone curve of pictures for viewing.
 #[derive(Args, Debug)]
 pub(crate) struct Tone {
-    /// Exposure of pictures to look at, in stops, or auto: the median of what the picture covers becomes middle gray
-    /// [default: auto; of differences 0]
+    /// Exposure of pictures for viewing, in stops; auto maps the median over the covered pixels to middle gray
+    /// [default: auto; 0 for differences]
     #[arg(long, value_name = "EV|auto", allow_negative_numbers = true)]
     exposure: Option<Exposure>,
-    /// Tone curve of pictures to look at; agx is Blender's, standard clips at 1 [default: agx; of differences
-    /// standard]
+    /// Tone curve of pictures for viewing; agx is Blender's, standard clips at 1 [default: agx; standard for
+    /// differences]
     #[arg(long, value_name = "CURVE", value_parser = tone_curve())]
     tone: Option<ToneCurve>,
 }
 
 impl Tone {
-    /// The tone mapping of pictures to look at; `automatic` is the exposure where none was given.
+    /// The tone mapping of pictures for viewing; `automatic` computes the exposure if none was given.
     pub(crate) fn of_picture(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
         let exposure = match self.exposure.unwrap_or(Exposure::Auto) {
             Exposure::Auto => automatic(),
@@ -370,7 +371,7 @@ impl Tone {
         ToneMapping { exposure, curve: self.tone.unwrap_or(ToneCurve::Agx) }
     }
 
-    /// The tone mapping of pictures that are measured or used again: none, unless something else was asked for.
+    /// The tone mapping of pictures for measurement or further use: none, unless requested.
     pub(crate) fn of_measurement(&self, automatic: impl FnOnce() -> f32) -> ToneMapping {
         let exposure = match self.exposure.unwrap_or(Exposure::Stops(0.0)) {
             Exposure::Auto => automatic(),
@@ -379,7 +380,7 @@ impl Tone {
         ToneMapping { exposure, curve: self.tone.unwrap_or(ToneCurve::Standard) }
     }
 
-    /// Whether pictures to look at are exposed automatically.
+    /// Whether pictures for viewing are exposed automatically.
     pub(crate) fn is_automatic(&self) -> bool {
         matches!(self.exposure, None | Some(Exposure::Auto))
     }
@@ -394,7 +395,7 @@ fn tone_curve() -> impl TypedValueParser<Value = ToneCurve> {
     one_of(ToneCurve::ALL.map(value))
 }
 
-/// Reads one of the `names`, which help and errors list.
+/// Parses one of the `names`, which help and errors list.
 fn one_of<T>(
     names: impl IntoIterator<Item: Into<PossibleValue>>,
 ) -> impl TypedValueParser<Value = T>

@@ -16,18 +16,18 @@ Examples:
   domelight render bunny.ply --env studio.hdr --material ggx:0.2 --ground -o bunny.png
       your mesh under your HDRI
   domelight render scene.toml --strategy mis --split 3:1 --spp 256 -o out.exr -o out.png
-      a scene file, three environment samples for each BRDF sample
+      a scene file, three environment samples per BRDF sample
   domelight render robot.glb --env studio.hdr --view three-quarter --env-rotate auto --ground shadow
-      seen from the right side, lit from the left, with its shadow on the map
+      a three-quarter view, lit from the left, with its shadow on the map
   domelight render robot.glb --env studio.hdr --turntable 36 -o robot.png
-      robot.0000.png to robot.0035.png, once around it
+      robot.0000.png to robot.0035.png, once around the robot
   domelight render spheres --env cathedral --strategy brdf --rays 4 --json > stats.json
-      another built-in scene, its statistics as JSON
+      another built-in scene, with its statistics as JSON
   domelight render --spp 4096 --checkpoint long.exr
   domelight render --spp 4096 --resume long.exr
-      a long render that survives whatever ends it
+      a long render that survives interruptions
   domelight render --shard 0/8 -o part-0.exr
-      one of eight parts; `domelight merge part-*.exr -o whole.exr` puts them together";
+      one of eight parts; `domelight merge part-*.exr -o whole.exr` merges them";
 
 /// Render a scene lit by an HDR environment.
 #[derive(Args, Debug)]
@@ -52,24 +52,24 @@ pub(crate) struct RenderArguments {
 #[command(next_help_heading = "Output")]
 #[expect(clippy::struct_excessive_bools, reason = "each is an option of its own")]
 pub(crate) struct OutputArguments {
-    /// Where to: .exr (all layers), .png, .hdr or .pfm; several times for several files; - writes
-    /// OpenEXR to standard output [default: domelight.exr and domelight.png]
+    /// Output file: .exr (all layers), .png, .hdr or .pfm; may be repeated; - writes OpenEXR to
+    /// standard output [default: domelight.exr and domelight.png]
     #[arg(short, long = "output", value_name = "FILE")]
     pub(crate) output: Vec<PicturePath>,
-    /// How PNG output is shown.
+    /// How PNG output is developed.
     #[command(flatten)]
     pub(crate) tone: Tone,
-    /// Denoise PNG, HDR and PFM output by Open Image Denoise, if its library is installed or $OIDN_LIBRARY names it;
-    /// OpenEXR keeps all layers as they were rendered, and gets one more, denoised
+    /// Denoise PNG, HDR and PFM output with Open Image Denoise, if its library is installed or $OIDN_LIBRARY names it;
+    /// OpenEXR keeps all layers as rendered and gets an additional layer, denoised
     #[arg(long, conflicts_with_all = ["shard", "tiles"])]
     pub(crate) denoise: bool,
-    /// Print settings, times and counts as JSON on standard output
+    /// Print settings, times and counts as JSON to standard output
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write PNG output first in half the size, after one sample, to look at while the rest is rendered
+    /// First write PNG output at half size after one sample, as a preview of the rest
     #[arg(long)]
     pub(crate) preview: bool,
-    /// Report the CPU seconds of each stage on standard error, and in --json
+    /// Report the CPU seconds of each stage to standard error and in --json
     #[arg(long)]
     pub(crate) profile: bool,
     /// Form of the progress report
@@ -79,8 +79,8 @@ pub(crate) struct OutputArguments {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ProgressKind {
-    /// A bar on standard error, if that is a terminal
+    /// A bar on standard error, if it is a terminal
     Bar,
-    /// The lines of Open Job Description on standard output
+    /// Open Job Description messages on standard output
     Openjd,
 }

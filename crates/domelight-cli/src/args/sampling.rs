@@ -1,4 +1,4 @@
-//! How directions and points are chosen.
+//! Sampling arguments: strategies, samples and point sets.
 
 use std::str::FromStr;
 
@@ -12,7 +12,7 @@ use domelight::strategy::{
 use super::{one_of, positive};
 use crate::parse::Split;
 
-/// A strategy's name and the options that go with it in one text.
+/// A strategy's name and options, parsed from one string.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StrategyText {
     pub(crate) kind: StrategyKind,
@@ -33,68 +33,68 @@ impl FromStr for StrategyText {
 #[command(next_help_heading = "Sampling")]
 pub(crate) struct StrategyArguments {
     /// Sampling strategy: brdf, environment, mis, product, rejection, sir, median-cut or
-    /// variance-minimization, also with numbers and options as in mis:3:1, sir:15/800 or product:8
+    /// variance-minimization, optionally with numbers and options as in mis:3:1, sir:15/800 or product:8
     #[arg(long, value_name = "NAME[:OPTIONS]", default_value = "product",
           long_help = strategy_help())]
     pub(crate) strategy: StrategyText,
-    /// Shadow rays of each camera sample; with product no more than these, with rejection samples to
-    /// accept [default: with product 8, with mis 2, else 1]
+    /// Shadow rays per camera sample; with product the maximum, with rejection the number of samples to
+    /// accept [default: 8 with product, 2 with mis, otherwise 1]
     #[arg(long, value_name = "N", conflicts_with = "split",
           value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub(crate) rays: Option<u32>,
-    /// Environment and BRDF samples of each camera sample, with mis [default: half of --rays each]
+    /// Environment and BRDF samples per camera sample, with mis [default: half of --rays each]
     #[arg(long, value_name = "M:N")]
     pub(crate) split: Option<Split>,
-    /// Lights that stand for the probe, with median-cut and variance-minimization [default: 64]
+    /// Lights that replace the probe, with median-cut and variance-minimization [default: 64]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub(crate) lights: Option<u32>,
-    /// Candidates of each camera sample, with sir [default: by a pilot, for the least error in time]
+    /// Candidates per camera sample, with sir [default: chosen by a pilot for the least error per time]
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub(crate) candidates: Option<u32>,
-    /// Density that sir draws its candidates from [default: mixture]
+    /// Density from which sir draws its candidates [default: mixture]
     #[arg(long, value_enum, value_name = "SOURCE")]
     pub(crate) from: Option<SourceName>,
-    /// Method by which sir picks rays from candidates [default: sorted]
+    /// How sir picks rays from its candidates [default: sorted]
     #[arg(long, value_enum, value_name = "HOW")]
     pub(crate) resampling: Option<ResamplingName>,
-    /// Tries of each camera sample, with rejection; with --rays the most tries [default: 16; with
-    /// --rays N 64 N]
+    /// Tries per camera sample, with rejection; with --rays the maximum number of tries [default: 16;
+    /// 64 N with --rays N]
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub(crate) tries: Option<u32>,
-    /// Factor of the product that rejection draws its tries from [default: tighter]
+    /// Factor of the product from which rejection draws its tries [default: tighter]
     #[arg(long, value_enum, value_name = "SOURCE")]
     pub(crate) proposal: Option<ProposalName>,
-    /// Heuristic that weights the samples of mis [default: power]
+    /// Heuristic for the MIS weights [default: power]
     #[arg(long, value_enum)]
     pub(crate) heuristic: Option<HeuristicName>,
-    /// With mis, draw from the environment's whole table; by default what is dimmer than the mean
-    /// is left to the BRDF samples
+    /// With mis, sample the whole environment; by default, radiance below the mean is left to the
+    /// BRDF samples
     #[arg(long)]
     pub(crate) no_compensation: bool,
 }
 
-/// How many camera samples.
+/// The number of camera samples.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Sampling")]
 pub(crate) struct SampleArguments {
-    /// Camera samples of each pixel; with product the usual number: noisy pixels get more, others fewer
+    /// Camera samples per pixel; with product the average: noisy pixels get more, others fewer
     #[arg(long, value_name = "N", default_value_t = 32,
           value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub(crate) spp: u32,
-    /// With product, as many camera samples for every pixel
+    /// With product, take the same number of camera samples in every pixel
     #[arg(long)]
     pub(crate) no_adaptive: bool,
-    /// Division of camera samples into passes over the picture
+    /// How the camera samples are divided into passes over the picture
     #[arg(long, value_enum, value_name = "HOW", default_value_t = PassesName::Efficient,
           conflicts_with = "target_error")]
     pub(crate) passes: PassesName,
-    /// End each tile when two sets of its samples differ no more than this relMSE suggests, such as 1e-3, but not before
-    /// 16 samples
+    /// Stop each tile when two independent sets of its samples indicate an error (relMSE) of at most E, such as 1e-3,
+    /// but not before 16 samples
     #[arg(long, value_name = "E", value_parser = positive)]
     pub(crate) target_error: Option<f32>,
 }
 
-/// The points of a pixel, and who computes them.
+/// Point sets, the pixel filter, and threads.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Sampling")]
 pub(crate) struct PixelArguments {
@@ -104,10 +104,10 @@ pub(crate) struct PixelArguments {
     /// Pixel filter
     #[arg(long, default_value = "gaussian", value_parser = one_of::<Filter>(Filter::ALL.map(Filter::name)))]
     pub(crate) filter: Filter,
-    /// Names the random numbers; the same seed gives the same picture
+    /// Seed of the random numbers; the same seed gives the same picture
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Threads [default: SLURM_CPUS_PER_TASK, else the cores that the process may use]
+    /// Number of threads [default: SLURM_CPUS_PER_TASK, otherwise the cores available to the process]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub(crate) threads: Option<u32>,
 }
@@ -124,13 +124,13 @@ pub(crate) enum SourceName {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum ResamplingName {
-    /// A random number for each ray
+    /// An independent random number for each ray
     Multinomial,
     /// Equally spaced picks
     Systematic,
     /// Equally spaced picks from candidates sorted in space
     Sorted,
-    /// Streaming reservoirs: no memory for candidates
+    /// Streaming reservoirs, which need no memory for candidates
     Reservoir,
 }
 
@@ -154,9 +154,9 @@ pub(crate) enum HeuristicName {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum PassesName {
-    /// The length that the strategy works best with
+    /// Passes of the length that suits the strategy best
     Efficient,
-    /// 1, 1, 2, 4, … samples, as the browser edition has them: with product another picture
+    /// Passes of 1, 1, 2, 4, … samples, as in the browser edition; with product, this gives a different picture
     Doubling,
 }
 
@@ -168,12 +168,12 @@ pub(crate) enum SamplerName {
     Independent,
 }
 
-/// All strategies with a line each, for `--help`.
+/// One line per strategy, for `--help`.
 fn strategy_help() -> String {
     let line = |kind: StrategyKind| format!("- {}: {}", kind.name(), kind.summary());
     let lines: Vec<String> = StrategyKind::ALL.into_iter().map(line).collect();
     format!(
-        "Sampling strategy, also with numbers and options as in mis:3:1, sir:15/800, product:8 or \
+        "Sampling strategy, optionally with numbers and options as in mis:3:1, sir:15/800, product:8 or \
          rejection:16:proposal=brdf\n\nStrategies:\n{}\n",
         lines.join("\n")
     )

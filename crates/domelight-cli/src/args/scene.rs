@@ -1,4 +1,4 @@
-//! What is rendered: scene, environment, camera.
+//! Arguments for the scene, the environment and the camera.
 
 use clap::{Args, ValueEnum};
 use domelight::environment::UpAxis;
@@ -9,7 +9,7 @@ use super::{finite, mapping};
 use crate::parse::{Rotation, Size, Triple, not_negative};
 use domelight_lab::scene::{BUILTIN_ROWS, DepthOfField, NamedMaterial};
 
-/// A scene under its light, seen by a camera: for every command that renders.
+/// A scene, its light and a camera, for every command that renders.
 #[derive(Args, Debug)]
 pub(crate) struct SceneArguments {
     /// A built-in scene (statue, spheres, material-ball, sphere, …), a mesh (.ply, .obj, .stl, .off,
@@ -27,17 +27,17 @@ pub(crate) struct SceneArguments {
     pub(crate) subject: SubjectArguments,
 }
 
-/// What of a file is shown.
+/// Which parts of a file to show.
 #[derive(Args, Debug, Default)]
 #[command(next_help_heading = "Scene file")]
 pub(crate) struct FileArguments {
-    /// The scene of a glTF file with several, by name or number from 0 [default: the file's own]
+    /// Scene of a glTF file, by name or by number from 0 [default: the file's default scene]
     #[arg(long = "scene", id = "file_scene", value_name = "NAME|N")]
     pub(crate) scene: Option<String>,
-    /// An animation of a glTF file, by name or number from 0 [default: at rest]
+    /// Animation of a glTF file, by name or by number from 0 [default: none, the rest pose]
     #[arg(long, value_name = "NAME|N")]
     pub(crate) animation: Option<String>,
-    /// The moment of the animation that is shown [seconds]
+    /// Time in the animation [seconds]
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = finite,
           allow_negative_numbers = true, requires = "animation")]
     pub(crate) at: f32,
@@ -47,11 +47,11 @@ pub(crate) struct FileArguments {
 #[command(next_help_heading = "Environment")]
 pub(crate) struct EnvironmentArguments {
     /// A built-in probe (sky, studio, cathedral, constant) or a file (.hdr, .exr, .pfm, .png, .jpg;
-    /// - reads standard input) [default: the scene's, else sky]
+    /// - reads standard input) [default: the scene's, otherwise sky]
     #[arg(long, value_name = "PROBE")]
     pub(crate) env: Option<String>,
-    /// Turn the environment about the up axis, counter-clockwise seen from above [degrees], or auto: its sun or
-    /// brightest side shines from the left on what the camera sees
+    /// Rotate the environment about the up axis, counterclockwise as seen from above [degrees]; auto puts its sun or
+    /// brightest side to the left of the camera
     #[arg(long, value_name = "DEG|auto", allow_negative_numbers = true)]
     pub(crate) env_rotate: Option<Rotation>,
     /// Multiply the environment's radiance
@@ -60,24 +60,24 @@ pub(crate) struct EnvironmentArguments {
     /// Multiply the environment's radiance by 2^EV
     #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true)]
     pub(crate) env_exposure: Option<f32>,
-    /// The world axis that the top of the map points to
+    /// World axis toward which the top of the map points
     #[arg(long, value_enum, value_name = "AXIS")]
     pub(crate) env_up: Option<Up>,
-    /// The map's layout, where shape and attributes of the file do not determine it
+    /// Layout of the map [default: inferred from the shape and the attributes of the file]
     #[arg(long, value_name = "MAPPING", value_parser = mapping())]
     pub(crate) env_mapping: Option<Mapping>,
-    /// The layer of an OpenEXR map
+    /// Layer of an OpenEXR map
     #[arg(long, value_name = "NAME")]
     pub(crate) env_layer: Option<String>,
-    /// Rows of a built-in probe
+    /// Number of rows of a built-in probe
     #[arg(long, value_name = "ROWS", default_value_t = BUILTIN_ROWS,
           value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(crate) env_rows: u32,
-    /// Refuse input that is otherwise repaired or left out with a warning: negative, NaN and infinite texels, vertices that are
-    /// not finite, images and material libraries that cannot be read, and unknown extensions that a glTF file requires
+    /// Refuse input that is otherwise repaired or skipped with a warning: negative, NaN and infinite texels, non-finite
+    /// vertices, images and material libraries that cannot be read, and unknown extensions that a glTF file requires
     #[arg(long)]
     pub(crate) strict: bool,
-    /// What is done without --strict; scripts may still say so.
+    /// The behavior without --strict; kept for existing scripts.
     #[arg(long, hide = true, conflicts_with = "strict")]
     pub(crate) sanitize: bool,
 }
@@ -85,20 +85,20 @@ pub(crate) struct EnvironmentArguments {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Camera")]
 pub(crate) struct CameraArguments {
-    /// Size of the picture
+    /// Picture size
     #[arg(long, value_name = "WxH", default_value = "640x640")]
     pub(crate) size: Size,
-    /// One of the scene's cameras, by name or number from 0 [default: the first]
+    /// Camera of the scene, by name or by number from 0 [default: the first]
     #[arg(long, value_name = "NAME|N")]
     pub(crate) camera: Option<String>,
-    /// Frame the camera to the subject, seen from front, back, left, right, top, bottom, three-quarter, or from an azimuth
-    /// (90 is its right) and an elevation [degrees], such as 30,15 [default: the scene's camera, else 0,20]
+    /// Frame the subject from front, back, left, right, top, bottom, three-quarter, or from an azimuth (90 is its
+    /// right) and an elevation [degrees], such as 30,15 [default: the scene's camera, otherwise 0,20]
     #[arg(long, value_name = "VIEW|AZ,EL", allow_hyphen_values = true, conflicts_with_all = ["camera", "origin"])]
     pub(crate) view: Option<ViewDirection>,
-    /// Position of the camera [default: framed to the scene]
+    /// Position of the camera [default: frames the scene]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) origin: Option<Triple>,
-    /// Point that the camera looks at
+    /// Point at which the camera looks
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) target: Option<Triple>,
     /// Direction that points up in the picture
@@ -107,11 +107,11 @@ pub(crate) struct CameraArguments {
     /// Vertical field of view [degrees]
     #[arg(long, value_name = "DEG", value_parser = not_negative, allow_negative_numbers = true, conflicts_with = "ortho")]
     pub(crate) fov: Option<f32>,
-    /// Make the camera orthographic, with this height of the picture in the world
+    /// Use an orthographic camera; HEIGHT is the height of the picture in world units
     #[arg(long, value_name = "HEIGHT", value_parser = not_negative, allow_negative_numbers = true)]
     pub(crate) ortho: Option<f32>,
-    /// Depth of field: the f-number of a full-frame camera in a world of meters, the distance of what is sharp or auto
-    /// (the subject's center), and the blades of the aperture [default: a round one], such as 2.8,auto or 1.4,3.5,6
+    /// Depth of field: the f-number of a full-frame camera (world units are meters), the focus distance or auto (the
+    /// subject's center), and the number of aperture blades [default: a round aperture], such as 2.8,auto or 1.4,3.5,6
     #[arg(long, value_name = "F,DIST[,BLADES]", conflicts_with = "ortho")]
     pub(crate) dof: Option<DepthOfField>,
 }
@@ -125,21 +125,21 @@ pub(crate) struct SubjectArguments {
     /// Move and scale the scene: center of the bounds to 0, longest half-extent to 1
     #[arg(long)]
     pub(crate) normalize: bool,
-    /// Put ground under the subject: a plate, diffuse (reflectance 0.5), that fades toward its rim, or shadow: nothing is
-    /// seen of it but shadows on the environment, or in alpha with --hide-env
+    /// Put ground under the subject: plate, a diffuse plate (reflectance 0.5) that fades out toward its rim, or
+    /// shadow, a shadow catcher that shows only shadows, on the environment or, with --hide-env, in alpha
     #[arg(long, value_enum, value_name = "KIND", num_args = 0..=1, default_missing_value = "plate")]
     pub(crate) ground: Option<GroundName>,
-    /// Leave the background out: pixels without a surface are transparent
+    /// Hide the environment behind the scene: pixels without a surface are transparent
     #[arg(long)]
     pub(crate) hide_env: bool,
 }
 
-/// What is put under a subject.
+/// The ground under a subject.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum GroundName {
-    /// A diffuse plate that fades toward its rim
+    /// A diffuse plate that fades out toward its rim
     Plate,
-    /// Nothing but shadows
+    /// Only shadows
     Shadow,
 }
 

@@ -1,4 +1,4 @@
-//! `domelight lights`: a probe as a rig of lights, and what they leave of it.
+//! `domelight lights`: converts a probe to a light rig and a residual map.
 
 mod preview;
 mod report;
@@ -32,7 +32,7 @@ use preview::Preview;
 use report::{LightsReport, Timings};
 use written::WrittenFiles;
 
-/// Lights where nothing else is said.
+/// The default number of lights.
 const N_LIGHTS: usize = 64;
 
 /// Runs the subcommand.
@@ -102,7 +102,7 @@ struct DomeFiles {
     of_outputs: Vec<Option<PathBuf>>,
 }
 
-/// A rig and what is known of its error.
+/// A rig and its error, if known.
 pub(crate) struct ExtractedRig {
     pub(crate) extraction: Extraction,
     /// Numbers of lights that were tried for `--error`, rising; else the rig's alone, if it was
@@ -118,7 +118,7 @@ impl ExtractedRig {
     }
 }
 
-/// A rig's file whose format is known.
+/// A rig's output file with its format.
 struct Output<'a> {
     path: &'a Path,
     format: Format,
@@ -140,16 +140,16 @@ impl LightsArguments {
         }
     }
 
-    /// Files with their formats, checked for what does not go together.
+    /// The files with their formats, checked for conflicts.
     fn outputs(&self) -> Result<Vec<Output<'_>>> {
         if self.n_on_standard_output() > 1 {
             let message = "only one result can go to standard output; give a file name";
             return Err(UsageError(message.into()).into());
         }
         if self.keep_residual.is_some() && self.has_regions() && self.min_energy.is_none() {
-            let message = "nothing is left for --keep-residual: the lights take all of the probe. \
-                           Leave -n and --error out to keep what --sun and --lamps do not take, \
-                           or keep dim lights on the map by --min-energy";
+            let message = "nothing is left for --keep-residual: the lights use the whole probe. \
+             Omit -n and --error to keep the light that --sun and --lamps do not use, or leave \
+             dim lights in the map with --min-energy";
             return Err(UsageError(message.into()).into());
         }
         let outputs: Vec<_> = self.output.iter().map(|o| self.output(o)).collect::<Result<_>>()?;
@@ -184,7 +184,7 @@ impl LightsArguments {
         rigs + [residual, preview, self.json].map(usize::from).iter().sum::<usize>()
     }
 
-    /// Where the preview goes, if there is one: as asked for, or on a terminal beside the first rig.
+    /// The output of the preview, if any: as requested, or on a terminal next to the first rig.
     fn preview_path(&self, outputs: &[Output], quiet: bool) -> Option<PathBuf> {
         match &self.preview {
             Some(PreviewPath::None) => return None,
@@ -197,7 +197,7 @@ impl LightsArguments {
         Some(first.path.with_file_name(format!("{stem}_preview.png")))
     }
 
-    /// Declares all that may be written; the file of the dome's map, if there may be one.
+    /// Declares all possible outputs. Returns the file of the dome's map, if there may be one.
     fn declare(&self, outputs: &[Output], preview: Option<&Path>) -> Result<Option<PicturePath>> {
         outputs.iter().try_for_each(|o| files::writes(o.path))?;
         preview.map_or(Ok(()), files::writes)?;
@@ -242,7 +242,7 @@ impl LightsArguments {
         Ok(ExtractedRig { extraction, errors })
     }
 
-    /// The file of the dome's map, if light may be left on it: as asked for, or beside the first rig that refers to it.
+    /// The file of the dome's map, if there may be a residual: as requested, or next to the first rig that refers to it.
     fn dome_path(&self, outputs: &[Output]) -> Result<Option<PicturePath>> {
         if self.has_regions() && self.min_energy.is_none() {
             return Ok(None);
@@ -260,7 +260,7 @@ impl LightsArguments {
 }
 
 impl LightsArguments {
-    /// Writes the dome's map and what else outputs need of it.
+    /// Writes the dome's map and its other pictures that outputs need.
     fn write_dome(
         &self,
         path: &PicturePath,
@@ -325,7 +325,7 @@ fn refer(rig: &Path, dome: &Path) -> Result<String, UsageError> {
     };
     let refuse = || UsageError(format!("{}: its name is not UTF-8", name.display()));
     let text = name.to_str().ok_or_else(refuse)?;
-    // Elsewhere a backslash is a letter like others.
+    // Elsewhere, a backslash is an ordinary character.
     Ok(if cfg!(windows) { text.replace('\\', "/") } else { text.to_owned() })
 }
 

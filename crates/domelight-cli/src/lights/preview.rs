@@ -148,7 +148,7 @@ impl Preview<'_> {
             sheet.text((r.x + 0.5 * edge, top + edge + 24.0), title, style);
         }
         let note = format!(
-            "a white matte sphere without shadows; the greatest difference is {:.2} % of its \
+            "a white matte sphere without shadows; the largest difference is {:.2} % of its \
              brightest point",
             100.0 * worst
         );

@@ -1,4 +1,4 @@
-//! `domelight probe`: what a light probe is like, and its conversion.
+//! `domelight probe`: statistics and conversion of a light probe.
 
 mod sheet;
 
@@ -27,7 +27,7 @@ const BUILTIN_ROWS: u32 = 512;
 /// Rows of the map under which noise is measured, at the most: smaller suns are as noisy.
 const NOISE_ROWS: usize = 512;
 
-/// A probe and what is known of it.
+/// A probe with its statistics.
 struct MeasuredProbe {
     probe: LoadedProbe,
     /// The file's name, or that of a built-in probe.
@@ -89,12 +89,12 @@ fn measure(arguments: &ProbeArguments, probe: LoadedProbe) -> anyhow::Result<Mea
     Ok(MeasuredProbe { name: name.into_owned(), is_builtin, statistics, environment, noise, probe })
 }
 
-/// Says that a sun or lamp seems to be cut off; built-in ones are even on purpose.
+/// Warns if a sun or lamp seems to be clipped; built-in ones are evenly bright on purpose.
 fn clipping_warning(measured: &MeasuredProbe) -> Option<String> {
     let plateau = measured.statistics.plateau.filter(|_| !measured.is_builtin)?;
     Some(format!(
-        "{}: {} texels side by side have the greatest value, {}: a sun or lamp is clipped, unless it is evenly bright; a \
-         clipped one lights too little, and its shadows are too faint",
+        "{}: {} adjacent texels have the maximum value, {}: a sun or lamp is clipped, unless it \
+         is evenly bright; a clipped light is too dim, and its shadows are too faint",
         measured.name, plateau.n_texels, plateau.value
     ))
 }
@@ -103,7 +103,7 @@ fn builtin(arguments: &ProbeArguments) -> Option<BuiltinProbe> {
     arguments.probe.to_str().and_then(|name| name.parse::<BuiltinProbe>().ok())
 }
 
-/// The built-in probe of that name, else the file.
+/// The built-in probe with this name, or else the file.
 fn load(arguments: &ProbeArguments) -> anyhow::Result<LoadedProbe> {
     if let Some(builtin) = builtin(arguments) {
         let rows = arguments.size.unwrap_or(BUILTIN_ROWS);
@@ -168,7 +168,7 @@ fn table(measured: &MeasuredProbe) -> String {
     }
     if let Some(plateau) = s.plateau {
         let (n, share) = (plateau.n_texels, 100.0 * plateau.share);
-        let what = if measured.is_builtin { "even" } else { "clipped, or even" };
+        let what = if measured.is_builtin { "even" } else { "clipped, or evenly bright" };
         row(
             "greatest value",
             format!("{} in {n} texels, {share:.1} % of the energy: {what}", plateau.value),
@@ -182,7 +182,7 @@ fn table(measured: &MeasuredProbe) -> String {
     text
 }
 
-/// What a person wants to know of the sun.
+/// The rows about the sun.
 fn sun_rows(sun: &Sun) -> [(&'static str, String); 4] {
     let d = sun.direction;
     let (azimuth, elevation) = (sun.azimuth(), sun.elevation());
@@ -198,10 +198,10 @@ fn sun_rows(sun: &Sun) -> [(&'static str, String); 4] {
     ]
 }
 
-/// The error of each strategy, and what a small one takes.
+/// The error of each strategy, and the rays needed for a small one.
 fn noise_table(noise: &[StrategyNoise]) -> String {
     let mut text = format!(
-        "noise of a sphere, {RAYS_A_PIXEL} shadow rays a pixel       rays for an error of 1 %\n\
+        "noise of a sphere, {RAYS_A_PIXEL} shadow rays per pixel     rays for an error of 1 %\n\
          strategy                matte    glossy         matte      glossy\n"
     );
     for n in noise {

@@ -56,7 +56,7 @@ impl Sheet<'_> {
             s.peak_to_mean()
         );
         if s.plateau.is_some() && !self.measured.is_builtin {
-            facts += "; the greatest value is clipped, or even";
+            facts += "; the greatest value is clipped, or evenly bright";
         }
         sheet.text((MARGIN, 54.0), &facts, TextStyle::new(17.0).color(Color::GRAY));
     }
@@ -146,7 +146,7 @@ fn light_by_stops(map: &RgbImage) -> Plot {
 fn draw_noise(sheet: &mut Document, r: Rect, noise: &[StrategyNoise]) {
     const LABELS: f64 = 150.0;
     const NUMBERS: f64 = 80.0;
-    let title = format!("Noise of a sphere, {RAYS_A_PIXEL} shadow rays a pixel");
+    let title = format!("Noise of a sphere, {RAYS_A_PIXEL} shadow rays per pixel");
     let style = TextStyle::new(19.0).bold().anchor(Anchor::Middle);
     sheet.text((r.x + 0.5 * r.width, r.y + 27.0), &title, style);
     let errors = || noise.iter().flat_map(|n| [n.matte, n.glossy]).filter(|e| *e > 0.0);

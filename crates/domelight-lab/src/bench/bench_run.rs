@@ -119,7 +119,7 @@ enum Source<'a> {
     Mitsuba(&'a RefCell<Mitsuba>),
 }
 
-/// All pictures with a number of camera samples a pixel; one value a seed.
+/// All pictures with a number of camera samples per pixel; one value a seed.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct BudgetPoint {
     pub(super) spp: u32,
@@ -178,7 +178,7 @@ struct Measurement {
 
 /// Which budgets are worth measuring.
 pub(super) struct Limits {
-    /// The least and the greatest error that is wanted.
+    /// The least and the largest error that is wanted.
     pub(super) errors: (f64, f64),
     /// CPU seconds of all pictures of a budget.
     pub(super) most: f64,
@@ -243,7 +243,7 @@ impl<'a> BenchRun<'a> {
         Ok(errors.iter().sum::<f64>() / errors.len() as f64)
     }
 
-    /// Chooses the budgets by a picture each: from the last with more than the greatest error to the first
+    /// Chooses the budgets by a picture each: from the last with more than the largest error to the first
     /// with less than the least, as far as time allows.
     pub(super) fn choose_budgets(&mut self, limits: &Limits) -> Result<(), Error> {
         let (least, greatest) = limits.errors;
@@ -343,7 +343,7 @@ pub(super) struct CostAtError {
     pub(super) rel_mse: f64,
     pub(super) cpu_seconds: f64,
     pub(super) fit: Fit,
-    /// The least and the greatest over the seeds' own errors.
+    /// The least and the largest over the seeds' own errors.
     pub(super) range: Option<(f64, f64)>,
     pub(super) wall_seconds: f64,
     /// 1 / (relMSE · CPU seconds).

@@ -1,5 +1,5 @@
-//! What the lecture's optimum would cost: perfect samples of the product of reflectance and light, of
-//! which only the visibility is unknown.
+//! The cost of the lecture's optimum: perfect samples of the product of reflectance and light, where only
+//! the visibility is unknown.
 
 use domelight::RgbImage;
 use domelight::geometry::{RayBatch, offset_origin};
@@ -21,7 +21,7 @@ use domelight::render::{RenderSettings, pilot_points};
 pub(super) struct Bound {
     /// Occlusion rays in a CPU second of one thread, by the ray kernel on the case.
     pub(super) occlusion_rays_per_cpu_second: f64,
-    /// relMSE of one ray a pixel.
+    /// relMSE of one ray per pixel.
     pub(super) rel_mse_of_a_ray: f64,
     /// relMSE times CPU seconds, which no budget changes: a picture of N rays in each covered pixel takes N
     /// times as long for an N-th of the error.

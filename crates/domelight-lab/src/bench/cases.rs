@@ -1,4 +1,4 @@
-//! What is rendered: scenes of a material, under a probe, seen by a camera.
+//! Benchmark cases: a scene with a material, a probe and a camera.
 
 use std::fmt;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Embree 4, loaded while the program runs: what the ray kernel is measured against.
+//! Embree 4, loaded at run time, as the peer of the ray kernel.
 //!
 //! The declarations follow the headers of Embree 4 (rtcore_device.h, rtcore_scene.h, rtcore_ray.h); one
 //! thread, default build quality, no flags.
@@ -243,7 +243,7 @@ impl Embree {
         // SAFETY: the configuration is a C string.
         let device = unsafe { (functions.rtcNewDevice)(c"threads=1".as_ptr()) };
         if device.is_null() {
-            return Err(Error::Failed("Embree makes no device".into()));
+            return Err(Error::Failed("Embree cannot create a device".into()));
         }
         let embree = Self { functions, device, _library: ManuallyDrop::new(library) };
         let [major, minor, patch] = embree.version();
@@ -284,7 +284,7 @@ impl Embree {
             let triangles = buffer(INDEX, UINT3, mesh.triangles.len()).cast::<[u32; 3]>();
             let positions = buffer(VERTEX, FLOAT3, mesh.positions.len()).cast::<Vec3>();
             if triangles.is_null() || positions.is_null() {
-                return Err(Error::Failed("Embree takes no such mesh".into()));
+                return Err(Error::Failed("Embree rejects the mesh".into()));
             }
             triangles.copy_from_nonoverlapping(mesh.triangles.as_ptr(), mesh.triangles.len());
             positions.copy_from_nonoverlapping(mesh.positions.as_ptr(), mesh.positions.len());
@@ -336,7 +336,7 @@ impl<'a> Committed<'a> {
         let bytes = BYTES.load(Ordering::Relaxed).wrapping_sub(before) as usize;
         let committed = Self { embree: mesh.embree, scene, bytes };
         if error != 0 {
-            return Err(Error::Failed(format!("Embree fails to build its tree: error {error}")));
+            return Err(Error::Failed(format!("Embree cannot build its BVH: error {error}")));
         }
         Ok(committed)
     }

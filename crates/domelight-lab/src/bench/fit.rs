@@ -1,4 +1,4 @@
-//! From errors at rising budgets to the cost of a wanted error.
+//! Computes the cost of a target error from errors at increasing budgets.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,13 +18,13 @@ pub(super) struct Cost {
 pub(super) enum Fit {
     /// Between two budgets whose errors lie on either side.
     Interpolated,
-    /// Beyond the greatest budget.
+    /// Beyond the largest budget.
     Extrapolated,
     /// The least budget is good enough: an upper bound.
     AtMost,
 }
 
-/// The greatest factor between the least error that was measured and one that is extrapolated.
+/// The largest factor between the least error that was measured and one that is extrapolated.
 const FARTHEST: f64 = 10.0;
 
 /// The exponents of error over time that an extrapolation may have: never worse than N^-½, nor better

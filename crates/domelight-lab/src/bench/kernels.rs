@@ -1,8 +1,8 @@
-//! The suite `kernels`: rays a second of the ray kernel and the build of its tree, against Embree 4 if
-//! its library is given.
+//! The suite `kernels`: rays per second of the ray kernel and the build time of its BVH, against Embree 4
+//! if its library is given.
 //!
-//! All engines trace the same rays in turns, in one process, so that what else the machine does hits
-//! them alike; a ratio is formed in each round. One thread, by its own CPU time.
+//! All engines trace the same rays in turns, in one process, so that other load affects them equally. A
+//! ratio is computed in each round. One thread is measured by its own CPU time.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -79,7 +79,7 @@ struct Scaling {
     wall: MedianAndRange,
 }
 
-/// The median of the rounds, and the least and the greatest.
+/// The median of the rounds, and the least and the largest.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct MedianAndRange {
     median: f64,
@@ -405,7 +405,7 @@ fn rays(rows: &[Row], title: &str, traces: impl Fn(&Row) -> &[Trace]) -> Table {
 
 fn builds(rows: &[Row]) -> Table {
     let head = ["mesh", "engine", "triangles", "CPU s", "ratio", "bytes/triangle"];
-    let mut table = Table::new("Build of the tree on one thread", &head);
+    let mut table = Table::new("BVH build on one thread", &head);
     for row in rows {
         table.rows.extend(row.builds.iter().map(|build| {
             vec![

@@ -1,9 +1,9 @@
 //! Mitsuba 3 (Jakob et al. 2022), on the same cases.
 //!
-//! One Python serves all cases: a line asks for a picture, a line answers what it cost. So its pictures and
-//! ours can be taken in turn. It is configured as strongly as it can be for this task: one sample of the
-//! light with MIS compensation and one of the BRDF, weighed by the power heuristic, correlated
-//! multi-jittered points, compiled by LLVM for all cores.
+//! One Python process serves all cases: a line requests a picture, and a line returns its cost. So its pictures and
+//! ours can be rendered in turns. Mitsuba is configured as strongly as possible for this task: one light sample with
+//! MIS compensation and one BRDF sample, weighted by the power heuristic, correlated multi-jittered points, compiled
+//! by LLVM for all cores.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -133,12 +133,12 @@ impl Mitsuba {
     /// The scene as the script takes it; else why it cannot be said.
     fn scene(&self, built: &BuiltCase, case_material: &CaseMaterial) -> Result<Value, String> {
         let CaseMaterial::Of { material, text } = case_material else {
-            return Err("the scene's own materials are not handed over".to_owned());
+            return Err("the scene's own materials cannot be passed on".to_owned());
         };
         let bsdf = bsdf(material).ok_or_else(|| format!("it has no {text}"))?;
         let camera = built.camera;
         let Projection::Perspective { fov_y_degrees } = camera.projection else {
-            return Err("an orthographic camera is not handed over".to_owned());
+            return Err("an orthographic camera cannot be passed on".to_owned());
         };
         // Its first column is toward −Z, ours toward +Z.
         let turn = Mat3::from_rotation_y(PI);
@@ -223,7 +223,7 @@ impl Mitsuba {
             let messages =
                 fs::read_to_string(self.folder.path().join(MESSAGES)).unwrap_or_default();
             let last = messages.lines().rev().find(|line| !line.trim().is_empty());
-            let why = last.unwrap_or("it does not say why").trim();
+            let why = last.unwrap_or("it gives no reason").trim();
             return Err(Error::Failed(format!("{} ended: {why}", self.python)));
         }
         let answer: Value = serde_json::from_str(&line).at(format_args!(

@@ -1,4 +1,4 @@
-//! What error costs, in CPU time.
+//! Benchmarks: the CPU time that strategies need to reach a given error.
 
 mod bench_run;
 mod bound;
@@ -37,7 +37,7 @@ pub enum Suite {
 }
 
 impl Suite {
-    /// As it is typed.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Lecture => "lecture",

@@ -1,4 +1,4 @@
-//! A scene's triangles as one binary PLY file, for other programs.
+//! Writes a scene's triangles as one binary PLY file, for other programs.
 
 use std::io::{self, Write};
 

@@ -1,4 +1,4 @@
-//! The suites `lecture` and `probes`: what strategies cost on scenes, case by case.
+//! The suites `lecture` and `probes`: the cost of strategies on scenes, case by case.
 
 use std::cell::RefCell;
 
@@ -57,7 +57,7 @@ pub(super) struct Row {
     build: Seconds,
     reference: ReferenceReport,
     bound: Bound,
-    /// That are to be reached, the greatest first; in the suite `lecture` after that of SIR's picture.
+    /// That are to be reached, the largest first; in the suite `lecture` after that of SIR's picture.
     errors: Vec<f64>,
     strategies: Vec<StrategyEntry>,
     /// Null if none was asked for, or it cannot show the case.
@@ -131,7 +131,7 @@ struct CaseRunner<'a> {
     bench: &'a Bench<'a>,
     strategies: Vec<NamedStrategy>,
     quality_of: Option<&'a str>,
-    /// That are to be reached, the greatest first.
+    /// That are to be reached, the largest first.
     errors: Vec<f64>,
     reference_error: f64,
     peer: Option<RefCell<Mitsuba>>,
@@ -247,11 +247,13 @@ impl CaseRunner<'_> {
             host.warn(&text);
         }
         if let Some(why) = &row.peer_left_out {
-            host.warn(&format!("left out of the other program: {why}"));
+            host.warn(&format!("not measured with the other program: {why}"));
         }
         if let Some(peer) = row.peer.as_ref().filter(|peer| (peer.mean_ratio - 1.0).abs() > 0.02) {
             let percent = 100.0 * (peer.mean_ratio - 1.0);
-            host.warn(&format!("its converged picture is {percent:+.1} % as bright as ours"));
+            host.warn(&format!(
+                "its converged picture differs from ours by {percent:+.1} % in brightness"
+            ));
         }
     }
 }
@@ -292,7 +294,7 @@ fn mark(fit: Fit) -> &'static str {
 /// Tables of the suite `lecture`, whose first error is that of SIR's picture.
 pub(super) fn lecture_tables(rows: &[Row]) -> Vec<Table> {
     let mut table = Table::new(
-        format!("Seconds to the quality of {LECTURE_OPTIMUM} with one camera sample a pixel"),
+        format!("Seconds to the quality of {LECTURE_OPTIMUM} with one camera sample per pixel"),
         &["case", "strategy", "relMSE", "CPU-s", "wall s"],
     );
     for row in rows {

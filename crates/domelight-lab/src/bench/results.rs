@@ -1,4 +1,4 @@
-//! What a run measured, as `--json` gives it and `--table` reads it.
+//! The results of a run, which `--json` prints and `--table` reads.
 
 use std::path::Path;
 use std::time::SystemTime;
@@ -15,7 +15,7 @@ use crate::{At as _, Error};
 /// Raised when a file of before can no longer be read.
 const SCHEMA: u32 = 1;
 
-/// A run: when, where, with what, and the rows.
+/// The results of a run: when, where, with which settings, and the rows.
 #[derive(Serialize, Deserialize)]
 pub struct Results {
     schema: u32,
@@ -63,7 +63,7 @@ impl Results {
         }
     }
 
-    /// Reads what [`Results::json`] gave.
+    /// Reads the output of [`Results::json`].
     ///
     /// # Errors
     /// If it cannot be read, or is of another version.
@@ -75,14 +75,14 @@ impl Results {
         })?;
         let usage = |why: String| Error::Usage(format!("{name}: {why}"));
         let value: serde_json::Value = serde_json::from_str(&text)
-            .map_err(|e| usage(format!("it is no JSON of domelight bench ({e})")))?;
+            .map_err(|e| usage(format!("it is not JSON from domelight bench ({e})")))?;
         match value["schema"].as_u64() {
             Some(schema) if schema == u64::from(SCHEMA) => {}
             Some(schema) => {
                 let why = format!("its schema is {schema}, that of this version {SCHEMA}");
                 return Err(usage(why));
             }
-            None => return Err(usage("it is no JSON of domelight bench".into())),
+            None => return Err(usage("it is not JSON from domelight bench".into())),
         }
         let results = serde_json::from_value(value);
         results.map_err(|e| usage(format!("it is damaged ({e})")))
@@ -96,11 +96,11 @@ impl Results {
         serde_json::to_string_pretty(self).at("the results cannot be written as JSON")
     }
 
-    /// When, where and with what, in a sentence.
+    /// A sentence that says when, where and with which settings.
     pub fn describe(&self) -> String {
         let day = self.date.split('T').next().unwrap_or(&self.date);
         let threads = if self.threads == 1 { "thread" } else { "threads" };
-        let complete = if self.complete { "" } else { "; not all of it was done" };
+        let complete = if self.complete { "" } else { "; incomplete" };
         format!(
             "domelight {}, {day}, {} {threads} on {}{complete}",
             self.version,
@@ -109,7 +109,7 @@ impl Results {
         )
     }
 
-    /// For people.
+    /// The tables for readers.
     pub fn tables(&self) -> Vec<Table> {
         match &self.rows {
             Rows::Lecture(rows) => renders::lecture_tables(rows),

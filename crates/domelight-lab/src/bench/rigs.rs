@@ -1,4 +1,4 @@
-//! The suite `rigs`: what rigs of lights cost, and how well they shade.
+//! The suite `rigs`: the cost of light rigs, and their shading error.
 
 use domelight::Rgb;
 use domelight::environment::Environment;
@@ -28,7 +28,7 @@ pub(super) struct Row {
     lights: usize,
     /// To extract them; one value a repetition, wall-clock seconds where the system does not report them.
     cpu_seconds: Vec<f64>,
-    /// The irradiance of all lights against that of the map, the greatest difference of a channel relative to it.
+    /// The irradiance of all lights against that of the map, the largest difference of a channel relative to it.
     flux_error: f64,
     /// Root mean square of the shading relative to that of the map's: a matte surface, and the lobe cos²⁰.
     diffuse_error: f64,

@@ -1,20 +1,20 @@
-//! What the strategies of a comparison have in common.
+//! The budget of the strategies in a comparison.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// What each picture may cost.
+/// The budget of each picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Budget {
-    /// Camera samples of each pixel.
+    /// Camera samples per pixel.
     Samples(u32),
-    /// Shadow rays traced for a pixel that the scene covers.
+    /// Shadow rays traced per pixel that the scene covers.
     Rays(f64),
     /// CPU seconds of rendering.
     Time(f64),
 }
 
-/// A text that is no budget.
+/// A text that is not a valid budget.
 #[derive(Debug, thiserror::Error)]
 #[error("'{0}' is not rays:N, time:T (such as 2s, 500ms, 1m) or spp:N, all above 0")]
 pub struct BadBudget(String);

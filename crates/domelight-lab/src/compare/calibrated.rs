@@ -1,4 +1,4 @@
-//! A comparison whose strategies are prepared and calibrated: the reference that suits them, and their pictures.
+//! A comparison with prepared and calibrated strategies: renders the reference and the pictures.
 
 use domelight::environment::Environment;
 use domelight::picture::compare::compare;
@@ -25,7 +25,7 @@ const PILOTS: f64 = 2.0;
 /// A mean of another renderer's picture may differ by this part of the reference's without a word.
 const MEAN_TOLERANCE: f64 = 0.02;
 
-/// A comparison whose strategies know how many samples the budget buys.
+/// A comparison in which the number of samples of each strategy is known.
 pub struct CalibratedComparison<'c, 'a> {
     comparison: &'c Comparison<'a>,
     host: &'c dyn Host,
@@ -157,11 +157,11 @@ impl<'c, 'a> CalibratedComparison<'c, 'a> {
         }
     }
 
-    /// The converged picture of the view, from the cache if it has it, else rendered: with more samples until its error
-    /// is at most a tenth of the least that is expected of a strategy, as far as the settings allow.
+    /// The converged picture of the view, from the cache if available, otherwise rendered with more samples until its
+    /// error is at most a tenth of the smallest error expected of a strategy, as far as the settings allow.
     ///
     /// # Errors
-    /// If the scene is not in sight, or the host ended the work.
+    /// If the camera does not see the scene, or the host ended the work.
     pub fn reference(&self, cache: Option<&Cache>) -> Result<Reference, Error> {
         let settings = &self.comparison.settings;
         let mut spp = settings.reference_spp;
@@ -268,8 +268,7 @@ impl<'c, 'a> CalibratedComparison<'c, 'a> {
         let CalibratedStrategy { spec, strategy, setup_seconds, calibration } = strategy;
         let mut report = StrategyReport {
             name: competitor.name().to_owned(),
-            settings: spec
-                .map_or("a strategy of the caller's".to_owned(), StrategySpec::description),
+            settings: spec.map_or("a custom strategy".to_owned(), StrategySpec::description),
             unbiased: Some(spec.is_none_or(StrategySpec::is_unbiased)),
             setup_seconds: *setup_seconds,
             left_out: None,
@@ -321,8 +320,8 @@ impl<'c, 'a> CalibratedComparison<'c, 'a> {
         let off = sum(image) / sum(reference) - 1.0;
         if off.abs() > MEAN_TOLERANCE {
             self.host.warn(&format!(
-                "the picture {name} is {:+.1} % as bright as the reference: its error is that of another light, \
-                 exposure or material, too",
+                "the picture {name} differs from the reference by {:+.1} % in brightness: part of \
+                 its error comes from another light, exposure or material",
                 100.0 * off
             ));
         }

@@ -1,4 +1,4 @@
-//! Strategies on one scene at equal samples, rays or time.
+//! Compares strategies on one scene at equal samples, rays or time.
 
 mod budget;
 mod calibrated;
@@ -34,28 +34,28 @@ use strategy_run::StrategyMeasurement;
 /// The relMSE of the reference should be at most this part of the least that is measured against it.
 const CONVERGED: f64 = 0.1;
 
-/// How far beside its budget a strategy may be without a word.
+/// How far a strategy may miss its budget without a warning.
 const TOLERANCE: f64 = 0.1;
 
-/// What all strategies of a comparison have in common.
+/// The settings common to all strategies of a comparison.
 #[derive(Clone, Debug)]
 pub struct ComparisonSettings {
     /// Settings of each picture, except for the number of samples.
     pub render: RenderSettings,
-    /// What each picture may cost.
+    /// The budget of each picture.
     pub budget: Budget,
-    /// Pictures of each strategy, from the seed of `render` on.
+    /// The number of pictures per strategy, with seeds from that of `render` on.
     pub n_seeds: u32,
-    /// At which ꟻLIP sees the pictures, and the page opens; automatic is [`automatic_exposure`].
+    /// The exposure for ꟻLIP and of the page when it opens; automatic is [`automatic_exposure`].
     pub exposure: Exposure,
-    /// Through which ꟻLIP sees the pictures, and the page opens.
+    /// The tone curve for ꟻLIP and of the page when it opens.
     pub tone: ToneCurve,
-    /// Camera samples of each pixel of a rendered reference, at least 2.
+    /// The number of camera samples per pixel of a rendered reference, at least 2.
     pub reference_spp: u32,
-    /// The reference gets more camera samples, up to as many of each pixel, until its relMSE is at most a tenth of the
-    /// least that is expected of a strategy.
+    /// The maximum number of camera samples per pixel of the reference, which gets more samples until its relMSE is
+    /// at most a tenth of the smallest error expected of a strategy.
     pub most_reference_spp: u32,
-    /// What makes the report again; for people.
+    /// The command that makes the report again, for readers.
     pub command: String,
 }
 
@@ -97,14 +97,14 @@ impl Competitor<'_> {
     }
 }
 
-/// What a comparison found.
+/// The results of a comparison.
 #[derive(Debug)]
 pub struct ComparisonResult {
     /// All numbers.
     pub report: CompareReport,
-    /// The first seed's picture of each strategy and its errors; none of those that were left out.
+    /// The first seed's picture of each strategy and its errors; `None` for strategies that were left out.
     pub pictures: Vec<Option<Picture>>,
-    /// What they were measured against.
+    /// The reference of the errors.
     pub reference: RgbImage,
 }
 
@@ -113,7 +113,7 @@ pub struct ComparisonResult {
 pub struct Picture {
     /// Radiance.
     pub image: RgbImage,
-    /// |I − R| / √(R² + 0.01), the mean of the channels, row by row.
+    /// |I − R| / √(R² + 0.01), averaged over the channels, row by row.
     pub relative_error: Vec<f32>,
     /// ꟻLIP of each pixel, in \[0, 1\].
     pub flip: Vec<f32>,
@@ -130,12 +130,12 @@ impl ComparisonResult {
 }
 
 impl<'a> Comparison<'a> {
-    /// A comparison that nobody takes part in yet.
+    /// Creates a comparison without strategies.
     pub fn new(view: PreparedSceneRef<'a>, settings: ComparisonSettings) -> Self {
         Self { view, settings, competitors: Vec::new() }
     }
 
-    /// One of the library's strategies takes part.
+    /// Adds a built-in strategy.
     ///
     /// # Errors
     /// If one of that name does already.
@@ -143,7 +143,7 @@ impl<'a> Comparison<'a> {
         self.add_competitor(Competitor::Named(strategy))
     }
 
-    /// A strategy of any type takes part. It counts as unbiased: the report complains if it turns out not to be.
+    /// Adds a strategy of any type. It counts as unbiased; the report has a warning if it is not.
     ///
     /// # Errors
     /// If one of that name does already.
@@ -155,7 +155,7 @@ impl<'a> Comparison<'a> {
         self.add_competitor(Competitor::Own { name: name.into(), strategy })
     }
 
-    /// Another renderer's picture takes part.
+    /// Adds a picture by another renderer.
     ///
     /// # Errors
     /// If it has another size than the comparison, or one of that name takes part already.
@@ -165,8 +165,9 @@ impl<'a> Comparison<'a> {
         if [image.width, image.height] != [width, height] {
             let (w, h) = (image.width, image.height);
             let why = format!(
-                "the picture {name} is {w}x{h}, but the comparison renders {width}x{height}: all must be of one size; \
-                 give --size {w}x{h}, or the picture of {name} in {width}x{height}"
+                "the picture {name} is {w}x{h}, but the comparison renders {width}x{height}: all \
+                 must have the same size; give --size {w}x{h}, or the picture of {name} in \
+                 {width}x{height}"
             );
             return Err(Error::Usage(why));
         }
@@ -180,14 +181,14 @@ impl<'a> Comparison<'a> {
     fn add_competitor(&mut self, competitor: Competitor<'a>) -> Result<(), Error> {
         let name = competitor.name();
         if self.competitors.iter().any(|other| other.name() == name) {
-            let why = format!("'{name}' takes part twice: leave one out, or give it another name");
+            let why = format!("'{name}' takes part twice: remove one, or rename it");
             return Err(Error::Usage(why));
         }
         self.competitors.push(competitor);
         Ok(())
     }
 
-    /// Prepares all strategies and finds by pilot pictures how many samples the budget buys of each.
+    /// Prepares all strategies and determines with pilot pictures how many samples of each the budget allows.
     ///
     /// # Errors
     /// If a strategy does not suit the environment, the scene is not in sight, or the host ended the work.
@@ -295,8 +296,8 @@ impl CompareReport {
             let is_off = result.bias.is_some_and(|bias| bias > 0.5 * result.rel_mse.mean);
             if *unbiased == Some(true) && is_off && self.reference.source == Source::File {
                 host.warn(&format!(
-                    "{name} is unbiased, but the mean of its pictures differs from the \
-                         reference: is that of another scene, light or filter, or noisy?"
+                    "{name} is unbiased, but the mean of its pictures differs from the reference: \
+                     does the reference show another scene, light or filter, or is it noisy?"
                 ));
             }
         }
@@ -320,11 +321,11 @@ impl CompareReport {
             Budget::Time(seconds) => (result.cpu_seconds.mean, seconds, "CPU seconds"),
         };
         let off = spent / budget - 1.0;
-        let what = format!("{spent:.3} {unit} with {spp} camera samples a pixel");
+        let what = format!("{spent:.3} {unit} with {spp} camera samples per pixel");
         (off.abs() > TOLERANCE).then_some((what, 100.0 * off))
     }
 
-    /// A line for each strategy that took part.
+    /// One line per strategy.
     pub fn summary(&self) -> Vec<String> {
         let width = self.strategies.iter().map(|s| s.name.chars().count()).max().unwrap_or(0);
         let line = |StrategyReport { name, result, unbiased, .. }: &StrategyReport| {

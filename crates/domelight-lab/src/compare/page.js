@@ -453,7 +453,7 @@
 
   const [kind, value] = report.budget.split(":");
   const budget = {
-    rays: `${value} shadow rays a pixel`, time: `${value.replace("s", "")} CPU seconds`, spp: `${value} camera samples a pixel`,
+    rays: `${value} shadow rays per pixel`, time: `${value.replace("s", "")} CPU seconds`, spp: `${value} camera samples per pixel`,
   }[kind];
 
   function lead() {
@@ -561,7 +561,7 @@
       ["Picture", `${width} × ${height}, filter ${report.filter}, sampler ${report.sampler}`],
       ["Budget", report.budget],
       ["Seeds", `${report.seed} to ${report.seed + report.seeds - 1}; the pictures shown are of the first`],
-      ["Reference", reference.source === "file" ? reference.file : `${reference.strategy}, ${reference.spp} camera samples a pixel${reference.source === "cache" ? ", from the cache" : ""}`],
+      ["Reference", reference.source === "file" ? reference.file : `${reference.strategy}, ${reference.spp} camera samples per pixel${reference.source === "cache" ? ", from the cache" : ""}`],
       ["ꟻLIP at", `${stops(report.exposure)}, tone curve ${report.tone}`],
       ["Threads", report.threads],
       ["Version", report.version],

@@ -1,4 +1,4 @@
-//! Pictures by other renderers, each with what it cost: a folder of OpenEXR files.
+//! Pictures by other renderers with their cost: a folder of OpenEXR files.
 
 use std::collections::HashMap;
 use std::fs;
@@ -14,20 +14,20 @@ use crate::{At as _, Error, Host};
 /// The file that may state the times of a folder's pictures.
 const TIMES: &str = "times.csv";
 
-/// A picture that another renderer made, and what it cost.
+/// A picture by another renderer, and its cost.
 #[derive(Clone, Debug)]
 pub struct OtherPicture {
-    /// What it is called in tables and plots.
+    /// The name in tables and plots.
     pub name: String,
-    /// Radiance, of the comparison's size.
+    /// Radiance, with the size of the comparison.
     pub image: RgbImage,
-    /// CPU seconds of rendering, as they were stated; above 0.
+    /// The stated CPU seconds of rendering, > 0.
     pub seconds: f64,
 }
 
-/// Reads all OpenEXR pictures of a folder, by name. The time of each is stated by a line `NAME,SECONDS` of `times.csv`
-/// in the folder, else by the end of its name as in `NAME.12.5s.exr`, else by an attribute `domelight.seconds` or
-/// `renderTime` (also Blender's), in seconds or as `MM:SS`.
+/// Reads all OpenEXR pictures of a folder, sorted by name. The time of each comes from a line `NAME,SECONDS` of
+/// `times.csv` in the folder, or else from the end of its name as in `NAME.12.5s.exr`, or else from an attribute
+/// `domelight.seconds` or `renderTime` (also Blender's), in seconds or as `MM:SS`.
 ///
 /// # Errors
 /// If the folder has no picture, one cannot be read, or one has no time.
@@ -85,8 +85,8 @@ fn read_picture(path: &Path, times: &Times, host: &dyn Host) -> Result<OtherPict
     let seconds = times.0.get(&stem).copied().or(of_name).or_else(of_attributes);
     let seconds = seconds.ok_or_else(|| {
         let why = format!(
-            "nothing states how long it took: name it {stem}.12.5s.exr, add a line {stem},12.5 to {TIMES} in its \
-             folder, or write an attribute domelight.seconds into it"
+            "its render time is unknown: name it {stem}.12.5s.exr, add a line {stem},12.5 to \
+             {TIMES} in its folder, or write an attribute domelight.seconds into it"
         );
         Error::Usage(why)
     })?;
@@ -126,7 +126,7 @@ impl Times {
                 if i == 0 {
                     continue;
                 }
-                return Err(usage(format!("'{time}' is no number of seconds above 0")));
+                return Err(usage(format!("'{time}' is not a number of seconds above 0")));
             };
             let stem = name.strip_suffix(".exr").unwrap_or(&name).to_owned();
             if !pictures.contains(&stem) {

@@ -16,7 +16,7 @@ pub(super) enum Cost {
 /// deviation over the seeds.
 pub(super) fn convergence(report: &CompareReport, cost: Cost) -> String {
     let label = match cost {
-        Cost::Rays => "shadow rays a pixel",
+        Cost::Rays => "shadow rays per pixel",
         Cost::Seconds => "CPU seconds",
     };
     let results = report.strategies.iter().filter_map(|s| Some((s, s.result.as_ref()?)));

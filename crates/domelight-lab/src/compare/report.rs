@@ -1,4 +1,4 @@
-//! The numbers of a comparison, as `--json` gives them and the page shows them.
+//! The numbers of a comparison, which `--json` prints and the page shows.
 
 use serde::{Serialize, Serializer};
 
@@ -12,47 +12,47 @@ use crate::report::SceneReport;
 pub struct CompareReport {
     /// Version of domelight.
     pub version: &'static str,
-    /// As it was typed.
+    /// The command line.
     pub command: String,
-    /// As it may be typed.
+    /// The budget, in the notation of the command line.
     #[serde(serialize_with = "as_text")]
     pub budget: Budget,
     /// What was rendered.
     pub scene: SceneReport,
-    /// Which points a pixel has.
+    /// The point set of a pixel.
     pub sampler: &'static str,
     /// The pixel filter.
     pub filter: &'static str,
-    /// The first one.
+    /// The first seed.
     pub seed: u64,
-    /// How many pictures of each strategy there are.
+    /// The number of pictures per strategy.
     pub seeds: u32,
-    /// How many worked.
+    /// The number of threads.
     pub threads: usize,
-    /// At which the page opens and ꟻLIP saw the pictures \[stops\].
+    /// The exposure of the page when it opens, also used for ꟻLIP \[stops\].
     pub exposure: f32,
     /// The tone curve of both.
     pub tone: &'static str,
-    /// What the pictures were measured against.
+    /// The reference of the errors.
     pub reference: ReferenceReport,
-    /// In the order in which they were given.
+    /// The strategies in the given order.
     pub strategies: Vec<StrategyReport>,
 }
 
 /// The numbers of a strategy.
 #[derive(Clone, Debug, Serialize)]
 pub struct StrategyReport {
-    /// As it was given.
+    /// The name as given.
     pub name: String,
-    /// In full.
+    /// The settings in full.
     pub settings: String,
-    /// If false, its error does not fall to 0; null of another renderer's picture, of which nothing is known.
+    /// Whether its error falls to 0; null for another renderer's picture, about which nothing is known.
     pub unbiased: Option<bool>,
     /// CPU seconds for tables and lights, once for all pictures.
     pub setup_seconds: f64,
-    /// Why it was left out; null if it was not, and then there is a result.
+    /// Why it was left out; null if there is a result.
     pub left_out: Option<String>,
-    /// None of what was left out.
+    /// `None` if it was left out.
     pub result: Option<ResultReport>,
 }
 
@@ -71,8 +71,8 @@ pub struct ResultReport {
     pub rel_mse: MeanAndDeviation,
     /// Mean ꟻLIP of the first seed's picture.
     pub flip: f64,
-    /// The part of relMSE that more samples do not take away: an estimate, which may be below 0, without the reference's
-    /// own error where that is known; null for a single seed.
+    /// The estimated part of relMSE that more samples do not remove. It may be negative, excludes the reference's own
+    /// error if known, and is null for a single seed.
     pub bias: Option<f64>,
     /// The 95 % interval of `bias`.
     pub bias_interval: Option<[f64; 2]>,
@@ -84,7 +84,7 @@ pub struct ResultReport {
     pub efficiency_ratio_to_mis: Option<f64>,
     /// Camera samples that were NaN or infinite, over all seeds.
     pub non_finite_samples: u64,
-    /// On the way to the budget; empty of another renderer's picture.
+    /// The points on the way to the budget; empty for another renderer's picture.
     pub convergence: Vec<ConvergencePoint>,
 }
 

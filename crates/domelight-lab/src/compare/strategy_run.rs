@@ -1,4 +1,4 @@
-//! One strategy of a comparison: as many samples as its budget buys, pictures, and their errors.
+//! One strategy of a comparison: the number of samples in its budget, its pictures, and their errors.
 
 use domelight::RgbImage;
 use domelight::picture::compare::{REGULARIZER, compare};
@@ -9,7 +9,7 @@ use crate::Error;
 use crate::measure::Reference;
 use crate::measure::render::{Render, RenderSetup};
 
-/// How far beyond its budget a strategy may be where it cannot meet it.
+/// How far a strategy may exceed its budget if it cannot meet it.
 const MOST_EXCESS: f64 = 1.5;
 
 /// Halvings of the budget that the convergence shows.
@@ -243,7 +243,7 @@ fn sample_count(budget: f64, each: f64, one_sample: &str) -> SampleCount {
     if each > MOST_EXCESS * budget {
         let advice = "give the strategy fewer rays or lights, or all a larger budget";
         return SampleCount::OverBudget(format!(
-            "one camera sample a pixel {one_sample}; {advice}"
+            "one camera sample per pixel {one_sample}; {advice}"
         ));
     }
     SampleCount::Samples(

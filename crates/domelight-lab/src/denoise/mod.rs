@@ -1,7 +1,7 @@
-//! Pictures without noise, by Intel's Open Image Denoise where its library is installed.
+//! Denoising with Intel's Open Image Denoise, if its library is installed.
 //!
-//! A denoised picture is biased: what the filter takes for noise may be texture, and what it invents may be wrong. How
-//! much cannot be known from the picture itself, so a denoised picture is to be looked at, not to be measured.
+//! A denoised picture is biased: the filter may mistake texture for noise, and invented detail may be wrong. The
+//! picture itself does not reveal by how much, so denoised pictures are for viewing, not for measurement.
 
 mod oidn;
 
@@ -18,7 +18,7 @@ use domelight::{Rgb, RgbImage};
 use crate::Error;
 use oidn::Device;
 
-/// Names the library's file; without it the system's loader looks for it.
+/// The environment variable that names the library's file; without it, the system's loader searches for it.
 pub const LIBRARY_VARIABLE: &str = "OIDN_LIBRARY";
 
 const HOW_TO_GET: &str = "install Open Image Denoise 2 (openimagedenoise.org, or a package of your system), or: pip \
@@ -39,7 +39,7 @@ pub struct Denoiser {
     device: Device,
 }
 
-/// What is known of a picture's surfaces. All images have the size of the picture.
+/// The features of a picture's surfaces. All images have the size of the picture.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Features<'a> {
     /// Reflectance in \[0, 1\], premultiplied by coverage.
@@ -52,9 +52,9 @@ impl Features<'_> {
     /// The features in words.
     pub fn description(&self) -> &'static str {
         match (self.albedo, self.normal) {
-            (Some(_), Some(_)) => "by color, albedo and normals",
-            (Some(_), None) => "by color and albedo",
-            _ => "by color alone",
+            (Some(_), Some(_)) => "from color, albedo and normals",
+            (Some(_), None) => "from color and albedo",
+            _ => "from color alone",
         }
     }
 }
@@ -85,7 +85,7 @@ impl Denoiser {
             // A pipe might never end.
             let is_path = Path::new(name).components().count() > 1;
             if is_path && fs::metadata(name).is_ok_and(|there| !there.is_file()) {
-                reasons.push(format!("{}: it is not a plain file", name.to_string_lossy()));
+                reasons.push(format!("{}: not a regular file", name.to_string_lossy()));
                 continue;
             }
             match Device::load(name, rayon::current_num_threads()) {
@@ -103,8 +103,8 @@ impl Denoiser {
         format!("Open Image Denoise {major}.{minor}.{patch}")
     }
 
-    /// A picture without noise, of HDR radiance that may be premultiplied by coverage. Normals without albedo are no use
-    /// to the library; pixels without a normal show no surface and stay as they are.
+    /// Denoises HDR radiance, which may be premultiplied by coverage. The library cannot use normals without albedo.
+    /// Pixels without a normal show no surface and are unchanged.
     ///
     /// # Errors
     /// If sizes differ, or the library fails.
@@ -125,7 +125,7 @@ impl Denoiser {
         Ok(filtered)
     }
 
-    /// A render's color without noise, by its albedo and normals, and how it was made, in words.
+    /// Denoises a render's color with its albedo and normals. Also returns a description.
     ///
     /// # Errors
     /// If the library fails.
@@ -138,7 +138,7 @@ impl Denoiser {
     }
 }
 
-/// Writes a render's OpenEXR file with what a denoiser made of its color as the layer `denoised` beside the others.
+/// Writes a render's OpenEXR file with the denoised color as an additional layer, `denoised`.
 ///
 /// # Errors
 /// If `out` does not take it, or a name of an attribute cannot be one of OpenEXR.

@@ -1,4 +1,4 @@
-//! Intel's Open Image Denoise 2, loaded while the program runs.
+//! Intel's Open Image Denoise 2, loaded at run time.
 //!
 //! The declarations follow the library's header oidn.h of version 2.
 #![allow(unsafe_code)]
@@ -82,7 +82,7 @@ impl Device {
         // SAFETY: a device of the CPU has no preconditions.
         let handle = unsafe { (functions.oidnNewDevice)(CPU) };
         if handle.is_null() {
-            return Err("it makes no device of the CPU".into());
+            return Err("it cannot create a CPU device".into());
         }
         let device = Self { functions, handle, _library: ManuallyDrop::new(library) };
         let [major, minor, _] = device.version();
@@ -139,7 +139,7 @@ impl Device {
         let handle = unsafe { (f.oidnNewFilter)(self.handle, c"RT".as_ptr()) };
         if handle.is_null() {
             self.check()?;
-            return Err("it makes no filter".into());
+            return Err("it cannot create a filter".into());
         }
         let filter = Filter { functions: f, handle, _images: PhantomData };
         filter.set(c"color", color, width, height)?;

@@ -42,7 +42,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         "strategy",
         "M",
         "N",
-        "shadow rays a point",
+        "shadow rays per point",
         "CPU seconds",
         "relMSE",
         "relMSE × seconds",

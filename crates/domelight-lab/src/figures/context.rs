@@ -257,7 +257,7 @@ pub(crate) struct FigureMeasurement {
 }
 
 impl FigureScene<'_> {
-    /// With as many camera samples a pixel.
+    /// With as many camera samples per pixel.
     pub(crate) fn samples(mut self, n_samples: u32) -> Self {
         self.settings.n_samples = n_samples;
         self

@@ -91,7 +91,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         "numbers",
         "method",
         "n",
-        "shadow rays a point",
+        "shadow rays per point",
         "CPU seconds",
         "RMS relative error",
         "standard deviation",

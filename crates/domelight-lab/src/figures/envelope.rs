@@ -23,7 +23,7 @@ const REACH: f64 = 60.0;
 
 /// What both bounds are worth for a lobe.
 struct Bounds {
-    /// The greatest BRDF × cosine [sr⁻¹], and the greatest luminance.
+    /// The largest BRDF × cosine [sr⁻¹], and the largest luminance.
     reflectance: f64,
     light: f64,
     /// ∫ f L, ∫ f, ∫ L.

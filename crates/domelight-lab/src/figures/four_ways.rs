@@ -41,7 +41,7 @@ pub(super) fn sir(n: u32, n_candidates: Option<u32>) -> StrategySpec {
     StrategySpec::Sir { n_candidates, n_samples: n, candidates, resampling }
 }
 
-/// The product from a table, with up to so many rays a camera sample.
+/// The product from a table, with up to so many rays per camera sample.
 fn product(n_rays: u32) -> StrategySpec {
     StrategySpec::Product { n_rays: n_rays.min(MAX_PRODUCT_RAYS) }
 }
@@ -106,7 +106,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     Ok(figure)
 }
 
-const CAPTION: &str = "<p>One camera ray a pixel, the same in all pictures; what differs is the estimate of the \
+const CAPTION: &str = "<p>One camera ray per pixel, the same in all pictures; what differs is the estimate of the \
     light alone. First at the lecture's counts: 100 samples of the environment (EM), 75 of the BRDF, 37 of each by \
     multiple importance sampling (power heuristic, compensated), and 15 shadow rays resampled from 800 candidates \
     (SIR), which took the same time in 2005. They no longer do: a shadow ray is now cheaper than a candidate. So MIS \

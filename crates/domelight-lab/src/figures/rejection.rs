@@ -161,7 +161,7 @@ fn strip(scale: ColorScale) -> Result<Vec<u8>, Error> {
     png_bytes(&RgbImage::from_fn(1, 128, |_, y| scale.color(1.0 - y as f32 / 127.0)), AS_IT_IS)
 }
 
-/// Tries in one dimension under a bound that is `looseness` times the greatest value.
+/// Tries in one dimension under a bound that is `looseness` times the largest value.
 fn bound(looseness: f64, seed: u64) -> Document {
     const TRIES: usize = 400;
     const REACH: f64 = 45.0;

@@ -150,7 +150,7 @@ impl<'a> Inspection<'a> {
         let mut lines: Vec<String> = named
             .map(|d| {
                 let variance = d.variance_per_ray();
-                format!("{:width$}  variance of a ray {variance:.2e}  {}", d.name, d.diagnosis())
+                format!("{:width$}  variance per ray {variance:.2e}  {}", d.name, d.diagnosis())
             })
             .collect();
         lines.push(self.advice().to_string());

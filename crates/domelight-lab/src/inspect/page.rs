@@ -122,8 +122,8 @@ fn table(report: &InspectionReport) -> Code<Html> {
     code!(
         Html,
         "<table><thead><tr><th scope=\"col\">Strategy</th><th scope=\"col\">Luminance</th>\
-         <th scope=\"col\">Variance of a<br>camera sample</th><th scope=\"col\">Rays of a<br>camera sample</th>\
-         <th scope=\"col\">Variance<br>of a ray</th><th scope=\"col\">÷ the best</th></tr></thead>\
+         <th scope=\"col\">Variance per<br>camera sample</th><th scope=\"col\">Rays per<br>camera sample</th>\
+         <th scope=\"col\">Variance<br>per ray</th><th scope=\"col\">÷ the best</th></tr></thead>\
          <tbody>{rows}</tbody></table>",
         rows = rows,
     )
@@ -151,7 +151,7 @@ fn sources(report: &InspectionReport) -> Code<Html> {
         Html,
         "<table><thead><tr><th scope=\"col\">Strategy</th><th scope=\"col\">Source</th>\
          <th scope=\"col\">Share of<br>the light</th><th scope=\"col\">Share of<br>the rays</th>\
-         <th scope=\"col\">Rays that<br>are free</th><th scope=\"col\">Hits that<br>it reaches</th></tr></thead>\
+         <th scope=\"col\">Rays<br>unoccluded</th><th scope=\"col\">Hits that<br>it reaches</th></tr></thead>\
          <tbody>{rows}</tbody></table>",
         rows = rows,
     )
@@ -203,7 +203,7 @@ fn pictures(
     let free: Vec<Rgb> = hemisphere.visibility.iter().map(|&v| Rgb::splat(v * v)).collect();
     let mut maps = Code::default();
     let nothing = |_: &mut Document| {};
-    maps += figure("Light L", "as it is lit, tone mapped", &light, nothing);
+    maps += figure("Light L", "tone mapped", &light, nothing);
     maps += figure(
         "Reflectance f·cos θ",
         "relative to its peak",
@@ -211,7 +211,7 @@ fn pictures(
         nothing,
     );
     maps += figure("Visibility V", "black is hidden", &plain(n, &free)?, nothing);
-    let text = "what a perfect strategy's density is in proportion to";
+    let text = "the density of a perfect strategy, up to a factor";
     maps += figure("Product f·cos θ·L·V", text, &scaled(n, &ideal, most)?, nothing);
     let maps = code!(
         Html,

@@ -1,7 +1,7 @@
 //! References in the user's cache folder, by content.
 //!
 //! An entry is `KEY-SUM.exr`: KEY is the fingerprint of everything that decides the picture, SUM that of
-//! the file itself, so that a damaged entry is known and made again.
+//! the file itself, so that a damaged entry is detected and rendered again.
 
 use std::fmt::Display;
 use std::fs;
@@ -22,19 +22,21 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// The folder that was asked for, else that of the platform; none, with a warning, where there is none. `program`
-    /// is the fingerprint of what renders: another build may make other pictures.
+    /// The requested folder, or else that of the platform; `None` with a warning if there is none. `program` is the fingerprint
+    /// of the renderer, because another build may make other pictures.
     pub fn new(folder: Option<&Path>, program: &str, host: &dyn Host) -> Option<Self> {
         let folder = folder
             .map(Path::to_path_buf)
             .or_else(|| Some(choose_native_strategy().ok()?.cache_dir().join("domelight")));
         if folder.is_none() {
-            host.warn("this user has no home to keep references in; --cache FOLDER names a place");
+            host.warn(
+                "there is no home folder for the cache of references; name one with --cache FOLDER",
+            );
         }
         Some(Self { folder: folder?, program: program.to_owned() })
     }
 
-    /// The entry and its bytes, if it is there and sound; a damaged one is removed.
+    /// The entry and its bytes, if it exists and is valid. A damaged entry is removed.
     pub(crate) fn get(&self, key: &Key, host: &dyn Host) -> Option<(PathBuf, Vec<u8>)> {
         let entries = fs::read_dir(&self.folder).ok()?.flatten().map(|entry| entry.path());
         for path in entries {
@@ -46,7 +48,7 @@ impl Cache {
             match fs::read(&path) {
                 Ok(bytes) if of(&bytes).to_string() == sum => return Some((path, bytes)),
                 _ => {
-                    host.warn(&format!("{}: damaged; it is made again", path.display()));
+                    host.warn(&format!("{}: damaged; it is rendered again", path.display()));
                     let _ = fs::remove_file(&path);
                 }
             }
@@ -54,10 +56,11 @@ impl Cache {
         None
     }
 
-    /// Keeps the bytes, if that is possible; else warns, for what was rendered is there all the same.
+    /// Stores the bytes if possible. Otherwise it only warns, because the render is still available.
     pub(crate) fn put(&self, key: &Key, bytes: &[u8], host: &dyn Host) -> Option<PathBuf> {
         let kept = self.try_put(key, bytes);
-        kept.inspect_err(|error| host.warn(&format!("the reference is not kept: {error}"))).ok()
+        kept.inspect_err(|error| host.warn(&format!("the reference cannot be cached: {error}")))
+            .ok()
     }
 
     fn try_put(&self, key: &Key, bytes: &[u8]) -> Result<PathBuf, Error> {
@@ -67,18 +70,18 @@ impl Cache {
         remove_abandoned(folder);
         // A pipe would be written to directly, and wait for its reader.
         if fs::metadata(&path).is_ok_and(|there| !there.is_file()) {
-            return Err(Error::Failed(format!("{}: it is not a plain file", path.display())));
+            return Err(Error::Failed(format!("{}: not a regular file", path.display())));
         }
         write_atomically(&path, |out| out.write_all(bytes))?;
         Ok(path)
     }
 }
 
-/// Names everything that decides a picture.
+/// The key of everything that decides a picture.
 pub(crate) struct Key(String);
 
 impl Key {
-    /// The key of what this program makes: scene, light and view, the program itself, and what `settings` say.
+    /// The key of a picture by this program: scene, light and view, the program itself, and `settings`.
     pub(crate) fn of_program(
         cache: &Cache,
         view: PreparedSceneRef,
@@ -90,7 +93,7 @@ impl Key {
         Self::of(key, view, settings)
     }
 
-    /// The key of what another program makes, which `settings` name.
+    /// The key of a picture by another program, described by `settings`.
     pub(crate) fn of_other(view: PreparedSceneRef, settings: impl Display) -> Self {
         Self::of(Fingerprinter::default(), view, settings)
     }

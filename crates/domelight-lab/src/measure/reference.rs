@@ -1,4 +1,4 @@
-//! The converged picture that all others are measured against.
+//! The converged picture against which all others are measured.
 
 use std::path::Path;
 
@@ -25,18 +25,18 @@ pub(crate) const MIS: StrategySpec = StrategySpec::Mis {
     compensation: true,
 };
 
-/// To the same error in a tenth of the time of MIS, and unbiased like it.
+/// It reaches the same error in a tenth of the time of MIS, and is unbiased too.
 pub(crate) const PRODUCT: StrategySpec = StrategySpec::Product { n_rays: 8 };
 
-/// Seeds of its halves, which nobody takes for pictures.
+/// The seeds of its halves, which no picture uses.
 const SEEDS: [u64; 2] = [0x7265_6665_7265_6e63, 0x6365_6e65_7265_6665];
 
-/// The attributes that keep the noise and the samples.
+/// The attributes for the noise and the number of samples.
 const NOISE: &str = "domelight.reference.noise";
 const COVERED_NOISE: &str = "domelight.reference.noise-covered";
 const SAMPLES: &str = "domelight.reference.samples";
 
-/// The layer that keeps the picture without shadows.
+/// The layer for the picture without shadows.
 const UNOCCLUDED: &str = "unoccluded";
 
 /// The converged picture.
@@ -44,31 +44,31 @@ const UNOCCLUDED: &str = "unoccluded";
 pub struct Reference {
     /// The picture.
     pub picture: ReferencePicture,
-    /// Where it comes from, and how far it has converged.
+    /// Its source and convergence.
     pub report: ReferenceReport,
 }
 
-/// What is kept of a converged picture.
+/// The stored data of a converged picture.
 #[derive(Clone, Debug)]
 pub struct ReferencePicture {
     /// Radiance.
     pub image: RgbImage,
-    /// Coverage; none of a file without it.
+    /// The coverage; `None` for a file without it.
     pub alpha: Option<Vec<f32>>,
-    /// With every shadow ray free; none of files and of other programs.
+    /// The picture with every shadow ray unoccluded; `None` for files and other programs.
     pub unoccluded: Option<RgbImage>,
 }
 
-/// Where the reference comes from.
+/// The source of the reference.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ReferenceReport {
     /// File, cache or render.
     pub source: Source,
-    /// The name of the file that it is kept in, without the folder.
+    /// The name of the file that stores it, without the folder.
     pub file: Option<String>,
     /// How it was rendered; null for files.
     pub strategy: Option<String>,
-    /// Camera samples of each pixel; null for files.
+    /// The number of camera samples per pixel; null for files.
     pub spp: Option<u32>,
     /// relMSE of the reference itself, estimated from its halves; null for files.
     pub rel_mse: Option<f64>,
@@ -76,28 +76,29 @@ pub struct ReferenceReport {
     pub rel_mse_covered: Option<f64>,
 }
 
-/// Where the reference comes from.
+/// The source of the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
     /// A file that the user gave.
     File,
-    /// It was rendered before.
+    /// It was cached.
     Cache,
     /// It was rendered now.
     Rendered,
 }
 
-/// When a reference is good enough.
+/// The convergence goal of a reference.
 #[derive(Clone, Copy, Debug)]
 pub enum Goal {
-    /// With so many camera samples a pixel.
+    /// With so many camera samples per pixel.
     Samples(u32),
-    /// When the relMSE of the pixels that show any of the scene is no greater than `noise`, or after `most` camera samples a pixel.
+    /// When the relMSE of the pixels that show any of the scene is no greater than `noise`, or after `most` camera
+    /// samples per pixel.
     Noise {
         /// relMSE.
         noise: f64,
-        /// Camera samples of each pixel.
+        /// The number of camera samples per pixel.
         most: u32,
     },
 }
@@ -177,7 +178,7 @@ fn mean(a: &RgbImage, b: &RgbImage) -> RgbImage {
 }
 
 impl Reference {
-    /// Reads a reference of the wanted size.
+    /// Reads a reference with the required size.
     ///
     /// # Errors
     /// If it cannot be read, has another size, or a pixel that is NaN or infinite.
@@ -194,7 +195,7 @@ impl Reference {
         if let Some(i) = image.pixels.iter().position(|pixel| !pixel.is_finite()) {
             let (x, y) = (i % image.width, i / image.width);
             let why =
-                format!("{name}: pixel ({x}, {y}) is NaN or infinite; a reference must not be");
+                format!("{name}: pixel ({x}, {y}) is NaN or infinite; a reference must be finite");
             return Err(Error::Failed(why));
         }
         let report = ReferenceReport {
@@ -208,7 +209,7 @@ impl Reference {
         Ok(Self { picture: ReferencePicture { image, alpha: None, unoccluded: None }, report })
     }
 
-    /// From the cache, else taken half by half by `render`, which is given camera samples a pixel and 0 or 1,
+    /// From the cache, else taken half by half by `render`, which is given camera samples per pixel and 0 or 1,
     /// and kept.
     pub(crate) fn get(
         cache: Option<(&Cache, &Key)>,
@@ -268,7 +269,7 @@ pub(crate) struct ReferenceRun<'a> {
 }
 
 impl ReferenceRun<'_> {
-    /// From the cache, else rendered and kept.
+    /// Takes it from the cache, or else renders and stores it.
     pub(crate) fn reach(self, goal: Goal) -> Result<Reference, Error> {
         let Self { cache, view, strategy, settings, shown, host } = self;
         let settings = RenderSettings { n_samples: 0, seed: SEEDS[0], ..settings };
@@ -287,7 +288,7 @@ impl ReferenceRun<'_> {
 }
 
 impl Goal {
-    /// The mean of two halves, its relMSE and its camera samples a pixel.
+    /// The mean of two halves, its relMSE and its camera samples per pixel.
     fn reach(
         self,
         mut render: impl FnMut(u32, usize) -> Result<ReferencePicture, Error>,
@@ -326,8 +327,8 @@ impl Goal {
     }
 }
 
-/// Enough to divide the noise by `ratio`, which falls with the samples or faster: not much more at once
-/// than was tried, and twice as many at least.
+/// Enough samples to divide the noise by `ratio`; the noise falls with the number of samples or faster. At least twice as
+/// many, but not many more at once than before.
 fn next_samples(each: u32, ratio: f64) -> u32 {
     (f64::from(each) * ratio.clamp(2.0, 16.0)).ceil() as u32
 }

@@ -83,7 +83,7 @@ impl Render {
 }
 
 impl RenderSetup<'_> {
-    /// Renders with so many camera samples a pixel; an error if interrupted.
+    /// Renders with so many camera samples per pixel; an error if interrupted.
     pub(crate) fn render(&self, label: &str, n_samples: u32, seed: u64) -> Result<Render, Error> {
         let settings = RenderSettings { n_samples, seed, ..self.settings };
         let mut watch = Stopwatch::start();

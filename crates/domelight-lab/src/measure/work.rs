@@ -35,7 +35,7 @@ struct Plan {
     stages: Vec<Stage>,
     /// The pace of a stage that nothing is known of.
     usual_pace: f64,
-    /// The greatest share that was shown.
+    /// The largest share that was shown.
     share: f64,
 }
 

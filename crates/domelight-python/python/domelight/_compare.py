@@ -103,7 +103,7 @@ def compare(
     strategies : sequence or mapping
         Strategies as of `render`; a mapping names them. Functions count as unbiased.
     budget : str, default 'rays:32'
-        What each picture may cost: 'spp:16' camera samples a pixel, 'rays:64' shadow rays a pixel, or 'time:2s' of CPU.
+        What each picture may cost: 'spp:16' camera samples per pixel, 'rays:64' shadow rays per pixel, or 'time:2s' of CPU.
     seeds : int, default 4
         Pictures of each strategy.
     reference_spp : int, default 64

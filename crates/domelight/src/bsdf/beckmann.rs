@@ -1,12 +1,12 @@
 //! The Beckmann lobe: Gaussian slopes.
 //!
 //! Beckmann & Spizzichino 1963; Walter et al. 2007, whose rational fit of Λ (relative error below
-//! 0.35 %) stands in for the error function.
+//! 0.35 %) replaces the error function.
 //!
-//! Normals are drawn from D(h) cos θ_h. Visible Beckmann normals (Heitz & d'Eon 2014) need a numerical
-//! inversion of an error function and would make this lobe the slowest one; it is here for
-//! comparison with published pictures, where the simple sampler is what was used. Its weights grow
-//! without bound at grazing angles: [`super::Ggx`] is the lobe to render with.
+//! Normals are sampled from D(h) cos θ_h. Visible Beckmann normals (Heitz & d'Eon 2014) need a numerical
+//! inversion of an error function and would make this lobe the slowest one. The lobe is for comparison
+//! with published pictures, which used the simple sampler. Its weights grow without bound at grazing
+//! angles, so use [`super::Ggx`] for rendering.
 
 use super::microfacet::{Masking, Microfacet, NormalDistribution, gaussian_slopes};
 use super::{Fresnel, range};
@@ -17,7 +17,7 @@ use crate::simd::{SimdFloat, Vectors};
 pub type Beckmann = Microfacet<BeckmannNormals>;
 
 impl Beckmann {
-    /// The lobe with roughness α along x and y (equal for an isotropic lobe), clamped to
+    /// Creates the lobe with roughness α along x and y (equal for an isotropic lobe), clamped to
     /// \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
     pub fn new(alpha: [f32; 2], fresnel: Fresnel, masking: Masking) -> Self {
         Self::with_normals(BeckmannNormals::new(alpha), fresnel, masking)
@@ -31,7 +31,7 @@ pub struct BeckmannNormals {
 }
 
 impl BeckmannNormals {
-    /// Normals with this roughness along x and y, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
+    /// Creates normals with roughness α along x and y, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
     pub fn new(alpha: [f32; 2]) -> Self {
         Self { alpha: range::alpha(alpha) }
     }

@@ -1,15 +1,15 @@
 //! The clear coat of glTF (`KHR_materials_clearcoat`): a thin dielectric layer of refractive index 1.5.
 //!
-//! f_r = F D G₂/(4 cos θ_i cos θ_o), GGX with f0 = 0.04, about a normal of its own: a coat is often smooth where the
-//! layer below it has relief. Cosines are those to the coat's normal. What lies below keeps the share
-//! 1 − strength · F(cos θ_o), as the specification has it; see [`super::Bsdf::layered`].
+//! f_r = F D G₂/(4 cos θ_i cos θ_o), GGX with f0 = 0.04, about its own normal, because a coat is often smooth where the
+//! layer below has relief. Cosines are with respect to the coat's normal. The layers below are scaled by
+//! 1 − strength · F(cos θ_o), as in the specification; see [`super::Bsdf::layered`].
 
 use super::{Brdf, Fresnel, Ggx, HORIZON, Masking, where_above};
 use crate::Rgb;
 use crate::math::{Frame, Vec3};
 use crate::simd::{Colors, SimdFloat, Vectors};
 
-/// A clear coat of full strength.
+/// A clear coat with full strength.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coat {
     frame: Frame,
@@ -20,8 +20,9 @@ impl Coat {
     /// The coat's reflectance at normal incidence.
     pub const F0: f32 = 0.04;
 
-    /// The coat with GGX roughness `alpha`, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\], about a unit `normal`
-    /// in the local frame of the layer below. A normal that is not finite or not above that layer is replaced by +z.
+    /// Creates the coat with GGX roughness `alpha`, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\], about
+    /// a unit `normal` in the local frame of the layer below. A normal that is not finite or not above that layer is
+    /// replaced by +z.
     pub fn new(alpha: f32, normal: Vec3) -> Self {
         let normal = normal.try_normalize().filter(|n| n.z > 0.0).unwrap_or(Vec3::Z);
         let [alpha, _] = super::range::alpha([alpha; 2]);
@@ -37,13 +38,13 @@ impl Coat {
         self.frame.z
     }
 
-    /// How far the coat's normal leans from that of the layer below: the tangent of the angle.
+    /// The tilt of the coat's normal from that of the layer below: the tangent of the angle.
     pub(super) fn lean(&self) -> f32 {
         let n = self.frame.z;
         n.truncate().length() / n.z
     }
 
-    /// Fresnel's reflectance toward `wo`, in \[0, 1\].
+    /// The Fresnel reflectance toward `wo`, in \[0, 1\].
     pub(super) fn reflectance(&self, wo: Vec3) -> f32 {
         Fresnel::Schlick { f0: Rgb::splat(Self::F0) }.eval(self.frame.z.dot(wo).max(0.0)).r
     }
@@ -53,7 +54,7 @@ impl Coat {
         Ggx::new([self.alpha; 2], fresnel, Masking::Correlated)
     }
 
-    /// From the frame of the layer below to the coat's.
+    /// Transforms from the frame of the layer below to the coat's.
     #[inline(always)]
     fn in_coat<F: SimdFloat>(&self, w: Vectors<F>) -> Vectors<F> {
         let along = |axis: Vec3| w.dot_each(Vectors::splat(w.z, axis));
@@ -76,13 +77,13 @@ impl Brdf for Coat {
         let axis = |axis| Vectors::splat(wo.z, axis);
         let Frame { x, y, z } = self.frame;
         let in_layer = axis(x).times(wi.x).plus(axis(y).times(wi.y)).plus(axis(z).times(wi.z));
-        // Below a coat that leans, but above the layer, a direction has no density here and may have one in a mixture.
+        // A direction below a tilted coat but above the layer has no density here, but may have one in a mixture.
         let horizon = wo.z.splat(HORIZON);
         let is_above = horizon.lt(to_viewer.z) & horizon.lt(wi.z);
         Vectors::select(is_above, in_layer, axis(-Vec3::Z))
     }
 
-    /// That of its microfacets.
+    /// The density of its microfacets.
     fn max_eval(&self, wo: Vec3) -> f32 {
         if wo.z <= HORIZON {
             return 0.0;
@@ -90,7 +91,7 @@ impl Brdf for Coat {
         self.ggx().max_eval(self.frame.to_local(wo))
     }
 
-    /// Fresnel's reflectance at `cos_theta_o`, as if the coat's normal were the layer's.
+    /// The Fresnel reflectance at `cos_theta_o`, as if the coat's normal were the layer's.
     #[inline]
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb {
         Fresnel::Schlick { f0: Rgb::splat(Self::F0) }.eval(cos_theta_o)
@@ -108,7 +109,7 @@ mod tests {
         for alpha in [0.05, 0.3, 1.0] {
             let coat = Coat::new(alpha, Vec3::Z);
             check_lobe(&coat);
-            // The bound takes Fresnel's factor for 1 where it may be: 25 times f0.
+            // The bound takes the Fresnel factor for 1 where it may be: 25 times f0.
             check_bound(&coat, 2.5 * 25.0);
             // Its cosines are not to the normal that the law of reciprocity divides by.
             for normal in [vec3(0.3, -0.1, 0.9), vec3(0.0, 0.8, 0.6)] {

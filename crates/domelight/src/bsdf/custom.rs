@@ -1,4 +1,4 @@
-//! Lobes of the caller's own, from functions of single directions.
+//! Custom lobes, from functions of single directions.
 
 use std::fmt::Debug;
 
@@ -7,54 +7,54 @@ use crate::Rgb;
 use crate::math::{Vec2, Vec3};
 use crate::simd::{Colors, SimdFloat, Vectors};
 
-/// A reflectance lobe for programs that bring their own; one implementation serves every strategy.
+/// A custom reflectance lobe. One implementation serves every strategy.
 ///
-/// Directions are unit vectors in the local frame, z the shading normal, and lie above the surface where
-/// [`Bxdf::eval_pdf`] gets them. The density must be positive wherever the value is, and that of
-/// [`Bxdf::sample`]: `testkit`'s χ² test proves it.
+/// Directions are unit vectors in the local frame, where z is the shading normal, and those passed to
+/// [`Bxdf::eval_pdf`] lie above the surface. The density must be positive wherever the value is, and must be the
+/// density of [`Bxdf::sample`]; `testkit`'s χ² test proves it.
 pub trait Bxdf: Debug + Send + Sync {
-    /// f_r(wo, wi) · cos θ_i ≥ 0 \[sr⁻¹\], the cosine inside, and the density of [`Bxdf::sample`] \[sr⁻¹\].
+    /// f_r(wo, wi) · cos θ_i ≥ 0 \[sr⁻¹\], including the cosine, and the density of [`Bxdf::sample`] \[sr⁻¹\].
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32);
 
-    /// Draws `wi` from uniform numbers in [0, 1); `None` is a sample of value zero. By default cosine-weighted, for
+    /// Samples `wi` from uniform numbers in [0, 1); `None` is a sample with value zero. The default is cosine-weighted, for
     /// densities of cos θ / π.
     fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Vec3> {
         let _ = (wo, u_lobe);
         Some(crate::sampling::warp::cosine_hemisphere(u))
     }
 
-    /// An upper bound over all `wi` of the greatest channel of the value \[sr⁻¹\]; rejection sampling stands on it.
+    /// An upper bound over all `wi` on the largest channel of the value \[sr⁻¹\], which rejection sampling requires.
     fn max_eval(&self, wo: Vec3) -> f32;
 
-    /// The fraction of uniform light that is reflected toward `wo` = (·, ·, `cos_theta_o`), roughly; not negative.
+    /// The approximate, non-negative fraction of uniform light that is reflected toward `wo` = (·, ·, `cos_theta_o`).
     fn albedo(&self, cos_theta_o: f32) -> Rgb;
 
-    /// The GGX roughness α of a lobe about the mirror direction that is as wide, or `None` if the lobe resembles a
-    /// diffuse one. It guides `product`; a poor guess costs rays, not bias.
+    /// The GGX roughness α of an equally wide lobe around the mirror direction, or `None` if the lobe resembles a diffuse one.
+    /// It guides `product`; a poor guess costs rays but adds no bias.
     fn roughness(&self) -> Option<f32> {
         None
     }
 }
 
-/// A [`Bxdf`] as a lobe: a pointer, so that materials stay plain data.
-// Packed, or the alignment of pointers would make every material larger.
+/// A [`Bxdf`] as a lobe. It is a pointer, so that BSDFs stay plain data.
+// Packed, because the alignment of pointers would make every BSDF larger.
 #[derive(Clone, Copy)]
 #[repr(C, packed(4))]
 pub struct CustomLobe(&'static dyn Bxdf);
 
 impl CustomLobe {
-    /// A lobe that lives as long as the program: a `static`, or one that is leaked.
+    /// Wraps a lobe that lives as long as the program: a `static`, or a leaked one.
     pub fn new(bxdf: &'static dyn Bxdf) -> Self {
         Self(bxdf)
     }
 
-    /// Keeps a lobe until the program ends. Its memory is never freed: call it once for each lobe, not for each
+    /// Keeps a lobe until the program ends. Its memory is never freed, so call this once per lobe, not once per
     /// shading point.
     pub fn leak(bxdf: impl Bxdf + 'static) -> Self {
         Self(Box::leak(Box::new(bxdf)))
     }
 
-    /// The lobe itself.
+    /// The wrapped lobe.
     pub fn bxdf(&self) -> &'static dyn Bxdf {
         self.0
     }

@@ -1,17 +1,17 @@
 //! Fresnel reflectance as a function of the angle of incidence on a microfacet.
 //!
 //! - Schlick 1994, "An Inexpensive BRDF Model for Physically-based Rendering", eq. 15.
-//! - The exact unpolarized reflectance of a conductor of complex refractive index η + ik, per
+//! - The exact unpolarized reflectance of a conductor with complex refractive index η + ik, per
 //!   color channel; for its arithmetic see Lagarde 2013, "Memo on Fresnel equations".
 
 use super::range;
 use crate::Rgb;
 use crate::simd::{Colors, SimdFloat};
 
-/// What a microfacet reflects.
+/// The Fresnel reflectance of a microfacet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Fresnel {
-    /// Everything: F = 1.
+    /// A perfect mirror: F = 1.
     #[default]
     One,
     /// f0 + (1 − f0)(1 − cos θ)⁵.
@@ -24,7 +24,7 @@ pub enum Fresnel {
 }
 
 impl Fresnel {
-    /// The same with its parameters clamped to the range that the formulas bear.
+    /// The same with parameters clamped to the range in which the formulas are valid.
     pub(super) fn in_range(self) -> Self {
         match self {
             Self::One => Self::One,
@@ -35,7 +35,7 @@ impl Fresnel {
         }
     }
 
-    /// F at the cosine between direction and microfacet normal, in [0, 1].
+    /// F at the cosine in [0, 1] between direction and microfacet normal.
     #[inline(always)]
     pub fn eval(&self, cos_theta: f32) -> Rgb {
         self.eval_lanes(cos_theta).single()
@@ -51,7 +51,7 @@ impl Fresnel {
         }
     }
 
-    /// The greatest channel of F over all cosines from `cos_theta` to 1.
+    /// The largest channel of F over all cosines from `cos_theta` to 1.
     pub fn max_from(&self, cos_theta: f32) -> f32 {
         // All three fall, or fall and rise once, from grazing to normal incidence.
         self.eval(cos_theta).max_component().max(self.eval(1.0).max_component())
@@ -88,14 +88,14 @@ fn unit<F: SimdFloat>(x: F) -> F {
 /// A complex refractive index per color channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conductor {
-    /// Real part.
+    /// The real part.
     pub eta: Rgb,
-    /// Imaginary part, the extinction coefficient.
+    /// The imaginary part, the extinction coefficient.
     pub k: Rgb,
 }
 
 impl Conductor {
-    /// Silver. These indices are measured spectra brought to linear Rec. 709.
+    /// Silver. These indices are measured spectra converted to linear Rec. 709.
     pub const SILVER: Self = Self {
         eta: Rgb::new(0.155265, 0.116723, 0.138381),
         k: Rgb::new(4.828343, 3.122246, 2.147050),
@@ -137,7 +137,7 @@ impl Conductor {
         ("tungsten", Self::TUNGSTEN),
     ];
 
-    /// Unpolarized reflectance per channel at the cosine of incidence in [0, 1].
+    /// The unpolarized reflectance per channel at a cosine of incidence in [0, 1].
     #[inline]
     pub fn reflectance(&self, cos_theta: f32) -> Rgb {
         self.reflectance_lanes(cos_theta).single()

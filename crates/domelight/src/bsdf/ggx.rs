@@ -1,9 +1,9 @@
 //! The GGX (Trowbridge–Reitz) lobe.
 //!
 //! Trowbridge & Reitz 1975; Walter et al. 2007; anisotropic form and σ from Heitz 2014. Visible
-//! normals are drawn by spherical caps (Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with
-//! Spherical Caps"), which has the density of Heitz 2018 with less arithmetic; drawing from D cos θ
-//! instead has weights without bound at grazing angles.
+//! normals are sampled with spherical caps (Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with
+//! Spherical Caps"), which gives the density of Heitz 2018 with less arithmetic. Sampling D cos θ
+//! instead would give unbounded weights at grazing angles.
 
 use super::microfacet::{Masking, Microfacet, NormalDistribution};
 use super::{Fresnel, range};
@@ -14,7 +14,7 @@ use crate::simd::{SimdFloat, Vectors};
 pub type Ggx = Microfacet<GgxNormals>;
 
 impl Ggx {
-    /// The lobe with roughness α along x and y (equal for an isotropic lobe), clamped to
+    /// Creates the lobe with roughness α along x and y (equal for an isotropic lobe), clamped to
     /// \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
     pub fn new(alpha: [f32; 2], fresnel: Fresnel, masking: Masking) -> Self {
         Self::with_normals(GgxNormals::new(alpha), fresnel, masking)
@@ -28,7 +28,7 @@ pub struct GgxNormals {
 }
 
 impl GgxNormals {
-    /// Normals with this roughness along x and y, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
+    /// Creates normals with roughness α along x and y, clamped to \[[`super::MIN_ALPHA`], [`super::MAX_ALPHA`]\].
     pub fn new(alpha: [f32; 2]) -> Self {
         Self { alpha: range::alpha(alpha) }
     }

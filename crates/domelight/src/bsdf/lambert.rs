@@ -6,14 +6,14 @@ use crate::math::{FRAC_1_PI, Vec3};
 use crate::sampling::warp;
 use crate::simd::{Colors, SimdFloat, Vectors};
 
-/// Ideal diffuse reflection, sampled by the cosine.
+/// Ideal diffuse reflection, with cosine-weighted sampling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lambert {
     albedo: Rgb,
 }
 
 impl Lambert {
-    /// The lobe with albedo ρ, clamped to [0, 1].
+    /// Creates the lobe with albedo ρ, clamped to [0, 1].
     pub const fn new(albedo: Rgb) -> Self {
         Self { albedo: range::reflectance(albedo) }
     }

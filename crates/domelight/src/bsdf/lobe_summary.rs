@@ -1,4 +1,4 @@
-//! A summary of a BSDF's lobes: what a sampling density needs to follow it roughly.
+//! A summary of a BSDF's lobes, from which a sampling density can follow the BSDF roughly.
 
 use super::{Brdf as _, Bsdf, Lobe, MIN_ALPHA};
 use crate::Rgb;
@@ -7,16 +7,16 @@ use crate::math::Vec3;
 /// The shape of a glossy lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GlossyLobe {
-    /// Microfacets of roughness α along x and y. Gaussian slopes have short tails, GGX's long ones.
+    /// Microfacets with roughness α along x and y. Gaussian slopes have short tails, those of GGX long ones.
     Slopes {
         /// The roughness.
         alpha: [f32; 2],
-        /// Whether tails fall as a Gaussian.
+        /// Whether the tails fall like a Gaussian.
         gaussian: bool,
-        /// The normal that the lobe is about, where it is not the surface's: a unit vector in the local frame.
+        /// The normal around which the lobe lies, if it is not the surface's: a unit vector in the local frame.
         leaning: Option<Vec3>,
     },
-    /// A cosⁿ lobe about the mirror direction.
+    /// A cosⁿ lobe around the mirror direction.
     Mirror {
         /// The exponent n.
         exponent: f32,
@@ -24,7 +24,7 @@ pub enum GlossyLobe {
 }
 
 impl GlossyLobe {
-    /// The roughness, of a mirror lobe that of the microfacets which reflect as widely: their normals
+    /// The roughness; for a mirror lobe, that of microfacets with an equally wide reflection, whose normals
     /// turn by half the angle.
     pub fn width(&self) -> f32 {
         match *self {
@@ -37,12 +37,12 @@ impl GlossyLobe {
 /// The albedo of a lobe that is black from a view, but not from all.
 const LEAST_ALBEDO: f32 = 1e-4;
 
-/// A diffuse part and glossy lobes, weighed by the light that they reflect.
+/// A diffuse part and glossy lobes, weighted by the light that they reflect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LobeSummary {
-    /// Albedo of what reflects by the cosine.
+    /// The albedo of the diffuse part.
     pub diffuse: Rgb,
-    /// The glossy lobes with their albedos; the first of none ends them.
+    /// The glossy lobes with their albedos, terminated by the first `None`.
     pub glossy: [Option<(Rgb, GlossyLobe)>; super::MAX_LOBES],
 }
 
@@ -54,7 +54,7 @@ impl LobeSummary {
 }
 
 impl Bsdf {
-    /// Whether it looks the same when it turns about the normal.
+    /// Whether the BSDF is isotropic: invariant under rotation about the normal.
     #[cfg(feature = "render")]
     pub(crate) fn is_isotropic(&self) -> bool {
         self.lobes().all(|(_, lobe)| match lobe {
@@ -78,7 +78,7 @@ impl Bsdf {
         };
         let mut diffuse = Rgb::BLACK;
         for (weight, lobe) in self.lobes() {
-            // One that reflects nothing toward this view by Fresnel's factor at the normal still does at others.
+            // One that reflects nothing toward this view by the Fresnel factor at the normal still does at others.
             let albedo = lobe.directional_albedo(wo.z);
             let albedo = if albedo.is_black() { Rgb::splat(LEAST_ALBEDO) } else { albedo } * weight;
             match lobe {

@@ -1,7 +1,7 @@
-//! Materials: weighted sums of a few lobes.
+//! BSDFs: weighted sums of a few lobes.
 //!
-//! A material is sampled by choosing one lobe and drawing from it; its density is that of the
-//! mixture, so no sample is worse than the chosen lobes' own by more than the choice.
+//! A BSDF is sampled by choosing one lobe and sampling it. The density is that of the mixture, so the
+//! weight of a sample is bounded by the lobes' own weights divided by the probabilities of the choice.
 
 use super::{
     Beckmann, Brdf, Coat, CustomLobe, Ggx, Lambert, MetallicRoughness, Phong, Sheen, Ward, range,
@@ -17,7 +17,7 @@ macro_rules! lobes {
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub enum Lobe {
             $($(#[$doc])* $model($model),)*
-            /// A lobe of the caller's own.
+            /// A custom lobe.
             Custom(CustomLobe),
         }
 
@@ -52,7 +52,7 @@ lobes! {
     Coat
 }
 
-/// The same expression for the lobe inside, whatever it is.
+/// Evaluates the same expression for any lobe.
 macro_rules! each {
     ($lobe:expr, $l:ident => $body:expr) => {
         match $lobe {
@@ -96,7 +96,7 @@ impl From<CustomLobe> for Lobe {
     }
 }
 
-/// The most lobes of a [`Bsdf`].
+/// The maximum number of lobes of a [`Bsdf`].
 pub const MAX_LOBES: usize = 3;
 
 /// A sum of at most [`MAX_LOBES`] weighted lobes: plain data of 160 bytes, no heap.
@@ -114,54 +114,54 @@ struct Term {
     probability: f32,
 }
 
-/// More lobes than a material holds.
+/// The error of too many lobes for a [`Bsdf`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a material is a sum of at most {MAX_LOBES} lobes that are not black, not {count}")]
+#[error("a material is a sum of at most {MAX_LOBES} non-black lobes, not {count}")]
 pub struct TooManyLobes {
     /// The number of lobes given.
     pub count: usize,
 }
 
-/// The cosine at which lobes are weighed while the view is unknown: the mean of cos θ over
-/// directions that a diffuse surface receives light from.
+/// The cosine at which lobes are weighted while the view is unknown: the mean of cos θ over the
+/// directions from which a diffuse surface receives light.
 const TYPICAL_COSINE: f32 = 2.0 / 3.0;
 
-/// The least share of a lobe, relative to the sum of all: its albedo is only an estimate.
+/// The minimum share of a lobe relative to the sum of all, because its albedo is only an estimate.
 const LEAST_SHARE: f32 = 0.05;
 
 impl Bsdf {
-    /// Reflects nothing.
+    /// A BSDF that reflects nothing.
     pub const BLACK: Self = {
         let lobe = Lobe::Lambert(Lambert::new(Rgb::BLACK));
         let term = Term { lobe, weight: 0.0, probability: 0.0 };
         Self { terms: [term; MAX_LOBES], n_terms: 0 }
     };
 
-    /// One lobe.
+    /// Creates a BSDF with a single lobe.
     pub fn single(lobe: impl Into<Lobe>) -> Self {
         Self::of_terms([(1.0, lobe.into())])
     }
 
-    /// The sum of lobes.
+    /// Creates the sum of lobes.
     ///
     /// # Errors
-    /// [`TooManyLobes`] when more than [`MAX_LOBES`] are not black.
+    /// [`TooManyLobes`] if more than [`MAX_LOBES`] lobes are not black.
     pub fn new(lobes: &[Lobe]) -> Result<Self, TooManyLobes> {
         Self::checked(lobes.iter().map(|&lobe| (1.0, lobe)))
     }
 
-    /// The sum of lobes times weights in [0, 1000]; greater ones are clamped, and a weight that is not positive
-    /// drops its lobe.
+    /// Creates the sum of lobes times weights in [0, 1000]. Greater weights are clamped, and a lobe whose weight is not
+    /// positive is dropped.
     ///
     /// # Errors
-    /// [`TooManyLobes`] when more than [`MAX_LOBES`] are not black.
+    /// [`TooManyLobes`] if more than [`MAX_LOBES`] lobes are not black.
     pub fn weighted(lobes: &[(f32, Lobe)]) -> Result<Self, TooManyLobes> {
         Self::checked(lobes.iter().copied())
     }
 
-    /// glTF's layers as seen from `wo`: sheen on the `base`, and a coat of a strength in \[0, 1\] on both. A layer takes
-    /// from those below it what it reflects toward `wo`, whatever the direction of light, so that the result is good
-    /// for this view alone.
+    /// Creates glTF's layers as seen from `wo`: sheen on the `base`, and a coat with a strength in \[0, 1\] on both.
+    /// A layer dims those below by what it reflects toward `wo`, regardless of the direction of light, so the result
+    /// is valid only for this view.
     #[must_use]
     pub fn layered(
         base: impl Into<Lobe>,
@@ -198,8 +198,8 @@ impl Bsdf {
         bsdf
     }
 
-    /// The same material with its lobes chosen in proportion to their albedos toward `wo`: Fresnel's
-    /// reflectance then has the right share at every angle. Worth its cost from a few samples up.
+    /// The same BSDF with its lobes chosen in proportion to their albedos toward `wo`, which accounts for the
+    /// Fresnel reflectance at every angle. Worth its cost from a few samples up.
     #[must_use]
     #[inline]
     pub fn for_view(&self, wo: Vec3) -> Self {
@@ -208,7 +208,7 @@ impl Bsdf {
         seen
     }
 
-    /// Makes it what [`Bsdf::for_view`] makes of `other`, in place.
+    /// Sets this to [`Bsdf::for_view`] of `other`, in place.
     #[inline]
     pub(crate) fn set(&mut self, other: &Self, wo: Vec3) {
         self.n_terms = other.n_terms;
@@ -234,12 +234,12 @@ impl Bsdf {
         }
     }
 
-    /// The color of the surface, roughly: its albedo seen from above.
+    /// The approximate color of the surface: its albedo as seen from above.
     pub fn albedo(&self) -> Rgb {
         self.directional_albedo(1.0)
     }
 
-    /// Whether samples choose among lobes or parts of them: if not, `u_lobe` does not matter.
+    /// Whether samples choose among lobes or parts of them; if not, `u_lobe` is unused.
     pub(crate) fn has_choice(&self) -> bool {
         let mut terms = self.terms().iter();
         self.n_terms > 1
@@ -257,7 +257,7 @@ impl Bsdf {
     }
 }
 
-/// Not black from every direction.
+/// Whether the lobe is not black from every direction.
 fn reflects(&(weight, lobe): &(f32, Lobe)) -> bool {
     let albedo = lobe.directional_albedo(0.0) + lobe.directional_albedo(1.0);
     weight > 0.0 && !albedo.is_black()
@@ -295,7 +295,7 @@ impl Brdf for Bsdf {
         (value, pdf)
     }
 
-    /// What is left of `u_lobe` after the choice of a lobe is uniform again, and chooses within the lobe.
+    /// The remainder of `u_lobe` after the choice of a lobe is uniform again, and chooses within the lobe.
     #[inline(always)]
     fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F> {
         let one = |x| wo.z.splat(x);
@@ -490,7 +490,7 @@ mod tests {
         assert_eq!(error, TooManyLobes { count: 4 });
     }
 
-    /// The share of samples drawn from the glossy lobe follows Fresnel's reflectance.
+    /// The share of samples drawn from the glossy lobe follows the Fresnel reflectance.
     #[test]
     fn a_view_refines_the_choice() {
         let bsdf = Bsdf::new(&[Lambert::new(Rgb::splat(0.5)).into(), glossy(0.04)]).unwrap();

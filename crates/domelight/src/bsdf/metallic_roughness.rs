@@ -3,16 +3,16 @@
 //! f_r = (1 − F) c_diff/π + F D G₂/(4 cos θ_i cos θ_o) with F by Schlick at h·wo,
 //! c_diff = (1 − metallic) · base, f0 = lerp(0.04, base, metallic), and D and G₂ those of GGX with
 //! correlated masking and α = roughness². The diffuse part depends on the half vector, so the two
-//! parts are one lobe, not a sum of two; it is sampled as a mixture whose share follows Fresnel's
-//! reflectance at `wo`.
+//! parts are one lobe rather than a sum of two. It is sampled as a mixture whose proportions follow the
+//! Fresnel reflectance at `wo`.
 //!
 //! `KHR_materials_specular` gives the dielectric a strength w and a color: F goes from
 //! f0 = lerp(w min(f0 color, 1), base, metallic) to f90 = lerp(w, 1, metallic), and the diffuse part keeps 1 − max F,
 //! so that it does not take on the complementary color. `KHR_materials_anisotropy` makes the lobe rougher along x.
 //!
-//! This is the specification's formula, so that materials look as in other glTF viewers; it does not
-//! conserve energy. Light from everywhere meets half vectors that are less oblique than the view, so
-//! 1 − F takes too little from the diffuse part at grazing angles: a white dielectric of roughness
+//! This is the specification's formula, so that materials look as in other glTF viewers. It does not
+//! conserve energy: over all directions of light, half vectors are less oblique than the view, so
+//! 1 − F removes too little from the diffuse part at grazing angles. A white dielectric with roughness
 //! 0.3 has the albedo 1.00 at 45°, 1.15 at 75° and 1.29 at 85°.
 
 use super::ggx::{Ggx, GgxNormals};
@@ -28,30 +28,30 @@ use crate::simd::{Colors, LaneMask as _, SimdFloat, Vectors};
 pub struct MetallicRoughness {
     diffuse: Rgb,
     f0: Rgb,
-    /// No less than any channel of `f0`.
+    /// At least as large as any channel of `f0`.
     f90: f32,
     alpha: [f32; 2],
-    /// Whether the diffuse part loses the greatest channel of F from every channel.
+    /// Whether the diffuse part loses the largest channel of F from every channel.
     keeps_hue: bool,
 }
 
 impl MetallicRoughness {
-    /// The lobe with this base color, metalness and perceptual roughness. All are clamped to [0, 1], as glTF requires for
-    /// products of factors and textures, and α = roughness² to at least [`super::MIN_ALPHA`].
+    /// Creates the lobe with a base color, metalness and perceptual roughness. All are clamped to [0, 1], as glTF
+    /// requires for products of factors and textures, and α = roughness² to at least [`super::MIN_ALPHA`].
     pub fn new(base_color: Rgb, metallic: f32, roughness: f32) -> Self {
         Self::with_dielectric(base_color, metallic, roughness, 0.04)
     }
 
-    /// The same over a dielectric of another refractive index than 1.5 (`KHR_materials_ior`): `f0` is its reflectance
+    /// The same with a refractive index of the dielectric other than 1.5 (`KHR_materials_ior`): `f0` is its reflectance
     /// at normal incidence, ((ior − 1) / (ior + 1))², clamped to \[0, 1\].
     pub fn with_dielectric(base_color: Rgb, metallic: f32, roughness: f32, f0: f32) -> Self {
         let specular = Self::with_specular(base_color, metallic, roughness, Rgb::splat(f0), 1.0);
         Self { keeps_hue: false, ..specular }
     }
 
-    /// The same over a dielectric that reflects more or less, and in a color (`KHR_materials_specular`): `f0` is its
+    /// The same with a strength and color of the dielectric reflection (`KHR_materials_specular`): `f0` is the
     /// reflectance at normal incidence, the product of the color and ((ior − 1) / (ior + 1))², clamped to \[0, 1\], and
-    /// `strength` in \[0, 1\] a factor on its reflectance at every angle.
+    /// `strength` in \[0, 1\] is a factor on the reflectance at every angle.
     pub fn with_specular(
         base_color: Rgb,
         metallic: f32,
@@ -71,7 +71,7 @@ impl MetallicRoughness {
         .ordered()
     }
 
-    /// The same with a lobe that is drawn out along x (`KHR_materials_anisotropy`): there, α is
+    /// The same with a lobe stretched along x (`KHR_materials_anisotropy`), where α is
     /// lerp(α, 1, `strength`²), with `strength` clamped to \[0, 1\].
     #[must_use]
     pub fn anisotropic(self, strength: f32) -> Self {
@@ -80,19 +80,19 @@ impl MetallicRoughness {
         Self { alpha: [alpha * (1.0 - along) + along, alpha], ..self }
     }
 
-    /// The same over a body that lets the share `transmission` in \[0, 1\] of what enters it pass
-    /// (`KHR_materials_transmission`): the diffuse part loses it.
+    /// The same with a body that transmits the fraction `transmission` in \[0, 1\] of the light that enters it
+    /// (`KHR_materials_transmission`). The diffuse part loses this fraction.
     #[must_use]
     pub fn transmitting(self, transmission: f32) -> Self {
         Self { diffuse: self.diffuse * (1.0 - range::unit(transmission)), ..self }
     }
 
-    /// With f90 ≥ f0 to the last bit, whatever was rounded.
+    /// Ensures f90 ≥ f0 to the last bit, regardless of rounding.
     fn ordered(self) -> Self {
         Self { f90: self.f90.max(self.f0.max_component()), ..self }
     }
 
-    /// The same lobe by glTF's older parameters (`KHR_materials_pbrSpecularGlossiness`): diffuse color,
+    /// Creates the lobe from glTF's older parameters (`KHR_materials_pbrSpecularGlossiness`): diffuse color,
     /// reflectance at normal incidence and 1 − perceptual roughness, all clamped to \[0, 1\].
     ///
     /// The diffuse color is scaled by 1 − max(specular).
@@ -108,21 +108,21 @@ impl MetallicRoughness {
         self.alpha
     }
 
-    /// The specular part over `f90`.
+    /// The specular part divided by `f90`.
     fn specular(&self) -> Ggx {
         let f0 = if self.f90 > 0.0 { self.f0 / self.f90 } else { Rgb::BLACK };
         Ggx::new(self.alpha, Fresnel::Schlick { f0 }, Masking::Correlated)
     }
 
-    /// What the diffuse part loses to reflection, where that is `f`.
+    /// The fraction that the diffuse part loses to reflection `f`.
     #[inline(always)]
     fn lost<F: SimdFloat>(&self, f: Colors<F>) -> Colors<F> {
         let Colors([r, g, b]) = f;
         if self.keeps_hue { Colors([r.max(g).max(b); 3]) } else { f }
     }
 
-    /// The probability of drawing from the specular part: at most [`MOST_SPECULAR`] beside a diffuse one, whose weights
-    /// would have no bound at grazing views.
+    /// The probability of sampling the specular part: at most [`MOST_SPECULAR`] if there is a diffuse part, whose weights would
+    /// otherwise be unbounded at grazing views.
     #[inline]
     pub(super) fn specular_share<F: SimdFloat>(&self, cos_theta_o: F) -> F {
         let one = |x| cos_theta_o.splat(x);
@@ -137,7 +137,7 @@ impl MetallicRoughness {
     }
 }
 
-/// The greatest probability of drawing from the specular part beside a diffuse one.
+/// The maximum probability of sampling the specular part if there is a diffuse part.
 const MOST_SPECULAR: f32 = 0.95;
 
 impl Brdf for MetallicRoughness {

@@ -1,10 +1,10 @@
-//! What the microfacet lobes share: f_r = F D G₂ / (4 cos θ_i cos θ_o).
+//! The base of the microfacet lobes: f_r = F D G₂ / (4 cos θ_i cos θ_o).
 //!
 //! Torrance & Sparrow 1967; Cook & Torrance 1982; Walter et al. 2007, "Microfacet Models for
 //! Refraction through Rough Surfaces"; Heitz 2014, "Understanding the Masking-Shadowing Function in
 //! Microfacet-Based BRDFs".
 //!
-//! Masking is written through σ(w) = cos θ (1 + Λ(w)), the projected area of the microfacets that
+//! Masking is expressed through σ(w) = cos θ (1 + Λ(w)), the projected area of the microfacets that
 //! face w (Heitz 2014, eq. 22 with G₁ = cos θ/σ). Unlike Λ and G₁ it stays finite and away from 0/0
 //! at grazing angles:
 //!
@@ -14,7 +14,7 @@
 //! The half vector stays unnormalized, H = wo + wi with |H| = 2 h·wi, so that neither a square root
 //! nor 1 − cos² appears where a lobe is narrow.
 //!
-//! Single scattering only: rough lobes lose the light that bounces twice.
+//! Single scattering only: rough lobes lose the light that is scattered more than once.
 
 use super::{Brdf, Fresnel, HORIZON, ROUNDING, where_above};
 use crate::Rgb;
@@ -31,7 +31,7 @@ pub enum Masking {
     Separable,
 }
 
-/// A distribution of microfacet normals and how to draw from it.
+/// A distribution of microfacet normals with sampling.
 pub trait NormalDistribution: Copy + Send + Sync {
     /// The roughness along x and y.
     fn alpha(&self) -> [f32; 2];
@@ -39,7 +39,7 @@ pub trait NormalDistribution: Copy + Send + Sync {
     /// D(h/|h|) \[sr⁻¹\] for an `h` of any length.
     fn d<F: SimdFloat>(&self, h: Vectors<F>) -> F;
 
-    /// The greatest D where tan² θ_h lies in a closed range, which may end at infinity.
+    /// The largest D where tan² θ_h lies in a closed range, which may end at infinity.
     fn max_d(&self, tan2: [f32; 2]) -> f32;
 
     /// σ(w) = cos θ (1 + Λ(w)), the projected area of the microfacets facing `w`.
@@ -62,7 +62,8 @@ pub struct Microfacet<D> {
 }
 
 impl<D: NormalDistribution> Microfacet<D> {
-    /// The lobe with this distribution of normals. The reflectance is clamped to the range that Fresnel's formulas accept.
+    /// Creates the lobe with a distribution of normals. The reflectance is clamped to the range that the Fresnel
+    /// formulas accept.
     pub fn with_normals(normals: D, fresnel: Fresnel, masking: Masking) -> Self {
         Self { normals, fresnel: fresnel.in_range(), masking }
     }
@@ -71,7 +72,7 @@ impl<D: NormalDistribution> Microfacet<D> {
         self.normals.alpha()
     }
 
-    /// D G₂/(4 cos θ_o), the lobe without Fresnel's factor, and the density.
+    /// D G₂/(4 cos θ_o), the lobe without the Fresnel factor, and the density.
     #[inline(always)]
     pub(super) fn geometry_pdf<F: SimdFloat>(
         &self,
@@ -111,7 +112,7 @@ impl<D: NormalDistribution> Brdf for Microfacet<D> {
         reflect_about(wo, self.normals.sample_normals(wo, u))
     }
 
-    /// Bounded ring by ring of h: the greatest D of a ring, Fresnel's factor at its lowest h·wo, and
+    /// Bounded ring by ring of h: the largest D of a ring, the Fresnel factor at its lowest h·wo, and
     /// masking at its highest `wi` in the direction of the smoothest slope. Within a factor of 2.5
     /// of the maximum.
     fn max_eval(&self, wo: Vec3) -> f32 {
@@ -131,7 +132,7 @@ impl<D: NormalDistribution> Brdf for Microfacet<D> {
         rings(wo, ax.max(ay)).map(bound).fold(0.0, f32::max) * ROUNDING
     }
 
-    /// Fresnel's reflectance at `cos_theta_o`.
+    /// The Fresnel reflectance at `cos_theta_o`.
     #[inline]
     fn directional_albedo(&self, cos_theta_o: f32) -> Rgb {
         self.fresnel.eval(cos_theta_o)
@@ -160,7 +161,7 @@ pub(super) struct Ring {
     pub(super) tan2: [f32; 2],
     /// The least h·wo ≥ 0: the angle between h and wo is at most θ_o + θ₁.
     pub(super) min_cos_d: f32,
-    /// The greatest cos θ_i: reflection about h is that about the normal turned by at most 2θ₁.
+    /// The largest cos θ_i: reflection about h is that about the normal turned by at most 2θ₁.
     pub(super) max_cos_i: f32,
 }
 

@@ -1,8 +1,8 @@
-//! Reflectance: lobes and the materials that they add up to.
+//! Reflectance: lobes, and BSDFs as sums of lobes.
 //!
 //! A [`Bsdf`] is a small sum of [`Lobe`]s: [`Lambert`], [`Phong`], [`Ward`], [`Ggx`],
-//! [`Beckmann`], and glTF's [`MetallicRoughness`], [`Sheen`] and [`Coat`], one model a file. All work in the local frame,
-//! are plain `Copy` data and evaluate value and density together, because multiple importance
+//! [`Beckmann`], and glTF's [`MetallicRoughness`], [`Sheen`] and [`Coat`], one model per file. All work in the local
+//! frame, are plain `Copy` data, and evaluate value and density together, because multiple importance
 //! sampling always needs both.
 //!
 //! ```
@@ -18,9 +18,9 @@
 //! # Ok::<(), domelight::bsdf::ParseMaterialError>(())
 //! ```
 //!
-//! All lobes here are reciprocal: f_r(wo, wi) = f_r(wi, wo). (glTF's layers are not: what a coat or sheen leaves to
-//! the layer below depends on `wo` alone, as in its specification.) Their constructors clamp every parameter to the
-//! range that the formulas bear, so no lobe evaluates to NaN or infinity.
+//! All lobes are reciprocal: f_r(wo, wi) = f_r(wi, wo). (glTF's layers are not: the fraction that a coat or sheen
+//! leaves to the layer below depends only on `wo`, as in the specification.) Constructors clamp every parameter to
+//! the range in which the formulas are valid, so no lobe evaluates to NaN or infinity.
 //!
 //! Rejected: trait objects (the set is closed, and the sample loop should inline); tabulated
 //! energy compensation (its tables would have to enter the bounds of [`Brdf::max_eval`]).
@@ -73,7 +73,7 @@ pub trait Brdf: Copy + Send + Sync {
     /// or is not finite is the sample of value zero.
     fn sample_lanes<F: SimdFloat>(&self, wo: Vectors<F>, u_lobe: F, u: [F; 2]) -> Vectors<F>;
 
-    /// An upper bound over all `wi` of the greatest channel of [`Brdf::eval`] \[sr⁻¹\].
+    /// An upper bound over all `wi` of the largest channel of [`Brdf::eval`] \[sr⁻¹\].
     fn max_eval(&self, wo: Vec3) -> f32;
 
     /// The fraction of light toward `wo` = (·, ·, `cos_theta_o`) under uniform light, roughly: what

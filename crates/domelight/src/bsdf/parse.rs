@@ -1,4 +1,4 @@
-//! Materials as text: what a command line and a scene file accept.
+//! Materials as text, the notation of the command line and of scene files.
 //!
 //! ```text
 //! material = "diffuse" ":" color
@@ -18,7 +18,7 @@
 //! ```
 //!
 //! The default masking of this notation is *separable*, not the library's correlated one, so that
-//! `ggx:0.2` is the same surface as in renderers that it is compared with.
+//! `ggx:0.2` is the same surface as in the renderers that we compare with.
 
 use super::{
     Beckmann, Bsdf, Conductor, Fresnel, Ggx, Lambert, Lobe, MAX_ALPHA, MAX_EXPONENT, MIN_ALPHA,
@@ -27,7 +27,7 @@ use super::{
 use crate::Rgb;
 use std::str::FromStr;
 
-/// A material as a user names it; [`Bsdf::from`] makes it.
+/// A material in text notation; [`Bsdf::from`] converts it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MaterialSpec {
     /// `diffuse:0.8` or `diffuse:R,G,B`.
@@ -79,18 +79,18 @@ pub enum MaterialSpec {
         metallic: f32,
         /// Perceptual roughness.
         roughness: f32,
-        /// The strength of the dielectric's reflection.
+        /// The strength of the dielectric reflection.
         specular: f32,
         /// Its color at normal incidence.
         specular_color: Rgb,
-        /// How much the highlight is drawn out along x.
+        /// The strength with which the highlight is stretched along x.
         anisotropy: f32,
     },
     /// `mix`: half `diffuse:0.5`, half `ggx:0.1`.
     Mix,
 }
 
-/// Why a text is not a material.
+/// An error in the text of a material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ParseMaterialError {
     /// An unknown model.
@@ -110,14 +110,14 @@ pub enum ParseMaterialError {
     Count {
         /// The model.
         model: &'static str,
-        /// How many it takes, in words.
+        /// The expected number, in words.
         expected: &'static str,
-        /// How many were given.
+        /// The given number.
         given: usize,
         /// A right one.
         example: &'static str,
     },
-    /// A part that is no value of its kind.
+    /// A part that is not a valid value.
     #[error("the {parameter} of «{model}» is «{text}», but should be {expected}")]
     Value {
         /// The model.
@@ -126,7 +126,7 @@ pub enum ParseMaterialError {
         parameter: &'static str,
         /// What stands there.
         text: String,
-        /// What may stand there.
+        /// The expected value.
         expected: &'static str,
     },
 }
@@ -142,7 +142,7 @@ const WARD_FORM: &str = "«bounded», «1992» or «duer»";
 const MASKING: &str = "«separable» or «correlated»";
 
 impl MaterialSpec {
-    /// The names of the models, as their texts begin.
+    /// The names of the models, with which their texts begin.
     pub const MODELS: [&'static str; 7] =
         ["diffuse", "phong", "ward", "ggx", "beckmann", "gltf", "mix"];
 }
@@ -375,7 +375,7 @@ impl From<MaterialSpec> for Bsdf {
 impl FromStr for Bsdf {
     type Err = ParseMaterialError;
 
-    /// As [`MaterialSpec`].
+    /// Those of [`MaterialSpec`].
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         text.parse::<MaterialSpec>().map(Self::from)
     }

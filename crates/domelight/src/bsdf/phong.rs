@@ -1,12 +1,12 @@
-//! Phong's lobe about the mirror direction, normalized:
-//! f_r = k_s (n + 2)/(2π) max(0, cos α)ⁿ with α the angle between `wi` and the mirror of `wo`.
+//! The Phong lobe around the mirror direction, normalized:
+//! f_r = k_s (n + 2)/(2π) max(0, cos α)ⁿ, where α is the angle between `wi` and the mirror direction of `wo`.
 //!
 //! Lafortune & Willems 1994, "Using the Modified Phong Reflectance Model for Physically Based
-//! Rendering". Its diffuse part k_d is a Lambert lobe beside it.
+//! Rendering". The diffuse part k_d is a separate Lambert lobe.
 //!
-//! The sampled lobe, of density (n + 1)/(2π) cosⁿ α, dips below the surface when `wo` is oblique.
-//! Those samples are lost and counted; redrawing them would need their fraction in the density,
-//! which has no closed form for real n.
+//! The sampled lobe, with density (n + 1)/(2π) cosⁿ α, extends below the surface if `wo` is oblique.
+//! Samples below the surface count as zero. Redrawing them would require their fraction in the
+//! density, which has no closed form for real n.
 
 use super::{Brdf, HORIZON, ROUNDING, range, where_above};
 use crate::Rgb;
@@ -22,7 +22,8 @@ pub struct Phong {
 }
 
 impl Phong {
-    /// The lobe with reflectance k_s, clamped to [0, 1], and exponent n, clamped to [0, [`super::MAX_EXPONENT`]].
+    /// Creates the lobe with reflectance k_s, clamped to [0, 1], and exponent n, clamped to
+    /// [0, [`super::MAX_EXPONENT`]].
     pub fn new(specular: Rgb, exponent: f32) -> Self {
         Self { specular: range::reflectance(specular), exponent: range::exponent(exponent) }
     }

@@ -1,36 +1,36 @@
 //! The ranges of the lobes' parameters, which their constructors enforce.
 //!
-//! A constructor clamps to the nearest value in range, and takes NaN for the least one: textures hold any
-//! value, files hold values outside, and no formula behind a constructor checks again.
+//! A constructor clamps to the nearest value in range, and replaces NaN by the minimum. Textures may hold any
+//! value, files may hold values outside the range, and no formula behind a constructor checks again.
 //!
-//! - Roughness stops at [`MIN_ALPHA`] because directions in single precision resolve no narrower lobe. There
+//! - Roughness is at least [`MIN_ALPHA`], because single-precision directions resolve no narrower lobe. There,
 //!   D reaches 1/(π α²) = 3·10⁷ sr⁻¹, products with the brightest light of a scene stay far below 10³⁸, and
 //!   every strategy still samples the lobe without bias. A perfectly smooth surface is a lobe of this width.
-//! - It stops at [`MAX_ALPHA`] because D is then concentrated at the horizon and masking takes most of it.
-//! - Phong's exponent stops at [`MAX_EXPONENT`] because cosⁿ α is evaluated by a logarithm whose rounding the
-//!   exponent multiplies.
-//! - Reflectances lie in [0, 1]: more would create energy.
+//! - It is at most [`MAX_ALPHA`], because D is then concentrated at the horizon and masking removes most of it.
+//! - The Phong exponent is at most [`MAX_EXPONENT`], because cosⁿ α is evaluated with a logarithm whose rounding
+//!   error the exponent multiplies.
+//! - Reflectances lie in [0, 1], because more would create energy.
 //! - Refractive indices lie in [`MIN_INDEX`, `MAX_INDEX`]: at η = k = 0 the reflectance is 0/0, and the fourth
 //!   power of an index has to stay finite. Metals have indices from 0.04 to 10.
 
 use crate::Rgb;
 
-/// The least roughness of a lobe.
+/// The minimum roughness of a lobe.
 pub const MIN_ALPHA: f32 = 1e-4;
 
-/// The greatest roughness of a lobe.
+/// The maximum roughness of a lobe.
 pub const MAX_ALPHA: f32 = 10.0;
 
-/// The greatest exponent of a Phong lobe.
+/// The maximum exponent of a Phong lobe.
 pub const MAX_EXPONENT: f32 = 1e5;
 
-/// The least real part of a refractive index.
+/// The minimum real part of a refractive index.
 const MIN_INDEX: f32 = 1e-3;
 
-/// The greatest real or imaginary part of a refractive index.
+/// The maximum real or imaginary part of a refractive index.
 const MAX_INDEX: f32 = 1e3;
 
-/// The greatest weight of a lobe in a material.
+/// The maximum weight of a lobe in a BSDF.
 const MAX_WEIGHT: f32 = 1e3;
 
 /// `x` clamped to [`low`, `high`]; `low` for NaN.

@@ -1,15 +1,15 @@
-//! The sheen of glTF (`KHR_materials_sheen`): fibers that stand off a surface and glow at grazing angles.
+//! The sheen of glTF (`KHR_materials_sheen`): fibers on a surface that brighten it at grazing angles.
 //!
 //! f_r = color · D V with D of Estevez & Kulla 2017, "Production Friendly Microfacet Sheen BRDF", eq. 2:
 //! D = (2 + 1/α) sin^(1/α) θ_h / (2π) and α = roughness², and V of Neubelt & Pettineo 2013:
-//! V = 1 / (4 (cos θ_i + cos θ_o − cos θ_i cos θ_o)), the smooth form that the extension allows in place of its fitted
-//! one, and that most viewers of glTF use.
+//! V = 1 / (4 (cos θ_i + cos θ_o − cos θ_i cos θ_o)), the smooth form that the extension allows instead of its fitted
+//! one, and that most glTF viewers use.
 //!
-//! Samples are uniform over the hemisphere: f_r cos θ_i is at most color · D/4 at any view, so their weights are bounded
-//! by (2 + 1/α)/4, where cosine-weighted ones have no bound at grazing views.
+//! Samples are uniform over the hemisphere. f_r cos θ_i is at most color · D/4 for any view, so the weights are bounded
+//! by (2 + 1/α)/4; cosine-weighted samples would have unbounded weights at grazing views.
 //!
-//! What lies below keeps the share 1 − max(color) E(cos θ_o), where E is the albedo of white sheen; none where E exceeds
-//! one, which it does by a tenth at 85° and roughness 0.1: this V does not conserve energy.
+//! The layers below are scaled by 1 − max(color) E(cos θ_o), where E is the albedo of white sheen, and by 0 where
+//! that is negative. E exceeds one by a tenth at 85° and roughness 0.1, because this V does not conserve energy.
 
 use std::sync::LazyLock;
 
@@ -31,7 +31,7 @@ pub struct Sheen {
 }
 
 impl Sheen {
-    /// The lobe with this color, clamped to \[0, 1\], and this perceptual roughness, clamped to \[0.1, 1\].
+    /// Creates the lobe with a color, clamped to \[0, 1\], and a perceptual roughness, clamped to \[0.1, 1\].
     pub fn new(color: Rgb, roughness: f32) -> Self {
         let roughness = range::unit(roughness).max(MIN_ROUGHNESS);
         Self { color: range::reflectance(color), roughness }
@@ -84,7 +84,7 @@ impl Brdf for Sheen {
         Vectors { x: sin_theta * cos_phi, y: sin_theta * sin_phi, z: one - u }
     }
 
-    /// Bounded slice by slice of cos θ_i: the visibility grows with it, and the greatest θ_h = (θ_i + θ_o)/2 shrinks.
+    /// Bounded slice by slice of cos θ_i: the visibility grows with it, and the largest θ_h = (θ_i + θ_o)/2 shrinks.
     fn max_eval(&self, wo: Vec3) -> f32 {
         const SLICES: usize = 24;
         if wo.z <= HORIZON {

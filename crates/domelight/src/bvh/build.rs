@@ -1,9 +1,9 @@
-//! Top-down construction with the binned surface area heuristic, eight children at once.
+//! Top-down construction with the binned surface area heuristic, straight to eight children.
 //!
-//! A node starts as one range of triangles; the range of the largest surface is split in two until
-//! there are eight. A split minimizes area × blocks over equal bins of the centroids on each axis
-//! (Wald 2007). Boxes are four-wide vectors, of which x, y and z count. Past a certain depth ranges are halved instead, which bounds the depth of the tree
-//! and with it the traversal's stack, whatever the input.
+//! A node starts as one range of triangles. The range with the largest surface area is split in two until
+//! there are eight. A split minimizes area × blocks over equal bins of the centroids on each axis (Wald
+//! 2007). Boxes are four-wide vectors, of which x, y and z are used. Beyond a certain depth, ranges are
+//! halved instead, which bounds the depth of the tree and so the traversal's stack for any input.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Whether anything may lie in a pyramid or a prism: what spares camera rays into nothing.
+//! Frustum tests, which skip camera rays that cannot hit anything.
 
 use super::traverse::STACK;
 use super::{Bvh, Node};
@@ -6,7 +6,7 @@ use crate::geometry::Aabb;
 use crate::math::Vec3;
 use crate::simd::{Kernel, LaneMask, Simd, SimdFloat, set_bits};
 
-/// The points on the inner side of four planes: the view of a rectangle of the picture.
+/// The intersection of four half-spaces: the view through a rectangle of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frustum {
     /// Normals, pointing inward.
@@ -16,8 +16,8 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    /// What the rays see that start at `origins` toward `directions`, which are the corners of a
-    /// rectangle in order, clockwise or not, and all that lie between them.
+    /// The frustum of all rays between the corner rays that start at `origins` toward `directions`. The
+    /// corners form a rectangle, in order, clockwise or counterclockwise.
     pub fn new(origins: [Vec3; 4], directions: [Vec3; 4]) -> Self {
         let inner = directions.iter().sum::<Vec3>();
         let middle = origins.iter().sum::<Vec3>() * 0.25;

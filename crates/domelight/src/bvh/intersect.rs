@@ -1,23 +1,23 @@
-//! One ray against eight boxes or eight triangles.
+//! Intersects one ray with eight boxes or eight triangles.
 //!
-//! The triangle test moves the ray's origin to 0 and shears its direction to the axis along which
-//! it is longest (Woop, Benthin & Wald 2013). Each vertex is sheared on its own, so neighbors see
-//! the same corners, and what remains is whether the origin lies in a triangle of the plane. The
-//! sign of an edge function is that of the exact one or it is zero, because rounding is monotone;
-//! where it is zero it is computed again in f64, which holds a product of two f32 exactly. So the
-//! answer is exact for the sheared corners, which lie within 7·2⁻²⁴·m of where they should, m being
-//! the greatest distance from the origin to the scene along an axis.
+//! The triangle test translates the ray's origin to 0 and shears its direction to its longest axis
+//! (Woop, Benthin & Wald 2013). Each vertex is sheared independently, so adjacent triangles have the same
+//! corners, and the test is whether the origin lies in a triangle in the plane. An edge function has the
+//! sign of the exact one or is zero, because rounding is monotone. If it is zero, it is recomputed in
+//! f64, which holds a product of two f32 exactly. So the answer is exact for the sheared corners, which
+//! are within 7·2⁻²⁴·m of their exact positions, where m is the largest distance from the origin to the
+//! scene along an axis.
 //!
-//! The box test asks about the unsheared ray. To let everything through that the triangle test would
-//! accept, planes move outward by 16·2⁻²⁴·m + 4·2⁻²⁴·|o|, o being the origin's coordinate (after Ize 2013, "Robust BVH
+//! The box test uses the unsheared ray. To pass everything that the triangle test would accept, planes
+//! move outward by 16·2⁻²⁴·m + 4·2⁻²⁴·|o|, where o is the origin's coordinate (after Ize 2013, "Robust BVH
 //! Ray Traversal", and the section on traversal of the paper above).
-//! Of the former the shear needs 7, a component of the direction that counts as greater than it is 1, and the box test 4:
-//! of the distance p/d − o/d to a plane p, its own rounding, that of 1/d on two axes that meet, and that of the
-//! product p/d, since |p| ≤ |o| + m. Of the latter o ± margin, its product with 1/d, and p/d again need one each.
-//! So it does not matter how often p/d − o/d is rounded: which boxes are entered may differ, hits do not. Instruction
-//! sets that fuse do so ([`SimdF32x8::mul_sub`]), the others do not; the tests compare all of them with a loop over all
-//! triangles. The product must not overflow, though, where the difference would not, nor underflow: rays of which that
-//! cannot be said (`is_moderate`) have it exact.
+//! In the first term, the shear needs 7 units, a direction component that is overestimated needs 1, and the box test
+//! needs 4: in the distance p/d − o/d to a plane p, for its own rounding, for 1/d on two axes that are compared, and
+//! for the product p/d, since |p| ≤ |o| + m. In the second term, o ± margin, its product with 1/d, and p/d need one
+//! each. So it does not matter how often p/d − o/d is rounded: the boxes entered may differ, but the hits do not.
+//! Instruction sets with fused operations use them ([`SimdF32x8::mul_sub`]), the others do not. Tests compare all of
+//! them with a loop over all triangles. However, the product must not overflow where the difference would not, nor
+//! underflow. Rays for which this is not guaranteed (see `is_moderate`) compute it exactly.
 
 use super::prepare::PreparedRays;
 use super::{Block, Lanes, Node, WIDTH};
@@ -68,7 +68,7 @@ impl<S: Simd> Slabs<S> {
         [enter[0].max(enter[1]).max(enter[2].max(zero)), leave[0].min(leave[1]).min(leave[2])]
     }
 
-    /// Which boxes ray `i` crosses within [0, `limit`], and the distances where it enters them.
+    /// The boxes that ray `i` crosses within [0, `limit`], and the distances where it enters them.
     #[inline(always)]
     pub(super) fn cross_within<const N: usize>(
         &self,
@@ -82,14 +82,14 @@ impl<S: Simd> Slabs<S> {
     }
 }
 
-/// Where a ray meets planes, an axis each.
+/// The distances at which a ray meets planes, one per axis.
 #[inline(always)]
 fn distances<F: SimdF32x8>(planes: [F; 3], inverse: [F; 3], origin: [F; 3]) -> [F; 3] {
     let ([px, py, pz], [x, y, z], [ox, oy, oz]) = (planes, inverse, origin);
     [px * x - ox, py * y - oy, pz * z - oz]
 }
 
-/// The same of exact products.
+/// The same with exact products.
 #[inline(always)]
 fn distances_fused<F: SimdF32x8>(planes: [F; 3], inverse: [F; 3], origin: [F; 3]) -> [F; 3] {
     let ([px, py, pz], [x, y, z], [ox, oy, oz]) = (planes, inverse, origin);
@@ -163,13 +163,13 @@ pub(super) struct Sheared<S: Simd> {
     depths: [S::F32x8; 3],
     /// Barycentric weights, scaled alike.
     weights: [S::F32x8; 3],
-    /// Where the ray's line goes through the triangle.
+    /// The position where the ray's line passes through the triangle.
     inside: <S::F32x8 as SimdFloat>::Mask,
 }
 
 /// The triangles of a block that a ray hits.
 pub(super) struct BlockHits<S: Simd> {
-    /// Bit i: triangle i is hit; the rest of its lane means nothing otherwise.
+    /// Bit i: triangle i is hit. Otherwise its lane is undefined.
     pub(super) mask: u32,
     /// Distances in units of the direction's length.
     pub(super) t: S::F32x8,
@@ -216,7 +216,7 @@ impl<S: Simd> Sheared<S> {
             ];
             let exact = exact_edges(corners, [u.store(), v.store(), w.store()]);
             (u, v, w) = (simd.load(&exact[0]), simd.load(&exact[1]), simd.load(&exact[2]));
-            // A determinant that is zero or NaN is no hit.
+            // A determinant that is zero or NaN is not a hit.
             let determinant = u + v + w;
             let has_area = determinant.lt(zero) | zero.lt(determinant);
             let same = zero.le(u.min(v).min(w)) | u.max(v).max(w).le(zero);
@@ -225,7 +225,7 @@ impl<S: Simd> Sheared<S> {
         Self { frame, to_corner, depths: [a.z, b.z, c.z], weights: [u, v, w], inside }
     }
 
-    /// Whether the ray's line goes through none of the triangles.
+    /// Whether the ray's line misses all triangles.
     #[inline(always)]
     pub(super) fn misses(&self) -> bool {
         self.inside.bits() == 0
@@ -288,8 +288,8 @@ fn edge<F: SimdF32x8>(p: Points<F>, q: Points<F>) -> F {
 
 /// The planes of a block's triangles.
 ///
-/// Aligned like a vector, and with it the stack of the kernels: what AVX2 has no register for is kept there, and waits
-/// where it straddles two lines of the cache.
+/// Aligned like a vector, which also aligns the stack of the kernels: spilled AVX2 registers are stored there, and stall if
+/// they straddle two cache lines.
 #[repr(align(32))]
 pub(super) struct Planes {
     /// n = (b − a) × (c − a), by axis.
@@ -322,7 +322,7 @@ impl Planes {
     }
 }
 
-/// Where an edge function is zero, all three in f64, in which the products of f32 are exact.
+/// If an edge function is zero, computes all three in f64, where the products of f32 are exact.
 #[cold]
 #[inline(never)]
 fn exact_edges([a, b, c]: [[Lanes; 2]; 3], rounded: [Lanes; 3]) -> [Lanes; 3] {

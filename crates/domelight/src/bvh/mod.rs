@@ -1,8 +1,8 @@
-//! Ray tracing: a bounding volume hierarchy with eight children a node.
+//! Ray tracing: a bounding volume hierarchy with eight children per node.
 //!
-//! A [`Bvh`] answers two questions: which triangle a ray meets first, and whether a ray to the
-//! environment is blocked. The second is asked far more often, for whole tiles of shadow rays at a
-//! time ([`Bvh::occluded`]), and the layout serves it.
+//! A [`Bvh`] answers two questions: which triangle a ray hits first, and whether a ray to the
+//! environment is occluded. The second is asked far more often, for whole tiles of shadow rays at a
+//! time ([`Bvh::occluded`]), and the layout is optimized for it.
 //!
 //! - **Build**: top-down, binned surface area heuristic, straight to eight children (Wald 2007, "On
 //!   fast Construction of SAH-based Bounding Volume Hierarchies"; Wald, Benthin & Boulos 2008,
@@ -10,12 +10,12 @@
 //! - **Triangle test**: Woop, Benthin & Wald 2013, "Watertight Ray/Triangle Intersection". A ray
 //!   cannot slip between two triangles that share an edge or a vertex.
 //! - **Box test**: boxes are widened by the rounding error of the triangle test, so that *the tree
-//!   never changes the answer*: it is that of a loop over all triangles, bit for bit. (The exception
+//!   never changes the answer*: it equals that of a loop over all triangles, bit for bit. (The exception
 //!   is a triangle seen so nearly edge-on that its distance has no correct digit.)
-//! - **Many rays**: traced as streams of 64 of one octant, into which shadow rays are sorted (Tsakok
+//! - **Many rays**: traced as streams of 64 rays in one octant, into which shadow rays are sorted (Tsakok
 //!   2009, "Faster Incoherent Rays: Multi-BVH Ray Stream Tracing"; Fuetterling et al. 2015, "Efficient
-//!   Ray Tracing Kernels for Modern CPU Architectures"). Two or four streams take turns, each asking for the
-//!   memory of its next node before the others go on, so that none waits for it.
+//!   Ray Tracing Kernels for Modern CPU Architectures"). Two or four streams take turns, and each
+//!   prefetches its next node before the others continue, which hides the latency.
 //!
 //! Every kernel is written once over vectors of eight numbers and compiled for each instruction set. Box tests
 //! multiply and subtract in one rounding on all of them, and nothing else is fused, so all of them **give the same
@@ -23,19 +23,19 @@
 //!
 //! # Limits
 //! Coordinates from about 1e-12 to 1e12 in magnitude, and directions from about 1e-18 to 1e20 in
-//! length, keep all intermediate products finite and normal. Beyond that rays may miss; nothing
-//! panics. Shadow rays that leave a surface need more: a size of 1e-6 at least and coordinates up to
-//! 1e7, which [`Scene::new`](crate::scene::Scene::new) sees to by tracing other scenes at a usual
-//! size. From further away than some 10⁴ times the scene's size boxes are widened so much that
-//! rays become slow.
+//! length, keep all intermediate products finite and normal. Beyond that, rays may miss, but nothing
+//! panics. Shadow rays that leave a surface need a size of at least 1e-6 and coordinates up to 1e7,
+//! which [`Scene::new`](crate::scene::Scene::new) ensures by tracing other scenes at a moderate
+//! size. From farther away than some 10⁴ times the scene's size, boxes are widened so much that rays
+//! become slow.
 //!
 //! # Alternatives
-//! Möller–Trumbore makes rays 3 to 7 % quicker and leaks along shared edges. Fused multiply-adds
-//! in the edge functions would make those of two neighbors differ.
-//! Sorting shadow rays more finely than by octant loses more coherence of the origins than it wins.
-//! Clustering from below (PLOC) with reinsertion gives trees of similar quality, but of no bounded
-//! depth. Packets of camera rays, 16 to a vector, are quicker than streams where the tree fits the
-//! cache, and camera rays are few. `docs/experiments.md` has figures.
+//! Möller–Trumbore makes rays 3 to 7 % faster but leaks along shared edges. Fused multiply-adds in the
+//! edge functions would make those of adjacent triangles differ.
+//! Sorting shadow rays more finely than by octant loses more from incoherent origins than it gains.
+//! Bottom-up clustering (PLOC) with reinsertion gives trees of similar quality but unbounded depth.
+//! Packets of 16 camera rays are faster than streams if the tree fits the cache, but camera rays are
+//! few. `docs/experiments.md` has figures.
 
 mod build;
 mod frustum;
@@ -52,7 +52,7 @@ pub use crate::simd::InstructionSet;
 pub use frustum::Frustum;
 pub use validate::BvhDefect;
 
-/// How many children a node and how many triangles a block has: the width of a vector.
+/// The number of children of a node and of triangles in a block: the width of a vector.
 const WIDTH: usize = 8;
 
 /// One number a lane.
@@ -69,7 +69,7 @@ pub struct Bvh {
     instruction_set: InstructionSet,
 }
 
-/// Eight children: their boxes, and where they are.
+/// A node with the boxes and references of eight children.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
 struct Node {
@@ -78,7 +78,7 @@ struct Node {
     children: [Child; WIDTH],
 }
 
-/// Where a child is: a node, or the one block of a leaf.
+/// The reference of a child: a node, or the single block of a leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Child(u32);
 
@@ -104,13 +104,13 @@ impl Child {
     }
 }
 
-/// Up to eight triangles; a missing one has NaN vertices, which no ray meets.
+/// Up to eight triangles. A missing one has NaN vertices, which no ray hits.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 struct Block {
     /// By vertex, then axis.
     vertices: [[Lanes; 3]; 3],
-    /// The triangles' numbers, [`Block::NONE`] where one is missing.
+    /// The indices of the triangles; [`Block::NONE`] for a missing one.
     ids: [u32; WIDTH],
 }
 
@@ -118,11 +118,11 @@ impl Block {
     const NONE: u32 = u32::MAX;
 }
 
-/// What keeps a hierarchy from being built.
+/// An error in building a BVH.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BvhError {
     /// A coordinate that is NaN or infinite.
-    #[error("vertex {vertex} has a coordinate that is not finite: {position}")]
+    #[error("vertex {vertex} has a non-finite coordinate: {position}")]
     NotFinite {
         /// The vertex.
         vertex: usize,
@@ -130,21 +130,19 @@ pub enum BvhError {
         position: Vec3,
     },
     /// An index beyond the vertices.
-    #[error("triangle {triangle} names vertex {index}, but there are only {vertices} vertices")]
+    #[error("triangle {triangle} refers to vertex {index}, but there are only {vertices} vertices")]
     Index {
         /// The triangle.
         triangle: usize,
         /// Its index.
         index: u32,
-        /// How many vertices there are.
+        /// The number of vertices.
         vertices: usize,
     },
     /// More triangles than indices.
-    #[error(
-        "{count} triangles are too many: at most {max} fit into one hierarchy; split the scene"
-    )]
+    #[error("{count} triangles are too many: at most {max} fit in one BVH; split the scene")]
     TooManyTriangles {
-        /// How many there are.
+        /// The number of triangles.
         count: usize,
         /// How many fit.
         max: usize,
@@ -152,68 +150,68 @@ pub enum BvhError {
 }
 
 impl Bvh {
-    /// Builds a hierarchy over triangles given as indices into `positions`.
+    /// Builds a BVH over triangles given as indices into `positions`.
     ///
     /// The result does not depend on the number of threads. Triangles without area (the cross
-    /// product of two edges is zero) are left out: nothing can hit them.
+    /// product of two edges is zero) are omitted, because nothing can hit them.
     ///
     /// # Errors
-    /// A vertex that is not finite, an index out of range, or 2³¹ triangles and more.
+    /// If a vertex is not finite, an index is out of range, or there are 2³¹ triangles or more.
     pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self, BvhError> {
         build::build(positions, triangles)
     }
 
-    /// The same hierarchy, traced with another instruction set; `None` if this processor lacks it.
+    /// The same BVH traced with another instruction set; `None` if this processor lacks it.
     ///
-    /// All give the same answers. [`Bvh::build`] chooses the fastest; this is for comparing them.
+    /// All give the same answers. [`Bvh::build`] chooses the fastest; this is for comparisons.
     #[must_use]
     pub fn with_instruction_set(mut self, instruction_set: InstructionSet) -> Option<Self> {
         self.instruction_set = instruction_set;
         instruction_set.is_available().then_some(self)
     }
 
-    /// The least box around all triangles that have an area.
+    /// The bounding box of all triangles with an area.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// The number of triangles that have an area and are thus in the tree.
+    /// The number of triangles with an area, which are in the tree.
     pub fn triangle_count(&self) -> usize {
         self.triangle_count
     }
 
-    /// The memory that nodes and triangles take, in bytes.
+    /// The memory of nodes and triangles \[bytes\].
     pub fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..])
     }
 
-    /// The first triangle that the ray meets in its open interval (0, `t_max`), from either side.
+    /// The first triangle that the ray hits in its open interval (0, `t_max`), from either side.
     ///
-    /// Among hits at the same distance, the triangle with the least index is returned. A ray that is not finite or has a
-    /// zero direction meets nothing.
+    /// Among hits at the same distance, the triangle with the smallest index is returned. A ray that is not finite or
+    /// has a zero direction hits nothing.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         simd::dispatch(self.instruction_set, traverse::ClosestHit { bvh: self, ray })
     }
 
-    /// [`Bvh::closest_hit`] among the hits that `accept` returns true for: one that it refuses is as if it were not
-    /// there. It may be asked about hits in any order, and must answer the same each time.
+    /// [`Bvh::closest_hit`] among the hits for which `accept` returns true; other hits are ignored. `accept` may be
+    /// called in any order, and must return the same answer each time.
     pub fn closest_hit_where(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
         simd::dispatch(self.instruction_set, traverse::ClosestHitWhere { bvh: self, ray, accept })
     }
 
-    /// [`Bvh::closest_hit`] of many rays; quickest for neighbors, such as a tile's camera rays.
+    /// [`Bvh::closest_hit`] for many rays. Fastest for neighboring rays, such as a tile's camera rays.
     ///
-    /// `hits` is overwritten, one entry a ray.
+    /// `hits` is overwritten, one entry per ray.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
         hits.clear();
         hits.resize(rays.len(), None);
         simd::dispatch(self.instruction_set, traverse::ClosestHits { bvh: self, rays, hits });
     }
 
-    /// Whether each ray of a batch meets any triangle, to infinity: V = 0.
+    /// Whether each ray of a batch hits any triangle up to infinity (V = 0).
     ///
-    /// The same answers as [`Bvh::any_hit`]; much quicker for some thousand rays at a time. Their
-    /// order matters little: they are sorted inside. `occluded` is overwritten, one entry a ray.
+    /// Gives the same answers as [`Bvh::any_hit`], but much faster for some thousand rays at a time. Their
+    /// order matters little, because they are sorted internally. `occluded` is overwritten, one entry per ray.
     ///
     /// # Panics
     /// If the batch has fewer directions than origins.
@@ -227,10 +225,11 @@ impl Bvh {
         );
     }
 
-    /// What share of light gets along each ray of a batch, to infinity: the product of `of_hit`, in \[0, 1\], over all
-    /// triangles that it meets; 1 where it meets none. `of_hit` gets the ray's number in the batch and the hit.
+    /// The transmittance along each ray of a batch up to infinity: the product of `of_hit`, in \[0, 1\], over all
+    /// triangles that the ray hits; 1 if it hits none. `of_hit` receives the index of the ray in the batch and the hit.
     ///
-    /// A ray's answer has the same bits whatever rays go with it. `transmittances` is overwritten, one entry a ray.
+    /// A ray's result has the same bits regardless of the other rays. `transmittances` is overwritten, one entry per
+    /// ray.
     ///
     /// # Panics
     /// If the batch has fewer directions than origins.
@@ -250,19 +249,19 @@ impl Bvh {
         );
     }
 
-    /// Whether the ray meets any triangle in its open interval (0, `t_max`).
+    /// Whether the ray hits any triangle in its open interval (0, `t_max`).
     pub fn any_hit(&self, ray: &Ray) -> bool {
         simd::dispatch(self.instruction_set, traverse::AnyHit { bvh: self, ray })
     }
 
     /// Whether a ray within the frustum may hit anything; false only if none does.
     ///
-    /// By the boxes alone: cheap, and true near what is there.
+    /// It tests only boxes, so it is cheap, and true near geometry.
     pub fn may_hit(&self, frustum: &Frustum) -> bool {
         simd::dispatch(self.instruction_set, frustum::MayHit { bvh: self, frustum })
     }
 
-    /// Checks that every triangle is in the tree once, each box holds what is below it, and every
+    /// Checks that every triangle is in the tree once, each box contains its subtree, and every
     /// reference is in range.
     ///
     /// # Errors

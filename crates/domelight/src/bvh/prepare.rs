@@ -1,4 +1,4 @@
-//! What the tests need of rays, computed for eight at a time.
+//! Precomputes ray data for the intersection tests, eight rays at a time.
 
 use super::{Lanes, WIDTH};
 use crate::geometry::Aabb;
@@ -98,7 +98,7 @@ impl<const N: usize> PreparedRays<N> {
         let d = load(simd, &self.directions, first);
         let length = [signs[0] * d[0], signs[1] * d[1], signs[2] * d[2]];
 
-        // The greatest distance to the scene along an axis, and the greatest component.
+        // The largest distance to the scene along an axis, and the largest component.
         let (mut farthest, mut greatest) = (simd.splat(0.0), simd.splat(0.0));
         for k in 0..3 {
             let lower = simd.splat(scene.min[k]) - o[k];

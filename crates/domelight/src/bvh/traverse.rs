@@ -1,4 +1,4 @@
-//! Walking the tree: one ray to its closest or any hit, and streams of rays.
+//! Traversal: one ray to its closest or any hit, and streams of rays.
 //!
 //! Everything here is generic over the instruction set and inlined into it.
 #![allow(clippy::large_stack_arrays)] // Some streams, 50 KiB.
@@ -13,18 +13,18 @@ use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
 use crate::simd::{Kernel, LaneMask, Simd, SimdBitSets, SimdF32x8, SimdFloat, set_bits};
 
-/// A node leaves at most seven children behind on the way down, and pushes eight.
+/// The stack size: each node leaves at most seven children behind on the way down, and pushes eight.
 pub(super) const STACK: usize = 256;
 const _: () = assert!(MAX_DEPTH as usize * (WIDTH - 1) + WIDTH <= STACK);
 
-/// Rays of a stream: one bit each in two words.
+/// The number of rays per stream, with one bit each in two words.
 const STREAM: usize = 64;
-/// Streams in flight: while one waits for memory the others go on.
+/// The number of streams in flight: while one waits for memory, the others continue.
 const INTERLEAVED: usize = 4;
-/// Rays through a tree of so many bytes or fewer, which the caches hold, go in two streams: they wait little,
-/// and leave more of the nearest cache to the tree.
+/// Trees of at most this size \[bytes\] fit in the caches and are traversed by two streams, which wait little and leave more
+/// of the nearest cache to the tree.
 const CACHED: usize = 1 << 24;
-/// Rays sorted at once: enough to fill the streams of all octants, few enough to stay coherent.
+/// The number of rays sorted at once: enough to fill the streams of all octants, but few enough to stay coherent.
 const WINDOW: usize = 4096;
 
 /// [`Bvh::closest_hit`]
@@ -148,13 +148,13 @@ impl Kernel for Transmittances<'_> {
     }
 }
 
-/// The greatest t of the open interval that ends at `t_max`.
+/// The largest t in the open interval that ends at `t_max`.
 #[inline(always)]
 fn last_below(t_max: f32) -> f32 {
     t_max.next_down()
 }
 
-/// None if the ray can hit nothing.
+/// `None` if the ray cannot hit anything.
 #[inline(always)]
 fn prepare_one<S: Simd>(simd: S, bvh: &Bvh, ray: &Ray) -> Option<PreparedRays<WIDTH>> {
     let mut rays = PreparedRays::EMPTY;
@@ -164,14 +164,14 @@ fn prepare_one<S: Simd>(simd: S, bvh: &Bvh, ray: &Ray) -> Option<PreparedRays<WI
 
 // ---- one ray -------------------------------------------------------------------------------------
 
-/// A child yet to visit, and where the ray enters it.
+/// A child to visit, and the distance where the ray enters it.
 #[derive(Clone, Copy, Default)]
 struct ClosestEntry {
     enter: f32,
     child: Child,
 }
 
-/// Children yet to visit, the nearest of a node on top.
+/// The children to visit, with the nearest child of a node on top.
 struct ClosestStack {
     entries: [ClosestEntry; STACK],
     len: usize,
@@ -183,7 +183,7 @@ impl ClosestStack {
         Self { entries: [ClosestEntry::default(); STACK], len: 0 }
     }
 
-    /// The next child that the ray enters no later than `limit`.
+    /// Pops the next child that the ray enters at or before `limit`.
     #[inline(always)]
     fn pop(&mut self, limit: f32) -> Option<Child> {
         while self.len > 0 {
@@ -209,9 +209,9 @@ impl ClosestStack {
     }
 }
 
-/// Which hits of a leaf count.
+/// Selects the accepted hits of a leaf.
 trait Accepting {
-    /// The best hit of a leaf for a ray that counts, if it is nearer than `closest`, or as near and of a lower number.
+    /// The best accepted hit of a leaf, if it is nearer than `closest`, or equally near with a smaller index.
     fn closest_in_block<S: Simd>(
         &self,
         simd: S,
@@ -241,7 +241,7 @@ impl Accepting for Everything {
     }
 }
 
-/// Those that the function accepts.
+/// The hits that the function accepts.
 struct Where<F>(F);
 
 impl<F: Fn(&Hit) -> bool> Accepting for Where<F> {
@@ -338,7 +338,7 @@ fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRays<WIDTH>, limit: f32) -
     }
 }
 
-/// The best hit of a leaf if it is nearer than `closest`, or as near and of a lower number.
+/// The best hit of a leaf, if it is nearer than `closest`, or equally near with a smaller index.
 #[inline(always)]
 fn closest_in_block<S: Simd, const N: usize>(
     simd: S,
@@ -365,7 +365,7 @@ fn closest_in_block<S: Simd, const N: usize>(
     Some(Hit { t: t[lane], u: u[lane], v: v[lane], triangle: block.ids[lane] })
 }
 
-/// Hands over each hit of a leaf, in the order of its triangles.
+/// Passes each hit of a leaf to the function, in the order of its triangles.
 #[inline(always)]
 fn for_hits_in_block<S: Simd, const N: usize>(
     simd: S,
@@ -393,25 +393,25 @@ fn for_hits_in_block<S: Simd, const N: usize>(
 
 // ---- streams -------------------------------------------------------------------------------------
 
-/// Rays of one octant on their way through the tree, together: a node's planes are loaded once for all
-/// rays that reach it. The order of the visits does not change the answers.
+/// Rays of one octant that traverse the tree together: a node's planes are loaded once for all rays that
+/// reach it. The order of visits does not change the answers.
 trait Stream: Sized {
     const EMPTY: Self;
     /// The rays to start with.
     type Rays<'a>;
-    /// What it needs to know besides.
+    /// Additional context.
     type Context<'a>: Copy;
     type Answer;
 
     /// Begins at the root.
     fn start<S: Simd>(&mut self, simd: S, bvh: &Bvh, rays: Self::Rays<'_>);
-    /// Visits the next node or leaf; false if there is none.
+    /// Visits the next node or leaf. Returns false if there is none.
     fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh, context: Self::Context<'_>) -> bool;
-    /// Hands over the answers.
+    /// Writes the answers.
     fn finish(&mut self, answers: &mut [Self::Answer]);
 }
 
-/// Runs as many streams in turns as the tree's size asks for.
+/// Runs streams in turns, with their number chosen by the size of the tree.
 #[inline(always)]
 fn interleave<'a, S: Simd, T: Stream>(
     simd: S,
@@ -427,7 +427,7 @@ fn interleave<'a, S: Simd, T: Stream>(
     }
 }
 
-/// Runs `N` streams in turns, each again and again, until nothing is left to start with.
+/// Runs `N` streams in turns until no rays are left.
 #[inline(always)]
 fn take_turns<'a, S: Simd, T: Stream, const N: usize>(
     simd: S,
@@ -484,7 +484,7 @@ impl<S: Simd> Entering<S> {
     }
 }
 
-/// Children yet to visit, and for each the rays of the stream that enter it.
+/// The children to visit, each with the rays of the stream that enter it.
 struct StreamStack {
     children: [u32; STACK],
     /// The lower and the upper half of the rays.
@@ -522,11 +522,11 @@ impl StreamStack {
         self.push_entered(&node.children, entering);
     }
 
-    /// Pushes the children that any ray enters, the last on top.
+    /// Pushes the children that any ray enters, with the last on top.
     #[inline(always)]
     fn push_entered<S: Simd>(&mut self, children: &[Child; WIDTH], rays: Entering<S>) {
         let (rays, children, count) = SimdBitSets::pack(rays.0, children.map(|child| child.0));
-        // What lies beyond `count` is overwritten by the next.
+        // Entries beyond `count` are overwritten by the next push.
         self.children[self.len..self.len + WIDTH].copy_from_slice(&children);
         for (stack, rays) in self.rays.iter_mut().zip(&rays) {
             stack[self.len..self.len + WIDTH].copy_from_slice(rays);
@@ -534,7 +534,7 @@ impl StreamStack {
         self.len += count;
     }
 
-    /// The next child that any of the rays `free` enters, and which.
+    /// Pops the next child that any of the rays `free` enters, with those rays.
     #[inline(always)]
     fn pop(&mut self, free: u64) -> Option<(Child, u64)> {
         while self.len > 0 {
@@ -548,7 +548,7 @@ impl StreamStack {
         None
     }
 
-    /// Asks for the memory of the next child.
+    /// Prefetches the next child.
     #[inline(always)]
     fn prefetch<S: Simd>(&self, simd: S, bvh: &Bvh) {
         let Some(&top) = self.children[..self.len].last() else { return };
@@ -566,7 +566,7 @@ struct ClosestStream {
     rays: PreparedRays<STREAM>,
     limits: [f32; STREAM],
     hits: [Option<Hit>; STREAM],
-    /// Where the rays are in their batch.
+    /// The indices of the rays in their batch.
     members: Range<usize>,
     stack: StreamStack,
 }
@@ -658,9 +658,9 @@ impl Stream for ClosestStream {
 /// [`any_hit`] to infinity of up to [`STREAM`] rays.
 struct ShadowStream {
     rays: PreparedRays<STREAM>,
-    /// Where the rays are in their batch.
+    /// The indices of the rays in their batch.
     members: [usize; STREAM],
-    /// Rays that have hit nothing yet, and those that have, as bits.
+    /// The rays that have hit nothing yet, and those that have, as bits.
     free: u64,
     hit: u64,
     stack: StreamStack,
@@ -735,11 +735,11 @@ impl Stream for ShadowStream {
 /// it, so that its product has the same bits.
 struct TransmittanceStream {
     rays: PreparedRays<STREAM>,
-    /// Where the rays are in their batch.
+    /// The indices of the rays in their batch.
     members: [usize; STREAM],
     count: usize,
     transmittances: [f32; STREAM],
-    /// Rays of which something is left, as bits.
+    /// The rays with transmittance left, as bits.
     free: u64,
     stack: StreamStack,
 }
@@ -810,7 +810,7 @@ impl Stream for TransmittanceStream {
     }
 }
 
-/// Orders the rays of a window by octant and keeps their order within; returns the octants' ranges.
+/// Sorts the rays of a window by octant, preserving their order within. Returns the octants' ranges.
 fn sort_by_octant(directions: &[Vec3], order: &mut [u16; WINDOW]) -> [Range<usize>; 8] {
     let mut counts = [0; 8];
     for &direction in directions {

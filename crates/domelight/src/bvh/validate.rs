@@ -1,15 +1,15 @@
-//! Checks a finished tree against what the traversal takes for granted.
+//! Checks a finished tree against the assumptions of the traversal.
 
 use super::build::MAX_DEPTH;
 use super::{Block, Bvh, Child, Node, WIDTH};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
 
-/// What is wrong with a hierarchy; each would be a defect of the builder.
+/// A defect in a BVH, which would be a bug in the builder.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BvhDefect {
-    /// A child's box does not hold a triangle or box below it.
-    #[error("child {child} of node {node} does not hold what is below it: {bounds:?}")]
+    /// A child's box does not contain a triangle or box below it.
+    #[error("child {child} of node {node} does not contain its subtree: {bounds:?}")]
     Bounds {
         /// The node.
         node: usize,
@@ -32,7 +32,7 @@ pub enum BvhDefect {
         /// The node.
         node: usize,
     },
-    /// Nodes, blocks or triangles that no path reaches, or more than one.
+    /// Nodes, blocks or triangles that no path reaches, or that several paths reach.
     #[error("the tree reaches {reached} of {count} {what}")]
     Coverage {
         /// What is missing or repeated.
@@ -43,7 +43,7 @@ pub enum BvhDefect {
         count: usize,
     },
     /// A triangle that is in two blocks.
-    #[error("triangle {triangle} is in the tree twice")]
+    #[error("triangle {triangle} is in the BVH twice")]
     Repeated {
         /// The triangle.
         triangle: u32,

@@ -6,22 +6,22 @@ use crate::Rgb;
 use crate::math::{Vec2, Vec3};
 use crate::sampling::HierarchicalTable;
 
-/// A table over max(L − mean L, 0): it leaves the dim parts of the map to another technique.
+/// A table of max(L − mean L, 0), which leaves the dim parts of the map to another technique.
 ///
-/// Its density is zero where the map is not, so alone it would be biased. It is a type of its own
+/// Its density is zero where the map is not, so alone it would be biased. It is a separate type
 /// that only multiple importance sampling with BRDF samples accepts.
 #[derive(Clone, Debug)]
 pub struct CompensatedTable {
-    /// None where nothing exceeds the mean, on a constant or black map: all is left to the BRDF.
+    /// `None` if nothing exceeds the mean, on a constant or black map; everything is left to the BRDF.
     table: Option<HierarchicalTable>,
-    /// What is taken off the luminance.
+    /// The value subtracted from the luminance.
     floor: f32,
-    /// One over the table's total; 0 without a table.
+    /// The reciprocal of the table's total; 0 without a table.
     inverse_total: f32,
 }
 
 impl CompensatedTable {
-    /// The table of an environment; the mean is over solid angle.
+    /// Creates the table of an environment. The mean is over solid angle.
     pub fn new(environment: &Environment) -> Self {
         let mean = environment.power() / (4.0 * std::f64::consts::PI);
         // The mean of a constant map may round to just below it.
@@ -32,12 +32,12 @@ impl CompensatedTable {
         Self { table, floor, inverse_total }
     }
 
-    /// Draws a direction; none where nothing exceeds the mean.
+    /// Samples a direction; `None` if nothing exceeds the mean.
     pub fn sample(&self, environment: &Environment, u: Vec2) -> Option<EnvironmentSample> {
         environment.sample_table(self.table.as_ref()?, u, |le| self.density(le))
     }
 
-    /// Radiance, and the density of [`CompensatedTable::sample`] at `wi` \[sr⁻¹\].
+    /// The radiance from `wi`, and the density of [`CompensatedTable::sample`] \[sr⁻¹\].
     pub fn le_pdf(&self, environment: &Environment, wi: Vec3) -> (Rgb, f32) {
         let le = environment.le(wi);
         (le, self.density(le))

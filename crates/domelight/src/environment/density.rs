@@ -1,14 +1,14 @@
-//! Densities of the caller's own over an environment's texels.
+//! Custom densities over an environment's texels.
 
 use super::{Environment, EnvironmentSample, Texel, unit_of};
 use crate::math::Vec2;
 use crate::sampling::HierarchicalTable;
 use crate::simd::Vectors;
 
-/// A way to draw directions in proportion to weights that the caller gives the texels of an environment, constant over
-/// each: an importance of one's own beside that of luminance.
+/// A density over directions proportional to the caller's weights for the texels of an environment, constant over each
+/// texel.
 ///
-/// Where a weight is zero and the radiance is not, the density alone would be biased: combine it with another one by
+/// If a weight is zero but the radiance is not, sampling this density alone is biased. Combine it with another one by
 /// multiple importance sampling.
 #[derive(Clone, Debug)]
 pub struct EnvironmentDensity {
@@ -19,11 +19,11 @@ pub struct EnvironmentDensity {
     inverse_total: f32,
 }
 
-/// Weights that make no density.
+/// Invalid weights of a density.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DensityError {
-    /// Not a weight for each texel.
+    /// The number of weights differs from the number of texels.
     #[error("there are {found} weights for a map of {width}x{height} texels")]
     Count {
         /// How many weights.
@@ -43,17 +43,18 @@ pub enum DensityError {
         /// The weight.
         value: f32,
     },
-    /// No weight is positive.
+    /// All weights are 0.
     #[error("all weights are 0")]
     AllZero,
 }
 
 impl EnvironmentDensity {
-    /// The density in proportion to `weights`, per solid angle: one for each texel of [`Environment::map`], row by row.
+    /// Creates the density per solid angle proportional to `weights`, one for each texel of [`Environment::map`], row
+    /// by row.
     ///
     /// # Errors
-    /// The first weight in row order that is negative or not finite, another number of weights than of texels, or
-    /// weights that are all 0.
+    /// The first weight in row order that is negative or not finite, a number of weights that differs from the number
+    /// of texels, or weights that are all 0.
     pub fn new(environment: &Environment, weights: Vec<f32>) -> Result<Self, DensityError> {
         let grid = &environment.grid;
         let (width, height) = (grid.texels.width(), grid.texels.height());
@@ -80,7 +81,7 @@ impl EnvironmentDensity {
         Ok(Self { table, weights, width, inverse_total })
     }
 
-    /// Draws a direction; none where the density is too small for single precision. `environment` is that of
+    /// Samples a direction; `None` if the density is too small for single precision. `environment` is that of
     /// [`EnvironmentDensity::new`], or one of the same size.
     pub fn sample(&self, environment: &Environment, u: Vec2) -> Option<EnvironmentSample> {
         let drawn = self.table.sample(u);
@@ -92,7 +93,7 @@ impl EnvironmentDensity {
         (pdf > 0.0).then_some(EnvironmentSample { wi, le, pdf })
     }
 
-    /// Density of [`EnvironmentDensity::sample`] at `wi` \[sr⁻¹\].
+    /// The density of [`EnvironmentDensity::sample`] at `wi` \[sr⁻¹\].
     pub fn pdf(&self, environment: &Environment, wi: crate::math::Vec3) -> f32 {
         self.density(
             environment.grid.texel(environment.orientation.up.to_map(Vectors::from(wi)).into()),

@@ -1,8 +1,8 @@
-//! Light probes from files: any picture format, any mapping, brought to the lat-long working map.
+//! Loads light probes from any picture format and mapping, converted to the lat-long working map.
 //!
-//! Radiance must be finite and not negative before any sampling table is made from it. Lossy compression leaves negative
-//! texels in most maps, and stitching NaN in some: they are repaired and counted in a warning, for a NaN may be where
-//! the sun was; with [`ProbeOptions::strict`] they are an error that shows the first bad texel.
+//! Sampling tables require finite, non-negative radiance. Lossy compression leaves negative texels in most maps, and
+//! stitching leaves NaN in some. They are repaired and counted in a warning, because a NaN may be where the sun was.
+//! With [`ProbeOptions::strict`], they are an error that names the first bad texel.
 
 use super::mapping::{Mapping, ShapeError, to_lat_long};
 use crate::math::{Vec2, vec2};
@@ -11,50 +11,50 @@ use crate::picture::{self, DataWindow, Format, PictureError, ReadOptions};
 use crate::{Rgb, RgbImage};
 use std::path::Path;
 
-/// Options for reading a probe's file.
+/// Options for loading a probe.
 #[derive(Clone, Debug, Default)]
 pub struct ProbeOptions {
-    /// The mapping; by default guessed from attribute, shape and, of a square, its corners.
+    /// The mapping; by default inferred from the attribute, the shape and, for a square, the corners.
     pub mapping: Option<Mapping>,
-    /// The OpenEXR layer, see [`ReadOptions::layer`].
+    /// The OpenEXR layer; see [`ReadOptions::layer`].
     pub layer: Option<String>,
-    /// Refuse negative and non-finite values instead of repairing them.
+    /// Whether to reject negative and non-finite values instead of repairing them.
     pub strict: bool,
-    /// The most memory that reading may take, see [`ReadOptions::max_memory`].
+    /// The maximum memory for reading; see [`ReadOptions::max_memory`].
     pub max_memory: Option<u64>,
 }
 
-/// A probe in the working map.
+/// A probe converted to the working map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadedProbe {
-    /// Lat-long, every value finite and ≥ 0.
+    /// The lat-long map, with every value finite and ≥ 0.
     pub image: RgbImage,
     /// The mapping of the file.
     pub mapping: Mapping,
-    /// Width and height of the file's picture.
+    /// The width and height of the picture in the file.
     pub file_size: (usize, usize),
-    /// What was repaired.
+    /// The numbers of repaired values.
     pub sanitized: SanitizeReport,
-    /// Differences between the map and the light that was there, one sentence each.
+    /// Differences between the map and the original light, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// Numbers of repaired values (channels of texels).
+/// The numbers of repaired values (channels of texels).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SanitizeReport {
-    /// Negative values, now 0.
+    /// Negative values, replaced by 0.
     pub negative: usize,
-    /// NaN and infinities, now the mean of their neighbors.
+    /// NaN and infinities, replaced by the mean of their neighbors.
     pub non_finite: usize,
 }
 
-/// A probe could not be loaded.
+/// An error in loading a probe.
 #[derive(Debug, thiserror::Error)]
 pub enum ProbeError {
     /// The picture could not be read.
     #[error(transparent)]
     Picture(#[from] PictureError),
-    /// The picture has not the shape of the mapping that was asked for.
+    /// The picture does not have the shape of the requested mapping.
     #[error("{file}: {shape}")]
     Shape {
         /// The file.
@@ -62,7 +62,7 @@ pub enum ProbeError {
         /// What does not fit.
         shape: ShapeError,
     },
-    /// Some values are no radiance.
+    /// Some values are not valid radiance.
     #[error(
         "{file}: texel ({x}, {y}) has {channel} = {value}, and {count} value(s) in all are negative, NaN or infinite; \
          without --strict they are repaired"
@@ -70,26 +70,26 @@ pub enum ProbeError {
     BadTexel {
         /// The file.
         file: String,
-        /// Column of the first bad texel.
+        /// The column of the first bad texel.
         x: usize,
-        /// Row of the first bad texel.
+        /// The row of the first bad texel.
         y: usize,
         /// `R`, `G` or `B`.
         channel: char,
         /// Its value there.
         value: f32,
-        /// Number of bad values in the whole picture.
+        /// The number of bad values in the whole picture.
         count: usize,
     },
 }
 
-/// The light probe in a file, or on standard input if `path` is `-`.
+/// Loads the light probe in a file, or on standard input if `path` is `-`.
 ///
-/// Lat-long maps keep their texels bit for bit; other mappings are converted at the height that keeps their detail.
+/// Lat-long maps keep their texels bit for bit. Other mappings are converted at the height that keeps their detail.
 ///
 /// # Errors
-/// If the picture cannot be read, has not the mapping's shape, or, with [`ProbeOptions::strict`], has values that are
-/// no radiance.
+/// If the picture cannot be read, does not have the shape of the mapping, or, with [`ProbeOptions::strict`], has
+/// invalid radiance.
 pub fn load_probe(path: &Path, options: &ProbeOptions) -> Result<LoadedProbe, ProbeError> {
     let read = ReadOptions { layer: options.layer.clone(), max_memory: options.max_memory };
     let picture = picture::read(path, &read)?;
@@ -98,10 +98,10 @@ pub fn load_probe(path: &Path, options: &ProbeOptions) -> Result<LoadedProbe, Pr
     probe_from_picture(picture, &file, options)
 }
 
-/// The light probe in the bytes of a file; `file` is its name, for messages.
+/// Loads the light probe in the bytes of a file; `file` is its name, for messages.
 ///
 /// # Errors
-/// As [`load_probe`].
+/// Those of [`load_probe`].
 pub fn probe_from_bytes(
     bytes: &[u8],
     file: &str,
@@ -111,10 +111,10 @@ pub fn probe_from_bytes(
     probe_from_picture(picture::read_bytes(bytes, file, &read)?, file, options)
 }
 
-/// The light probe in a picture; `file` is for messages.
+/// Converts a picture to a light probe; `file` is for messages.
 ///
 /// # Errors
-/// As [`load_probe`], but for reading.
+/// Those of [`load_probe`], except for reading.
 pub fn probe_from_picture(
     picture: picture::Picture,
     file: &str,
@@ -127,15 +127,17 @@ pub fn probe_from_picture(
             in_display_window(&image, window, options).map_err(|problem| problem.in_file(file))?
     {
         warnings.push(format!(
-            "{file}: the data window of {}x{} texels is shown in the display window of {}x{}; what lies outside the \
-             one is black, outside the other is cut off",
+            "{file}: the data window of {}x{} texels differs from the display window of {}x{}; \
+             texels outside the data window are black, texels outside the display window are \
+             cropped",
             image.width, image.height, framed.width, framed.height
         ));
         image = framed;
     }
     if matches!(picture.format, Format::Png | Format::Jpeg) {
         warnings.push(format!(
-            "{file}: {} holds nothing brighter than white, so that suns and lamps are cut off; use .exr or .hdr",
+            "{file}: {} holds nothing brighter than white, so suns and lamps are clipped; use \
+             .exr or .hdr",
             if picture.format == Format::Png { "PNG" } else { "JPEG" }
         ));
     }
@@ -165,7 +167,7 @@ pub fn probe_from_picture(
     Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings })
 }
 
-/// The display window's picture, if that has the shape of a map and the data window has not.
+/// The picture in the display window, if it has the shape of a map and the data window does not.
 ///
 /// Cropped maps and those with borders beyond the frame keep their directions so. But the display windows of many
 /// files are whatever their makers had open, so a data window that looks like a map is one.
@@ -200,7 +202,7 @@ fn in_display_window(
     Ok(Some(framed))
 }
 
-/// An angular map is black outside its disc; a square that is not is taken as octahedral.
+/// An angular map is black outside its disc; any other square is interpreted as octahedral.
 fn guess_of_square(image: &RgbImage) -> Mapping {
     let n = image.width as f32;
     let is_outside = |x: usize, y: usize| {
@@ -234,8 +236,8 @@ fn require_radiance(image: &RgbImage, file: &str) -> Result<(), ProbeError> {
     })
 }
 
-/// Makes every value finite and ≥ 0: negative ones become 0, NaN and infinities the mean of their finite neighbors
-/// among the eight around, from the border of a bad region inward. A channel without any finite value becomes 0.
+/// Makes every value finite and ≥ 0. Negative values become 0; NaN and infinities become the mean of their finite
+/// 8-neighbors, from the border of a bad region inward. A channel without any finite value becomes 0.
 pub fn sanitize(image: &mut RgbImage) -> SanitizeReport {
     let mut report = SanitizeReport::default();
     for pixel in &mut image.pixels {

@@ -1,4 +1,4 @@
-//! Where the key light of a map comes from, to turn the map so that it falls on what the camera sees.
+//! Finds the key light of a map, to rotate the map so that this light falls on the visible side of the subject.
 
 use super::statistics::{ProbeStatistics, Sun, texel_direction};
 use super::{LatLongGrid, UpAxis};
@@ -9,20 +9,21 @@ use crate::math::{Vec3, functions};
 /// Rows of the reduced map on which the sun is looked for.
 const ROWS: usize = 256;
 
-/// The least share of the map's light of a compact source that is the key light by itself.
+/// The minimum share of the map's light for a compact source to be the key light.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Below this share of all light, the horizontal light vector has no direction worth the name.
+/// Below this share of all light, the direction of the horizontal light vector is not meaningful.
 const LEAST_ANISOTROPY: f64 = 1e-3;
 
 /// From the direction to the camera, around the up axis \[degrees\]: negative is on the picture's left.
 const BESIDE_CAMERA: f32 = -45.0;
 
-/// The rotation \[degrees\], in (−180, 180\], of [`Orientation`](super::Orientation) at which the key light of a lat-long map falls from
-/// the left onto what a camera sees: around the up axis 45° from the direction `toward_camera`, of any length.
+/// The rotation \[degrees\] of [`Orientation`](super::Orientation), in (−180, 180\], at which the key light of a
+/// lat-long map comes from the left of a camera: 45° around the up axis from the direction `toward_camera`, which may
+/// have any length.
 ///
-/// The key light is the sun of the map, or without one the direction from which most light comes, in the plane of the
-/// horizon. Maps without such a direction are not turned.
+/// The key light is the sun of the map or, without a sun, the direction in the plane of the horizon from which most
+/// light comes. Maps without such a direction are not rotated.
 ///
 /// # Panics
 /// If the map has no texels.
@@ -32,7 +33,7 @@ pub fn key_light_rotation(map: &RgbImage, up: UpAxis, toward_camera: Vec3) -> f3
     let key = sun.map(|Sun { direction, .. }| direction).or_else(|| light_vector(&map));
     let Some(key) = key else { return 0.0 };
     let toward_camera = up.from_y_up().transpose() * toward_camera;
-    // Counter-clockwise seen from above.
+    // Counterclockwise as seen from above.
     let angle = |v: Vec3| functions::atan2(v.x, v.z).to_degrees();
     let turn = angle(toward_camera) + BESIDE_CAMERA - angle(key);
     180.0 - (180.0 - turn).rem_euclid(360.0)

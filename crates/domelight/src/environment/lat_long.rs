@@ -1,12 +1,13 @@
-//! The grid of a lat-long map, and how much of the sphere its rows and texels cover.
+//! The grid of a lat-long map, with the solid angles of its rows and texels.
 //!
-//! In the plane of longitude and cos θ areas are solid angles (Archimedes), and texels are rectangles.
+//! In the plane of longitude and cos θ, areas equal solid angles (Archimedes), and texels are rectangles.
 
 use crate::math::functions;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-/// Columns of equal longitude and rows of equal polar angle θ, from θ = 0 in the first row's upper edge to π.
+/// Columns uniform in longitude and rows uniform in the polar angle θ, from θ = 0 at the upper edge of the first row
+/// to π.
 #[derive(Clone, Debug)]
 pub struct LatLongGrid {
     width: usize,
@@ -16,30 +17,30 @@ pub struct LatLongGrid {
 }
 
 impl LatLongGrid {
-    /// The grid of `width` × `height` texels, neither zero.
+    /// Creates a grid of `width` × `height` texels, neither zero.
     pub fn new(width: usize, height: usize) -> Self {
         let edge = |row: usize| functions::cos(PI * row as f64 / height as f64);
         Self { width, height, cos_edges: (0..=height).map(edge).collect() }
     }
 
-    /// Columns.
+    /// The number of columns.
     #[inline]
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// The number of rows.
     #[inline]
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// The longitudes that a column spans \[rad\].
+    /// The width of a column in longitude \[rad\].
     pub fn column_angle(&self) -> f64 {
         TAU / self.width as f64
     }
 
-    /// cos θ of the upper edge of a row; of row [`LatLongGrid::height`] the lower edge of the last row.
+    /// cos θ of the upper edge of a row; for row [`LatLongGrid::height`], of the lower edge of the last row.
     ///
     /// # Panics
     /// If there is no such row.
@@ -48,7 +49,7 @@ impl LatLongGrid {
         self.cos_edges[row]
     }
 
-    /// The height of a band of rows in cos θ: 2 for all rows.
+    /// The extent of a band of rows in cos θ; 2 for all rows.
     ///
     /// # Panics
     /// If there is no such row.
@@ -57,7 +58,7 @@ impl LatLongGrid {
         self.cos_edges[rows.start] - self.cos_edges[rows.end]
     }
 
-    /// Solid angle of a texel of row `row` \[sr\].
+    /// The solid angle of a texel in row `row` \[sr\].
     ///
     /// # Panics
     /// If there is no such row.

@@ -1,11 +1,11 @@
-//! How a picture covers the sphere of directions: the mappings in which light probes are kept, and conversion
-//! to and from the lat-long working map.
+//! Mappings between pictures of light probes and the sphere of directions, with conversion to and from the
+//! lat-long working map.
 //!
 //! Every mapping is a pair of inverse functions between picture coordinates (u, v) ∈ \[0, 1\]² (u right, v down)
 //! and directions in the world frame (right-handed, +Y up), with its Jacobian dω / (du dv). A texel's value is
 //! constant over the texel, so conversion is an area average: each target texel is the mean of the source over
-//! the texel's solid angle, by the exact areas that two texels share (`overlap.rs`). Supersampling was rejected: it
-//! loses or doubles lights of a texel's size. Bilinear look-up was, too: it smears a one-texel sun over its neighbors
+//! the texel's solid angle, from the exact overlap of texels (`overlap.rs`). Supersampling was rejected, because it
+//! loses or doubles texel-sized lights. So was bilinear look-up, because it smears a one-texel sun over its neighbors
 //! and disagrees with the constant texels of the importance table.
 //!
 //! Sources: Debevec 1998, "Rendering Synthetic Objects into Real Scenes", and his light-probe gallery (angular
@@ -23,50 +23,50 @@ pub use cube::CubeLayout;
 use crate::math::{PI, TAU, Vec2, Vec3, functions, sqr, vec2, vec3};
 use std::str::FromStr;
 
-/// What the `envmap` attribute of an OpenEXR file says about its picture.
+/// The value of the `envmap` attribute of an OpenEXR file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EnvmapKind {
-    /// Latitude and longitude, the center toward +Z.
+    /// Latitude and longitude, with the center toward +Z.
     LatLong,
-    /// Six faces of a cube, one above the other.
+    /// The six faces of a cube, stacked vertically.
     Cube,
 }
 
 /// A mapping between picture coordinates and directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mapping {
-    /// Latitude and longitude, the working map: row 0 is +Y, the center column looks toward −Z and u grows to
+    /// Latitude and longitude, the working map. Row 0 is +Y, the center column looks toward −Z, and u grows to
     /// the right as seen from inside.
     LatLong,
-    /// Latitude and longitude as OpenEXR's `envmap` attribute defines it: as [`Mapping::LatLong`], but the center
+    /// Latitude and longitude as defined by OpenEXR's `envmap` attribute: like [`Mapping::LatLong`], but the center
     /// column looks toward +Z. OpenEXR puts the centers of the border texels on the border (texel 0 at longitude
-    /// π exactly); here, as in all other mappings, texels are areas, which moves a texel by less than its half.
+    /// π exactly). Here, as in all other mappings, texels are areas, which shifts a texel by less than half its size.
     LatLongExr,
     /// Debevec's light probe: a disc whose radius is the angle to −Z over π; the center looks toward −Z, the
     /// circumference is +Z, right is +X, up is +Y.
     Angular,
-    /// An orthographic photograph of a mirror ball that touches the picture's borders. The camera stands at −Z of
+    /// An orthographic photograph of a mirror ball that touches the borders of the picture. The camera is at −Z of
     /// the ball, so the center, which reflects the camera, looks toward −Z like that of the angular map, and the
-    /// circumference grazes +Z. It is a reflection: u grows to the *left* as seen from inside, and a plain
-    /// photograph gives an environment in which text reads the right way round. (pfstools and the book of Reinhard
-    /// et al. take ball pictures that were mirrored beforehand.)
+    /// circumference grazes +Z. It is a reflection, so u grows to the *left* as seen from inside, and an unedited
+    /// photograph gives an environment in which text reads correctly. (pfstools and the book of Reinhard et al.
+    /// expect ball pictures that were mirrored beforehand.)
     MirrorBall,
-    /// Six faces of a cube, unfolded in one of several ways.
+    /// The six faces of a cube, unfolded in one of several layouts.
     Cube(CubeLayout),
-    /// Equal-area octahedral square with +Y at its center and −Y at its corners, as in pbrt-v4. Rotated such that
-    /// what pbrt's `imgtool makeequiarea` makes of a lat-long map comes back as that map.
+    /// The equal-area octahedral square with +Y at its center and −Y at its corners, as in pbrt-v4. It is rotated so
+    /// that a lat-long map converted by pbrt's `imgtool makeequiarea` converts back to the same map.
     Octahedral,
 }
 
-/// The picture has a shape in which the mapping cannot be.
+/// A picture whose shape does not fit the mapping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{mapping} maps have width : height = {}:{}, this picture is {width}x{height}", .mapping.aspect().0, .mapping.aspect().1)]
 pub struct ShapeError {
-    /// The mapping that was asked for.
+    /// The requested mapping.
     pub mapping: Mapping,
-    /// Columns of the picture.
+    /// The number of columns of the picture.
     pub width: usize,
-    /// Rows of the picture.
+    /// The number of rows of the picture.
     pub height: usize,
 }
 
@@ -74,7 +74,7 @@ pub struct ShapeError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown mapping {name:?}; known are {}", Mapping::ALL.map(Mapping::name).join(", "))]
 pub struct UnknownMapping {
-    /// What was asked for.
+    /// The given name.
     pub name: String,
 }
 
@@ -104,7 +104,7 @@ impl Mapping {
         }
     }
 
-    /// Width to height in least whole numbers. Lat-long maps of any other shape are accepted too.
+    /// The ratio of width to height in lowest terms. Lat-long maps with any other shape are accepted too.
     pub const fn aspect(self) -> (usize, usize) {
         match self {
             Self::LatLong | Self::LatLongExr => (2, 1),
@@ -116,7 +116,7 @@ impl Mapping {
     /// Whether a picture of `width` × `height` texels can be in this mapping.
     ///
     /// # Errors
-    /// If it has not the exact shape [`Mapping::aspect`]; lat-long maps may have any.
+    /// If it does not have the exact ratio [`Mapping::aspect`]; lat-long maps may have any shape.
     pub fn check_shape(self, width: usize, height: usize) -> Result<(), ShapeError> {
         let (columns, rows) = self.aspect();
         let any_shape = matches!(self, Self::LatLong | Self::LatLongExr);
@@ -129,9 +129,9 @@ impl Mapping {
 
     /// The likely mapping of a picture from its size and its OpenEXR attribute.
     ///
-    /// The attribute decides where its shape can be true. Then 1:1 is an angular map, 4:3 and 3:4 a cross, 6:1 and
-    /// 1:6 a strip of faces, and everything else, a single texel included, lat-long. A square can as well be a
-    /// mirror ball or octahedral: the size does not distinguish them.
+    /// The attribute decides if the shape fits. Otherwise, 1:1 is an angular map, 4:3 and 3:4 a cross, 6:1 and 1:6 a
+    /// strip of faces, and everything else, including a single texel, is lat-long. A square may also be a mirror ball
+    /// or octahedral; the size does not distinguish them.
     pub fn guess(width: usize, height: usize, envmap: Option<EnvmapKind>) -> Self {
         let has_shape = |mapping: &Self| mapping.check_shape(width, height).is_ok();
         match envmap {
@@ -151,7 +151,7 @@ impl Mapping {
         std::iter::once(Self::Angular).chain(cubes).find(has_shape).unwrap_or(Self::LatLong)
     }
 
-    /// What OpenEXR's `envmap` attribute calls the mapping, if it knows it.
+    /// The value of OpenEXR's `envmap` attribute for the mapping, if there is one.
     pub const fn envmap(self) -> Option<EnvmapKind> {
         match self {
             Self::LatLongExr => Some(EnvmapKind::LatLong),
@@ -212,7 +212,7 @@ impl Mapping {
             // sin θ dθ = 4 r dr for θ = 2 asin r: the reflection in a ball preserves area.
             Self::MirrorBall => 16.0,
             Self::Octahedral => 4.0 * PI,
-            // dω = ds dt / (1 + s² + t²)^{3/2}, and 1/√(1 + s² + t²) is the greatest component.
+            // dω = ds dt / (1 + s² + t²)^{3/2}, and 1/√(1 + s² + t²) is the largest component.
             Self::Cube(layout) => {
                 let (columns, rows) = layout.faces_across_and_down();
                 4.0 * (columns * rows) as f32 * functions::powi(direction.abs().max_element(), 3)
@@ -222,7 +222,7 @@ impl Mapping {
 
     /// The height of a lat-long map that keeps the finest detail of a picture of this mapping.
     ///
-    /// The lat-long texel π / height is as wide as the source's texel where that is widest in the picture's center.
+    /// The lat-long texel π / height is as wide as the source's widest texel in the center of the picture.
     pub fn lat_long_height(self, width: usize, height: usize) -> usize {
         let edge = height as f32 / self.aspect().1 as f32;
         let keeps = match self {
@@ -235,7 +235,7 @@ impl Mapping {
         (keeps.ceil() as usize).max(1)
     }
 
-    /// The size (width, height) of a picture of this mapping that keeps the detail of a lat-long map of
+    /// The size (width, height) of a picture in this mapping that keeps the detail of a lat-long map with
     /// `lat_long_height` rows: the inverse of [`Mapping::lat_long_height`].
     pub fn size_for(self, lat_long_height: usize) -> (usize, usize) {
         let h = lat_long_height as f32;

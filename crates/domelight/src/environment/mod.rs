@@ -1,9 +1,9 @@
-//! The distant light: radiance over directions, its importance table and its look-up.
+//! The distant light: radiance over directions, look-up, and importance sampling.
 //!
 //! An [`Environment`] is a lat-long map of constant texels. Its table holds luminance times the
 //! texel's *exact* solid angle, so look-up, table and density agree everywhere: at the poles, at
-//! the seam and beside the sun. (A bilinear look-up over this table would lose up to 43.75 % of a
-//! single bright texel's light, for the table is zero where the interpolant is not.)
+//! the seam and next to the sun. (A bilinear look-up over this table would lose up to 43.75 % of a
+//! single bright texel's light, because the table is zero where the interpolant is not.)
 
 pub mod builtin;
 pub(crate) mod compact;
@@ -46,13 +46,13 @@ impl UpAxis {
         }
     }
 
-    /// The rotation from a world in which +Y is up to one in which this axis is; what the center of
-    /// a map looks toward stays in front.
+    /// The rotation from a world in which +Y is up to one in which this axis is up. The center of a
+    /// map stays in front.
     pub fn from_y_up(self) -> Mat3 {
         Mat3::from_cols(self.to_world(Vec3::X), self.to_world(Vec3::Y), self.to_world(Vec3::Z))
     }
 
-    /// World to the map's own frame, where +Y is up.
+    /// Transforms from world space to the map's own frame, where +Y is up.
     #[inline(always)]
     pub(crate) fn to_map<F: SimdFloat>(self, w: Vectors<F>) -> Vectors<F> {
         match self {
@@ -61,7 +61,7 @@ impl UpAxis {
         }
     }
 
-    /// The map's own frame to the world.
+    /// Transforms from the map's own frame to world space.
     pub(crate) fn to_world(self, m: Vec3) -> Vec3 {
         match self {
             Self::Y => m,
@@ -75,7 +75,7 @@ impl UpAxis {
 pub struct Orientation {
     /// The axis of the top row.
     pub up: UpAxis,
-    /// Rotation about the up axis \[degrees\], counter-clockwise seen from above: at 90 what was in
+    /// Rotation about the up axis \[degrees\], counterclockwise as seen from above: at 90, the part that was in
     /// front (−Z) is on the left (−X).
     pub rotation: f32,
 }
@@ -87,7 +87,7 @@ impl Orientation {
     }
 }
 
-/// What makes a map unusable.
+/// An error in the construction of an environment.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum EnvironmentError {
     /// No texels.
@@ -108,7 +108,7 @@ pub enum EnvironmentError {
         x: usize,
         /// Row.
         y: usize,
-        /// Its value, scale included.
+        /// The value, including the scale.
         value: Rgb,
     },
     /// A scale that is negative, NaN or infinite.
@@ -119,14 +119,14 @@ pub enum EnvironmentError {
     BadRotation(f32),
 }
 
-/// A direction drawn from the environment.
+/// A direction sampled from the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvironmentSample {
-    /// Unit direction toward the light, world frame.
+    /// The unit direction toward the light, in world space.
     pub wi: Vec3,
-    /// Radiance from there, [`Environment::le`] of `wi`.
+    /// Radiance from `wi`, equal to [`Environment::le`].
     pub le: Rgb,
-    /// Density \[sr⁻¹\], [`Environment::pdf`] of `wi`, positive.
+    /// Density \[sr⁻¹\] of `wi`, positive and equal to [`Environment::pdf`].
     pub pdf: f32,
 }
 
@@ -137,12 +137,12 @@ struct Texel {
     row: usize,
 }
 
-/// Radiance from every direction, and a way to draw directions in proportion to its luminance.
+/// Radiance over all directions, with importance sampling proportional to its luminance.
 ///
-/// Radiance, power and map are multiples of [`Environment::unit`] W·m⁻²·sr⁻¹, which is 1 unless the brightest texel
-/// lies outside 2^±64: then only ratios matter, and neither weights nor their squares overflow or vanish.
+/// Radiance, power and map are in multiples of [`Environment::unit`] W·m⁻²·sr⁻¹. The unit is 1 unless the brightest
+/// texel lies outside 2^±64; with such maps, it keeps weights and their squares from overflowing or vanishing.
 ///
-/// Resident memory is 17⅓ bytes a texel: three floats of radiance and a pyramid of weights.
+/// Resident memory is 17⅓ bytes per texel: three floats of radiance and a pyramid of weights.
 #[derive(Clone, Debug)]
 pub struct Environment {
     /// In multiples of the unit.
@@ -151,26 +151,26 @@ pub struct Environment {
     unit: f64,
     orientation: Orientation,
     grid: Grid,
-    /// Luminance · solid angle; none for a black map.
+    /// The table of luminance · solid angle; `None` for a black map.
     table: Option<HierarchicalTable>,
-    /// One over the table's total; 0 for a black map.
+    /// The reciprocal of the table's total; 0 for a black map.
     inverse_power: f32,
-    /// The greatest luminance of a texel.
+    /// The maximum luminance of a texel.
     max_luminance: f32,
 }
 
-/// A change of a map's texels that leaves its radiance as it is, along columns and rows.
+/// A change of resolution along columns and rows that preserves the map's radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Reshaping {
-    /// So many equal texels become one.
+    /// This many equal texels become one.
     merged: [usize; 2],
-    /// Each of these becomes so many.
+    /// Each of these texels becomes this many.
     divided: [usize; 2],
 }
 
-/// Into how many columns and rows each texel of a map is divided to be about as wide as high, as far as memory allows.
+/// The number of columns and rows into which each texel is divided to become about square, as far as memory allows.
 fn division([width, height]: [usize; 2]) -> [usize; 2] {
-    /// A map is divided into no more texels than this.
+    /// The maximum number of texels after the division.
     const MOST_TEXELS: usize = 1 << 22;
     let columns = if width < height { (2 * height).div_ceil(width) } else { 1 };
     let rows = if width > 4 * height { width.div_ceil(2 * height) } else { 1 };
@@ -184,7 +184,7 @@ fn gcd(a: usize, b: usize) -> usize {
 }
 
 impl Environment {
-    /// The fingerprint of the light: the map's texels times the scale, and how it is turned.
+    /// The fingerprint of the light: the map's texels times the scale, and the orientation.
     #[cfg(feature = "io")]
     pub fn fingerprint(&self) -> crate::fingerprint::Fingerprint {
         let mut fingerprinter = crate::fingerprint::Fingerprinter::default();
@@ -204,7 +204,7 @@ impl Environment {
             .unwrap_or_else(|_| unreachable!("built-in probes are valid"))
     }
 
-    /// An environment from a lat-long map that stands upright: [`Environment::new`] without rotation and scale.
+    /// Creates an environment from an upright lat-long map: [`Environment::new`] without rotation and scale.
     ///
     /// # Errors
     /// The first bad texel in row order, or an empty map.
@@ -212,8 +212,8 @@ impl Environment {
         Self::new(map, Orientation::default(), 1.0)
     }
 
-    /// The irradiance ∫ L max(0, n · ω) dω of an unoccluded surface with the world normal n, a unit vector, in multiples of
-    /// [`Environment::unit`] \[W·m⁻²\].
+    /// The irradiance ∫ L max(0, n · ω) dω of an unoccluded surface with the unit normal n in world space, in
+    /// multiples of [`Environment::unit`] \[W·m⁻²\].
     pub fn irradiance(&self, normal: Vec3) -> Rgb {
         /// Columns and rows into which coarse maps are divided.
         const SIZE: [usize; 2] = [1024, 512];
@@ -235,7 +235,7 @@ impl Environment {
             }
             sum
         };
-        // Add rows in their order, whoever computed them.
+        // Add rows in order, whichever thread computed them.
         let rows: Vec<[f64; 3]> = crate::parallel::in_order(grid.height(), row_sum);
         let sum = rows.iter().fold([0.0; 3], |sum, row| std::array::from_fn(|c| sum[c] + row[c]));
         Rgb::from(sum.map(|c: f64| c as f32))
@@ -258,8 +258,8 @@ impl Environment {
         Self::in_units(self.map, self.orientation, self.unit, scale)
     }
 
-    /// An environment from a lat-long map: row 0 up, texel centers at +½, every texel finite and not negative;
-    /// radiance is multiplied by `scale`.
+    /// Creates an environment from a lat-long map with row 0 at the top and texel centers at +½. Every texel must be
+    /// finite and not negative. The radiance is multiplied by `scale`.
     ///
     /// # Errors
     /// The first bad texel in row order, an empty map, or a bad scale or rotation.
@@ -315,10 +315,10 @@ impl Environment {
         Ok(Self { map, unit, orientation, grid, table, inverse_power, max_luminance })
     }
 
-    /// The same radiance of texels that are about as wide as high, if the map is much narrower or wider than 2:1; else
-    /// `None`. Equal neighbors along the longer side become one texel, then texels are divided along the shorter side.
+    /// The same radiance with about square texels, if the map is much narrower or wider than 2:1; otherwise `None`.
+    /// Equal neighbors along the longer side are merged, then texels are divided along the shorter side.
     ///
-    /// Divisions of a map into squares of texels assume that its texels are about as wide as high.
+    /// Algorithms that divide a map into squares of texels assume that the texels are about square.
     pub(crate) fn reshaped(&self) -> Option<Self> {
         let Reshaping { merged, divided } = self.reshaping()?;
         let [width, height] = [0, 1].map(|i| self.size()[i] / merged[i] * divided[i]);
@@ -329,7 +329,7 @@ impl Environment {
         Self::in_units(map, self.orientation, self.unit, 1.0).ok()
     }
 
-    /// How [`Environment::reshaped`] changes the texels; `None` if it leaves the map as it is.
+    /// How [`Environment::reshaped`] changes the texels; `None` if it keeps the map unchanged.
     fn reshaping(&self) -> Option<Reshaping> {
         let [width, height] = self.size();
         let merged = match () {
@@ -341,14 +341,14 @@ impl Environment {
         (merged != divided).then_some(Reshaping { merged, divided })
     }
 
-    /// The most rows that the map is made of equal groups of.
+    /// The largest number of rows such that all groups of that size hold equal rows.
     fn equal_rows(&self) -> usize {
         let RgbImage { width, height, pixels } = &self.map;
         let row = |y: usize| &pixels[y * width..][..*width];
         (1..*height).filter(|&y| row(y) != row(y - 1)).fold(*height, gcd)
     }
 
-    /// The most columns that the map is made of equal groups of.
+    /// The largest number of columns such that all groups of that size hold equal columns.
     fn equal_columns(&self) -> usize {
         let RgbImage { width, pixels, .. } = &self.map;
         let differs = |x: usize| pixels.chunks_exact(*width).any(|row| row[x] != row[x - 1]);
@@ -360,7 +360,7 @@ impl Environment {
         [self.map.width, self.map.height]
     }
 
-    /// Memory that [`Environment::reshaped`] takes \[bytes\].
+    /// The memory that [`Environment::reshaped`] needs \[bytes\].
     pub(crate) fn memory_to_reshape(&self) -> u64 {
         let n_texels = |Reshaping { merged, divided }: Reshaping| {
             let along = |i: usize| self.size()[i] / merged[i] * divided[i];
@@ -369,11 +369,11 @@ impl Environment {
         Self::MEMORY_PER_TEXEL * self.reshaping().map_or(0, n_texels)
     }
 
-    /// Memory that an environment and what is made with it take for each texel \[bytes\], its making included: its map,
-    /// its tables, fixed lights.
+    /// The memory per texel \[bytes\] of an environment and everything built from it, including during construction:
+    /// the map, its tables, fixed lights.
     pub const MEMORY_PER_TEXEL: u64 = 36;
 
-    /// The same radiance from everywhere.
+    /// Creates an environment with constant radiance.
     ///
     /// # Errors
     /// If it is negative or not finite.
@@ -388,12 +388,12 @@ impl Environment {
         EnvironmentError::BadTexel { x, y, value: map.pixels[i] }
     }
 
-    /// What radiance, power and map are multiples of \[W·m⁻²·sr⁻¹\]: a power of two, 1 for all but extreme maps.
+    /// The unit of radiance, power and map \[W·m⁻²·sr⁻¹\]: a power of two, 1 for all but extreme maps.
     pub fn unit(&self) -> f64 {
         self.unit
     }
 
-    /// The map, scale included.
+    /// The map, including the scale.
     pub fn map(&self) -> &RgbImage {
         &self.map
     }
@@ -403,12 +403,12 @@ impl Environment {
         self.orientation
     }
 
-    /// The table of luminance times solid angle; none for a black map.
+    /// The table of luminance times solid angle; `None` for a black map.
     pub fn table(&self) -> Option<&HierarchicalTable> {
         self.table.as_ref()
     }
 
-    /// Solid angle of a texel of row `row` \[sr\], exactly the integral of sin θ over it.
+    /// The solid angle of a texel in row `row` \[sr\], the exact integral of sin θ over it.
     ///
     /// # Panics
     /// If there is no such row.
@@ -421,7 +421,7 @@ impl Environment {
         self.table.as_ref().map_or(0.0, HierarchicalTable::total)
     }
 
-    /// The greatest luminance of [`Environment::le`] over all directions; 0 for a black map.
+    /// The maximum luminance of [`Environment::le`] over all directions; 0 for a black map.
     pub fn max_luminance(&self) -> f32 {
         self.max_luminance
     }
@@ -432,8 +432,8 @@ impl Environment {
         self.map.get(t.column, t.row)
     }
 
-    /// Radiance from `wi` interpolated between texel centers: for what the camera sees behind the
-    /// scene, where texels would show. It lights nothing, for the table does not match it.
+    /// Radiance from `wi`, interpolated between texel centers. It is for the background that the
+    /// camera sees, where texels would show. It lights nothing, because the table does not match it.
     pub fn le_interpolated(&self, wi: Vec3) -> Rgb {
         let (w, h) = (self.map.width, self.map.height);
         let uv = self.uv(wi);
@@ -451,20 +451,20 @@ impl Environment {
         self.le_pdf(wi).1
     }
 
-    /// [`Environment::le`] and [`Environment::pdf`] by one look-up.
+    /// [`Environment::le`] and [`Environment::pdf`] with a single look-up.
     pub fn le_pdf(&self, wi: Vec3) -> (Rgb, f32) {
         let t = self.texel(wi);
         let le = self.map.get(t.column, t.row);
         (le, self.density(le))
     }
 
-    /// Draws a direction in proportion to luminance; none from a black map.
+    /// Samples a direction with density proportional to luminance; `None` for a black map.
     #[inline]
     pub fn sample(&self, u: Vec2) -> Option<EnvironmentSample> {
         self.sample_table(self.table.as_ref()?, u, |le| self.density(le))
     }
 
-    /// Draws from any table over this map's texels; `density` is that of a texel by its radiance.
+    /// Samples any table over this map's texels. `density` maps a texel's radiance to its density.
     #[inline]
     fn sample_table(
         &self,
@@ -480,7 +480,7 @@ impl Environment {
         (pdf > 0.0).then_some(EnvironmentSample { wi, le, pdf })
     }
 
-    /// A texel's probability over its solid angle: the solid angle of the weight cancels.
+    /// A texel's probability divided by its solid angle. The solid angle in the weight cancels.
     fn density(&self, le: Rgb) -> f32 {
         le.luminance() * self.inverse_power
     }
@@ -489,8 +489,8 @@ impl Environment {
         self.grid.texel(self.orientation.up.to_map(wi.into()).into())
     }
 
-    /// The direction of a place on the map, in texels from its upper left corner, in the map's own
-    /// frame: +Y up. Within a texel rows are equally spaced in cos θ, as solid angle is.
+    /// The direction of a position on the map, in texels from its upper left corner, in the map's own
+    /// frame with +Y up. Positions within a texel are uniform in cos θ, and so in solid angle.
     pub(crate) fn map_direction(&self, column: f64, row: f64) -> Vec3 {
         self.grid.direction(column / self.grid.texels.width() as f64, self.cos_theta(row))
     }
@@ -500,25 +500,25 @@ impl Environment {
         self.grid.texels.cos_theta(row)
     }
 
-    /// The columns and the rows that directions look at; of one that is not finite anything.
+    /// The columns and the rows that directions look up; unspecified for non-finite directions.
     #[inline(always)]
     pub(crate) fn texels_at<F: SimdF32x8>(&self, wi: Vectors<F>) -> [[i32; LANES]; 2] {
         let [u, v] = self.grid.uv(self.orientation.up.to_map(wi));
-        // What is rounded up to the edge is of the last texel; these are exact.
+        // Values rounded up to the edge belong to the last texel; these are exact.
         let [width, height] = [self.map.width as f32, self.map.height as f32];
         let column = (u * u.splat(width)).min(u.splat(width - 1.0));
         let row = (v * v.splat(height)).min(v.splat(height - 1.0));
         [column.to_i32().store(), row.to_i32().store()]
     }
 
-    /// The column and the row that `wi` looks at.
+    /// The column and the row that `wi` looks up.
     #[cfg(any(test, feature = "render"))]
     pub(crate) fn texel_at(&self, wi: Vec3) -> [usize; 2] {
         let Texel { column, row } = self.texel(wi);
         [column, row]
     }
 
-    /// Where in its texel `wi` looks, in [0, 1)²: linear in φ and cos θ.
+    /// The position within its texel that `wi` looks up, in [0, 1)²: linear in φ and cos θ.
     pub(crate) fn inside(&self, wi: Vec3) -> Vec2 {
         let wi = Vec3::from(self.orientation.up.to_map(wi.into()));
         let Texel { column, row } = self.grid.texel(wi);
@@ -534,7 +534,7 @@ impl Environment {
         self.orientation.up.to_world(self.grid.direction(x, functions::cos(f64::from(PI) * y)))
     }
 
-    /// The point of the map that `wi` looks at, in [0, 1]².
+    /// The point of the map that `wi` looks up, in [0, 1]².
     pub fn uv(&self, wi: Vec3) -> Vec2 {
         self.grid.uv(self.orientation.up.to_map(wi.into())).into()
     }
@@ -542,7 +542,7 @@ impl Environment {
 
 /// The unit for a map whose brightest channel is `brightest`.
 fn unit_of(brightest: f64) -> f64 {
-    /// Products and squares of such radiances, times and over solid angles, stay within single precision.
+    /// Products and squares of such radiances, multiplied or divided by solid angles, stay within single precision.
     const ORDINARY: std::ops::RangeInclusive<f64> =
         5.421_010_862_427_522e-20..=18_446_744_073_709_551_616.0;
     if brightest == 0.0 || ORDINARY.contains(&brightest) {
@@ -556,9 +556,9 @@ fn unit_of(brightest: f64) -> f64 {
 #[derive(Clone, Debug)]
 struct Grid {
     texels: LatLongGrid,
-    /// The rotation as a share of a turn.
+    /// The rotation as a fraction of a full turn.
     turn: f32,
-    /// A distance from a texel's edge, in texels, within which rounding may cross it.
+    /// The distance from a texel's edge, in texels, within which rounding may cross the edge.
     margin: Vec2,
 }
 
@@ -605,8 +605,8 @@ impl Grid {
         self.direction(u, top + f64::from(inside.y) * (bottom - top))
     }
 
-    /// As [`Grid::direction_in`], but never rounded into a neighbor: the look-up of the direction
-    /// is the texel that was drawn.
+    /// Like [`Grid::direction_in`], but never rounded into a neighbor: the direction looks up the
+    /// texel that was sampled.
     #[inline]
     fn direction_inside(&self, t: Texel, inside: Vec2) -> Vec3 {
         let wi = self.direction_in(t, inside);

@@ -1,7 +1,7 @@
-//! What a light probe is like: how bright, how concentrated, where its sun stands.
+//! Statistics of a light probe: brightness, concentration, and the position of its sun.
 //!
-//! Everything is weighed by the exact solid angle of the texels, in f64. Means over pixels, which
-//! overrate the poles, are given beside it only because other programs print them.
+//! Everything is weighted by the exact solid angle of the texels, in f64. Means over pixels, which
+//! overweight the poles, are included only because other programs print them.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -15,58 +15,58 @@ use crate::math::{Vec3, functions, vec2};
 /// A part of this size counts as the brightest texels.
 const BRIGHTEST: f64 = 0.001;
 
-/// Measures of a lat-long map.
+/// Statistics of a lat-long map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbeStatistics {
-    /// Least luminance above zero; 0 if the map is black.
+    /// The minimum luminance above zero; 0 if the map is black.
     pub min_luminance: f32,
-    /// Greatest luminance.
+    /// The maximum luminance.
     pub max_luminance: f32,
-    /// Mean over pixels.
+    /// The mean over pixels.
     pub pixel_mean: Rgb,
-    /// Mean radiance over the sphere, ∫ L dω / 4π.
+    /// The mean radiance over the sphere, ∫ L dω / 4π.
     pub mean_radiance: Rgb,
-    /// Irradiance of a surface that faces up, ∫ L max(0, ω·Y) dω \[W·m⁻²\].
+    /// The irradiance of a surface that faces up, ∫ L max(0, ω·Y) dω \[W·m⁻²\].
     pub irradiance_up: Rgb,
-    /// Part of ∫ L dω (in luminance) that the brightest 0.1 % of the texels hold, in \[0, 1\].
+    /// The share of ∫ L dω (in luminance) in the brightest 0.1 % of the texels, in \[0, 1\].
     pub brightest_share: f64,
     /// The sun, if there is one.
     pub sun: Option<Sun>,
-    /// Texels of the greatest value side by side, if there are: a source that the camera clipped, or one that is evenly
-    /// bright.
+    /// Adjacent texels with the maximum value, if there are any: a source that the camera clipped, or an evenly bright
+    /// one.
     pub plateau: Option<Plateau>,
 }
 
-/// Texels that share the greatest value of the map, sharply bounded.
+/// A sharply bounded set of texels with the maximum value of the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plateau {
-    /// Their greatest channel.
+    /// The value of their largest channel.
     pub value: f32,
-    /// How many there are.
+    /// The number of texels.
     pub n_texels: usize,
     /// Their solid angle \[sr\].
     pub solid_angle: f64,
-    /// Their part of ∫ L dω (in luminance), in \[0, 1\].
+    /// Their share of ∫ L dω (in luminance), in \[0, 1\].
     pub share: f64,
 }
 
-/// The compact source that is taken for the sun: what exceeds the radiance around it.
+/// The compact source identified as the sun: the radiance in excess of its surroundings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sun {
-    /// Its center of energy, a unit vector.
+    /// The energy centroid, a unit vector.
     pub direction: Vec3,
-    /// Solid angle of its texels \[sr\], glare around it included.
+    /// The solid angle of its texels \[sr\], including the glare around it.
     pub solid_angle: f64,
-    /// Angular radius of the even disc whose light is spread as widely \[rad\].
+    /// The angular radius of the uniform disc with the same variance \[rad\].
     pub angular_radius: f64,
-    /// Irradiance at normal incidence \[W·m⁻²\].
+    /// The irradiance at normal incidence \[W·m⁻²\].
     pub irradiance: Rgb,
-    /// Its part of ∫ L dω (in luminance), in \[0, 1\].
+    /// Its share of ∫ L dω (in luminance), in \[0, 1\].
     pub share: f64,
 }
 
 impl ProbeStatistics {
-    /// Measures a lat-long map of finite radiance ≥ 0, of any shape.
+    /// Computes the statistics of a lat-long map with finite radiance ≥ 0 and any shape.
     ///
     /// # Panics
     /// If the map has no texels.
@@ -88,7 +88,7 @@ impl ProbeStatistics {
         }
     }
 
-    /// Greatest over least positive luminance; 1 for a black map.
+    /// The ratio of the maximum to the minimum positive luminance; 1 for a black map.
     pub fn dynamic_range(&self) -> f64 {
         if self.max_luminance > 0.0 {
             self.max_luminance as f64 / self.min_luminance as f64
@@ -97,7 +97,7 @@ impl ProbeStatistics {
         }
     }
 
-    /// Greatest luminance over that of the mean radiance; 1 for a black map.
+    /// The ratio of the maximum luminance to that of the mean radiance; 1 for a black map.
     pub fn peak_to_mean(&self) -> f64 {
         let mean = self.mean_radiance.luminance();
         if mean > 0.0 { self.max_luminance as f64 / mean as f64 } else { 1.0 }
@@ -105,12 +105,12 @@ impl ProbeStatistics {
 }
 
 impl Sun {
-    /// Height above the horizon \[°\].
+    /// The elevation above the horizon \[°\].
     pub fn elevation(&self) -> f64 {
         functions::asin((self.direction.y as f64).clamp(-1.0, 1.0)).to_degrees()
     }
 
-    /// Angle around +Y from −Z toward +X \[°\], in (−180, 180]; 0 is the center column of the map.
+    /// The angle around +Y from −Z toward +X \[°\], in (−180, 180]; 0 is the center column of the map.
     pub fn azimuth(&self) -> f64 {
         functions::atan2(self.direction.x as f64, -self.direction.z as f64).to_degrees()
     }
@@ -192,7 +192,7 @@ fn sun(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Sun> {
     Some(Sun { direction, solid_angle, angular_radius, irradiance, share: energy / all })
 }
 
-/// The texels of the greatest value, if they are several, small, bright, and end sharply.
+/// The texels of the largest value, if they are several, small, bright, and end sharply.
 fn plateau(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Plateau> {
     /// What is at least so bright belongs to a peak that has no sharp edge.
     const NEAR: f32 = 0.98;
@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn a_peak_that_fades_is_no_plateau() {
-        // Rounded, more coarsely than Radiance pictures are: several texels of a smooth peak share the greatest value.
+        // Rounded, more coarsely than Radiance pictures are: several texels of a smooth peak share the largest value.
         let rounded = |x: f32| 2.0 * (0.5 * x).round();
         let peak = |variance: f32, clip: f32| {
             RgbImage::from_fn(256, 128, |x, y| {

@@ -1,4 +1,4 @@
-//! Files that are whole or not there.
+//! Atomic writing: a file is complete or does not exist.
 
 use super::temporary::{Temporary, remove_abandoned};
 use crate::picture::{PictureError, PictureErrorKind};
@@ -6,13 +6,13 @@ use std::fs::{self, File, Metadata};
 use std::io::{self, BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// Runs `write` on a new file beside `path` and renames it to `path` when all of it is on the disk, so
-/// that a crash never leaves half a file; `-` is standard output. What is not a plain file (a device, a pipe) is
-/// written to directly, and a symbolic link keeps pointing where it points. A file that is replaced keeps its
-/// permissions and, where that is allowed, its owner.
+/// Runs `write` on a new file next to `path` and renames it to `path` once it is completely on disk, so that a crash
+/// never leaves an incomplete file; `-` is standard output. A device or a pipe is written to directly, and a symbolic
+/// link keeps its target. A replaced file keeps its permissions and, if allowed, its owner.
 ///
 /// # Errors
-/// If the file cannot be created, written or renamed, or the one there is read-only; the old file is then untouched.
+/// If the file cannot be created, written or renamed, or the existing file is read-only. The old file is then
+/// unchanged.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -27,16 +27,16 @@ pub fn write_atomically(
         .map_err(|error| PictureErrorKind::Io(error).in_file(&path.display().to_string()))
 }
 
-/// A file that is written in any order.
+/// A file that can be written in any order.
 pub trait WriteSeek: Write + Seek {}
 
 impl<T: Write + Seek> WriteSeek for T {}
 
-/// Does what [`write_atomically`] does, for formats that are not written from beginning to end. Where one cannot go back (standard output, a
-/// device, a pipe) the bytes are gathered in memory first.
+/// Like [`write_atomically`], for formats that are not written sequentially. If seeking is not possible (standard
+/// output, a device, a pipe), the bytes are collected in memory first.
 ///
 /// # Errors
-/// As [`write_atomically`].
+/// Those of [`write_atomically`].
 pub fn write_atomically_seeking(
     path: &Path,
     write: impl FnOnce(&mut dyn WriteSeek) -> io::Result<()>,
@@ -53,8 +53,8 @@ pub fn write_atomically_seeking(
     })
 }
 
-/// Whether [`write_atomically`] can make a file at `path` now: to be asked before hours of work. Leaves nothing behind,
-/// not even what killed runs left in the folder ([`remove_abandoned`]), and does not open devices and pipes.
+/// Checks whether [`write_atomically`] can create a file at `path` now, for use before hours of work. It leaves nothing
+/// behind, removes what killed runs left in the folder ([`remove_abandoned`]), and does not open devices and pipes.
 ///
 /// # Errors
 /// If a file cannot be created there.

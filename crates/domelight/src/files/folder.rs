@@ -1,13 +1,13 @@
-//! Folders for results.
+//! Output folders.
 
 use std::fs;
 use std::io;
 use std::path::Path;
 
-/// Makes a folder and those that it is in, unless it is there.
+/// Creates a folder and its parents, unless they exist.
 ///
 /// # Errors
-/// What the system says; where something else has the name, that it is not a folder.
+/// The system's error, or an error if the name belongs to something that is not a folder.
 pub fn create_folder(path: &Path) -> io::Result<()> {
     fs::create_dir_all(path).map_err(|error| match error.kind() {
         io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => {

@@ -1,4 +1,4 @@
-//! The files that are read and written, identified by what the system knows of them, not by their names.
+//! The files that are read and written, identified by the system's identifiers rather than by their names.
 
 use std::ffi::OsString;
 use std::fs::{self, Metadata};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::atomic::target;
 
-/// The files that a piece of work reads and writes, declared before it.
+/// The files that a task will read and write, declared in advance.
 ///
 /// ```
 /// use domelight::files::FileLedger;
@@ -26,12 +26,12 @@ pub struct FileLedger {
     written: Vec<(PathBuf, FileIdentity)>,
 }
 
-/// Two uses of a file that exclude each other.
+/// Two conflicting uses of a file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FileConflict {
     /// What is to be written would take the place of what is read.
     #[error(
-        "{} would be written over {}, which is read: choose another name",
+        "{} would overwrite {}, which is an input: choose another name",
         name(output),
         if input == output { "itself".to_owned() } else { name(input) }
     )]
@@ -41,7 +41,7 @@ pub enum FileConflict {
         /// What is read.
         input: PathBuf,
     },
-    /// Two results under one name.
+    /// Two outputs with the same name.
     #[error("two results are written to {}: choose another name for one", both(first, second))]
     Twice {
         /// As it was named first.
@@ -86,7 +86,7 @@ impl FileLedger {
     /// Declares that `path` is read; `-` is standard input.
     ///
     /// # Errors
-    /// If it is to be written.
+    /// If it is declared as written.
     pub fn read(&mut self, path: &Path) -> Result<(), FileConflict> {
         let Some(identity) = FileIdentity::of_input(path) else { return Ok(()) };
         let output = self.written.iter().find(|(_, written)| *written == identity);
@@ -99,7 +99,7 @@ impl FileLedger {
         }
     }
 
-    /// A file that was declared as read and lies in a folder, if there is one.
+    /// A file in a folder that is declared as read, if there is one.
     pub fn read_in(&self, folder: &Path) -> Option<&Path> {
         let folder = fs::canonicalize(folder).ok()?;
         let is_inside =
@@ -110,7 +110,7 @@ impl FileLedger {
     /// Declares that `path` is written; `-` is standard output.
     ///
     /// # Errors
-    /// If it is read, or written already.
+    /// If it is already declared as read or written.
     pub fn write(&mut self, path: &Path) -> Result<(), FileConflict> {
         let Some(identity) = FileIdentity::of_output(path) else { return Ok(()) };
         if let Some((input, _)) = self.read.iter().find(|(_, read)| *read == identity) {
@@ -123,10 +123,10 @@ impl FileLedger {
         Ok(())
     }
 
-    /// Whether `path` is declared to be read.
+    /// Checks that `path` is not declared as read.
     ///
     /// # Errors
-    /// If it is: it must not be written.
+    /// If it is, and so must not be written.
     pub fn check_unread(&self, path: &Path) -> Result<(), FileConflict> {
         let identity = FileIdentity::of_output(path);
         match self.read.iter().find(|(_, read)| Some(read) == identity.as_ref()) {

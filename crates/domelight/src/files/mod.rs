@@ -1,4 +1,4 @@
-//! Files that are whole or not there, and which file is which.
+//! Atomic writing and the identity of files.
 
 mod atomic;
 mod folder;

@@ -1,8 +1,8 @@
-//! Temporary files that know whether their writer lives.
+//! Temporary files that reveal whether their writer is alive.
 //!
-//! A writer holds a lock on its file, which the system takes from it however it ends. Folders of farms are shared, and
-//! not every file system hands locks from one machine to another: so the name has the machine and the start of its
-//! system, and nobody touches files of other machines. Process numbers and ages prove nothing.
+//! A writer holds a lock on its file, which the system releases however the writer ends. Folders of farms are shared,
+//! and not every file system shares locks between machines. So the name contains the machine and its boot time, and no
+//! program touches the files of other machines. Process numbers and ages prove nothing.
 
 use std::ffi::OsStr;
 use std::fs::{self, File, TryLockError};
@@ -66,8 +66,8 @@ impl Drop for Temporary {
     }
 }
 
-/// Removes the temporary files that killed runs of this machine left in a folder: those whose lock can be taken.
-/// Returns how many there were.
+/// Removes the temporary files that killed runs on this machine left in a folder: those whose lock can be taken.
+/// Returns their number.
 pub fn remove_abandoned(folder: &Path) -> usize {
     let Ok(entries) = fs::read_dir(folder) else { return 0 };
     let here = Machine::this();

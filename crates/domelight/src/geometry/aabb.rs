@@ -2,42 +2,42 @@
 
 use crate::math::Vec3;
 
-/// An axis-aligned box; empty when a minimum exceeds its maximum.
+/// An axis-aligned box, which is empty if a minimum exceeds its maximum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
-    /// Least corner.
+    /// The minimum corner.
     pub min: Vec3,
-    /// Greatest corner.
+    /// The maximum corner.
     pub max: Vec3,
 }
 
 impl Aabb {
-    /// The box that holds nothing.
+    /// The empty box.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// The least box around some points; NaN coordinates are passed over.
+    /// The bounding box of some points. NaN coordinates are ignored.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
         points.into_iter().fold(Self::EMPTY, Self::including)
     }
 
-    /// The least box around this one and `p`.
+    /// The bounding box of this box and `p`.
     #[must_use]
     pub fn including(self, p: Vec3) -> Self {
         Self { min: self.min.min(p), max: self.max.max(p) }
     }
 
-    /// The least box around both.
+    /// The bounding box of both boxes.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Holds no point.
+    /// Whether the box is empty.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
 
-    /// The middle; NaN for an empty box.
+    /// The center; NaN for an empty box.
     pub fn center(&self) -> Vec3 {
         0.5 * (self.min + self.max)
     }

@@ -4,32 +4,32 @@ use super::Aabb;
 use crate::color::Rgb;
 use crate::math::{Mat3, Mat4, Vec2, Vec3, Vec4};
 
-/// An indexed triangle mesh. Every attribute array is empty or has one entry a vertex.
+/// An indexed triangle mesh. Every attribute array is empty or has one entry per vertex.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Vertex positions.
     pub positions: Vec<Vec3>,
-    /// Unit shading normals; empty: the flat geometric normal shades.
+    /// Unit shading normals. If empty, the geometric normal is used.
     pub normals: Vec<Vec3>,
-    /// Texture coordinates, (0, 0) the first texel of the first row as in glTF.
+    /// Texture coordinates, with (0, 0) at the first texel of the first row as in glTF.
     pub uvs: Vec<Vec2>,
     /// A second set of texture coordinates.
     pub uvs2: Vec<Vec2>,
     /// Unit tangents with the bitangent's sign in w, as in glTF.
     pub tangents: Vec<Vec4>,
-    /// Linear vertex colors, a factor on the base color.
+    /// Linear vertex colors, multiplied by the base color.
     pub colors: Vec<Rgb>,
-    /// Vertex opacity in \[0, 1\], a factor on the surface's.
+    /// Vertex opacity in \[0, 1\], multiplied by that of the material.
     pub alphas: Vec<f32>,
-    /// Triangles as counter-clockwise vertex indices.
+    /// Triangles as counterclockwise vertex indices.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// What makes a mesh unusable.
+/// An error in a mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// An index beyond the vertices.
-    #[error("triangle {triangle} names vertex {index}, but there are only {vertices} vertices")]
+    #[error("triangle {triangle} refers to vertex {index}, but there are only {vertices} vertices")]
     Index {
         /// The triangle.
         triangle: usize,
@@ -49,7 +49,7 @@ pub enum MeshError {
         vertices: usize,
     },
     /// A coordinate that is NaN or infinite.
-    #[error("vertex {vertex} has a coordinate that is not finite: {position}")]
+    #[error("vertex {vertex} has a non-finite coordinate: {position}")]
     NotFinite {
         /// The vertex.
         vertex: usize,
@@ -115,13 +115,13 @@ impl Mesh {
         (b - a).cross(c - a)
     }
 
-    /// The bounds of all vertices.
+    /// The bounding box of all vertices.
     pub fn bounds(&self) -> Aabb {
         Aabb::around(self.positions.iter().copied())
     }
 
-    /// Moves the mesh by an affine matrix: normals by the inverse transpose, tangents by the matrix;
-    /// a reflection also turns the triangles round.
+    /// Transforms the mesh by an affine matrix: normals by the inverse transpose, tangents by the matrix.
+    /// A reflection also flips the triangles.
     pub fn transform(&mut self, m: &Mat4) {
         let linear = linear_part(m);
         let normal_matrix = linear.inverse().transpose();
@@ -150,8 +150,8 @@ impl Mesh {
         }
     }
 
-    /// Replaces the normals by the area-weighted mean of the faces round each vertex; a face at a vertex that is not finite
-    /// does not count.
+    /// Replaces the normals by the area-weighted mean over the faces around each vertex. Faces with a non-finite
+    /// vertex do not count.
     pub fn compute_normals(&mut self) {
         let mut normals = vec![Vec3::ZERO; self.positions.len()];
         let finite = self.positions.iter().copied().filter(|position| position.is_finite());
@@ -169,7 +169,7 @@ impl Mesh {
         self.normals = normals.into_iter().map(Vec3::normalize_or_zero).collect();
     }
 
-    /// Puts the center of the bounds at the origin and scales the longest half-extent to 1.
+    /// The transform that moves the center of the bounds to the origin and scales the longest half-extent to 1.
     pub fn normalization(bounds: &Aabb) -> Mat4 {
         let scale = 2.0 / bounds.size().max_element();
         let scale = if scale.is_finite() { scale } else { 1.0 };
@@ -177,7 +177,7 @@ impl Mesh {
     }
 }
 
-/// The linear part of an affine matrix, divided by a power of two so that its greatest entry is in [1, 2): products of
+/// The linear part of an affine matrix, divided by a power of two so that its largest entry is in [1, 2): products of
 /// its entries neither overflow nor vanish, and all digits stay.
 pub(crate) fn linear_part(m: &Mat4) -> Mat3 {
     let linear = Mat3::from_mat4(*m);
@@ -186,7 +186,7 @@ pub(crate) fn linear_part(m: &Mat4) -> Mat3 {
     Mat3::from_cols_array(&linear.to_cols_array().map(|entry| entry / unit))
 }
 
-/// The greatest power of two that is not greater than a size; 1 of 0 and of what is not finite. Nothing that is finite
+/// The largest power of two that is not greater than a size; 1 of 0 and of what is not finite. Nothing that is finite
 /// leaves the range of numbers when it is divided by it, as long as it is no greater than the size.
 pub(crate) fn power_of_two(size: f32) -> f32 {
     if size.is_normal() && size > 0.0 { f32::from_bits(size.to_bits() & (0xff << 23)) } else { 1.0 }

@@ -1,20 +1,20 @@
-//! Rays, one and many, and where they hit.
+//! Rays, batches of rays, and hits.
 
 use crate::math::Vec3;
 
 /// A ray with the open interval (0, `t_max`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Origin.
+    /// The origin.
     pub origin: Vec3,
-    /// Direction; distances are in units of its length.
+    /// The direction; distances are in units of its length.
     pub direction: Vec3,
     /// The end of the interval, `f32::INFINITY` for a shadow ray to the environment.
     pub t_max: f32,
 }
 
 impl Ray {
-    /// A ray to infinity.
+    /// Creates a ray to infinity.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Self { origin, direction, t_max: f32::INFINITY }
     }
@@ -28,22 +28,22 @@ impl Ray {
 /// The nearest intersection of a ray with a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Distance in units of the direction's length.
+    /// The distance in units of the direction's length.
     pub t: f32,
-    /// Barycentric weight of the triangle's second vertex.
+    /// The barycentric weight of the triangle's second vertex.
     pub u: f32,
-    /// Barycentric weight of the triangle's third vertex.
+    /// The barycentric weight of the triangle's third vertex.
     pub v: f32,
-    /// Index of the triangle.
+    /// The index of the triangle.
     pub triangle: u32,
 }
 
 /// Shadow rays to infinity in structure-of-arrays form.
 #[derive(Clone, Debug, Default)]
 pub struct RayBatch {
-    /// Origins.
+    /// The origins.
     pub origins: Vec<Vec3>,
-    /// Unit directions, as many as origins.
+    /// The unit directions, as many as origins.
     pub directions: Vec<Vec3>,
 }
 
@@ -59,22 +59,22 @@ impl RayBatch {
         self.origins.len()
     }
 
-    /// No rays.
+    /// Whether there are no rays.
     pub fn is_empty(&self) -> bool {
         self.origins.is_empty()
     }
 
-    /// Forgets the rays and keeps the memory.
+    /// Removes the rays and keeps the memory.
     pub fn clear(&mut self) {
         self.origins.clear();
         self.directions.clear();
     }
 }
 
-/// Moves a ray's origin off the surface, to the side that `normal` points to, by a few units in
-/// the last place: far enough not to hit the surface it starts on, near enough not to be seen.
+/// Offsets a ray's origin from the surface, to the side of `normal`, by a few units in the last place:
+/// far enough not to hit the surface where it starts, and too little to be visible.
 ///
-/// Near the origin, where units in the last place vanish, the step is 2⁻¹⁶ of `extent`, the size of
+/// Near the origin, where units in the last place vanish, the offset is 2⁻¹⁶ of `extent`, the size of
 /// the scene, or of 1 if that is less.
 ///
 /// Wächter & Binder 2019, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing

@@ -1,17 +1,17 @@
-//! Why a pixel is noisy and what would help, in sentences with numbers.
+//! Explains in sentences with numbers why a pixel is noisy and what would help.
 
 use std::fmt;
 
 use super::decomposition::{Cause, Decomposition, Share};
 
 impl Decomposition {
-    /// Why the pixel is noisy, in a sentence with numbers.
+    /// Explains why the pixel is noisy, in a sentence with numbers.
     pub fn diagnosis(&self) -> Diagnosis<'_> {
         Diagnosis(self)
     }
 }
 
-/// Why the pixel is noisy under one strategy; its text is a sentence.
+/// Why the pixel is noisy with one strategy. It displays as a sentence.
 #[derive(Clone, Copy, Debug)]
 pub struct Diagnosis<'a>(&'a Decomposition);
 
@@ -19,7 +19,7 @@ impl fmt::Display for Diagnosis<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(decomposition) = self;
         let Some(&Share { cause, share }) = decomposition.shares.first() else {
-            return f.write_str("no error: all estimates of this pixel are alike");
+            return f.write_str("no error: all estimates of this pixel are equal");
         };
         if share >= 0.995 {
             f.write_str("nearly all of the error: ")?;
@@ -33,13 +33,9 @@ impl fmt::Display for Diagnosis<'_> {
                 "the pixel lies on an edge, and {} of its camera samples show the scene",
                 percent(decomposition.coverage)
             ),
-            Cause::Background => {
-                f.write_str("what is behind the scene differs between camera samples")
-            }
-            Cause::Emission => {
-                f.write_str("the light that surfaces emit differs between camera samples")
-            }
-            Cause::Known => f.write_str("what is known without rays differs from pass to pass"),
+            Cause::Background => f.write_str("the background differs between camera samples"),
+            Cause::Emission => f.write_str("emission differs between camera samples"),
+            Cause::Known => f.write_str("the part known without rays differs from pass to pass"),
             Cause::Shading(kind) => {
                 write!(f, "the surfaces that the pixel shows reflect {kind} differently")
             }
@@ -55,13 +51,17 @@ impl fmt::Display for Diagnosis<'_> {
             }
             Cause::Penumbra(kind) => {
                 let free = of(kind).and_then(|statistics| statistics.free).unwrap_or(0.0);
-                write!(f, "{kind} is hidden in part: {} of the rays to it are free", percent(free))
+                write!(
+                    f,
+                    "{kind} is partly hidden: {} of the rays to it are unoccluded",
+                    percent(free)
+                )
             }
         }
     }
 }
 
-/// What would help at a pixel; its text is a sentence.
+/// What would help at a pixel. It displays as a sentence.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 #[non_exhaustive]
@@ -75,7 +75,7 @@ pub enum Advice {
         /// Share of its variance between camera samples.
         between: f64,
     },
-    /// The strategy needs the fewest rays to the same error.
+    /// This strategy needs the fewest rays for the same error.
     Strategy {
         /// Name of the best strategy.
         name: String,
@@ -84,11 +84,11 @@ pub enum Advice {
         /// That one.
         than: String,
     },
-    /// All strategies are about alike: more rays.
+    /// All strategies perform about the same; more rays would help.
     Rays,
 }
 
-/// What would help at a pixel, given the variance of some strategies there.
+/// Advice for a pixel, given the variance of some strategies there.
 pub fn advice(strategies: &[Decomposition]) -> Advice {
     /// A factor that is worth changing the strategy for.
     const WORTH: f64 = 1.5;
@@ -131,7 +131,7 @@ impl fmt::Display for Advice {
             Self::Strategy { name, .. } => {
                 write!(f, "{name} would help: it has no error at this pixel")
             }
-            Self::Rays => f.write_str("more rays would help; the strategies are about alike here"),
+            Self::Rays => f.write_str("more rays would help; the strategies are about equal here"),
         }
     }
 }

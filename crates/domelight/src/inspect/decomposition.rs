@@ -1,11 +1,11 @@
-//! The variance of a strategy at a pixel, by causes.
+//! Decomposes the variance of a strategy at a pixel by cause.
 //!
-//! Let t be the estimate from one camera sample, a sum of parts: what rays toward each source add, and what is known
-//! without rays. By the law of total variance, Var\[t\] = Var\[E\[t | p\]\] + E\[Var\[t | p\]\] over points p of the pixel. Both
-//! terms are sums of covariances with the parts, Var\[t\] = Σ Cov\[t, tᵣ\], so that shares sum to 1. A part is divided
-//! once more, tᵣ = v uᵣ + (tᵣ − v uᵣ), where uᵣ is the same with all rays free and v = E\[tᵣ\] / E\[uᵣ\]: the first
-//! varies with light, reflectance and densities, the second with visibility. A share below 0 belongs to a cause that
-//! offsets others.
+//! Let t be the estimate from one camera sample, a sum of parts: the contributions of rays toward each source, and the
+//! part known without rays. By the law of total variance, Var\[t\] = Var\[E\[t | p\]\] + E\[Var\[t | p\]\] over
+//! points p of the pixel. Both terms are sums of covariances with the parts, Var\[t\] = Σ Cov\[t, tᵣ\], so that the
+//! shares sum to 1. Each part is split once more, tᵣ = v uᵣ + (tᵣ − v uᵣ), where uᵣ is the same part with all rays
+//! unoccluded and v = E\[tᵣ\] / E\[uᵣ\]: the first term varies with light, reflectance and densities, the second with
+//! visibility. A cause with a negative share offsets others.
 
 use std::fmt;
 
@@ -13,30 +13,30 @@ use super::CameraSample;
 use super::regions::{Regions, Source, SourceKind};
 use super::replicates::{N_PIXELS, Replicates, SAMPLES_PER_PIXEL};
 
-/// Why estimates of a pixel differ.
+/// A cause of differences between estimates of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Cause {
     /// Some camera samples hit the scene, some miss it.
     Coverage,
-    /// What is behind the scene differs between camera samples.
+    /// The background differs between camera samples.
     Background,
-    /// The light that surfaces emit differs between camera samples.
+    /// Emission differs between camera samples.
     Emission,
-    /// What is known without rays differs between camera samples, or between passes.
+    /// The part known without rays differs between camera samples, or between passes.
     Known,
     /// The unoccluded light of a source differs between camera samples: texture, curvature, materials.
     Shading(SourceKind),
-    /// The source is seen by some of the camera samples: the edge of a shadow.
+    /// Only some of the camera samples see the source: the edge of a shadow.
     ShadowEdge(SourceKind),
-    /// The density of the directions does not follow what the source's light does at a point.
+    /// The density of directions does not follow the light of the source at a point.
     Directions(SourceKind),
-    /// The source is hidden in part from one point: a penumbra.
+    /// The source is partly hidden from a point: a penumbra.
     Penumbra(SourceKind),
 }
 
 impl Cause {
-    /// Differs between camera samples, so that no choice of directions changes it.
+    /// Whether the cause lies between camera samples, so that no choice of directions changes it.
     pub fn is_between_samples(self) -> bool {
         !matches!(self, Self::Directions(_) | Self::Penumbra(_) | Self::Known)
     }
@@ -61,46 +61,47 @@ impl fmt::Display for Cause {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize))]
 pub struct Share {
-    /// Why.
+    /// The cause.
     pub cause: Cause,
-    /// Share of the variance; all shares sum to 1.
+    /// The share of the variance; all shares sum to 1.
     pub share: f64,
 }
 
-/// What a strategy does with a source.
+/// Statistics of a strategy for a source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize))]
 pub struct SourceStatistics {
     /// The source.
     pub source: Source,
-    /// Share of the strategy's rays that go there.
+    /// The share of the strategy's rays toward the source.
     pub rays: f64,
-    /// Share of the light reflected toward the camera that comes from there, by multiple importance sampling.
+    /// The share of the light reflected toward the camera that comes from the source, estimated by multiple importance
+    /// sampling.
     pub light: f64,
-    /// Mean visibility of the rays that go there; none if none do.
+    /// The mean visibility of the rays toward the source; `None` without such rays.
     pub free: Option<f64>,
-    /// Share of the hits that any light from there was found at.
+    /// The share of the hits at which any light from the source was found.
     pub seen: f64,
 }
 
-/// The variance of a strategy at a pixel, by causes. Units are those of luminance.
+/// The variance of a strategy at a pixel, decomposed by cause. Units are those of luminance.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize))]
 pub struct Decomposition {
-    /// Name of the strategy.
+    /// The name of the strategy.
     pub name: String,
-    /// Luminance of the pixel.
+    /// The luminance of the pixel.
     pub mean: f64,
-    /// Variance of the estimate from one camera sample. Directions are as well distributed as in a pass of 16 samples
-    /// a pixel, camera samples count as independent.
+    /// The variance of the estimate from one camera sample. Directions are as well distributed as in a pass of 16
+    /// samples per pixel; camera samples count as independent.
     pub variance: f64,
-    /// Shadow rays of a camera sample.
+    /// The number of shadow rays per camera sample.
     pub rays_per_sample: f64,
-    /// Share of the camera samples that hit the scene.
+    /// The fraction of the camera samples that hit the scene.
     pub coverage: f64,
-    /// The causes, the greatest share first; empty if there is no variance.
+    /// The causes in descending order of their share; empty if there is no variance.
     pub shares: Vec<Share>,
-    /// What the strategy does with each source.
+    /// The statistics for each source.
     pub sources: Vec<SourceStatistics>,
 }
 
@@ -145,12 +146,12 @@ impl Decomposition {
         }
     }
 
-    /// Variance of the estimate from one shadow ray; from one camera sample where there are no rays.
+    /// The variance of the estimate from one shadow ray, or from one camera sample if there are no rays.
     pub fn variance_per_ray(&self) -> f64 {
         self.variance * if self.rays_per_sample > 0.0 { self.rays_per_sample } else { 1.0 }
     }
 
-    /// Share of the variance between camera samples, which no choice of directions changes.
+    /// The share of the variance between camera samples, which no choice of directions changes.
     pub fn between_samples(&self) -> f64 {
         let between = self.shares.iter().filter(|share| share.cause.is_between_samples());
         between.map(|share| share.share).sum()

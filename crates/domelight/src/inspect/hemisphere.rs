@@ -1,7 +1,7 @@
 //! The hemisphere above a point as maps.
 //!
-//! A map is the disk of Lambert's azimuthal equal-area projection in a square: the normal in the middle, the horizon
-//! on the circle, and every pixel has the same solid angle. Rows run from +y of the local frame down.
+//! A map is the disk of Lambert's azimuthal equal-area projection in a square. The normal is in the center, the
+//! horizon is the circle, and every pixel has the same solid angle. Rows run from +y of the local frame down.
 
 use crate::Rgb;
 use crate::environment::Environment;
@@ -14,9 +14,9 @@ const SUBPIXELS: usize = 4;
 /// Light, reflectance and visibility above a point. Pixels outside the disk are black.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hemisphere {
-    /// Pixels along an edge.
+    /// The number of pixels along an edge.
     pub resolution: usize,
-    /// x, y and z of the local frame in the world; z is the shading normal.
+    /// The x, y and z axes of the local frame in world space; z is the shading normal.
     pub frame: [[f32; 3]; 3],
     /// L \[W·m⁻²·sr⁻¹\].
     pub radiance: Vec<Rgb>,
@@ -80,9 +80,9 @@ impl Hemisphere {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize))]
 pub struct DirectionSample {
-    /// Position on the maps: x to the right and y up, in \[−1, 1\].
+    /// The position on the maps, with x to the right and y up, in \[−1, 1\].
     pub place: [f32; 2],
-    /// Luminance of what it adds if it is free.
+    /// The luminance of its contribution if it is unoccluded.
     pub weight: f32,
     /// V, in \[0, 1\].
     pub visibility: f32,
@@ -91,13 +91,13 @@ pub struct DirectionSample {
 /// The distribution of the rays that a strategy sends from a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DirectionHistogram {
-    /// Pixels along an edge.
+    /// The number of pixels along an edge.
     pub resolution: usize,
-    /// Rays per solid angle and ray \[sr⁻¹\], estimated by counting.
+    /// The density \[sr⁻¹\], estimated by counting rays.
     pub density: Vec<f32>,
     /// The number of rays counted.
     pub n_rays: usize,
-    /// Some of them.
+    /// Some of the rays.
     pub samples: Vec<DirectionSample>,
 }
 

@@ -1,7 +1,7 @@
-//! The pixel X-ray: why is this pixel noisy, and what would help?
+//! The pixel X-ray: explains why a pixel is noisy and what would help.
 //!
-//! An [`Inspector`] takes many camera samples of one pixel and lets strategies estimate each of them again and again.
-//! From that follow the hemisphere as maps ([`Hemisphere`]), where a strategy sends its rays ([`DirectionHistogram`]),
+//! An [`Inspector`] takes many camera samples of one pixel and lets strategies estimate each of them many times. The
+//! results are the hemisphere as maps ([`Hemisphere`]), the distribution of a strategy's rays ([`DirectionHistogram`]),
 //! and a decomposition of a strategy's variance into causes whose shares sum to 1 ([`Decomposition`]).
 //!
 //! ```
@@ -72,7 +72,7 @@ pub enum InspectError {
     },
 }
 
-/// A pixel under the microscope.
+/// Inspects one pixel.
 #[derive(Debug)]
 pub struct Inspector<'a> {
     scene: &'a Scene,
@@ -101,28 +101,28 @@ struct CameraSample {
     throughput: Rgb,
 }
 
-/// What a pixel shows.
+/// A summary of what a pixel shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize))]
 pub struct PixelSummary {
-    /// Column and row, from the upper left.
+    /// The column and row, from the upper left.
     pub pixel: [usize; 2],
-    /// Share of the camera samples that hit the scene.
+    /// The fraction of the camera samples that hit the scene.
     pub coverage: f64,
-    /// World position of the hit nearest to the pixel's center; none where the pixel has no hit.
+    /// The world position of the hit nearest to the pixel's center; `None` if the pixel has no hit.
     pub position: Option<[f32; 3]>,
-    /// The shading normal there.
+    /// The shading normal at this hit.
     pub normal: Option<[f32; 3]>,
-    /// Directional-hemispherical reflectance there, linear Rec. 709.
+    /// The directional-hemispherical reflectance at this hit, in linear Rec. 709.
     pub albedo: Option<[f32; 3]>,
 }
 
 impl<'a> Inspector<'a> {
-    /// Takes camera samples of the pixel in that column and row, counted from the upper left. `settings` give the
-    /// picture's size, filter, background and seed.
+    /// Takes camera samples of the pixel in the given column and row, counted from the upper left. `settings` provide
+    /// the picture's size, filter, background and seed.
     ///
     /// # Errors
-    /// If the pixel is not in the picture.
+    /// If the pixel is outside the picture.
     pub fn new(
         scene: &'a Scene,
         camera: &Camera,
@@ -190,7 +190,7 @@ impl<'a> Inspector<'a> {
         replicates.map_or(Vec::new(), |replicates| replicates.light_by_source(self.samples.len()))
     }
 
-    /// What the pixel shows.
+    /// A summary of what the pixel shows.
     pub fn summary(&self) -> PixelSummary {
         let hits = self.samples.iter().filter(|sample| sample.point.is_some()).count();
         let point = self.representative.as_ref();
@@ -203,21 +203,21 @@ impl<'a> Inspector<'a> {
         }
     }
 
-    /// The suns and lamps that causes are divided by, and the rest of the map.
+    /// The suns and lamps by which causes are divided, and the rest of the map.
     pub fn sources(&self) -> &[Source] {
         self.regions.sources()
     }
 
-    /// The hemisphere above the hit nearest to the pixel's center, as maps of `resolution` by `resolution` pixels; none
-    /// of a pixel without a hit.
+    /// The hemisphere above the hit nearest to the pixel's center, as maps of `resolution` by `resolution` pixels;
+    /// `None` for a pixel without a hit.
     pub fn hemisphere(&self, resolution: usize) -> Option<Hemisphere> {
         let point = self.representative.as_ref()?;
         let trace = |point: &ShadingPoint, wi: &[Vec3]| self.trace(point, wi);
         Some(Hemisphere::new(point, self.environment, resolution, trace))
     }
 
-    /// Where a strategy sends its rays from that hit, as a map of `resolution` by `resolution` pixels; none of a pixel
-    /// without a hit.
+    /// The distribution of a strategy's rays from that hit, as a map of `resolution` by `resolution` pixels; `None`
+    /// for a pixel without a hit.
     pub fn directions<S: Strategy>(
         &self,
         strategy: &S,
@@ -230,9 +230,9 @@ impl<'a> Inspector<'a> {
         Some(DirectionHistogram::new(point, &rays, &visibility, resolution))
     }
 
-    /// The variance of a strategy at this pixel, by causes.
+    /// Decomposes the variance of a strategy at this pixel by cause.
     ///
-    /// Rays that are so rare that none was found count by what they must bring at least, with a confidence of 95 %.
+    /// Contributions from rays too rare to be found are included with their lower bound at a confidence of 95 %.
     pub fn decompose<S: Strategy>(&self, name: &str, strategy: &S) -> Decomposition {
         let replicates = self.replicates(strategy);
         Decomposition::new(name, &self.samples, &replicates, &self.regions, &self.light)

@@ -1,4 +1,4 @@
-//! The light by sources: the sun, lamps, and the rest of the map.
+//! Divides the light into sources: the sun, lamps, and the rest of the map.
 
 use crate::environment::Environment;
 use crate::environment::compact::{SourceCriteria, compact_sources};
@@ -13,21 +13,21 @@ const MIN_SHARE: f64 = 0.01;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize))]
 pub struct Source {
-    /// What it is.
+    /// The kind of source.
     pub kind: SourceKind,
-    /// The direction of its center in the world; none of the rest of the map.
+    /// The direction of its center in world space; `None` for the rest of the map.
     pub direction: Option<[f32; 3]>,
 }
 
-/// What a part of the light is.
+/// The kind of a part of the light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize), serde(rename_all = "lowercase"))]
 pub enum SourceKind {
     /// The brightest source no wider than 7°.
     Sun,
-    /// A lamp or window; the one with the most light is 1.
+    /// A lamp or window, numbered from 1 in descending order of light.
     Lamp(u32),
-    /// What is no source.
+    /// The light outside all sources.
     Rest,
 }
 

@@ -1,4 +1,4 @@
-//! Estimates of a pixel's camera samples, again and again: what the statistics are made of.
+//! Repeated estimates of a pixel's camera samples, from which the statistics are computed.
 
 use super::regions::Regions;
 use super::{CameraSample, N_SAMPLES};

@@ -1,13 +1,14 @@
-//! The elementary functions of the whole library: the same bits on every processor and operating system.
+//! The elementary functions of the library, with the same bits on every processor and operating system.
 //!
-//! What the standard library calls comes from the platform's C library, which rounds as it likes; so does
-//! `f32::mul_add` where the processor has no such instruction, and `powi` leaves the order of its products open. Clippy
-//! forbids all of these here (`clippy.toml`). Square roots and rounding are exact everywhere and need no care.
+//! The standard library calls the platform's C library, whose rounding varies. So does `f32::mul_add` if the processor
+//! has no such instruction, and `powi` does not define the order of its products. Clippy forbids all of these here
+//! (`clippy.toml`). Square roots and rounding are exact everywhere.
 //!
-//! Exponentials and logarithms of f32 are computed in f64 and rounded once: a Taylor polynomial after a reduction of the
-//! argument, without tables, so that loops over them vectorize. Those that lobes use are kept out of line, because the
-//! compiler treats them as pure and hoists them above the branch on the lobe. All others are those of the `libm` crate,
-//! which are about as fast as the platform's. [`super::atan2`] and its neighbors are for vectors, and less accurate.
+//! Exponentials and logarithms of f32 are computed in f64 and rounded once. They use argument reduction and a Taylor
+//! polynomial without tables, so that loops over them vectorize. Functions used by lobes are not inlined, because the
+//! compiler treats them as pure and would hoist them above the branch on the lobe. All others come from the `libm`
+//! crate, which is about as fast as the platform's library. [`super::atan2`] and its neighbors are for vectors and less
+//! accurate.
 #![cfg_attr(not(feature = "io"), allow(dead_code))] // Some serve files alone.
 
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2, LOG2_E, LOG10_2};
@@ -341,7 +342,7 @@ functions! {
 mod tests {
     use super::*;
 
-    /// The greatest distance between a function of f32 and the same of f64, in units of the last place of the result.
+    /// The largest distance between a function of f32 and the same of f64, in units of the last place of the result.
     fn worst(
         arguments: impl Iterator<Item = f32>,
         f: fn(f32) -> f32,

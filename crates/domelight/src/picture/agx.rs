@@ -1,9 +1,9 @@
-//! AgX as Blender has it since version 4.0: the base look of Sobotka 2022 in the Rec. 2020 form of Chow 2023.
+//! AgX as in Blender since version 4.0: the base look of Sobotka 2022 in the Rec. 2020 form of Chow 2023.
 //!
-//! Light is brought toward gray by a matrix (the inset), each channel is shaped by a sigmoid over 16.5 stops, part of
-//! the hue shift that this causes is taken back, and a second matrix (the outset) restores purity. What Rec. 709 cannot
-//! hold of the result is brought into it at nearly constant luminance. Blender tabulates this in a cube of 57³ values;
-//! here the formulas are evaluated themselves.
+//! A matrix (the inset) moves colors toward gray, a sigmoid over 16.5 stops shapes each channel, part of the hue shift
+//! that this causes is reverted, and a second matrix (the outset) restores purity. Colors outside Rec. 709 are mapped
+//! into it at nearly constant luminance. Blender tabulates this in a cube of 57³ values; here the formulas are
+//! evaluated directly.
 
 use crate::Rgb;
 use crate::math::{Mat3, Vec3, functions};
@@ -66,7 +66,7 @@ pub(super) fn shaped(light: f32) -> f32 {
     functions::powf(encoded.max(0.0), GAMMA)
 }
 
-/// Least and greatest light that [`shaped`] distinguishes from black and white.
+/// Least and largest light that [`shaped`] distinguishes from black and white.
 pub(super) fn range() -> (f32, f32) {
     (MIDDLE_GRAY * functions::exp2(DARKEST), MIDDLE_GRAY * functions::exp2(BRIGHTEST))
 }

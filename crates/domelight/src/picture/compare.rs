@@ -1,8 +1,8 @@
-//! How far a picture is from its reference, in numbers and as a false-color picture.
+//! The error of a picture against its reference, as numbers and as a false-color picture.
 //!
 //! All sums are in f64 over linear radiance. relMSE divides by R² + 0.01, the regularizer that most
-//! papers on sampling use, so that dark pixels do not decide alone; the trimmed relMSE leaves out the
-//! worst 0.1 % of the pixels, so that a few fireflies do not.
+//! papers on sampling use, so that dark pixels do not dominate. The trimmed relMSE omits the worst
+//! 0.1 % of the pixels, so that a few fireflies do not dominate either.
 
 use super::tone::linear_from_srgb;
 use crate::color::Rgb;
@@ -21,16 +21,16 @@ const KEPT: f64 = 0.999;
     test.0, test.1, reference.0, reference.1
 )]
 pub struct SizeMismatch {
-    /// Width and height of the picture.
+    /// The width and height of the picture.
     pub test: (usize, usize),
-    /// Width and height of its reference.
+    /// The width and height of its reference.
     pub reference: (usize, usize),
 }
 
-/// Differences of a picture I from its reference R.
+/// The error of a picture I against its reference R.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
-    /// Number of pixels that were compared.
+    /// The number of pixels compared.
     pub n_pixels: usize,
     /// Mean over pixels and channels of (I − R)².
     pub mse: f64,
@@ -38,7 +38,7 @@ pub struct Comparison {
     pub rel_mse: f64,
     /// [`rel_mse`](Self::rel_mse) without the worst 0.1 % of the pixels.
     pub rel_mse_trimmed: f64,
-    /// 10 log₁₀(peak² / MSE) \[dB\]; the peak is the greatest channel value of the reference, not a
+    /// 10 log₁₀(peak² / MSE) \[dB\]; the peak is the largest channel value of the reference, not a
     /// screen's white. Infinite for equal pictures.
     pub psnr: f64,
     /// Mean of I.
@@ -53,13 +53,13 @@ pub struct Comparison {
 
 /// Compares `test` with `reference` over the pixels where `mask` is true, or over all.
 ///
-/// Without a single pixel to compare, the means are NaN.
+/// Without any pixel to compare, the means are NaN.
 ///
 /// # Errors
 /// If the pictures differ in size.
 ///
 /// # Panics
-/// If the mask has not a value for every pixel.
+/// If the mask does not have one value per pixel.
 pub fn compare(
     test: &RgbImage,
     reference: &RgbImage,
@@ -120,7 +120,7 @@ fn channel_means(pixels: impl ExactSizeIterator<Item = Rgb>) -> [f64; 3] {
     sum.map(|s| s / n)
 }
 
-/// √ of the mean over the channels of (I − R)² / (R² + 0.01), each pixel: 0.1 is an error of 10 %.
+/// √ of the mean over the channels of (I − R)² / (R² + 0.01) for each pixel: 0.1 is an error of 10 %.
 ///
 /// # Errors
 /// If the pictures differ in size.
@@ -128,7 +128,7 @@ pub fn relative_error_map(test: &RgbImage, reference: &RgbImage) -> Result<Vec<f
     error_map(test, reference, relative_error)
 }
 
-/// √ of the mean over the channels of (I − R)², each pixel, in units of radiance.
+/// √ of the mean over the channels of (I − R)² for each pixel, in units of radiance.
 ///
 /// # Errors
 /// If the pictures differ in size.
@@ -146,21 +146,21 @@ fn error_map(
     Ok(pairs.map(|(&i, &r)| error(i, r).sqrt() as f32).collect())
 }
 
-/// A perceptually uniform color scale: equal steps look equal, and its gray version still rises.
+/// A perceptually uniform color scale: equal steps look equal, and lightness increases monotonically.
 ///
 /// Van der Walt and Smith 2015, matplotlib's default color maps (their tables are CC0), here as lines
-/// between every fifth entry, off by at most 0.004. Rainbow scales, which show edges where there are
-/// none, are not offered.
+/// between every fifth entry, off by at most 0.004. Rainbow scales, which show false
+/// edges, are not offered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorScale {
-    /// Violet, green, yellow.
+    /// From violet over green to yellow.
     Viridis,
-    /// Black, purple, orange, pale yellow; that of the ꟻLIP papers.
+    /// From black over purple and orange to pale yellow, as in the ꟻLIP papers.
     Magma,
 }
 
 impl ColorScale {
-    /// Linear light of the scale at `t`, clamped to \[0, 1\]; NaN is cyan, which no scale contains.
+    /// The linear color at `t`, clamped to \[0, 1\]; NaN is cyan, which no scale contains.
     pub fn color(self, t: f32) -> Rgb {
         if t.is_nan() {
             return Rgb::new(0.0, 1.0, 1.0);
@@ -174,7 +174,7 @@ impl ColorScale {
         srgb(table[i]).lerp(srgb(table[i + 1]), at - i as f32).map(linear_from_srgb)
     }
 
-    /// The picture of `values` over `white`, the value at the scale's upper end.
+    /// The picture of `values`, where `white` is the value at the upper end of the scale.
     ///
     /// # Panics
     /// If there are not `width` · `height` values.

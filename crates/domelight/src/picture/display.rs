@@ -1,4 +1,4 @@
-//! The encoding of a whole picture for a screen, faster than pixel by pixel with the formulas of [`super::tone`].
+//! Encodes a whole picture for display, faster than pixel by pixel with the formulas of [`super::tone`].
 
 use super::agx;
 use super::tone::{ToneCurve, ToneMapping, srgb_from_linear};
@@ -52,7 +52,7 @@ impl FloatTable {
     fn new(least: f32, greatest: f32, f: impl Fn(f32) -> f32) -> Self {
         let (first, last) = (least.to_bits() >> SHIFT, (greatest.to_bits() >> SHIFT) + 1);
         let mut values: Vec<f32> = (first..=last).map(|i| f(f32::from_bits(i << SHIFT))).collect();
-        // The function may bend at its greatest argument: lead the last line through its value there.
+        // The function may bend at its largest argument: lead the last line through its value there.
         let (t, n) = (fraction(greatest.to_bits()), values.len());
         if t > 0.0 {
             values[n - 1] = values[n - 2] + (f(greatest) - values[n - 2]) / t;

@@ -1,27 +1,27 @@
-//! What can be wrong with a picture file.
+//! Errors of picture files.
 
 use crate::memory::OverLimit;
 use std::io;
 
-/// A picture file could not be read or written.
+/// An error in reading or writing a picture file.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {kind}")]
 pub struct PictureError {
-    /// The file's name as the user gave it.
+    /// The file name as given by the user.
     pub file: String,
-    /// What is wrong with it.
+    /// The kind of error.
     #[source]
     pub kind: PictureErrorKind,
 }
 
-/// What is wrong with a picture file. Offsets are in bytes from the file's start.
+/// The kinds of errors of picture files. Offsets are in bytes from the start of the file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PictureErrorKind {
-    /// The system says so.
+    /// An I/O error.
     #[error("{0}")]
     Io(io::Error),
-    /// No bytes.
+    /// The file is empty.
     #[error("the file is empty")]
     NoBytes,
     /// The first bytes belong to no known format.
@@ -29,7 +29,7 @@ pub enum PictureErrorKind {
         "not a picture in a known format (Radiance HDR, OpenEXR, PFM, PNG, JPEG), by its first bytes"
     )]
     UnknownFormat,
-    /// A line of the header makes no sense.
+    /// An invalid header line.
     #[error("header line {line}: {found:?} is not {expected}")]
     Header {
         /// Counted from 1.
@@ -39,7 +39,7 @@ pub enum PictureErrorKind {
         /// What should.
         expected: &'static str,
     },
-    /// No texels.
+    /// The picture has no texels.
     #[error("the picture is {width}x{height}: it has no texels")]
     Empty {
         /// Columns.
@@ -80,7 +80,7 @@ pub enum PictureErrorKind {
         /// Where the file ends.
         offset: usize,
     },
-    /// A Radiance run that cannot be.
+    /// An invalid run in a Radiance file.
     #[error("scanline {scanline}, byte {offset}: {what}")]
     Scanline {
         /// Counted from 0 in the file's order.
@@ -99,10 +99,10 @@ pub enum PictureErrorKind {
         /// Its own words.
         message: String,
     },
-    /// Something of OpenEXR that is not read.
+    /// An OpenEXR feature that is not supported.
     #[error("OpenEXR: {0} are not supported")]
     ExrUnsupported(&'static str),
-    /// The layer that was asked for is not there.
+    /// The requested layer does not exist.
     #[error("there is no layer {asked:?} with color channels; the file has {}", list(.present))]
     NoSuchLayer {
         /// Its name.
@@ -116,7 +116,7 @@ pub enum PictureErrorKind {
         /// The channels there are.
         present: Vec<String>,
     },
-    /// It takes more memory than [`super::ReadOptions::max_memory`] allows.
+    /// The picture needs more memory than [`super::ReadOptions::max_memory`] allows.
     #[error("{0}")]
     Memory(#[from] OverLimit),
     /// A decoder of the `image` crate refused the file.
@@ -133,7 +133,7 @@ pub enum PictureErrorKind {
 }
 
 impl PictureErrorKind {
-    /// Names the file.
+    /// Adds the name of the file.
     pub fn in_file(self, file: &str) -> PictureError {
         PictureError { file: file.to_owned(), kind: self }
     }

@@ -1,16 +1,16 @@
-//! Which exposure a picture is shown at.
+//! The exposure of pictures for display.
 
 use crate::RgbImage;
 use crate::math::functions;
 use std::str::FromStr;
 
-/// The luminance that the median of an automatically exposed picture has.
+/// The luminance to which automatic exposure maps the median.
 pub const MIDDLE_GRAY: f32 = 0.18;
 
 /// An exposure, or the rule that chooses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exposure {
-    /// The median luminance of what is covered becomes [`MIDDLE_GRAY`].
+    /// Maps the median luminance over the covered pixels to [`MIDDLE_GRAY`].
     Auto,
     /// A number of stops: radiance times 2^stops.
     Stops(f32),
@@ -20,15 +20,15 @@ pub enum Exposure {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{text:?} is neither auto nor a finite number of stops")]
 pub struct BadExposure {
-    /// What was given.
+    /// The given text.
     pub text: String,
 }
 
 impl Exposure {
-    /// The exposure of a picture \[stops\], in hundredths if it is automatic, so that it can be typed again.
+    /// The exposure of a picture \[stops\], rounded to hundredths if it is automatic, so that it can be typed.
     ///
-    /// `coverage` says which pixels count, a value a pixel: those above 0; all count if it is `None` or nothing is
-    /// covered. Pixels that are black or not finite do not count; a picture of such pixels alone has 0.
+    /// `coverage` has one value per pixel, and pixels with a value above 0 count. All pixels count if it is `None` or
+    /// nothing is covered. Black and non-finite pixels do not count; if there are no others, the exposure is 0.
     ///
     /// # Panics
     /// If `coverage` has fewer values than the picture has pixels.

@@ -1,16 +1,16 @@
-//! ꟻLIP: how different two pictures look to somebody who flips between them.
+//! ꟻLIP: the perceived difference of two pictures when flipping between them.
 //!
 //! - LDR: Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild 2020, "ꟻLIP: A Difference
 //!   Evaluator for Alternating Images", Proc. ACM Comput. Graph. Interact. Tech. 3(2).
 //! - HDR: Andersson, Nilsson, Shirley, Akenine-Möller 2021, "Visualizing Errors in Rendered High
-//!   Dynamic Range Images", Eurographics short papers: the greatest LDR difference over a range of
-//!   exposures that the reference alone decides.
+//!   Dynamic Range Images", Eurographics short papers: the maximum LDR difference over a range of
+//!   exposures determined by the reference alone.
 //!
-//! The filters are sums of Gaussians and their derivatives, so all are run as rows, then columns; this
+//! The filters are sums of Gaussians and their derivatives, so all are applied to rows, then columns. This
 //! is exact, also at the border, which repeats the outermost pixels.
 //!
-//! SSIM was considered for the same place: it is older and better known, but judges Monte Carlo noise
-//! on dark ground far too hard, and says nothing about color.
+//! SSIM was rejected: it is older and better known, but far too strict on Monte Carlo noise in dark areas,
+//! and it ignores color.
 
 use super::compare::{SizeMismatch, check_sizes};
 use crate::color::Rgb;
@@ -25,7 +25,7 @@ pub const PIXELS_PER_DEGREE: f32 = 67.020_64;
 const Q_COLOR: f32 = 0.7;
 /// Exponent of the feature difference.
 const Q_FEATURE: f32 = 0.5;
-/// Color differences up to this part of the greatest ...
+/// Color differences up to this part of the largest ...
 const P_COLOR: f32 = 0.4;
 /// ... are spread over this part of the scale.
 const P_TOP: f32 = 0.95;
@@ -38,18 +38,18 @@ const WHITE: [f32; 3] = [0.950_428_55, 1.0, 1.088_900_4];
 /// The HDR difference and the exposures behind it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HdrFlip {
-    /// Difference of each pixel in \[0, 1\].
+    /// The difference of each pixel, in \[0, 1\].
     pub map: Vec<f32>,
-    /// Lowest exposure \[stops\].
+    /// The lowest exposure \[stops\].
     pub start_exposure: f32,
-    /// Highest exposure \[stops\].
+    /// The highest exposure \[stops\].
     pub stop_exposure: f32,
-    /// Number of exposures from the lowest to the highest, both included.
+    /// The number of exposures from the lowest to the highest, inclusive.
     pub n_exposures: u32,
 }
 
 /// LDR-ꟻLIP of each pixel, in \[0, 1\], of two pictures of linear light on the screen in \[0, 1\] (that is,
-/// after the tone curve, before the sRGB encoding); what lies outside is clamped.
+/// after the tone curve, before the sRGB encoding). Values outside are clamped.
 ///
 /// `pixels_per_degree` > 0 is the resolution at the eye, see [`PIXELS_PER_DEGREE`].
 ///
@@ -82,8 +82,8 @@ pub fn ldr_flip(
 /// HDR-ꟻLIP of two pictures of linear radiance, as the authors' program flip-evaluator 1.7 computes it; non-finite
 /// values count as 0.
 ///
-/// Negative values go through the tone curve as they are, which shows those below −0.02 as *light*: repair them first
-/// where that is not wanted.
+/// Negative values pass through the tone curve unchanged, which shows values below −0.02 as *bright*. Repair them first
+/// if that is not wanted.
 ///
 /// # Errors
 /// If the pictures differ in size.
@@ -125,7 +125,7 @@ fn tone_map(radiance: Rgb) -> Rgb {
     })
 }
 
-/// From where the greatest to where the median luminance is shown at 85 % \[stops\].
+/// From where the largest to where the median luminance is shown at 85 % \[stops\].
 ///
 /// The median is at least [`f32::EPSILON`], as in the authors' program: where most of the picture is black it is shown
 /// at up to 24 stops. A picture without any light is shown as it is.

@@ -1,17 +1,17 @@
-//! Radiance pictures (`.hdr`, `.pic`): RGBE and XYZE, flat and both kinds of run lengths, all eight orientations.
+//! Radiance pictures (`.hdr`, `.pic`): RGBE and XYZE, flat and both run-length encodings, all eight orientations.
 //!
 //! Ward 1991, "Real Pixels", Graphics Gems II; the *Radiance* reference manual, "File Formats". A color is three
-//! mantissas and one exponent, c = m · 2^(e−136). No half is added to the mantissa (Ward's own reader adds ½; stb,
-//! OpenImageIO and most others do not): the writer rounds to nearest, so that what is read is written again
-//! unchanged.
+//! mantissas and one exponent, c = m · 2^(e−136). The reader does not add ½ to the mantissa (Ward's own reader
+//! does; stb, OpenImageIO and most others do not). The writer rounds to nearest, so that reading and writing a
+//! file leaves it unchanged.
 //!
-//! EXPOSURE and COLORCORR are divided out (all of them, as they accumulate), PRIMARIES other than Rec. 709's are
-//! converted. XYZE goes to Rec. 709 by the D65 matrix; colors outside the gamut are clipped at zero, since a
-//! mantissa step in XYZ is enough to cross it.
+//! EXPOSURE and COLORCORR are divided out (all of them, as they accumulate), and PRIMARIES other than Rec. 709's are
+//! converted. XYZE is converted to Rec. 709 with the D65 matrix. Colors outside the gamut are clipped at zero, because
+//! a mantissa step in XYZ is enough to leave it.
 //!
-//! Reading goes in two passes: the first walks along the runs of all scanlines and so proves that the file holds
-//! what the header promises, before memory is taken; the second decodes scanlines independently, in parallel. The
-//! `image` crate's decoder knows one orientation and drops EXPOSURE.
+//! Reading takes two passes. The first scans the runs of all scanlines, which proves that the file holds what the
+//! header promises before memory is allocated. The second decodes scanlines independently, in parallel. The `image`
+//! crate's decoder supports only one orientation and drops EXPOSURE.
 
 use super::primaries::{Primaries, transform, xyz_to_rec709};
 use super::{PictureErrorKind, allocate, checked_area};
@@ -23,7 +23,7 @@ use std::io::{self, Write};
 /// Decodes a whole file into linear Rec. 709, top row first.
 ///
 /// # Errors
-/// If header or data are damaged or incomplete.
+/// If the header or the data is damaged or incomplete.
 pub fn decode(bytes: &[u8]) -> Result<RgbImage, PictureErrorKind> {
     let header = Header::parse(bytes)?;
     let (lines, length) = (header.lines, header.length);
@@ -396,13 +396,13 @@ impl ColorTable {
     }
 }
 
-/// Writes an RGBE picture with run lengths of the new kind.
+/// Writes an RGBE picture with the new run-length encoding.
 ///
-/// Each color is rounded to the nearest that the format holds. It holds no negative and no non-finite values:
-/// negative and NaN become 0, infinity the greatest value, 255 · 2^119.
+/// Each color is rounded to the nearest one in the format, which has no negative and no non-finite values:
+/// negative and NaN values become 0, and infinity becomes the maximum, 255 · 2^119.
 ///
 /// # Errors
-/// If `out` does not take it.
+/// If writing to `out` fails.
 pub fn encode(image: &RgbImage, out: &mut dyn Write) -> io::Result<()> {
     write!(out, "#?RADIANCE\nSOFTWARE=domelight\nFORMAT=32-bit_rle_rgbe\n\n")?;
     writeln!(out, "-Y {} +X {}", image.height, image.width)?;
@@ -421,12 +421,12 @@ pub fn encode(image: &RgbImage, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-/// The nearest (mantissas, exponent): the greatest mantissa is in 128 ..= 255.
+/// The nearest (mantissas, exponent), with the largest mantissa in 128 ..= 255.
 pub fn rgbe(color: Rgb) -> [u8; 4] {
     // max before min: NaN becomes 0.
     let color = color.map(|c| f32::min(c.max(0.0), f32::MAX));
     let greatest = f64::from(color.max_component());
-    // 2^(e−136) · 127.5 ≤ greatest < 2^(e−136) · 255.5, so that the greatest mantissa rounds to 128 ..= 255.
+    // 2^(e−136) · 127.5 ≤ largest < 2^(e−136) · 255.5, so that the largest mantissa rounds to 128 ..= 255.
     let exponent = |value: f64| (functions::log2(value / 255.5).floor() as i32 + 137).clamp(0, 255);
     let mut e = if greatest > 0.0 { exponent(greatest) } else { 0 };
     if e > 0 && e < 255 && greatest / functions::powi(2.0, e - 136) >= 255.5 {

@@ -1,11 +1,11 @@
-//! Pictures in files: Radiance `.hdr`, OpenEXR, `.pfm`, PNG, JPEG (read only); and what a tone curve makes of them.
+//! Picture files: Radiance `.hdr`, OpenEXR, `.pfm`, PNG, JPEG (read only); exposure and tone curves.
 //!
-//! The format is recognized by the first bytes, never by the name. What comes out is linear Rec. 709, top row first.
-//! A header that promises more texels than its file can hold is refused before memory is taken for them; truncated
-//! and corrupt files give a [`PictureError`] that names file, place and value.
+//! The format is recognized by the first bytes, never by the name. Decoded pictures are linear Rec. 709, top row first.
+//! A header that promises more texels than the file can hold is rejected before memory is allocated. Truncated and
+//! corrupt files give a [`PictureError`] that names the file, the place and the value.
 //!
-//! Writers make bytes ([`hdr::encode`], [`exr::ExrLayers::encode`], [`pfm::encode`], [`png::encode`]);
-//! [`write_atomically`] puts them into a file that is either the old one or the whole new one.
+//! Writers produce bytes ([`hdr::encode`], [`exr::ExrLayers::encode`], [`pfm::encode`], [`png::encode`]);
+//! [`write_atomically`] writes them to a file that is always either the old or the complete new one.
 
 mod agx;
 pub mod compare;
@@ -30,10 +30,10 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// No picture with more texels than this is read (2²⁹: 32768 × 16384).
+/// The maximum number of texels of a picture that is read (2²⁹: 32768 × 16384).
 pub const MAX_TEXELS: usize = 1 << 29;
 
-/// The file formats that [`read`] understands.
+/// The file formats that [`read`] supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Radiance RGBE or XYZE.
@@ -42,35 +42,35 @@ pub enum Format {
     Exr,
     /// Portable float map.
     Pfm,
-    /// PNG, taken as sRGB.
+    /// PNG, interpreted as sRGB.
     Png,
-    /// JPEG, taken as sRGB.
+    /// JPEG, interpreted as sRGB.
     Jpeg,
 }
 
-/// Position of OpenEXR's data window, which is the picture, in the display window.
+/// The position of OpenEXR's data window, which is the picture, in the display window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DataWindow {
-    /// Position of its top left texel, in texels right and down from the display window's.
+    /// The position of its top left texel relative to that of the display window, right and down \[texels\].
     pub position: (i64, i64),
-    /// Width and height of the display window \[texels\].
+    /// The width and height of the display window \[texels\].
     pub display: (usize, usize),
 }
 
-/// A picture as read from a file.
+/// A picture read from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Linear Rec. 709. Where there is alpha, premultiplied by it.
+    /// Linear Rec. 709, premultiplied by alpha if there is any.
     pub image: RgbImage,
-    /// Coverage in \[0, 1\], a value a texel, if the file has it.
+    /// The coverage in \[0, 1\], one value per texel, if the file has it.
     pub alpha: Option<Vec<f32>>,
-    /// What OpenEXR's `envmap` attribute says.
+    /// The value of OpenEXR's `envmap` attribute.
     pub envmap: Option<EnvmapKind>,
-    /// Position of the picture in OpenEXR's display window, if the two differ.
+    /// The position of the picture in OpenEXR's display window, if the two differ.
     pub window: Option<DataWindow>,
-    /// The format it was read from.
+    /// The format of the file.
     pub format: Format,
-    /// OpenEXR's attributes that are text, by name.
+    /// OpenEXR's text attributes, by name.
     pub attributes: Vec<(String, String)>,
 }
 
@@ -80,25 +80,25 @@ impl Picture {
     }
 }
 
-/// What to take from a file that holds several pictures.
+/// Options for reading a picture file.
 #[derive(Clone, Debug, Default)]
 pub struct ReadOptions {
-    /// The OpenEXR layer; by default the unnamed R, G, B channels, else the first layer that has them.
+    /// The OpenEXR layer; by default the unnamed R, G, B channels, or else the first layer that has them.
     pub layer: Option<String>,
-    /// The most memory that reading may take, in bytes: file and picture; by default there is no limit.
+    /// The maximum memory \[bytes\] for the file and the picture; unlimited by default.
     pub max_memory: Option<u64>,
 }
 
-/// The picture in a file, or on standard input if `path` is `-`.
+/// Reads the picture in a file, or on standard input if `path` is `-`.
 ///
 /// # Errors
-/// If the file cannot be read or is not a whole, valid picture in one of the known formats.
+/// If the file cannot be read or is not a complete, valid picture in one of the known formats.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Picture, PictureError> {
     let bytes = read_file(path, options.max_memory)?;
     read_bytes(&bytes, &display_name(path), options)
 }
 
-/// The bytes of a file, or of standard input if `path` is `-`; no more than `max_memory`.
+/// Reads the bytes of a file, or of standard input if `path` is `-`, up to `max_memory`.
 ///
 /// # Errors
 /// If the file cannot be read or is larger.
@@ -106,10 +106,10 @@ pub fn read_file(path: &Path, max_memory: Option<u64>) -> Result<Vec<u8>, Pictur
     read_all(path, max_memory).map_err(|kind| kind.in_file(&display_name(path)))
 }
 
-/// The picture in `bytes`; `name` is for messages.
+/// Decodes the picture in `bytes`; `name` is for messages.
 ///
 /// # Errors
-/// If the bytes are not a whole, valid picture in one of the known formats.
+/// If the bytes are not a complete, valid picture in one of the known formats.
 pub fn read_bytes(
     bytes: &[u8],
     name: &str,
@@ -133,7 +133,7 @@ pub fn read_bytes(
     decoded.map_err(|kind| kind.in_file(name))
 }
 
-/// An estimate of the memory that the file and its picture take while it is read, from the header alone.
+/// An estimate of the memory that the file and its picture need during reading \[bytes\], from the header alone.
 ///
 /// # Errors
 /// If the header is damaged.
@@ -149,7 +149,7 @@ pub fn memory_to_read(bytes: &[u8]) -> Result<u64, PictureErrorKind> {
     Ok(bytes.len() as u64 + texels as u64 * per_texel)
 }
 
-/// The format that the first bytes promise.
+/// The format according to the first bytes.
 pub fn format_of(bytes: &[u8]) -> Option<Format> {
     match bytes {
         [b'#', b'?', ..] => Some(Format::Hdr),

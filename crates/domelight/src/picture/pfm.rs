@@ -1,7 +1,7 @@
 //! Portable float maps (`.pfm`): `PF` (RGB) and `Pf` (gray), bottom row first, either byte order.
 //!
-//! Debevec's format. The sign of the scale is the byte order (negative: little endian), its magnitude is
-//! multiplied in.
+//! Debevec's format. The sign of the scale is the byte order (negative: little endian), and its magnitude is a
+//! factor on the values.
 
 use super::{PictureErrorKind, allocate, checked_area};
 use crate::{Rgb, RgbImage};
@@ -17,7 +17,7 @@ pub(super) fn texels(bytes: &[u8]) -> Result<usize, PictureErrorKind> {
 /// Decodes a whole file, top row first.
 ///
 /// # Errors
-/// If header or data are damaged or incomplete.
+/// If the header or the data is damaged or incomplete.
 pub fn decode(bytes: &[u8]) -> Result<RgbImage, PictureErrorKind> {
     let mut header = Words { bytes, at: 0, line: 1 };
     let channels = if header.next()? == b"PF" { 3 } else { 1 };
@@ -58,10 +58,10 @@ pub fn decode(bytes: &[u8]) -> Result<RgbImage, PictureErrorKind> {
     Ok(RgbImage::new(width, height, pixels))
 }
 
-/// Writes a little-endian color map of scale 1: every value bit for bit.
+/// Writes a little-endian color map with scale 1, which keeps every bit of the values.
 ///
 /// # Errors
-/// If `out` does not take it.
+/// If writing to `out` fails.
 pub fn encode(image: &RgbImage, out: &mut dyn Write) -> io::Result<()> {
     write!(out, "PF\n{} {}\n-1.0\n", image.width, image.height)?;
     for row in image.pixels.chunks(image.width.max(1)).rev() {

@@ -1,8 +1,8 @@
-//! PNG: writes sRGB in 8 or 16 bits a channel, reads it back as linear color; reads JPEG likewise.
+//! PNG: writes sRGB with 8 or 16 bits per channel, and reads it as linear color; reads JPEG the same way.
 //!
-//! PNG keeps color and alpha apart (straight, unassociated); pictures here are premultiplied. The writer divides by
-//! alpha before the tone curve, so that what a viewer composes over black is the tone-mapped object; light that does
-//! not cover (alpha 0) cannot be kept. No dithering: the same color is the same byte everywhere.
+//! PNG has straight (unassociated) alpha; pictures here are premultiplied. The writer divides by alpha before the tone
+//! curve, so that a viewer that composites over black shows the tone-mapped object. Light with alpha 0 is lost. There
+//! is no dithering: the same color gives the same byte everywhere.
 
 use super::display::DisplayEncoder;
 use super::tone::{ToneMapping, linear_from_srgb};
@@ -11,7 +11,7 @@ use crate::{Rgb, RgbImage, parallel};
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::{self, Cursor, Write};
 
-/// Bits a channel.
+/// Bits per channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Depth {
     /// 8 bits.
@@ -21,10 +21,10 @@ pub enum Depth {
     Sixteen,
 }
 
-/// Writes an sRGB picture with an `sRGB` chunk; with alpha if given, by which `image` is premultiplied.
+/// Writes an sRGB picture with an `sRGB` chunk, and with alpha if given. `image` is premultiplied by it.
 ///
 /// # Errors
-/// If `out` does not take it, or the picture is empty or `alpha` has another size.
+/// If writing to `out` fails, the picture is empty, or `alpha` has another size.
 pub fn encode(
     image: &RgbImage,
     alpha: Option<&[f32]>,
@@ -111,7 +111,7 @@ pub(crate) fn texels(bytes: &[u8], format: Format) -> Result<usize, PictureError
     Err(PictureErrorKind::Header { line: 1, found, expected })
 }
 
-/// Decodes a PNG as sRGB (whatever it says of its colors) into linear, premultiplied color.
+/// Decodes a PNG as sRGB (ignoring its color metadata) into linear, premultiplied color.
 ///
 /// # Errors
 /// If the file is damaged or incomplete.

@@ -1,6 +1,6 @@
-//! Color spaces of RGB primaries, brought to Rec. 709.
+//! Converts color spaces given by RGB primaries to Rec. 709.
 //!
-//! Matrices from chromaticities: SMPTE RP 177-1993. White points are adapted by Bradford's cone responses.
+//! Matrices from chromaticities: SMPTE RP 177-1993. White points are adapted with Bradford's cone responses.
 
 use crate::Rgb;
 use crate::math::Mat3;

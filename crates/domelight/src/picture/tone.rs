@@ -1,26 +1,26 @@
-//! From scene-linear radiance to what a screen shows: exposure, tone curve, sRGB encoding.
+//! Converts scene-linear radiance for display: exposure, tone curve, sRGB encoding.
 
 use super::agx::{self, rows};
 use crate::Rgb;
 use crate::math::{Vec3, functions};
 use std::str::FromStr;
 
-/// A curve that brings radiance into the range of a screen. All curves take and give linear Rec. 709.
+/// A curve that maps radiance to the range of a display. All curves map linear Rec. 709 to linear Rec. 709.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ToneCurve {
-    /// None: values beyond \[0, 1\] are cut off. Comparable, as values in range are shown as they are; Blender's view
-    /// Standard.
+    /// No curve: values outside \[0, 1\] are clipped, and others are unchanged, so that pictures can be compared.
+    /// Blender's view Standard.
     #[default]
     Standard,
-    /// c / (1 + Y), Y the luminance: Reinhard et al. 2002, "Photographic Tone Reproduction for Digital Images",
-    /// equation 3, without the key (that is the exposure's task).
+    /// c / (1 + Y), where Y is the luminance: Reinhard et al. 2002, "Photographic Tone Reproduction for Digital
+    /// Images", equation 3, without the key, which the exposure replaces.
     Reinhard,
     /// The ACES 1.0 reference and sRGB output transforms as fitted by Stephen Hill (2016, in "BakingLab" of Pettineo
     /// and Neubelt).
     Aces,
-    /// AgX, the base look, as Blender shows it since version 4.0.
+    /// AgX with the base look, as in Blender since version 4.0.
     Agx,
-    /// Khronos PBR Neutral (2024): colors up to 0.8 as they are, for true-to-life base colors.
+    /// Khronos PBR Neutral (2024): keeps colors up to 0.8, for true-to-life base colors.
     Neutral,
 }
 
@@ -28,7 +28,7 @@ pub enum ToneCurve {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown tone curve {name:?}; known are {}", ToneCurve::ALL.map(ToneCurve::name).join(", "))]
 pub struct UnknownToneCurve {
-    /// What was asked for.
+    /// The given name.
     pub name: String,
 }
 
@@ -37,7 +37,7 @@ impl ToneCurve {
     pub const ALL: [Self; 5] =
         [Self::Standard, Self::Reinhard, Self::Aces, Self::Agx, Self::Neutral];
 
-    /// The name that [`FromStr`] understands.
+    /// The name that [`FromStr`] parses.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Standard => "standard",
@@ -48,7 +48,7 @@ impl ToneCurve {
         }
     }
 
-    /// Another name that [`FromStr`] understands.
+    /// An alternative name that [`FromStr`] parses.
     pub const fn alias(self) -> Option<&'static str> {
         match self {
             Self::Standard => Some("srgb"),
@@ -56,7 +56,7 @@ impl ToneCurve {
         }
     }
 
-    /// Linear light on the screen, in \[0, 1\], of exposed radiance; negative and NaN count as 0.
+    /// Maps exposed radiance to linear display light in \[0, 1\]. Negative and NaN values count as 0.
     pub fn apply(self, radiance: Rgb) -> Rgb {
         self.apply_with(radiance, agx::shaped)
     }
@@ -91,17 +91,17 @@ impl std::fmt::Display for ToneCurve {
     }
 }
 
-/// Exposure, then a curve.
+/// An exposure followed by a tone curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToneMapping {
-    /// Exposure \[stops\]: radiance is multiplied by 2^exposure.
+    /// The exposure \[stops\]: radiance is multiplied by 2^exposure.
     pub exposure: f32,
-    /// Applied after it.
+    /// The curve, applied after the exposure.
     pub curve: ToneCurve,
 }
 
 impl ToneMapping {
-    /// Linear light on the screen, in \[0, 1\].
+    /// Maps radiance to linear display light in \[0, 1\].
     pub fn apply(&self, radiance: Rgb) -> Rgb {
         self.curve.apply(radiance * functions::exp2(self.exposure))
     }

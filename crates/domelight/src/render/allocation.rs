@@ -1,36 +1,37 @@
-//! How the camera samples of a pass are divided among pixels: more for noisier pixels, about as many altogether as
-//! were asked for.
+//! Divides the camera samples of a pass among pixels: noisier pixels get more, and the total is about the number
+//! requested.
 //!
-//! The relative variance of a pixel is the variance of its camera samples' luminance, hits and misses alike, over
-//! their squared mean (and a hundredth: a black pixel needs no care). The mean of n stratified samples keeps a part
-//! of it that falls like n⁻² for a smooth integrand and n⁻¹ for a rough one, so the least sum over all pixels of
-//! variance · n⁻ᵏ asks for n in proportion to variance^(1/(k+1)), with an exponent between 1/3 and 1/2; a little
-//! less is best for a variance that is estimated from a few samples.
+//! The relative variance of a pixel is the variance of the luminance of its camera samples, including misses, divided
+//! by their squared mean plus 0.01 (black pixels need few samples). The variance of the mean of n stratified samples
+//! falls like n⁻² for a smooth integrand and like n⁻¹ for a rough one. The sum over all pixels of variance · n⁻ᵏ is
+//! smallest for n proportional to variance^(1/(k+1)), an exponent between 1/3 and 1/2. A slightly smaller exponent is
+//! best for a variance estimated from few samples.
 //!
-//! A pixel's number follows from the samples of pixels of lower levels, never from its own, so the mean of its
-//! samples stays unbiased. (A number that grows with the pixel's own samples would prefer what it saw: Kirk & Arvo
-//! 1991, "Unbiased Sampling Techniques for Image Synthesis".) Pixels of lower levels find silhouettes by what their
-//! samples saw of the background, and by the difference of their means where one is covered more than another.
+//! The number of samples of a pixel depends on the samples of pixels of lower levels, never on its own, so the mean of
+//! its samples stays unbiased. (A number that depends on the pixel's own samples would introduce bias: Kirk & Arvo
+//! 1991, "Unbiased Sampling Techniques for Image Synthesis".) Pixels of lower levels reveal silhouettes by the
+//! background in their samples, and by differences of their means if their coverage differs.
 //!
-//! One scale serves the whole picture, so that samples move from quiet tiles to noisy ones; scouts find it ([`super::scouts`]).
-//! Exact budgets for tiles would cost a quarter to three quarters more error at equal rays (docs/experiments.md).
+//! One scale serves the whole picture, so that samples move from quiet tiles to noisy ones. Scouts determine it
+//! ([`super::scouts`]).
+//! Exact budgets per tile would increase the error at equal rays by a quarter to three quarters (docs/experiments.md).
 
 use crate::math::functions;
 use crate::strategy::levels::{N_LEVELS, coarser, level};
 
-/// The power of the relative variance that the number of samples is proportional to.
+/// The number of samples is proportional to the relative variance raised to this power.
 const EXPONENT: f32 = 0.3;
 
-/// No pixel gets fewer than a fourth of the usual samples, nor more than eight times as many.
+/// The range of samples relative to the default number, in octaves: a fourth to eight times.
 pub(super) const OCTAVES: [i32; 2] = [-2, 3];
 
-/// Relative variances below this count as this.
+/// The lower bound of relative variances.
 const LEAST_VARIANCE: f32 = 1e-6;
 
-/// Coverages that differ by more belong to a silhouette.
+/// A larger difference in coverage indicates a silhouette.
 const SILHOUETTE: f32 = 0.02;
 
-/// What the camera samples of a pixel in a pass saw: sums over their luminance.
+/// Sums over the luminance of a pixel's camera samples in a pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PassSums {
     pub(super) n: u32,
@@ -52,11 +53,11 @@ impl PassSums {
     }
 }
 
-/// A pixel of a lower level, as far as others learn from it.
+/// The data of a pixel of a lower level from which others are predicted.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     mean: f32,
-    /// None of fewer than two samples, and of pixels that see nothing of the scene.
+    /// `None` with fewer than two samples, and for pixels that do not see the scene.
     relative_variance: Option<f32>,
     coverage: f32,
 }
@@ -65,16 +66,16 @@ struct Seen {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Allocation {
     width: usize,
-    /// Camera samples of each pixel, as asked for.
+    /// The requested number of camera samples per pixel.
     n_samples: u32,
-    /// The logarithm at which a pixel has the usual number; `None` if all pixels have as many.
+    /// The logarithm at which a pixel gets the default number; `None` if all pixels get that number.
     mean_log: Option<f32>,
     seen: Vec<Option<Seen>>,
     counts: Vec<u32>,
 }
 
 impl Allocation {
-    /// Begins a pass: `n_samples` for each pixel on average, or for each if `mean_log` is `None`.
+    /// Begins a pass with `n_samples` per pixel on average, or in every pixel if `mean_log` is `None`.
     pub(super) fn reset(
         &mut self,
         width: usize,
@@ -96,7 +97,7 @@ impl Allocation {
         self.counts[pixel]
     }
 
-    /// Learns what the samples of a pixel saw; `in_sight` is false where nothing was to be seen.
+    /// Records the samples of a pixel; `in_sight` is false if nothing was visible.
     pub(super) fn learn(&mut self, pixel: usize, sums: &PassSums, in_sight: bool) {
         let n = f64::from(sums.n.max(1));
         let mean = sums.luminance / n;
@@ -110,17 +111,17 @@ impl Allocation {
         });
     }
 
-    /// How many pixels the tile has.
+    /// The number of pixels of the tile.
     pub(super) fn n_pixels(&self) -> usize {
         self.counts.len()
     }
 
-    /// log₂ of what the number of a pixel's samples is proportional to; `None` where nothing predicts it.
+    /// log₂ of the relative number of samples of a pixel; `None` if nothing predicts it.
     pub(super) fn log(&self, pixel: usize) -> Option<f32> {
         self.predicted(pixel).map(|variance| log(variance) + dither(pixel))
     }
 
-    /// The relative variance that pixels of lower levels predict.
+    /// The relative variance predicted by pixels of lower levels.
     fn predicted(&self, pixel: usize) -> Option<f32> {
         let around = || coarser(pixel, self.width, self.seen.len()).filter_map(|i| self.seen[i]);
         let variances = || around().filter_map(|seen| seen.relative_variance);
@@ -129,7 +130,7 @@ impl Allocation {
             return None;
         }
         let within = variances().sum::<f32>() / n_variances as f32;
-        // Between a covered and an uncovered pixel lies a silhouette.
+        // There is a silhouette between a covered and an uncovered pixel.
         let coverage =
             |(low, high): (f32, f32), seen: Seen| (low.min(seen.coverage), high.max(seen.coverage));
         let (low, high) = around().fold((1.0, 0.0), coverage);
@@ -161,12 +162,12 @@ impl Allocation {
     }
 }
 
-/// log₂ of what the number of samples is proportional to.
+/// log₂ of the relative number of samples.
 fn log(relative_variance: f32) -> f32 {
     EXPONENT * functions::log2(relative_variance.max(LEAST_VARIANCE))
 }
 
-/// The usual number n times a power of two, as digital nets want it, within `fewest` and the most octaves.
+/// The default number n times a power of two, as digital nets require, within `fewest` and the maximum octaves.
 pub(super) fn count(n: u32, octaves: f32, fewest: i32) -> u32 {
     let octaves = (octaves.round() as i32).clamp(fewest, OCTAVES[1]);
     let count = if octaves < 0 { n >> -octaves } else { n.saturating_mul(1 << octaves) };
@@ -179,7 +180,7 @@ pub(super) fn fewest(level: u32) -> i32 {
     if level + 2 < N_LEVELS { 0 } else { OCTAVES[0] }
 }
 
-/// An eighth of an octave more or less, so that pixels of equal variance do not all jump to another power of two at once.
+/// Dithers by up to an eighth of an octave, so that pixels of equal variance do not all jump to another power of two.
 fn dither(pixel: usize) -> f32 {
     /// The fractional part of the golden ratio, times 2³².
     const GOLDEN: u32 = 0x9e37_79b9;

@@ -1,7 +1,7 @@
 //! Checkpoints and parts: a render's sums in an OpenEXR file that other programs can open.
 //!
-//! R, G, B, A are the picture so far; the layers below `state` are the exact bits of the sums, from which all
-//! other layers follow, and the attributes identify the render. A fingerprint over both reveals a damaged
+//! R, G, B, A hold the picture so far. The layers below `state` hold the exact bits of the sums, from which all
+//! other layers are computed. The attributes identify the render. A fingerprint over both reveals a damaged
 //! file.
 
 use std::ops::Range;
@@ -15,65 +15,65 @@ use crate::picture::exr::{Compression, ExrLayers, Plane};
 /// The state of a render, or of a shard of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
-    /// What decides the picture, but for the number of samples: names and values, by name. Only a render of
-    /// which all are equal may go on from here.
+    /// Everything that decides the picture except the number of samples: names and values, sorted by name. Only a
+    /// render with an equal identity may continue from this checkpoint.
     pub identity: Vec<(String, String)>,
-    /// Provenance of the finished picture: further attributes, by name.
+    /// Provenance of the finished picture: further attributes, sorted by name.
     pub provenance: Vec<(String, String)>,
     /// The tiles.
     pub tiles: Range<usize>,
-    /// Tiles of the whole picture.
+    /// The number of tiles of the whole picture.
     pub n_tiles: usize,
-    /// Camera samples that each pixel is to have.
+    /// The target number of camera samples per pixel.
     pub n_samples: u32,
-    /// All tiles are finished.
+    /// Whether all tiles are finished.
     pub complete: bool,
-    /// What was done.
+    /// Counts of the work done so far.
     pub counts: Counts,
     /// The sums.
     pub film: Film,
 }
 
-/// Why a file is no checkpoint to go on from.
+/// An error in reading a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// It is no whole OpenEXR file.
+    /// The file is not a complete OpenEXR file.
     #[error(transparent)]
     Picture(#[from] PictureErrorKind),
-    /// It is a picture of something else.
+    /// The file is some other picture.
     #[error("it is not a checkpoint or part of a render by domelight")]
     Foreign,
     /// Another version of the program wrote it.
     #[error("it is a checkpoint of format {found}; this program reads format {FORMAT}")]
     Format {
-        /// What the file says.
+        /// The format of the file.
         found: String,
     },
-    /// Its content is not what was written.
+    /// The content was altered after it was written.
     #[error("it is damaged: {0}")]
     Damaged(&'static str),
 }
 
-/// The version of the format; another layout gets another number.
+/// The version of the format, which changes with the layout.
 const FORMAT: &str = "2";
 
-/// Before the names of the identity.
+/// The prefix of identity attributes.
 const IDENTITY: &str = "domelight.render.";
 
-/// Before the names of the planes of bits.
+/// The prefix of bit planes.
 const STATE: &str = "state.";
 
 impl Checkpoint {
-    /// The file's bytes; the same for the same state.
+    /// Encodes the checkpoint as a file. Equal states give equal bytes.
     ///
     /// # Errors
-    /// If the picture is too large, or a name of the provenance cannot be one of OpenEXR.
+    /// If the picture is too large, or a name of the provenance is not a valid OpenEXR name.
     pub fn encode(&self) -> Result<Vec<u8>, PictureErrorKind> {
         let Film { width, height, window, .. } = self.film;
         let (color, alpha) = self.film.picture();
         let mut exr = ExrLayers::from_image(&color, Some(&alpha));
         exr.attributes = self.attributes();
-        // Random bits: deflate takes five times as long to save a third.
+        // The bits are random: deflate would take five times as long to save a third.
         exr.compression = Compression::Rle;
         exr.origin = (window.x, window.y);
         exr.whole = Some((width, height));
@@ -87,20 +87,20 @@ impl Checkpoint {
         exr.encode()
     }
 
-    /// An estimate of the memory that [`Checkpoint::decode`] takes, the bytes themselves included.
+    /// An estimate of the memory that [`Checkpoint::decode`] needs \[bytes\], including `bytes` itself.
     ///
     /// # Errors
-    /// If they are no OpenEXR file.
+    /// If `bytes` is not an OpenEXR file.
     pub fn memory_to_decode(bytes: &[u8]) -> Result<u64, CheckpointError> {
-        // The channels as they are read and the sums that they become.
+        // The decoded channels and the resulting sums.
         let pixel = 4 * (4 + PixelSums::WORDS.len()) + size_of::<PixelSums>();
         Ok(bytes.len() as u64 + crate::picture::exr::texels(bytes)? as u64 * pixel as u64)
     }
 
-    /// Reads the bytes of [`Checkpoint::encode`].
+    /// Decodes the bytes from [`Checkpoint::encode`].
     ///
     /// # Errors
-    /// If they are anything else, incomplete or damaged.
+    /// If `bytes` is anything else, incomplete or damaged.
     pub fn decode(bytes: &[u8]) -> Result<Self, CheckpointError> {
         let exr = ExrLayers::decode(bytes)?;
         let mut attributes = exr.attributes.clone();
@@ -127,10 +127,10 @@ impl Checkpoint {
         let planes = PixelSums::WORDS.iter().filter_map(|name| plane(&exr, name));
         planes.for_each(|words| digest.words(words.iter().copied()));
         if digest.finish().to_string() != written {
-            return Err(CheckpointError::Damaged("its digest does not fit its content"));
+            return Err(CheckpointError::Damaged("its digest does not match its content"));
         }
 
-        let missing = || CheckpointError::Damaged("an attribute is missing or no number");
+        let missing = || CheckpointError::Damaged("an attribute is missing or not a number");
         let mut number = |name: &str| take(name).and_then(|text| text.parse().ok());
         let mut count = |name: &str| number(name).ok_or_else(missing);
         let tiles = count("domelight.state.first-tile")? as usize
@@ -151,12 +151,12 @@ impl Checkpoint {
         Ok(Self { identity, provenance, tiles, n_tiles, n_samples, complete, counts, film })
     }
 
-    /// The first entry of the identity that is not the same here and there: its name, here, there.
+    /// The first entry that differs between this checkpoint's identity and `identity`.
     pub fn difference<'a>(&'a self, identity: &'a [(String, String)]) -> Option<Difference<'a>> {
         let get = |of: &'a [(String, String)], name: &str| {
             of.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value)
         };
-        // First the size: a camera that frames the scene depends on it.
+        // Compare the size first, because a camera that frames the scene depends on it.
         let all = self.identity.iter().chain(identity).map(|(name, _)| name.as_str());
         let names = std::iter::once("size").chain(all);
         names
@@ -202,7 +202,7 @@ pub struct Difference<'a> {
     pub there: &'a str,
 }
 
-/// A digest that has taken the attributes in; the words follow.
+/// A digest of the attributes, to be continued with the words.
 fn digest(attributes: &[(String, String)]) -> Fingerprinter {
     let mut digest = Fingerprinter::default();
     for (name, value) in attributes {

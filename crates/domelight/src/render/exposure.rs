@@ -1,4 +1,4 @@
-//! The automatic exposure of a render, before it is rendered.
+//! The automatic exposure, determined before rendering.
 
 use super::{Background, RenderSettings, Renderer};
 use crate::environment::Environment;
@@ -7,15 +7,15 @@ use crate::sampling::Heuristic;
 use crate::scene::{Camera, Scene};
 use crate::strategy::StrategySpec;
 
-/// Rows or columns of the pilot picture, whichever are more.
+/// The larger dimension of the pilot picture.
 const PILOT_SIZE: usize = 64;
 
-/// The exposure \[stops\] that [`Exposure::Auto`] gives a small picture of the scene: the median luminance of what it
-/// covers, or of the background if it covers nothing, becomes middle gray.
+/// The exposure \[stops\] that [`Exposure::Auto`] gives a small picture of the scene. It maps the median luminance
+/// over the pixels that the scene covers, or over the background if it covers none, to middle gray.
 ///
-/// It depends on scene, light, view and the shape of the picture alone, not on seed, samples or strategy. So it is the
-/// same for all parts of a picture, for a render that is resumed with more samples, and for a first preview; the frames
-/// of an animation may share that of the first. It costs about 100,000 shadow rays, and is 0 if there is no light.
+/// It depends only on scene, light, view and the aspect ratio, not on seed, samples or strategy. So it is the same
+/// for all parts of a picture, for a render resumed with more samples, and for a preview. The frames of an animation
+/// may share the exposure of the first. It costs about 100,000 shadow rays, and is 0 if there is no light.
 pub fn automatic_exposure(
     scene: &Scene,
     camera: &Camera,
@@ -36,7 +36,7 @@ pub fn automatic_exposure(
         ..RenderSettings::default()
     };
     let camera = camera.resized(size, (settings.width, settings.height));
-    // Each pixel is nearly right under any light, which the median asks for, rather than the mean of all.
+    // The median requires each pixel to be nearly right under any light, not just the mean.
     let strategy = StrategySpec::Mis {
         n_environment: 4,
         n_brdf: 2,

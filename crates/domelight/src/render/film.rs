@@ -1,4 +1,4 @@
-//! The sums of all pixels: what a render adds to, and layers are made from.
+//! The film: sums over the camera samples of all pixels, from which layers are computed.
 
 use super::RenderSettings;
 use super::layers::Layers;
@@ -7,22 +7,22 @@ use super::tiling::Window;
 use super::variance::VarianceSums;
 use crate::RgbImage;
 
-/// The sums of all pixels of a picture or of a window of it, from which a render can go on.
+/// The sums of all pixels of a picture or of a window of it. A render can continue from them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
-    /// Columns of the whole picture.
+    /// The number of columns of the whole picture.
     pub width: usize,
-    /// Rows of the whole picture.
+    /// The number of rows of the whole picture.
     pub height: usize,
-    /// The pixels of the picture that it holds; those that were not rendered have no samples.
+    /// The pixels of the picture that the film holds. Pixels that were not rendered have no samples.
     pub window: Window,
     pixels: Vec<PixelSums>,
 }
 
-/// Sums that do not belong to a render.
+/// A film that does not match a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FilmMismatch {
-    /// Another picture or part of it.
+    /// The film has another size or window.
     #[error("it is window {found} of the picture, not {expected}")]
     Window {
         /// The window of the sums.
@@ -33,27 +33,27 @@ pub enum FilmMismatch {
     /// Some pixels of a tile have samples and others none.
     #[error("the tile at ({x}, {y}) is torn: some of its pixels have samples and others none")]
     Samples {
-        /// Column of the tile's corner.
+        /// The column of the tile's corner.
         x: usize,
-        /// Row of the tile's corner.
+        /// The row of the tile's corner.
         y: usize,
     },
 }
 
 impl Film {
-    /// No samples yet.
+    /// Creates a film without samples.
     pub fn new(width: usize, height: usize, window: Window) -> Self {
         Self { width, height, window, pixels: vec![PixelSums::default(); window.area()] }
     }
 
-    /// The picture of the window.
+    /// Computes the layers of the window.
     pub fn layers(&self) -> Layers {
         let mut layers = Layers::new(self.window.width, self.window.height);
         layers.put(&self.pixels, self.window, self.window, &self.variance_sums());
         layers
     }
 
-    /// What the variance of the pixels is estimated from.
+    /// The sums from which the variance of the pixels is estimated.
     pub fn variance_sums(&self) -> VarianceSums {
         VarianceSums::of(self.pixels.iter().filter_map(PixelSums::contrast))
     }
@@ -93,7 +93,7 @@ impl Film {
         Err(FilmMismatch::Window { found, expected })
     }
 
-    /// The bits of the sums: for each of [`PixelSums::WORDS`] one word a pixel.
+    /// The bits of the sums: for each of [`PixelSums::WORDS`] one word per pixel.
     #[cfg(feature = "io")]
     pub(super) fn words(&self) -> impl Iterator<Item = (&'static str, Vec<u32>)> {
         let plane = || Vec::with_capacity(self.pixels.len());
@@ -105,7 +105,7 @@ impl Film {
         planes.into_iter()
     }
 
-    /// From the words of [`Film::words`], found by name; none if one is missing or too short.
+    /// Restores a film from the words of [`Film::words`], looked up by name; `None` if one is missing or too short.
     #[cfg(feature = "io")]
     pub(super) fn from_words<'w>(
         width: usize,
@@ -123,11 +123,11 @@ impl Film {
 }
 
 impl Layers {
-    /// Takes the pixels that have samples in a part of the picture over; `self` is a band of its rows, of which row `y` is
-    /// the first, and `variance` the sum over all parts of the picture.
+    /// Copies the pixels that have samples in a part of the picture. `self` is a band of rows of the picture that
+    /// begins with row `y`, and `variance` is the sum over all parts of the picture.
     ///
     /// # Panics
-    /// If a pixel lies beside the picture.
+    /// If a pixel lies outside the picture.
     pub fn merge(&mut self, part: &Film, y: usize, variance: &VarianceSums) {
         let (width, height) = (self.width(), self.height());
         self.put(&part.pixels, part.window, Window { x: 0, y, width, height }, variance);

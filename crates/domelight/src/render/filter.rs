@@ -1,8 +1,8 @@
 //! Pixel filters, by importance sampling: Ernst et al. 2006, "Filter Importance Sampling".
 //!
-//! Camera samples are placed with the density of the filter and all count the same. No sample is
-//! splatted into a neighbor, so a tile depends on nothing but itself and pixels keep independent
-//! noise. Only filters without negative lobes can be had this way.
+//! Camera samples are distributed with the density of the filter and have equal weights. No sample is
+//! splatted into a neighbor, so tiles are independent and pixels keep independent
+//! noise. This works only for filters without negative lobes.
 
 use std::str::FromStr;
 
@@ -12,14 +12,14 @@ use crate::sampling::Table1d;
 /// A reconstruction filter, separable, centered on the pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Filter {
-    /// The plain mean over the pixel's square.
+    /// The mean over the pixel's square.
     Box,
     /// A triangle of radius 1.
     Tent,
-    /// A Gaussian of standard deviation 0.5, cut at 1.5.
+    /// A Gaussian with standard deviation 0.5, truncated at 1.5.
     #[default]
     Gaussian,
-    /// Blackman and Harris's window of radius 1.5.
+    /// The Blackman-Harris window with radius 1.5.
     BlackmanHarris,
 }
 
@@ -37,7 +37,7 @@ impl Filter {
         }
     }
 
-    /// Half the width \[pixels\].
+    /// The radius \[pixels\], half the width.
     pub fn radius(self) -> f32 {
         match self {
             Self::Box => 0.5,
@@ -65,9 +65,9 @@ impl Filter {
     }
 }
 
-/// A name that is not a filter's.
+/// The name of an unknown filter.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no filter is called '{0}'; there are box, tent, gaussian and blackman-harris")]
+#[error("there is no filter '{0}'; the filters are box, tent, gaussian and blackman-harris")]
 pub struct UnknownFilter(pub String);
 
 impl FromStr for Filter {
@@ -78,7 +78,7 @@ impl FromStr for Filter {
     }
 }
 
-/// Draws positions with the density of a filter.
+/// Samples positions with the density of a filter.
 #[derive(Clone, Debug)]
 pub struct FilterSampler {
     radius: f32,
@@ -89,7 +89,7 @@ pub struct FilterSampler {
 impl FilterSampler {
     const CELLS: usize = 512;
 
-    /// The sampler of a filter; beyond the box it is tabulated in 512 steps.
+    /// Creates a sampler for a filter. Filters other than the box are tabulated in 512 steps.
     pub fn new(filter: Filter) -> Self {
         let radius = filter.radius();
         let center = |i: usize| (2.0 * (i as f32 + 0.5) / Self::CELLS as f32 - 1.0) * radius;
@@ -103,7 +103,7 @@ impl FilterSampler {
         self.radius - 0.5
     }
 
-    /// A position relative to the pixel's upper left corner \[pixels\].
+    /// Samples a position relative to the pixel's upper left corner \[pixels\].
     pub fn sample(&self, u: Vec2) -> Vec2 {
         vec2(self.sample_1d(u.x), self.sample_1d(u.y))
     }

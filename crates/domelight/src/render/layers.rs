@@ -1,4 +1,4 @@
-//! The layers of a rendered picture: one table of what they are, from which files, Python and the page are made.
+//! The layers of a rendered picture, in one table that files, Python and the page use.
 
 use std::ops::Range;
 
@@ -11,16 +11,16 @@ use crate::{Rgb, RgbImage};
 /// A layer of [`Layers`].
 #[derive(Clone, Copy, Debug)]
 pub struct LayerInfo {
-    /// Its name in Python, such as `depth`.
+    /// The name in Python, such as `depth`.
     pub name: &'static str,
-    /// What stands before the dot in the names of its channels in a file: empty for the picture itself. `None` if files
+    /// The part before the dot in the names of its channels in a file, empty for the picture itself. `None` if files
     /// do not have the layer.
     pub file_layer: Option<&'static str>,
-    /// Its channels, such as `["R", "G", "B"]`.
+    /// The channels, such as `["R", "G", "B"]`.
     pub channels: &'static [&'static str],
-    /// What it shows, in a sentence or two.
+    /// A description in a sentence or two.
     pub description: &'static str,
-    /// Its values, row by row.
+    /// Returns the values, row by row.
     pub values: fn(&Layers) -> LayerValues<'_>,
 }
 
@@ -38,9 +38,8 @@ pub enum LayerValues<'a> {
     Counts(&'a [u32]),
 }
 
-/// Defines [`Layers`] and [`LAYERS`]: for each layer what it shows, its field and type, its layer and channels in files,
-/// and its value at a pixel, from the pixel's sums and the
-/// scale of its variance ([`VarianceSums::scale`]).
+/// Defines [`Layers`] and [`LAYERS`]: for each layer, its description, its field and type, its layer and channels in files,
+/// and its value at a pixel, computed from the pixel's sums and the scale of its variance ([`VarianceSums::scale`]).
 macro_rules! layers {
     ($($(#[doc = $doc:literal])+ $field:ident: $type:ty = $name:literal {
         file: $file:expr, channels: $channels:expr, |$sums:ident, $scale:ident| $value:expr
@@ -51,7 +50,7 @@ macro_rules! layers {
             $($(#[doc = $doc])+ pub $field: $type,)*
         }
 
-        /// What the layers of a film are.
+        /// The layers of a film.
         pub const LAYERS: &[LayerInfo] = &[$(LayerInfo {
             name: $name,
             file_layer: $file,
@@ -61,12 +60,12 @@ macro_rules! layers {
         }),*];
 
         impl Layers {
-            /// The layers of a picture without samples.
+            /// Creates the layers of a picture without samples.
             pub fn new(width: usize, height: usize) -> Self {
                 Self { $($field: LayerData::zero(width, height),)* }
             }
 
-            /// Some of the rows.
+            /// Copies some of the rows.
             ///
             /// # Panics
             /// If there are no such rows.
@@ -76,7 +75,7 @@ macro_rules! layers {
                 Self { $($field: LayerData::rows(&self.$field, width, rows.clone()),)* }
             }
 
-            /// Sets pixel `i` to what its sums give.
+            /// Sets pixel `i` from its sums.
             fn set(&mut self, i: usize, sums: &PixelSums, variance_scale: f64) {
                 $({
                     let ($sums, $scale) = (sums, variance_scale);
@@ -138,14 +137,14 @@ impl Layers {
         self.color.height
     }
 
-    /// The part of the picture that the scene covers \[pixels\]: the sum over all pixels of the share of camera samples
-    /// that hit it.
+    /// The area that the scene covers \[pixels\]: the sum over all pixels of the fraction of camera samples that hit
+    /// the scene.
     pub fn covered_pixels(&self) -> f64 {
         let coverage = |(&hits, &n): (&u32, &u32)| f64::from(hits) / f64::from(n.max(1));
         self.n_hits.iter().zip(&self.n_samples).map(coverage).sum()
     }
 
-    /// Sets the samples of the pixels of a tile, which saw nothing in any of them; `self` is of the pixels of `window`.
+    /// Sets the number of samples for a tile that saw nothing; `self` has the pixels of `window`.
     pub(super) fn set_misses(&mut self, n: u32, tile: Window, window: Window) {
         for y in tile.y..tile.y + tile.height {
             let start = window.index(tile.x, y);
@@ -153,8 +152,8 @@ impl Layers {
         }
     }
 
-    /// Takes the pixels over that have samples, of the rows of `from` that are in `window`; `pixels` are those of `from`,
-    /// or none, and `self` is of the pixels of `window`.
+    /// Copies the pixels that have samples from the rows of `from` that are in `window`. `pixels` are those of `from`, or empty,
+    /// and `self` has the pixels of `window`.
     pub(super) fn put(
         &mut self,
         pixels: &[PixelSums],
@@ -166,7 +165,7 @@ impl Layers {
         let end = (from.y + from.height).min(window.y + window.height).max(start);
         let inside = (start - from.y) * from.width..(end - from.y) * from.width;
         let pixels = pixels.get(inside.clone()).unwrap_or_default().iter().zip(inside);
-        // Neighbors often have as many samples, and the scale costs a power.
+        // Reuse the scale for neighbors with the same number of samples, because it costs a power.
         let mut scale_of = (0, 1.0);
         for (p, i) in pixels.filter(|(p, _)| p.n_samples > 0) {
             let (x, y) = (from.x + i % from.width, from.y + i / from.width);
@@ -209,7 +208,7 @@ impl LayerData for RgbImage {
     }
 }
 
-/// A value at a pixel, of which a vector is a layer.
+/// The type of a layer's value at a pixel.
 trait Element: Copy + Default {
     fn values(values: &[Self]) -> LayerValues<'_>;
 }

@@ -1,8 +1,8 @@
 //! Rendering: tiles of camera samples, a strategy's shadow rays, and the film.
 //!
-//! A tile depends on nothing but the scene, the settings, the seed and its own place; a pixel's
-//! sums are added in the order of its samples. So the picture has the same bits for any number of
-//! threads; with strategies that learn nothing, also for any tile size and division into passes.
+//! A tile depends only on the scene, the settings, the seed and its position. A pixel's sums are
+//! added in the order of its samples. So the picture has the same bits for any number of threads and,
+//! with strategies that learn nothing, for any tile size and division into passes.
 
 mod allocation;
 #[cfg(feature = "io")]
@@ -51,13 +51,13 @@ use crate::scene::material::CATCHER_REFLECTANCE;
 use crate::scene::{Camera, Scene};
 use crate::strategy::{ShadingPoint, Strategy, StrategySpec};
 
-/// What camera rays see that leave the scene.
+/// What camera rays see if they leave the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Background {
-    /// The environment, interpolated between texels; alpha is 1.
+    /// The environment, interpolated between texels, with alpha 1.
     #[default]
     Shown,
-    /// Nothing; alpha is the coverage.
+    /// Nothing, with the coverage as alpha.
     Hidden,
 }
 
@@ -73,13 +73,13 @@ impl Background {
 
 /// The division of camera samples into passes over the picture.
 ///
-/// Strategies that learn nothing give the same picture with any.
+/// Strategies that learn nothing give the same picture with any division.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Passes {
-    /// The length that the strategy works best with.
+    /// The length that suits the strategy best.
     #[default]
     Efficient,
-    /// Passes of 1, 1, 2, 4, … samples, up to the length of [`Passes::Efficient`]: the first picture comes soon.
+    /// Passes of 1, 1, 2, 4, … samples, up to the length of [`Passes::Efficient`], to show a first picture soon.
     Doubling,
 }
 
@@ -96,32 +96,33 @@ impl Passes {
 /// Size, samples and further settings of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
-    /// Columns, at least 1.
+    /// The number of columns, at least 1.
     pub width: usize,
-    /// Rows, at least 1.
+    /// The number of rows, at least 1.
     pub height: usize,
-    /// Camera samples of each pixel, at least 1.
+    /// The number of camera samples per pixel, at least 1.
     pub n_samples: u32,
-    /// Gives noisier pixels more samples, with strategies that render a tile in rounds: `n_samples` is then the mean over
-    /// the picture instead of the number of each pixel.
+    /// Whether noisier pixels get more samples, with strategies that render a tile in rounds. `n_samples` is then the
+    /// mean over the picture.
     pub adaptive: bool,
-    /// A tile is finished before its samples are, but not before 16, when two independent sets of them suggest no more
-    /// than this relMSE: the mean over its pixels of error² of the luminance over (luminance² + 0.01), and one standard
-    /// error of that. Tiles that stop so have the error within a factor of 2 on average; those that 16 samples are
-    /// more than enough for have less. To stop on what was drawn biases a picture by far less than the error.
+    /// The target relMSE of a tile: the mean over its pixels of error² / (luminance² + 0.01), plus one standard
+    /// error. A tile stops early, but not before 16 samples, when two independent sets of its samples indicate at
+    /// most this error. The error of tiles that stop this way is within a factor of 2 of the target on average; it is
+    /// smaller if 16 samples are more than enough. Stopping based on the samples biases a picture by far less than
+    /// the error.
     pub target_error: Option<f32>,
-    /// Division of the samples into passes; with a target error, passes have lengths of their own.
+    /// The division of the samples into passes. Ignored with a target error, which sets the lengths of passes.
     pub passes: Passes,
-    /// Names the whole set of random numbers.
+    /// The seed of all random numbers.
     pub seed: u64,
-    /// Pixel filter.
+    /// The pixel filter.
     pub filter: Filter,
-    /// The point sets that samples are drawn from.
+    /// The point sets from which samples are drawn.
     pub sampler: SamplerKind,
-    /// What camera rays see that leave the scene.
+    /// What camera rays see if they leave the scene.
     pub background: Background,
-    /// Pixels along a tile's edge, at least 1. Strategies that learn nothing give the same picture
-    /// with any.
+    /// The number of pixels along a tile's edge, at least 1. Strategies that learn nothing give the same picture
+    /// with any tile size.
     pub tile_size: usize,
 }
 
@@ -143,39 +144,39 @@ impl Default for RenderSettings {
     }
 }
 
-/// What a tile goes through in a pass, for profiles.
+/// A stage of rendering a tile, for profiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Camera rays are made and traced.
+    /// Generating and tracing camera rays.
     CameraRays,
-    /// Hits become shading points: interpolation, textures, materials.
+    /// Turning hits into shading points: interpolation, textures, materials.
     Surfaces,
-    /// The strategy asks for shadow rays, and learns from the last ones.
+    /// Running the strategy, which generates shadow rays and learns from the last ones.
     Strategy,
-    /// Shadow rays are traced.
+    /// Tracing shadow rays.
     ShadowRays,
-    /// Samples are added to their pixels.
+    /// Adding samples to their pixels.
     Sums,
 }
 
 impl Stage {
-    /// All, in order.
+    /// All stages, in order.
     pub const ALL: [Self; 5] =
         [Self::CameraRays, Self::Surfaces, Self::Strategy, Self::ShadowRays, Self::Sums];
 }
 
-/// Watches a render and may end it. Called from many threads.
+/// Watches a render and can end it. Called from many threads.
 pub trait Observer: Sync {
-    /// A pass over the picture begins: camera samples `samples` of each pixel.
+    /// Called when a pass over the picture begins, with the range of camera samples in each pixel.
     fn pass_started(&self, _samples: std::ops::Range<u32>) {}
 
-    /// The calling thread begins a stage of a tile.
+    /// Called when the calling thread begins a stage of a tile.
     fn stage_started(&self, _stage: Stage) {}
 
-    /// A tile of a pass is complete, and with it the thread's last stage.
+    /// Called when a tile of a pass is complete, which also ends the thread's last stage.
     fn tile_finished(&self, _counts: &Counts) {}
 
-    /// True ends the render: running tiles are finished, the others keep what they have.
+    /// Returns true to end the render: running tiles are finished, and others keep their samples.
     fn canceled(&self) -> bool {
         false
     }
@@ -196,42 +197,42 @@ impl Observer for AtomicBool {
 pub struct Rendering {
     /// The picture.
     pub layers: Layers,
-    /// What was done.
+    /// Counts of the work done.
     pub counts: Counts,
-    /// All samples of all pixels are there.
+    /// Whether all samples of all pixels were taken.
     pub complete: bool,
 }
 
-/// All that tiles share.
+/// The data shared by all tiles.
 struct RenderContext<'a> {
     scene: &'a Scene,
-    /// In the scene's own units of length, as all that is traced.
+    /// The camera, in the scene's internal units of length.
     camera: Camera,
     environment: &'a Environment,
     settings: RenderSettings,
     filter: FilterSampler,
     /// The longest extent of the scene, in its units.
     extent: f32,
-    /// What ground reflects that shows nothing but shadows.
+    /// The reflectance of shadow catchers.
     catcher: Option<Catcher>,
 }
 
-/// Ground that shows nothing but shadows.
+/// A shadow catcher.
 #[derive(Clone, Copy, Debug)]
 struct Catcher {
-    /// What it reflects of the unoccluded light, in multiples of [`Environment::unit`].
+    /// The unoccluded light that it reflects, in multiples of [`Environment::unit`].
     radiance: Rgb,
 }
 
 impl Catcher {
-    /// The ground of a scene, if it has any.
+    /// The shadow catcher of a scene, if it has one.
     fn of(scene: &Scene, environment: &Environment) -> Option<Self> {
         let normal = scene.catcher_normal()?;
         let reflected = CATCHER_REFLECTANCE * FRAC_1_PI;
         Some(Self { radiance: environment.irradiance(normal) * reflected })
     }
 
-    /// The share of each channel that is missing of light of which `missing` does not arrive, in the same multiples.
+    /// The missing fraction of each channel, if `missing` of the light does not arrive, in the same multiples.
     fn shadow(self, missing: Rgb) -> Rgb {
         let share = |missing: f32, all: f32| if all > 0.0 { missing / all } else { 0.0 };
         let (Rgb { r, g, b }, all) = (missing, self.radiance);
@@ -239,10 +240,10 @@ impl Catcher {
     }
 }
 
-/// Renders a scene under an environment with one strategy, on rayon's current pool of threads.
+/// Renders a scene under an environment with one strategy, on rayon's current thread pool.
 ///
-/// The camera must have been made for the settings' width and height. The strategy brings its own
-/// reference to the light that it samples; `environment` is what camera rays see.
+/// The camera must be made for the settings' width and height. The strategy has its own reference to
+/// the light that it samples; `environment` is the background that camera rays see.
 ///
 /// # Panics
 /// If width, height or tile size are zero.
@@ -260,7 +261,8 @@ pub fn render<S: Strategy>(
 }
 
 impl StrategySpec {
-    /// Chooses what is left open, by a pilot at points that the picture shows; see [`StrategySpec::for_scene`].
+    /// Sets the parameters that were left open, with a pilot at points that the picture shows; see
+    /// [`StrategySpec::for_scene`].
     #[must_use]
     pub fn for_picture(
         self,
@@ -280,7 +282,8 @@ impl StrategySpec {
     }
 }
 
-/// The shading points of up to 256 pixels' centers, spread over the picture: for pilots. In units of [`Scene::unit`].
+/// The shading points at the centers of up to 256 pixels, spread over the picture, for pilots. In units of
+/// [`Scene::unit`].
 pub fn pilot_points(
     scene: &Scene,
     camera: &Camera,

@@ -1,4 +1,4 @@
-//! A rendered picture as the layers of an OpenEXR file.
+//! Writes rendered pictures as OpenEXR layers and as PNG.
 
 use std::io::{Seek, Write};
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::picture::tone::{ToneCurve, ToneMapping};
 use crate::picture::{PictureErrorKind, write_atomically, write_atomically_seeking};
 use crate::{Error, RgbImage};
 
-/// A film developed to what a screen shows.
+/// A film developed for display.
 #[derive(Clone, Debug)]
 pub struct Developed {
     color: RgbImage,
@@ -21,15 +21,15 @@ pub struct Developed {
 }
 
 impl Developed {
-    /// The exposure that was used \[stops\], and the curve.
+    /// The exposure \[stops\] and the tone curve that were used.
     pub fn tone(&self) -> ToneMapping {
         self.tone
     }
 
-    /// Writes a PNG file of 8 bits; `-` is standard output.
+    /// Writes an 8-bit PNG file; `-` is standard output.
     ///
     /// # Errors
-    /// If the file cannot be written; no half-written file is left.
+    /// If the file cannot be written. No incomplete file is left behind.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let alpha = self.alpha.as_deref();
         let write =
@@ -37,7 +37,7 @@ impl Developed {
         Ok(write_atomically(path.as_ref(), |out| write(out))?)
     }
 
-    /// The bytes of a PNG file of 8 bits.
+    /// Encodes an 8-bit PNG file.
     ///
     /// # Errors
     /// If the picture is empty.
@@ -52,7 +52,7 @@ impl Film {
     /// Writes an OpenEXR file with all layers ([`Layers::to_exr`]); `-` is standard output.
     ///
     /// # Errors
-    /// If the file cannot be written; no half-written file is left.
+    /// If the file cannot be written. No incomplete file is left behind.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let layers = self.layers();
         Ok(write_atomically_seeking(path.as_ref(), |out| {
@@ -60,8 +60,8 @@ impl Film {
         })?)
     }
 
-    /// The picture for a screen; automatic exposure is for what the scene covers. Where the background is hidden, alpha
-    /// goes along.
+    /// Develops the picture for display. Automatic exposure uses the pixels that the scene covers. If the background is
+    /// hidden, the picture has alpha.
     pub fn develop(&self, exposure: Exposure, curve: ToneCurve) -> Developed {
         let Layers { color, alpha, n_hits, .. } = self.layers();
         let coverage: Vec<f32> = n_hits.iter().map(|&n| n as f32).collect();
@@ -72,8 +72,8 @@ impl Film {
 }
 
 impl Layers {
-    /// All layers that files have in one part, by the names that [`LAYERS`] gives: the picture itself as R, G, B, A,
-    /// and others such as `depth.Z`. Counts become numbers.
+    /// All layers that files have, in one part, with the names in [`LAYERS`]: the picture itself as R, G, B, A, and
+    /// others such as `depth.Z`. Counts become floats.
     ///
     /// `attributes` are written as strings, for provenance.
     pub fn to_exr(&self, attributes: Vec<(String, String)>) -> ExrLayers {
@@ -98,7 +98,7 @@ impl Layers {
     /// Writes the bytes of [`Layers::to_exr`] without a copy of all layers.
     ///
     /// # Errors
-    /// If `out` does not take them, or a name of an attribute cannot be one of OpenEXR.
+    /// If writing to `out` fails, or the name of an attribute is not a valid OpenEXR name.
     pub fn write_exr(
         &self,
         attributes: &[(String, String)],

@@ -1,4 +1,4 @@
-//! How a picture was made, as attributes of its file.
+//! Provenance: how a picture was made, as attributes of its file.
 
 use super::RenderSettings;
 use crate::picture::exposure::Exposure;
@@ -6,24 +6,24 @@ use crate::picture::exposure::Exposure;
 /// The attribute of OpenEXR files that keeps the automatic exposure of a render \[stops\].
 const EXPOSURE: &str = "domelight.exposure";
 
-/// How a picture was made: enough to render it again. All front ends write the same.
+/// How a picture was made, in enough detail to render it again. All front ends write the same attributes.
 #[derive(Clone, Copy, Debug)]
 pub struct Provenance<'a> {
-    /// What a user calls the scene.
+    /// The user's name for the scene.
     pub scene: &'a str,
-    /// What a user calls the environment.
+    /// The user's name for the environment.
     pub environment: &'a str,
     /// [`StrategySpec::description`](crate::strategy::StrategySpec::description) with the pilot's choices, or the name
-    /// of a strategy of the caller's own.
+    /// of a custom strategy.
     pub strategy: &'a str,
-    /// How it was rendered.
+    /// The render settings.
     pub settings: &'a RenderSettings,
-    /// The automatic exposure \[stops\], see [`automatic_exposure`](super::automatic_exposure).
+    /// The automatic exposure \[stops\]; see [`automatic_exposure`](super::automatic_exposure).
     pub exposure: f32,
 }
 
 impl Provenance<'_> {
-    /// Names and values of the attributes, in the order of the file.
+    /// The names and values of the attributes, in file order.
     pub fn attributes(&self) -> Vec<(String, String)> {
         let Self { scene, environment, strategy, settings, exposure } = *self;
         let attributes = [
@@ -42,7 +42,7 @@ impl Provenance<'_> {
     }
 }
 
-/// The automatic exposure \[stops\] that a file's attributes keep; `None` if they keep none.
+/// The automatic exposure \[stops\] stored in a file's attributes, if any.
 pub fn kept_exposure(attributes: &[(String, String)]) -> Option<f32> {
     let (_, value) = attributes.iter().find(|(name, _)| name == EXPOSURE)?;
     match value.parse() {

@@ -1,5 +1,5 @@
-//! The progressive renderer: a picture on its way to all its samples, pass by pass. It can be watched, interrupted,
-//! saved and resumed, and rendered in shards.
+//! The progressive renderer renders a picture pass by pass. A render can be watched, interrupted, saved, resumed, and
+//! divided into shards.
 
 use std::ops::{Deref, Range};
 
@@ -19,11 +19,11 @@ use crate::sampling::Sampler;
 use crate::scene::{Camera, Scene};
 use crate::strategy::{PrepareError, PreparedStrategy, Strategy, StrategySpec};
 
-/// A picture on its way to all its samples.
+/// A progressive render.
 ///
-/// Passes go over all tiles that lack samples; between passes, or when an [`Observer`] ends one early, the caller
-/// may look at the film, save it, or leave and resume later. A tile depends on nothing but the scene, the settings,
-/// the seed and its own place, so none of this changes a bit of the finished picture.
+/// Each pass renders all tiles that lack samples. Between passes, or after an [`Observer`] ended one early, the caller
+/// can look at the film, save it, or stop and resume later. A tile depends only on the scene, the settings, the seed
+/// and its position, so none of this changes a bit of the finished picture.
 ///
 /// ```
 /// use domelight::environment::{Environment, builtin::BuiltinProbe};
@@ -51,15 +51,15 @@ pub struct Renderer<'a, S: Strategy = PreparedStrategy<'a>> {
     /// The tiles to render.
     range: Range<usize>,
     tiles: Vec<Tile>,
-    /// What was done before the renderer was restored.
+    /// Counts of the work before the renderer was restored.
     before: Counts,
-    /// Passes begun so far.
+    /// The number of passes begun so far.
     mark: Mark,
-    /// The pass that the observer ended, to go on with.
+    /// The pass that the observer ended, to be continued.
     interrupted: Option<(u32, Pass<S>)>,
 }
 
-/// A strategy of the renderer's own, or the caller's.
+/// A strategy owned by the renderer, or the caller's.
 enum Held<'a, S> {
     Own(Box<S>),
     Lent(&'a S),
@@ -79,18 +79,18 @@ impl<S> Deref for Held<'_, S> {
 /// How a pass ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum PassEnd {
-    /// All tiles that it was to render have its samples.
+    /// All tiles have the samples of the pass.
     Complete,
     /// The observer ended it.
     Canceled,
-    /// There was nothing to render.
+    /// Nothing was left to render.
     NothingLeft,
 }
 
 impl<'a> Renderer<'a> {
-    /// Renders with a strategy of the library, for whose open choices a pilot looks at the scene.
+    /// Renders with a built-in strategy. A pilot sets the parameters that were left open.
     ///
-    /// The camera must have been made for the settings' width and height.
+    /// The camera must be made for the settings' width and height.
     ///
     /// # Errors
     /// If the strategy does not suit the environment.
@@ -110,7 +110,7 @@ impl<'a> Renderer<'a> {
         Ok(Self { spec: Some(spec), ..renderer })
     }
 
-    /// The strategy that renders, with the pilot's choices; `None` of a strategy that the caller holds.
+    /// The strategy, with the pilot's choices; `None` for a strategy that the caller supplied.
     pub fn spec(&self) -> Option<StrategySpec> {
         self.spec
     }
@@ -119,8 +119,8 @@ impl<'a> Renderer<'a> {
 impl<'a, S: Strategy> Renderer<'a, S> {
     /// Renders with any strategy.
     ///
-    /// The camera must have been made for the settings' width and height. The strategy brings its own
-    /// reference to the light that it samples; `environment` is what camera rays see.
+    /// The camera must be made for the settings' width and height. The strategy has its own reference to
+    /// the light that it samples; `environment` is the background that camera rays see.
     ///
     /// # Panics
     /// If width, height or tile size are zero.
@@ -161,7 +161,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         empty.only(0..tiling.n_tiles())
     }
 
-    /// The same renderer for `tiles` only, without samples.
+    /// Restricts the renderer to `tiles` and discards its samples.
     ///
     /// # Panics
     /// If there are no such tiles.
@@ -173,7 +173,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         self
     }
 
-    /// The same renderer for shard `k` of `n` only, without samples.
+    /// Restricts the renderer to shard `k` of `n` and discards its samples.
     ///
     /// # Panics
     /// Unless k < n.
@@ -193,37 +193,37 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         self.tiling
     }
 
-    /// The tiles that are rendered.
+    /// The tiles to render.
     pub fn tiles(&self) -> Range<usize> {
         self.range.clone()
     }
 
-    /// Renders the next pass. Returns false when there was nothing left to render.
+    /// Renders the next pass. Returns false if nothing was left to render.
     pub fn step(&mut self) -> bool {
         self.pass(&(), u32::MAX) != PassEnd::NothingLeft
     }
 
-    /// Renders the next pass, or what the observer lets be done of it. Returns false when there was nothing left to
+    /// Renders the next pass, until the observer ends it. Returns false if nothing was left to
     /// render.
     pub fn step_with(&mut self, observer: &impl Observer) -> bool {
         self.pass(observer, u32::MAX) != PassEnd::NothingLeft
     }
 
-    /// As [`Self::step_with`], with a pass of no more than `most` camera samples a pixel, at least 1: for renders that
-    /// end at a set time. A strategy that learns within a pass then makes another picture than with passes of full
-    /// length. With a target error passes keep their lengths.
+    /// Like [`Self::step_with`], but with a pass of at most `most` ≥ 1 camera samples per pixel, for renders with a
+    /// time limit. A strategy that learns within a pass then gives another picture than with passes of full length.
+    /// With a target error, passes keep their lengths.
     pub fn step_at_most(&mut self, most: u32, observer: &impl Observer) -> bool {
         self.pass(observer, most.max(1)) != PassEnd::NothingLeft
     }
 
-    /// Renders all that is missing and returns the film.
+    /// Renders all remaining samples and returns the film.
     pub fn finish(&mut self) -> Film {
         self.run(&());
         self.film()
     }
 
-    /// Renders what is missing, on rayon's current pool of threads, until the observer ends it: a later run goes on
-    /// from there. Returns whether all samples of all pixels are there.
+    /// Renders the remaining samples on rayon's current thread pool, until the observer ends the render; a later call
+    /// continues. Returns whether all samples of all pixels were taken.
     pub fn run(&mut self, observer: &(impl Observer + ?Sized)) -> bool {
         loop {
             match self.pass(observer, u32::MAX) {
@@ -234,7 +234,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         }
     }
 
-    /// Renders one pass of no more than `most` samples over the tiles that are behind.
+    /// Renders one pass of at most `most` samples over the tiles that lack samples.
     fn pass(&mut self, observer: &(impl Observer + ?Sized), most: u32) -> PassEnd {
         let Some(start) = self.unfinished().map(Tile::n_samples).min() else {
             return PassEnd::NothingLeft;
@@ -271,7 +271,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         PassEnd::Canceled
     }
 
-    /// Prepares the pass that begins at sample `start`, of no more than `most` samples.
+    /// Prepares the pass that begins at sample `start`, with at most `most` samples.
     fn begin_pass(&self, start: u32, most: u32) -> Pass<S> {
         let Self { context, strategy, tiling, .. } = self;
         let (strategy, settings): (&S, _) = (strategy, &context.settings);
@@ -294,7 +294,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         pass
     }
 
-    /// Whether all samples of all pixels are there.
+    /// Whether all samples of all pixels were taken.
     pub fn is_complete(&self) -> bool {
         self.unfinished().next().is_none()
     }
@@ -303,7 +303,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         self.tiles.iter().filter(|tile| !tile.is_finished(&self.context.settings))
     }
 
-    /// The share of the camera samples that is done, in [0, 1].
+    /// The fraction of the camera samples taken so far, in [0, 1].
     pub fn progress(&self) -> f64 {
         let n_samples = f64::from(self.context.settings.n_samples);
         let done = |tile: &Tile| {
@@ -315,7 +315,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         if area == 0 { 1.0 } else { self.tiles.iter().map(done).sum::<f64>() / area as f64 }
     }
 
-    /// The share of the pixels that the next pass renders, in [0, 1]: all, unless an observer ended the last pass.
+    /// The fraction of the pixels that the next pass renders, in [0, 1]: 1 unless an observer ended the last pass.
     pub fn share_behind(&self) -> f64 {
         let behind = self.unfinished().map(Tile::n_samples).min();
         let behind = |tile: &&Tile| Some(tile.n_samples()) == behind;
@@ -324,22 +324,22 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         self.unfinished().filter(behind).map(area).sum::<f64>() / all.max(1.0)
     }
 
-    /// The least number of camera samples that a tile has.
+    /// The minimum number of camera samples per pixel over all tiles.
     pub fn least_samples(&self) -> u32 {
         self.tiles.iter().map(Tile::n_samples).min().unwrap_or(0)
     }
 
-    /// This moment, to ask later which tiles have changed since.
+    /// Marks the current state, for a later call of [`Self::changed_since`].
     pub fn mark(&self) -> Mark {
         self.mark
     }
 
-    /// The pixels of the tiles that have got samples since a mark.
+    /// The windows of the tiles that received samples since a mark.
     pub fn changed_since(&self, mark: Mark) -> impl Iterator<Item = Window> {
         self.tiles.iter().filter(move |tile| tile.changed > mark).map(|tile| tile.window)
     }
 
-    /// What was done, including what was done before the renderer was restored.
+    /// Counts of the work done, including the work before the renderer was restored.
     pub fn counts(&self) -> Counts {
         self.tiles.iter().fold(self.before, |sum, tile| sum + tile.counts)
     }
@@ -355,10 +355,10 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         film
     }
 
-    /// The film of one tile's pixels, for instance of those that have changed.
+    /// The film of one tile, for instance one that has changed.
     ///
     /// # Panics
-    /// If the window is none of the renderer's tiles.
+    /// If the window is not one of the renderer's tiles.
     pub fn film_of(&self, window: Window) -> Film {
         let RenderSettings { width, height, .. } = self.context.settings;
         let tile = self.tiles.iter().find(|tile| tile.window == window);
@@ -368,10 +368,10 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         film
     }
 
-    /// Takes over the sums that another renderer of the same picture had.
+    /// Restores the sums from another renderer of the same picture.
     ///
     /// # Errors
-    /// If they are of another part or size of picture, or of no whole number of passes.
+    /// If the film has another window or picture size, or does not hold a whole number of passes.
     pub fn restore(&mut self, film: &Film, counts: Counts) -> Result<(), FilmMismatch> {
         film.require_window(&self.context.settings, self.tiling.window(&self.range))?;
         self.mark = self.mark.next();

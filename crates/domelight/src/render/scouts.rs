@@ -1,5 +1,5 @@
-//! Finds the scale by which the camera samples of a picture are divided: small windows, spread over it, are rendered
-//! ahead of it and show how many samples its pixels will get.
+//! Determines the scale of the sample allocation of a picture: small windows, spread over the picture, are rendered
+//! first and show how many samples its pixels will get.
 
 use rayon::prelude::*;
 
@@ -11,12 +11,12 @@ use crate::sampling::{Pcg32, Sampler};
 use crate::strategy::Strategy;
 use crate::strategy::levels::N_LEVELS;
 
-/// Columns and rows of a window of scouts: its corners are pixels of the first level. Many small windows estimate the
-/// mean over the picture better than a few large ones: those of 9 × 9 at equal cost erred twice as much
-/// (docs/experiments.md).
+/// The number of columns and rows of a scout window, whose corners are pixels of the first level. Many small windows
+/// estimate the mean over the picture better than a few large ones: the error of 9 × 9 windows at equal cost was twice as
+/// large (docs/experiments.md).
 const SCOUT_WINDOW: usize = 5;
 
-/// The share of a tile's pixels that are of a level.
+/// The fraction of a tile's pixels in a level.
 fn share(level: u32) -> f64 {
     f64::from(1 << level.saturating_sub(1)) / 16.0
 }
@@ -25,19 +25,19 @@ fn share(level: u32) -> f64 {
 #[derive(Clone, Copy, Debug)]
 struct Scout {
     level: u32,
-    /// What its number of samples follows from; `None` where it is the usual number.
+    /// The logarithm that determines its number of samples; `None` for the default number.
     log: Option<f32>,
 }
 
 impl Scout {
-    /// The pixels of a tile that was rendered.
+    /// The pixels of a rendered tile.
     fn of_tile(allocation: &Allocation) -> impl Iterator<Item = Self> {
         let scout =
             |pixel: usize| Self { level: allocation.level(pixel), log: allocation.log(pixel) };
         (0..allocation.n_pixels()).map(scout)
     }
 
-    /// Its samples, if a pixel at `mean_log` has `n`.
+    /// Its number of samples, if a pixel at `mean_log` has `n`.
     fn count(self, n: u32, mean_log: f32) -> f64 {
         let octaves = self.log.map(|log| log - mean_log);
         f64::from(octaves.map_or(n, |octaves| count(n, octaves, fewest(self.level))))
@@ -61,13 +61,13 @@ fn spent(scouts: &[Scout], n: u32, mean_log: f32) -> f64 {
 /// The logarithm at which a pixel has `n` samples, if pixels like these have `budget` times `n` on average; `None` if
 /// none of them sees the scene.
 fn mean_log(scouts: &[Scout], n: u32, budget: f64) -> Option<f32> {
-    /// The range is halved as often.
+    /// The number of bisection steps.
     const STEPS: usize = 20;
     let [fewest, most] = OCTAVES.map(|octaves| octaves as f32);
     let logs = || scouts.iter().filter_map(|scout| scout.log);
     let mut low = logs().reduce(f32::min)? - most - 1.0;
     let mut high = logs().reduce(f32::max)? - fewest + 1.0;
-    // `low` spends too much, `high` does not.
+    // `low` spends too much; `high` does not.
     for _ in 0..STEPS {
         let middle = 0.5 * (low + high);
         if spent(scouts, n, middle) > budget {
@@ -79,32 +79,33 @@ fn mean_log(scouts: &[Scout], n: u32, budget: f64) -> Option<f32> {
     Some(high)
 }
 
-/// The logarithm at which a pixel has the usual number of samples, so that those of the picture are about as many as
-/// were asked for; `None` if no scout sees the scene.
+/// The logarithm at which a pixel gets the default number of samples, so that the total over the picture is about the
+/// number requested; `None` if no scout sees the scene.
 ///
-/// Scouts are windows of pixels, spread over the picture, with random numbers of their own: a scale that followed a
-/// pixel's own samples would bias them. They are rendered twice: a few with as many samples in every pixel, which finds
-/// a first scale; then all of them by that scale, since a strategy that learns errs less where more is learned.
+/// Scouts are windows of pixels, spread over the picture, with their own random numbers, because a scale that depends on a
+/// pixel's own samples would introduce bias. They are rendered twice: a few with the same number of samples in every
+/// pixel, which gives a first scale; then all of them with that scale, because a strategy that learns errs less where more
+/// is learned.
 pub(super) fn scale<S: Strategy>(
     context: &RenderContext,
     strategy: &S,
     pass: &Pass<S>,
 ) -> Option<f32> {
-    /// A window for so many pixels of the picture: scouts cost a fiftieth of the render, less in large pictures.
+    /// The number of pixels of the picture per window. Scouts cost a fiftieth of the render, and less for large pictures.
     const PIXELS_PER_WINDOW: usize = 20 * SCOUT_WINDOW * SCOUT_WINDOW;
-    /// The fewest and the most.
+    /// The minimum and maximum number of windows.
     const N_WINDOWS: [usize; 2] = [52, 1296];
-    /// Windows for the first scale.
+    /// The number of windows for the first scale.
     const FIRST: usize = 29;
-    /// The samples of a pixel of a window, as a part of the picture's: what noise asks for changes little with them.
-    const SHARE: u32 = 4;
-    /// The fewest of them.
+    /// The divisor of the picture's samples per pixel: the estimated noise depends little on the number of samples.
+    const SAMPLES_DIVISOR: u32 = 4;
+    /// The minimum number of samples per pixel.
     const FEWEST_SAMPLES: u32 = 4;
     let RenderSettings { width, height, seed, .. } = context.settings;
     let settings = RenderSettings { seed: !seed, ..context.settings };
     let context = &RenderContext { settings, filter: context.filter.clone(), ..*context };
     let sampler = Sampler::for_pass(settings.sampler, settings.seed, 0);
-    let n_samples = (pass.n_samples / SHARE).max(FEWEST_SAMPLES).min(pass.n_samples);
+    let n_samples = (pass.n_samples / SAMPLES_DIVISOR).max(FEWEST_SAMPLES).min(pass.n_samples);
     let shared = strategy.begin_pass(sampler, n_samples);
     let mut pass = Pass { n_samples, mean_log: None, shared, ..*pass };
     let scouts = |n: usize, pass: &Pass<S>| -> Vec<Scout> {
@@ -117,7 +118,7 @@ pub(super) fn scale<S: Strategy>(
             .flatten_iter()
             .collect()
     };
-    // Second sets of samples are paid from the same budget.
+    // Second sets of samples count toward the same budget.
     let budget = if settings.target_error.is_none() { 1.0 / (1.0 + SECOND_SETS) } else { 1.0 };
     pass.mean_log = Some(mean_log(&scouts(FIRST, &pass), pass.n_samples, budget)?);
     let [fewest, most] = N_WINDOWS;
@@ -125,7 +126,8 @@ pub(super) fn scale<S: Strategy>(
     mean_log(&scouts(n_windows, &pass), pass.n_samples, budget)
 }
 
-/// About `n` windows of `size` × `size` pixels, or what the picture has, one at random in each cell of a grid.
+/// About `n` windows of `size` × `size` pixels, or as large as the picture allows, one at a random position in each cell of a
+/// grid.
 fn spread(width: usize, height: usize, size: usize, n: usize) -> Vec<Window> {
     let aspect = (width as f64 / height as f64).sqrt();
     let cells = |of: f64, extent: usize| ((n as f64).sqrt() * of).round().clamp(1.0, extent as f64);

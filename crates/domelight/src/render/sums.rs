@@ -1,26 +1,26 @@
-//! Sums of the camera samples of a pixel: what a film consists of, and what a checkpoint keeps bit by bit.
+//! The sums over the camera samples of a pixel, which make up a film and which a checkpoint stores bit by bit.
 
 use super::tiling::SampleSet;
 use super::variance::Contrast;
 use crate::Rgb;
 use crate::math::{Vec3, functions};
 
-/// What one camera sample adds to its pixel.
+/// The contribution of one camera sample to its pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CameraSample {
     pub(super) color: Rgb,
     pub(super) unoccluded: Rgb,
     pub(super) alpha: f32,
-    /// The share of each channel of the background that shadows take away, on ground that shows nothing else.
+    /// The fraction of each channel of the background that shadows remove, on a shadow catcher.
     pub(super) shadow: Rgb,
-    /// Luminance of such ground, where the background is hidden: its noise is that of the picture to be composited.
+    /// The luminance of the shadow catcher if the background is hidden; its noise is that of the composited picture.
     pub(super) unseen: f32,
-    /// None where the ray left the scene.
+    /// `None` if the ray left the scene.
     pub(super) surface: Option<SurfaceSample>,
 }
 
 impl CameraSample {
-    /// Seen through surfaces that let the share `throughput` of each channel pass.
+    /// Attenuates the sample by the `throughput` of the surfaces in front.
     pub(super) fn through(self, throughput: Rgb) -> Self {
         // What is not seen behind the scene hides its share.
         let behind = if self.surface.is_some() { 0.0 } else { throughput.mean() };
@@ -35,7 +35,7 @@ impl CameraSample {
     }
 }
 
-/// What a camera sample saw of a surface.
+/// The surface that a camera sample saw.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SurfaceSample {
     pub(super) albedo: Rgb,
@@ -43,8 +43,8 @@ pub(super) struct SurfaceSample {
     pub(super) depth: f32,
 }
 
-/// Defines the sums of a pixel: for each its type and the channels in which a checkpoint keeps its bits, one for each
-/// 32 of them. A checkpoint's digest takes the channels in the order of the sums.
+/// Defines the sums of a pixel: for each, its type and the channels in which a checkpoint stores its bits, one channel per
+/// 32 bits. A checkpoint's digest hashes the channels in the order of the sums.
 macro_rules! pixel_sums {
     ($(#[$meta:meta])* { $($(#[$doc:meta])* $sum:ident: $type:ty = [$($word:literal)*],)* }) => {
         $(#[$meta])*
@@ -78,7 +78,7 @@ macro_rules! pixel_sums {
 }
 
 pixel_sums! {
-    /// The sums of one pixel. Samples are added one by one in their order, whatever the passes: the
+    /// The sums of one pixel. Samples are added one by one in order, regardless of the passes, so the
     /// same samples give the same bits.
     {
         color: [f64; 3] = [
@@ -92,13 +92,13 @@ pixel_sums! {
             "unoccluded.R.high" "unoccluded.R.low" "unoccluded.G.high" "unoccluded.G.low"
             "unoccluded.B.high" "unoccluded.B.low"
         ],
-        /// The part of `color` that is of the second set.
+        /// The part of `color` from the second set.
         second: [f64; 3] = [
             "second.R.high" "second.R.low" "second.G.high" "second.G.low" "second.B.high"
             "second.B.low"
         ],
         depth: f64 = ["depth.Z.high" "depth.Z.low"],
-        /// `color` after the first n and n/2 samples, with n the greatest power of two so far.
+        /// `color` after the first n and n/2 samples, where n is the largest power of two so far.
         prefixes: [Rgb; 2] = ["whole.R" "whole.G" "whole.B" "half.R" "half.G" "half.B"],
         shadow: Rgb = ["shadow.R" "shadow.G" "shadow.B"],
         albedo: Rgb = ["albedo.R" "albedo.G" "albedo.B"],
@@ -111,7 +111,7 @@ pixel_sums! {
     }
 }
 
-/// What is kept in words of 32 bits.
+/// A sum stored in 32-bit words.
 #[cfg(feature = "io")]
 trait Words: Sized {
     fn put_words(self, put: &mut impl FnMut(u32));
@@ -191,13 +191,13 @@ impl Words for Vec3 {
 }
 
 impl PixelSums {
-    /// After `n_samples` that saw nothing, before no background.
+    /// The sums after `n_samples` that saw nothing, without background.
     pub(super) fn missed(n_samples: u32) -> Self {
         Self { n_samples, ..Self::default() }
     }
 
-    /// Adds a sample of a set, with colors in multiples of `unit`. A sample that is not finite counts as black and is
-    /// reported: it returns false.
+    /// Adds a sample of a set, with colors in multiples of `unit`. A sample that is not finite counts as black, and the
+    /// function returns false.
     #[inline]
     pub(super) fn add(&mut self, sample: &CameraSample, set: SampleSet, unit: f64) -> bool {
         let colors = [sample.color, sample.unoccluded, sample.shadow];
@@ -236,7 +236,7 @@ impl PixelSums {
         finite
     }
 
-    /// Adds `n` samples of a set that saw nothing, before no background, to a pixel that never saw anything.
+    /// Adds `n` samples of a set that saw nothing, without background, to a pixel that never saw anything.
     pub(super) fn add_misses(&mut self, n: u32, set: SampleSet) {
         self.n_samples += n;
         self.n_second += if set == SampleSet::Second { n } else { 0 };
@@ -259,13 +259,13 @@ impl PixelSums {
         self.mean(self.color).luminance()
     }
 
-    /// Error² of the mean's luminance by the difference of the two sets; 0 without a second.
+    /// The squared error of the mean's luminance, from the difference of the two sets; 0 without a second set.
     pub(super) fn variance_by_sets(&self) -> f32 {
         let difference = Rgb::from(self.difference().map(|d| d as f32)).luminance();
         self.balance() as f32 * difference * difference
     }
 
-    /// The mean of the first set less that of the second; 0 if either is empty.
+    /// The difference of the means of the two sets; 0 if either is empty.
     fn difference(&self) -> [f64; 3] {
         let [first, second] =
             [SampleSet::First, SampleSet::Second].map(|set| f64::from(self.n_of(set)));
@@ -282,7 +282,7 @@ impl PixelSums {
         first * second / functions::powi(first + second, 2).max(1.0)
     }
 
-    /// What the pixel shows of how much less than independent samples its samples err.
+    /// The pixel's contribution to the variance sums.
     pub(super) fn contrast(&self) -> Option<Contrast> {
         if self.n_samples < 2 {
             return None;
@@ -302,24 +302,24 @@ impl PixelSums {
         Some(Contrast::Halves([independent, squares(halves)]))
     }
 
-    /// One over the number of samples.
+    /// The reciprocal of the number of samples.
     pub(super) fn scale(&self) -> f32 {
         1.0 / self.n_samples.max(1) as f32
     }
 
-    /// A sum over the number of samples.
+    /// A sum divided by the number of samples.
     pub(super) fn mean(&self, sum: [f64; 3]) -> Rgb {
         let n = f64::from(self.n_samples.max(1));
         // Means of differences may be negative; clamping them would introduce bias.
         Rgb::from(sum.map(|c| narrowed(c / n)))
     }
 
-    /// The share of the background that shadows take away.
+    /// The fraction of the background that shadows remove.
     pub(super) fn shadow(&self) -> Rgb {
         (self.shadow * self.scale()).map(|c| c.clamp(0.0, 1.0))
     }
 
-    /// The share of camera samples that show something.
+    /// The fraction of camera samples that show something.
     pub(super) fn alpha(&self) -> f32 {
         (self.alpha * self.scale()).clamp(0.0, 1.0)
     }
@@ -347,7 +347,7 @@ impl PixelSums {
     }
 }
 
-/// The nearest finite number of single precision.
+/// The nearest finite single-precision number.
 fn narrowed(x: f64) -> f32 {
     x.min(f64::from(f32::MAX)) as f32
 }

@@ -1,5 +1,5 @@
-//! The unit of work: a tile's camera rays, its shading points grouped by pixel, a strategy's rounds
-//! of shadow rays, and their sums.
+//! The unit of work, a tile: its camera rays, its shading points grouped by pixel, the strategy's rounds
+//! of shadow rays, and the sums.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -18,10 +18,10 @@ use crate::sampling::{Dimension, SampleSequence, Sampler};
 use crate::strategy::levels::{N_LEVELS, level};
 use crate::strategy::{Contributions, PixelPoints, ShadingPoint, Strategy, TileShading};
 
-/// Camera samples below which the difference of two sets says nothing.
+/// The number of camera samples below which the difference of two sets is not meaningful.
 const FEWEST_SAMPLES: u32 = 16;
 
-/// Names the random numbers that decide which surfaces camera rays see.
+/// The seed of the random numbers that decide which surfaces camera rays see.
 const COVERAGE: u64 = 0x636f_7665_7261_6765;
 
 /// A moment between passes; see [`Renderer::changed_since`](super::Renderer::changed_since).
@@ -29,7 +29,7 @@ const COVERAGE: u64 = 0x636f_7665_7261_6765;
 pub struct Mark(u64);
 
 impl Mark {
-    /// The mark of the pass that follows.
+    /// The mark of the next pass.
     pub(super) fn next(self) -> Self {
         Self(self.0 + 1)
     }
@@ -42,23 +42,23 @@ pub(super) struct Tile {
     /// Empty before the first sample, for of a shard's picture most tiles are others' work, and where nothing is to
     /// be seen.
     pixels: Vec<PixelSums>,
-    /// Camera samples of each pixel while `pixels` are empty.
+    /// The number of camera samples per pixel while `pixels` is empty.
     n_missed: u32,
     pub(super) counts: Counts,
-    /// When it last got samples.
+    /// The pass in which it last received samples.
     pub(super) changed: Mark,
 }
 
-/// What was done, for the statistics.
+/// Counts of the work done, for statistics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Camera rays, with those of which it is known that they meet nothing.
+    /// Camera rays, including those known to hit nothing.
     pub camera_rays: u64,
     /// Camera rays that hit the scene.
     pub shading_points: u64,
     /// Shadow rays traced.
     pub shadow_rays: u64,
-    /// Camera samples whose value was NaN or infinite; they count as black.
+    /// Camera samples with a NaN or infinite value, which count as black.
     pub non_finite: u64,
 }
 
@@ -80,14 +80,14 @@ impl std::ops::AddAssign for Counts {
     }
 }
 
-/// Memory that a thread keeps from tile to tile, and the strategy's.
+/// Scratch memory that a thread keeps from tile to tile, including the strategy's.
 pub(super) struct Scratch<S: Strategy> {
     batch: Batch,
     of_strategy: S::Scratch,
 }
 
 impl<S: Strategy> Scratch<S> {
-    /// What the last tile has shown of its pixels.
+    /// What the pixels of the last tile showed.
     pub(super) fn allocation(&self) -> &Allocation {
         &self.batch.allocation
     }
@@ -101,12 +101,12 @@ impl<S: Strategy> Default for Scratch<S> {
 
 /// A pass over the picture.
 pub(super) struct Pass<S: Strategy> {
-    /// Its camera samples of each pixel; about the mean over the picture where they are divided unevenly.
+    /// The number of camera samples per pixel; about the mean over the picture if they are divided unevenly.
     pub(super) n_samples: u32,
     pub(super) set: SampleSet,
-    /// Divides its samples unevenly, or will when `mean_log` is known.
+    /// Whether samples are divided unevenly, or will be once `mean_log` is known.
     pub(super) adaptive: bool,
-    /// The logarithm at which a pixel has the usual number; see [`super::allocation`].
+    /// The logarithm at which a pixel gets the default number; see [`super::allocation`].
     pub(super) mean_log: Option<f32>,
     pub(super) shared: S::Pass,
 }
@@ -116,16 +116,16 @@ pub(super) struct Pass<S: Strategy> {
 struct Batch {
     /// Whether each pixel of the tile may see anything.
     seen: Vec<bool>,
-    /// Whether it takes a second set of samples in the pass.
+    /// Whether each pixel takes a second set of samples in the pass.
     has_second: Vec<bool>,
-    /// Its pixels learn from one another how many samples they need.
+    /// Determines the number of samples of each pixel from other pixels.
     adaptive: bool,
-    /// Whether it takes part in the round.
+    /// Whether each pixel takes part in the round.
     chosen: Vec<bool>,
     allocation: Allocation,
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
-    /// Factors on what the rays see; none in scenes where nothing transmits.
+    /// Factors on the radiance that the rays see; empty in scenes without transmission.
     throughputs: Vec<Rgb>,
     /// The camera rays of each pixel.
     camera_rays: Vec<CameraRays>,
@@ -142,14 +142,14 @@ struct Batch {
 /// The camera rays of a pixel.
 #[derive(Clone)]
 struct CameraRays {
-    /// Which camera samples; none in a pixel of another round.
+    /// The range of camera samples; empty for a pixel of another round.
     samples: Range<u32>,
-    /// The place of the first ray; none if nothing is to be seen.
+    /// The index of the first ray; `None` if nothing is visible.
     first: Option<usize>,
 }
 
 impl CameraRays {
-    /// Where the rays are.
+    /// The range of the rays.
     fn range(&self) -> Range<usize> {
         self.first.map_or(0..0, |first| first..first + self.samples.len())
     }
@@ -172,7 +172,7 @@ impl Tile {
         Self { window, pixels: Vec::new(), n_missed: 0, counts, changed: Mark::default() }
     }
 
-    /// Camera samples of each pixel.
+    /// The number of camera samples per pixel.
     pub(super) fn n_samples(&self) -> u32 {
         self.pixels.first().map_or(self.n_missed, PixelSums::n_samples)
     }
@@ -195,17 +195,17 @@ impl Tile {
         }
     }
 
-    /// What the variance of its pixels is estimated from.
+    /// The sums from which the variance of its pixels is estimated.
     pub(super) fn variance_sums(&self) -> VarianceSums {
         VarianceSums::of(self.pixels.iter().filter_map(PixelSums::contrast))
     }
 
-    /// Takes over the sums of a tile whose work is not counted here.
+    /// Copies the sums of a tile whose work is not counted here.
     pub(super) fn restore(&mut self, pixels: Vec<PixelSums>) {
         *self = Self { pixels, ..Self::new(self.window) };
     }
 
-    /// Has all samples, or as few as the error allows: a decision that no other tile has a part in.
+    /// Whether the tile has all its samples, or as few as the error allows, independent of other tiles.
     pub(super) fn is_finished(&self, settings: &RenderSettings) -> bool {
         let n_samples = self.n_samples();
         let precise =
@@ -213,19 +213,19 @@ impl Tile {
         n_samples >= settings.n_samples || settings.target_error.is_some_and(precise)
     }
 
-    /// Its second set is as large as the first.
+    /// Whether its second set is as large as the first.
     fn has_even_sets(&self) -> bool {
         let even = |p: &PixelSums| p.n_of(SampleSet::First) == p.n_of(SampleSet::Second);
         self.pixels.first().map_or(self.n_missed.is_multiple_of(2), even)
     }
 
-    /// The relMSE that the differences of the two sets suggest, and one standard error more: a tile whose error is in a
+    /// The relMSE according to the differences of the two sets, plus one standard error. Otherwise, a tile whose error is in a
     /// few pixels would stop on the first lucky estimate.
     fn error(&self) -> f32 {
         let luminance: Vec<f32> = self.pixels.iter().map(PixelSums::luminance).collect();
         let (mut sum, mut sum_of_squares) = (0.0, 0.0);
         for (i, pixel) in self.pixels.iter().enumerate() {
-            // A pixel with a firefly is as bright as it is wrong: its neighbors say how bright it should be.
+            // A firefly inflates the pixel's own brightness, so average over its neighbors.
             let mean = self.mean_around(i, &luminance);
             let error = pixel.variance_by_sets() / (mean * mean + 0.01);
             sum += error;
@@ -262,7 +262,7 @@ impl Tile {
         batch.seen.clear();
         batch.seen.resize(n_pixels, false);
         self.find_seen(context, self.window, &mut batch.seen);
-        // Where nothing is seen there is nothing to learn.
+        // Nothing visible: nothing to learn.
         let n_rounds = if batch.seen.contains(&true) { strategy.n_rounds() } else { 1 };
         let learns = n_rounds > 1;
         batch.adaptive = learns && pass.adaptive;
@@ -279,13 +279,13 @@ impl Tile {
         self.pixels.resize(n_pixels, PixelSums::missed(self.n_missed));
         let strategy_context = StrategyContext { context, strategy, pass: &pass.shared, width };
         let mut counts = Counts::default();
-        // Renders with a target error have a second set in every pixel.
+        // With a target error, every pixel has a second set.
         let one_in_many = learns && context.settings.target_error.is_none();
         self.choose_second_sets(context, one_in_many, batch);
         for round in 0..n_rounds {
             batch.allocation.assign(round);
             let of_round = |i: usize| !learns || level(i % width, i / width) == round;
-            // First, as what the strategy keeps for learning is that of its last rays.
+            // Render the second set first, because the strategy learns from its last rays.
             batch.choose(|i, batch| batch.has_second[i] && of_round(i));
             if batch.chosen.contains(&true) {
                 counts += self.sample(
@@ -315,7 +315,7 @@ impl Tile {
         batch.has_second.clear();
         let second = |(i, &seen): (usize, &bool)| {
             let (x, y) = self.position(i);
-            // The number of samples of a tile is that of its first pixel.
+            // A tile's number of samples is that of its first pixel.
             one_in_many && seen && i > 0 && has_second_set(context.settings.seed, x, y)
         };
         batch.has_second.extend(batch.seen.iter().enumerate().map(second));
@@ -340,7 +340,7 @@ impl Tile {
         Counts { camera_rays, shading_points, shadow_rays, non_finite: 0 }
     }
 
-    /// Those of a set of the chosen pixels; returns how many.
+    /// Traces the samples of a set of the chosen pixels. Returns their number.
     fn trace_camera_rays(&self, context: &RenderContext, set: SampleSet, batch: &mut Batch) -> u64 {
         let Batch {
             seen, chosen, allocation, rays, hits, throughputs, camera_rays, pixels, ..
@@ -387,7 +387,7 @@ impl Tile {
         count
     }
 
-    /// What random numbers of a set of pixel `i` depend on that decide which surfaces are seen.
+    /// The key of the random numbers that decide which surfaces a set of pixel `i` sees.
     fn key(&self, context: &RenderContext, i: usize, set: SampleSet) -> u64 {
         let (x, y) = self.position(i);
         let pixel = (y * context.settings.width + x) as u64;
@@ -415,13 +415,13 @@ impl Tile {
         }
     }
 
-    /// Where pixel `i` is in the picture.
+    /// The position of pixel `i` in the picture.
     fn position(&self, i: usize) -> (usize, usize) {
         let Window { x, y, width, .. } = self.window;
         (x + i % width, y + i / width)
     }
 
-    /// The uniform numbers of a set of pixel `i`.
+    /// The sampler of a set of pixel `i`.
     fn sampler(&self, context: &RenderContext, i: usize, set: SampleSet) -> Sampler {
         let (x, y) = self.position(i);
         let pixel = (y * context.settings.width + x) as u64;
@@ -490,7 +490,7 @@ impl Tile {
     }
 }
 
-/// The share of the pixels that have a second set of samples in strategies that place the rays of a pixel together.
+/// The fraction of the pixels with a second set of samples, for strategies that place the rays of a pixel together.
 pub(super) const SECOND_SETS: f64 = 4.0 / 256.0;
 
 /// Whether a pixel of the picture has a second set of samples in strategies that place the rays of a pixel together:
@@ -518,7 +518,7 @@ fn has_second_set(seed: u64, x: usize, y: usize) -> bool {
 /// The numbers of a pixel's camera rays.
 struct CameraNumbers {
     film: SampleSequence,
-    /// None of a camera without a lens.
+    /// `None` for a camera without a lens.
     lens: Option<SampleSequence>,
 }
 
@@ -550,7 +550,7 @@ fn camera_ray(
     }
 }
 
-/// What a ray sees behind the scene, in multiples of `unit`.
+/// The background that a ray sees, in multiples of `unit`.
 fn background_sample(context: &RenderContext, direction: Vec3, unit: f64) -> CameraSample {
     match context.settings.background {
         Background::Hidden => CameraSample::default(),
@@ -661,7 +661,7 @@ impl Batch {
             return self.shadow_sample(context, catcher, point, ray, unit);
         }
         let p = &self.points[point];
-        // In multiples of the unit, as the rest.
+        // Convert to multiples of the unit.
         let in_units = |c: f32| (f64::from(c) / unit).min(f64::from(f32::MAX)) as f32;
         let emitted = context.scene.emitted(hit);
         let emitted = if emitted == Rgb::BLACK { emitted } else { emitted.map(in_units) };
@@ -681,8 +681,8 @@ impl Batch {
 }
 
 impl Batch {
-    /// The background, darkened by what the light does not reach. The estimate of the light that is missing is zero
-    /// where every ray is free, so that no noise is laid over the background.
+    /// The background, darkened by the missing light. The estimate of the missing light is zero if every ray is unoccluded, so
+    /// that no noise is added to the background.
     fn shadow_sample(
         &self,
         context: &RenderContext,
@@ -716,12 +716,12 @@ struct StrategyContext<'a, S: Strategy> {
     context: &'a RenderContext<'a>,
     strategy: &'a S,
     pass: &'a S::Pass,
-    /// Pixels in a row of the tile.
+    /// The number of pixels in a row of the tile.
     width: usize,
 }
 
 impl ShadowRays {
-    /// Tests the visibility of all rays asked for at once.
+    /// Tests the visibility of all requested rays at once.
     fn trace(&mut self, context: &RenderContext, points: &[ShadingPoint], origins: &[Vec3]) {
         let origin = |(&wi, &point): (&Vec3, &u32)| {
             let p = &points[point as usize];

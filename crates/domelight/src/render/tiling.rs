@@ -1,4 +1,4 @@
-//! How a picture is divided into tiles, and tiles into shards.
+//! Divides a picture into tiles, and tiles into shards.
 
 use std::fmt;
 use std::ops::Range;
@@ -9,13 +9,13 @@ use crate::strategy::Strategy;
 /// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
-    /// First column.
+    /// The first column.
     pub x: usize,
-    /// First row.
+    /// The first row.
     pub y: usize,
-    /// Columns.
+    /// The number of columns.
     pub width: usize,
-    /// Rows.
+    /// The number of rows.
     pub height: usize,
 }
 
@@ -25,7 +25,7 @@ impl Window {
         self.width * self.height
     }
 
-    /// The quarters that have pixels.
+    /// The non-empty quarters.
     pub(super) fn quarters(self) -> impl Iterator<Item = Self> {
         let halves = |start: usize, n: usize| [(start, n / 2), (start + n / 2, n - n / 2)];
         let rows = halves(self.y, self.height);
@@ -36,25 +36,25 @@ impl Window {
         windows.filter(|window| window.area() > 0)
     }
 
-    /// Whether a pixel of the picture lies within.
+    /// Whether the window contains a pixel of the picture.
     pub(super) fn contains(&self, x: usize, y: usize) -> bool {
         (self.x..self.x + self.width).contains(&x) && (self.y..self.y + self.height).contains(&y)
     }
 
-    /// The index, row by row, of a pixel of the picture that lies within.
+    /// The index, row by row, of a pixel of the picture in the window.
     pub(super) fn index(&self, x: usize, y: usize) -> usize {
         (y - self.y) * self.width + x - self.x
     }
 }
 
-/// As in `640x16+0+32`: columns, rows, and the corner.
+/// Formats as `640x16+0+32`: columns, rows, and the corner.
 impl fmt::Display for Window {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}x{}+{}+{}", self.width, self.height, self.x, self.y)
     }
 }
 
-/// One of two independent sets of a pixel's samples; most pixels have the first alone.
+/// One of two independent sets of a pixel's samples. Most pixels have only the first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum SampleSet {
     #[default]
@@ -62,7 +62,7 @@ pub(super) enum SampleSet {
     Second,
 }
 
-/// The tiles of a picture, in row order; those at the right and lower border may be smaller.
+/// The tiles of a picture, in row order. Tiles at the right and lower border may be smaller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tiling {
     width: usize,
@@ -70,12 +70,12 @@ pub struct Tiling {
     size: usize,
 }
 
-/// Shadow rays of a tile in one pass that the caches hold.
+/// The number of shadow rays of a tile and pass that fit in the caches.
 const RAYS_PER_TILE: usize = 1 << 15;
 
 impl Tiling {
-    /// The tiles of a render by a strategy that asks for up to `n_rays` shadow rays at a point:
-    /// smaller than set where one sample of each pixel asks for too many.
+    /// The tiles of a render with a strategy that requests up to `n_rays` shadow rays per point. Tiles are
+    /// smaller than set if one sample per pixel requests too many rays.
     ///
     /// # Panics
     /// If width, height or tile size are zero.
@@ -91,7 +91,7 @@ impl Tiling {
         self.across() * self.height.div_ceil(self.size)
     }
 
-    /// The tiles of shard `k` of `n`: ranges that follow each other and differ by one tile at the most.
+    /// The tiles of shard `k` of `n`. Shards are consecutive ranges whose lengths differ by at most one tile.
     ///
     /// # Panics
     /// Unless k < n.
@@ -112,7 +112,7 @@ impl Tiling {
         Window { x, y, width, height: self.size.min(self.height - y) }
     }
 
-    /// The least rectangle around a range of tiles; of an empty range, the first pixel: a file needs one.
+    /// The smallest rectangle around a range of tiles. For an empty range, the first pixel, because a file needs one.
     ///
     /// # Panics
     /// If there are no such tiles.

@@ -1,27 +1,28 @@
-//! How much less than independent samples the samples of a render err.
+//! Estimates how much less the samples of a render err than independent samples.
 //!
-//! The mean of n independent samples of variance s² has the variance s²/n. Stratified samples err less, and their own
-//! spread does not show by how much. What does show it:
+//! The mean of n independent samples with variance s² has the variance s²/n. Stratified samples err less, but their
+//! sample variance does not show by how much. Two measurements do:
 //!
-//! - **A second set** of samples of some pixels, independent of the first: the squared difference of two such means is
-//!   their variances' sum, whatever the samples have in common within a set. Strategies that place all the rays of a
-//!   pixel together have it in one pixel of 64, renders with a target error in all.
+//! - **A second set** of samples in some pixels, independent of the first. The squared difference of the two means is
+//!   the sum of their variances in expectation, however the samples within a set depend on each other. Strategies that
+//!   place all the rays of a pixel together use it in one pixel of 64, and renders with a target error in all pixels.
 //! - **Halves of a sequence.** Let the mean of the first 2ʲ samples and that of the next 2ʲ differ by Dⱼ. The Dⱼ are
-//!   the details of a Haar expansion over the index, taken as uncorrelated under Owen's scrambling (Owen 1997, "Monte
-//!   Carlo variance of scrambled net quadrature"), and the mean over many pixels of Dⱼ² as proportional to rʲ. Then
+//!   the details of a Haar expansion over the index. They are assumed to be uncorrelated under Owen scrambling (Owen
+//!   1997, "Monte Carlo variance of scrambled net quadrature"), and the mean of Dⱼ² over many pixels is assumed to be
+//!   proportional to rʲ. Then
 //!
 //! ```text
 //! Var(mean of n) = Σⱼ E[Dⱼ²]/4 · (min(x, 2ʲ⁺¹ − x) / n)²        x = n mod 2ʲ⁺¹
 //! ```
 //!
-//!   r is ½ for independent samples, whose D₀² is 2 s², and follows from s² and the greatest j that was drawn.
+//!   r is ½ for independent samples, whose D₀² is 2 s², and follows from s² and the largest j available.
 //!
-//! Either is too noisy in a single pixel. So the quotient of this variance and of s²/n, both summed over all pixels of
-//! the picture, scales the s²/n of each.
+//! Both are too noisy in a single pixel. So the ratio of this variance to s²/n, both summed over all pixels of the
+//! picture, scales the s²/n of each pixel.
 
 use crate::math::functions;
 
-/// Sums over pixels of what their variance is estimated from. In whole numbers, so that the sums of parts of a
+/// Sums over pixels from which their variance is estimated. They hold whole numbers, so that the sums of parts of a
 /// picture add up to those of the whole in any order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VarianceSums {
@@ -29,12 +30,12 @@ pub struct VarianceSums {
     halves: [i128; 2],
 }
 
-/// What a pixel adds to [`VarianceSums`]; channels added up.
+/// A pixel's contribution to [`VarianceSums`], summed over channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Contrast {
-    /// Two independent sets: s²/n, and the variance by their difference.
+    /// Two independent sets: s²/n, and the variance from their difference.
     Sets([f64; 2]),
-    /// One sequence: s²/N of its longest prefix of N = 2^k samples, and D² of the halves of that.
+    /// One sequence: s²/N of its longest prefix of N = 2^k samples, and D² of the halves of this prefix.
     Halves([f64; 2]),
 }
 
@@ -46,7 +47,7 @@ impl VarianceSums {
         sums.zip(others).for_each(|(sum, x)| *sum = sum.saturating_add(*x));
     }
 
-    /// The sums of what some pixels add.
+    /// Sums the contributions of some pixels.
     pub(super) fn of(contrasts: impl Iterator<Item = Contrast>) -> Self {
         let mut sums = Self::default();
         for contrast in contrasts {
@@ -60,7 +61,7 @@ impl VarianceSums {
         sums
     }
 
-    /// The variance of the mean of `n` samples over s²/n.
+    /// The ratio of the variance of the mean of `n` samples to s²/n.
     pub(super) fn scale(&self, n: u32) -> f64 {
         let [independent, measured] = self.sets.map(|sum| sum as f64);
         if independent > 0.0 {
@@ -76,7 +77,7 @@ fn fixed(x: f64) -> i128 {
     (x * functions::powi(2f64, 64)) as i128
 }
 
-/// The variance of the mean of n samples over s²/n, given D² of the halves of the first N over s²/N.
+/// The ratio of the variance of the mean of n samples to s²/n, given the ratio of D² of the halves of the first N to s²/N.
 fn of_mean(n: u32, halves: f64) -> f64 {
     let last = n.max(2).ilog2() as i32 - 1;
     let prefix = functions::powi(2f64, last + 1);
@@ -98,11 +99,11 @@ fn of_mean(n: u32, halves: f64) -> f64 {
     0.25 * halves * sum * f64::from(n) / prefix
 }
 
-/// By which part of what is left of ½ the ratio of two details rises from one to the next beyond the samples: rough
-/// pixels remain. As measured on three scenes.
+/// Beyond the samples, the ratio of successive details approaches ½ by this fraction of the remaining distance from one to
+/// the next, because rough pixels remain. Measured on three scenes.
 const RISE: f64 = 0.0625;
 
-/// The last detail; each beyond the samples is at the most half the one before.
+/// The last detail. Each detail beyond the samples is at most half the previous one.
 const LAST: i32 = 60;
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
-//! The one place where shadow rays are traced.
+//! Traces shadow rays; no other module does.
 
 use crate::geometry::RayBatch;
 use crate::scene::Scene;
 
-/// Memory that tracing keeps.
+/// Scratch memory for tracing.
 #[derive(Default)]
 pub(crate) struct Scratch {
     occluded: Vec<bool>,
-    /// Rays that nothing opaque blocks, where they are in their batch, and what gets along them.
+    /// Rays that no opaque surface blocks: their indices in the batch and their transmittances.
     free: RayBatch,
     numbers: Vec<u32>,
     transmittances: Vec<f32>,

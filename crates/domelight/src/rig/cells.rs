@@ -1,14 +1,14 @@
-//! Nearest-light cells on the sphere, and Lloyd's refinement of lights by them.
+//! Nearest-light cells on the sphere, and Lloyd's refinement of lights.
 //!
-//! Refinement alternates: every piece of the map goes to the nearest light, every light moves to
-//! the energy centroid of its pieces (Lloyd 1982, "Least Squares Quantization in PCM"; on unit
+//! Refinement alternates two steps: every piece of the map is assigned to the nearest light, and every
+//! light moves to the energy centroid of its pieces (Lloyd 1982, "Least Squares Quantization in PCM"; on unit
 //! vectors Dhillon & Modha 2001, "Concept Decompositions"). Σ (W − |R|) over cells never grows.
-//! Cells know neither poles nor seam, so a sun that the first cuts divided becomes whole.
+//! Cells do not depend on poles or the seam, so a sun divided by the first cuts becomes whole again.
 //!
-//! Which light is nearest is found for whole tiles of the map at a time: only lights that are
-//! within the nearest one's distance plus the tile's diameter of its middle can win in it. A tile
-//! with one such light is done; others are quartered. The result is that of trying every light at
-//! every texel.
+//! The nearest light is found for whole tiles of the map at a time. Only lights whose distance from the
+//! tile's center is within the nearest light's distance plus the tile's diameter can be nearest in it. A
+//! tile with one such light is done; others are divided into four. The result is the same as testing
+//! every light at every texel.
 
 use std::ops::Range;
 

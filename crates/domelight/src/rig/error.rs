@@ -1,8 +1,8 @@
-//! How well a rig shades.
+//! The shading error of a rig.
 //!
-//! Without occluders, over normals spread evenly on the sphere: the irradiance of a matte surface,
-//! ∫ L max(0, n·ω) dω, and a glossy lobe, ∫ L max(0, n·ω)²⁰ dω, both of luminance. Shadows are not
-//! part of it: there point lights stay hard, and the error falls slowly with any method.
+//! It is measured without occluders, over normals spread evenly on the sphere, for the irradiance of a matte
+//! surface, ∫ L max(0, n·ω) dω, and for a glossy lobe, ∫ L max(0, n·ω)²⁰ dω, both of luminance. Shadows are
+//! excluded, because shadows of point lights stay hard and their error falls slowly with any method.
 
 use super::Rig;
 use super::regions::{Blocks, Metric};
@@ -22,20 +22,20 @@ const CELLS: [usize; 2] = [512, 256];
 /// The root mean square error of a rig's shading, relative to the root mean square of the map's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadingError {
-    /// The error on a matte surface; 0.01 is one percent.
+    /// The error on a matte surface; 0.01 is 1 %.
     pub diffuse: f64,
-    /// The error of the lobe cos²⁰.
+    /// The error with the lobe cos²⁰.
     pub glossy: f64,
 }
 
 impl ShadingError {
-    /// The greater of the two.
+    /// The larger of the two errors.
     pub fn worst(self) -> f64 {
         self.diffuse.max(self.glossy)
     }
 }
 
-/// What a map shades, to be compared with many rigs.
+/// The shading under a map, for comparison with many rigs.
 #[derive(Clone, Debug)]
 pub struct ShadingReference {
     exact: Vec<Shading>,
@@ -59,8 +59,8 @@ impl Shading {
 }
 
 impl ShadingReference {
-    /// Sums over cells of 0.7° or less, for a texel's light comes from all of it; on maps of more than 2¹⁷ texels over
-    /// the energy centroids of blocks.
+    /// Sums over cells of at most 0.7°, because the light of a texel comes from its whole area; on maps with more
+    /// than 2¹⁷ texels, over the energy centroids of blocks.
     pub fn new(environment: &Environment) -> Self {
         let texels = Texels::new(environment);
         let blocks = Blocks::at_most(MAX_BLOCKS, texels.width(), texels.height());
@@ -68,12 +68,12 @@ impl ShadingReference {
         Self { exact: in_order(N_NORMALS, |i| shade(normal(i), &lights)) }
     }
 
-    /// The error of a rig that stands for the whole map.
+    /// The error of a rig that replaces the whole map.
     pub fn error(&self, rig: &Rig) -> ShadingError {
         self.error_of(&self.shade(rig))
     }
 
-    /// The error of a rig that shines beside a dome.
+    /// The error of a rig combined with a dome.
     pub fn error_beside(&self, rig: &Rig, dome: &Self) -> ShadingError {
         let mut shaded = self.shade(rig);
         shaded.iter_mut().zip(&dome.exact).for_each(|(s, d)| {

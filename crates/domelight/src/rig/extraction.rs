@@ -1,10 +1,10 @@
-//! Lights out of an environment, and what they leave of it.
+//! Extraction of lights from an environment, with the residual.
 //!
-//! Compact sources come first: suns, lamps and windows, each taken out whole where it stands out of
-//! its surroundings, the rest filled from around it. Then regions of what is left become lights, or
-//! it stays as a dome beside the lights. Lights and residual are the environment, channel by
-//! channel: what is taken from a texel is the difference of two numbers of single precision, summed
-//! in double precision.
+//! Compact sources come first: suns, lamps and windows. Each is extracted as a whole if it stands out from
+//! its surroundings, and the gap is filled from around it. Then regions of the remaining light become
+//! lights, or it stays as a dome beside the lights. Lights and residual add up to the environment, channel
+//! by channel: the light taken from a texel is the difference of two single-precision numbers, summed in
+//! double precision.
 
 use super::median_cut::{MedianCut, median_cut};
 use super::texels::Texels;
@@ -17,9 +17,9 @@ use crate::{Rgb, RgbImage};
 /// The algorithm that divides a map into regions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Regions of even energy.
+    /// Regions of equal energy.
     MedianCut(MedianCut),
-    /// Regions of little spread.
+    /// Regions of small variance.
     VarianceMinimization(VarianceMinimization),
 }
 
@@ -30,7 +30,7 @@ impl Default for Method {
 }
 
 impl Method {
-    /// `n_lights` lights that take all of the environment's light.
+    /// Divides all of the environment's light into `n_lights` lights.
     ///
     /// # Errors
     /// Those of [`median_cut`] and [`variance_minimization`].
@@ -44,25 +44,25 @@ impl Method {
     }
 }
 
-/// What is taken out of an environment.
+/// Settings for the extraction of lights.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExtractionSettings {
-    /// Take the sun: of the compact sources no wider than a cap of 7° the one with the most light.
+    /// Extract the sun: the compact source with the most light among those within a cap of 7°.
     pub sun: bool,
-    /// Take up to so many other compact sources, those with the most light, none wider than a cap
+    /// The maximum number of other compact sources to extract, those with the most light within a cap
     /// of 28°.
     pub n_lamps: usize,
-    /// Make so many lights, compact ones included, and put all light into them; none leaves what is
-    /// not of compact sources to the residual.
+    /// The number of lights, including compact ones, among which all light is divided. `None` leaves the light
+    /// outside compact sources in the residual.
     pub n_lights: Option<usize>,
-    /// The algorithm that divides the map without the compact sources.
+    /// The algorithm that divides the map after the compact sources are removed.
     pub method: Method,
-    /// Share of the environment's luminance below which a light is left on the residual, in \[0, 1\];
-    /// by default 0 of regions and 0.001 of compact sources.
+    /// The share of the environment's luminance, in \[0, 1\], below which a light is left in the residual;
+    /// by default 0 for regions and 0.001 for compact sources.
     pub min_share: Option<f32>,
 }
 
-/// An environment without its compact sources, from which rigs of any size are made.
+/// An environment with its compact sources extracted, from which rigs of any size can be made.
 #[derive(Clone, Debug)]
 pub struct CompactExtraction<'a> {
     environment: &'a Environment,
@@ -73,12 +73,12 @@ pub struct CompactExtraction<'a> {
     residual: Option<Environment>,
 }
 
-/// Takes the lights that the settings ask for out of an environment.
+/// Extracts lights from an environment.
 ///
 /// # Errors
-/// [`RigError::NoLights`] if nothing is asked for, [`RigError::Black`] for an environment without
-/// light, [`RigError::NoSun`] and [`RigError::NoLamp`] if nothing stands out of its surroundings by
-/// a factor of 4 and no other lights were asked for, [`RigError::TooDim`] if `min_share` leaves no
+/// [`RigError::NoLights`] if no lights are requested, [`RigError::Black`] for an environment without
+/// light, [`RigError::NoSun`] and [`RigError::NoLamp`] if nothing stands out from its surroundings by
+/// a factor of 4 and no other lights are requested, [`RigError::TooDim`] if `min_share` leaves no
 /// light, and [`RigError::TooFewTexels`].
 pub fn extract(
     environment: &Environment,
@@ -91,20 +91,20 @@ pub fn extract(
     compact.with_lights(settings.n_lights)
 }
 
-/// A rig and what it leaves on the map: together they are the environment, channel by channel.
+/// A rig and its residual, which add up to the environment, channel by channel.
 #[derive(Clone, Debug)]
 pub struct Extraction {
     /// The lights.
     pub rig: Rig,
-    /// The environment without the light that they took, nowhere negative; none if they took all.
+    /// The environment without the light of the rig, nowhere negative; `None` if the rig has all light.
     pub residual: Option<Environment>,
 }
 
 impl<'a> CompactExtraction<'a> {
-    /// Takes the compact sources out.
+    /// Extracts the compact sources.
     ///
     /// # Errors
-    /// As [`extract`].
+    /// Those of [`extract`].
     pub fn new(
         environment: &'a Environment,
         settings: ExtractionSettings,
@@ -150,11 +150,11 @@ impl<'a> CompactExtraction<'a> {
         self.rest().map().pixels.iter().filter(|le| le.luminance() > 0.0).count()
     }
 
-    /// A rig of `n_lights` lights, compact ones included, which take all light; or of the compact
-    /// ones alone.
+    /// Makes a rig of `n_lights` lights, including compact ones, with all the light; or a rig of only
+    /// the compact ones.
     ///
     /// # Errors
-    /// As [`extract`].
+    /// Those of [`extract`].
     pub fn with_lights(&self, n_lights: Option<usize>) -> Result<Extraction, RigError> {
         let n_regions = self.n_regions(n_lights);
         if n_regions == 0 {

@@ -1,8 +1,8 @@
 //! Debevec 2005, "A Median Cut Algorithm for Light Probe Sampling".
 //!
-//! Cut each region along its longest dimension such that its light energy is divided evenly; after
-//! k levels put a light into each of the 2ᵏ regions. Cuts lie between texels; the one nearest to
-//! an even division is taken.
+//! Cut each region along its longest dimension so that its light energy is divided evenly. After
+//! k levels, place a light in each of the 2ᵏ regions. Cuts lie between texels; the one nearest to
+//! an even division is used.
 
 use super::regions::{Metric, SummedArea};
 use super::split::{Criterion, split};
@@ -13,18 +13,18 @@ use crate::environment::Environment;
 /// The position of a light in its region.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightPosition {
-    /// The direction of ∫ L ω dω: what the method asks for.
+    /// The direction of ∫ L ω dω, as the method requires.
     #[default]
     EnergyCentroid,
-    /// The middle of the rectangle on the map: a common mistake, several times worse.
+    /// The center of the rectangle on the map, a common mistake with an error several times as large.
     GeometricCenter,
 }
 
 /// Settings of [`median_cut`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MedianCut {
-    /// Compare widths to heights after scaling them by the cosine of the inclination, as the paper
-    /// says. Without it regions near the poles are cut as if the map were flat.
+    /// Scale widths by the cosine of the inclination before comparing them with heights, as in the
+    /// paper. Otherwise regions near the poles are cut as if the map were flat.
     pub scale_width: bool,
     /// The position of each light in its region.
     pub position: LightPosition,
@@ -39,7 +39,7 @@ impl Default for MedianCut {
     }
 }
 
-/// `n_lights` lights of about equal energy.
+/// Divides the environment into `n_lights` lights of about equal energy.
 ///
 /// # Errors
 /// [`RigError::NoLights`] for `n_lights` = 0, [`RigError::Black`] for a map without light, and

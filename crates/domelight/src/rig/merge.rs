@@ -1,9 +1,9 @@
-//! Joining parts of a division that are better one.
+//! Merging parts of a division.
 //!
-//! Cuts are final: one that runs through a lamp, as any cut between columns does at a pole, leaves
-//! two lights where one would do, and Lloyd's refinement cannot undo it. So the map is divided into
-//! more parts than lights are wanted, and the two whose union adds the least variance become one,
-//! again and again: Ward 1963, "Hierarchical Grouping to Optimize an Objective Function".
+//! Cuts are final. A cut through a lamp, such as any cut between columns at a pole, leaves two lights
+//! where one would suffice, and Lloyd's refinement cannot undo it. So the map is divided into more parts
+//! than the number of lights, and the two parts whose union adds the least variance are merged
+//! repeatedly: Ward 1963, "Hierarchical Grouping to Optimize an Objective Function".
 
 use glam::DVec3;
 

@@ -1,17 +1,17 @@
-//! Light rigs: a lat-long map turned into a handful of directional lights.
+//! Light rigs: a few directional lights that replace a lat-long map.
 //!
-//! A method divides the map into regions and puts one light into each:
+//! A method divides the map into regions and places one light in each:
 //! - [`median_cut`] halves the energy of rectangles: Debevec 2005, "A Median Cut Algorithm for
 //!   Light Probe Sampling".
-//! - [`variance_minimization`] halves their spread instead: Viriyothai & Debevec 2009, "Variance
-//!   Minimization Light Probe Sampling", and a form of it on the sphere that is better throughout.
+//! - [`variance_minimization`] minimizes their variance instead: Viriyothai & Debevec 2009, "Variance
+//!   Minimization Light Probe Sampling", and a variant on the sphere that is always better.
 //!
 //! # What is exact
-//! Every texel of the map belongs to one region, and a light's irradiance is the sum over its
-//! region's texels of radiance times *exact* solid angle, in double precision: the lights add up to
-//! the integral of the map in each channel. Directions and sizes come from the exact integrals of
-//! the direction over each texel. Where regions are cut is a choice, not an integral: on maps of
-//! more than two million texels large regions are cut between blocks of texels.
+//! Every texel of the map belongs to one region. A light's irradiance is the sum over its region's
+//! texels of radiance times *exact* solid angle, in double precision, so the lights add up to the
+//! integral of the map in each channel. Directions and sizes come from the exact integrals of
+//! the direction over each texel. The positions of cuts need not be exact: on maps with more than two
+//! million texels, large regions are cut between blocks of texels.
 //!
 //! Everything here has the same bits for any number of threads.
 
@@ -44,17 +44,17 @@ use crate::math::{Vec3, functions};
 use crate::parallel::{bands, in_order};
 use texels::Texels;
 
-/// Why there is no rig.
+/// An error in making a rig.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RigError {
-    /// A rig of no lights.
-    #[error("a rig has at least one light; 0 were asked for")]
+    /// No lights were requested.
+    #[error("a rig has at least one light; 0 were requested")]
     NoLights,
     /// A map without light.
     #[error("the map is black; there is no light to extract")]
     Black,
-    /// More lights than texels that could be one.
-    #[error("{n_lights} lights were asked for, but only {lit} texels of the map are not black")]
+    /// More lights than texels that are not black.
+    #[error("{n_lights} lights were requested, but only {lit} texels of the map are not black")]
     TooFewTexels {
         /// Lights asked for.
         n_lights: usize,
@@ -63,20 +63,20 @@ pub enum RigError {
     },
     /// No sun.
     #[error(
-        "there is no sun: no compact source of 0.1 % of the map's light or more stands out of its \
-         surroundings by a factor of 4"
+        "there is no sun: no compact source with at least 0.1 % of the map's light stands out \
+         from its surroundings by a factor of 4"
     )]
     NoSun,
     /// No lamp.
     #[error(
-        "there is no lamp: no compact source of 0.1 % of the map's light or more stands out of its \
-         surroundings by a factor of 4"
+        "there is no lamp: no compact source with at least 0.1 % of the map's light stands out \
+         from its surroundings by a factor of 4"
     )]
     NoLamp,
-    /// Lights too dim to be kept.
-    #[error("no light holds the least share of the map's light that was asked for")]
+    /// All lights are too dim to keep.
+    #[error("no light has the requested minimum share of the map's light")]
     TooDim,
-    /// No rig is good enough.
+    /// No rig reaches the requested error.
     #[error("even {n_lights} lights have a shading error of {} %", digits(*percent))]
     ErrorNotReached {
         /// The most lights that were tried.
@@ -103,50 +103,50 @@ impl RigError {
     }
 }
 
-/// Directional lights that stand for an environment, and the region of the map behind each.
+/// Directional lights that replace an environment, each with its region of the map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
-    /// The lights: compact ones first, then those of regions, of each kind those of the greatest
-    /// luminance first.
+    /// The lights: compact ones first, then those of regions; within each kind, in descending order
+    /// of luminance.
     pub lights: Vec<RigLight>,
-    /// Columns of the map.
+    /// The number of columns of the map.
     pub width: usize,
-    /// Rows of the map.
+    /// The number of rows of the map.
     pub height: usize,
-    /// The index in [`Rig::lights`] of the light of each texel, row by row; [`Rig::NO_LIGHT`] of
-    /// texels that no light was taken from. Compact lights lie over the regions.
+    /// The index in [`Rig::lights`] of each texel's light, row by row; [`Rig::NO_LIGHT`] for texels
+    /// without a light. Compact lights overlay the regions.
     pub labels: Vec<u32>,
 }
 
 /// A distant light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigLight {
-    /// Unit direction toward the light, in the world.
+    /// The unit direction toward the light, in world space.
     pub direction: Vec3,
-    /// ∫ L dω over the region \[W·m⁻²\]: what a surface that faces the light receives. All lights
-    /// together have the integral of the map, channel by channel.
+    /// ∫ L dω over the region \[W·m⁻²\]: the irradiance of a surface that faces the light. The lights
+    /// add up to the integral of the map, channel by channel.
     pub irradiance: Rgb,
-    /// Angular radius of the uniformly bright disc of the same spread \[rad\], in [0, π].
+    /// The angular radius \[rad\], in [0, π], of the uniformly bright disc with the same variance.
     ///
     /// A disc of radius α has the mean direction |R|/W = (1 + cos α)/2, where W = ∫ L dω and
-    /// R = ∫ L ω dω of luminance. So a sun that fills its region alone gets its own radius.
+    /// R = ∫ L ω dω of luminance. So a sun alone in its region gets its own radius.
     pub angular_radius: f32,
-    /// Share of the map's luminance, in [0, 1].
+    /// The share of the map's luminance, in [0, 1].
     pub share: f32,
-    /// Solid angle of the region \[sr\].
+    /// The solid angle of the region \[sr\].
     pub solid_angle: f32,
     /// The shape of the region.
     pub region: Region,
 }
 
-/// The shape of a light's region; its texels are those of its label in [`Rig::labels`].
+/// The shape of a light's region, whose texels have the light's label in [`Rig::labels`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Region {
     /// A rectangle of the map.
     Rectangle(TexelRect),
-    /// The texels that are nearer to this light than to any other, on the sphere.
+    /// The texels nearer to this light than to any other, on the sphere.
     Cell,
-    /// The compact source that is taken for the sun.
+    /// The compact source identified as the sun.
     Sun,
     /// Another compact source.
     Lamp,
@@ -154,17 +154,17 @@ pub enum Region {
 
 /// Columns [x0, x1) and rows [y0, y1) of the map.
 ///
-/// Columns run on across the seam: 0 ≤ x0 < width, x1 ≤ x0 + width, and column x is column
-/// x − width where x ≥ width.
+/// Columns continue across the seam: 0 ≤ x0 < width, x1 ≤ x0 + width, and column x ≥ width is column
+/// x − width.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TexelRect {
-    /// First column.
+    /// The first column.
     pub x0: usize,
-    /// Column after the last.
+    /// The column after the last.
     pub x1: usize,
-    /// First row.
+    /// The first row.
     pub y0: usize,
-    /// Row after the last.
+    /// The row after the last.
     pub y1: usize,
 }
 
@@ -181,7 +181,7 @@ impl TexelRect {
 }
 
 impl Rig {
-    /// The label of a texel that no light was taken from.
+    /// The label of a texel without a light.
     pub const NO_LIGHT: u32 = u32::MAX;
 
     /// Σ irradiance \[W·m⁻²\].

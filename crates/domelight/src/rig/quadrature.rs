@@ -1,12 +1,12 @@
-//! A map as many lights: for sums over directions that need not look at every texel.
+//! A map as many lights, for sums over directions that need not visit every texel.
 
 use super::regions::Blocks;
 use super::texels::Texels;
 use super::{Region, RegionSums, Rig, TexelRect};
 use crate::environment::Environment;
 
-/// A light for each block of texels that is not black, blocks as small as `max_lights` of them
-/// allow: what a map shades, Σ irradiance · f(direction), to within the blocks' size.
+/// Returns one light for each block of texels that is not black, with blocks as small as `max_lights`
+/// allows. Σ irradiance · f(direction) then integrates f over the map, up to the size of the blocks.
 pub fn quadrature(environment: &Environment, max_lights: usize) -> Rig {
     let texels = Texels::new(environment);
     let (width, height) = (texels.width(), texels.height());

@@ -1,9 +1,9 @@
-//! Summed-area tables of luminance and of where it lies, and rectangles measured by them.
+//! Summed-area tables of luminance and its position, which measure rectangles.
 //!
-//! Sums are in double precision. Tables of one entry a texel would take 40 bytes each, more than a
+//! Sums are in double precision. Tables of one entry per texel would take 40 bytes each, more than a
 //! gigabyte for 8192×4096, so on large maps an entry is a block of texels. Large regions are then
-//! cut between blocks; small ones are summed texel by texel, which costs less than the cut of a
-//! large one.
+//! cut between blocks. Small ones are summed texel by texel, which costs less than cutting a large
+//! one.
 
 use crate::math::functions;
 use std::f64::consts::TAU;

@@ -1,4 +1,4 @@
-//! The smallest rig that shades well enough.
+//! The smallest rig with a given shading error.
 
 use super::{
     CompactExtraction, Extraction, ExtractionSettings, RigError, ShadingError, ShadingReference,
@@ -8,26 +8,26 @@ use crate::environment::Environment;
 /// Lights above which no rig is tried.
 const MAX_LIGHTS: usize = 4096;
 
-/// A rig that was found by its error.
+/// A rig found for a target error.
 #[derive(Clone, Debug)]
 pub struct SmallestRig {
     /// The lights.
     pub extraction: Extraction,
-    /// Their error.
+    /// The error of the lights.
     pub error: ShadingError,
-    /// The numbers of lights that were tried, rising, with their errors.
+    /// The numbers of lights that were tried, in ascending order, with their errors.
     pub tried: Vec<(usize, ShadingError)>,
 }
 
-/// The rig of the fewest lights whose error, matte and glossy, is `target` or less.
+/// Finds the rig with the fewest lights whose matte and glossy errors are at most `target`.
 ///
-/// The error falls with the number of lights but for small ripples. Numbers are doubled until one
-/// is good enough and the interval before it is halved, so that the rig of one light fewer is not;
-/// a still smaller one may be by chance. [`ExtractionSettings::n_lights`] is ignored.
+/// The error falls with the number of lights, except for small ripples. The number is doubled until the
+/// error is small enough, and the interval before is bisected, so that a rig with one light fewer fails.
+/// A still smaller rig may succeed by chance. [`ExtractionSettings::n_lights`] is ignored.
 ///
 /// # Errors
-/// [`RigError::ErrorNotReached`] if 4096 lights, or as many as texels are lit, have a greater
-/// error, and those of [`extract`](super::extract()).
+/// [`RigError::ErrorNotReached`] if 4096 lights, or as many lights as there are lit texels, have a larger
+/// error; and those of [`extract`](super::extract()).
 pub fn smallest_rig(
     environment: &Environment,
     settings: ExtractionSettings,

@@ -1,8 +1,8 @@
-//! Nine spherical harmonics of an environment.
+//! The first nine spherical harmonics of an environment.
 //!
 //! Ramamoorthi & Hanrahan 2001, "An Efficient Representation for Irradiance Environment Maps":
-//! irradiance, as a function of the normal, is the environment blurred so much that its harmonics
-//! up to degree 2 hold 99 % of it.
+//! irradiance, as a function of the normal, is so smooth that the harmonics up to degree 2 hold 99 % of
+//! it.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ use crate::environment::Environment;
 use crate::math::{Mat3, Vec3, functions, vec3};
 use crate::parallel::in_order;
 
-/// Radiance as Σ L_i Y_i with the real harmonics up to degree 2, over the world's axes.
+/// Radiance as Σ L_i Y_i with the real harmonics up to degree 2, in world space.
 ///
 /// The basis is that of the paper's equation 3, without the Condon-Shortley phase, in the order
 /// (l, m) = (0, 0), (1, −1), (1, 0), (1, 1), (2, −2), (2, −1), (2, 0), (2, 1), (2, 2):
@@ -25,7 +25,7 @@ use crate::parallel::in_order;
 /// | 6 | 0.315392 · (3z² − 1) |
 /// | 8 | 0.546274 · (x² − y²) |
 ///
-/// x, y and z are the *world's*, whichever axis is up; so z is the polar axis of the harmonics.
+/// x, y and z are the *world's* axes, whichever is up, so z is the polar axis of the harmonics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphericalHarmonics {
     /// L_i = ∫ L Y_i dω \[W·m⁻²·sr⁻¹\].
@@ -44,14 +44,14 @@ impl SphericalHarmonics {
         Self { coefficients }
     }
 
-    /// Radiance from the unit direction `wi`; may be negative where the environment is not smooth.
+    /// The radiance from the unit direction `wi`, which may be negative if the environment is not smooth.
     pub fn radiance(&self, wi: Vec3) -> Rgb {
         basis(wi).into_iter().zip(self.coefficients).map(|(y, l)| l * y).sum()
     }
 
-    /// The coefficients of the same radiance turned by `rotation`.
+    /// The coefficients of the radiance rotated by `rotation`.
     ///
-    /// By the rule of 14 points, the corners and the faces' centers of a cube, which integrates
+    /// Uses the quadrature rule with 14 points, the corners and face centers of a cube, which integrates
     /// polynomials of degree 5 over the sphere exactly.
     #[must_use]
     pub fn turned(&self, rotation: Mat3) -> Self {
@@ -67,7 +67,7 @@ impl SphericalHarmonics {
         Self { coefficients }
     }
 
-    /// Irradiance of a surface whose normal is the unit vector `normal` \[W·m⁻²\]: Σ Â_l L_lm Y_lm
+    /// The irradiance of a surface with the unit normal `normal` \[W·m⁻²\]: Σ Â_l L_lm Y_lm
     /// with Â = (π, 2π/3, π/4), equation 8 of the paper.
     pub fn irradiance(&self, normal: Vec3) -> Rgb {
         Self { coefficients: self.irradiance_coefficients() }.radiance(normal)

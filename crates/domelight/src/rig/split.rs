@@ -1,4 +1,4 @@
-//! Dividing the map by cutting rectangles in two, one after the other.
+//! Divides the map by repeatedly cutting rectangles in two.
 
 use crate::math::functions;
 use std::cmp::Ordering;
@@ -10,25 +10,25 @@ use super::regions::{Moments, Profile, SummedArea};
 /// The order in which regions are cut.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
-    /// The worst first: that of the greatest energy (median cut) or variance.
+    /// The worst region first: the one with the largest energy (median cut) or variance.
     #[default]
     WorstFirst,
-    /// Level by level as in the papers: 2ᵏ lights are k cuts deep. The last level, if it is not
-    /// complete, cuts the worst first.
+    /// Level by level, as in the papers: 2ᵏ lights are k cuts deep. If the last level is incomplete, it
+    /// cuts the worst regions first.
     Levels,
 }
 
 /// Where a region is cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Criterion {
-    /// A cut across the longest dimension, energies as equal as can be.
+    /// A cut across the longest dimension that makes the energies as equal as possible.
     EvenEnergy {
         /// The width counts times the sine of the polar angle at the region's middle.
         scale_width: bool,
     },
-    /// The greater of the two variances is least, along either axis.
+    /// A cut along either axis that minimizes the larger of the two variances.
     MinMaxVariance,
-    /// The sum of the two variances is least, along either axis.
+    /// A cut along either axis that minimizes the sum of the two variances.
     MinSumVariance,
 }
 

@@ -1,4 +1,4 @@
-//! The texels of a lat-long map with the exact integrals over each.
+//! The texels of a lat-long map, with exact integrals over each.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -92,7 +92,7 @@ impl<'a> Texels<'a> {
     /// A direction in a rectangle without a seam, and a bound on the angle from it to any other.
     ///
     /// The straight line on the map from the middle, Δφ and Δθ away at the most, is no longer than
-    /// √(Δθ² + Δφ² sin² θ) on the sphere with the greatest sin θ, and a great circle is shorter.
+    /// √(Δθ² + Δφ² sin² θ) on the sphere with the largest sin θ, and a great circle is shorter.
     pub(super) fn cone(&self, columns: &Range<usize>, rows: &Range<usize>) -> (Vec3, f32) {
         let middle = self.half(columns.start + columns.end, rows.start + rows.end);
         let delta_phi = PI as f32 * columns.len() as f32 / self.width() as f32;

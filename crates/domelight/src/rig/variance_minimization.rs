@@ -1,13 +1,13 @@
 //! Viriyothai & Debevec 2009, "Variance Minimization Light Probe Sampling".
 //!
-//! Cut regions such that the light in each lies close together: the variance of a region is
-//! ∫ L d² dω, d the distance to its energy centroid. It is not the variance of the texels' values.
+//! Cut regions so that the light in each is close together: the variance of a region is ∫ L d² dω, where
+//! d is the distance to its energy centroid. It is not the variance of the texels' values.
 //!
-//! The poster measures d on the map and takes the cut whose worse half is best. The default here
-//! measures chords on the sphere, where the variance is W − |R|²/W with W = ∫ L dω and
-//! R = ∫ L ω dω and no pole or seam matters; it takes the cut whose halves sum to the least, cuts
-//! the worst region first. Then it gives up rectangles: of twice as many parts as there are lights
-//! it joins those that belong together, and lets the lights move (Lloyd's refinement).
+//! The poster measures d on the map and minimizes the variance of the worse half. The default here
+//! measures chords on the sphere, where the variance is W − |R|²/W with W = ∫ L dω and R = ∫ L ω dω,
+//! independent of poles and the seam. It minimizes the sum of both halves' variances and cuts the worst
+//! region first. Then it abandons rectangles: it makes twice as many parts as lights, merges parts that
+//! belong together, and moves the lights (Lloyd's refinement).
 
 use super::cells::{Piece, assign, refine};
 use super::merge::merge;
@@ -18,7 +18,7 @@ use super::{Order, Region, RegionSums, Rig, RigError, TexelRect};
 use crate::environment::Environment;
 use crate::math::Vec3;
 
-/// Parts that the map is cut into for each light, to be joined again before the refinement.
+/// The number of parts per light into which the map is cut, before parts are merged and refined.
 const PARTS_PER_LIGHT: usize = 2;
 /// Lights above which no parts are joined: joining takes time in proportion to their square.
 const MAX_JOINED: usize = 4096;
@@ -26,11 +26,11 @@ const MAX_JOINED: usize = 4096;
 /// What a cut minimizes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rule {
-    /// The greater of the two halves' variances; distance in texels of the map, where the seam
-    /// divides. The poster's.
+    /// The larger of the two halves' variances, with distances in texels of the map, divided at the
+    /// seam, as in the poster.
     Poster,
-    /// The sum of the two halves' variances; distance on the sphere. The first cut starts
-    /// opposite the map's center of light, so turning the map turns the rig.
+    /// The sum of the two halves' variances, with distances on the sphere. The first cut starts
+    /// opposite the map's center of light, so rotating the map rotates the rig.
     #[default]
     Spherical,
 }
@@ -51,7 +51,7 @@ pub struct VarianceMinimization {
     pub rule: Rule,
     /// The order in which regions are cut.
     pub order: Order,
-    /// Steps of Lloyd's refinement on the sphere; at 0 regions stay rectangles.
+    /// The number of steps of Lloyd's refinement on the sphere; with 0, regions stay rectangles.
     pub lloyd_steps: u32,
 }
 
@@ -62,16 +62,16 @@ impl Default for VarianceMinimization {
 }
 
 impl VarianceMinimization {
-    /// The poster's own: planar distance, level by level, rectangles.
+    /// The settings of the poster: planar distance, level by level, rectangles.
     pub fn poster() -> Self {
         Self { rule: Rule::Poster, order: Order::Levels, lloyd_steps: 0 }
     }
 }
 
-/// `n_lights` lights with as little spread of energy around them as can be found.
+/// Divides the environment into `n_lights` lights with as little variance of the light around each as possible.
 ///
-/// Where all steps of the refinement would leave a light without energy, fewer are taken; where
-/// even none would, regions stay rectangles.
+/// If all steps of the refinement would leave a light without energy, fewer steps are taken. If even
+/// zero steps would, regions stay rectangles.
 ///
 /// # Errors
 /// [`RigError::NoLights`] for `n_lights` = 0, [`RigError::Black`] for a map without light, and

@@ -1,8 +1,8 @@
-//! Drawing an index in constant time: Walker's alias method, built by Vose 1991, "A Linear
+//! Samples an index in constant time: Walker's alias method, built as in Vose 1991, "A Linear
 //! Algorithm for Generating Random Numbers with a Given Distribution".
 //!
-//! Faster than inverting a CDF, but it does not keep the order of the uniform numbers: strata are
-//! lost. Tables ([`super::Table1d`]) serve stratified sampling, this serves independent draws.
+//! It is faster than inverting a CDF, but does not preserve the order of the uniform numbers, so strata
+//! are lost. Use [`super::Table1d`] for stratified sampling, and this for independent samples.
 
 use super::table::{TableError, check_weights};
 
@@ -21,10 +21,10 @@ struct Bin {
 }
 
 impl AliasTable {
-    /// A table from non-negative finite weights.
+    /// Creates a table from non-negative finite weights.
     ///
     /// # Errors
-    /// No weights, a negative or non-finite one, or all zero.
+    /// If there are no weights, one is negative or not finite, or all are zero.
     pub fn new(weights: &[f32]) -> Result<Self, TableError> {
         let total = check_weights(weights)?;
         if total <= 0.0 {
@@ -57,7 +57,7 @@ impl AliasTable {
         Ok(Self { bins, pmf })
     }
 
-    /// An index and the rest of `u`, again uniform in [0, 1).
+    /// Samples an index. Also returns the remainder of `u`, again uniform in [0, 1).
     pub fn sample(&self, u: f32) -> (usize, f32) {
         let x = u * self.bins.len() as f32;
         let i = (x as usize).min(self.bins.len() - 1);
@@ -71,7 +71,7 @@ impl AliasTable {
         }
     }
 
-    /// Probability of index `i`.
+    /// The probability of index `i`.
     ///
     /// # Panics
     /// If there is no such index.

@@ -1,17 +1,17 @@
-//! A two-dimensional table that is sampled from coarse to fine: hierarchical sample warping
+//! A two-dimensional table sampled from coarse to fine: hierarchical sample warping
 //! (Clarberg et al. 2005, "Wavelet Importance Sampling", section 4.2; McCool & Harwood 1997).
 //!
-//! Each level holds the sums of 2 × 2 cells of the level below. A point of the unit square is
-//! thrown down the levels: its y chooses the upper or lower half of four cells, then its x the left
-//! or right one, and both are stretched over what was chosen. Unlike inversion of a row marginal
-//! and a column conditional ([`super::Table2d`]), which shears strata into strips along rows, it
-//! keeps near points near and square regions roughly square, so stratified points stay stratified
-//! over the map. On a sky with a sun and windows, with 64 Owen-scrambled points, the variance of a
-//! diffuse estimate is 1.8 times lower.
+//! Each level holds the sums of 2 × 2 cells of the level below. A point of the unit square descends the
+//! levels: its y chooses the upper or lower half of four cells, its x chooses the left or right cell, and
+//! both are rescaled to the chosen cell. Inverting a row marginal and a column conditional
+//! ([`super::Table2d`]) shears strata into strips along rows. In contrast, this warp keeps nearby points
+//! close and square regions roughly square, so stratified points stay stratified over the map. On a sky
+//! with a sun and windows, with 64 Owen-scrambled points, the variance of a diffuse estimate is 1.8 times
+//! lower.
 //!
-//! Four sums of one choice lie together: a level costs a cache line. Sums are in single precision,
-//! for only ratios of neighbors matter; the probability of a cell differs from its weight over the
-//! total by some 10⁻⁶ of itself.
+//! The four sums of one choice are adjacent in memory, so a level costs one cache line. Sums are in
+//! single precision, because only ratios of neighbors matter. The relative difference between a cell's
+//! probability and its weight over the total is about 10⁻⁶.
 
 use super::ONE_MINUS_EPSILON;
 use super::table::{TableError, TableSample};
@@ -38,9 +38,9 @@ struct Level {
 }
 
 impl HierarchicalTable {
-    /// A hierarchy from `width · height` weights, row by row: `weight(row, out)` writes those of one row.
+    /// Creates a hierarchy from `width · height` weights; `weight(row, out)` writes the weights of one row.
     ///
-    /// Rows are independent; they are filled in parallel with the feature `render`.
+    /// Rows are independent, and are filled in parallel with the feature `render`.
     ///
     /// # Errors
     /// See [`TableError`]; the index of a bad weight is row · width + column.
@@ -63,12 +63,12 @@ impl HierarchicalTable {
         Ok(Self { width, height, levels, total })
     }
 
-    /// Columns.
+    /// The number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// The number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
@@ -78,8 +78,8 @@ impl HierarchicalTable {
         self.total
     }
 
-    /// The number of levels of halving from the whole to a cell: the square of 2^`depth` cells at the
-    /// upper left holds all.
+    /// The number of levels from the whole table to a cell: a square of 2^`depth` cells at the upper
+    /// left contains the table.
     pub fn depth(&self) -> usize {
         self.levels.len()
     }
@@ -94,7 +94,7 @@ impl HierarchicalTable {
         level.quads[row * level.width + column]
     }
 
-    /// Probability of a cell.
+    /// The probability of a cell.
     ///
     /// # Panics
     /// If there is no such cell.
@@ -105,8 +105,8 @@ impl HierarchicalTable {
         f64::from(quad[row % 2 * 2 + column % 2]) / self.total
     }
 
-    /// Draws a cell, and a position in it, by a point of [0, 1)². A cell of weight zero is never
-    /// drawn.
+    /// Samples a cell, and a position in it, with a point in [0, 1)². A cell with weight zero is never
+    /// sampled.
     pub fn sample(&self, u: Vec2) -> TableSample {
         let (mut column, mut row, mut x, mut y) = (0, 0, u.x, u.y);
         let mut weight = 0.0;

@@ -1,8 +1,8 @@
-//! Hilbert's curve over the hemisphere: neighbors along it are neighbors in space, so a stratified
-//! choice from what is sorted along it is stratified in space.
+//! A Hilbert curve over the hemisphere. Neighbors along it are neighbors in space, so a stratified
+//! choice from items sorted along it is stratified in space.
 //!
-//! Rejected: Morton's curve, which jumps across the square at every power of two and so groups
-//! directions that have nothing in common.
+//! Rejected: the Morton curve, which jumps across the square at every power of two and so groups
+//! distant directions.
 
 use crate::math::Vec3;
 

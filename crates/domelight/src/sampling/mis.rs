@@ -2,10 +2,10 @@
 //! Techniques for Monte Carlo Rendering".
 //!
 //! The multi-sample estimator is Σᵢ (1/nᵢ) Σⱼ wᵢ(xᵢⱼ) f(xᵢⱼ) / pᵢ(xᵢⱼ) with Σᵢ wᵢ = 1. Weights that
-//! sum to one do not go with a common factor 1/(M + N): two techniques with M = N samples would
-//! then give exactly half the answer.
+//! sum to one must not be combined with a common factor 1/(M + N): two techniques with M = N samples
+//! would then give exactly half the result.
 
-/// The rule that gives a sample's weight from the densities of the techniques.
+/// The heuristic that computes a sample's weight from the densities of the techniques.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Heuristic {
     /// wᵢ = nᵢ pᵢ / Σₖ nₖ pₖ.
@@ -16,10 +16,10 @@ pub enum Heuristic {
 }
 
 impl Heuristic {
-    /// The weight in [0, 1] of a sample that one technique drew, `n_pdf` being its count times its
-    /// density and `other` the same of the other technique; both non-negative, in the same measure.
+    /// The weight in [0, 1] of a sample from one technique. `n_pdf` is its count times its density, and
+    /// `other` the same for the other technique; both are non-negative and in the same measure.
     ///
-    /// A technique with an infinite density takes all, an impossible sample counts nothing.
+    /// A technique with an infinite density gets weight 1, and an impossible sample gets 0.
     pub fn weight(self, n_pdf: f32, other: f32) -> f32 {
         if n_pdf <= 0.0 {
             return 0.0;

@@ -1,4 +1,4 @@
-//! Drawing from densities: uniform numbers, warps, tables, and the weights that combine them.
+//! Sampling: uniform random numbers, warps, tables, and MIS weights.
 
 pub(crate) mod alias;
 pub(crate) mod hierarchy;
@@ -19,10 +19,10 @@ pub use rng::Pcg32;
 pub use sampler::{Dimension, SamplePoint, SampleSequence, Sampler, SamplerKind};
 pub use table::{Table1d, Table2d, TableError, TableSample};
 
-/// The greatest number below 1 in single precision.
+/// The largest number below 1 in single precision.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
-/// The upper 24 bits as a number in [0, 1), never 1.
+/// Converts the upper 24 bits to a number in [0, 1), never 1.
 #[inline(always)]
 pub fn unit_f32(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)

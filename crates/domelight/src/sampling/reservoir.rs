@@ -1,14 +1,15 @@
-//! Choosing from a stream of weighted items whose number and total are not known before its end.
+//! Samples from a stream of weighted items whose number and total weight are unknown until its end.
 //!
 //! Each reservoir keeps item i with probability wᵢ / Σw, at any time of the stream: Chao 1982, "A
 //! General Purpose Unequal Probability Sampling Plan", as Bitterli et al. 2020, "Spatiotemporal
 //! Reservoir Resampling for Real-Time Ray Tracing with Dynamic Direct Lighting", use it. Several
-//! reservoirs choose independently of each other, so they are a multinomial choice.
+//! independent reservoirs make a multinomial choice.
 //!
-//! A number for each item and reservoir is not needed. An item that was taken at the running total
-//! W stays beyond the total W′ with probability W / W′, so it stays until the total exceeds W / u
+//! One random number per item and reservoir is not necessary. An item chosen at the running total W is
+//! still there at the total W′ with probability W / W′, so it stays until the total exceeds W / u
 //! (the exponential jumps of Efraimidis & Spirakis 2006, "Weighted Random Sampling with a
-//! Reservoir"): one comparison an item, and about ln(number of items) numbers a reservoir.
+//! Reservoir"). This takes one comparison per item, and about ln(number of items) random numbers per
+//! reservoir.
 
 use super::Pcg32;
 
@@ -35,14 +36,14 @@ impl<T> Default for WeightedReservoirs<T> {
 }
 
 impl<T: Copy> WeightedReservoirs<T> {
-    /// Forgets the stream and keeps the memory.
+    /// Clears the reservoirs and keeps the memory.
     pub fn clear(&mut self) {
         self.reservoirs.clear();
         self.total = 0.0;
     }
 
-    /// Adds the next item to each of `n` reservoirs, the same `n` for the whole stream; an item
-    /// without weight is not one. `numbers` must be independent of the items.
+    /// Offers the next item to each of `n` reservoirs, with the same `n` for the whole stream. Items
+    /// without weight are ignored. `numbers` must be independent of the items.
     pub fn add(&mut self, item: T, weight: f64, n: usize, numbers: &mut Pcg32) {
         if weight == 0.0 {
             return;
@@ -68,7 +69,7 @@ impl<T: Copy> WeightedReservoirs<T> {
         self.total
     }
 
-    /// The item in each reservoir; none before the first item with weight.
+    /// The item in each reservoir; empty before the first item with weight.
     pub fn items(&self) -> impl ExactSizeIterator<Item = &T> {
         self.reservoirs.iter().map(|r| &r.item)
     }

@@ -13,9 +13,10 @@ pub struct Pcg32 {
 impl Pcg32 {
     const MULTIPLIER: u64 = 6_364_136_223_846_793_005;
 
-    /// The generator of the given stream, seeded.
+    /// Creates the generator of a stream with a seed.
     ///
-    /// Neighboring streams of one seed start alike: for many short sequences, hash the index into the seed instead.
+    /// Neighboring streams with the same seed start similarly. For many short sequences, hash the index into the seed
+    /// instead.
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut pcg = Self { state: 0, increment: (stream << 1) | 1 };
         pcg.next_u32();

@@ -1,6 +1,6 @@
-//! Samplers: the uniform numbers of each pixel, addressed by dimension and index.
+//! Samplers: the uniform random numbers of each pixel, addressed by dimension and index.
 //!
-//! A sampler is a pure function. Nothing depends on the order in which numbers are asked for, so
+//! A sampler is a pure function. Numbers do not depend on the order in which they are requested, so
 //! pictures do not depend on threads, tiles or passes.
 
 use super::rng::{Pcg32, hash2};
@@ -27,42 +27,42 @@ impl SamplerKind {
     }
 }
 
-/// What a set of numbers is for. Each names a padded set of four dimensions.
+/// The purpose of a set of random numbers. Each variant is a padded set of four dimensions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Dimension {
     /// The position in the pixel.
     Film = 0,
-    /// Directions from the environment.
+    /// Directions sampled from the environment.
     Environment = 1,
-    /// Lobe and direction from the BRDF.
+    /// Lobe and direction sampled from the BRDF.
     Brdf = 2,
     /// Choices among candidates.
     Resampling = 3,
-    /// Sequences without a fixed length, see [`Sampler::generator`].
+    /// Sequences without a fixed length; see [`Sampler::generator`].
     Sequence = 4,
-    /// Samplers derived from a sampler, see [`Sampler::part`].
+    /// Samplers derived from a sampler; see [`Sampler::part`].
     Part = 5,
-    /// The place on the camera's lens.
+    /// The position on the camera's lens.
     Lens = 6,
 }
 
-/// Four uniform numbers of one index of one dimension.
+/// Four uniform random numbers for one index of one dimension.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SamplePoint(pub [f32; 4]);
 
 impl SamplePoint {
-    /// The first two, for a direction or a position.
+    /// The first two numbers, for a direction or a position.
     pub fn u(&self) -> Vec2 {
         vec2(self.0[0], self.0[1])
     }
 
-    /// The third, for the choice of a lobe or a technique.
+    /// The third number, for the choice of a lobe or a technique.
     pub fn u_lobe(&self) -> f32 {
         self.0[2]
     }
 
-    /// The fourth, for whether to keep what the others gave.
+    /// The fourth number, for acceptance of the sample.
     pub fn u_accept(&self) -> f32 {
         self.0[3]
     }
@@ -76,7 +76,7 @@ pub struct SampleSequence {
 }
 
 impl SampleSequence {
-    /// Point `index`, each number in [0, 1), see [`Sampler::numbers`].
+    /// Point `index`, with each number in [0, 1); see [`Sampler::numbers`].
     #[inline]
     pub fn numbers(&self, index: u32) -> SamplePoint {
         SamplePoint(match self.kind {
@@ -88,7 +88,7 @@ impl SampleSequence {
         })
     }
 
-    /// [`SamplePoint::u`] of N points from `first` on, by coordinate.
+    /// [`SamplePoint::u`] of the N points from `first` on, by coordinate.
     #[inline(always)]
     pub fn u<const N: usize>(&self, first: u32) -> [[f32; N]; 2] {
         let (mut x, mut y) = ([0.0; N], [0.0; N]);
@@ -110,7 +110,7 @@ impl SampleSequence {
     }
 }
 
-/// All numbers of one pixel.
+/// All random numbers of one pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
     kind: SamplerKind,
@@ -122,40 +122,40 @@ impl Sampler {
     #[cfg(feature = "render")]
     pub(crate) const NONE: Self = Self { kind: SamplerKind::Sobol, key: 0 };
 
-    /// The sampler of a pixel under a seed.
+    /// Creates the sampler of a pixel with a seed.
     pub fn new(kind: SamplerKind, seed: u64, pixel: u64) -> Self {
         Self { kind, key: hash2(seed, pixel) }
     }
 
-    /// The sampler of what all pixels share in the pass that begins with camera sample `first`.
+    /// Creates the sampler shared by all pixels in the pass that begins with camera sample `first`.
     pub fn for_pass(kind: SamplerKind, seed: u64, first: u32) -> Self {
         // No pixel has this number.
         Self::new(kind, seed, u64::MAX).part(first)
     }
 
-    /// Sampler `index` derived from this one, independent of it and of the others.
+    /// Derives sampler `index`, which is independent of this one and of the others.
     #[must_use]
     pub fn part(&self, index: u32) -> Self {
         let key = hash2(hash2(self.key, Dimension::Part as u64), u64::from(index));
         Self { kind: self.kind, key }
     }
 
-    /// Point `index` of the set `dimension`, each number in [0, 1).
+    /// Point `index` of the set `dimension`, with each number in [0, 1).
     ///
-    /// Consecutive indices are well distributed together: number all samples of a pixel that serve
-    /// one purpose in one sequence.
+    /// Consecutive indices are well distributed together. Number all samples of a pixel that serve
+    /// the same purpose consecutively.
     pub fn numbers(&self, dimension: Dimension, index: u32) -> SamplePoint {
         self.set(dimension).numbers(index)
     }
 
-    /// The numbers of one dimension.
+    /// The points of one dimension.
     #[inline]
     pub fn set(&self, dimension: Dimension) -> SampleSequence {
         SampleSequence { kind: self.kind, seed: hash2(self.key, dimension as u64) }
     }
 
-    /// Independent numbers without end, sequence `index` of this sampler: for procedures that stop at
-    /// a random time, whose laws hold for independent numbers alone.
+    /// An endless sequence of independent random numbers, number `index` of this sampler, for procedures
+    /// that stop at a random time and so require independent numbers.
     pub fn generator(&self, index: u32) -> Pcg32 {
         generator(hash2(self.key, Dimension::Sequence as u64), index)
     }

@@ -2,12 +2,12 @@
 //!
 //! A set is a shuffled, scrambled copy of the first four dimensions of the Sobol' sequence (Joe &
 //! Kuo's direction numbers). Sets are padded: each has its own seed, so two sets are paired at
-//! random but each stays stratified by itself (Burley 2020, "Practical Hash-based Owen
-//! Scrambling", JCGT 9(4), section 4). Four dimensions cover every decision of one sampling
-//! technique at once: the lobe, the two numbers of the direction, and one to spare.
+//! random, but each set stays stratified (Burley 2020, "Practical Hash-based Owen
+//! Scrambling", JCGT 9(4), section 4). Four dimensions cover all decisions of one sampling
+//! technique: the lobe, the two numbers of the direction, and one spare.
 //!
-//! Points are good for any index below 2³²; a power of two of consecutive points from an aligned
-//! start is a (t, m, s)-net.
+//! Any index below 2³² is valid. A power of two of consecutive points from an aligned start is a
+//! (t, m, s)-net.
 
 /// Generating matrices of dimensions 0…3, as the images of the 32 index bits, bit-reversed:
 /// both ends of the computation work on reversed integers, see [`point`].

@@ -1,18 +1,18 @@
-//! Tabulated densities: one and two dimensions by inversion of the cumulative sum.
+//! Tabulated densities in one and two dimensions, sampled by inversion of the cumulative sum.
 //!
-//! Prefix sums are kept in double precision, un-normalized: the probability of a cell *is* the
-//! difference of its two neighbors over the total, so what [`Table2d::sample`] draws and what
-//! [`Table2d::pmf`] says agree exactly, on maps of any size. Inversion keeps the order of the
-//! uniform numbers, so stratified points stay stratified (an alias table would be faster and lose
-//! the strata). A guide (Chen & Asau 1974's cutpoints) gives the start of the search.
+//! Prefix sums are stored in double precision and not normalized. The probability of a cell *is* the
+//! difference of its two prefix sums over the total, so [`Table2d::sample`] and [`Table2d::pmf`] agree
+//! exactly on maps of any size. Inversion preserves the order of the uniform numbers, so stratified points
+//! stay stratified (an alias table would be faster but lose the strata). A guide table (the cutpoints of
+//! Chen & Asau 1974) gives the start of the search.
 
 use super::ONE_MINUS_EPSILON;
 use crate::math::{Vec2, vec2};
 
-/// What makes weights unusable.
+/// An error in the weights of a table.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TableError {
-    /// No weights at all.
+    /// There are no weights.
     #[error("a table needs at least one weight")]
     Empty,
     /// A weight that is negative, NaN or infinite.
@@ -23,7 +23,7 @@ pub enum TableError {
         /// Its value.
         value: f32,
     },
-    /// Nothing to draw.
+    /// All weights are zero.
     #[error("all weights are zero")]
     AllZero,
 }
@@ -92,7 +92,7 @@ pub struct Table1d {
 }
 
 impl Table1d {
-    /// A table from non-negative finite weights, not all zero.
+    /// Creates a table from non-negative finite weights, not all zero.
     ///
     /// # Errors
     /// See [`TableError`].
@@ -127,7 +127,7 @@ impl Table1d {
         self.sums.len()
     }
 
-    /// Never: a table has at least one cell.
+    /// Always false: a table has at least one cell.
     pub fn is_empty(&self) -> bool {
         self.sums.is_empty()
     }
@@ -137,7 +137,7 @@ impl Table1d {
         self.sums[self.sums.len() - 1]
     }
 
-    /// Probability of cell `i`.
+    /// The probability of cell `i`.
     ///
     /// # Panics
     /// If there is no such cell.
@@ -145,22 +145,22 @@ impl Table1d {
         width(&self.sums, i) / self.total()
     }
 
-    /// A cell, and the rest of `u` in [0, 1): the position inside the cell.
+    /// Samples a cell. Also returns the remainder of `u` in [0, 1), the position inside the cell.
     pub fn sample(&self, u: f32) -> (usize, f32) {
         invert(&self.sums, &self.guide, u)
     }
 }
 
-/// A cell drawn from a [`Table2d`].
+/// A cell sampled from a [`Table2d`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TableSample {
-    /// Column of the cell.
+    /// The column of the cell.
     pub column: usize,
-    /// Row of the cell.
+    /// The row of the cell.
     pub row: usize,
-    /// Position inside the cell, in [0, 1)².
+    /// The position inside the cell, in [0, 1)².
     pub inside: Vec2,
-    /// Probability of the cell.
+    /// The probability of the cell.
     pub pmf: f64,
 }
 
@@ -176,9 +176,9 @@ pub struct Table2d {
 }
 
 impl Table2d {
-    /// A table from `width · height` weights, row by row: `weight(row, out)` writes those of one row.
+    /// Creates a table from `width · height` weights; `weight(row, out)` writes the weights of one row.
     ///
-    /// Rows are independent; they are filled in parallel with the feature `render`.
+    /// Rows are independent, and are filled in parallel with the feature `render`.
     ///
     /// # Errors
     /// See [`TableError`]; the index of a bad weight is row · width + column.
@@ -226,7 +226,7 @@ impl Table2d {
         Ok(Self { width, rows: Table1d::from_sums(sums)?, columns, guides })
     }
 
-    /// A table from weights, row by row.
+    /// Creates a table from weights, row by row.
     ///
     /// # Errors
     /// See [`TableError`].
@@ -243,12 +243,12 @@ impl Table2d {
         })
     }
 
-    /// Columns.
+    /// The number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// The number of rows.
     pub fn height(&self) -> usize {
         self.rows.len()
     }
@@ -263,7 +263,7 @@ impl Table2d {
         &self.rows
     }
 
-    /// Probability of a column given its row; zero in a row without weight.
+    /// The probability of a column given its row; zero in a row without weight.
     ///
     /// # Panics
     /// If there is no such cell.
@@ -273,7 +273,7 @@ impl Table2d {
         if total > 0.0 { width(sums, column) / total } else { 0.0 }
     }
 
-    /// Probability of a cell.
+    /// The probability of a cell.
     ///
     /// # Panics
     /// If there is no such cell.
@@ -281,7 +281,7 @@ impl Table2d {
         self.rows.pmf(row) * self.conditional_pmf(column, row)
     }
 
-    /// Draws a row by `u.y`, then a column by `u.x`.
+    /// Samples a row with `u.y`, then a column with `u.x`.
     pub fn sample(&self, u: Vec2) -> TableSample {
         let (row, y) = self.rows.sample(u.y);
         let n = guide_len(self.width);

@@ -1,9 +1,9 @@
-//! Warps of the unit square onto the disk, the sphere and the hemisphere, each beside its density.
+//! Warps of the unit square to the disk, the sphere and the hemisphere, each with its density.
 //!
-//! All take `u` in [0, 1)²; the hemisphere is z > 0. Cosine-weighted directions go through the
-//! concentric map of Shirley & Chiu 1997 ("A Low Distortion Map Between Disk and Square"), which
-//! keeps the stratification of `u` and needs one sine and cosine; the polar map √u has the same
-//! density and distorts more.
+//! All take `u` in [0, 1)²; the hemisphere is z > 0. Cosine-weighted directions use the concentric map
+//! of Shirley & Chiu 1997 ("A Low Distortion Map Between Disk and Square"), which preserves the
+//! stratification of `u` and needs one sine and cosine. The polar map with √u has the same density but
+//! more distortion.
 
 use crate::math::{
     FRAC_1_4PI, FRAC_1_PI, TAU, Vec2, Vec3, from_spherical, functions, sin_cos_eighth,
@@ -70,7 +70,7 @@ pub fn uniform_sphere_pdf() -> f32 {
 
 /// A power-of-cosine lobe about +z: density [`phong_lobe_pdf`]; `exponent` ≥ 0.
 ///
-/// 1 − cos θ is computed by itself, so that a narrow lobe keeps its shape in f32.
+/// 1 − cos θ is computed directly, so that a narrow lobe keeps its shape in f32.
 pub fn phong_lobe(u: Vec2, exponent: f32) -> Vec3 {
     phong_lanes(u.to_array(), exponent).into()
 }

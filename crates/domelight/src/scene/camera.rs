@@ -1,4 +1,4 @@
-//! The pinhole, the thin lens and the orthographic camera.
+//! Pinhole, thin-lens and orthographic cameras.
 //!
 //! The picture's basis is f = normalize(target − origin), r = normalize(f × up), u = r × f. The
 //! point (px, py) of a W × H picture, px to the right and py **down** from the top left corner in
@@ -7,23 +7,23 @@
 //! normalize(f + tan(fov/2) · ((2 px/W − 1) · W/H · r + (1 − 2 py/H) · u)),
 //!
 //! so pixel centers lie at +½, pixels are square and `fov` is the vertical field of view. The
-//! orthographic camera moves the origin instead, with height/2 in the place of tan(fov/2).
+//! orthographic camera moves the origin instead, with height/2 in place of tan(fov/2).
 
 use crate::bvh::Frustum;
 use crate::geometry::{Ray, power_of_two};
 use crate::math::{Mat4, TAU, Vec2, Vec3, functions, vec2};
 use crate::sampling::warp::concentric_disk;
 
-/// A camera before the size of its picture is known.
+/// The settings of a camera, independent of the size of its picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraSettings {
     /// Perspective or orthographic.
     pub projection: Projection,
-    /// Position of the camera.
+    /// The position of the camera.
     pub origin: Vec3,
-    /// What it looks at: any point on its axis but the origin.
+    /// The point it looks at: any point on its axis except the origin.
     pub target: Vec3,
-    /// A direction that points up in the picture, not parallel to the axis; of any length.
+    /// The direction that points up in the picture, of any length and not parallel to the axis.
     pub up: Vec3,
 }
 
@@ -42,14 +42,14 @@ pub enum Projection {
     },
 }
 
-/// A thin lens with an aperture: what is not at its focus distance is blurred.
+/// A thin lens with an aperture, which blurs everything away from the focus distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
-    /// Radius of the aperture in world units, ≥ 0.
+    /// The radius of the aperture in world units, ≥ 0.
     pub radius: f32,
-    /// Distance from the camera, along its axis, of what is sharp, > 0.
+    /// The distance from the camera to the focal plane along its axis, > 0.
     pub focus_distance: f32,
-    /// Blades of the aperture, 3 or more; fewer mean a round one.
+    /// The number of aperture blades, at least 3; a smaller number means a round aperture.
     pub blades: u32,
 }
 
@@ -57,8 +57,9 @@ impl Lens {
     /// Height of the sensor of a full-frame camera \[m\].
     const SENSOR: f32 = 0.024;
 
-    /// A lens of a full-frame camera at an f-number > 0, in a world whose unit is a meter: the sensor's height of 24 mm and
-    /// the field of view of `settings` give the focal length, and the aperture is the focal length over the f-number.
+    /// Creates the lens of a full-frame camera with an f-number > 0, in a world measured in meters. The sensor height
+    /// of 24 mm and the field of view of `settings` give the focal length; the aperture diameter is the focal length
+    /// divided by the f-number.
     ///
     /// # Errors
     /// If the camera is orthographic, or a number is not positive and finite.
@@ -91,7 +92,7 @@ impl Lens {
         if self.blades < 3 {
             return concentric_disk(vec2(u, v));
         }
-        // Choose one of the triangles from the center to an edge, and a point of it by its area.
+        // Choose one of the triangles from the center to an edge, and sample it uniformly by area.
         let n = self.blades as f32;
         let blade = (u * n).floor().min(n - 1.0);
         let corner = |i: f32| {
@@ -103,7 +104,7 @@ impl Lens {
     }
 }
 
-/// A camera that makes no picture.
+/// An invalid camera.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
     /// A coordinate is NaN or infinite.
@@ -114,7 +115,7 @@ pub enum CameraError {
         /// Its value.
         value: Vec3,
     },
-    /// No direction to look in.
+    /// The viewing direction is undefined.
     #[error("the camera's origin and target are the same point: {origin}; move one of them")]
     NoDirection {
         /// The origin.
@@ -130,13 +131,13 @@ pub enum CameraError {
         /// The viewing direction.
         forward: Vec3,
     },
-    /// A field of view that does not fit a plane.
+    /// A field of view outside (0°, 180°).
     #[error("the field of view {fov_y_degrees}° is outside (0°, 180°)")]
     FieldOfView {
         /// The vertical field of view \[degrees\].
         fov_y_degrees: f32,
     },
-    /// An orthographic picture of no height.
+    /// An invalid orthographic height.
     #[error("the orthographic height {height} is not a positive finite number")]
     Height {
         /// The height.
@@ -145,7 +146,7 @@ pub enum CameraError {
     /// An orthographic camera with a lens.
     #[error("an orthographic camera has no lens; give a field of view, or no depth of field")]
     NoLens,
-    /// A lens that is none.
+    /// An invalid lens.
     #[error("the lens's {name} {value} is not a positive finite number")]
     Lens {
         /// Which number.
@@ -167,16 +168,16 @@ impl CameraSettings {
     /// The vertical field of view of [`CameraSettings::framing`] \[degrees\].
     pub const DEFAULT_FOV_Y_DEGREES: f32 = 35.0;
 
-    /// Checks that the settings make a picture.
+    /// Checks that the settings are valid.
     ///
     /// # Errors
-    /// The [`CameraError`] that says which one does not.
+    /// The [`CameraError`] of the first invalid setting.
     pub fn check(&self) -> Result<(), CameraError> {
         basis(self).and(half_height(self.projection)).map(|_| ())
     }
 
-    /// The direction to the camera from what it sees, along the ground: around the axis `up`, of any length. A camera
-    /// that looks along the axis has the bottom of its picture in front.
+    /// The direction along the ground from the target to the camera, perpendicular to the axis `up`, which may have any
+    /// length. For a camera that looks along the axis, it is the direction of the bottom of its picture.
     pub fn side(&self, up: Vec3) -> Vec3 {
         let flat = |v: Vec3| v - up * (v.dot(up) / up.length_squared().max(f32::MIN_POSITIVE));
         let toward = (self.origin - self.target).normalize_or_zero();
@@ -187,7 +188,7 @@ impl CameraSettings {
         if toward.dot(up) > 0.0 { -flat(self.up) } else { flat(self.up) }
     }
 
-    /// The same camera moved around `center` about `axis`, counter-clockwise seen from its tip by an angle \[degrees\].
+    /// The camera rotated around `center` about `axis`, counterclockwise as seen from the tip of the axis \[degrees\].
     #[must_use]
     pub fn orbited(&self, center: Vec3, axis: Vec3, degrees: f32) -> Self {
         let Some(axis) = direction(axis) else { return *self };
@@ -201,7 +202,7 @@ impl CameraSettings {
         }
     }
 
-    /// Scales the camera's place and, of an orthographic one, the height of its picture by a factor > 0.
+    /// Scales the camera's position and, for an orthographic camera, its height by a factor > 0.
     pub fn scale(&mut self, factor: f32) {
         self.origin *= factor;
         self.target *= factor;
@@ -210,7 +211,7 @@ impl CameraSettings {
         }
     }
 
-    /// Moves the camera by an affine matrix; an orthographic height grows with its scale.
+    /// Transforms the camera by an affine matrix, whose scale also applies to an orthographic height.
     pub fn transform(&mut self, m: &Mat4) {
         self.origin = m.transform_point3(self.origin);
         self.target = m.transform_point3(self.target);
@@ -221,7 +222,7 @@ impl CameraSettings {
     }
 }
 
-/// A camera of one picture: camera rays from pixel positions.
+/// A camera for a picture of given size, which generates camera rays from pixel positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// The origin of all rays (perspective), or of the ray through the top left corner (orthographic).
@@ -232,13 +233,13 @@ pub struct Camera {
     step_x: Vec3,
     /// One pixel down.
     step_y: Vec3,
-    /// The camera's axis through its place, to measure depth along.
+    /// The camera's axis through its position, along which depth is measured.
     axis: Ray,
     orthographic: bool,
     lens: Option<LensPlane>,
 }
 
-/// A lens in the world.
+/// A lens in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LensPlane {
     lens: Lens,
@@ -248,10 +249,10 @@ struct LensPlane {
 }
 
 impl Camera {
-    /// The camera of a picture of `width` × `height` pixels.
+    /// Creates the camera for a picture of `width` × `height` pixels.
     ///
     /// # Errors
-    /// The [`CameraError`] that says which setting makes no picture.
+    /// The [`CameraError`] of the first invalid setting.
     pub fn new(
         settings: &CameraSettings,
         width: usize,
@@ -290,7 +291,7 @@ impl Camera {
         })
     }
 
-    /// The same view through a lens; an orthographic camera stays as it is.
+    /// Adds a lens. An orthographic camera is unchanged.
     #[must_use]
     pub fn with_lens(mut self, lens: Lens) -> Self {
         if !self.orthographic && lens.radius > 0.0 {
@@ -300,20 +301,20 @@ impl Camera {
         self
     }
 
-    /// Whether rays through a point of the picture differ by where they meet the lens.
+    /// Whether rays depend on a point on the lens.
     #[inline]
     pub fn has_lens(&self) -> bool {
         self.lens.is_some()
     }
 
-    /// The same view in a picture of another size: both sizes are (columns, rows), at least 1.
+    /// The same view for a picture of another size. Sizes are (columns, rows), each at least 1.
     #[must_use]
     pub fn resized(&self, from: (usize, usize), to: (usize, usize)) -> Self {
         let [x, y] = [from.0 as f32 / to.0 as f32, from.1 as f32 / to.1 as f32];
         Self { step_x: self.step_x * x, step_y: self.step_y * y, ..*self }
     }
 
-    /// The same view where all lengths are multiplied by a factor > 0.
+    /// The same view with all lengths multiplied by a factor > 0.
     pub(crate) fn scaled(&self, factor: f32) -> Self {
         let step = if self.orthographic { factor } else { 1.0 };
         let mut lens = self.lens;
@@ -342,8 +343,8 @@ impl Camera {
         }
     }
 
-    /// The ray through a point of the picture, as [`Camera::ray`], that passes the lens where the numbers `u` in \[0, 1) say;
-    /// they count only if there is a lens.
+    /// Like [`Camera::ray`], for a ray through the point of the lens that `u` in \[0, 1)² samples. `u` is ignored if
+    /// there is no lens.
     pub fn lens_ray(&self, px: f32, py: f32, u: [f32; 2]) -> Ray {
         let Some(LensPlane { lens, right, down }) = self.lens else { return self.ray(px, py) };
         let at = lens.radius * lens.point(u);
@@ -353,13 +354,13 @@ impl Camera {
         Ray::new(self.origin + aside, direction.normalize())
     }
 
-    /// What the rays see through the rectangle of the picture from (`x[0]`, `y[0]`) to
+    /// The frustum of the rays through the rectangle of the picture from (`x[0]`, `y[0]`) to
     /// (`x[1]`, `y[1]`) \[pixels\].
     pub fn frustum(&self, x: [f32; 2], y: [f32; 2]) -> Frustum {
         let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
         let steps = corners.map(|[x, y]| x * self.step_x + y * self.step_y);
         if let Some(LensPlane { lens, right, down }) = self.lens {
-            // A ray starts no farther aside than the aperture's rim, and strays from the pinhole's no faster than from there.
+            // A ray starts at most at the rim of the aperture, and diverges from the pinhole ray at most as fast as from there.
             let signs = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
             let out = signs.map(|[x, y]| lens.radius * (x * right + y * down));
             let toward = |i: usize| self.direction + steps[i] + out[i] / lens.focus_distance;
@@ -371,7 +372,7 @@ impl Camera {
         }
     }
 
-    /// The distance of a point from the plane through the camera's place, across its axis.
+    /// The depth of a point: its distance along the camera's axis.
     pub fn depth(&self, point: Vec3) -> f32 {
         (point - self.axis.origin).dot(self.axis.direction)
     }

@@ -1,18 +1,18 @@
-//! What rays see and pass through: surfaces that do not hide all behind them, or are not seen from behind.
+//! Coverage, transmission and single-sided surfaces: what rays hit and what they pass through.
 //!
-//! A surface with coverage a, the share of it that is there, that transmits T lets 1 − a + a T through, a color where T is
-//! one. T is that of `KHR_materials_transmission`: the base color, for light that is not reflected, straight through.
+//! A surface with coverage a and transmittance T lets 1 − a + a T through, a color if T is a color. T is that of
+//! `KHR_materials_transmission`: the base color, for light that is not reflected, straight through.
 //!
-//! A camera ray meets a surface with a probability that is its coverage; each triangle along the ray has a random number
-//! of its own, so that what is seen through several layers is their product. One that transmits is met with the
-//! probability p = max(1 − max(T), ¼) where it is there, and the sample's weight is 1/p if it is met, T/(1 − p) if not. A
-//! shadow ray takes the product of what all surfaces along it let through, without noise, by the mean of T's channels at
-//! normal incidence.
+//! A camera ray hits a surface with a probability equal to its coverage. Each triangle along the ray has its own random
+//! number, so that the transmittances of several layers multiply. A covered point of a transmissive surface is hit with
+//! probability p = max(1 − max(T), ¼); the sample's weight is 1/p if the surface is hit, and T/(1 − p) if not. A shadow
+//! ray multiplies the transmittances of all surfaces along it, without noise, using the mean of T's channels at normal
+//! incidence.
 //!
-//! A single-sided surface is not there for a camera ray that comes from behind, so that a closed body is met once. Its
-//! shadow falls from either side, but T counts once a body for light, too: where light comes upon the front, that is
-//! where the shadow ray leaves the body. So light is tinted that falls into a body, through it, or through an open pane
-//! that faces the light.
+//! A single-sided surface is invisible to a camera ray that comes from behind, so that a closed body is hit once. It
+//! casts a shadow from either side, but T also counts only once per body for light: where light reaches the front,
+//! that is, where the shadow ray leaves the body. So light is tinted if it falls into a body, through it, or through
+//! an open pane that faces the light.
 
 use std::cell::RefCell;
 
@@ -24,11 +24,11 @@ use crate::geometry::{Hit, Ray, RayBatch};
 use crate::math::Vec3;
 use crate::sampling::{rng::hash2, sobol};
 
-/// The triangles that may not hide what is behind them.
+/// The triangles that may not be opaque.
 #[derive(Debug)]
 pub(super) struct Partial {
     bvh: Bvh,
-    /// The number in the scene of the first.
+    /// The index in the scene of the first of these triangles.
     first_triangle: u32,
 }
 
@@ -37,7 +37,7 @@ impl Partial {
         Self { bvh, first_triangle }
     }
 
-    /// The hit with the triangle's number in the scene.
+    /// The hit with the triangle's index in the scene.
     fn in_scene(&self, hit: &Hit) -> Hit {
         Hit { triangle: hit.triangle + self.first_triangle, ..*hit }
     }
@@ -46,9 +46,9 @@ impl Partial {
 /// What a camera ray sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sight {
-    /// The surface that it meets; `None`: what is behind the scene.
+    /// The surface that the ray hits; `None` for the background.
     pub hit: Option<Hit>,
-    /// A factor ≥ 0 on the radiance that comes from there; one where nothing transmits.
+    /// A factor ≥ 0 on the radiance from there; 1 without transmission.
     pub throughput: Rgb,
 }
 
@@ -58,17 +58,17 @@ impl Sight {
     }
 }
 
-/// The least probability with which a camera ray meets a surface that transmits. What it reflects is a few percent of
-/// the light, but may be a sun.
+/// The minimum probability with which a camera ray hits a transmissive surface. It reflects only a few percent of the
+/// light, but that may include a sun.
 const LEAST_REFLECTED: f32 = 0.25;
 
-/// How a camera ray meets a surface that is not opaque.
+/// How a camera ray interacts with a surface that is not opaque.
 #[derive(Clone, Copy, Debug)]
 struct Layer {
     transmits: bool,
-    /// The probability that a ray meets it.
+    /// The probability that a ray hits it.
     probability: f32,
-    /// Factors on the radiance of a ray that meets it, and of one that does not.
+    /// Factors on the radiance of a ray that hits it, and of one that does not.
     if_met: Rgb,
     if_not: Rgb,
 }
@@ -99,8 +99,8 @@ fn throughput(mut layers: Vec<(Hit, Layer, bool)>, seen: Option<Hit>) -> Rgb {
 }
 
 impl Coverage {
-    /// The share in \[0, 1\] of the surface in what is seen, where the product of factor, texture and vertices is
-    /// `opacity`; 0 if that is NaN.
+    /// The effective opacity in \[0, 1\], where `opacity` is the product of factor, texture and vertices; 0 if that is
+    /// NaN.
     pub fn of(&self, opacity: f32) -> f32 {
         match self.mode {
             AlphaMode::Opaque => 1.0,
@@ -112,7 +112,7 @@ impl Coverage {
 }
 
 impl Part {
-    /// Whether it hides all behind it, everywhere.
+    /// Whether it is opaque everywhere.
     pub(super) fn is_opaque(&self, materials: &[Material]) -> bool {
         let material = &materials[self.material];
         if material.transmits() || material.catches_shadows {
@@ -125,9 +125,9 @@ impl Part {
 }
 
 impl Scene {
-    /// What a camera ray sees first. A surface that covers only a share of what is behind it, or lets light through, is
-    /// seen with a probability, by random numbers that are a function of `key`, `sample` and the triangle; a single-sided
-    /// one not from behind. Numbers of many samples of one key, which may be a pixel, are stratified.
+    /// The first surface that a camera ray sees. A surface with partial coverage or transmission is seen with a
+    /// probability, using random numbers that are a function of `key`, `sample` and the triangle. A single-sided
+    /// surface is not seen from behind. The numbers for many samples of one key, such as a pixel, are stratified.
     pub fn sight(&self, ray: &Ray, key: u64, sample: u32) -> Sight {
         self.seen(ray, self.bvh.closest_hit(ray), key, sample)
     }
@@ -137,7 +137,7 @@ impl Scene {
         self.sight(ray, key, sample).hit
     }
 
-    /// Whether [`Scene::sight`] may differ from the closest hit of the hierarchy of [`Scene::bvh`].
+    /// Whether [`Scene::sight`] may differ from the closest hit in [`Scene::bvh`].
     #[inline]
     pub(crate) fn has_see_through(&self) -> bool {
         self.has_single_sided || self.partial.is_some()
@@ -149,7 +149,7 @@ impl Scene {
         self.transmits
     }
 
-    /// [`Scene::sight`], given the closest `hit` of what is opaque.
+    /// [`Scene::sight`], given the closest opaque `hit`.
     pub(crate) fn seen(&self, ray: &Ray, mut hit: Option<Hit>, key: u64, sample: u32) -> Sight {
         if hit.is_some_and(|hit| !self.faces(ray, &hit)) {
             hit = self.bvh.closest_hit_where(ray, |hit| self.faces(ray, hit));
@@ -174,7 +174,7 @@ impl Scene {
         Sight { hit, throughput: throughput(layers.into_inner(), hit) }
     }
 
-    /// How a camera ray meets a surface that is not opaque.
+    /// How a camera ray interacts with a surface that is not opaque.
     fn layer(&self, ray: &Ray, hit: &Hit) -> Layer {
         let coverage = self.opacity(hit);
         let (part, triangle) = self.locate(hit.triangle);
@@ -195,7 +195,7 @@ impl Scene {
         }
     }
 
-    /// The share T of each channel of light that a surface lets through at a hit where it is there.
+    /// The transmittance T of a surface at a hit, per channel, where the surface exists.
     fn transmittance(&self, part: &Part, triangle: usize, hit: &Hit, cos_theta: f32) -> Rgb {
         let corners = Corners::new(&part.mesh, triangle, hit);
         let tint = corners.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
@@ -227,13 +227,13 @@ impl Scene {
         self.bvh.may_hit(frustum) || self.partial.as_ref().is_some_and(|p| p.bvh.may_hit(frustum))
     }
 
-    /// Whether anything lets a share of light through.
+    /// Whether any surface transmits a fraction of the light.
     #[inline]
     pub(crate) fn has_partial(&self) -> bool {
         self.dims_light
     }
 
-    /// Whether the surface of a hit shows nothing but shadows.
+    /// Whether the surface at a hit is a shadow catcher.
     #[inline]
     pub(crate) fn catches_shadows(&self, hit: &Hit) -> bool {
         self.catches_shadows && self.materials[self.locate(hit.triangle).0.material].catches_shadows
@@ -247,8 +247,8 @@ impl Scene {
         if mesh.triangles.is_empty() { None } else { mesh.area_normal(0).try_normalize() }
     }
 
-    /// What share of light, in \[0, 1\], the surfaces that are not in [`Scene::bvh`] let through along each shadow ray:
-    /// a product over all of them. `transmittances` is overwritten, one entry a ray.
+    /// The transmittance in \[0, 1\] along each shadow ray of the surfaces that are not in [`Scene::bvh`]: a product
+    /// over all of them. `transmittances` is overwritten, one entry per ray.
     pub fn transmittances(&self, rays: &RayBatch, transmittances: &mut Vec<f32>) {
         let Some(partial) = self.partial.as_ref().filter(|_| self.dims_light) else {
             transmittances.clear();
@@ -272,7 +272,7 @@ impl Scene {
         partial.bvh.transmittances(rays, &of_hit, transmittances);
     }
 
-    /// The share in \[0, 1\] of the surface in what is seen at a hit.
+    /// The opacity in \[0, 1\] of the surface at a hit.
     pub fn opacity(&self, hit: &Hit) -> f32 {
         let (part, triangle) = self.locate(hit.triangle);
         let (mesh, coverage) = (&part.mesh, &self.materials[part.material].coverage);
@@ -284,7 +284,7 @@ impl Scene {
         coverage.of(opacity)
     }
 
-    /// Whether the surface is seen from the ray's side.
+    /// Whether the surface is visible from the ray's side.
     fn faces(&self, ray: &Ray, hit: &Hit) -> bool {
         if !self.has_single_sided {
             return true;

@@ -1,4 +1,4 @@
-//! What a scene is made of, before anything is built: the common result of every loader.
+//! The description of a scene before it is built, the common result of all loaders.
 
 use std::path::PathBuf;
 
@@ -10,36 +10,36 @@ use crate::environment::UpAxis;
 use crate::geometry::{Aabb, Mesh};
 use crate::math::{Mat4, functions};
 
-/// A scene as loaders and built-in scenes give it; [`Scene::new`](super::Scene::new) checks it.
+/// The description of a scene, from a loader or a built-in scene. [`Scene::new`](super::Scene::new) checks it.
 #[derive(Clone, Debug, Default)]
 pub struct SceneDescription {
     /// The meshes.
     pub parts: Vec<Part>,
-    /// What the parts are made of.
+    /// The materials of the parts.
     pub materials: Vec<Material>,
     /// The images that the materials refer to.
     pub textures: Vec<Texture>,
-    /// The camera, if the scene brings one.
+    /// The camera, if the scene has one.
     pub camera: Option<CameraSettings>,
-    /// All cameras of the file, of which `camera` is one, in the file's order.
+    /// All cameras of the file in file order, including `camera`.
     pub cameras: Vec<NamedCamera>,
-    /// From where a camera looks that is framed to the scene; `None` is [`ViewDirection::DEFAULT`].
+    /// The direction from which a camera frames the scene; `None` is [`ViewDirection::DEFAULT`].
     pub view: Option<ViewDirection>,
     /// The environment, if the scene names one.
     pub environment: Option<EnvironmentSettings>,
-    /// Parts that are scenery, such as floors and plinths, by index: the camera is not framed to
-    /// them and a material for the subject does not reach them.
+    /// The indices of parts that are scenery, such as floors and plinths. Framing and the material of
+    /// the subject ignore them.
     pub scenery: Vec<usize>,
-    /// The axis of the file that points up; `None` if the format does not say.
+    /// The up axis of the file; `None` if the format does not specify it.
     ///
-    /// The geometry is given as it is in the file: turning it is the caller's choice.
+    /// The geometry is as in the file; rotating it is up to the caller.
     pub up: Option<UpAxis>,
 }
 
-/// A mesh and what it is made of.
+/// A mesh and its material.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// Its name in the file, for messages.
+    /// The name in the file, for messages.
     pub name: String,
     /// The mesh in world space.
     pub mesh: Mesh,
@@ -50,9 +50,9 @@ pub struct Part {
 /// One of a file's cameras.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedCamera {
-    /// Its name, which may be empty.
+    /// The name, which may be empty.
     pub name: String,
-    /// What it sees.
+    /// The settings.
     pub settings: CameraSettings,
 }
 
@@ -63,11 +63,11 @@ pub struct EnvironmentSettings {
     pub source: EnvironmentSource,
     /// Rotation about the up axis \[degrees\].
     pub rotate_degrees: f32,
-    /// Factor on the radiance, ≥ 0.
+    /// A factor on the radiance, ≥ 0.
     pub scale: f32,
-    /// Exposure in stops: a further factor of 2^exposure.
+    /// The exposure in stops: another factor, 2^exposure.
     pub exposure: f32,
-    /// The axis of the map that points up.
+    /// The up axis of the map.
     pub up: UpAxis,
 }
 
@@ -81,14 +81,14 @@ impl EnvironmentSettings {
 /// The source of a light probe.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum EnvironmentSource {
-    /// A file, its path already relative to the working directory.
+    /// A file, with a path relative to the working directory.
     File(PathBuf),
     /// The name of a built-in probe.
     Builtin(String),
 }
 
 impl SceneDescription {
-    /// The least box around all vertices.
+    /// The bounding box of all vertices.
     pub fn bounds(&self) -> Aabb {
         self.parts.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()))
     }
@@ -99,7 +99,7 @@ impl SceneDescription {
         self.parts.iter().map(|part| part.mesh.memory()).sum()
     }
 
-    /// Moves the parts and the camera by an affine matrix.
+    /// Transforms the parts and the camera by an affine matrix.
     pub fn transform(&mut self, m: &Mat4) {
         for part in &mut self.parts {
             part.mesh.transform(m);
@@ -110,7 +110,7 @@ impl SceneDescription {
         }
     }
 
-    /// Appends another scene's parts; its camera and environment are taken where this one has none.
+    /// Appends another scene's parts, and its camera and environment if this scene has none.
     pub fn append(&mut self, mut other: Self) {
         let (materials, textures) = (self.materials.len(), self.textures.len());
         self.scenery.extend(other.scenery.iter().map(|part| part + self.parts.len()));

@@ -1,4 +1,4 @@
-//! Light that surfaces send to the camera: emission, and colors that are shown as they are. It lights nothing else.
+//! Emission and unlit colors, which the camera sees but which light nothing else.
 
 use super::Scene;
 use super::shading::Corners;
@@ -6,7 +6,7 @@ use crate::Rgb;
 use crate::geometry::Hit;
 
 impl Scene {
-    /// The radiance ≥ 0 that the surface of a hit sends to the camera whatever light falls on it.
+    /// The radiance ≥ 0 that the surface at a hit sends to the camera, independent of the light on it.
     pub fn emitted(&self, hit: &Hit) -> Rgb {
         if !self.emits {
             return Rgb::BLACK;

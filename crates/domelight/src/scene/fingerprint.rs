@@ -1,11 +1,11 @@
-//! The fingerprint of a scene: geometry, materials and textures to the bit; names and files do not count.
+//! The fingerprint of a scene: geometry, materials and textures to the bit, without names and files.
 
 use super::{Material, Scene};
 use crate::fingerprint::{Fingerprint, Fingerprinter};
 use crate::math::{Vec2, Vec3, Vec4};
 
 impl Scene {
-    /// The fingerprint of all that rays can meet.
+    /// The fingerprint of everything that rays can hit.
     pub fn fingerprint(&self) -> Fingerprint {
         let mut f = Fingerprinter::default();
         for part in &self.parts {

@@ -1,9 +1,10 @@
-//! Framing: where a camera stands so that a subject fills its picture.
+//! Framing: places a camera so that the subject fills its picture.
 //!
-//! Four planes through the camera's place bound the picture. For a viewing direction f with right r and up u, a point
-//! p is within the left and right ones if |x − c_x| ≤ t_x (z − c_z), with (x, y, z) the coordinates of p along (r, u, f),
-//! c those of the camera and t_x the tangent of half the horizontal field of view. The greatest values of x − t_x z and
-//! −x − t_x z over all points give c_x and the largest c_z, so one pass over the vertices finds the nearest camera.
+//! Four planes through the camera's position bound the picture. For a viewing direction f with right r and up u, a
+//! point p is within the left and right ones if |x − c_x| ≤ t_x (z − c_z), with (x, y, z) the coordinates of p along
+//! (r, u, f), c those of the camera and t_x the tangent of half the horizontal field of view. The largest values of
+//! x − t_x z and −x − t_x z over all points give c_x and the largest c_z, so one pass over the vertices finds the
+//! nearest camera.
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,20 +14,21 @@ use super::camera::{Camera, CameraSettings, Projection};
 use crate::geometry::Aabb;
 use crate::math::{Vec3, functions};
 
-/// The share of the picture's height or width that a subject fills, whichever is tighter.
+/// The fraction of the picture's height or width that a subject fills, whichever is tighter.
 const FILL: f32 = 0.86;
 
-/// From which side a framed camera looks at its subject.
+/// The direction from which a framed camera views its subject.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewDirection {
     azimuth: f32,
     elevation: f32,
 }
 
-/// A text that names no view.
+/// A text that is not a view.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no view is called {text:?}; there are front, back, left, right, top, bottom and three-quarter, or azimuth and \
+    "there is no view {text:?}; the views are front, back, left, right, top, bottom and \
+     three-quarter, or azimuth and \
      elevation in degrees such as 30,15, the elevation from -90 to 90"
 )]
 pub struct UnknownView {
@@ -35,7 +37,7 @@ pub struct UnknownView {
 }
 
 impl ViewDirection {
-    /// The views that have names.
+    /// The named views.
     pub const NAMED: [(&'static str, Self); 7] = [
         ("front", Self { azimuth: 0.0, elevation: 0.0 }),
         ("back", Self { azimuth: 180.0, elevation: 0.0 }),
@@ -49,11 +51,11 @@ impl ViewDirection {
     /// From the front, 20° from above.
     pub const DEFAULT: Self = Self { azimuth: 0.0, elevation: 20.0 };
 
-    /// A camera at an azimuth \[degrees\], 0 in front of the subject and 90 on its right seen from there, and an
-    /// elevation from −90 (below) to 90 (above) \[degrees\]. The front is +Z where +Y is up, and −Y where +Z is.
+    /// A view from an azimuth \[degrees\], where 0 is in front of the subject and 90 to its right as seen from there,
+    /// and an elevation from −90 (below) to 90 (above) \[degrees\]. The front is +Z if +Y is up, and −Y if +Z is up.
     ///
     /// # Errors
-    /// If an angle is not finite, or the elevation outside of its range.
+    /// If an angle is not finite, or the elevation is outside its range.
     pub fn new(azimuth: f32, elevation: f32) -> Result<Self, UnknownView> {
         if azimuth.is_finite() && (-90.0..=90.0).contains(&elevation) {
             Ok(Self { azimuth, elevation })
@@ -62,19 +64,19 @@ impl ViewDirection {
         }
     }
 
-    /// Around the subject \[degrees\].
+    /// The azimuth around the subject \[degrees\].
     pub fn azimuth(self) -> f32 {
         self.azimuth
     }
 
-    /// Above it \[degrees\], in \[−90, 90\].
+    /// The elevation above the subject \[degrees\], in \[−90, 90\].
     pub fn elevation(self) -> f32 {
         self.elevation
     }
 
     /// The unit vector from the subject to the camera, and the direction that is up in the picture.
     fn axes(self, up: Vec3) -> [Vec3; 2] {
-        /// Elevations from here on look along the up axis.
+        /// From this elevation on, the view is along the up axis.
         const STEEP: f32 = 89.9;
         let up = up.try_normalize().unwrap_or(Vec3::Y);
         let front = Vec3::Z - up * up.z;
@@ -117,32 +119,32 @@ impl fmt::Display for ViewDirection {
     }
 }
 
-/// How a camera is framed to a subject.
+/// How a camera frames a subject.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Framing {
-    /// From where it looks; `None` is what the scene says, or else [`ViewDirection::DEFAULT`].
+    /// The direction of the view; `None` is the scene's own, or else [`ViewDirection::DEFAULT`].
     pub view: Option<ViewDirection>,
     /// Width / height of the picture, > 0.
     pub aspect: f32,
-    /// The direction that points up; zero is taken as +Y.
+    /// The direction that points up; zero means +Y.
     pub up: Vec3,
-    /// Vertical field of view \[degrees\]; values outside (0, 180) are taken as
+    /// The vertical field of view \[degrees\]; values outside (0, 180) mean
     /// [`CameraSettings::DEFAULT_FOV_Y_DEGREES`].
     pub fov_y_degrees: f32,
-    /// Whether the subject stays in the picture while the camera goes around it, about an axis along `up` through the
-    /// center of the bounds.
+    /// Whether the subject must stay in the picture while the camera goes around it, about an axis along `up` through
+    /// the center of the bounds.
     pub all_around: bool,
 }
 
 impl Framing {
-    /// The usual view, in a picture of `aspect` = width / height.
+    /// The default view, for a picture with `aspect` = width / height.
     pub fn new(aspect: f32, up: Vec3) -> Self {
         let fov_y_degrees = CameraSettings::DEFAULT_FOV_Y_DEGREES;
         Self { view: None, aspect, up, fov_y_degrees, all_around: false }
     }
 
-    /// The nearest camera that sees all points, with a margin of 7 % of the picture's height or width, whichever is
-    /// tighter, at either side. Without points, or with infinite ones, it sees the cube from −1 to 1.
+    /// The nearest camera that sees all points, with a margin on either side of 7 % of the picture's height or width,
+    /// whichever is tighter. Without points, or with infinite ones, it frames the cube from −1 to 1.
     pub fn fit(&self, points: impl Iterator<Item = Vec3> + Clone) -> CameraSettings {
         let bounds = Aabb::around(points.clone());
         if bounds.is_empty() || !(bounds.min.is_finite() && bounds.max.is_finite()) {
@@ -202,7 +204,7 @@ impl Framing {
     }
 }
 
-/// The greatest values of ±x − t_x z and ±y − t_y z, and the least z.
+/// The largest values of ±x − t_x z and ±y − t_y z, and the least z.
 struct Reach {
     right: f32,
     left: f32,
@@ -220,7 +222,7 @@ impl Reach {
         nearest: f32::INFINITY,
     };
 
-    /// Of points with coordinates along right, up and forward.
+    /// The extremes of points with coordinates along right, up and forward.
     fn of(points: impl Iterator<Item = Vec3>, tan_x: f32, tan_y: f32) -> Self {
         points.fold(Self::NONE, |reach, p| Self {
             right: reach.right.max(p.x - tan_x * p.z),
@@ -231,9 +233,9 @@ impl Reach {
         })
     }
 
-    /// Of the circles that points describe about `axis`, a unit vector without an x.
+    /// The extremes of the circles of points around `axis`, a unit vector with x = 0.
     ///
-    /// Each value is a linear function g · p, whose greatest value on a circle of radius ρ about the axis a at height h is
+    /// Each value is a linear function g · p, whose largest value on a circle of radius ρ about the axis a at height h is
     /// h (g · a) + ρ |g − (g · a) a|.
     fn all_around(points: impl Iterator<Item = Vec3>, axis: Vec3, tan_x: f32, tan_y: f32) -> Self {
         let gradients = [
@@ -273,7 +275,7 @@ impl CameraSettings {
     /// A view from the front, 20° from above, that fits `bounds` into a picture of `aspect` = width / height with a
     /// small margin; [`Framing`] has other views, and [`Scene::framed`] fits the scene's vertices, which is tighter.
     ///
-    /// Empty or infinite bounds are taken as the cube from −1 to 1, an `up` of zero as +Y.
+    /// Empty or infinite bounds mean the cube from −1 to 1, and an `up` of zero means +Y.
     pub fn framing(bounds: &Aabb, aspect: f32, up: Vec3) -> Self {
         let corners = if bounds.is_empty() { None } else { Some(corners(bounds)) };
         Framing::new(aspect, up).fit(corners.into_iter().flatten())
@@ -282,7 +284,7 @@ impl CameraSettings {
 
 impl Camera {
     /// The scene's own camera, or one that frames the scene, for a picture of `width` × `height` pixels, each at
-    /// least 1. A camera of the file that makes no picture gives way to the framing one.
+    /// least 1. If the file's camera is invalid, a framing camera replaces it.
     ///
     /// # Panics
     /// If width or height are zero.
@@ -303,7 +305,7 @@ mod tests {
     use crate::math::vec3;
     use crate::scene::builtin::shapes;
 
-    /// The least and the greatest of the picture's coordinates, from −1 to 1, at which points are seen.
+    /// The least and the largest of the picture's coordinates, from −1 to 1, at which points are seen.
     fn seen(s: &CameraSettings, aspect: f32, points: &[Vec3]) -> [[f32; 2]; 2] {
         let Projection::Perspective { fov_y_degrees } = s.projection else { panic!() };
         let f = (s.target - s.origin).normalize();

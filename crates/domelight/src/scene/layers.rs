@@ -1,7 +1,7 @@
-//! What glTF's material extensions add to metallic-roughness, as a file states it.
+//! The layers that glTF's material extensions add to metallic-roughness, as a file states them.
 //!
-//! A loader fills these in whole; [`Material::approximated_features`](super::Material::approximated_features) says
-//! which of them a picture only approximates. Where a number has a texture, the two are multiplied.
+//! A loader fills them in completely. [`Material::approximated_features`](super::Material::approximated_features) lists
+//! those that a picture only approximates. A number with a texture is multiplied by it.
 
 use super::texture::{Texture, TextureRef, Uvs};
 use crate::Rgb;
@@ -11,26 +11,26 @@ use crate::math::{Vec2, Vec3, functions, sqr, vec2};
 /// Alpha coverage: how much of the background shows through a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coverage {
-    /// What the opacity means.
+    /// The meaning of the opacity.
     pub mode: AlphaMode,
-    /// Opacity in \[0, 1\]; multiplied by the texture's alpha and by the vertices'.
+    /// The opacity in \[0, 1\], multiplied by the alpha of the texture and of the vertices.
     pub opacity: f32,
-    /// A texture whose alpha counts.
+    /// A texture whose alpha multiplies the opacity.
     pub texture: Option<TextureRef>,
 }
 
-/// What the opacity of a surface means.
+/// The meaning of a surface's opacity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum AlphaMode {
-    /// Nothing: the surface is opaque.
+    /// Ignored: the surface is opaque.
     #[default]
     Opaque,
-    /// The surface is there where opacity reaches the cutoff.
+    /// The surface exists where the opacity reaches the cutoff.
     Mask {
         /// The cutoff, ≥ 0.
         cutoff: f32,
     },
-    /// The share of the surface in what is seen.
+    /// The opacity blends the surface with what is behind it.
     Blend,
 }
 
@@ -51,21 +51,21 @@ impl Coverage {
     }
 }
 
-/// Light that a surface sends out.
+/// Light that a surface emits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Emission {
-    /// Radiance ≥ 0, the strength of `KHR_materials_emissive_strength` included.
+    /// The radiance ≥ 0, including the strength of `KHR_materials_emissive_strength`.
     pub radiance: Rgb,
     /// A color texture.
     pub texture: Option<TextureRef>,
 }
 
-/// A number with a linear texture that holds it in one of its channels.
+/// A number with a linear texture that multiplies it by one of its channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factor {
     /// The number.
     pub value: f32,
-    /// The texture; which channel counts is the parameter's to say.
+    /// The texture; the parameter defines the channel.
     pub texture: Option<TextureRef>,
 }
 
@@ -84,7 +84,7 @@ pub struct NormalMap {
     /// A linear texture: red along the tangent, green along the bitangent, blue along the normal,
     /// each from −1 at 0 to 1 at 1.
     pub texture: TextureRef,
-    /// Factor on the first two.
+    /// A factor on the first two components.
     pub scale: f32,
 }
 
@@ -124,23 +124,23 @@ impl ColorFactor {
     }
 }
 
-/// What lies on, in and behind the metallic-roughness layer; nothing by default.
+/// The layers on, in and behind the metallic-roughness layer; none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Layers {
     /// The index of refraction ≥ 1, or 0 for a reflectance of 1; `None`: 1.5
     /// (`KHR_materials_ior`).
     pub ior: Option<f32>,
-    /// The strength and color of the dielectric's reflection.
+    /// The strength and color of the dielectric reflection.
     pub specular: Option<Specular>,
-    /// A clear varnish.
+    /// A clear coat.
     pub clearcoat: Option<Clearcoat>,
-    /// Fibers that glow at grazing angles.
+    /// Fibers that brighten the surface at grazing angles.
     pub sheen: Option<Sheen>,
-    /// A highlight that is longer in one direction.
+    /// A highlight stretched in one direction.
     pub anisotropy: Option<Anisotropy>,
-    /// Light that goes through the surface.
+    /// Light that passes through the surface.
     pub transmission: Option<Factor>,
-    /// What lies behind a surface that transmits.
+    /// The volume behind a transmissive surface.
     pub volume: Option<Volume>,
 }
 
@@ -160,7 +160,7 @@ pub struct Clearcoat {
     pub strength: Factor,
     /// Perceptual roughness in \[0, 1\]; the texture's green channel.
     pub roughness: Factor,
-    /// The coat's own relief.
+    /// The coat's own normal map.
     pub normal_map: Option<NormalMap>,
 }
 
@@ -178,7 +178,7 @@ pub struct Sheen {
 pub struct Anisotropy {
     /// Strength in \[0, 1\]; the texture's blue channel.
     pub strength: f32,
-    /// The longer direction, counter-clockwise from the tangent \[rad\].
+    /// The direction of the stretch, counterclockwise from the tangent \[rad\].
     pub rotation: f32,
     /// A linear texture: a direction in red and green from −1 at 0 to 1 at 1, and the strength.
     pub texture: Option<TextureRef>,
@@ -189,7 +189,7 @@ pub struct Anisotropy {
 pub struct Volume {
     /// Thickness ≥ 0 in the mesh's units, 0 for a thin wall; the texture's green channel.
     pub thickness: Factor,
-    /// The distance at which white light has the attenuation's color, in world units; may be infinite.
+    /// The distance after which white light has the attenuation color, in world units; may be infinite.
     pub attenuation_distance: f32,
     /// The color at that distance, in \[0, 1\].
     pub attenuation_color: Rgb,
@@ -246,7 +246,7 @@ impl Volume {
 }
 
 impl Layers {
-    /// The reflectance of the dielectric at normal incidence, in \[0, 1\]: by the refractive index, which is 1.5 unless set.
+    /// The reflectance of the dielectric at normal incidence, in \[0, 1\], from the refractive index (1.5 by default).
     #[inline]
     pub fn dielectric_f0(&self) -> f32 {
         self.ior.map_or(0.04, |ior| sqr((ior - 1.0) / (ior + 1.0)))

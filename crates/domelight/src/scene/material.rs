@@ -1,7 +1,7 @@
-//! What a mesh is made of, before textures are looked up.
+//! Materials: reflectance models with parameters and textures.
 //!
-//! A [`Material`] becomes a [`Bsdf`], a sum of reflectance lobes, at each hit:
-//! textures are looked up there and vertex colors multiplied in.
+//! At each hit, a [`Material`] becomes a [`Bsdf`], a sum of reflectance lobes: textures are looked up
+//! and multiplied by vertex colors.
 
 use super::layers::{Channel, Coverage, Emission, Layers, NormalMap};
 use super::texture::{Texture, TextureRef, Uvs};
@@ -9,39 +9,40 @@ use crate::Rgb;
 use crate::bsdf::{Bsdf, Fresnel, Lambert, MetallicRoughness, Phong};
 use crate::math::Vec3;
 
-/// What surfaces reflect that show nothing but shadows; shadows do not depend on it.
+/// The reflectance of shadow catchers, on which shadows do not depend.
 pub(crate) const CATCHER_REFLECTANCE: f32 = 0.5;
 
-/// What a part of a scene is made of.
+/// The material of a part of a scene.
 #[derive(Clone, Debug)]
 pub struct Material {
-    /// Its name in the file, for messages.
+    /// The name in the file, for messages.
     pub name: String,
-    /// Its reflectance model.
+    /// The reflectance model.
     pub model: MaterialModel,
-    /// Its fine relief.
+    /// The normal map.
     pub normal_map: Option<NormalMap>,
-    /// How much of the background shows through it.
+    /// How much of the background shows through.
     pub coverage: Coverage,
-    /// Whether it is seen from behind, too. Its shadow falls from either side.
+    /// Whether the surface is also visible from behind. It casts a shadow from either side.
     pub double_sided: bool,
-    /// Light of its own, which the camera sees and which lights nothing else.
+    /// Emitted light, which the camera sees and which lights nothing else.
     pub emission: Option<Emission>,
-    /// Whether its color is shown as it is, whatever the light (`KHR_materials_unlit`).
+    /// Whether the color is shown unchanged, regardless of the light (`KHR_materials_unlit`).
     pub unlit: bool,
-    /// Whether it shows nothing but the shadows on it, whatever its model: the background is seen instead, darkened as a
-    /// diffuse surface would be. It casts no shadow. Such surfaces are flat, and all of a scene face the same way.
+    /// Whether the surface is a shadow catcher, which shows only the shadows on it, regardless of its model: the
+    /// background is seen instead, darkened as a diffuse surface would be. It casts no shadow. Shadow catchers are
+    /// flat, and all of them in a scene face the same way.
     pub catches_shadows: bool,
-    /// What glTF's extensions add.
+    /// The layers that glTF's extensions add.
     pub layers: Layers,
 }
 
 /// The reflectance model of a material, with its parameters.
 #[derive(Clone, Debug)]
 pub enum MaterialModel {
-    /// The same BSDF everywhere; vertex colors do not touch it.
+    /// The same BSDF everywhere, independent of vertex colors.
     Fixed(Bsdf),
-    /// Lambert, with a Phong highlight where `specular` is not black.
+    /// Lambert, with a Phong highlight unless `specular` is black.
     Phong(PhongMaterial),
     /// The metallic-roughness model of glTF.
     MetallicRoughness(MetallicRoughnessMaterial),
@@ -52,11 +53,11 @@ pub enum MaterialModel {
 /// Parameters of [`MaterialModel::Phong`], as in a Wavefront MTL file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhongMaterial {
-    /// Diffuse albedo k_d in \[0, 1\]; multiplied by the texture and the vertex color.
+    /// Diffuse albedo k_d in \[0, 1\], multiplied by the texture and the vertex color.
     pub diffuse: Rgb,
-    /// A color texture, a factor on `diffuse`.
+    /// A color texture, multiplied by `diffuse`.
     pub diffuse_texture: Option<TextureRef>,
-    /// Specular albedo k_s; cut to 1 − diffuse, so that no energy is made.
+    /// Specular albedo k_s, clamped to 1 − diffuse to conserve energy.
     pub specular: Rgb,
     /// Exponent of the highlight, ≥ 0.
     pub exponent: f32,
@@ -65,35 +66,35 @@ pub struct PhongMaterial {
 /// Parameters of [`MaterialModel::MetallicRoughness`], as in glTF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetallicRoughnessMaterial {
-    /// Base color in \[0, 1\]; multiplied by the texture and the vertex color.
+    /// Base color in \[0, 1\], multiplied by the texture and the vertex color.
     pub base_color: Rgb,
-    /// A color texture, a factor on `base_color`.
+    /// A color texture, multiplied by `base_color`.
     pub base_color_texture: Option<TextureRef>,
     /// Metalness in \[0, 1\].
     pub metallic: f32,
     /// Perceptual roughness in \[0, 1\], the square root of GGX's α.
     pub roughness: f32,
-    /// A linear texture: its green channel is a factor on `roughness`, its blue one on `metallic`.
+    /// A linear texture: its green channel multiplies `roughness`, its blue channel `metallic`.
     pub metallic_roughness_texture: Option<TextureRef>,
 }
 
 /// Parameters of [`MaterialModel::SpecularGlossiness`], as in glTF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpecularGlossinessMaterial {
-    /// Diffuse color in \[0, 1\]; multiplied by the texture and the vertex color.
+    /// Diffuse color in \[0, 1\], multiplied by the texture and the vertex color.
     pub diffuse: Rgb,
-    /// A color texture, a factor on `diffuse`.
+    /// A color texture, multiplied by `diffuse`.
     pub diffuse_texture: Option<TextureRef>,
     /// Reflectance at normal incidence in \[0, 1\].
     pub specular: Rgb,
     /// Glossiness in \[0, 1\], 1 − perceptual roughness.
     pub glossiness: f32,
-    /// A texture: its color is a factor on `specular`, its alpha on `glossiness`.
+    /// A texture: its color multiplies `specular`, its alpha `glossiness`.
     pub specular_glossiness_texture: Option<TextureRef>,
 }
 
 impl Material {
-    /// An opaque, two-sided surface.
+    /// Creates an opaque, two-sided material.
     pub fn new(name: impl Into<String>, model: MaterialModel) -> Self {
         Self {
             name: name.into(),
@@ -108,17 +109,17 @@ impl Material {
         }
     }
 
-    /// A diffuse material of one color.
+    /// Creates a diffuse material with one color.
     pub fn diffuse(name: impl Into<String>, albedo: Rgb) -> Self {
         Self::new(name, MaterialModel::diffuse(albedo))
     }
 
-    /// A material with the same BSDF everywhere.
+    /// Creates a material with the same BSDF everywhere.
     pub fn fixed(name: impl Into<String>, bsdf: Bsdf) -> Self {
         Self::new(name, MaterialModel::Fixed(bsdf))
     }
 
-    /// What of this surface a picture only approximates, in glTF's terms.
+    /// The features of this surface that a picture only approximates, in glTF terms.
     pub fn approximated_features(&self) -> impl Iterator<Item = &'static str> {
         let Layers { transmission, volume, .. } = &self.layers;
         let transmits = self.transmits();
@@ -130,7 +131,7 @@ impl Material {
         .filter_map(|(is_used, feature)| is_used.then_some(feature))
     }
 
-    /// Whether light passes through it where it is there.
+    /// Whether the surface transmits light.
     #[inline]
     pub(crate) fn transmits(&self) -> bool {
         self.layers.transmission.is_some()
@@ -170,7 +171,7 @@ impl Material {
         base * body * share
     }
 
-    /// The textures that it refers to.
+    /// The textures that the material refers to.
     pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
         self.shading_textures()
             .chain(&self.coverage.texture)
@@ -194,7 +195,7 @@ impl Material {
         of_model.chain(self.normal_map.as_ref().map(|n| &n.texture)).chain(self.layers.textures())
     }
 
-    /// Whether it matters which way the tangent points.
+    /// Whether the direction of the tangent matters.
     #[inline]
     pub(crate) fn needs_tangent(&self) -> bool {
         let fixed = match &self.model {
@@ -207,7 +208,7 @@ impl Material {
         fixed || self.normal_map.is_some() || self.layers.anisotropy.is_some() || coat_relief
     }
 
-    /// Which set of texture coordinates tangents follow: 0 or 1.
+    /// The set of texture coordinates for tangents: 0 or 1.
     #[inline]
     pub(crate) fn tangent_set(&self) -> usize {
         let Layers { anisotropy, clearcoat, .. } = &self.layers;
@@ -320,7 +321,7 @@ impl Material {
 }
 
 impl MaterialModel {
-    /// Lambert of one color.
+    /// Creates a Lambertian model with one color.
     pub fn diffuse(albedo: Rgb) -> Self {
         Self::Phong(PhongMaterial {
             diffuse: albedo,
@@ -339,7 +340,7 @@ impl TextureRef {
         textures[self.texture].sample_by(uv, self.wrap, self.filter)
     }
 
-    /// The alpha there; 1 if the texture has none.
+    /// The alpha at these coordinates; 1 if the texture has none.
     #[inline]
     pub(crate) fn alpha_at(&self, textures: &[Texture], uvs: &Uvs) -> f32 {
         let uv = self.transform.apply(uvs[self.uv_set]);

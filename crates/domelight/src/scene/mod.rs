@@ -1,8 +1,7 @@
-//! Scenes: meshes, what they are made of, and the camera; built in code or loaded from files.
+//! Scenes: meshes, materials and cameras, built in code or loaded from files.
 //!
-//! A loader or a built-in scene gives a [`SceneDescription`]; [`Scene::new`] checks it and builds
-//! the ray-tracing hierarchy; after that nothing fails. [`Scene::shading_point`] turns a hit into
-//! all that shading needs.
+//! A loader or a built-in scene returns a [`SceneDescription`]. [`Scene::new`] checks it and builds
+//! the BVH; after that nothing fails. [`Scene::shading_point`] turns a hit into a shading point.
 
 pub mod builtin;
 mod camera;
@@ -46,106 +45,106 @@ use crate::bvh::{Bvh, BvhError, InstructionSet};
 use crate::geometry::{Aabb, Mesh, MeshError};
 use coverage::Partial;
 
-/// A scene ready for rays.
+/// A scene ready for ray tracing.
 #[derive(Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a property of its own")]
 pub struct Scene {
     parts: Vec<Part>,
     materials: Vec<Material>,
     textures: Vec<Texture>,
-    /// The first triangle of each part in the hierarchy.
+    /// The first triangle of each part in the BVH.
     first_triangle: Vec<u32>,
-    /// The hierarchy of the opaque parts, which come first.
+    /// The BVH over the opaque parts, which come first.
     bvh: Bvh,
     /// The parts that are not opaque, if there are any.
     partial: Option<Partial>,
-    /// Some part is not seen from behind.
+    /// Whether some part is invisible from behind.
     has_single_sided: bool,
-    /// Some part sends out light.
+    /// Whether some part emits light.
     emits: bool,
-    /// Light passes through some part.
+    /// Whether some part transmits light.
     transmits: bool,
-    /// Some part that does not hide all behind it dims light.
+    /// Whether some part with partial coverage dims light.
     dims_light: bool,
-    /// Some part shows nothing but shadows.
+    /// Whether some part is a shadow catcher.
     catches_shadows: bool,
     /// In units of the description.
     bounds: Aabb,
-    /// The bounds of what is not scenery, in units of the description.
+    /// The bounds of the subject, in units of the description.
     subject_bounds: Aabb,
-    /// Of each part, whether it is no scenery.
+    /// Whether each part belongs to the subject.
     is_subject: Vec<bool>,
-    /// From where a framed camera looks.
+    /// The direction of a framed camera.
     view: Option<ViewDirection>,
-    /// The length of one unit of the hierarchy and the parts, in units of the description; a power of two.
+    /// The length of one unit of the BVH and the parts, in units of the description; a power of two.
     unit: f32,
     /// The camera and the up axis of the file, if it has them.
     camera: Option<CameraSettings>,
     up: UpAxis,
 }
 
-/// A description that makes no scene.
+/// An invalid scene description.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
-    /// A mesh that cannot be used.
+    /// An invalid mesh.
     #[error("mesh {part}: {source}")]
     Mesh {
         /// The part's name.
         part: String,
-        /// What is wrong with it.
+        /// The error in the mesh.
         source: MeshError,
     },
-    /// A part of a surface that does not exist.
-    #[error("mesh {part} is made of surface {material}, but there are only {materials}")]
+    /// A part with a material that does not exist.
+    #[error("mesh {part} uses material {material}, but there are only {materials}")]
     NoSurface {
         /// The part's name.
         part: String,
-        /// The surface's index.
+        /// The index of the material.
         material: usize,
-        /// How many there are.
+        /// The number available.
         materials: usize,
     },
-    /// A surface with a texture that does not exist.
-    #[error("surface {material} refers to texture {texture}, but there are only {textures}")]
+    /// A material with a texture that does not exist.
+    #[error("material {material} refers to texture {texture}, but there are only {textures}")]
     NoTexture {
-        /// The surface's name.
+        /// The name of the material.
         material: String,
-        /// The texture's index.
+        /// The index of the texture.
         texture: usize,
-        /// How many there are.
+        /// The number available.
         textures: usize,
     },
-    /// More vertices than indices can name.
+    /// More vertices than an index can address.
     #[error("the scene has {vertices} vertices; at most {} fit", u32::MAX)]
     TooManyVertices {
-        /// How many there are.
+        /// The number available.
         vertices: usize,
     },
-    /// Lengths whose squares leave the range of numbers, or a scene that is a speck at its distance from the origin.
+    /// Lengths whose squares overflow or underflow, or a scene that is tiny relative to its distance from the origin.
     #[error(
         "the scene is {size:e} across, {farthest:e} at its farthest; scale it to a size from 1e-18 to 1e18 and move it \
          nearer to the origin than some 1e10 times its size"
     )]
     Size {
-        /// The longest edge of the bounds of what is not scenery.
+        /// The longest edge of the subject's bounds.
         size: f32,
-        /// The greatest coordinate.
+        /// The largest coordinate.
         farthest: f32,
     },
-    /// The hierarchy cannot be built.
+    /// The BVH cannot be built.
     #[error(transparent)]
     Bvh(#[from] BvhError),
 }
 
 impl Scene {
-    /// Checks every mesh and reference, and builds a hierarchy over the parts that hide all behind them and one over
-    /// those that may not; the former are moved before the latter.
+    /// Checks every mesh and reference, and builds one BVH over the opaque parts and one over the others. The opaque
+    /// parts are moved before the others.
     ///
-    /// Scenes that are very small or very large are traced at a usual size, which changes no picture: their
-    /// [`Scene::unit`] is not 1. Bounds, cameras and depths are in the units of the description all the same.
+    /// Scenes that are very small or very large are traced at a moderate size, which does not change pictures; their
+    /// [`Scene::unit`] is not 1. Bounds, cameras and depths are still in the units of the description.
     ///
     /// # Errors
-    /// The first [`SceneError`] found. A scene without triangles is not an error: nothing is hit.
+    /// The first [`SceneError`] found. A scene without triangles is valid: nothing is hit.
     pub fn new(description: SceneDescription) -> Result<Self, SceneError> {
         check(&description)?;
         let subject_bounds = description.subject_bounds();
@@ -199,7 +198,8 @@ impl Scene {
         })
     }
 
-    /// The same scene, traced with another instruction set; `None` if this processor lacks it. Pictures are the same.
+    /// The same scene traced with another instruction set; `None` if this processor lacks it. The pictures are the
+    /// same.
     #[must_use]
     pub fn with_instruction_set(mut self, instruction_set: InstructionSet) -> Option<Self> {
         self.bvh = self.bvh.with_instruction_set(instruction_set)?;
@@ -211,7 +211,7 @@ impl Scene {
         Self::new(scene.description()).unwrap_or_else(|_| unreachable!("built-in scenes are valid"))
     }
 
-    /// A single mesh of one material.
+    /// Creates a scene from a single mesh with one BSDF.
     ///
     /// # Errors
     /// If the mesh is invalid.
@@ -224,14 +224,14 @@ impl Scene {
         })
     }
 
-    /// The camera of the file, or else one that frames what is not scenery in a picture of
+    /// The camera of the file, or else one that frames the subject in a picture with
     /// `aspect` = width / height.
     pub fn camera(&self, aspect: f32) -> CameraSettings {
         let framed = || self.framed(&Framing::new(aspect, self.up.vector()));
         self.camera.unwrap_or_else(framed)
     }
 
-    /// A camera that frames what is not scenery, whatever camera the file has; in units of the description.
+    /// A camera that frames the subject, regardless of the file's camera, in units of the description.
     pub fn framed(&self, framing: &Framing) -> CameraSettings {
         let parts = self.parts.iter().zip(&self.is_subject);
         let subject = parts.filter(|(_, is_subject)| **is_subject);
@@ -244,43 +244,42 @@ impl Scene {
         camera
     }
 
-    /// The length of one unit of the hierarchy, of [`Scene::parts`] and of shading points, in units of the description: a
-    /// power of two, and 1 for scenes from 1/16 to 65536. Rays to the hierarchy, to [`Scene::sight`] and
-    /// [`Scene::camera_hit`] have its units; [`Scene::camera_inside`] gives a camera whose rays do.
+    /// The length of one unit of the BVH, of [`Scene::parts`] and of shading points, in units of the description: a
+    /// power of two, and 1 for scenes from 1/16 to 65536. Rays for the BVH, for [`Scene::sight`] and for
+    /// [`Scene::camera_hit`] are in its units; [`Scene::camera_inside`] returns a camera whose rays are.
     pub fn unit(&self) -> f32 {
         self.unit
     }
 
-    /// A camera, which is in the units of the description, in those of the hierarchy; see [`Scene::unit`]. Renders do this
-    /// by themselves.
+    /// Converts a camera from the units of the description to those of the BVH; see [`Scene::unit`]. Renders do this
+    /// automatically.
     #[must_use]
     pub fn camera_inside(&self, camera: &Camera) -> Camera {
         camera.scaled(1.0 / self.unit)
     }
 
-    /// The longest extent, in units of the hierarchy.
+    /// The longest extent, in units of the BVH.
     pub(crate) fn extent(&self) -> f32 {
         self.bounds.size().max_element() / self.unit
     }
 
-    /// The least box around all vertices; empty without any.
+    /// The bounding box of all vertices; empty without vertices.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// The least box around what is not scenery; around everything if there is nothing else.
+    /// The bounding box of the subject, or of everything if there is only scenery.
     pub fn subject_bounds(&self) -> Aabb {
         self.subject_bounds
     }
 
-    /// The axis that points up; +Y if the file does not say.
+    /// The up axis; +Y if the file does not specify it.
     pub fn up_axis(&self) -> UpAxis {
         self.up
     }
 
-    /// The ray-tracing hierarchy over all triangles that hide what is behind them: all but those whose material has a
-    /// [`Coverage`] that is not whole everywhere. [`Scene::sight`] and [`Scene::transmittances`] know both. Its unit of
-    /// length is [`Scene::unit`].
+    /// The BVH over all opaque triangles, which excludes those whose material has a partial [`Coverage`] anywhere.
+    /// [`Scene::sight`] and [`Scene::transmittances`] account for both. Its unit of length is [`Scene::unit`].
     pub fn bvh(&self) -> &Bvh {
         &self.bvh
     }
@@ -290,17 +289,17 @@ impl Scene {
         &self.parts
     }
 
-    /// What they are made of.
+    /// The materials of the parts.
     pub fn materials(&self) -> &[Material] {
         &self.materials
     }
 
-    /// The number of triangles of all meshes.
+    /// The total number of triangles.
     pub fn triangle_count(&self) -> usize {
         self.parts.iter().map(|p| p.mesh.triangles.len()).sum()
     }
 
-    /// The part that a triangle of the hierarchy belongs to, and the triangle's index in its mesh.
+    /// The part of a triangle of the BVH, and the triangle's index in its mesh.
     #[inline]
     pub(crate) fn locate(&self, triangle: u32) -> (&Part, usize) {
         let part = self.first_triangle.partition_point(|&first| first <= triangle) - 1;
@@ -308,12 +307,12 @@ impl Scene {
     }
 }
 
-/// Refuses what is so small or so large, or once scaled so small, that rays would hit the surface that they leave.
+/// Rejects scenes so small or so large, or so small after scaling, that rays would hit the surface where they start.
 fn check_size(bounds: &Aabb, subject: &Aabb, scale: f32) -> Result<(), SceneError> {
     let size = subject.size().max_element();
     let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
     let scaled = bounds.size().max_element() * scale;
-    // What has no size is not seen. Squares of the subject's lengths must be finite.
+    // A scene without size is invisible. Squares of the subject's lengths must be finite.
     let is_squarable = size == 0.0 || (1e-18..=1e18).contains(&size);
     let is_empty = bounds.is_empty() || scaled == 0.0;
     let usable = is_empty || is_squarable && farthest.is_finite() && scaled >= 1e-6;
@@ -338,7 +337,7 @@ fn check(description: &SceneDescription) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// The hierarchy over the parts one after the other.
+/// Builds the BVH over consecutive parts.
 fn build(parts: &[Part]) -> Result<Bvh, SceneError> {
     let vertices: usize = parts.iter().map(|p| p.mesh.positions.len()).sum();
     if vertices > u32::MAX as usize {

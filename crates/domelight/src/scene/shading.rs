@@ -1,17 +1,17 @@
-//! From a hit to what shading needs: position, normals, frame and BSDF.
+//! Turns a hit into a shading point: position, normals, frame and BSDF.
 //!
-//! Surfaces are shaded from either side: both normals are turned to the viewer's side. The position comes from
-//! the barycentric coordinates, whose error is that of the vertices, rather than from
-//! origin + t · direction, whose error grows with the distance.
+//! Surfaces are shaded from either side: both normals are flipped to the viewer's side. The position is computed from
+//! the barycentric coordinates, with the error of the vertices, rather than from origin + t · direction, whose error
+//! grows with the distance.
 //!
 //! An interpolated or mapped normal may face away from the viewer although the surface does not.
 //! Such a normal is **bent toward the viewer** until `wo` lies just above the shading horizon:
-//! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Black pixels
-//! along silhouettes would be the alternative.
+//! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Otherwise there
+//! would be black pixels along silhouettes.
 //!
-//! A smooth surface is shaded as such also where its triangles are coarse: shadow rays start where it would be, above the
-//! triangle, and reach as far down as it would let them. Otherwise triangles shade one another near the terminator, in
-//! stair-steps. (Hanika 2021, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4.)
+//! A smooth surface with coarse triangles is shaded as smooth: shadow rays start where the smooth surface would be,
+//! above the triangle, and may point as far down as it allows. Otherwise triangles shadow one another near the
+//! terminator, in stair-steps. (Hanika 2021, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4.)
 
 use super::{Layers, Material, NormalMap, Part, Scene};
 use crate::Rgb;
@@ -20,17 +20,17 @@ use crate::math::{Frame, Vec2, Vec3, Vec4};
 use crate::scene::texture::Uvs;
 use crate::strategy::ShadingPoint;
 
-/// The least cosine between the shading normal and the direction to the viewer.
+/// The minimum cosine between the shading normal and the direction to the viewer.
 const MIN_COS_THETA_O: f32 = 1e-3;
 
 /// Vertex normals within this cosine of the geometric one belong to a flat triangle: 0.1°, far more than rounding.
 const COS_FLAT: f32 = 0.999_998;
 
-/// Vertex normals beyond this cosine say nothing of a smooth surface over the triangle: 60°.
+/// Vertex normals beyond this cosine do not describe a smooth surface over the triangle: 60°.
 const COS_ROUGH: f32 = 0.5;
 
 impl Scene {
-    /// All that shading needs of a hit that [`Scene::bvh`] reported for `ray`.
+    /// The shading point of a hit that [`Scene::bvh`] reported for `ray`.
     ///
     /// # Panics
     /// If `hit.triangle` is not one of this scene's.
@@ -40,7 +40,7 @@ impl Scene {
         point
     }
 
-    /// Sets `point` to [`Scene::shading_point`]: a point is large, and need not be copied.
+    /// Sets `point` to [`Scene::shading_point`] in place, because a point is large.
     #[inline]
     pub(crate) fn shade(&self, ray: &Ray, hit: &Hit, point: &mut ShadingPoint) {
         let (part, triangle) = self.locate(hit.triangle);
@@ -85,7 +85,7 @@ impl Scene {
         (point.frame, point.wo) = (frame, wo);
     }
 
-    /// The material of a hit, if its BSDF is the same all over.
+    /// The material of a hit, if its BSDF is the same everywhere.
     #[inline]
     pub(crate) fn constant_material(&self, hit: &Hit) -> Option<usize> {
         let (part, _) = self.locate(hit.triangle);
@@ -136,12 +136,12 @@ impl Scene {
     }
 }
 
-/// What maps say of a surface at a point, on its front side. Which side the viewer is on follows from the interpolated
-/// normal, for relief may tip others over.
+/// The normals and tangent from maps at a point, on the front side of the surface. The interpolated normal determines the
+/// viewer's side, because a normal map may tilt others over.
 struct Relief {
     /// The interpolated normal with the normal map applied.
     normal: Vec3,
-    /// The same of a clear coat.
+    /// The same for a clear coat.
     coat_normal: Vec3,
     /// The x axis of anisotropic lobes, of any length.
     tangent: Option<Vec3>,
@@ -183,7 +183,7 @@ impl Corners {
         self.indices.map(|i| attribute[i])
     }
 
-    /// An attribute interpolated; `None` if the mesh lacks it.
+    /// An interpolated attribute; `None` if the mesh lacks it.
     #[inline]
     pub(super) fn mix<T>(&self, attribute: &[T]) -> Option<T>
     where
@@ -197,9 +197,9 @@ impl Corners {
         Some(a * wa + b * wb + c * wc)
     }
 
-    /// The way from `position` on the triangle up to the smooth surface that the vertex normals describe, each of them times
-    /// `side`, if that bulges to the side of the geometric normal `ng`: Σ bᵢ max(0, (pᵢ − p) · nᵢ) nᵢ, of which each term
-    /// leads to the tangent plane of a vertex. `None` for flat triangles and hollows.
+    /// The offset from `position` on the triangle up to the smooth surface that the vertex normals, times `side`,
+    /// describe, if that surface bulges to the side of the geometric normal `ng`: Σ bᵢ max(0, (pᵢ − p) · nᵢ) nᵢ,
+    /// where each term leads to the tangent plane of a vertex. `None` for flat triangles and hollows.
     #[inline]
     fn rise(&self, mesh: &Mesh, position: Vec3, ng: Vec3, side: f32) -> Option<Vec3> {
         if mesh.normals.is_empty() {
@@ -219,7 +219,7 @@ impl Corners {
         (rise != Vec3::ZERO).then_some(rise)
     }
 
-    /// The texture coordinates; 0 of a set that the mesh lacks.
+    /// The texture coordinates; 0 for a set that the mesh lacks.
     #[inline]
     pub(super) fn uvs(&self, mesh: &Mesh) -> Uvs {
         [&mesh.uvs, &mesh.uvs2].map(|set| self.mix(set).unwrap_or_default())

@@ -1,4 +1,4 @@
-//! The subject of a scene: its bounds, its scale, another BSDF, the ground under it.
+//! The subject of a scene: its bounds, its scale, its BSDF, and the ground under it.
 
 use super::builtin::shapes;
 use super::material::CATCHER_REFLECTANCE;
@@ -8,7 +8,7 @@ use crate::bsdf::Bsdf;
 use crate::geometry::{Aabb, Mesh, power_of_two};
 use crate::math::{Frame, Mat4, Vec3};
 
-/// Sizes of scenes that are traced as they are: from the one, and no coordinate beyond the other.
+/// The range of scenes that are traced unscaled: the minimum size, and the maximum coordinate.
 const USUAL: [f32; 2] = [1.0 / 16.0, 65536.0];
 
 /// The radii between which a plate fades to nothing, in half-extents of the subject.
@@ -18,14 +18,14 @@ const PLATE_RADII: [f32; 2] = [3.0, 8.0];
 const CATCHER_RADII: [f32; 2] = [12.0, 32.0];
 
 impl SceneDescription {
-    /// The least box around the parts that are not scenery; around all if there is nothing else.
+    /// The bounding box of the parts that are not scenery, or of all parts if there are no others.
     pub fn subject_bounds(&self) -> Aabb {
         let subject =
             self.parts.iter().zip(self.is_subject()).filter(|(_, is_subject)| *is_subject);
         subject.fold(Aabb::EMPTY, |b, (p, _)| b.union(p.mesh.bounds()))
     }
 
-    /// Of each part, whether it is no scenery; all are the subject if there is nothing else.
+    /// Whether each part belongs to the subject: it is not scenery, or there is nothing else.
     pub(super) fn is_subject(&self) -> Vec<bool> {
         let is_scenery = |i: usize| self.scenery.contains(&i);
         let part = |i: usize| !is_scenery(i) && !self.parts[i].mesh.positions.is_empty();
@@ -33,7 +33,7 @@ impl SceneDescription {
         (0..self.parts.len()).map(|i| all || !is_scenery(i)).collect()
     }
 
-    /// A camera that frames what is not scenery, whatever camera the scene has.
+    /// A camera that frames the subject, regardless of the scene's camera.
     pub fn framed(&self, framing: &Framing) -> CameraSettings {
         let is_subject = self.is_subject();
         let subject = self.parts.iter().zip(&is_subject).filter(|(_, is_subject)| **is_subject);
@@ -41,12 +41,13 @@ impl SceneDescription {
         framing.fit(subject.flat_map(|(part, _)| part.mesh.positions.iter().copied()))
     }
 
-    /// Scales scenes that are very small or very large to a usual size, with `view` and the scene's own camera; returns
-    /// the factor, a power of two, which is 1 for scenes from 1/16 to 65536. The picture stays the same, for the light is
-    /// infinitely far; the distance that rays keep from surfaces is made for usual sizes.
+    /// Scales a very small or very large scene to a moderate size, together with `view` and the scene's own camera.
+    /// Returns the factor, a power of two, which is 1 for scenes from 1/16 to 65536. The picture stays the same,
+    /// because the light is infinitely far away. The distance that rays keep from surfaces is chosen for moderate
+    /// sizes.
     ///
-    /// [`Scene::new`](super::Scene::new) scales the meshes of other scenes by itself, and takes a camera in the units of
-    /// the description.
+    /// [`Scene::new`](super::Scene::new) scales the meshes of other scenes automatically, and takes a camera in the
+    /// units of the description.
     pub fn rescale(&mut self, view: &mut CameraSettings) -> f32 {
         let factor = self.usual_scale();
         if factor != 1.0 {
@@ -56,7 +57,7 @@ impl SceneDescription {
         factor
     }
 
-    /// The factor, a power of two, that makes a usual size of the scene's; 1 for what has one.
+    /// The factor, a power of two, that scales a scene to a moderate size; 1 if it has one.
     pub(super) fn usual_scale(&self) -> f32 {
         let bounds = self.bounds();
         let size = bounds.size().max_element();
@@ -69,13 +70,13 @@ impl SceneDescription {
         if size >= USUAL[0] {
             return 1.0 / unit;
         }
-        // What is far from the origin cannot grow.
+        // A scene far from the origin cannot be enlarged.
         let least = 2.0 * power_of_two(farthest) / USUAL[1];
         1.0 / (unit * (0.5 * power_of_two(size)).max(least).min(1.0))
     }
 
     /// Moves the center of the subject's bounds to the origin and scales its longest half-extent
-    /// to 1; everything else moves along.
+    /// to 1. Everything else is transformed with it.
     pub fn normalize(&mut self) {
         let bounds = self.subject_bounds();
         if !bounds.is_empty() {
@@ -83,7 +84,7 @@ impl SceneDescription {
         }
     }
 
-    /// Gives one BSDF to every part that is not scenery.
+    /// Sets the BSDF of every part that is not scenery.
     pub fn set_subject_material(&mut self, bsdf: Bsdf) {
         let material = self.materials.len();
         self.materials.push(Material::fixed("subject", bsdf));
@@ -103,13 +104,13 @@ impl SceneDescription {
         }
     }
 
-    /// Puts a diffuse plate of reflectance 0.5 under the subject, facing `up`, which fades to nothing toward its rim. It is
-    /// eight times as wide as the subject's longest extent. An empty scene gets none.
+    /// Adds a diffuse plate with reflectance 0.5 under the subject, facing `up`, which fades out toward its rim. It
+    /// is eight times as wide as the subject's longest extent. An empty scene gets none.
     pub fn add_ground(&mut self, up: Vec3) {
         self.add_disc(up, PLATE_RADII, &Material::diffuse("ground", Rgb::splat(0.5)));
     }
 
-    /// Puts ground under the subject, facing `up`, that shows nothing but shadows
+    /// Adds a shadow catcher under the subject, facing `up`
     /// ([`Material::catches_shadows`](super::Material::catches_shadows)). An empty scene gets none.
     pub fn add_shadow_catcher(&mut self, up: Vec3) {
         let ground = Material {
@@ -120,7 +121,7 @@ impl SceneDescription {
         self.add_disc(up, CATCHER_RADII, &ground);
     }
 
-    /// Puts a disk of `material` under the subject that fades between two radii.
+    /// Adds a disk of `material` under the subject that fades between two radii.
     fn add_disc(&mut self, up: Vec3, radii: [f32; 2], material: &Material) {
         const SEGMENTS: u32 = 256;
         const CIRCLES: u32 = 24;
@@ -129,7 +130,7 @@ impl SceneDescription {
             return;
         }
         let half = 0.5 * bounds.size().max_element();
-        // The disk is made about +Y at height 0; the lowest corner says how deep it goes.
+        // Create the disk around +Y at height 0, and move it down to the lowest corner.
         let center = bounds.center();
         let depth = 0.5 * bounds.size().abs().dot(up.abs());
         let frame = Frame::from_z(up);

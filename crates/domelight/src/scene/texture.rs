@@ -1,9 +1,9 @@
 //! Textures: images on surfaces, of reflectance, roughness or normals.
 //!
-//! Texels are kept as the file has them, 8 or 16 bits a channel, and decoded through a table of the
-//! 2⁸ or 2¹⁶ values; alpha has 8 bits, and is kept where a surface needs it. Look-ups are bilinear
-//! between texel centers, or take the nearest one. There are no mip maps: a renderer that takes many samples a pixel averages the
-//! texture by itself, and without ray differentials a mip level would be a guess.
+//! Texels are stored as in the file, with 8 or 16 bits per channel, and decoded through a table of the
+//! 2⁸ or 2¹⁶ values. Alpha has 8 bits and is stored if a material needs it. Look-ups are bilinear or
+//! take the nearest texel. There are no mip maps: many samples per pixel average the texture, and
+//! without ray differentials a mip level would be a guess.
 
 use crate::Rgb;
 use crate::math::{Vec2, functions, vec2};
@@ -11,7 +11,7 @@ use crate::math::{Vec2, functions, vec2};
 /// The mapping from texel values to numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Encoding {
-    /// Color with the transfer curve of IEC 61966-2-1.
+    /// Colors with the transfer curve of IEC 61966-2-1.
     Srgb,
     /// Numbers in \[0, 1\]: roughness, metalness, normals.
     Linear,
@@ -26,7 +26,7 @@ pub struct Texture {
     texels: Texels,
     /// The number for each texel value.
     decode: Vec<f32>,
-    /// 0 to 255 from transparent to opaque; empty: opaque.
+    /// 0 to 255 from transparent to opaque; empty if opaque.
     alpha: Vec<u8>,
 }
 
@@ -36,20 +36,20 @@ enum Texels {
     Bits16(Vec<[u16; 3]>),
 }
 
-/// What becomes of texture coordinates outside \[0, 1\].
+/// The treatment of texture coordinates outside \[0, 1\].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "io", derive(serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum Wrap {
     /// The image is tiled.
     #[default]
     Repeat,
-    /// The border texels go on for ever.
+    /// The border texels extend indefinitely.
     Clamp,
-    /// The image is tiled, every second tile a mirror image.
+    /// The image is tiled, with every second tile mirrored.
     Mirror,
 }
 
-/// What a look-up between texel centers gives.
+/// The filter of texture look-ups.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TextureFilter {
     /// The bilinear mean of the four nearest texels.
@@ -62,7 +62,7 @@ pub enum TextureFilter {
 /// A point's texture coordinates: the first set and the second.
 pub(crate) type Uvs = [Vec2; 2];
 
-/// A texture as one use of it sees it: which one, and where on the mesh.
+/// A reference to a texture: which one, and how it is placed on the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureRef {
     /// Index into the scene's textures.
@@ -79,7 +79,7 @@ pub struct TextureRef {
 }
 
 impl TextureRef {
-    /// The texture as it is, repeated.
+    /// References a texture, repeated and untransformed.
     pub fn new(texture: usize) -> Self {
         Self {
             texture,
@@ -103,7 +103,7 @@ pub struct UvTransform {
 }
 
 impl UvTransform {
-    /// Changes nothing.
+    /// The identity.
     pub const IDENTITY: Self = Self { x: Vec2::X, y: Vec2::Y, offset: Vec2::ZERO };
 
     /// Scale, then rotation \[rad\], then offset, as the glTF extension `KHR_texture_transform`
@@ -113,7 +113,7 @@ impl UvTransform {
         Self { x: scale.x * vec2(cos, -sin), y: scale.y * vec2(sin, cos), offset }
     }
 
-    /// The image's coordinates of the mesh's `uv`.
+    /// Maps the mesh's `uv` to image coordinates.
     #[inline]
     pub fn apply(&self, uv: Vec2) -> Vec2 {
         uv.x * self.x + uv.y * self.y + self.offset
@@ -135,10 +135,10 @@ pub struct TextureError {
 }
 
 impl Texture {
-    /// A texture from 8-bit texels, the first row on top.
+    /// Creates a texture from 8-bit texels, with the first row at the top.
     ///
     /// # Errors
-    /// The number of texels is not width · height, or there are none.
+    /// If the number of texels is not width · height, or is 0.
     pub fn from_rgb8(
         name: impl Into<String>,
         width: u32,
@@ -149,10 +149,10 @@ impl Texture {
         Self::new(name.into(), width, height, Texels::Bits8(texels), encoding)
     }
 
-    /// A texture from 16-bit texels, the first row on top.
+    /// Creates a texture from 16-bit texels, with the first row at the top.
     ///
     /// # Errors
-    /// The number of texels is not width · height, or there are none.
+    /// If the number of texels is not width · height, or is 0.
     pub fn from_rgb16(
         name: impl Into<String>,
         width: u32,
@@ -163,7 +163,7 @@ impl Texture {
         Self::new(name.into(), width, height, Texels::Bits16(texels), encoding)
     }
 
-    /// The texels as they are kept, byte by byte, and everything else in words.
+    /// The stored texels, byte by byte, and everything else as text.
     #[cfg(feature = "io")]
     pub(crate) fn add_to(&self, fingerprinter: &mut crate::fingerprint::Fingerprinter) {
         let Self { name: _, width, height, texels, decode, alpha } = self;
@@ -198,10 +198,10 @@ impl Texture {
         Ok(Self { name, width, height, texels, decode, alpha: Vec::new() })
     }
 
-    /// The same texture with an alpha for each texel.
+    /// Adds one alpha per texel.
     ///
     /// # Errors
-    /// The number of alphas is not that of the texels.
+    /// If the number of alphas differs from the number of texels.
     pub fn with_alpha(self, alpha: Vec<u8>) -> Result<Self, TextureError> {
         let Self { width, height, .. } = self;
         if alpha.len() as u64 != u64::from(width) * u64::from(height) {
@@ -210,12 +210,12 @@ impl Texture {
         Ok(Self { alpha, ..self })
     }
 
-    /// Whether it has an alpha for each texel.
+    /// Whether the texture has alpha.
     pub fn has_alpha(&self) -> bool {
         !self.alpha.is_empty()
     }
 
-    /// Its name, for messages.
+    /// The name, for messages.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -228,7 +228,7 @@ impl Texture {
     /// The texel in column `x` of row `y` from the top, decoded.
     ///
     /// # Panics
-    /// Outside the image.
+    /// If the position is outside the image.
     #[inline]
     pub fn texel(&self, x: u32, y: u32) -> Rgb {
         let i = y as usize * self.width as usize + x as usize;
@@ -239,7 +239,7 @@ impl Texture {
         Rgb::new(self.decode[r], self.decode[g], self.decode[b])
     }
 
-    /// Whether it is, going by its mean, a normal map in the tangents' space: half red, half green, all blue.
+    /// Whether the mean suggests a tangent-space normal map: half red, half green, full blue.
     #[cfg(feature = "io")]
     pub(crate) fn looks_like_normals(&self) -> bool {
         // Enough texels for a mean, in all parts of the image.
@@ -256,8 +256,8 @@ impl Texture {
         half.contains(&mean.r) && half.contains(&mean.g) && mean.b > mean.r.max(mean.g) + 0.15
     }
 
-    /// The bilinear look-up at `uv`, (0, 0) the top left corner of the image and (1, 1) the bottom
-    /// right one; coordinates that are not finite count as 0.
+    /// The bilinear look-up at `uv`, where (0, 0) is the top left corner of the image and (1, 1) the bottom
+    /// right corner. Non-finite coordinates count as 0.
     #[inline]
     pub fn sample(&self, uv: Vec2, wrap: [Wrap; 2]) -> Rgb {
         let (x0, x1, fx) = neighbors(uv.x, self.width, wrap[0]);
@@ -269,7 +269,7 @@ impl Texture {
 }
 
 impl Texture {
-    /// The look-up at `uv` by a filter, otherwise as [`Texture::sample`].
+    /// Like [`Texture::sample`], with a choice of filter.
     #[inline]
     pub fn sample_by(&self, uv: Vec2, wrap: [Wrap; 2], filter: TextureFilter) -> Rgb {
         match filter {
@@ -281,7 +281,7 @@ impl Texture {
         }
     }
 
-    /// The alpha at `uv` in \[0, 1\], looked up as [`Texture::sample_by`]; 1 without any.
+    /// The alpha at `uv` in \[0, 1\], looked up like [`Texture::sample_by`]; 1 if the texture has no alpha.
     #[inline]
     pub fn sample_alpha(&self, uv: Vec2, wrap: [Wrap; 2], filter: TextureFilter) -> f32 {
         if self.alpha.is_empty() {
@@ -336,7 +336,7 @@ fn neighbors(t: f32, n: u32, wrap: Wrap) -> (u32, u32, f32) {
     (wrap_index(i, n, wrap), wrap_index(i + 1, n, wrap), x - floor)
 }
 
-/// The texel index `i` in [-1, n] brought into [0, n).
+/// Wraps the texel index `i` in [-1, n] into [0, n).
 #[inline]
 fn wrap_index(i: i64, n: u32, wrap: Wrap) -> u32 {
     match wrap {

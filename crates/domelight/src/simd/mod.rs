@@ -1,12 +1,12 @@
-//! Vectors of eight numbers, and of sixteen, on each instruction set: the only unsafe code of the library.
+//! Vectors of eight and sixteen numbers for each instruction set, with the only unsafe code of the library.
 //!
 //! A [`Kernel`] is written once over the vectors of a [`Simd`], whose operators are one IEEE
-//! operation a lane; nothing fuses or reorders them, so a kernel gives the same bits on every instruction set.
-//! [`SimdF32x8::mul_sub`] alone may differ. [`dispatch`] compiles it for each and picks at run time, so that a portable
-//! binary traces as fast as one built for the machine. Another instruction set is one more file like
-//! `avx2.rs`, or `neon.rs` of half the width, and one more line in [`InstructionSet`] and [`dispatch`].
+//! operation per lane. Nothing fuses or reorders them, so a kernel gives the same bits on every instruction set; only
+//! [`SimdF32x8::mul_sub`] may differ. [`dispatch`] compiles a kernel for each instruction set and picks one at run
+//! time, so that a portable binary traces as fast as one built for the machine. Another instruction set takes one
+//! file like `avx2.rs`, or like `neon.rs` for half the width, and one line each in [`InstructionSet`] and [`dispatch`].
 //!
-//! Formulas are written over [`SimdFloat`], which is one number or a vector of them.
+//! Formulas are written over [`SimdFloat`], a scalar or a vector.
 #![cfg_attr(not(feature = "render"), allow(dead_code))] // Some of it serves rays alone.
 
 #[cfg(target_arch = "x86_64")]
@@ -34,12 +34,12 @@ pub(crate) const LANES: usize = 8;
 /// One number a lane.
 pub(crate) type Lanes = [f32; LANES];
 
-/// The instructions that trace rays and weigh light.
+/// An instruction set for tracing rays and evaluating light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
-    /// One number at a time; the reference, on every processor.
+    /// Scalar code, the reference, available on every processor.
     Scalar,
-    /// WebAssembly SIMD: four numbers at a time, in modules that were compiled for it.
+    /// WebAssembly SIMD: four numbers at a time, in modules compiled for it.
     Simd128,
     /// AArch64 NEON: four numbers at a time.
     Neon,
@@ -50,7 +50,7 @@ pub enum InstructionSet {
 }
 
 impl InstructionSet {
-    /// All that this version knows, the fastest last.
+    /// All instruction sets that this version supports, the fastest last.
     pub const ALL: [Self; 5] = [Self::Scalar, Self::Simd128, Self::Neon, Self::Avx2, Self::Avx512];
 
     /// Whether this processor has the instructions.
@@ -71,7 +71,7 @@ impl InstructionSet {
         }
     }
 
-    /// The fastest that this processor has.
+    /// The fastest instruction set of this processor.
     pub fn best() -> Self {
         Self::ALL.into_iter().rfind(|i| i.is_available()).unwrap_or(Self::Scalar)
     }
@@ -147,7 +147,7 @@ pub(crate) trait Simd: Copy {
     }
 }
 
-/// A number, or some side by side: what a formula is written for once.
+/// A scalar or a vector, for which a formula is written once.
 pub trait SimdFloat:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
@@ -248,7 +248,7 @@ pub trait SimdI32x8: Copy + Add<Output = Self> {
     fn store(self) -> [i32; LANES];
 }
 
-/// Truth values.
+/// A truth value per lane.
 pub trait LaneMask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
     /// Bit i is lane i.
     fn bits(self) -> u32;

@@ -1,4 +1,4 @@
-//! Sampling the BRDF: directions where the surface reflects, whatever light there is.
+//! BRDF sampling: directions in proportion to reflectance, regardless of the light.
 
 use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
@@ -11,7 +11,7 @@ use crate::sampling::Dimension;
 pub struct BrdfSampling<'a> {
     /// The light.
     pub environment: &'a Environment,
-    /// Shadow rays at each point.
+    /// The number of shadow rays per point.
     pub n_samples: u32,
 }
 

@@ -1,4 +1,4 @@
-//! Sampling the environment: directions where light comes from, whatever the surface does.
+//! Environment sampling: directions in proportion to the light, regardless of the surface.
 
 use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
@@ -13,7 +13,7 @@ use crate::sampling::Dimension;
 pub struct EnvironmentSampling<'a> {
     /// The light.
     pub environment: &'a Environment,
-    /// Shadow rays at each point.
+    /// The number of shadow rays per point.
     pub n_samples: u32,
 }
 

@@ -1,12 +1,12 @@
-//! Any strategy on shading points and visibility of the caller's own: for renderers with their own ray tracer.
+//! Runs any strategy on the caller's shading points and visibility, for renderers with their own ray tracer.
 
 use super::levels::level;
 use super::{Contributions, PixelPoints, Strategy, TileShading};
 use crate::Rgb;
 
-/// Runs a strategy's rounds on tiles of shading points whose visibility the caller answers.
+/// Runs a strategy's rounds on tiles of shading points, with visibility from the caller.
 ///
-/// Keep one for each thread: it carries memory from tile to tile, and nothing else.
+/// Keep one per thread. It carries only scratch memory from tile to tile.
 #[derive(Debug)]
 pub struct Estimator<'s, S: Strategy> {
     strategy: &'s S,
@@ -18,7 +18,7 @@ pub struct Estimator<'s, S: Strategy> {
 }
 
 impl<'s, S: Strategy> Estimator<'s, S> {
-    /// An estimator that has seen no tile.
+    /// Creates an estimator.
     pub fn new(strategy: &'s S) -> Self {
         Self {
             strategy,
@@ -30,11 +30,11 @@ impl<'s, S: Strategy> Estimator<'s, S> {
         }
     }
 
-    /// Estimates ∫ f_r · cos θ · L · V dω at each point of a tile, of all its rounds.
+    /// Estimates ∫ f_r · cos θ · L · V dω at each point of a tile, over all rounds.
     ///
-    /// `pass` comes from [`Strategy::begin_pass`], once for all tiles of a picture. `trace` gets the rays of a round,
-    /// world directions `wi` from the shading points `point` to infinity, and sets V of each, in [0, 1]. The
-    /// expected value over `pass` and the pixels' streams is the integral if the strategy is unbiased.
+    /// `pass` comes from [`Strategy::begin_pass`], once for all tiles of a picture. `trace` receives the rays of a
+    /// round, world directions `wi` from the shading points `point` to infinity, and sets V in [0, 1] for each. If
+    /// the strategy is unbiased, the expected value over `pass` and the pixels' samplers is the integral.
     pub fn estimate(
         &mut self,
         pass: &S::Pass,

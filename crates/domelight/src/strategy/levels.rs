@@ -1,6 +1,6 @@
-//! The order of a tile's pixels: every fourth pixel of every fourth row, then those in the middle of four known
-//! ones, then those between two rows and columns of them, and so on to the last. Each level doubles what is
-//! known; what is learned from one helps the next.
+//! The order of a tile's pixels: every fourth pixel of every fourth row, then the pixels in the middle of four known
+//! ones, then those between two rows and columns of known ones, and so on. Each level doubles the number of known
+//! pixels and is predicted from the coarser ones.
 //!
 //! ```text
 //! 0 4 2 4 0
@@ -10,7 +10,7 @@
 //! 0 4 2 4 0
 //! ```
 
-/// Levels of pixels.
+/// The number of levels.
 pub const N_LEVELS: u32 = 5;
 
 /// The level of the pixel at (`x`, `y`) of its tile.
@@ -20,8 +20,8 @@ pub fn level(x: usize, y: usize) -> u32 {
     LEVELS[y % 4][x % 4]
 }
 
-/// The pixels of lower levels next to pixel `i` of a tile of `width` columns and `n` pixels: four, or those of
-/// them that the tile has; none of a pixel of the first level.
+/// The pixels of lower levels next to pixel `i` of a tile with `width` columns and `n` pixels: four, or fewer at the
+/// border of the tile; none for a pixel of the first level.
 pub fn coarser(i: usize, width: usize, n: usize) -> impl Iterator<Item = usize> {
     /// Columns and rows from a pixel in the middle of four, and from one between two rows or columns.
     const DIAGONAL: [(isize, isize); 4] = [(-1, -1), (1, -1), (-1, 1), (1, 1)];

@@ -1,13 +1,13 @@
-//! A fixed set of lights: no noise, but the light of each region comes from a single direction.
+//! A fixed set of lights: noise-free, but the light of each region comes from a single direction.
 
 use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
 use crate::math::Vec3;
 use crate::rig::Rig;
 
-/// Σ f_r cos θ · E over the lights of a rig, E their irradiance: the same rays at every point.
+/// Σ f_r cos θ · E over the lights of a rig with irradiance E, with the same rays at every point.
 ///
-/// Biased: shadows are sums of hard ones and narrow lobes see separate lights.
+/// It is biased: shadows are sums of hard ones, and narrow lobes reflect the individual lights.
 #[derive(Clone, Debug)]
 pub struct LightSet {
     /// The lights.

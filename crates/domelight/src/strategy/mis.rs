@@ -1,5 +1,5 @@
 //! Sampling both the environment and the BRDF, combined by multiple importance sampling: Veach &
-//! Guibas 1995, equation 10 (the multi-sample model; weights sum to one for each direction).
+//! Guibas 1995, equation 10 (the multi-sample model; the weights sum to one for each direction).
 
 use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
@@ -7,16 +7,16 @@ use crate::environment::{CompensatedTable, Environment, EnvironmentSample};
 use crate::math::{Vec2, Vec3};
 use crate::sampling::{Dimension, Heuristic};
 
-/// The density that directions toward the light are drawn from.
+/// The density from which directions toward the light are sampled.
 #[derive(Clone, Debug)]
 pub enum LightTable {
     /// A density proportional to luminance.
     Full,
-    /// A density proportional to the luminance above the mean; it needs BRDF samples beside it.
+    /// A density proportional to the luminance above the mean. It must be combined with BRDF samples.
     Compensated(CompensatedTable),
 }
 
-/// M samples of the environment and N of the BRDF at each point.
+/// M environment samples and N BRDF samples at each point.
 #[derive(Clone, Debug)]
 pub struct MultipleImportanceSampling<'a> {
     environment: &'a Environment,
@@ -28,11 +28,13 @@ pub struct MultipleImportanceSampling<'a> {
 
 /// A compensated table without BRDF samples would lose the dim light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a compensated table needs at least one BRDF sample: alone it leaves out all dim light")]
+#[error(
+    "MIS compensation needs at least one BRDF sample: a compensated table alone omits all dim light"
+)]
 pub struct CompensationNeedsBrdf;
 
 impl<'a> MultipleImportanceSampling<'a> {
-    /// `n_environment` and `n_brdf` samples at each point; either may be zero.
+    /// Takes `n_environment` and `n_brdf` samples at each point; either may be zero.
     ///
     /// # Errors
     /// A compensated table with `n_brdf` = 0.

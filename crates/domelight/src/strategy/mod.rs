@@ -1,17 +1,17 @@
 //! Strategies: how shading points become shadow rays.
 //!
-//! Under a distant environment every ray that a strategy asks for is the same thing: a shadow ray
-//! to infinity. So a strategy turns shading points into pairs (wi, weight), and the estimate of
+//! Under a distant environment, every ray that a strategy requests is a shadow ray to infinity. So a
+//! strategy turns shading points into pairs (wi, weight), and the estimate of
 //! ∫ f_r · cos θ · L · V dω at a point is
 //!
 //! ```text
 //! base + Σ weight · V(wi)
 //! ```
 //!
-//! 1/n, 1/pdf and combination weights are already in the weight; `base` is what a strategy knows
-//! without rays. Visibility, ray counts, the unoccluded picture (every V = 1, the lecture's L_ns)
-//! and the variance are then computed once, outside, and strategies compare at equal shadow rays
-//! by construction. Nothing here traces a ray.
+//! The weight includes 1/n, 1/pdf and the combination weight. `base` is the part of the estimate that
+//! a strategy knows without rays. Visibility, ray counts, the unoccluded picture (every V = 1, the
+//! lecture's L_ns) and the variance are computed outside of strategies, so that strategies compare at
+//! equal shadow rays by construction. Nothing here traces a ray.
 
 mod brdf;
 mod environment;
@@ -48,7 +48,7 @@ use crate::sampling::sampler::SamplePoint;
 use crate::sampling::{Dimension, Pcg32, Sampler};
 use crate::simd::{Colors, SimdFloat, Vectors};
 
-/// A point where a camera ray met an opaque surface.
+/// A point where a camera ray hit an opaque surface.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadingPoint {
     /// World position.
@@ -64,7 +64,7 @@ pub struct ShadingPoint {
 }
 
 impl ShadingPoint {
-    /// Memory for a point.
+    /// A placeholder to be overwritten.
     #[cfg(feature = "render")]
     pub(crate) const UNSET: Self = {
         let frame = Frame { x: Vec3::X, y: Vec3::Y, z: Vec3::Z };
@@ -74,7 +74,7 @@ impl ShadingPoint {
 
     /// f_r · max(0, cos θ_i) for the world direction `wi` \[sr⁻¹\].
     ///
-    /// Black below the geometric surface as well: it is opaque, and no ray need be traced to know.
+    /// Black below the geometric surface too: it is opaque, so no ray needs to be traced.
     pub fn eval(&self, wi: Vec3) -> Rgb {
         if self.ng.dot(wi) <= 0.0 {
             return Rgb::BLACK;
@@ -90,7 +90,7 @@ impl ShadingPoint {
         self.bsdf.eval_pdf(self.wo, self.frame.to_local(wi))
     }
 
-    /// [`ShadingPoint::eval_pdf`] of world directions side by side, of another BSDF.
+    /// [`ShadingPoint::eval_pdf`] for several world directions at once, with another BSDF.
     #[inline(always)]
     pub(crate) fn eval_lanes<F: SimdFloat>(&self, bsdf: &Bsdf, wi: Vectors<F>) -> (Colors<F>, F) {
         let Frame { x, y, z } = self.frame;
@@ -101,7 +101,7 @@ impl ShadingPoint {
         (value.map(|c| F::select(above, c, zero)), F::select(above, pdf, zero))
     }
 
-    /// Draws a world direction from the BSDF; none is a sample of value zero.
+    /// Samples a world direction from the BSDF. `None` is a sample with value zero.
     pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<DirectionSample> {
         let s = self.bsdf.sample(self.wo, u_lobe, u)?;
         let wi = self.frame.to_world(s.wi);
@@ -109,7 +109,7 @@ impl ShadingPoint {
     }
 }
 
-/// A world direction drawn from the BSDF of a point.
+/// A world direction sampled from the BSDF of a point.
 #[derive(Clone, Copy, Debug)]
 pub struct DirectionSample {
     /// Unit direction toward the light, in the world.
@@ -120,7 +120,7 @@ pub struct DirectionSample {
     pub pdf: f32,
 }
 
-/// Addresses the uniform numbers of one camera sample: a sampler, and the index in it.
+/// Identifies the uniform random numbers of one camera sample: a sampler, and the index of the sample.
 #[derive(Clone, Copy, Debug)]
 pub struct SampleIndex {
     /// The pixel's sampler.
@@ -130,32 +130,32 @@ pub struct SampleIndex {
 }
 
 impl SampleIndex {
-    /// Numbers j of n for one purpose: those of all camera samples of a pixel form one sequence.
+    /// The j-th of n points for one purpose. The points of all camera samples of a pixel form one sequence.
     pub fn get(&self, dimension: Dimension, j: u32, n: u32) -> SamplePoint {
         self.sampler.numbers(dimension, self.sample.wrapping_mul(n).wrapping_add(j))
     }
 
-    /// Independent numbers without end.
+    /// An endless supply of independent random numbers.
     pub fn generator(&self) -> Pcg32 {
         self.sampler.generator(self.sample)
     }
 }
 
-/// What a strategy asks for: pairs (wi, weight) by point, and what it knows without rays.
+/// The output of a strategy: pairs (wi, weight) for each point, and the part known without rays.
 #[derive(Clone, Debug, Default)]
 pub struct Contributions {
     /// World directions of the shadow rays.
     pub wi: Vec<Vec3>,
-    /// What each ray adds if it is free.
+    /// The contribution of each ray if it is unoccluded.
     pub weight: Vec<Rgb>,
-    /// The shading point of each ray; rising.
+    /// The index of the shading point of each ray, in ascending order.
     pub point: Vec<u32>,
-    /// Added to each point without a ray; as many as there are points.
+    /// The part of each point's estimate that needs no ray, one per point.
     pub base: Vec<Rgb>,
 }
 
 impl Contributions {
-    /// Forgets the pairs, keeps the memory, and makes `base` black for `n_points`.
+    /// Clears the pairs but keeps their memory, and sets `base` to black for `n_points`.
     pub fn reset(&mut self, n_points: usize) {
         self.wi.clear();
         self.weight.clear();
@@ -169,12 +169,12 @@ impl Contributions {
         self.wi.len()
     }
 
-    /// No shadow rays.
+    /// Whether there are no shadow rays.
     pub fn is_empty(&self) -> bool {
         self.wi.is_empty()
     }
 
-    /// Asks for a ray; a black weight needs none.
+    /// Requests a ray, unless its weight is black.
     pub fn push(&mut self, point: u32, wi: Vec3, weight: Rgb) {
         if !weight.is_black() {
             self.wi.push(wi);
@@ -184,19 +184,19 @@ impl Contributions {
     }
 }
 
-/// A strategy that looks at one shading point at a time: the lecture's.
+/// A strategy that processes one shading point at a time, like those of the lecture.
 pub trait PointStrategy: Sync {
-    /// Memory that is kept from point to point; it carries no state.
+    /// Scratch memory reused from point to point; it carries no state.
     type Scratch: Default;
 
-    /// The expected value of the estimate is the integral.
+    /// Whether the expected value of the estimate is the integral.
     const UNBIASED: bool;
 
-    /// Shadow rays asked for at each point at the most.
+    /// The maximum number of shadow rays per point.
     fn n_rays(&self) -> u32;
 
-    /// What weights are multiples of: [`Environment::unit`](crate::environment::Environment::unit) of a strategy whose weights are
-    /// in proportion to [`Environment::le`](crate::environment::Environment::le).
+    /// The unit of the weights: [`Environment::unit`](crate::environment::Environment::unit) for a strategy whose
+    /// weights are proportional to [`Environment::le`](crate::environment::Environment::le).
     fn unit(&self) -> f64 {
         1.0
     }
@@ -214,13 +214,13 @@ pub trait PointStrategy: Sync {
 /// The shading points of a tile, grouped by pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct TileShading<'a> {
-    /// All camera hits of the round.
+    /// The camera hits of the round.
     pub points: &'a [ShadingPoint],
-    /// Index of each point's camera sample in its pixel.
+    /// The index of each point's camera sample within its pixel.
     pub samples: &'a [u32],
-    /// The pixels of the tile in row order, those of other rounds and those without a hit as well.
+    /// The pixels of the tile in row order, including those of other rounds and those without a hit.
     pub pixels: &'a [PixelPoints],
-    /// Pixels in a row of the tile.
+    /// The number of pixels in a row of the tile.
     pub width: usize,
 }
 
@@ -229,61 +229,61 @@ pub struct TileShading<'a> {
 pub struct PixelPoints {
     /// Their range in [`TileShading::points`].
     pub points: std::ops::Range<usize>,
-    /// Camera samples of the pixel in this round, hits and misses.
+    /// The number of camera samples of the pixel in this round, hits and misses.
     pub n_samples: u32,
-    /// The pixel's uniform numbers.
+    /// The pixel's uniform random numbers.
     pub sampler: Sampler,
-    /// All show one material without textures: their BSDFs differ in no more than what
-    /// [`Bsdf::for_view`] makes of them.
+    /// Whether all points show one material without textures, so that their BSDFs differ only by
+    /// [`Bsdf::for_view`].
     pub one_material: bool,
 }
 
 impl PixelPoints {
-    /// The points of a pixel, of any materials, with its camera samples in this round, hits and misses, and its
-    /// uniform numbers.
+    /// Creates a pixel from its points, which may have any materials, the number of its camera samples in this round
+    /// (hits and misses), and its uniform random numbers.
     pub fn new(points: std::ops::Range<usize>, n_samples: u32, sampler: Sampler) -> Self {
         Self { points, n_samples, sampler, one_material: false }
     }
 
-    /// A pixel of another round, which has no points.
+    /// Creates a pixel of another round, which has no points.
     #[cfg(feature = "render")]
     pub(crate) const NONE: Self =
         Self { points: 0..0, n_samples: 0, sampler: Sampler::NONE, one_material: true };
 }
 
-/// A strategy that looks at a tile at a time, in rounds: all its pixels, or one of their [`levels`] after the other.
-/// Every [`PointStrategy`] is one: it needs a single round and learns nothing.
+/// A strategy that processes one tile at a time, in rounds: all its pixels at once, or one of their [`levels`] after
+/// the other. Every [`PointStrategy`] is a `Strategy` with a single round that learns nothing.
 pub trait Strategy: Sync {
-    /// What all tiles of a pass share.
+    /// Data shared by all tiles of a pass.
     type Pass: Sync;
-    /// Memory that a thread keeps. It carries what is learned from round to round of a tile, and nothing
-    /// from tile to tile: passes are independent, so a render may be interrupted between them.
+    /// Scratch memory of a thread. It carries what is learned from round to round of a tile, but nothing
+    /// from tile to tile. Passes are independent, so a render may be interrupted between them.
     type Scratch: Default;
 
-    /// Rounds of a tile: 1, or [`levels::N_LEVELS`].
+    /// The number of rounds per tile: 1, or [`levels::N_LEVELS`].
     fn n_rounds(&self) -> u32 {
         1
     }
 
-    /// The most shadow rays at a point, for sizing batches.
+    /// The maximum number of shadow rays per point, for sizing batches.
     fn n_rays(&self) -> u32;
 
-    /// What weights and base are multiples of; see [`PointStrategy::unit`].
+    /// The unit of weights and base; see [`PointStrategy::unit`].
     fn unit(&self) -> f64 {
         1.0
     }
 
-    /// Camera samples of each pixel that a pass should have, for strategies that place the rays of
-    /// all of them together; `None` where it does not matter.
+    /// The number of camera samples per pixel that a pass should have, for strategies that place the rays of
+    /// all of them together; `None` if it does not matter.
     fn samples_per_pass(&self) -> Option<u32> {
         None
     }
 
-    /// Prepares a pass of `n_samples` camera samples a pixel, as a rule; `sampler` is its own, independent of those of
+    /// Prepares a pass of about `n_samples` camera samples per pixel. `sampler` is independent of the samplers of
     /// pixels and other passes.
     fn begin_pass(&self, sampler: Sampler, n_samples: u32) -> Self::Pass;
 
-    /// Asks for the shadow rays of a round; `out` comes reset. Pixels of other rounds have no points.
+    /// Pushes the shadow rays of a round to `out`, which is reset. Pixels of other rounds have no points.
     fn push(
         &self,
         pass: &Self::Pass,
@@ -293,7 +293,7 @@ pub trait Strategy: Sync {
         out: &mut Contributions,
     );
 
-    /// Learns from the rays of a round, unless it was the last: `visibility` has V in [0, 1] of each pushed ray.
+    /// Learns from the rays of a round, unless it was the last. `visibility` has the V in [0, 1] of each pushed ray.
     fn learn(
         &self,
         _tile: &TileShading,

@@ -1,4 +1,4 @@
-//! A running strategy of any kind: the tables and lights that a [`StrategySpec`] needs of an environment.
+//! A strategy prepared for an environment: a [`StrategySpec`] with its tables and lights.
 
 use super::{
     BrdfSampling, CandidatePilot, CompensationNeedsBrdf, Contributions, EnvironmentSampling,
@@ -12,7 +12,7 @@ use crate::rig::{MedianCut, RigError, VarianceMinimization, median_cut, variance
 use crate::sampling::Sampler;
 use crate::simd::InstructionSet;
 
-/// A strategy that runs: a closed set, so that the choice costs one branch a tile.
+/// A strategy prepared for an environment. The set is closed, so that dispatch costs one branch per tile.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 #[expect(clippy::large_enum_variant, reason = "there is one for each picture")]
@@ -33,7 +33,7 @@ pub enum PreparedStrategy<'e> {
     Lights(LightSet),
 }
 
-/// A strategy that an environment does not go with.
+/// An error in preparing a strategy for an environment.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PrepareError {
@@ -49,9 +49,9 @@ pub enum PrepareError {
 }
 
 impl StrategySpec {
-    /// Chooses what is left open, by a pilot at some of the scene's points: the number of SIR's candidates with the
-    /// least error for its cost ([`CandidatePilot`]). `points` is called only where it matters; `visibility` is V of a
-    /// point and a direction, in [0, 1].
+    /// Sets the parameters that were left open, with a pilot at some points of the scene: the number of SIR candidates
+    /// with the least error for its cost ([`CandidatePilot`]). `points` is called only if needed. `visibility`
+    /// returns V in [0, 1] for a point and a direction.
     #[must_use]
     pub fn for_scene(
         self,
@@ -87,8 +87,9 @@ impl StrategySpec {
 }
 
 impl<'e> PreparedStrategy<'e> {
-    /// Memory that [`PreparedStrategy::new`] takes \[bytes\] beyond [`Environment::MEMORY_PER_TEXEL`], an estimate:
-    /// product sampling divides the texels of maps that are much wider or narrower than 2:1.
+    /// An estimate of the memory that [`PreparedStrategy::new`] needs \[bytes\] beyond
+    /// [`Environment::MEMORY_PER_TEXEL`]. Product sampling divides the texels of maps that are much wider or narrower
+    /// than 2:1.
     pub fn memory(spec: StrategySpec, environment: &Environment) -> u64 {
         match spec {
             StrategySpec::Product { .. } => environment.memory_to_reshape(),
@@ -102,8 +103,8 @@ impl<'e> PreparedStrategy<'e> {
         }
     }
 
-    /// Makes the tables and lights that all pictures under the environment share. SIR whose candidates are left open
-    /// ([`StrategySpec::for_scene`]) has as many candidates as rays.
+    /// Builds the tables and lights that all pictures under the environment share. If the number of SIR candidates was
+    /// left open ([`StrategySpec::for_scene`]), it equals the number of rays.
     ///
     /// # Errors
     /// If the environment or the counts do not suit the strategy.
@@ -156,8 +157,8 @@ impl<'e> PreparedStrategy<'e> {
 }
 
 impl PreparedStrategy<'_> {
-    /// The same strategy, computed with another instruction set where it has a choice; `None` if this processor lacks
-    /// it. Pictures are the same.
+    /// The same strategy computed with another instruction set, if it has a choice; `None` if this processor lacks
+    /// the instruction set. The pictures are the same.
     #[must_use]
     pub fn with_instruction_set(self, instruction_set: InstructionSet) -> Option<Self> {
         match self {
@@ -189,7 +190,7 @@ macro_rules! each {
     };
 }
 
-/// Scratch memory of [`PreparedStrategy`]; only that of the running strategy takes any.
+/// Scratch memory of [`PreparedStrategy`]. Only the part of the running strategy is allocated.
 #[derive(Debug, Default)]
 pub struct PreparedScratch {
     product: product::ProductScratch,

@@ -1,38 +1,39 @@
 //! Rejection sampling of the product of light and reflectance: Burke, Ghosh & Heidrich 2005,
 //! "Bidirectional Importance Sampling for Direct Illumination".
 //!
-//! Directions are drawn from one factor and kept with a probability in proportion to the other. An
-//! envelope of mass C lies over the product p̂; a try is kept with probability a = ∫ p̂ / C, and what
-//! is kept follows p̂ exactly. Two envelopes:
+//! Directions are drawn from one factor and accepted with a probability proportional to the other. An
+//! envelope with mass C bounds the product p̂. A try is accepted with probability a = ∫ p̂ / C, and accepted
+//! directions follow p̂ exactly. There are two envelopes:
 //!
 //! ```text
 //! from the environment   q = L_y / Q    keep with (f_r cos θ · L)_y / (L_y · g_max)   C = Q · g_max
 //! from the BRDF          q = p_brdf     keep with L_y / L_max                         C = L_max
 //! ```
 //!
-//! Here y is luminance, Q = ∫ L_y dω and g_max bounds the greatest channel of f_r cos θ
-//! ([`Brdf::max_eval`]), hence (g · L)_y ≤ g_max · L_y for any colors. The first keeps directions in
-//! proportion to the luminance of the product; the second, since f_r cos θ / p_brdf has no bound in
-//! general, in proportion to p_brdf · L_y, and that quotient stays in the weight. So does color.
+//! Here y is luminance, Q = ∫ L_y dω and g_max bounds the largest channel of f_r cos θ
+//! ([`Brdf::max_eval`]), hence (g · L)_y ≤ g_max · L_y for any colors. The first accepts directions in
+//! proportion to the luminance of the product. The second accepts them in proportion to p_brdf · L_y,
+//! because f_r cos θ / p_brdf has no bound in general; that quotient stays in the weight, and so does the
+//! color.
 //!
-//! To divide by the probability of keeping, one has to know a, and an estimate of 1 / a or of a from
-//! the same tries is a trap: N kept over T tries is biased upward when one stops at the N-th. Two
+//! To divide by the acceptance probability, a must be known, and estimating 1 / a or a from the same tries
+//! is a trap: N accepted over T tries is biased upward if the tries stop at the N-th. There are two
 //! stopping rules with an unbiased estimate, each with its limit on tries *inside* the estimate:
 //!
-//! * [`StoppingRule::Tries`]: always M tries, C/M · Σ kept: plain importance sampling by the envelope, in which
-//!   most values are known to be zero without a ray. The points may be stratified.
-//! * [`StoppingRule::Accepted`]: stop at the N-th kept or the M-th try. The unbiased estimate of a is the
-//!   probability that the *first* try was kept given how it ended (Girshick, Mosteller & Savage
-//!   1946, "Unbiased Estimates for Certain Binomial Sampling Problems with Applications"): the share
+//! * [`StoppingRule::Tries`]: always M tries, C/M · Σ accepted. This is plain importance sampling with the
+//!   envelope, where most values are known to be zero without a ray. The points may be stratified.
+//! * [`StoppingRule::Accepted`]: stop at the N-th acceptance or the M-th try. The unbiased estimate of a is
+//!   the probability that the *first* try was accepted given how the tries ended (Girshick, Mosteller & Savage
+//!   1946, "Unbiased Estimates for Certain Binomial Sampling Problems with Applications"): the fraction
 //!   of the paths to the end that begin so. That is (N − 1)/(T − 1) at the N-th (Haldane 1945, "On a
-//!   Method of Estimating Frequencies") and k/M when the tries ran out with k < N kept. What was kept
-//!   is exchangeable and independent of T, so a's estimate times C times the mean is unbiased for
-//!   any limit, however low. It needs independent tries: a stratified sequence knows how many are
-//!   still to come.
+//!   Method of Estimating Frequencies") and k/M if the tries ran out with k < N accepted. The accepted
+//!   directions are exchangeable and independent of T, so the estimate of a times C times the mean is
+//!   unbiased for any limit, however low. The tries must be independent, because a stratified sequence
+//!   reveals how many are still to come.
 //!
-//! At equal tries both have the variance I (C − I) / M, to first order. Rejected: the number of tries
-//! without a limit (a point that sees no light would never end), and redrawing at the limit from
-//! something else (a bias, if a small one).
+//! At equal tries, both have the variance I (C − I) / M, to first order. Rejected: an unlimited number of
+//! tries (a point that sees no light would never finish), and sampling from another density at the limit
+//! (a bias, if a small one).
 
 use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
@@ -42,18 +43,18 @@ use crate::math::Vec3;
 use crate::sampling::sampler::SamplePoint;
 use crate::sampling::{Dimension, Pcg32};
 
-/// The factor of the product that directions are drawn from.
+/// The factor of the product from which directions are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Proposal {
-    /// The environment, kept by the BRDF.
+    /// The environment, accepted by the BRDF.
     Environment,
-    /// The BRDF, kept by the environment.
+    /// The BRDF, accepted by the environment.
     Brdf,
-    /// The factor that keeps more samples, chosen at each point.
+    /// The factor that accepts more samples, chosen at each point.
     ///
-    /// With ρ = ∫ f_r cos θ dω, the BRDF's envelope as one of the product has the mass ρ · L_max
+    /// With ρ = ∫ f_r cos θ dω, the BRDF's envelope of the product has the mass ρ · L_max
     /// (exact where the density follows f_r cos θ), so the environment is better where
-    /// Q · g_max ≤ ρ · L_max. ρ is an approximation; an error in it costs tries, not bias.
+    /// Q · g_max ≤ ρ · L_max. ρ is an approximation; its error costs tries but adds no bias.
     #[default]
     Tighter,
 }
@@ -61,66 +62,68 @@ pub enum Proposal {
 /// The rule that ends the tries at a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoppingRule {
-    /// After this many tries, at least 1. As many shadow rays as are kept.
+    /// Stop after this many tries, at least 1. Each accepted direction is one shadow ray.
     Tries(u32),
-    /// A number of accepted samples, or a number of tries if that is reached first. Tries use independent numbers.
+    /// Stop at a number of accepted samples or a number of tries, whichever comes first. Tries use independent random
+    /// numbers.
     Accepted {
-        /// Directions to keep, at least 2.
+        /// The number of directions to accept, at least 2.
         n: u32,
-        /// The most tries, at least 1.
+        /// The maximum number of tries, at least 1.
         max_tries: u32,
     },
 }
 
-/// A stopping rule that has no unbiased estimate of use.
+/// A stopping rule without a useful unbiased estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RejectionError {
     /// No tries.
     #[error("rejection sampling needs at least one try")]
     NoTries,
-    /// One kept direction says nothing about how rare it is.
+    /// One accepted direction does not determine the acceptance rate.
     #[error(
-        "stopping after {n} accepted directions: at least 2 are needed to estimate without bias how rare they are"
+        "stopping after {n} accepted directions: at least 2 are needed for an unbiased estimate \
+         of the acceptance rate"
     )]
     TooFewAccepted {
-        /// The number asked for.
+        /// The requested number.
         n: u32,
     },
 }
 
-/// What happened at a point.
+/// Statistics of the tries at a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RejectionStatistics {
-    /// The factor that was drawn from, never [`Proposal::Tighter`].
+    /// The factor that was sampled, never [`Proposal::Tighter`].
     pub proposal: Proposal,
-    /// Directions drawn; 0 where the product is known to be zero without any.
+    /// The number of directions drawn; 0 if the product is known to be zero.
     pub tries: u32,
-    /// Directions kept: shadow rays.
+    /// The number of directions accepted, which become shadow rays.
     pub accepted: u32,
-    /// The tries ran out before enough were kept.
+    /// Whether the tries ran out before enough were accepted.
     pub ran_out: bool,
 }
 
 impl RejectionStatistics {
-    /// Accepted per try; 0 of none.
+    /// The acceptance rate; 0 without tries.
     pub fn acceptance(&self) -> f32 {
         self.accepted as f32 / self.tries.max(1) as f32
     }
 }
 
-/// A shadow ray to be weighed when the number of tries is known.
+/// A shadow ray to be weighted once the number of tries is known.
 #[derive(Clone, Copy, Debug)]
 struct AcceptedSample {
     wi: Vec3,
-    /// Its value over that of the envelope.
+    /// The ratio of its value to the envelope.
     value: Rgb,
 }
 
-/// Memory of [`RejectionSampling`].
+/// Scratch memory of [`RejectionSampling`].
 #[derive(Clone, Debug, Default)]
 pub struct RejectionScratch(Vec<AcceptedSample>);
 
-/// Directions from the product of light and reflectance by rejection.
+/// Samples the product of light and reflectance by rejection.
 #[derive(Clone, Copy, Debug)]
 pub struct RejectionSampling<'a> {
     environment: &'a Environment,
@@ -128,22 +131,22 @@ pub struct RejectionSampling<'a> {
     stop: StoppingRule,
 }
 
-/// What tries at a point are made under.
+/// The setup of the tries at a point.
 #[derive(Clone, Copy, Debug)]
 struct Envelope {
     /// Never [`Proposal::Tighter`].
     proposal: Proposal,
-    /// The bound on the factor that is not drawn from.
+    /// The bound on the other factor.
     bound: f32,
     /// C.
     mass: f32,
 }
 
 impl<'a> RejectionSampling<'a> {
-    /// Rejection sampling with a stopping rule.
+    /// Creates the strategy with a stopping rule.
     ///
     /// # Errors
-    /// No tries, or fewer than two accepted directions.
+    /// If there are no tries, or fewer than two accepted directions.
     pub fn new(
         environment: &'a Environment,
         proposal: Proposal,
@@ -160,7 +163,7 @@ impl<'a> RejectionSampling<'a> {
         }
     }
 
-    /// [`PointStrategy::sample`], and how many tries it took.
+    /// [`PointStrategy::sample`] that also returns the statistics of the tries.
     pub fn sample_counted(
         &self,
         at: &ShadingPoint,

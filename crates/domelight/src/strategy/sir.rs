@@ -2,35 +2,37 @@
 //! 2005, "Bidirectional Importance Sampling for Direct Illumination"; the same estimator with one
 //! pick is the resampled importance sampling of Talbot, Cline & Egbert 2005.
 //!
-//! M candidates xⱼ come from an easy density; each has a weight Wⱼ, its unshadowed contribution
-//! p̂(xⱼ) over M times the density. N of them are picked in proportion to their weights, and only those
+//! M candidates xⱼ are drawn from an easy density. Each has a weight Wⱼ, its unshadowed contribution
+//! p̂(xⱼ) divided by M times the density. N of them are picked in proportion to their weights, and only those
 //! are traced:
 //!
 //! ```text
 //! (Σ W) · (1/N) Σ V(pick)        Σ W estimates L_ns, the unshadowed integral
 //! ```
 //!
-//! The expectation over the picks is Σ Wⱼ V(xⱼ), the estimate had all candidates been traced, so it is
-//! unbiased for every M, N ≥ 1. With independent candidates and picks its variance is
+//! The expectation over the picks is Σ Wⱼ V(xⱼ), the estimate from tracing all candidates, so it is
+//! unbiased for every M, N ≥ 1. With independent candidates and picks, its variance is
 //!
 //! ```text
 //! A/M + (1 − 1/M) B/N     A = Var(p̂ V / q),  B = I (L_ns − I)
 //! ```
 //!
-//! The first term is that of plain importance sampling with M rays, the second what is unknown of
-//! visibility: no better than tracing all candidates, but a candidate costs less than a ray. See
+//! The first term is that of plain importance sampling with M rays. The second comes from the unknown
+//! visibility. This is no better than tracing all candidates, but a candidate costs less than a ray. See
 //! [`Candidates::optimal_number`].
 //!
-//! Weights are luminances, and a pick carries its color over its luminance: the luminance of the
-//! weights adds up to Σ W exactly, colors do in expectation. A candidate picked k times is one ray
-//! of k times the weight.
+//! Weights are luminances, and a pick carries its color divided by its luminance. The luminances of the
+//! weights add up to Σ W exactly, and the colors do so in expectation. A candidate picked k times is one
+//! ray with k times the weight.
 //!
-//! Candidates from both factors are weighed by Veach's balance heuristic: the density is the mixture
-//! with the expected counts. An odd candidate comes from either factor by the toss of a coin. Candidates sorted along a curve through space make a systematic
-//! choice a stratified one, for the picks spread over what lights the point.
+//! Candidates from both factors are weighted by Veach's balance heuristic: the density is the mixture
+//! with the expected counts. An odd candidate comes from either factor at random. If the candidates are
+//! sorted along a space-filling curve, systematic resampling becomes stratified, because the picks spread
+//! over the light that reaches the point.
 //!
-//! Rejected: a number of candidates that adapts to the estimate itself (a bias, for when to stop
-//! would know the values), or from pixel to pixel (their points would no longer form one sequence).
+//! Rejected: a number of candidates that adapts to the estimate itself (biased, because the decision to
+//! stop would depend on the values), or from pixel to pixel (the points would no longer form one
+//! sequence).
 
 use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
@@ -40,20 +42,20 @@ use crate::sampling::hilbert::hemisphere_index;
 use crate::sampling::rng::hash2;
 use crate::sampling::{Dimension, ONE_MINUS_EPSILON, Sampler, SamplerKind, WeightedReservoirs};
 
-/// The density that candidates are drawn from.
+/// The density from which candidates are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Candidates {
     /// The environment, in proportion to luminance.
     Environment,
     /// The BRDF.
     Brdf,
-    /// Half from each, an odd one from either at random, weighed by the balance heuristic.
+    /// Half from each, an odd one from either at random, weighted by the balance heuristic.
     #[default]
     Mixture,
 }
 
 impl Candidates {
-    /// How many of `m` come from the environment and from the BRDF for certain; one more may come from either.
+    /// The fixed numbers out of `m` from the environment and from the BRDF; one more may come from either.
     fn split(self, m: u32) -> (u32, u32) {
         match self {
             Self::Environment => (m, 0),
@@ -66,12 +68,12 @@ impl Candidates {
 /// The method that picks N of the candidates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Resampling {
-    /// A random number for each pick; the picks are stratified as far as the numbers are.
+    /// One random number per pick. The picks are as well stratified as the numbers.
     Multinomial,
     /// N equally spaced picks from one random offset: candidate j is picked ⌊N Wⱼ/ΣW⌋ times or once
     /// more.
     Systematic,
-    /// The same from candidates sorted along Hilbert's curve over the hemisphere.
+    /// The same, with candidates sorted along a Hilbert curve over the hemisphere.
     #[default]
     SystematicSorted,
     /// N independent reservoirs over the stream of candidates (Chao 1982; Bitterli et al. 2020):
@@ -84,11 +86,11 @@ pub enum Resampling {
 pub struct SamplingImportanceResampling<'a> {
     /// The light.
     pub environment: &'a Environment,
-    /// Candidates at each point, at least 1.
+    /// The number of candidates per point, at least 1.
     pub n_candidates: u32,
-    /// Picks at each point, at least 1: the most shadow rays.
+    /// The number of picks per point, at least 1; the maximum number of shadow rays.
     pub n_samples: u32,
-    /// The density that candidates are drawn from.
+    /// The density from which candidates are drawn.
     pub candidates: Candidates,
     /// The method that picks candidates.
     pub resampling: Resampling,
@@ -102,17 +104,17 @@ struct Candidate {
     value: Rgb,
     /// Its luminance, positive.
     weight: f32,
-    /// Its place among the candidates of the point.
+    /// Its index among the candidates of the point.
     index: u32,
 }
 
-/// Memory of [`SamplingImportanceResampling`].
+/// Scratch memory of [`SamplingImportanceResampling`].
 #[derive(Clone, Debug, Default)]
 pub struct SirScratch {
     candidates: Vec<Candidate>,
-    /// Place on the curve in the upper half, place among the candidates in the lower.
+    /// The position on the curve in the upper half, the index of the candidate in the lower half.
     order: Vec<u64>,
-    /// Where picks fall, as shares of the total, rising.
+    /// The positions of picks as fractions of the total, in ascending order.
     ticks: Vec<f32>,
     reservoirs: WeightedReservoirs<Candidate>,
 }
@@ -125,10 +127,10 @@ impl SamplingImportanceResampling<'_> {
         let is_odd = m + n < self.n_candidates;
         let odd = if is_odd { 0.5 } else { 0.0 };
         let (expected_m, expected_n) = (expected(m, odd), expected(n, odd));
-        // Samples of the pixel share a sequence, so each reserves as many numbers.
+        // All samples of the pixel share a sequence, so each reserves the same number of points.
         let (numbers_m, numbers_n) = (m + u32::from(is_odd), n + u32::from(is_odd));
         if is_odd {
-            // Toss a coin for the odd candidate, by a number that no direction uses.
+            // Choose the source of the odd candidate with a number that no direction uses.
             let coin = sample_index.get(Dimension::Environment, m, numbers_m).u_lobe();
             if coin < 0.5 { m += 1 } else { n += 1 }
         }
@@ -180,7 +182,7 @@ impl SamplingImportanceResampling<'_> {
         self.draw(at, sample_index, |c| candidates.push(c));
         let total = candidates.iter().map(|c| f64::from(c.weight)).sum();
         if !f64::is_finite(total) {
-            // Overflow is handed on, for the film to count.
+            // Pass overflow on to the film, which counts it.
             candidates.iter().take(1).for_each(|c| push(c.wi, c.value * f32::INFINITY));
             return;
         }
@@ -248,7 +250,7 @@ fn pick<'a>(
             ticks = &ticks[count..];
         }
     }
-    // A tick is below 1 by more than sums in double precision are off.
+    // A tick is below 1 by more than the rounding error of double-precision sums.
     debug_assert!(ticks.is_empty() || total == 0.0);
 }
 
@@ -279,9 +281,9 @@ impl PointStrategy for SamplingImportanceResampling<'_> {
     }
 }
 
-/// The cost of a shadow ray over that of a candidate, as measured with this library on scenes of a
-/// hundred thousand triangles under a map of 1024 × 512 texels: 0.05 to 0.08 µs against 0.2 µs, of
-/// which the look-up in the map and its table is the most. Rays cost more in larger scenes.
+/// The cost of a shadow ray divided by that of a candidate. Measured with this library on scenes with a
+/// hundred thousand triangles under a map of 1024 × 512 texels: 0.05 to 0.08 µs against 0.2 µs, most of it
+/// for the look-up in the map and its table. Rays cost more in larger scenes.
 pub const RAY_COST: f64 = 0.3;
 
 /// Estimates of a pilot at each point.
@@ -292,14 +294,14 @@ const REPEATS: u32 = 16;
 pub struct CandidatePilot<'p, V> {
     visibility: V,
     seed: u64,
-    /// Points that see light, and what they reflect of it, nearly.
+    /// Points that see light, with an approximation of the light they reflect.
     points: Vec<(&'p ShadingPoint, f64)>,
 }
 
 impl<'p, V: Fn(&ShadingPoint, Vec3) -> f32> CandidatePilot<'p, V> {
-    /// A pilot at 64 of the points, spread over their order; `visibility` is V of a point and a direction, in [0, 1].
+    /// Creates a pilot at 64 of the points, spread evenly over them. `visibility` returns V in [0, 1].
     ///
-    /// Its random numbers are other ones than a render's with the same seed.
+    /// The random numbers differ from those of a render with the same seed.
     pub fn new(
         environment: &'p Environment,
         points: &'p [ShadingPoint],
@@ -342,8 +344,8 @@ impl<'p, V: Fn(&ShadingPoint, Vec3) -> f32> CandidatePilot<'p, V> {
         }
     }
 
-    /// Error² times cost of N of M candidates at each point that sees light: the mean squared relative error of an
-    /// estimate, times M + [`RAY_COST`] N.
+    /// The squared error times the cost at each point that sees light: the mean squared relative error of an estimate,
+    /// times M + [`RAY_COST`] N.
     pub fn work(&self, sir: &SamplingImportanceResampling) -> Vec<f64> {
         let cost = f64::from(sir.n_candidates) + RAY_COST * f64::from(sir.n_samples);
         let mut work = vec![0.0; self.points.len()];
@@ -354,11 +356,11 @@ impl<'p, V: Fn(&ShadingPoint, Vec3) -> f32> CandidatePilot<'p, V> {
         work
     }
 
-    /// The number of candidates M, N or a power of two above it, with the least [`CandidatePilot::work`] for the picks
-    /// of `sir`, whose own M does not matter.
+    /// The number of candidates M, which is N or a power of two above it, with the least [`CandidatePilot::work`] for
+    /// the picks of `sir`. The M of `sir` itself is ignored.
     ///
-    /// The search doubles M until two doublings in turn have won nothing. More candidates must win by more than two
-    /// standard errors over the points.
+    /// The search doubles M until two doublings in a row bring no gain. A gain must exceed two standard errors over the
+    /// points.
     pub fn optimal_number(&self, sir: &SamplingImportanceResampling) -> u32 {
         const MOST: u32 = 1 << 14;
         let work = |n_candidates| self.work(&SamplingImportanceResampling { n_candidates, ..*sir });

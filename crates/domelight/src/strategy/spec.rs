@@ -3,13 +3,13 @@
 //! | text | strategy |
 //! |---|---|
 //! | `brdf:4`, `environment:4` | 4 samples of one density |
-//! | `mis:3:1` | 3 environment and 1 BRDF sample by multiple importance sampling |
+//! | `mis:3:1` | multiple importance sampling with 3 environment samples and 1 BRDF sample |
 //! | `product:8` | product sampling with at most 8 shadow rays |
 //! | `rejection:16`, `rejection:rays=4:tries=256` | 16 tries; until 4 of at most 256 tries are accepted |
-//! | `sir:15/800`, `sir:15` | 15 of 800 candidates; of as many as a pilot finds best |
+//! | `sir:15/800`, `sir:15` | 15 of 800 candidates; a pilot chooses the number of candidates |
 //! | `median-cut:64`, `variance-minimization:64` | 64 directional lights |
 //!
-//! Numbers may be left out. Further keys are `heuristic=balance|power` and `no-compensation` of `mis`,
+//! Numbers are optional. Further keys are `heuristic=balance|power` and `no-compensation` of `mis`,
 //! `proposal=environment|brdf|tighter` of `rejection`, and `from=environment|brdf|mixture` and
 //! `resampling=multinomial|systematic|sorted|reservoir` of `sir`. [`StrategySpec`] displays as the shortest
 //! such text, which parses to the same value.
@@ -22,52 +22,52 @@ use crate::sampling::Heuristic;
 
 /// A strategy with its parameters, independent of scene and environment.
 ///
-/// [`PreparedStrategy::new`](super::PreparedStrategy::new) turns it into one that runs.
+/// [`PreparedStrategy::new`](super::PreparedStrategy::new) prepares it for an environment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StrategySpec {
     /// BRDF sampling.
     Brdf {
-        /// Shadow rays of each camera sample, 1 to 65,536.
+        /// Shadow rays per camera sample, 1 to 65,536.
         n_samples: u32,
     },
     /// Environment sampling.
     Environment {
-        /// Shadow rays of each camera sample, 1 to 65,536.
+        /// Shadow rays per camera sample, 1 to 65,536.
         n_samples: u32,
     },
     /// Multiple importance sampling of environment and BRDF.
     Mis {
-        /// Environment samples of each camera sample, up to 65,536; not both counts are zero.
+        /// Environment samples per camera sample, up to 65,536. The two counts must not both be zero.
         n_environment: u32,
-        /// BRDF samples of each camera sample, up to 65,536.
+        /// BRDF samples per camera sample, up to 65,536.
         n_brdf: u32,
-        /// The heuristic that weights the samples.
+        /// The heuristic for the MIS weights.
         heuristic: Heuristic,
-        /// Leaves what is dimmer than the mean radiance to the BRDF samples; needs at least one.
+        /// Whether radiance below the mean is left to the BRDF samples, which requires at least one.
         compensation: bool,
     },
     /// Product sampling with learned visibility.
     Product {
-        /// Shadow rays of each camera sample at the most, 1 to 65,536.
+        /// The maximum number of shadow rays per camera sample, 1 to 65,536.
         n_rays: u32,
     },
     /// Rejection sampling of the product.
     Rejection {
-        /// The factor of the product that tries are drawn from.
+        /// The factor of the product from which tries are drawn.
         proposal: Proposal,
         /// The rule that ends the tries at a point.
         stop: StoppingRule,
     },
     /// Sampling importance resampling of the product.
     Sir {
-        /// Candidates of each camera sample, 1 to 1,048,576; `None` lets a pilot choose.
+        /// Candidates per camera sample, 1 to 1,048,576; with `None`, a pilot chooses.
         n_candidates: Option<u32>,
-        /// Shadow rays of each camera sample, 1 to 65,536, no more than candidates.
+        /// Shadow rays per camera sample, 1 to 65,536, at most the number of candidates.
         n_samples: u32,
-        /// The density that candidates are drawn from.
+        /// The density from which candidates are drawn.
         candidates: Candidates,
-        /// The method that picks rays from candidates.
+        /// How rays are picked from candidates.
         resampling: Resampling,
     },
     /// The directional lights of median cut; biased.
@@ -110,10 +110,10 @@ pub enum StrategyKind {
     VarianceMinimization,
 }
 
-/// The most shadow rays of a camera sample.
+/// The maximum number of shadow rays per camera sample.
 const MAX_RAYS: u32 = 1 << 16;
 
-/// The most candidates, tries or lights.
+/// The maximum number of candidates, tries or lights.
 const MAX_CANDIDATES: u32 = 1 << 20;
 
 /// The values of one option by name; names of a value other than the first are aliases.
@@ -159,7 +159,7 @@ impl StrategyKind {
         Self::VarianceMinimization,
     ];
 
-    /// Its name in text, such as `median-cut`.
+    /// The name in text form, such as `median-cut`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Brdf => "brdf",
@@ -173,28 +173,28 @@ impl StrategyKind {
         }
     }
 
-    /// What the strategy does, in a line.
+    /// A one-line description of the strategy.
     pub fn summary(self) -> &'static str {
         match self {
             Self::Brdf => "samples the BRDF",
             Self::Environment => "samples the environment's radiance",
             Self::Mis => "samples both and weights them by multiple importance sampling",
             Self::Product => {
-                "samples the product of both by a table for each pixel, with learned visibility; traces rays \
-                 where they matter"
+                "samples the product of both from a table for each pixel, with learned \
+                 visibility; traces rays where they matter"
             }
             Self::Rejection => {
                 "samples the product by rejection from one factor with a bound on the other"
             }
             Self::Sir => "samples the product by resampling candidates to rays",
-            Self::MedianCut => "directional lights by median cut: no noise, but bias",
+            Self::MedianCut => "directional lights by median cut: noise-free, but biased",
             Self::VarianceMinimization => {
-                "directional lights by variance minimization: no noise, but bias"
+                "directional lights by variance minimization: noise-free, but biased"
             }
         }
     }
 
-    /// Other names that are understood.
+    /// Alternative names.
     pub fn aliases(self) -> &'static [&'static str] {
         match self {
             Self::Environment => &["env", "em"],
@@ -212,7 +212,7 @@ impl StrategyKind {
 /// The options of a strategy; `None` stands for the default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StrategyOptions {
-    /// Shadow rays of each camera sample; samples to accept of rejection.
+    /// Shadow rays per camera sample; for rejection, samples to accept.
     pub rays: Option<u32>,
     /// Environment and BRDF samples of `mis`.
     pub split: Option<[u32; 2]>,
@@ -220,21 +220,21 @@ pub struct StrategyOptions {
     pub lights: Option<u32>,
     /// Candidates of `sir`.
     pub candidates: Option<u32>,
-    /// The density that `sir` draws candidates from.
+    /// The density from which `sir` draws candidates.
     pub from: Option<Candidates>,
-    /// The method by which `sir` picks rays from candidates.
+    /// How `sir` picks rays from its candidates.
     pub resampling: Option<Resampling>,
     /// Tries of rejection.
     pub tries: Option<u32>,
-    /// What rejection draws its tries from.
+    /// The density from which rejection draws its tries.
     pub proposal: Option<Proposal>,
-    /// The heuristic that weights the samples of `mis`.
+    /// The heuristic for the weights of `mis`.
     pub heuristic: Option<Heuristic>,
-    /// `mis` draws from the environment's whole table.
+    /// Whether `mis` samples the whole environment, without compensation.
     pub no_compensation: bool,
 }
 
-/// The error of a text or a set of options that describe no strategy.
+/// An invalid strategy text or set of options.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StrategyError {
@@ -244,7 +244,7 @@ pub enum StrategyError {
     /// No option has that name.
     #[error("there is no option '{0}' of strategies")]
     UnknownOption(String),
-    /// A value that an option does not take.
+    /// An invalid value of an option.
     #[error("{option} is '{value}'; it must be {expected}")]
     BadValue {
         /// The option.
@@ -255,17 +255,17 @@ pub enum StrategyError {
         expected: String,
     },
     /// Two numbers for a strategy that takes one.
-    #[error("two numbers go with mis:M:N and sir:N/M only")]
+    #[error("only mis:M:N and sir:N/M take two numbers")]
     TwoNumbers,
     /// An option of another strategy.
-    #[error("{option} goes with {strategies}")]
+    #[error("{option} applies only to {strategies}")]
     Misplaced {
         /// The option.
         option: &'static str,
-        /// The strategies that take it.
+        /// The strategies that accept it.
         strategies: &'static str,
     },
-    /// Numbers that contradict each other.
+    /// Contradictory numbers.
     #[error("{0}")]
     Contradiction(&'static str),
 }
@@ -311,7 +311,7 @@ impl StrategyOptions {
         Ok((kind, options))
     }
 
-    /// Sets what the numbers after a strategy's name stand for.
+    /// Sets the options given by the numbers after a strategy's name.
     fn set_numbers(
         &mut self,
         kind: StrategyKind,
@@ -369,7 +369,7 @@ impl StrategyOptions {
         Ok(())
     }
 
-    /// These options where they are given, else those of `other`.
+    /// These options, with those of `other` where they are not given.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self {
@@ -386,7 +386,7 @@ impl StrategyOptions {
         }
     }
 
-    /// Refuses options of other strategies.
+    /// Rejects options of other strategies.
     fn check(&self, kind: StrategyKind) -> Result<(), StrategyError> {
         use StrategyKind as K;
         let is_rig = matches!(kind, K::MedianCut | K::VarianceMinimization);
@@ -449,8 +449,8 @@ fn named<T: Copy>(option: &'static str, names: Names<T>, text: &str) -> Result<T
 }
 
 impl StrategySpec {
-    /// The strategy with those options; defaults are 1 ray, 1:1 of `mis`, 8 rays of `product`, 16 tries and 64
-    /// lights.
+    /// Creates the strategy with these options. The defaults are 1 ray, 1:1 for `mis`, 8 rays for `product`, 16 tries
+    /// and 64 lights.
     ///
     /// # Errors
     /// If an option belongs to another strategy, or options contradict each other.
@@ -492,7 +492,7 @@ impl StrategySpec {
             n_environment,
             n_brdf,
             heuristic: options.heuristic.unwrap_or(Heuristic::Power),
-            // Without BRDF samples nothing would catch the dim light.
+            // Without BRDF samples, the dim light would be lost.
             compensation: !options.no_compensation && n_brdf > 0,
         })
     }
@@ -542,7 +542,7 @@ impl StrategySpec {
         !matches!(self, Self::MedianCut { .. } | Self::VarianceMinimization { .. })
     }
 
-    /// The most points that one camera sample takes from a sequence of 2³² points a pixel.
+    /// The maximum number of points that one camera sample takes from the pixel's sequence of 2³² points.
     pub fn points_per_sample(self) -> u32 {
         match self {
             Self::Brdf { n_samples } | Self::Environment { n_samples } => n_samples,
@@ -550,14 +550,14 @@ impl StrategySpec {
             Self::Rejection { stop: StoppingRule::Tries(n), .. } => n,
             Self::Mis { n_environment, n_brdf, .. } => n_environment.max(n_brdf),
             Self::Sir { n_candidates, n_samples, .. } => n_candidates.unwrap_or(n_samples),
-            // These draw independent numbers, or none.
+            // These use independent random numbers, or none.
             Self::Rejection { stop: StoppingRule::Accepted { .. }, .. }
             | Self::MedianCut { .. }
             | Self::VarianceMinimization { .. } => 1,
         }
     }
 
-    /// A sentence for readers of reports.
+    /// A description for reports.
     pub fn description(self) -> String {
         match self {
             Self::Brdf { n_samples } => format!("brdf, {n_samples} per camera sample"),

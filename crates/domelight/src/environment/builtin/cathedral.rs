@@ -1,8 +1,8 @@
-//! A Gothic nave seen from its middle: dim stone, small bright stained glass, hanging lamps.
+//! A Gothic nave seen from its center: dim stone, small bright stained glass, hanging lamps.
 //!
-//! Made to stress a sampler as the Grace Cathedral probe of Debevec 1998, "Rendering Synthetic Objects
-//! into Real Scenes", does: the brightest 0.1 % of the pixels hold about two thirds of the energy.
-//! The room is a box under a barrel vault; light on the stone is painted, not simulated.
+//! It stresses a sampler like the Grace Cathedral probe of Debevec 1998, "Rendering Synthetic Objects
+//! into Real Scenes": the brightest 0.1 % of the pixels hold about two thirds of the energy.
+//! The room is a box under a barrel vault. The light on the stone is painted, not simulated.
 
 use super::smoothstep;
 use crate::color::Rgb;

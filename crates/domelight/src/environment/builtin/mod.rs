@@ -1,12 +1,11 @@
-//! Light probes made in code, at any size, without files.
+//! Procedural light probes at any size.
 //!
 //! Each is a radiance over directions; a texel of the lat-long map is its mean over the texel's solid
-//! angle, from a regular grid of directions fine enough that the coarsest map still sees the smallest
-//! lamp. The sun alone is smaller than any such grid and is laid in by its exact solid angle.
+//! angle, from a regular grid of directions fine enough that the coarsest map still resolves the smallest
+//! lamp. Only the sun is smaller than any such grid; it is added with its exact solid angle.
 //!
-//! A stored picture would have fixed the resolution and weighed megabytes; a fit to a measured probe
-//! would carry somebody else's license. Random placement is avoided: light that matters has a
-//! position that was chosen by eye.
+//! A stored picture would fix the resolution and take megabytes, and a fit to a measured probe would
+//! carry somebody else's license. There is no random placement: important lights were positioned by eye.
 
 mod cathedral;
 mod sky;
@@ -20,7 +19,7 @@ use crate::color::Rgb;
 use crate::image::RgbImage;
 use crate::math::{Vec3, functions, vec3};
 
-/// A light probe made in code.
+/// A procedural light probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BuiltinProbe {
     /// A clear afternoon sky with a true-size sun over a plain ground.
@@ -30,20 +29,20 @@ pub enum BuiltinProbe {
     /// A dim nave with small bright windows and lamps: two thirds of the energy in 0.1 % of the pixels
     /// (62 % at 256 rows, 67 % at 512, 72 % at 1024; finer texels separate glass from lead).
     Cathedral,
-    /// Radiance 1 from everywhere, the white furnace.
+    /// Radiance 1 from all directions, the white furnace.
     Constant,
 }
 
-/// A name that is no built-in probe.
+/// The name of an unknown built-in probe.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no built-in probe is called {name:?}; there are sky, studio, cathedral and constant")]
+#[error("there is no built-in probe {name:?}; the probes are sky, studio, cathedral and constant")]
 pub struct UnknownProbe {
     /// The name that was given.
     pub name: String,
 }
 
 impl BuiltinProbe {
-    /// All of them, in the order of their documentation.
+    /// All built-in probes, in the order of their documentation.
     pub const ALL: [Self; 4] = [Self::Sky, Self::Studio, Self::Cathedral, Self::Constant];
 
     /// The name that [`FromStr`] reads.
@@ -56,7 +55,7 @@ impl BuiltinProbe {
         }
     }
 
-    /// One line for a list of probes.
+    /// A one-line description for a list of probes.
     pub const fn description(self) -> &'static str {
         match self {
             Self::Sky => "clear afternoon sky with a true-size sun, over a plain ground",
@@ -68,9 +67,9 @@ impl BuiltinProbe {
         }
     }
 
-    /// The probe as a lat-long map of `height` rows and `2 · height` columns.
+    /// The probe as a lat-long map with `height` rows and `2 · height` columns.
     ///
-    /// Mean radiance is the same at every size, up to the sampling of edges. The pixels do not depend
+    /// The mean radiance is the same at every size, up to the sampling of edges. The pixels do not depend
     /// on the number of threads.
     ///
     /// # Panics

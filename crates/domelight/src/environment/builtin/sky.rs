@@ -8,9 +8,9 @@
 //! the sky as a whole is scaled to the measured illuminance of clear skies instead.
 //!
 //! Hošek and Wilkie 2012 is more accurate at high turbidity and low sun, but needs tables of some
-//! thousand coefficients; at the turbidity and sun height used here the two differ little. The CIE
-//! standard skies have no color. Single scattering in the manner of Nishita loses the
-//! multiply scattered third of the light.
+//! thousand coefficients; at the turbidity and sun elevation used here, the two differ little. The CIE
+//! standard skies have no color. Single scattering as in Nishita's model loses the third of the light
+//! that is multiply scattered.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

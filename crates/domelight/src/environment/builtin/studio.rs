@@ -1,7 +1,7 @@
 //! A photographer's dark room: soft boxes around the subject at the origin.
 //!
-//! Every light is a rectangle seen from the origin, brightest in the middle and soft at the edge, as
-//! cloth in front of a lamp is.
+//! Every light is a rectangle seen from the origin, brightest in the center and soft at the edge, like
+//! cloth in front of a lamp.
 
 use super::smoothstep;
 use crate::color::Rgb;

@@ -1,15 +1,15 @@
-//! What is behind a source: radiance continued from its rim, in value and slope.
+//! Fills in the background behind a source: radiance continued from its rim, in value and slope.
 //!
-//! The smoothest continuation of the rim's values is the harmonic one, a membrane. Within a circle
-//! it is Poisson's integral, the mean of the values with weights 1/d², d the distance; on the sphere
-//! as in the plane, for stereographic projection keeps circles and harmonic functions. The same
-//! mean is taken within other outlines, where it is near to the membrane: it passes continuously
-//! into the rim and never leaves the range of its values.
+//! The smoothest continuation of the rim's values is the harmonic one, a membrane. Within a circle, it is
+//! Poisson's integral, the mean of the values with weights 1/d² for distance d. This holds on the sphere
+//! as in the plane, because stereographic projection preserves circles and harmonic functions. The same
+//! mean is used within other outlines, where it approximates the membrane: it is continuous at the rim
+//! and never leaves the range of the rim's values.
 //!
-//! A membrane alone cuts the glow around a source off to a flat top. By Almansi's theorem the
-//! biharmonic continuation, a thin plate, is the membrane and (R² − r²)/2R times the continuation of
-//! the slope toward the source; and (R² − r²)/2R = π / ∫ ds/d², so that the same weights give it.
-//! (What the membrane's own slope would change is left out; it vanishes where the rim is even.)
+//! A membrane alone would truncate the glow around a source to a flat top. By Almansi's theorem, the
+//! biharmonic continuation, a thin plate, is the membrane plus (R² − r²)/2R times the continuation of the
+//! slope toward the source. Since (R² − r²)/2R = π / ∫ ds/d², the same weights give it. (The effect of
+//! the membrane's own slope is neglected; it vanishes for a uniform rim.)
 
 use std::f32::consts::PI;
 

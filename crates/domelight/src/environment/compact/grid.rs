@@ -1,4 +1,4 @@
-//! The grid that sources are searched on: texels, or blocks of texels of a large map.
+//! The grid on which sources are searched: texels, or blocks of texels on a large map.
 
 use std::f64::consts::{PI, TAU};
 

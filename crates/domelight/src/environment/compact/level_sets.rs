@@ -1,15 +1,15 @@
-//! Peaks of luminance that stand out of their surroundings.
+//! Peaks of luminance that stand out from their surroundings.
 //!
 //! Let the level t fall from the brightest cell to black and follow the connected components of
 //! {L > t} with their solid angles A(t): the component tree (Salembier et al. 1998, "Antiextensive
 //! Connected Operators"; by union-find after Najman & Couprie 2006, "Building the Component Tree in
-//! Quasi-Linear Time"). What a component would have to hold at the least is the flux t·A(t). It
-//! rises while a source is filled, falls along the source's edge, where A hardly grows, and rises
-//! again in the surroundings. **The source ends where t·A is least**: for a round source that is
-//! where radiance begins to fall slower than 1/r², so that further rings would add ever more light.
-//! How far t·A falls is the source's contrast.
+//! Quasi-Linear Time"). A component holds at least the flux t·A(t). This bound rises while a source is
+//! filled, falls along the source's edge, where A hardly grows, and rises again in the surroundings.
+//! **The source ends where t·A is minimal**: for a round source, where radiance begins to fall more
+//! slowly than 1/r², so that further rings would add more and more light. The drop of t·A is the source's
+//! contrast.
 //!
-//! No radius, brightness or background is assumed; scaling the map's radiance changes nothing.
+//! No radius, brightness or background is assumed, and scaling the map's radiance changes nothing.
 
 use super::grid::Grid;
 use crate::parallel::sort;
@@ -41,7 +41,7 @@ struct Component {
     seed: u32,
     area: f64,
     energy: f64,
-    /// The greatest t·A so far.
+    /// The largest t·A so far.
     most: f64,
     /// The least t·A since then, and the peak that would end there.
     least: f64,

@@ -1,11 +1,11 @@
-//! Compact bright sources: suns, lamps and windows, each found whole and taken out of its map.
+//! Compact bright sources: suns, lamps and windows, each detected as a whole and extracted from the map.
 //!
-//! A source is what stands out of its surroundings (`level_sets`: where the level sets of
-//! luminance hardly grow while the level falls). What is behind it is guessed from its rim (`fill`),
-//! and the source is what exceeds that, so that source and rest are the map, texel by texel.
+//! A source stands out from its surroundings (`level_sets`: where the level sets of luminance hardly grow
+//! while the level falls). The background behind it is estimated from its rim (`fill`), and the source is
+//! the excess over this background, so that source and remainder add up to the map, texel by texel.
 //!
-//! Large maps are searched in blocks of texels; which light of a texel is a source's is decided for
-//! every texel.
+//! Large maps are searched in blocks of texels, but the light of a source is determined for every
+//! texel.
 
 mod fill;
 mod grid;

@@ -1,8 +1,7 @@
 //! Conversion between mappings: area averages of constant texels.
 //!
-//! What a texel of the one picture and one of the other share of the sphere is computed exactly
-//! ([`super::overlap`]), so each texel's light goes somewhere, however small it is: a sun of one texel keeps its flux
-//! to about 10⁻⁶, and a constant map stays constant.
+//! The overlap of two texels on the sphere is computed exactly ([`super::overlap`]), so no light is lost, however small
+//! a texel is: a one-texel sun keeps its flux to about 10⁻⁶, and a constant map stays constant.
 
 use super::Mapping;
 use super::overlap::Overlap;
@@ -14,11 +13,11 @@ use crate::parallel::in_order;
 /// Rows of the source whose shares are computed before they are added up.
 const BAND: usize = 64;
 
-/// The lat-long map of `2 · height` × `height` texels of what `image` shows in `mapping`.
+/// Converts `image` in `mapping` to a lat-long map of `2 · height` × `height` texels.
 ///
-/// Each texel is the mean of the source over its solid angle. A lat-long map that has `height` rows already is
-/// returned bit for bit, and so is OpenEXR's, turned by half its (even) width. [`Mapping::lat_long_height`] gives
-/// the height that keeps all detail. The same bits for any number of threads.
+/// Each texel is the mean of the source over its solid angle. A lat-long map that already has `height` rows is
+/// returned bit for bit, and so is one in OpenEXR's convention, rotated by half its (even) width.
+/// [`Mapping::lat_long_height`] is the height that keeps all detail. The bits are the same for any number of threads.
 ///
 /// # Panics
 /// If the picture has no texels or `height` is zero.
@@ -51,11 +50,11 @@ pub fn to_lat_long(image: &RgbImage, mapping: Mapping, height: usize) -> RgbImag
     RgbImage::new(width, height, pixels)
 }
 
-/// What a lat-long map shows, as a picture of `size` (width, height) in `mapping`; black where the picture shows
-/// no direction.
+/// Converts a lat-long map to a picture of `size` (width, height) in `mapping`, black where the picture shows no
+/// direction.
 ///
-/// Each texel is the mean of the map over the texel's solid angle. [`Mapping::size_for`] gives the size that keeps
-/// all detail. The same bits for any number of threads.
+/// Each texel is the mean of the map over the texel's solid angle. [`Mapping::size_for`] is the size that keeps all
+/// detail. The bits are the same for any number of threads.
 ///
 /// # Panics
 /// If the map or the size is empty.

@@ -1,4 +1,4 @@
-//! Unfolded cubes: where each face lies in the picture and how it is turned.
+//! Unfolded cubes: the position and orientation of each face in the picture.
 
 use crate::math::{Vec2, Vec3, vec2};
 
@@ -76,7 +76,7 @@ impl CubeLayout {
     pub const ALL: [Self; 4] =
         [Self::CrossHorizontal, Self::CrossVertical, Self::StripHorizontal, Self::StripVertical];
 
-    /// The name that `--mapping` understands.
+    /// The name for `--mapping`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::CrossHorizontal => "cross-horizontal",
@@ -86,7 +86,7 @@ impl CubeLayout {
         }
     }
 
-    /// Columns and rows of faces in the picture, empty cells included.
+    /// The columns and rows of faces in the picture, including empty cells.
     pub const fn faces_across_and_down(self) -> (usize, usize) {
         match self {
             Self::CrossHorizontal => (4, 3),

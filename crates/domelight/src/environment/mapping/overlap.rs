@@ -1,12 +1,11 @@
-//! Which texels of a lat-long map a texel of any mapping covers, and how much of the sphere they share.
+//! The exact overlap on the sphere between texels of a lat-long map and texels of any mapping.
 //!
-//! In the plane of longitude and height (φ, y = cos θ) areas are solid angles (Archimedes) and the texels of a
-//! lat-long map are rectangles. A texel of another mapping is drawn into that plane as a polygon, its edges refined
-//! until parabolas will do, and the polygon's area within each rectangle is summed edge by edge, as rasterizers of
-//! fonts do. Neighboring texels share their edges, so what one loses the other gains: all of the sphere is shared
-//! out, none of it twice.
+//! In the plane of longitude and height (φ, y = cos θ), areas equal solid angles (Archimedes), and the texels of a
+//! lat-long map are rectangles. A texel of another mapping becomes a polygon in that plane, with its edges refined
+//! until parabolas suffice. The polygon's area within each rectangle is summed edge by edge, as in font rasterizers.
+//! Neighboring texels share their edges, so the whole sphere is covered exactly once.
 //!
-//! Everything here is in double precision: at 4096 rows a coordinate in single precision is off by 10⁻⁴ of a texel.
+//! Everything is in double precision: at 4096 rows, a single-precision coordinate is off by 10⁻⁴ of a texel.
 
 use super::{CubeLayout, Mapping};
 use crate::environment::LatLongGrid;
@@ -95,7 +94,7 @@ impl<'a> Overlap<'a> {
         self.outline.extend([[left, top], [right, top], [right, bottom], [left, bottom]]);
     }
 
-    /// The outline, counter-clockwise or clockwise, its longitudes continuous.
+    /// The outline, counterclockwise or clockwise, its longitudes continuous.
     fn trace(&mut self, chart: &Chart, size: [f64; 2], at: Point) {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
             .map(|c: Point| [(at[0] + c[0]) / size[0], (at[1] + c[1]) / size[1]]);
@@ -262,7 +261,7 @@ const POLE: f64 = 1e-13;
 /// The middle of two straight lines from `a` to `b` on the plane with the area of the parabola through `m` (Simpson's
 /// rule); none if the curve bends too much for that.
 fn arc(a: &Vertex, m: &Vertex, b: &Vertex) -> Option<Vertex> {
-    /// The greatest area of the triangle (a, m, b) over the square of the line; the area missed is about 4 times its cube.
+    /// The largest area of the triangle (a, m, b) over the square of the line; the area missed is about 4 times its cube.
     const BEND: f64 = 2e-3;
     let (Some(_), Some(longitude), Some(_)) = (a.longitude, m.longitude, b.longitude) else {
         return is_meridian(&[a, m, b].map(|v| v.longitude)).then_some(*m);

@@ -1,4 +1,4 @@
-//! What a header says of the picture's place and of its colors.
+//! Header attributes for the position and the colors of the picture.
 
 use crate::math::Mat3;
 use crate::picture::DataWindow;

@@ -1,4 +1,4 @@
-//! Writing OpenEXR band by band: no more than a band of rows need be in memory.
+//! Writes OpenEXR band by band, with only one band of rows in memory.
 
 use super::write::sort_attributes;
 use super::{Compression, ExrLayers, Plane};
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use std::borrow::Borrow;
 use std::io::{Cursor, Seek, SeekFrom, Write};
 
-/// Rows of a band, if it is not the last: whole blocks, some for each of several cores.
+/// The number of rows of every band except the last: whole blocks, enough for several cores.
 pub const BAND_ROWS: usize = 4 * BLOCK_ROWS;
 
 /// Rows of a deflated block; other compressions have a divisor of it.
@@ -23,12 +23,12 @@ const BLOCK_ROWS: usize = 16;
 /// Blocks compressed together: enough for all cores, few enough to need little memory.
 const BATCH: usize = 32;
 
-/// Writes a picture of `height` rows from bands: `band(y)` is what follows from row `y` on, [`BAND_ROWS`] or a
-/// multiple of them but at the end. All have the same width and channels; what else the file tells is from the first.
+/// Writes a picture with `height` rows from bands. `band(y)` returns the rows from `y` on, [`BAND_ROWS`] of them or a
+/// multiple, except at the end. All bands have the same width and channels; other attributes come from the first.
 /// The bytes are those of [`ExrLayers::encode`].
 ///
 /// # Errors
-/// As [`ExrLayers::encode`], or if `out` does not take it or `band` fails.
+/// Those of [`ExrLayers::encode`], or if writing to `out` or `band` fails.
 pub fn write<B: Borrow<ExrLayers>, E: From<PictureErrorKind>>(
     height: usize,
     out: &mut (impl Write + Seek + ?Sized),
@@ -64,11 +64,11 @@ pub fn write<B: Borrow<ExrLayers>, E: From<PictureErrorKind>>(
 }
 
 impl ExrLayers {
-    /// The file's bytes: 32 bits a sample, scanlines.
+    /// Encodes the layers as a file with scanlines and 32 bits per sample.
     ///
     /// # Errors
-    /// If there are no texels or no channels, two channels have one name, a name is not ASCII or too long, or a
-    /// channel has not `width · height` values.
+    /// If there are no texels or no channels, two channels have the same name, a name is not ASCII or too long, or a
+    /// channel does not have `width · height` values.
     pub fn encode(&self) -> Result<Vec<u8>, PictureErrorKind> {
         let mut bytes = Cursor::new(Vec::new());
         write(self.height, &mut bytes, |_| Ok::<_, PictureErrorKind>(self))?;

@@ -1,10 +1,10 @@
-//! Luminance and chroma: OpenEXR's Y at every texel, RY and BY at every second of every second line.
+//! Luminance and chroma: OpenEXR's Y at every texel, RY and BY at every second texel of every second line.
 //!
-//! RY = (R − Y) / Y and BY = (B − Y) / Y, Y by the weights of the file's primaries ("Technical Introduction to
-//! OpenEXR", Luminance/Chroma Images). Chroma is interpolated bilinearly; OpenEXR's own reader takes a wider filter.
+//! RY = (R − Y) / Y and BY = (B − Y) / Y, with Y from the weights of the file's primaries ("Technical Introduction to
+//! OpenEXR", Luminance/Chroma Images). Chroma is interpolated bilinearly; OpenEXR's own reader uses a wider filter.
 //!
-//! The `exr` crate decompresses subsampled channels, but refuses their headers; so the table of blocks is walked
-//! through here.
+//! The `exr` crate decompresses subsampled channels but rejects their headers, so this module reads the table of
+//! blocks itself.
 
 use super::attributes::{primaries, to_rec709, window};
 use crate::picture::primaries::{Primaries, transform};

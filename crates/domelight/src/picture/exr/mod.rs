@@ -1,4 +1,4 @@
-//! OpenEXR: reads one layer of any flat file, writes several layers into one part.
+//! OpenEXR: reads one layer of any flat file, and writes several layers into one part.
 
 mod attributes;
 pub mod bands;

@@ -1,13 +1,13 @@
-//! Reading OpenEXR.
+//! Reads OpenEXR.
 //!
 //! The `exr` crate parses and decompresses: scanlines and tiles, half, float and uint, every compression
-//! it knows (none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB). Of mip- and rip-mapped files the largest
-//! level is read. The picture is the data window, wherever it lies in the display window ([`DataWindow`]). A
-//! `chromaticities` attribute other than Rec. 709's is converted, white point included.
+//! it supports (none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB). The largest level of mip- and rip-mapped
+//! files is read. The picture is the data window, wherever it lies in the display window ([`DataWindow`]). Colors
+//! with a `chromaticities` attribute other than Rec. 709 are converted, including the white point.
 //!
-//! Blocks are decompressed in batches on the program's own threads: the crate's parallel reader starts a pool of its
-//! own for each file, in which a panic over a corrupt block would abort the process. What the crate asserts instead
-//! of returning an error is caught here and becomes [`PictureErrorKind::ExrPanic`].
+//! Blocks are decompressed in batches on the program's own threads. The crate's parallel reader starts a new thread
+//! pool for each file, in which a panic over a corrupt block would abort the process. Assertions of the crate that
+//! replace errors are caught here and become [`PictureErrorKind::ExrPanic`].
 
 use super::attributes::{to_rec709, window};
 use super::luminance_chroma::LuminanceChroma;
@@ -29,12 +29,12 @@ use rayon::prelude::*;
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Decodes one layer of a whole file.
+/// Decodes one layer of a complete file.
 ///
-/// By default that is the unnamed R, G, B channels, else the first layer with R, G, B, else one with Y alone, else the
-/// only channel that there is, whatever its name but for depth and coverage. `layer`
-/// names another: a part, the part of the channel names before the last dot, or both joined by a dot, in any case
-/// of letters; X, Y, Z or a single channel of any name then count as color too.
+/// By default, this is the unnamed R, G, B channels, or else the first layer with R, G, B, or else one with only Y,
+/// or else the only channel, whatever its name except depth and coverage. `layer` names another: a part, the part of
+/// the channel names before the last dot, or both joined by a dot, case-insensitive. X, Y, Z or a single channel of
+/// any name then also count as color.
 ///
 /// # Errors
 /// If the file is damaged, incomplete or deep, or has no such layer.

@@ -1,4 +1,4 @@
-//! Reading back all that [`ExrLayers::encode`] writes.
+//! Reads everything that [`ExrLayers::encode`] writes.
 
 use super::read::{for_each_block, guarded, open};
 use super::write::string_attributes;
@@ -11,7 +11,7 @@ use ::exr::prelude::SampleType;
 use crate::environment::mapping::EnvmapKind;
 
 impl ExrLayers {
-    /// All channels and strings of the first part, to the bit: the inverse of [`ExrLayers::encode`].
+    /// Decodes all channels and strings of the first part, to the bit: the inverse of [`ExrLayers::encode`].
     ///
     /// # Errors
     /// If the file is damaged or incomplete, or has channels that [`ExrLayers::encode`] does not write: half floats,

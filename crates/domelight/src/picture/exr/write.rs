@@ -1,7 +1,7 @@
-//! Writing OpenEXR: layers in one part.
+//! Writes OpenEXR: layers in one part.
 //!
-//! One part with dotted channel names is what Blender, Nuke and OpenImageIO show as layers; several parts were
-//! rejected because Blender and older viewers see only the first.
+//! Blender, Nuke and OpenImageIO show one part with dotted channel names as layers. Several parts were rejected,
+//! because Blender and older viewers show only the first.
 
 use crate::environment::mapping::EnvmapKind;
 use crate::picture::{PictureErrorKind, checked_area};
@@ -15,18 +15,18 @@ use std::io::Cursor;
 /// Channels that belong together, such as `albedo` with R, G and B.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// What stands before the dot in the file; empty for the picture itself.
+    /// The name before the dot in the file; empty for the picture itself.
     pub name: String,
-    /// Name (R, G, B, A, X, Y, Z …) and a value a texel, row by row.
+    /// The channels: a name (R, G, B, A, X, Y, Z …) and one value per texel, row by row.
     pub channels: Vec<(String, Plane)>,
 }
 
 /// The values of a channel, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Plane {
-    /// Numbers of 32 bits.
+    /// 32-bit floats.
     Float(Vec<f32>),
-    /// Counts, or bits that mean something to their writer alone.
+    /// Counts, or bits that only their writer interprets.
     Uint(Vec<u32>),
 }
 
@@ -39,7 +39,7 @@ impl Plane {
         }
     }
 
-    /// No values.
+    /// Whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -48,10 +48,10 @@ impl Plane {
 /// The lossless compression of a file: speed or size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compression {
-    /// Deflate: the smaller file.
+    /// Deflate, for smaller files.
     #[default]
     Zip,
-    /// Run lengths: several times as fast.
+    /// Run-length encoding, which is several times as fast.
     Rle,
 }
 
@@ -67,15 +67,15 @@ impl From<Vec<u32>> for Plane {
     }
 }
 
-/// Layers of one size, to be written as one part: `R`, `G`, `B`, `A` for the picture itself and `layer.R` … for
+/// Layers of the same size, written as one part: `R`, `G`, `B`, `A` for the picture itself and `layer.R` … for
 /// others, the naming that Blender, Nuke and OpenImageIO show as layers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ExrLayers {
-    /// Columns.
+    /// The number of columns.
     pub width: usize,
-    /// Rows.
+    /// The number of rows.
     pub height: usize,
-    /// Position of the first column and row in the whole picture: the data window's corner.
+    /// The position of the first column and row in the whole picture: the corner of the data window.
     pub origin: (usize, usize),
     /// Columns and rows of the whole picture, the display window; by default the data window.
     pub whole: Option<(usize, usize)>,
@@ -90,19 +90,19 @@ pub struct ExrLayers {
 }
 
 impl ExrLayers {
-    /// No layers yet.
+    /// Creates a file without layers.
     pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, ..Self::default() }
     }
 
-    /// One picture, with alpha if given.
+    /// Creates a file with one picture, with alpha if given.
     pub fn from_image(image: &RgbImage, alpha: Option<&[f32]>) -> Self {
         let mut layers = Self::new(image.width, image.height);
         layers.push_rgb("", image, alpha);
         layers
     }
 
-    /// Adds a layer with R, G, B and perhaps A.
+    /// Adds a layer with R, G, B and optionally A.
     pub fn push_rgb(&mut self, name: &str, image: &RgbImage, alpha: Option<&[f32]>) {
         let plane = |f: fn(&Rgb) -> f32| Plane::Float(image.pixels.iter().map(f).collect());
         let mut channels = vec![
@@ -121,7 +121,7 @@ impl ExrLayers {
         self.layers.push(Layer { name: name.to_owned(), channels: channels.collect() });
     }
 
-    /// Adds a layer of one channel, such as `depth.Z`.
+    /// Adds a layer with one channel, such as `depth.Z`.
     pub fn push_channel(&mut self, name: &str, channel: &str, values: impl Into<Plane>) {
         let channels = vec![(channel.to_owned(), values.into())];
         self.layers.push(Layer { name: name.to_owned(), channels });
@@ -143,7 +143,7 @@ impl ExrLayers {
             if !name.is_ascii() || name.is_empty() || name.len() > 255 {
                 return refuse(name, "its name must be ASCII and 1 to 255 characters long");
             } else if values.len() != area {
-                return refuse(name, "it has not one value for each texel");
+                return refuse(name, "it does not have one value per texel");
             }
         }
         if let Some(pair) = planes.windows(2).find(|pair| pair[0].0 == pair[1].0) {
@@ -210,7 +210,7 @@ fn split_attribute(header: &[u8]) -> Option<(&[u8], &[u8])> {
     header.split_at_checked(value + length as usize)
 }
 
-/// The string attributes of the first part: what [`ExrLayers::attributes`] wrote.
+/// Reads the string attributes of the first part, as written from [`ExrLayers::attributes`].
 ///
 /// # Errors
 /// If the file's headers are damaged.
@@ -219,10 +219,10 @@ pub fn text_attributes(bytes: &[u8]) -> Result<Vec<(String, String)>, PictureErr
     Ok(reader.headers().first().map(string_attributes).unwrap_or_default())
 }
 
-/// The attributes of the first part that are texts or numbers, by name; numbers as text.
+/// Reads the text and number attributes of the first part, by name. Numbers become text.
 ///
 /// # Errors
-/// If these are no OpenEXR bytes.
+/// If the bytes are not OpenEXR.
 pub fn plain_attributes(bytes: &[u8]) -> Result<Vec<(String, String)>, PictureErrorKind> {
     let reader = block::read(Cursor::new(bytes), false).map_err(PictureErrorKind::Exr)?;
     let Some(header) = reader.headers().first() else { return Ok(Vec::new()) };

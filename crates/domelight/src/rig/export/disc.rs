@@ -31,7 +31,7 @@ pub(super) fn solid_angle(radius: f32) -> f32 {
     4.0 * std::f32::consts::PI * functions::powi(functions::sin(0.5 * radius), 2)
 }
 
-/// A color whose greatest channel is 1 and the factor that restores the light; white and 0 for
+/// A color whose largest channel is 1 and the factor that restores the light; white and 0 for
 /// none.
 pub(super) fn color_and_strength(light: Rgb) -> (Rgb, f32) {
     match light.max_component() {

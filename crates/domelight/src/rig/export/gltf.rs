@@ -26,7 +26,7 @@ use crate::rig::SphericalHarmonics;
 /// Texels along the edge of a face of the reflections.
 const FACE_SIZE: u32 = 16;
 
-/// The greatest radiance that RGBD holds.
+/// The largest radiance that RGBD holds.
 const RGBD_RANGE: f32 = 255.0;
 
 /// The space of the image-based light, left-handed as that of cube maps, is the world in a mirror.

@@ -1,7 +1,7 @@
-//! Rigs as files of other programs: one format a file.
+//! Rigs as files of other programs: one format per file.
 //!
-//! Functions here make bytes and do no I/O. What a format needs of the outside, the name of the
-//! file that holds the residual map, is given as text.
+//! Functions here return bytes and do no I/O. The name of the file that holds the residual map is
+//! passed as text.
 
 mod axes;
 mod blender;
@@ -26,7 +26,7 @@ use super::{Region, RigLight, SphericalHarmonics};
 use crate::environment::mapping::Mapping;
 use crate::environment::{Environment, Orientation};
 
-/// What all formats write.
+/// The content that all formats write.
 #[derive(Clone, Copy, Debug)]
 pub struct RigExport<'a> {
     /// The probe's name, for comments.
@@ -35,18 +35,18 @@ pub struct RigExport<'a> {
     pub orientation: Orientation,
     /// The lights: compact ones first.
     pub lights: &'a [RigLight],
-    /// What the lights left on the map; none if they took all its light.
+    /// The residual of the map; `None` if the lights have all its light.
     pub dome: Option<Dome<'a>>,
 }
 
-/// The light that shines beside a rig's lights: the map without what they took.
+/// The dome light beside a rig's lights: the map without their light.
 #[derive(Clone, Copy, Debug)]
 pub struct Dome<'a> {
-    /// Its map and orientation.
+    /// The map and its orientation.
     pub environment: &'a Environment,
-    /// Its first nine harmonics, over the world's axes.
+    /// The first nine spherical harmonics, in world space.
     pub harmonics: SphericalHarmonics,
-    /// The file that holds its map, as the rig's file refers to it; none if it was not written.
+    /// The file that holds the map, as the rig's file refers to it; `None` if it was not written.
     pub file: Option<&'a str>,
 }
 
@@ -56,7 +56,7 @@ impl RigExport<'_> {
         self.dome.and_then(|dome| dome.file)
     }
 
-    /// A name for each light, all different: `sun`, `lamp_1`, …, `light_1`, ….
+    /// A unique name for each light: `sun`, `lamp_1`, …, `light_1`, ….
     pub fn names(&self) -> Vec<String> {
         let (mut lamps, mut regions) = (0, 0);
         let numbered = |name: &str, count: &mut usize| {
@@ -72,12 +72,12 @@ impl RigExport<'_> {
     }
 }
 
-/// The formats that a rig can be written in.
+/// The file formats of rigs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Our own, of `docs/rig.schema.json`.
+    /// The format of `docs/rig.schema.json`.
     Json,
-    /// A table with a light a row.
+    /// A table with one light per row.
     Csv,
     /// glTF 2.0 as text.
     Gltf,
@@ -99,14 +99,14 @@ pub enum Format {
     Sibl,
 }
 
-/// A picture of the dome beside a rig's file.
+/// The kind of dome picture that accompanies a rig's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DomePicture {
-    /// The map itself in any file of high dynamic range.
+    /// The map itself in any HDR format.
     LatLong,
     /// The map itself as Radiance `.hdr`.
     LatLongHdr,
-    /// The map in [`Mapping::Octahedral`], in any file of high dynamic range.
+    /// The map in [`Mapping::Octahedral`], in any HDR format.
     Octahedral,
 }
 
@@ -120,7 +120,7 @@ impl DomePicture {
     }
 }
 
-/// Why a rig cannot be written.
+/// An error in writing a rig.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExportError {
     /// A light whose direction is no unit vector, or whose numbers are not finite or negative.
@@ -135,7 +135,7 @@ pub enum ExportError {
         /// The light.
         light: RigLight,
     },
-    /// A file name that the format has no way to write.
+    /// A file name that the format cannot represent.
     #[error("{format} files cannot name the file {file:?}: choose a name without {}", format.unquotable())]
     BadFileName {
         /// The format.
@@ -147,7 +147,7 @@ pub enum ExportError {
 
 /// No format has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{name}' is no format of light rigs: {}", Format::ALL.map(Format::name).join(", "))]
+#[error("'{name}' is not a light rig format: {}", Format::ALL.map(Format::name).join(", "))]
 pub struct UnknownFormat {
     name: String,
 }
@@ -168,7 +168,7 @@ impl Format {
         Self::Sibl,
     ];
 
-    /// Its name on the command line.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Json => "json",
@@ -185,7 +185,7 @@ impl Format {
         }
     }
 
-    /// The ends of file names that mean it, in lower case.
+    /// The file extensions of the format, in lower case.
     pub fn extensions(self) -> &'static [&'static str] {
         match self {
             Self::Json => &["json"],
@@ -202,14 +202,14 @@ impl Format {
         }
     }
 
-    /// The format that the end of a file's name means, in either case.
+    /// The format of a file extension, case-insensitive.
     pub fn of_extension(extension: &str) -> Option<Self> {
         let extension = extension.to_ascii_lowercase();
         Self::ALL.into_iter().find(|f| f.extensions().contains(&extension.as_str()))
     }
 
-    /// The picture of the dome that files of this format name and light a scene with, so that it
-    /// must be written beside them.
+    /// The dome picture that files of this format refer to and light a scene with. It must be written
+    /// next to them.
     pub fn dome_picture(self) -> Option<DomePicture> {
         match self {
             Self::Json | Self::Csv | Self::Gltf | Self::Glb | Self::Three => None,
@@ -219,11 +219,11 @@ impl Format {
         }
     }
 
-    /// The rig as a file of this format.
+    /// Encodes the rig as a file of this format.
     ///
     /// # Errors
-    /// A light that is not a direction with light of finite amount, or a name of the dome's file
-    /// that the format cannot hold.
+    /// If a light is invalid (a direction that is not a unit vector, or irradiance that is not finite), or the
+    /// format cannot represent the name of the dome's file.
     pub fn encode(self, rig: &RigExport) -> Result<Vec<u8>, ExportError> {
         check(rig)?;
         Ok(match self {

@@ -1,11 +1,11 @@
-//! Which program a rig's file is for, and how it gets in there.
+//! The target program of a rig's file, and how to open the file there.
 
 use super::Format;
 use crate::code;
 use crate::quote::{Code, Xml, javascript, pbrt, shell, xml};
 
 impl Format {
-    /// The programs that read files of this format, as they call themselves.
+    /// The names of the programs that read files of this format.
     pub fn program(self) -> &'static str {
         match self {
             Self::Json => "programs of your own",
@@ -21,8 +21,8 @@ impl Format {
         }
     }
 
-    /// How the file of that name is opened: a command for a POSIX shell, or what to write into a scene or module of the
-    /// program; a menu where there is neither.
+    /// How to open the file: a command for a POSIX shell, or the text to add to a scene or module of the program, or
+    /// otherwise a menu entry.
     pub fn how_to_open(self, file: &str) -> String {
         let word = shell::word(file);
         let beside = format!("./{}", file.rsplit('/').next().unwrap_or(file));

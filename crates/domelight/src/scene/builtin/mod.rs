@@ -1,7 +1,7 @@
-//! Scenes made in code, for pictures and tests.
+//! Procedural scenes, for pictures and tests.
 //!
-//! Each shows what one question needs: self-shadowing, roughness, a material, or a plain sphere whose
-//! every normal is seen. [`BuiltinScene::environment`] is the light that suits.
+//! Each serves one purpose: self-shadowing, roughness, a material, or a plain sphere that shows every
+//! normal. [`BuiltinScene::environment`] is a suitable light.
 
 pub(crate) mod material_ball;
 pub mod shapes;
@@ -35,12 +35,12 @@ const FLOOR_RADIUS: f32 = 100.0;
 /// The parts that only set off the subject.
 const SCENERY: [&str; 3] = ["floor", "plinth", "cradle"];
 
-/// A scene made in code.
+/// A procedural scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BuiltinScene {
-    /// A pierced, fluted sculpture on a plinth: strong shadows of itself.
+    /// A pierced, fluted sculpture on a plinth, with strong self-shadowing.
     Statue,
-    /// Seven metal spheres of rising roughness on a floor.
+    /// Seven metal spheres with increasing roughness on a floor.
     Spheres,
     /// A grooved ball in a cradle: curvature, edges and contact shadows.
     MaterialBall,
@@ -53,7 +53,7 @@ pub enum BuiltinScene {
 /// A name that is no built-in scene.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no built-in scene is called {name:?}; there are statue, spheres, material-ball, sphere and \
+    "there is no built-in scene {name:?}; the scenes are statue, spheres, material-ball, sphere and \
      sphere-orthographic"
 )]
 pub struct UnknownScene {
@@ -62,7 +62,7 @@ pub struct UnknownScene {
 }
 
 impl BuiltinScene {
-    /// All of them, in the order of their documentation.
+    /// All built-in scenes, in the order of their documentation.
     pub const ALL: [Self; 5] =
         [Self::Statue, Self::Spheres, Self::MaterialBall, Self::Sphere, Self::SphereOrthographic];
 
@@ -77,18 +77,18 @@ impl BuiltinScene {
         }
     }
 
-    /// One line for a list of scenes.
+    /// A one-line description for a list of scenes.
     pub const fn summary(self) -> &'static str {
         match self {
-            Self::Statue => "pierced, fluted marble on a plinth, with strong shadows of itself",
-            Self::Spheres => "seven metal spheres of rising roughness on a floor",
+            Self::Statue => "pierced, fluted marble on a plinth, with strong self-shadowing",
+            Self::Spheres => "seven metal spheres with increasing roughness on a floor",
             Self::MaterialBall => "grooved ball in a cradle: curvature, edges, contact shadows",
             Self::Sphere => "a single diffuse sphere in perspective",
             Self::SphereOrthographic => "a single diffuse sphere that fills the picture",
         }
     }
 
-    /// The name of the built-in probe that suits it best.
+    /// The name of the built-in probe that suits the scene best.
     pub const fn probe(self) -> &'static str {
         match self {
             Self::Statue => "sky",
@@ -105,7 +105,7 @@ impl BuiltinScene {
         }
     }
 
-    /// The probe that suits it, turned.
+    /// The suitable probe, rotated for the scene.
     pub fn environment(self) -> EnvironmentSettings {
         EnvironmentSettings {
             source: EnvironmentSource::Builtin(self.probe().to_owned()),
@@ -116,7 +116,7 @@ impl BuiltinScene {
         }
     }
 
-    /// The scene, with its camera, or the view to frame it from, and the probe that suits it.
+    /// The description of the scene, with its camera or the view that frames it, and the suitable probe.
     pub fn description(self) -> SceneDescription {
         SceneDescription { environment: Some(self.environment()), ..self.geometry() }
     }

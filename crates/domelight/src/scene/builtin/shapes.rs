@@ -1,6 +1,6 @@
 //! Elementary shapes as meshes: spheres, a disc, a beveled box, surfaces of revolution.
 //!
-//! All triangles are counter-clockwise seen from outside and all normals are those of the exact
+//! All triangles are counterclockwise seen from outside and all normals are those of the exact
 //! surface. Where two patches meet (a seam of texture coordinates, a crease) vertices are doubled
 //! with the same position bit for bit, so that the solids are closed.
 
@@ -106,7 +106,7 @@ pub fn fading_ring(inner: f32, outer: f32, segments: u32, steps: u32) -> Mesh {
 /// `segments` (≥ 3) sectors.
 ///
 /// The profile rises from the lower end of the axis to the upper one, or is a loop that ends where
-/// it began, counter-clockwise in the (r, y) plane; no point follows itself. Gentle turns are shaded smooth, sharp ones as creases.
+/// it began, counterclockwise in the (r, y) plane; no point follows itself. Gentle turns are shaded smooth, sharp ones as creases.
 pub fn lathe(profile: &[Vec2], segments: u32) -> Mesh {
     let directions: Vec<Vec2> =
         profile.windows(2).map(|w| (w[1] - w[0]).normalize_or_zero()).collect();
@@ -130,7 +130,7 @@ pub fn lathe(profile: &[Vec2], segments: u32) -> Mesh {
     builder.mesh
 }
 
-/// The points of a circular arc from angle `from` to `to` \[rad\], counter-clockwise from +r, in
+/// The points of a circular arc from angle `from` to `to` \[rad\], counterclockwise from +r, in
 /// `steps` pieces: a part of a profile for [`lathe`].
 pub fn arc(center: Vec2, radius: f32, from: f32, to: f32, steps: u32) -> Vec<Vec2> {
     let angle = |i: u32| from + (to - from) * i as f32 / steps as f32;

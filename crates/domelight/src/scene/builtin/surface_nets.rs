@@ -126,7 +126,7 @@ impl Grid {
                 if begins_inside == ends_inside {
                     continue;
                 }
-                // Counter-clockwise about the axis, which points out where the edge begins inside.
+                // Counterclockwise about the axis, which points out where the edge begins inside.
                 let round = [
                     (p, 0, 0),
                     (back(p, b), 1, 0),

@@ -1,13 +1,13 @@
-//! Where the bytes of a scene's files come from: the file system, or whoever has them in memory.
+//! The source of a scene's files: the file system, or the caller.
 
 use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
-/// Gives the bytes of the files that a scene refers to, where there is no file system.
+/// Returns the bytes of the files that a scene refers to, for use without a file system.
 ///
 /// The path is relative to the scene and has neither `.` nor inner `..`: `textures/wood.png`, `../shared/wood.png`. An
-/// error of the kind [`io::ErrorKind::NotFound`] says that there is no such file.
+/// error of the kind [`io::ErrorKind::NotFound`] means that there is no such file.
 pub type Resolver<'r> = dyn Fn(&Path) -> io::Result<Vec<u8>> + 'r;
 
 /// The files that a scene refers to.
@@ -36,7 +36,7 @@ impl Files<'_> {
             return Err(error(io::ErrorKind::IsADirectory.into()));
         }
         if !metadata.is_file() {
-            let what = "it is not a plain file";
+            let what = "not a regular file";
             return Err(error(io::Error::new(io::ErrorKind::InvalidInput, what)));
         }
         allow(metadata.len())?;

@@ -1,4 +1,4 @@
-//! Loaders: meshes and scenes from files, one format a file.
+//! Loaders: meshes and scenes from files, one format per file.
 //!
 //! | format | geometry | materials | camera |
 //! |---|---|---|---|
@@ -9,9 +9,9 @@
 //! | glTF, GLB | triangles, skins, morph targets | all of the standard's extensions as data | all |
 //! | TOML | the above and built-in meshes | by text or table | yes |
 //!
-//! The format is recognized by the first bytes where they are unambiguous (PLY, GLB), else by the extension, else by the first
-//! word (`OFF`, `solid`).
-//! Every loader checks what it reads before it takes memory for it; bad input is a [`LoadError`]
+//! The format is recognized by the first bytes if they are unambiguous (PLY, GLB), or else by the extension, or else by
+//! the first word (`OFF`, `solid`).
+//! Every loader checks its input before it allocates memory. Invalid input gives a [`LoadError`]
 //! that names the file and the place, never a panic.
 
 mod budget;
@@ -52,16 +52,16 @@ use crate::memory::OverLimit;
 use budget::Budget;
 use files::Files;
 
-/// A scene from a file, and what the loader passed over.
+/// A scene loaded from a file, with the loader's warnings.
 #[derive(Clone, Debug, Default)]
 pub struct Loaded {
     /// The scene.
     pub description: SceneDescription,
-    /// What the picture will lack, one sentence each.
+    /// What the picture will lack, one sentence per item.
     pub warnings: Vec<String>,
-    /// An estimate of the memory that loading took, in bytes.
+    /// An estimate of the memory that loading used \[bytes\].
     pub memory: u64,
-    /// The files that were read beside the one that was asked for.
+    /// The other files that were read.
     pub files: Vec<PathBuf>,
 }
 
@@ -84,40 +84,40 @@ const DEFAULT_ALBEDO: Rgb = Rgb::splat(0.6);
 /// The folders that a scene's files may be in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reach {
-    /// Anywhere; files outside of the scene's folder are read with one warning.
+    /// Anywhere. Files outside the scene's folder give one warning.
     #[default]
     Anywhere,
-    /// The scene's folder and the folders in it, links followed: for programs that serve others.
+    /// The scene's folder and its subfolders, after following links; for programs that load untrusted scenes.
     OwnFolder,
 }
 
-/// Options for reading a scene's file.
+/// Options for loading a scene file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
-    /// The most that meshes and textures together take of the memory \[bytes\]; by default there is no limit.
+    /// The maximum memory of meshes and textures together \[bytes\]; unlimited by default.
     pub max_memory: Option<u64>,
     /// The folders that the scene's files may be in.
     pub reach: Reach,
-    /// Whether a file is refused that requires an extension which is not known (glTF), refers to an image or a material
-    /// library that cannot be read (glTF, OBJ), or has a vertex whose position is NaN or infinite; else what can be drawn
-    /// is drawn, with a warning.
+    /// Whether to reject files that require an unknown extension (glTF), refer to an image or a material library that
+    /// cannot be read (glTF, OBJ), or have a vertex with a NaN or infinite position. Otherwise the rest is drawn,
+    /// with a warning.
     pub strict: bool,
-    /// The scene of a file with several (glTF), by name or by number from 0.
+    /// The scene in a file with several scenes (glTF), by name or by number from 0.
     pub scene: Option<String>,
-    /// The moment of an animation (glTF); without one, nodes are as the file has them at rest.
+    /// A time in an animation (glTF); without one, nodes have the rest pose of the file.
     pub animation: Option<AnimationTime>,
 }
 
-/// A moment of an animation.
+/// A time in an animation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AnimationTime {
     /// The animation's name, or its number from 0.
     pub name: String,
-    /// Time since its beginning \[s\]; before the first key and after the last one nothing moves.
+    /// The time since its start \[s\]. Nothing moves before the first key and after the last.
     pub seconds: f32,
 }
 
-/// Why a file makes no scene.
+/// An error in loading a scene.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The file cannot be read.
@@ -138,7 +138,7 @@ pub enum LoadError {
         /// What the system says.
         source: io::Error,
     },
-    /// A file outside of the scene's folder, where [`Reach`] does not allow it.
+    /// A file outside the scene's folder that [`Reach`] does not allow.
     #[error("{}, which {referrer} refers to, is outside of the scene's folder", path.display())]
     Outside {
         /// The file.
@@ -158,7 +158,7 @@ pub enum LoadError {
         /// What the decoder says.
         source: image::ImageError,
     },
-    /// A file that takes more memory than is allowed.
+    /// A file that needs more memory than allowed.
     #[error("{file}: {source}")]
     Memory {
         /// The file, or its place in another one.
@@ -168,7 +168,8 @@ pub enum LoadError {
     },
     /// Neither content nor extension is known.
     #[error(
-        "{} is none of the scene formats known: .ply, .obj, .stl, .off, .gltf, .glb and .toml", path.display()
+        "{} is not in a known scene format: .ply, .obj, .stl, .off, .gltf, .glb and \
+         .toml", path.display()
     )]
     UnknownFormat {
         /// The file.
@@ -185,8 +186,8 @@ pub enum LoadError {
         /// Which file and what in it.
         referrer: String,
     },
-    /// A scene or an animation asked of a format that has none.
-    #[error("{} is no glTF file and has no {what} to choose", path.display())]
+    /// A scene or an animation requested from a format that has none.
+    #[error("{} is not a glTF file and has no {what} to choose", path.display())]
     NoChoice {
         /// The file.
         path: PathBuf,
@@ -199,7 +200,7 @@ pub enum LoadError {
         /// The file.
         path: PathBuf,
     },
-    /// A broken PLY file.
+    /// An invalid PLY file.
     #[error("{}, {place}: {kind}", path.display())]
     Ply {
         /// The file.
@@ -209,7 +210,7 @@ pub enum LoadError {
         /// What is wrong.
         kind: Box<PlyErrorKind>,
     },
-    /// A broken OBJ or MTL file.
+    /// An invalid OBJ or MTL file.
     #[error("{}, line {line}: {kind}", path.display())]
     Obj {
         /// The file.
@@ -219,7 +220,7 @@ pub enum LoadError {
         /// What is wrong.
         kind: ObjErrorKind,
     },
-    /// A broken OFF file.
+    /// An invalid OFF file.
     #[error("{}, line {line}: {kind}", path.display())]
     Off {
         /// The file.
@@ -229,7 +230,7 @@ pub enum LoadError {
         /// What is wrong.
         kind: OffErrorKind,
     },
-    /// A broken STL file.
+    /// An invalid STL file.
     #[error("{}: {kind}", path.display())]
     Stl {
         /// The file.
@@ -237,7 +238,7 @@ pub enum LoadError {
         /// What is wrong, and where.
         kind: StlErrorKind,
     },
-    /// A broken glTF file.
+    /// An invalid glTF file.
     #[error("{}: {kind}", path.display())]
     Gltf {
         /// The file.
@@ -245,7 +246,7 @@ pub enum LoadError {
         /// What is wrong, and where.
         kind: Box<GltfErrorKind>,
     },
-    /// A broken scene file.
+    /// An invalid scene file.
     #[error("{}{}: {kind}", path.display(), line.map(|l| format!(", line {l}")).unwrap_or_default())]
     Toml {
         /// The file.
@@ -276,11 +277,11 @@ pub fn load(path: impl AsRef<Path>) -> Result<Loaded, LoadError> {
     load_with(path, &LoadOptions::default())
 }
 
-/// Does what [`load`] does, within limits.
+/// Like [`load`], within limits.
 ///
 /// # Errors
-/// As [`load`]; what would exceed the memory allowed is refused before it is taken, and a file before it is read. Also
-/// what the options refuse, and a scene or an animation that the file does not have.
+/// Those of [`load`]. Also if the scene would exceed the memory limit, which is checked before allocating memory or
+/// reading a file, if the options reject the file, or if it lacks the requested scene or animation.
 pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let path = path.as_ref();
     let budget = &Budget::new(path, Files::System, options.max_memory, options.reach);
@@ -288,9 +289,9 @@ pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
     Ok(finish(load_file(path, &bytes, false, budget, options)?, path, budget))
 }
 
-/// Does what [`load_with`] does, from a file's bytes. `name` is the file's own path, for messages and for a format that the
-/// content does not determine; `resolver` gives the bytes of the files that it refers to, whose paths are relative to the
-/// folder of `name`.
+/// Like [`load_with`], from the bytes of a file. `name` is the path of the file, for messages and to recognize the
+/// format if the content does not determine it. `resolver` returns the bytes of the files that it refers to, with
+/// paths relative to the folder of `name`.
 ///
 /// ```
 /// use std::io;
@@ -308,7 +309,7 @@ pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
 /// ```
 ///
 /// # Errors
-/// As [`load_with`]. With [`Reach::OwnFolder`] the resolver is not asked for files outside of the scene's folder.
+/// Those of [`load_with`]. With [`Reach::OwnFolder`], the resolver is not called for files outside the scene's folder.
 pub fn load_bytes(
     name: impl AsRef<Path>,
     bytes: &[u8],

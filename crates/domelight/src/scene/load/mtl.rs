@@ -1,12 +1,11 @@
 //! Wavefront MTL, the material libraries of OBJ files.
 //!
-//! `Kd`, `Ks`, `Ns` and `map_Kd` make Lambert with a Phong highlight; where `Pr`, `Pm`, `map_Pr` or `map_Pm` stands, the
-//! material is metallic-roughness with `Kd` as the base color, and a map stands instead of its number. `Ke` and `map_Ke` are
-//! emission. `d`, or else `Tr`, is opacity, and `map_d` a factor on it: its alpha channel if it has one, else its luminance.
-//! `norm` is a normal map, and so is `map_Bump` or
-//! `bump` where its picture looks like one, as most exporters write it. Of a texture's options `-s`, `-o`, `-bm` and
-//! `-clamp` count. Heights, spectra and the other maps are passed over, and so is a texture whose
-//! file cannot be read, each kind with one warning.
+//! `Kd`, `Ks`, `Ns` and `map_Kd` give a Lambertian material with a Phong highlight. With `Pr`, `Pm`, `map_Pr` or
+//! `map_Pm`, the material is metallic-roughness with `Kd` as the base color, and a map replaces its number. `Ke` and
+//! `map_Ke` are emission. `d`, or else `Tr`, is opacity, multiplied by `map_d`: its alpha channel if it has one, else
+//! its luminance. `norm` is a normal map, and so is `map_Bump` or `bump` if its picture looks like one, as most
+//! exporters write it. The texture options `-s`, `-o`, `-bm` and `-clamp` are supported. Heights, spectra, other maps
+//! and textures that cannot be read are ignored, each kind with one warning.
 
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! Positions that are NaN or infinite, as broken exporters write them.
 //!
-//! The triangles at such vertices are left out, with one warning a file. Where that would leave nothing, the meshes stay
-//! as they are, and [`Scene::new`](crate::scene::Scene::new) names the vertex.
+//! The triangles at such vertices are dropped, with one warning per file. If that would leave nothing, the meshes stay
+//! unchanged, and [`Scene::new`](crate::scene::Scene::new) names the vertex.
 
 use std::path::Path;
 

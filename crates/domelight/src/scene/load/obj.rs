@@ -1,14 +1,14 @@
 //! Wavefront OBJ.
 //!
-//! Read are `v` (with colors), `vt` (v upward), `vn`, `f` (polygons of any shape, relative
-//! indices), `o`, `g`, `usemtl` and `mtllib` ([`super::mtl`]); lines, points, curves and smoothing
-//! groups are passed over. A line may go on after a backslash; text that is not UTF-8 is Latin-1.
-//! Every object or group and material makes a part of its own, wherever in the file its faces are.
-//! A corner without normal gets the smooth one of its position, computed over the whole file, so
+//! The reader supports `v` (with colors), `vt` (v upward), `vn`, `f` (polygons of any shape, relative
+//! indices), `o`, `g`, `usemtl` and `mtllib` ([`super::mtl`]). Lines, points, curves and smoothing
+//! groups are ignored. A backslash continues a line; text that is not UTF-8 is read as Latin-1.
+//! Every object or group and material becomes a separate part, wherever in the file its faces are.
+//! A corner without a normal gets the smooth normal of its position, computed over the whole file, so
 //! that seams of texture coordinates and materials do not show.
 //!
-//! Written for this program: the crate tobj reports no line numbers, and its arithmetic overflows on
-//! relative indices out of range.
+//! We do not use the crate tobj, because it reports no line numbers and its arithmetic overflows on
+//! out-of-range relative indices.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -219,7 +219,9 @@ impl<'a> Reader<'a> {
         let place = format!("{}, line {line}", self.path.display());
         let why = match super::read_referenced(&path, &place, self.textures.budget) {
             // What is no library is nobody's business.
-            Ok(bytes) if !mtl::is_library(&bytes) => "it is no material library (MTL)".to_owned(),
+            Ok(bytes) if !mtl::is_library(&bytes) => {
+                "it is not a material library (MTL)".to_owned()
+            }
             Ok(bytes) => {
                 let (textures, warnings) = (&mut self.textures, &mut self.warnings);
                 for material in mtl::parse(&path, &bytes, textures, self.strict, warnings)? {

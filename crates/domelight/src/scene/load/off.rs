@@ -1,12 +1,14 @@
 //! OFF, the Object File Format of Geomview and of collections of meshes.
 //!
-//! Read are the header words `OFF`, `COFF` (colors of vertices), `NOFF` (normals), `STOFF` (texture coordinates),
-//! `4OFF` (homogeneous coordinates) and their compounds, or none; the counts on the same line or even in the same
-//! word; comments after `#`; polygons of any shape; and of each face the color after its indices, of one number for
-//! gray, three or four. Colors are sRGB from 0 to 255 if all of a file's are whole numbers and some exceed 1, else
-//! linear from 0 to 1; opacity and indices into color maps are passed over. Vertices without normals get smooth ones.
+//! The reader supports the header words `OFF`, `COFF` (colors of vertices), `NOFF` (normals), `STOFF` (texture
+//! coordinates), `4OFF` (homogeneous coordinates) and their compounds, or none; the counts on the same line or even
+//! in the same word; comments after `#`; polygons of any shape; and face colors after the indices, with one number
+//! for gray, three or four. Colors are sRGB from 0 to 255 if all colors of a file are whole numbers and some exceed
+//! 1, otherwise linear from 0 to 1. Opacity and indices into color maps are ignored. Vertices without normals get
+//! smooth ones.
 //!
-//! <http://www.geomview.org/docs/html/OFF.html>. Binary files and those of other dimensions are refused by name.
+//! <http://www.geomview.org/docs/html/OFF.html>. Binary files and files with other dimensions are rejected with a
+//! message.
 
 use std::path::Path;
 
@@ -17,24 +19,24 @@ use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
 use crate::scene::texture::{Encoding, decode};
 
-/// What is wrong with an OFF file.
+/// An error in an OFF file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OffErrorKind {
-    /// A kind of OFF file that is not read.
+    /// An unsupported kind of OFF file.
     #[error("{kind} files are not read; write it as plain OFF or as PLY")]
     Unsupported {
         /// The header word.
         kind: String,
     },
-    /// No numbers of vertices and faces.
-    #[error("'{text}' are no numbers of vertices, faces and edges")]
+    /// The numbers of vertices and faces are missing.
+    #[error("'{text}' are not the numbers of vertices, faces and edges")]
     Counts {
         /// What stands there.
         text: String,
     },
     /// The file ends too early.
     #[error(
-        "the file ends after {found} of {promised} {what}; it is cut short or its header wrong"
+        "the file ends after {found} of {promised} {what}; it is truncated or its header is wrong"
     )]
     EndOfFile {
         /// Vertices or faces.
@@ -50,8 +52,8 @@ pub enum OffErrorKind {
         /// The word.
         text: String,
     },
-    /// An index that names no vertex.
-    #[error("index {text} names no vertex; there are {vertices}")]
+    /// An index that is out of range.
+    #[error("index {text} refers to no vertex; there are {vertices}")]
     Index {
         /// The index.
         text: String,

@@ -1,12 +1,13 @@
 //! Stanford PLY: ASCII and both binary byte orders.
 //!
-//! Read are, of the element `vertex`, the properties `x y z`, `nx ny nz`, texture coordinates
+//! The reader supports, for the element `vertex`, the properties `x y z`, `nx ny nz`, texture coordinates
 //! (`s t`, `u v` or `texture_u texture_v`, v upward) and `red green blue` (integers: sRGB, floats:
-//! linear); of the element `face` the list `vertex_indices` or `vertex_index`, polygons of any shape, and colors as of
-//! vertices, which count where vertices have none; of `tristrips` that list, a strip ending at −1. Elements and
-//! properties may stand in any order. All else is passed over. A file without normals gets smooth ones.
+//! linear); for the element `face`, the list `vertex_indices` or `vertex_index` with polygons of any shape, and
+//! colors as for vertices, which are used if vertices have none; for `tristrips`, the same list, where −1 ends a
+//! strip. Elements and properties may come in any order. Everything else is ignored. A file without normals gets
+//! smooth ones.
 //!
-//! Written for this program: the crates that read PLY build a map of properties for every row.
+//! We do not use a PLY crate, because the existing ones build a map of properties for every row.
 
 use std::fmt;
 use std::path::Path;
@@ -18,7 +19,7 @@ use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
 use crate::scene::texture::{Encoding, decode};
 
-/// A place in a PLY file.
+/// A position in a PLY file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PlyPlace {
     /// A line of the header, from 1.
@@ -44,14 +45,14 @@ impl fmt::Display for PlyPlace {
     }
 }
 
-/// What is wrong with a PLY file.
+/// An error in a PLY file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlyErrorKind {
     /// The header does not end.
-    #[error("the header has no end_header line; the file is cut short or not PLY")]
+    #[error("the header has no end_header line; the file is truncated or not PLY")]
     NoEndOfHeader,
     /// A header line that is not PLY.
-    #[error("'{text}' is no valid header line")]
+    #[error("'{text}' is not a valid header line")]
     HeaderLine {
         /// The line.
         text: String,
@@ -61,7 +62,7 @@ pub enum PlyErrorKind {
         "the header names no format; it needs ascii, binary_little_endian or binary_big_endian"
     )]
     NoFormat,
-    /// An element or a property that is needed is absent.
+    /// A required element or property is missing.
     #[error("the header declares no {what}")]
     Missing {
         /// What is absent.
@@ -69,7 +70,8 @@ pub enum PlyErrorKind {
     },
     /// More rows than the file can hold.
     #[error(
-        "the header promises {count} rows of {element}, at least {needed} bytes, but only {left} bytes follow; the file is cut short or its header wrong"
+        "the header promises {count} rows of {element}, at least {needed} bytes, but only {left} \
+         bytes follow; the file is truncated or its header is wrong"
     )]
     TooManyRows {
         /// The element.
@@ -81,7 +83,7 @@ pub enum PlyErrorKind {
         /// The bytes there are.
         left: usize,
     },
-    /// The data end too early.
+    /// The data ends too early.
     #[error("the file ends in the middle of the data")]
     EndOfFile,
     /// A token that is not a number.
@@ -96,15 +98,15 @@ pub enum PlyErrorKind {
         /// The length.
         value: f64,
     },
-    /// An index that names no vertex.
-    #[error("index {value} names no vertex; there are {vertices}")]
+    /// An index that is out of range.
+    #[error("index {value} refers to no vertex; there are {vertices}")]
     Index {
         /// The index.
         value: f64,
         /// How many vertices there are.
         vertices: usize,
     },
-    /// A vertex at no place.
+    /// A vertex with a non-finite position.
     #[error("the position is not finite: {position}; without --strict its triangles are left out")]
     NotFinite {
         /// The position.
@@ -187,7 +189,7 @@ impl Scalar {
         }
     }
 
-    /// The greatest value of an integer type.
+    /// The largest value of an integer type.
     fn max(self) -> Option<f32> {
         match self {
             Self::U8 => Some(255.0),
@@ -315,7 +317,7 @@ impl Header {
             let slack = u128::from(self.format == Format::Ascii);
             let needed = u128::from(element.count) * row as u128;
             total += needed;
-            // Rows without properties take no bytes; one byte a row bounds the loop over them.
+            // Rows without properties take no bytes; one byte per row bounds the loop over them.
             let rows = u128::from(element.count);
             if total > left as u128 + slack || rows > (left as u128 + slack) {
                 let kind = PlyErrorKind::TooManyRows {
@@ -460,7 +462,7 @@ fn slot_of(property: &Property) -> Option<usize> {
 /// How an element's red, green and blue are written.
 #[derive(Clone, Copy)]
 struct Colors {
-    /// The greatest value of an integer type.
+    /// The largest value of an integer type.
     max: Option<f32>,
 }
 

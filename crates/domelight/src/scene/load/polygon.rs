@@ -1,10 +1,10 @@
-//! Polygons of any shape as triangles, by cutting off ears.
+//! Triangulates polygons of any shape by ear clipping.
 //!
-//! Meisters 1975, "Polygons Have Ears"; Eberly, "Triangulation by Ear Clipping". A convex polygon is a fan round its
-//! first corner. A hole that a polygon is slit open to, as files of polygons write it, is followed round.
+//! Meisters 1975, "Polygons Have Ears"; Eberly, "Triangulation by Ear Clipping". A convex polygon is a fan around
+//! its first corner. A hole connected to the outline by a slit, as in many polygon files, is followed around.
 //!
-//! Written for this program: the crate earcut tries every diagonal of a polygon that it cannot clip, which takes
-//! hours for a hostile one. Here the work on a file is bounded; what exceeds it is cut into fans.
+//! We do not use the crate earcut, because it tries every diagonal of a polygon that it cannot clip, which takes hours
+//! for a hostile one. Here the work per file is bounded; polygons beyond the bound become fans.
 
 use crate::math::Vec3;
 
@@ -43,13 +43,13 @@ impl Triangulator {
         self.triangles.extend((2..n).map(|i| [0, i - 1, i]));
     }
 
-    /// Drops the axis along which the polygon's area is greatest; true if it has no area.
+    /// Drops the axis along which the polygon's area is largest; true if it has no area.
     fn project(&mut self, n: usize, position: impl Fn(usize) -> Vec3) -> bool {
         let at = |i: usize| (position(i) - position(0)).as_dvec3();
         // Newell's normal.
         let normal = (1..n - 1).map(|i| at(i).cross(at(i + 1))).sum::<glam::DVec3>();
         let axis = normal.abs().max_position();
-        // Counter-clockwise in the plane.
+        // Counterclockwise in the plane.
         let (u, v) = match (axis, normal[axis] > 0.0) {
             (0, true) => (1, 2),
             (0, false) => (2, 1),

@@ -1,13 +1,14 @@
-//! STL, the format of 3D printers: ASCII, one part a solid, and binary.
+//! STL, the format of 3D printers: ASCII, with one part per solid, and binary.
 //!
-//! Facets share no vertices and shade flat; their normals are those of their corners' order, as most programs take
-//! them, for files often have others or none. Colors in the two bytes after a binary facet mean different things to
-//! different programs and are passed over.
+//! Facets share no vertices and shade flat. Their normals follow from the order of their corners, as in most programs,
+//! because files often have wrong normals or none. The colors in the two bytes after a binary facet mean different
+//! things to different programs and are ignored.
 //!
 //! 3D Systems 1989, "StereoLithography Interface Specification". A binary file may begin with `solid`, too: a file is
 //! binary if it is as long as its count of facets says.
 //!
-//! Written for this program: the crate stl_io reads one solid and takes memory for as many facets as a header says.
+//! We do not use the crate stl_io, because it reads one solid and allocates memory for as many facets as a header
+//! claims.
 
 use std::path::Path;
 
@@ -16,13 +17,13 @@ use crate::geometry::Mesh;
 use crate::math::Vec3;
 use crate::scene::{Material, Part, SceneDescription};
 
-/// What is wrong with an STL file.
+/// An error in an STL file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StlErrorKind {
     /// Neither text nor a binary file of the right length.
     #[error(
         "neither text that begins with 'solid' nor a binary file: its header promises {facets} facets, \
-         {needed} bytes, but it has {held}; the file is cut short or not STL"
+         {needed} bytes, but it has {held}; the file is truncated or not STL"
     )]
     Length {
         /// The count in the header.
@@ -33,14 +34,14 @@ pub enum StlErrorKind {
         held: usize,
     },
     /// A vertex that cannot be read.
-    #[error("line {line}: '{text}' is no vertex; it needs three finite numbers")]
+    #[error("line {line}: '{text}' is not a vertex; it needs three finite numbers")]
     Vertex {
         /// The line, from 1.
         line: usize,
         /// What stands there.
         text: String,
     },
-    /// A facet that is no triangle.
+    /// A facet that is not a triangle.
     #[error("line {line}: a facet of {corners} vertices; it needs three")]
     Facet {
         /// The line at which the facet ends, from 1.
@@ -161,7 +162,7 @@ fn ascii(path: &Path, bytes: &[u8], strict: bool) -> Result<Vec<(String, Mesh)>,
             corners = 0;
         }
     }
-    // A facet without its end belongs to a file that was cut short.
+    // A facet without its end belongs to a file that was truncated.
     if corners > 0 {
         let line = bytes.split(|&b| b == b'\n' || b == b'\r').count();
         return Err(StlErrorKind::Facet { line, corners });

@@ -2,7 +2,7 @@
 //! `docs/scene-format.md` is its manual.
 //!
 //! ```toml
-//! up = "y"                            # or "z": which way the whole scene points up
+//! up = "y"                            # or "z": the up axis of the whole scene
 //!
 //! [camera]
 //! origin = [0.0, 1.0, 5.0]
@@ -30,10 +30,10 @@
 //! normal_map = "normal.png"           # linear, +Y up as in glTF
 //! normal_scale = 1.0
 //! emission = [0.0, 0.0, 0.0]          # radiance that the camera sees; it lights nothing else
-//! emission_texture = "glow.png"       # sRGB, a factor on emission, whose default is then white
-//! opacity = 1.0                       # the share of the surface in what is seen
-//! opacity_texture = "leaf.png"        # its alpha, or its luminance if it has none, a factor on opacity
-//! wrap = "repeat"                     # or "clamp", "mirror"; of all the material's textures
+//! emission_texture = "glow.png"       # sRGB, multiplied by emission, whose default is then white
+//! opacity = 1.0                       # of the surface and of its shadow
+//! opacity_texture = "leaf.png"        # its alpha, or its luminance if it has none, multiplied by opacity
+//! wrap = "repeat"                     # or "clamp", "mirror"; for all textures of the material
 //! uv_scale = 1.0                      # how often the textures repeat, default 1
 //!
 //! [[objects]]
@@ -47,7 +47,7 @@
 //! # matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]   # rows, instead of the three
 //! ```
 //!
-//! Paths are relative to the scene file. Unknown keys are errors, as are files that are missing.
+//! Paths are relative to the scene file. Unknown keys and missing files are errors.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -68,11 +68,11 @@ use crate::scene::{
     MetallicRoughnessMaterial, NormalMap, SceneDescription, TextureRef, UpAxis, UvTransform, Wrap,
 };
 
-/// What is wrong with a scene file.
+/// An error in a scene file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TomlErrorKind {
     /// Not UTF-8.
-    #[error("not a text in UTF-8; the first bad byte is byte {byte}")]
+    #[error("not UTF-8 text; the first bad byte is byte {byte}")]
     Encoding {
         /// The first bad byte.
         byte: usize,
@@ -80,7 +80,7 @@ pub enum TomlErrorKind {
     /// Not TOML, or not a scene.
     #[error("{0}")]
     Syntax(String),
-    /// A thing that needs exactly one of two keys.
+    /// A table that needs exactly one of two keys.
     #[error("{what} needs either '{first}' or '{second}', and not both")]
     OneOf {
         /// The table.
@@ -93,7 +93,7 @@ pub enum TomlErrorKind {
     /// A built-in scene that does not exist.
     #[error(transparent)]
     Builtin(#[from] UnknownScene),
-    /// A material that is neither defined nor notation.
+    /// A material that is neither defined nor valid notation.
     #[error("material '{text}' is neither defined in [materials] nor valid notation: {source}")]
     Material {
         /// The text.
@@ -101,7 +101,7 @@ pub enum TomlErrorKind {
         /// Why it is no notation.
         source: ParseMaterialError,
     },
-    /// A number out of its range.
+    /// A number outside its range.
     #[error("{what} is {value}, which is outside {range}")]
     Range {
         /// Which key.
@@ -111,16 +111,16 @@ pub enum TomlErrorKind {
         /// Its range.
         range: &'static str,
     },
-    /// A transform that flattens or loses the object.
+    /// A singular or non-finite transform.
     #[error("the transform of this object is singular or not finite; no scale may be 0")]
     Singular,
-    /// A matrix beside other transforms.
-    #[error("'matrix' stands instead of 'scale', 'rotate' and 'translate', not beside them")]
+    /// A matrix together with other transforms.
+    #[error("'matrix' replaces 'scale', 'rotate' and 'translate'; give one or the other")]
     MatrixAndOthers,
     /// A matrix that is not affine.
-    #[error("the last row of 'matrix' must be [0, 0, 0, 1]; give the matrix by rows")]
+    #[error("the last row of 'matrix' must be [0, 0, 0, 1]; give the matrix row by row")]
     NotAffine,
-    /// A camera that makes no picture.
+    /// An invalid camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
 }

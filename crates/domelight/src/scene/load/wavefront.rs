@@ -1,10 +1,10 @@
-//! Lines of Wavefront's text formats, OBJ and MTL: a keyword, and numbers or names.
+//! Lines of Wavefront's text formats OBJ and MTL: a keyword followed by numbers or names.
 
 use std::borrow::Cow;
 
 use super::text_of;
 
-/// What is wrong with a line of an OBJ or MTL file.
+/// An error in a line of an OBJ or MTL file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ObjErrorKind {
     /// Not enough numbers.
@@ -24,13 +24,13 @@ pub enum ObjErrorKind {
         text: String,
     },
     /// A face with a corner that cannot be read.
-    #[error("'{text}' is no corner of a face; write v, v/vt, v//vn or v/vt/vn")]
+    #[error("'{text}' is not a face corner; write v, v/vt, v//vn or v/vt/vn")]
     Corner {
         /// The corner.
         text: String,
     },
-    /// An index that names nothing yet.
-    #[error("index {index} names no {what}; {count} are defined so far")]
+    /// An index that is not defined yet.
+    #[error("index {index} refers to no {what}; {count} are defined so far")]
     Index {
         /// The index as written.
         index: i64,
@@ -39,7 +39,7 @@ pub enum ObjErrorKind {
         /// How many there are.
         count: usize,
     },
-    /// A face with less than three corners.
+    /// A face with fewer than three corners.
     #[error("a face needs three corners or more, but there are {corners}")]
     Face {
         /// How many it has.
@@ -52,7 +52,7 @@ pub enum ObjErrorKind {
         keyword: String,
     },
     /// A material's property before any material.
-    #[error("{keyword} stands before the first newmtl")]
+    #[error("{keyword} comes before the first newmtl")]
     NoMaterial {
         /// The keyword.
         keyword: String,

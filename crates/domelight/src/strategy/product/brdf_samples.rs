@@ -1,4 +1,4 @@
-//! Candidates from the material: samples of several hits side by side.
+//! BRDF sample candidates, for several hits side by side.
 
 use super::candidate::Candidate;
 use super::cells::Cells;
@@ -14,7 +14,7 @@ use crate::simd::{
     Colors, LANES, LaneMask as _, Lanes, Simd, SimdF32x8 as _, SimdFloat as _, Vectors, set_bits,
 };
 
-/// Samples of the material side by side: where they are drawn, and by which numbers.
+/// BRDF samples side by side: their shading frames and random numbers.
 #[derive(Default)]
 pub(super) struct BrdfSamples {
     n: usize,
@@ -28,7 +28,7 @@ pub(super) struct BrdfSamples {
 }
 
 impl BrdfSamples {
-    /// Samples `which` of the pixel, no more than there are lanes.
+    /// The samples `which` of the pixel, at most one per lane.
     #[inline(always)]
     pub(super) fn new(hits: Hits, numbers: &PixelSamples, which: std::ops::Range<usize>) -> Self {
         let set = numbers.sampler.set(Dimension::Brdf);
@@ -52,7 +52,7 @@ impl BrdfSamples {
         samples
     }
 
-    /// Their directions in the local frames.
+    /// The directions in the local frames.
     #[inline(always)]
     fn sample<S: Simd>(&self, simd: S, hits: Hits) -> Vectors<S::F32x8> {
         if hits.one_material {
@@ -99,33 +99,33 @@ impl BrdfSamples {
     }
 }
 
-/// Directions of samples of the material and where they look.
+/// Directions of BRDF samples and the texels that they look up.
 #[derive(Clone, Debug)]
 pub(super) struct BrdfSampleBatch {
-    /// Bit i: lane i may find light.
+    /// Bit i: lane i may see light.
     possible: u32,
     hits: [usize; LANES],
-    /// In the world.
+    /// The directions in world space.
     wi: [Lanes; 3],
     f: [Lanes; 3],
     pdf: Lanes,
-    /// Columns and rows of the map.
+    /// The columns and rows of the map.
     texels: [[i32; LANES]; 2],
 }
 
-/// What the samples of the material are weighted against: the strata of a table.
+/// The strata of a table, against which BRDF samples are weighted.
 #[derive(Clone, Copy)]
 pub(super) struct BesideStrata<'a> {
     pub(super) environment: &'a Environment,
     pub(super) cells: &'a Cells,
     pub(super) table: &'a Table,
-    /// Number of strata M over the total of the table.
+    /// The number of strata M divided by the total of the table.
     pub(super) strata: f32,
-    /// Number of samples of the material N.
+    /// The number of BRDF samples N.
     pub(super) n_brdf: f32,
 }
 
-/// What samples of the material meet on the map.
+/// The light that BRDF samples find on the map.
 #[derive(Default)]
 struct LightLookup {
     /// Bit i: there is light for lane i.
@@ -144,8 +144,7 @@ impl LightLookup {
 }
 
 impl BrdfSampleBatch {
-    /// Draws `n` samples of the material, and prefetches the texels that they look at, which are far from each other and
-    /// seldom in a near cache.
+    /// Draws `n` BRDF samples, and prefetches their texels, which are far from each other and rarely in a near cache.
     #[inline(always)]
     pub(super) fn draw<S: Simd>(
         simd: S,
@@ -176,7 +175,7 @@ impl BrdfSampleBatch {
         }
     }
 
-    /// Adds the samples as candidates, weighted beside the strata of the table by the balance heuristic.
+    /// Adds the samples as candidates, weighted against the strata of the table by the balance heuristic.
     #[inline(always)]
     pub(super) fn weigh<S: Simd>(
         &self,

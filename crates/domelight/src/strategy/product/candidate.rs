@@ -1,4 +1,4 @@
-//! A candidate: a direction with its value, and eight of them side by side.
+//! A candidate, a direction with its value, and eight candidates side by side.
 
 use crate::Rgb;
 use crate::math::Vec3;
@@ -13,30 +13,30 @@ pub(super) struct Candidate {
     pub(super) value: Rgb,
     /// Its luminance.
     pub(super) luminance: f32,
-    /// The slot of the cell where its light is.
+    /// The slot of its cell.
     pub(super) slot: u32,
-    /// Which hit of the pixel.
+    /// The index of its hit in the pixel.
     pub(super) hit: u32,
-    /// π, as [`choose`](super::systematic) has it.
+    /// π, the [selection probability](super::systematic).
     pub(super) selection_probability: u32,
 }
 
-/// Candidates of one hit side by side.
+/// Candidates of one hit, side by side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CandidateBlock {
     pub(super) wi: [Lanes; 3],
     /// Black in a lane without a candidate.
     pub(super) value: [Lanes; 3],
-    /// W without what the control variate knows of it.
+    /// W minus the control variate.
     pub(super) residual: [Lanes; 3],
     pub(super) luminance: Lanes,
     pub(super) slots: [i32; LANES],
-    /// π of each.
+    /// The π of each candidate.
     pub(super) selection_probabilities: [i32; LANES],
 }
 
 impl CandidateBlock {
-    /// One of them, of hit `hit`.
+    /// One of the candidates, of hit `hit`.
     #[inline(always)]
     pub(super) fn get(&self, lane: usize, hit: u32) -> Candidate {
         Candidate {

@@ -1,17 +1,17 @@
-//! The candidates of a pixel: directions from the product table and from the material, weighed by the
+//! The candidates of a pixel: directions from the product table and from the BRDF, weighted by the
 //! balance heuristic.
 //!
-//! M strata of the table and N samples of the material are shared by the n camera hits of the pixel:
-//! stratum k belongs to hit (k − r) mod n with one random r, so every hit has each stratum with
+//! The n camera hits of the pixel share M strata of the table and N BRDF samples:
+//! stratum k belongs to hit (k − r) mod n with one random r, so every hit gets each stratum with
 //! probability 1/n. A candidate stands for
 //!
 //! ```text
 //! W = f(ω) L(ω) / (M p_table(ω) + N p_brdf(ω))        p_table = width(c)/total · L/W(c)
 //! ```
 //!
-//! f and p_brdf those of its hit, and Σ W is an unbiased estimate of the mean over the hits of
-//! ∫ f L dω: of each hit it is the multi-sample estimator of Veach & Guibas 1995 with counts M/n and
-//! N/n in expectation.
+//! where f and p_brdf are those of its hit. Σ W is an unbiased estimate of the mean over the hits of
+//! ∫ f L dω: for each hit, it is the multi-sample estimator of Veach & Guibas 1995 with expected counts
+//! M/n and N/n.
 
 use super::super::ShadingPoint;
 use super::brdf_samples::{BesideStrata, BrdfSampleBatch};
@@ -30,27 +30,27 @@ use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat, SimdI32x8};
 /// The candidates of a pixel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Candidates {
-    /// From the table: as many blocks for each hit.
+    /// Candidates from the table, with the same number of blocks for each hit.
     pub(super) lights: Vec<CandidateBlock>,
-    /// From the material.
+    /// Candidates from the BRDF.
     pub(super) brdf: Vec<Candidate>,
-    /// Which hit each stratum is assigned to.
+    /// The assignment of strata to hits.
     pub(super) assignment: StratumAssignment,
-    /// The slot of each stratum, where its candidate is in `lights`.
+    /// The slot of each stratum, where `lights` has its candidate.
     slots: Vec<[i32; LANES]>,
-    /// Memory of [`Table::assign_strata`].
+    /// Scratch memory of [`Table::assign_strata`].
     cell_starts: Vec<i32>,
-    /// What those from the material look at.
+    /// The texels that BRDF samples look up.
     drawn: Vec<BrdfSampleBatch>,
 }
 
-/// Where candidates come from.
+/// The sources of candidates.
 pub(super) struct Sources<'a> {
     pub(super) environment: &'a Environment,
     pub(super) cells: &'a Cells,
     pub(super) pool: &'a LightSamplePool,
     pub(super) table: &'a Table,
-    /// None if visibility is not known.
+    /// `None` if visibility is unknown.
     pub(super) control_variate: Option<&'a ControlVariate>,
 }
 
@@ -73,7 +73,7 @@ impl Sources<'_> {
         let strata = Strata::new(n_strata, numbers.strata, total);
         let scale = if n_strata > 0 { n_strata as f32 / total } else { 0.0 };
         candidates.assignment = assignment;
-        // Begin with the samples of the material: the texels that they look at take long to arrive.
+        // Begin with the BRDF samples, because their texels take long to arrive.
         let drawn = &mut candidates.drawn;
         BrdfSampleBatch::draw(simd, self.environment, hits, numbers, counts.brdf, drawn);
         candidates.lights.clear();
@@ -101,7 +101,7 @@ impl Sources<'_> {
         }
     }
 
-    /// The first `n` lanes of a block of strata that fall at `positions`.
+    /// The first `n` lanes of a block of strata at `positions`.
     #[inline(always)]
     fn draw_lights<S: Simd>(
         &self,
@@ -141,13 +141,13 @@ impl Sources<'_> {
     }
 }
 
-/// A hit whose candidates are drawn.
+/// A hit for which candidates are drawn.
 struct HitContext<'a> {
     at: &'a ShadingPoint,
     bsdf: &'a Bsdf,
-    /// What it reflects by the cosine.
+    /// Its diffuse albedo.
     diffuse: Rgb,
-    /// M over the total of the table.
+    /// M divided by the total of the table.
     scale: f32,
     /// N.
     n_brdf: f32,

@@ -1,20 +1,20 @@
-//! Light cells: the map cut into some hundred squares, in the order of a space-filling curve.
+//! Light cells: the map divided into a few hundred squares along a space-filling curve.
 //!
-//! A cell is a node of the environment's own pyramid of weights, or a part of a texel, which is
-//! constant. Cells follow each other along Hilbert's curve, so that a running sum over them is a
-//! one-dimensional distribution whose strata are compact regions of the sky, and a choice that is
-//! spread evenly over it is spread evenly over the sky.
+//! A cell is a node of the environment's pyramid of weights, or a part of a texel, which is constant.
+//! Cells are ordered along a Hilbert curve, so that a running sum over them is a one-dimensional
+//! distribution whose strata are compact regions of the sky. A choice spread evenly over the running sum
+//! is then spread evenly over the sky.
 //!
-//! Cells are split where their light spreads most: the cell of the greatest
+//! Cells are split in order of the variance of their light: first the cell with the largest
 //!
 //! ```text
 //! (W − |R|²/W)/W₀ + 0.02 (W/W₀) s + 10⁻⁴ a s        + 10³ s if s > 0.08
 //! ```
 //!
-//! first, with W = ∫ L dω and R = ∫ L ω dω over the cell, W₀ = W of the whole map, a its solid angle
+//! where W = ∫ L dω and R = ∫ L ω dω over the cell, W₀ is W of the whole map, a is its solid angle
 //! and s = 1 − |∫ ω dω|/a, half the square of its angular radius. The first term is the variance of
 //! directions of Viriyothai & Debevec 2009 on the sphere; the others keep dim cells small enough for
-//! a cosine and a lobe to be looked up at their centers.
+//! a cosine and a lobe to be evaluated at their centers.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -27,15 +27,15 @@ use crate::math::{Vec3, functions};
 use crate::sampling::hilbert::HilbertState;
 use crate::simd::{LANES, Lanes, Simd, SimdF32x16};
 
-/// The most cells of a lane, which has an eighth of the curve.
+/// The maximum number of cells per lane, which has an eighth of the curve.
 pub(super) const MAX_ROWS: usize = 48;
 
-/// Rows of a table: a power of two, so that an index that is masked with it needs no other check.
+/// The number of rows of a table: a power of two, so that a masked index needs no other check.
 pub(super) const TABLE_ROWS: usize = MAX_ROWS.next_power_of_two();
-/// Places in a table; those of rows that the cells do not fill are nobody's.
+/// The number of slots in a table. Slots in rows that the cells do not fill are unused.
 pub(super) const N_SLOTS: usize = TABLE_ROWS * LANES;
 
-/// One number a cell, at [`Cells::slot`], by row.
+/// One number per cell, at [`Cells::slot`], by row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
 pub(super) struct CellArray([Lanes; TABLE_ROWS]);
@@ -69,7 +69,7 @@ impl DerefMut for CellArray {
     }
 }
 
-/// Zero for each cell.
+/// Zero for every cell.
 pub(super) const ZERO_CELLS: CellArray = CellArray([[0.0; LANES]; TABLE_ROWS]);
 
 /// The number in a slot.
@@ -84,18 +84,18 @@ pub(super) fn get_mut(slots: &mut CellArray, slot: usize) -> &mut f32 {
     &mut slots[slot / LANES % TABLE_ROWS][slot % LANES]
 }
 
-/// Steps of a search that are looked up.
+/// The number of search steps replaced by a look-up.
 const KNOWN_DEPTH: u32 = 6;
 
-/// Texels are cut no finer than into squares of 2⁻⁸ of their side.
+/// Texels are divided at most into squares of 2⁻⁸ of their side.
 const FINEST: i32 = -8;
 
 /// A square of the map.
 #[derive(Clone, Copy, Debug)]
 struct Square {
-    /// Its side is 2^`size` texels.
+    /// The side is 2^`size` texels.
     size: i32,
-    /// Counted in such squares.
+    /// The position in units of such squares.
     column: u32,
     row: u32,
     state: HilbertState,
@@ -117,10 +117,10 @@ impl Square {
     }
 }
 
-/// What a link of the tree leads to.
+/// The target of a link in the tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Link {
-    /// Nothing: no light.
+    /// No light.
     Dark,
     Cell(u16),
     Split(u16),
@@ -129,31 +129,31 @@ enum Link {
 /// The cells of an environment.
 #[derive(Clone, Debug)]
 pub(super) struct Cells {
-    /// Rows of each lane.
+    /// The number of rows per lane.
     rows: usize,
     /// Along the curve.
     squares: Vec<Square>,
     /// The four quarters of each square that was split, by row; the first is the whole.
     links: Vec<[Link; 4]>,
-    /// How often the map is halved down to its texels.
+    /// The number of levels from the map to its texels.
     depth: u32,
-    /// Where the links lead to in the first [`KNOWN_DEPTH`] steps, for each square there, by row.
+    /// The target after the first [`KNOWN_DEPTH`] steps, for each square at that depth, by row.
     known: Vec<Link>,
-    /// Unit direction of the light's mean, in the world.
+    /// The mean direction of the light, a unit vector in world space.
     pub(super) center: [Box<CellArray>; 3],
-    /// Angular radius.
+    /// The angular radius.
     pub(super) radius: Box<CellArray>,
-    /// For normals that spread by each of [`NORMAL_SPREADS`].
+    /// For each normal spread in [`NORMAL_SPREADS`].
     ramps: [Ramp; NORMAL_SPREADS.len()],
     /// No direction of the cell is further from its center than this \[rad\].
     pub(super) bounding_angle: Box<CellArray>,
-    /// ∫ luminance dω; 0 where there is no cell.
+    /// ∫ luminance dω; 0 if there is no cell.
     pub(super) mass: Box<CellArray>,
-    /// The solid angle over it.
+    /// The solid angle divided by the mass.
     pub(super) inverse_radiance: Box<CellArray>,
 }
 
-/// The soft step of the cosine on a cell: what r and the spread of normals make of it.
+/// The soft step of the cosine over a cell, from its angular radius r and the spread of normals.
 #[derive(Clone, Debug)]
 pub(super) struct Ramp {
     /// s = √(r² + spread²).
@@ -162,12 +162,12 @@ pub(super) struct Ramp {
     pub(super) scale: Box<CellArray>,
 }
 
-/// Spreads of normals that ramps are made for \[rad\].
+/// The normal spreads for which ramps are tabulated \[rad\].
 const NORMAL_SPREADS: [f32; 7] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28];
 
 impl Cells {
-    /// Cuts an environment into as many cells as each of some numbers of rows holds, which are even and at most
-    /// [`MAX_ROWS`]; none of a black one.
+    /// Divides an environment into as many cells as fit in each of the given numbers of rows, which are even and at
+    /// most [`MAX_ROWS`]. Empty for a black environment.
     pub(super) fn new<const N: usize>(
         environment: &Environment,
         rows: [usize; N],
@@ -255,43 +255,43 @@ impl Cells {
         (0..1 << (2 * depth)).map(walk).collect()
     }
 
-    /// The ramps for normals that spread by `spread`, or a little more.
+    /// The ramps for normals with a spread of `spread`, or slightly more.
     pub(super) fn ramp(&self, spread: f32) -> &Ramp {
         let above = NORMAL_SPREADS.partition_point(|&s| s < spread);
         &self.ramps[above.min(NORMAL_SPREADS.len() - 1)]
     }
 
-    /// The rows of a table that they fill.
+    /// The rows of a table that the cells fill.
     #[inline(always)]
     pub(super) fn rows(&self) -> Range<usize> {
         0..self.rows.min(MAX_ROWS)
     }
 
-    /// Places in these rows.
+    /// The number of slots in these rows.
     pub(super) fn n_slots(&self) -> usize {
         self.rows * LANES
     }
 
-    /// The same rows by two, where all lanes are alike.
+    /// The same rows in pairs, where all lanes are alike.
     #[inline(always)]
     pub(super) fn pairs(&self) -> Range<usize> {
         0..self.rows.min(MAX_ROWS) / 2
     }
 
-    /// Where a cell's number is, row by row: lane l has the l-th eighth of the curve, row by row, so that one running
-    /// sum a lane and one over the lanes make the sum along the curve.
+    /// The slot of a cell, row by row. Lane l has the l-th eighth of the curve, so that one running sum per lane and
+    /// one over the lanes give the sum along the curve.
     pub(super) fn slot(&self, cell: usize) -> usize {
         cell % self.rows * LANES + cell / self.rows
     }
 
-    /// The cell whose number is in a slot; none in rows that are not theirs and behind the last.
+    /// The cell of a slot; `None` for unused rows and beyond the last cell.
     pub(super) fn cell_in(&self, slot: usize) -> Option<usize> {
         let (row, lane) = (slot / LANES, slot % LANES);
         let cell = lane * self.rows + row;
         (row < self.rows && cell < self.len()).then_some(cell)
     }
 
-    /// How many.
+    /// The number of cells.
     pub(super) fn len(&self) -> usize {
         self.squares.len()
     }
@@ -301,7 +301,7 @@ impl Cells {
         get(&self.mass, self.slot(cell))
     }
 
-    /// The cell that `wi` looks at, in this texel (column and row); none where there is no light.
+    /// The cell that `wi` looks up, in this texel (column and row); `None` if there is no light.
     #[inline]
     pub(super) fn at_texel(
         &self,
@@ -330,7 +330,7 @@ impl Cells {
         }
     }
 
-    /// The cell that `wi` looks at and the radiance from there.
+    /// The cell that `wi` looks up, and the radiance from there.
     #[cfg(test)]
     pub(super) fn find(&self, environment: &Environment, wi: Vec3) -> Option<(usize, Rgb)> {
         let texel = environment.texel_at(wi);
@@ -338,10 +338,10 @@ impl Cells {
         Some((self.at_texel(environment, texel, wi)?, le))
     }
 
-    /// Draws a direction in a cell in proportion to luminance; neighboring `u` in [0, 1) give
-    /// neighbors along the curve. `jitter` in [0, 1)² places it within what `u` resolves.
+    /// Samples a direction in a cell in proportion to luminance. Neighboring `u` in [0, 1) give
+    /// neighbors along the curve. `jitter` in [0, 1)² positions it below the resolution of `u`.
     ///
-    /// Its density within the cell is the luminance of the radiance over the cell's mass \[sr⁻¹\].
+    /// The density within the cell is the luminance of the radiance divided by the cell's mass \[sr⁻¹\].
     pub(super) fn draw(
         &self,
         environment: &Environment,
@@ -359,7 +359,7 @@ impl Cells {
             let [a, b, c, d] = masses.map(f64::from);
             let (b, c, d) = (a + b, a + b + c, a + b + c + d);
             let at = u * d;
-            // Without branches, for they are not foreseen.
+            // Avoid branches, because they are mispredicted.
             let mut i = usize::from(at >= a) + usize::from(at >= b) + usize::from(at >= c);
             // Rounding may lead past the last that has any mass.
             while masses[i] <= 0.0 && i > 0 {
@@ -495,12 +495,12 @@ impl Map<'_> {
     }
 }
 
-/// An angle brought to [−π, π].
+/// Wraps an angle to [−π, π].
 fn wrapped(angle: f64) -> f64 {
     angle - (angle / TAU).round() * TAU
 }
 
-/// The squares in the course of splitting.
+/// The squares during splitting.
 struct Tree {
     nodes: Vec<Node>,
     /// The children of each square that was split, one after the other, by row; those without light are left out.
@@ -513,7 +513,7 @@ struct Node {
 }
 
 impl Tree {
-    /// With `most` leaves at most.
+    /// Splits until there are at most `most` leaves.
     fn grow(map: &Map, root: Square, most: usize) -> Self {
         let nodes = vec![Node { square: root, split: None }];
         let mut tree = Self { nodes, links: Vec::new() };
@@ -551,7 +551,7 @@ impl Tree {
     }
 }
 
-/// Whether one of so many cells may become four.
+/// Whether splitting one of this many cells into four stays within the limit.
 fn may_split(n_cells: usize, most: usize) -> bool {
     n_cells + 3 <= most
 }

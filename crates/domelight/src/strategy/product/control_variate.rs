@@ -1,25 +1,25 @@
-//! A control variate for the light itself: what a pixel reflects from each cell, as a function h of the
-//! direction whose integral is known.
+//! A control variate for the reflected light: a function h of the direction that approximates the pixel's reflectance
+//! in each cell and whose integral is known.
 //!
 //! ```text
-//! h(ω) = k_d/π · n·ω, where the whole cell is above the horizon      + k_s (a_c + b_c·ω)
+//! h(ω) = k_d/π · n·ω, if the whole cell is above the horizon      + k_s (a_c + b_c·ω)
 //! ```
 //!
-//! The first part is what a diffuse surface reflects, exactly. The second follows the glossy lobes about the
-//! middle of the cell c to first order. Both are linear in ω, so that ∫ h L dω over a cell follows from the
-//! moments ∫ L dω and ∫ L ω dω of its light. Then
+//! The first term is the exact reflectance of a diffuse surface. The second is a first-order expansion of the glossy
+//! lobes about the center of cell c. Both are linear in ω, so that ∫ h L dω over a cell follows from the moments ∫ L
+//! dω and ∫ L ω dω of its light. Then
 //!
 //! ```text
 //! Σ_j W_j V̂_j     becomes     Σ_c V̂_c ∫ h L dω + Σ_j V̂_j (W_j − h(ω_j) L_j/(M p_table(ω_j)))
 //! ```
 //!
-//! of the same expectation for any h, as little of the second sum is left to chance as h is like f.
+//! with the same expectation for any h. The closer h is to f, the lower the variance of the second sum.
 //!
-//! The moments are those of the pass's pool: given the pool, the strata draw its directions, and no
-//! others. Those of the map would not do: V̂ has learned from the pool, too, and the mean of a product of two things
-//! that err together is not the product of their means. Samples of the material have no part in h, for what they
-//! expect is the integral over the map, not over the pool. So h is also weighed as the balance heuristic weighs strata
-//! in the middle of the cell.
+//! The moments are those of the pass's pool: given the pool, strata draw only its directions. The moments of the map
+//! would introduce bias, because V̂ was also learned from the pool, and the mean of a product of correlated estimates
+//! is not the product of their means. BRDF samples do not use h, because their expectation is the integral over the
+//! map, not over the pool. For that reason, h is also weighted as the balance heuristic weights strata at the center
+//! of the cell.
 
 use super::cells::{CellArray, Cells, ZERO_CELLS};
 use super::hits::Group;
@@ -28,14 +28,14 @@ use crate::Rgb;
 use crate::math::{FRAC_1_PI, Vec3};
 use crate::simd::{Colors, Simd, SimdF32x8, SimdF32x16, Vectors};
 
-/// h of a pixel.
+/// The function h of a pixel.
 #[derive(Clone, Debug)]
 pub(super) struct ControlVariate {
-    /// 1 where a cell is above the horizon of all groups, else 0.
+    /// 1 for cells above the horizon of all groups, otherwise 0.
     pub(super) above: CellArray,
-    /// a, and b by component, of the glossy lobes together, in luminance.
+    /// a, and b by component, summed over the glossy lobes, in luminance.
     gloss: [CellArray; 4],
-    /// k_s, of luminance 1; none without glossy lobes.
+    /// k_s, with luminance 1; `None` without glossy lobes.
     tint: Option<Rgb>,
 }
 
@@ -54,7 +54,7 @@ pub(super) struct Integral {
 }
 
 impl Integral {
-    /// At a hit with the normal `n` that reflects `diffuse`.
+    /// At a hit with normal `n` and diffuse albedo `diffuse`.
     #[inline(always)]
     pub(super) fn eval(&self, n: Vec3, diffuse: Rgb) -> Rgb {
         let facing = Rgb::from(self.diffuse.map(|r| FRAC_1_PI * n.dot(r)));
@@ -63,7 +63,7 @@ impl Integral {
 }
 
 impl ControlVariate {
-    /// Forgets the glossy lobes of the pixel before.
+    /// Clears the glossy lobes of the previous pixel.
     pub(super) fn reset(&mut self, groups: &[Group]) {
         let lobes = groups.iter().flat_map(|g| g.lobe_summary.lobes().map(|(c, _)| c * g.share));
         let color: Rgb = lobes.sum();
@@ -71,7 +71,7 @@ impl ControlVariate {
         self.tint = (luminance > 0.0).then(|| color / luminance);
     }
 
-    /// Adds w + `slope`·(ω − center) of a glossy lobe in a pair of rows of cells; sets it if it is the first.
+    /// Adds w + `slope`·(ω − center) for a glossy lobe in a pair of rows of cells; the first lobe overwrites.
     #[inline(always)]
     pub(super) fn add_glossy_lobe<S: Simd>(
         &mut self,
@@ -88,8 +88,8 @@ impl ControlVariate {
         }
     }
 
-    /// Weighs the glossy part as strata are weighed beside samples of the material: a cell whose light is
-    /// as dense as `share` times what the pixel sees in the mean counts half.
+    /// Weights the glossy part as strata are weighted against BRDF samples: a cell whose light is as dense as `share`
+    /// times the pixel's mean counts half.
     #[inline(always)]
     pub(super) fn balance<S: Simd>(&mut self, simd: S, cells: &Cells, share: f32) {
         if self.tint.is_none() || share == 0.0 {
@@ -104,7 +104,7 @@ impl ControlVariate {
         }
     }
 
-    /// Its integral over all cells, each seen through `visible`.
+    /// The integral over all cells, each multiplied by its visibility in `visible`.
     #[inline(always)]
     pub(super) fn integral<S: Simd>(
         &self,
@@ -147,7 +147,7 @@ impl ControlVariate {
         Integral { diffuse, gloss }
     }
 
-    /// h toward `wi` in the cells in `slots`, at a hit that reflects `diffuse` and has these cosines.
+    /// h toward `wi` in the cells in `slots`, at a hit with diffuse albedo `diffuse` and these cosines.
     #[inline(always)]
     pub(super) fn eval<F: SimdF32x8>(
         &self,

@@ -1,13 +1,13 @@
 //! The estimator of product sampling, step by step.
 //!
-//! For a pixel with hits x and cells c of the map (notation of [`super`]):
+//! For a pixel with hits x and cells c of the map (in the notation of [`super`]):
 //!
 //! ```text
 //! pilot    I = Σ_j W_j V_j                                                               all candidates traced
 //! others   I = Σ_c V̂_c ∫_c h L + Σ_j V̂_j (W_j − h_j L_j/p_j) + Σ_chosen (W_j/π_j) (V_j − V̂_j)
 //! ```
 //!
-//! The terms of V alone are rays; all others are the pixel's base, known without them.
+//! Only the terms with V are rays; all others form the pixel's base.
 
 use super::candidates::Sources;
 use super::cells::Cells;
@@ -28,7 +28,7 @@ pub(super) struct TileEstimator<'a, 'e> {
     pub(super) cells: &'a Cells,
     pub(super) pool: &'a LightSamplePool,
     pub(super) tile: &'a TileShading<'a>,
-    /// The first level, where nothing is known of visibility yet.
+    /// Whether this is the first level, where visibility is unknown.
     pub(super) pilots: bool,
     pub(super) scratch: &'a mut ProductScratch,
     pub(super) out: &'a mut Contributions,
@@ -57,7 +57,7 @@ impl Kernel for TileEstimator<'_, '_> {
 }
 
 impl TileEstimator<'_, '_> {
-    /// Chooses the rays of a pixel, and gives its points what they reflect without them.
+    /// Chooses the rays of a pixel, and sets the part of its points that needs no rays.
     #[inline(always)]
     fn sample_pixel<S: Simd>(&mut self, simd: S, i: usize, pixel: &PixelPoints, block: usize) {
         let tile = self.tile;
@@ -69,23 +69,23 @@ impl TileEstimator<'_, '_> {
         let counts = self.strategy.counts(&self.scratch.groups, points.len(), self.pilots);
         // Tabulate light times reflectance over the cells (Clarberg & Akenine-Möller 2008, section 3).
         self.tabulate_product(simd, block, counts);
-        // Draw candidates from the table and of the BRDF, weighted by the balance heuristic (Veach 1997, eq. 9.8).
+        // Draw candidates from the table and from the BRDF, weighted by the balance heuristic (Veach 1997, eq. 9.8).
         let numbers = self.pixel_numbers(pixel);
         self.draw_candidates(simd, hits, counts, &numbers);
         if self.pilots {
-            // Trace them all.
+            // Trace all candidates.
             let ProductScratch { candidates, targets, .. } = &mut *self.scratch;
             Rays { pixel, out: self.out, targets }.push_all(candidates);
             return;
         }
         // Integrate the control variate through the estimated visibility.
         let known = self.integrate_control_variate(simd, pixel, points, block);
-        // Choose the candidates whose visibility matters, and correct the estimate by them (Horvitz & Thompson 1952).
+        // Choose the candidates whose visibility matters, and correct the estimate with them (Horvitz & Thompson 1952).
         let importance = self.importance(i, pixel, known, counts);
         self.choose_rays(simd, pixel, block, importance, numbers.choice);
     }
 
-    /// Fills the table, and beside pilots the control variate.
+    /// Fills the table and, except for pilots, the control variate.
     ///
     /// For diffuse pixels, where the control variate is exact, the density is proportional to the uncertainty of
     /// visibility.
@@ -113,7 +113,7 @@ impl TileEstimator<'_, '_> {
         PixelSamples::new(pixel.sampler.part(self.tile.samples[pixel.points.start]))
     }
 
-    /// Strata along the curve, each with a direction of the pool, and samples of the BRDF.
+    /// Draws strata along the curve, each with a direction from the pool, and BRDF samples.
     #[inline(always)]
     fn draw_candidates<S: Simd>(
         &mut self,
@@ -129,7 +129,7 @@ impl TileEstimator<'_, '_> {
         sources.draw(simd, hits, &groups.diffuse, counts, numbers, candidates);
     }
 
-    /// Gives each point Σ_c V̂_c ∫_c h L; returns the mean luminance over the points.
+    /// Adds Σ_c V̂_c ∫_c h L to each point. Returns the mean luminance over the points.
     #[inline(always)]
     fn integrate_control_variate<S: Simd>(
         &mut self,
@@ -152,12 +152,12 @@ impl TileEstimator<'_, '_> {
         known.luminance().max(0.0) / points.len() as f32
     }
 
-    /// What a candidate's standard deviation is multiplied by to give its selection probability π: one over the error that
-    /// the pixel's brightness tolerates.
+    /// The factor from a candidate's standard deviation to its selection probability π: the reciprocal of the error
+    /// that the pixel's brightness tolerates.
     fn importance(&self, i: usize, pixel: &PixelPoints, known: f32, counts: Counts) -> f32 {
         let Self { strategy, tile, .. } = *self;
         let n_points = pixel.points.len() as f32;
-        // No brighter than what is known of it: it may lie in a shadow or beside a highlight.
+        // Limit the brightness by the pixel's own estimate, because it may lie in a shadow or next to a highlight.
         let brightness = strategy.expected_brightness(tile, &self.scratch.visibility_stats, i);
         let brightness = brightness.min(strategy.brightness(known));
         let n = (counts.light + counts.brdf) as f32;
@@ -166,7 +166,7 @@ impl TileEstimator<'_, '_> {
         covered * n / (tolerance * brightness)
     }
 
-    /// Gives each point Σ_j V̂_j (W_j − h_j L_j/p_j) − Σ_chosen (W_j/π_j) V̂_j, and traces the chosen candidates.
+    /// Adds Σ_j V̂_j (W_j − h_j L_j/p_j) − Σ_chosen (W_j/π_j) V̂_j to each point, and traces the chosen candidates.
     #[inline(always)]
     fn choose_rays<S: Simd>(
         &mut self,
@@ -192,8 +192,8 @@ impl TileShading<'_> {
 }
 
 impl ProductSampling<'_> {
-    /// How bright a pixel will be: the harmonic mean over those of lower levels about it, because a dark one
-    /// among them marks the edge of a shadow.
+    /// The predicted brightness of a pixel: the harmonic mean over its neighbors of lower levels, because a dark
+    /// neighbor marks the edge of a shadow.
     fn expected_brightness(
         &self,
         tile: &TileShading,

@@ -1,4 +1,4 @@
-//! The camera hits of a pixel, in groups of like normals and materials: one table serves a group.
+//! The camera hits of a pixel, clustered by normal and BRDF. One table serves a cluster.
 
 use super::super::ShadingPoint;
 use super::strata::Counts;
@@ -10,34 +10,34 @@ use crate::math::{Frame, Vec3};
 #[derive(Clone, Copy)]
 pub(super) struct Hits<'a> {
     pub(super) points: &'a [ShadingPoint],
-    /// The material of the first is that of all.
+    /// Whether all hits have the BSDF of the first.
     pub(super) one_material: bool,
 }
 
 impl<'a> Hits<'a> {
-    /// The material that a hit is sampled by.
+    /// The BSDF from which a hit is sampled.
     pub(super) fn bsdf(self, hit: usize) -> &'a Bsdf {
         &self.points[if self.one_material { 0 } else { hit }].bsdf
     }
 }
 
-/// Hits of like normals and materials.
+/// Hits with similar normals and BSDFs.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
-    /// About the mean normal, with the tangent of the first hit.
+    /// The frame around the mean normal, with the tangent of the first hit.
     pub(super) frame: Frame,
     /// The mean direction to the viewer, in that frame.
     pub(super) wo: Vec3,
-    /// No normal of the group is further from the mean than this \[rad\].
+    /// The maximum angle between the normals and their mean \[rad\].
     pub(super) normal_spread: f32,
-    /// The material of the first hit.
+    /// The BSDF of the first hit.
     pub(super) lobe_summary: LobeSummary,
-    /// The share of the pixel's hits.
+    /// The fraction of the pixel's hits.
     pub(super) share: f32,
 }
 
 impl Group {
-    /// A frame about another normal, given in that of the group, and the direction to the viewer in it.
+    /// A frame around another normal, given in the group's frame, and the direction to the viewer in it.
     pub(super) fn about(&self, normal: Vec3) -> (Frame, Vec3) {
         let frame = Frame::from_z(self.frame.to_world(normal));
         let wo = frame.to_local(self.frame.to_world(self.wo));
@@ -45,17 +45,17 @@ impl Group {
     }
 }
 
-/// Hits of a group have normals within 18° of the first one's.
+/// The normals of a group are within 18° of the first hit's normal.
 const LIKE_NORMALS: f32 = 0.95;
-/// The roughnesses of a group are within this factor of the first one's.
+/// The roughnesses of a group are within this factor of the first hit's roughness.
 const LIKE_ROUGHNESS: f32 = 1.5;
 
-/// The spread of normals that hardly turns a lobe, as a share of its roughness.
+/// The spread of normals that hardly rotates a lobe, as a fraction of its roughness.
 const SMALL_NORMAL_SPREAD: f32 = 0.25;
-/// The cosine of the view from which lobes are not drawn out.
+/// The cosine of the view above which lobes are not elongated.
 const STEEP_COSINE: f32 = 0.5;
 
-/// A group in the making.
+/// A group under construction.
 #[derive(Clone, Debug)]
 struct HitCluster {
     first: usize,
@@ -65,12 +65,12 @@ struct HitCluster {
     n: usize,
 }
 
-/// Memory for grouping.
+/// Scratch memory for grouping.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Groups {
     clusters: Vec<HitCluster>,
     member: Vec<usize>,
-    /// What each hit reflects by the cosine.
+    /// The diffuse albedo of each hit.
     pub(super) diffuse: Vec<Rgb>,
     pub(super) all: Vec<Group>,
 }
@@ -119,7 +119,7 @@ impl Groups {
         }
         for (p, &member) in points.iter().zip(&self.member) {
             let group = &mut self.all[member];
-            // The chord is off the angle by less than a twentieth here.
+            // The chord differs from the angle by less than a twentieth here.
             let angle = 1.05 * p.frame.z.distance(group.frame.z);
             group.normal_spread = group.normal_spread.max(angle);
         }
@@ -127,28 +127,27 @@ impl Groups {
 }
 
 impl Groups {
-    /// Whether any of the materials has a lobe beside a diffuse one.
+    /// Whether any of the BSDFs has a glossy lobe.
     pub(super) fn is_glossy(&self) -> bool {
         self.narrowest().is_some()
     }
 
-    /// The roughness of the narrowest lobe; none if all is diffuse.
+    /// The roughness of the narrowest lobe; `None` if all lobes are diffuse.
     pub(super) fn narrowest(&self) -> Option<f32> {
         let lobes = self.all.iter().flat_map(|g| g.lobe_summary.lobes());
         lobes.map(|(_, gloss)| gloss.width()).reduce(f32::min)
     }
 
-    /// Whether a table follows lobes of this roughness well: the lobe hardly turns within a group, and is not
-    /// drawn out along the horizon.
+    /// Whether a table approximates lobes of this roughness well: the lobe hardly rotates within a group, and is not
+    /// elongated along the horizon.
     pub(super) fn is_well_tabulated(&self, roughness: f32) -> bool {
         self.all
             .iter()
             .all(|g| g.normal_spread <= SMALL_NORMAL_SPREAD * roughness && g.wo.z >= STEEP_COSINE)
     }
 
-    /// How dense samples of the material are beside strata of a table with this total, where the light of a cell
-    /// has the density 1: their number over that of the strata, times the light that the pixel reflects
-    /// in the mean over its lobes.
+    /// The density of BRDF samples relative to strata of a table with this total, where the light of a cell has
+    /// density 1: the ratio of their numbers, times the light that the pixel reflects, averaged over its lobes.
     pub(super) fn brdf_share(&self, counts: Counts, total: f32) -> f32 {
         let lobes = self.all.iter().flat_map(|g| {
             let diffuse = std::iter::once(g.lobe_summary.diffuse);
@@ -162,7 +161,7 @@ impl Groups {
     }
 }
 
-/// Both in local frames that are near.
+/// Compares BSDFs in similar local frames.
 fn near_normals(a: Option<Vec3>, b: Option<Vec3>) -> bool {
     match (a, b) {
         (None, None) => true,
@@ -171,7 +170,7 @@ fn near_normals(a: Option<Vec3>, b: Option<Vec3>) -> bool {
     }
 }
 
-/// Whether both have the same kinds of lobes, of about the same roughness.
+/// Whether both have the same kinds of lobes with about the same roughness.
 fn alike(a: &LobeSummary, b: &LobeSummary) -> bool {
     let near = |a: f32, b: f32| a < LIKE_ROUGHNESS * b && b < LIKE_ROUGHNESS * a;
     // The width of the lobe falls as the square root of the exponent.

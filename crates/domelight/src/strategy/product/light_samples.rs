@@ -1,9 +1,9 @@
-//! The light sample pool: directions toward the light, drawn anew for each pass and shared by its pixels.
+//! The light sample pool: directions toward the light, redrawn for each pass and shared by its pixels.
 //!
-//! Drawing from the map costs a walk through its pyramid and a direction; a pixel takes some hundred.
-//! Instead each cell has 32 directions ready, or 16, stratified along the curve within the cell, and a
-//! stratum that falls into the cell takes the one where it falls. The estimate of a pixel is unbiased
-//! over the pools; what the pool of one pass has in error, all its pixels share.
+//! Sampling the map costs a walk through its pyramid and a direction, and a pixel needs a few hundred. So
+//! each cell has 32 or 16 precomputed directions, stratified along the curve within the cell, and a
+//! stratum in the cell uses the direction at its position. The estimate of a pixel is unbiased over the
+//! pools; all pixels of a pass share the error of its pool.
 
 use super::cells::{CellArray, Cells, MAX_ROWS, N_SLOTS, ZERO_CELLS, get_mut};
 use crate::environment::Environment;
@@ -11,13 +11,14 @@ use crate::parallel;
 use crate::sampling::Sampler;
 use crate::simd::{Colors, LANES, Lanes, Simd, SimdF32x8, SimdI32x8, Vectors};
 
-/// Directions of each cell at the most.
+/// The maximum number of directions per cell.
 pub(super) const PER_CELL: usize = 32;
 
-/// How long a pass is.
+/// The length of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PassLength {
-    /// A pass of up to 8 camera samples: the error of coarser cells and fewer directions is small beside the pixels' own.
+    /// A pass of up to 8 camera samples, where the error of coarser cells and fewer directions is small relative to
+    /// the pixels' own.
     Short,
     Long,
 }
@@ -28,7 +29,7 @@ impl PassLength {
         if n_samples <= 8 { Self::Short } else { Self::Long }
     }
 
-    /// Rows of its cells.
+    /// The number of rows of its cells.
     pub(super) fn rows(self) -> usize {
         match self {
             Self::Short => 32,
@@ -36,7 +37,7 @@ impl PassLength {
         }
     }
 
-    /// Directions of each cell.
+    /// The number of directions per cell.
     fn per_cell(self) -> usize {
         match self {
             Self::Short => PER_CELL / 2,
@@ -45,14 +46,13 @@ impl PassLength {
     }
 }
 
-/// A direction toward the light: half a line of the cache. x, y and z of the unit direction in the
-/// world; red, green and blue of the radiance from there; its density within its cell \[sr⁻¹\];
-/// nothing.
+/// A direction toward the light, in half a cache line: x, y and z of the unit direction in world space;
+/// red, green and blue of the radiance from there; the density within its cell \[sr⁻¹\]; padding.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 struct LightSample(Lanes);
 
-/// How many all slots have: a power of two.
+/// The total over all slots: a power of two.
 const N_LIGHT_SAMPLES: usize = N_SLOTS * PER_CELL;
 
 /// The directions of all cells.
@@ -60,13 +60,13 @@ const N_LIGHT_SAMPLES: usize = N_SLOTS * PER_CELL;
 pub struct LightSamplePool {
     /// By slot.
     lights: Box<[LightSample; N_LIGHT_SAMPLES]>,
-    /// Each cell has the first of its places.
+    /// Determines how many directions each slot holds, at its start.
     pub(super) length: PassLength,
     /// By channel of the radiance L: ∫ L dω, and ∫ L ω dω by component, as the directions estimate it.
     pub(super) moments: Box<[[CellArray; 4]; 3]>,
 }
 
-/// Lights side by side.
+/// Light samples side by side.
 pub(super) struct LightSamples<F> {
     pub(super) wi: Vectors<F>,
     pub(super) le: Colors<F>,
@@ -114,7 +114,7 @@ impl LightSamplePool {
         pool
     }
 
-    /// The directions of the cells in `slots`, each at `u` in [0, 1) of its part of the curve.
+    /// The directions of the cells in `slots`, each at position `u` in [0, 1) along its part of the curve.
     #[inline(always)]
     pub(super) fn get<S: Simd>(
         &self,
@@ -132,7 +132,7 @@ impl LightSamplePool {
     }
 }
 
-/// ∫ L dω and ∫ L ω dω over a cell, by channel of L, as its directions estimate them.
+/// ∫ L dω and ∫ L ω dω over a cell, by channel of L, estimated from its directions.
 fn moments(lights: &[LightSample]) -> [[f32; 4]; 3] {
     let mut moments = [[0.0; 4]; 3];
     for &LightSample([x, y, z, r, g, b, density, _]) in lights {

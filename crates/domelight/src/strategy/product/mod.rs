@@ -1,15 +1,18 @@
-//! Product sampling: rays follow light times reflectance, and visibility is learned on the way.
+//! Product sampling: rays follow light times reflectance, and visibility is learned during the render.
 //!
-//! Once for an environment its map is cut into some hundred `cells` along Hilbert's curve. Each pass draws
-//! `light_samples`, a pool of directions, in every cell. Then, pixel by pixel, all its camera hits together:
+//! Once per environment, the map is divided into a few hundred `cells` along a Hilbert curve. Each pass draws
+//! `light_samples`, a pool of directions in every cell. Then each pixel is processed, with all its camera hits
+//! together:
 //!
-//! 1. A `table` gives each cell its light times what the pixel reflects of it.
-//! 2. `candidates`: strata along the curve, each with one direction of the pool, and samples of the
-//!    material where the table does not know it well, weighed by the balance heuristic.
-//! 3. The tile's pixels come in [levels](super::levels). Those of the first, *pilots*, trace all their candidates.
-//!    From the rays of each level the tile learns the `visibility` V̂ of each cell and the brightness of its pixels.
-//! 4. What the next levels reflect of light that is seen through V̂ is known but for its details: the integral of
-//!    a `control_variate` h over all cells. `systematic` sampling traces those candidates whose visibility matters:
+//! 1. A `table` holds the light times the reflectance of each cell.
+//! 2. `candidates` are strata along the curve, each with one direction from the pool, and BRDF samples where the table
+//!    approximates the BRDF badly, weighted by the balance heuristic.
+//! 3. The tile's pixels are processed in [levels](super::levels). Those of the first level, the *pilots*, trace all
+//! their
+//!    candidates. From the rays of each level, the tile learns the `visibility` V̂ of each cell and the brightness of
+//!    its pixels.
+//! 4. In the next levels, the integral of a `control_variate` h over all cells, seen through V̂, approximates the
+//!    reflected light. `systematic` sampling traces the candidates whose visibility matters:
 //!
 //! ```text
 //! base = Σ_c V̂_c ∫ h L + Σ_j V̂_j (W_j − h_j L_j/p_j) − Σ_chosen (W_j/π_j) V̂_j        rays: weight W_j/π_j
@@ -18,12 +21,11 @@
 //!    For diffuse pixels, where the control variate is exact, the density is proportional to the uncertainty of
 //!    visibility.
 //!
-//! The expectation is ∫ f L V dω for every V̂, brightness and pool, given that they do not depend on
-//! the numbers that strata, samples and choice are drawn with: V̂ and brightness come from pixels of lower levels,
-//! and each pixel and pass has a sampler of its own. V̂ has the pool in common with the candidates. That does
-//! no harm: given the pool, strata draw nothing else, and the expectation of their part is a sum over the pool
-//! whatever V̂ and the density made of it are. Samples of the material do not come from the pool, so where there are any
-//! the density depends on the pixel's hits alone.
+//! The expectation is ∫ f L V dω for every V̂, brightness and pool, provided that they do not depend on the random
+//! numbers of strata, BRDF samples and selection. V̂ and brightness come from pixels of lower levels, and each pixel
+//! and pass has its own sampler. V̂ and the candidates share the pool, which does no harm: given the pool, strata
+//! draw only from it, and the expectation of their part is a sum over the pool for any V̂ and any density derived
+//! from it. BRDF samples do not come from the pool, so if there are any, the density depends only on the pixel's hits.
 //!
 //! Related: Clarberg & Akenine-Möller 2008, "Practical Product Importance Sampling for Direct
 //! Illumination", multiplies trees of BRDF and map; Atanasov et al. 2018, "Adaptive Environment
@@ -66,46 +68,46 @@ use strata::{CandidateIndex, Counts};
 use table::Table;
 use visibility::{VisibilityEstimate, VisibilityStats};
 
-/// Camera samples of a pass: strata that one random offset spreads over all of them are worth more
+/// Camera samples per pass. Strata that share one random offset over all camera samples are worth more
 /// than the same number in two sets.
 const SAMPLES_PER_PASS: u32 = 64;
 
-/// A pilot of a short pass has as many times the candidates of other pixels: it has no control variate, and it
-/// teaches.
+/// The factor on the number of candidates of pilots in short passes, because pilots have no control variate and other
+/// pixels learn from them.
 const PILOT: usize = 2;
 
-/// Candidates of a pixel in a pass, for the sake of memory.
+/// The maximum number of candidates per pixel and pass, which limits memory.
 const MAX_CANDIDATES: u32 = 1 << 14;
 
-/// One candidate in this many comes from the material where the table approximates it badly: where normals spread or
-/// the view is oblique, and for lobes narrower than most cells.
+/// One candidate in this many is a BRDF sample where the table approximates the BRDF badly: if normals vary or the
+/// view is oblique, and for lobes narrower than most cells.
 const BRDF_SHARE: [usize; 2] = [8, 4];
 
 /// The roughness below which a lobe is narrower than most cells.
 const NARROW: f32 = 0.1;
 
-/// The error of a candidate that does not matter, as a share of the pixel's brightness over the
-/// number of candidates: of a diffuse pixel, where nothing else is left to chance, and of a glossy one.
+/// The tolerated error of a candidate, as a fraction of the pixel's brightness over the number of candidates: for a
+/// diffuse pixel, where nothing else is random, and for a glossy pixel.
 const TOLERANCE: [f32; 2] = [0.15, 0.35];
 
-/// Pixels darker than this share of the environment's mean are not held to their own brightness.
+/// For pixels darker than this fraction of the environment's mean, the tolerated error stops shrinking.
 const DARK: f32 = 0.15;
 
-/// Product sampling: up to N rays for each camera sample, in proportion to light, reflectance and learned visibility.
+/// Product sampling: up to N rays per camera sample, in proportion to light, reflectance and learned visibility.
 #[derive(Clone, Debug)]
 pub struct ProductSampling<'a> {
-    /// The environment with texels about as wide as high, so that cells are.
+    /// The environment with about square texels, so that cells are about square too.
     environment: Cow<'a, Environment>,
-    /// The cells of short passes and of long ones; none under a black sky.
+    /// The cells of short passes and of long ones; empty under a black sky.
     cells: Option<[Cells; 2]>,
-    /// Luminance below which brightness does not count.
+    /// The luminance below which brightness is ignored.
     dark: f32,
     n_rays: u32,
     instruction_set: InstructionSet,
 }
 
 impl<'a> ProductSampling<'a> {
-    /// Product sampling with at most `n_rays` ≥ 1 shadow rays for each camera sample that hits, and twice as many in
+    /// Creates the strategy with at most `n_rays` ≥ 1 shadow rays per camera sample that hits, and twice as many in
     /// pilots (one pixel of 16). This is the number of candidates; those that cannot change the pixel visibly are not
     /// traced.
     pub fn new(environment: &'a Environment, n_rays: u32) -> Self {
@@ -123,15 +125,15 @@ impl<'a> ProductSampling<'a> {
         }
     }
 
-    /// The same with another instruction set; `None` if this processor lacks it. All give the same bits:
-    /// this is for comparing them.
+    /// The same with another instruction set; `None` if this processor lacks it. All give the same bits;
+    /// this is for comparisons.
     #[must_use]
     pub fn with_instruction_set(mut self, instruction_set: InstructionSet) -> Option<Self> {
         self.instruction_set = instruction_set;
         instruction_set.is_available().then_some(self)
     }
 
-    /// How many candidates the hits of a pixel have together.
+    /// The total number of candidates over the hits of a pixel.
     fn counts(&self, groups: &Groups, n_hits: usize, pilot: bool) -> Counts {
         let times = if pilot && PassLength::new(n_hits) == PassLength::Short { PILOT } else { 1 };
         let all = self.n_rays as usize * n_hits * times;
@@ -152,23 +154,23 @@ impl<'a> ProductSampling<'a> {
         })
     }
 
-    /// The brightness of a pixel that its error is measured by.
+    /// The brightness against which the error of a pixel is measured.
     fn brightness(&self, luminance: f32) -> f32 {
         functions::hypot(luminance, self.dark)
     }
 }
 
-/// Memory of [`ProductSampling`].
+/// Scratch memory of [`ProductSampling`].
 #[derive(Clone, Debug, Default)]
 pub struct ProductScratch {
     groups: Groups,
     table: Table,
     control_variate: ControlVariate,
     candidates: Candidates,
-    /// The chosen strata's candidates.
+    /// The candidates of the chosen strata.
     chosen: Vec<CandidateIndex>,
     visibility: VisibilityEstimate,
-    /// The slot of the cell that each ray of the round goes to.
+    /// The slot of each ray's cell in this round.
     targets: Vec<u16>,
     /// The pixels of the round that have hits.
     sampled_pixels: Vec<usize>,

@@ -1,4 +1,4 @@
-//! The rays of a pixel: which candidates are traced, and with what weight.
+//! The rays of a pixel: the traced candidates and their weights.
 //!
 //! Systematic sampling with unequal probabilities π and the estimator Σ W/π: Horvitz & Thompson 1952, "A
 //! Generalization of Sampling Without Replacement from a Finite Universe".
@@ -12,11 +12,11 @@ use crate::Rgb;
 use crate::simd::{Colors, LANES, Simd, SimdF32x8};
 use crate::strategy::{Contributions, PixelPoints};
 
-/// Where the rays of a pixel go.
+/// The output of a pixel's rays.
 pub(super) struct Rays<'a> {
     pub(super) pixel: &'a PixelPoints,
     pub(super) out: &'a mut Contributions,
-    /// The slot of the cell that each ray goes to.
+    /// The slot of each ray's cell.
     pub(super) targets: &'a mut Vec<u16>,
 }
 
@@ -26,7 +26,7 @@ impl Rays<'_> {
         self.pixel.points.len() as f32
     }
 
-    /// What `hit` has without rays.
+    /// The part of `hit` that needs no rays.
     #[inline(always)]
     pub(super) fn base(&mut self, hit: u32) -> &mut Rgb {
         &mut self.out.base[self.pixel.points.start + hit as usize]
@@ -57,7 +57,7 @@ impl Rays<'_> {
         }
     }
 
-    /// Adds Σ W V̂ and sets the π of all candidates: W g times `importance`.
+    /// Adds Σ W V̂ and sets the π of all candidates to W g times `importance`.
     #[inline(always)]
     pub(super) fn weigh_candidates<S: Simd>(
         &mut self,
@@ -89,7 +89,7 @@ impl Rays<'_> {
         }
     }
 
-    /// Σ W (V − V̂)/π: traces the chosen ones.
+    /// Σ W (V − V̂)/π: traces the chosen candidates.
     #[inline(always)]
     pub(super) fn push_chosen(
         &mut self,

@@ -1,15 +1,14 @@
-//! The strata of a pixel's table: how many there are, which hit each is assigned to, and the random numbers that place
-//! them.
+//! The strata of a pixel's table: their number, their assignment to hits, and their random offsets.
 
 use crate::sampling::{Dimension, Sampler};
 use crate::simd::{LANES, Simd, SimdFloat, SimdI32x8};
 
-/// How many candidates.
+/// The numbers of candidates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Counts {
     /// Strata of the table.
     pub(super) light: usize,
-    /// Samples of the material.
+    /// BRDF samples.
     pub(super) brdf: usize,
 }
 
@@ -25,12 +24,12 @@ pub(super) struct StratumAssignment {
 }
 
 impl StratumAssignment {
-    /// Assigns M strata to n hits; `shift` in [0, 1) becomes r.
+    /// Assigns M strata to n hits; `shift` in [0, 1) determines r.
     pub(super) fn new(n_strata: usize, n_hits: usize, shift: f32) -> Self {
         Self { n_strata, n_hits, shift: (shift * n_hits as f32) as usize % n_hits.max(1) }
     }
 
-    /// Blocks of each hit.
+    /// The number of blocks per hit.
     pub(super) fn blocks(self) -> usize {
         self.n_strata.div_ceil(self.n_hits.max(1)).div_ceil(LANES)
     }
@@ -42,7 +41,7 @@ impl StratumAssignment {
         if k < self.n_hits { k } else { k - self.n_hits }
     }
 
-    /// The places of strata 0 to M − 1 in blocks of hits that follow each other.
+    /// The positions of strata 0 to M − 1 in consecutive blocks of hits.
     #[inline(always)]
     pub(super) fn indices(self) -> impl Iterator<Item = CandidateIndex> {
         let (n, stride) = (self.n_hits, self.blocks() * LANES);
@@ -66,11 +65,11 @@ impl StratumAssignment {
     }
 }
 
-/// Where a stratum's candidate is.
+/// The position of a stratum's candidate.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CandidateIndex {
     pub(super) hit: usize,
-    /// Counted through all blocks.
+    /// The lane, counted over all blocks.
     pub(super) lane: usize,
 }
 
@@ -81,19 +80,19 @@ pub(super) struct Strata {
     pub(super) n: usize,
     /// ξ in [0, 1).
     pub(super) offset: f32,
-    /// Their width in the running sum.
+    /// The width of a stratum in the running sum.
     pub(super) width: f32,
-    /// What none may reach.
+    /// The exclusive upper bound of positions.
     total: f32,
 }
 
 impl Strata {
-    /// `n` strata of a table of the given total.
+    /// Creates `n` strata of a table with the given total.
     pub(super) fn new(n: usize, offset: f32, total: f32) -> Self {
         Self { n, offset, width: total / n as f32, total }
     }
 
-    /// Where strata `first`, `first` + `step`, … fall in the running sum.
+    /// The positions of strata `first`, `first` + `step`, … in the running sum.
     #[inline(always)]
     pub(super) fn positions<S: Simd>(&self, simd: S, first: usize, step: usize) -> S::F32x8 {
         let k = simd.iota().to_f32() * simd.splat(step as f32) + simd.splat(first as f32);
@@ -107,26 +106,26 @@ impl Strata {
 pub(super) struct PixelSamples {
     /// The offset of all strata.
     pub(super) strata: f32,
-    /// The offset of the choice of rays.
+    /// The offset of the selection of rays.
     pub(super) choice: f32,
-    /// Shifts of the hits against the strata and against the samples of the material.
+    /// Shifts of the hits relative to the strata and to the BRDF samples.
     shift: [f32; 2],
     pub(super) sampler: Sampler,
 }
 
 impl PixelSamples {
-    /// From a sampler that serves this pixel in this pass alone.
+    /// Draws the numbers from a sampler used only by this pixel in this pass.
     pub(super) fn new(sampler: Sampler) -> Self {
         let [strata, choice, a, b] = sampler.numbers(Dimension::Resampling, 0).0;
         Self { strata, choice, shift: [a, b], sampler }
     }
 
-    /// The hit of sample `j` of the material, of `n` hits.
+    /// The hit of BRDF sample `j`, of `n` hits.
     pub(super) fn brdf_hit(&self, j: usize, n: usize) -> usize {
         (j + (self.shift[1] * n as f32) as usize) % n
     }
 
-    /// The shift of the hits against the strata, in [0, 1).
+    /// The shift of the hits relative to the strata, in [0, 1).
     pub(super) fn strata_shift(&self) -> f32 {
         self.shift[0]
     }

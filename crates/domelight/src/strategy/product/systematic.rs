@@ -1,17 +1,17 @@
-//! The choice of rays: each candidate j is traced with a probability π_j of its own, and counts 1/π_j
-//! times then (Horvitz & Thompson 1952).
+//! The selection of rays: each candidate j is traced with its own probability π_j and weighted by 1/π_j
+//! (Horvitz & Thompson 1952).
 //!
 //! ```text
 //! π_j = min(1, W_j g_j / τ)
 //! ```
 //!
-//! W_j is what the candidate adds to the pixel, g_j how uncertain its visibility is, and τ the error
-//! that does not matter: scaled to the brightness of the pixel *with* shadows, for scaled to its
-//! brightness without them it is far too coarse in shadow.
+//! W_j is the candidate's contribution to the pixel, g_j the uncertainty of its visibility, and τ the
+//! tolerated error. τ is proportional to the brightness of the pixel *with* shadows; the brightness
+//! without shadows would make it far too coarse in shadow.
 //!
-//! The choice is systematic (Madow 1949): a running sum of the π_j along the curve, from one random
-//! offset, picks the candidate at which it passes an integer. Each is picked with probability π_j
-//! exactly, and the picks are spread over the sky.
+//! The selection is systematic (Madow 1949): a running sum of the π_j along the curve, from one random
+//! offset, selects a candidate whenever it passes an integer. Each is selected with probability exactly
+//! π_j, and the selected candidates are spread over the sky.
 
 use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat, SimdI32x8};
 

@@ -1,4 +1,4 @@
-//! The product table of a pixel: for each cell its light times how much of it the pixel reflects.
+//! The product table of a pixel: for each cell, its light times the pixel's reflectance.
 //!
 //! ```text
 //! t(c) = W(c) · f(n, wo, center of c)
@@ -6,13 +6,12 @@
 //!
 //! f is the summary of the BSDF's lobes, widened by the angular radius r of the cell and the spread of
 //! the normals in the pixel: s² = r² + spread² is added to the variance of a lobe, and the cosine x
-//! becomes a ramp (x + s)²/4s where |x| < s. No cell that may hold a direction above the surface has
-//! a diffuse weight of zero, so the table is a density for all that the pixel reflects; the tails of
-//! narrow lobes may fall below what single precision adds up, and are left to samples of the
-//! material.
+//! becomes a ramp (x + s)²/4s for |x| < s. Every cell that may hold a direction above the surface has a
+//! positive diffuse weight, so the table is a valid density for everything that the pixel reflects. The
+//! tails of narrow lobes may vanish in single-precision sums; BRDF samples cover them.
 //!
 //! The running sum of the table is a distribution along the curve. Its M strata share one random
-//! offset: stratum k falls at u = (k + ξ)/M.
+//! offset: stratum k is at u = (k + ξ)/M.
 
 use super::cells::{CellArray, Cells, MAX_ROWS, TABLE_ROWS, ZERO_CELLS};
 use super::control_variate::ControlVariate;
@@ -22,19 +21,19 @@ use crate::bsdf::GlossyLobe;
 use crate::math::{FRAC_1_PI, Frame, Vec3, sqr};
 use crate::simd::{LANES, LaneMask, Simd, SimdF32x8, SimdFloat, SimdI32x8, Vectors};
 
-/// The least cosine of a cell that is not all below the surface: what the table leaves to chance.
+/// The minimum cosine of a cell that is not completely below the surface.
 const LEAST_COSINE: f32 = 0.01;
 
 /// A distribution over cells, by slot.
 #[derive(Clone, Debug)]
 pub(super) struct Table {
-    /// What the cell is worth; after [`Table::accumulate`] its part of the running sum exactly.
+    /// The weight of the cell; after [`Table::accumulate`], exactly its part of the running sum.
     weight: CellArray,
-    /// The running sum along the curve up to the cell.
+    /// The running sum along the curve before the cell.
     start: CellArray,
-    /// The running sum up to and with it.
+    /// The running sum including the cell.
     end: CellArray,
-    /// How much light reaches a surface facing the cell, at least [`LEAST_COSINE`]; 0 below it.
+    /// The cosine of the cell, at least [`LEAST_COSINE`]; 0 for cells below the surface.
     cosine: CellArray,
     /// The sum over all cells.
     total: f32,
@@ -53,8 +52,8 @@ impl Default for Table {
 }
 
 impl Table {
-    /// Fills the table for groups of hits, with `CONTROL_VARIATE` their control variate as well; [`Table::accumulate`] makes
-    /// it a distribution.
+    /// Fills the table for groups of hits and, with `CONTROL_VARIATE`, their control variate. [`Table::accumulate`]
+    /// then makes it a distribution.
     #[inline(always)]
     pub(super) fn fill<S: Simd, const CONTROL_VARIATE: bool>(
         &mut self,
@@ -103,7 +102,7 @@ impl Table {
         }
     }
 
-    /// Weights the table of a diffuse pixel by what is uncertain: visibility, by its `std_dev`, and the light of
+    /// Weights the table of a diffuse pixel by uncertainty: that of visibility, `std_dev`, and that of the light of
     /// cells across the horizon.
     #[inline(always)]
     pub(super) fn weight_by_variance<S: Simd>(
@@ -125,7 +124,7 @@ impl Table {
         }
     }
 
-    /// The ramp of the cosine, and the diffuse part, added to what other groups have if there are `others`.
+    /// Computes the ramp of the cosine and the diffuse part, added to those of previous groups if there are `others`.
     #[inline(always)]
     fn fill_cosine<S: Simd, const CONTROL_VARIATE: bool>(
         &mut self,
@@ -268,7 +267,7 @@ impl Table {
             before[lane] = before[lane - 1] + sum[lane - 1];
         }
         self.total = before[LANES - 1] + sum[LANES - 1];
-        // The width of a cell is the difference of its ends as rounded: what strata fall into.
+        // The width of a cell is the difference of its rounded ends, which is exactly what strata see.
         let before = simd.load(&before);
         let mut last = before;
         for row in cells.rows() {
@@ -285,17 +284,17 @@ impl Table {
         self.total
     }
 
-    /// What the cells in `slots` have of [`Table::total`].
+    /// The parts of [`Table::total`] of the cells in `slots`.
     #[inline(always)]
     pub(super) fn widths<F: SimdF32x8>(&self, slots: F::I32x8) -> F {
         F::gather(&self.weight, slots)
     }
 
-    /// Sets the slot of the cell that each stratum falls into, at the stratum's place.
+    /// Sets the slot of each stratum's cell, at the stratum's position.
     ///
-    /// Stratum k lies at or after a cell's start s if k ≥ s/w − ξ, so a cell has the strata from the
-    /// first that does to the first that does for the next cell. It marks its first in `cell_starts`; marks, which rise
-    /// along the curve, spread to the right.
+    /// Stratum k is at or after a cell's start s if k ≥ s/w − ξ, so a cell has the strata from the first for which
+    /// this holds to the first for which it holds for the next cell. Each cell marks its first stratum in
+    /// `cell_starts`; the marks, which increase along the curve, then propagate to the right.
     #[inline(always)]
     pub(super) fn assign_strata<S: Simd>(
         &self,
@@ -308,7 +307,7 @@ impl Table {
     ) {
         cell_starts.clear();
         cell_starts.resize(strata.n, 0);
-        // The first stratum of each cell that has any, and the cell's mark.
+        // Mark the first stratum of each cell that has any.
         let mut firsts = [0; LANES * (MAX_ROWS + 1)];
         let mut n_firsts = 0;
         let mut mark = simd.iota().shl::<MARK>();
@@ -332,13 +331,13 @@ impl Table {
         let mut last = 0;
         for (mark, index) in cell_starts.iter().zip(assignment.indices()) {
             last = last.max(*mark);
-            // Row and lane as they follow each other in memory.
+            // Row and lane in memory order.
             let slot = (last & ((1 << MARK) - 1)) << ROW | last >> MARK;
             slots[index.lane / LANES][index.lane % LANES] = slot;
         }
     }
 
-    /// Where in the cells in `slots` the sums `at` lie, in [0, 1].
+    /// The positions in [0, 1] of the sums `at` within the cells in `slots`.
     #[inline(always)]
     pub(super) fn inside<F: SimdF32x8>(&self, slots: F::I32x8, at: F) -> F {
         let start = F::gather(&self.start, slots);
@@ -346,7 +345,7 @@ impl Table {
     }
 }
 
-/// The first stratum that does not lie before `start`.
+/// The first stratum at or after `start`.
 #[inline(always)]
 fn first<S: Simd>(simd: S, strata: &Strata, start: S::F32x8) -> S::I32x8 {
     let k = start * simd.splat(1.0 / strata.width) - simd.splat(strata.offset);
@@ -356,13 +355,13 @@ fn first<S: Simd>(simd: S, strata: &Strata, start: S::F32x8) -> S::I32x8 {
     first.min(simd.splat_i32(strata.n as i32))
 }
 
-/// Bits of a row's number in a mark: marks are ordered by lane, then by row.
+/// The number of bits for the row in a mark. Marks are ordered by lane, then by row.
 const MARK: i32 = TABLE_ROWS.ilog2() as i32;
 
-/// Bits of a mark.
+/// The number of bits of a mark.
 const MARKS: i32 = MARK + ROW;
 
-/// The power of two that a row's length is.
+/// The base-2 logarithm of a row's length.
 const ROW: i32 = LANES.ilog2() as i32;
 
 /// (cos θ + √(cos² θ + α² sin² θ))/2.
@@ -374,17 +373,17 @@ fn sigma<F: SimdFloat>(cosine: F, alpha2: F) -> F {
     cosine.splat(0.5) * (cosine + (cosine2 + alpha2 * sine2).sqrt())
 }
 
-/// A lobe of a group to be added to a table.
+/// A lobe of a group that is added to a table.
 struct GroupLobe<'a> {
     cells: &'a Cells,
     group: &'a Group,
-    /// Its part of what the pixel reflects.
+    /// Its weight in the pixel.
     share: f32,
-    /// It is the first of the pixel.
+    /// Whether it is the first lobe of the pixel.
     first: bool,
 }
 
-/// Vectors given in a frame.
+/// Vectors in a given frame.
 #[inline(always)]
 fn frame_vector<F: SimdFloat>(frame: &Frame, [x, y, z]: [F; 3]) -> Vectors<F> {
     let [x, y, z] = [

@@ -1,43 +1,44 @@
-//! What shadow rays have taught about a tile: how visible each light cell is from each block of
-//! pixels, and how bright the pixels are.
+//! The visibility learned from a tile's shadow rays: the visibility of each light cell from each block of
+//! pixels, and the brightness of the pixels.
 //!
-//! With n rays to a cell, k of them free, counted in a block, 0.35 times in its four neighbors, and
-//! 0.25 times to the two cells beside it along the curve,
+//! With n rays to a cell, k of them unoccluded, where rays in the block count 1, rays in its four
+//! neighbors 0.35, and rays to the two neighboring cells along the curve 0.25,
 //!
 //! ```text
 //! V̂ = (k + p)/(n + 1)        p = (K + v₀)/(N + 1)
 //! g² = V̂(1 − V̂) + (p(1 − p)/2 + 0.005)/(n + 1) + 0.0003
 //! ```
 //!
-//! p is the same of the whole tile, K of N rays to the cell, and v₀ that of all cells. g is the standard
-//! deviation of a ray about V̂, and what V̂ itself may be wrong by: much, where rays of the tile to the cell differ.
+//! p is the visibility of the cell over the whole tile, with K of N rays unoccluded, and v₀ that of all cells. g is the
+//! standard deviation of a ray around V̂ combined with the uncertainty of V̂ itself, which is large if the tile's
+//! rays to the cell differ.
 //!
-//! V̂ serves as a control variate: the pixel's estimate is what it reflects of light seen through V̂, and
-//! Σ W (V − V̂)/π, whose expectation does not depend on V̂ as long as V̂ does not depend on the numbers that strata
-//! and choice are drawn with. So V̂ comes from pixels of lower levels alone.
+//! V̂ is a control variate: the pixel's estimate is the light seen through V̂ that it reflects, plus Σ W (V − V̂)/π.
+//! Its expectation does not depend on V̂, provided that V̂ does not depend on the random numbers of strata and
+//! selection. For that reason, V̂ comes only from pixels of lower levels.
 
 use super::cells::{CellArray, Cells, MAX_ROWS, ZERO_CELLS, get_mut};
 use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat};
 
-/// Pixels along the side of a block.
+/// The number of pixels along the side of a block.
 pub(super) const BLOCK: usize = 4;
-/// What a ray of a neighboring block counts.
+/// The weight of a ray from a neighboring block.
 const NEIGHBOR: f32 = 0.35;
-/// What a ray to a neighboring cell counts.
+/// The weight of a ray to a neighboring cell.
 const BESIDE: f32 = 0.25;
 
-/// What is known of a tile.
+/// The statistics of a tile.
 #[derive(Clone, Debug, Default)]
 pub(super) struct VisibilityStats {
-    /// Rays traced from each block to each cell.
+    /// The number of rays traced from each block to each cell.
     rays: Vec<CellArray>,
-    /// Those that were free.
+    /// The number of unoccluded rays.
     free: Vec<CellArray>,
-    /// The luminance of each pixel that is known.
+    /// The luminance of each known pixel.
     luminance: Vec<Option<f32>>,
 }
 
-/// A tile cut into blocks.
+/// A tile divided into blocks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Blocks {
     pub(super) width: usize,
@@ -59,7 +60,7 @@ impl Blocks {
         y / BLOCK * self.width + x / BLOCK
     }
 
-    /// The blocks that share an edge; itself where there is none.
+    /// The blocks that share an edge with a block, or the block itself where there is none.
     fn neighbors(self, block: usize) -> [usize; 4] {
         let (x, y) = (block % self.width, block / self.width);
         [
@@ -72,7 +73,7 @@ impl Blocks {
 }
 
 impl VisibilityStats {
-    /// Forgets all.
+    /// Clears the statistics.
     pub(super) fn reset(&mut self, blocks: Blocks, n_pixels: usize) {
         for counts in [&mut self.rays, &mut self.free] {
             counts.clear();
@@ -109,7 +110,7 @@ pub(super) struct VisibilityEstimate {
 }
 
 impl VisibilityEstimate {
-    /// Estimates all.
+    /// Computes the estimates.
     #[inline(always)]
     pub(super) fn estimate<S: Simd>(
         &mut self,
@@ -187,7 +188,7 @@ fn around<S: Simd>(
         sum = sum + beside * simd.load(&counts[block][row + 1]);
     }
     for &neighbor in neighbors {
-        // A block without a neighbor on a side is its own there, and counts nothing.
+        // A block without a neighbor on a side refers to itself there, and is not counted again.
         let share = simd.splat(if neighbor == block { 0.0 } else { NEIGHBOR });
         sum = sum + share * simd.load(&counts[neighbor][row]);
     }

@@ -28,7 +28,7 @@ pub enum GltfErrorKind {
         version: String,
     },
     /// A GLB file whose chunks do not fit together.
-    #[error("the GLB container is cut short or damaged: {problem}")]
+    #[error("the GLB container is truncated or damaged: {problem}")]
     Container {
         /// What does not fit.
         problem: String,
@@ -53,7 +53,7 @@ pub enum GltfErrorKind {
     },
     /// Data that lie outside of what holds them.
     #[error(
-        "{what} {index} covers bytes {begin}..{end} of {length}; the file is cut short or damaged"
+        "{what} {index} covers bytes {begin}..{end} of {length}; the file is truncated or damaged"
     )]
     OutOfRange {
         /// What lies outside.
@@ -80,7 +80,9 @@ pub enum GltfErrorKind {
         used_for: String,
     },
     /// Accessors that promise zeros without end.
-    #[error("accessor {index} has {count} values but no data, more zeros than are made of nothing")]
+    #[error(
+        "accessor {index} has {count} values but no data, too many zeros for a file without data"
+    )]
     NoData {
         /// The accessor.
         index: usize,
@@ -130,7 +132,7 @@ pub enum GltfErrorKind {
         problem: String,
     },
     /// A KTX2 image that cannot be decoded.
-    #[error("image {image} is no KTX2 file that can be read: {source}")]
+    #[error("image {image} is not a readable KTX2 file: {source}")]
     Ktx2 {
         /// The image.
         image: usize,
@@ -150,7 +152,7 @@ pub enum GltfErrorKind {
     },
     /// A node with two parents or among its own ancestors, or too deep a tree.
     #[error(
-        "node {node} is reached twice or lies more than {limit} levels deep; nodes must form a tree"
+        "node {node} is reached twice or is more than {limit} levels deep; nodes must form a tree"
     )]
     NotATree {
         /// The node.
@@ -159,7 +161,7 @@ pub enum GltfErrorKind {
         limit: usize,
     },
     /// An index that names no vertex.
-    #[error("index {index} names no vertex; there are {vertices}")]
+    #[error("index {index} refers to no vertex; there are {vertices}")]
     Index {
         /// The index.
         index: u32,
@@ -178,7 +180,7 @@ pub enum GltfErrorKind {
     },
     /// A required extension that is not known, where none may be passed over.
     #[error(
-        "the file requires the extension {name}, which is not known; without --strict, what can be drawn is drawn"
+        "the file requires the extension {name}, which is unknown; without --strict, the rest is drawn"
     )]
     RequiredExtension {
         /// The extension.

@@ -44,7 +44,7 @@ const HARMLESS: [(&str, &str); 22] = [
     ("KHR_lights_punctual", "its lamps are left out: light comes from the environment"),
     ("EXT_lights_", "its own light is left out: light comes from the environment"),
     ("KHR_lights_environment", "its own light is left out: light comes from the environment"),
-    ("KHR_animation_pointer", "what it animates stays at rest"),
+    ("KHR_animation_pointer", "the values that it animates stay at rest"),
     ("KHR_materials_variants", "its default materials are drawn"),
     ("KHR_xmp", "metadata are left out"),
     ("AGI_articulations", "articulations stay at rest"),
@@ -87,15 +87,17 @@ pub(super) fn check(
     for name in all {
         match effect(name) {
             Effect::Read => {}
-            Effect::Harmless(text) => warn(&format!("the extension {name} is not read; {text}")),
+            Effect::Harmless(text) => {
+                warn(&format!("the extension {name} is not supported; {text}"))
+            }
             Effect::Unknown if !required.contains(name) => {
-                warn(&format!("the extension {name} is not known and ignored"));
+                warn(&format!("the extension {name} is unknown and ignored"));
             }
             Effect::Unknown if strict => {
                 return Err(GltfErrorKind::RequiredExtension { name: name.clone() });
             }
             Effect::Unknown => warn(&format!(
-                "the file requires the extension {name}, which is not known; what can be drawn without it is drawn"
+                "the file requires the extension {name}, which is unknown; the rest is drawn without it"
             )),
         }
     }

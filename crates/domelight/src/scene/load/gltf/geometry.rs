@@ -9,7 +9,7 @@ use super::json;
 use super::material::Slot;
 use super::source::Source;
 
-/// What is known of a primitive's vertices; an attribute is empty or has a value a vertex.
+/// What is known of a primitive's vertices; an attribute is empty or has a value per vertex.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vertices {
     pub(super) positions: Vec<[f32; 3]>,

@@ -12,10 +12,10 @@ use basisu::{DecodeFlags, TargetFormat, Transcoder};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Ktx2Error {
     /// No KTX2 file at all.
-    #[error("it does not begin as one")]
+    #[error("it lacks the KTX2 signature")]
     Magic,
     /// The file ends too early, or a table lies outside of it.
-    #[error("its {0} lies outside of the file, which is cut short or damaged")]
+    #[error("its {0} lies outside the file, which is truncated or damaged")]
     OutOfRange(&'static str),
     /// A number in the header that a glTF texture cannot have.
     #[error("its {what} is {value}; {wanted}")]
@@ -34,7 +34,7 @@ pub enum Ktx2Error {
 
 const MAGIC: [u8; 12] = *b"\xabKTX 20\xbb\r\n\x1a\n";
 
-/// The greatest width and height, as graphics processors have it.
+/// The largest width and height, as graphics processors have it.
 const MAX_SIZE: u32 = 16384;
 
 /// Color models of the data format descriptor (Khronos, "Data Format Specification" 1.4).
@@ -105,7 +105,8 @@ impl<'a> Ktx2<'a> {
                 [0, 8, 16].map(|i| u64::from_le_bytes(std::array::from_fn(|j| entry[i + j])));
             inside(offset, length, "level")?;
             if level == 0 && is_uastc {
-                let (what, wanted) = ("length of the first level", "16 bytes a block fit the size");
+                let (what, wanted) =
+                    ("length of the first level", "16 bytes per block fit the size");
                 let value = if scheme == 0 { length } else { uncompressed };
                 if value != 16 * blocks {
                     return Err(Ktx2Error::Header { what, value, wanted });
@@ -187,7 +188,7 @@ mod tests {
         assert!(error(48, 0xffff_fff0).contains("descriptor"));
         assert!(error(80, u64::MAX - 3).contains("level"));
         assert!(error(88, 1 << 55).contains("level"));
-        assert!(error(20, 16384).contains("16 bytes a block"));
+        assert!(error(20, 16384).contains("16 bytes per block"));
         assert_eq!(Ktx2::new(b"PNG"), Err(Ktx2Error::Magic));
     }
 

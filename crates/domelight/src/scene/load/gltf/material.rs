@@ -306,7 +306,7 @@ fn unit(v: f32) -> f32 {
     not_negative(v).min(1.0)
 }
 
-/// Clamps to \[0, the greatest number\]; NaN becomes 0.
+/// Clamps to \[0, the largest number\]; NaN becomes 0.
 fn not_negative(v: f32) -> f32 {
     if v > 0.0 { v.min(f32::MAX) } else { 0.0 }
 }

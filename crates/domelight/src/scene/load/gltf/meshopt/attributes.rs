@@ -1,4 +1,4 @@
-//! Mode 0: elements as differences of bytes, 16 elements a group.
+//! Mode 0: elements as differences of bytes, 16 elements per group.
 
 use super::{Cursor, MeshoptError};
 

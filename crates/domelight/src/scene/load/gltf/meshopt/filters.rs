@@ -54,7 +54,7 @@ fn octahedral([x, y, one, w]: [i16; 4], max: f32) -> [i16; 4] {
 }
 
 /// A unit quaternion from its three smaller components; the fourth number has the unit, but for the
-/// last two bits, which name the greatest component.
+/// last two bits, which name the largest component.
 fn quaternion([x, y, z, w]: [i16; 4]) -> [i16; 4] {
     let scale = std::f32::consts::FRAC_1_SQRT_2 / f32::from(w | 3);
     let [x, y, z] = [x, y, z].map(|c| f32::from(c) * scale);
@@ -119,7 +119,7 @@ mod tests {
         let mut bytes = words([0, 0, 0, 2047 & !3 | 3]);
         apply(Filter::Quaternion, 8, &mut bytes);
         assert_eq!(bytes, words([0, 0, 0, 32767]));
-        // x = y = 1/√2: y is named the greatest, and x, its third successor, is at the end of its range.
+        // x = y = 1/√2: y is named the largest, and x, its third successor, is at the end of its range.
         let mut bytes = words([0, 0, 2047, 2047 & !3 | 1]);
         apply(Filter::Quaternion, 8, &mut bytes);
         assert_eq!(bytes, words([23170, 23170, 0, 0]));

@@ -60,7 +60,7 @@ pub(super) enum Filter {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MeshoptError {
     /// A stride that the mode or the filter does not allow.
-    #[error("{stride} bytes an element do not fit its mode and filter")]
+    #[error("{stride} bytes per element do not fit its mode and filter")]
     Stride {
         /// The stride \[bytes\].
         stride: usize,
@@ -69,7 +69,7 @@ pub enum MeshoptError {
     #[error("indices take no filter")]
     Filter,
     /// A number of indices that makes no triangles.
-    #[error("{count} indices make no whole triangles")]
+    #[error("{count} indices do not form whole triangles")]
     Count {
         /// How many indices.
         count: usize,
