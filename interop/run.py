@@ -379,6 +379,63 @@ def check_readers(table, rigs):
             table.count(name, f"{rig.name}: panorama not found", int(not (rig.folder / file).is_file()))
 
 
+NAMES = [
+    'a "b" c', "it's", "x\\y", "a@b@", "$(touch owned)", "`touch owned`", "#hash", "a]]>b", "{{x}}", "new\nline",
+    "line\u2028separator", "%s %n", "[0]", "!touch owned", "a;b", "-dash", "tab\there", "é√", '"""', "<b>&amp;",
+]  # fmt: skip
+
+
+def check_names(table):
+    """Names that mean something in a format's language: the reader finds the lights and the dome's file, or
+    `domelight lights` refuses the name."""
+    folder = OUT / "names"
+    folder.mkdir(parents=True, exist_ok=True)
+    texels = np.full((32, 64, 3), 0.2, np.float32)
+    texels[8:10, 20:22] = 400.0
+    probe.write_pfm(folder / "probe.pfm", texels)
+
+    def read_usd(path):
+        return usd.lights(path), os.path.basename(usd.dome(path)[0])
+
+    def read_pbrt(path):
+        return readers.pbrt(path)[:2]
+
+    def read_sibl(path):
+        return readers.sibl(path)
+
+    def read_radiance(path):
+        assert radiance.trace(path, np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])).sum() > 0
+        return [0], f"{path.stem}_dome.hdr"
+
+    read = {
+        f"OpenUSD {usd.VERSION}": ("usda", read_usd),
+        f"Radiance {radiance.VERSION}": ("rad", read_radiance),
+        "pbrt-v4, a reader, not the program": ("pbrt", read_pbrt),
+        "sIBL, a reader, not a program": ("ibl", read_sibl),
+    }
+    for consumer, (extension, reader) in read.items():
+        wrong, refused = [], 0
+        for name in NAMES:
+            rig = folder / f"{name}.{extension}"
+            command = [DOMELIGHT, "lights", folder / "probe.pfm", "--lamps", "1", "-o", rig, "--quiet"]
+            done = subprocess.run(command, capture_output=True, text=True)
+            if done.returncode:
+                refused += 1
+                if "cannot name the file" not in done.stderr:
+                    wrong.append(f"{name!r}: {done.stderr.strip()}")
+                continue
+            try:
+                lights, dome = reader(rig)
+                if not lights or not (folder / dome).is_file():
+                    wrong.append(f"{name!r}: {len(lights)} lights, dome {dome!r}")
+            except Exception as error:
+                wrong.append(f"{name!r}: {error!r}")
+        for line in wrong:
+            print(f"{consumer}: {line}", file=sys.stderr)
+        table.count(consumer, f"{len(NAMES)} odd names of files, {refused} refused: not read", len(wrong))
+    table.count("all", "odd names of files: commands that ran", len(list(OUT.rglob("owned"))) + os.path.exists("owned"))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--ci", action="store_true", help="leave Blender out; fail if anything else is not run")
@@ -397,6 +454,7 @@ def main():
         ("gltf-validator", check_gltf),
         ("three.js, Babylon.js", check_web),
         ("pbrt-v4, sIBL", check_readers),
+        ("names of files", lambda table, _: check_names(table)),
     ]
     for name, check in checks:
         if arguments.only.lower() not in name.lower():

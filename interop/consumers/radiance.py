@@ -46,8 +46,9 @@ def render(rig, view, dome):
 
 def trace(rig, directions):
     """Radiance from these directions, (n, 3) over the world's axes."""
+    # A leading ! or - would be a command or an option.
     octree = subprocess.run(
-        ["oconv", rig.name], cwd=rig.parent, env=ENVIRONMENT, capture_output=True, check=True
+        ["oconv", f"./{rig.name}"], cwd=rig.parent, env=ENVIRONMENT, capture_output=True, check=True
     ).stdout
     (rig.parent / "dome.oct").write_bytes(octree)
     rays = "".join(f"0 0 0 {x:.9f} {y:.9f} {z:.9f}\n" for x, y, z in directions)

@@ -14,8 +14,9 @@ import probe
 
 def pbrt(path):
     """Distant lights (direction, irradiance), the infinite light's file and its world-from-light."""
-    text = re.sub(r"#.*", "", path.read_text())
-    tokens = re.findall(r'"(?:[^"\\]|\\.)*"|\[|\]|[^\s\[\]"]+', text)
+    # Comments end at line breaks; a # in a string begins none.
+    tokens = re.findall(r'"(?:[^"\\]|\\.)*"|#.*|\[|\]|[^\s\[\]"]+', path.read_text())
+    tokens = [token for token in tokens if not token.startswith("#")]
     lights, file, matrix, stack, at = [], None, np.eye(4), [], 0
 
     def bracket():
@@ -46,11 +47,17 @@ def pbrt(path):
                 lights.append((probe.unit(matrix[:3, :3] @ toward), np.array(parameters["rgb L"], float)))
             else:
                 assert kind == "infinite", kind
-                file, world_from_light = parameters["string filename"][0].strip('"'), matrix[:3, :3]
+                file, world_from_light = unescaped(parameters["string filename"][0]), matrix[:3, :3]
         else:
             raise ValueError(f"{path}: {directive}?")
     assert not stack
     return lights, file, world_from_light if file else None
+
+
+def unescaped(string):
+    """The text of a string in double quotes, as pbrt-v4 reads its escapes."""
+    named = {"b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t"}
+    return re.sub(r"\\(.)", lambda m: named.get(m[1], m[1]), string[1:-1], flags=re.DOTALL)
 
 
 def equal_area_square(w):
@@ -68,7 +75,7 @@ def equal_area_square(w):
 
 def sibl(path):
     """Lights (u, v, color times multiplier) and the panorama's file."""
-    ibl = configparser.ConfigParser(inline_comment_prefixes=None, comment_prefixes=("--",))
+    ibl = configparser.RawConfigParser(inline_comment_prefixes=None, comment_prefixes=("--",))
     ibl.read_string(path.read_text())
     lights = []
     for section in ibl.sections():
@@ -78,5 +85,5 @@ def sibl(path):
             color = np.array(values[prefix + "color"].split(","), float) / 255
             u, v = float(values[prefix + "u"]), float(values[prefix + "v"])
             lights.append((u, v, color * float(values[prefix + "multi"])))
-    file = ibl["Enviroment"]["EVfile"].strip('"') if "Enviroment" in ibl else None
+    file = ibl["Enviroment"]["EVfile"][1:-1] if "Enviroment" in ibl else None
     return lights, file

@@ -70,7 +70,8 @@ fn file_names_that_a_format_cannot_hold_are_refused() {
     let environment = Environment::new(map, Orientation::default(), 1.0).unwrap();
     let harmonics = SphericalHarmonics::project(&environment);
     let refused = |format: Format, file: &str| match format {
-        Format::Usd | Format::Pbrt => file.contains('\u{1}'),
+        Format::Usd => file.contains(['\u{1}', '\\']),
+        Format::Pbrt => file.contains('\u{1}'),
         Format::Mitsuba => file.contains(['\n', '\u{1}', '$']),
         Format::Sibl => file.contains(['\n', '\u{1}', '"']),
         Format::Radiance => {
@@ -78,8 +79,15 @@ fn file_names_that_a_format_cannot_hold_are_refused() {
         }
         _ => false,
     };
-    let names =
-        ["line\nbreak.exr", "bell\u{1}.exr", "quote\".exr", "'\".exr", "$x.exr", "söme name.exr"];
+    let names = [
+        "line\nbreak.exr",
+        "bell\u{1}.exr",
+        "quote\".exr",
+        "'\".exr",
+        "$x.exr",
+        "back\\slash.exr",
+        "söme name.exr",
+    ];
     for file in names {
         let dome = Dome { environment: &environment, harmonics, file: Some(file) };
         for format in Format::ALL {
@@ -88,7 +96,7 @@ fn file_names_that_a_format_cannot_hold_are_refused() {
                 assert!(matches!(result, Err(ExportError::BadFileName { .. })), "{format} {file}");
             } else {
                 let text = String::from_utf8_lossy(&result.unwrap()).into_owned();
-                let plain = !file.contains(['"', '\'', '\n', '\u{1}']);
+                let plain = !file.contains(['"', '\'', '\n', '\u{1}', '\\']);
                 let named = format.dome_picture().is_some();
                 assert!(!named || !plain || text.contains(file), "{format}");
             }

@@ -11,7 +11,8 @@ pub fn string(text: &str) -> Code<Usd> {
 
 /// An asset path; none where USD has no way to write it.
 pub fn asset(path: &str) -> Option<Code<Usd>> {
-    if path.contains(char::is_control) {
+    // OpenUSD reads backslashes as separators.
+    if path.contains(|c: char| c.is_control() || c == '\\') {
         return None;
     }
     if !path.contains('@') {

@@ -245,13 +245,13 @@ impl Format {
     fn unquotable(self) -> &'static str {
         match self {
             Self::Mitsuba => "'$' and control characters",
+            Self::Usd => "'\\' and control characters",
             Self::Sibl => "'\"' and control characters",
             Self::Radiance => "control characters and with quotes of one kind at the most",
             Self::Json
             | Self::Csv
             | Self::Gltf
             | Self::Glb
-            | Self::Usd
             | Self::Blender
             | Self::Pbrt
             | Self::Three => "control characters",
