@@ -312,8 +312,8 @@ impl LoadedScene {
         host.take_memory(&tree, TRIANGLE * n_triangles as u64)?;
         let scene = Scene::new(description).at(&settings.scene)?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
-        let scale = light.factor();
         let probe = probe_name(&light.source);
+        let scale = light.factor().at(&probe)?;
         let environment = Environment::new(map, orientation, scale).at(&probe)?;
         let report = SceneReport {
             scene: file_name(&settings.scene),

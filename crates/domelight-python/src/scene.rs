@@ -508,7 +508,8 @@ impl Scene {
             ),
         };
         let orientation = Orientation { up: settings.up, rotation: settings.rotate_degrees };
-        Environment::build(py, map, orientation, settings.factor(), name)
+        let scale = settings.factor().map_err(to_python)?;
+        Environment::build(py, map, orientation, scale, name)
     }
 
     fn __repr__(&self) -> String {

@@ -258,7 +258,8 @@ impl Engine {
             exposure: light.exposure,
             up,
         };
-        let environment = Environment::new(image, orientation, settings.factor()).map_err(error)?;
+        let scale = settings.factor().map_err(error)?;
+        let environment = Environment::new(image, orientation, scale).map_err(error)?;
         let map = environment.map();
         let report = ProbeReport { size: [map.width, map.height], warnings };
         self.session = None;

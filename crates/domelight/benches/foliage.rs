@@ -8,7 +8,8 @@ use domelight::geometry::Mesh;
 use domelight::math::{TAU, from_spherical, vec2, vec3};
 use domelight::sampling::Pcg32;
 use domelight::scene::{
-    AlphaMode, Coverage, Encoding, Material, Part, Scene, SceneDescription, Texture, TextureRef,
+    AlphaMode, Coverage, Encoding, Material, Part, Scene, SceneDescription, SightKey, Sights,
+    Texture, TextureRef,
 };
 use rays::{camera_rays, shadow_rays};
 
@@ -71,6 +72,9 @@ fn foliage(c: &mut Criterion) {
     let shadow = shadow_rays(opaque.bvh(), &camera);
     let (mut hits, mut occluded, mut transmittances) = (Vec::new(), Vec::new(), Vec::new());
 
+    let keys: Vec<_> = (0..camera.len() as u64).map(|key| SightKey { key, sample: 0 }).collect();
+    let mut sights = Sights::default();
+
     let mut group = c.benchmark_group("foliage");
     group.sample_size(10).throughput(Throughput::Elements(camera.len() as u64));
     group.bench_function("camera/opaque", |b| {
@@ -78,10 +82,14 @@ fn foliage(c: &mut Criterion) {
     });
     for (name, scene) in [("camera/masked", &masked), ("camera/blended", &blended)] {
         group.bench_function(name, |b| {
+            b.iter(|| scene.sights(&camera, &keys, &mut sights));
+        });
+    }
+    for (name, scene) in [("camera/single/masked", &masked), ("camera/single/blended", &blended)] {
+        group.bench_function(name, |b| {
             b.iter(|| {
-                scene.bvh().closest_hits(&camera, &mut hits);
-                let keys = camera.iter().zip(0u64..);
-                keys.filter(|(ray, key)| scene.camera_hit(ray, *key, 0).is_some()).count()
+                let rays = camera.iter().zip(&keys);
+                rays.filter(|(ray, key)| scene.camera_hit(ray, key.key, 0).is_some()).count()
             });
         });
     }

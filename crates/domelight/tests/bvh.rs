@@ -366,7 +366,16 @@ fn refused_hits_are_as_if_they_were_not_there() {
         let rays = rays(&scene, &bvh, 2_000_000 / (scene.triangles.len() + 1000), seed as u64);
         let expected: Vec<_> =
             rays.iter().map(|r| brute_force_where(&scene, r, accepted)).collect();
+        let accept = |hits: &[(usize, Hit)], is_accepted: &mut [bool]| {
+            assert_eq!(hits.len(), is_accepted.len());
+            for ((_, hit), is_accepted) in hits.iter().zip(is_accepted) {
+                *is_accepted = accepted(hit);
+            }
+        };
         for bvh in on(&bvh) {
+            let mut hits = vec![None];
+            bvh.closest_hits_where(&rays, accept, &mut hits);
+            assert!(hits == expected, "{name}");
             for (ray, expected) in rays.iter().zip(&expected) {
                 assert_eq!(bvh.closest_hit_where(ray, accepted), *expected, "{name}: {ray:?}");
                 assert_eq!(bvh.closest_hit_where(ray, |_| true), bvh.closest_hit(ray));

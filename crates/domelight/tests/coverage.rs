@@ -4,11 +4,13 @@ use domelight::environment::{Environment, Orientation};
 use domelight::geometry::{Mesh, Ray, RayBatch};
 use domelight::math::{Mat4, Vec2, Vec3, vec2, vec3};
 use domelight::render::{Background, Layers, RenderSettings, render};
+use domelight::sampling::Pcg32;
 use domelight::scene::builtin::shapes;
 use domelight::scene::{
     AlphaMode, Camera, CameraSettings, ColorFactor, Coverage, Emission, Encoding, Factor,
     Layers as MaterialLayers, Material, MaterialModel, MetallicRoughnessMaterial, Part, Projection,
-    Scene, SceneDescription, Specular, Texture, TextureFilter, TextureRef, UvTransform, Volume,
+    Scene, SceneDescription, SightKey, Sights, Specular, Texture, TextureFilter, TextureRef,
+    UvTransform, Volume,
 };
 use domelight::strategy::{EnvironmentSampling, PreparedStrategy, Strategy};
 use domelight::{Rgb, RgbImage};
@@ -574,6 +576,125 @@ fn the_camera_sees_emission_and_unlit_colors_as_they_are() {
     assert!(draw(&lit, &bright)[2] > 2.6);
     for environment in [&dark, &bright] {
         assert_eq!(draw(&unlit, environment), [0.75, 0.5, 0.25]);
+    }
+}
+
+/// Cards at random places and turns, each twice in the same place.
+fn scattered(pcg: &mut Pcg32, n: usize) -> Mesh {
+    let mut mesh = Mesh::default();
+    for _ in 0..n {
+        let center = pcg.next_vec3() - 0.5;
+        let (u, v) = (pcg.next_vec3() - 0.5).normalize().any_orthonormal_pair();
+        let first = mesh.positions.len() as u32;
+        for (x, y) in [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)] {
+            mesh.positions.push(center + 0.3 * (x * u + y * v));
+            mesh.uvs.push(vec2(x + 0.5, y + 0.5));
+            mesh.alphas.push(pcg.next_f32());
+        }
+        let card = [[0, 1, 2], [0, 2, 3], [0, 1, 2], [0, 2, 3]];
+        mesh.triangles.extend(card.map(|triangle| triangle.map(|i| i + first)));
+    }
+    mesh
+}
+
+trait NextVec3 {
+    fn next_vec3(&mut self) -> Vec3;
+}
+
+impl NextVec3 for Pcg32 {
+    fn next_vec3(&mut self) -> Vec3 {
+        vec3(self.next_f32(), self.next_f32(), self.next_f32())
+    }
+}
+
+/// Many rays together see what each of them sees alone, to the bit: through cut-outs, what is blended, what transmits, from
+/// either side, where several coincide, and with opaque surfaces among them.
+#[test]
+fn rays_see_together_what_each_sees_alone() {
+    let mut pcg = Pcg32::new(5, 0);
+    let (texture, reference) = half();
+    let mut masked = covering(AlphaMode::Mask { cutoff: 0.5 }, 1.0, 0.5);
+    masked.coverage.texture = Some(reference);
+    let blended = covering(AlphaMode::Blend, 0.7, 0.5);
+    let one_sided = |material: Material| Material { double_sided: false, ..material };
+    let tinted = pane(Rgb::new(0.9, 0.5, 0.2), 0.8, 1.0);
+    let materials = vec![
+        masked.clone(),
+        blended.clone(),
+        tinted.clone(),
+        pane(Rgb::new(0.3, 0.6, 0.9), 1.0, 0.6),
+        one_sided(masked),
+        one_sided(blended),
+        one_sided(tinted),
+        Material::diffuse("opaque", Rgb::WHITE),
+        one_sided(Material::diffuse("opaque from the front", Rgb::WHITE)),
+    ];
+    let mut part = |material| {
+        let mesh = scattered(&mut pcg, if material < 7 { 12 } else { 3 });
+        Part { name: "cards".into(), mesh, material }
+    };
+    let mut parts: Vec<Part> = (0..materials.len()).map(&mut part).collect();
+    // The cards of one material are where those of another are.
+    let again = |i: usize, material| Part { material, ..parts[i].clone() };
+    let coincident = [again(0, 2), again(2, 1), again(3, 2), again(7, 3)];
+    parts.extend(coincident);
+    let of_part: Vec<usize> =
+        parts.iter().flat_map(|p| vec![p.material; p.mesh.triangles.len()]).collect();
+    let n_materials = materials.len();
+    let textures = vec![texture];
+    let description =
+        SceneDescription { parts, materials, textures, ..SceneDescription::default() };
+    let scene = Scene::new(description).unwrap();
+
+    let mut sights = Sights::default();
+    let (mut seen, mut n_tinted, mut n_clear) = (vec![0; n_materials], 0, 0);
+    for batch in [1, 2, 63, 64, 65, 1000, 4096, 20_000] {
+        let mut random_ray = |_| {
+            let origin = 2.0 * (pcg.next_vec3() - 0.5);
+            Ray::new(origin, pcg.next_vec3() - 0.5 - origin)
+        };
+        let rays: Vec<Ray> = (0..batch).map(&mut random_ray).collect();
+        let key = |i: u32| SightKey { key: u64::from(i / 4), sample: i % 4 };
+        let keys: Vec<SightKey> = (0..batch).map(key).collect();
+        scene.sights(&rays, &keys, &mut sights);
+        assert_eq!((sights.hits.len(), sights.throughputs.len()), (rays.len(), rays.len()));
+        for (i, (ray, key)) in rays.iter().zip(&keys).enumerate() {
+            let alone = scene.sight(ray, key.key, key.sample);
+            assert_eq!(sights.hits[i], alone.hit, "{ray:?}");
+            let bits = |color: Rgb| color.to_array().map(f32::to_bits);
+            assert_eq!(bits(sights.throughputs[i]), bits(alone.throughput), "{ray:?}");
+            match alone.hit {
+                Some(hit) => seen[of_part[hit.triangle as usize]] += 1,
+                None => n_clear += 1,
+            }
+            n_tinted += usize::from(alone.throughput != Rgb::WHITE);
+        }
+    }
+    assert!(n_tinted > 1000 && n_clear > 100, "{n_tinted} {n_clear}");
+    assert!(seen.iter().all(|&n| n > 50), "{seen:?}");
+}
+
+/// Of two surfaces in the same place that are met with probabilities p and q, a ray sees the first with p and the second with
+/// (1 − p) q; neither is lost or met twice.
+#[test]
+fn of_coincident_cards_each_is_seen_with_its_own_probability() {
+    const N: u32 = 40_000;
+    let parts = [0.5, 0.4].map(|opacity| (card(0.0), covering(AlphaMode::Blend, opacity, 0.5)));
+    let (meshes, materials): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+    let part = |(material, mesh)| Part { name: "card".into(), mesh, material };
+    let parts = meshes.into_iter().enumerate().map(part).collect();
+    let scene = SceneDescription { parts, materials, ..SceneDescription::default() };
+    let scene = Scene::new(scene).unwrap();
+    let rays = vec![Ray::new(vec3(1.0, 1.0, 2.0), -Vec3::Y); N as usize];
+    let keys: Vec<_> = (0..N).map(|i| SightKey { key: u64::from(i), sample: 0 }).collect();
+    let mut sights = Sights::default();
+    scene.sights(&rays, &keys, &mut sights);
+    for (i, expected) in [0.5, 0.5 * 0.4].into_iter().enumerate() {
+        let of_card = |hit: &&domelight::geometry::Hit| hit.triangle as usize / 2 == i;
+        let share = sights.hits.iter().flatten().filter(of_card).count() as f64 / f64::from(N);
+        let sigma = (expected * (1.0 - expected) / f64::from(N)).sqrt();
+        // Five standard deviations of a binomial: one run in two million.
+        assert!((share - expected).abs() < 5.0 * sigma, "{share}, not {expected}");
     }
 }
 

@@ -124,7 +124,7 @@ fn the_same_bits_for_any_threads_and_tiles() {
     let rejection = RejectionSampling::new(&environment, Proposal::Tighter, stop).unwrap();
     same_bits("rejection", &environment, &rejection);
     let rig = variance_minimization(&environment, 8, VarianceMinimization::default()).unwrap();
-    same_bits("lights", &environment, &LightSet { rig: rig.clone() });
+    same_bits("lights", &environment, &LightSet { rig: rig.clone(), unit: 1.0 });
 }
 
 /// A strategy that learns from a tile's other pixels depends on the tiles, but not on who renders them.

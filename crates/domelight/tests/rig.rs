@@ -326,7 +326,7 @@ fn a_light_set_asks_for_one_ray_a_light() {
     let env = environment(interior(32, 16));
     let lit = env.map().pixels.iter().filter(|p| !p.is_black()).count();
     let rig = median_cut(&env, lit, MedianCut::default()).unwrap();
-    let lights = LightSet { rig: rig.clone() };
+    let lights = LightSet { rig: rig.clone(), unit: 1.0 };
     assert_eq!(PointStrategy::n_rays(&lights), lit as u32);
     let normal = Vec3::new(0.6, 0.64, 0.48);
     let at = ShadingPoint {

@@ -221,7 +221,7 @@ impl LightsArguments {
         let more = memory::EXTRACTION_TEXEL - Environment::MEMORY_PER_TEXEL;
         memory::allow(&format!("{probe}: its lights"), more * map.pixels.len() as u64)?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
-        let scale = light.factor();
+        let scale = light.factor().with_context(|| probe.clone())?;
         let environment =
             Environment::new(map, orientation, scale).with_context(|| probe.clone())?;
         Ok((environment, probe))

@@ -83,7 +83,7 @@ impl<'a> FigureContext<'a> {
         let map = settings.environment.load(&light, host)?;
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
         let probe = probe_name(&light.source);
-        let scale = light.factor();
+        let scale = light.factor().at(&probe)?;
         let environment = Environment::new(map, orientation, scale).at(&probe)?;
         if environment.power() == 0.0 {
             let why = format!("{probe}: the map is black; there is nothing to show");

@@ -208,6 +208,22 @@ impl Bvh {
         simd::dispatch(self.instruction_set, traverse::ClosestHits { bvh: self, rays, hits });
     }
 
+    /// [`Bvh::closest_hit_where`] of many rays. `accept` gets hits with their rays' numbers, some at a time, and sets for each
+    /// whether it counts.
+    ///
+    /// `hits` is overwritten, one entry a ray.
+    pub fn closest_hits_where(
+        &self,
+        rays: &[Ray],
+        accept: impl Fn(&[(usize, Hit)], &mut [bool]),
+        hits: &mut Vec<Option<Hit>>,
+    ) {
+        hits.clear();
+        hits.resize(rays.len(), None);
+        let kernel = traverse::ClosestHitsWhere { bvh: self, rays, accept, hits };
+        simd::dispatch(self.instruction_set, kernel);
+    }
+
     /// Whether each ray of a batch hits any triangle up to infinity (V = 0).
     ///
     /// Gives the same answers as [`Bvh::any_hit`], but much faster for some thousand rays at a time. Their

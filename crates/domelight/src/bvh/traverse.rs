@@ -3,6 +3,7 @@
 //! Everything here is generic over the instruction set and inlined into it.
 #![allow(clippy::large_stack_arrays)] // Some streams, 50 KiB.
 
+use std::marker::PhantomData;
 use std::ops::Range;
 
 use super::build::MAX_DEPTH;
@@ -73,15 +74,38 @@ impl Kernel for ClosestHits<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let same_octant = |a: &Ray, b: &Ray| octant(a.direction) == octant(b.direction);
-        let runs = self.rays.chunk_by(same_octant).flat_map(|run| run.chunks(STREAM));
-        let mut first = 0;
-        let starts = runs.map(|rays| {
-            first += rays.len();
-            (first - rays.len(), rays)
-        });
+        let starts = runs_of_an_octant(self.rays);
         interleave::<S, ClosestStream>(simd, self.bvh, (), starts, self.hits);
     }
+}
+
+/// [`Bvh::closest_hits_where`]; `hits` start all empty.
+pub(super) struct ClosestHitsWhere<'a, F> {
+    pub(super) bvh: &'a Bvh,
+    pub(super) rays: &'a [Ray],
+    pub(super) accept: F,
+    pub(super) hits: &'a mut [Option<Hit>],
+}
+
+impl<F: Fn(&[(usize, Hit)], &mut [bool])> Kernel for ClosestHitsWhere<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let starts = runs_of_an_octant(self.rays);
+        interleave::<S, WhereStream<F>>(simd, self.bvh, &self.accept, starts, self.hits);
+    }
+}
+
+/// Streams of neighbors in one octant, each with the number of its first ray.
+#[inline(always)]
+fn runs_of_an_octant(rays: &[Ray]) -> impl Iterator<Item = (usize, &[Ray])> {
+    let same_octant = |a: &Ray, b: &Ray| octant(a.direction) == octant(b.direction);
+    let mut first = 0;
+    rays.chunk_by(same_octant).flat_map(|run| run.chunks(STREAM)).map(move |rays| {
+        first += rays.len();
+        (first - rays.len(), rays)
+    })
 }
 
 /// [`Bvh::any_hit`]
@@ -257,14 +281,18 @@ impl<F: Fn(&Hit) -> bool> Accepting for Where<F> {
     ) -> Option<Hit> {
         let mut best = None;
         for_hits_in_block(simd, bvh, leaf, ray, 0, limit, |hit| {
-            let nearest = best.or(closest);
-            let is_nearer = nearest.is_none_or(|n: Hit| (hit.t, hit.triangle) < (n.t, n.triangle));
-            if is_nearer && (self.0)(&hit) {
+            if is_nearer(&hit, best.or(closest)) && (self.0)(&hit) {
                 best = Some(hit);
             }
         });
         best
     }
+}
+
+/// Than the closest so far; as near and of a lower number counts as nearer.
+#[inline(always)]
+fn is_nearer(hit: &Hit, closest: Option<Hit>) -> bool {
+    closest.is_none_or(|closest| (hit.t, hit.triangle) < (closest.t, closest.triangle))
 }
 
 #[inline(always)]
@@ -400,7 +428,9 @@ trait Stream: Sized {
     /// The rays to start with.
     type Rays<'a>;
     /// Additional context.
-    type Context<'a>: Copy;
+    type Context<'a>: Copy
+    where
+        Self: 'a;
     type Answer;
 
     /// Begins at the root.
@@ -534,6 +564,48 @@ impl StreamStack {
         self.len += count;
     }
 
+    /// Pushes the children of a node whose boxes any of `members` crosses within its limit, the nearest child of the last
+    /// ray on top.
+    #[inline(always)]
+    fn push_by_distance<S: Simd>(
+        &mut self,
+        simd: S,
+        node: &Node,
+        rays: &PreparedRays<STREAM>,
+        limits: &[f32; STREAM],
+        members: u64,
+    ) {
+        let slabs = Slabs::load(simd, node, rays.octant);
+        let mut entering = Entering::none(simd);
+        let mut enter = simd.splat(0.0);
+        for i in set_bits(members) {
+            let (crossed, entered) = slabs.cross_within(simd, rays, i, limits[i]);
+            entering.insert(i, crossed);
+            enter = entered;
+        }
+        let not_empty = entering.0.map(SimdBitSets::not_empty);
+        let (halves, enter) = (entering.0.map(SimdBitSets::store), enter.store());
+        let base = self.len;
+        let mut keys = [0.0; WIDTH];
+        for lane in set_bits(not_empty[0] | not_empty[1]) {
+            let mut at = self.len;
+            while at > base && keys[at - 1 - base] < enter[lane] {
+                self.children[at] = self.children[at - 1];
+                for rays in &mut self.rays {
+                    rays[at] = rays[at - 1];
+                }
+                keys[at - base] = keys[at - 1 - base];
+                at -= 1;
+            }
+            self.children[at] = node.children[lane].0;
+            for (rays, sets) in self.rays.iter_mut().zip(&halves) {
+                rays[at] = sets[lane];
+            }
+            keys[at - base] = enter[lane];
+            self.len += 1;
+        }
+    }
+
     /// Pops the next child that any of the rays `free` enters, with those rays.
     #[inline(always)]
     fn pop(&mut self, free: u64) -> Option<(Child, u64)> {
@@ -611,37 +683,118 @@ impl Stream for ClosestStream {
             }
         } else {
             let node = &bvh.nodes[child.index()];
-            let slabs = Slabs::load(simd, node, self.rays.octant);
-            let mut entering = Entering::none(simd);
-            let mut enter = simd.splat(0.0);
+            self.stack.push_by_distance(simd, node, &self.rays, &self.limits, rays);
+        }
+        self.stack.prefetch(simd, bvh);
+        true
+    }
+
+    #[inline(always)]
+    fn finish(&mut self, answers: &mut [Option<Hit>]) {
+        let members = std::mem::take(&mut self.members);
+        let count = members.len();
+        answers[members].copy_from_slice(&self.hits[..count]);
+    }
+}
+
+/// [`Bvh::closest_hit_where`] of up to [`STREAM`] rays.
+struct WhereStream<F> {
+    rays: PreparedRays<STREAM>,
+    limits: [f32; STREAM],
+    /// The closest that were accepted.
+    hits: [Option<Hit>; STREAM],
+    /// Where the rays are in their batch.
+    members: Range<usize>,
+    stack: StreamStack,
+    /// Hits that are yet to be accepted or refused, with the numbers of their rays in the batch.
+    candidates: [(usize, Hit); STREAM],
+    n_candidates: usize,
+    accept: PhantomData<F>,
+}
+
+/// Candidates that are decided on together: enough to wait for memory once, few enough that their rays do not go far beyond
+/// what they will meet.
+const TOGETHER: usize = 16;
+
+impl<F: Fn(&[(usize, Hit)], &mut [bool])> WhereStream<F> {
+    /// Shortens the rays to the candidates that are accepted.
+    #[inline(always)]
+    fn decide(&mut self, accept: &F) {
+        let candidates = &self.candidates[..self.n_candidates];
+        let mut accepted = [false; STREAM];
+        accept(candidates, &mut accepted[..self.n_candidates]);
+        for (&(ray, hit), &is_accepted) in candidates.iter().zip(&accepted) {
+            let i = (ray - self.members.start) % STREAM;
+            if is_accepted && is_nearer(&hit, self.hits[i]) {
+                self.limits[i] = hit.t;
+                self.hits[i] = Some(hit);
+            }
+        }
+        self.n_candidates = 0;
+    }
+}
+
+impl<F: Fn(&[(usize, Hit)], &mut [bool])> Stream for WhereStream<F> {
+    const EMPTY: Self = Self {
+        rays: PreparedRays::EMPTY,
+        limits: [0.0; STREAM],
+        hits: [None; STREAM],
+        members: 0..0,
+        stack: StreamStack::EMPTY,
+        candidates: [(0, Hit { t: 0.0, u: 0.0, v: 0.0, triangle: 0 }); STREAM],
+        n_candidates: 0,
+        accept: PhantomData,
+    };
+
+    /// With the number of the first.
+    type Rays<'a> = (usize, &'a [Ray]);
+    type Context<'a>
+        = &'a F
+    where
+        F: 'a;
+    type Answer = Option<Hit>;
+
+    #[inline(always)]
+    fn start<S: Simd>(&mut self, simd: S, bvh: &Bvh, (first, rays): (usize, &[Ray])) {
+        for (i, ray) in rays.iter().enumerate() {
+            self.rays.set(i, ray.origin, ray.direction);
+            self.limits[i] = last_below(ray.t_max);
+        }
+        self.hits[..rays.len()].fill(None);
+        self.members = first..first + rays.len();
+        let valid = self.rays.prepare(simd, octant(rays[0].direction), rays.len(), &bvh.bounds);
+        self.stack.push(Child::node(0), valid);
+    }
+
+    #[inline(always)]
+    fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh, accept: &F) -> bool {
+        let Some((child, rays)) = self.stack.pop(u64::MAX) else {
+            if self.n_candidates > 0 {
+                self.decide(accept);
+            }
+            return false;
+        };
+        if child.is_leaf() {
             for i in set_bits(rays) {
-                let (crossed, entered) = slabs.cross_within(simd, &self.rays, i, self.limits[i]);
-                entering.insert(i, crossed);
-                enter = entered;
-            }
-            let not_empty = entering.0.map(SimdBitSets::not_empty);
-            let (halves, enter) = (entering.0.map(SimdBitSets::store), enter.store());
-            // The nearest child of the last ray on top.
-            let stack = &mut self.stack;
-            let base = stack.len;
-            let mut keys = [0.0; WIDTH];
-            for lane in set_bits(not_empty[0] | not_empty[1]) {
-                let mut at = stack.len;
-                while at > base && keys[at - 1 - base] < enter[lane] {
-                    stack.children[at] = stack.children[at - 1];
-                    for rays in &mut stack.rays {
-                        rays[at] = rays[at - 1];
+                let (limit, closest) = (self.limits[i], self.hits[i]);
+                let ray = self.members.start + i;
+                for_hits_in_block(simd, bvh, child, &self.rays, i, limit, |hit| {
+                    if is_nearer(&hit, closest) {
+                        self.candidates[self.n_candidates] = (ray, hit);
+                        self.n_candidates += 1;
                     }
-                    keys[at - base] = keys[at - 1 - base];
-                    at -= 1;
+                });
+                // Leave room for as many as a leaf has.
+                if self.n_candidates > STREAM - WIDTH {
+                    self.decide(accept);
                 }
-                stack.children[at] = node.children[lane].0;
-                for (rays, sets) in stack.rays.iter_mut().zip(&halves) {
-                    rays[at] = sets[lane];
-                }
-                keys[at - base] = enter[lane];
-                stack.len += 1;
             }
+            if self.n_candidates >= TOGETHER {
+                self.decide(accept);
+            }
+        } else {
+            let node = &bvh.nodes[child.index()];
+            self.stack.push_by_distance(simd, node, &self.rays, &self.limits, rays);
         }
         self.stack.prefetch(simd, bvh);
         true

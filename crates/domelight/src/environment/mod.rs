@@ -21,6 +21,8 @@ pub use density::{DensityError, EnvironmentDensity};
 pub use key_light::key_light_rotation;
 pub use lat_long::LatLongGrid;
 
+use std::borrow::Cow;
+
 use crate::math::{Mat3, PI, TAU, Vec2, Vec3, atan2, functions, rotation_y, vec2, vec3};
 use crate::sampling::{HierarchicalTable, ONE_MINUS_EPSILON, TableError};
 use crate::simd::{LANES, SimdF32x8, SimdFloat, SimdI32x8 as _, Vectors};
@@ -114,6 +116,17 @@ pub enum EnvironmentError {
     /// A scale that is negative, NaN or infinite.
     #[error("the scale is {0}; it must be finite and not negative")]
     BadScale(f32),
+    /// An exposure whose power of two, times the scale, is beyond single precision.
+    #[error(
+        "an exposure of {exposure} stops multiplies radiance by {factor}, which is beyond single precision; \
+         choose one between -120 and 120"
+    )]
+    BadExposure {
+        /// The exposure in stops.
+        exposure: f32,
+        /// The factor that is left of it: 0, infinite or NaN.
+        factor: f32,
+    },
     /// A rotation that is NaN or infinite.
     #[error("the rotation is {0} degrees; it must be finite")]
     BadRotation(f32),
@@ -386,6 +399,15 @@ impl Environment {
         let i = map.pixels.iter().position(bad).unwrap_or(0);
         let (x, y) = (i % map.width, i / map.width);
         EnvironmentError::BadTexel { x, y, value: map.pixels[i] }
+    }
+
+    /// The same numbers in multiples of 1: a map whose brightest texel is ordinary.
+    pub(crate) fn with_radiance_in_units(&self) -> Cow<'_, Self> {
+        if self.unit == 1.0 {
+            Cow::Borrowed(self)
+        } else {
+            Cow::Owned(Self { unit: 1.0, ..self.clone() })
+        }
     }
 
     /// The unit of radiance, power and map \[W·m⁻²·sr⁻¹\]: a power of two, 1 for all but extreme maps.

@@ -314,14 +314,20 @@ impl PixelSums {
         Rgb::from(sum.map(|c| narrowed(c / n)))
     }
 
-    /// The fraction of the background that shadows remove.
+    /// The fraction of the background that shadows remove; an unbiased estimate, as unclamped as color.
     pub(super) fn shadow(&self) -> Rgb {
-        (self.shadow * self.scale()).map(|c| c.clamp(0.0, 1.0))
+        self.shadow.map(|sum| self.share(sum))
     }
 
-    /// The fraction of camera samples that show something.
+    /// The fraction of camera samples that show something; an unbiased estimate where shadows are caught.
     pub(super) fn alpha(&self) -> f32 {
-        (self.alpha * self.scale()).clamp(0.0, 1.0)
+        self.share(self.alpha)
+    }
+
+    /// A sum over the number of samples; rounding does not carry it beyond 1.
+    fn share(&self, sum: f32) -> f32 {
+        let mean = sum * self.scale();
+        if sum <= self.n_samples as f32 { mean.min(1.0) } else { mean }
     }
 
     /// The mean over the samples that hit.
@@ -367,5 +373,25 @@ mod tests {
         }
         assert_eq!(pixel.mean(pixel.color), Rgb::splat(-0.25));
         assert_eq!(pixel.mean(pixel.unoccluded), Rgb::splat(-0.25));
+    }
+
+    /// An estimate of a shadow that is sometimes below 0 or above 1 has its own mean, whatever the number of samples.
+    #[test]
+    fn means_of_shadows_are_kept_beyond_0_and_1() {
+        let estimates = [-0.5, 0.25, 1.75, 0.5];
+        let shown = |estimates: &[f32]| {
+            let mut pixel = PixelSums::missed(0);
+            for &x in estimates {
+                let shadow = Rgb::splat(x);
+                let sample = CameraSample { shadow, alpha: x, ..CameraSample::default() };
+                assert!(pixel.add(&sample, SampleSet::First, 1.0));
+            }
+            assert_eq!(pixel.shadow(), Rgb::splat(pixel.alpha()));
+            pixel.alpha()
+        };
+        let of_one: f32 = estimates.iter().map(|&x| shown(&[x])).sum();
+        assert_eq!(of_one / 4.0, shown(&estimates));
+        // What covers is not more than all there is.
+        assert!((1..200).all(|n| shown(&vec![1.0; n]) <= 1.0));
     }
 }

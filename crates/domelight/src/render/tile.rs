@@ -15,6 +15,7 @@ use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
 use crate::math::{Vec3, vec2};
 use crate::sampling::rng::hash2;
 use crate::sampling::{Dimension, SampleSequence, Sampler};
+use crate::scene::{SightKey, Sights};
 use crate::strategy::levels::{N_LEVELS, level};
 use crate::strategy::{Contributions, PixelPoints, ShadingPoint, Strategy, TileShading};
 
@@ -124,9 +125,9 @@ struct Batch {
     chosen: Vec<bool>,
     allocation: Allocation,
     rays: Vec<Ray>,
-    hits: Vec<Option<Hit>>,
-    /// Factors on the radiance that the rays see; empty in scenes without transmission.
-    throughputs: Vec<Rgb>,
+    /// Which random numbers decide what each ray sees; none in scenes where all is opaque.
+    keys: Vec<SightKey>,
+    sights: Sights,
     /// The camera rays of each pixel.
     camera_rays: Vec<CameraRays>,
     points: Vec<ShadingPoint>,
@@ -342,10 +343,10 @@ impl Tile {
 
     /// Traces the samples of a set of the chosen pixels. Returns their number.
     fn trace_camera_rays(&self, context: &RenderContext, set: SampleSet, batch: &mut Batch) -> u64 {
-        let Batch {
-            seen, chosen, allocation, rays, hits, throughputs, camera_rays, pixels, ..
-        } = batch;
+        let Batch { seen, chosen, allocation, rays, keys, sights, camera_rays, pixels, .. } = batch;
+        let has_see_through = context.scene.has_see_through();
         rays.clear();
+        keys.clear();
         pixels.clear();
         camera_rays.clear();
         let mut count = 0;
@@ -365,25 +366,16 @@ impl Tile {
                 let numbers = CameraNumbers::of(context, &sampler);
                 let ray = |sample| camera_ray(context, x, y, &numbers, sample);
                 rays.extend(samples.clone().map(ray));
+                if has_see_through {
+                    let key = self.key(context, i, set);
+                    keys.extend(samples.clone().map(|sample| SightKey { key, sample }));
+                }
             }
             camera_rays.push(CameraRays { samples, first });
             pixels.push(PixelPoints { points: 0..0, n_samples, sampler, one_material: true });
             count += u64::from(n_samples);
         }
-        context.scene.bvh().closest_hits(rays, hits);
-        throughputs.clear();
-        if context.scene.has_see_through() {
-            for (i, of_pixel) in camera_rays.iter().enumerate() {
-                let key = self.key(context, i, set);
-                for (ray, sample) in of_pixel.range().zip(of_pixel.samples.clone()) {
-                    let sight = context.scene.seen(&rays[ray], hits[ray], key, sample);
-                    hits[ray] = sight.hit;
-                    if context.scene.transmits() {
-                        throughputs.push(sight.throughput);
-                    }
-                }
-            }
-        }
+        context.scene.sights(rays, keys, sights);
         count
     }
 
@@ -462,7 +454,7 @@ impl Tile {
             let mut sums = PassSums::default();
             for (s, sample) in samples.clone().enumerate() {
                 let ray = first.map(|first| first + s);
-                let sample = match ray.map(|ray| (&batch.rays[ray], batch.hits[ray])) {
+                let sample = match ray.map(|ray| (&batch.rays[ray], batch.sights.hits[ray])) {
                     Some((ray, Some(hit))) => {
                         point += 1;
                         batch.surface_sample(context, point - 1, ray, &hit, unit)
@@ -474,7 +466,7 @@ impl Tile {
                         background_sample(ray.direction)
                     }
                 };
-                let throughput = ray.and_then(|ray| batch.throughputs.get(ray));
+                let throughput = ray.and_then(|ray| batch.sights.throughputs.get(ray));
                 let sample = throughput.map_or(sample, |&through| sample.through(through));
                 if adaptive {
                     let luminance = sample.color.luminance() + sample.unseen;
@@ -576,12 +568,12 @@ impl Batch {
     fn gather_points(&mut self, context: &RenderContext) {
         self.origins.clear();
         self.samples.clear();
-        self.points.resize(self.hits.iter().flatten().count(), ShadingPoint::UNSET);
+        self.points.resize(self.sights.hits.iter().flatten().count(), ShadingPoint::UNSET);
         for (pixel, of_pixel) in self.pixels.iter_mut().zip(&self.camera_rays) {
             let start = self.samples.len();
             let (mut material, mut one_material) = (None, true);
             for (ray, sample) in of_pixel.range().zip(of_pixel.samples.clone()) {
-                let Some(hit) = &self.hits[ray] else { continue };
+                let Some(hit) = &self.sights.hits[ray] else { continue };
                 let constant = context.scene.constant_material(hit);
                 let known = self.samples.len() == start || constant == material;
                 one_material &= known && constant.is_some();

@@ -17,6 +17,7 @@
 use std::cell::RefCell;
 
 use super::shading::Corners;
+use super::texture::Uvs;
 use super::{AlphaMode, Coverage, Material, Part, Scene};
 use crate::Rgb;
 use crate::bvh::{Bvh, Frustum};
@@ -58,6 +59,45 @@ impl Sight {
     }
 }
 
+/// Which random numbers decide what a camera ray sees. Numbers of many samples of one key, which may be a pixel, are
+/// stratified.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SightKey {
+    /// For example, the pixel.
+    pub key: u64,
+    /// The sample's number in it.
+    pub sample: u32,
+}
+
+impl SightKey {
+    /// Whether the ray meets a triangle that it meets with a probability.
+    #[inline]
+    fn meets(self, triangle: u32, probability: f32) -> bool {
+        // Cut-outs are there or are not: no number is needed.
+        if probability <= 0.0 || probability >= 1.0 {
+            return probability >= 1.0;
+        }
+        uniform(self.key, self.sample, triangle) < probability
+    }
+}
+
+/// What a batch of camera rays sees; see [`Scene::sights`]. Its memory serves the next batch.
+#[derive(Debug, Default)]
+pub struct Sights {
+    /// The surface that each ray meets; `None`: what is behind the scene.
+    pub hits: Vec<Option<Hit>>,
+    /// The factor ≥ 0 on the radiance that comes from there, of each ray; empty where nothing transmits.
+    pub throughputs: Vec<Rgb>,
+    /// The rays as far as what is opaque.
+    rays: Vec<Ray>,
+    /// What each meets there.
+    met: Vec<Option<Hit>>,
+    crossings: Vec<Crossing>,
+}
+
+/// Hits whose texture coordinates are fetched together, so that the latency of memory counts once.
+const TOGETHER: usize = 16;
+
 /// The minimum probability with which a camera ray hits a transmissive surface. It reflects only a few percent of the
 /// light, but that may include a sun.
 const LEAST_REFLECTED: f32 = 0.25;
@@ -73,29 +113,48 @@ struct Layer {
     if_not: Rgb,
 }
 
+impl Layer {
+    /// On the radiance of a ray that meets it, or does not.
+    fn factor(&self, is_met: bool) -> Rgb {
+        if is_met { self.if_met } else { self.if_not }
+    }
+}
+
 impl Default for Layer {
     fn default() -> Self {
         Self { transmits: false, probability: 1.0, if_met: Rgb::WHITE, if_not: Rgb::WHITE }
     }
 }
 
-/// The product over the layers up to the surface that is seen. The hierarchy asks about hits in any order, and about some
-/// twice.
-fn throughput(mut layers: Vec<(Hit, Layer, bool)>, seen: Option<Hit>) -> Rgb {
-    layers.sort_unstable_by(|(a, ..), (b, ..)| {
-        (a.t.total_cmp(&b.t)).then(a.triangle.cmp(&b.triangle))
+/// A surface that transmits, on the way of a camera ray.
+#[derive(Clone, Copy, Debug)]
+struct Crossing {
+    /// The ray's number in its batch.
+    ray: usize,
+    t: f32,
+    triangle: u32,
+    is_met: bool,
+    /// The factor on the radiance of a ray that meets it, if it is met, else of one that does not.
+    factor: Rgb,
+}
+
+/// The product over a ray's crossings up to the surface that is seen. The hierarchy asks about hits in any order, and about
+/// some twice; so they are sorted and may be repeated.
+fn throughput(crossings: &[Crossing], seen: Option<Hit>) -> Rgb {
+    let seen = seen.map(|seen| (seen.t, seen.triangle));
+    let counts = |crossing: &&Crossing| {
+        let place = (crossing.t, crossing.triangle);
+        if crossing.is_met { Some(place) == seen } else { seen.is_none_or(|seen| place < seen) }
+    };
+    let each_once = crossings.chunk_by(|a, b| a.triangle == b.triangle).map(|same| &same[0]);
+    each_once.filter(counts).fold(Rgb::WHITE, |product, crossing| product * crossing.factor)
+}
+
+/// By ray, and along it.
+fn sort(crossings: &mut [Crossing]) {
+    crossings.sort_unstable_by(|a, b| {
+        a.ray.cmp(&b.ray).then(a.t.total_cmp(&b.t)).then(a.triangle.cmp(&b.triangle))
     });
-    layers.dedup_by_key(|(hit, ..)| hit.triangle);
-    let mut throughput = Rgb::WHITE;
-    for (hit, layer, is_met) in layers {
-        let is_seen = seen.is_some_and(|seen| seen.triangle == hit.triangle);
-        if is_seen {
-            throughput = throughput * layer.if_met;
-        } else if !is_met && seen.is_none_or(|seen| hit.t <= seen.t) {
-            throughput = throughput * layer.if_not;
-        }
-    }
-    throughput
 }
 
 impl Coverage {
@@ -129,7 +188,7 @@ impl Scene {
     /// probability, using random numbers that are a function of `key`, `sample` and the triangle. A single-sided
     /// surface is not seen from behind. The numbers for many samples of one key, such as a pixel, are stratified.
     pub fn sight(&self, ray: &Ray, key: u64, sample: u32) -> Sight {
-        self.seen(ray, self.bvh.closest_hit(ray), key, sample)
+        self.seen(ray, self.bvh.closest_hit(ray), SightKey { key, sample })
     }
 
     /// The hit of [`Scene::sight`].
@@ -143,41 +202,116 @@ impl Scene {
         self.has_single_sided || self.partial.is_some()
     }
 
-    /// Whether the throughput of a [`Sight`] may differ from one.
-    #[inline]
-    pub(crate) fn transmits(&self) -> bool {
-        self.transmits
+    /// [`Scene::sight`] of many rays; quickest for neighbors, such as a tile's. There is a key for each ray; none are needed
+    /// where nothing can be seen through. `sights` is overwritten.
+    pub fn sights(&self, rays: &[Ray], keys: &[SightKey], sights: &mut Sights) {
+        let Sights { hits, throughputs, rays: nearer, met, crossings } = sights;
+        self.bvh.closest_hits(rays, hits);
+        throughputs.clear();
+        if self.has_single_sided {
+            rays.iter().zip(&mut *hits).for_each(|(ray, hit)| *hit = self.facing(ray, *hit));
+        }
+        let Some(partial) = &self.partial else { return };
+        // Trace each ray on to what it meets before.
+        nearer.clear();
+        nearer.extend(rays.iter().zip(&*hits).map(|(ray, hit)| up_to(ray, hit.as_ref())));
+        crossings.clear();
+        let noted = RefCell::new(std::mem::take(crossings));
+        let crossed = |crossing| noted.borrow_mut().push(crossing);
+        let accept = |candidates: &[(usize, Hit)], is_met: &mut [bool]| {
+            for (hits, is_met) in candidates.chunks(TOGETHER).zip(is_met.chunks_mut(TOGETHER)) {
+                let uvs = self.fetch_uvs(partial, hits);
+                for ((&(i, hit), is_met), uvs) in hits.iter().zip(is_met).zip(&uvs) {
+                    *is_met =
+                        self.meets(i, &rays[i], keys[i], &partial.in_scene(&hit), uvs, crossed);
+                }
+            }
+        };
+        partial.bvh.closest_hits_where(nearer, accept, met);
+        for (hit, met) in hits.iter_mut().zip(&*met) {
+            *hit = met.map(|met| partial.in_scene(&met)).or(*hit);
+        }
+        *crossings = noted.into_inner();
+        if !self.transmits {
+            return;
+        }
+        // Multiply what each has come through.
+        sort(crossings);
+        let mut rest = &crossings[..];
+        throughputs.extend(hits.iter().enumerate().map(|(i, hit)| {
+            let (of_ray, others) = rest.split_at(rest.partition_point(|c| c.ray <= i));
+            rest = others;
+            throughput(of_ray, *hit)
+        }));
     }
 
-    /// [`Scene::sight`], given the closest opaque `hit`.
-    pub(crate) fn seen(&self, ray: &Ray, mut hit: Option<Hit>, key: u64, sample: u32) -> Sight {
-        if hit.is_some_and(|hit| !self.faces(ray, &hit)) {
-            hit = self.bvh.closest_hit_where(ray, |hit| self.faces(ray, hit));
+    /// The texture coordinates of up to [`TOGETHER`] hits of the second hierarchy.
+    fn fetch_uvs(&self, partial: &Partial, hits: &[(usize, Hit)]) -> [Uvs; TOGETHER] {
+        let mut corners = [const { None }; TOGETHER];
+        for (corners, (_, hit)) in corners.iter_mut().zip(hits) {
+            let hit = partial.in_scene(hit);
+            let (part, triangle) = self.locate(hit.triangle);
+            *corners = Some((&part.mesh, Corners::new(&part.mesh, triangle, &hit)));
         }
+        corners.map(|of| of.map_or_else(Uvs::default, |(mesh, corners)| corners.uvs(mesh)))
+    }
+
+    /// [`Scene::sight`], given the closest `hit` of what is opaque.
+    fn seen(&self, ray: &Ray, hit: Option<Hit>, key: SightKey) -> Sight {
+        let hit = self.facing(ray, hit);
         let Some(partial) = &self.partial else { return Sight::clear(hit) };
-        let nearer = Ray { t_max: hit.map_or(ray.t_max, |hit| hit.t), ..*ray };
-        let layers = RefCell::new(Vec::new());
+        let crossings = RefCell::new(Vec::new());
+        let crossed = |crossing| crossings.borrow_mut().push(crossing);
         let accept = |hit: &Hit| {
             let hit = partial.in_scene(hit);
-            if !self.faces(ray, &hit) {
-                return false;
-            }
-            let layer = self.layer(ray, &hit);
-            let is_met = uniform(key, sample, hit.triangle) < layer.probability;
-            if layer.transmits {
-                layers.borrow_mut().push((hit, layer, is_met));
-            }
-            is_met
+            let (part, triangle) = self.locate(hit.triangle);
+            let uvs = Corners::new(&part.mesh, triangle, &hit).uvs(&part.mesh);
+            self.meets(0, ray, key, &hit, &uvs, crossed)
         };
-        let met = partial.bvh.closest_hit_where(&nearer, accept);
+        let met = partial.bvh.closest_hit_where(&up_to(ray, hit.as_ref()), accept);
         let hit = met.map(|hit| partial.in_scene(&hit)).or(hit);
-        Sight { hit, throughput: throughput(layers.into_inner(), hit) }
+        let mut crossings = crossings.into_inner();
+        sort(&mut crossings);
+        Sight { hit, throughput: throughput(&crossings, hit) }
     }
 
-    /// How a camera ray interacts with a surface that is not opaque.
-    fn layer(&self, ray: &Ray, hit: &Hit) -> Layer {
-        let coverage = self.opacity(hit);
+    /// Whether ray `i` of a batch meets a surface that is not opaque, at a hit with texture coordinates `uvs`; hands over
+    /// what transmits to `crossed`.
+    #[inline]
+    fn meets(
+        &self,
+        i: usize,
+        ray: &Ray,
+        key: SightKey,
+        hit: &Hit,
+        uvs: &Uvs,
+        crossed: impl FnOnce(Crossing),
+    ) -> bool {
+        if !self.faces(ray, hit) {
+            return false;
+        }
+        let layer = self.layer(ray, hit, uvs);
+        let is_met = key.meets(hit.triangle, layer.probability);
+        if layer.transmits {
+            let (&Hit { t, triangle, .. }, factor) = (hit, layer.factor(is_met));
+            crossed(Crossing { ray: i, t, triangle, is_met, factor });
+        }
+        is_met
+    }
+
+    /// The closest hit of what is opaque and seen from the ray's side, given the closest of what is opaque.
+    fn facing(&self, ray: &Ray, hit: Option<Hit>) -> Option<Hit> {
+        if hit.is_some_and(|hit| !self.faces(ray, &hit)) {
+            self.bvh.closest_hit_where(ray, |hit| self.faces(ray, hit))
+        } else {
+            hit
+        }
+    }
+
+    /// How a camera ray meets a surface that is not opaque.
+    fn layer(&self, ray: &Ray, hit: &Hit, uvs: &Uvs) -> Layer {
         let (part, triangle) = self.locate(hit.triangle);
+        let coverage = self.opacity_at(part, triangle, hit, uvs);
         let material = &self.materials[part.material];
         if !material.transmits() {
             return Layer { probability: coverage, ..Layer::default() };
@@ -275,11 +409,19 @@ impl Scene {
     /// The opacity in \[0, 1\] of the surface at a hit.
     pub fn opacity(&self, hit: &Hit) -> f32 {
         let (part, triangle) = self.locate(hit.triangle);
+        let uvs = Corners::new(&part.mesh, triangle, hit).uvs(&part.mesh);
+        self.opacity_at(part, triangle, hit, &uvs)
+    }
+
+    /// [`Scene::opacity`] at a place on a part.
+    fn opacity_at(&self, part: &Part, triangle: usize, hit: &Hit, uvs: &Uvs) -> f32 {
         let (mesh, coverage) = (&part.mesh, &self.materials[part.material].coverage);
-        let corners = Corners::new(mesh, triangle, hit);
-        let mut opacity = coverage.opacity * corners.mix(&mesh.alphas).unwrap_or(1.0);
+        let mut opacity = coverage.opacity;
+        if !mesh.alphas.is_empty() {
+            opacity *= Corners::new(mesh, triangle, hit).mix(&mesh.alphas).unwrap_or(1.0);
+        }
         if let Some(texture) = &coverage.texture {
-            opacity *= texture.alpha_at(&self.textures, &corners.uvs(mesh));
+            opacity *= texture.alpha_at(&self.textures, uvs);
         }
         coverage.of(opacity)
     }
@@ -295,6 +437,12 @@ impl Scene {
         }
         part.mesh.area_normal(triangle).dot(ray.direction) <= 0.0
     }
+}
+
+/// The ray as far as what it hits.
+#[inline]
+fn up_to(ray: &Ray, hit: Option<&Hit>) -> Ray {
+    Ray { t_max: hit.map_or(ray.t_max, |hit| hit.t), ..*ray }
 }
 
 /// The number in [0, 1) of a camera sample for a triangle: those of many samples are stratified, those of two triangles

@@ -6,7 +6,7 @@ use super::camera::CameraSettings;
 use super::framing::ViewDirection;
 use super::material::Material;
 use super::texture::Texture;
-use crate::environment::UpAxis;
+use crate::environment::{EnvironmentError, UpAxis};
 use crate::geometry::{Aabb, Mesh};
 use crate::math::{Mat4, functions};
 
@@ -73,8 +73,17 @@ pub struct EnvironmentSettings {
 
 impl EnvironmentSettings {
     /// The factor on the radiance: scale · 2^exposure.
-    pub fn factor(&self) -> f32 {
-        self.scale * functions::exp2(self.exposure)
+    ///
+    /// # Errors
+    /// An exposure that makes a factor of 0 or ∞ of a scale that is neither.
+    pub fn factor(&self) -> Result<f32, EnvironmentError> {
+        let Self { scale, exposure, .. } = *self;
+        let factor = scale * functions::exp2(exposure);
+        let is_lost = !factor.is_finite() || factor == 0.0;
+        if is_lost && scale.is_finite() && scale != 0.0 {
+            return Err(EnvironmentError::BadExposure { exposure, factor });
+        }
+        Ok(factor)
     }
 }
 
@@ -128,5 +137,25 @@ impl SceneDescription {
         self.cameras.append(&mut other.cameras);
         self.environment = self.environment.take().or(other.environment);
         self.up = self.up.or(other.up);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exposures_beyond_single_precision_are_refused() {
+        let factor = |scale, exposure| {
+            let source = EnvironmentSource::Builtin("sky".to_owned());
+            let up = UpAxis::Y;
+            EnvironmentSettings { source, rotate_degrees: 0.0, scale, exposure, up }.factor()
+        };
+        assert_eq!(factor(0.5, -3.0), Ok(0.0625));
+        assert_eq!(factor(0.0, 3.0), Ok(0.0));
+        for (exposure, left) in [(-2000.0, 0.0), (2000.0, f32::INFINITY)] {
+            let refused = EnvironmentError::BadExposure { exposure, factor: left };
+            assert_eq!(factor(1.0, exposure), Err(refused));
+        }
     }
 }

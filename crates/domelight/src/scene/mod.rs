@@ -21,7 +21,7 @@ mod texture;
 
 pub use crate::environment::UpAxis;
 pub use camera::{Camera, CameraError, CameraSettings, Lens, Projection};
-pub use coverage::Sight;
+pub use coverage::{Sight, SightKey, Sights};
 pub use description::{
     EnvironmentSettings, EnvironmentSource, NamedCamera, Part, SceneDescription,
 };

@@ -2,8 +2,9 @@
 
 use super::{PointStrategy, SampleIndex, ShadingPoint};
 use crate::Rgb;
+use crate::environment::Environment;
 use crate::math::Vec3;
-use crate::rig::Rig;
+use crate::rig::{Rig, RigError};
 
 /// Σ f_r cos θ · E over the lights of a rig with irradiance E, with the same rays at every point.
 ///
@@ -12,12 +13,31 @@ use crate::rig::Rig;
 pub struct LightSet {
     /// The lights.
     pub rig: Rig,
+    /// What their irradiance is a multiple of \[W·m⁻²\].
+    pub unit: f64,
+}
+
+impl LightSet {
+    /// The lights that `extract` makes of a map, in multiples of its unit: sums over texels near the limit of single
+    /// precision exceed it in watts.
+    pub(crate) fn of(
+        environment: &Environment,
+        extract: impl FnOnce(&Environment) -> Result<Rig, RigError>,
+    ) -> Result<Self, RigError> {
+        let unit = environment.unit();
+        let rig = extract(&environment.with_radiance_in_units())?;
+        Ok(Self { rig, unit })
+    }
 }
 
 impl PointStrategy for LightSet {
     type Scratch = ();
 
     const UNBIASED: bool = false;
+
+    fn unit(&self) -> f64 {
+        self.unit
+    }
 
     fn n_rays(&self) -> u32 {
         self.rig.lights.len() as u32

@@ -144,13 +144,17 @@ impl<'e> PreparedStrategy<'e> {
                 })
             }
             StrategySpec::MedianCut { n_lights } => {
-                let rig = median_cut(environment, n_lights as usize, MedianCut::default())?;
-                Self::Lights(LightSet { rig })
+                let rig = |environment: &Environment| {
+                    median_cut(environment, n_lights as usize, MedianCut::default())
+                };
+                Self::Lights(LightSet::of(environment, rig)?)
             }
             StrategySpec::VarianceMinimization { n_lights } => {
                 let settings = VarianceMinimization::default();
-                let rig = variance_minimization(environment, n_lights as usize, settings)?;
-                Self::Lights(LightSet { rig })
+                let rig = |environment: &Environment| {
+                    variance_minimization(environment, n_lights as usize, settings)
+                };
+                Self::Lights(LightSet::of(environment, rig)?)
             }
         })
     }
