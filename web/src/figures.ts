@@ -2,9 +2,9 @@
 
 import { color, h, short, signed } from "./dom";
 import { Film, FilmView } from "./film";
-import type { Stage } from "./lecture";
 import { plot, slope, type Series } from "./plot";
 import type { FromWorker } from "./protocol";
+import type { Stage } from "./stage";
 
 type Figure = (stage: Stage) => void;
 type Point = [number, number];
