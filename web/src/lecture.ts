@@ -36,14 +36,14 @@ export class Lecture {
 
   private show(i: number) {
     this.shown = i;
-    const { title, text, formula, question, answer } = STEPS[i];
+    const { title, text, formulas, question, answer } = STEPS[i];
     $("steps").querySelectorAll("a").forEach((link, k) => {
       if (k === i) link.setAttribute("aria-current", "step");
       else link.removeAttribute("aria-current");
     });
     const place = h("div", { class: "figure", id: "figure" });
-    const formulaBox = h("div", { class: "formula", tabindex: "0", role: "group", "aria-label": "Formula" });
-    formulaBox.innerHTML = `<math display="block">${formula}</math>`;
+    const formulaBox = h("div", { class: "formula", tabindex: "0", role: "group", "aria-label": "Formulas" });
+    formulaBox.innerHTML = formulas.map((formula) => `<math display="block">${formula}</math>`).join("");
     const move = (name: string, k: number) => {
       const button = h("button", { type: "button" }, name);
       button.disabled = k < 0 || k >= STEPS.length;
@@ -53,7 +53,7 @@ export class Lecture {
     $("step").replaceChildren(
       h("h2", {}, title), ...text.map((paragraph) => h("p", {}, paragraph)), formulaBox, place,
       h("div", { class: "question" }, h("p", {}, question), h("details", {}, h("summary", {}, "What the figure shows"), h("p", {}, answer))),
-      h("div", { class: "steps" }, move("← Before", i - 1), move("Next →", i + 1)));
+      h("div", { class: "steps" }, move("← Previous", i - 1), move("Next →", i + 1)));
     // Without a map there is nothing to draw yet.
     if (this.app.probe) FIGURES[i](new Stage(place, this.app, this.app.state.figure.split(";")));
     document.documentElement.dataset.step = String(i + 1);

@@ -1,7 +1,7 @@
 // The Lights panel: a probe as a rig, its regions, how it shades, and its files.
 
 import type { App, Change } from "./app";
-import { $, h, latest, save, short } from "./dom";
+import { $, h, latest, percentage, save, short, words } from "./dom";
 import { Film, FilmView } from "./film";
 import { isBuiltinProbe, quoted } from "./state";
 
@@ -168,7 +168,7 @@ export class LightsPanel {
     const lights = rig.lights.length;
     $("rig-caption").textContent = `${lights} light${lights === 1 ? "" : "s"} of ${app.envName}${rig.residual ? ", beside what they leave on the map" : ""}. Error of shading: matte ${percent(rig.diffuse)}, glossy ${percent(rig.glossy)}.`;
     $("rig-table").querySelector("tbody")!.replaceChildren(...rig.lights.slice(0, 6).map((light) =>
-      h("tr", {}, h("th", { scope: "row" }, light.name.replace("_", " ")), h("td", {}, percent(light.share)), h("td", {}, `${short(light.radius)}°`))));
+      h("tr", {}, h("th", { scope: "row" }, light.name.replace("_", " ")), h("td", {}, percentage(light.share)), h("td", {}, `${light.radius.toFixed(1)}°`))));
     this.offer(leave);
     document.documentElement.dataset.rig = `${state.method}:${lights}`;
   });
@@ -233,11 +233,11 @@ export class LightsPanel {
       button(`rig.${format.extension}`, () => app.engines.call("rigFile", format.name, app.envName) as Promise<Uint8Array>)));
     const domes = [...new Set(rig.formats.flatMap((format) => format.dome ?? []))];
     $("dome-files").replaceChildren(...domes.map((name) => button(name, () => app.engines.call("domeFile", name) as Promise<Uint8Array>)));
-    const words = ["domelight", "lights", state.env, ...(isBuiltinProbe(state.env) ? [`--env-rows=${state.rows}`] : []),
+    const command = ["domelight", "lights", state.env, ...(isBuiltinProbe(state.env) ? [`--env-rows=${state.rows}`] : []),
       ...(state.rotate ? [`--env-rotate=${state.rotate}`] : []), ...(state.scale === 1 ? [] : [`--env-scale=${state.scale}`]), ...(state.ev ? [`--env-exposure=${state.ev}`] : []), ...(state.sun ? ["--sun"] : []),
       ...(leave ? ["--keep-residual", "dome.exr"] : ["-n", String(state.lights)]), "--method", state.method, "-o", "rig.json"];
     // The program refines.
     $("rig-command").hidden = state.method === "variance-minimization" && !state.refine;
-    $("rig-command").textContent = words.map(quoted).join(" ");
+    $("rig-command").replaceChildren(...words(command.map(quoted)));
   }
 }
