@@ -1,6 +1,6 @@
 // The live figures of the lecture, one for each step.
 
-import { color, h, short, signed } from "./dom";
+import { h, percentage, short, signed } from "./dom";
 import { Film, FilmView } from "./film";
 import { plot, slope, type Series } from "./plot";
 import type { Statistics } from "./protocol";
@@ -80,7 +80,9 @@ const estimator: Figure = (stage) => {
     stage.svg(plot([
       { name: "root mean square of 200 runs", kind: "first", points: rms }, { name: "one run", kind: "second", points: first, as: "dots" },
     ], { x: { name: "samples N", log: true }, y: { name: "relative error", log: true, range: [1e-4, 1] } }), "Error over samples");
-    stage.say(`The error at ${n} samples is ${short(rms.at(-1)![1])}; the slope of the line is ${signed(slope(rms))}.`);
+    const last = rms.at(-1)![1];
+    // A density in proportion to the integrand leaves what rounding does.
+    stage.say(last < 1e-9 ? `The error at ${n} samples is 0: every sample has the value of the integral.` : `The error at ${n} samples is ${short(last)}; the slope of the line is ${signed(slope(rms))}.`);
   });
 };
 
@@ -180,7 +182,7 @@ const ward: Figure = (stage) => {
 };
 
 /** Half vectors in the middle of patches: polar angle toward the mirror direction and azimuth [degrees]. */
-const PATCHES: Point[] = [[0, 0], [25, 180], [30, 90], [30, 0], [30, -60]];
+const PATCHES: Point[] = [[0, 0], [18, 60], [20, -70], [40, 130], [38, -140]];
 /** Their angular radius [degrees]. */
 const PATCH = 6;
 
@@ -246,11 +248,11 @@ const inversion: Figure = (stage) => {
 };
 
 const rowsAndColumns: Figure = (stage) => {
-  const weighted = stage.choice("Rows count", [["1", "with sin θ"], ["", "all alike (wrong)"]]);
+  const weighted = stage.choice("Rows count", [["solid-angle", "with sin θ"], ["alike", "all alike (wrong)"]]);
   const chosen = stage.slider("Row", 0, 63, 1, 24);
   stage.draw(async () => {
     const width = 128, height = width / 2, y = chosen();
-    const { rows, columns } = JSON.parse(await stage.app.engines.call("rowProbabilities", width, y, !!weighted())) as { rows: number[]; columns: number[] };
+    const { rows, columns } = JSON.parse(await stage.app.engines.call("rowProbabilities", width, y, weighted() === "solid-angle")) as { rows: number[]; columns: number[] };
     const points = (values: number[]) => values.map((p, i): Point => [i, p]);
     stage.svg(plot([{ name: "p(y)", kind: "first", points: points(rows), as: "bars" }, { name: "", kind: "second", points: [[y, rows[y]]], as: "dots" }],
       { x: { name: "row y, from the top", range: [-1, height] }, y: { name: "probability of a row", range: [0, Math.max(...rows)] }, height: 170 })
@@ -332,7 +334,7 @@ const product: Figure = (stage) => {
   stage.draw(() => {
     const lobe = (x: number) => gauss(x, center(), width());
     const f = (x: number) => light(x) * lobe(x), total = integral(f, 4000), p = (x: number) => f(x) / total;
-    const visible = integral((x) => (x < hidden() ? p(x) : 0), 4000), exact = visible * total;
+    const visible = integral((x) => (x < hidden() ? p(x) : 0), 4000), hiddenShare = 1 - visible, exact = visible * total;
     const q = normalized(light), r = normalized(lobe);
     const relative = (d: (x: number) => number) => {
       const second = integral((x) => (x < hidden() && d(x) > 0 ? f(x) ** 2 / d(x) : 0), 4000);
@@ -344,14 +346,14 @@ const product: Figure = (stage) => {
       { name: "product", kind: "third", points: line(400, (x) => p(x) / top(p)), as: "area" },
       { name: "hidden", kind: "shade", points: [[hidden(), 0], [1, 0]], as: "band" },
     ], { x: { name: "direction", range: [0, 1] }, y: { name: "relative to the greatest", range: [0, 1.05] } }), "Light, lobe and their product");
-    stage.say(`${short(100 * visible)} % of the product is visible. Relative deviation of one sample: light ${relative(q)}, lobe ${relative(r)}, product ${visible > 0 ? short(Math.sqrt((1 - visible) / visible)) : "–"}.`);
+    stage.say(`${short(100 * visible)} % of the product is visible. Relative deviation of one sample: light ${relative(q)}, lobe ${relative(r)}, product ${visible > 0 ? short(hiddenShare > 1e-9 ? Math.sqrt(hiddenShare / visible) : 0) : "–"}.`);
   });
 };
 
 const target = normalized((x) => light(x) * gauss(x, 0.5, 0.12));
 
 const rejection: Figure = (stage) => {
-  const bound = stage.slider("Least bound", 0.3, 3, 0.05, 1, (x) => `× ${x.toFixed(2)}`);
+  const bound = stage.slider("Envelope", 0.3, 3, 0.05, 1, (x) => `${x.toFixed(2)} × the least`);
   stage.draw(() => {
     const q = normalized(light), needed = Math.max(...line(2000, (x) => target(x) / q(x)).map((p) => p[1]));
     const c = bound() * needed, table = new Table(q), random = generator(5);
@@ -388,7 +390,9 @@ const resampling: Figure = (stage) => {
     stage.svg(plot([
       { name: "picked", kind: "third", points: bars, as: "bars" }, { name: "candidates", kind: "second", points: line(400, q) }, { name: "target", kind: "first", points: line(400, target) },
     ], { x: { name: "direction", range: [0, 1] }, y: { name: "density", range: [0, 10] }, height: 260 }), "A histogram of what resampling picks");
-    stage.say(`The histogram differs from the target by ${short(100 * distance)} %, half the sum of all differences; ${short(picks)} picks.`);
+    // What counting so many picks of the target itself would differ.
+    const noise = 0.5 * bars.reduce((sum, [x]) => { const p = integral((u) => target(x + (u - 0.5) / bins), 20) / bins; return sum + Math.sqrt(2 * p * (1 - p) / (Math.PI * picks)); }, 0);
+    stage.say(`The histogram of ${picks.toLocaleString("en-US")} picks differs from the target by ${percentage(distance)} (half the sum of all differences); the noise of counting makes ${percentage(noise)}.`);
   });
 };
 
@@ -458,7 +462,8 @@ const fourWays: Figure = (stage) => {
       const { view, caption } = figures[k];
       view.set({ exposure: 0, curve: "agx" });
       view.show(0, picture.film);
-      caption.textContent = `${name}${timed ? "" : `, ${counts}`}: error ${short(relativeError(picture, truth))} in ${((performance.now() - started) / 1000).toFixed(2)} s`;
+      const seconds = (performance.now() - started) / 1000;
+      caption.replaceChildren(timed ? name : `${name}, ${counts}`, h("br"), `error ${short(relativeError(picture, truth))} in ${seconds.toFixed(2)} s`);
       found.push(`${name} ${short(picture.statistics.shadowRays / 1000)} thousand rays`);
     }
     stage.say(`Errors are relative squares, in the mean over the pixels. Traced: ${found.join(", ")}.`);

@@ -110,7 +110,7 @@ export const STEPS: Step[] = [
     ],
     formulas: [row(sub(i("w"), i("m")), eq, frac(row(i("M"), sub(i("q"), i("m"))), row(i("M"), sub(i("q"), i("m")), o("+"), i("N"), sub(i("q"), i("n"))))), row(sub(i("I"), i("MIS")), eq, frac(n(1), i("M")), sum("", i("M")), frac(row(i("f"), sub(i("w"), i("m"))), sub(i("q"), i("m"))), o("+"), frac(n(1), i("N")), sum("", i("N")), frac(row(i("f"), sub(i("w"), i("n"))), sub(i("q"), i("n"))))],
     question: "Is there a lobe for which one technique alone beats the mixture?",
-    answer: "Yes, at the ends: for a very wide lobe the light’s density alone, for a very narrow one the lobe’s. The mixture is never far behind, and that is its point.",
+    answer: "Yes, at the ends: for a very wide lobe the light’s density alone, for a very narrow one the lobe’s. The mixture then errs more, but it stays usable at both ends, where the other technique alone fails.",
   },
   {
     title: "The product is the target",
@@ -140,7 +140,7 @@ export const STEPS: Step[] = [
     ],
     formulas: [row(sub(i("L"), i("SIR")), eq, tall(frac(n(1), i("M")), sum(row(i("m"), eq, n(1)), i("M")), sub(i("w"), i("m"))), frac(n(1), i("N")), sumN, frac(row(i("f"), par(sub(i("ω"), i("j"))), i("V")), row(phat, par(sub(i("ω"), i("j")))))), row(sub(i("w"), i("m")), eq, frac(phat, i("q")))],
     question: "From which M on can you no longer tell the histogram from the target?",
-    answer: "It depends on how far the candidates are from the target: here some 64. A narrower lobe, or light that the candidates seldom find, needs more.",
+    answer: "It depends on how far the candidates are from the target: here from 32 on, when the difference is no more than the noise of counting. A narrower lobe, or light that the candidates seldom find, needs more.",
   },
   {
     title: "Four ways, side by side",
