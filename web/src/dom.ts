@@ -48,7 +48,7 @@ export const count = (n: number) => {
   return `${Number((n / (unit as number)).toPrecision(3))}${name}`;
 };
 /** A share of the whole with as many digits as say something. */
-export const percentage = (share: number) => (share !== 0 && Math.abs(share) < 5e-4 ? "under 0.1 %" : `${signed(100 * share, 1)} %`);
+export const percentage = (share: number) => (share !== 0 && Math.abs(share) < 5e-4 ? "< 0.1 %" : `${signed(100 * share, 1)} %`);
 /** A signed number with a minus that looks like one. */
 export const signed = (x: number, digits = 2) => x.toFixed(digits).replace("-", "−");
 

@@ -2,7 +2,7 @@
 
 import { h, percentage, short, signed } from "./dom";
 import { Film, FilmView } from "./film";
-import { plot, slope, type Series } from "./plot";
+import { figureWidth, plot, slope, type Series } from "./plot";
 import type { Statistics } from "./protocol";
 import type { Stage } from "./stage";
 
@@ -88,7 +88,7 @@ const estimator: Figure = (stage) => {
 
 /** A polar diagram of densities [1/sr] by the angle from the normal, −90° to 90°. */
 function polar(series: Series[], directions: [number, string][]): string {
-  const [width, height, x0, y0, radius] = [640, 312, 320, 284, 240];
+  const width = figureWidth(), x0 = width / 2, radius = Math.min(240, x0 - 40), y0 = radius + 44, height = y0 + 28;
   const most = Math.max(...series.flatMap((s) => s.points.map((p) => p[1])), 1e-9);
   const at = (theta: number, r: number) => `${(x0 + radius * r * Math.sin(theta)).toFixed(1)},${(y0 - radius * r * Math.cos(theta)).toFixed(1)}`;
   const label = (theta: number, r: number, text: string, kind = "name") => {
@@ -99,7 +99,7 @@ function polar(series: Series[], directions: [number, string][]): string {
   const curves = series.map((s) => `<path class="${s.kind} line" d="M${s.points.map(([t, r]) => at(t, r / most)).join("L")}"/>`);
   const arrows = directions.map(([theta, name]) => `<path class="axis" d="M${x0} ${y0}L${at(theta, 1)}"/>${label(theta, 1.04, name)}`);
   const legend = series.map((s, i) => `<path class="${s.kind} line" d="M8 ${14 + 18 * i}h16"/><text class="name" x="30" y="${18 + 18 * i}">${s.name}</text>`);
-  return `<svg viewBox="0 0 ${width} ${height}" aria-hidden="true">${rings.join("")}<path class="axis" d="M20 ${y0}H620"/>${arrows.join("")}${curves.join("")}${legend.join("")}</svg>`;
+  return `<svg viewBox="0 0 ${width} ${height}" aria-hidden="true">${rings.join("")}<path class="axis" d="M20 ${y0}H${width - 20}"/>${arrows.join("")}${curves.join("")}${legend.join("")}</svg>`;
 }
 
 const lobes: Figure = (stage) => {
@@ -146,6 +146,9 @@ const fromAbove = ([x, y, z]: Vector, [x0, y0, radius]: Vector): Point => {
   return [x0 + r * x, y0 - r * y];
 };
 
+/** The middle and the radius of a hemisphere from above, with `above` of room on top. */
+const hemisphere = (above: number): Vector => [figureWidth() / 2, above + 172, 150];
+
 /** Rings of 30°, 60° and 90° from the normal, with the axes x and y. */
 function rings([x0, y0, radius]: Vector): string {
   const circle = (degrees: number) => {
@@ -162,7 +165,7 @@ const ward: Figure = (stage) => {
   const angle = stage.slider("Viewer", 0, 80, 1, 30, (x) => `${x}°`);
   stage.draw(async () => {
     const samples = (await stage.app.engines.call("lobeSamples", `ward:${ax()}:${ay()}:1`, angle(), 3000, 1)) as Float32Array;
-    const view: Vector = [320, 172, 150], theta = angle() * Math.PI / 180;
+    const view = hemisphere(0), theta = angle() * Math.PI / 180;
     const dots: string[] = [];
     let [sx, sy, mx] = [0, 0, 0];
     const n = samples.length / 3;
@@ -175,7 +178,7 @@ const ward: Figure = (stage) => {
       const [x, y] = fromAbove([side * Math.sin(theta), 0, Math.cos(theta)], view);
       return `<circle class="axis" cx="${x}" cy="${y}" r="5"/><text class="name halo" x="${x}" y="${y + 20}" text-anchor="middle">${name}</text>`;
     };
-    stage.svg(`<svg viewBox="0 0 640 330" aria-hidden="true">${rings(view)}<path class="first dots" d="${dots.join("")}"/>${mark("viewer", -1)}${mark("mirror", 1)}</svg>`,
+    stage.svg(`<svg viewBox="0 0 ${2 * view[0]} ${view[1] + 158}" aria-hidden="true">${rings(view)}<path class="first dots" d="${dots.join("")}"/>${mark("viewer", -1)}${mark("mirror", 1)}</svg>`,
       "Directions drawn from Ward’s lobe, seen from above");
     stage.say(`Spread along x ${short(Math.sqrt(sx / n - (mx / n) ** 2))}, along y ${short(Math.sqrt(sy / n))} (standard deviations of the direction); rings are 30°, 60° and 90° from the normal.`);
   });
@@ -189,7 +192,7 @@ const PATCH = 6;
 const halfVectors: Figure = (stage) => {
   const angle = stage.slider("Viewer", 0, 85, 1, 40, (x) => `${x}°`);
   stage.draw(() => {
-    const radians = Math.PI / 180, o = -angle() * radians, [x0, y0, r] = [320, 272, 240];
+    const radians = Math.PI / 180, o = -angle() * radians, width = figureWidth(), x0 = width / 2, r = Math.min(240, x0 - 30), y0 = r + 40;
     const at = (theta: number, length: number) => `${(x0 + length * Math.sin(theta)).toFixed(1)} ${(y0 - length * Math.cos(theta)).toFixed(1)}`;
     const directions: string[] = [], halves: string[] = [];
     for (let k = -8; k <= 8; k++) {
@@ -198,11 +201,11 @@ const halfVectors: Figure = (stage) => {
       if (Math.abs(direction) < Math.PI / 2) directions.push(`M${at(direction, 0.45 * r)}L${at(direction, r)}`);
     }
     const [x, y] = at(o, r + 10).split(" ");
-    const plane = `<svg viewBox="0 0 640 290" aria-hidden="true"><path class="axis" d="M20 ${y0}H620M${x0} ${y0}L${at(o, r)}"/>
+    const plane = `<svg viewBox="0 0 ${width} ${y0 + 12}" aria-hidden="true"><path class="axis" d="M20 ${y0}H${width - 20}M${x0} ${y0}L${at(o, r)}"/>
       <path class="first line" d="${directions.join("")}"/><path class="second line" d="${halves.join("")}"/>
       <text class="name" x="${x}" y="${y}" text-anchor="end">viewer</text>
       <path class="second line" d="M8 14h16"/><text class="name" x="30" y="18">half vectors, every 5°</text><path class="first line" d="M8 32h16"/><text class="name" x="30" y="36">directions, every 10°</text></svg>`;
-    const view: Vector = [320, 172, 150], wo: Vector = [Math.sin(o), 0, Math.cos(o)];
+    const view = hemisphere(width < 480 ? 36 : 0), wo: Vector = [Math.sin(o), 0, Math.cos(o)];
     const dot = (a: Vector, b: Vector) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     const mirror = (h: Vector) => h.map((c, k) => 2 * dot(wo, h) * c - wo[k]) as Vector;
     const factors: number[] = [];
@@ -224,7 +227,7 @@ const halfVectors: Figure = (stage) => {
       return [path(mirrored, "first"), shown, `<text class="name halo" x="${x.toFixed(1)}" y="${(y + 4).toFixed(1)}" text-anchor="middle">× ${growth.toFixed(1)}</text>`];
     });
     const [vx, vy] = fromAbove(wo, view);
-    const above = `<svg viewBox="0 0 640 330" aria-hidden="true">${rings(view)}${patches.join("")}<circle class="axis" cx="${vx}" cy="${vy}" r="5"/><text class="name halo" x="${vx}" y="${vy - 10}" text-anchor="middle">viewer</text>
+    const above = `<svg viewBox="0 0 ${width} ${view[1] + 158}" aria-hidden="true">${rings(view)}${patches.join("")}<circle class="axis" cx="${vx}" cy="${vy}" r="5"/><text class="name halo" x="${vx}" y="${vy + 20}" text-anchor="middle">viewer</text>
       <path class="second line" d="M8 14h16"/><text class="name" x="30" y="18">patches of half vectors</text><path class="first line" d="M8 32h16"/><text class="name" x="30" y="36">mirrored, × their growth</text></svg>`;
     stage.svg(plane + above, "Half vectors and the directions that they mirror to, in the plane of incidence and from above");
     stage.say(`${directions.length} of 17 directions are above the surface; the patches grow ${factors.length ? `${short(Math.min(...factors))} to ${short(Math.max(...factors))} times` : "beyond the horizon"}: 4 ωh·ωi.`);
@@ -487,7 +490,7 @@ const biasAndVariance: Figure = (stage) => {
       return [n, Math.sqrt(squares / runs)];
     });
     stage.svg(plot([{ name: "random samples", kind: "first", points: noisy }, { name: "fixed lights", kind: "second", points: fixed }],
-      { x: { name: "N", log: true, range: [2, 1000], ticks: [2, 10, 100, 1000] }, y: { name: "absolute error", log: true, range: [1e-5, 1] } }), "Error of random and of fixed points");
+      { x: { name: "number of samples or lights N", log: true, range: [2, 1000], ticks: [2, 10, 100, 1000] }, y: { name: "absolute error", log: true, range: [1e-5, 1] } }), "Error of random and of fixed points");
     stage.say(`At N = ${counts.at(-1)} the noise is ${short(noisy.at(-1)![1])} and the bias ${short(fixed.at(-1)![1])}; at N = ${counts[8]} they are ${short(noisy[8][1])} and ${short(fixed[8][1])}.`);
   });
 };

@@ -67,10 +67,12 @@ function swatch({ kind, as }: Series, x: number, y: number): string {
   return `<path class="${kind} line" d="M${x - 14} ${y}h14"/>`;
 }
 
+/** How wide a figure is: text keeps its size on a phone. */
+export const figureWidth = () => Math.min(640, Math.max(320, document.documentElement.clientWidth - 32));
+
 /** An SVG of series over two axes. */
 export function plot(series: Series[], axes: Axes): string {
-  // Text keeps its size on a phone.
-  const width = axes.width ?? Math.min(640, Math.max(320, document.documentElement.clientWidth - 32)), height = axes.height ?? 240;
+  const width = axes.width ?? figureWidth(), height = axes.height ?? 240;
   const named = series.filter((s) => s.name);
   const ofLegend = named.reduce((sum, s) => sum + widthOf(s.name) + 36, 0);
   const [left, right, bottom] = [58, 14, 38];

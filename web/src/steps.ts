@@ -148,7 +148,10 @@ export const STEPS: Step[] = [
       "A shiny sphere under a dim nave with small bright windows, by all four: the environment with 100 samples, the reflectance with 75, both combined, and 15 rays picked from 800 candidates. The first is noisy where the sphere mirrors dim walls, which it seldom samples; the second where it mirrors the small windows, which its lobe seldom meets.",
       "Per ray resampling wins by far: the candidates’ variance falls with their number M, and the N rays are left with the variance of visibility. But a candidate costs about as much as a third of a short ray, so at equal time the order may turn.",
     ],
-    formulas: [row(i("Var"), of, sub(i("L"), i("SIR")), eq, frac(n(1), i("M")), i("Var"), of, tall(frac(row(fr, cos(i("i")), sub(i("L"), i("i")), i("V")), i("q"))), o("+"), tall(n(1), o("−"), frac(n(1), i("M"))), frac(row(sub(i("L"), i("r")), par(sub(i("L"), i("ns")), o("−"), sub(i("L"), i("r")))), i("N")))],
+    formulas: [
+      row(i("Var"), of, sub(i("L"), i("SIR")), eq, frac(sup(i("σ"), n(2)), i("M")), o("+"), tall(n(1), o("−"), frac(n(1), i("M"))), frac(row(sub(i("L"), i("r")), par(sub(i("L"), i("ns")), o("−"), sub(i("L"), i("r")))), i("N"))),
+      row(sup(i("σ"), n(2)), eq, i("Var"), of, tall(frac(row(fr, cos(i("i")), sub(i("L"), i("i")), i("V")), i("q")))),
+    ],
     question: "Which one is best by count, and which in equal time? Add some diffuse reflectance and look again.",
     answer: "By traced rays resampling is; in equal time multiple importance sampling usually is. With diffuse light the reflectance’s own samples suffer most.",
   },

@@ -5,7 +5,7 @@ import { $, color, h, latest, percentage, short } from "./dom";
 import { Film, FilmView } from "./film";
 
 const SIZE = 160, DENSITY = 48;
-const LAYERS = ["light L", "reflectance f · cos θ", "visibility V", "what arrives, f · cos θ · L · V"];
+const LAYERS = ["light L", "reflectance f · cos θ", "visibility V", "what arrives, f · cos θ · L · V"];
 const COMPARED = ["brdf:1", "environment:1", "mis:1:1", "product:8", "sir:2/32", "rejection:16"];
 
 interface Report {
