@@ -404,7 +404,7 @@ const WAYS = [
   { name: "environment", counts: "100", strategy: "environment:100", few: "environment:4" },
   { name: "reflectance", counts: "75", strategy: "brdf:75", few: "brdf:4" },
   { name: "both", counts: "50 : 38", strategy: "mis:50:38", few: "mis:2:2" },
-  { name: "resampling", counts: "15 of 800", strategy: "sir:15/800", few: "sir:15/800" },
+  { name: "resampling", counts: "15/800", strategy: "sir:15/800", few: "sir:15/800" },
 ];
 /** How the picture to compare with is made. */
 const TRUTH = { strategy: "product:16", spp: 32 };
@@ -466,7 +466,7 @@ const fourWays: Figure = (stage) => {
       view.set({ exposure: 0, curve: "agx" });
       view.show(0, picture.film);
       const seconds = (performance.now() - started) / 1000;
-      caption.replaceChildren(timed ? name : `${name}, ${counts}`, h("br"), `error ${short(relativeError(picture, truth))} in ${seconds.toFixed(2)} s`);
+      caption.replaceChildren(timed ? name : `${name}, ${counts}`, h("br"), `error ${short(Number(relativeError(picture, truth).toPrecision(2)))}, ${seconds.toFixed(2)} s`);
       found.push(`${name} ${short(picture.statistics.shadowRays / 1000)} thousand rays`);
     }
     stage.say(`Errors are relative squares, in the mean over the pixels. Traced: ${found.join(", ")}.`);

@@ -8,7 +8,7 @@ import { Film, FilmView } from "./film";
 import { plot, slope, type Series } from "./plot";
 import { Reference } from "./reference";
 import { PROBES, SCENES, command, commandWords, toHash } from "./state";
-import { CURVES, type Curve } from "./tone";
+import { CURVES, CURVE_NAMES, type Curve } from "./tone";
 
 type Vec = [number, number, number];
 const sub = (a: number[], b: number[]): Vec => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -426,7 +426,7 @@ export class PicturePanel {
     fill($("scene"), withFile(SCENES, app.files.scenes, state.scene), state.scene);
     fill($("env"), withFile(PROBES, app.files.probes, state.env), state.env);
     this.fillCameras();
-    fill($("curve"), CURVES, state.curve);
+    fill($("curve"), CURVES.map((curve): [string, string] => [curve, CURVE_NAMES[curve]]), state.curve);
     $<HTMLSelectElement>("view").value = state.view;
     $<HTMLInputElement>("ground").checked = state.ground;
     $<HTMLInputElement>("hide").checked = state.hide;

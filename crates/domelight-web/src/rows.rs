@@ -6,8 +6,8 @@ use domelight::sampling::{Dimension, Sampler, SamplerKind, Table2d, TableError};
 use serde::Serialize;
 use wasm_bindgen::prelude::*;
 
-use crate::setup::to_json;
 use crate::Engine;
+use crate::setup::to_json;
 
 /// The probabilities of rows, and of the columns of one, for the page.
 #[derive(Serialize)]
