@@ -438,16 +438,13 @@ const fourWays: Figure = (stage) => {
   /** A picture, ended after a while if it is timed. */
   const render = (strategy: string, spp: number, milliseconds = 0) => new Promise<Rendered>((resolve, reject) => {
     const film = new Film(size, size), mine = ++token;
-    let statistics: Statistics | undefined;
-    const end = () => { if (statistics) resolve({ film, statistics }); };
-    const timer = milliseconds ? setTimeout(end, milliseconds) : 0;
+    const end = milliseconds ? performance.now() + milliseconds : Infinity;
     host.onRender = (message) => {
       if (message.token !== mine) return;
       if (message.kind === "failed") reject(new Error(message.error));
       if (message.kind !== "update") return;
       film.put(message.windows, message.pixels);
-      statistics = message.statistics;
-      if (message.complete) { clearTimeout(timer); end(); }
+      if (message.complete || performance.now() >= end) resolve({ film, statistics: message.statistics });
     };
     host.send({ kind: "render", token: mine, settings: JSON.stringify({ width: size, height: size, spp, strategy, seed: mine, hideEnvironment: true, camera: null, shard: [0, 1] }) });
   });
