@@ -54,7 +54,7 @@ function longInTrace(trace) {
   const { traceEvents } = JSON.parse(trace);
   const names = traceEvents.filter(({ name, args }) => name === "thread_name" && args.name === "CrRendererMain");
   const isMain = ({ pid, tid }) => names.some((main) => main.pid === pid && main.tid === tid);
-  const tasks = traceEvents.filter((event) => /RunTask$/.test(event.name) && event.tdur > 50_000 && isMain(event));
+  const tasks = traceEvents.filter((event) => event.name === "RunTask" && event.tdur > 50_000 && isMain(event));
   return tasks.map(({ tdur }) => Math.round(tdur / 1000));
 }
 const { page, done } = await open("");
