@@ -27,6 +27,11 @@ export function save(name: string, bytes: Uint8Array) {
 
 export const degrees = (x: number) => `${Math.round(x)}°`;
 export const stops = (x: number) => `${x > 0 ? "+" : x < 0 ? "−" : ""}${Math.abs(x).toFixed(1)} EV`;
+/** The digits of an exponent. */
+export const superscript = (n: number) => [...String(n)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)] ?? "⁻").join("");
+/** Words of a command, of which none is broken at its hyphens. */
+export const words = (all: string[]): (HTMLElement | string)[] =>
+  all.flatMap((word, i) => [...(i ? [" "] : []), h("span", { class: "word" }, word)]);
 /** Three digits that a reader can take in. */
 export function short(x: number): string {
   if (x === 0) return "0";
@@ -34,7 +39,7 @@ export function short(x: number): string {
   if (size >= 1e4 || size < 1e-3) {
     const exponent = Math.floor(Math.log10(size));
     const lead = Number((x / 10 ** exponent).toPrecision(2));
-    return `${lead === 1 ? "" : `${lead}·`}10${[...String(exponent)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)] ?? "⁻").join("")}`;
+    return `${lead === 1 ? "" : `${lead}·`}10${superscript(exponent)}`;
   }
   return String(Number(x.toPrecision(3))).replace("-", "−");
 }
@@ -42,6 +47,8 @@ export const count = (n: number) => {
   const [unit, name] = n >= 1e9 ? [1e9, " G"] : n >= 1e6 ? [1e6, " M"] : n >= 1e4 ? [1e3, " k"] : [1, ""];
   return `${Number((n / (unit as number)).toPrecision(3))}${name}`;
 };
+/** A share of the whole with as many digits as say something. */
+export const percentage = (share: number) => (share !== 0 && Math.abs(share) < 5e-4 ? "< 0.1 %" : `${signed(100 * share, 1)} %`);
 /** A signed number with a minus that looks like one. */
 export const signed = (x: number, digits = 2) => x.toFixed(digits).replace("-", "−");
 

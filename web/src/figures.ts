@@ -1,10 +1,10 @@
 // The live figures of the lecture, one for each step.
 
-import { color, h, short, signed } from "./dom";
+import { h, percentage, short, signed } from "./dom";
 import { Film, FilmView } from "./film";
-import type { Stage } from "./lecture";
-import { plot, slope, type Series } from "./plot";
-import type { FromWorker } from "./protocol";
+import { figureWidth, plot, slope, type Series } from "./plot";
+import type { Statistics } from "./protocol";
+import type { Stage } from "./stage";
 
 type Figure = (stage: Stage) => void;
 type Point = [number, number];
@@ -36,10 +36,8 @@ class Table {
   constructor(f: (x: number) => number, private n = 1000) {
     this.cdf = new Float64Array(n + 1);
     for (let i = 0; i < n; i++) this.cdf[i + 1] = this.cdf[i] + f((i + 0.5) / n);
-    for (let i = 0; i <= n; i++) this.cdf[i] /= this.cdf[n] || 1;
-    this.cdf = this.cdf.map((c) => c);
-    const total = this.cdf[n];
-    if (total !== 1) this.cdf = this.cdf.map((c) => c / total);
+    const total = this.cdf[n] || 1;
+    this.cdf = this.cdf.map((c) => c / total);
   }
   at(x: number) {
     const i = Math.min(Math.floor(x * this.n), this.n - 1);
@@ -81,20 +79,27 @@ const estimator: Figure = (stage) => {
     const rms = [...squares].map(([k, s]): Point => [k, Math.sqrt(s / runs)]);
     stage.svg(plot([
       { name: "root mean square of 200 runs", kind: "first", points: rms }, { name: "one run", kind: "second", points: first, as: "dots" },
-    ], { x: { name: "samples N", log: true }, y: { name: "error", log: true, range: [1e-4, 1] } }), "Error over samples");
-    stage.say(`The error at ${n} samples is ${short(rms.at(-1)![1])}; the line's slope is ${signed(slope(rms))}.`);
+    ], { x: { name: "samples N", log: true }, y: { name: "relative error", log: true, range: [1e-4, 1] } }), "Error over samples");
+    const last = rms.at(-1)![1];
+    // A density in proportion to the integrand leaves what rounding does.
+    stage.say(last < 1e-9 ? `The error at ${n} samples is 0: every sample has the value of the integral.` : `The error at ${n} samples is ${short(last)}; the slope of the line is ${signed(slope(rms))}.`);
   });
 };
 
-/** A polar diagram of functions of the angle from the normal, −90° to 90°. */
+/** A polar diagram of densities [1/sr] by the angle from the normal, −90° to 90°. */
 function polar(series: Series[], directions: [number, string][]): string {
-  const [width, height, x0, y0, radius] = [640, 300, 320, 276, 250];
+  const width = figureWidth(), x0 = width / 2, radius = Math.min(240, x0 - 40), y0 = radius + 44, height = y0 + 28;
   const most = Math.max(...series.flatMap((s) => s.points.map((p) => p[1])), 1e-9);
   const at = (theta: number, r: number) => `${(x0 + radius * r * Math.sin(theta)).toFixed(1)},${(y0 - radius * r * Math.cos(theta)).toFixed(1)}`;
+  const label = (theta: number, r: number, text: string, kind = "name") => {
+    const [x, y] = at(theta, r).split(",");
+    return `<text${kind && ` class="${kind}"`} x="${x}" y="${Number(y) + 4}" text-anchor="${theta < -0.3 ? "end" : theta > 0.3 ? "start" : "middle"}">${text}</text>`;
+  };
+  const rings = [0.5, 1].map((r) => `<path class="grid" fill="none" d="M${at(-Math.PI / 2, r)}A${radius * r} ${radius * r} 0 0 1 ${at(Math.PI / 2, r)}"/><text x="${x0 + radius * r}" y="${y0 + 16}" text-anchor="middle">${short(r * most)}${r === 1 ? " per sr" : ""}</text>`);
   const curves = series.map((s) => `<path class="${s.kind} line" d="M${s.points.map(([t, r]) => at(t, r / most)).join("L")}"/>`);
-  const arrows = directions.map(([theta, name]) => `<path class="axis" d="M${x0} ${y0}L${at(theta, 1)}"/><text class="name" x="${at(theta, 1.06).split(",")[0]}" y="${at(theta, 1.03).split(",")[1]}" text-anchor="middle">${name}</text>`);
+  const arrows = directions.map(([theta, name]) => `<path class="axis" d="M${x0} ${y0}L${at(theta, 1)}"/>${label(theta, 1.04, name)}`);
   const legend = series.map((s, i) => `<path class="${s.kind} line" d="M8 ${14 + 18 * i}h16"/><text class="name" x="30" y="${18 + 18 * i}">${s.name}</text>`);
-  return `<svg viewBox="0 0 ${width} ${height}" aria-hidden="true"><path class="axis" d="M20 ${y0}H620"/>${arrows.join("")}${curves.join("")}${legend.join("")}</svg>`;
+  return `<svg viewBox="0 0 ${width} ${height}" aria-hidden="true">${rings.join("")}<path class="axis" d="M20 ${y0}H${width - 20}"/>${arrows.join("")}${curves.join("")}${legend.join("")}</svg>`;
 }
 
 const lobes: Figure = (stage) => {
@@ -115,7 +120,7 @@ const lobes: Figure = (stage) => {
     const theta = angle() * Math.PI / 180;
     stage.svg(polar(series, [[-theta, "viewer"], [theta, "mirror"]]), "Densities in the plane of incidence");
     const peak = Math.max(...series[0].points.map((p) => p[1]));
-    stage.say(`Greatest density ${short(peak)} per steradian; ${short(100 * (1 - kept / 2000))} % of the samples end below the surface.`);
+    stage.say(`Greatest density ${short(peak)} per steradian; ${short(100 * (1 - kept / 2000))} % of the samples of Phong’s lobe end below the surface.`);
   });
 };
 
@@ -133,52 +138,99 @@ function canvas(stage: Stage, width: number, height: number, label: string): Can
   return context;
 }
 
+type Vector = [number, number, number];
+
+/** Where a direction is in a drawing of the hemisphere from above, the radius in proportion to the polar angle. */
+const fromAbove = ([x, y, z]: Vector, [x0, y0, radius]: Vector): Point => {
+  const across = Math.hypot(x, y), r = across > 0 ? radius * Math.atan2(across, z) / (Math.PI / 2) / across : 0;
+  return [x0 + r * x, y0 - r * y];
+};
+
+/** The middle and the radius of a hemisphere from above, with `above` of room on top. */
+const hemisphere = (above: number): Vector => [figureWidth() / 2, above + 172, 150];
+
+/** Rings of 30°, 60° and 90° from the normal, with the axes x and y. */
+function rings([x0, y0, radius]: Vector): string {
+  const circle = (degrees: number) => {
+    const r = radius * degrees / 90, at = Math.SQRT1_2 * r;
+    return `<circle class="grid" fill="none" cx="${x0}" cy="${y0}" r="${r}"/><text class="halo" x="${x0 - at}" y="${y0 - at + 4}" text-anchor="middle">${degrees}°</text>`;
+  };
+  return `<path class="grid" d="M${x0 - radius} ${y0}h${2 * radius}M${x0} ${y0 - radius}v${2 * radius}"/>${[30, 60, 90].map(circle).join("")}
+    <text x="${x0 + radius + 8}" y="${y0 + 4}">x</text><text x="${x0}" y="${y0 - radius - 6}" text-anchor="middle">y</text>`;
+}
+
 const ward: Figure = (stage) => {
   const ax = stage.slider("α along x", 0.02, 0.8, 0.01, 0.3);
   const ay = stage.slider("α along y", 0.02, 0.8, 0.01, 0.08);
   const angle = stage.slider("Viewer", 0, 80, 1, 30, (x) => `${x}°`);
   stage.draw(async () => {
     const samples = (await stage.app.engines.call("lobeSamples", `ward:${ax()}:${ay()}:1`, angle(), 3000, 1)) as Float32Array;
-    const size = 320, context = canvas(stage, size, size, "Directions drawn from Ward's lobe, seen from above");
-    const [middle, radius] = [size / 2, size / 2 - 6];
-    context.strokeStyle = color("line");
-    for (const theta of [30, 60, 90]) {
-      context.beginPath();
-      context.arc(middle, middle, radius * Math.sin(theta * Math.PI / 180), 0, 2 * Math.PI);
-      context.stroke();
-    }
-    context.fillStyle = color("first");
-    context.globalAlpha = 0.5;
+    const view = hemisphere(0), theta = angle() * Math.PI / 180;
+    const dots: string[] = [];
     let [sx, sy, mx] = [0, 0, 0];
     const n = samples.length / 3;
     for (let i = 0; i < samples.length; i += 3) {
-      const [x, y] = samples.subarray(i, i + 2);
-      context.fillRect(middle + radius * x - 1, middle - radius * y - 1, 2, 2);
+      const [x, y, z] = samples.subarray(i, i + 3);
+      dots.push(`M${fromAbove([x, y, z], view).map((c) => c.toFixed(1)).join(" ")}h0`);
       [sx, sy, mx] = [sx + x * x, sy + y * y, mx + x];
     }
-    context.globalAlpha = 1;
-    stage.say(`Spread along x ${short(Math.sqrt(sx / n - (mx / n) ** 2))}, along y ${short(Math.sqrt(sy / n))}; rings at 30°, 60° and 90°.`);
+    const mark = (name: string, side: number) => {
+      const [x, y] = fromAbove([side * Math.sin(theta), 0, Math.cos(theta)], view);
+      return `<circle class="axis" cx="${x}" cy="${y}" r="5"/><text class="name halo" x="${x}" y="${y + 20}" text-anchor="middle">${name}</text>`;
+    };
+    stage.svg(`<svg viewBox="0 0 ${2 * view[0]} ${view[1] + 158}" aria-hidden="true">${rings(view)}<path class="first dots" d="${dots.join("")}"/>${mark("viewer", -1)}${mark("mirror", 1)}</svg>`,
+      "Directions drawn from Ward’s lobe, seen from above");
+    stage.say(`Spread along x ${short(Math.sqrt(sx / n - (mx / n) ** 2))}, along y ${short(Math.sqrt(sy / n))} (standard deviations of the direction); rings are 30°, 60° and 90° from the normal.`);
   });
 };
+
+/** Half vectors in the middle of patches: polar angle toward the mirror direction and azimuth [degrees]. */
+const PATCHES: Point[] = [[0, 0], [18, 60], [20, -70], [40, 130], [38, -140]];
+/** Their angular radius [degrees]. */
+const PATCH = 6;
 
 const halfVectors: Figure = (stage) => {
   const angle = stage.slider("Viewer", 0, 85, 1, 40, (x) => `${x}°`);
   stage.draw(() => {
-    const o = -angle() * Math.PI / 180, [x0, y0, r] = [320, 280, 250];
-    const at = (theta: number, length: number) => `${x0 + length * Math.sin(theta)} ${y0 - length * Math.cos(theta)}`;
-    const parts: string[] = [], factors: number[] = [];
+    const radians = Math.PI / 180, o = -angle() * radians, width = figureWidth(), x0 = width / 2, r = Math.min(240, x0 - 30), y0 = r + 40;
+    const at = (theta: number, length: number) => `${(x0 + length * Math.sin(theta)).toFixed(1)} ${(y0 - length * Math.cos(theta)).toFixed(1)}`;
+    const directions: string[] = [], halves: string[] = [];
     for (let k = -8; k <= 8; k++) {
-      const half = k * Math.PI / 36, direction = 2 * half - o;
-      parts.push(`<path class="second line faint" d="M${x0} ${y0}L${at(half, 0.45 * r)}"/>`);
-      if (Math.abs(direction) < Math.PI / 2) {
-        factors.push(1 / (4 * Math.cos(direction - half)));
-        parts.push(`<path class="first line" d="M${x0} ${y0}L${at(direction, r)}"/>`);
-      }
+      const half = k * 5 * radians, direction = 2 * half - o;
+      halves.push(`M${x0} ${y0}L${at(half, 0.4 * r)}`);
+      if (Math.abs(direction) < Math.PI / 2) directions.push(`M${at(direction, 0.45 * r)}L${at(direction, r)}`);
     }
-    parts.push(`<path class="axis" d="M20 ${y0}H620M${x0} ${y0}L${at(o, r)}"/><text class="name" x="${at(o, r + 14).split(" ")[0]}" y="${at(o, r + 10).split(" ")[1]}" text-anchor="middle">viewer</text>`);
-    parts.push(`<path class="second line" d="M8 14h16"/><text class="name" x="30" y="18">half vectors, every 5°</text><path class="first line" d="M8 32h16"/><text class="name" x="30" y="36">directions</text>`);
-    stage.svg(`<svg viewBox="0 0 640 300" aria-hidden="true">${parts.join("")}</svg>`, "Half vectors and the directions that they mirror to");
-    stage.say(`${factors.length} of 17 directions are above the surface; the factor 1 / (4 ωh·ωi) is between ${short(Math.min(...factors))} and ${short(Math.max(...factors))}.`);
+    const [x, y] = at(o, r + 10).split(" ");
+    const plane = `<svg viewBox="0 0 ${width} ${y0 + 12}" aria-hidden="true"><path class="axis" d="M20 ${y0}H${width - 20}M${x0} ${y0}L${at(o, r)}"/>
+      <path class="first line" d="${directions.join("")}"/><path class="second line" d="${halves.join("")}"/>
+      <text class="name" x="${x}" y="${y}" text-anchor="end">viewer</text>
+      <path class="second line" d="M8 14h16"/><text class="name" x="30" y="18">half vectors, every 5°</text><path class="first line" d="M8 32h16"/><text class="name" x="30" y="36">directions, every 10°</text></svg>`;
+    const view = hemisphere(width < 480 ? 36 : 0), wo: Vector = [Math.sin(o), 0, Math.cos(o)];
+    const dot = (a: Vector, b: Vector) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    const mirror = (h: Vector) => h.map((c, k) => 2 * dot(wo, h) * c - wo[k]) as Vector;
+    const factors: number[] = [];
+    const patches = PATCHES.flatMap(([theta, phi]) => {
+      const [st, ct, sp, cp] = [Math.sin(theta * radians), Math.cos(theta * radians), Math.sin(phi * radians), Math.cos(phi * radians)];
+      const middle: Vector = [st * cp, st * sp, ct], u: Vector = [ct * cp, ct * sp, -st], v: Vector = [-sp, cp, 0];
+      const [s, c] = [Math.sin(PATCH * radians), Math.cos(PATCH * radians)];
+      const rim = Array.from({ length: 48 }, (_, i) => {
+        const [a, b] = [s * Math.cos(i * Math.PI / 24), s * Math.sin(i * Math.PI / 24)];
+        return middle.map((m, j) => c * m + a * u[j] + b * v[j]) as Vector;
+      });
+      const path = (points: Vector[], kind: string) => `<path class="${kind} patch" d="M${points.map((p) => fromAbove(p, view).map((t) => t.toFixed(1)).join(" ")).join("L")}Z"/>`;
+      const mirrored = rim.map(mirror), growth = 4 * dot(middle, wo);
+      const shown = path(rim, "second");
+      // A patch that is below the surface in part is not reflected.
+      if (growth <= 0 || mirrored.some((p) => p[2] < 0)) return [shown];
+      factors.push(growth);
+      const [x, y] = fromAbove(mirror(middle), view);
+      return [path(mirrored, "first"), shown, `<text class="name halo" x="${x.toFixed(1)}" y="${(y + 4).toFixed(1)}" text-anchor="middle">× ${growth.toFixed(1)}</text>`];
+    });
+    const [vx, vy] = fromAbove(wo, view);
+    const above = `<svg viewBox="0 0 ${width} ${view[1] + 158}" aria-hidden="true">${rings(view)}${patches.join("")}<circle class="axis" cx="${vx}" cy="${vy}" r="5"/><text class="name halo" x="${vx}" y="${vy + 20}" text-anchor="middle">viewer</text>
+      <path class="second line" d="M8 14h16"/><text class="name" x="30" y="18">patches of half vectors</text><path class="first line" d="M8 32h16"/><text class="name" x="30" y="36">mirrored, × their growth</text></svg>`;
+    stage.svg(plane + above, "Half vectors and the directions that they mirror to, in the plane of incidence and from above");
+    stage.say(`${directions.length} of 17 directions are above the surface; the patches grow ${factors.length ? `${short(Math.min(...factors))} to ${short(Math.max(...factors))} times` : "beyond the horizon"}: 4 ωh·ωi.`);
   });
 };
 
@@ -190,7 +242,7 @@ const inversion: Figure = (stage) => {
     const table = new Table(p), top = Math.max(...line(200, p).map((q) => q[1]));
     const samples = Array.from({ length: n() }, (_, i): Point => [table.sample((i + 0.5) / n()), (i + 0.5) / n()]);
     stage.svg(plot([
-      { name: `density, of ${short(top)}`, kind: "second", points: line(200, (x) => p(x) / top), as: "area" }, { name: "P(x)", kind: "first", points: line(200, (x) => table.at(x)) },
+      { name: `density, greatest ${short(top)}`, kind: "second", points: line(200, (x) => p(x) / top), as: "area" }, { name: "P(x)", kind: "first", points: line(200, (x) => table.at(x)) },
       { name: "", kind: "first", points: samples, as: "dots" }, { name: "", kind: "third", points: samples.map(([x]): Point => [x, 0]), as: "dots" },
     ], { x: { name: "x", range: [0, 1] }, y: { name: "u", range: [0, 1] } }), "A cumulative distribution and samples by its inverse");
     const inside = samples.filter(([x]) => Math.abs(x - 0.7) < 2 * peak()).length;
@@ -198,29 +250,19 @@ const inversion: Figure = (stage) => {
   });
 };
 
-/** The map's luminance, small, with what each row covers. */
-async function mapTable(stage: Stage, width = 128) {
-  const rgb = (await stage.app.engines.call("map", width)) as Float32Array;
-  const height = width / 2;
-  const luminance = Array.from({ length: width * height }, (_, i) => 0.2126 * rgb[3 * i] + 0.7152 * rgb[3 * i + 1] + 0.0722 * rgb[3 * i + 2]);
-  const sin = Array.from({ length: height }, (_, y) => Math.cos(Math.PI * y / height) - Math.cos(Math.PI * (y + 1) / height));
-  return { rgb, luminance, sin, width, height };
-}
-
 const rowsAndColumns: Figure = (stage) => {
-  const weighted = stage.choice("Rows count", [["1", "with sin θ"], ["", "all alike (wrong)"]]);
+  const weighted = stage.choice("Rows count", [["solid-angle", "with sin θ"], ["alike", "all alike (wrong)"]]);
   const chosen = stage.slider("Row", 0, 63, 1, 24);
   stage.draw(async () => {
-    const { luminance, sin, width, height } = await mapTable(stage);
-    const sums = sin.map((s, y) => (weighted() ? s : 1) * luminance.slice(y * width, (y + 1) * width).reduce((a, b) => a + b, 0));
-    const total = sums.reduce((a, b) => a + b, 0) || 1, y = chosen();
-    const row = luminance.slice(y * width, (y + 1) * width), sum = row.reduce((a, b) => a + b, 0) || 1;
-    stage.svg(plot([{ name: "p(y)", kind: "first", points: sums.map((s, i): Point => [i, s / total]), as: "bars" }, { name: "", kind: "second", points: [[y, sums[y] / total]], as: "dots" }],
-      { x: { name: "row y, from the top", range: [-1, height] }, y: { name: "probability of a row", range: [0, Math.max(...sums) / total] }, height: 170 })
-      + plot([{ name: `p(x | y = ${y})`, kind: "second", points: row.map((s, i): Point => [i, s / sum]), as: "bars" }],
-        { x: { name: "column x", range: [-1, width] }, y: { name: "probability of a column", range: [0, Math.max(...row) / sum] }, height: 170 }), "Probabilities of rows, and of columns in the chosen one");
-    const poles = (sums.slice(0, 4).reduce((a, b) => a + b, 0) + sums.slice(-4).reduce((a, b) => a + b, 0)) / total;
-    stage.say(`Row ${y} is drawn with probability ${short(sums[y] / total)}; the four rows at each pole together with ${short(poles)}.`);
+    const width = 128, height = width / 2, y = chosen();
+    const { rows, columns } = JSON.parse(await stage.app.engines.call("rowProbabilities", width, y, weighted() === "solid-angle")) as { rows: number[]; columns: number[] };
+    const points = (values: number[]) => values.map((p, i): Point => [i, p]);
+    stage.svg(plot([{ name: "p(y)", kind: "first", points: points(rows), as: "bars" }, { name: "", kind: "second", points: [[y, rows[y]]], as: "dots" }],
+      { x: { name: "row y, from the top", range: [-1, height] }, y: { name: "probability of a row", range: [0, Math.max(...rows)] }, height: 170 })
+      + plot([{ name: `p(x | y = ${y})`, kind: "second", points: points(columns), as: "bars" }],
+        { x: { name: "column x", range: [-1, width] }, y: { name: "probability of a column", range: [0, Math.max(...columns)] }, height: 170 }), "Probabilities of rows, and of columns in the chosen one");
+    const poles = [...rows.slice(0, 4), ...rows.slice(-4)].reduce((a, b) => a + b, 0);
+    stage.say(`Row ${y} is drawn with probability ${short(rows[y])}; the four rows at each pole together with ${short(poles)}.`);
   });
 };
 
@@ -244,28 +286,20 @@ function paintMap(context: CanvasRenderingContext2D, rgb: Float32Array, width: n
 const environmentSamples: Figure = (stage) => {
   const n = stage.slider("Samples", 0, 11, 1, 7, (x) => String(2 ** x));
   stage.draw(async () => {
-    const { rgb, luminance, sin, width, height } = await mapTable(stage, 256);
-    const weights = luminance.map((l, i) => l * sin[Math.floor(i / width)]);
-    const rows = Array.from({ length: height }, (_, y) => weights.slice(y * width, (y + 1) * width));
-    const table = new Table((y) => rows[Math.min(Math.floor(y * height), height - 1)].reduce((a, b) => a + b, 0), height);
-    const random = generator(3), context = canvas(stage, 640, 320, "Samples of the environment");
+    const { engines, envName } = stage.app, width = 320, count = 2 ** n();
+    const rgb = (await engines.call("map", width)) as Float32Array;
+    const { places, nInBrightest, shareOfBrightest } = JSON.parse(await engines.call("mapSamples", count, 3)) as { places: Point[]; nInBrightest: number; shareOfBrightest: number };
+    const context = canvas(stage, 640, 320, "Samples of the environment");
     paintMap(context, rgb, width);
-    const order = [...weights].sort((a, b) => b - a), limit = order[Math.floor(order.length / 100)];
-    let inside = 0;
-    const count = 2 ** n();
-    for (let k = 0; k < count; k++) {
-      const y = table.sample((k + random()) / count), row = rows[Math.min(Math.floor(y * height), height - 1)];
-      const x = new Table((u) => row[Math.min(Math.floor(u * width), width - 1)], width).sample(random());
-      if (row[Math.min(Math.floor(x * width), width - 1)] > limit) inside++;
+    for (const [u, v] of places) {
       context.beginPath();
-      context.arc(640 * x, 320 * y, 2.5, 0, 2 * Math.PI);
+      context.arc(640 * u, 320 * v, 2.5, 0, 2 * Math.PI);
       context.fillStyle = "#fff";
       context.fill();
       context.strokeStyle = "#000";
       context.stroke();
     }
-    const share = order.slice(0, Math.floor(order.length / 100)).reduce((a, b) => a + b, 0) / order.reduce((a, b) => a + b, 0);
-    stage.say(`${inside} of ${count} samples (${short(100 * inside / count)} %) lie in the brightest hundredth of ${stage.app.envName}, which holds ${short(100 * share)} % of its light.`);
+    stage.say(`${nInBrightest} of ${count} samples (${short(100 * nInBrightest / count)} %) lie in the brightest hundredth of ${envName}, which has ${short(100 * shareOfBrightest)} % of its light.`);
   });
 };
 
@@ -273,7 +307,7 @@ const environmentSamples: Figure = (stage) => {
 const light = (x: number) => 0.15 + 4 * gauss(x, 0.35, 0.02) + 0.7 * gauss(x, 0.75, 0.15);
 
 const combination: Figure = (stage) => {
-  const width = stage.slider("Lobe", -3, -0.3, 0.1, -1.3, (x) => `width ${short(10 ** x)}`);
+  const width = stage.slider("Lobe", -3, -0.3, 0.1, -1.3, (x) => `width ${Number((10 ** x).toPrecision(2))}`);
   const split = stage.slider("Of 16 from the light", 1, 15, 1, 8);
   const heuristic = stage.choice("Weights", [["1", "balance"], ["2", "power"]]);
   stage.draw(() => {
@@ -303,7 +337,7 @@ const product: Figure = (stage) => {
   stage.draw(() => {
     const lobe = (x: number) => gauss(x, center(), width());
     const f = (x: number) => light(x) * lobe(x), total = integral(f, 4000), p = (x: number) => f(x) / total;
-    const visible = integral((x) => (x < hidden() ? p(x) : 0), 4000), exact = visible * total;
+    const visible = integral((x) => (x < hidden() ? p(x) : 0), 4000), hiddenShare = 1 - visible, exact = visible * total;
     const q = normalized(light), r = normalized(lobe);
     const relative = (d: (x: number) => number) => {
       const second = integral((x) => (x < hidden() && d(x) > 0 ? f(x) ** 2 / d(x) : 0), 4000);
@@ -313,15 +347,16 @@ const product: Figure = (stage) => {
     stage.svg(plot([
       { name: "light", kind: "second", points: line(400, (x) => light(x) / top(light)) }, { name: "lobe", kind: "first", points: line(400, lobe) },
       { name: "product", kind: "third", points: line(400, (x) => p(x) / top(p)), as: "area" },
+      { name: "hidden", kind: "shade", points: [[hidden(), 0], [1, 0]], as: "band" },
     ], { x: { name: "direction", range: [0, 1] }, y: { name: "relative to the greatest", range: [0, 1.05] } }), "Light, lobe and their product");
-    stage.say(`${short(100 * visible)} % of the product is visible. Relative deviation of one sample: light ${relative(q)}, lobe ${relative(r)}, product ${visible > 0 ? short(Math.sqrt((1 - visible) / visible)) : "–"}.`);
+    stage.say(`${short(100 * visible)} % of the product is visible. Relative deviation of one sample: light ${relative(q)}, lobe ${relative(r)}, product ${visible > 0 ? short(hiddenShare > 1e-9 ? Math.sqrt(hiddenShare / visible) : 0) : "–"}.`);
   });
 };
 
 const target = normalized((x) => light(x) * gauss(x, 0.5, 0.12));
 
 const rejection: Figure = (stage) => {
-  const bound = stage.slider("Envelope", 0.3, 3, 0.05, 1, (x) => `${short(x)} of what is needed`);
+  const bound = stage.slider("Envelope", 0.3, 3, 0.05, 1, (x) => `${x.toFixed(2)} × the least`);
   stage.draw(() => {
     const q = normalized(light), needed = Math.max(...line(2000, (x) => target(x) / q(x)).map((p) => p[1]));
     const c = bound() * needed, table = new Table(q), random = generator(5);
@@ -331,9 +366,9 @@ const rejection: Figure = (stage) => {
       (y < target(x) ? kept : lost).push([x, y]);
     }
     stage.svg(plot([
-      { name: "c · q", kind: "second", points: line(400, (x) => c * q(x)) }, { name: "target", kind: "first", points: line(400, target) },
-      { name: "", kind: "second", points: lost, as: "dots" }, { name: "", kind: "first", points: kept, as: "dots" },
-    ], { x: { name: "direction", range: [0, 1] }, y: { name: "density", range: [0, Math.max(c * q(0.35), 5)] }, height: 280 }), "Tries under an envelope");
+      { name: "rejected", kind: "second", points: lost, as: "dots" }, { name: "kept", kind: "first", points: kept, as: "dots" },
+      { name: "envelope c · q", kind: "second", points: line(400, (x) => c * q(x)) }, { name: "target", kind: "first", points: line(400, target) },
+    ], { x: { name: "direction", range: [0, 1] }, y: { name: "density", range: [0, Math.max(c * q(0.35), 10)] }, height: 280 }), "Tries under an envelope");
     const bias = integral((x) => Math.max(target(x) - c * q(x), 0));
     stage.say(`${kept.length} of 800 tries are kept (1 / c = ${short(1 / c)})${bias > 1e-3 ? `; ${short(100 * bias)} % of the target sticks out of the envelope and is lost` : ""}.`);
   });
@@ -357,54 +392,81 @@ const resampling: Figure = (stage) => {
     const distance = 0.5 * bars.reduce((sum, [x, y]) => sum + Math.abs(y - integral((u) => target(x + (u - 0.5) / bins), 20)) / bins, 0);
     stage.svg(plot([
       { name: "picked", kind: "third", points: bars, as: "bars" }, { name: "candidates", kind: "second", points: line(400, q) }, { name: "target", kind: "first", points: line(400, target) },
-    ], { x: { name: "direction", range: [0, 1] }, y: { name: "density", range: [0, 8] }, height: 260 }), "A histogram of what resampling picks");
-    stage.say(`${short(100 * distance)} % of the picks lie where the target has no room for them.`);
+    ], { x: { name: "direction", range: [0, 1] }, y: { name: "density", range: [0, 10] }, height: 260 }), "A histogram of what resampling picks");
+    // What counting so many picks of the target itself would differ.
+    const noise = 0.5 * bars.reduce((sum, [x]) => { const p = integral((u) => target(x + (u - 0.5) / bins), 20) / bins; return sum + Math.sqrt(2 * p * (1 - p) / (Math.PI * picks)); }, 0);
+    stage.say(`The histogram of ${picks.toLocaleString("en-US")} picks differs from the target by ${percentage(distance)} (half the sum of all differences); the noise of counting makes ${percentage(noise)}.`);
   });
 };
+
+/** What each of the four ways is called, its strategy at the counts, and with few samples at a time for a set time. */
+const WAYS = [
+  { name: "environment", counts: "100", strategy: "environment:100", few: "environment:4" },
+  { name: "reflectance", counts: "75", strategy: "brdf:75", few: "brdf:4" },
+  { name: "both", counts: "50 : 38", strategy: "mis:50:38", few: "mis:2:2" },
+  { name: "resampling", counts: "15/800", strategy: "sir:15/800", few: "sir:15/800" },
+];
+/** How the picture to compare with is made. */
+const TRUTH = { strategy: "product:16", spp: 32 };
+/** What each way has in equal time [ms]. */
+const EQUAL_TIME = 500;
+
+type Rendered = { film: Film; statistics: Statistics };
+
+/** The relative squared error of a picture, in the mean over the pixels, without what the truth errs. */
+function relativeError({ film }: Rendered, truth: Rendered): number {
+  const luminance = (pixels: Float32Array, i: number) => 0.2126 * pixels[i] + 0.7152 * pixels[i + 1] + 0.0722 * pixels[i + 2];
+  let sum = 0;
+  for (let i = 0; i < film.pixels.length; i += 4) {
+    const y = luminance(truth.film.pixels, i);
+    sum += (luminance(film.pixels, i) - y) ** 2 / (y * y + 0.01);
+  }
+  return Math.max((sum - (truth.statistics.relativeVariance ?? 0)) / (film.pixels.length / 4), 0);
+}
 
 const fourWays: Figure = (stage) => {
   const by = stage.choice("Compare", [["counts", "at the counts named above"], ["time", "in half a second each"]]);
   const diffuse = stage.slider("Diffuse share", 0, 0.8, 0.1, 0);
-  const ways: [string, string][] = [["environment:100", "environment, 100"], ["brdf:75", "reflectance, 75"], ["mis:50:38", "both, 50 : 38"], ["sir:15/800", "resampling, 15 of 800"]];
-  const size = 96, figures = ways.map(([, name]) => {
+  const size = 96, figures = WAYS.map(({ name, counts }) => {
     const element = h("canvas", { width: String(size), height: String(size), role: "img", "aria-label": `A sphere by ${name}` });
-    const caption = h("figcaption", {}, name);
+    const caption = h("figcaption", {}, `${name}, ${counts}`);
     return { view: new FilmView(element, false), caption, figure: h("figure", {}, element, caption) };
   });
   stage.drawing.replaceChildren(h("div", { class: "quartet" }, ...figures.map((f) => f.figure)));
+  const host = stage.app.engines.extra(), truths = new Map<number, Rendered>();
   let token = 0;
+  /** A picture, ended after a while if it is timed. */
+  const render = (strategy: string, spp: number, milliseconds = 0) => new Promise<Rendered>((resolve, reject) => {
+    const film = new Film(size, size), mine = ++token;
+    const end = milliseconds ? performance.now() + milliseconds : Infinity;
+    host.onRender = (message) => {
+      if (message.token !== mine) return;
+      if (message.kind === "failed") reject(new Error(message.error));
+      if (message.kind !== "update") return;
+      film.put(message.windows, message.pixels);
+      if (message.complete || performance.now() >= end) resolve({ film, statistics: message.statistics });
+    };
+    host.send({ kind: "render", token: mine, settings: JSON.stringify({ width: size, height: size, spp, strategy, seed: mine, hideEnvironment: true, camera: null, shard: [0, 1] }) });
+  });
   stage.draw(async () => {
-    const host = stage.app.engines.extra();
-    await host.call("loadScene", JSON.stringify({ scene: "sphere-orthographic", material: `phong:50:1:${diffuse()}`, ground: false }));
+    const share = diffuse(), timed = by() === "time";
+    await host.call("loadScene", JSON.stringify({ scene: "sphere-orthographic", material: `phong:50:1:${share}`, ground: false }));
     await host.call("loadEnvironment", JSON.stringify({ probe: "cathedral", rows: 128, rotate: 0, scale: 1, exposure: 0 }));
-    const told: string[] = [];
-    for (const [k, [strategy, name]] of ways.entries()) {
-      const film = new Film(size, size), timed = by() === "time";
-      let exposed = false;
-      const started = performance.now(), mine = ++token;
-      let last: Extract<FromWorker, { kind: "update" }> | undefined;
-      await new Promise<void>((resolve, reject) => {
-        const timer = timed ? setTimeout(resolve, 500) : 0;
-        host.onRender = (message) => {
-          if (message.token !== mine) return;
-          if (message.kind === "failed") reject(new Error(message.error));
-          if (message.kind !== "update") return;
-          film.put(message.windows, message.pixels);
-          last = message;
-          if (message.complete) { clearTimeout(timer); resolve(); }
-        };
-        const few = timed && k === 3 ? strategy : timed ? strategy.replace("100", "4").replace("75", "4").replace("50:38", "2:2") : strategy;
-        host.send({ kind: "render", token: mine, settings: JSON.stringify({ width: size, height: size, spp: timed ? 4096 : 1, strategy: few, seed: 0, hideEnvironment: true, camera: null, shard: [0, 1] }) });
-      });
+    const truth = truths.get(share) ?? await render(TRUTH.strategy, TRUTH.spp);
+    truths.set(share, truth);
+    const found: string[] = [];
+    for (const [k, { name, counts, strategy, few }] of WAYS.entries()) {
+      const started = performance.now();
+      const picture = await (timed ? render(few, 4096, EQUAL_TIME) : render(strategy, 1));
       host.send({ kind: "stop" });
-      if (!exposed) figures[k].view.set({ exposure: 0, curve: "agx" });
-      exposed = true;
-      figures[k].view.show(0, film);
+      const { view, caption } = figures[k];
+      view.set({ exposure: 0, curve: "agx" });
+      view.show(0, picture.film);
       const seconds = (performance.now() - started) / 1000;
-      figures[k].caption.textContent = `${name.split(",")[0]}${timed ? "" : `,${name.split(",")[1]}`}: ${short(seconds)} s`;
-      if (last) told.push(`${name.split(",")[0]} ${short(last.statistics.shadowRays / 1000)} thousand rays`);
+      caption.replaceChildren(timed ? name : `${name}, ${counts}`, h("br"), `error ${short(Number(relativeError(picture, truth).toPrecision(2)))}, ${seconds.toFixed(2)} s`);
+      found.push(`${name} ${short(picture.statistics.shadowRays / 1000)} thousand rays`);
     }
-    stage.say(`Traced: ${told.join(", ")}.`);
+    stage.say(`Errors are relative squares, in the mean over the pixels. Traced: ${found.join(", ")}.`);
   });
 };
 
@@ -425,7 +487,7 @@ const biasAndVariance: Figure = (stage) => {
       return [n, Math.sqrt(squares / runs)];
     });
     stage.svg(plot([{ name: "random samples", kind: "first", points: noisy }, { name: "fixed lights", kind: "second", points: fixed }],
-      { x: { name: "N", log: true, range: [2, 1000], ticks: [2, 10, 100, 1000] }, y: { name: "error", log: true, range: [1e-5, 1] } }), "Error of random and of fixed points");
+      { x: { name: "number of samples or lights N", log: true, range: [2, 1000], ticks: [2, 10, 100, 1000] }, y: { name: "absolute error", log: true, range: [1e-5, 1] } }), "Error of random and of fixed points");
     stage.say(`At N = ${counts.at(-1)} the noise is ${short(noisy.at(-1)![1])} and the bias ${short(fixed.at(-1)![1])}; at N = ${counts[8]} they are ${short(noisy[8][1])} and ${short(fixed[8][1])}.`);
   });
 };
@@ -433,19 +495,17 @@ const biasAndVariance: Figure = (stage) => {
 const cuts = (method: string, other: string): Figure => (stage) => {
   const rounds = stage.slider("Lights", 0, 9, 1, 4, (k) => String(2 ** k));
   stage.draw(async () => {
-    const { engines } = stage.app, n = 2 ** rounds(), width = 512;
+    const { engines } = stage.app, n = 2 ** rounds(), width = 640;
     const ask = async (name: string) => JSON.parse(await engines.call("lights", JSON.stringify({ method: name, refine: true, n, sun: false, lamps: 0 })));
     const beside = await ask(other), rig = await ask(method);
     const regions = (await engines.call("regions", width)) as Uint32Array;
-    const rgb = (await engines.call("map", width)) as Float32Array;
-    const context = canvas(stage, 640, 320, `The map in ${n} regions`);
-    paintMap(context, rgb, width);
+    const rgb = (await engines.call("map", width / 2)) as Float32Array;
+    const context = canvas(stage, width, width / 2, `The map in ${n} regions`);
+    paintMap(context, rgb, width / 2);
     context.fillStyle = "rgb(255 255 255 / 0.8)";
-    const [sx, sy] = [640 / width, 640 / width];
     regions.forEach((label, i) => {
-      const x = i % width, below = regions[i + width];
-      if (label !== regions[i - x + (x + 1) % width]) context.fillRect((x + 1) * sx - 0.5, Math.floor(i / width) * sy, 1, sy);
-      if (below !== undefined && label !== below) context.fillRect(x * sx, (Math.floor(i / width) + 1) * sy - 0.5, sx, 1);
+      const x = i % width, below = regions[i + width] ?? label;
+      if (label !== below || label !== regions[i - x + (x + 1) % width]) context.fillRect(x, Math.floor(i / width), 1, 1);
     });
     for (const { uv, share } of rig.lights as { uv: Point; share: number }[]) {
       context.beginPath();

@@ -1,7 +1,7 @@
 // The Lights panel: a probe as a rig, its regions, how it shades, and its files.
 
 import type { App, Change } from "./app";
-import { $, h, latest, save, short } from "./dom";
+import { $, h, latest, percentage, save, short, words } from "./dom";
 import { Film, FilmView } from "./film";
 import { isBuiltinProbe, quoted } from "./state";
 
@@ -19,6 +19,12 @@ const STEP = 700;
 const RULES: Record<string, string> = {
   "median-cut": "across its longer side, so that both parts have the same light",
   "variance-minimization": "where the variance of both parts adds up to the least",
+};
+
+/** What reads the formats. */
+const READERS: Record<string, string> = {
+  json: "domelight", csv: "spreadsheets", gltf: "glTF", glb: "glTF", usd: "OpenUSD", blender: "Blender", mitsuba: "Mitsuba", pbrt: "pbrt",
+  three: "three.js", radiance: "Radiance", sibl: "sIBL",
 };
 
 interface Rig {
@@ -46,7 +52,8 @@ function splits(before: Uint32Array, after: Uint32Array): Set<number> {
 /** Whether a number of lights has regions of its own instead of those of the number before with one divided. */
 const isRefined = (method: string, refine: boolean) => refine && method === "variance-minimization";
 
-const percent = (x: number) => `${short(100 * x)} %`;
+/** An error; less says nothing. */
+const percent = (x: number) => (x < 1e-5 ? "< 0.001 %" : `${short(100 * x)} %`);
 
 export class LightsPanel {
   private map = new FilmView($<HTMLCanvasElement>("rig-film"), false);
@@ -166,18 +173,19 @@ export class LightsPanel {
       sphere.show(0, picture);
     }
     const lights = rig.lights.length;
-    $("rig-caption").textContent = `${lights} light${lights === 1 ? "" : "s"} of ${app.envName}${rig.residual ? ", beside what they leave on the map" : ""}. Error of shading: matte ${percent(rig.diffuse)}, glossy ${percent(rig.glossy)}.`;
+    $("rig-caption").textContent = `${lights} light${lights === 1 ? "" : "s"} of ${app.envName}${rig.residual ? `, beside what ${lights === 1 ? "it leaves" : "they leave"} on the map` : ""}. Error of shading: matte ${percent(rig.diffuse)}, glossy ${percent(rig.glossy)}.`;
     $("rig-table").querySelector("tbody")!.replaceChildren(...rig.lights.slice(0, 6).map((light) =>
-      h("tr", {}, h("th", { scope: "row" }, light.name.replace("_", " ")), h("td", {}, percent(light.share)), h("td", {}, `${short(light.radius)}°`))));
+      h("tr", {}, h("th", { scope: "row" }, light.name.replace("_", " ")), h("td", {}, percentage(light.share)), h("td", {}, `${light.radius.toFixed(1)}°`))));
     this.offer(leave);
     document.documentElement.dataset.rig = `${state.method}:${lights}`;
   });
 
   /** What the last step did. */
   private tellStep(divided: Set<number>, lights: number) {
-    const { method, refine } = this.app.state;
+    const { method, refine, leave } = this.app.state;
     const before = this.before ? lights - this.before.lights : 0;
-    $("rig-step").textContent = isRefined(method, refine) ? "The map is cut into twice as many parts as there are lights; those that belong together are joined, and the lights move to the centers of their light. Without Refine, each step divides a region."
+    $("rig-step").textContent = leave ? "Suns and lamps become lights; the rest of the light stays on the map, which goes along as a dome."
+      : isRefined(method, refine) ? "The map is cut into twice as many parts as there are lights; those that belong together are joined, and the lights move to the centers of their light. Without Refine, each step divides a region."
       : divided.size === 0 ? `Each step divides a region ${RULES[method]}.`
         : before === 1 ? `This step divided the region along the orange line ${RULES[method]}.`
           : `These ${before} steps divided regions along the orange lines, each ${RULES[method]}.`;
@@ -217,8 +225,8 @@ export class LightsPanel {
   /** Buttons of all files, and the command that makes them. */
   private offer(leave: boolean) {
     const { app } = this, { state } = app, rig = this.rig!;
-    const button = (name: string, bytes: () => Promise<Uint8Array>) => {
-      const element = h("button", { type: "button" }, name);
+    const button = (name: string, bytes: () => Promise<Uint8Array>, reader = "") => {
+      const element = h("button", { type: "button" }, name, ...(reader ? [h("small", {}, reader)] : []));
       element.addEventListener("click", async () => {
         try {
           save(name, await bytes());
@@ -230,14 +238,14 @@ export class LightsPanel {
       return element;
     };
     $("formats").replaceChildren(...rig.formats.map((format) =>
-      button(`rig.${format.extension}`, () => app.engines.call("rigFile", format.name, app.envName) as Promise<Uint8Array>)));
+      button(`rig.${format.extension}`, () => app.engines.call("rigFile", format.name, app.envName) as Promise<Uint8Array>, READERS[format.name])));
     const domes = [...new Set(rig.formats.flatMap((format) => format.dome ?? []))];
     $("dome-files").replaceChildren(...domes.map((name) => button(name, () => app.engines.call("domeFile", name) as Promise<Uint8Array>)));
-    const words = ["domelight", "lights", state.env, ...(isBuiltinProbe(state.env) ? [`--env-rows=${state.rows}`] : []),
+    const command = ["domelight", "lights", state.env, ...(isBuiltinProbe(state.env) ? [`--env-rows=${state.rows}`] : []),
       ...(state.rotate ? [`--env-rotate=${state.rotate}`] : []), ...(state.scale === 1 ? [] : [`--env-scale=${state.scale}`]), ...(state.ev ? [`--env-exposure=${state.ev}`] : []), ...(state.sun ? ["--sun"] : []),
       ...(leave ? ["--keep-residual", "dome.exr"] : ["-n", String(state.lights)]), "--method", state.method, "-o", "rig.json"];
     // The program refines.
     $("rig-command").hidden = state.method === "variance-minimization" && !state.refine;
-    $("rig-command").textContent = words.map(quoted).join(" ");
+    $("rig-command").replaceChildren(...words(command.map(quoted)));
   }
 }

@@ -1,14 +1,14 @@
 // The Picture panel: the progressive picture, its camera, material, strategies, and what it costs.
 
 import type { App, Change } from "./app";
-import { $, color, count, degrees, fill, save, short, signed, stops } from "./dom";
+import { $, color, count, degrees, fill, save, short, signed, stops, words } from "./dom";
 import { materialEditor, strategyEditor } from "./editors";
 import type { Camera, Job, RenderSettings } from "./engines";
 import { Film, FilmView } from "./film";
 import { plot, slope, type Series } from "./plot";
 import { Reference } from "./reference";
-import { PROBES, SCENES, command, toHash } from "./state";
-import { CURVES, type Curve } from "./tone";
+import { PROBES, SCENES, command, commandWords, toHash } from "./state";
+import { CURVES, CURVE_NAMES, type Curve } from "./tone";
 
 type Vec = [number, number, number];
 const sub = (a: number[], b: number[]): Vec => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -272,8 +272,8 @@ export class PicturePanel {
     const slopes = series.map((s) => `${s.name}: ${short(s.points.at(-1)?.[1] ?? NaN)}, slope ${signed(slope(s.points))}`);
     $("error-plot").setAttribute("aria-label", `Estimated relative variance. ${slopes.join("; ")}`);
     $("error-plot").parentElement!.querySelector("figcaption")!.textContent =
-      `Estimated error over shadow rays — ${series.map((s) => { const k = slope(s.points); return isFinite(k) ? `${s.name} falls with slope ${signed(k)}` : `${s.name}: two passes are needed`; }).join("; ")}${measured.length ? ". Dots: measured against the reference" : ""}`;
-    $("command").textContent = command(this.app.state);
+      `Estimated error over shadow rays — ${series.map((s) => { const k = slope(s.points); return !isFinite(k) ? `${s.name}: two passes are needed` : k < 0 ? `${s.name} falls with slope ${signed(k)}` : `${s.name}: too few samples for a slope`; }).join("; ")}${measured.length ? ". Dots: measured against the reference" : ""}`;
+    $("command").replaceChildren(...words(commandWords(this.app.state)));
   }
 
   // ---- what is shown of it
@@ -293,7 +293,7 @@ export class PicturePanel {
       $(id).hidden = !split;
       $(id).textContent = text;
     }
-    $("command").textContent = command(state);
+    $("command").replaceChildren(...words(commandWords(state)));
     const marks = $<HTMLCanvasElement>("film-marks"), context = marks.getContext("2d")!;
     context.clearRect(0, 0, marks.width, marks.height);
     if (state.pixel) {
@@ -426,7 +426,7 @@ export class PicturePanel {
     fill($("scene"), withFile(SCENES, app.files.scenes, state.scene), state.scene);
     fill($("env"), withFile(PROBES, app.files.probes, state.env), state.env);
     this.fillCameras();
-    fill($("curve"), CURVES, state.curve);
+    fill($("curve"), CURVES.map((curve): [string, string] => [curve, CURVE_NAMES[curve]]), state.curve);
     $<HTMLSelectElement>("view").value = state.view;
     $<HTMLInputElement>("ground").checked = state.ground;
     $<HTMLInputElement>("hide").checked = state.hide;

@@ -1,13 +1,13 @@
 // Plots as SVG.
 
-import { short } from "./dom";
+import { short, superscript } from "./dom";
 
 export interface Series {
   name: string;
   points: [number, number][];
-  kind: "first" | "second" | "third";
-  /** Drawn as bars, dots or an area instead of a line. */
-  as?: "line" | "dots" | "bars" | "area" | "faint";
+  kind: "first" | "second" | "third" | "shade";
+  /** Drawn as bars, dots or an area instead of a line; a band is all between two places of x. */
+  as?: "line" | "dots" | "bars" | "area" | "band";
 }
 
 export interface Axes {
@@ -43,15 +43,41 @@ function ticksOf([low, high]: [number, number], log = false): number[] {
   return Array.from({ length: Math.floor((high - first) / step + 1e-9) + 1 }, (_, i) => Number((first + i * step).toPrecision(10)));
 }
 
+/** Powers of ten where one of the ticks is written as one. */
+function labels(ticks: number[], log = false): string[] {
+  const isLong = (t: number) => t !== 0 && (Math.abs(t) >= 1e4 || Math.abs(t) < 1e-3);
+  const power = (t: number) => (t === 1 || t === 10 ? String(t) : `10${superscript(Math.round(Math.log10(t)))}`);
+  return log && ticks.some(isLong) && ticks.every((t) => Math.abs(Math.log10(t) % 1) < 1e-6) ? ticks.map(power) : ticks.map(short);
+}
+
+/** How wide a text of a plot is. */
+const widthOf = (() => {
+  let context: CanvasRenderingContext2D | null = null;
+  return (text: string) => {
+    context ??= document.createElement("canvas").getContext("2d")!;
+    context.font = `12px ${getComputedStyle(document.documentElement).fontFamily}`;
+    return context.measureText(text).width;
+  };
+})();
+
+/** The sign of a series in the legend, 14 wide, that ends at `x`. */
+function swatch({ kind, as }: Series, x: number, y: number): string {
+  if (as === "dots") return `<circle class="${kind} fill" cx="${x - 7}" cy="${y}" r="3"/>`;
+  if (as === "bars" || as === "area" || as === "band") return `<rect class="${kind} fill faint" x="${x - 14}" y="${y - 5}" width="14" height="10"/>`;
+  return `<path class="${kind} line" d="M${x - 14} ${y}h14"/>`;
+}
+
+/** How wide a figure is: text keeps its size on a phone. */
+export const figureWidth = () => Math.min(640, Math.max(320, document.documentElement.clientWidth - 32));
+
 /** An SVG of series over two axes. */
 export function plot(series: Series[], axes: Axes): string {
-  // Text keeps its size on a phone.
-  const width = axes.width ?? Math.min(640, Math.max(320, document.documentElement.clientWidth - 32)), height = axes.height ?? 240;
+  const width = axes.width ?? figureWidth(), height = axes.height ?? 240;
   const named = series.filter((s) => s.name);
-  const ofLegend = named.reduce((sum, s) => sum + 6.6 * s.name.length + 34, 0);
+  const ofLegend = named.reduce((sum, s) => sum + widthOf(s.name) + 36, 0);
   const [left, right, bottom] = [58, 14, 38];
   // Below the axis's name where both do not fit side by side.
-  const legendAt = left + 6.6 * axes.y.name.length + ofLegend > width - right ? 30 : 12, top = legendAt + 10;
+  const legendAt = left + widthOf(axes.y.name) + ofLegend > width - right ? 30 : 12, top = legendAt + 10;
   const xs = axes.x.range ?? extent(series.flatMap((s) => s.points.map((p) => p[0])), axes.x.log);
   const ys = axes.y.range ?? extent(series.flatMap((s) => s.points.map((p) => p[1])), axes.y.log);
   const share = (v: number, [low, high]: [number, number], log = false) =>
@@ -60,24 +86,28 @@ export function plot(series: Series[], axes: Axes): string {
   const Y = (v: number) => height - bottom - (height - top - bottom) * Math.min(Math.max(share(v, ys, axes.y.log), -0.02), 1.02);
   const at = (p: [number, number]) => `${X(p[0]).toFixed(1)},${Y(p[1]).toFixed(1)}`;
   const out: string[] = [];
-  for (const t of axes.y.ticks ?? ticksOf(ys, axes.y.log)) {
-    out.push(`<path class="grid" d="M${left} ${Y(t)}H${width - right}"/><text x="${left - 7}" y="${Y(t) + 4}" text-anchor="end">${short(t)}</text>`);
+  const ofY = axes.y.ticks ?? ticksOf(ys, axes.y.log), ofX = axes.x.ticks ?? ticksOf(xs, axes.x.log);
+  for (const [i, label] of labels(ofY, axes.y.log).entries()) {
+    const y = Y(ofY[i]);
+    out.push(`<path class="grid" d="M${left} ${y}H${width - right}"/><text x="${left - 7}" y="${y + 4}" text-anchor="end">${label}</text>`);
   }
-  for (const t of axes.x.ticks ?? ticksOf(xs, axes.x.log)) {
-    const label = axes.x.tick ? axes.x.tick(t) : short(t);
-    const anchor = X(t) > width - right - 12 ? "end" : "middle";
+  for (const [i, label] of (axes.x.tick ? ofX.map(axes.x.tick) : labels(ofX, axes.x.log)).entries()) {
+    const t = ofX[i], anchor = X(t) > width - right - 12 ? "end" : "middle";
     out.push(`<text x="${X(t)}" y="${height - bottom + 17}" text-anchor="${anchor}">${escape(label)}</text>`);
   }
   const base = Y(axes.y.log ? ys[0] : Math.max(ys[0], Math.min(0, ys[1])));
   for (const s of series) {
     const points = s.points.filter(([x, y]) => isFinite(x) && isFinite(y) && (!axes.y.log || y > 0) && (!axes.x.log || x > 0));
     if (!points.length) continue;
-    if (s.as === "dots") out.push(...points.map((p) => `<circle class="${s.kind} fill" cx="${X(p[0]).toFixed(1)}" cy="${Y(p[1]).toFixed(1)}" r="3"/>`));
+    if (s.as === "dots") out.push(...points.map((p) => `<circle class="${s.kind} fill" cx="${X(p[0]).toFixed(1)}" cy="${Y(p[1]).toFixed(1)}" r="${points.length > 200 ? 1.5 : 3}"/>`));
     else if (s.as === "bars") {
       const w = points.length > 1 ? Math.abs(X(points[1][0]) - X(points[0][0])) * 0.9 : 8;
       out.push(...points.map((p) => `<rect class="${s.kind} fill faint" x="${(X(p[0]) - w / 2).toFixed(1)}" y="${Math.min(Y(p[1]), base).toFixed(1)}" width="${w.toFixed(1)}" height="${Math.abs(Y(p[1]) - base).toFixed(1)}"/>`));
+    } else if (s.as === "band") {
+      const [from, to] = [X(points[0][0]), X(points[points.length - 1][0])];
+      out.push(`<rect class="${s.kind} fill faint" x="${from}" y="${top}" width="${to - from}" height="${height - bottom - top}"/>`);
     } else if (s.as === "area") out.push(`<path class="${s.kind} fill faint" d="M${X(points[0][0])},${base}L${points.map(at).join("L")}L${X(points[points.length - 1][0])},${base}Z"/>`);
-    else out.push(`<path class="${s.kind} line${s.as === "faint" ? " faint" : ""}" d="M${points.map(at).join("L")}"/>`);
+    else out.push(`<path class="${s.kind} line" d="M${points.map(at).join("L")}"/>`);
   }
   out.push(`<path class="axis" d="M${left} ${height - bottom}H${width - right}"/>`);
   out.push(`<text x="${(left + width - right) / 2}" y="${height - 4}" text-anchor="middle">${escape(axes.x.name)}</text>`);
@@ -85,9 +115,9 @@ export function plot(series: Series[], axes: Axes): string {
   let legend = width - right;
   for (const s of [...named].reverse()) {
     out.push(`<text class="name" x="${legend}" y="${legendAt}" text-anchor="end">${escape(s.name)}</text>`);
-    legend -= 6.6 * s.name.length + 8;
-    out.push(`<path class="${s.kind} line" d="M${legend - 14} ${legendAt - 4}h14"/>`);
-    legend -= 26;
+    legend -= widthOf(s.name) + 6;
+    out.push(swatch(s, legend, legendAt - 4));
+    legend -= 30;
   }
   return `<svg viewBox="0 0 ${width} ${height}" aria-hidden="true">${out.join("")}</svg>`;
 }

@@ -110,8 +110,8 @@ function isOfKind(key: string, value: unknown, fallback: unknown): boolean {
 
 export const quoted = (word: string) => (/^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
 
-/** The command that renders the same picture. */
-export function command(state: State): string {
+/** The command that renders the same picture, word by word. */
+export function commandWords(state: State): string[] {
   const words = ["domelight", "render", state.scene, "--env", state.env];
   const option = (name: string, value: string) => words.push(`--${name}=${value}`);
   if (isBuiltinProbe(state.env)) option("env-rows", String(state.rows));
@@ -137,8 +137,9 @@ export function command(state: State): string {
   if (state.exposure !== null) option("exposure", String(state.exposure));
   if (state.curve !== "agx") option("tone", state.curve);
   words.push("-o", "domelight.exr", "-o", "domelight.png");
-  return words.map(quoted).join(" ");
+  return words.map(quoted);
 }
+export const command = (state: State) => commandWords(state).join(" ");
 
 export const PROBES = ["sky", "studio", "cathedral", "constant"];
 export const SCENES = ["statue", "spheres", "material-ball", "sphere", "sphere-orthographic"];

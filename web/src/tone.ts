@@ -2,6 +2,7 @@
 
 export const CURVES = ["agx", "aces", "neutral", "reinhard", "standard"] as const;
 export type Curve = (typeof CURVES)[number];
+export const CURVE_NAMES: Record<Curve, string> = { agx: "AgX", aces: "ACES", neutral: "Khronos neutral", reinhard: "Reinhard", standard: "standard" };
 
 export const GLSL = `
 vec3 aces(vec3 c) {

@@ -1,11 +1,11 @@
 // The X-ray panel: the hemisphere above a pixel, where strategies send their rays, and why the pixel is noisy.
 
 import type { App, Change } from "./app";
-import { $, color, h, latest, short } from "./dom";
+import { $, color, h, latest, percentage, short } from "./dom";
 import { Film, FilmView } from "./film";
 
 const SIZE = 160, DENSITY = 48;
-const LAYERS = ["light L", "reflectance f · cos θ", "visibility V", "what arrives, f · cos θ · L · V"];
+const LAYERS = ["light L", "reflectance f · cos θ", "visibility V", "what arrives, f · cos θ · L · V"];
 const COMPARED = ["brdf:1", "environment:1", "mis:1:1", "product:8", "sir:2/32", "rejection:16"];
 
 interface Report {
@@ -127,7 +127,7 @@ export class XrayPanel {
       ...s.causes.slice(0, 4).map(([name, share]) => {
         const bar = h("div", { class: "bar" });
         bar.style.width = `${Math.max(0, Math.min(100, 100 * share))}%`;
-        return h("div", { class: "cause" }, h("span", {}, name), h("div", {}, bar), h("span", {}, percent(share)));
+        return h("div", { class: "cause" }, h("span", {}, name), h("div", {}, bar), h("span", {}, percentage(share)));
       }),
     ]));
   }

@@ -9,6 +9,7 @@ mod lights;
 mod lobe;
 mod map;
 mod picture;
+mod rows;
 mod session;
 mod setup;
 
