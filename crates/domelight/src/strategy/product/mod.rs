@@ -7,9 +7,8 @@
 //! 1. A `table` holds the light times the reflectance of each cell.
 //! 2. `candidates` are strata along the curve, each with one direction from the pool, and BRDF samples where the table
 //!    approximates the BRDF badly, weighted by the balance heuristic.
-//! 3. The tile's pixels are processed in [levels](super::levels). Those of the first level, the *pilots*, trace all
-//! their
-//!    candidates. From the rays of each level, the tile learns the `visibility` V̂ of each cell and the brightness of
+//! 3. The tile's pixels are processed in [levels](super::levels). Those of the first level, the *pilots*, trace
+//!    all their candidates. From the rays of each level, the tile learns the `visibility` V̂ of each cell and the brightness of
 //!    its pixels.
 //! 4. In the next levels, the integral of a `control_variate` h over all cells, seen through V̂, approximates the
 //!    reflected light. `systematic` sampling traces the candidates whose visibility matters:

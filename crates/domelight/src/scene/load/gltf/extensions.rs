@@ -88,7 +88,7 @@ pub(super) fn check(
         match effect(name) {
             Effect::Read => {}
             Effect::Harmless(text) => {
-                warn(&format!("the extension {name} is not supported; {text}"))
+                warn(&format!("the extension {name} is not supported; {text}"));
             }
             Effect::Unknown if !required.contains(name) => {
                 warn(&format!("the extension {name} is unknown and ignored"));
