@@ -11,11 +11,11 @@ use domelight::strategy::PreparedStrategy;
 
 use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
 use crate::clock;
-use crate::error::UsageError;
+use crate::error::{UsageError, status};
 use crate::interrupt;
 use crate::memory;
 use crate::output::{self, PicturePath, print_progress, require_one_on_standard_output};
-use crate::parse::Size;
+use crate::parse::{Rotation, Size};
 use crate::preview;
 use crate::progress::RenderProgress;
 use crate::render_run::TryWriting;
@@ -139,6 +139,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let stages = Timings { load, build, render, write: watch.lap(), total };
     let points = || pilot_points(scene, camera, settings);
     let rejection = acceptance(spec, points, environment, settings.seed)?;
+    let rotate = described.scene.environment.rotate();
     let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
     report.profile = progress.profile();
     report.denoised = denoised;
@@ -149,6 +150,9 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         report.print_json()?;
     } else if !quiet {
         report.print_summary();
+        if arguments.scene.environment.env_rotate == Some(Rotation::Auto) {
+            status(&format!("--env-rotate auto turned the environment by {rotate:.2} degrees"));
+        }
     }
     report.check(saved, arguments.render_run.is_part(), quiet)
 }

@@ -46,6 +46,14 @@ fn a_page_that_needs_nothing_else() {
     assert!(page.starts_with("<!doctype html>") && !page.contains("{{"));
     assert!(!page.contains("src=\"http") && !page.contains("<script"));
     assert!(page.contains("Pixel 3, 4 of sphere"));
+
+    // The shares of each strategy sum to 100 %, but for rounding.
+    for causes in page.split("<article>").skip(1) {
+        let causes = causes.split("</article>").next().unwrap();
+        let shares = causes.split("class=\"share\">").skip(1);
+        let sum: f64 = shares.map(|s| s.split(' ').next().unwrap().parse::<f64>().unwrap()).sum();
+        assert!((sum - 100.0).abs() < 0.4, "{sum} %: {causes}");
+    }
 }
 
 #[test]

@@ -177,6 +177,9 @@ fn views_frame_the_subject_and_light_is_turned_to_them() {
     };
     let turn = (rotation("right") - rotation("front")).rem_euclid(360.0);
     assert!((turn - 90.0).abs() < 0.1, "{turn}");
+    let said = render(&folder, &["sphere", "--env", "sky", "--env-rotate", "auto", "-o", "x.pfm"]);
+    succeeded(&said);
+    assert!(stderr(&said).contains("turned the environment by"), "{}", stderr(&said));
 
     refused(&render(&folder, &["sphere", "--view", "side"]), 2, &["side", "three-quarter"]);
     refused(

@@ -58,6 +58,11 @@ impl EnvironmentReport {
         &self.probe
     }
 
+    /// The turn about the up axis, counterclockwise seen from above \[degrees\].
+    pub fn rotate(&self) -> f32 {
+        self.rotate
+    }
+
     /// The report of a probe with this name, without folders, used as `light` says.
     pub fn new(probe: String, light: &EnvironmentSettings, environment: &Environment) -> Self {
         Self {

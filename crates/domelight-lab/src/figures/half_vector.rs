@@ -20,8 +20,9 @@ const MATERIAL: &str = "ggx:0.3";
 const VIEWER: f64 = 40.0;
 /// Angular radius of the patches of half vectors [degrees].
 const PATCH: f32 = 6.0;
-/// Half vectors in the middle of patches: polar angle toward the viewer's side and azimuth [degrees].
-const PATCHES: [(f32, f32); 4] = [(0.0, 0.0), (12.0, 180.0), (32.0, 70.0), (24.0, -55.0)];
+/// Half vectors in the middle of patches: polar angle and azimuth, 180 toward the viewer [degrees]. The labels of the
+/// patches that they reflect to do not overlap.
+const PATCHES: [(f32, f32); 4] = [(0.0, 0.0), (24.0, 90.0), (24.0, 40.0), (24.0, -75.0)];
 /// Width of the slice around the plane of incidence, and of its bins, of which none straddles the normal [degrees].
 const SLICE: f64 = 12.0;
 const BIN: f64 = 5.0;
@@ -64,7 +65,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
              solid angle of ω<sub>i</sub> is thinner by as much.</p>\
              <p>Below: the lobe {MATERIAL} seen {VIEWER}° from the normal, cut along the plane of incidence. {n} directions that were \
              drawn follow the density with the Jacobian. Without it the density integrates to {without}, not to {with}, the \
-             share of the samples that end above the horizon: an estimate that divides by it is as much too dark.</p>",
+             share of the samples that end above the horizon: an estimate that divides by it is too dark by the ratio of the two.</p>",
             MATERIAL = MATERIAL,
             VIEWER = VIEWER,
             n = n,
@@ -223,7 +224,13 @@ fn sphere(wo: Vec3) -> Document {
         let r = radius * degrees / 90.0;
         panel.circle((center + 12.0, center + 12.0), r, Style::stroke(Color::FAINT, 1.4));
     }
-    for patch in patches(wo) {
+    let patches = patches(wo);
+    let middle = |rim: &[Vec3]| at(rim.iter().copied().sum::<Vec3>().normalize());
+    for patch in &patches {
+        let (a, b) = (middle(&patch.half_vectors), middle(&patch.directions));
+        panel.line(a, b, Style::stroke(Color::GRAY, 1.0).dashed(4.0));
+    }
+    for patch in &patches {
         let loop_of = |rim: &[Vec3]| -> Vec<Point> {
             rim.iter().chain(rim.first()).map(|&w| at(w)).collect()
         };
@@ -231,12 +238,10 @@ fn sphere(wo: Vec3) -> Document {
             panel.polyline(loop_of(rim), Style::fill(color).opacity(0.35));
             panel.polyline(loop_of(rim), Style::stroke(color, 2.0));
         }
-        let middle = |rim: &[Vec3]| rim.iter().copied().sum::<Vec3>().normalize();
-        let (a, b) = (at(middle(&patch.half_vectors)), at(middle(&patch.directions)));
-        panel.line(a, b, Style::stroke(Color::GRAY, 1.0).dashed(4.0));
+        let (x, y) = middle(&patch.directions);
         let times = format!("× {:.2}", patch.reflected_solid_angle / patch.solid_angle);
         let style = TextStyle::new(15.0).anchor(Anchor::Middle).halo();
-        panel.text((b.0, b.1 + 5.0), &times, style);
+        panel.text((x, y + 5.0), &times, style);
     }
     panel.circle(at(wo), 6.0, Style::fill(PALETTE[0]).outlined(Color::WHITE, 1.0));
     let (x, y) = at(wo);

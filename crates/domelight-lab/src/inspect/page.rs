@@ -74,6 +74,7 @@ fn causes(report: &InspectionReport) -> Code<Html> {
     let mut all = Code::default();
     for StrategyReport { decomposition, diagnosis, .. } in &report.strategies {
         let mut list = Code::default();
+        let percent = |share: f64| number(format!("{:.1}", (1000.0 * share).round() / 10.0 + 0.0));
         for Share { cause, share } in decomposition.shares.iter().take(SHOWN_CAUSES) {
             list += code!(
                 Html,
@@ -82,7 +83,17 @@ fn causes(report: &InspectionReport) -> Code<Html> {
                 cause = html::text(&cause.to_string()),
                 class = if cause.is_between_samples() { " class=\"between\"" } else { "" },
                 width = (100.0 * share.clamp(0.0, 1.0)).round(),
-                share = number(format!("{:.1}", (1000.0 * share).round() / 10.0 + 0.0)),
+                share = percent(*share),
+            );
+        }
+        let others: f64 = decomposition.shares.iter().skip(SHOWN_CAUSES).map(|s| s.share).sum();
+        if others.abs() >= 5e-4 {
+            list += code!(
+                Html,
+                "<li><span>other causes</span><span class=\"bar\"><i style=\"width:{width}%\"></i></span>\
+                 <span class=\"share\">{share} %</span></li>",
+                width = (100.0 * others.clamp(0.0, 1.0)).round(),
+                share = percent(others),
             );
         }
         all += code!(
@@ -149,7 +160,7 @@ fn sources(report: &InspectionReport) -> Code<Html> {
     }
     code!(
         Html,
-        "<table><thead><tr><th scope=\"col\">Strategy</th><th scope=\"col\">Source</th>\
+        "<table><thead><tr><th scope=\"col\">Strategy</th><th scope=\"col\" class=\"words\">Source</th>\
          <th scope=\"col\">Share of<br>the light</th><th scope=\"col\">Share of<br>the rays</th>\
          <th scope=\"col\">Rays<br>unoccluded</th><th scope=\"col\">Hits that<br>it reaches</th></tr></thead>\
          <tbody>{rows}</tbody></table>",
