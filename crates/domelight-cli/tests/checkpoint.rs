@@ -236,7 +236,7 @@ fn another_render_is_not_gone_on_with() {
         &["its background is shown, that of this render hidden"],
     );
     refused(&["--spp", "4", "--target-error", "1"], &["its target-error is none"]);
-    refused(&["--spp", "3"], &["4 samples", "--spp 3"]);
+    refused(&["--spp", "3"], &["4 samples", "--spp is 3"]);
     refused(&["--spp", "4", "--size", "71x50"], &["its size is 70x50", "c.exr"]);
     ended(&render(&folder, &["--resume", "gone.exr"]), 2, &["gone.exr", "No such file"]);
     ended(&render(&folder, &["--resume", "c.png"]), 2, &["c.png", ".exr"]);
@@ -337,7 +337,7 @@ fn budgets_end_the_render_with_what_is_there() {
     let report: serde_json::Value = common::json(&output);
     assert_eq!((&report["complete"], &report["stopped"]), (&false.into(), &"time".into()));
     let part = ["--spp", "10000000", "--time", "300ms", "--shard", "0/2", "-o", "part.exr"];
-    ended(&render(&folder, &part), 75, &["time is over", "part.exr"]);
+    ended(&render(&folder, &part), 75, &["the time is up", "part.exr"]);
     let precise = ["--spp", "1024", "--target-error", "0.02", "-o", "y.exr", "--json"];
     let report: serde_json::Value = common::json(&render(&folder, &precise));
     assert_eq!(report["complete"], true);

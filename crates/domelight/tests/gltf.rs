@@ -614,7 +614,7 @@ fn vertices_that_are_not_finite_are_left_out_unless_that_is_refused() {
         has(warning, &["a.gltf", "vertex 5", "'soup'", "1 of 2 triangles", "left out"]);
         let refused = load_with(&file(&soup(bad)).path, &strict()).unwrap();
         let error = Scene::new(refused.description).unwrap_err().to_string();
-        has(&error, &["soup", "vertex 5", "not finite"]);
+        has(&error, &["soup", "vertex 5", "non-finite"]);
     }
     assert_eq!(loaded(&soup(1.0)).warnings, [""; 0]);
 }

@@ -509,7 +509,7 @@ fn vertices_at_no_place_take_their_triangles_with_them() {
     let obj = "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     let description = load(Folder::new().with("a.obj", obj).path("a.obj")).unwrap().description;
     let error = Scene::new(description).unwrap_err().to_string();
-    assert!(error.contains("vertex 0") && error.contains("not finite"), "{error}");
+    assert!(error.contains("vertex 0") && error.contains("non-finite"), "{error}");
 }
 
 fn close_f(a: f32, b: f32) -> bool {

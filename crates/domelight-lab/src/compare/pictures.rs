@@ -211,7 +211,7 @@ mod tests {
         assert_eq!((times.0["a"], times.0["b,c"]), (2.0, 90.0));
         for (text, why) in [
             ("a 2", "line 1: 'a 2' is not NAME,SECONDS"),
-            ("a,2\nb,c,soon", "line 2: 'soon' is no number"),
+            ("a,2\nb,c,soon", "line 2: 'soon' is not a number"),
             ("d,2", "line 1: there is no picture d.exr"),
         ] {
             let error = Times::parse(text, &pictures).err().unwrap().to_string();

@@ -439,7 +439,7 @@ mod tests {
         };
         assert!(broken(|d| d.parts[0].mesh.triangles[0][1] = 7).contains("vase"));
         assert!(broken(|d| d.parts[0].mesh.positions[2].y = f32::NAN).contains("vase"));
-        assert!(broken(|d| d.parts[0].material = 3).contains("surface 3"));
+        assert!(broken(|d| d.parts[0].material = 3).contains("material 3"));
         let texture = |d: &mut SceneDescription| {
             d.materials[0].normal_map = Some(NormalMap { texture: TextureRef::new(2), scale: 1.0 });
         };
