@@ -116,7 +116,7 @@ impl Stage {
         let EnvironmentSource::Builtin(probe) = &light.source else { panic!("a built-in probe") };
         let map = probe.parse::<BuiltinProbe>().expect("a probe").image(64);
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
-        let environment = Environment::new(map, orientation, light.factor()).expect("a map");
+        let environment = Environment::new(map, orientation, light.factor().expect("a factor")).expect("a map");
         let scene =
             Scene::builtin(builtin).with_instruction_set(instruction_set).expect("instructions");
         Self { builtin, scene, environment, instruction_set }
