@@ -480,7 +480,7 @@ test("dropped files are shown, and their errors named", async () => {
   assert.equal(await page.inputValue("#env"), "blue.hdr");
   await drop(page, [["broken.obj", "v 0 0 0\nf 1 2 3\n"]]);
   await page.waitForSelector("#status.error");
-  assert.match(await text(page, "#status"), /broken\.obj, line 2: index 2 names no vertex/);
+  assert.match(await text(page, "#status"), /broken\.obj, line 2: index 2 refers to no vertex/);
   await drop(page, [["notes.txt", "hello"]]);
   await page.waitForFunction(() => /notes\.txt is neither/.test(document.getElementById("status").textContent));
   await done();
