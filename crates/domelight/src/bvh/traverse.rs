@@ -643,6 +643,22 @@ struct ClosestStream {
     stack: StreamStack,
 }
 
+impl ClosestStream {
+    /// Ends ray `i` at a hit.
+    #[inline(always)]
+    fn shorten(&mut self, i: usize, hit: Hit) {
+        self.limits[i] = hit.t;
+        self.hits[i] = Some(hit);
+    }
+
+    /// Pushes the children of a node that any of `rays` enters.
+    #[inline(always)]
+    fn descend<S: Simd>(&mut self, simd: S, bvh: &Bvh, child: Child, rays: u64) {
+        let node = &bvh.nodes[child.index()];
+        self.stack.push_by_distance(simd, node, &self.rays, &self.limits, rays);
+    }
+}
+
 impl Stream for ClosestStream {
     const EMPTY: Self = Self {
         rays: PreparedRays::EMPTY,
@@ -675,15 +691,13 @@ impl Stream for ClosestStream {
         if child.is_leaf() {
             for i in set_bits(rays) {
                 let (limit, closest) = (self.limits[i], self.hits[i]);
-                let hit = closest_in_block(simd, bvh, child, &self.rays, i, limit, closest);
-                if let Some(hit) = hit {
-                    self.limits[i] = hit.t;
-                    self.hits[i] = Some(hit);
+                if let Some(hit) = closest_in_block(simd, bvh, child, &self.rays, i, limit, closest)
+                {
+                    self.shorten(i, hit);
                 }
             }
         } else {
-            let node = &bvh.nodes[child.index()];
-            self.stack.push_by_distance(simd, node, &self.rays, &self.limits, rays);
+            self.descend(simd, bvh, child, rays);
         }
         self.stack.prefetch(simd, bvh);
         true
@@ -699,13 +713,8 @@ impl Stream for ClosestStream {
 
 /// [`Bvh::closest_hit_where`] of up to [`STREAM`] rays.
 struct WhereStream<F> {
-    rays: PreparedRays<STREAM>,
-    limits: [f32; STREAM],
-    /// The closest that were accepted.
-    hits: [Option<Hit>; STREAM],
-    /// Where the rays are in their batch.
-    members: Range<usize>,
-    stack: StreamStack,
+    /// The rays and the closest hits that were accepted.
+    closest: ClosestStream,
     /// Hits that are yet to be accepted or refused, with the numbers of their rays in the batch.
     candidates: [(usize, Hit); STREAM],
     n_candidates: usize,
@@ -724,10 +733,9 @@ impl<F: Fn(&[(usize, Hit)], &mut [bool])> WhereStream<F> {
         let mut accepted = [false; STREAM];
         accept(candidates, &mut accepted[..self.n_candidates]);
         for (&(ray, hit), &is_accepted) in candidates.iter().zip(&accepted) {
-            let i = (ray - self.members.start) % STREAM;
-            if is_accepted && is_nearer(&hit, self.hits[i]) {
-                self.limits[i] = hit.t;
-                self.hits[i] = Some(hit);
+            let i = (ray - self.closest.members.start) % STREAM;
+            if is_accepted && is_nearer(&hit, self.closest.hits[i]) {
+                self.closest.shorten(i, hit);
             }
         }
         self.n_candidates = 0;
@@ -736,18 +744,13 @@ impl<F: Fn(&[(usize, Hit)], &mut [bool])> WhereStream<F> {
 
 impl<F: Fn(&[(usize, Hit)], &mut [bool])> Stream for WhereStream<F> {
     const EMPTY: Self = Self {
-        rays: PreparedRays::EMPTY,
-        limits: [0.0; STREAM],
-        hits: [None; STREAM],
-        members: 0..0,
-        stack: StreamStack::EMPTY,
+        closest: ClosestStream::EMPTY,
         candidates: [(0, Hit { t: 0.0, u: 0.0, v: 0.0, triangle: 0 }); STREAM],
         n_candidates: 0,
         accept: PhantomData,
     };
 
-    /// With the number of the first.
-    type Rays<'a> = (usize, &'a [Ray]);
+    type Rays<'a> = <ClosestStream as Stream>::Rays<'a>;
     type Context<'a>
         = &'a F
     where
@@ -755,20 +758,13 @@ impl<F: Fn(&[(usize, Hit)], &mut [bool])> Stream for WhereStream<F> {
     type Answer = Option<Hit>;
 
     #[inline(always)]
-    fn start<S: Simd>(&mut self, simd: S, bvh: &Bvh, (first, rays): (usize, &[Ray])) {
-        for (i, ray) in rays.iter().enumerate() {
-            self.rays.set(i, ray.origin, ray.direction);
-            self.limits[i] = last_below(ray.t_max);
-        }
-        self.hits[..rays.len()].fill(None);
-        self.members = first..first + rays.len();
-        let valid = self.rays.prepare(simd, octant(rays[0].direction), rays.len(), &bvh.bounds);
-        self.stack.push(Child::node(0), valid);
+    fn start<S: Simd>(&mut self, simd: S, bvh: &Bvh, rays: Self::Rays<'_>) {
+        self.closest.start(simd, bvh, rays);
     }
 
     #[inline(always)]
     fn advance<S: Simd>(&mut self, simd: S, bvh: &Bvh, accept: &F) -> bool {
-        let Some((child, rays)) = self.stack.pop(u64::MAX) else {
+        let Some((child, rays)) = self.closest.stack.pop(u64::MAX) else {
             if self.n_candidates > 0 {
                 self.decide(accept);
             }
@@ -776,9 +772,9 @@ impl<F: Fn(&[(usize, Hit)], &mut [bool])> Stream for WhereStream<F> {
         };
         if child.is_leaf() {
             for i in set_bits(rays) {
-                let (limit, closest) = (self.limits[i], self.hits[i]);
-                let ray = self.members.start + i;
-                for_hits_in_block(simd, bvh, child, &self.rays, i, limit, |hit| {
+                let (limit, closest) = (self.closest.limits[i], self.closest.hits[i]);
+                let ray = self.closest.members.start + i;
+                for_hits_in_block(simd, bvh, child, &self.closest.rays, i, limit, |hit| {
                     if is_nearer(&hit, closest) {
                         self.candidates[self.n_candidates] = (ray, hit);
                         self.n_candidates += 1;
@@ -793,18 +789,15 @@ impl<F: Fn(&[(usize, Hit)], &mut [bool])> Stream for WhereStream<F> {
                 self.decide(accept);
             }
         } else {
-            let node = &bvh.nodes[child.index()];
-            self.stack.push_by_distance(simd, node, &self.rays, &self.limits, rays);
+            self.closest.descend(simd, bvh, child, rays);
         }
-        self.stack.prefetch(simd, bvh);
+        self.closest.stack.prefetch(simd, bvh);
         true
     }
 
     #[inline(always)]
     fn finish(&mut self, answers: &mut [Option<Hit>]) {
-        let members = std::mem::take(&mut self.members);
-        let count = members.len();
-        answers[members].copy_from_slice(&self.hits[..count]);
+        self.closest.finish(answers);
     }
 }
 
