@@ -184,7 +184,7 @@ export class PicturePanel {
     }
     const errors = this.films.map((film) => reference.error(film));
     const named = errors.map((error, i) => (errors.length > 1 ? `${this.jobs[i].strategy} ` : "") + short(error)).join(", ");
-    legend.textContent = `Blue pixels are too dark, orange ones too bright; full color is an error of 100 %, black one of 0.4 % or less. Relative squared error: ${named}, against ${Math.round(reference.statistics!.samples)} samples a pixel of a reference whose own variance, ${short(reference.variance)}, is taken off.`;
+    legend.textContent = `Blue pixels are too dark, orange ones too bright; full color is an error of 100 %, black one of 0.4 % or less. Relative squared error: ${named}, against ${Math.round(reference.statistics!.samples)} samples per pixel of a reference whose own variance, ${short(reference.variance)}, is taken off.`;
     if (this.jobs.every((job) => job.complete)) reference.settle(Math.min(...errors));
     return errors;
   }
