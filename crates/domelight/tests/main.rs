@@ -13,6 +13,7 @@ mod gltf;
 mod grid;
 mod inspect;
 mod mapping;
+mod materials;
 mod picture_io;
 mod product_sampling;
 mod product_strategy;

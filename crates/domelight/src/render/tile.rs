@@ -664,7 +664,7 @@ impl Batch {
             shadow: Rgb::BLACK,
             unseen: 0.0,
             surface: Some(SurfaceSample {
-                albedo: p.bsdf.albedo(),
+                albedo: context.scene.albedo(hit, p),
                 normal: p.frame.z,
                 depth: context.camera.depth(ray.at(hit.t)) * context.scene.unit(),
             }),

@@ -37,6 +37,26 @@ pub struct Material {
     pub layers: Layers,
 }
 
+/// The BSDF of a material that has the same everywhere on meshes without vertex colors, up to the choice of lobes.
+#[derive(Clone, Debug)]
+pub(super) struct ConstantBsdf {
+    pub(super) bsdf: Bsdf,
+    pub(super) albedo: Rgb,
+}
+
+impl ConstantBsdf {
+    /// `None` if the material has textures, or a coat or sheen, which dim the layers below depending on the view.
+    pub(super) fn of(material: &Material) -> Option<Self> {
+        let is_layered = material.layers.sheen.is_some() || material.layers.clearcoat.is_some();
+        if is_layered || material.shading_textures().next().is_some() {
+            return None;
+        }
+        let mut bsdf = Bsdf::BLACK;
+        material.set_bsdf(&[], &Uvs::default(), Rgb::WHITE, [Vec3::Z, Vec3::Z], &mut bsdf);
+        Some(Self { bsdf, albedo: bsdf.albedo() })
+    }
+}
+
 /// The reflectance model of a material, with its parameters.
 #[derive(Clone, Debug)]
 pub enum MaterialModel {

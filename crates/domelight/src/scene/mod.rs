@@ -44,6 +44,7 @@ use crate::bsdf::Bsdf;
 use crate::bvh::{Bvh, BvhError, InstructionSet};
 use crate::geometry::{Aabb, Mesh, MeshError};
 use coverage::Partial;
+use material::ConstantBsdf;
 
 /// A scene ready for ray tracing.
 #[derive(Debug)]
@@ -52,6 +53,8 @@ pub struct Scene {
     parts: Vec<Part>,
     materials: Vec<Material>,
     textures: Vec<Texture>,
+    /// The BSDFs of the materials that do not vary.
+    constant_bsdfs: Vec<Option<ConstantBsdf>>,
     /// The first triangle of each part in the BVH.
     first_triangle: Vec<u32>,
     /// The BVH over the opaque parts, which come first.
@@ -176,10 +179,12 @@ impl Scene {
         let catches_shadows = used().any(|material| material.catches_shadows);
         let dims = |part: &Part| !materials[part.material].catches_shadows;
         let dims_light = parts[n_opaque..].iter().any(dims);
+        let constant_bsdfs = materials.iter().map(ConstantBsdf::of).collect();
         Ok(Self {
             parts,
             materials,
             textures,
+            constant_bsdfs,
             first_triangle,
             bvh,
             partial,

@@ -74,8 +74,14 @@ impl Scene {
             }
             _ => Vec3::Z,
         };
-        let tint = corner.mix(&part.mesh.colors).unwrap_or(Rgb::WHITE);
-        material.set_bsdf(&self.textures, &uvs, tint, [wo, coat_normal], &mut point.bsdf);
+        let tint = corner.mix(&part.mesh.colors);
+        match (&self.constant_bsdfs[part.material], tint) {
+            (Some(constant), None) => point.bsdf.set(&constant.bsdf, wo),
+            (_, tint) => {
+                let tint = tint.unwrap_or(Rgb::WHITE);
+                material.set_bsdf(&self.textures, &uvs, tint, [wo, coat_normal], &mut point.bsdf);
+            }
+        }
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
         let side = if smooth.dot(ng) < 0.0 { -1.0 } else { 1.0 };
         (point.position, point.ng) = match corner.rise(&part.mesh, position, ng, side) {
@@ -89,9 +95,18 @@ impl Scene {
     #[inline]
     pub(crate) fn constant_material(&self, hit: &Hit) -> Option<usize> {
         let (part, _) = self.locate(hit.triangle);
-        let is_plain = part.mesh.colors.is_empty()
-            && self.materials[part.material].shading_textures().next().is_none();
+        let is_plain = part.mesh.colors.is_empty() && self.constant_bsdfs[part.material].is_some();
         is_plain.then_some(part.material)
+    }
+
+    /// The albedo of a shading point of this scene, seen from above.
+    #[inline]
+    pub(crate) fn albedo(&self, hit: &Hit, point: &ShadingPoint) -> Rgb {
+        let (part, _) = self.locate(hit.triangle);
+        match &self.constant_bsdfs[part.material] {
+            Some(constant) if part.mesh.colors.is_empty() => constant.albedo,
+            _ => point.bsdf.albedo(),
+        }
     }
 
     /// The normals and the tangent at a hit, given the interpolated `normal`.
