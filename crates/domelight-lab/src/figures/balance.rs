@@ -1,4 +1,4 @@
-//! Figure 11: how many candidates for each ray, and how many samples of each kind.
+//! Figure 11: candidates per ray for resampling, and the split of samples between techniques for MIS.
 
 use domelight::code;
 use domelight::quote::Html;
@@ -18,19 +18,19 @@ const MATERIALS: [(&str, &str); 3] = [
     ("Phong, s = 50, kd = 0.5", "phong:50:1:0.5"),
     ("Gold, GGX, α = 0.2", "ggx:0.2:gold"),
 ];
-/// Rays of resampling, and candidates of each.
+/// Rays for resampling, and candidates per ray.
 const RAYS: u32 = 16;
 const RATIOS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
-/// Samples of both kinds together.
+/// Total samples of both techniques.
 const BOTH: u32 = 32;
 const OF_LIGHT: [u32; 9] = [0, 1, 4, 8, 16, 24, 28, 31, 32];
 
-/// A material's errors.
+/// The errors for one material.
 struct Curve {
     name: &'static str,
-    /// Over M/N.
+    /// SIR, over M/N.
     resampled: Vec<(f64, FigureMeasurement)>,
-    /// Over the share of the light's samples.
+    /// MIS, over the share of environment samples.
     combined: Vec<(f64, FigureMeasurement)>,
 }
 
@@ -76,15 +76,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let error = |m: &FigureMeasurement| m.rel_mse;
     let work = |m: &FigureMeasurement| m.rel_mse * m.render.seconds;
     let over_ratio = |title: &str, label: &str, value: fn(&FigureMeasurement) -> f64| {
-        plot(
-            title,
-            "candidates of each ray, M/N",
-            Scale::Log,
-            label,
-            &curves,
-            |c| &c.resampled,
-            value,
-        )
+        plot(title, "candidates per ray, M/N", Scale::Log, label, &curves, |c| &c.resampled, value)
     };
     let over_share = plot(
         &format!("MIS, M + N = {BOTH}"),
@@ -105,20 +97,20 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 19–20 and 28–29",
         caption: code!(
             Html,
-            "<p>Resampling draws M candidates and traces N of them. More candidates bring the {RAYS} rays closer to the \
-             product, until what is left is visibility, which candidates do not know: the error levels off, but the time does \
-             not. Where error × time is least is the best balance; it depends on the material and on what a ray costs, which is \
-             why <code>sir</code> without a number of candidates asks a pilot.</p>\
-             <p>Multiple importance sampling divides {BOTH} rays among M samples of the environment and N of the BRDF, weighed by \
-             the power heuristic. One sample of the kind that a surface needs less costs little, and none of it can cost \
-             everything: the ends of the curves.</p>",
+            "<p>Resampling draws M candidates and traces N of them. More candidates bring the distribution of the {RAYS} rays \
+             closer to the product. Then only visibility, which candidates ignore, adds variance: the error levels off, but the \
+             time keeps growing. The best balance minimizes error × time; it depends on the material and on the cost of a ray, so \
+             <code>sir</code> without a candidate count chooses it with a pilot.</p>\
+             <p>Multiple importance sampling splits {BOTH} rays into M environment samples and N BRDF samples, weighted by \
+             the power heuristic. One sample of the less useful technique costs little; dropping it entirely can ruin the \
+             estimate (the ends of the curves).</p>",
             RAYS = RAYS,
             BOTH = BOTH,
         ),
         formulas: formulas::four_ways(),
         rows: vec![
-            Row::new("Candidates for each ray", resampling),
-            Row::new("Samples of the environment and of the BRDF", vec![over_share]),
+            Row::new("Candidates per ray", resampling),
+            Row::new("Environment and BRDF samples", vec![over_share]),
         ],
         tables: vec![table],
         has_data: true,
@@ -150,7 +142,7 @@ fn measure(scene: &FigureScene, name: &'static str) -> Result<Curve, Error> {
     Ok(curve)
 }
 
-/// A curve for each material.
+/// Plots one curve per material.
 fn plot(
     title: &str,
     x: &str,

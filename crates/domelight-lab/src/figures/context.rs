@@ -1,4 +1,4 @@
-//! What all figures share: the light, the scene, and how pictures are rendered and measured.
+//! Shared by all figures: the light, the scene, and code that renders and measures pictures.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -30,15 +30,15 @@ use crate::scene::{
 use crate::usage::Stopwatch;
 use crate::{At as _, Error, Host};
 
-/// Rows of the map as it is shown.
+/// Rows of the displayed map.
 const SHOWN_ROWS: usize = 240;
 
-/// The light, the scene and the settings of a run.
+/// The light, scene and settings of a run.
 pub struct FigureContext<'a> {
     pub(crate) environment: Environment,
-    /// The map, small enough to be shown.
+    /// The map, downsampled for display.
     pub(crate) map: RgbImage,
-    /// The arguments that all figures of this run have in common, for the commands on the page.
+    /// The arguments common to all figures of this run, for the commands on the page.
     pub(crate) arguments: Code<Shell>,
     pub(crate) probe: String,
     pub(crate) scene: String,
@@ -50,12 +50,12 @@ pub struct FigureContext<'a> {
     references: RefCell<HashMap<String, Rc<Layers>>>,
 }
 
-/// What is in front of the camera.
+/// What the camera sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Subject<'a> {
-    /// The scene as it is.
+    /// The whole scene, unchanged.
     Scene,
-    /// What the scene is about, without floor and plinth, of one material: the lecture's statue.
+    /// The scene's main object in one material, without floor or plinth: the lecture's statue.
     Alone(&'a str),
     /// A white matte sphere that fills an orthographic picture.
     Sphere,
@@ -65,7 +65,7 @@ impl<'a> FigureContext<'a> {
     /// Loads scene and probe.
     ///
     /// # Errors
-    /// If one cannot be used, or the map is black.
+    /// If the scene or the probe cannot be used, or the map is black.
     pub fn load(settings: &FigureSettings, host: &'a dyn Host) -> Result<Self, Error> {
         let (mut description, _) =
             load_scene(&settings.scene, &FileSettings::default(), false, host)?;
@@ -105,12 +105,12 @@ impl<'a> FigureContext<'a> {
         })
     }
 
-    /// `full`, or `quick` in a quick run.
+    /// Returns `full`, or `quick` in a quick run.
     pub(crate) fn choose<T>(&self, full: T, quick: T) -> T {
         if self.quick { quick } else { full }
     }
 
-    /// How the map is shown: exposed automatically, as everywhere.
+    /// The map's tone mapping, with the usual automatic exposure.
     pub(crate) fn map_tone(&self) -> ToneMapping {
         exposed(Exposure::Auto.stops(&self.map, None))
     }
@@ -126,7 +126,7 @@ impl<'a> FigureContext<'a> {
         self.environment.direction(vec2(at(x, map.width), at(y, map.height)))
     }
 
-    /// The middles of the texels of the map as it is shown, in the world, with their solid angles [sr].
+    /// The centers of the displayed map's texels in world space, with their solid angles [sr].
     pub(crate) fn directions(&self) -> impl Iterator<Item = (Vec3, f64)> + '_ {
         let (width, height) = (self.map.width, self.map.height);
         let grid = LatLongGrid::new(width, height);
@@ -164,7 +164,7 @@ impl<'a> FigureContext<'a> {
             name: format!("{subject:?} {width}x{height}"),
             reference: match subject {
                 Subject::Alone(_) => self.choose(split(1024, 1024), split(64, 64)),
-                // Matte for the most part.
+                // Mostly matte.
                 Subject::Scene | Subject::Sphere => self.choose(split(1536, 128), split(64, 16)),
             },
             camera: Camera::new(&view, width, height)?,
@@ -180,7 +180,7 @@ impl<'a> FigureContext<'a> {
     }
 }
 
-/// The flags that a command on the page repeats.
+/// The flags shared by all commands on the page.
 fn common_arguments(settings: &FigureSettings) -> Code<Shell> {
     let mut text = Code::default();
     let mut add = |flag: &'static str, value: String| {
@@ -225,13 +225,13 @@ fn common_arguments(settings: &FigureSettings) -> Code<Shell> {
     text
 }
 
-/// A scene in front of a camera. All its pictures have the same camera rays under one seed, one
-/// a pixel: what differs between them is the estimate of the light alone.
+/// A scene in front of a camera. For one seed, all of its pictures share the same camera rays, one per pixel; they
+/// differ only in the lighting estimate.
 pub(crate) struct FigureScene<'a> {
     context: &'a FigureContext<'a>,
-    /// Names what is seen, not how it is sampled.
+    /// Describes the view, not the sampling.
     name: String,
-    /// Samples of each kind in a pixel of the converged picture.
+    /// Samples per technique in each pixel of the converged picture.
     reference: Split,
     pub(crate) scene: Scene,
     pub(crate) camera: Camera,
@@ -241,7 +241,7 @@ pub(crate) struct FigureScene<'a> {
 /// A picture and its cost.
 pub(crate) struct FigureRender {
     pub(crate) layers: Layers,
-    /// What was done, in words.
+    /// A description of the strategy.
     pub(crate) strategy: String,
     pub(crate) shadow_rays: u64,
     pub(crate) points: u64,
@@ -249,21 +249,21 @@ pub(crate) struct FigureRender {
     pub(crate) seconds: f64,
 }
 
-/// A picture and how far it is from the converged one.
+/// A picture and its error against the converged one.
 pub(crate) struct FigureMeasurement {
     pub(crate) render: FigureRender,
-    /// Mean over pixels that show the scene of (I − R)² / (R² + 0.01).
+    /// The mean of (I − R)² / (R² + 0.01) over the pixels that show the scene.
     pub(crate) rel_mse: f64,
 }
 
 impl FigureScene<'_> {
-    /// With as many camera samples per pixel.
+    /// Sets the number of camera samples per pixel.
     pub(crate) fn samples(mut self, n_samples: u32) -> Self {
         self.settings.n_samples = n_samples;
         self
     }
 
-    /// Fills in what a specification leaves to the scene.
+    /// Fills in the parts of a specification that depend on the scene.
     pub(crate) fn complete(&self, spec: StrategySpec) -> StrategySpec {
         spec.for_picture(&self.scene, &self.camera, &self.context.environment, &self.settings)
     }
@@ -273,7 +273,7 @@ impl FigureScene<'_> {
         self.render_with(spec, self.settings.seed, SamplerKind::Sobol)
     }
 
-    /// Renders the picture with numbers of another seed or kind.
+    /// Renders the picture with another seed or sampler.
     pub(crate) fn render_with(
         &self,
         spec: StrategySpec,
@@ -305,7 +305,7 @@ impl FigureScene<'_> {
         self.measure_with(spec, self.settings.seed, SamplerKind::Sobol)
     }
 
-    /// As [`FigureScene::measure`], with numbers of another seed or kind.
+    /// Like [`FigureScene::measure`], with another seed or sampler.
     pub(crate) fn measure_with(
         &self,
         spec: StrategySpec,
@@ -319,8 +319,8 @@ impl FigureScene<'_> {
         Ok(FigureMeasurement { render, rel_mse: error.rel_mse })
     }
 
-    /// The converged picture with the camera rays of that seed: many samples of both kinds, by
-    /// multiple importance sampling. Made once in a run.
+    /// The converged picture with the camera rays of that seed: many samples of both techniques, combined by multiple
+    /// importance sampling. Rendered once per run.
     pub(crate) fn reference(&self, seed: u64, sampler: SamplerKind) -> Result<Rc<Layers>, Error> {
         let n_samples = self.settings.n_samples;
         let key = format!("{} {n_samples} {seed} {sampler:?}", self.name);
@@ -339,14 +339,14 @@ impl FigureScene<'_> {
         Ok(made)
     }
 
-    /// How pictures of this scene are shown: the exposure of the reference, as `render` chooses it.
+    /// The tone mapping of this scene's pictures: the automatic exposure that `render` would choose for the reference.
     pub(crate) fn tone(&self) -> Result<ToneMapping, Error> {
         let reference = self.reference(self.settings.seed, SamplerKind::Sobol)?;
         Ok(exposed(Exposure::Auto.stops(&reference.color, Some(&reference.alpha))))
     }
 }
 
-/// Samples of the environment and of the BRDF.
+/// Environment samples and BRDF samples.
 #[derive(Clone, Copy, Debug)]
 struct Split {
     environment: u32,

@@ -1,4 +1,4 @@
-//! Figure 8: bias against variance, every method's error over its rays.
+//! Figure 8: bias versus variance: the error of every method over its rays.
 
 use crate::Error;
 use domelight::code;
@@ -14,14 +14,14 @@ use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE};
 
 const MATERIAL: &str = "phong:50:1:0.5";
-/// Candidates of each ray that is resampled, and tries of each that rejection should accept.
+/// SIR's candidates per ray, and rejection's tries per ray.
 const CANDIDATES: u32 = 4;
 const TRIES: u32 = 8;
 
-/// The strategy for a number of rays or lights.
+/// Builds the strategy for a number of rays or lights.
 type SpecFor = fn(u32) -> StrategySpec;
 
-/// What is compared, by name.
+/// The compared methods, by name.
 const METHODS: [(&str, SpecFor); 7] = [
     ("EM", |n| StrategySpec::Environment { n_samples: n }),
     ("BRDF", |n| StrategySpec::Brdf { n_samples: n }),
@@ -35,10 +35,10 @@ const METHODS: [(&str, SpecFor); 7] = [
     ("variance minimization", |n| StrategySpec::VarianceMinimization { n_lights: n }),
 ];
 
-/// A method at one count, over all seeds.
+/// One method at one count, over all seeds.
 struct Point {
     n: u32,
-    /// Shadow rays at each shading point.
+    /// Shadow rays per shading point.
     rays: f64,
     seconds: f64,
     /// √relMSE of each seed.
@@ -68,7 +68,7 @@ struct Curve {
 }
 
 impl Curve {
-    /// The exponent of the rays that fits the errors best: least squares of logarithms.
+    /// The slope of log error over log rays, fitted by least squares.
     fn slope(&self) -> f64 {
         let logs: Vec<(f64, f64)> = self
             .points
@@ -98,7 +98,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         "seeds",
     ]);
     let mut slopes =
-        Table::new(&["method", "slope, independent numbers", "slope, Owen-scrambled Sobol’"]);
+        Table::new(&["method", "slope, independent samples", "slope, Owen-scrambled Sobol’"]);
     let independent = curves(context, counts, n_seeds, SamplerKind::Independent)?;
     let sobol = curves(context, counts, n_seeds, SamplerKind::Sobol)?;
     for (name, curves) in [("independent", &independent), ("sobol", &sobol)] {
@@ -122,13 +122,13 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slopes.rows.push(vec![a.name.into(), rounded(a.slope()).into(), rounded(b.slope()).into()]);
     }
     let plots = vec![
-        plot("Independent numbers", &independent, Cost::Rays),
+        plot("Independent samples", &independent, Cost::Rays),
         plot("Owen-scrambled Sobol’ points", &sobol, Cost::Rays),
     ];
     let over_time = plot("Owen-scrambled Sobol’ points, over time", &sobol, Cost::Seconds);
     Ok(Figure {
         number: 8,
-        title: "Bias against variance",
+        title: "Bias versus variance",
         slides: "slides 3 and 30",
         caption: caption(&independent, &sobol, n_seeds),
         formulas: formulas::convergence(),
@@ -139,20 +139,19 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     })
 }
 
-/// Methods that sample; the others are fixed lights.
+/// The number of sampling methods; the others use fixed lights.
 const N_SAMPLED: usize = 5;
 
-/// What the slopes say, whatever they came out as.
+/// The caption, phrased according to the measured slopes.
 fn caption(independent: &[Curve], sobol: &[Curve], n_seeds: u64) -> Code<Html> {
     let (sampled, fixed) = independent.split_at(N_SAMPLED);
     let mut text = code!(
         Html,
-        "<p>Error of every method over its shadow rays or lights at each point, for the statue of {MATERIAL}; bars are \
-         the standard deviation over {n_seeds} seeds. Once samples have met all the light, errors of independent \
-         numbers fall with 1/√N, a slope of −½ (the variance falls with 1/N, not with 1/N²). Here they fall with slopes \
-         of {range}.{outliers} Stratified points have slopes of {sobol}{verdict}. Fixed lights have no noise; what they have \
-         instead is bias, which falls as lights are added (slopes of {fixed}), but which no average over pictures takes \
-         away.</p>",
+        "<p>The error of every method over its shadow rays or lights per point, for a statue of {MATERIAL}; bars show \
+         the standard deviation over {n_seeds} seeds. Once samples have found all the light, the error of independent \
+         samples falls as 1/√N, a slope of −½ (the variance falls as 1/N, not as 1/N²). Here the slopes are \
+         {range}.{outliers} Stratified points have slopes of {sobol}{verdict}. Fixed lights have bias instead of noise. \
+         The bias falls as lights are added (slopes of {fixed}), but averaging pictures does not remove it.</p>",
         MATERIAL = MATERIAL,
         n_seeds = n_seeds,
         range = range_of(sampled),
@@ -162,12 +161,12 @@ fn caption(independent: &[Curve], sobol: &[Curve], n_seeds: u64) -> Code<Html> {
         fixed = range_of(fixed),
     );
     if n_seeds < 3 {
-        text += "<p>Two seeds of a small picture: these slopes are rough.</p>";
+        text += "<p>These slopes are rough: two seeds of a small picture.</p>";
     }
     text
 }
 
-/// The flattest and the steepest slope.
+/// The flattest and steepest slopes.
 fn range_of(curves: &[Curve]) -> Code<Html> {
     let slopes = || curves.iter().map(Curve::slope).filter(|slope| slope.is_finite());
     let (flat, steep) =
@@ -175,7 +174,7 @@ fn range_of(curves: &[Curve]) -> Code<Html> {
     html::text(&format!("{} to {}", number_of(flat), number_of(steep)))
 }
 
-/// The methods whose slope is not −½, and why that may be.
+/// The methods whose slope is not near −½, with likely reasons.
 fn outliers(sampled: &[Curve]) -> Code<Html> {
     const NEAR: f64 = 0.1;
     let named = |is: &dyn Fn(f64) -> bool| {
@@ -187,23 +186,23 @@ fn outliers(sampled: &[Curve]) -> Code<Html> {
     let (flat, steep) = (named(&|s| s > -0.5 + NEAR), named(&|s| s < -0.5 - NEAR));
     let sentence = |methods: &str, before: &str, why: &str| match methods {
         "" => String::new(),
-        methods => format!(" {before} at these counts: {methods}: {why}."),
+        methods => format!(" {before} at these counts: {methods}; {why}."),
     };
     let flat = sentence(
         &flat,
         "Flatter",
-        "a small bright light that is rarely met makes pictures of few rays look better than the method is, and where \
-         candidates or tries set the error, rays gain less",
+        "pictures with few rays rarely hit a small bright light and so underestimate the error, and where candidates or \
+         tries dominate the error, more rays help less",
     );
     let steep = sentence(
         &steep,
         "Steeper",
-        "with few rays its errors hang on single samples, as its bars show, so that the slope is not settled",
+        "with few rays single samples dominate the error, as the bars show, so the slope is uncertain",
     );
     html::text(&(flat + &steep))
 }
 
-/// Whether stratification pays here.
+/// States whether stratification helps here.
 fn verdict(independent: &[Curve], sobol: &[Curve]) -> &'static str {
     let median = |curves: &[Curve]| {
         let mut slopes: Vec<f64> = curves.iter().map(Curve::slope).collect();
@@ -245,7 +244,7 @@ fn curves(
     Ok(curves)
 }
 
-/// What an error is plotted over.
+/// The x axis of an error plot.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Cost {
     Rays,
@@ -278,7 +277,7 @@ fn plot(title: &str, curves: &[Curve], cost: Cost) -> Document {
         series.push(guide(&curves[0]));
     }
     let label =
-        if cost == Cost::Rays { "shadow rays (lights) at each point, N" } else { "CPU seconds" };
+        if cost == Cost::Rays { "shadow rays (lights) per point, N" } else { "CPU seconds" };
     let plot = Plot {
         title: title.to_owned(),
         x: Axis::around(label, Scale::Log, all().map(of)),
@@ -289,7 +288,7 @@ fn plot(title: &str, curves: &[Curve], cost: Cost) -> Document {
     plot_panel(&plot, 900.0, 520.0)
 }
 
-/// With a true minus sign and two digits.
+/// Formats a slope with a true minus sign and two digits.
 fn number_of(slope: f64) -> String {
     if slope.is_finite() { format!("{slope:.2}").replace('-', "−") } else { number(slope) }
 }

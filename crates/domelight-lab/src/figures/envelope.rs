@@ -1,4 +1,4 @@
-//! Figure 13: rejection's envelopes: a bound on the product in proportion to one of its factors.
+//! Figure 13: the envelopes of rejection sampling: bounds on the product, proportional to one of its factors.
 
 use domelight::bsdf::Bsdf;
 use domelight::code;
@@ -16,14 +16,14 @@ use crate::svg::{Document, PALETTE};
 
 /// Exponents of the Phong lobe.
 const EXPONENTS: [u32; 11] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000];
-/// The lobe that the curves show.
+/// The exponent of the plotted lobe.
 const SHOWN: u32 = 50;
-/// Degrees of the great circle on each side of the lobe's axis.
+/// The plotted range of the great circle on each side of the lobe's axis [degrees].
 const REACH: f64 = 60.0;
 
-/// What both bounds are worth for a lobe.
+/// Both bounds for one lobe, with the integrals that determine acceptance.
 struct Bounds {
-    /// The largest BRDF × cosine [sr⁻¹], and the largest luminance.
+    /// The maximum of BRDF × cosine [sr⁻¹], and the maximum luminance.
     reflectance: f64,
     light: f64,
     /// ∫ f L, ∫ f, ∫ L.
@@ -47,7 +47,7 @@ impl Bounds {
         bounds
     }
 
-    /// Shares of the tries that are accepted: from the environment, from the BRDF.
+    /// Acceptance rates of proposals from the environment and from the BRDF.
     fn acceptance(&self) -> [f64; 2] {
         [self.product / (self.reflectance * self.power), self.product / (self.light * self.brdf)]
     }
@@ -86,16 +86,16 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     ];
     Ok(Figure {
         number: 13,
-        title: "The envelopes of rejection",
+        title: "Envelopes of rejection sampling",
         slides: "slides 24–25",
         caption: code!(
             Html,
-            "<p>Rejection draws from one factor of the product and needs a bound on the other: their product is the envelope, \
-             under which the product must lie everywhere. What is between both is rejected. Above: both envelopes along the great \
-             circle through the lobe’s axis (Phong, exponent {SHOWN}) and the brightest light, {OFF_AXIS:.0}° beside it. An envelope is as loose \
-             as the factor that it bounds is uneven: the light’s greatest value is reached in a few texels, the lobe’s \
-             on its axis.</p><p>Below: the share of tries that is accepted over the lobe’s exponent. A wide lobe is nearly even, and \
-             its bound tight; a narrow one leaves little of the environment. Which proposal is the better one changes with the \
+            "<p>Rejection sampling draws from one factor of the product and bounds the other. Factor times bound is the envelope, \
+             which must exceed the product everywhere; the area between them is rejected. Above: both envelopes along the great \
+             circle through the lobe’s axis (Phong, exponent {SHOWN}) and the brightest light, {OFF_AXIS:.0}° from it. The more the bounded \
+             factor varies, the looser the envelope: the light reaches its maximum in a few texels, the lobe only \
+             on its axis.</p><p>Below: the acceptance rate over the lobe’s exponent. A wide lobe is nearly constant, so its \
+             bound is tight; a narrow lobe rejects most environment samples. The better proposal changes with the \
              point, so <code>rejection</code> takes the tighter bound at each.</p>",
             SHOWN = SHOWN,
             OFF_AXIS = OFF_AXIS,
@@ -111,7 +111,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     })
 }
 
-/// The product under one envelope, on a logarithmic scale.
+/// Plots the product under one envelope on a logarithmic scale.
 fn along_the_circle(
     context: &FigureContext,
     point: &ShadingPoint,
@@ -132,7 +132,7 @@ fn along_the_circle(
         let bound = if from_environment {
             bounds.reflectance * light
         } else {
-            // The texel that is looked up may be brighter than the mean of those that were measured.
+            // A single texel may be brighter than the mean of the measured ones.
             bounds.light.max(light) * value
         };
         product.push(Datum::new(x, value * light));
@@ -140,9 +140,9 @@ fn along_the_circle(
     }
     let top = envelope.iter().map(|d| d.y).fold(f64::MIN_POSITIVE, f64::max);
     let (title, name) = if from_environment {
-        ("From the environment", "envelope: greatest BRDF × light")
+        ("From the environment", "envelope: max BRDF × light")
     } else {
-        ("From the BRDF", "envelope: greatest light × BRDF")
+        ("From the BRDF", "envelope: max light × BRDF")
     };
     let plot = Plot {
         title: format!("{title}: {} % accepted", number(100.0 * acceptance)),
@@ -168,7 +168,7 @@ fn acceptance_plot([environment, brdf]: [Vec<Datum>; 2]) -> Document {
     };
     let all = || environment.iter().chain(&brdf);
     let plot = Plot {
-        title: "Share of tries that is accepted".to_owned(),
+        title: "Acceptance rate".to_owned(),
         x: Axis::around("exponent of the lobe", Scale::Log, all().map(|d| d.x)),
         y: Axis::around("accepted [%]", Scale::Log, all().map(|d| d.y)),
         series: vec![

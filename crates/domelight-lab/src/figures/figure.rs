@@ -1,4 +1,4 @@
-//! A figure: panels in rows, what they say, and what was measured.
+//! A figure: rows of panels, a caption, and measurements.
 
 use std::fs;
 use std::path::Path;
@@ -18,18 +18,18 @@ use crate::svg::{Anchor, Color, Document, Pixels, Rect, Style, TextStyle, raster
 pub(crate) struct Figure {
     pub(crate) number: u8,
     pub(crate) title: &'static str,
-    /// The slides that it is about.
+    /// The slides that the figure illustrates.
     pub(crate) slides: &'static str,
-    /// What is to be seen, as HTML.
+    /// The caption, as HTML.
     pub(crate) caption: Code<Html>,
-    /// What is computed, as MathML.
+    /// The formulas, as MathML.
     pub(crate) formulas: Vec<String>,
     pub(crate) rows: Vec<Row>,
-    /// What was measured.
+    /// The measurements.
     pub(crate) tables: Vec<Table>,
     /// Whether the first table is written as CSV and JSON.
     pub(crate) has_data: bool,
-    /// Radiance, written as OpenEXR and PNG.
+    /// Radiance maps, written as OpenEXR and PNG.
     pub(crate) pictures: Vec<Radiance>,
 }
 
@@ -39,14 +39,14 @@ pub(crate) struct Row {
     pub(crate) panels: Vec<Document>,
 }
 
-/// A picture in a file of its own.
+/// A picture with its own file.
 pub(crate) struct Radiance {
     pub(crate) name: String,
     pub(crate) image: RgbImage,
     pub(crate) tone: ToneMapping,
 }
 
-/// Numbers under names.
+/// A table of values with named columns.
 pub(crate) struct Table {
     pub(crate) columns: Vec<&'static str>,
     pub(crate) rows: Vec<Vec<Value>>,
@@ -94,7 +94,7 @@ fn quoted(text: &str) -> String {
 }
 
 impl Figure {
-    /// The names of the files beside the page that belong to the figure.
+    /// The names of the figure's files beside the page.
     pub(crate) fn files(&self) -> Vec<String> {
         let n = self.number;
         let mut names = vec![format!("figure-{n}.png")];
@@ -104,7 +104,7 @@ impl Figure {
         names
     }
 
-    /// The names of the files of radiance, in a folder of the figure's own.
+    /// The names of the radiance files, in the figure's own folder.
     pub(crate) fn picture_files(&self) -> Vec<String> {
         let n = self.number;
         let both = |p: &Radiance| {
@@ -113,7 +113,7 @@ impl Figure {
         self.pictures.iter().flat_map(both).collect()
     }
 
-    /// Writes all files of the figure; the PNG has `scale` pixels for each of the sheet's.
+    /// Writes all files of the figure; the PNG has `scale` pixels per sheet pixel.
     pub(crate) fn write(&self, folder: &Path, scale: f32, host: &dyn Host) -> Result<(), Error> {
         let n = self.number;
         let sheet = self.sheet();
@@ -172,14 +172,14 @@ impl Figure {
     }
 }
 
-/// The picture as it is shown.
+/// The tone-mapped picture as PNG.
 pub(crate) fn png_bytes(image: &RgbImage, tone: ToneMapping) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     png::encode(image, None, &tone, Depth::Eight, &mut bytes)?;
     Ok(bytes)
 }
 
-/// What a picture panel shows.
+/// The contents of a picture panel.
 pub(crate) struct Picture<'a> {
     pub(crate) png: Vec<u8>,
     /// Size on the sheet.
@@ -191,7 +191,7 @@ pub(crate) struct Picture<'a> {
     pub(crate) notes: &'a [String],
 }
 
-/// A panel with a picture, and what `over` draws on it.
+/// A panel with a picture and an overlay drawn by `over`.
 pub(crate) fn picture_panel(picture: &Picture, over: impl FnOnce(&mut Document, Rect)) -> Document {
     const TITLE: f64 = 19.0;
     const NOTE: f64 = 16.0;
@@ -216,7 +216,7 @@ pub(crate) fn plot_panel(plot: &Plot, width: f64, height: f64) -> Document {
     panel
 }
 
-/// A color scale as a strip, with numbers at its ends and middle.
+/// A color bar with labels at its ends and middle.
 pub(crate) fn scale_panel(height: f64, png: &[u8], labels: &[String; 3], title: &str) -> Document {
     let mut panel = Document::new(120.0, height);
     let place = Rect::new(6.0, 44.0, 22.0, height - 60.0);
@@ -232,7 +232,7 @@ pub(crate) fn scale_panel(height: f64, png: &[u8], labels: &[String; 3], title: 
     panel
 }
 
-/// A number with three digits that count.
+/// Formats a number with three significant digits.
 pub(crate) fn number(x: f64) -> String {
     if x == 0.0 {
         return "0".to_owned();
@@ -250,7 +250,7 @@ pub(crate) fn number(x: f64) -> String {
     format!("{mantissa}·10{}", superscript(exponent.parse().unwrap_or(0)))
 }
 
-/// A count with its thousands in groups.
+/// Formats a count with grouped thousands.
 pub(crate) fn count(n: u64) -> String {
     let digits = n.to_string();
     let mut text = String::new();

@@ -19,7 +19,7 @@ fn thin() -> String {
     "<mspace width=\"0.17em\"/>".to_owned()
 }
 
-/// A function's name.
+/// A function name.
 fn function(name: &str) -> String {
     mi(name) + &thin()
 }
@@ -29,7 +29,7 @@ fn row<T: Display>(parts: impl IntoIterator<Item = T>) -> String {
     format!("<mrow>{parts}</mrow>")
 }
 
-/// Between two equations.
+/// A separator between two equations.
 fn and() -> String {
     "<mo>,</mo><mspace width=\"1.6em\"/>".to_owned()
 }
@@ -78,7 +78,7 @@ fn f_cos() -> String {
     row([sub(&mi("f"), &mi("r")), function("cos"), mi("θ")])
 }
 
-/// tan² θ (cos² φ / αx² + sin² φ / αy²), without the tangent.
+/// cos² φ / αx² + sin² φ / αy²: the exponent tan² θ (…) without its tangent.
 fn ellipse() -> String {
     let square = |f: &str| row([sup(&mi(f), &mn("2")), thin(), sub(&mi("φ"), &mi("h"))]);
     let term = |f: &str, axis: &str| {
@@ -87,7 +87,7 @@ fn ellipse() -> String {
     row([term("cos", "x"), mo("+"), term("sin", "y")])
 }
 
-/// Figure 1: the lobes and how they are drawn.
+/// Figure 1: the lobes and their sampling.
 pub(crate) fn lobes() -> Vec<String> {
     let (theta_h, phi_h) = (sub(&mi("θ"), &mi("h")), sub(&mi("φ"), &mi("h")));
     let (u1, u2) = (sub(&mi("u"), &mn("1")), sub(&mi("u"), &mn("2")));
@@ -276,7 +276,7 @@ pub(crate) fn four_ways() -> Vec<String> {
     ]
 }
 
-/// Figure 5: when to accept, and what the accepted are worth.
+/// Figure 5: the acceptance probability and the estimator.
 pub(crate) fn rejection() -> Vec<String> {
     let g_max = sub(&mi("g"), &mi("max"));
     let minus_one = |n: &str| row([mi(n), mo("−"), mn("1")]);
@@ -299,7 +299,7 @@ pub(crate) fn rejection() -> Vec<String> {
     ])]
 }
 
-/// Figures 6 and 7: a region's light, and its variance on the map and on the sphere.
+/// Figures 6 and 7: the light of a region, and its variance on the map and on the sphere.
 pub(crate) fn region_light() -> String {
     let over_r = integral(&mi("r"));
     let d_omega = row([thin(), mi("d"), mi("ω")]);
@@ -349,7 +349,7 @@ pub(crate) fn region_variance() -> String {
     ])
 }
 
-/// Figure 9: the half vector, and what it does to a solid angle.
+/// Figure 9: the half vector and its Jacobian.
 pub(crate) fn half_vector() -> Vec<String> {
     let both = row([omega("o"), mo("+"), omega("i")]);
     let d = |index: &str| row([mi("d"), omega(index)]);
@@ -396,7 +396,7 @@ pub(crate) fn mis_weights() -> Vec<String> {
     ])]
 }
 
-/// Figure 12: the density of what resampling keeps.
+/// Figure 12: the density of resampled directions.
 pub(crate) fn sir_density() -> Vec<String> {
     let ratio = frac(&mi("p"), &mi("q"));
     let of = |x: &str| paren(&sub(&mi("ω"), &mi(x)));
@@ -422,7 +422,7 @@ pub(crate) fn sir_density() -> Vec<String> {
     ])]
 }
 
-/// Figure 13: the two envelopes, and how much of them is the product.
+/// Figure 13: the two envelopes, and the product's share of each.
 pub(crate) fn envelope() -> Vec<String> {
     let light = mi("L");
     let max = |f: &str| row([sub(&mi("max"), &mi("ω")), thin(), f.to_owned()]);

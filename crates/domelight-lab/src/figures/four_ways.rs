@@ -1,4 +1,4 @@
-//! Figure 4: the environment's samples, the BRDF's, both, and their product by resampling and by a table, at the
+//! Figure 4: sampling the environment, the BRDF, both, and their product (by resampling and from a table), at the
 //! lecture's counts and in equal time.
 
 use crate::Error;
@@ -14,16 +14,16 @@ use super::formulas;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE, Pixels};
 
-/// The lecture's picture.
+/// The size of the lecture's picture.
 const SIZE: (usize, usize) = (176, 248);
-/// Its counts: environment, BRDF, both (environment and BRDF each), resampled of candidates.
+/// The lecture's counts: environment, BRDF, MIS (of each), SIR (rays, candidates).
 const EM: u32 = 100;
 const BRDF: u32 = 75;
 const MIS: u32 = 37;
 const SIR: (u32, u32) = (15, 800);
-/// Rays of the product's table, which the lecture did not have: those of resampling.
+/// Rays of the `product` strategy, which the lecture did not have: as many as for resampling.
 const PRODUCT: u32 = SIR.0;
-/// More are of no use to it, however much time there is.
+/// More rays do not help `product`, however much time there is.
 const MAX_PRODUCT_RAYS: u32 = 1024;
 
 /// The lecture's materials.
@@ -31,22 +31,22 @@ const MATERIALS: [(&str, &str); 2] = [
     ("Phong, s = 50, ks = 1", "phong:50:1"),
     ("Phong, s = 50, ks = 1, kd = 0.5", "phong:50:1:0.5"),
 ];
-/// Two more, for the environment against the product.
+/// Two more materials, for environment versus product sampling.
 const MORE: [(&str, &str); 2] =
     [("Ward, α = 0.15 × 0.5", "ward:0.15:0.5"), ("Gold, GGX, α = 0.2", "ggx:0.2:gold")];
 
-/// The product by resampling, from candidates of both factors.
+/// Samples the product by resampling candidates from both factors.
 pub(super) fn sir(n: u32, n_candidates: Option<u32>) -> StrategySpec {
     let (candidates, resampling) = (Candidates::Mixture, Resampling::SystematicSorted);
     StrategySpec::Sir { n_candidates, n_samples: n, candidates, resampling }
 }
 
-/// The product from a table, with up to so many rays per camera sample.
+/// Samples the product from a table, with up to `n_rays` rays per camera sample.
 fn product(n_rays: u32) -> StrategySpec {
     StrategySpec::Product { n_rays: n_rays.min(MAX_PRODUCT_RAYS) }
 }
 
-/// As many samples of the environment as of the BRDF, weighed as the program does by default.
+/// Takes equally many environment and BRDF samples, with the program's default weights.
 pub(super) fn mis(each: u32) -> StrategySpec {
     StrategySpec::Mis {
         n_environment: each,
@@ -106,21 +106,20 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     Ok(figure)
 }
 
-const CAPTION: &str = "<p>One camera ray per pixel, the same in all pictures; what differs is the estimate of the \
-    light alone. First at the lecture's counts: 100 samples of the environment (EM), 75 of the BRDF, 37 of each by \
+const CAPTION: &str = "<p>All pictures share the same camera rays, one per pixel; they differ only in the lighting \
+    estimate. The first row uses the lecture's counts: 100 environment samples (EM), 75 BRDF samples, 37 of each with \
     multiple importance sampling (power heuristic, compensated), and 15 shadow rays resampled from 800 candidates \
-    (SIR), which took the same time in 2005. They no longer do: a shadow ray is now cheaper than a candidate. So MIS \
-    stands there once more, with as many samples as it gets in the time of SIR; and so does the product \
-    of light and BRDF from a table of each pixel (the strategy <code>product</code>), with as many rays as SIR; it is made for pixels of several camera rays, which share a table. The second row gives \
-    all the time of the environment’s 100 samples, their counts calibrated by measurement: SIR with the \
-    lecture’s ratio of candidates to rays, and with the ratio that suits what they cost here. Under each picture \
-    stand its error against the converged one (relMSE: mean of (I − R)² / (R² + 0.01) over the pixels that show the \
-    scene), its shadow rays and its CPU seconds.</p><p>The weights of multiple importance sampling add up to 1 for \
-    each direction, and each kind of sample is divided by its own count: divided by M + N, as it is sometimes \
-    written, the same weights \
-    give half the answer.</p>";
+    (SIR). These took equal time in 2005, but a shadow ray is now cheaper than a candidate. So the row repeats MIS \
+    with the sample count that takes the time of SIR. It also shows the strategy <code>product</code>, which samples the \
+    product of light and BRDF from a table for each pixel, with as many rays as SIR; it is designed for pixels with \
+    several camera rays, which share a table. In the second row every strategy takes the time of 100 environment \
+    samples, with counts calibrated by measurement: SIR with the lecture’s ratio of candidates to rays, and with the \
+    best ratio for their costs here. Each picture is labeled with its error against the converged one (relMSE: mean of \
+    (I − R)² / (R² + 0.01) over the pixels that show the scene), its shadow rays and its CPU seconds.</p>\
+    <p>The MIS weights of a direction add up to 1, and each technique’s samples are divided by that technique’s count. \
+    Dividing by M + N instead, as is sometimes written, gives half the result.</p>";
 
-/// A picture with its name.
+/// A labeled picture of one strategy.
 struct ShownStrategy {
     title: String,
     spec: StrategySpec,
@@ -146,7 +145,7 @@ impl ShownStrategy {
         Ok(Self { title: format!("{name} {counts}"), spec, measured: figure_scene.measure(spec)? })
     }
 
-    /// What the plot and the colors know it by.
+    /// The index of the strategy in the plot and its colors.
     fn kind(&self) -> usize {
         match self.spec {
             StrategySpec::Environment { .. } => 0,
@@ -163,12 +162,12 @@ impl ShownStrategy {
     }
 }
 
-/// Candidates of `n` rays in the lecture's ratio.
+/// The number of candidates for `n` rays at the lecture's ratio.
 fn scaled_candidates(n: u32) -> u32 {
     (u64::from(n) * u64::from(SIR.1) / u64::from(SIR.0)) as u32
 }
 
-/// Resampling by the ratio of candidates to rays that a pilot finds best here.
+/// Resampling with the ratio of candidates to rays that a pilot finds best here.
 fn tuned_sir(figure_scene: &FigureScene) -> impl Fn(u32) -> StrategySpec + use<> {
     const PILOT: u32 = 64;
     let ratio = match figure_scene.complete(sir(PILOT, None)) {
@@ -178,7 +177,7 @@ fn tuned_sir(figure_scene: &FigureScene) -> impl Fn(u32) -> StrategySpec + use<>
     move |n| sir(n, Some(n * ratio.max(1)))
 }
 
-/// The lecture's four, how far both factors come in the time of the last, and the product with its rays.
+/// The lecture's four strategies, MIS in the time of SIR, and `product` with the rays of SIR.
 fn at_lectures_counts(figure_scene: &FigureScene) -> Result<Vec<ShownStrategy>, Error> {
     let mut shown = vec![
         ShownStrategy::new("EM", figure_scene, StrategySpec::Environment { n_samples: EM })?,
@@ -196,7 +195,7 @@ fn at_lectures_counts(figure_scene: &FigureScene) -> Result<Vec<ShownStrategy>, 
     Ok(shown)
 }
 
-/// The four again with `seconds` for each, resampling with the ratio that suits, and the product.
+/// The four strategies in `seconds` each, SIR also at its best ratio, and `product`.
 fn in_equal_time(figure_scene: &FigureScene, seconds: f64) -> Result<Vec<ShownStrategy>, Error> {
     let lectures_ratio = |n: u32| sir(n, Some(scaled_candidates(n)));
     Ok(vec![
@@ -225,14 +224,14 @@ fn in_equal_time(figure_scene: &FigureScene, seconds: f64) -> Result<Vec<ShownSt
     ])
 }
 
-/// The product's table with as many rays as `seconds` pay for.
+/// `product` with the number of rays that takes `seconds`.
 fn product_in(figure_scene: &FigureScene, seconds: f64) -> Result<StrategySpec, Error> {
     equal_time(figure_scene, seconds, PRODUCT, product)
 }
 
-/// The strategy with the count that takes `seconds`, by measurement from `start` on.
+/// The strategy with the count that takes `seconds`, found by measurement starting at `start`.
 ///
-/// A picture costs a + b·n; the part a, camera rays and shading points, is measured with one sample.
+/// A picture costs a + b·n; a, the cost of camera rays and shading points, is measured with one sample.
 fn equal_time(
     figure_scene: &FigureScene,
     seconds: f64,
@@ -247,7 +246,7 @@ fn equal_time(
     Ok(spec(n.round().clamp(1.0, 30_000.0) as u32))
 }
 
-/// Puts a row of pictures into the figure, the converged one last.
+/// Adds a row of pictures to the figure, the converged one last.
 fn add(
     figure: &mut Figure,
     figure_scene: &FigureScene,
@@ -258,7 +257,7 @@ fn add(
 ) -> Result<(), Error> {
     let tone = figure_scene.tone()?;
     let (width, height) = (figure_scene.settings.width, figure_scene.settings.height);
-    // With the scale of the file a whole number of pixels for each.
+    // At the file's scale, each pixel covers a whole number of pixels.
     let enlarged = (4.0 / 3.0) * SIZE.0 as f64 / width as f64;
     let (w, h) = (width as f64 * enlarged, height as f64 * enlarged);
     let mut panels: Vec<Document> = Vec::new();
@@ -303,7 +302,7 @@ fn add(
     Ok(())
 }
 
-/// Letters, digits and hyphens.
+/// Reduces a text to letters, digits and hyphens.
 pub(super) fn file_name(text: &str) -> String {
     let plain: String = text
         .to_lowercase()

@@ -1,4 +1,4 @@
-//! Figure 9: half vectors, and the Jacobian from their solid angle to that of reflected directions.
+//! Figure 9: half vectors, and the Jacobian from half vectors to reflected directions.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -20,10 +20,10 @@ const MATERIAL: &str = "ggx:0.3";
 const VIEWER: f64 = 40.0;
 /// Angular radius of the patches of half vectors [degrees].
 const PATCH: f32 = 6.0;
-/// Half vectors in the middle of patches: polar angle and azimuth, 180 toward the viewer [degrees]. The labels of the
-/// patches that they reflect to do not overlap.
+/// Half vectors at the patch centers: polar angle and azimuth, 180 toward the viewer [degrees]. Chosen so that the
+/// labels of the reflected patches do not overlap.
 const PATCHES: [(f32, f32); 4] = [(0.0, 0.0), (24.0, 90.0), (24.0, 40.0), (24.0, -75.0)];
-/// Width of the slice around the plane of incidence, and of its bins, of which none straddles the normal [degrees].
+/// Width of the slice around the plane of incidence, and of its bins; no bin straddles the normal [degrees].
 const SLICE: f64 = 12.0;
 const BIN: f64 = 5.0;
 
@@ -54,18 +54,18 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let plot = densities(&bsdf, wo, n, context.seed);
     Ok(Figure {
         number: 9,
-        title: "Half vectors and their Jacobian",
+        title: "Half vectors and the Jacobian",
         slides: "slides 8–9",
         caption: code!(
             Html,
-            "<p>A microfacet mirrors the viewer’s direction ω<sub>o</sub> into ω<sub>i</sub> if its normal is the half vector \
-             ω<sub>h</sub> of both. So directions are drawn by drawing half vectors, and reflecting. In the plane of incidence \
-             a turn of ω<sub>h</sub> turns ω<sub>i</sub> twice as far; on the sphere a small patch of half vectors becomes a \
-             patch of directions that is 4 (ω<sub>h</sub>·ω<sub>i</sub>) times as large, as the table measures. The density per \
-             solid angle of ω<sub>i</sub> is thinner by as much.</p>\
-             <p>Below: the lobe {MATERIAL} seen {VIEWER}° from the normal, cut along the plane of incidence. {n} directions that were \
-             drawn follow the density with the Jacobian. Without it the density integrates to {without}, not to {with}, the \
-             share of the samples that end above the horizon: an estimate that divides by it is too dark by the ratio of the two.</p>",
+            "<p>A microfacet reflects the viewer’s direction ω<sub>o</sub> into ω<sub>i</sub> if its normal is their half vector \
+             ω<sub>h</sub>. So directions are sampled by sampling half vectors and reflecting about them. In the plane of \
+             incidence, rotating ω<sub>h</sub> rotates ω<sub>i</sub> twice as far; on the sphere, a small patch of half vectors \
+             maps to a patch of directions 4 (ω<sub>h</sub>·ω<sub>i</sub>) times as large, as the table measures. The density per \
+             solid angle of ω<sub>i</sub> is lower by the same factor.</p>\
+             <p>Below: the lobe {MATERIAL} seen {VIEWER}° from the normal, in the plane of incidence. {n} sampled directions \
+             follow the density with the Jacobian. Without the Jacobian the density integrates to {without} instead of {with}, the \
+             fraction of samples above the horizon; an estimate that divides by it is too dark by the ratio of the two.</p>",
             MATERIAL = MATERIAL,
             VIEWER = VIEWER,
             n = n,
@@ -83,20 +83,20 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     })
 }
 
-/// The direction so far from the normal [degrees], in the plane of incidence, on the viewer's side.
+/// The direction at this angle from the normal [degrees], in the plane of incidence, on the viewer's side.
 fn in_plane(degrees: f64) -> Vec3 {
     let (sin, cos) = degrees.to_radians().sin_cos();
     vec3(-sin as f32, 0.0, cos as f32)
 }
 
-/// A patch of half vectors and what becomes of it.
+/// A patch of half vectors and its reflection.
 struct Patch {
-    /// Around the patch, half vectors and reflected directions.
+    /// The rim of the patch: half vectors and reflected directions.
     half_vectors: Vec<Vec3>,
     directions: Vec<Vec3>,
     solid_angle: f64,
     reflected_solid_angle: f64,
-    /// 4 (ωh · ωi) in the middle.
+    /// 4 (ωh · ωi) at the center.
     jacobian: f64,
 }
 
@@ -127,7 +127,7 @@ fn patches(wo: Vec3) -> Vec<Patch> {
         .collect()
 }
 
-/// The solid angle within a rim around `middle` [sr]: triangles from there (Van Oosterom & Strackee 1983).
+/// The solid angle inside a rim around `middle` [sr], as a fan of triangles (Van Oosterom & Strackee 1983).
 fn solid_angle(middle: Vec3, rim: &[Vec3]) -> f64 {
     let double = |v: Vec3| v.to_array().map(f64::from);
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -143,7 +143,7 @@ fn solid_angle(middle: Vec3, rim: &[Vec3]) -> f64 {
     sum.abs()
 }
 
-/// The surface from the side: a fan of half vectors, and the directions that they reflect to.
+/// A side view of the surface: a fan of half vectors, and the reflected directions.
 fn plane_of_incidence() -> Document {
     const SIZE: (f64, f64) = (620.0, 400.0);
     const RADIUS: f64 = 270.0;
@@ -208,7 +208,7 @@ fn arrow(panel: &mut Document, from: Point, to: Point, style: Style, color: Colo
     panel.polyline([to, side(1.0), side(-1.0), to], Style::fill(color));
 }
 
-/// The hemisphere from above, the radius in proportion to the polar angle.
+/// The hemisphere from above, with radius proportional to the polar angle.
 fn sphere(wo: Vec3) -> Document {
     const SIZE: f64 = 400.0;
     let (center, radius) = (0.5 * SIZE, 0.5 * SIZE - 24.0);
@@ -249,13 +249,13 @@ fn sphere(wo: Vec3) -> Document {
     panel
 }
 
-/// ∫ over the hemisphere of the density, and of the same without the Jacobian.
+/// The integral of the density over the hemisphere, with and without the Jacobian.
 struct Integrals {
     with: f64,
     without: f64,
 }
 
-/// By the midpoints of rings and sectors.
+/// Integrates with the midpoint rule over rings and sectors.
 fn integrals(bsdf: &Bsdf, wo: Vec3) -> Integrals {
     const RINGS: usize = 256;
     const SECTORS: usize = 512;
@@ -283,7 +283,7 @@ fn jacobian(wo: Vec3, wi: Vec3) -> f64 {
     4.0 * f64::from((wo + wi).normalize().dot(wi))
 }
 
-/// Densities along the plane of incidence, and a histogram of what was drawn near it.
+/// Densities along the plane of incidence, and a histogram of the directions sampled near it.
 fn densities(bsdf: &Bsdf, wo: Vec3, n: usize, seed: u64) -> Document {
     // The side away from the viewer counts as positive.
     let toward = |degrees: f64| in_plane(-degrees);
@@ -304,9 +304,9 @@ fn densities(bsdf: &Bsdf, wo: Vec3, n: usize, seed: u64) -> Document {
         ),
         y: Axis::new("density [1/sr]", Scale::Linear, 0.0, 1.08 * top),
         series: vec![
-            Series::new("directions that were drawn", PALETTE[0], Join::Bars, bars),
+            Series::new("sampled directions", PALETTE[0], Join::Bars, bars),
             Series::new("p(ωh) / 4 (ωh · ωi)", PALETTE[1], Join::Curve, with),
-            Series::new("p(ωh), the Jacobian forgotten", PALETTE[6], Join::Dashed, without),
+            Series::new("p(ωh), without the Jacobian", PALETTE[6], Join::Dashed, without),
         ],
         legend: Legend::Above,
     };
@@ -331,7 +331,7 @@ fn histogram(bsdf: &Bsdf, wo: Vec3, n: usize, seed: u64) -> Vec<Datum> {
     }
     let edge = |i: usize| -90.0 + BIN * i as f64;
     let density = |i: usize| {
-        // Of the ring sector between two polar angles on one side.
+        // The ring sector between two polar angles on one side.
         let cos = |degrees: f64| degrees.to_radians().cos();
         let omega = (cos(edge(i)) - cos(edge(i + 1))).abs() * SLICE * PI / 180.0;
         f64::from(counts[i]) / (n as f64 * omega)

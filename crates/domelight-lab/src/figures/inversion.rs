@@ -1,4 +1,4 @@
-//! Figure 2: inversion of a distribution function, in one dimension and over a map's rows and columns.
+//! Figure 2: inverting a distribution function, in one dimension and over a map's rows and columns.
 
 use crate::Error;
 use domelight::math::vec2;
@@ -14,9 +14,9 @@ use crate::svg::{Color, Document, PALETTE, Rect, Style};
 
 /// Cells of the one-dimensional example.
 const CELLS: usize = 24;
-/// Numbers that it inverts.
+/// Uniform numbers that the example inverts.
 const NUMBERS: usize = 12;
-/// The course's numbers of samples.
+/// The course's sample counts.
 const COUNTS: [usize; 3] = [64, 256, 1024];
 
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
@@ -64,14 +64,14 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let mut numbers = Table::new(&["quantity", "value"]);
     numbers.rows = vec![
         vec!["map".into(), format!("{} × {} texels", map.width, map.height).into()],
-        vec!["row of the greatest p(y)".into(), brightest.into()],
+        vec!["row with the largest p(y)".into(), brightest.into()],
         vec![
-            "its elevation [°]".into(),
+            "elevation of that row [°]".into(),
             (90.0 - degrees(brightest, table.height())).round().into(),
         ],
         vec!["share of the energy in the brightest tenth of the rows".into(), share(&table).into()],
         vec![
-            format!("of {} samples below the horizon", count(COUNTS[2] as u64)).into(),
+            format!("samples below the horizon, of {}", count(COUNTS[2] as u64)).into(),
             lower.into(),
         ],
     ];
@@ -81,11 +81,11 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         title: "Inverting a distribution function; sampling the environment",
         slides: "slides 10–11",
         caption: Code::literal(
-            "<p>Equally spaced numbers on the axis of the distribution function find values in proportion to \
-            the density: steep where there is much, flat where there is little. A map takes two such steps: first a \
-            row, by the energy of each scan line times sin θ, for rows near the poles cover little of the sphere; \
-            then a column of that row. The samples are drawn as the course's marks of 5 × 5 pixels, as \
-            dots, and alone in the colors that remain when luminance is divided by the density: an estimate \
+            "<p>Inverting equally spaced numbers through the distribution function yields values in proportion to \
+            the density: the function is steep where the density is high, flat where it is low. A map takes two such steps: \
+            first a row, by the energy of each scan line times sin θ, because rows near the poles cover little of the sphere; \
+            then a column in that row. The samples are shown as the course's marks of 5 × 5 pixels, as \
+            dots, and alone in the colors that remain when the density cancels the luminance: an estimate \
             of a colored integral keeps that factor.</p>",
         ),
         formulas: formulas::inversion(),
@@ -134,18 +134,18 @@ fn draw(context: &FigureContext, table: &Table2d, n: usize) -> Vec<Sample> {
     (0..n).map(sample).collect()
 }
 
-/// Two bumps on a little everywhere.
+/// Two bumps on a small constant.
 fn example(x: f64) -> f64 {
     let bump = |center: f64, width: f64| (-((x - center) / width).powi(2)).exp();
     0.08 + bump(0.3, 0.12) + 0.7 * bump(0.74, 0.06)
 }
 
-/// Polar angle of a row's middle.
+/// Polar angle of a row's center.
 fn degrees(row: usize, height: usize) -> f64 {
     180.0 * (row as f64 + 0.5) / height as f64
 }
 
-/// Energy in the tenth of the rows that has most of it, in percent.
+/// Energy in the brightest tenth of the rows, in percent.
 fn share(table: &Table2d) -> f64 {
     let mut rows: Vec<f64> = (0..table.height()).map(|y| table.rows().pmf(y)).collect();
     rows.sort_by(|a, b| b.total_cmp(a));
@@ -153,7 +153,7 @@ fn share(table: &Table2d) -> f64 {
     (1000.0 * sum).round() / 10.0
 }
 
-/// Cells as bars of total height 1.
+/// Cells as bars with a total height of 1.
 fn bars(weights: &[f64]) -> Vec<Datum> {
     let total: f64 = weights.iter().sum();
     let n = weights.len();
@@ -194,7 +194,7 @@ fn cdf_plot(weights: &[f64]) -> Result<Document, Error> {
             let x = (cell as f64 + f64::from(inside)) / table.len() as f64;
             let path = [(0.0, u), (x, u), (x, 0.0)].map(|(x, y)| Datum::new(x, y)).to_vec();
             Series::new(
-                if i == 0 { "equally spaced u, and their x" } else { "" },
+                if i == 0 { "equally spaced u and their x" } else { "" },
                 PALETTE[1],
                 Join::Dashed,
                 path,
@@ -212,7 +212,7 @@ fn cdf_plot(weights: &[f64]) -> Result<Document, Error> {
     Ok(plot_panel(&plot, 730.0, 360.0))
 }
 
-/// The marginal over rows, and what it would be without sin θ.
+/// The marginal density over rows, with and without sin θ.
 fn row_plot(context: &FigureContext, table: &Table2d) -> Document {
     let h = table.height();
     let with: Vec<f64> = (0..h).map(|y| table.rows().pmf(y)).collect();

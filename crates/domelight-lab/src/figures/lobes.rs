@@ -1,4 +1,4 @@
-//! Figure 1: directions drawn from lobes; their histogram against their density.
+//! Figure 1: directions sampled from lobes; their histograms and densities.
 
 use crate::Error;
 use domelight::bsdf::{Brdf, Bsdf};
@@ -23,9 +23,9 @@ const LOBES: [(&str, &str); 4] = [
 ];
 const THETA_BINS: usize = 45;
 const PHI_BINS: usize = 36;
-/// Points of the quadrature over the other angle.
+/// Quadrature points over the other angle.
 const QUADRATURE: usize = 256;
-/// Directions that are drawn as dots.
+/// Directions shown as dots.
 const DOTS: usize = 1000;
 
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
@@ -47,17 +47,17 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     }
     Ok(Figure {
         number: 1,
-        title: "Directions drawn from lobes",
+        title: "Directions sampled from lobes",
         slides: "slides 5–9",
         caption: code!(
             Html,
-            "<p>{n} directions of each lobe, drawn by inverting its distribution function with the viewer \
+            "<p>{n} directions per lobe, sampled by inverting its distribution function with the viewer \
              along the normal: a thousand of them as dots (the center is the normal, the rim the horizon), \
              and all of them as histograms over the density that the program divides by. If the histogram \
-             follows the curve, sampler and density agree; χ² near its degrees of freedom says so in a number.</p>\
-             <p>Three traps: the density of Ward's half-vector needs cos³θ<sub>h</sub> below the exponential; a \
-             plain arctan for φ<sub>h</sub> reaches half of the lobe only, atan2 all of it; and \
-             p(ω<sub>i</sub>) = p(ω<sub>h</sub>) / 4(ω<sub>h</sub>·ω<sub>i</sub>), for it is ω<sub>i</sub> that is traced.</p>",
+             follows the curve, sampler and density agree; then χ² is near its degrees of freedom.</p>\
+             <p>Three pitfalls: the density of Ward's half vector needs cos³θ<sub>h</sub> in the denominator; a \
+             plain arctan for φ<sub>h</sub> reaches only half of the lobe, atan2 all of it; and \
+             p(ω<sub>i</sub>) = p(ω<sub>h</sub>) / 4(ω<sub>h</sub>·ω<sub>i</sub>), because ω<sub>i</sub> is traced.</p>",
             n = n,
         ),
         formulas: formulas::lobes(),
@@ -68,12 +68,12 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     })
 }
 
-/// A number of the table, without digits that mean nothing.
+/// Rounds a number for the table to meaningful digits.
 fn rounded(x: f64) -> serde_json::Value {
     number(x).parse::<f64>().unwrap_or(x).into()
 }
 
-/// A lobe seen along the normal, and directions drawn from it.
+/// A lobe seen along the normal, and directions sampled from it.
 struct Lobe {
     bsdf: Bsdf,
     /// Polar angle and azimuth [degrees], azimuth in [−180, 180).
@@ -118,7 +118,7 @@ impl Lobe {
         sum * 0.5 * PI / QUADRATURE as f64 * PI / 180.0
     }
 
-    /// Counts of values in bins of equal width over [min, max).
+    /// Counts values in bins of equal width over [min, max).
     fn histogram(
         values: impl Iterator<Item = f64>,
         min: f64,
@@ -133,7 +133,7 @@ impl Lobe {
         counts
     }
 
-    /// Σ (observed − expected)² / expected over the bins of θ that expect five or more, and their number.
+    /// Σ (observed − expected)² / expected over the bins of θ with expected counts of five or more, and their number.
     fn chi2(&self) -> (f64, usize) {
         const STEPS: usize = 16;
         let counts = Self::histogram(self.drawn.iter().map(|d| d.0), 0.0, 90.0, THETA_BINS);
@@ -191,7 +191,7 @@ impl Lobe {
         self.plot("azimuth φ [°]", (-180.0, 180.0), &counts, |x| self.phi_density(x))
     }
 
-    /// The hemisphere from above, the radius in proportion to θ.
+    /// The hemisphere from above, with radius proportional to θ.
     fn dots(&self) -> Document {
         const SIZE: f64 = 300.0;
         let (center, radius) = (0.5 * SIZE, 0.5 * SIZE - 12.0);

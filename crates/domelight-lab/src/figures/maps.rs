@@ -1,4 +1,4 @@
-//! The environment as a map, and what is drawn on it.
+//! The environment map and overlays on it.
 
 use std::fmt::Write as _;
 
@@ -14,10 +14,10 @@ use crate::svg::{Color, Document, Pixels, Rect, Style};
 
 /// Width of a map on the sheet.
 pub(crate) const MAP_WIDTH: f64 = 480.0;
-/// The course's marks.
+/// The color of the course's marks.
 const BLUE: Color = Color(0x1f, 0x4b, 0xff);
 
-/// A panel with the map, and what `over` draws on it.
+/// A panel with the map and an overlay drawn by `over`.
 pub(crate) fn map_panel(
     context: &FigureContext,
     title: &str,
@@ -28,7 +28,7 @@ pub(crate) fn map_panel(
     Ok(panel_of(&context.map, png, title, notes, over))
 }
 
-/// A panel of the size of the map, in black.
+/// A black panel of the map's size.
 pub(crate) fn black_panel(
     context: &FigureContext,
     title: &str,
@@ -52,35 +52,35 @@ fn panel_of(
     picture_panel(&picture, over)
 }
 
-/// The sRGB of linear light in [0, 1].
+/// The sRGB color of linear light in [0, 1].
 pub(crate) fn shown_color(color: Rgb) -> Color {
     let [r, g, b] = color.to_array().map(|c| (255.0 * srgb_from_linear(c.clamp(0.0, 1.0))) as u8);
     Color(r, g, b)
 }
 
-/// Where a direction lies on a map that is drawn into `r`.
+/// The position of a direction on a map drawn into `r`.
 pub(crate) fn on_map(context: &FigureContext, r: Rect, direction: Vec3) -> (f64, f64) {
     let uv = context.environment.uv(direction);
     (r.x + f64::from(uv.x) * r.width, r.y + f64::from(uv.y) * r.height)
 }
 
-/// The course's mark: a blue square of five pixels, with a rim that shows on dark and bright.
+/// The course's mark: a blue square of five pixels, with a rim visible on dark and bright backgrounds.
 pub(crate) fn mark(sheet: &mut Document, (x, y): (f64, f64)) {
     let style = Style::fill(BLUE).outlined(Color::WHITE, 0.8);
     sheet.rect(Rect::new(x - 2.5, y - 2.5, 5.0, 5.0), style);
 }
 
-/// A picture of the size of the map.
+/// A panel of the map's size with a picture.
 pub(crate) fn image_panel(context: &FigureContext, png: Vec<u8>, title: &str) -> Document {
     panel_of(&context.map, png, title, &[], |_, _| {})
 }
 
-/// White lines between the regions of a rig, which are drawn for `part` of the map in [0, 1]².
+/// Draws white lines between the regions of a rig, for `part` of the map in [0, 1]².
 pub(crate) fn borders(sheet: &mut Document, r: Rect, rig: &Rig, part: Rect) {
     borders_in(sheet, r, rig, part, Color::WHITE, 1.3);
 }
 
-/// The same in a color and width.
+/// Like [`borders`], with a color and width.
 pub(crate) fn borders_in(
     sheet: &mut Document,
     r: Rect,
@@ -89,9 +89,9 @@ pub(crate) fn borders_in(
     color: Color,
     width: f64,
 ) {
-    // A line for each run of texels whose neighbor belongs to another light.
+    // One line for each run of texels whose neighbors belong to another light.
     let (w, h) = (rig.width, rig.height);
-    // Finer than the sheet's pixels no border is seen.
+    // Borders finer than the sheet's pixels are invisible.
     let step = ((w as f64 * part.width / r.width) as usize).max(1);
     let label = |x: usize, y: usize| rig.labels[y.min(h - 1) * w + x % w];
     let (sx, sy) = (r.width / part.width, r.height / part.height);

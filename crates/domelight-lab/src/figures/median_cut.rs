@@ -1,4 +1,4 @@
-//! Figure 6: median cut, its regions and lights, and what they shade.
+//! Figure 6: median cut: its regions and lights, and renders with them.
 
 use crate::Error;
 use domelight::picture::tone::ToneMapping;
@@ -12,11 +12,11 @@ use super::formulas;
 use super::maps::{black_panel, borders, map_panel, mark, on_map, shown_color};
 use crate::svg::{Document, Pixels, Rect, Style};
 
-/// The lecture's numbers of regions.
+/// The lecture's region counts.
 const REGIONS: [usize; 6] = [1, 2, 4, 16, 64, 256];
-/// Lights of the renders.
+/// Light counts of the renders.
 const LIGHTS: [usize; 5] = [2, 4, 16, 64, 256];
-/// All of the map.
+/// The whole map.
 pub(super) const WHOLE: Rect = Rect { x: 0.0, y: 0.0, width: 1.0, height: 1.0 };
 
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
@@ -74,7 +74,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
             tone: figure_scene.tone()?,
         });
     }
-    let lights = lights_panel(context, &rig(256)?, "256 lights, their color and energy")?;
+    let lights = lights_panel(context, &rig(256)?, "Color and energy of 256 lights")?;
     let on_the_map = map_panel(context, "256 lights on the map", &[], |sheet, r| {
         for light in &rig(256).map(|r| r.lights).unwrap_or_default() {
             mark(sheet, on_map(context, r, light.direction));
@@ -85,19 +85,19 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         title: "Median cut",
         slides: "slides 31–41",
         caption: Code::literal(
-            "<p>The map is one region; each region is cut along its longer side, its width scaled by \
-            sin θ, so that both halves have the same energy; after n rounds each of 2<sup>n</sup> regions \
-            becomes a light with the region's energy. It stands at the centroid of that <em>energy</em> (blue); at the \
-            middle of the rectangle instead, errors are several times as large, as the table shows: RMS error of \
-            unoccluded matte shading over all normals.</p><p>Fixed lights have no noise but bias: shadows are \
-            sums of hard ones, and narrow lobes would see separate lights. The bias falls as lights are added.</p>",
+            "<p>The map starts as one region. Each round cuts every region across its longer side (with widths scaled by \
+            sin θ) into halves of equal energy; after n rounds each of the 2<sup>n</sup> regions \
+            becomes a light with the region's energy. The light sits at the centroid of that <em>energy</em> (blue). At the \
+            center of the rectangle instead, errors are several times as large, as the table shows (RMS error of \
+            unoccluded matte shading over all normals).</p><p>Fixed lights have bias instead of noise: shadows become \
+            sums of hard shadows, and narrow lobes would show separate lights. The bias falls as lights are added.</p>",
         ),
         formulas: vec![formulas::region_light()],
         rows: vec![
             Row::new("", early),
             Row::new("", late),
             Row::new("The lights", vec![on_the_map, lights]),
-            Row::new("The scene, lit by them", scene_row),
+            Row::new("The scene under the lights", scene_row),
             Row::new("A matte sphere", sphere_row),
         ],
         tables: vec![table],
@@ -106,7 +106,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     })
 }
 
-/// The scene as it is, in a picture that both figures of fixed lights share.
+/// The whole scene, in the view that both figures of fixed lights share.
 pub(super) fn full_scene<'a>(context: &'a FigureContext) -> Result<FigureScene<'a>, Error> {
     let size = context.choose(220, 24);
     Ok(context.scene(Subject::Scene, size, size)?.samples(context.choose(2, 1)))
@@ -118,7 +118,7 @@ pub(super) fn sphere_scene<'a>(context: &'a FigureContext) -> Result<FigureScene
     Ok(context.scene(Subject::Sphere, size, size)?.samples(context.choose(2, 1)))
 }
 
-/// The map, the borders of regions in white and their lights in blue.
+/// The map with region borders in white and lights in blue.
 pub(super) fn regions_panel(
     context: &FigureContext,
     rig: &Rig,
@@ -132,7 +132,7 @@ pub(super) fn regions_panel(
     })
 }
 
-/// The lights alone: discs in their colors, their area in proportion to their energy.
+/// The lights alone: discs in their colors, with areas proportional to energy.
 fn lights_panel(context: &FigureContext, rig: &Rig, title: &str) -> Result<Document, Error> {
     let total = rig.lights.len() as f64;
     black_panel(context, title, &[], |sheet, r| {
@@ -144,7 +144,7 @@ fn lights_panel(context: &FigureContext, rig: &Rig, title: &str) -> Result<Docum
     })
 }
 
-/// A picture that fixed lights made, and its error.
+/// A render with fixed lights, and its error.
 pub(super) fn lit_panel(
     title: &str,
     measured: &FigureMeasurement,
@@ -167,7 +167,7 @@ fn square_panel(
     tone: ToneMapping,
     notes: &[String],
 ) -> Result<Document, Error> {
-    // At the scale of the file a pixel is a pixel.
+    // At the file's scale, one pixel stays one pixel.
     const SIZE: f64 = 220.0;
     let png = png_bytes(image, tone)?;
     let picture = Picture { png, width: SIZE, height: SIZE, pixels: Pixels::Smooth, title, notes };

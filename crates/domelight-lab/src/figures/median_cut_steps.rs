@@ -1,4 +1,4 @@
-//! Figure 14: median cut, step by step: where each round cuts, and the cells as lights see them.
+//! Figure 14: median cut, step by step: the cuts of each round, and the mean radiance of the cells.
 
 use domelight::picture::exposure::Exposure;
 use domelight::picture::tone::ToneMapping;
@@ -24,10 +24,10 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let mut table = Table::new(&[
         "round",
         "regions",
-        "least share of the energy [%]",
-        "greatest share [%]",
-        "least solid angle [sr]",
-        "greatest solid angle [sr]",
+        "smallest share of the energy [%]",
+        "largest share [%]",
+        "smallest solid angle [sr]",
+        "largest solid angle [sr]",
     ]);
     // The mean of the map becomes middle gray.
     let tone = ToneMapping {
@@ -62,10 +62,10 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         title: "Median cut, step by step",
         slides: "slides 32–37",
         caption: Code::literal(
-            "<p>A round cuts every region once, across its longer side, where both halves have the same energy: the new cuts \
-             are orange, those of earlier rounds white, and the lights blue. Below each round the map as its lights know it: \
-             every cell has the mean radiance of its region, so that its light is that times the solid angle (exposed for the mean of the map). Bright parts are \
-             cut into small cells soon; dark ones stay large, and cost no lights. Shares of the energy are not exactly even, \
+            "<p>A round cuts every region once, across its longer side, into halves of equal energy: new cuts \
+             are orange, earlier cuts white, and lights blue. Below each round, every cell shows the mean radiance of its \
+             region (exposed for the mean of the map); the light of a cell is that radiance times the solid angle. Bright \
+             areas are soon cut into small cells; dark areas stay large and waste no lights. Energy shares are not exactly equal, \
              because a cut runs between texels.</p>",
         ),
         formulas: vec![formulas::region_light()],
@@ -97,7 +97,7 @@ fn cuts_panel(
     })
 }
 
-/// The map with the mean radiance of its region in every texel.
+/// The map with every texel replaced by the mean radiance of its region.
 fn cells_picture(context: &FigureContext, rig: &Rig) -> RgbImage {
     let radiance: Vec<Rgb> = rig
         .lights

@@ -14,9 +14,9 @@ use crate::Error;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE};
 
-/// Degrees around the lobe that the maps show.
+/// Angular radius of the maps around the lobe [degrees].
 const SHOWN: f32 = 50.0;
-/// Points along the great circle, on each side of the lobe's axis [half degrees].
+/// Extent of the great circle on each side of the lobe's axis [half degrees].
 const REACH: i32 = 120;
 
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
@@ -38,10 +38,10 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let labels = ["0, BRDF".to_owned(), "½".to_owned(), "1, light".to_owned()];
     weights.push(scale_panel(440.0, &weight_strip()?, &labels, "weight"));
 
-    // The shares of the product that each kind of sample estimates, in one scale.
+    // The parts of the product that each technique estimates, on one scale.
     let whole = view.picture(|wi| domelight::Rgb::splat(product(wi)));
     let top = peak(&whole);
-    let mut table = Table::new(&["heuristic", "of the environment [%]", "of the BRDF [%]"]);
+    let mut table = Table::new(&["heuristic", "environment [%]", "BRDF [%]"]);
     let mut shares = vec![view.panel(&scaled(&whole, top)?, "Product of light and BRDF", &[], &[])];
     for (heuristic, name) in [(Heuristic::Balance, "balance"), (Heuristic::Power, "power")] {
         let [light, brdf] = energies(context, &point, |wi| weight(heuristic, wi));
@@ -59,15 +59,15 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     }
     Ok(Figure {
         number: 10,
-        title: "The weights of multiple importance sampling over the sphere",
+        title: "MIS weights over the sphere",
         slides: "slides 19–20",
         caption: code!(
             Html,
-            "<p>The middle of the sphere of figure 3, {SHOWN:.0}° around where a Phong lobe of exponent 50 leans, {OFF_AXIS:.0}° past the \
-             brightest light. Each direction has a weight for the kind of sample that found it, large where that kind is dense; \
-             for one sample of each kind. The two weights of a direction add up to 1, so that the parts add up to the product. The \
-             power heuristic decides more sharply, which spares the estimate the rare samples of the kind that should not have \
-             found the direction. Outside of the lobe’s hemisphere the BRDF has no density: the weight is the environment’s, \
+            "<p>The center of figure 3’s sphere, {SHOWN:.0}° around a Phong lobe of exponent 50 that leans {OFF_AXIS:.0}° past the \
+             brightest light, with one sample per technique. Each direction has one weight per technique, large where that \
+             technique’s density is high. The two weights of a direction add up to 1, so the parts add up to the product. The \
+             power heuristic separates them more sharply, which suppresses rare samples from the wrong technique. \
+             Outside the lobe’s hemisphere the BRDF has zero density: the environment gets all the weight, \
              and the product is black.</p>",
             OFF_AXIS = OFF_AXIS,
             SHOWN = SHOWN,
@@ -75,7 +75,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         formulas: formulas::mis_weights(),
         rows: vec![
             Row::new("Weights", weights),
-            Row::new("What each kind of sample estimates, power heuristic", shares),
+            Row::new("Part of the product that each technique estimates, power heuristic", shares),
             Row::new(
                 "Along the great circle through the lobe and the brightest light",
                 vec![along_the_circle(context, &point)],
@@ -87,7 +87,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     })
 }
 
-/// The product's integral by the weights of both kinds, over the texels of the map that is shown.
+/// The product's integral weighted for each technique, over the texels of the displayed map.
 fn energies(
     context: &FigureContext,
     point: &ShadingPoint,

@@ -1,4 +1,4 @@
-//! The figures of a lecture on sampling direct illumination, one a file, and a page that shows them.
+//! The figures of a lecture on sampling direct illumination, one per file, and a page that shows them.
 
 mod balance;
 mod context;
@@ -31,56 +31,56 @@ use crate::{At as _, Error};
 pub use context::FigureContext;
 use figure::Figure;
 
-/// How many figures there are.
+/// The number of figures.
 pub const N_FIGURES: u8 = 14;
 
-/// What the figures show.
+/// The scene, light and quality of the figures.
 #[derive(Clone, Debug)]
 pub struct FigureSettings {
     /// A built-in scene or a file.
     pub scene: String,
     /// The light; a built-in scene is lit by the cathedral by default.
     pub environment: LightSettings,
-    /// Small pictures, few samples, poor references.
+    /// Whether to use small pictures, few samples and noisy references.
     pub quick: bool,
-    /// Names the random numbers.
+    /// The seed of the random numbers.
     pub seed: u64,
 }
 
-/// What was drawn.
+/// The drawn figures and their page.
 #[derive(Clone, Debug, Serialize)]
 pub struct DrawnFigures {
     /// The page that shows all figures.
     pub page: PathBuf,
-    /// In the order of their numbers.
+    /// The figures, ordered by number.
     pub figures: Vec<DrawnFigure>,
 }
 
 /// A figure and its files.
 #[derive(Clone, Debug, Serialize)]
 pub struct DrawnFigure {
-    /// From 1 to [`N_FIGURES`].
+    /// The figure's number, from 1 to [`N_FIGURES`].
     pub number: u8,
-    /// What it shows.
+    /// The figure's title.
     pub title: String,
-    /// The drawing, and its data where there are.
+    /// The drawing, and data files if any.
     pub files: Vec<PathBuf>,
-    /// Radiance as OpenEXR and PNG; empty if there is none.
+    /// Radiance maps as OpenEXR and PNG; may be empty.
     pub pictures: Vec<PathBuf>,
-    /// Wall-clock time that it took \[s\].
+    /// Wall-clock time \[s\].
     pub seconds: f64,
 }
 
-/// The names of what [`draw`] writes into its folder.
+/// The names of files and folders that [`draw`] writes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileNames {
-    /// The page and the drawings, and tables that a figure may have.
+    /// The page, the drawings, and any tables.
     pub files: Vec<String>,
     /// Folders of pictures.
     pub folders: Vec<String>,
 }
 
-/// What [`draw`] may write for `only` these figures, or for all.
+/// The files that [`draw`] may write for the figures in `only`, or for all figures if `only` is empty.
 pub fn names_of_files(only: &[u8]) -> FileNames {
     let numbers = || numbers(only);
     let of_figure = |n| ["png", "csv", "json"].map(|extension| format!("figure-{n}.{extension}"));
@@ -90,13 +90,13 @@ pub fn names_of_files(only: &[u8]) -> FileNames {
     }
 }
 
-/// The figures that are drawn.
+/// The numbers of the figures to draw.
 fn numbers(only: &[u8]) -> impl Iterator<Item = u8> {
     (1..=N_FIGURES).filter(|n| only.is_empty() || only.contains(n))
 }
 
-/// Draws figures into a folder, with a page that shows them. `only` are the numbers of the figures, from 1 to
-/// [`N_FIGURES`]; none are all. After an error what is done stays, on the page as well.
+/// Draws figures into a folder, with a page that shows them. `only` lists figure numbers from 1 to [`N_FIGURES`]; an
+/// empty list means all. After an error, finished figures stay, in the folder and on the page.
 ///
 /// # Errors
 /// If a file cannot be written, or the host ended the work.

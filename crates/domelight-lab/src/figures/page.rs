@@ -1,4 +1,4 @@
-//! The page: all figures of a run in the lecture's order, in one file that needs no other.
+//! The page: all figures of a run in the lecture's order, in one self-contained file.
 
 use std::path::Path;
 
@@ -12,10 +12,10 @@ use super::context::FigureContext;
 use super::figure::{Figure, Row, Table, count, number};
 use crate::svg::{Document, data_uri, font_face_css};
 
-/// For formulas: signs that grow, which fonts for text have not.
+/// A font for formulas, with the stretchy symbols that text fonts lack.
 const MATH_FONT: &[u8] = include_bytes!("../../assets/math-subset.otf");
 
-/// The page's file.
+/// The file name of the page.
 pub(crate) const NAME: &str = "index.html";
 
 /// Writes the page.
@@ -40,7 +40,8 @@ fn page(context: &FigureContext, figures: &[Figure]) -> Code<Html> {
         sections += section(context, figure);
     }
     let map = context.environment.map();
-    let quick = context.choose("", " This is a quick run: pictures are small and references poor.");
+    let quick =
+        context.choose("", " This is a quick run: pictures are small and references noisy.");
     code!(
         Html,
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -48,8 +49,8 @@ fn page(context: &FigureContext, figures: &[Figure]) -> Code<Html> {
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <title>Sampling direct illumination</title>\n<style>{font}{math_font}{style}</style>\n</head>\n<body>\n\
          <header><h1>Sampling direct illumination</h1>\
-         <p>The figures of the lecture, computed: <b>{scene}</b> in the light of <b>{probe}</b> ({width}×{height} texels), \
-         by domelight {version}.{quick}</p>\
+         <p>The lecture’s figures for <b>{scene}</b> under <b>{probe}</b> ({width}×{height} texels), \
+         computed by domelight {version}.{quick}</p>\
          <p class=\"command\"><code>domelight figures{arguments}</code></p></header>\n\
          <nav aria-label=\"Figures\"><h2>Figures</h2><ol>{contents}</ol></nav>\n<main>\n{sections}</main>\n</body>\n</html>\n",
         font = Code::<Html>::generated(font_face_css()),
@@ -115,7 +116,7 @@ fn panels(row: &Row) -> Code<Html> {
     }
     let widths = || row.panels.iter().map(Document::width);
     let columns: Vec<String> = widths().map(|w| format!("{w:.0}fr")).collect();
-    // On a phone two small panels stand side by side.
+    // On a phone, two small panels fit side by side.
     let least = widths().fold(0.0, f64::max).min(480.0) * 0.68;
     html += code!(
         Html,

@@ -1,4 +1,4 @@
-//! Figure 3: what the environment, the BRDF and their product say about where to look.
+//! Figure 3: importance according to the environment, the BRDF and their product.
 
 use crate::Error;
 use domelight::code;
@@ -15,7 +15,7 @@ use super::figure::{Figure, Radiance, Row, Table, png_bytes};
 use super::formulas;
 use super::sphere::{OFF_AXIS, SphereView, peak, shading_point};
 
-/// Samples of each kind.
+/// Samples per technique.
 const SAMPLES: u32 = 100;
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let point = shading_point(context)?;
@@ -46,21 +46,20 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         let value = |wi: &Vec3| (point.eval(*wi) * environment.le(*wi)).luminance();
         let useful = directions.iter().filter(|wi| value(wi) > 0.01 * product_peak).count();
         table.rows.push(vec![title.into(), useful.into()]);
-        let notes =
-            [format!("{useful} of {} where the product is not negligible", directions.len())];
+        let notes = [format!("product not negligible at {useful} of {}", directions.len())];
         samples.push(view.panel(&product_png, title, directions, &notes));
     }
     Ok(Figure {
         number: 3,
-        title: "Importance of light, of reflectance, and of both",
+        title: "Importance of light, reflectance and their product",
         slides: "slides 17–18",
         caption: code!(
             Html,
-            "<p>The sphere of directions as a light probe: its center looks toward where the lobe points, the rim is behind. A Phong lobe of \
-             exponent 50 leans {OFF_AXIS:.0}° past the brightest light. Samples of the environment find lights \
-             that the surface does not reflect, samples of the BRDF find directions from where little light comes; \
-             samples of the product do neither. They are drawn by rejection, which follows the product exactly. \
-             (BRDF and product are shown in a color scale over value<sup>0.4</sup>, so that faint parts are seen.)</p>",
+            "<p>The sphere of directions as a light probe: the center is the lobe’s direction, the rim the opposite one. A Phong lobe of \
+             exponent 50 leans {OFF_AXIS:.0}° past the brightest light. Environment samples find lights \
+             that the surface does not reflect, and BRDF samples find directions with little light; \
+             product samples do neither. They are drawn by rejection, which follows the product exactly. \
+             (BRDF and product use a color scale over value<sup>0.4</sup> to show faint parts.)</p>",
             OFF_AXIS = OFF_AXIS,
         ),
         formulas: formulas::product(),
@@ -97,7 +96,7 @@ fn from_product(context: &FigureContext, point: &ShadingPoint) -> Result<Vec<Vec
     by_rejection(context, point, sampler(context), SAMPLES)
 }
 
-/// By rejection, which follows the product exactly.
+/// Samples by rejection, which follows the product exactly.
 pub(super) fn by_rejection(
     context: &FigureContext,
     point: &ShadingPoint,

@@ -1,4 +1,4 @@
-//! Figure 5: rejection, what is accepted and how long it takes.
+//! Figure 5: rejection sampling: accepted samples and the number of tries.
 
 use crate::Error;
 use domelight::code;
@@ -20,7 +20,7 @@ use crate::acceptance::{Acceptance, count_tries};
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE, Pixels, superscript};
 
-/// Directions to accept at each point, and the most tries.
+/// Directions to accept at each point, and the maximum number of tries.
 const ACCEPT: u32 = 8;
 const MAX_TRIES: u32 = 2048;
 const MATERIAL: &str = "phong:50:1:0.5";
@@ -92,14 +92,14 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 24–25",
         caption: code!(
             Html,
-            "<p>A direction drawn from one factor of the product is kept with a probability in proportion to the other. \
-             What is kept follows the product exactly, and the tighter the bound, the more is kept. Above: uniform \
-             tries under a bound on cos<sup>50</sup>θ, tight, and three times too high. Below: a statue of {MATERIAL}, \
-             {ACCEPT} directions to accept at each point and at the most {MAX_TRIES} tries. A small bright light makes the bound \
+            "<p>A direction drawn from one factor of the product is accepted with probability proportional to the other. \
+             Accepted directions follow the product exactly; a tighter bound accepts more of them. Above: uniform \
+             tries under a bound on cos<sup>50</sup>θ, tight and three times too high. Below: a statue of {MATERIAL}, \
+             with {ACCEPT} directions to accept at each point in at most {MAX_TRIES} tries. A small bright light makes the bound \
              on light loose everywhere; the bound on the BRDF is loose where lobes are narrow.</p>\
-             <p>To accept, the unshadowed integral need not be known; to estimate it must. N accepted out of T tries is a \
-             biased estimate when the N-th ends the tries; (N − 1)/(T − 1) is not (Haldane 1945). Where the tries run out, the \
-             estimate is the number accepted over the number tried, and the whole is still unbiased.</p>",
+             <p>Acceptance does not require the unshadowed integral, but the estimate does. N accepted of T tries is a \
+             biased estimate if the tries end with the N-th; (N − 1)/(T − 1) is unbiased (Haldane 1945). Where the tries run out, the \
+             estimate is accepted over tried, and the result stays unbiased.</p>",
             MATERIAL = MATERIAL,
             ACCEPT = ACCEPT,
             MAX_TRIES = MAX_TRIES,
@@ -110,7 +110,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
                 "Accepted and rejected",
                 vec![bound(1.0, context.seed), bound(3.0, context.seed)],
             ),
-            Row::new("Share of the tries that is accepted", acceptance),
+            Row::new("Acceptance rate", acceptance),
             Row::new("Tries until enough are accepted", tries),
         ],
         tables: vec![table],
@@ -119,7 +119,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     })
 }
 
-/// What the center of each pixel sees.
+/// The shading point at the center of each pixel.
 fn points(figure_scene: &FigureScene) -> Vec<Option<ShadingPoint>> {
     let (width, height) = (figure_scene.settings.width, figure_scene.settings.height);
     let point = |i: usize| {
@@ -156,12 +156,12 @@ fn map(
     Ok(picture_panel(&picture, |_, _| {}))
 }
 
-/// The scale, its end on top.
+/// A vertical strip of the color scale, its end on top.
 fn strip(scale: ColorScale) -> Result<Vec<u8>, Error> {
     png_bytes(&RgbImage::from_fn(1, 128, |_, y| scale.color(1.0 - y as f32 / 127.0)), AS_IT_IS)
 }
 
-/// Tries in one dimension under a bound that is `looseness` times the largest value.
+/// Plots tries in one dimension under a bound of `looseness` times the largest value.
 fn bound(looseness: f64, seed: u64) -> Document {
     const TRIES: usize = 400;
     const REACH: f64 = 45.0;

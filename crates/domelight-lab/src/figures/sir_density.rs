@@ -16,17 +16,17 @@ use crate::Error;
 use crate::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
 use crate::svg::{Document, PALETTE};
 
-/// Degrees around the lobe that the maps show.
+/// Angular radius of the maps around the lobe [degrees].
 const VIEW: f32 = 45.0;
-/// Candidates; those that have a picture.
+/// Candidate counts, and those with a picture.
 const CANDIDATES: [usize; 9] = [1, 2, 4, 8, 16, 32, 64, 128, 256];
 const SHOWN: [usize; 4] = [1, 4, 16, 256];
-/// Directions that are kept of each set of candidates, at the most: they share its accidents, but have the density of one.
+/// The maximum number of directions kept from one candidate set. They are correlated, but have the same density.
 const PICKS: usize = 16;
 
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let point = shading_point(context)?;
-    // Cells so large that counts are not noise alone.
+    // Large cells keep the noise of the counts low.
     let view = SphereView::new(context, &point).within(VIEW).of_pixels(context.choose(110, 24));
     let n = context.choose(200_000, 4_000);
     let exact = |pixel: u64| -> Result<Histogram, Error> {
@@ -37,7 +37,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     let floor = product.distance(&again);
     let top = peak(&product.picture(&view));
 
-    let mut table = Table::new(&["candidates", "distance from the product [%]"]);
+    let mut table = Table::new(&["candidates", "distance to the product [%]"]);
     let (mut panels, mut distances) = (Vec::new(), Vec::new());
     for m in CANDIDATES {
         context.host.check_canceled()?;
@@ -49,13 +49,13 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         if SHOWN.contains(&m) {
             let title =
                 if m == 1 { "M = 1: the candidates".to_owned() } else { format!("M = {m}") };
-            let notes = [format!("{} % away from the product", number(100.0 * distance))];
+            let notes = [format!("distance to the product {} %", number(100.0 * distance))];
             let png = scaled(&histogram.picture(&view), top)?;
             panels.push(sharp_panel(&png, &title, &notes));
         }
     }
     table.rows.push(vec!["exact".into(), ((1000.0 * floor).round() / 10.0).into()]);
-    let notes = [format!("{} %: the counts’ own noise", number(100.0 * floor))];
+    let notes = [format!("noise of the counts {} %", number(100.0 * floor))];
     panels.push(sharp_panel(&scaled(&product.picture(&view), top)?, "The product", &notes));
     Ok(Figure {
         number: 12,
@@ -63,20 +63,20 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 26–27",
         caption: code!(
             Html,
-            "<p>The middle of the sphere of figure 3, {VIEW:.0}° around a lobe that leans {OFF_AXIS:.0}° past the brightest light. M candidates are drawn, half \
-             from the environment and half from the BRDF, and one is kept with a probability in proportion to product over \
-             density. A candidate alone follows the mixture; among more there is more often one where the product is large. Counted are \
-             {n} directions for each M; the distance from the product is half the sum of absolute differences over the cells of the \
-             picture, 100 % where nothing overlaps. It cannot fall below the noise of the counts, which two sets of exact directions \
-             show (dashed; by rejection).</p><p>The estimate is unbiased for every M: candidates that were not representative are \
-             made up for by the mean of their weights.</p>",
+            "<p>The center of figure 3’s sphere, {VIEW:.0}° around a lobe that leans {OFF_AXIS:.0}° past the brightest light. M candidates are drawn, half \
+             from the environment and half from the BRDF, and one is kept with probability proportional to product over \
+             density. A single candidate follows the mixture; a larger set more often contains one where the product is large. The \
+             histograms count {n} directions for each M. The distance to the product is half the sum of absolute differences over the \
+             cells, 100 % if nothing overlaps. It cannot fall below the noise of the counts, measured between two sets of exact \
+             directions (dashed; by rejection).</p><p>The estimate is unbiased for every M: unrepresentative candidates are \
+             compensated by the mean of their weights.</p>",
             OFF_AXIS = OFF_AXIS,
             VIEW = VIEW,
             n = n,
         ),
         formulas: formulas::sir_density(),
         rows: vec![
-            Row::new("Density of what is kept", panels),
+            Row::new("Density of the kept directions", panels),
             Row::new("", vec![plot(&distances, 100.0 * floor)]),
         ],
         tables: vec![table],
@@ -85,7 +85,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     })
 }
 
-/// Directions that are kept of sets of `m` candidates, `n` in all.
+/// Resamples `n` directions in total from sets of `m` candidates.
 fn resampled(context: &FigureContext, point: &ShadingPoint, m: usize, n: usize) -> Vec<Vec3> {
     let sampler = Sampler::new(SamplerKind::Independent, context.seed, 1200 + m as u64);
     let environment = &context.environment;
@@ -94,7 +94,7 @@ fn resampled(context: &FigureContext, point: &ShadingPoint, m: usize, n: usize) 
     let mut candidates: Vec<(Vec3, f64)> = Vec::with_capacity(m);
     let mut index = 0;
     while kept.len() < n && index < 64 * n as u32 * m as u32 {
-        // Draw from both in equal parts.
+        // Draw equally from both techniques.
         candidates.clear();
         for _ in 0..m {
             let numbers = sampler.numbers(Dimension::Brdf, index);
@@ -111,7 +111,7 @@ fn resampled(context: &FigureContext, point: &ShadingPoint, m: usize, n: usize) 
             let product = f64::from((value * environment.le(wi)).luminance());
             candidates.push((wi, product / density));
         }
-        // Keep in proportion to the weights, by a comb with a random first tooth.
+        // Keep candidates in proportion to their weights, by systematic resampling with a random offset.
         let total: f64 = candidates.iter().map(|c| c.1).sum();
         if total <= 0.0 {
             continue;
@@ -129,7 +129,7 @@ fn resampled(context: &FigureContext, point: &ShadingPoint, m: usize, n: usize) 
     kept
 }
 
-/// Shares of directions in the cells of the sphere's picture, and at last of those beside it.
+/// Fractions of directions in the cells of the sphere's picture; the last entry counts directions outside of it.
 struct Histogram(Vec<f64>);
 
 impl Histogram {
@@ -147,7 +147,7 @@ impl Histogram {
         Self(shares)
     }
 
-    /// Half of the sum of differences: what would have to be moved.
+    /// Half the sum of absolute differences (the total variation distance).
     fn distance(&self, other: &Self) -> f64 {
         0.5 * self.0.iter().zip(&other.0).map(|(a, b)| (a - b).abs()).sum::<f64>()
     }
@@ -175,7 +175,7 @@ fn plot(distances: &[Datum], floor: f64) -> Document {
     ];
     let values = distances.iter().map(|d| d.y).chain([floor, 0.5 * floor, 100.0]);
     let plot = Plot {
-        title: "Distance from the product".to_owned(),
+        title: "Distance to the product".to_owned(),
         x: Axis::around("candidates, M", Scale::Log, [1.0, most]),
         y: Axis::around("distance [%]", Scale::Log, values),
         series: series.clone(),

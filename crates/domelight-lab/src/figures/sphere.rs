@@ -18,12 +18,12 @@ use crate::svg::{Color, Document, Pixels, Style};
 const SIZE: f64 = 440.0;
 /// Angle between the lobe's axis and the brightest light [degrees].
 pub(super) const OFF_AXIS: f32 = 14.0;
-/// Angle between the axis and the normal [degrees].
+/// Angle between the lobe's axis and the normal [degrees].
 const TILT: f32 = 35.0;
-/// Colors are already what is to be seen.
+/// The identity tone mapping, for colors that are already final.
 pub(super) const AS_IT_IS: ToneMapping = ToneMapping { exposure: 0.0, curve: ToneCurve::Standard };
 
-/// The scale of weights, its end on top.
+/// A vertical strip of the color scale for weights, its end on top.
 pub(super) fn weight_strip() -> Result<Vec<u8>, Error> {
     let color = |_, y: usize| ColorScale::Viridis.color(1.0 - y as f32 / 127.0);
     png_bytes(&RgbImage::from_fn(1, 128, color), AS_IT_IS)
@@ -44,7 +44,7 @@ pub(super) fn scaled(values: &RgbImage, top: f32) -> Result<Vec<u8>, Error> {
     png_bytes(&RgbImage::new(values.width, values.height, shown), AS_IT_IS)
 }
 
-/// Luminance that all but one in two thousand pixels stay below.
+/// The luminance exceeded by only one in two thousand pixels.
 pub(super) fn peak(picture: &RgbImage) -> f32 {
     let mut values: Vec<f32> = picture.pixels.iter().map(|p| p.luminance()).collect();
     values.sort_by(f32::total_cmp);
@@ -54,15 +54,15 @@ pub(super) fn peak(picture: &RgbImage) -> f32 {
 /// The sphere of directions as an angular map of n × n pixels.
 pub(super) struct SphereView<'a> {
     environment: &'a Environment,
-    /// Where across the map the center looks, from the middle on.
+    /// The center's position across the map, relative to the middle.
     turn: f32,
     pub(super) n: usize,
-    /// The part of the sphere's radius that is shown: 1 is all of it, ½ the hemisphere around the center.
+    /// The displayed part of the sphere's radius: 1 is the whole sphere, ½ the hemisphere around the center.
     radius: f32,
 }
 
 impl<'a> SphereView<'a> {
-    /// The sphere around the direction that a point's lobe leans to.
+    /// A view of the sphere centered on the direction of a point's lobe.
     pub(super) fn new(context: &'a FigureContext, point: &ShadingPoint) -> Self {
         let environment = &context.environment;
         let ahead = environment.uv(point.frame.to_world(reflect(point.wo, Vec3::Z)));
@@ -70,17 +70,17 @@ impl<'a> SphereView<'a> {
         Self { environment, turn: ahead.x - 0.5, n, radius: 1.0 }
     }
 
-    /// Of the directions within `degrees` of the center, a little more in the corners.
+    /// Limits the view to directions within `degrees` of the center (slightly more in the corners).
     pub(super) fn within(self, degrees: f32) -> Self {
         Self { radius: degrees / 180.0, ..self }
     }
 
-    /// With another number of pixels across.
+    /// Sets the number of pixels across.
     pub(super) fn of_pixels(self, n: usize) -> Self {
         Self { n, ..self }
     }
 
-    /// The mean of four values in each pixel; black beside the sphere.
+    /// A picture with the mean of four values per pixel, and black outside the sphere.
     pub(super) fn picture(&self, value: impl Fn(Vec3) -> Rgb) -> RgbImage {
         let at = |i: usize, k: usize| (i as f32 + 0.25 + 0.5 * k as f32) / self.n as f32;
         RgbImage::from_fn(self.n, self.n, |x, y| {
@@ -90,20 +90,20 @@ impl<'a> SphereView<'a> {
         })
     }
 
-    /// A picture of values in a color scale, as PNG.
+    /// A color-scaled picture of values, as PNG.
     pub(super) fn scaled(&self, value: impl Fn(Vec3) -> f32) -> Result<Vec<u8>, Error> {
         let values = self.picture(|wi| Rgb::splat(value(wi)));
         scaled(&values, peak(&values))
     }
 
-    /// A picture of weights in [0, 1] in a color scale, as PNG.
+    /// A color-scaled picture of weights in [0, 1], as PNG.
     pub(super) fn weights(&self, weight: impl Fn(Vec3) -> f32) -> Result<Vec<u8>, Error> {
         let values = self.picture(|wi| Rgb::splat(weight(wi)));
         let shown = values.pixels.iter().map(|p| ColorScale::Viridis.color(p.g)).collect();
         png_bytes(&RgbImage::new(self.n, self.n, shown), AS_IT_IS)
     }
 
-    /// The mapping knows the map's own frame: the orientation places it in the world.
+    /// The mapping uses the map's own frame; the orientation places it in the world.
     fn direction(&self, uv: Vec2) -> Option<Vec3> {
         let middle = Vec2::splat(0.5);
         let in_map = Mapping::Angular.direction(middle + (uv - middle) * self.radius)?;
@@ -144,7 +144,7 @@ impl<'a> SphereView<'a> {
     }
 }
 
-/// A point that reflects toward the viewer what is near the brightest light of the map.
+/// A point that reflects the surroundings of the map's brightest light toward the viewer.
 pub(super) fn shading_point(context: &FigureContext) -> Result<ShadingPoint, Error> {
     let light = Frame::from_z(context.brightest());
     let (sin, cos) = OFF_AXIS.to_radians().sin_cos();

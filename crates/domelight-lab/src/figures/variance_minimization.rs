@@ -1,4 +1,4 @@
-//! Figure 7: variance minimization beside median cut.
+//! Figure 7: variance minimization compared with median cut.
 
 use crate::Error;
 use domelight::RgbImage;
@@ -16,9 +16,9 @@ use super::maps::{borders, mark};
 use super::median_cut::{converged_panel, full_scene, lit_panel, regions_panel, sphere_scene};
 use crate::svg::{Document, Pixels, Rect};
 
-/// The poster's numbers of regions.
+/// The poster's region counts.
 const REGIONS: [usize; 4] = [4, 16, 64, 256];
-/// Lights of the renders and of the detail.
+/// The number of lights in the renders and the detail.
 const LIGHTS: usize = 64;
 
 pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
@@ -69,14 +69,14 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         title: "Variance minimization",
         slides: "slides 42–45",
         caption: Code::literal(
-            "<p>Equal energy is not what shading asks for: light that lies close together may share a light, \
-            light that is spread out may not. Here a cut minimizes the greater of the two halves’ variances, the \
-            energy times the squared distance to the centroid (not the variance of the pixels’ values). The first row is the \
-            poster’s rule, with distances on the map; the second the program’s default: distances on the sphere, where no pole \
-            or seam matters, the worst region cut first, then joined and refined into cells about their lights. \
-            The detail shows the surroundings of the brightest light: lights (blue) sit on what shines.</p>\
-            <p>The table has the RMS error of unoccluded shading over all normals, in percent of the RMS shading: matte, \
-            and of a lobe cos<sup>20</sup>.</p>",
+            "<p>Equal energy is not optimal for shading: one light can represent concentrated energy, but not energy \
+            that is spread out. Here a cut minimizes the larger of the two halves’ variances, the \
+            energy times the squared distance to the centroid (not the variance of the pixel values). The first row uses the \
+            poster’s rule, with distances on the map. The second uses the program’s default: distances on the sphere, without \
+            poles or seams; the worst region is cut first, then regions are joined and refined into cells around their lights. \
+            The detail shows the surroundings of the brightest light: lights (blue) sit on the bright features.</p>\
+            <p>The table lists the RMS error of unoccluded shading over all normals, in percent of the RMS shading: matte, \
+            and for a lobe cos<sup>20</sup>.</p>",
         ),
         formulas: vec![formulas::region_variance()],
         rows: vec![
@@ -91,10 +91,10 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
     })
 }
 
-/// A rig of some lights.
+/// Builds a rig with a number of lights.
 type Method<'a> = Box<dyn Fn(usize) -> Result<Rig, RigError> + 'a>;
 
-/// RMS shading errors of every method.
+/// The RMS shading errors of every method.
 fn errors(context: &FigureContext) -> Result<Table, Error> {
     let environment = &context.environment;
     let reference = ShadingReference::new(environment);
@@ -141,13 +141,13 @@ fn errors(context: &FigureContext) -> Result<Table, Error> {
 /// The surroundings of the map's brightest texel.
 struct Detail<'a> {
     context: &'a FigureContext<'a>,
-    /// In [0, 1]² of the map.
+    /// The displayed part of the map, in [0, 1]².
     part: Rect,
     image: RgbImage,
 }
 
 impl<'a> Detail<'a> {
-    /// Share of the map's width.
+    /// The width of the part, relative to the map's.
     const WIDTH: f64 = 0.14;
 
     fn new(context: &'a FigureContext) -> Self {
