@@ -1,4 +1,4 @@
-// What all panels share: the engines, the state, and what is loaded.
+// Shared by all panels: the engines, the state, and the loaded scene and light.
 
 import { $, latest } from "./dom";
 import type { Camera, Engines, Host } from "./engines";
@@ -22,10 +22,10 @@ export interface ProbeReport {
 
 type Contents = { path: string; bytes: Uint8Array }[];
 
-/** Files that are too large for an instance of WebAssembly with what is made of them. */
+/** The maximum total size of files [bytes]: WebAssembly must also hold the data decoded from them. */
 const MAX_FILES = 1 << 30;
-/** What an engine takes without files [bytes], and how much more than their own size files take when they are loaded: a
- *  guess, from which on it is measured. */
+/** The memory of an engine without files [bytes], and the memory of loaded files relative to their size: an initial
+ *  guess, replaced by measurements. */
 const ENGINE_MEMORY = 40 * 2 ** 20, DECODED = 8;
 
 /** The engine's settings of a light. */
@@ -35,19 +35,19 @@ export class App {
   state: State;
   scene: SceneReport | null = null;
   probe: ProbeReport | null = null;
-  /** Names of dropped files that can be a scene or a probe. */
+  /** Names of the dropped scene and probe files. */
   files = { scenes: [] as string[], probes: [] as string[] };
-  /** What was dropped with the scene and with the probe. */
+  /** The files dropped with the scene and with the probe. */
   private drops = { scene: [] as Contents, probe: [] as Contents };
-  /** What was loaded last without an error. */
+  /** The last configuration that loaded without errors. */
   private good: { state: State; files: App["files"]; drops: App["drops"]; loaded: App["loaded"] } | null = null;
   private listeners: ((what: Change) => void)[] = [];
   private hashTimer = 0;
   private loaded = { scene: "", env: "", rotate: NaN };
-  /** The drops that the engines have, and those of which it is known how much memory they take. */
+  /** The drops that the engines hold, and the drops with measured memory use. */
   private provided: App["drops"] | null = null;
   private measured: App["drops"] | null = null;
-  /** The scene that is loaded next brings its own light. */
+  /** Whether to adopt the light of the next loaded scene. */
   private adopts = false;
 
   constructor(readonly engines: Engines) {
@@ -72,7 +72,7 @@ export class App {
     this.listeners.forEach((listener) => listener(what));
   }
 
-  /** Changes the state; what must be loaded again is. */
+  /** Changes the state, and reloads scene and light if necessary. */
   set(change: Partial<State>, what: Change = "render") {
     Object.assign(this.state, change);
     this.keepInAddress();
@@ -85,26 +85,26 @@ export class App {
     this.hashTimer = setTimeout(() => history.replaceState(null, "", `#${toHash(this.state)}`), 200) as unknown as number;
   }
 
-  /** What the state names, and has to be dropped before it can be shown. */
+  /** The files named by the state that have not been dropped yet. */
   get missing(): { scene: string; env: string } {
     const { scene, env } = this.state;
     const has = (name: string) => this.contents().some(({ path }) => fileName(path) === fileName(name));
     return { scene: SCENES.includes(scene) || has(scene) ? "" : scene, env: isBuiltinProbe(env) || has(env) ? "" : env };
   }
 
-  /** The camera of the state; none while its scene is missing. */
+  /** The state's camera; null while its scene is missing. */
   get camera(): Camera | null {
     return this.missing.scene ? null : this.state.camera;
   }
 
-  /** The settings of scene and light for the engine; what is missing has a stand-in. */
+  /** The engine's settings for scene and light, with stand-ins for missing files. */
   private keys() {
     const { material, ground, rows, rotate, ev, scale } = this.state, { missing } = this;
     const scene = missing.scene ? DEFAULT.scene : this.state.scene, probe = missing.env ? DEFAULT.env : this.state.env;
     return { scene: JSON.stringify({ scene, material, ground }), env: JSON.stringify({ probe, rows, exposure: ev, scale }), rotate };
   }
 
-  /** Loads what the state names and is not loaded yet, then says so. */
+  /** Loads the parts of the state that are not loaded yet, then notifies the panels. */
   readonly load = latest(async () => {
     let what: Change = "render";
     try {
@@ -126,7 +126,7 @@ export class App {
     this.emit(what);
   });
 
-  /** Loads scene and light into as many engines as memory has room for. */
+  /** Loads scene and light into as many engines as fit into memory. */
   private async loadWhatFits(): Promise<Change> {
     const { engines } = this, all = engines.hosts.length;
     const bytes = this.contents().reduce((sum, { bytes }) => sum + bytes.length, 0);
@@ -137,7 +137,7 @@ export class App {
     if (this.provided !== this.drops || fresh.length) await this.provide();
     const what = await this.loadInto(engines.working);
     if (isMeasured) return what;
-    // The first engine has shown what each will take; a reference wants one more.
+    // The first engine shows how much memory each needs; a reference needs one more engine.
     this.measured = this.drops;
     const more = engines.use(Math.min(Math.max(Math.floor(engines.memory / engines.hosts[0].memory) - 1, 1), all));
     await this.provide(more);
@@ -146,7 +146,7 @@ export class App {
     return what;
   }
 
-  /** Loads what is new of scene and light into engines that have the files; what has changed. */
+  /** Loads the new scene or light into engines that have the files, and returns the change. */
   private async loadInto(hosts: Host[]): Promise<Change> {
     const { rotate } = this.state, { scene } = this.keys();
     let what: Change = "render";
@@ -169,7 +169,7 @@ export class App {
     return what;
   }
 
-  /** Takes over the light that a dropped scene names. */
+  /** Adopts the light named by a dropped scene. */
   private adopt({ environment }: SceneReport) {
     if (this.adopts && environment) {
       const { probe, rotate, scale, exposure } = environment;
@@ -180,15 +180,15 @@ export class App {
     this.adopts = false;
   }
 
-  /** Says which files a link wants. */
+  /** Shows which files a link needs. */
   private tellMissing() {
     const names = Object.values(this.missing).filter(Boolean).map(fileName);
     const wanted = $("wanted");
     wanted.hidden = !names.length;
-    if (names.length) wanted.textContent = `This link shows ${names.join(" under ")}, which it does not hold: drop ${names.join(" and ")} here. Until then you see ${this.missing.scene ? DEFAULT.scene : this.state.scene} under ${this.missing.env ? DEFAULT.env : this.envName}.`;
+    if (names.length) wanted.textContent = `This link contains no files: drop ${names.join(" and ")} here. Until then the page shows ${this.missing.scene ? DEFAULT.scene : this.state.scene} under ${this.missing.env ? DEFAULT.env : this.envName}.`;
   }
 
-  /** After a file that cannot be loaded: what the engines still have. */
+  /** Restores the last good configuration after a file fails to load. */
   private async goBack() {
     const { good, state } = this;
     this.adopts = false;
@@ -200,7 +200,7 @@ export class App {
     this.loaded = { ...good.loaded };
     await this.provide();
     this.emit("files");
-    // Engines that were emptied for what did not come begin again.
+    // Engines emptied for the failed load restart.
     if (this.engines.active < this.engines.hosts.length && this.measured !== this.drops) this.load();
   }
 
@@ -210,45 +210,45 @@ export class App {
     status.classList.toggle("error", isError);
   }
 
-  /** An engine for a reference, with what is loaded. */
+  /** An engine for a reference, with the loaded scene and light. */
   async reference(): Promise<Host> {
     const [host, isNew] = this.engines.reference();
     if (isNew && this.loaded.scene && this.loaded.env) {
       const { scene, env, rotate } = this.loaded;
-      // All are sent before anything else is: an engine answers in order.
+      // Send all calls first: an engine answers in order.
       const files = this.contents().map(({ path, bytes }) => host.call("addFile", path, bytes));
       await Promise.all([...files, host.call("loadScene", scene), host.call("loadEnvironment", withTurn(env, rotate))]);
     }
     return host;
   }
 
-  /** All files that scene and probe may want. */
+  /** All files that scene and probe may refer to. */
   private contents(): Contents {
     const { scene, probe } = this.drops;
     return scene === probe ? scene : [...scene, ...probe];
   }
 
-  /** Gives engines the dropped files. */
+  /** Sends the dropped files to engines. */
   private async provide(hosts = this.engines.working) {
     this.provided = this.drops;
     await Promise.all(hosts.map((host) => host.call("clearFiles")));
     for (const { path, bytes } of this.contents()) await Promise.all(hosts.map((host) => host.call("addFile", path, bytes)));
   }
 
-  /** Takes files over and shows the first scene and the first probe among them. */
+  /** Opens files, and shows the first scene and the first probe among them. */
   async open(files: { path: string; file: File }[]) {
     const total = files.reduce((sum, { file }) => sum + file.size, 0);
     if (total > MAX_FILES) {
-      this.tell(`${(total / 2 ** 30).toFixed(1)} GiB are more than this page can hold; 1 GiB is the most. Use the program`, true);
+      this.tell(`${(total / 2 ** 30).toFixed(1)} GiB exceed this page’s limit of 1 GiB; use the program`, true);
       return;
     }
     this.tell("Reading …");
     const isScene = (path: string) => /\.(glb|gltf|obj|ply|stl|off|toml)$/i.test(path);
     const isProbe = (path: string) => /\.(hdr|exr|pfm|pic|rgbe)$/i.test(path);
     const paths = files.map(({ path }) => path);
-    // A scene file comes before the meshes that it names.
+    // Scene files come before the meshes that they name.
     const scenes = paths.filter(isScene).sort((a, b) => Number(/\.toml$/i.test(b)) - Number(/\.toml$/i.test(a))), radiance = paths.filter(isProbe);
-    // Beside a scene, pictures are its textures.
+    // Pictures dropped with a scene are its textures.
     const probes = scenes.length || radiance.length ? radiance : paths.filter((path) => /\.(png|jpe?g)$/i.test(path));
     if (!scenes.length && !probes.length) {
       this.tell(`${paths[0] ?? "nothing"} is neither a scene (GLB, glTF, OBJ, PLY, STL, OFF, TOML) nor a light probe (HDR, EXR, PFM, PNG, JPEG)`, true);
@@ -256,12 +256,12 @@ export class App {
     }
     const contents = await Promise.all(files.map(async ({ path, file }) => ({ path, bytes: new Uint8Array(await file.arrayBuffer()) })));
     const { missing } = this;
-    // A probe that is dropped leaves the scene's files, and a scene the probe's.
+    // A dropped probe keeps the scene's files, and a dropped scene the probe's.
     this.drops = { scene: scenes.length ? contents : this.drops.scene, probe: probes.length ? contents : this.drops.probe };
     this.files = { scenes: scenes.length ? scenes : this.files.scenes, probes: probes.length ? probes : this.files.probes };
     this.loaded = { scene: scenes.length ? "" : this.loaded.scene, env: probes.length ? "" : this.loaded.env, rotate: this.loaded.rotate };
     const wanted = (paths: string[], name: string) => paths.find((path) => name && fileName(path) === fileName(name));
-    // What a link has waited for is shown as the link says.
+    // Files that a link was waiting for are shown with the link's settings.
     const [scene, probe] = [wanted(scenes, missing.scene), wanted(probes, missing.env)];
     this.adopts = scenes.length > 0 && !scene;
     const change: Partial<State> = {
@@ -277,7 +277,7 @@ export class App {
     return fileName(this.state.env);
   }
 
-  /** The pixel that was picked, for the engine. */
+  /** The picked pixel, as engine settings. */
   pixel(): string | null {
     const { state: { pixel, size }, camera } = this;
     if (!pixel || pixel[0] >= size || pixel[1] >= size) return null;
@@ -285,5 +285,5 @@ export class App {
   }
 }
 
-/** What has changed, from most to least. */
+/** Kinds of changes, from largest to smallest. */
 export type Change = "all" | "files" | "scene" | "light" | "turn" | "render" | "camera" | "view" | "pixel" | "panel";

@@ -10,7 +10,7 @@ export function h<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Rec
   return element;
 }
 
-/** A select of values, which may have other names. */
+/** Fills a select with values, optionally with display names. */
 export function fill(select: HTMLSelectElement, values: readonly (string | [string, string])[], chosen: string) {
   select.replaceChildren(...values.map((value) => {
     const [key, name] = typeof value === "string" ? [value, value] : value;
@@ -27,12 +27,12 @@ export function save(name: string, bytes: Uint8Array) {
 
 export const degrees = (x: number) => `${Math.round(x)}°`;
 export const stops = (x: number) => `${x > 0 ? "+" : x < 0 ? "−" : ""}${Math.abs(x).toFixed(1)} EV`;
-/** The digits of an exponent. */
+/** An exponent in superscript digits. */
 export const superscript = (n: number) => [...String(n)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)] ?? "⁻").join("");
-/** Words of a command, of which none is broken at its hyphens. */
+/** The words of a command, without line breaks at hyphens. */
 export const words = (all: string[]): (HTMLElement | string)[] =>
   all.flatMap((word, i) => [...(i ? [" "] : []), h("span", { class: "word" }, word)]);
-/** Three digits that a reader can take in. */
+/** A number with three significant digits. */
 export function short(x: number): string {
   if (x === 0) return "0";
   const size = Math.abs(x);
@@ -47,12 +47,12 @@ export const count = (n: number) => {
   const [unit, name] = n >= 1e9 ? [1e9, " G"] : n >= 1e6 ? [1e6, " M"] : n >= 1e4 ? [1e3, " k"] : [1, ""];
   return `${Number((n / (unit as number)).toPrecision(3))}${name}`;
 };
-/** A share of the whole with as many digits as say something. */
+/** A percentage with its meaningful digits. */
 export const percentage = (share: number) => (share !== 0 && Math.abs(share) < 5e-4 ? "< 0.1 %" : `${signed(100 * share, 1)} %`);
-/** A signed number with a minus that looks like one. */
+/** A signed number with a true minus sign. */
 export const signed = (x: number, digits = 2) => x.toFixed(digits).replace("-", "−");
 
-/** Runs at most one of a kind at a time, and of those asked for meanwhile the last. */
+/** Runs at most one task at a time; afterwards runs only the last of the tasks requested meanwhile. */
 export function latest<A extends unknown[]>(task: (...args: A) => Promise<void>): (...args: A) => void {
   let running = false;
   let next: A | null = null;
@@ -73,5 +73,5 @@ export function latest<A extends unknown[]>(task: (...args: A) => Promise<void>)
   };
 }
 
-/** Colors of the theme. */
+/** The theme's colors. */
 export const color = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

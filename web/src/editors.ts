@@ -1,4 +1,4 @@
-// Editors of what the program takes as text: strategies and materials.
+// Editors of strategies and materials, which the program takes as text.
 
 import { fill, h } from "./dom";
 
@@ -19,7 +19,7 @@ interface Choice {
   value: string;
 }
 
-/** Linear R, G and B, or one number of all three, in [0, 1]. */
+/** Linear R, G and B, or one number for all three, in [0, 1]. */
 interface Color {
   kind: "color";
   name: string;
@@ -30,13 +30,13 @@ interface Color {
 type Field = Slider | Choice | Color;
 
 interface Kind {
-  /** Its name in text. */
+  /** The name in the text form. */
   key: string;
   label: string;
   fields: Field[];
-  /** The text of the fields' values. */
+  /** Formats the fields' values as text. */
   text(values: string[]): string;
-  /** The fields' values of a text's parts after the name; none if it is more than the editor can say. */
+  /** Parses the text's parts after the name into field values; null if the editor cannot express them. */
   parse(words: string[]): string[] | null;
 }
 
@@ -52,9 +52,9 @@ const one = (key: string, label: string, name: string, value: number, max: numbe
 });
 
 export const STRATEGIES: Kind[] = [
-  one("product", "product", "Rays at most", 8, 64),
+  one("product", "product", "Max. rays", 8, 64),
   {
-    key: "mis", label: "multiple importance",
+    key: "mis", label: "multiple importance (MIS)",
     fields: [
       whole("Environment", 1, 128, 0), whole("BRDF", 1, 128, 0),
       choice("Weights", [["power", "power heuristic"], ["balance", "balance heuristic"]]),
@@ -74,7 +74,7 @@ export const STRATEGIES: Kind[] = [
   {
     key: "sir", label: "resampling (SIR)",
     fields: [
-      whole("Rays", 1, 64), choice("Candidates", [["given", "as many as given"], ["pilot", "chosen by a pilot"]]),
+      whole("Rays", 1, 64), choice("Candidates", [["given", "fixed number"], ["pilot", "chosen by a pilot"]]),
       { ...whole("Number", 32, 1024), when: (values) => values[1] === "given" },
       choice("From", [["mixture", "both"], ["environment", "environment"], ["brdf", "BRDF"]]),
       choice("Picks", [["sorted", "sorted"], ["systematic", "systematic"], ["multinomial", "multinomial"], ["reservoir", "reservoirs"]]),
@@ -90,7 +90,7 @@ export const STRATEGIES: Kind[] = [
   {
     key: "rejection", label: "rejection",
     fields: [
-      choice("Ends", [["tries", "after all tries"], ["rays", "when enough are accepted"]]),
+      choice("Stop", [["tries", "after all tries"], ["rays", "when enough are accepted"]]),
       { ...whole("Accepted", 2, 64), when: (values) => values[0] === "rays" }, whole("Tries", 16, 256),
       choice("From", [["tighter", "the tighter bound"], ["environment", "environment"], ["brdf", "BRDF"]]),
     ],
@@ -111,12 +111,12 @@ const METALS: [string, string][] = ["gold", "copper", "silver", "aluminum", "chr
 const unit = (name: string, value: number): Slider => ({ kind: "number", name, min: 0, max: 1, step: 0.01, value: String(value) });
 const alpha = (name: string, value: number): Slider => ({ kind: "number", name, min: 0.01, max: 1, step: 0.01, value: String(value) });
 const color = (name: string, value: string): Color => ({ kind: "color", name, value });
-/** Four digits at most. */
+/** A number with at most four digits. */
 const rounded = (x: number) => String(Number(x.toFixed(4)));
-/** Values of parts that follow each other; parts that are left out are as given, but for the first `least`. */
+/** Parses positional parts; missing parts get defaults, except for the first `least`. */
 const inOrder = (least: number, usual: string[]) => (words: string[]) =>
   (words.length >= least && words.length <= usual.length ? usual.map((value, i) => words[i] ?? value) : null);
-/** Without the parts at the end that say what goes without saying. */
+/** The text without trailing parts that equal the defaults. */
 const trimmed = (words: string[], usual: string[], least: number) => {
   let n = words.length;
   while (n > least && words[n - 1] === usual[n - 1]) n--;
@@ -176,7 +176,7 @@ export const MATERIALS: Kind[] = [
 const kindOf = (kinds: Kind[], text: string) => kinds.find((kind) => kind.key === text.split(":")[0]);
 const usual = (kind: Kind) => kind.text(kind.fields.map(({ value }) => value));
 
-/** `#rrggbb` of linear numbers, and back. */
+/** Converts linear numbers to `#rrggbb`, and back. */
 function toHex(linear: string): string {
   const numbers = linear.split(",").map(Number), channels = numbers.length === 3 ? numbers : [numbers[0], numbers[0], numbers[0]];
   const encoded = (c: number) => 255 * Math.min(Math.max(c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055, 0), 1);
@@ -188,10 +188,10 @@ function fromHex(hex: string): string {
   return linear[0] === linear[1] && linear[1] === linear[2] ? linear[0] : linear.join(",");
 }
 
-/** The controls of one kind; `change` gets the text. */
+/** The controls of one kind; `change` receives the text. */
 function controls(kind: Kind, text: string, change: (text: string) => void): HTMLElement[] {
   const values = kind.parse(text.split(":").slice(1));
-  if (!values) return [h("p", { class: "hint" }, "The text says more than there are controls for.")];
+  if (!values) return [h("p", { class: "hint" }, "The controls cannot express this text.")];
   const rows: HTMLElement[] = [];
   const showRows = () => kind.fields.forEach((field, i) => { rows[i].hidden = field.kind !== "choice" && !!field.when && !field.when(values); });
   const tell = (i: number, value: string) => {
@@ -230,7 +230,7 @@ function row(field: Field, value: string, change: (value: string) => void): HTML
   return h("label", {}, field.name, input, output);
 }
 
-/** An editor of a strategy's text in `place`. */
+/** Puts an editor of a strategy's text into `place`. */
 export function strategyEditor(place: HTMLElement, text: string, change: (text: string) => void) {
   const kind = kindOf(STRATEGIES, text) ?? STRATEGIES[0];
   const select = h("select");
@@ -246,11 +246,11 @@ export function strategyEditor(place: HTMLElement, text: string, change: (text: 
   place.className = "controls";
 }
 
-/** Controls of a material's text in `place`; the model's name is in `select`. */
+/** Puts controls of a material's text into `place`; `select` holds the model's name. */
 export function materialEditor(select: HTMLSelectElement, place: HTMLElement, text: string, change: (text: string) => void) {
   const kind = text ? kindOf(MATERIALS, text) : undefined;
   const known = !text || kind;
-  fill(select, [["", "as in the scene"], ...MATERIALS.map((k): [string, string] => [k.key, k.label]), ...(known ? [] : [["text", "as the text says"] as [string, string]])], kind?.key ?? (text ? "text" : ""));
+  fill(select, [["", "as in the scene"], ...MATERIALS.map((k): [string, string] => [k.key, k.label]), ...(known ? [] : [["text", "as text"] as [string, string]])], kind?.key ?? (text ? "text" : ""));
   place.className = "controls";
   place.replaceChildren(...(kind ? controls(kind, text, change) : []));
   select.onchange = () => {

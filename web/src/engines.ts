@@ -2,7 +2,7 @@
 
 import type { Arguments, Call, FromWorker, Result, Statistics, ToWorker, Update } from "./protocol";
 
-/** A first Worker, and the engine's module, which it unpacks from the page. */
+/** The first Worker, and the engine's module that it unpacks from the page. */
 async function unpacked(script: string): Promise<[Worker, WebAssembly.Module]> {
   const worker = new Worker(script);
   const module = await new Promise<WebAssembly.Module>((resolve, reject) => {
@@ -16,7 +16,7 @@ async function unpacked(script: string): Promise<[Worker, WebAssembly.Module]> {
   return [worker, module];
 }
 
-/** Half of the computer's memory as far as the browser says how much there is, else 4 GiB; `?memory=` in the address is
+/** Half of the computer's memory as reported by the browser, or 4 GiB if it is not reported; `?memory=` in the address sets
  *  another limit [GiB]. */
 function memoryLimit(): number {
   const given = Number(new URLSearchParams(location.search).get("memory"));
@@ -24,16 +24,16 @@ function memoryLimit(): number {
   return 2 ** 30 * (given > 0 ? given : 0.5 * deviceMemory);
 }
 
-/** An engine in a Worker of its own. */
+/** An engine in its own Worker. */
 export class Host {
   private worker!: Worker;
   private nextId = 0;
   private waiting = new Map<number, { resolve: (value: never) => void; reject: (error: Error) => void }>();
   onRender: (message: Extract<FromWorker, { token: number }>) => void = () => {};
-  /** Called after the engine died and another has taken its place, without scene and light. */
+  /** Called after a new engine, without scene and light, has replaced one that died. */
   onRestart: () => void = () => {};
 
-  /** What the engine takes of the memory [bytes]. */
+  /** The engine's memory use [bytes]. */
   memory = 0;
 
   constructor(private module: WebAssembly.Module, private script: string, worker?: Worker) {
@@ -73,7 +73,7 @@ export class Host {
     this.onRestart();
   }
 
-  /** Ends the engine, whose memory is free then. */
+  /** Ends the engine and frees its memory. */
   end(why: string) {
     this.worker.terminate();
     this.waiting.forEach(({ reject }) => reject(new Error(why)));
@@ -81,9 +81,9 @@ export class Host {
     this.memory = 0;
   }
 
-  /** Another engine takes its place, without scene and light. */
+  /** Replaces the engine by a new one, without scene and light. */
   reset() {
-    this.end("the engine was started again");
+    this.end("the engine was restarted");
     this.boot();
   }
 
@@ -100,7 +100,7 @@ export class Host {
   }
 }
 
-/** The settings of a render but for its shard. */
+/** The settings of a render, except for its shard. */
 export interface RenderSettings {
   width: number;
   height: number;
@@ -119,9 +119,9 @@ export interface Camera {
   ortho: number | null;
 }
 
-/** A picture that some of the engines render together. */
+/** A picture that several engines render together. */
 export class Job {
-  /** As the engine names it, with what its pilot chose. */
+  /** The engine's name for the strategy, with the pilot's choices. */
   strategy = "";
   private statisticsOf = new Map<Host, Statistics>();
   private progressOf = new Map<Host, number>();
@@ -168,9 +168,9 @@ export class Engines {
   events: JobEvents = { update() {}, failed() {} };
   onRestart: () => void = () => {};
 
-  /** How many of the engines have the scene; the others are empty where memory has no room for more. */
+  /** The number of engines that hold the scene; the others stay empty if memory is short. */
   active: number;
-  /** What all engines together may take of the memory [bytes]. */
+  /** The memory limit of all engines together [bytes]. */
   readonly memory = memoryLimit();
 
   private constructor(readonly hosts: Host[], private another: () => Host) {
@@ -184,47 +184,47 @@ export class Engines {
   static async create(): Promise<Engines> {
     const script = URL.createObjectURL(new Blob([document.getElementById("worker")!.textContent!], { type: "text/javascript" }));
     const [worker, module] = await unpacked(script);
-    // Two at least, for two strategies side by side.
+    // At least two, for two strategies side by side.
     const n = Math.max(2, Math.min(navigator.hardwareConcurrency || 2, 8));
     const another = () => new Host(module, script);
     return new Engines([new Host(module, script, worker), ...Array.from({ length: n - 1 }, another)], another);
   }
 
-  /** The engine that answers questions. */
+  /** The engine that answers calls. */
   call<C extends Call>(call: C, ...args: Arguments<C>): Promise<Result<C>> {
     return this.hosts[0].call(call, ...args);
   }
 
-  /** The engines that have the scene. */
+  /** The engines that hold the scene. */
   get working(): Host[] {
     const hosts = this.hosts.slice(0, this.active);
     return this.beside ? [...hosts, this.beside] : hosts;
   }
 
-  /** The same for all that work; the first one's answer. */
+  /** Makes a call to all working engines, and returns the first engine's answer. */
   async all<C extends Call>(call: C, ...args: Arguments<C>): Promise<Result<C>> {
     return (await Promise.all(this.working.map((host) => host.call(call, ...args))))[0];
   }
 
-  /** That not all work, in words; empty if all do. */
+  /** A message if not all engines work; empty otherwise. */
   get shortage(): string {
-    return this.active < this.hosts.length ? ` by ${this.active} of ${this.hosts.length} Workers, as memory has no room for more` : "";
+    return this.active < this.hosts.length ? ` on ${this.active} of ${this.hosts.length} Workers, because memory is limited` : "";
   }
 
-  /** Lets so many engines work; those that begin to. What the others had is forgotten. */
+  /** Sets the number of working engines, and returns the added ones. The others lose their data. */
   use(n: number): Host[] {
     const { active } = this;
     if (n < active) {
       this.stop();
       this.hosts.slice(n).forEach((host) => host.memory && host.reset());
-      this.beside?.end("its memory is wanted for the picture");
+      this.beside?.end("the picture needs its memory");
       this.beside = null;
     }
     this.active = n;
     return this.hosts.slice(active, n);
   }
 
-  /** Renders pictures side by side, each with its share of the engines. */
+  /** Renders pictures side by side, each on its share of the engines. */
   render(pictures: RenderSettings[]): Job[] {
     this.jobs = pictures.map((settings, i) => {
       const hosts = this.hosts.slice(0, this.active).filter((_, k) => k % pictures.length === i);
@@ -239,7 +239,7 @@ export class Engines {
   private aside: Host | null = null;
   private beside: Host | null = null;
 
-  /** An engine beside the picture's that has its scene and light from now on; whether it is new. */
+  /** An extra engine that keeps the picture's scene and light, and whether it is new. */
   reference(): [Host, boolean] {
     const isNew = !this.beside;
     if (!this.beside) {
@@ -249,12 +249,12 @@ export class Engines {
     return [this.beside, isNew];
   }
 
-  /** An engine beside the picture's, for scenes of figures. */
+  /** An extra engine for the scenes of figures. */
   extra(): Host {
     return (this.aside ??= this.another());
   }
 
-  /** Begins one of the pictures anew with other settings. */
+  /** Restarts one of the pictures with other settings. */
   again(job: Job, change: Partial<RenderSettings>): Job {
     const next = new Job(this.nextToken++, job.hosts, { ...job.settings, ...change });
     this.jobs = this.jobs.map((other) => (other === job ? next : other));
@@ -263,7 +263,7 @@ export class Engines {
     return next;
   }
 
-  /** Ends one of the pictures as it is. */
+  /** Stops one of the pictures in its current state. */
   end(job: Job) {
     job.ended = true;
     job.hosts.forEach((host) => host.send({ kind: "pause", token: job.token, paused: true }));
@@ -291,7 +291,7 @@ export class Engines {
     }
   }
 
-  /** The whole picture of a job in one engine, to be written as a file. */
+  /** Collects a job's whole picture in one engine, to write it as a file. */
   async gather(job: Job) {
     for (const host of job.hosts) {
       const part = await host.call("part");

@@ -1,4 +1,4 @@
-// The live figures of the lecture, one for each step.
+// The interactive figures of the lecture, one per step.
 
 import { h, percentage, short, signed } from "./dom";
 import { Film, FilmView } from "./film";
@@ -9,7 +9,7 @@ import type { Stage } from "./stage";
 type Figure = (stage: Stage) => void;
 type Point = [number, number];
 
-/** Uniform numbers that are the same every time. */
+/** A generator of reproducible uniform numbers. */
 function generator(seed: number): () => number {
   let s = seed >>> 0;
   return () => {
@@ -30,7 +30,7 @@ const normalized = (f: (x: number) => number) => {
   return (x: number) => f(x) / total;
 };
 
-/** A function on [0, 1] as a table that can be drawn from. */
+/** A function on [0, 1] as a table that can be sampled. */
 class Table {
   private cdf: Float64Array;
   constructor(f: (x: number) => number, private n = 1000) {
@@ -56,7 +56,7 @@ class Table {
 }
 
 const estimator: Figure = (stage) => {
-  const resemblance = stage.slider("Density", 0, 1, 0.05, 0, (x) => (x === 0 ? "uniform" : `${Math.round(100 * x)} % alike`));
+  const resemblance = stage.slider("Density", 0, 1, 0.05, 0, (x) => (x === 0 ? "uniform" : `${Math.round(100 * x)} % similar`));
   const most = stage.slider("Samples", 2, 12, 1, 10, (x) => String(2 ** x));
   stage.draw(() => {
     const f = (x: number) => 3 * x * x;
@@ -78,15 +78,15 @@ const estimator: Figure = (stage) => {
     }
     const rms = [...squares].map(([k, s]): Point => [k, Math.sqrt(s / runs)]);
     stage.svg(plot([
-      { name: "root mean square of 200 runs", kind: "first", points: rms }, { name: "one run", kind: "second", points: first, as: "dots" },
-    ], { x: { name: "samples N", log: true }, y: { name: "relative error", log: true, range: [1e-4, 1] } }), "Error over samples");
+      { name: "RMS of 200 runs", kind: "first", points: rms }, { name: "one run", kind: "second", points: first, as: "dots" },
+    ], { x: { name: "samples N", log: true }, y: { name: "relative error", log: true, range: [1e-4, 1] } }), "Error over the number of samples");
     const last = rms.at(-1)![1];
-    // A density in proportion to the integrand leaves what rounding does.
-    stage.say(last < 1e-9 ? `The error at ${n} samples is 0: every sample has the value of the integral.` : `The error at ${n} samples is ${short(last)}; the slope of the line is ${signed(slope(rms))}.`);
+    // A density proportional to the integrand leaves only rounding errors.
+    stage.say(last < 1e-9 ? `The error at ${n} samples is 0: every sample equals the integral.` : `The error at ${n} samples is ${short(last)}; the slope of the line is ${signed(slope(rms))}.`);
   });
 };
 
-/** A polar diagram of densities [1/sr] by the angle from the normal, −90° to 90°. */
+/** A polar plot of densities [1/sr] over the angle from the normal, −90° to 90°. */
 function polar(series: Series[], directions: [number, string][]): string {
   const width = figureWidth(), x0 = width / 2, radius = Math.min(240, x0 - 40), y0 = radius + 44, height = y0 + 28;
   const most = Math.max(...series.flatMap((s) => s.points.map((p) => p[1])), 1e-9);
@@ -120,11 +120,11 @@ const lobes: Figure = (stage) => {
     const theta = angle() * Math.PI / 180;
     stage.svg(polar(series, [[-theta, "viewer"], [theta, "mirror"]]), "Densities in the plane of incidence");
     const peak = Math.max(...series[0].points.map((p) => p[1]));
-    stage.say(`Greatest density ${short(peak)} per steradian; ${short(100 * (1 - kept / 2000))} % of the samples of Phong’s lobe end below the surface.`);
+    stage.say(`The maximum density is ${short(peak)} per steradian; ${short(100 * (1 - kept / 2000))} % of the Phong samples are below the surface.`);
   });
 };
 
-/** A square canvas and its context, of so many pixels. */
+/** A canvas of the given size, and its context. */
 function canvas(stage: Stage, width: number, height: number, label: string): CanvasRenderingContext2D {
   let element = stage.drawing.querySelector("canvas");
   if (!element || element.width !== width) {
@@ -140,16 +140,16 @@ function canvas(stage: Stage, width: number, height: number, label: string): Can
 
 type Vector = [number, number, number];
 
-/** Where a direction is in a drawing of the hemisphere from above, the radius in proportion to the polar angle. */
+/** The position of a direction in a hemisphere seen from above, with radius proportional to the polar angle. */
 const fromAbove = ([x, y, z]: Vector, [x0, y0, radius]: Vector): Point => {
   const across = Math.hypot(x, y), r = across > 0 ? radius * Math.atan2(across, z) / (Math.PI / 2) / across : 0;
   return [x0 + r * x, y0 - r * y];
 };
 
-/** The middle and the radius of a hemisphere from above, with `above` of room on top. */
+/** The center and radius of a hemisphere from above, with `above` as the space on top. */
 const hemisphere = (above: number): Vector => [figureWidth() / 2, above + 172, 150];
 
-/** Rings of 30°, 60° and 90° from the normal, with the axes x and y. */
+/** Rings at 30°, 60° and 90° from the normal, with the axes x and y. */
 function rings([x0, y0, radius]: Vector): string {
   const circle = (degrees: number) => {
     const r = radius * degrees / 90, at = Math.SQRT1_2 * r;
@@ -179,14 +179,14 @@ const ward: Figure = (stage) => {
       return `<circle class="axis" cx="${x}" cy="${y}" r="5"/><text class="name halo" x="${x}" y="${y + 20}" text-anchor="middle">${name}</text>`;
     };
     stage.svg(`<svg viewBox="0 0 ${2 * view[0]} ${view[1] + 158}" aria-hidden="true">${rings(view)}<path class="first dots" d="${dots.join("")}"/>${mark("viewer", -1)}${mark("mirror", 1)}</svg>`,
-      "Directions drawn from Ward’s lobe, seen from above");
-    stage.say(`Spread along x ${short(Math.sqrt(sx / n - (mx / n) ** 2))}, along y ${short(Math.sqrt(sy / n))} (standard deviations of the direction); rings are 30°, 60° and 90° from the normal.`);
+      "Directions sampled from Ward’s lobe, seen from above");
+    stage.say(`Standard deviation of the directions: ${short(Math.sqrt(sx / n - (mx / n) ** 2))} along x, ${short(Math.sqrt(sy / n))} along y. The rings are 30°, 60° and 90° from the normal.`);
   });
 };
 
-/** Half vectors in the middle of patches: polar angle toward the mirror direction and azimuth [degrees]. */
+/** Half vectors at the patch centers: polar angle toward the mirror direction and azimuth [degrees]. */
 const PATCHES: Point[] = [[0, 0], [18, 60], [20, -70], [40, 130], [38, -140]];
-/** Their angular radius [degrees]. */
+/** The angular radius of the patches [degrees]. */
 const PATCH = 6;
 
 const halfVectors: Figure = (stage) => {
@@ -220,7 +220,7 @@ const halfVectors: Figure = (stage) => {
       const path = (points: Vector[], kind: string) => `<path class="${kind} patch" d="M${points.map((p) => fromAbove(p, view).map((t) => t.toFixed(1)).join(" ")).join("L")}Z"/>`;
       const mirrored = rim.map(mirror), growth = 4 * dot(middle, wo);
       const shown = path(rim, "second");
-      // A patch that is below the surface in part is not reflected.
+      // Patches partly below the surface are not reflected.
       if (growth <= 0 || mirrored.some((p) => p[2] < 0)) return [shown];
       factors.push(growth);
       const [x, y] = fromAbove(mirror(middle), view);
@@ -228,9 +228,9 @@ const halfVectors: Figure = (stage) => {
     });
     const [vx, vy] = fromAbove(wo, view);
     const above = `<svg viewBox="0 0 ${width} ${view[1] + 158}" aria-hidden="true">${rings(view)}${patches.join("")}<circle class="axis" cx="${vx}" cy="${vy}" r="5"/><text class="name halo" x="${vx}" y="${vy + 20}" text-anchor="middle">viewer</text>
-      <path class="second line" d="M8 14h16"/><text class="name" x="30" y="18">patches of half vectors</text><path class="first line" d="M8 32h16"/><text class="name" x="30" y="36">mirrored, × their growth</text></svg>`;
-    stage.svg(plane + above, "Half vectors and the directions that they mirror to, in the plane of incidence and from above");
-    stage.say(`${directions.length} of 17 directions are above the surface; the patches grow ${factors.length ? `${short(Math.min(...factors))} to ${short(Math.max(...factors))} times` : "beyond the horizon"}: 4 ωh·ωi.`);
+      <path class="second line" d="M8 14h16"/><text class="name" x="30" y="18">patches of half vectors</text><path class="first line" d="M8 32h16"/><text class="name" x="30" y="36">reflected patches, × magnification</text></svg>`;
+    stage.svg(plane + above, "Half vectors and their reflected directions, in the plane of incidence and from above");
+    stage.say(`${directions.length} of 17 directions are above the surface; reflection enlarges the patches ${factors.length ? `${short(Math.min(...factors))} to ${short(Math.max(...factors))} times` : "beyond the horizon"}: 4 ωh·ωi.`);
   });
 };
 
@@ -242,16 +242,16 @@ const inversion: Figure = (stage) => {
     const table = new Table(p), top = Math.max(...line(200, p).map((q) => q[1]));
     const samples = Array.from({ length: n() }, (_, i): Point => [table.sample((i + 0.5) / n()), (i + 0.5) / n()]);
     stage.svg(plot([
-      { name: `density, greatest ${short(top)}`, kind: "second", points: line(200, (x) => p(x) / top), as: "area" }, { name: "P(x)", kind: "first", points: line(200, (x) => table.at(x)) },
+      { name: `density, maximum ${short(top)}`, kind: "second", points: line(200, (x) => p(x) / top), as: "area" }, { name: "P(x)", kind: "first", points: line(200, (x) => table.at(x)) },
       { name: "", kind: "first", points: samples, as: "dots" }, { name: "", kind: "third", points: samples.map(([x]): Point => [x, 0]), as: "dots" },
-    ], { x: { name: "x", range: [0, 1] }, y: { name: "u", range: [0, 1] } }), "A cumulative distribution and samples by its inverse");
+    ], { x: { name: "x", range: [0, 1] }, y: { name: "u", range: [0, 1] } }), "A cumulative distribution, and samples drawn by inverting it");
     const inside = samples.filter(([x]) => Math.abs(x - 0.7) < 2 * peak()).length;
-    stage.say(`${inside} of ${n()} samples lie within the peak.`);
+    stage.say(`${inside} of ${n()} samples are in the peak.`);
   });
 };
 
 const rowsAndColumns: Figure = (stage) => {
-  const weighted = stage.choice("Rows count", [["solid-angle", "with sin θ"], ["alike", "all alike (wrong)"]]);
+  const weighted = stage.choice("Row weights", [["solid-angle", "with sin θ"], ["alike", "equal (wrong)"]]);
   const chosen = stage.slider("Row", 0, 63, 1, 24);
   stage.draw(async () => {
     const width = 128, height = width / 2, y = chosen();
@@ -260,13 +260,13 @@ const rowsAndColumns: Figure = (stage) => {
     stage.svg(plot([{ name: "p(y)", kind: "first", points: points(rows), as: "bars" }, { name: "", kind: "second", points: [[y, rows[y]]], as: "dots" }],
       { x: { name: "row y, from the top", range: [-1, height] }, y: { name: "probability of a row", range: [0, Math.max(...rows)] }, height: 170 })
       + plot([{ name: `p(x | y = ${y})`, kind: "second", points: points(columns), as: "bars" }],
-        { x: { name: "column x", range: [-1, width] }, y: { name: "probability of a column", range: [0, Math.max(...columns)] }, height: 170 }), "Probabilities of rows, and of columns in the chosen one");
+        { x: { name: "column x", range: [-1, width] }, y: { name: "probability of a column", range: [0, Math.max(...columns)] }, height: 170 }), "Probabilities of the rows, and of the columns in the chosen row");
     const poles = [...rows.slice(0, 4), ...rows.slice(-4)].reduce((a, b) => a + b, 0);
-    stage.say(`Row ${y} is drawn with probability ${short(rows[y])}; the four rows at each pole together with ${short(poles)}.`);
+    stage.say(`Row ${y} has probability ${short(rows[y])}; the four rows at each pole together have ${short(poles)}.`);
   });
 };
 
-/** Draws the small map behind a figure. */
+/** Draws the small map in the background of a figure. */
 function paintMap(context: CanvasRenderingContext2D, rgb: Float32Array, width: number) {
   const film = Film.fromRgb(width, width / 2, rgb), scale = 2 ** film.exposure();
   const small = h("canvas", { width: String(width), height: String(width / 2) }), inner = small.getContext("2d")!;
@@ -289,7 +289,7 @@ const environmentSamples: Figure = (stage) => {
     const { engines, envName } = stage.app, width = 320, count = 2 ** n();
     const rgb = (await engines.call("map", width)) as Float32Array;
     const { places, nInBrightest, shareOfBrightest } = JSON.parse(await engines.call("mapSamples", count, 3)) as { places: Point[]; nInBrightest: number; shareOfBrightest: number };
-    const context = canvas(stage, 640, 320, "Samples of the environment");
+    const context = canvas(stage, 640, 320, "Environment samples");
     paintMap(context, rgb, width);
     for (const [u, v] of places) {
       context.beginPath();
@@ -299,7 +299,7 @@ const environmentSamples: Figure = (stage) => {
       context.strokeStyle = "#000";
       context.stroke();
     }
-    stage.say(`${nInBrightest} of ${count} samples (${short(100 * nInBrightest / count)} %) lie in the brightest hundredth of ${envName}, which has ${short(100 * shareOfBrightest)} % of its light.`);
+    stage.say(`${nInBrightest} of ${count} samples (${short(100 * nInBrightest / count)} %) are in the brightest hundredth of ${envName}, which holds ${short(100 * shareOfBrightest)} % of the light.`);
   });
 };
 
@@ -308,7 +308,7 @@ const light = (x: number) => 0.15 + 4 * gauss(x, 0.35, 0.02) + 0.7 * gauss(x, 0.
 
 const combination: Figure = (stage) => {
   const width = stage.slider("Lobe", -3, -0.3, 0.1, -1.3, (x) => `width ${Number((10 ** x).toPrecision(2))}`);
-  const split = stage.slider("Of 16 from the light", 1, 15, 1, 8);
+  const split = stage.slider("Light samples of 16", 1, 15, 1, 8);
   const heuristic = stage.choice("Weights", [["1", "balance"], ["2", "power"]]);
   stage.draw(() => {
     const lobe = normalized((x) => gauss(x, 0.5, 10 ** width()));
@@ -324,8 +324,8 @@ const combination: Figure = (stage) => {
     const top = (g: (x: number) => number) => Math.max(...line(400, g).map((p) => p[1]));
     stage.svg(plot([
       { name: "light", kind: "second", points: line(400, (x) => q(x) / top(q)) }, { name: "lobe", kind: "first", points: line(400, (x) => lobe(x) / top(lobe)) },
-      { name: "weight of the light’s samples", kind: "third", points: line(400, w), as: "area" },
-    ], { x: { name: "direction", range: [0, 1] }, y: { name: "relative to the greatest", range: [0, 1.05] } }), "Two densities and the weight of one of them");
+      { name: "MIS weight of light samples", kind: "third", points: line(400, w), as: "area" },
+    ], { x: { name: "direction", range: [0, 1] }, y: { name: "relative to the maximum", range: [0, 1.05] } }), "Two densities and the MIS weight of one of them");
     stage.say(`Error of 16 samples: light alone ${error(variance(q, () => 1) / 16)}, lobe alone ${error(variance(lobe, () => 1) / 16)}, both ${error(variance(q, w) / m + variance(lobe, (x) => 1 - w(x)) / n)}.`);
   });
 };
@@ -333,7 +333,7 @@ const combination: Figure = (stage) => {
 const product: Figure = (stage) => {
   const center = stage.slider("Mirror direction", 0.05, 0.95, 0.01, 0.5);
   const width = stage.slider("Lobe", 0.02, 0.4, 0.01, 0.08, (x) => `width ${x}`);
-  const hidden = stage.slider("Hidden from", 0, 1, 0.01, 0.6);
+  const hidden = stage.slider("Occluded from", 0, 1, 0.01, 0.6);
   stage.draw(() => {
     const lobe = (x: number) => gauss(x, center(), width());
     const f = (x: number) => light(x) * lobe(x), total = integral(f, 4000), p = (x: number) => f(x) / total;
@@ -347,16 +347,16 @@ const product: Figure = (stage) => {
     stage.svg(plot([
       { name: "light", kind: "second", points: line(400, (x) => light(x) / top(light)) }, { name: "lobe", kind: "first", points: line(400, lobe) },
       { name: "product", kind: "third", points: line(400, (x) => p(x) / top(p)), as: "area" },
-      { name: "hidden", kind: "shade", points: [[hidden(), 0], [1, 0]], as: "band" },
-    ], { x: { name: "direction", range: [0, 1] }, y: { name: "relative to the greatest", range: [0, 1.05] } }), "Light, lobe and their product");
-    stage.say(`${short(100 * visible)} % of the product is visible. Relative deviation of one sample: light ${relative(q)}, lobe ${relative(r)}, product ${visible > 0 ? short(hiddenShare > 1e-9 ? Math.sqrt(hiddenShare / visible) : 0) : "–"}.`);
+      { name: "occluded", kind: "shade", points: [[hidden(), 0], [1, 0]], as: "band" },
+    ], { x: { name: "direction", range: [0, 1] }, y: { name: "relative to the maximum", range: [0, 1.05] } }), "Light, lobe and their product");
+    stage.say(`${short(100 * visible)} % of the product is unoccluded. Relative standard deviation of one sample: light ${relative(q)}, lobe ${relative(r)}, product ${visible > 0 ? short(hiddenShare > 1e-9 ? Math.sqrt(hiddenShare / visible) : 0) : "–"}.`);
   });
 };
 
 const target = normalized((x) => light(x) * gauss(x, 0.5, 0.12));
 
 const rejection: Figure = (stage) => {
-  const bound = stage.slider("Envelope", 0.3, 3, 0.05, 1, (x) => `${x.toFixed(2)} × the least`);
+  const bound = stage.slider("Envelope", 0.3, 3, 0.05, 1, (x) => `${x.toFixed(2)} × the tightest`);
   stage.draw(() => {
     const q = normalized(light), needed = Math.max(...line(2000, (x) => target(x) / q(x)).map((p) => p[1]));
     const c = bound() * needed, table = new Table(q), random = generator(5);
@@ -370,7 +370,7 @@ const rejection: Figure = (stage) => {
       { name: "envelope c · q", kind: "second", points: line(400, (x) => c * q(x)) }, { name: "target", kind: "first", points: line(400, target) },
     ], { x: { name: "direction", range: [0, 1] }, y: { name: "density", range: [0, Math.max(c * q(0.35), 10)] }, height: 280 }), "Tries under an envelope");
     const bias = integral((x) => Math.max(target(x) - c * q(x), 0));
-    stage.say(`${kept.length} of 800 tries are kept (1 / c = ${short(1 / c)})${bias > 1e-3 ? `; ${short(100 * bias)} % of the target sticks out of the envelope and is lost` : ""}.`);
+    stage.say(`${kept.length} of 800 tries are kept (1 / c = ${short(1 / c)})${bias > 1e-3 ? `; ${short(100 * bias)} % of the target exceeds the envelope and is lost` : ""}.`);
   });
 };
 
@@ -392,28 +392,28 @@ const resampling: Figure = (stage) => {
     const distance = 0.5 * bars.reduce((sum, [x, y]) => sum + Math.abs(y - integral((u) => target(x + (u - 0.5) / bins), 20)) / bins, 0);
     stage.svg(plot([
       { name: "picked", kind: "third", points: bars, as: "bars" }, { name: "candidates", kind: "second", points: line(400, q) }, { name: "target", kind: "first", points: line(400, target) },
-    ], { x: { name: "direction", range: [0, 1] }, y: { name: "density", range: [0, 10] }, height: 260 }), "A histogram of what resampling picks");
-    // What counting so many picks of the target itself would differ.
+    ], { x: { name: "direction", range: [0, 1] }, y: { name: "density", range: [0, 10] }, height: 260 }), "A histogram of the resampled directions");
+    // The expected distance of a histogram of as many samples of the target itself.
     const noise = 0.5 * bars.reduce((sum, [x]) => { const p = integral((u) => target(x + (u - 0.5) / bins), 20) / bins; return sum + Math.sqrt(2 * p * (1 - p) / (Math.PI * picks)); }, 0);
-    stage.say(`The histogram of ${picks.toLocaleString("en-US")} picks differs from the target by ${percentage(distance)} (half the sum of all differences); the noise of counting makes ${percentage(noise)}.`);
+    stage.say(`The histogram of ${picks.toLocaleString("en-US")} picks differs from the target by ${percentage(distance)} (half the sum of absolute differences); counting noise accounts for ${percentage(noise)}.`);
   });
 };
 
-/** What each of the four ways is called, its strategy at the counts, and with few samples at a time for a set time. */
+/** The four ways: name, counts, the strategy at these counts, and a strategy with few samples per pass for equal time. */
 const WAYS = [
   { name: "environment", counts: "100", strategy: "environment:100", few: "environment:4" },
   { name: "reflectance", counts: "75", strategy: "brdf:75", few: "brdf:4" },
   { name: "both", counts: "50 : 38", strategy: "mis:50:38", few: "mis:2:2" },
   { name: "resampling", counts: "15/800", strategy: "sir:15/800", few: "sir:15/800" },
 ];
-/** How the picture to compare with is made. */
+/** The settings of the reference picture. */
 const TRUTH = { strategy: "product:16", spp: 32 };
-/** What each way has in equal time [ms]. */
+/** The time of each way at equal time [ms]. */
 const EQUAL_TIME = 500;
 
 type Rendered = { film: Film; statistics: Statistics };
 
-/** The relative squared error of a picture, in the mean over the pixels, without what the truth errs. */
+/** The mean relative squared error of a picture's pixels, without the reference's own variance. */
 function relativeError({ film }: Rendered, truth: Rendered): number {
   const luminance = (pixels: Float32Array, i: number) => 0.2126 * pixels[i] + 0.7152 * pixels[i + 1] + 0.0722 * pixels[i + 2];
   let sum = 0;
@@ -425,17 +425,17 @@ function relativeError({ film }: Rendered, truth: Rendered): number {
 }
 
 const fourWays: Figure = (stage) => {
-  const by = stage.choice("Compare", [["counts", "at the counts named above"], ["time", "in half a second each"]]);
+  const by = stage.choice("Compare", [["counts", "at the counts above"], ["time", "in half a second each"]]);
   const diffuse = stage.slider("Diffuse share", 0, 0.8, 0.1, 0);
   const size = 96, figures = WAYS.map(({ name, counts }) => {
-    const element = h("canvas", { width: String(size), height: String(size), role: "img", "aria-label": `A sphere by ${name}` });
+    const element = h("canvas", { width: String(size), height: String(size), role: "img", "aria-label": `A sphere rendered by ${name}` });
     const caption = h("figcaption", {}, `${name}, ${counts}`);
     return { view: new FilmView(element, false), caption, figure: h("figure", {}, element, caption) };
   });
   stage.drawing.replaceChildren(h("div", { class: "quartet" }, ...figures.map((f) => f.figure)));
   const host = stage.app.engines.extra(), truths = new Map<number, Rendered>();
   let token = 0;
-  /** A picture, ended after a while if it is timed. */
+  /** Renders a picture, stopped after `milliseconds` if it is timed. */
   const render = (strategy: string, spp: number, milliseconds = 0) => new Promise<Rendered>((resolve, reject) => {
     const film = new Film(size, size), mine = ++token;
     const end = milliseconds ? performance.now() + milliseconds : Infinity;
@@ -464,14 +464,14 @@ const fourWays: Figure = (stage) => {
       view.show(0, picture.film);
       const seconds = (performance.now() - started) / 1000;
       caption.replaceChildren(timed ? name : `${name}, ${counts}`, h("br"), `error ${short(Number(relativeError(picture, truth).toPrecision(2)))}, ${seconds.toFixed(2)} s`);
-      found.push(`${name} ${short(picture.statistics.shadowRays / 1000)} thousand rays`);
+      found.push(`${name} ${short(picture.statistics.shadowRays / 1000)} thousand`);
     }
-    stage.say(`Errors are relative squares, in the mean over the pixels. Traced: ${found.join(", ")}.`);
+    stage.say(`Errors are mean relative squared errors of the pixels. Shadow rays: ${found.join(", ")}.`);
   });
 };
 
 const biasAndVariance: Figure = (stage) => {
-  const edge = stage.slider("Edge of the shadow", 0.1, 0.9, 0.005, 0.4);
+  const edge = stage.slider("Shadow edge", 0.1, 0.9, 0.005, 0.4);
   stage.draw(() => {
     const f = (x: number) => (x < edge() ? 1 : 0), random = generator(9);
     const counts = Array.from({ length: 40 }, (_, k) => Math.round(2 ** (1 + k / 4.5))).filter((c, k, all) => c !== all[k - 1]);
@@ -487,7 +487,7 @@ const biasAndVariance: Figure = (stage) => {
       return [n, Math.sqrt(squares / runs)];
     });
     stage.svg(plot([{ name: "random samples", kind: "first", points: noisy }, { name: "fixed lights", kind: "second", points: fixed }],
-      { x: { name: "number of samples or lights N", log: true, range: [2, 1000], ticks: [2, 10, 100, 1000] }, y: { name: "absolute error", log: true, range: [1e-5, 1] } }), "Error of random and of fixed points");
+      { x: { name: "number of samples or lights N", log: true, range: [2, 1000], ticks: [2, 10, 100, 1000] }, y: { name: "absolute error", log: true, range: [1e-5, 1] } }), "Error of random samples and fixed lights");
     stage.say(`At N = ${counts.at(-1)} the noise is ${short(noisy.at(-1)![1])} and the bias ${short(fixed.at(-1)![1])}; at N = ${counts[8]} they are ${short(noisy[8][1])} and ${short(fixed[8][1])}.`);
   });
 };
@@ -516,7 +516,7 @@ const cuts = (method: string, other: string): Figure => (stage) => {
       context.stroke();
     }
     const percent = (x: number) => `${short(100 * x)} %`;
-    stage.say(`${n} light${n > 1 ? "s" : ""} of ${stage.app.envName}: shading errs by ${percent(rig.diffuse)} matte and ${percent(rig.glossy)} glossy; ${other.replace("-", " ")} by ${percent(beside.diffuse)} and ${percent(beside.glossy)}.`);
+    stage.say(`${n} light${n > 1 ? "s" : ""} of ${stage.app.envName}: the shading error is ${percent(rig.diffuse)} matte and ${percent(rig.glossy)} glossy; with ${other.replace("-", " ")}, ${percent(beside.diffuse)} and ${percent(beside.glossy)}.`);
   });
 };
 

@@ -1,5 +1,5 @@
-// Radiance on a canvas: two pictures with a divider, or their errors against a third, on the GPU, or without one in
-// slices of time.
+// Radiance on a canvas: two pictures with a divider, or their errors against a third, drawn on the GPU, or on the CPU
+// in time slices.
 
 import { CURVES, ERROR_GLSL, GLSL, develop, errorColor, type Curve } from "./tone";
 
@@ -10,14 +10,14 @@ export class Film {
     this.pixels = new Float32Array(4 * width * height);
   }
 
-  /** From R, G and B alone. */
+  /** A film from R, G and B without alpha. */
   static fromRgb(width: number, height: number, rgb: Float32Array): Film {
     const film = new Film(width, height);
     for (let i = 0; i < width * height; i++) film.pixels.set([rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2], 1], 4 * i);
     return film;
   }
 
-  /** Puts rectangles in; see the engine's `Update`. */
+  /** Writes rectangles into the film; see the engine's `Update`. */
   put(windows: Uint32Array, pixels: Float32Array) {
     let from = 0;
     for (let i = 0; i < windows.length; i += 4) {
@@ -28,7 +28,7 @@ export class Film {
     }
   }
 
-  /** Takes over another picture of any size, as what is seen until there is more. */
+  /** Copies another picture of any size, as a placeholder. */
   underlay(before: Film) {
     if (before.width === this.width && before.height === this.height) {
       this.pixels.set(before.pixels);
@@ -48,7 +48,7 @@ export class Film {
     }
   }
 
-  /** The median luminance of what has light, brought to middle gray [stops]. */
+  /** The exposure that maps the median luminance of nonblack pixels to middle gray [stops]. */
   exposure(): number {
     const n = this.width * this.height, step = Math.max(1, Math.floor(n / 20000)), { pixels } = this;
     const luminances = new Float32Array(Math.ceil(n / step));
@@ -66,30 +66,30 @@ export class Film {
 interface Look {
   exposure: number;
   curve: Curve;
-  /** Where the second picture begins, as a share of the width. */
+  /** The start of the second picture, as a fraction of the width. */
   divider: number;
-  /** Shows errors against the third picture. */
+  /** Whether to show errors against the third picture. */
   errors: boolean;
 }
 
 interface Painter {
-  /** Both pictures and the reference; windows say what changed since. Ends when it is on the canvas. */
+  /** Paints both pictures and the reference; `changed` lists the rectangles that changed. Resolves when done. */
   paint(films: (Film | null)[], look: Look, changed: (Uint32Array | "all" | null)[]): Promise<void>;
 }
 
 export class FilmView {
-  /** The left one, the right one and the reference. */
+  /** The left picture, the right picture and the reference. */
   films: (Film | null)[] = [null, null, null];
   look: Look = { exposure: 0, curve: "agx", divider: 1, errors: false };
   private painter: Painter | null = null;
   private changed: (Uint32Array | "all" | null)[] = [null, null, null];
-  /** There is something to paint, and something is being painted. */
+  /** Whether something waits to be painted, and whether painting is in progress. */
   private stale = false;
   private busy = false;
 
   constructor(readonly canvas: HTMLCanvasElement, private gpu = true) {}
 
-  /** Made when there is something to paint: a panel may never be seen. */
+  /** Created at the first paint, because a panel may never be shown. */
   private makePainter(): Painter {
     const gl = this.gpu ? this.canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: true }) : null;
     this.canvas.dataset.painter = gl ? "webgl2" : "2d";
@@ -107,7 +107,7 @@ export class FilmView {
     this.repaint(side, windows);
   }
 
-  /** Paints pixels of a film anew. */
+  /** Repaints pixels of a film. */
   repaint(side: number, windows: Uint32Array) {
     const before = this.changed[side];
     if (before !== "all") {
@@ -124,7 +124,7 @@ export class FilmView {
     this.refresh();
   }
 
-  /** Paints at the next frame, or the one after what is being painted. */
+  /** Paints at the next frame, or after the paint in progress. */
   private refresh() {
     this.stale = true;
     this.canvas.toggleAttribute("data-stale", true);
@@ -140,13 +140,13 @@ export class FilmView {
       if (this.stale) this.refresh();
       else this.canvas.removeAttribute("data-stale");
     };
-    // A tab in the background has no frames.
+    // Background tabs get no animation frames.
     if (document.hidden) setTimeout(paint, 100);
     else requestAnimationFrame(paint);
   }
 }
 
-/** Draws into a texture, and shows it when the GPU is done: the page never waits, not even for a GPU that is none. */
+/** Draws into a texture and shows it when the GPU is done, so that the page never waits, even for a software GPU. */
 class GpuPainter implements Painter {
   private textures: WebGLTexture[];
   private target: { framebuffer: WebGLFramebuffer; texture: WebGLTexture; size: string };
@@ -189,7 +189,7 @@ class GpuPainter implements Painter {
     this.ready = this.use(program);
   }
 
-  /** Takes a program as soon as it is linked; to ask for more before would wait. */
+  /** Uses a program once it is linked; earlier queries would block. */
   private async use(program: WebGLProgram) {
     const { gl } = this, parallel = gl.getExtension("KHR_parallel_shader_compile");
     if (parallel) {
@@ -206,7 +206,7 @@ class GpuPainter implements Painter {
     gl.uniform1i(this.uniform("third"), 2);
   }
 
-  /** Makes the texture that is drawn into as large as the picture; whether it was another. */
+  /** Resizes the render texture to the picture, and returns whether its size changed. */
   private resize(width: number, height: number): boolean {
     const { gl, target } = this, size = `${width}x${height}`;
     if (target.size === size) return false;
@@ -219,7 +219,7 @@ class GpuPainter implements Painter {
     return true;
   }
 
-  /** Ends when the GPU has done all that it was told. */
+  /** Resolves when the GPU has finished all commands. */
   private async finished() {
     const { gl } = this, sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
@@ -229,7 +229,7 @@ class GpuPainter implements Painter {
     gl.deleteSync(sync);
   }
 
-  /** The look of what is on the canvas. */
+  /** The look of the painted pixels. */
   private painted = "";
 
   async paint(films: (Film | null)[], look: Look, changed: (Uint32Array | "all" | null)[]) {
@@ -238,7 +238,7 @@ class GpuPainter implements Painter {
     const key = JSON.stringify([look, films.map((film) => film && [film.width, film.height])]);
     const all = this.resize(width, height) || key !== this.painted || changed.includes("all");
     this.painted = key;
-    /** Bands of rows that changed. */
+    /** The changed bands of rows. */
     const dirty = new Set<number>();
     const BAND = 16;
     films.forEach((film, i) => {
@@ -286,13 +286,13 @@ class GpuPainter implements Painter {
   }
 }
 
-/** Whether errors are to be shown and can be. */
+/** Whether to show errors, and the reference exists. */
 const shows = ([first, , third]: (Film | null)[], look: Look) =>
   look.errors && !!first && !!third && first.width === third.width && first.height === third.height;
 
 const pause = () => new Promise((done) => setTimeout(done, 2));
 
-/** Ranges of whole numbers that follow each other, from the first to after the last. */
+/** Merges integers into half-open ranges. */
 function runs(numbers: Set<number>): [number, number][] {
   const ranges: [number, number][] = [];
   for (const n of [...numbers].sort((a, b) => a - b)) {
@@ -303,7 +303,7 @@ function runs(numbers: Set<number>): [number, number][] {
   return ranges;
 }
 
-/** Gives a canvas a size, which clears it; whether it had another. */
+/** Resizes a canvas, which clears it; returns whether the size changed. */
 function fit(canvas: HTMLCanvasElement | OffscreenCanvas, width: number, height: number): boolean {
   if (canvas.width === width && canvas.height === height) return false;
   canvas.width = width;
@@ -311,7 +311,7 @@ function fit(canvas: HTMLCanvasElement | OffscreenCanvas, width: number, height:
   return true;
 }
 
-/** Rows one after the other, no longer than a frame at a time. */
+/** Paints row by row on the CPU, for at most one frame at a time. */
 class PlainPainter implements Painter {
   constructor(private context: CanvasRenderingContext2D) {}
 
@@ -338,12 +338,12 @@ class PlainPainter implements Painter {
         this.context.putImageData(image, 0, y);
       } while (++y < height && performance.now() < end);
       if (y < height) await new Promise((done) => setTimeout(done, 0));
-      // Another look or picture begins anew.
+      // Another look or picture starts over.
       if (exposure !== look.exposure || curve !== look.curve || divider !== look.divider || errors !== look.errors || films[0]!.width !== width) return;
     }
   }
 
-  /** Gives the canvas a size, and what was on it. */
+  /** Resizes the canvas and keeps its contents. */
   private fit(width: number, height: number) {
     const { canvas } = this.context;
     if (canvas.width === width && canvas.height === height) return;

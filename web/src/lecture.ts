@@ -1,4 +1,4 @@
-// The Lecture panel: sampling direct illumination step by step, each with a figure that the reader changes.
+// The Lecture panel: sampling direct illumination step by step, with an interactive figure for each step.
 
 import type { App, Change } from "./app";
 import { $, h } from "./dom";
@@ -17,7 +17,7 @@ export class Lecture {
     }));
     app.on((what) => this.changed(what));
     this.changed("all");
-    // Paper has no answers to open.
+    // Open all answers for printing.
     const paper = matchMedia("print");
     paper.addEventListener("change", () => document.querySelectorAll<HTMLDetailsElement>("#step details").forEach((details) => { details.open = paper.matches; }));
   }
@@ -52,9 +52,9 @@ export class Lecture {
     };
     $("step").replaceChildren(
       h("h2", {}, title), ...text.map((paragraph) => h("p", {}, paragraph)), formulaBox, place,
-      h("div", { class: "question" }, h("p", {}, question), h("details", {}, h("summary", {}, "What the figure shows"), h("p", {}, answer))),
+      h("div", { class: "question" }, h("p", {}, question), h("details", {}, h("summary", {}, "Answer"), h("p", {}, answer))),
       h("div", { class: "steps" }, move("← Previous", i - 1), move("Next →", i + 1)));
-    // Without a map there is nothing to draw yet.
+    // Figures need a map.
     if (this.app.probe) FIGURES[i](new Stage(place, this.app, this.app.state.figure.split(";")));
     document.documentElement.dataset.step = String(i + 1);
   }

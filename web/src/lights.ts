@@ -1,4 +1,4 @@
-// The Lights panel: a probe as a rig, its regions, how it shades, and its files.
+// The Lights panel: a probe as a rig, with its regions, its shading and its files.
 
 import type { App, Change } from "./app";
 import { $, h, latest, percentage, save, short, words } from "./dom";
@@ -7,21 +7,21 @@ import { isBuiltinProbe, quoted } from "./state";
 
 const WIDTH = 768, SPHERE = 160;
 
-/** Numbers of lights that the slider goes through: one by one up to 16, then four in each doubling, up to 1024. */
+/** The slider's light counts: one by one up to 16, then four per doubling, up to 1024. */
 const COUNTS = [
   ...Array.from({ length: 16 }, (_, i) => i + 1),
   ...[16, 32, 64, 128, 256, 512].flatMap((n) => [1.25, 1.5, 1.75, 2].map((k) => k * n)),
 ];
-/** How long a step is seen when they are played [ms]. */
+/** The duration of a step in playback [ms]. */
 const STEP = 700;
 
-/** Which regions the methods divide, and where. */
+/** How the methods divide a region. */
 const RULES: Record<string, string> = {
-  "median-cut": "across its longer side, so that both parts have the same light",
-  "variance-minimization": "where the variance of both parts adds up to the least",
+  "median-cut": "across its longer side, into parts of equal energy",
+  "variance-minimization": "where the sum of both parts’ variances is smallest",
 };
 
-/** What reads the formats. */
+/** The programs that read the formats. */
 const READERS: Record<string, string> = {
   json: "domelight", csv: "spreadsheets", gltf: "glTF", glb: "glTF", usd: "OpenUSD", blender: "Blender", mitsuba: "Mitsuba", pbrt: "pbrt",
   three: "three.js", radiance: "Radiance", sibl: "sIBL",
@@ -35,10 +35,10 @@ interface Rig {
   formats: { name: string; extension: string; dome: string | null }[];
 }
 
-/** The place of a number of lights on the slider: that of the nearest. */
+/** The slider position of the nearest light count. */
 const place = (lights: number) => COUNTS.reduce((best, n, i) => (Math.abs(n - lights) < Math.abs(COUNTS[best] - lights) ? i : best), 0);
 
-/** The regions of the first division that have parts in more than one of the second. */
+/** The regions of the first division that overlap more than one region of the second. */
 function splits(before: Uint32Array, after: Uint32Array): Set<number> {
   const part = new Map<number, number>(), divided = new Set<number>();
   for (let i = 0; i < before.length; i++) {
@@ -49,10 +49,10 @@ function splits(before: Uint32Array, after: Uint32Array): Set<number> {
   return divided;
 }
 
-/** Whether a number of lights has regions of its own instead of those of the number before with one divided. */
+/** Whether each light count has its own regions, instead of dividing one region of the previous count. */
 const isRefined = (method: string, refine: boolean) => refine && method === "variance-minimization";
 
-/** An error; less says nothing. */
+/** An error in percent; smaller errors are not meaningful. */
 const percent = (x: number) => (x < 1e-5 ? "< 0.001 %" : `${short(100 * x)} %`);
 
 export class LightsPanel {
@@ -60,7 +60,7 @@ export class LightsPanel {
   private truth = new FilmView($<HTMLCanvasElement>("sphere-truth"), false);
   private approximate = new FilmView($<HTMLCanvasElement>("sphere-rig"), false);
   private rig: Rig | null = null;
-  /** The regions of the last step, and what they were made of. */
+  /** The regions of the last step, and their settings. */
   private before: { regions: Uint32Array; lights: number; of: string } | null = null;
   private timer = 0;
 
@@ -92,7 +92,7 @@ export class LightsPanel {
     $("gloss").addEventListener("change", () => app.set({ gloss: Number($<HTMLSelectElement>("gloss").value) }, "panel"));
   }
 
-  /** Goes to the next number of lights, or the one before; whether there is one. */
+  /** Goes to the next or previous light count; returns whether it exists. */
   private step(by: number): boolean {
     const at = place(this.app.state.lights) + by;
     if (at < 0 || at >= COUNTS.length) return false;
@@ -100,7 +100,7 @@ export class LightsPanel {
     return true;
   }
 
-  /** Plays the steps from here, from the first if here is the last, or stops. */
+  /** Plays the steps from here (from the start if this is the last), or stops. */
   private play(on: boolean) {
     const { state } = this.app;
     clearTimeout(this.timer);
@@ -110,7 +110,7 @@ export class LightsPanel {
     if (!on) return;
     if (place(state.lights) === COUNTS.length - 1) this.app.set({ lights: 1 }, "panel");
     const next = () => {
-      // A step is seen before the next one comes.
+      // Show each step before the next one.
       if (this.drawn !== state.lights) this.timer = setTimeout(next, 50) as unknown as number;
       else if (state.panel !== "lights" || !this.step(1)) this.play(false);
       else this.timer = setTimeout(next, STEP) as unknown as number;
@@ -118,7 +118,7 @@ export class LightsPanel {
     this.timer = setTimeout(next, STEP) as unknown as number;
   }
 
-  /** The number of lights that is shown. */
+  /** The displayed number of lights. */
   private drawn = 0;
 
   private changed(what: Change) {
@@ -173,26 +173,26 @@ export class LightsPanel {
       sphere.show(0, picture);
     }
     const lights = rig.lights.length;
-    $("rig-caption").textContent = `${lights} light${lights === 1 ? "" : "s"} of ${app.envName}${rig.residual ? `, beside what ${lights === 1 ? "it leaves" : "they leave"} on the map` : ""}. Error of shading: matte ${percent(rig.diffuse)}, glossy ${percent(rig.glossy)}.`;
+    $("rig-caption").textContent = `${lights} light${lights === 1 ? "" : "s"} of ${app.envName}${rig.residual ? `; the rest of the light stays on the map` : ""}. Shading error: matte ${percent(rig.diffuse)}, glossy ${percent(rig.glossy)}.`;
     $("rig-table").querySelector("tbody")!.replaceChildren(...rig.lights.slice(0, 6).map((light) =>
       h("tr", {}, h("th", { scope: "row" }, light.name.replace("_", " ")), h("td", {}, percentage(light.share)), h("td", {}, `${light.radius.toFixed(1)}°`))));
     this.offer(leave);
     document.documentElement.dataset.rig = `${state.method}:${lights}`;
   });
 
-  /** What the last step did. */
+  /** Describes the last step. */
   private tellStep(divided: Set<number>, lights: number) {
     const { method, refine, leave } = this.app.state;
     const before = this.before ? lights - this.before.lights : 0;
-    $("rig-step").textContent = leave ? "Suns and lamps become lights; the rest of the light stays on the map, which goes along as a dome."
-      : isRefined(method, refine) ? "The map is cut into twice as many parts as there are lights; those that belong together are joined, and the lights move to the centers of their light. Without Refine, each step divides a region."
-      : divided.size === 0 ? `Each step divides a region ${RULES[method]}.`
+    $("rig-step").textContent = leave ? "Suns and lamps become lights; the rest of the light stays on the map, which is exported as a dome light."
+      : isRefined(method, refine) ? "The map is cut into twice as many regions as lights; then matching regions are joined, and the lights move to the centroids of their regions’ light. Without Refine, each step divides one region."
+      : divided.size === 0 ? `Each step divides one region ${RULES[method]}.`
         : before === 1 ? `This step divided the region along the orange line ${RULES[method]}.`
           : `These ${before} steps divided regions along the orange lines, each ${RULES[method]}.`;
     document.documentElement.dataset.divided = String(divided.size);
   }
 
-  /** Draws the borders of the regions, those that are new in orange, and the lights. */
+  /** Draws the borders of the regions (new ones in orange) and the lights. */
   private mark(regions: Uint32Array, leave: boolean, divided: Set<number>) {
     const before = this.before?.regions;
     const canvas = $<HTMLCanvasElement>("rig-marks"), context = canvas.getContext("2d")!;
@@ -205,7 +205,7 @@ export class LightsPanel {
         if (other === i) continue;
         const isNew = divided.size > 0 && before![i] === before![other] && divided.has(before![i]);
         image.data.set(isNew ? [255, 140, 0, 255] : [255, 255, 255, 190], 4 * i);
-        // Twice as wide.
+        // Double width.
         if (isNew) for (const j of [i - 1, i - WIDTH]) if (j >= 0) image.data.set([255, 140, 0, 255], 4 * j);
       }
     }
@@ -222,7 +222,7 @@ export class LightsPanel {
     }
   }
 
-  /** Buttons of all files, and the command that makes them. */
+  /** Shows buttons for all files, and the command that writes them. */
   private offer(leave: boolean) {
     const { app } = this, { state } = app, rig = this.rig!;
     const button = (name: string, bytes: () => Promise<Uint8Array>, reader = "") => {

@@ -1,4 +1,4 @@
-// The page: unpacks the engine, makes the panels, and takes dropped files.
+// The page: unpacks the engine, creates the panels, and accepts dropped files.
 
 import { App } from "./app";
 import { $ } from "./dom";
@@ -11,10 +11,10 @@ import { XrayPanel } from "./xray";
 
 const PANELS = ["picture", "map", "xray", "lights", "lecture"];
 
-/** What the page cannot do without; the name of what is missing. */
+/** The name of a browser feature that the page needs but lacks, or null. */
 function missing(): string | null {
   if (typeof WebAssembly === "undefined") return "WebAssembly";
-  // A function of one SIMD instruction.
+  // A function with one SIMD instruction.
   const simd = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11];
   if (!WebAssembly.validate(new Uint8Array(simd))) return "WebAssembly SIMD";
   if (typeof DecompressionStream === "undefined") return "DecompressionStream";
@@ -74,7 +74,7 @@ interface Dropped {
   file: File;
 }
 
-/** All files of a folder, with their paths in it. */
+/** All files in a folder, with their relative paths. */
 async function filesOf(handle: FileSystemHandle, folder = ""): Promise<Dropped[]> {
   const path = folder + handle.name;
   if (handle.kind === "file") return [{ path, file: await (handle as FileSystemFileHandle).getFile() }];
@@ -83,7 +83,7 @@ async function filesOf(handle: FileSystemHandle, folder = ""): Promise<Dropped[]
   return (await Promise.all(inside)).flat();
 }
 
-/** The same of browsers without handles. */
+/** The same for browsers without file handles. */
 async function filesOfEntry(entry: FileSystemEntry, folder = ""): Promise<Dropped[]> {
   const path = folder + entry.name;
   if (entry.isFile) {
@@ -99,11 +99,11 @@ async function filesOfEntry(entry: FileSystemEntry, folder = ""): Promise<Droppe
   return (await Promise.all(all.map((inner) => filesOfEntry(inner, `${path}/`)))).flat();
 }
 
-/** What was dropped. Chromium has entries of nothing for a page from the disk, so handles come first. */
+/** The dropped files. Handles come first, because Chromium's entries are empty for a page from the disk. */
 function dropped(transfer: DataTransfer): Promise<Dropped[]> {
   type Item = DataTransferItem & { getAsFileSystemHandle?: () => Promise<FileSystemHandle | null> };
   const items = [...transfer.items].filter((item) => item.kind === "file") as Item[];
-  // All is asked for at once: after the event there is nothing to ask.
+  // Request everything at once: the data is gone after the event.
   return Promise.all(items.map((item) => {
     const file = item.getAsFile(), entry = item.webkitGetAsEntry?.();
     const handle = item.getAsFileSystemHandle?.().catch(() => null);
@@ -135,7 +135,7 @@ function wireDrop(app: App) {
       const found = await dropped(event.dataTransfer);
       if (found.length) await app.open(found);
     } catch (error) {
-      app.tell(`what was dropped cannot be read: ${(error as Error).message}`, true);
+      app.tell(`the dropped files cannot be read: ${(error as Error).message}`, true);
     }
   });
 }

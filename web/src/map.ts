@@ -1,4 +1,4 @@
-// The Map panel: the probe in any mapping, and what the picked pixel makes of it.
+// The Map panel: the probe in any mapping, and how the picked pixel samples it.
 
 import type { App, Change } from "./app";
 import { $, degrees, fill, h, latest, short, stops } from "./dom";
@@ -7,27 +7,27 @@ import type { MapPicture } from "./protocol";
 
 const MAPPINGS: [string, string][] = [
   ["lat-long", "latitude and longitude"], ["angular", "angular, light probe"], ["mirror-ball", "mirror ball"],
-  ["octahedral", "octahedral"], ["cross-horizontal", "cube, lying cross"], ["cross-vertical", "cube, standing cross"], ["strip-horizontal", "cube, strip"],
+  ["octahedral", "octahedral"], ["cross-horizontal", "cube, horizontal cross"], ["cross-vertical", "cube, vertical cross"], ["strip-horizontal", "cube, strip"],
 ];
 const WIDTH = 768, LAYER = 192;
 /** Layers of the engine's `importance`, in their order. */
 const IMPORTANCE = ["light", "reflectance", "visibility", "environment", "brdf", "mis", "target"];
-/** Strategies whose rays are counted for a layer. */
+/** The strategies whose rays the counted layers show. */
 const COUNTED: Record<string, string> = { product: "product:8", sir: "sir:2/32", rejection: "rejection:16" };
-/** How long samples take to come [ms]. */
+/** The duration of the samples' animation [ms]. */
 const ARRIVAL = 900;
 
 export class MapPanel {
   private view = new FilmView($<HTMLCanvasElement>("map-film"), !new URLSearchParams(location.search).has("2d"));
   private exposed = "";
   private samples: Float32Array = new Float32Array();
-  /** The samples that have come so far. */
+  /** The number of samples shown so far. */
   private arrived = 0;
-  /** The layers of `importance`, and one of counted rays with what it is of. */
+  /** The layers of `importance`, and one layer of counted rays with its settings. */
   private layers: MapPicture | null = null;
   private counted: { of: string; density: MapPicture } | null = null;
   private size = [WIDTH, WIDTH / 2];
-  /** A circle around the sun on the map that is not turned, and where it lies on this one. */
+  /** A circle around the sun on the unrotated map, and its position on the displayed one. */
   private sun: Float32Array | null = null;
   private outline: Float32Array | null = null;
   private sunOf = "";
@@ -124,12 +124,12 @@ export class MapPanel {
     }
     this.outline = this.sun && ((await app.engines.call("placesOf", state.mapping, state.rotate, this.sun)) as Float32Array);
     const size = app.probe!.size;
-    $("map-caption").textContent = `${app.envName}, ${size[0]} × ${size[1]} texels, turned by ${degrees(state.rotate)}${this.sun ? "; its sun is outlined" : "; no sun stands out"}.`;
+    $("map-caption").textContent = `${app.envName}, ${size[0]} × ${size[1]} texels, rotated by ${degrees(state.rotate)}; ${this.sun ? "the sun is outlined" : "no sun found"}.`;
     this.mark();
     document.documentElement.dataset.map = key;
   });
 
-  /** Asks what the pixel makes of the light. */
+  /** Requests the pixel's layers, samples and radiance. */
   private readonly ask = latest(async () => {
     const { app } = this, { state } = app, pixel = app.pixel();
     $("map-hint").hidden = !!pixel;
@@ -155,7 +155,7 @@ export class MapPanel {
     this.tellLayer();
   });
 
-  /** Lays another layer over the map; the samples stay. */
+  /** Overlays another layer on the map; the samples stay. */
   private readonly lay = latest(async () => {
     const { app } = this, pixel = app.pixel();
     try {
@@ -172,7 +172,7 @@ export class MapPanel {
     document.documentElement.dataset.layer = `${layer} ${mapping}`;
   }
 
-  /** The strategy whose rays the chosen layer counts, if it counts any. */
+  /** The strategy whose rays the chosen layer counts, if any. */
   private get countedStrategy(): string | undefined {
     const { layer, strategy } = this.app.state;
     return layer === "own" || (COUNTED[layer] && strategy.startsWith(`${layer}:`)) ? strategy : COUNTED[layer];
@@ -187,7 +187,7 @@ export class MapPanel {
     this.counted = { of, density: await engines.call("rayDensity", pixel, strategy, state.mapping, LAYER) };
   }
 
-  /** What the table says of the pixel. */
+  /** The table's rows for the pixel. */
   private rows(point: { shadowed: number; unshadowed: number } | null): [string, string][] {
     if (!point) return [["This pixel shows", "the background"]];
     const { strategy } = this.app.state, rays = this.samples.length / 4;
@@ -199,11 +199,11 @@ export class MapPanel {
     return [
       ["Radiance, by quadrature", short(point.shadowed)], ["without shadows", short(point.unshadowed)],
       [`${strategy}, ${this.nSamples} camera samples`, strategy.startsWith("product") ? "—" : short(sum / this.nSamples)],
-      ["shadow rays", String(rays)], ["of these free", rays ? `${Math.round(100 * free / rays)} %` : "—"],
+      ["shadow rays", String(rays)], ["unoccluded", rays ? `${Math.round(100 * free / rays)} %` : "—"],
     ];
   }
 
-  /** Lets the samples come one after the other, or at once for who wants no motion. */
+  /** Shows the samples one after the other, or at once if the user prefers reduced motion. */
   private arrive() {
     const all = this.samples.length / 4, start = performance.now(), of = this.samples;
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches || document.hidden || this.app.state.panel !== "map";
@@ -231,7 +231,7 @@ export class MapPanel {
     if ($<HTMLInputElement>("show-samples").checked) this.dots(context, 0, this.arrived);
   }
 
-  /** The layer that is laid over the map. */
+  /** The layer overlaid on the map. */
   private layer(): { values: Float32Array; width: number; height: number } | null {
     const { layers, counted } = this, at = IMPORTANCE.indexOf(this.app.state.layer);
     if (this.countedStrategy && counted) return { ...counted.density, values: counted.density.pixels };
@@ -240,8 +240,8 @@ export class MapPanel {
     return { ...layers, values: layers.pixels.subarray(at * n, (at + 1) * n) };
   }
 
-  /** A density as the opacity of one color, by the square root: tails are seen, too. Full is what all but a hundredth of
-   *  the map stay below, or a sun would leave nothing to be seen of the rest. */
+  /** A density as the opacity of one color. The square root makes tails visible; full opacity is at the 99th percentile of
+   *  the map, because a sun at full opacity would hide everything else. */
   private heat(context: CanvasRenderingContext2D) {
     const layer = this.layer();
     if (!layer?.values.length) return;
@@ -255,7 +255,7 @@ export class MapPanel {
     context.drawImage(small, 0, 0, ...(this.size as [number, number]));
   }
 
-  /** A closed line, but for where the layout tears it. */
+  /** Draws a closed line, with gaps at the layout's seams. */
   private circle(context: CanvasRenderingContext2D, places: Float32Array) {
     const [width, height] = this.size;
     for (const [line, style] of [[4, "#000"], [2, "#ffd34d"]] as const) {
@@ -272,7 +272,7 @@ export class MapPanel {
     }
   }
 
-  /** Samples from one number to another. */
+  /** Draws the samples in an index range. */
   private dots(context: CanvasRenderingContext2D, from: number, to: number) {
     let mean = 0;
     for (let i = 2; i < this.samples.length; i += 4) mean += this.samples[i];
@@ -299,7 +299,7 @@ export class MapPanel {
   }
 }
 
-/** A circle around the first region of a map of `WIDTH` columns, as places on it; none if there is no such region. */
+/** A circle around the first region of a map of `WIDTH` columns, as positions on the map; null without a region. */
 function circle(regions: Uint32Array): Float32Array | null {
   let x = 0, y = 0, far = 0;
   const cells: [number, number][] = [];

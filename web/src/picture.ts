@@ -1,4 +1,4 @@
-// The Picture panel: the progressive picture, its camera, material, strategies, and what it costs.
+// The Picture panel: the progressive picture, its camera, material, strategies and cost.
 
 import type { App, Change } from "./app";
 import { $, color, count, degrees, fill, save, short, signed, stops, words } from "./dom";
@@ -20,7 +20,7 @@ const unit = (a: number[]): Vec => scale(a, 1 / Math.hypot(...a));
 const turned = (v: number[], axis: number[], angle: number): Vec =>
   add(add(scale(v, Math.cos(angle)), cross(axis, v), Math.sin(angle)), axis, dot(axis, v) * (1 - Math.cos(angle)));
 
-/** The picture that is shown while the camera moves has this many pixels along an edge. */
+/** The edge length of the preview while the camera moves [pixels]. */
 const PREVIEW = 128;
 
 export class PicturePanel {
@@ -30,13 +30,13 @@ export class PicturePanel {
   private histories: { rays: number; error: number; samples: number }[][] = [[], []];
   private preview = false;
   private settle = 0;
-  /** Counts what was begun. */
+  /** Counts the started renders. */
   private turn = 0;
-  /** The automatic exposure that was found last, of what, and the light and scene that it suits nearly. */
+  /** The last automatic exposure, the view that it belongs to, and the light and scene for which it is a good guess. */
   private automatic = { exposure: 0, view: "", light: "" };
   private reference: Reference;
   private lastPlot = 0;
-  /** What decides the picture that is rendered. */
+  /** The settings that determine the rendered picture. */
   private renderedKey = "";
   /** Times of the last start and of the first pixels after it [ms]. */
   readonly times = { start: 0, first: 0, done: 0 };
@@ -67,7 +67,7 @@ export class PicturePanel {
     if (!this.app.scene || !this.app.probe) return;
     const { panel, step, figure, pixel, compared, exposure, curve, view, mapping, layer, samples, method, refine, lights, sun, lamps, leave, gloss, ...rendered } = this.app.state;
     const key = JSON.stringify(rendered);
-    // What came by the hash may be of another panel alone.
+    // A changed hash may concern only another panel.
     if (what === "all" && key === this.renderedKey) return;
     this.renderedKey = key;
     void this.restart(what !== "render");
@@ -75,10 +75,10 @@ export class PicturePanel {
 
   // ---- rendering
 
-  /** Renders anew: after a change of what is seen first small, so that it is seen at once. */
+  /** Restarts the render. After a change of the view, first renders a small preview for an immediate response. */
   async restart(atOnce: boolean) {
     clearTimeout(this.settle);
-    // Another scene or light waits for its exposure; another view begins with the last one.
+    // A new scene or light waits for its exposure; a new view starts with the last exposure.
     const turn = ++this.turn;
     if (this.app.state.exposure === null && this.automatic.light !== this.lightKey) {
       await this.expose();
@@ -91,7 +91,7 @@ export class PicturePanel {
     } else this.start(false);
   }
 
-  /** What is rendered by a strategy. */
+  /** The render settings for a strategy. */
   private settings(strategy: string): RenderSettings {
     const { size, spp, seed, hide } = this.app.state;
     return { width: size, height: size, spp, strategy, seed, hideEnvironment: hide, camera: this.app.camera };
@@ -103,7 +103,7 @@ export class PicturePanel {
     const settings = (strategy: string): RenderSettings =>
       (preview ? { ...this.settings("mis:1:1:no-compensation"), width: size, height: size, spp: 1 } : this.settings(strategy));
     const pair = !preview && state.beside && engines.active > 1;
-    if (state.beside && !pair && !preview) this.app.tell("Two pictures side by side need two Workers, and memory has room for one", true);
+    if (state.beside && !pair && !preview) this.app.tell("Two pictures side by side need two Workers, but memory suffices only for one", true);
     if (!preview && state.exposure === null) void this.expose();
     this.preview = preview;
     this.calibrated = false;
@@ -111,7 +111,7 @@ export class PicturePanel {
     this.times.first = this.times.done = 0;
     const right = () => ({ ...settings(state.beside), ...(state.equal === "time" ? { spp: 65536 } : {}) });
     this.jobs = engines.render(pair ? [settings(state.strategy), right()] : [settings(state.strategy)]);
-    // What was seen stays until there is more.
+    // The old picture stays until there are new pixels.
     this.films = this.jobs.map(() => new Film(size, size));
     this.histories = [[], []];
     this.refer();
@@ -125,7 +125,7 @@ export class PicturePanel {
     const film = this.films[side];
     const isFirst = this.view.films[side] !== film;
     if (isFirst) {
-      // The rest of the picture until it is there: what was seen before.
+      // The old picture fills the rest until it is rendered.
       const before = this.view.films[side] ?? this.view.films[0];
       if (before) film.underlay(before);
       film.put(windows, pixels);
@@ -157,7 +157,7 @@ export class PicturePanel {
 
   // ---- the error
 
-  /** Begins a reference of the picture, where its error is to be shown. */
+  /** Starts a reference of the picture if the view shows its error. */
   private refer() {
     this.reference.stop();
     this.view.show(2, null);
@@ -173,26 +173,26 @@ export class PicturePanel {
     this.report(false);
   }
 
-  /** What the error is, under the picture. */
+  /** Shows the error under the picture. */
   private tellError(): number[] {
     const { reference } = this, legend = $("error-legend");
     legend.hidden = this.app.state.view !== "error";
     if (legend.hidden) return [];
     if (!reference.isReady) {
-      legend.textContent = "A reference begins to converge …";
+      legend.textContent = "Rendering a reference …";
       return [];
     }
     const errors = this.films.map((film) => reference.error(film));
     const named = errors.map((error, i) => (errors.length > 1 ? `${this.jobs[i].strategy} ` : "") + short(error)).join(", ");
-    legend.textContent = `Blue pixels are too dark, orange ones too bright; full color is an error of 100 %, black one of 0.4 % or less. Relative squared error: ${named}, against ${Math.round(reference.statistics!.samples)} samples per pixel of a reference whose own variance, ${short(reference.variance)}, is taken off.`;
+    legend.textContent = `Blue pixels are too dark, orange pixels too bright. Full color means an error of 100 %, black 0.4 % or less. Relative squared error: ${named}, against a reference with ${Math.round(reference.statistics!.samples)} samples per pixel, whose own variance of ${short(reference.variance)} is subtracted.`;
     if (this.jobs.every((job) => job.complete)) reference.settle(Math.min(...errors));
     return errors;
   }
 
   private calibrated = false;
 
-  /** At equal rays the right picture has as many samples as make as many rays, and the one that is ahead waits; at equal
-   *  time it ends with the left one. */
+  /** At equal rays, sets the right picture's sample count for the same number of rays, and pauses the picture that is
+   *  ahead. At equal time, stops the right picture when the left one ends. */
   private pace() {
     if (this.jobs.length < 2) return;
     const { engines, state } = this.app, [a, b] = this.jobs;
@@ -203,7 +203,7 @@ export class PicturePanel {
     const both = this.jobs.map((job) => job.statistics), rays = both.map((s) => s.shadowRays);
     if (!this.calibrated && both.every((s) => s.samples >= 1)) {
       this.calibrated = true;
-      // By hits, of which both have as many: some tiles are already in another pass than the others.
+      // Compare rays per hit: hits per sample are the same for both, and tiles may be in different passes.
       const [ofLeft, ofRight] = both.map((s) => s.shadowRays / Math.max(s.shadingPoints, 1));
       const spp = Math.min(Math.max(1, Math.round(state.spp * ofLeft / Math.max(ofRight, 1e-3))), 65536);
       if (spp !== b.settings.spp) {
@@ -218,7 +218,7 @@ export class PicturePanel {
     engines.pause(b, !a.complete && rays[1] > ahead);
   }
 
-  /** The program's automatic exposure of what the state shows, unless it has been found. */
+  /** Computes the program's automatic exposure for the state, unless it is known. */
   private async expose() {
     const view = JSON.stringify([this.lightKey, this.app.state.material, this.app.state.ground, this.app.state.rotate, this.app.camera]);
     const light = this.lightKey;
@@ -235,7 +235,7 @@ export class PicturePanel {
     }
   }
 
-  /** Scene and light, whose automatic exposures are near each other for all views and materials. */
+  /** Scene and light; for these, automatic exposures are similar for all views and materials. */
   private get lightKey() {
     const { scene, env, rows, ev, scale } = this.app.state;
     return JSON.stringify([scene, env, rows, ev, scale, this.app.missing]);
@@ -272,11 +272,11 @@ export class PicturePanel {
     const slopes = series.map((s) => `${s.name}: ${short(s.points.at(-1)?.[1] ?? NaN)}, slope ${signed(slope(s.points))}`);
     $("error-plot").setAttribute("aria-label", `Estimated relative variance. ${slopes.join("; ")}`);
     $("error-plot").parentElement!.querySelector("figcaption")!.textContent =
-      `Estimated error over shadow rays — ${series.map((s) => { const k = slope(s.points); return !isFinite(k) ? `${s.name}: two passes are needed` : k < 0 ? `${s.name} falls with slope ${signed(k)}` : `${s.name}: too few samples for a slope`; }).join("; ")}${measured.length ? ". Dots: measured against the reference" : ""}`;
+      `Estimated error over shadow rays — ${series.map((s) => { const k = slope(s.points); return !isFinite(k) ? `${s.name}: a slope needs two passes` : k < 0 ? `${s.name} falls with slope ${signed(k)}` : `${s.name}: too few samples for a slope`; }).join("; ")}${measured.length ? ". Dots: measured against the reference" : ""}`;
     $("command").replaceChildren(...words(commandWords(this.app.state)));
   }
 
-  // ---- what is shown of it
+  // ---- display
 
   private showView() {
     const { state } = this.app;
@@ -344,7 +344,7 @@ export class PicturePanel {
 
   private orbit(yaw: number, pitch: number, zoom = 1) {
     const camera = this.camera(), scene = this.app.scene;
-    // What a link shows stays until it is there.
+    // The picture of a link stays until its files are loaded.
     if (!camera || !scene || this.app.missing.scene) return;
     const up = unit(scene.up), center = scene.center;
     const turn = (point: number[]) => add(center, turned(sub(point, center), up, yaw));
@@ -415,7 +415,7 @@ export class PicturePanel {
     const box = $("viewer").getBoundingClientRect(), { size } = this.app.state;
     const at = (x: number, n: number) => Math.min(Math.max(Math.floor(x / n * size), 0), size - 1);
     this.app.set({ pixel: [at(event.clientX - box.left, box.width), at(event.clientY - box.top, box.height)] }, "pixel");
-    this.app.tell("Picked: see X-ray and Map for what this pixel samples");
+    this.app.tell("Pixel picked: the X-ray and Map panels show its samples");
   }
 
   // ---- controls
@@ -441,13 +441,13 @@ export class PicturePanel {
     strategyEditor($("beside-editor"), state.beside || "mis:1:1", (beside) => app.set({ beside }));
   }
 
-  /** The cameras of a file, where it has any. */
+  /** Lists the cameras of a file, if any. */
   private fillCameras() {
     const { scene, camera } = this.app, cameras = scene?.cameras ?? [];
     $("cameras").hidden = !cameras.length;
     const chosen = camera ? cameras.findIndex((of) => JSON.stringify(of.camera) === JSON.stringify(camera)) : 0;
     const names = cameras.map(({ name }, i): [string, string] => [String(i), name]);
-    fill($("camera"), chosen < 0 ? [...names, ["-1", "turned by hand"]] : names, String(chosen));
+    fill($("camera"), chosen < 0 ? [...names, ["-1", "custom"]] : names, String(chosen));
   }
 
   private materialTimer = 0;
@@ -515,15 +515,15 @@ export class PicturePanel {
     });
     $("save-exr").addEventListener("click", () => this.save("exr"));
     $("save-png").addEventListener("click", () => this.save("png"));
-    $("copy-link").addEventListener("click", () => this.copy(`${location.href.replace(/#.*/, "")}#${toHash(app.state)}`, "The link is copied"));
-    $("copy-command").addEventListener("click", () => this.copy(command(app.state), "The command is copied"));
+    $("copy-link").addEventListener("click", () => this.copy(`${location.href.replace(/#.*/, "")}#${toHash(app.state)}`, "Link copied"));
+    $("copy-command").addEventListener("click", () => this.copy(command(app.state), "Command copied"));
   }
 
   private async copy(text: string, told: string) {
     try {
       await navigator.clipboard.writeText(text);
     } catch {
-      // Where there is no right to the clipboard, the old way.
+      // Without clipboard permission, use the legacy command.
       const area = document.createElement("textarea");
       area.value = text;
       document.body.append(area);
@@ -534,7 +534,7 @@ export class PicturePanel {
     this.app.tell(told);
   }
 
-  /** The bytes of the picture as a file. */
+  /** The picture as the bytes of a file. */
   async file(kind: "exr" | "png"): Promise<Uint8Array> {
     const { engines, state } = this.app;
     const { scene, env, spp, seed } = state, settings = JSON.stringify({ ...this.settings(state.strategy), shard: [0, 1] });
@@ -548,13 +548,13 @@ export class PicturePanel {
     if (this.preview || !this.jobs.length) return;
     try {
       save(`domelight.${kind}`, await this.file(kind));
-      this.app.tell(`domelight.${kind} is saved`);
+      this.app.tell(`Saved domelight.${kind}`);
     } catch (error) {
       this.app.tell((error as Error).message, true);
     }
   }
 }
 
-/** Keeps the theme's colors in canvases that draw with them. */
+/** Redraws canvases when the theme changes. */
 export const themed = (draw: () => void) => matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 export { color };

@@ -6,7 +6,7 @@ export interface Series {
   name: string;
   points: [number, number][];
   kind: "first" | "second" | "third" | "shade";
-  /** Drawn as bars, dots or an area instead of a line; a band is all between two places of x. */
+  /** Draws bars, dots or an area instead of a line; a band covers the range between two values of x. */
   as?: "line" | "dots" | "bars" | "area" | "band";
 }
 
@@ -43,14 +43,14 @@ function ticksOf([low, high]: [number, number], log = false): number[] {
   return Array.from({ length: Math.floor((high - first) / step + 1e-9) + 1 }, (_, i) => Number((first + i * step).toPrecision(10)));
 }
 
-/** Powers of ten where one of the ticks is written as one. */
+/** Writes all ticks as powers of ten if any tick needs it. */
 function labels(ticks: number[], log = false): string[] {
   const isLong = (t: number) => t !== 0 && (Math.abs(t) >= 1e4 || Math.abs(t) < 1e-3);
   const power = (t: number) => (t === 1 || t === 10 ? String(t) : `10${superscript(Math.round(Math.log10(t)))}`);
   return log && ticks.some(isLong) && ticks.every((t) => Math.abs(Math.log10(t) % 1) < 1e-6) ? ticks.map(power) : ticks.map(short);
 }
 
-/** How wide a text of a plot is. */
+/** The width of a plot's text. */
 const widthOf = (() => {
   let context: CanvasRenderingContext2D | null = null;
   return (text: string) => {
@@ -60,23 +60,23 @@ const widthOf = (() => {
   };
 })();
 
-/** The sign of a series in the legend, 14 wide, that ends at `x`. */
+/** The legend key of a series, 14 wide, ending at `x`. */
 function swatch({ kind, as }: Series, x: number, y: number): string {
   if (as === "dots") return `<circle class="${kind} fill" cx="${x - 7}" cy="${y}" r="3"/>`;
   if (as === "bars" || as === "area" || as === "band") return `<rect class="${kind} fill faint" x="${x - 14}" y="${y - 5}" width="14" height="10"/>`;
   return `<path class="${kind} line" d="M${x - 14} ${y}h14"/>`;
 }
 
-/** How wide a figure is: text keeps its size on a phone. */
+/** The width of a figure; text keeps its size on a phone. */
 export const figureWidth = () => Math.min(640, Math.max(320, document.documentElement.clientWidth - 32));
 
-/** An SVG of series over two axes. */
+/** An SVG plot of series. */
 export function plot(series: Series[], axes: Axes): string {
   const width = axes.width ?? figureWidth(), height = axes.height ?? 240;
   const named = series.filter((s) => s.name);
   const ofLegend = named.reduce((sum, s) => sum + widthOf(s.name) + 36, 0);
   const [left, right, bottom] = [58, 14, 38];
-  // Below the axis's name where both do not fit side by side.
+  // Put the legend below the axis label if both do not fit side by side.
   const legendAt = left + widthOf(axes.y.name) + ofLegend > width - right ? 30 : 12, top = legendAt + 10;
   const xs = axes.x.range ?? extent(series.flatMap((s) => s.points.map((p) => p[0])), axes.x.log);
   const ys = axes.y.range ?? extent(series.flatMap((s) => s.points.map((p) => p[1])), axes.y.log);
@@ -122,7 +122,7 @@ export function plot(series: Series[], axes: Axes): string {
   return `<svg viewBox="0 0 ${width} ${height}" aria-hidden="true">${out.join("")}</svg>`;
 }
 
-/** The slope of log y over log x by least squares; NaN of fewer than two points. */
+/** The slope of log y over log x by least squares; NaN for fewer than two points. */
 export function slope(points: [number, number][]): number {
   const logs = points.filter(([x, y]) => x > 0 && y > 0).map(([x, y]) => [Math.log(x), Math.log(y)]);
   const mean = (i: number) => logs.reduce((sum, p) => sum + p[i], 0) / logs.length;

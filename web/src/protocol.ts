@@ -1,4 +1,4 @@
-// What the page and its Workers say to each other.
+// The messages between the page and its Workers.
 
 import type { Engine, MapView, lobeSamples, lobeSection } from "../dist/engine/engine.js";
 
@@ -8,7 +8,7 @@ type Signature<C extends Call> = C extends "lobeSection" ? typeof lobeSection
   : C extends "lobeSamples" ? typeof lobeSamples
   : C extends keyof Engine ? Engine[C] : never;
 export type Arguments<C extends Call> = Signature<C> extends (...args: infer A) => unknown ? A : never;
-/** A map in some mapping: R, G, B and alpha, or layer by layer. */
+/** A map in a given mapping: R, G, B and alpha, or layer by layer. */
 export interface MapPicture {
   width: number;
   height: number;
@@ -18,14 +18,14 @@ export interface MapPicture {
 type Plain<R> = R extends MapView ? MapPicture : R;
 export type Result<C extends Call> = Signature<C> extends (...args: never[]) => infer R ? Plain<R> : never;
 
-/** What was done so far by one Worker, or by several together. */
+/** The progress of one Worker, or of several combined. */
 export interface Statistics {
   cameraRays: number;
   shadowRays: number;
   shadingPoints: number;
   nonFinite: number;
   samples: number;
-  /** Of a Worker null where it was not estimated. */
+  /** Null if a Worker has not estimated it. */
   relativeVariance: number | null;
   pixels: number;
   complete: boolean;
@@ -52,7 +52,7 @@ export interface Update {
 export type FromWorker =
   | { kind: "unpacked"; module: WebAssembly.Module }
   | { kind: "booted" }
-  /** `memory` is what the engine has taken so far [bytes]. */
+  /** `memory` is the engine's memory use so far [bytes]. */
   | { kind: "result"; id: number; result: unknown; memory: number }
   | { kind: "error"; id: number; error: string; dead: boolean }
   | { kind: "started"; token: number; strategy: string }

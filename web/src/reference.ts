@@ -1,15 +1,15 @@
-// A picture that converges beside the one that is shown, to measure the error of that.
+// A reference that converges alongside the displayed picture, to measure its error.
 
 import type { App } from "./app";
 import type { Host, RenderSettings } from "./engines";
 import { Film } from "./film";
 import type { FromWorker, Statistics } from "./protocol";
 
-/** Without bias, and the least noise in most scenes. */
+/** The reference's strategy: unbiased, with the least noise in most scenes. */
 const STRATEGY = "product:16";
-/** The reference has converged when its variance is this share of the picture's error. */
+/** The reference has converged when its variance is this fraction of the picture's error. */
 const CONVERGED = 0.01;
-/** From so many samples of each pixel on, its variance is known well enough to rely on. */
+/** The number of samples per pixel from which the variance estimate is reliable. */
 const RELIABLE = 16;
 
 export class Reference {
@@ -21,7 +21,7 @@ export class Reference {
 
   constructor(private app: App, private changed: (windows: Uint32Array | "all") => void) {}
 
-  /** Begins the reference of a picture, with other random numbers. */
+  /** Starts the reference of a picture, with different random numbers. */
   async start(of: RenderSettings) {
     const token = --this.token;
     this.isStarted = true;
@@ -41,7 +41,7 @@ export class Reference {
     this.host?.send({ kind: "stop" });
   }
 
-  /** Every pixel has samples. */
+  /** Whether every pixel has samples. */
   get isReady() {
     return !!this.film && (this.statistics?.samples ?? 0) >= 1;
   }
@@ -59,13 +59,13 @@ export class Reference {
     this.changed(isFirst ? "all" : windows);
   }
 
-  /** Its own relative variance, in the mean over the pixels. */
+  /** The reference's own relative variance, averaged over the pixels. */
   get variance(): number {
     const { relativeVariance, pixels } = this.statistics ?? {};
     return relativeVariance === null || relativeVariance === undefined ? NaN : relativeVariance / Math.max(pixels ?? 1, 1);
   }
 
-  /** The relative squared error of a picture, in the mean over the pixels, without what the reference errs. */
+  /** The mean relative squared error of a picture's pixels, without the reference's own variance. */
   error(of: Film): number {
     const { film } = this;
     if (!film || film.width !== of.width || film.height !== of.height) return NaN;
@@ -79,7 +79,7 @@ export class Reference {
     return Math.max(4 * sum / a.length - this.variance, 0);
   }
 
-  /** Ends when more samples would not change what is measured. */
+  /** Stops the reference when more samples would not change the measured error. */
   settle(error: number) {
     if ((this.statistics?.samples ?? 0) >= RELIABLE && this.variance < CONVERGED * error) this.host?.send({ kind: "stop" });
   }

@@ -1,21 +1,21 @@
-// Where a figure of the lecture is drawn: its controls, its drawing, and what it says in words.
+// The stage of a lecture figure: its controls, its drawing, and its result in words.
 
 import type { App } from "./app";
 import { h, latest, short } from "./dom";
 
-/** Controls and a place to draw in; a figure fills them. */
+/** Controls and a drawing area, filled by a figure. */
 export class Stage {
   private inputs: (HTMLInputElement | HTMLSelectElement)[] = [];
   readonly drawing = h("div");
   readonly result = h("p", { class: "result", role: "status" });
   private controls = h("div", { class: "controls" });
 
-  /** `values` are those of the controls in their order; what is missing or out of range is as the figure has it. */
+  /** `values` are the controls' values in order; missing or invalid values get the figure's defaults. */
   constructor(readonly place: HTMLElement, readonly app: App, private values: string[]) {
     place.replaceChildren(this.drawing, this.controls, this.result);
   }
 
-  /** A slider; `shown` says how its value is written. */
+  /** Adds a slider; `shown` formats its value. */
   slider(name: string, min: number, max: number, step: number, value: number, shown: (x: number) => string = short): () => number {
     const input = h("input", { type: "range", min: String(min), max: String(max), step: String(step) });
     input.value = this.begin(input, String(value));
@@ -35,13 +35,13 @@ export class Stage {
     return () => select.value;
   }
 
-  /** The value that a control begins with. */
+  /** The initial value of a control. */
   private begin(control: HTMLInputElement | HTMLSelectElement, usual: string): string {
     const given = this.values[this.inputs.push(control) - 1];
     return given && (control instanceof HTMLSelectElement || isFinite(Number(given))) ? given : usual;
   }
 
-  /** Draws again, and keeps the values in the address. */
+  /** Redraws, and stores the values in the address. */
   private changed() {
     this.app.set({ figure: this.inputs.map(({ value }) => value).join(";") }, "view");
     this.redraw();
@@ -63,7 +63,7 @@ export class Stage {
     this.redraw();
   }
 
-  /** Shows an SVG, with what it says in words. */
+  /** Shows an SVG with a text alternative. */
   svg(markup: string, label: string) {
     const image = h("div", { role: "img", "aria-label": label });
     image.innerHTML = markup;

@@ -1,4 +1,4 @@
-// What the page shows, in the URL's hash and as the program's command line.
+// The page's state, in the URL's hash and as the program's command line.
 
 import type { Camera } from "./engines";
 
@@ -12,7 +12,7 @@ export interface State {
   rows: number;
   rotate: number;
   ev: number;
-  /** The light is multiplied by it. */
+  /** A factor on the light. */
   scale: number;
   size: number;
   spp: number;
@@ -20,25 +20,25 @@ export interface State {
   strategy: string;
   /** The strategy on the right; empty for one picture. */
   beside: string;
-  /** What both have as much of: rays or time. */
+  /** The budget that both strategies share: rays or time. */
   equal: string;
   camera: Camera | null;
   exposure: number | null;
   curve: string;
-  /** What is shown: the picture, or its error against a reference. */
+  /** The displayed quantity: the picture, or its error against a reference. */
   view: string;
   mapping: string;
-  /** What is laid over the map, see `LAYERS`; empty for nothing. */
+  /** The overlay on the map, see `LAYERS`; empty for none. */
   layer: string;
-  /** Camera samples whose rays are drawn on the map, as the exponent of a power of two. */
+  /** The number of camera samples whose rays are drawn on the map, as a power of two's exponent. */
   samples: number;
   method: string;
-  /** Variance minimization gives up the rectangles of its cuts. */
+  /** Whether variance minimization refines its rectangles. */
   refine: boolean;
   lights: number;
   sun: boolean;
   lamps: number;
-  /** What is not of compact sources stays on the map. */
+  /** Whether light outside compact sources stays on the map. */
   leave: boolean;
   /** The exponent of the lobe of the spheres' surface; 0 is matte. */
   gloss: number;
@@ -46,7 +46,7 @@ export interface State {
   /** The strategies that the X-ray compares with the picture's, separated by spaces. */
   compared: string;
   step: number;
-  /** The values of the controls of the lecture's figure, separated by semicolons; empty leaves them as they are. */
+  /** The values of the lecture figure's controls, separated by semicolons; empty values mean the defaults. */
   figure: string;
 }
 
@@ -58,7 +58,7 @@ export const DEFAULT: State = {
   pixel: null, compared: "brdf:1 environment:1 mis:1:1 product:8", step: 1, figure: "",
 };
 
-/** What differs from the defaults, as text after `#`. */
+/** The differences to the defaults, as text after `#`. */
 export function toHash(state: State): string {
   const parts = new URLSearchParams();
   for (const [key, value] of Object.entries(state)) {
@@ -69,7 +69,7 @@ export function toHash(state: State): string {
   return parts.toString();
 }
 
-/** The state of a hash; what is not understood stays at its default. */
+/** Parses the state from a hash; invalid parts keep their defaults. */
 export function fromHash(hash: string): State {
   const state: Record<string, unknown> = { ...DEFAULT };
   for (const [key, text] of new URLSearchParams(hash.replace(/^#/, ""))) {

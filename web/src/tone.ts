@@ -1,4 +1,4 @@
-// Exposure and tone curves as the program has them, on the GPU and without one.
+// The program's exposure and tone curves, on the GPU and on the CPU.
 
 export const CURVES = ["agx", "aces", "neutral", "reinhard", "standard"] as const;
 export type Curve = (typeof CURVES)[number];
@@ -59,7 +59,7 @@ vec3 error_color(vec3 c, vec3 reference) {
   return mix(vec3(0.05), d < 0.0 ? vec3(0.35, 0.65, 1.0) : vec3(1.0, 0.55, 0.15), t);
 }`;
 
-/** The same as bytes, into `out` at `at`. */
+/** The same colors as bytes, written to `out` at `at`. */
 export function errorColor(pixel: Float32Array, reference: Float32Array, out: Uint8ClampedArray, at: number) {
   const luminance = (c: Float32Array) => 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
   const y = luminance(reference), d = (luminance(pixel) - y) / Math.sqrt(y * y + 0.01);
@@ -93,7 +93,7 @@ function agx(c: Color): Color {
   let s = v.map(agxShaped) as Color;
   const [least, low] = [Math.min(...v), Math.min(...s)];
   const [range, formed] = [Math.max(...v) - least, Math.max(...s) - low];
-  // Six tenths of the hue before the curve come back.
+  // Mix back six tenths of the hue before the curve.
   if (range > 0 && formed > 0) s = s.map((x, i) => low + 0.6 * formed * ((v[i] - least) / range) + 0.4 * (x - low)) as Color;
   s = times([1.9648874, -0.8559885, -0.10889892, -0.29931337, 1.326398, -0.0270846, -0.16435274, -0.23818397, 1.4025367], s);
   const below = -Math.min(...s);
@@ -115,13 +115,13 @@ function neutral(c: Color): Color {
   return d.map((x) => x * (top / peak) * (1 - white) + top * white) as Color;
 }
 
-/** A byte of sRGB from linear light in [0, 1]: a table is finer than the eye. */
+/** An sRGB byte from linear light in [0, 1], by a sufficiently fine table. */
 const ENCODED = Uint8ClampedArray.from({ length: 4097 }, (_, i) => {
   const c = i / 4096;
   return 255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055);
 });
 
-/** Writes the bytes that a screen shows of linear R, G, B into `out` at `at`. */
+/** Writes the display bytes of linear R, G, B to `out` at `at`. */
 export function develop(r: number, g: number, b: number, curve: Curve, out: Uint8ClampedArray, at: number) {
   let c: Color = [Math.max(r, 0) || 0, Math.max(g, 0) || 0, Math.max(b, 0) || 0];
   if (curve === "agx") c = agx(c);

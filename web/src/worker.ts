@@ -1,4 +1,4 @@
-// One engine. Answers calls in their order, and renders between them in slices of time.
+// One engine: answers calls in order, and renders between them in time slices.
 
 import { Engine, MapView, initSync, lobeSamples, lobeSection } from "../dist/engine/engine.js";
 import type { Call, FromWorker, ToWorker } from "./protocol";
@@ -8,19 +8,19 @@ const SLICE = 16;
 let engine: Engine | undefined;
 let memory: WebAssembly.Memory | undefined;
 let rendering: { token: number; paused: boolean } | undefined;
-/** When the variance may be estimated again, so that it takes no more than a thirtieth of the time. */
+/** The earliest time of the next variance estimate; estimates take at most a thirtieth of the time. */
 let nextVariance = 0;
 const pending: ToWorker[] = [];
 
 const post = (message: FromWorker, transfer: Transferable[] = []) =>
   (self as unknown as Worker).postMessage(message, transfer);
 
-// A message to ourselves comes after those that are already waiting.
+// A message to this Worker itself queues behind the waiting ones.
 const channel = new MessageChannel();
 const soon = () => channel.port2.postMessage(0);
 channel.port1.onmessage = turn;
 
-/** The engine's module from the page's text: in base64, compressed. */
+/** Unpacks the engine's module from the page's text (compressed, in base64). */
 async function unpack(packed: string) {
   const text = atob(packed.trim()), bytes = new Uint8Array(text.length);
   for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
@@ -69,7 +69,7 @@ function answer(message: ToWorker) {
       }
       break;
     case "render":
-      // Of several that wait, the last.
+      // Of several waiting renders, keep the last.
       if (pending.some((other) => other.kind === "render")) break;
       try {
         const started = JSON.parse(engine!.start(message.settings));
@@ -94,12 +94,12 @@ function call(name: Call, args: unknown[]): unknown {
   if (name === "lobeSamples") return lobeSamples(...(args as Parameters<typeof lobeSamples>));
   const method = engine![name] as (...args: unknown[]) => unknown;
   const result = method.apply(engine, args);
-  // What was rendered is of another scene or light. After an error it goes on.
+  // The render in progress is of an old scene or light. After an error it continues.
   if (name === "loadScene" || name === "loadEnvironment" || name === "turnEnvironment") rendering = undefined;
   return result instanceof MapView ? plain(result) : result;
 }
 
-/** A picture of the engine's as a message can carry it. */
+/** Converts the engine's picture for a message. */
 function plain(view: MapView) {
   const picture = { width: view.width, height: view.height, pixels: view.pixels() };
   view.free();
@@ -125,11 +125,11 @@ function slice() {
   }
 }
 
-/** What WebAssembly throws leaves an engine of unknown state. */
+/** Errors thrown by WebAssembly leave the engine in an unknown state. */
 const isDead = (error: unknown) => error instanceof WebAssembly.RuntimeError;
 
 const text = (error: unknown) =>
-  isDead(error) ? "the engine stopped, most likely for want of memory; it was started again"
+  isDead(error) ? "the engine stopped, probably out of memory, and was restarted"
     : error instanceof Error ? error.message : String(error);
 
 function fail(id: number, error: unknown) {

@@ -1,11 +1,11 @@
-// The X-ray panel: the hemisphere above a pixel, where strategies send their rays, and why the pixel is noisy.
+// The X-ray panel: the hemisphere above a pixel, the rays of each strategy, and the causes of noise.
 
 import type { App, Change } from "./app";
 import { $, color, h, latest, percentage, short } from "./dom";
 import { Film, FilmView } from "./film";
 
 const SIZE = 160, DENSITY = 48;
-const LAYERS = ["light L", "reflectance f · cos θ", "visibility V", "what arrives, f · cos θ · L · V"];
+const LAYERS = ["light L", "reflectance f · cos θ", "visibility V", "integrand f · cos θ · L · V"];
 const COMPARED = ["brdf:1", "environment:1", "mis:1:1", "product:8", "sir:2/32", "rejection:16"];
 
 interface Report {
@@ -33,7 +33,7 @@ export class XrayPanel {
     }));
   }
 
-  /** The strategies that are compared with the picture's. */
+  /** The strategies compared with the picture's. */
   private get compared(): string[] {
     return this.app.state.compared.split(" ").filter(Boolean);
   }
@@ -88,7 +88,7 @@ export class XrayPanel {
     const n = 3 * SIZE * SIZE;
     this.views.forEach((view, i) => {
       const film = Film.fromRgb(SIZE, SIZE, maps.subarray(i * n, (i + 1) * n));
-      // Visibility and reflectance are shares; light has its own exposure.
+      // Visibility and reflectance have fixed ranges; light has its own exposure.
       view.set({ exposure: i === 2 ? 0 : film.exposure() + (i === 3 ? 1 : 0), curve: i === 2 ? "standard" : "agx" });
       view.show(0, film);
     });
@@ -99,7 +99,7 @@ export class XrayPanel {
     const context = canvas.getContext("2d")!;
     const small = h("canvas", { width: String(DENSITY), height: String(DENSITY) }), inner = small.getContext("2d")!;
     const image = inner.createImageData(DENSITY, DENSITY), sorted = density.filter((value) => value > 0).sort();
-    // Full is what all but a hundredth stays below, or a sun would leave nothing to be seen of the rest.
+    // Full opacity is at the 99th percentile, because a sun at full opacity would hide everything else.
     const most = sorted[Math.floor(0.99 * (sorted.length - 1))] ?? 1;
     density.forEach((value, i) => image.data.set([255, 96, 176, 255 * Math.sqrt(Math.min(value / most, 1))], 4 * i));
     inner.putImageData(image, 0, 0);
@@ -133,13 +133,13 @@ export class XrayPanel {
   }
 }
 
-/** With a full stop, and a capital unless it begins with a strategy's name. */
+/** Adds a period, and a capital unless the text begins with a strategy's name. */
 const sentence = (text: string) => {
   const begin = /^[a-z-]+:/.test(text) ? text.slice(0, 1) : text.slice(0, 1).toUpperCase();
   return text && begin + text.slice(1).replace(/\.?$/, ".");
 };
 
-/** The picture with a cross, to pick a pixel by pointer or keys. */
+/** The picture with a crosshair, to pick a pixel by pointer or keys. */
 class PixelPicker {
   /** The pixel under the cross. */
   private at: [number, number] | null = null;

@@ -89,7 +89,7 @@ test("files beyond what memory holds are refused before they are read", async ()
   truncateSync(path, 1.5 * 2 ** 30);
   await drop(page, [path]);
   await page.waitForSelector("#status.error");
-  assert.match(await text(page, "#status"), /1\.5 GiB are more than this page can hold; 1 GiB is the most/);
+  assert.match(await text(page, "#status"), /1\.5 GiB exceed this page’s limit of 1 GiB/);
   await done();
 });
 
@@ -179,7 +179,7 @@ test("the cameras of a file are chosen from", async () => {
   assert.notEqual(far, near);
   await page.focus("#viewer");
   await renderedAnew(page, () => page.keyboard.press("ArrowLeft"));
-  assert.equal(await page.$eval("#camera option:checked", (option) => option.textContent), "turned by hand");
+  assert.equal(await page.$eval("#camera option:checked", (option) => option.textContent), "custom");
   await done();
 });
 
@@ -188,8 +188,8 @@ test("fewer Workers hold a scene that is too large for all", async () => {
   await rendered(page);
   const all = await page.evaluate(() => window.domelight.app.engines.hosts.length);
   await renderedAnew(page, () => drop(page, [put("large.glb", glb({ padding: 12 << 20 }))]));
-  await page.waitForFunction(() => /Workers, as memory has no room for more/.test(document.getElementById("status").textContent));
-  assert.match(await text(page, "#status"), new RegExp(`by 1 of ${all} Workers`));
+  await page.waitForFunction(() => /Workers, because memory is limited/.test(document.getElementById("status").textContent));
+  assert.match(await text(page, "#status"), new RegExp(`on 1 of ${all} Workers`));
   const [red, green] = await middle(page);
   assert.ok(red > 3 * green, `red ${red}, green ${green}`);
   await renderedAnew(page, () => drop(page, [put("triangle.glb", glb())]));

@@ -141,7 +141,7 @@ test("the map turns, shows the sun, and what a pixel samples", async () => {
   await rendered(page);
   await show(page, "map");
   await page.waitForSelector("html[data-map]");
-  assert.match(await text(page, "#map-caption"), /sky, 128 × 64 texels, turned by 125°; its sun is outlined/);
+  assert.match(await text(page, "#map-caption"), /sky, 128 × 64 texels, rotated by 125°; the sun is outlined/);
   const first = await canvasHash(page, "map-film");
   await page.focus("#map-viewer");
   await page.keyboard.press("ArrowLeft");
@@ -224,7 +224,7 @@ test("lights: regions, files of every format, and what is left", async () => {
   await page.waitForSelector("html[data-rig='median-cut:8']");
   await page.check("#leave");
   await page.waitForSelector("html[data-rig='median-cut:1']");
-  assert.match(await text(page, "#rig-caption"), /beside what it leaves on the map/);
+  assert.match(await text(page, "#rig-caption"), /the rest of the light stays on the map/);
   const buttons = "#formats button, #dome-files button";
   const names = await page.$$eval(buttons, (all) => all.map((button) => button.firstChild.textContent));
   assert.ok(names.includes("rig.usda") && names.includes("dome.exr"), names.join(" "));
@@ -403,12 +403,12 @@ test("the command, the link and both pictures are taken away", async () => {
     navigator.clipboard.writeText = async (text) => { window.copied.push(text); };
   });
   await page.click("#copy-command");
-  await page.waitForFunction(() => document.getElementById("status").textContent === "The command is copied");
+  await page.waitForFunction(() => document.getElementById("status").textContent === "Command copied");
   await slide(page, "#exposure", -2);
   await page.selectOption("#curve", "aces");
   await page.click("#copy-command");
   await page.click("#copy-link");
-  await page.waitForFunction(() => document.getElementById("status").textContent === "The link is copied");
+  await page.waitForFunction(() => document.getElementById("status").textContent === "Link copied");
   const [plain, developed, link] = await page.evaluate(() => window.copied);
   assert.match(plain, /^domelight render statue --env sky --env-rows=64 .*--strategy=brdf:2 --spp=4 --passes=doubling -o domelight\.exr -o domelight\.png$/);
   assert.match(developed, /--exposure=-2 --tone=aces -o/);
