@@ -1,10 +1,10 @@
-//! Accessors: numbers from bytes, sparse ones replaced.
+//! Accessors: decodes numbers from bytes, including sparse accessors.
 
 use super::error::{Failure, GltfErrorKind};
 use super::json::{Accessor, Sparse, SparseData};
 use super::source::{Source, slice};
 
-/// The type of a number.
+/// A component type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Component {
     I8,
@@ -36,7 +36,7 @@ impl Component {
         }
     }
 
-    /// What normalized integers of the type are divided by; `None` for numbers that are what they are.
+    /// The divisor of normalized integers; `None` for types that cannot be normalized.
     fn range(self) -> Option<f32> {
         match self {
             Self::I8 => Some(127.0),
@@ -59,7 +59,7 @@ impl Component {
     }
 }
 
-/// What an accessor's integers are divided by, if they are normalized.
+/// The divisor of an accessor's integers, if they are normalized.
 pub(super) fn component_range(accessor: &Accessor) -> Option<f32> {
     Component::new(accessor.component_type)
         .and_then(Component::range)
@@ -76,7 +76,7 @@ fn unsigned(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |value, &b| value << 8 | u32::from(b))
 }
 
-/// How many numbers a value has.
+/// The number of components of a value.
 fn dimensions(shape: &str) -> Option<usize> {
     match shape {
         "SCALAR" => Some(1),
@@ -89,8 +89,8 @@ fn dimensions(shape: &str) -> Option<usize> {
 }
 
 impl Source<'_> {
-    /// The values of an accessor as `N` numbers each, normalized integers in \[0, 1\] or \[−1, 1\];
-    /// those that a value does not have are 0. `needed` has the shapes allowed, parted by ` or `.
+    /// The values of an accessor as `N` numbers each; normalized integers are in \[0, 1\] or \[−1, 1\], and missing
+    /// components are 0. `needed` lists the allowed shapes, separated by ` or `.
     pub(super) fn floats<const N: usize>(
         &self,
         index: usize,
@@ -149,7 +149,7 @@ impl Source<'_> {
         Ok(self.integers::<1>(index, needed, "indices")?.into_iter().map(|[i]| i).collect())
     }
 
-    /// Every value of an accessor, decoded from its `size` bytes; sparse ones replaced.
+    /// Decodes all values of an accessor from `size` bytes each, including sparse replacements.
     fn values<T: Clone>(
         &self,
         index: usize,
@@ -165,7 +165,7 @@ impl Source<'_> {
                 let what = ("accessor", index);
                 strided(&bytes, byte_offset, stride, size, count, what)?.map(&decode).collect()
             }
-            // Zeros by the format; bounded in all the file, for nothing in it backs them.
+            // The format defines these as zeros; limit their total, because no data in the file backs them.
             None if self.take_zeros(count) => vec![decode(&vec![0; size]); count],
             None => return Err(GltfErrorKind::NoData { index, count }.into()),
         };
@@ -175,7 +175,7 @@ impl Source<'_> {
         Ok(values)
     }
 
-    /// Replaces the values that a sparse accessor names.
+    /// Replaces the values listed by a sparse accessor.
     fn replace<T>(
         &self,
         index: usize,
@@ -213,7 +213,7 @@ impl Source<'_> {
     }
 }
 
-/// `count` values of `size` bytes, each `stride` bytes after the other.
+/// `count` values of `size` bytes, `stride` bytes apart.
 fn strided<'b>(
     bytes: &'b [u8],
     offset: u64,

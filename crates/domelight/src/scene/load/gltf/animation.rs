@@ -1,4 +1,4 @@
-//! Animations at one moment: what they set of nodes.
+//! Animations, evaluated at one time.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use super::source::Source;
 use crate::math::{Quat, Vec4, functions};
 use crate::scene::load::AnimationTime;
 
-/// What an animation sets of a node.
+/// The animated properties of a node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct NodePose {
     pub(super) translation: Option<[f32; 3]>,
@@ -17,7 +17,7 @@ pub(super) struct NodePose {
     pub(super) weights: Option<Vec<f32>>,
 }
 
-/// The index of a choice: by name, else by number.
+/// The index of a choice by name, otherwise by number.
 pub(super) fn choose(
     what: &'static str,
     asked: &str,
@@ -31,7 +31,7 @@ pub(super) fn choose(
     })
 }
 
-/// The nodes as an animation has them at a moment.
+/// The poses of nodes in an animation at a time.
 pub(super) fn at(
     source: &Source<'_>,
     time: &AnimationTime,
@@ -97,10 +97,10 @@ fn channel_at(
     Ok(())
 }
 
-/// More morph targets than any mesh has.
+/// An upper bound on the morph targets of any real mesh.
 const MAX_WEIGHTS: usize = 1 << 16;
 
-/// Values at times, as many numbers a time as there are more values than times.
+/// Values at times; the number of components per value is the ratio of the counts.
 struct Curve<'c> {
     times: &'c [f32],
     values: &'c [f32],
@@ -108,8 +108,7 @@ struct Curve<'c> {
 }
 
 impl Curve<'_> {
-    /// The value at a time; before the first and after the last it stays as it is there. `None` if there
-    /// are none, or too few.
+    /// The value at a time, clamped to the first and last keys. `None` without keys or with too few values.
     fn at(&self, seconds: f32, path: &str) -> Option<Vec<f32>> {
         let cubic = self.interpolation == Interpolation::CubicSpline;
         let per_key = if cubic { 3 } else { 1 };
@@ -117,7 +116,7 @@ impl Curve<'_> {
         if self.times.is_empty() || n == 0 {
             return None;
         }
-        // Of a key: in-tangent, value and out-tangent of a spline, else the value.
+        // A spline's key holds in-tangent, value and out-tangent; other keys hold the value.
         let of_key = |key: usize, part: usize| {
             let begin = (key * per_key + part) * n;
             &self.values[begin..begin + n]
@@ -153,11 +152,11 @@ impl Curve<'_> {
     }
 }
 
-/// The rotation at `t` in [0, 1] on the shorter way from `a` to `b`, at constant speed; unit quaternions.
+/// Spherical linear interpolation of unit quaternions along the shorter arc from `a` to `b`, `t` in [0, 1].
 fn slerp(a: Quat, b: Quat, t: f32) -> Quat {
     let cos = a.dot(b);
     let b = if cos < 0.0 { -b } else { b };
-    // Of the half angle's tangent: the arc cosine is inaccurate near 1.
+    // Use the half angle's tangent, because the arc cosine is inaccurate near 1.
     let angle = 2.0 * functions::atan2((b - a).length(), (b + a).length());
     let sin = functions::sin(angle);
     if sin < 1e-6 {
@@ -179,7 +178,7 @@ mod tests {
         }
         let step = curve(Interpolation::Step, &[10.0, 20.0]);
         assert_eq!(step.at(2.9, "weights").unwrap(), [10.0]);
-        // In the middle of an interval of 2 s: the mean, and an eighth of the tangents' difference each.
+        // At the middle of a 2 s interval: the mean, plus 2 s / 8 times the tangents' difference.
         let spline = curve(Interpolation::CubicSpline, &[9.0, 10.0, 4.0, 0.0, 20.0, 9.0]);
         assert_eq!(spline.at(2.0, "translation").unwrap(), [16.0]);
         assert_eq!(spline.at(3.0, "translation").unwrap(), [20.0]);

@@ -1,4 +1,4 @@
-//! The container: a JSON text, or a GLB file of a JSON chunk and a binary one.
+//! The container: a JSON text, or a GLB file with a JSON chunk and a binary chunk.
 
 use super::error::GltfErrorKind;
 
@@ -10,10 +10,10 @@ pub(super) struct Container<'a> {
 }
 
 impl<'a> Container<'a> {
-    /// Takes a file apart.
+    /// Splits a file into its chunks.
     pub(super) fn new(file: &'a [u8]) -> Result<Self, GltfErrorKind> {
         let Some(header) = file.strip_prefix(b"glTF") else {
-            // Some exporters begin a text with the mark of its encoding.
+            // Some exporters write a byte order mark.
             let json = file.strip_prefix(b"\xef\xbb\xbf").unwrap_or(file);
             return Ok(Self { json, binary: None });
         };
@@ -52,7 +52,7 @@ type Chunk<'a> = ([u8; 4], &'a [u8]);
 
 /// Splits off the next chunk: its kind and its data.
 fn chunk<'a>(rest: &mut &'a [u8]) -> Result<Option<Chunk<'a>>, GltfErrorKind> {
-    // Less than a header is padding.
+    // Fewer bytes than a header are padding.
     let Some((header, data)) = rest.split_at_checked(8) else { return Ok(None) };
     let [length, kind] = [0, 4].map(|i| [header[i], header[i + 1], header[i + 2], header[i + 3]]);
     let length = u32::from_le_bytes(length);

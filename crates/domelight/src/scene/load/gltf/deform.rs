@@ -1,4 +1,4 @@
-//! Morph targets and skins: from a primitive to the mesh that one node shows.
+//! Morph targets and skins: deforms a primitive to the mesh of one node.
 
 use std::rc::Rc;
 
@@ -8,12 +8,12 @@ use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Mat4, Vec2, Vec3, Vec4};
 
-/// Where a node shows a mesh, and in which shape.
+/// The transform of a node's mesh.
 #[derive(Clone, Debug)]
 pub(super) enum Pose {
-    /// By a matrix from the mesh to the world.
+    /// A matrix from the mesh to the world.
     Rigid(Mat4),
-    /// By a skin: a matrix from the mesh to the world for each joint.
+    /// A skin: a matrix from the mesh to the world for each joint.
     Skinned(Rc<[Mat4]>),
 }
 
@@ -50,7 +50,7 @@ pub(super) fn place(mut geometry: Geometry, pose: &Pose, weights: &[f32]) -> Mes
     mesh
 }
 
-/// Adds each morph target by its weight.
+/// Adds the weighted morph targets.
 fn morph(vertices: &mut Vertices, weights: &[f32]) {
     let Vertices { positions, normals, tangents, targets, .. } = vertices;
     for (&index, target) in &*targets {
@@ -71,7 +71,7 @@ fn morph(vertices: &mut Vertices, weights: &[f32]) {
     }
 }
 
-/// Moves each vertex by the weighted mean of its joints' matrices.
+/// Transforms each vertex by the weighted mean of its joints' matrices.
 fn skin(mesh: &mut Mesh, joints: &[Vec<[u32; 4]>], weights: &[Vec<[f32; 4]>], matrices: &[Mat4]) {
     let blended = |vertex: usize| {
         let mut sum = Mat4::ZERO;
@@ -85,7 +85,7 @@ fn skin(mesh: &mut Mesh, joints: &[Vec<[u32; 4]>], weights: &[Vec<[f32; 4]>], ma
                 }
             }
         }
-        // Weights that do not add up to one are scaled; a vertex without any follows the first joint.
+        // Normalize the weights; a vertex without weights follows the first joint.
         if total > 0.0 {
             sum * (1.0 / total)
         } else {

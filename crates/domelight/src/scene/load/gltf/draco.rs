@@ -14,7 +14,7 @@ pub(super) struct DracoMesh<'p> {
 }
 
 impl<'p> DracoMesh<'p> {
-    /// Decodes a primitive's stream within the memory allowed.
+    /// Decodes a primitive's stream within the memory limit.
     pub(super) fn new(
         source: &Source<'_>,
         extension: &'p json::Draco,
@@ -23,7 +23,7 @@ impl<'p> DracoMesh<'p> {
         let (stream, _) = source.view(extension.buffer_view)?;
         let mut limits = DecodeLimits::default();
         if let Some(left) = source.budget.left() {
-            // A face is three indices here and three there, and its connectivity while it is decoded.
+            // A face takes three indices in the decoder and three here, plus its connectivity during decoding.
             limits = limits
                 .with_max_decoded_bytes(left.min(limits.max_decoded_bytes))
                 .with_max_faces((left / 64).min(limits.max_faces))
@@ -33,7 +33,7 @@ impl<'p> DracoMesh<'p> {
         MeshDecoder::new()
             .decode(&mut DecoderBuffer::new(&stream).with_limits(limits), &mut mesh)
             .map_err(|e| GltfErrorKind::Draco { problem: e.to_string() })?;
-        // The decoder checks the number of faces, but not of points.
+        // The decoder limits the number of faces, but not of points.
         let points = mesh.num_points() as u64;
         if points > limits.max_points {
             let problem = format!("{points} points, more than the limit of {}", limits.max_points);
@@ -44,14 +44,14 @@ impl<'p> DracoMesh<'p> {
         Ok(Self { mesh, extension })
     }
 
-    /// How many vertices there are.
+    /// The number of vertices.
     pub(super) fn n_vertices(&self) -> usize {
         self.mesh.num_points()
     }
 
-    /// An attribute of the primitive's, if the stream has it; missing numbers are 0.
+    /// An attribute of the primitive, if the stream has it; missing components are 0.
     ///
-    /// Integers are divided by `normalize_by`, which the attribute's accessor says.
+    /// Integers are divided by `normalize_by`, according to the attribute's accessor.
     pub(super) fn floats<const N: usize>(
         &self,
         semantic: &str,
@@ -68,7 +68,7 @@ impl<'p> DracoMesh<'p> {
         Some(values.as_chunks().0.to_vec())
     }
 
-    /// The corners of all triangles, one after the other.
+    /// The corners of all triangles, in order.
     pub(super) fn indices(&self) -> Vec<u32> {
         let face = |i: usize| self.mesh.face(FaceIndex(i as u32)).map(|point| point.0);
         (0..self.mesh.num_faces()).flat_map(face).collect()

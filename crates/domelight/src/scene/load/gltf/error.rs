@@ -1,110 +1,110 @@
-//! What can be wrong with a glTF file.
+//! Errors in glTF files.
 
 use super::ktx2::Ktx2Error;
 use super::meshopt::MeshoptError;
 use crate::scene::TextureError;
 use crate::scene::load::LoadError;
 
-/// What is wrong with a glTF file.
+/// The kind of a glTF error.
 #[derive(Debug, thiserror::Error)]
 pub enum GltfErrorKind {
-    /// A part of the JSON that is not what the format has there.
+    /// A part of the JSON that violates the format.
     #[error("{place} is not valid: {source}")]
     Json {
         /// `the JSON`, or an array with an index.
         place: String,
-        /// What the parser says.
+        /// The parser's error.
         source: serde_json::Error,
     },
-    /// A file of the format's first version.
+    /// A glTF 1.0 file.
     #[error(
-        "this is glTF 1.0, which glTF 2.0 replaced in 2017; convert it, for instance by `npx gltf-pipeline -i OLD -o NEW.glb`"
+        "this is glTF 1.0, which glTF 2.0 replaced in 2017; convert it, for instance with `npx gltf-pipeline -i OLD -o NEW.glb`"
     )]
     Version1,
-    /// A file of a version that is not known.
-    #[error("this is glTF {version}; version 2.0 is read")]
+    /// A file of an unknown version.
+    #[error("this is glTF {version}; only version 2.0 is supported")]
     Version {
-        /// The version that the file asks for.
+        /// The version that the file requires.
         version: String,
     },
-    /// A GLB file whose chunks do not fit together.
+    /// A GLB file with inconsistent chunks.
     #[error("the GLB container is truncated or damaged: {problem}")]
     Container {
-        /// What does not fit.
+        /// The inconsistency.
         problem: String,
     },
-    /// Something wrong in one part of the file.
+    /// An error in one part of the file.
     #[error("{place}: {source}")]
     In {
-        /// Which part.
+        /// The part.
         place: String,
-        /// What is wrong there.
+        /// The error there.
         source: Box<GltfErrorKind>,
     },
-    /// An index of something that is not there.
+    /// An index out of range.
     #[error("it refers to {what} {index}, but there are only {count}")]
     NoSuch {
-        /// What.
+        /// The kind of object.
         what: &'static str,
         /// The index.
         index: usize,
-        /// How many there are.
+        /// The number of objects.
         count: usize,
     },
-    /// Data that lie outside of what holds them.
+    /// Data outside of their container.
     #[error(
         "{what} {index} covers bytes {begin}..{end} of {length}; the file is truncated or damaged"
     )]
     OutOfRange {
-        /// What lies outside.
+        /// The kind of data.
         what: &'static str,
-        /// Its index.
+        /// The index.
         index: usize,
-        /// Where it begins.
+        /// The first byte.
         begin: u64,
-        /// Where it ends.
+        /// The byte after the last.
         end: u64,
-        /// How much there is.
+        /// The size of the container \[bytes\].
         length: usize,
     },
     /// An accessor of a type that its use does not allow.
-    #[error("accessor {index} holds {found}, but {needed} is needed for {used_for}")]
+    #[error("accessor {index} holds {found}, but its use for {used_for} requires {needed}")]
     AccessorType {
         /// The accessor.
         index: usize,
-        /// What it holds.
+        /// The type that it holds.
         found: String,
-        /// What was expected.
+        /// The type that the use requires.
         needed: &'static str,
-        /// For what.
+        /// The use.
         used_for: String,
     },
-    /// Accessors that promise zeros without end.
+    /// Accessors with too many implicit zeros.
     #[error(
         "accessor {index} has {count} values but no data, too many zeros for a file without data"
     )]
     NoData {
         /// The accessor.
         index: usize,
-        /// Its count.
+        /// The number of values.
         count: usize,
     },
     /// Embedded data that are not base64.
     #[error("{what} {index} has a data URI that cannot be decoded: {source}")]
     Base64 {
-        /// Whose.
+        /// The kind of object.
         what: &'static str,
-        /// Its index.
+        /// The index.
         index: usize,
-        /// What the decoder says.
+        /// The decoder's error.
         source: base64::DecodeError,
     },
     /// A URI that is neither data nor a relative path.
-    #[error("{what} {index} has the URI '{uri}'; only relative paths and base64 data are read")]
+    #[error("{what} {index} has the URI '{uri}'; only relative paths and base64 data are supported")]
     Uri {
-        /// Whose.
+        /// The kind of object.
         what: &'static str,
-        /// Its index.
+        /// The index.
         index: usize,
         /// The URI, shortened.
         uri: String,
@@ -112,9 +112,9 @@ pub enum GltfErrorKind {
     /// A buffer or an image without data.
     #[error("{what} {index} has no data")]
     NoSource {
-        /// What.
+        /// The kind of object.
         what: &'static str,
-        /// Its index.
+        /// The index.
         index: usize,
     },
     /// A buffer view that cannot be decompressed.
@@ -122,13 +122,13 @@ pub enum GltfErrorKind {
     Meshopt {
         /// The buffer view.
         view: usize,
-        /// What is wrong.
+        /// The decoder's error.
         source: MeshoptError,
     },
     /// A mesh that Draco cannot decode.
     #[error("its Draco data cannot be decoded: {problem}")]
     Draco {
-        /// What the decoder says.
+        /// The decoder's error.
         problem: String,
     },
     /// A KTX2 image that cannot be decoded.
@@ -136,21 +136,21 @@ pub enum GltfErrorKind {
     Ktx2 {
         /// The image.
         image: usize,
-        /// What is wrong.
+        /// The decoder's error.
         source: Ktx2Error,
     },
-    /// An image whose size and data disagree.
+    /// An image whose size does not match its data.
     #[error(transparent)]
     Texture(#[from] TextureError),
-    /// An image in a format that nothing here reads.
+    /// An image in an unsupported format.
     #[error(
-        "image {image} is AVIF, which is not read; convert it, for instance by `npx @gltf-transform/cli png IN.glb OUT.glb`"
+        "image {image} is AVIF, which is not supported; convert it, for instance with `npx @gltf-transform/cli png IN.glb OUT.glb`"
     )]
     Avif {
         /// The image.
         image: usize,
     },
-    /// A node with two parents or among its own ancestors, or too deep a tree.
+    /// A node with two parents, a cycle, or a tree that is too deep.
     #[error(
         "node {node} is reached twice or is more than {limit} levels deep; nodes must form a tree"
     )]
@@ -160,25 +160,25 @@ pub enum GltfErrorKind {
         /// The limit.
         limit: usize,
     },
-    /// An index that names no vertex.
+    /// An index that refers to no vertex.
     #[error("index {index} refers to no vertex; there are {vertices}")]
     Index {
         /// The index.
         index: u32,
-        /// How many vertices there are.
+        /// The number of vertices.
         vertices: usize,
     },
-    /// An attribute that is not as long as the positions.
+    /// An attribute whose count differs from that of the positions.
     #[error("{count} {attribute} for {vertices} vertices")]
     Count {
         /// The attribute.
         attribute: String,
-        /// How many there are.
+        /// The number of values.
         count: usize,
-        /// How many vertices there are.
+        /// The number of vertices.
         vertices: usize,
     },
-    /// A required extension that is not known, where none may be passed over.
+    /// An unknown required extension in strict mode.
     #[error(
         "the file requires the extension {name}, which is unknown; without --strict, the rest is drawn"
     )]
@@ -186,27 +186,27 @@ pub enum GltfErrorKind {
         /// The extension.
         name: String,
     },
-    /// Attributes of instances that are not of one length.
+    /// Attributes of instances with different lengths.
     #[error("an attribute of its instances has {count} values, another {instances}")]
     Instances {
-        /// How many one has.
+        /// The length of one attribute.
         count: usize,
-        /// How many another has.
+        /// The length of another attribute.
         instances: usize,
     },
     /// A choice that the file does not have.
     #[error("there is no {what} '{asked}'; {}", list(.what, .known))]
     NoChoice {
-        /// What was asked for.
+        /// The kind of object.
         what: &'static str,
-        /// Its name or number.
+        /// The requested name or number.
         asked: String,
-        /// The names of those that there are.
+        /// The available names.
         known: Vec<String>,
     },
 }
 
-/// `the scenes are 0 'a', 1 'b'`.
+/// Lists the available names: `the scenes are 0 'a', 1 'b'`.
 fn list(what: &str, known: &[String]) -> String {
     if known.is_empty() {
         return "the file has none".into();
@@ -216,22 +216,22 @@ fn list(what: &str, known: &[String]) -> String {
 }
 
 impl GltfErrorKind {
-    /// The problem with the part of the file where it is.
+    /// Adds the part of the file that contains the error.
     pub(super) fn within(self, place: impl Into<String>) -> Self {
         Self::In { place: place.into(), source: Box::new(self) }
     }
 }
 
-/// Why a file cannot be loaded: it is broken, or something around it is wrong.
+/// The reason why a file cannot be loaded.
 pub(super) enum Failure {
-    /// In the file.
+    /// An error in the file.
     Problem(GltfErrorKind),
-    /// Memory, or a file beside it.
+    /// A lack of memory, or an error in a referenced file.
     Load(LoadError),
 }
 
 impl Failure {
-    /// With the part of the file where it is.
+    /// Adds the part of the file that contains the error.
     pub(super) fn within(self, place: impl FnOnce() -> String) -> Self {
         match self {
             Self::Problem(problem) => Self::Problem(problem.within(place())),

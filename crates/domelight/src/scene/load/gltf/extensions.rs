@@ -1,18 +1,18 @@
-//! Which extensions are read, which change nothing that is seen, and which are not known.
+//! Supported, harmless and unknown extensions.
 
 use std::collections::BTreeSet;
 
 use super::error::GltfErrorKind;
 use super::json::Document;
 
-/// What an extension means to a picture under an environment.
+/// The effect of an extension on a picture under an environment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Effect {
-    /// It is read; a material's features that are not drawn are named by material.
+    /// It is supported; unsupported material features are reported per material.
     Read,
-    /// It adds what a picture under an environment has no use for: the text says what.
+    /// It adds only data without effect on a picture under an environment, described by the text.
     Harmless(&'static str),
-    /// It changes something, but is not read.
+    /// It may change the picture, but is not supported.
     Unknown,
 }
 
@@ -39,7 +39,7 @@ const READ: [&str; 20] = [
     "KHR_texture_transform",
 ];
 
-/// Prefixes of names, and what such extensions add.
+/// Name prefixes of harmless extensions, with descriptions.
 const HARMLESS: [(&str, &str); 22] = [
     ("KHR_lights_punctual", "its lamps are left out: light comes from the environment"),
     ("EXT_lights_", "its own light is left out: light comes from the environment"),
@@ -65,7 +65,7 @@ const HARMLESS: [(&str, &str); 22] = [
     ("VRM", "its rig is left out"),
 ];
 
-/// What an extension means, by its name.
+/// The effect of an extension, by its name.
 pub(super) fn effect(name: &str) -> Effect {
     if READ.contains(&name) {
         return Effect::Read;
@@ -74,8 +74,7 @@ pub(super) fn effect(name: &str) -> Effect {
     harmless.map_or(Effect::Unknown, |(_, text)| Effect::Harmless(text))
 }
 
-/// Warns of each extension of a document that is not read; with `strict` an unknown one that is required is
-/// an error.
+/// Warns of each unsupported extension; with `strict`, an unknown required extension is an error.
 pub(super) fn check(
     document: &Document<'_>,
     strict: bool,
@@ -127,7 +126,7 @@ mod tests {
             warnings[1].contains("X_used") && warnings[0].contains("requires") && error.is_none()
         );
         assert!(run(unknown, true).1.unwrap().contains("X_all"));
-        // Required without being named as used.
+        // Required but not listed as used.
         assert!(run(r#"{"extensionsRequired":["X"]}"#, true).1.is_some());
     }
 }

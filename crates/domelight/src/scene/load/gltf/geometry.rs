@@ -1,4 +1,4 @@
-//! A primitive's vertices and triangles, before they are placed.
+//! A primitive's vertices and triangles in mesh space.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use super::json;
 use super::material::Slot;
 use super::source::Source;
 
-/// What is known of a primitive's vertices; an attribute is empty or has a value per vertex.
+/// The vertices of a primitive; each attribute is empty or has one value per vertex.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vertices {
     pub(super) positions: Vec<[f32; 3]>,
@@ -17,10 +17,10 @@ pub(super) struct Vertices {
     pub(super) tangents: Vec<[f32; 4]>,
     pub(super) uvs: [Vec<[f32; 2]>; 2],
     pub(super) colors: Vec<[f32; 4]>,
-    /// Joints and weights, four a vertex and a set.
+    /// Joints and weights, four per vertex and set.
     pub(super) joints: Vec<Vec<[u32; 4]>>,
     pub(super) weights: Vec<Vec<[f32; 4]>>,
-    /// The morph targets that any placement uses, by index.
+    /// The morph targets used by any placement, by index.
     pub(super) targets: BTreeMap<usize, Target>,
 }
 
@@ -40,7 +40,7 @@ pub(super) struct Geometry {
     pub(super) slot: Slot,
 }
 
-/// Which morph targets have to be read, and whether joints have.
+/// The morph targets to read, and whether to read joints.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Deformations {
     pub(super) targets: BTreeSet<usize>,
@@ -137,7 +137,7 @@ impl Reader<'_, '_> {
         Ok(vertices)
     }
 
-    /// The values of an attribute; none if the primitive lacks it.
+    /// The values of an attribute; empty if the primitive lacks it.
     fn floats<const N: usize>(
         &self,
         semantic: &str,
@@ -154,7 +154,7 @@ impl Reader<'_, '_> {
         checked(semantic, values, n_vertices)
     }
 
-    /// An attribute out of the Draco stream, if there is one and it has it.
+    /// An attribute from the Draco stream, if the stream exists and has it.
     fn in_draco<const N: usize>(
         &self,
         semantic: &str,
@@ -165,7 +165,7 @@ impl Reader<'_, '_> {
         Ok(draco.floats(semantic, range))
     }
 
-    /// Colors, opaque where the file has three numbers.
+    /// Colors; those with three components are opaque.
     fn colors(&self, n_vertices: Option<usize>) -> Result<Vec<[f32; 4]>, Failure> {
         let mut colors: Vec<[f32; 4]> = self.floats("COLOR_0", "VEC3 or VEC4", n_vertices)?;
         if let Some(&accessor) = self.primitive.attributes.get("COLOR_0") {
@@ -209,7 +209,7 @@ impl Reader<'_, '_> {
     }
 }
 
-/// The values of an attribute, if there are as many as vertices.
+/// Checks that an attribute has one value per vertex.
 fn checked<T>(
     semantic: &str,
     values: Vec<T>,
@@ -224,16 +224,16 @@ fn checked<T>(
     }
 }
 
-/// What a primitive takes by the counts of its accessors \[bytes\], read and placed `placements` times.
+/// The memory of a primitive, read and placed `placements` times, from the counts of its accessors \[bytes\].
 pub(super) fn memory(
     source: &Source<'_>,
     primitive: &json::Primitive,
     deformations: &Deformations,
     placements: u64,
 ) -> Result<u64, GltfErrorKind> {
-    // Values are read as up to four floats, and kept as two to four.
+    // Values are read as up to four floats and stored as two to four.
     const VALUE: u64 = 16 + 16;
-    // An index, and a triangle for each in a strip.
+    // An index, and one triangle per index in a strip.
     const INDEX: u64 = 4 + 12;
     let count = |&accessor: &usize| -> Result<u64, GltfErrorKind> {
         Ok(source.document.get::<json::Accessor>(accessor)?.count as u64)

@@ -1,4 +1,4 @@
-//! The scene's nodes: what is shown where, and the cameras.
+//! The scene's nodes: placements of meshes, and cameras.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
@@ -14,31 +14,31 @@ use crate::scene::{CameraSettings, NamedCamera, Projection};
 
 const MAX_DEPTH: usize = 200;
 
-/// One place where a mesh is shown.
+/// One placement of a mesh.
 #[derive(Clone, Debug)]
 pub(super) struct Placement {
     pub(super) world: Mat4,
     pub(super) skin: Option<usize>,
-    /// Weights of the morph targets; where empty, the mesh's own apply.
+    /// Weights of the morph targets; if empty, the mesh's weights apply.
     pub(super) weights: Vec<f32>,
 }
 
-/// The nodes of a scene, in the world.
+/// The nodes of a scene in world space.
 pub(super) struct Graph<'g, 's> {
     source: &'g Source<'s>,
     poses: HashMap<usize, NodePose>,
-    /// The places of each mesh.
+    /// The placements of each mesh.
     pub(super) placements: BTreeMap<usize, Vec<Placement>>,
     pub(super) cameras: Vec<NamedCamera>,
-    /// World transforms of the nodes that were reached.
+    /// World transforms of the visited nodes.
     worlds: Vec<Option<Mat4>>,
     /// The joints of skins.
     skins: RefCell<HashMap<usize, Rc<[Mat4]>>>,
 }
 
 impl<'g, 's> Graph<'g, 's> {
-    /// Walks the scene that was asked for, else the file's own, else the first; without any scene every
-    /// mesh is shown once.
+    /// Walks the requested scene, otherwise the file's default scene, otherwise the first. Without scenes, every mesh
+    /// is placed once.
     pub(super) fn new(
         source: &'g Source<'s>,
         scene: Option<&str>,
@@ -137,7 +137,7 @@ impl<'g, 's> Graph<'g, 's> {
             })?;
             let world = world.unwrap_or_else(|| {
                 self.source.warn(&format!(
-                    "skin {index} uses joints outside of the scene, which stay where they are made"
+                    "skin {index} uses joints outside of the scene, which stay at the origin"
                 ));
                 Mat4::IDENTITY
             });
@@ -150,7 +150,7 @@ impl<'g, 's> Graph<'g, 's> {
     }
 }
 
-/// A node's own matrix; what an animation sets takes the place of what the file has.
+/// A node's local matrix; animated properties replace those of the file.
 fn local(node: &json::Node, pose: Option<&NodePose>) -> Mat4 {
     let of_pose = |part: fn(&NodePose) -> bool| pose.is_some_and(part);
     let moved = of_pose(|p| p.translation.or(p.scale).is_some() || p.rotation.is_some());
@@ -167,7 +167,7 @@ fn local(node: &json::Node, pose: Option<&NodePose>) -> Mat4 {
     )
 }
 
-/// A glTF camera looks along −Z of its node, +Y up; `None` if it makes no picture.
+/// Camera settings: a glTF camera looks along its node's −Z, with +Y up. `None` for an unusable camera.
 fn camera_settings(camera: &json::Camera, world: &Mat4) -> Option<CameraSettings> {
     let projection = match (&camera.perspective, &camera.orthographic) {
         (Some(p), _) => Projection::Perspective { fov_y_degrees: p.yfov.to_degrees() },

@@ -1,4 +1,4 @@
-//! Textures: which of its images a texture takes, and their decoding.
+//! Textures: chooses and decodes a texture's image.
 
 use std::collections::{HashMap, HashSet};
 
@@ -10,35 +10,35 @@ use crate::scene::load::textures::Textures;
 use crate::scene::load::{LoadError, read_referenced, relative};
 use crate::scene::{Encoding, Texture, TextureFilter, TextureRef, UvTransform, Wrap};
 
-/// What a use of an image needs of it.
+/// The channels that a use of an image needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Channels {
     pub(super) encoding: Encoding,
-    /// Whether alpha counts.
+    /// Whether alpha is used.
     pub(super) alpha: bool,
 }
 
 /// A color.
 pub(super) const COLOR: Channels = Channels { encoding: Encoding::Srgb, alpha: false };
-/// A color, and a number in the alpha channel.
+/// A color, and a value in the alpha channel.
 pub(super) const COLOR_AND_ALPHA: Channels = Channels { encoding: Encoding::Srgb, alpha: true };
-/// Numbers.
+/// Linear values.
 pub(super) const LINEAR: Channels = Channels { encoding: Encoding::Linear, alpha: false };
-/// A number in the alpha channel.
+/// A value in the alpha channel.
 pub(super) const ALPHA: Channels = Channels { encoding: Encoding::Linear, alpha: true };
 
-/// The images that were decoded.
+/// The decoded images.
 pub(super) struct Images<'a> {
     pub(super) textures: Textures<'a>,
     /// The texture of an image, and whether its alpha was read.
     known: HashMap<(usize, Encoding), (usize, bool)>,
-    /// Textures without which their materials are drawn.
+    /// Unusable textures; their materials are rendered without them.
     unusable: HashSet<usize>,
-    /// The first reason of each kind why a texture is unusable, and how many more there are.
+    /// For each reason: the first message, and the number of other unusable textures.
     reasons: Vec<(Reason, String, usize)>,
 }
 
-/// Why a texture is unusable; each kind is one warning.
+/// Why a texture is unusable; each reason gives one warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reason {
     File,
@@ -54,8 +54,8 @@ impl<'a> Images<'a> {
         Self { textures, known, unusable, reasons: Vec::new() }
     }
 
-    /// A use of a texture, its image decoded; `None`, with a warning, if the texture has no image, or one
-    /// that cannot be read and whose absence is not refused.
+    /// Decodes the image of a texture's use. Returns `None` with a warning if the texture has no image, or an
+    /// unreadable one and the load is not strict.
     pub(super) fn texture(
         &mut self,
         source: &Source<'_>,
@@ -80,7 +80,7 @@ impl<'a> Images<'a> {
         Ok(None)
     }
 
-    /// All textures, and one sentence for each kind of those that are left out.
+    /// Returns all textures, and warns once per reason of the textures left out.
     pub(super) fn finish(self, mut warn: impl FnMut(&str)) -> Vec<Texture> {
         for (_, first, more) in self.reasons {
             let all = match more {
@@ -103,7 +103,7 @@ impl<'a> Images<'a> {
         let texture: json::Texture = source.document.get(info.index)?;
         let Some(image) = image_of(&texture)? else {
             source
-                .warn(&format!("texture {} has no image that is read and is ignored", info.index));
+                .warn(&format!("texture {} has no supported image and is ignored", info.index));
             return Ok(None);
         };
         let sampler: json::Sampler = match texture.sampler {
@@ -140,7 +140,7 @@ impl<'a> Images<'a> {
         }
         let texture = self.decode(source, index, channels)?;
         let loaded = &mut self.textures.loaded;
-        // Read again for its alpha, an image takes its own place.
+        // An image that is read again for its alpha keeps its slot.
         let place = known.map_or(loaded.len(), |(place, _)| place);
         if place == loaded.len() {
             loaded.push(texture);
@@ -187,7 +187,7 @@ impl<'a> Images<'a> {
 }
 
 impl Reason {
-    /// Why a texture is unusable; `None` of what ends the load, such as a limit of memory.
+    /// Why a texture is unusable; `None` for failures that end the load, such as a memory limit.
     fn of(failure: &Failure) -> Option<Self> {
         match failure {
             Failure::Load(error) if !error.is_about_one_image() => None,
@@ -214,7 +214,7 @@ fn ktx2(
     let problem = |source| GltfErrorKind::Ktx2 { image: index, source };
     let image = Ktx2::new(bytes).map_err(problem)?;
     let (width, height) = (image.width, image.height);
-    // Decoded, once more as they are kept, and their alpha.
+    // The decoded texels, the stored texels, and their alpha.
     let place = format!("{}, image {index}", source.path.display());
     source.budget.take(&place, 12 * u64::from(width) * u64::from(height))?;
     let (texels, has_alpha) = image.decode().map_err(problem)?;
@@ -229,8 +229,7 @@ fn ktx2(
     Ok(texture)
 }
 
-/// The image that a texture takes: Basis Universal or WebP before the one that all programs read, which
-/// is also what stands in for AVIF.
+/// The image of a texture: Basis Universal or WebP if present, otherwise the default image (also instead of AVIF).
 fn image_of(texture: &json::Texture) -> Result<Option<usize>, GltfErrorKind> {
     let json::TextureExtensions { basisu, webp, avif } = &texture.extensions;
     let of = |source: &Option<json::TextureSource>| source.as_ref().and_then(|s| s.source);

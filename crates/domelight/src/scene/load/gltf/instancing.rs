@@ -1,11 +1,11 @@
-//! `EXT_mesh_gpu_instancing`: one node that shows its mesh many times.
+//! `EXT_mesh_gpu_instancing`: one node with many instances of its mesh.
 
 use super::error::{Failure, GltfErrorKind};
 use super::json::Instancing;
 use super::source::Source;
 use crate::math::{Mat4, Quat, Vec3};
 
-/// The matrices of the instances, from the node's space to its own.
+/// The matrices of the instances, from instance space to the node's space.
 pub(super) fn matrices(source: &Source<'_>, instancing: &Instancing) -> Result<Vec<Mat4>, Failure> {
     let attribute = |name: &str| instancing.attributes.get(name).copied();
     let vectors = |name: &str| match attribute(name) {
@@ -22,7 +22,7 @@ pub(super) fn matrices(source: &Source<'_>, instancing: &Instancing) -> Result<V
     if let Some(count) = lengths.into_iter().find(|&length| length != 0 && length != n) {
         return Err(GltfErrorKind::Instances { count, instances: n }.into());
     }
-    // Each has a matrix, and a place in the scene.
+    // Each instance has a matrix and a placement.
     let place = format!("{}, {n} instances", source.path.display());
     source.budget.take(&place, 256 * n as u64)?;
     let matrix = |i: usize| {
@@ -34,7 +34,7 @@ pub(super) fn matrices(source: &Source<'_>, instancing: &Instancing) -> Result<V
     Ok((0..n).map(matrix).collect())
 }
 
-/// A rotation of unit length; none if it has no length.
+/// Normalizes a quaternion; returns the identity if its length is 0 or not finite.
 pub(super) fn unit_quaternion(q: [f32; 4]) -> Quat {
     let q = Quat::from_array(q);
     if q.length_squared() > 0.0 && q.is_finite() { q.normalize() } else { Quat::IDENTITY }

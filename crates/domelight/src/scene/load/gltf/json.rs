@@ -1,9 +1,9 @@
-//! The document, parsed as far as it is used.
+//! The document, parsed on demand.
 //!
-//! The arrays are kept as text and their items parsed one by one when something refers to them, so
-//! that a broken item that nothing shows ends no load, and one that matters is named.
+//! Arrays are kept as text, and their items are parsed when something refers to them. So a broken item that nothing
+//! uses does not end the load, and errors name the broken item that matters.
 
-// Fields are called as the format calls them.
+// Fields are named as in the format.
 #![allow(clippy::struct_field_names)]
 
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use serde_json::value::RawValue;
 use super::error::GltfErrorKind;
 use super::meshopt::Compression;
 
-/// The top of the document.
+/// The top level of the document.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Document<'a> {
@@ -52,7 +52,7 @@ pub(super) struct Document<'a> {
     textures: Vec<&'a RawValue>,
 }
 
-/// What is enough to know a file's version.
+/// The parts of the document that identify the version.
 #[derive(Deserialize)]
 struct Header<'a> {
     #[serde(borrow)]
@@ -71,14 +71,14 @@ struct Asset {
 }
 
 impl<'a> Document<'a> {
-    /// Parses a document's top.
+    /// Parses a document's top level.
     pub(super) fn new(json: &'a [u8]) -> Result<Self, GltfErrorKind> {
         let invalid = |source| GltfErrorKind::Json { place: "the JSON".into(), source };
         check_version(&serde_json::from_slice(json).map_err(invalid)?)?;
         serde_json::from_slice(json).map_err(invalid)
     }
 
-    /// The item of an index.
+    /// The item at an index.
     pub(super) fn get<T: Item>(&self, index: usize) -> Result<T, GltfErrorKind> {
         let items = T::items(self);
         let text = items.get(index).ok_or_else(|| {
@@ -91,13 +91,13 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// How many items there are.
+    /// The number of items.
     pub(super) fn count<T: Item>(&self) -> usize {
         T::items(self).len()
     }
 }
 
-/// Refuses what is not version 2: there, arrays were objects.
+/// Refuses versions other than 2; in version 1, arrays were objects.
 fn check_version(header: &Header<'_>) -> Result<(), GltfErrorKind> {
     let is_object = |raw: Option<&RawValue>| raw.is_some_and(|raw| raw.get().starts_with('{'));
     if is_object(header.meshes) || is_object(header.nodes) {
@@ -105,7 +105,7 @@ fn check_version(header: &Header<'_>) -> Result<(), GltfErrorKind> {
     }
     let asset = header.asset.and_then(|raw| serde_json::from_str::<Asset>(raw.get()).ok());
     let Some(Asset { version, min_version }) = asset else { return Ok(()) };
-    // A later version that version 2 suffices for may be named beside it; numbers are no strings, but meant.
+    // A later version may declare that version 2 suffices. Accept numbers instead of strings.
     let text = |value: serde_json::Value| match value {
         serde_json::Value::String(text) => text,
         other => other.to_string(),
@@ -119,10 +119,10 @@ fn check_version(header: &Header<'_>) -> Result<(), GltfErrorKind> {
 
 /// An item of one of the document's arrays.
 pub(super) trait Item: DeserializeOwned {
-    /// What messages call it.
+    /// The item's name in messages.
     const NAME: &'static str;
 
-    /// The array.
+    /// The array of the items.
     fn items<'d>(document: &'d Document<'_>) -> &'d [&'d RawValue];
 }
 
@@ -182,7 +182,7 @@ pub(super) struct SparseData {
     pub(super) buffer_view: usize,
     #[serde(default)]
     pub(super) byte_offset: u64,
-    /// The type of the indices; values have the type of their accessor.
+    /// The component type of sparse indices; sparse values have the type of their accessor.
     pub(super) component_type: Option<u32>,
 }
 
@@ -298,7 +298,7 @@ pub(super) struct PrimitiveExtensions {
 #[serde(rename_all = "camelCase")]
 pub(super) struct Draco {
     pub(super) buffer_view: usize,
-    /// Draco's numbers of the attributes.
+    /// Draco's attribute ids.
     #[serde(default)]
     pub(super) attributes: BTreeMap<String, u32>,
 }
@@ -406,7 +406,7 @@ pub(super) struct Sampler {
     pub(super) wrap_t: Option<u32>,
 }
 
-/// A use of a texture, with what normal and occlusion maps add.
+/// A use of a texture, with the extra fields of normal and occlusion maps.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct TextureInfo {
@@ -548,7 +548,7 @@ pub(super) struct Specular {
 }
 
 impl Specular {
-    /// Whether it is more than the default, which many exporters write.
+    /// Whether it differs from the defaults, which many exporters write.
     pub(super) fn changes_anything(&self) -> bool {
         let Self {
             specular_factor,

@@ -1,30 +1,29 @@
 //! KTX2 images of `KHR_texture_basisu`: Basis Universal, as ETC1S or UASTC.
 //!
-//! The crate `basisu` transcodes the blocks, but trusts the lengths of the file's tables: one that is
-//! damaged would make it reserve memory without bound. So all that it will read by is checked here
-//! first, and should it panic all the same, that is an error like any other.
+//! The crate `basisu` transcodes the blocks, but trusts the lengths in the file's tables: a damaged table could make it
+//! allocate unbounded memory. So this module checks the tables first, and converts panics of the crate to errors.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use basisu::{DecodeFlags, TargetFormat, Transcoder};
 
-/// Why a KTX2 file cannot be read.
+/// An error in a KTX2 file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Ktx2Error {
-    /// No KTX2 file at all.
+    /// Not a KTX2 file.
     #[error("it lacks the KTX2 signature")]
     Magic,
     /// The file ends too early, or a table lies outside of it.
     #[error("its {0} lies outside the file, which is truncated or damaged")]
     OutOfRange(&'static str),
-    /// A number in the header that a glTF texture cannot have.
+    /// A header field with a value not allowed for glTF textures.
     #[error("its {what} is {value}; {wanted}")]
     Header {
-        /// Which number.
+        /// The field.
         what: &'static str,
-        /// Its value.
+        /// The value.
         value: u64,
-        /// What it should be.
+        /// The allowed values.
         wanted: &'static str,
     },
     /// The blocks cannot be decoded.
@@ -34,7 +33,7 @@ pub enum Ktx2Error {
 
 const MAGIC: [u8; 12] = *b"\xabKTX 20\xbb\r\n\x1a\n";
 
-/// The largest width and height, as graphics processors have it.
+/// The maximum width and height, as on GPUs.
 const MAX_SIZE: u32 = 16384;
 
 /// Color models of the data format descriptor (Khronos, "Data Format Specification" 1.4).
@@ -49,7 +48,7 @@ pub(super) struct Ktx2<'a> {
     pub(super) height: u32,
 }
 
-/// Whether a file begins as KTX2.
+/// Whether a file starts with the KTX2 signature.
 pub(super) fn is_ktx2(file: &[u8]) -> bool {
     file.starts_with(&MAGIC)
 }
@@ -69,16 +68,16 @@ impl<'a> Ktx2<'a> {
             let value = value.into();
             if is_right { Ok(()) } else { Err(Ktx2Error::Header { what, value, wanted }) }
         };
-        let universal = "0 for Basis Universal, the only kind that glTF textures may have";
+        let universal = "0 for Basis Universal, the only kind allowed in glTF";
         check(format == 0, "vkFormat", format, universal)?;
-        let sizes = "1 to 16384 are read";
+        let sizes = "1 to 16384 are supported";
         check((1..=MAX_SIZE).contains(&width), "width", width, sizes)?;
         check((1..=MAX_SIZE).contains(&height), "height", height, sizes)?;
         check(depth == 0, "depth", depth, "0 for a flat image")?;
         check(layers <= 1, "number of layers", layers, "0 or 1 for a single image")?;
         check(faces == 1, "number of faces", faces, "1 for a flat image")?;
         check((1..=15).contains(&levels), "number of levels", levels, "1 to 15 fit the size")?;
-        let schemes = "0, 1 (BasisLZ) and 2 (Zstandard) are read";
+        let schemes = "0, 1 (BasisLZ) and 2 (Zstandard) are supported";
         check(scheme <= 2, "supercompression", scheme, schemes)?;
 
         let size = file.len() as u64;
@@ -89,11 +88,11 @@ impl<'a> Ktx2<'a> {
         inside(word(9).into(), word(10).into(), "data format descriptor")?;
         inside(word(11).into(), word(12).into(), "key and value data")?;
         inside(long(13), long(15), "supercompression global data")?;
-        // Color model and scheme say which kind of blocks there are.
+        // Color model and scheme determine the kind of blocks.
         let descriptor = file.get(word(9) as usize..).unwrap_or_default();
         let model = *descriptor.get(12).ok_or(Ktx2Error::OutOfRange("data format descriptor"))?;
         let is_uastc = model == UASTC;
-        let models = "163 (ETC1S, with BasisLZ) and 166 (UASTC, without) are read";
+        let models = "163 (ETC1S, with BasisLZ) and 166 (UASTC, without) are supported";
         let fits = if is_uastc { scheme != 1 } else { model == ETC1S && scheme == 1 };
         check(fits, "color model", model.into(), models)?;
 
@@ -116,7 +115,7 @@ impl<'a> Ktx2<'a> {
         Ok(Self { file, width, height })
     }
 
-    /// The first level as RGBA, the top row first; whether alpha is more than opaque.
+    /// The first level as RGBA, top row first, and whether any alpha is not opaque.
     pub(super) fn decode(&self) -> Result<(Vec<[u8; 4]>, bool), Ktx2Error> {
         let decode = || {
             let transcoder = Transcoder::new(self.file).ok()?;
@@ -136,7 +135,7 @@ mod tests {
     use super::*;
     use base64::Engine;
 
-    /// An image of 8 × 8 texels: the left half red, the right one blue with an alpha of one half.
+    /// An image of 8 × 8 texels: the left half red, the right half blue with an alpha of one half.
     fn images() -> [Vec<u8>; 3] {
         let etc1s = "q0tUWCAyMLsNChoKAAAAAAEAAAAIAAAACAAAAAAAAAAAAAAAAQAAAAEAAAABAAAAaAAAADwAAACkAAAAJAAAAMgAAAAAAAAAjgAA\
         AAAAAABWAQAAAAAAAAMAAAAAAAAAAAAAAAAAAAA8AAAAAAAAAAIAOACjAQIAAwMAAAgIAAAAAAAAAAA/AAAAAAAAAAAA/////0AA\

@@ -1,4 +1,4 @@
-//! Materials: from the document to surfaces, with all that the extensions say.
+//! Materials, including their extensions.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -14,20 +14,20 @@ use crate::scene::{
     SpecularGlossinessMaterial, Texture, TextureRef, Volume,
 };
 
-/// What a primitive needs to know of its material.
+/// A primitive's material: its index, and the vertex attributes that it uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Slot {
-    /// The index of the surface.
+    /// The index of the material.
     pub(super) material: usize,
-    /// The file's sets of texture coordinates that become a mesh's first and second; `None` if unused.
+    /// The file's texture coordinate sets that become the mesh's first and second sets; `None` if unused.
     pub(super) uv_sets: [Option<u32>; 2],
-    /// The one of the two that tangents follow, if any need to.
+    /// Which of the two sets defines the tangents, if tangents are needed.
     pub(super) tangent_set: Option<usize>,
-    /// Whether the vertices' opacity counts.
+    /// Whether vertex opacity is used.
     pub(super) alpha: bool,
 }
 
-/// The surfaces of the materials that are used.
+/// The materials in use.
 pub(super) struct Materials<'a> {
     images: Images<'a>,
     loaded: Vec<Material>,
@@ -40,7 +40,7 @@ impl<'a> Materials<'a> {
         Self { images, loaded: Vec::new(), slots: HashMap::new() }
     }
 
-    /// The surface of a material, or of the default one.
+    /// The slot of a material, or of the default material.
     pub(super) fn slot(
         &mut self,
         source: &Source<'_>,
@@ -75,7 +75,7 @@ impl<'a> Materials<'a> {
         Ok(slot)
     }
 
-    /// All surfaces and textures; what of them is only approximated is said once a feature.
+    /// Returns all materials and textures, and warns once per approximated feature.
     pub(super) fn finish(self, mut warn: impl FnMut(&str)) -> (Vec<Material>, Vec<Texture>) {
         let mut approximated: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
         for material in &self.loaded {
@@ -138,7 +138,7 @@ impl Reader<'_, '_, '_> {
         })
     }
 
-    /// The model, its color texture and its opacity.
+    /// The metallic-roughness model, its color texture and its opacity.
     fn metallic_roughness(
         &mut self,
         m: &json::MetallicRoughness,
@@ -185,7 +185,7 @@ impl Reader<'_, '_, '_> {
             return Ok(None);
         }
         let texture = self.texture(material.emissive_texture.as_ref(), COLOR)?;
-        // Without its map the whole surface would glow.
+        // Without its map, the whole surface would glow.
         let is_lost = material.emissive_texture.is_some() && texture.is_none();
         Ok((!is_lost).then_some(Emission { radiance, texture }))
     }
@@ -202,7 +202,7 @@ impl Reader<'_, '_, '_> {
                 },
             });
         }
-        // A factor of zero is the extension's way to say no.
+        // A factor of zero disables the extension.
         if let Some(c) = e.clearcoat.as_ref().filter(|c| c.clearcoat_factor > 0.0) {
             layers.clearcoat = Some(Clearcoat {
                 strength: self.factor(c.clearcoat_factor, c.clearcoat_texture.as_ref(), LINEAR)?,
@@ -241,7 +241,7 @@ impl Reader<'_, '_, '_> {
         if let Some(t) = e.transmission.as_ref().filter(|t| t.transmission_factor > 0.0) {
             let map = t.transmission_texture.as_ref();
             let share = self.factor(t.transmission_factor, map, LINEAR)?;
-            // Without its map the whole surface would be clear.
+            // Without its map, the whole surface would be clear.
             let is_lost = map.is_some() && share.texture.is_none();
             layers.transmission = (!is_lost).then_some(share);
         }
@@ -276,7 +276,7 @@ impl Reader<'_, '_, '_> {
         Ok(self.texture(info, LINEAR)?.map(|texture| NormalMap { texture, scale }))
     }
 
-    /// A use of a texture; `None`, with a warning, if it needs a third set of texture coordinates.
+    /// A use of a texture; `None`, with a warning, if it needs a third texture coordinate set.
     fn texture(
         &mut self,
         info: Option<&json::TextureInfo>,

@@ -1,23 +1,23 @@
-//! glTF 2.0, as JSON with files beside it or as one GLB file.
+//! glTF 2.0, as JSON with separate files or as one GLB file.
 //!
-//! | read | by |
+//! | feature | module |
 //! |---|---|
-//! | container and document, item by item as something refers to it | [`container`], [`json`] |
+//! | container and document, parsed item by item on demand | [`container`], [`json`] |
 //! | buffers, views, `EXT_meshopt_compression`, `KHR_meshopt_compression` | [`source`], [`meshopt`] |
-//! | accessors, sparse ones, `KHR_mesh_quantization` | [`accessor`] |
+//! | accessors, also sparse, `KHR_mesh_quantization` | [`accessor`] |
 //! | `KHR_draco_mesh_compression` | [`draco`] |
 //! | triangle lists, strips and fans, two sets of texture coordinates, vertex colors | [`geometry`] |
-//! | tangents where a normal map needs them and the file has none | [`tangents`] |
-//! | skins and morph targets, at rest or at a moment of an animation | [`deform`], [`animation`] |
+//! | tangents, if a normal map needs them and the file has none | [`tangents`] |
+//! | skins and morph targets, at rest or at one time of an animation | [`deform`], [`animation`] |
 //! | nodes, `EXT_mesh_gpu_instancing`, `KHR_node_visibility`, scenes, cameras | [`graph`], [`instancing`] |
 //! | materials and their extensions, `KHR_texture_transform` | [`material`] |
 //! | PNG, JPEG, WebP (`EXT_texture_webp`), KTX2 (`KHR_texture_basisu`) | [`image`](mod@image), [`ktx2`] |
 //!
-//! What is read but not drawn, or not read at all, is said in a warning, once a feature. Occlusion
-//! textures are not needed: rays find out what is hidden. Points and lines are left out.
+//! Each unsupported feature gives one warning. Occlusion textures are ignored, because shadow rays determine occlusion.
+//! Points and lines are left out.
 //!
-//! Only what the picture needs is looked at and checked: a broken item that nothing shows, an attribute
-//! with a name of its own, an unknown extension do not end a load.
+//! Only the parts that the picture needs are read and checked: unused broken items, custom attributes and unknown
+//! extensions do not end a load.
 
 mod accessor;
 mod animation;
@@ -98,7 +98,7 @@ fn read(
     Ok(Loaded { description, warnings: source.into_warnings(), ..Loaded::default() })
 }
 
-/// Reads a mesh once, and adds a part for each primitive and place.
+/// Reads a mesh once, and adds a part for each primitive and placement.
 fn read_mesh(
     source: &Source<'_>,
     graph: &Graph<'_, '_>,
@@ -146,7 +146,7 @@ fn read_mesh(
         let slot = materials.slot(source, primitive.material)?;
         let geometry = geometry::read(source, primitive, slot, &deformations, &memory_place)
             .map_err(|e| e.within(place))?;
-        // A primitive without joints stays where its node is.
+        // A primitive without joints follows its node.
         let has_joints = !geometry.vertices.joints.is_empty();
         let material = geometry.slot.material;
         let copies = std::iter::repeat_n(geometry, poses.len());

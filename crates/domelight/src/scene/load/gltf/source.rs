@@ -1,7 +1,6 @@
-//! Where bytes come from: buffers, and views of them, which may be compressed.
+//! Sources of bytes: buffers and buffer views, which may be compressed.
 //!
-//! Buffers are read when something first looks into them: the fallback of a compressed view, which
-//! often has no data at all, is never asked for.
+//! Buffers are read on first use. So the fallback buffer of a compressed view, which often has no data, is never read.
 
 use std::borrow::Cow;
 use std::cell::{Cell, OnceCell, RefCell};
@@ -20,7 +19,7 @@ use super::json::{Buffer, BufferView, Document};
 use super::meshopt;
 use crate::scene::load::{Budget, read_referenced, relative};
 
-/// The most zeros of accessors that nothing in the file backs, all meshes and their instances together.
+/// The maximum total number of implicit zeros in accessors, over all meshes and their instances.
 const MAX_ZEROS: usize = 1 << 24;
 
 /// The document, and the bytes that it refers to.
@@ -28,13 +27,13 @@ pub(super) struct Source<'a> {
     pub(super) path: &'a Path,
     pub(super) document: Document<'a>,
     pub(super) budget: &'a Budget<'a>,
-    /// Whether what is missing is an error, not a warning.
+    /// Whether missing data are an error instead of a warning.
     pub(super) strict: bool,
     binary: Option<&'a [u8]>,
     buffers: Vec<OnceCell<Cow<'a, [u8]>>>,
     /// Decompressed views.
     decoded: RefCell<HashMap<usize, Rc<[u8]>>>,
-    /// What is left of [`MAX_ZEROS`].
+    /// The remainder of [`MAX_ZEROS`].
     zeros_left: Cell<usize>,
     warnings: RefCell<Vec<String>>,
 }
@@ -57,14 +56,14 @@ impl Deref for ViewBytes<'_> {
 }
 
 impl<'a> Source<'a> {
-    /// Takes a file apart; nothing else is read.
+    /// Opens a file without reading any other.
     pub(super) fn new(
         path: &'a Path,
         bytes: &'a [u8],
         budget: &'a Budget<'a>,
     ) -> Result<Self, Failure> {
         let Container { json, binary } = Container::new(bytes)?;
-        // An item of an array is kept as a reference of 16 bytes.
+        // An array item is stored as a reference of 16 bytes.
         let most_items = json.iter().map(|&b| u64::from(b == b',')).sum::<u64>();
         budget.take(&path.display().to_string(), 16 * most_items)?;
         let document = Document::new(json)?;
@@ -82,7 +81,7 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// Notes what the picture will lack, once; nobody reads more than so many.
+    /// Records a warning once, up to a maximum number of warnings.
     pub(super) fn warn(&self, text: &str) {
         const MAX_WARNINGS: usize = 100;
         let text = format!("{}: {text}", self.path.display());
@@ -92,12 +91,12 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// All that was noted.
+    /// The recorded warnings.
     pub(super) fn into_warnings(self) -> Vec<String> {
         self.warnings.into_inner()
     }
 
-    /// Takes `count` zeros of those that a file may have of nothing; whether there are as many left.
+    /// Takes `count` implicit zeros from the file's budget, and returns whether it sufficed.
     pub(super) fn take_zeros(&self, count: usize) -> bool {
         let left = self.zeros_left.get().checked_sub(count);
         if let Some(left) = left {
@@ -106,7 +105,7 @@ impl<'a> Source<'a> {
         left.is_some()
     }
 
-    /// The file and something in it, as messages name whatever refers to another file.
+    /// Names the file and an object in it that refers to another file, for messages.
     pub(super) fn referrer(&self, what: &str) -> String {
         format!("{}, {what},", self.path.display())
     }
@@ -132,7 +131,7 @@ impl<'a> Source<'a> {
         Ok(cell.get_or_init(|| bytes))
     }
 
-    /// What a URI names: data within it, or a file.
+    /// The data of a URI: embedded, or in a file.
     pub(super) fn uri(
         &self,
         what: &'static str,
@@ -145,7 +144,7 @@ impl<'a> Source<'a> {
         };
         if let Some(data) = uri.strip_prefix("data:") {
             let (_, encoded) = data.split_once(";base64,").ok_or_else(refused)?;
-            // The padding is often left out.
+            // Padding is often missing.
             let config = GeneralPurposeConfig::new()
                 .with_decode_padding_mode(DecodePaddingMode::Indifferent);
             let problem = |source| GltfErrorKind::Base64 { what, index, source };
@@ -185,7 +184,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// `length` bytes from `begin`.
+/// A slice of `length` bytes starting at `begin`.
 pub(super) fn slice<'b>(
     bytes: &'b [u8],
     begin: u64,
@@ -204,7 +203,7 @@ pub(super) fn slice<'b>(
     })
 }
 
-/// A URI's path with `%20` and the like decoded; what is not valid stays.
+/// Decodes percent escapes such as `%20` in a URI's path; invalid escapes stay.
 pub(super) fn percent_decoded(uri: &str) -> String {
     let bytes = uri.as_bytes();
     let mut out = Vec::with_capacity(bytes.len());
@@ -237,7 +236,7 @@ mod tests {
         Source::new(Path::new("a.gltf"), json.as_bytes(), budget).ok().expect("a document")
     }
 
-    /// A stream of two elements in mode 0, beside a fallback without data.
+    /// A stream of two elements in mode 0, with a fallback without data.
     #[test]
     fn compressed_views_ask_no_fallback() {
         let json = r#"{"buffers":[{"byteLength":8},{"byteLength":34,"uri":"data:;base64,of8CAQAABAQAAAAAAAAAAAAAAAAAAAAAAAAAAAAKFB4oAA"}],

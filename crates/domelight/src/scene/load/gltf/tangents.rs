@@ -1,7 +1,7 @@
-//! Tangents by MikkTSpace where a file has none, as the format asks for.
+//! MikkTSpace tangents for files without tangents, as the format requires.
 //!
-//! Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited". The algorithm gives a tangent a
-//! corner; a vertex whose corners differ is split.
+//! Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited". The algorithm gives one tangent per corner; a vertex
+//! whose corners differ is split.
 
 use std::collections::HashMap;
 
@@ -10,9 +10,9 @@ use bevy_mikktspace::{Geometry as MikkGeometry, TangentSpace, generate_tangents}
 use super::geometry::{Geometry, Vertices};
 use crate::math::Vec3;
 
-/// Gives `geometry` the tangents of texture coordinates `set`, splitting vertices.
+/// Adds tangents for texture coordinates `set` to `geometry`, splitting vertices.
 ///
-/// Without texture coordinates nothing changes.
+/// Without texture coordinates, nothing changes.
 pub(super) fn generate(geometry: &mut Geometry, set: usize) {
     let Geometry { vertices, triangles, .. } = geometry;
     if vertices.uvs[set].is_empty() {
@@ -20,11 +20,11 @@ pub(super) fn generate(geometry: &mut Geometry, set: usize) {
     }
     let mut corners =
         Corners { vertices, triangles, set, tangents: vec![[0.0; 4]; 3 * triangles.len()] };
-    // Its errors are an empty type.
+    // The error type is uninhabited.
     let Ok(()) = generate_tangents::<_, bevy_mikktspace::StdOps>(&mut corners) else { return };
     let tangents = corners.tangents;
 
-    // Which tangent each vertex has, and the vertices split off of it.
+    // The tangent of each vertex, and the vertices split from it.
     let n_vertices = vertices.positions.len();
     let mut of_vertex: Vec<Option<[f32; 4]>> = vec![None; n_vertices];
     let mut split: HashMap<(u32, [u32; 4]), u32> = HashMap::new();
@@ -69,7 +69,7 @@ impl MikkGeometry for Corners<'_> {
 
     fn position(&self, face: usize, corner: usize) -> [f32; 3] {
         let position = self.vertices.positions[self.vertex(face, corner)];
-        // Triangles of others are left out later; the algorithm is for numbers.
+        // The algorithm requires finite positions; other triangles are dropped later.
         if Vec3::from(position).is_finite() { position } else { [0.0; 3] }
     }
 
@@ -77,7 +77,7 @@ impl MikkGeometry for Corners<'_> {
         if let Some(&normal) = self.vertices.normals.get(self.vertex(face, corner)) {
             return normal;
         }
-        // Flat, as the format has it for meshes without normals.
+        // Flat shading, as the format specifies for meshes without normals.
         let [a, b, c] = [0, 1, 2].map(|i| Vec3::from(self.position(face, i)));
         (b - a).cross(c - a).normalize_or_zero().to_array()
     }
@@ -87,7 +87,7 @@ impl MikkGeometry for Corners<'_> {
     }
 
     fn set_tangent(&mut self, tangent: Option<TangentSpace>, face: usize, corner: usize) {
-        // The image's second axis points down in glTF, where the algorithm has it point up.
+        // The image's v axis points down in glTF, but up in the algorithm.
         let [x, y, z, w] = tangent.unwrap_or_default().tangent_encoded();
         self.tangents[3 * face + corner] = [x, y, z, -w];
     }
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
     use crate::scene::load::gltf::material::Slot;
 
-    /// Two triangles of a square in z = 0, u along x, v down; the second's texture is mirrored if asked for.
+    /// A square of two triangles in z = 0, with u along x and v down; optionally with the second's texture mirrored.
     fn square(mirrored: bool) -> Geometry {
         let positions = vec![[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
         let mut uvs: Vec<[f32; 2]> =

@@ -1,21 +1,21 @@
-//! Mode 0: elements as differences of bytes, 16 elements per group.
+//! Mode 0: elements coded as byte deltas, 16 elements per group.
 
 use super::{Cursor, MeshoptError};
 
-/// Elements whose differences are packed together.
+/// The number of elements whose deltas are packed together.
 const GROUP: usize = 16;
 
-/// The most elements of a block.
+/// The maximum number of elements in a block.
 const MAX_BLOCK: usize = 256;
 
-/// How the differences of four consecutive bytes of an element are taken.
+/// How the deltas of four consecutive bytes of an element are coded.
 #[derive(Clone, Copy)]
 enum Channel {
     /// Byte by byte, in zigzag.
     Bytes,
     /// As two 16-bit numbers, in zigzag.
     Words,
-    /// As one 32-bit number by exclusive or, rotated left by so many bits.
+    /// As one 32-bit number by exclusive or, rotated left by `rotation` bits.
     Xor { rotation: u32 },
 }
 
@@ -30,7 +30,7 @@ impl Channel {
     }
 }
 
-/// `count` elements of `stride` bytes, a multiple of four.
+/// Decodes `count` elements of `stride` bytes, a multiple of four.
 pub(super) fn decode(stream: &[u8], count: usize, stride: usize) -> Result<Vec<u8>, MeshoptError> {
     let (&header, body) = stream.split_first().ok_or(MeshoptError::Truncated)?;
     let version = match header {
@@ -54,7 +54,7 @@ pub(super) fn decode(stream: &[u8], count: usize, stride: usize) -> Result<Vec<u
     let mut elements = Vec::new();
     let block = ((8192 / stride) & !(GROUP - 1)).min(MAX_BLOCK);
     let mut left = count;
-    // One array of differences a byte of the element.
+    // One array of deltas per byte of the element.
     let mut deltas = vec![[0; MAX_BLOCK]; stride];
     while left > 0 {
         let n = left.min(block);
@@ -98,7 +98,7 @@ pub(super) fn decode(stream: &[u8], count: usize, stride: usize) -> Result<Vec<u
     Ok(elements)
 }
 
-/// The differences of a group, `bits` each; one of all ones stands for a byte that follows the group.
+/// Unpacks the deltas of a group, `bits` each; all ones stand for an explicit byte after the group.
 fn unpack(cursor: &mut Cursor<'_>, bits: u32, deltas: &mut [u8]) -> Result<(), MeshoptError> {
     match bits {
         0 => deltas.fill(0),
@@ -109,7 +109,7 @@ fn unpack(cursor: &mut Cursor<'_>, bits: u32, deltas: &mut [u8]) -> Result<(), M
             let packed = cursor.take(GROUP / per_byte)?;
             for (i, delta) in deltas.iter_mut().enumerate() {
                 let place = (i % per_byte) as u32 * bits;
-                // Single bits begin with the lowest, others with the highest.
+                // Single bits start at the lowest, wider codes at the highest.
                 let shift = if bits == 1 { place } else { 8 - bits - place };
                 *delta = packed[i / per_byte] >> shift & sentinel;
                 if *delta == sentinel {
@@ -145,7 +145,7 @@ fn add(channel: Channel, previous: [u8; 4], delta: [u8; 4]) -> [u8; 4] {
 mod tests {
     use super::*;
 
-    /// The example of the specification.
+    /// The specification's example.
     #[test]
     fn four_bit_differences_with_sentinels() {
         let bytes = [0x17, 0x5f, 0xf0, 0xbc, 0x77, 0xa9, 0x21, 0x00, 0x34, 0xb5];
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn a_stream_of_literals() {
         let mut stream = vec![0xa1, 0xff];
-        // Differences of two elements by byte: 1, −1; 0, 0; 2, 2; 0, 0.
+        // Deltas of two elements by byte: 1, −1; 0, 0; 2, 2; 0, 0.
         stream.extend([2, 1, 0, 0, 4, 4, 0, 0]);
         stream.extend([0; 24 - 5]);
         stream.extend([10, 20, 30, 40, 0]);

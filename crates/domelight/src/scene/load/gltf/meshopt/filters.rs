@@ -1,9 +1,9 @@
-//! What is done to decoded elements (appendix B of the specification).
+//! Filters for decoded elements (appendix B of the specification).
 
 use super::Filter;
 use crate::math::functions;
 
-/// Applies a filter to elements of `stride` bytes, a stride that the filter allows.
+/// Applies a filter to elements of `stride` bytes; the filter must allow this stride.
 pub(super) fn apply(filter: Filter, stride: usize, elements: &mut [u8]) {
     match filter {
         Filter::None => {}
@@ -41,7 +41,7 @@ fn each_four(elements: &mut [u8], f: impl Fn([i16; 4]) -> [i16; 4]) {
     }
 }
 
-/// A unit vector from its octahedral coordinates, whose unit is the third number.
+/// A unit vector from octahedral coordinates; the third number is their scale.
 fn octahedral([x, y, one, w]: [i16; 4], max: f32) -> [i16; 4] {
     let (x, y) = (f32::from(x) / f32::from(one), f32::from(y) / f32::from(one));
     let z = 1.0 - x.abs() - y.abs();
@@ -53,8 +53,8 @@ fn octahedral([x, y, one, w]: [i16; 4], max: f32) -> [i16; 4] {
     [x, y, z, w]
 }
 
-/// A unit quaternion from its three smaller components; the fourth number has the unit, but for the
-/// last two bits, which name the largest component.
+/// A unit quaternion from its three smaller components; the fourth number is their scale, except for the last two bits,
+/// the index of the largest component.
 fn quaternion([x, y, z, w]: [i16; 4]) -> [i16; 4] {
     let scale = std::f32::consts::FRAC_1_SQRT_2 / f32::from(w | 3);
     let [x, y, z] = [x, y, z].map(|c| f32::from(c) * scale);
@@ -66,20 +66,20 @@ fn quaternion([x, y, z, w]: [i16; 4]) -> [i16; 4] {
     out
 }
 
-/// 2^e · m of a signed byte e and a signed 24-bit m.
+/// 2^e · m from a signed byte e and a signed 24-bit m.
 fn exponential(element: &mut [u8; 4]) {
     let v = i32::from_le_bytes(*element);
     let (e, m) = (v >> 24, v << 8 >> 8);
     *element = (functions::powi(2f32, e) * m as f32).to_le_bytes();
 }
 
-/// RGBA from luma, chroma and alpha of as many bits as alpha's highest bit says.
+/// RGBA from luma, chroma and alpha; alpha's highest bit gives the number of bits.
 fn color(y: i32, [co, cg]: [i32; 2], a: i32, max: f32) -> [f32; 4] {
     let n_bits = 32 - a.leading_zeros();
     let unit = (1i32 << n_bits) - 1;
     let alpha = a & (unit >> 1);
     let alpha = alpha << 1 | alpha & 1;
-    // Without a highest bit, nothing is defined.
+    // Without a highest bit, the result is undefined.
     let scale = if unit == 0 { 0.0 } else { max / unit as f32 };
     [y + co - cg, y + cg, y - co - cg, alpha].map(|c| (c as f32 * scale).round())
 }
@@ -110,7 +110,7 @@ mod tests {
             .map(|b| f32::from(i16::from_le_bytes(*b)) / 32767.0)
             .collect();
         assert!((v.iter().map(|c| c * c).sum::<f32>() - 1.0).abs() < 1e-4);
-        // No unit at all is not defined, and no reason to fail.
+        // A scale of zero is undefined, but must not fail.
         apply(Filter::Octahedral, 4, &mut [1, 2, 0, 0]);
     }
 
@@ -119,7 +119,7 @@ mod tests {
         let mut bytes = words([0, 0, 0, 2047 & !3 | 3]);
         apply(Filter::Quaternion, 8, &mut bytes);
         assert_eq!(bytes, words([0, 0, 0, 32767]));
-        // x = y = 1/√2: y is named the largest, and x, its third successor, is at the end of its range.
+        // x = y = 1/√2: y is the largest component, and x, its third successor, is at the end of its range.
         let mut bytes = words([0, 0, 2047, 2047 & !3 | 1]);
         apply(Filter::Quaternion, 8, &mut bytes);
         assert_eq!(bytes, words([23170, 23170, 0, 0]));

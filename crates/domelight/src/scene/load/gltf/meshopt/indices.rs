@@ -1,4 +1,4 @@
-//! Modes 1 and 2: triangle lists, and other sequences of indices.
+//! Modes 1 and 2: triangle lists, and other index sequences.
 
 use super::{Cursor, MeshoptError};
 
@@ -18,7 +18,7 @@ impl Output {
     }
 }
 
-/// The last sixteen of what was pushed, the latest at 0.
+/// The last sixteen pushed values, the latest at index 0.
 #[derive(Default)]
 struct Fifo<T> {
     items: [Option<T>; 16],
@@ -40,12 +40,12 @@ fn zigzag(v: u32) -> u32 {
     (v >> 1) ^ (v & 1).wrapping_neg()
 }
 
-/// What the triangle decoder remembers.
+/// The state of the triangle decoder.
 #[derive(Default)]
 struct Triangles {
     /// The expected next new index.
     next: u32,
-    /// The last index that was coded explicitly.
+    /// The last explicitly coded index.
     last: u32,
     edges: Fifo<[u32; 2]>,
     vertices: Fifo<u32>,
@@ -63,7 +63,7 @@ impl Triangles {
         Ok(self.last)
     }
 
-    /// A corner by its half byte: 0 a new vertex, 15 one coded explicitly, else a recent one.
+    /// A corner from its nibble: 0 is a new vertex, 15 an explicitly coded one, other values a recent one.
     fn corner(&mut self, nibble: u8, data: &mut Cursor<'_>) -> Result<u32, MeshoptError> {
         match nibble {
             0 => Ok(self.new_vertex()),
@@ -93,7 +93,7 @@ impl Triangles {
         Ok([a, b, c])
     }
 
-    /// A triangle of three corners: the first by `first`, the others by the halves of `pair`.
+    /// A triangle of three coded corners: the first from `first`, the others from the nibbles of `pair`.
     fn separate(
         &mut self,
         first: u8,
@@ -172,7 +172,7 @@ pub(super) fn sequence(
         found => return Err(MeshoptError::Header { found }),
     }
     let data_size = cursor.0.len().checked_sub(4).ok_or(MeshoptError::Truncated)?;
-    // An index takes at least a byte.
+    // An index takes at least one byte.
     if count > data_size {
         return Err(MeshoptError::Truncated);
     }
@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn triangles_share_edges_and_vertices() {
-        // A new triangle by the table's first pair; then edge 0 and a new vertex; then an explicit one.
+        // A new triangle from the table's first pair; then edge 0 with a new vertex; then with an explicit vertex.
         let mut stream = vec![0xe1, 0xf0, 0x00, 0xfe];
         stream.extend([0x1f, 20]);
         stream.extend([0; 16]);
@@ -209,7 +209,7 @@ mod tests {
             assert!(triangles(&stream[..length], 9, 4).is_err());
         }
         assert_eq!(triangles(&stream, 8, 4), Err(MeshoptError::Count { count: 8 }));
-        // No edge was there before.
+        // There is no previous edge.
         stream[1] = 0;
         assert_eq!(triangles(&stream, 9, 4), Err(MeshoptError::Code { code: 0 }));
     }
@@ -217,7 +217,7 @@ mod tests {
     #[test]
     fn sequences_have_two_baselines() {
         let mut stream = vec![0xd1];
-        // +5 and +3 on the first, −2 on the second.
+        // +5 and +3 on the first baseline, −2 on the second.
         stream.extend([5 << 2, 3 << 2, (1 << 2) | 2 | 1]);
         stream.extend([0; 4]);
         assert_eq!(words(&sequence(&stream, 3, 4).unwrap()), [5, 8, u32::MAX - 1]);

@@ -1,8 +1,7 @@
 //! `KHR_meshopt_compression` and its predecessor `EXT_meshopt_compression`: compressed buffer views.
 //!
-//! Written from the bitstream's specification (appendix A and B of `KHR_meshopt_compression`); a
-//! stream of the older extension is one of version 0. The decoder reserves no memory that the bytes of
-//! the stream do not back: it grows the output block by block.
+//! Written from the bitstream's specification (appendices A and B of `KHR_meshopt_compression`); streams of the older
+//! extension have version 0. The decoder grows its output block by block, so the stream's size bounds its allocation.
 
 mod attributes;
 mod filters;
@@ -10,7 +9,7 @@ mod indices;
 
 use serde::Deserialize;
 
-/// How a buffer view is compressed: the extension's JSON object.
+/// The compression of a buffer view: the extension's JSON object.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Compression {
@@ -20,18 +19,18 @@ pub(super) struct Compression {
     pub(super) byte_length: u64,
     /// Size of an element \[bytes\].
     pub(super) byte_stride: usize,
-    /// Elements of the decoded view.
+    /// The number of elements in the decoded view.
     pub(super) count: usize,
     pub(super) mode: Mode,
     #[serde(default)]
     pub(super) filter: Filter,
 }
 
-/// What the bitstream encodes.
+/// The kind of data in the bitstream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub(super) enum Mode {
-    /// Elements of any kind, as differences of bytes.
+    /// Elements of any kind, coded as byte deltas.
     Attributes,
     /// A triangle list's indices.
     Triangles,
@@ -39,11 +38,11 @@ pub(super) enum Mode {
     Indices,
 }
 
-/// What is done to decoded elements.
+/// A filter for decoded elements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub(super) enum Filter {
-    /// Nothing.
+    /// No filter.
     #[default]
     None,
     /// Unit vectors from octahedral coordinates.
@@ -56,7 +55,7 @@ pub(super) enum Filter {
     Color,
 }
 
-/// A stream that cannot be decoded.
+/// An error in a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MeshoptError {
     /// A stride that the mode or the filter does not allow.
@@ -68,25 +67,25 @@ pub enum MeshoptError {
     /// A filter on indices.
     #[error("indices take no filter")]
     Filter,
-    /// A number of indices that makes no triangles.
+    /// A number of indices that is not a multiple of three.
     #[error("{count} indices do not form whole triangles")]
     Count {
-        /// How many indices.
+        /// The number of indices.
         count: usize,
     },
-    /// The first byte names another format or version.
+    /// A first byte of another format or version.
     #[error("the stream begins with {found:#04x}, which this mode does not know")]
     Header {
         /// The byte.
         found: u8,
     },
-    /// The data end before the last element.
+    /// Data that end before the last element.
     #[error("the stream ends early")]
     Truncated,
     /// Data after the last element.
     #[error("the stream has {bytes} bytes too many")]
     TrailingBytes {
-        /// How many.
+        /// The number of extra bytes.
         bytes: usize,
     },
     /// A byte that the format does not define.
@@ -125,7 +124,7 @@ pub(super) fn decode(stream: &[u8], c: &Compression) -> Result<Vec<u8>, MeshoptE
     Ok(elements)
 }
 
-/// What is left of a stream.
+/// The unread rest of a stream.
 struct Cursor<'a>(&'a [u8]);
 
 impl<'a> Cursor<'a> {
