@@ -100,7 +100,9 @@ pub enum GltfErrorKind {
         source: base64::DecodeError,
     },
     /// A URI that is neither data nor a relative path.
-    #[error("{what} {index} has the URI '{uri}'; only relative paths and base64 data are supported")]
+    #[error(
+        "{what} {index} has the URI '{uri}'; only relative paths and base64 data are supported"
+    )]
     Uri {
         /// The kind of object.
         what: &'static str,

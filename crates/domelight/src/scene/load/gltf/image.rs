@@ -102,8 +102,7 @@ impl<'a> Images<'a> {
     ) -> Result<Option<TextureRef>, Failure> {
         let texture: json::Texture = source.document.get(info.index)?;
         let Some(image) = image_of(&texture)? else {
-            source
-                .warn(&format!("texture {} has no supported image and is ignored", info.index));
+            source.warn(&format!("texture {} has no supported image and is ignored", info.index));
             return Ok(None);
         };
         let sampler: json::Sampler = match texture.sampler {
