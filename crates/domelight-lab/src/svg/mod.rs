@@ -1,7 +1,7 @@
 //! Drawings as SVG text: shapes, text and pictures on a white sheet, and [`plot`]s.
 //!
-//! Lengths are in pixels of the sheet, x to the right, y down. [`rasterize`] makes a PNG of a sheet; a
-//! page shows the same sheet in the same font with [`font_face_css`].
+//! Lengths are in pixels of the sheet, x to the right, y down. [`rasterize`] converts a sheet to PNG; with
+//! [`font_face_css`], a web page shows the sheet in the same font.
 
 pub mod plot;
 mod raster;
@@ -15,24 +15,24 @@ use base64::engine::general_purpose::STANDARD;
 use domelight::quote::xml;
 use std::fmt::{self, Display, Write as _};
 
-/// A place on the sheet.
+/// A point on the sheet.
 pub type Point = (f64, f64);
 
-/// A rectangle of the sheet.
+/// A rectangle on the sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rect {
     /// The left edge.
     pub x: f64,
     /// The upper edge.
     pub y: f64,
-    /// Along x.
+    /// The extent along x.
     pub width: f64,
-    /// Along y.
+    /// The extent along y.
     pub height: f64,
 }
 
 impl Rect {
-    /// By its upper left corner.
+    /// Creates a rectangle from its upper left corner and its size.
     pub fn new(x: f64, y: f64, width: f64, height: f64) -> Self {
         Self { x, y, width, height }
     }
@@ -43,13 +43,13 @@ impl Rect {
 pub struct Color(pub u8, pub u8, pub u8);
 
 impl Color {
-    /// Paper.
+    /// The color of the paper.
     pub const WHITE: Self = Self(255, 255, 255);
-    /// Text and axes.
+    /// The color of text and axes.
     pub const INK: Self = Self(0x1c, 0x1f, 0x24);
-    /// Captions and other secondary text.
+    /// The color of captions and other secondary text.
     pub const GRAY: Self = Self(0x6b, 0x72, 0x7c);
-    /// Grid lines.
+    /// The color of grid lines.
     pub const FAINT: Self = Self(0xe0, 0xe3, 0xe8);
 }
 
@@ -59,8 +59,8 @@ impl Display for Color {
     }
 }
 
-/// Colors that the color-blind distinguish, on white: Okabe & Ito 2008, "Color Universal Design",
-/// without the yellow, the sky blue a little darker; then black and a brown.
+/// Colors that color-blind readers can distinguish on white: Okabe & Ito 2008, "Color Universal Design", without yellow
+/// and with a slightly darker sky blue; then black and a brown.
 pub const PALETTE: [Color; 8] = [
     Color(0x00, 0x72, 0xb2),
     Color(0xd5, 0x5e, 0x00),
@@ -82,7 +82,7 @@ pub struct Style {
 }
 
 impl Style {
-    /// An area.
+    /// A filled area.
     pub fn fill(color: Color) -> Self {
         Self { fill: Some(color), ..Self::default() }
     }
@@ -92,19 +92,19 @@ impl Style {
         Self { stroke: Some((color, width)), ..Self::default() }
     }
 
-    /// A line around it.
+    /// Adds an outline.
     #[must_use]
     pub fn outlined(self, color: Color, width: f64) -> Self {
         Self { stroke: Some((color, width)), ..self }
     }
 
-    /// The line in dashes of this length.
+    /// Dashes the line with this dash length.
     #[must_use]
     pub fn dashed(self, length: f64) -> Self {
         Self { dash: Some(length), ..self }
     }
 
-    /// Half seen through, and so on; 1 is opaque.
+    /// Sets the opacity; 1 is opaque.
     #[must_use]
     pub fn opacity(self, opacity: f64) -> Self {
         Self { opacity: Some(opacity), ..self }
@@ -131,19 +131,19 @@ impl Display for Style {
     }
 }
 
-/// Which point of a text its place means.
+/// The anchor of a text: which of its points is at the given position.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Anchor {
-    /// On the left of the text.
+    /// The left end of the text.
     #[default]
     Start,
-    /// Its middle.
+    /// The middle of the text.
     Middle,
-    /// On the right of the text.
+    /// The right end of the text.
     End,
 }
 
-/// How a text is set.
+/// The style of a text.
 #[derive(Clone, Copy, Debug)]
 pub struct TextStyle {
     size: f64,
@@ -155,58 +155,58 @@ pub struct TextStyle {
 }
 
 impl TextStyle {
-    /// Letters of this height, from the baseline on to the right.
+    /// A style with this font size, anchored at the left end.
     pub fn new(size: f64) -> Self {
         let anchor = Anchor::Start;
         Self { size, color: Color::INK, anchor, bold: false, rotation: 0.0, halo: false }
     }
 
-    /// In that color.
+    /// Sets the color.
     #[must_use]
     pub fn color(self, color: Color) -> Self {
         Self { color, ..self }
     }
 
-    /// Placed by that point.
+    /// Sets the anchor.
     #[must_use]
     pub fn anchor(self, anchor: Anchor) -> Self {
         Self { anchor, ..self }
     }
 
-    /// With strong strokes.
+    /// Makes the text bold.
     #[must_use]
     pub fn bold(self) -> Self {
         Self { bold: true, ..self }
     }
 
-    /// Turned clockwise about its place \[degrees\].
+    /// Rotates the text clockwise about its anchor \[degrees\].
     #[must_use]
     pub fn rotated(self, degrees: f64) -> Self {
         Self { rotation: degrees, ..self }
     }
 
-    /// With a white rim, to be read on a picture.
+    /// Adds a white rim, for readability on pictures.
     #[must_use]
     pub fn halo(self) -> Self {
         Self { halo: true, ..self }
     }
 }
 
-/// Roughly how wide a line of text is.
+/// The approximate width of a line of text.
 pub fn text_width(text: &str, size: f64) -> f64 {
     0.56 * size * text.chars().count() as f64
 }
 
-/// Whether the pixels of a small picture may be seen.
+/// The interpolation of an enlarged picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pixels {
-    /// As squares.
+    /// Pixels are visible squares.
     Sharp,
-    /// Interpolated.
+    /// Pixels are interpolated.
     Smooth,
 }
 
-/// A sheet and what is drawn on it.
+/// A sheet with its drawing.
 #[derive(Clone, Debug)]
 pub struct Document {
     width: f64,
@@ -222,12 +222,12 @@ impl Document {
         sheet
     }
 
-    /// Pixels from the left to the right edge.
+    /// The width \[pixels\].
     pub fn width(&self) -> f64 {
         self.width
     }
 
-    /// Pixels from the upper to the lower edge.
+    /// The height \[pixels\].
     pub fn height(&self) -> f64 {
         self.height
     }
@@ -249,7 +249,7 @@ impl Document {
         self.push(format_args!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\"{style}/>"));
     }
 
-    /// A line through the points, or the area that it bounds if the style fills.
+    /// Draws a line through the points, or its area if the style fills.
     pub fn polyline(&mut self, points: impl IntoIterator<Item = Point>, style: Style) {
         let mut list = String::new();
         for (x, y) in points {
@@ -258,12 +258,12 @@ impl Document {
         self.push(format_args!("<polyline points=\"{}\"{style}/>", list.trim_end()));
     }
 
-    /// The path of SVG's path data.
+    /// Draws SVG path data.
     pub fn path(&mut self, data: &str, style: Style) {
         self.push(format_args!("<path d=\"{}\"{style}/>", xml::text(data)));
     }
 
-    /// A line of text.
+    /// Draws a line of text.
     pub fn text(&mut self, at: Point, text: &str, style: TextStyle) {
         let (x, y, color) = (Number(at.0), Number(at.1), style.color);
         let anchor = match style.anchor {
@@ -275,7 +275,7 @@ impl Document {
         if style.rotation != 0.0 {
             let _ = write!(more, " transform=\"rotate({} {x} {y})\"", Number(style.rotation));
         }
-        // The one font has one weight; a thin outline makes it bolder.
+        // The only font has a single weight; a thin outline makes it bolder.
         if style.halo {
             let rim = Number(0.2 * style.size);
             let _ = write!(
@@ -293,7 +293,7 @@ impl Document {
         ));
     }
 
-    /// A PNG, stretched over the rectangle.
+    /// Draws a PNG, stretched over the rectangle.
     pub fn image(&mut self, r: Rect, png: &[u8], pixels: Pixels) {
         let rendering = match pixels {
             // The attribute is for rasterize, the property for browsers.
@@ -309,7 +309,7 @@ impl Document {
         ));
     }
 
-    /// What `draw` draws, as far as it lies in the rectangle.
+    /// Draws with `draw`, clipped to the rectangle.
     pub fn clipped(&mut self, r: Rect, draw: impl FnOnce(&mut Self)) {
         let [x, y, w, h] = [r.x, r.y, r.width, r.height].map(Number);
         self.push(format_args!("<svg{} viewBox=\"{x} {y} {w} {h}\">", Place(r)));
@@ -317,13 +317,13 @@ impl Document {
         self.push(format_args!("</svg>"));
     }
 
-    /// Another sheet, its corner at `at`.
+    /// Adds another sheet with its corner at `at`.
     pub fn append(&mut self, at: Point, other: &Self) {
         let place = Place(Rect::new(at.0, at.1, other.width, other.height));
         self.push(format_args!("<svg{place}>{}</svg>", other.body));
     }
 
-    /// The SVG text, to stand alone or in a page.
+    /// The SVG text, for a file or a web page.
     pub fn to_svg(&self) -> String {
         let [w, h] = [self.width, self.height].map(Number);
         format!(
@@ -337,10 +337,10 @@ impl Document {
     }
 }
 
-/// The family of the one font.
+/// The family of the only font.
 const FONT: &str = "Inter";
 
-/// Bytes within a page or a drawing.
+/// Embeds bytes in a page or a drawing.
 pub fn data_uri(media_type: &str, bytes: &[u8]) -> String {
     format!("data:{media_type};base64,{}", STANDARD.encode(bytes))
 }
@@ -355,7 +355,7 @@ impl Display for Place {
     }
 }
 
-/// A length to the hundredth of a pixel, without needless digits; 0 if it is not finite.
+/// A length rounded to a hundredth of a pixel, without trailing zeros; 0 if it is not finite.
 struct Number(f64);
 
 impl Display for Number {

@@ -3,19 +3,19 @@
 use super::ticks::{self, Tick};
 use super::{Anchor, Color, Document, Point, Rect, Style, TextStyle, text_width};
 
-/// Height of titles, labels and numbers.
+/// Font sizes of titles, labels and numbers.
 const TITLE: f64 = 19.0;
 const LABEL: f64 = 17.0;
 const NUMBER: f64 = 15.0;
-/// Room of an entry of the legend before its text.
+/// The space before the text of a legend entry.
 const KEY: f64 = 34.0;
 
-/// How values are spread along an axis.
+/// The scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Equal steps for equal differences.
+    /// Equal differences have equal lengths.
     Linear,
-    /// Equal steps for equal ratios.
+    /// Equal ratios have equal lengths.
     Log,
 }
 
@@ -29,12 +29,12 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// From `min` to `max`.
+    /// Creates an axis from `min` to `max`.
     pub fn new(label: &str, scale: Scale, min: f64, max: f64) -> Self {
         Self { label: label.to_owned(), scale, min, max }
     }
 
-    /// With a little room around the values that the scale can show.
+    /// Creates an axis with a small margin around the values that the scale can show.
     pub fn around(label: &str, scale: Scale, values: impl IntoIterator<Item = f64>) -> Self {
         let shown =
             values.into_iter().filter(|&v| v.is_finite() && (scale == Scale::Linear || v > 0.0));
@@ -53,7 +53,7 @@ impl Axis {
         Self::new(label, scale, min, max)
     }
 
-    /// Where a value is, from 0 at `min` to 1 at `max`; none if it cannot be shown.
+    /// The position of a value, from 0 at `min` to 1 at `max`; `None` if it cannot be shown.
     fn place(&self, value: f64) -> Option<f64> {
         let place = match self.scale {
             Scale::Linear => (value - self.min) / (self.max - self.min),
@@ -73,22 +73,22 @@ impl Axis {
 /// A point of a series.
 #[derive(Clone, Copy, Debug)]
 pub struct Datum {
-    /// Along the horizontal axis.
+    /// The position along the horizontal axis.
     pub x: f64,
-    /// Along the vertical axis.
+    /// The position along the vertical axis.
     pub y: f64,
     /// The ends of its error bar.
     pub error: Option<(f64, f64)>,
 }
 
 impl Datum {
-    /// Without a spread.
+    /// Creates a point without an error bar.
     pub fn new(x: f64, y: f64) -> Self {
         Self { x, y, error: None }
     }
 }
 
-/// What stands at each point.
+/// The marker of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {
     /// ●
@@ -102,52 +102,52 @@ pub enum Marker {
 }
 
 impl Marker {
-    /// To be gone through with the palette: color is not the only difference.
+    /// All markers, to combine with the palette so that series differ not only in color.
     pub const ALL: [Self; 4] = [Self::Disc, Self::Square, Self::Diamond, Self::Triangle];
 }
 
-/// How the points of a series are joined.
+/// The lines between the points of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Join {
-    /// Not at all.
+    /// No lines.
     Apart,
-    /// By a curve.
+    /// A curve.
     Curve,
-    /// By a dashed curve.
+    /// A dashed curve.
     Dashed,
-    /// Bars from 0: each as high as its point, from there to the next, which gives the last its end.
+    /// Bars from 0 to the height of each point, reaching to the next point; the last point only ends the last bar.
     Bars,
 }
 
-/// Points that belong together.
+/// A series of points.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// In the legend; empty for none.
+    /// The name in the legend; empty for none.
     pub name: String,
     /// Color of the line and the markers.
     pub color: Color,
-    /// How the points are joined.
+    /// The lines between the points.
     pub join: Join,
-    /// What is drawn at each point.
+    /// The marker at each point.
     pub marker: Option<Marker>,
-    /// In the order in which they are joined.
+    /// The points, in drawing order.
     pub points: Vec<Datum>,
 }
 
 impl Series {
-    /// Points without markers.
+    /// Creates a series without markers.
     pub fn new(name: impl Into<String>, color: Color, join: Join, points: Vec<Datum>) -> Self {
         Self { name: name.into(), color, join, marker: None, points }
     }
 
-    /// The same with a marker at each point.
+    /// Adds a marker at each point.
     #[must_use]
     pub fn marked(self, marker: Marker) -> Self {
         Self { marker: Some(marker), ..self }
     }
 }
 
-/// Where names of series stand.
+/// The position of the legend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Legend {
     /// In rows between title and plot.
@@ -156,18 +156,18 @@ pub enum Legend {
     Right,
 }
 
-/// Series between two axes.
+/// A plot of series.
 #[derive(Clone, Debug)]
 pub struct Plot {
-    /// Above everything; empty for none.
+    /// The title; empty for none.
     pub title: String,
-    /// The horizontal one.
+    /// The horizontal axis.
     pub x: Axis,
-    /// The vertical one.
+    /// The vertical axis.
     pub y: Axis,
-    /// In the order of the legend.
+    /// The series, in the order of the legend.
     pub series: Vec<Series>,
-    /// Where the names are.
+    /// The position of the legend.
     pub legend: Legend,
 }
 
@@ -198,7 +198,7 @@ impl Plot {
         let left = r.x + LABEL + 22.0 + numbers.fold(0.0, f64::max);
         let area = Rect::new(left, top, right - left, bottom - top);
         self.draw_axes(sheet, area, r.x, &ticks);
-        // Markers may reach over the border, curves may not.
+        // Markers may cross the border, curves may not.
         sheet.clipped(area, |sheet| {
             for series in &self.series {
                 self.draw_lines(sheet, area, series);
@@ -289,7 +289,7 @@ impl Plot {
     }
 }
 
-/// The names in rows from `top` on; the end of the last row.
+/// Draws the names in rows from `top`, and returns the end of the last row.
 fn legend_above(sheet: &mut Document, r: Rect, top: f64, named: &[&Series]) -> f64 {
     let width = |s: &Series| KEY + text_width(&s.name, NUMBER) + 16.0;
     let mut rows: Vec<(f64, Vec<&Series>)> = Vec::new();
@@ -314,7 +314,7 @@ fn legend_above(sheet: &mut Document, r: Rect, top: f64, named: &[&Series]) -> f
     y + 2.0
 }
 
-/// A key and a name; `at` is the middle of its left end.
+/// Draws a key and a name; `at` is the middle of the left edge.
 fn entry(sheet: &mut Document, at: Point, series: &Series) {
     let (x, y) = at;
     let (left, right) = ((x, y), (x + KEY - 8.0, y));

@@ -1,4 +1,4 @@
-//! From SVG text to PNG, by resvg, in one font that is part of the program.
+//! Converts SVG text to PNG with resvg, in one font that is part of the program.
 
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree, fontdb};
@@ -7,16 +7,16 @@ use std::sync::{Arc, LazyLock};
 use super::{FONT, data_uri};
 use crate::Error;
 
-/// Inter Regular: Latin, Greek, and the signs of formulas.
+/// Inter Regular: Latin, Greek and mathematical symbols.
 const FONT_FILE: &[u8] = include_bytes!("../../assets/Inter-subset.otf");
 
-/// The widest picture that is made \[pixels\].
+/// The maximum width and height of a picture \[pixels\].
 const MOST: f32 = 20_000.0;
 
-/// A PNG of a drawing, `scale` pixels for each of its own.
+/// Converts a drawing to PNG, enlarged by `scale`.
 ///
 /// # Errors
-/// If the text is no drawing, or the picture would be empty or too large.
+/// If the text is not a valid drawing, or the picture would be empty or too large.
 pub fn rasterize(svg: &str, scale: f32) -> Result<Vec<u8>, Error> {
     static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
         let mut fonts = fontdb::Database::new();
@@ -39,7 +39,7 @@ pub fn rasterize(svg: &str, scale: f32) -> Result<Vec<u8>, Error> {
     picture.encode_png().map_err(|error| Error::Failed(error.to_string()))
 }
 
-/// The rule that lets a page show drawings in their font.
+/// The CSS rule with which a page shows drawings in their font.
 pub fn font_face_css() -> String {
     let source = data_uri("font/otf", FONT_FILE);
     format!("@font-face{{font-family:{FONT};src:url({source})}}")

@@ -1,6 +1,6 @@
-//! Where an axis has its marks, and what is written there.
+//! The ticks of an axis and their labels.
 
-/// A mark on an axis; small ones have no label.
+/// A tick on an axis; minor ticks have no label.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tick {
     pub(super) value: f64,
@@ -17,7 +17,7 @@ pub(super) fn linear(min: f64, max: f64, n: usize) -> Vec<Tick> {
     let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= raw * 0.999).unwrap_or(10.0);
     let step = factor * power;
     let digits = (-step.log10().floor()).max(0.0) as usize;
-    // A thousandth of a step for rounding.
+    // Allow a thousandth of a step for rounding.
     let (first, last) = ((min / step - 1e-3).ceil() as i64, (max / step + 1e-3).floor() as i64);
     let tick = |i: i64| {
         let value = i as f64 * step;
@@ -26,8 +26,8 @@ pub(super) fn linear(min: f64, max: f64, n: usize) -> Vec<Tick> {
     (first..=last).map(tick).collect()
 }
 
-/// Powers of ten within [min, max], both positive, with small marks at their multiples; where fewer
-/// than two powers fit, the multiples 2 and 5 have labels as well.
+/// Powers of ten within [min, max], both positive, with minor ticks at their multiples. If fewer than two powers fit,
+/// the multiples 2 and 5 also have labels.
 pub(super) fn logarithmic(min: f64, max: f64) -> Vec<Tick> {
     if !(min > 0.0 && max.is_finite() && min <= max) {
         return Vec::new();
@@ -35,7 +35,7 @@ pub(super) fn logarithmic(min: f64, max: f64) -> Vec<Tick> {
     let (first, last) = (min.log10().floor() as i32, max.log10().ceil() as i32);
     let inside = |value: f64| value >= min * 0.9999 && value <= max * 1.0001;
     let n_powers = (first..=last).filter(|&k| inside(10f64.powi(k))).count();
-    // Of many decades not all have room.
+    // Many decades do not all fit.
     let every = (last - first) as usize / 8 + 1;
     let plain = first >= -3 && last <= 4;
     let mut ticks = Vec::new();
@@ -55,7 +55,7 @@ pub(super) fn logarithmic(min: f64, max: f64) -> Vec<Tick> {
     ticks
 }
 
-/// digit · 10ᵏ, written out or as a power.
+/// Formats digit · 10ᵏ, written out or as a power.
 fn power(digit: i32, k: i32, plain: bool) -> String {
     if plain {
         let digits = (-k).max(0) as usize;
@@ -65,7 +65,7 @@ fn power(digit: i32, k: i32, plain: bool) -> String {
     if digit == 1 { format!("10{exponent}") } else { format!("{digit}·10{exponent}") }
 }
 
-/// A whole number in raised digits.
+/// An integer in superscript digits.
 pub fn superscript(k: i32) -> String {
     let raised = |c: char| match c {
         '-' => '⁻',
@@ -77,7 +77,7 @@ pub fn superscript(k: i32) -> String {
     k.to_string().chars().map(raised).collect()
 }
 
-/// With a true minus sign.
+/// Replaces hyphens by true minus signs.
 fn minus(number: &str) -> String {
     number.replace('-', "−")
 }

@@ -14,15 +14,15 @@ use glam::Vec4Swizzles;
 
 /// Triangle numbers and block numbers share 31 bits.
 const MAX_TRIANGLES: usize = (1 << 31) - 1;
-/// Levels of nodes that the heuristic may make. Halving adds at most 10: 8¹⁰ blocks are plenty.
+/// The maximum number of levels split by the heuristic. Halving adds at most 10, because 8¹⁰ blocks suffice.
 const MAX_HEURISTIC_DEPTH: u32 = 24;
-/// Levels of nodes in any tree.
+/// The maximum number of levels in any tree.
 pub(super) const MAX_DEPTH: u32 = MAX_HEURISTIC_DEPTH + 10;
-/// Ranges below this size are not worth a task of their own.
+/// Ranges below this size do not get their own task.
 const PARALLEL_THRESHOLD: usize = 4096;
 const MAX_BINS: usize = 32;
 
-/// A box as two vectors whose fourth numbers mean nothing.
+/// A box as two vectors whose fourth components are unused.
 #[derive(Clone, Copy)]
 struct Box4 {
     lower: Vec4,
@@ -52,9 +52,9 @@ impl Box4 {
     }
 }
 
-/// A triangle's box; the lower half of its number in `lower.w`, the upper half in `upper.w`.
+/// A triangle's box, with the lower half of its number in `lower.w` and the upper half in `upper.w`.
 ///
-/// As whole numbers: bits of an integer would be those of denormal numbers, and slow.
+/// Stored as integral floats, because an integer's bits would be slow denormals.
 #[derive(Clone, Copy)]
 struct Primitive(Box4);
 
@@ -81,7 +81,7 @@ enum Tree<'a> {
 }
 
 impl Tree<'_> {
-    /// How many nodes and leaves.
+    /// The numbers of nodes and leaves.
     fn counts(&self) -> (usize, usize) {
         match self {
             Self::Leaf(_) => (0, 1),
@@ -158,7 +158,7 @@ impl<'a> Range<'a> {
         self.primitives.len() <= WIDTH
     }
 
-    /// Splits where the heuristic is least, or in halves if all centroids fall into one bin.
+    /// Splits at the minimum of the heuristic, or in halves if all centroids are in one bin.
     fn split(self) -> [Self; 2] {
         let bins = Bins::new(&self);
         let Some(plane) = bins.best_plane() else {
@@ -186,8 +186,8 @@ impl<'a> Range<'a> {
     }
 }
 
-/// Moves what is left of the plane to the front; returns how many those are, and the boxes of the
-/// centroids of both sides.
+/// Moves the primitives left of the plane to the front. Returns their number, and the boxes of the centroids on both
+/// sides.
 fn partition(primitives: &mut [Primitive], plane: &Plane) -> (usize, [Box4; 2]) {
     let mut centroids = [Box4::EMPTY; 2];
     let mut side = |p: &Primitive| {
@@ -226,7 +226,7 @@ impl Binning {
         let scale = (count as f32 / (upper - lower)).to_array();
         Self {
             origin: lower,
-            // Where all centroids agree all go into the first bin.
+            // If all centroids are equal on an axis, they go into the first bin.
             scale: scale.map(|s| if s.is_finite() { s } else { 0.0 }).into(),
             count,
         }
@@ -234,7 +234,7 @@ impl Binning {
 
     /// The bins of a primitive on the three axes.
     fn bins(&self, p: &Primitive) -> [usize; 3] {
-        // Numbers from 2²³ have no fraction, so that the last bits of this sum are a whole number.
+        // Floats from 2²³ have no fraction, so the last bits of this sum are an integer.
         const WHOLE: f32 = (1 << 23) as f32;
         let at = (p.centroid() - self.origin) * self.scale - 0.5;
         let at = at.max(Vec4::ZERO).min(Vec4::splat((self.count - 1) as f32));
@@ -243,7 +243,7 @@ impl Binning {
     }
 }
 
-/// How many primitives fall into each bin of each axis, and their boxes.
+/// The number of primitives in each bin of each axis, and their boxes.
 struct Bins {
     binning: Binning,
     counts: [[u32; MAX_BINS]; 3],
@@ -277,7 +277,7 @@ impl Bins {
         bins
     }
 
-    /// The plane of least area × blocks; none if one side of each would be empty.
+    /// The plane with the smallest area × blocks; `None` if every plane has an empty side.
     fn best_plane(&self) -> Option<Plane> {
         let mut best = (f32::INFINITY, None);
         for axis in 0..3 {
@@ -295,7 +295,7 @@ impl Bins {
         best.1
     }
 
-    /// The cost of the right side of each plane; infinite where it is empty.
+    /// The cost of the right side of each plane; infinite for an empty side.
     fn right_costs(&self, axis: usize) -> [f32; MAX_BINS] {
         let mut costs = [f32::INFINITY; MAX_BINS];
         let (mut count, mut bounds) = (0, Box4::EMPTY);
@@ -316,7 +316,7 @@ impl Bins {
     }
 }
 
-/// Area × blocks: what the range would cost as leaves.
+/// Area × blocks: the cost of the range as leaves.
 fn cost(count: u32, bounds: Box4) -> f32 {
     bounds.area() * count.div_ceil(WIDTH as u32) as f32
 }
@@ -339,7 +339,7 @@ fn child(range: Range<'_>, depth: u32) -> (Box4, Tree<'_>) {
     (bounds, tree)
 }
 
-/// Splits the largest range until there are eight or all fit a leaf; the largest surface last.
+/// Splits the largest range until there are eight or all fit a leaf; sorts the largest surface last.
 fn split_in_eight(range: Range<'_>, depth: u32) -> Vec<Range<'_>> {
     let by_heuristic = depth < MAX_HEURISTIC_DEPTH;
     let size =

@@ -23,7 +23,7 @@ impl Frustum {
         let middle = origins.iter().sum::<Vec3>() * 0.25;
         let normals = std::array::from_fn(|i| {
             let next = (i + 1) % 4;
-            // An edge runs along both directions, and of parallel ones from corner to corner.
+            // The edge spans both directions; for parallel directions, it runs from corner to corner.
             let across = directions[next] - directions[i] + origins[next] - origins[i];
             let normal = directions[i].cross(across).normalize_or_zero();
             let inward = normal.dot(inner - directions[i] * 4.0) + normal.dot(middle - origins[i]);
@@ -68,7 +68,7 @@ struct Plane {
     d: f32,
 }
 
-/// The planes, moved outward by what rounding may move a ray or a box.
+/// The planes, moved outward by the maximum rounding error of rays and boxes.
 fn planes(frustum: &Frustum, bounds: &Aabb) -> [Plane; 4] {
     const ROUNDING: f32 = 16.0 * f32::EPSILON;
     std::array::from_fn(|i| {
@@ -78,12 +78,12 @@ fn planes(frustum: &Frustum, bounds: &Aabb) -> [Plane; 4] {
     })
 }
 
-/// The children of a node that are not all outside of one plane.
+/// The children of a node that are not completely outside of one plane.
 #[inline(always)]
 fn inside<S: Simd>(simd: S, planes: &[Plane; 4], node: &Node) -> u32 {
     let mut all = !0;
     for Plane { normal, d } in planes {
-        // The corner that lies furthest inward; NaN of a missing child's is not inside.
+        // The innermost corner; that of a missing child is NaN, hence not inside.
         let mut furthest = simd.splat(0.0);
         for axis in 0..3 {
             let n = normal[axis];

@@ -44,8 +44,8 @@ impl<S: Simd> Slabs<S> {
         }
     }
 
-    /// Where ray `i` enters the boxes, 0 in one that it starts in, and where it leaves them: before it enters where it
-    /// misses.
+    /// The distances where ray `i` enters the boxes (0 if it starts inside) and leaves them. If it misses a box, it
+    /// leaves before it enters.
     #[inline(always)]
     pub(super) fn cross<const N: usize>(
         &self,
@@ -96,7 +96,7 @@ fn distances_fused<F: SimdF32x8>(planes: [F; 3], inverse: [F; 3], origin: [F; 3]
     [px.mul_sub(x, ox), py.mul_sub(y, oy), pz.mul_sub(z, oz)]
 }
 
-/// The planes of an axis, the near one first; the lowest bit says whether that is the upper.
+/// The planes of an axis, the near one first; the lowest bit of `is_negative` is set if that is the upper plane.
 #[inline(always)]
 fn ordered(planes: &[Lanes; 2], is_negative: u32) -> [&Lanes; 2] {
     let near = is_negative as usize & 1;
@@ -159,11 +159,11 @@ pub(super) struct Sheared<S: Simd> {
     frame: ShearedFrame<S::F32x8>,
     /// From the origin to the first corner, not sheared.
     to_corner: Points<S::F32x8>,
-    /// The depths of the corners: how far they are along z.
+    /// The depths of the corners along z.
     depths: [S::F32x8; 3],
     /// Barycentric weights, scaled alike.
     weights: [S::F32x8; 3],
-    /// The position where the ray's line passes through the triangle.
+    /// Whether the ray's line passes through each triangle.
     inside: <S::F32x8 as SimdFloat>::Mask,
 }
 
@@ -204,7 +204,7 @@ impl<S: Simd> Sheared<S> {
         let b = frame.sheared(frame.to(simd, &block.vertices[1]));
         let c = frame.sheared(frame.to(simd, &block.vertices[2]));
 
-        // All of one sign inside; zero on an edge, or so near to one that the product underflows.
+        // All have the same sign inside; zero on an edge, or so close to one that the product underflows.
         let (mut u, mut v, mut w) = (edge(c, b), edge(a, c), edge(b, a));
         let signs = u.min(v).min(w) * u.max(v).max(w);
         let mut inside = zero.lt(signs);
@@ -234,7 +234,7 @@ impl<S: Simd> Sheared<S> {
     /// The triangles hit at 0 < t ≤ `limit`.
     #[inline(always)]
     pub(super) fn hits(&self, simd: S, planes: &Planes, limit: f32) -> BlockHits<S> {
-        // The depth of the plane, but within that of the corners even where the plane is edge-on.
+        // The depth of the plane, clamped to the depths of the corners in case the plane is edge-on.
         let [a, b, c] = self.depths;
         let (nearest, farthest) = (a.min(b).min(c), a.max(b).max(c));
         let plane = planes.depth(simd, &self.frame, self.to_corner);
@@ -246,7 +246,7 @@ impl<S: Simd> Sheared<S> {
     }
 }
 
-/// Where the ray is the z axis.
+/// The frame in which the ray is the z axis.
 struct ShearedFrame<F> {
     axes: [usize; 3],
     origin: Points<F>,
@@ -288,8 +288,8 @@ fn edge<F: SimdF32x8>(p: Points<F>, q: Points<F>) -> F {
 
 /// The planes of a block's triangles.
 ///
-/// Aligned like a vector, which also aligns the stack of the kernels: spilled AVX2 registers are stored there, and stall if
-/// they straddle two cache lines.
+/// Aligned like a vector, which also aligns the stack of the kernels: spilled AVX2 registers are stored there, and
+/// stall if they straddle two cache lines.
 #[repr(align(32))]
 pub(super) struct Planes {
     /// n = (b − a) × (c − a), by axis.
@@ -308,7 +308,7 @@ impl Planes {
 
     /// n · (a − o) / (n · d/d_z).
     ///
-    /// More accurate than to interpolate the corners' depths where the triangle is large and near.
+    /// This is more accurate than interpolating the corners' depths if the triangle is large and near.
     #[inline(always)]
     fn depth<S: Simd>(
         &self,

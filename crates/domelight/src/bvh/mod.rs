@@ -55,7 +55,7 @@ pub use validate::BvhDefect;
 /// The number of children of a node and of triangles in a block: the width of a vector.
 const WIDTH: usize = 8;
 
-/// One number a lane.
+/// One number per lane.
 type Lanes = simd::Lanes;
 
 /// A bounding volume hierarchy over triangles; see the [module](self).
@@ -144,7 +144,7 @@ pub enum BvhError {
     TooManyTriangles {
         /// The number of triangles.
         count: usize,
-        /// How many fit.
+        /// The maximum number.
         max: usize,
     },
 }
@@ -208,10 +208,10 @@ impl Bvh {
         simd::dispatch(self.instruction_set, traverse::ClosestHits { bvh: self, rays, hits });
     }
 
-    /// [`Bvh::closest_hit_where`] of many rays. `accept` gets hits with their rays' numbers, some at a time, and sets for each
-    /// whether it counts.
+    /// [`Bvh::closest_hit_where`] for many rays. `accept` receives a few hits at a time, with the indices of their
+    /// rays, and sets whether each hit is accepted.
     ///
-    /// `hits` is overwritten, one entry a ray.
+    /// `hits` is overwritten, one entry per ray.
     pub fn closest_hits_where(
         &self,
         rays: &[Ray],

@@ -5,13 +5,13 @@ use crate::geometry::Aabb;
 use crate::math::Vec3;
 use crate::simd::{LaneMask, Simd, SimdF32x8, SimdFloat};
 
-/// Up to `N` rays of one octant, `N` a multiple of eight, with what both tests need of them.
+/// Up to `N` rays of one octant, `N` a multiple of eight, with precomputed data for both tests.
 pub(super) struct PreparedRays<const N: usize> {
-    /// One bit an axis: set where the rays enter through the upper plane.
+    /// One bit per axis: set if the rays enter through the upper plane.
     pub(super) octant: u32,
-    /// Products of planes and inverse directions neither overflow nor lose digits to underflow.
+    /// Whether products of planes and inverse directions neither overflow nor lose digits to underflow.
     pub(super) is_moderate: bool,
-    /// By axis; origins and directions are given, the rest is computed from them.
+    /// The origins, by axis. Origins and directions are given; the rest is computed from them.
     origins: [[f32; N]; 3],
     directions: [[f32; N]; 3],
     /// The origins moved forward along each axis, times the inverse direction, for near planes.
@@ -30,7 +30,7 @@ pub(super) struct PreparedRays<const N: usize> {
 /// The axes x, y and z of the space whose z axis is the first, second, third.
 const AXES: [[u8; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
 
-/// One bit an axis: set where the direction is negative.
+/// One bit per axis: set if the direction is negative.
 #[inline(always)]
 pub(super) fn octant(direction: Vec3) -> u32 {
     direction.is_negative_bitmask()
@@ -58,8 +58,8 @@ impl<const N: usize> PreparedRays<N> {
         }
     }
 
-    /// Computes the rest for the first `count` rays; returns as bits which of them can hit anything: those
-    /// that are finite and have a direction.
+    /// Computes the rest for the first `count` rays. Returns a bit mask of the rays that can hit anything, because they
+    /// are finite and have a direction.
     #[inline(always)]
     pub(super) fn prepare<S: Simd>(
         &mut self,
@@ -80,16 +80,16 @@ impl<const N: usize> PreparedRays<N> {
         valid
     }
 
-    /// Which of eight rays are finite, and which are moderate, as bits.
+    /// Bit masks of the rays, of eight, that are finite and that are moderate.
     #[inline(always)]
     fn prepare_eight<S: Simd>(&mut self, simd: S, first: usize, scene: &Aabb) -> [u32; 2] {
         const INFLATION: f32 = 1.0 / (1 << 20) as f32;
-        // The rounding of origin ± inflation, of its product with the inverse direction and of the plane's, and room to
-        // spare.
+        // The rounding errors of origin ± inflation, of its product with the inverse direction and of the plane's
+        // product, with some reserve.
         const ORIGIN_ROUNDING: f32 = 1.0 / (1 << 22) as f32;
-        // A component so small moves the ray by less than the inflation while it crosses the scene.
+        // A smaller component moves the ray by less than the inflation while it crosses the scene.
         const NEGLIGIBLE: f32 = 1.0 / (1 << 24) as f32;
-        // A margin so large hides what a product loses to underflow, 2⁻¹⁵⁰ at the most.
+        // A larger margin covers the underflow error of a product, at most 2⁻¹⁵⁰.
         const LEAST_MARGIN: f32 = 1.0 / (1_u128 << 100) as f32;
 
         let sign = |axis: usize| if self.octant >> axis & 1 == 0 { 1.0 } else { -1.0 };
@@ -119,7 +119,7 @@ impl<const N: usize> PreparedRays<N> {
             store((o[k] + forward) * inverse[k], &mut self.near_origins[k], first);
             store((o[k] - forward) * inverse[k], &mut self.far_origins[k], first);
             store(inverse[k], &mut self.inverse_directions[k], first);
-            // Not finite if any of the numbers is not.
+            // The sum is not finite if any of the numbers is not.
             let sum = o[k] + d[k] + inverse[k] + inflation;
             is_finite = is_finite & sum.abs().lt(simd.splat(f32::INFINITY));
             let (reach, size) = (scene.min[k].abs().max(scene.max[k].abs()), inverse[k].abs());
@@ -176,13 +176,13 @@ fn store<F: SimdF32x8>(x: F, numbers: &mut [f32], first: usize) {
     *numbers[first..].first_chunk_mut().expect("a multiple of eight") = x.store();
 }
 
-/// By the axes of the sheared space: z is x where that is the longest, y where it is, else z.
+/// Permutes the components to the axes of the sheared space, whose z is the longest axis.
 #[inline(always)]
 fn turned<F: SimdF32x8>(is_x: F::Mask, is_y: F::Mask, [x, y, z]: [F; 3]) -> [F; 3] {
     [pick(is_x, is_y, [y, z, x]), pick(is_x, is_y, [z, x, y]), pick(is_x, is_y, [x, y, z])]
 }
 
-/// The first where the longest axis is x, the second where it is y, else the third.
+/// Selects the first where the longest axis is x, the second where it is y, otherwise the third.
 #[inline(always)]
 fn pick<F: SimdF32x8>(is_x: F::Mask, is_y: F::Mask, of: [F; 3]) -> F {
     F::select(is_x, of[0], F::select(is_y, of[1], of[2]))

@@ -1,7 +1,7 @@
 //! Traversal: one ray to its closest or any hit, and streams of rays.
 //!
 //! Everything here is generic over the instruction set and inlined into it.
-#![allow(clippy::large_stack_arrays)] // Some streams, 50 KiB.
+#![allow(clippy::large_stack_arrays)] // A few streams, 50 KiB.
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -22,8 +22,8 @@ const _: () = assert!(MAX_DEPTH as usize * (WIDTH - 1) + WIDTH <= STACK);
 const STREAM: usize = 64;
 /// The number of streams in flight: while one waits for memory, the others continue.
 const INTERLEAVED: usize = 4;
-/// Trees of at most this size \[bytes\] fit in the caches and are traversed by two streams, which wait little and leave more
-/// of the nearest cache to the tree.
+/// Trees of at most this size \[bytes\] fit in the caches and are traversed by two streams, which wait little and leave
+/// more of the nearest cache to the tree.
 const CACHED: usize = 1 << 24;
 /// The number of rays sorted at once: enough to fill the streams of all octants, but few enough to stay coherent.
 const WINDOW: usize = 4096;
@@ -62,7 +62,7 @@ impl<F: Fn(&Hit) -> bool> Kernel for ClosestHitWhere<'_, F> {
     }
 }
 
-/// [`Bvh::closest_hits`]; `hits` start all empty.
+/// [`Bvh::closest_hits`]; all `hits` must be empty initially.
 pub(super) struct ClosestHits<'a> {
     pub(super) bvh: &'a Bvh,
     pub(super) rays: &'a [Ray],
@@ -79,7 +79,7 @@ impl Kernel for ClosestHits<'_> {
     }
 }
 
-/// [`Bvh::closest_hits_where`]; `hits` start all empty.
+/// [`Bvh::closest_hits_where`]; all `hits` must be empty initially.
 pub(super) struct ClosestHitsWhere<'a, F> {
     pub(super) bvh: &'a Bvh,
     pub(super) rays: &'a [Ray],
@@ -97,7 +97,7 @@ impl<F: Fn(&[(usize, Hit)], &mut [bool])> Kernel for ClosestHitsWhere<'_, F> {
     }
 }
 
-/// Streams of neighbors in one octant, each with the number of its first ray.
+/// Streams of neighboring rays in one octant, each with the index of its first ray.
 #[inline(always)]
 fn runs_of_an_octant(rays: &[Ray]) -> impl Iterator<Item = (usize, &[Ray])> {
     let same_octant = |a: &Ray, b: &Ray| octant(a.direction) == octant(b.direction);
@@ -124,7 +124,7 @@ impl Kernel for AnyHit<'_> {
     }
 }
 
-/// [`Bvh::occluded`]; `answers` start all false.
+/// [`Bvh::occluded`]; all `answers` must be false initially.
 pub(super) struct Occluded<'a> {
     pub(super) bvh: &'a Bvh,
     pub(super) rays: &'a RayBatch,
@@ -147,7 +147,7 @@ impl Kernel for Occluded<'_> {
     }
 }
 
-/// [`Bvh::transmittances`]; `answers` start all 1.
+/// [`Bvh::transmittances`]; all `answers` must be 1 initially.
 pub(super) struct Transmittances<'a> {
     pub(super) bvh: &'a Bvh,
     pub(super) rays: &'a RayBatch,
@@ -247,7 +247,7 @@ trait Accepting {
     ) -> Option<Hit>;
 }
 
-/// All hits.
+/// Accepts all hits.
 struct Everything;
 
 impl Accepting for Everything {
@@ -265,7 +265,7 @@ impl Accepting for Everything {
     }
 }
 
-/// The hits that the function accepts.
+/// Accepts the hits for which the function returns true.
 struct Where<F>(F);
 
 impl<F: Fn(&Hit) -> bool> Accepting for Where<F> {
@@ -289,7 +289,7 @@ impl<F: Fn(&Hit) -> bool> Accepting for Where<F> {
     }
 }
 
-/// Than the closest so far; as near and of a lower number counts as nearer.
+/// Whether a hit is nearer than the closest so far; ties go to the smaller index.
 #[inline(always)]
 fn is_nearer(hit: &Hit, closest: Option<Hit>) -> bool {
     closest.is_none_or(|closest| (hit.t, hit.triangle) < (closest.t, closest.triangle))
@@ -352,7 +352,7 @@ fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRays<WIDTH>, limit: f32) -
             let node = &bvh.nodes[child.index()];
             let slabs = Slabs::load(simd, node, ray.octant);
             let (crossed, _) = slabs.cross_within(simd, ray, 0, limit);
-            // The last and largest on top.
+            // Push the last and largest on top.
             for lane in set_bits(crossed.bits()) {
                 stack[len] = node.children[lane];
                 len += 1;
@@ -564,8 +564,8 @@ impl StreamStack {
         self.len += count;
     }
 
-    /// Pushes the children of a node whose boxes any of `members` crosses within its limit, the nearest child of the last
-    /// ray on top.
+    /// Pushes the children of a node whose boxes any of `members` crosses within its limit, with the nearest child of
+    /// the last ray on top.
     #[inline(always)]
     fn push_by_distance<S: Simd>(
         &mut self,
@@ -668,7 +668,7 @@ impl Stream for ClosestStream {
         stack: StreamStack::EMPTY,
     };
 
-    /// With the number of the first.
+    /// The rays and the index of the first.
     type Rays<'a> = (usize, &'a [Ray]);
     type Context<'a> = ();
     type Answer = Option<Hit>;
@@ -713,20 +713,20 @@ impl Stream for ClosestStream {
 
 /// [`Bvh::closest_hit_where`] of up to [`STREAM`] rays.
 struct WhereStream<F> {
-    /// The rays and the closest hits that were accepted.
+    /// The rays and their closest accepted hits.
     closest: ClosestStream,
-    /// Hits that are yet to be accepted or refused, with the numbers of their rays in the batch.
+    /// Hits that are not yet accepted or rejected, with the indices of their rays in the batch.
     candidates: [(usize, Hit); STREAM],
     n_candidates: usize,
     accept: PhantomData<F>,
 }
 
-/// Candidates that are decided on together: enough to wait for memory once, few enough that their rays do not go far beyond
-/// what they will meet.
+/// The number of candidates decided together: enough to wait for memory once, but few enough that their rays do not
+/// traverse far beyond their hits.
 const TOGETHER: usize = 16;
 
 impl<F: Fn(&[(usize, Hit)], &mut [bool])> WhereStream<F> {
-    /// Shortens the rays to the candidates that are accepted.
+    /// Shortens the rays to the accepted candidates.
     #[inline(always)]
     fn decide(&mut self, accept: &F) {
         let candidates = &self.candidates[..self.n_candidates];
@@ -780,7 +780,7 @@ impl<F: Fn(&[(usize, Hit)], &mut [bool])> Stream for WhereStream<F> {
                         self.n_candidates += 1;
                     }
                 });
-                // Leave room for as many as a leaf has.
+                // Leave room for all hits of a leaf.
                 if self.n_candidates > STREAM - WIDTH {
                     self.decide(accept);
                 }
@@ -806,13 +806,13 @@ struct ShadowStream {
     rays: PreparedRays<STREAM>,
     /// The indices of the rays in their batch.
     members: [usize; STREAM],
-    /// The rays that have hit nothing yet, and those that have, as bits.
+    /// Bit masks of the rays that have hit nothing yet, and of those that have.
     free: u64,
     hit: u64,
     stack: StreamStack,
 }
 
-/// Rays of a batch: those whose numbers are `start` and one of `members`.
+/// Rays of a batch, with indices `start` plus one of `members`.
 struct ShadowRays<'a> {
     batch: &'a RayBatch,
     start: usize,
@@ -853,8 +853,7 @@ impl Stream for ShadowStream {
             let planes = Planes::of(simd, block);
             let mut hit = 0;
             for i in set_bits(rays) {
-                // Without branches: a shadow ray starts on a triangle, so half of the tests would go
-                // wrong halfway.
+                // Avoid branches: a shadow ray starts on a triangle, so half of them would be mispredicted.
                 let sheared = Sheared::new(simd, block, &self.rays, i);
                 let mask = sheared.hits(simd, &planes, f32::MAX).mask;
                 hit |= u64::from(mask != 0) << i;
@@ -877,8 +876,8 @@ impl Stream for ShadowStream {
     }
 }
 
-/// What gets through all hits of up to [`STREAM`] rays. A ray meets its leaves in the same order whatever rays go with
-/// it, so that its product has the same bits.
+/// The transmittance of up to [`STREAM`] rays. A ray visits its leaves in the same order regardless of the other rays,
+/// so that its product has the same bits.
 struct TransmittanceStream {
     rays: PreparedRays<STREAM>,
     /// The indices of the rays in their batch.

@@ -32,14 +32,14 @@ pub enum BvhDefect {
         /// The node.
         node: usize,
     },
-    /// Nodes, blocks or triangles that no path reaches, or that several paths reach.
+    /// Nodes, blocks or triangles that are reached by no path or by several paths.
     #[error("the tree reaches {reached} of {count} {what}")]
     Coverage {
-        /// What is missing or repeated.
+        /// The kind of object.
         what: &'static str,
-        /// How many are reached, with repetition.
+        /// The number of visits.
         reached: usize,
-        /// How many there are.
+        /// The number of objects.
         count: usize,
     },
     /// A triangle that is in two blocks.
@@ -69,7 +69,7 @@ fn covers(what: &'static str, reached: usize, count: usize) -> Result<(), BvhDef
     if reached == count { Ok(()) } else { Err(BvhDefect::Coverage { what, reached, count }) }
 }
 
-/// What was reached so far.
+/// The nodes, blocks and triangles reached so far.
 #[derive(Default)]
 struct Seen {
     nodes: usize,

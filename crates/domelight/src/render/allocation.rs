@@ -92,7 +92,7 @@ impl Allocation {
         self.counts.resize(n_pixels, n_samples);
     }
 
-    /// Camera samples of a set of a pixel, once its round is assigned.
+    /// The number of camera samples of a pixel's set, once its round is assigned.
     pub(super) fn get(&self, pixel: usize) -> u32 {
         self.counts[pixel]
     }
@@ -178,8 +178,8 @@ pub(super) fn count(n: u32, octaves: f32, fewest: i32) -> u32 {
     count.max(1)
 }
 
-/// The fewest octaves of the pixels of a level. Where two more levels build on what they see, they have the usual
-/// number at least.
+/// The minimum octaves of the pixels of a level. Pixels on which at least two more levels build get at least the
+/// default number.
 pub(super) fn fewest(level: u32) -> i32 {
     if level + 2 < N_LEVELS { 0 } else { OCTAVES[0] }
 }
@@ -204,7 +204,7 @@ mod tests {
         sums
     }
 
-    /// Runs a pass over a tile; `see` gives what n samples of a pixel see. Returns how many each pixel had.
+    /// Runs a pass over a tile; `see` returns the sums of n samples of a pixel. Returns the pixels' sample counts.
     fn pass(
         n_samples: u32,
         in_sight: impl Fn(usize) -> bool,
@@ -242,8 +242,8 @@ mod tests {
         assert!(mean(true) > 2.0 * mean(false), "{} {}", mean(true), mean(false));
     }
 
-    /// A pixel between a covered one and an empty one is worth more than the usual samples, even if neither of
-    /// them has any variance, or nothing is in sight of the empty ones.
+    /// A pixel between a covered pixel and an empty one gets more samples than the default, even if neither has any
+    /// variance, or nothing is visible from the empty ones.
     #[test]
     fn silhouettes_are_found_between_pixels() {
         for in_sight in [false, true] {
@@ -264,7 +264,7 @@ mod tests {
         }
     }
 
-    /// An object that covers a part of the last row alone is not mistaken for an empty tile.
+    /// An object that covers only part of the last row is not mistaken for an empty tile.
     #[test]
     fn the_rim_of_an_empty_tile_has_the_usual_samples() {
         let counts = pass(16, |_| true, |_, n| sums(n, 0, 0.0));

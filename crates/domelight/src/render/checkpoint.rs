@@ -73,7 +73,7 @@ impl Checkpoint {
         let (color, alpha) = self.film.picture();
         let mut exr = ExrLayers::from_image(&color, Some(&alpha));
         exr.attributes = self.attributes();
-        // The bits are random: deflate would take five times as long to save a third.
+        // The bits are random, so deflate would take five times as long to save a third.
         exr.compression = Compression::Rle;
         exr.origin = (window.x, window.y);
         exr.whole = Some((width, height));

@@ -82,7 +82,7 @@ impl FromStr for Filter {
 #[derive(Clone, Debug)]
 pub struct FilterSampler {
     radius: f32,
-    /// The filter over [−radius, radius]; none for the box, whose inversion is exact.
+    /// The filter over [−radius, radius]; `None` for the box, whose inversion is exact.
     table: Option<Table1d>,
 }
 
@@ -98,7 +98,7 @@ impl FilterSampler {
         Self { radius, table }
     }
 
-    /// How far positions lie outside of their pixel at the most \[pixels\].
+    /// The maximum distance of positions outside of their pixel \[pixels\].
     pub(super) fn overhang(&self) -> f32 {
         self.radius - 0.5
     }
@@ -142,7 +142,7 @@ mod tests {
                 norm += f;
                 moment += f * x * x;
             }
-            // The steps of the table: (3/512)²/12 in the second moment.
+            // The table's steps add (3/512)²/12 to the second moment.
             assert!(mean.abs() < 1e-4, "{filter:?} {mean}");
             assert!((second - moment / norm).abs() < 2e-5, "{filter:?} {second} {}", moment / norm);
         }

@@ -38,8 +38,9 @@ pub enum LayerValues<'a> {
     Counts(&'a [u32]),
 }
 
-/// Defines [`Layers`] and [`LAYERS`]: for each layer, its description, its field and type, its layer and channels in files,
-/// and its value at a pixel, computed from the pixel's sums and the scale of its variance ([`VarianceSums::scale`]).
+/// Defines [`Layers`] and [`LAYERS`]: for each layer, its description, its field and type, its layer and channels in
+/// files, and its value at a pixel, computed from the pixel's sums and the scale of its variance
+/// ([`VarianceSums::scale`]).
 macro_rules! layers {
     ($($(#[doc = $doc:literal])+ $field:ident: $type:ty = $name:literal {
         file: $file:expr, channels: $channels:expr, |$sums:ident, $scale:ident| $value:expr
@@ -87,52 +88,53 @@ macro_rules! layers {
 }
 
 layers! {
-    /// Direct light, and the background where it is shown.
+    /// Direct illumination, and the background where it is shown.
     color: RgbImage = "color" {
         file: Some(""), channels: ["R", "G", "B"], |sums, _scale| sums.mean(sums.color)
     }
-    /// Coverage: the share of camera samples that hit the scene, with the mean of `shadow`; 1 where the background is shown.
+    /// Coverage: the fraction of camera samples that hit the scene, with the mean of `shadow`; 1 where the background is
+    /// shown.
     alpha: Vec<f32> = "alpha" { file: Some(""), channels: ["A"], |sums, _scale| sums.alpha() }
-    /// As `color` with every shadow ray free: the lecture's L_ns.
+    /// Like `color`, but with every shadow ray unoccluded: the lecture's L_ns.
     unoccluded: RgbImage = "unoccluded" {
         file: Some("unoccluded"), channels: ["R", "G", "B"],
         |sums, _scale| sums.mean(sums.unoccluded)
     }
-    /// The share of the background that shadows take away on ground that catches them; zero without such ground.
+    /// The fraction of the background that shadows remove on a shadow catcher; zero without one.
     shadow: RgbImage = "shadow" {
         file: Some("shadow"), channels: ["R", "G", "B"], |sums, _scale| sums.shadow()
     }
-    /// Reflectance of the surfaces seen.
+    /// Reflectance of the visible surfaces.
     albedo: RgbImage = "albedo" {
         file: Some("albedo"), channels: ["R", "G", "B"],
         |sums, _scale| sums.albedo * sums.scale()
     }
-    /// Mean world shading normal, not normalized; zero where nothing was hit.
+    /// Mean world-space shading normal, not normalized; zero without hits.
     normal: Vec<Vec3> = "normal" {
         file: Some("normal"), channels: ["X", "Y", "Z"],
         |sums, _scale| sums.normal * sums.scale()
     }
-    /// Mean distance from the camera plane over the samples that hit; 0 where none did.
+    /// Mean distance from the camera plane over the samples that hit; 0 without hits.
     depth: Vec<f32> = "depth" { file: Some("depth"), channels: ["Z"], |sums, _scale| sums.depth() }
-    /// Variance of each pixel's mean, at most `f32::MAX`: that of independent samples of the same spread, scaled to
-    /// what the samples of the whole picture err.
+    /// Variance of each pixel's mean, at most `f32::MAX`: that of independent samples with the same sample variance,
+    /// scaled by the variance reduction measured over the whole picture.
     variance: RgbImage = "variance" {
         file: Some("variance"), channels: ["R", "G", "B"],
         |sums, scale| sums.variance(scale)
     }
-    /// Camera samples of each pixel.
+    /// Number of camera samples.
     n_samples: Vec<u32> = "samples" { file: Some("samples"), channels: ["Y"], |sums, _scale| sums.n_samples }
-    /// Those that hit the scene.
+    /// Number of camera samples that hit the scene.
     n_hits: Vec<u32> = "hits" { file: None, channels: ["Y"], |sums, _scale| sums.n_hits }
 }
 
 impl Layers {
-    /// Columns.
+    /// The number of columns.
     pub fn width(&self) -> usize {
         self.color.width
     }
 
-    /// Rows.
+    /// The number of rows.
     pub fn height(&self) -> usize {
         self.color.height
     }
@@ -152,8 +154,8 @@ impl Layers {
         }
     }
 
-    /// Copies the pixels that have samples from the rows of `from` that are in `window`. `pixels` are those of `from`, or empty,
-    /// and `self` has the pixels of `window`.
+    /// Copies the pixels that have samples from the rows of `from` that are in `window`. `pixels` are those of `from`,
+    /// or empty, and `self` has the pixels of `window`.
     pub(super) fn put(
         &mut self,
         pixels: &[PixelSums],

@@ -12,8 +12,8 @@ use crate::strategy::Strategy;
 use crate::strategy::levels::N_LEVELS;
 
 /// The number of columns and rows of a scout window, whose corners are pixels of the first level. Many small windows
-/// estimate the mean over the picture better than a few large ones: the error of 9 × 9 windows at equal cost was twice as
-/// large (docs/experiments.md).
+/// estimate the mean over the picture better than a few large ones: the error of 9 × 9 windows at equal cost was twice
+/// as large (docs/experiments.md).
 const SCOUT_WINDOW: usize = 5;
 
 /// The fraction of a tile's pixels in a level.
@@ -59,7 +59,7 @@ fn spent(scouts: &[Scout], n: u32, mean_log: f32) -> f64 {
 }
 
 /// The logarithm at which a pixel has `n` samples, if pixels like these have `budget` times `n` on average; `None` if
-/// none of them sees the scene.
+/// no pixel sees the scene.
 fn mean_log(scouts: &[Scout], n: u32, budget: f64) -> Option<f32> {
     /// The number of bisection steps.
     const STEPS: usize = 20;
@@ -82,16 +82,16 @@ fn mean_log(scouts: &[Scout], n: u32, budget: f64) -> Option<f32> {
 /// The logarithm at which a pixel gets the default number of samples, so that the total over the picture is about the
 /// number requested; `None` if no scout sees the scene.
 ///
-/// Scouts are windows of pixels, spread over the picture, with their own random numbers, because a scale that depends on a
-/// pixel's own samples would introduce bias. They are rendered twice: a few with the same number of samples in every
-/// pixel, which gives a first scale; then all of them with that scale, because a strategy that learns errs less where more
-/// is learned.
+/// Scouts are windows of pixels, spread over the picture, with their own random numbers, because a scale that depends
+/// on a pixel's own samples would introduce bias. They are rendered twice: a few with the same number of samples in
+/// every pixel, which gives a first scale; then all of them with that scale, because a strategy that learns has less
+/// error with more samples to learn from.
 pub(super) fn scale<S: Strategy>(
     context: &RenderContext,
     strategy: &S,
     pass: &Pass<S>,
 ) -> Option<f32> {
-    /// The number of pixels of the picture per window. Scouts cost a fiftieth of the render, and less for large pictures.
+    /// The number of pixels of the picture per window. Scouts cost a fiftieth of the render, less for large pictures.
     const PIXELS_PER_WINDOW: usize = 20 * SCOUT_WINDOW * SCOUT_WINDOW;
     /// The minimum and maximum number of windows.
     const N_WINDOWS: [usize; 2] = [52, 1296];
@@ -126,8 +126,8 @@ pub(super) fn scale<S: Strategy>(
     mean_log(&scouts(n_windows, &pass), pass.n_samples, budget)
 }
 
-/// About `n` windows of `size` × `size` pixels, or as large as the picture allows, one at a random position in each cell of a
-/// grid.
+/// About `n` windows of `size` × `size` pixels, or as large as the picture allows, one at a random position in each
+/// cell of a grid.
 fn spread(width: usize, height: usize, size: usize, n: usize) -> Vec<Window> {
     let aspect = (width as f64 / height as f64).sqrt();
     let cells = |of: f64, extent: usize| ((n as f64).sqrt() * of).round().clamp(1.0, extent as f64);
@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use crate::strategy::levels::level;
 
-    /// Pixels like the scouts have as many samples on average as were asked for.
+    /// Pixels like the scouts get the requested number of samples on average.
     #[test]
     fn the_scale_spends_what_was_asked_for() {
         let mut pcg = Pcg32::new(1, 2);

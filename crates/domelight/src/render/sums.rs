@@ -22,7 +22,7 @@ pub(super) struct CameraSample {
 impl CameraSample {
     /// Attenuates the sample by the `throughput` of the surfaces in front.
     pub(super) fn through(self, throughput: Rgb) -> Self {
-        // What is not seen behind the scene hides its share.
+        // The surfaces in front cover the fraction of the background that they remove.
         let behind = if self.surface.is_some() { 0.0 } else { throughput.mean() };
         Self {
             color: self.color * throughput,
@@ -43,8 +43,8 @@ pub(super) struct SurfaceSample {
     pub(super) depth: f32,
 }
 
-/// Defines the sums of a pixel: for each, its type and the channels in which a checkpoint stores its bits, one channel per
-/// 32 bits. A checkpoint's digest hashes the channels in the order of the sums.
+/// Defines the sums of a pixel: for each, its type and the channels in which a checkpoint stores its bits, one channel
+/// per 32 bits. A checkpoint's digest hashes the channels in the order of the sums.
 macro_rules! pixel_sums {
     ($(#[$meta:meta])* { $($(#[$doc:meta])* $sum:ident: $type:ty = [$($word:literal)*],)* }) => {
         $(#[$meta])*
@@ -106,7 +106,7 @@ pixel_sums! {
         alpha: f32 = ["alpha.A"],
         n_hits: u32 = ["hits.Y"],
         n_samples: u32 = ["samples.Y"],
-        /// Those of the second set.
+        /// The number of samples in the second set.
         n_second: u32 = ["second.samples.Y"],
     }
 }
@@ -140,7 +140,7 @@ impl Words for f32 {
     }
 }
 
-/// The upper half of the bits, then the lower.
+/// The upper half of the bits, then the lower half.
 #[cfg(feature = "io")]
 impl Words for f64 {
     fn put_words(self, put: &mut impl FnMut(u32)) {
@@ -246,7 +246,7 @@ impl PixelSums {
         self.n_samples
     }
 
-    /// Samples of a set.
+    /// The number of samples in a set.
     pub(super) fn n_of(&self, set: SampleSet) -> u32 {
         match set {
             SampleSet::First => self.n_samples - self.n_second,
@@ -275,7 +275,7 @@ impl PixelSums {
         std::array::from_fn(|c| (self.color[c] - self.second[c]) / first - self.second[c] / second)
     }
 
-    /// The variance of the mean over that of the difference of the sets, for sets that err alike: a b / (a + b)².
+    /// The variance of the mean divided by that of the difference of the sets, for equally noisy sets: a b / (a + b)².
     fn balance(&self) -> f64 {
         let [first, second] =
             [SampleSet::First, SampleSet::Second].map(|set| f64::from(self.n_of(set)));
@@ -324,7 +324,7 @@ impl PixelSums {
         self.share(self.alpha)
     }
 
-    /// A sum over the number of samples; rounding does not carry it beyond 1.
+    /// A sum divided by the number of samples, clamped to 1 against rounding.
     fn share(&self, sum: f32) -> f32 {
         let mean = sum * self.scale();
         if sum <= self.n_samples as f32 { mean.min(1.0) } else { mean }
@@ -362,7 +362,7 @@ fn narrowed(x: f64) -> f32 {
 mod tests {
     use super::*;
 
-    /// The mean of an estimate that is sometimes negative is unbiased as it is, and not when it is clamped.
+    /// The mean of a sometimes negative estimate is unbiased, unless it is clamped.
     #[test]
     fn negative_means_are_kept() {
         let mut pixel = PixelSums::missed(0);
@@ -375,7 +375,7 @@ mod tests {
         assert_eq!(pixel.mean(pixel.unoccluded), Rgb::splat(-0.25));
     }
 
-    /// An estimate of a shadow that is sometimes below 0 or above 1 has its own mean, whatever the number of samples.
+    /// A shadow estimate that is sometimes below 0 or above 1 keeps its mean for any number of samples.
     #[test]
     fn means_of_shadows_are_kept_beyond_0_and_1() {
         let estimates = [-0.5, 0.25, 1.75, 0.5];
@@ -391,7 +391,7 @@ mod tests {
         };
         let of_one: f32 = estimates.iter().map(|&x| shown(&[x])).sum();
         assert_eq!(of_one / 4.0, shown(&estimates));
-        // What covers is not more than all there is.
+        // Coverage is at most 1.
         assert!((1..200).all(|n| shown(&vec![1.0; n]) <= 1.0));
     }
 }

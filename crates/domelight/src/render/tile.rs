@@ -40,8 +40,8 @@ impl Mark {
 #[derive(Clone, Debug)]
 pub(super) struct Tile {
     pub(super) window: Window,
-    /// Empty before the first sample, for of a shard's picture most tiles are others' work, and where nothing is to
-    /// be seen.
+    /// Empty before the first sample, because most tiles of a shard's picture belong to other shards, and where nothing
+    /// is visible.
     pixels: Vec<PixelSums>,
     /// The number of camera samples per pixel while `pixels` is empty.
     n_missed: u32,
@@ -88,7 +88,7 @@ pub(super) struct Scratch<S: Strategy> {
 }
 
 impl<S: Strategy> Scratch<S> {
-    /// What the pixels of the last tile showed.
+    /// The sample allocation of the last tile.
     pub(super) fn allocation(&self) -> &Allocation {
         &self.batch.allocation
     }
@@ -125,7 +125,7 @@ struct Batch {
     chosen: Vec<bool>,
     allocation: Allocation,
     rays: Vec<Ray>,
-    /// Which random numbers decide what each ray sees; none in scenes where all is opaque.
+    /// The random number keys that decide which surfaces each ray sees; empty if the whole scene is opaque.
     keys: Vec<SightKey>,
     sights: Sights,
     /// The camera rays of each pixel.
@@ -167,7 +167,7 @@ struct ShadowRays {
 }
 
 impl Tile {
-    /// Without samples.
+    /// Creates a tile without samples.
     pub(super) fn new(window: Window) -> Self {
         let counts = Counts::default();
         Self { window, pixels: Vec::new(), n_missed: 0, counts, changed: Mark::default() }
@@ -187,7 +187,7 @@ impl Tile {
         }
     }
 
-    /// Adds its pixels to `layers` of the pixels of `window`.
+    /// Adds its pixels to `layers`, which hold the pixels of `window`.
     pub(super) fn put_into(&self, layers: &mut Layers, window: Window, variance: &VarianceSums) {
         if self.pixels.is_empty() {
             layers.set_misses(self.n_missed, self.window, window);
@@ -206,7 +206,7 @@ impl Tile {
         *self = Self { pixels, ..Self::new(self.window) };
     }
 
-    /// Whether the tile has all its samples, or as few as the error allows, independent of other tiles.
+    /// Whether the tile has all its samples or has reached the target error, independent of other tiles.
     pub(super) fn is_finished(&self, settings: &RenderSettings) -> bool {
         let n_samples = self.n_samples();
         let precise =
@@ -220,8 +220,8 @@ impl Tile {
         self.pixels.first().map_or(self.n_missed.is_multiple_of(2), even)
     }
 
-    /// The relMSE according to the differences of the two sets, plus one standard error. Otherwise, a tile whose error is in a
-    /// few pixels would stop on the first lucky estimate.
+    /// The relMSE from the differences of the two sets, plus one standard error. Without the latter, a tile whose error
+    /// is in a few pixels would stop on the first lucky estimate.
     fn error(&self) -> f32 {
         let luminance: Vec<f32> = self.pixels.iter().map(PixelSums::luminance).collect();
         let (mut sum, mut sum_of_squares) = (0.0, 0.0);
@@ -263,7 +263,7 @@ impl Tile {
         batch.seen.clear();
         batch.seen.resize(n_pixels, false);
         self.find_seen(context, self.window, &mut batch.seen);
-        // Nothing visible: nothing to learn.
+        // Nothing is visible, so there is nothing to learn.
         let n_rounds = if batch.seen.contains(&true) { strategy.n_rounds() } else { 1 };
         let learns = n_rounds > 1;
         batch.adaptive = learns && pass.adaptive;
@@ -386,7 +386,7 @@ impl Tile {
         hash2(hash2(hash2(context.settings.seed, COVERAGE), pixel), set as u64)
     }
 
-    /// Marks the pixels of a part of the tile that may see something.
+    /// Marks the pixels that may see something in a part of the tile.
     fn find_seen(&self, context: &RenderContext, part: Window, seen: &mut [bool]) {
         /// Parts no larger than this are not divided further \[pixels\].
         const SMALL: usize = 4;
@@ -425,8 +425,8 @@ impl Tile {
         }
     }
 
-    /// Adds each camera sample to its pixel, in order, and lets the other pixels learn from them; returns how many are
-    /// not finite.
+    /// Adds each camera sample to its pixel, in order, and lets the other pixels learn from them. Returns the number of
+    /// non-finite samples.
     fn add_samples<S: Strategy>(
         &mut self,
         strategy_context: &StrategyContext<S>,
@@ -486,7 +486,7 @@ impl Tile {
 pub(super) const SECOND_SETS: f64 = 4.0 / 256.0;
 
 /// Whether a pixel of the picture has a second set of samples in strategies that place the rays of a pixel together:
-/// four pixels in a square of 16 by 16, all of one [`level`], which is each level's as often as it has pixels.
+/// four pixels in a square of 16 by 16, all of one [`level`], with each level as frequent as its pixels.
 fn has_second_set(seed: u64, x: usize, y: usize) -> bool {
     let hash = hash2(hash2(!seed, (x / 16) as u64), (y / 16) as u64);
     // 1, 1, 2, 4 and 8 pixels of 16 are of levels 0 to 4.
@@ -499,7 +499,7 @@ fn has_second_set(seed: u64, x: usize, y: usize) -> bool {
     if level(x, y) != of_square || (x / 4) % 2 != cell % 2 || (y / 4) % 2 != cell / 2 % 2 {
         return false;
     }
-    // One of those of its level in a square of 4 by 4.
+    // One of the pixels of its level in a square of 4 by 4.
     let place = |x: usize, y: usize| {
         (0..16).filter(|i| level(i % 4, i / 4) == of_square).position(|i| i == y % 4 * 4 + x % 4)
     };
@@ -507,7 +507,7 @@ fn has_second_set(seed: u64, x: usize, y: usize) -> bool {
     place(x, y) == Some((hash >> 8) as usize % n)
 }
 
-/// The numbers of a pixel's camera rays.
+/// The random numbers of a pixel's camera rays.
 struct CameraNumbers {
     film: SampleSequence,
     /// `None` for a camera without a lens.
@@ -673,9 +673,9 @@ impl Batch {
 }
 
 impl Batch {
-    /// The background, darkened by the missing light. The estimate of the missing light is zero if every ray is unoccluded, so
-    /// that no noise is added to the background.
-    fn shadow_sample(
+    /// The background, darkened by the missing light. The estimate of the missing light is zero if every ray is
+/// unoccluded, so that no noise is added to the background.
+fn shadow_sample(
         &self,
         context: &RenderContext,
         catcher: Catcher,

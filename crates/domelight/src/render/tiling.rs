@@ -129,8 +129,8 @@ impl Tiling {
         }
     }
 
-    /// Camera samples of the pass that begins at sample `start`: as many as the strategy says, or as went
-    /// before, up to as many as keep a tile's rays in the caches; no more than `left`.
+    /// The camera samples of the pass that begins at sample `start`: the number requested by the strategy, or as many
+    /// as before, limited so that a tile's rays fit in the caches, and at most `left`.
     pub(super) fn pass(
         &self,
         strategy: &impl Strategy,
@@ -154,11 +154,11 @@ impl Tiling {
     }
 }
 
-/// The pass that begins at sample `start` of a render with a target error, and its set: two passes of the same length,
-/// one for each set, then two of a quarter of what was spent by the last power of two, so that a tile ends near its
-/// target.
+/// The pass that begins at sample `start` of a render with a target error, and its set. Passes come in pairs of equal
+/// length, one per set; later ones have a quarter of the samples up to the last power of two, so that a tile ends near
+/// its target.
 pub(super) fn paired_pass(start: u32, n_samples: u32) -> (Range<u32>, SampleSet) {
-    /// Passes of a set.
+    /// The minimum length of a pass.
     const SHORTEST: u32 = 4;
     const FIRST: u32 = 8;
     const LONGEST: u32 = 64;

@@ -1,6 +1,6 @@
-//! Estimates how much less the samples of a render err than independent samples.
+//! Estimates the variance of a render's samples relative to independent samples.
 //!
-//! The mean of n independent samples with variance s² has the variance s²/n. Stratified samples err less, but their
+//! The mean of n independent samples with variance s² has the variance s²/n. Stratified samples have less, but their
 //! sample variance does not show by how much. Two measurements do:
 //!
 //! - **A second set** of samples in some pixels, independent of the first. The squared difference of the two means is
@@ -72,12 +72,13 @@ impl VarianceSums {
     }
 }
 
-/// In units of 2⁻⁶⁴.
+/// Converts to units of 2⁻⁶⁴.
 fn fixed(x: f64) -> i128 {
     (x * functions::powi(2f64, 64)) as i128
 }
 
-/// The ratio of the variance of the mean of n samples to s²/n, given the ratio of D² of the halves of the first N to s²/N.
+/// The ratio of the variance of the mean of n samples to s²/n, given the ratio of D² of the halves of the first N to
+/// s²/N.
 fn of_mean(n: u32, halves: f64) -> f64 {
     let last = n.max(2).ilog2() as i32 - 1;
     let prefix = functions::powi(2f64, last + 1);
@@ -99,8 +100,8 @@ fn of_mean(n: u32, halves: f64) -> f64 {
     0.25 * halves * sum * f64::from(n) / prefix
 }
 
-/// Beyond the samples, the ratio of successive details approaches ½ by this fraction of the remaining distance from one to
-/// the next, because rough pixels remain. Measured on three scenes.
+/// Beyond the samples, the ratio of successive details approaches ½ by this fraction of the remaining distance from one
+/// to the next, because rough pixels remain. Measured on three scenes.
 const RISE: f64 = 0.0625;
 
 /// The last detail. Each detail beyond the samples is at most half the previous one.

@@ -7,15 +7,14 @@ use crate::scene::Scene;
 #[derive(Default)]
 pub(crate) struct Scratch {
     occluded: Vec<bool>,
-    /// Rays that no opaque surface blocks: their indices in the batch and their transmittances.
+    /// Rays that no opaque surface occludes: their indices in the batch and their transmittances.
     free: RayBatch,
     numbers: Vec<u32>,
     transmittances: Vec<f32>,
 }
 
-/// Traces a batch of shadow rays to infinity. Sets `visibility[i]`, in [0, 1], of each ray: 0 where the scene blocks
-/// it, and the share that gets through where surfaces cover only a share; the length of `visibility` becomes that of the
-/// batch.
+/// Traces a batch of shadow rays to infinity. Sets `visibility[i]` of each ray, in [0, 1]: 0 if the scene occludes it,
+/// otherwise its transmittance through surfaces of partial coverage. `visibility` gets the length of the batch.
 pub(crate) fn trace(
     scene: &Scene,
     rays: &RayBatch,

@@ -10,7 +10,7 @@ use super::{
     Kernel, LANES, LaneMask, Lanes, Simd, SimdBitSets, SimdF32x8, SimdFloat, SimdI32x8, last_of,
 };
 
-/// Exists only where the processor has AVX2, and FMA and the bit instructions that came with it.
+/// Proof that the processor has AVX2, FMA and the bit instructions introduced with them.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(());
 

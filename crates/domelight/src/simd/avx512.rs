@@ -1,5 +1,5 @@
-//! x86-64 AVX-512: comparisons go to mask registers, there are twice as many registers, and sixteen numbers
-//! fit into one.
+//! x86-64 AVX-512: comparisons write mask registers, and there are twice as many registers, each with room for sixteen
+//! numbers.
 #![allow(unsafe_code)]
 #![allow(clippy::wildcard_imports)] // The intrinsics' names are distinctive enough.
 
@@ -11,7 +11,7 @@ use super::{
     last_of,
 };
 
-/// Exists only where the processor has AVX-512 F and VL, and FMA and the bit instructions of AVX2's time.
+/// Proof that the processor has AVX-512 F and VL, FMA and the bit instructions introduced with AVX2.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx512(());
 
@@ -249,7 +249,7 @@ macro_rules! real {
                     }
                 }
                 values.map(|value| {
-                    // SAFETY: the arguments prove AVX-512; `value` is as many readable f32 as a vector has, and the load
+                    // SAFETY: the arguments prove AVX-512; `value` has as many readable f32 as a vector, and the load
                     // needs no alignment.
                     Self(unsafe { $loadu(value.as_ptr()) })
                 })

@@ -7,7 +7,7 @@
 //! file like `avx2.rs`, or like `neon.rs` for half the width, and one line each in [`InstructionSet`] and [`dispatch`].
 //!
 //! Formulas are written over [`SimdFloat`], a scalar or a vector.
-#![cfg_attr(not(feature = "render"), allow(dead_code))] // Some of it serves rays alone.
+#![cfg_attr(not(feature = "render"), allow(dead_code))] // Some of it serves only rays.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -28,10 +28,10 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 pub(crate) use vector::{Colors, Vectors};
 
-/// Numbers in a vector.
+/// The number of lanes in a vector.
 pub(crate) const LANES: usize = 8;
 
-/// One number a lane.
+/// One number per lane.
 pub(crate) type Lanes = [f32; LANES];
 
 /// An instruction set for tracing rays and evaluating light.
@@ -77,10 +77,10 @@ impl InstructionSet {
     }
 }
 
-/// Work to be compiled for each instruction set.
+/// Code that is compiled for each instruction set.
 ///
-/// `run` and all that handles vectors below it must be `#[inline(always)]` functions: what is not
-/// inlined lacks the instructions and is slow, as is a closure over vectors.
+/// `run` and everything below it that handles vectors must be `#[inline(always)]` functions: code that is not inlined
+/// is compiled without the instructions and is slow, as are closures over vectors.
 pub(crate) trait Kernel {
     type Output;
     fn run<S: Simd>(self, simd: S) -> Self::Output;
@@ -115,8 +115,8 @@ pub(crate) fn dispatch<K: Kernel>(instruction_set: InstructionSet, kernel: K) ->
     kernel.run(scalar::Scalar)
 }
 
-/// An instruction set. A value of it, and any vector made with one, proves that the processor has
-/// the instructions.
+/// An instruction set. Any value of this type, and any vector created with it, proves that the processor has the
+/// instructions.
 pub(crate) trait Simd: Copy {
     type F32x8: SimdF32x8<I32x8 = Self::I32x8>;
     type I32x8: SimdI32x8<F32x8 = Self::F32x8>;
@@ -125,7 +125,7 @@ pub(crate) trait Simd: Copy {
 
     fn splat(self, x: f32) -> Self::F32x8;
     fn load(self, x: &Lanes) -> Self::F32x8;
-    /// Asks for memory that will be read soon.
+    /// Prefetches memory that will be read soon.
     fn prefetch<T>(self, x: &T);
     fn splat_i32(self, x: i32) -> Self::I32x8;
     fn load_i32(self, x: &[i32; LANES]) -> Self::I32x8;
@@ -147,7 +147,7 @@ pub(crate) trait Simd: Copy {
     }
 }
 
-/// A scalar or a vector, for which a formula is written once.
+/// A scalar or a vector, so that formulas are written once for both.
 pub trait SimdFloat:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
@@ -155,9 +155,9 @@ pub trait SimdFloat:
 
     /// `x` in every lane.
     fn splat(self, x: f32) -> Self;
-    /// self < b ? self : b; so b if either is NaN.
+    /// self < b ? self : b; hence b if either is NaN.
     fn min(self, b: Self) -> Self;
-    /// self > b ? self : b; so b if either is NaN.
+    /// self > b ? self : b; hence b if either is NaN.
     fn max(self, b: Self) -> Self;
     /// self ≤ b; false if either is NaN.
     fn le(self, b: Self) -> Self::Mask;
@@ -168,7 +168,7 @@ pub trait SimdFloat:
     fn sqrt(self) -> Self;
     /// mask ? a : b.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
-    /// A function of M numbers, one lane after the other: for what no instruction does.
+    /// Applies a function of M numbers lane by lane, for operations without an instruction.
     fn each<const M: usize, const N: usize>(
         arguments: [Self; M],
         f: impl FnMut([f32; M]) -> [f32; N],
@@ -184,7 +184,7 @@ pub trait SimdFloat:
         self.max(self.splat(0.0) - self)
     }
 
-    /// A function of one number, one lane after the other.
+    /// Applies a function of one number lane by lane.
     #[inline(always)]
     fn map(self, mut f: impl FnMut(f32) -> f32) -> Self {
         let [y] = Self::each([self], |[x]| [f(x)]);
@@ -195,17 +195,17 @@ pub trait SimdFloat:
 /// Eight f32.
 pub trait SimdF32x8: SimdFloat {
     type I32x8: SimdI32x8<F32x8 = Self>;
-    /// [`SimdF32x8::mul_sub`] is one instruction; else it takes many.
+    /// Whether [`SimdF32x8::mul_sub`] is one instruction.
     const FUSES: bool;
 
     fn store(self) -> Lanes;
-    /// Toward zero; of numbers beyond 2³¹ and NaN anything.
+    /// Rounds toward zero; unspecified for NaN and beyond 2³¹.
     fn to_i32(self) -> Self::I32x8;
-    /// a b − c of an exact product, rounded once where there is an instruction for it, else twice: for what does not
-    /// depend on the last bit.
+    /// a b − c with an exact product; rounded once if there is an instruction for it, otherwise twice. Use it only
+    /// where the last bit does not matter.
     #[must_use]
     fn mul_sub(self, b: Self, c: Self) -> Self;
-    /// Numbers of a table of N rows, a power of two, at `at` modulo 8 N.
+    /// Gathers numbers from a table of N rows, a power of two, at indices `at` modulo 8 N.
     fn gather<const N: usize>(table: &[Lanes; N], at: Self::I32x8) -> Self;
 
     /// The sum of all lanes, from the first to the last.
@@ -219,14 +219,14 @@ pub trait SimdF32x8: SimdFloat {
 pub(crate) trait SimdF32x16: SimdFloat {
     type Half: SimdF32x8;
 
-    /// The first eight, and the others.
+    /// Joins the first eight and the last eight.
     fn of(halves: [Self::Half; 2]) -> Self;
-    /// The first eight, and the others.
+    /// Stores the first eight and the last eight.
     fn store(self) -> [Lanes; 2];
-    /// The first eight plus the others.
+    /// The first eight plus the last eight.
     fn folded(self) -> Self::Half;
 
-    /// The sum of all lanes, of the halves' sum from the first to the last.
+    /// The sum of all lanes: first of the halves, then from the first lane to the last.
     #[inline(always)]
     fn sum(self) -> f32 {
         self.folded().sum()
@@ -243,7 +243,7 @@ pub trait SimdI32x8: Copy + Add<Output = Self> {
     fn lt(self, b: Self) -> <Self::F32x8 as SimdFloat>::Mask;
     fn to_f32(self) -> Self::F32x8;
     fn select(mask: <Self::F32x8 as SimdFloat>::Mask, a: Self, b: Self) -> Self;
-    /// The lanes that are kept at the front, then anything.
+    /// Moves the kept lanes to the front; the other lanes are unspecified.
     fn compress(self, keep: <Self::F32x8 as SimdFloat>::Mask) -> [i32; LANES];
     fn store(self) -> [i32; LANES];
 }
@@ -254,7 +254,7 @@ pub trait LaneMask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
     fn bits(self) -> u32;
 }
 
-/// For each set of lanes its members from the lowest, then anything.
+/// The members of each set of lanes, from the lowest; the remaining entries are unspecified.
 #[cfg(target_arch = "x86_64")]
 static COMPRESSED_LANES: [[u32; 8]; 256] = {
     let mut table = [[0; 8]; 256];
@@ -273,19 +273,19 @@ static COMPRESSED_LANES: [[u32; 8]; 256] = {
     table
 };
 
-/// [`SimdI32x8::compress`], one lane after the other.
+/// [`SimdI32x8::compress`], lane by lane.
 #[inline(always)]
 fn compress<T: Copy + Default>(lanes: [T; LANES], keep: u32) -> [T; LANES] {
     let (mut packed, mut len) = ([T::default(); LANES], 0);
     for (i, lane) in lanes.into_iter().enumerate() {
-        // Overwritten by the next if it is not kept; in bounds, for the compiler.
+        // The next lane overwrites this one if it is not kept. The modulo avoids a bounds check.
         packed[len % LANES] = lane;
         len += (keep >> i & 1) as usize;
     }
     packed
 }
 
-/// [`SimdBitSets::pack`], one lane after the other.
+/// [`SimdBitSets::pack`], lane by lane.
 #[inline(always)]
 fn pack(pair: [[u32; 8]; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
     let [a, b] = pair;
@@ -307,10 +307,10 @@ pub(crate) trait SimdBitSets: Copy {
     /// Adds `bit` to the sets of the lanes in `m`.
     #[must_use]
     fn insert(self, m: Self::Mask, bit: u32) -> Self;
-    /// Bit i: set i is not empty.
+    /// A bit mask: bit i is set if set i is not empty.
     fn not_empty(self) -> u32;
-    /// Moves the pairs of sets of which one is not empty, and the numbers of their lanes, to the front; also how
-    /// many they are.
+    /// Moves the pairs of sets that are not both empty, and the numbers of their lanes, to the front; also returns
+    /// their count.
     fn pack(pair: [Self; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize);
     fn store(self) -> [u32; 8];
 }

@@ -14,7 +14,7 @@ use super::{
     Kernel, LANES, LaneMask, Lanes, Simd, SimdBitSets, SimdF32x8, SimdFloat, SimdI32x8, last_of,
 };
 
-/// Exists only where the processor has NEON.
+/// Proof that the processor has NEON.
 #[derive(Clone, Copy)]
 pub(crate) struct Neon(());
 
@@ -149,7 +149,7 @@ impl SimdFloat for F32x8 {
         Self(x, x)
     }
 
-    // The instructions FMIN and FMAX treat NaN and −0 otherwise.
+    // The instructions FMIN and FMAX treat NaN and −0 differently.
     #[inline(always)]
     fn min(self, b: Self) -> Self {
         Self::select(self.lt(b), self, b)

@@ -1,5 +1,5 @@
-//! A model of the instructions of NEON that `neon.rs` is made of, one lane after the other, with the signatures of
-//! `std::arch::aarch64`: so that `neon.rs` is compiled and tested on other processors as well.
+//! A lane-by-lane model of the NEON instructions in `neon.rs`, with the signatures of `std::arch::aarch64`, so that
+//! `neon.rs` is compiled and tested on other processors as well.
 #![allow(unsafe_code)]
 #![allow(non_camel_case_types)] // The names of `std::arch`.
 
@@ -14,7 +14,7 @@ pub(super) struct int32x4_t([i32; 4]);
 #[derive(Clone, Copy)]
 pub(super) struct uint32x4_t([u32; 4]);
 
-/// Filling, loading, storing.
+/// Defines instructions that fill, load and store.
 macro_rules! memory {
     ($type:ident, $number:ident, $dup:ident, $load:ident, $store:ident) => {
         pub(super) fn $dup(x: $number) -> $type {
@@ -34,7 +34,7 @@ memory!(float32x4_t, f32, vdupq_n_f32, vld1q_f32, vst1q_f32);
 memory!(int32x4_t, i32, vdupq_n_s32, vld1q_s32, vst1q_s32);
 memory!(uint32x4_t, u32, vdupq_n_u32, vld1q_u32, vst1q_u32);
 
-/// A function of each lane.
+/// Defines functions of each lane.
 macro_rules! unary {
     ($name:ident, $from:ident, $to:ident, $f:expr) => {
         pub(super) fn $name(a: $from) -> $to {
@@ -47,7 +47,7 @@ unary!(vsqrtq_f32, float32x4_t, float32x4_t, f32::sqrt);
 unary!(vcvtq_f32_s32, int32x4_t, float32x4_t, |x| x as f32);
 unary!(vcvtq_s32_f32, float32x4_t, int32x4_t, |x| x as i32);
 
-/// A function of the lanes of two.
+/// Defines functions of the lanes of two vectors.
 macro_rules! binary {
     ($name:ident, $from:ident, $to:ident, $f:expr) => {
         pub(super) fn $name(a: $from, b: $from) -> $to {
@@ -78,13 +78,13 @@ pub(super) fn vfmaq_f32(a: float32x4_t, b: float32x4_t, c: float32x4_t) -> float
     float32x4_t(from_fn(|i| b.0[i].mul_add(c.0[i], a.0[i])))
 }
 
-/// The bits of b where those of the mask are set, else those of c.
+/// The bits of b where the mask is set, the bits of c elsewhere.
 pub(super) fn vbslq_f32(mask: uint32x4_t, b: float32x4_t, c: float32x4_t) -> float32x4_t {
     let bits = |i: usize| mask.0[i] & b.0[i].to_bits() | !mask.0[i] & c.0[i].to_bits();
     float32x4_t(from_fn(|i| f32::from_bits(bits(i))))
 }
 
-/// The same.
+/// The same for integers.
 pub(super) fn vbslq_s32(mask: uint32x4_t, b: int32x4_t, c: int32x4_t) -> int32x4_t {
     int32x4_t(from_fn(|i| mask.0[i] as i32 & b.0[i] | !mask.0[i] as i32 & c.0[i]))
 }

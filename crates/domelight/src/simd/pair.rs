@@ -1,10 +1,10 @@
-//! Sixteen numbers where a register has no more than eight: two vectors, one after the other.
+//! Sixteen numbers as two vectors, for instruction sets without wider registers.
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 use super::{LaneMask, Lanes, SimdF32x8, SimdF32x16, SimdFloat};
 
-/// The first eight, and the others.
+/// The first eight and the last eight numbers.
 #[derive(Clone, Copy)]
 pub(crate) struct Pair<T>(T, T);
 

@@ -1,4 +1,4 @@
-//! The reference: plain Rust, one lane after the other.
+//! The reference: plain Rust, lane by lane.
 
 use std::array::from_fn;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};

@@ -1,5 +1,5 @@
-//! WebAssembly SIMD: a vector is two registers of four. A module has the instructions or it does not, so there is
-//! nothing to ask for at run time, and the intrinsics are safe.
+//! WebAssembly SIMD: a vector is two registers of four. The instructions are a property of the module, so there is no
+//! run-time check, and the intrinsics are safe.
 
 use std::arch::wasm32::{
     f32x4, f32x4_add, f32x4_convert_i32x4, f32x4_demote_f64x2_zero, f32x4_div, f32x4_eq,
@@ -30,7 +30,7 @@ pub(crate) struct Mask8(v128, v128);
 #[derive(Clone, Copy)]
 pub(crate) struct BitSets8(v128, v128);
 
-/// The lanes of two registers of whole numbers.
+/// The lanes of two integer registers.
 #[inline(always)]
 fn lanes(a: v128, b: v128) -> [i32; LANES] {
     [
@@ -156,14 +156,14 @@ impl SimdFloat for F32x8 {
     }
 }
 
-/// a b − c of an exact product, of the first two lanes.
+/// a b − c with an exact product, for the first two lanes.
 #[inline(always)]
 fn mul_sub_low(a: v128, b: v128, c: v128) -> v128 {
     let [a, b, c] = [a, b, c].map(|x| f64x2_promote_low_f32x4(x));
     f32x4_demote_f64x2_zero(f64x2_sub(f64x2_mul(a, b), c))
 }
 
-/// The same of all four.
+/// The same for all four lanes.
 #[inline(always)]
 fn mul_sub(a: v128, b: v128, c: v128) -> v128 {
     let low = mul_sub_low(a, b, c);

@@ -1,4 +1,4 @@
-//! One number: the same formulas where vectors do not pay.
+//! One number: the same formulas where vectors do not help.
 
 use super::{LaneMask, SimdFloat};
 

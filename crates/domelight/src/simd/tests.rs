@@ -1,4 +1,4 @@
-//! Every operation of every instruction set against one number at a time, on numbers that hurt.
+//! Compares every operation of every instruction set with scalar code, on difficult numbers.
 
 use super::*;
 use crate::sampling::Pcg32;
@@ -27,7 +27,7 @@ fn operations<F: SimdFloat>(a: F, b: F) -> [F; 12] {
     ]
 }
 
-/// What the operations make of two vectors, as bits; any NaN is the same.
+/// The results of all operations on two vectors, as bits; all NaNs are equal.
 struct All {
     a: Lanes,
     b: Lanes,
@@ -62,7 +62,7 @@ impl Kernel for All {
     }
 }
 
-/// The same of sixteen numbers.
+/// The same for sixteen numbers.
 struct Sixteen {
     a: [Lanes; 2],
     b: [Lanes; 2],
@@ -84,7 +84,7 @@ impl Kernel for Sixteen {
     }
 }
 
-/// The same of whole numbers.
+/// The same for integers.
 struct Whole {
     a: [i32; LANES],
     b: [i32; LANES],
@@ -156,7 +156,7 @@ fn every_instruction_set_gives_the_same_bits() {
     }
     let mut pcg = Pcg32::new(3, 4);
     for _ in 0..5000 {
-        // Within what a single holds exactly, which `truncated` takes back.
+        // Within the integers that f32 represents exactly, so that `to_i32` restores them.
         let mut number = || pcg.next_u32() as i32 >> 8;
         let (a, b) = (std::array::from_fn(|_| number()), std::array::from_fn(|_| number()));
         let expected = dispatch(InstructionSet::Scalar, Whole { a, b });

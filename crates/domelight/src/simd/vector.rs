@@ -1,4 +1,4 @@
-//! Directions and colors side by side.
+//! Vectors of directions and colors.
 
 use super::{Lanes, Simd, SimdF32x8, SimdFloat};
 use crate::Rgb;
@@ -13,13 +13,13 @@ pub struct Vectors<F> {
 }
 
 impl<F: SimdFloat> Vectors<F> {
-    /// The scalar products with one vector.
+    /// The dot products with one vector.
     #[inline(always)]
     pub(crate) fn dot(self, v: Vec3) -> F {
         self.x * self.x.splat(v.x) + self.y * self.x.splat(v.y) + self.z * self.x.splat(v.z)
     }
 
-    /// The scalar products of pairs.
+    /// The pairwise dot products.
     #[inline(always)]
     pub(crate) fn dot_each(self, b: Self) -> F {
         self.x * b.x + self.y * b.y + self.z * b.z
@@ -30,7 +30,7 @@ impl<F: SimdFloat> Vectors<F> {
         self.dot_each(self)
     }
 
-    /// `v` in every lane, beside numbers that prove the instructions.
+    /// `v` in every lane of vectors like `like`.
     #[inline(always)]
     pub(crate) fn splat(like: F, v: Vec3) -> Self {
         Self { x: like.splat(v.x), y: like.splat(v.y), z: like.splat(v.z) }
@@ -53,7 +53,7 @@ impl<F: SimdFloat> Vectors<F> {
         Self { x: F::select(mask, x, b.x), y: F::select(mask, y, b.y), z: F::select(mask, z, b.z) }
     }
 
-    /// Each times a number.
+    /// Each vector times a number.
     #[inline(always)]
     pub(crate) fn times(self, f: F) -> Self {
         Self { x: self.x * f, y: self.y * f, z: self.z * f }
@@ -94,13 +94,13 @@ impl From<Vec3> for Vectors<f32> {
 pub struct Colors<F>(pub(crate) [F; 3]);
 
 impl<F: SimdFloat> Colors<F> {
-    /// `color` in every lane, beside numbers that prove the instructions.
+    /// `color` in every lane of vectors like `like`.
     #[inline(always)]
     pub(crate) fn splat(like: F, color: Rgb) -> Self {
         Self([like.splat(color.r), like.splat(color.g), like.splat(color.b)])
     }
 
-    /// Channel by channel with another.
+    /// Combines the channels of two colors.
     #[inline(always)]
     pub(crate) fn zip(self, b: Self, f: impl Fn(F, F) -> F) -> Self {
         let ([r, g, b], [r2, g2, b2]) = (self.0, b.0);
@@ -120,7 +120,7 @@ impl<F: SimdFloat> Colors<F> {
         Self([r * x, g * x, b * x])
     }
 
-    /// Luminance by Rec. 709.
+    /// The Rec. 709 luminance.
     #[inline(always)]
     pub(crate) fn luminance(self) -> F {
         let [r, g, b] = self.0;
@@ -129,7 +129,7 @@ impl<F: SimdFloat> Colors<F> {
     }
 }
 
-// Arrays of vectors are spelled out: `map` is too large to be inlined for certain.
+// Arrays of vectors are spelled out, because `map` may not be inlined.
 impl<F: SimdF32x8> Colors<F> {
     /// By channel.
     #[inline(always)]

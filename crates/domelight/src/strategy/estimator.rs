@@ -55,7 +55,7 @@ impl<'s, S: Strategy> Estimator<'s, S> {
             }
             let tile = TileShading { pixels: &self.pixels, ..*tile };
 
-            // Ask for shadow rays and trace them.
+            // Request shadow rays and trace them.
             self.rays.reset(tile.points.len());
             self.strategy.push(pass, &tile, round, &mut self.scratch, &mut self.rays);
             self.visibility.clear();

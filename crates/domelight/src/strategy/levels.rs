@@ -1,6 +1,6 @@
-//! The order of a tile's pixels: every fourth pixel of every fourth row, then the pixels in the middle of four known
-//! ones, then those between two rows and columns of known ones, and so on. Each level doubles the number of known
-//! pixels and is predicted from the coarser ones.
+//! The order of a tile's pixels: every fourth pixel of every fourth row, then the pixels at the centers of four known
+//! pixels, then the pixels between two known rows or columns, and so on. Each level doubles the number of known
+//! pixels and is predicted from the coarser levels.
 //!
 //! ```text
 //! 0 4 2 4 0
@@ -23,7 +23,7 @@ pub fn level(x: usize, y: usize) -> u32 {
 /// The pixels of lower levels next to pixel `i` of a tile with `width` columns and `n` pixels: four, or fewer at the
 /// border of the tile; none for a pixel of the first level.
 pub fn coarser(i: usize, width: usize, n: usize) -> impl Iterator<Item = usize> {
-    /// Columns and rows from a pixel in the middle of four, and from one between two rows or columns.
+    /// Offsets from a pixel at the center of four, and from a pixel between two rows or columns.
     const DIAGONAL: [(isize, isize); 4] = [(-1, -1), (1, -1), (-1, 1), (1, 1)];
     const STRAIGHT: [(isize, isize); 4] = [(-1, 0), (1, 0), (0, -1), (0, 1)];
     let (x, y) = (i % width, i / width);

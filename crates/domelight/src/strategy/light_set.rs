@@ -8,18 +8,18 @@ use crate::rig::{Rig, RigError};
 
 /// Σ f_r cos θ · E over the lights of a rig with irradiance E, with the same rays at every point.
 ///
-/// It is biased: shadows are sums of hard ones, and narrow lobes reflect the individual lights.
+/// It is biased: shadows are sums of hard shadows, and narrow lobes reflect the individual lights.
 #[derive(Clone, Debug)]
 pub struct LightSet {
     /// The lights.
     pub rig: Rig,
-    /// What their irradiance is a multiple of \[W·m⁻²\].
+    /// The unit of their irradiance \[W·m⁻²\].
     pub unit: f64,
 }
 
 impl LightSet {
-    /// The lights that `extract` makes of a map, in multiples of its unit: sums over texels near the limit of single
-    /// precision exceed it in watts.
+    /// The lights that `extract` finds in a map, in multiples of its unit: in watts, sums over texels near the limit of
+    /// single precision would exceed it.
     pub(crate) fn of(
         environment: &Environment,
         extract: impl FnOnce(&Environment) -> Result<Rig, RigError>,

@@ -179,7 +179,7 @@ impl PreparedStrategy<'_> {
     }
 }
 
-/// The same expression for the strategy inside, whichever it is.
+/// Evaluates the same expression for every strategy.
 macro_rules! each {
     ($strategy:expr, $s:ident => $body:expr) => {
         match $strategy {

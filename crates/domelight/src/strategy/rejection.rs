@@ -25,7 +25,7 @@
 //! * [`StoppingRule::Accepted`]: stop at the N-th acceptance or the M-th try. The unbiased estimate of a is
 //!   the probability that the *first* try was accepted given how the tries ended (Girshick, Mosteller & Savage
 //!   1946, "Unbiased Estimates for Certain Binomial Sampling Problems with Applications"): the fraction
-//!   of the paths to the end that begin so. That is (N − 1)/(T − 1) at the N-th (Haldane 1945, "On a
+//!   of the paths to the end that begin with an acceptance. That is (N − 1)/(T − 1) at the N-th (Haldane 1945, "On a
 //!   Method of Estimating Frequencies") and k/M if the tries ran out with k < N accepted. The accepted
 //!   directions are exchangeable and independent of T, so the estimate of a times C times the mean is
 //!   unbiased for any limit, however low. The tries must be independent, because a stratified sequence
@@ -260,8 +260,7 @@ impl<'a> RejectionSampling<'a> {
 }
 
 impl StoppingRule {
-    /// What each of the `accepted` directions weighs: the estimate of the probability to be kept,
-    /// over their number.
+    /// The weight of each `accepted` direction: the estimated acceptance probability divided by their number.
     fn share(self, tries: u32, accepted: u32) -> f32 {
         match self {
             Self::Accepted { n, .. } if accepted == n => {
@@ -306,8 +305,8 @@ impl PointStrategy for RejectionSampling<'_> {
 mod tests {
     use super::*;
 
-    /// The estimate of the probability to be kept is unbiased for every limit: the sum over all ends
-    /// of the walk of probability times estimate, exactly.
+    /// The estimated acceptance probability is unbiased for every limit: sums probability times estimate over all ends
+    /// of the walk exactly.
     #[test]
     fn the_limit_on_tries_does_not_bias() {
         for a in [0.01, 0.2, 0.5, 0.9, 1.0] {

@@ -369,7 +369,7 @@ impl StrategyOptions {
         Ok(())
     }
 
-    /// These options, with those of `other` where they are not given.
+    /// Fills missing options from `other`.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self {
@@ -400,7 +400,7 @@ impl StrategyOptions {
             ("tries", self.tries.is_some(), kind == K::Rejection, "rejection"),
             ("proposal", self.proposal.is_some(), kind == K::Rejection, "rejection"),
             ("lights", self.lights.is_some(), is_rig, "median-cut and variance-minimization"),
-            ("rays", self.rays.is_some(), !is_rig, "the strategies that have no lights"),
+            ("rays", self.rays.is_some(), !is_rig, "strategies without lights"),
         ];
         match misplaced.into_iter().find(|&(_, is_given, applies, _)| is_given && !applies) {
             Some((option, _, _, strategies)) => {

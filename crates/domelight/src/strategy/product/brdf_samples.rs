@@ -14,7 +14,7 @@ use crate::simd::{
     Colors, LANES, LaneMask as _, Lanes, Simd, SimdF32x8 as _, SimdFloat as _, Vectors, set_bits,
 };
 
-/// BRDF samples side by side: their shading frames and random numbers.
+/// The shading frames and random numbers of BRDF samples, one per lane.
 #[derive(Default)]
 pub(super) struct BrdfSamples {
     n: usize,
@@ -125,7 +125,7 @@ pub(super) struct BesideStrata<'a> {
     pub(super) n_brdf: f32,
 }
 
-/// The light that BRDF samples find on the map.
+/// The radiance of BRDF samples, looked up in the map.
 #[derive(Default)]
 struct LightLookup {
     /// Bit i: there is light for lane i.

@@ -36,7 +36,7 @@ pub(super) struct CandidateBlock {
 }
 
 impl CandidateBlock {
-    /// One of the candidates, of hit `hit`.
+    /// One of the candidates, for hit `hit`.
     #[inline(always)]
     pub(super) fn get(&self, lane: usize, hit: u32) -> Candidate {
         Candidate {

@@ -78,7 +78,7 @@ pub(super) fn get(slots: &CellArray, slot: usize) -> f32 {
     slots[slot / LANES % TABLE_ROWS][slot % LANES]
 }
 
-/// The number in a slot, to be changed.
+/// A mutable reference to the number in a slot.
 #[inline(always)]
 pub(super) fn get_mut(slots: &mut CellArray, slot: usize) -> &mut f32 {
     &mut slots[slot / LANES % TABLE_ROWS][slot % LANES]
@@ -87,7 +87,7 @@ pub(super) fn get_mut(slots: &mut CellArray, slot: usize) -> &mut f32 {
 /// The number of search steps replaced by a look-up.
 const KNOWN_DEPTH: u32 = 6;
 
-/// Texels are divided at most into squares of 2⁻⁸ of their side.
+/// Texels are divided into squares of at least 2⁻⁸ of their side.
 const FINEST: i32 = -8;
 
 /// A square of the map.
@@ -131,9 +131,9 @@ enum Link {
 pub(super) struct Cells {
     /// The number of rows per lane.
     rows: usize,
-    /// Along the curve.
+    /// The cells, along the curve.
     squares: Vec<Square>,
-    /// The four quarters of each square that was split, by row; the first is the whole.
+    /// The four quarters of each split square, by row; the first square is the whole map.
     links: Vec<[Link; 4]>,
     /// The number of levels from the map to its texels.
     depth: u32,
@@ -143,9 +143,9 @@ pub(super) struct Cells {
     pub(super) center: [Box<CellArray>; 3],
     /// The angular radius.
     pub(super) radius: Box<CellArray>,
-    /// For each normal spread in [`NORMAL_SPREADS`].
+    /// The ramps for each normal spread in [`NORMAL_SPREADS`].
     ramps: [Ramp; NORMAL_SPREADS.len()],
-    /// No direction of the cell is further from its center than this \[rad\].
+    /// No direction of the cell is farther from its center than this \[rad\].
     pub(super) bounding_angle: Box<CellArray>,
     /// ∫ luminance dω; 0 if there is no cell.
     pub(super) mass: Box<CellArray>,
@@ -301,7 +301,7 @@ impl Cells {
         get(&self.mass, self.slot(cell))
     }
 
-    /// The cell that `wi` looks up, in this texel (column and row); `None` if there is no light.
+    /// The cell in direction `wi`, which is in this texel (column and row); `None` if there is no light.
     #[inline]
     pub(super) fn at_texel(
         &self,
@@ -330,7 +330,7 @@ impl Cells {
         }
     }
 
-    /// The cell that `wi` looks up, and the radiance from there.
+    /// The cell in direction `wi`, and its radiance.
     #[cfg(test)]
     pub(super) fn find(&self, environment: &Environment, wi: Vec3) -> Option<(usize, Rgb)> {
         let texel = environment.texel_at(wi);
@@ -349,7 +349,7 @@ impl Cells {
         mut u: f64,
         jitter: [f32; 2],
     ) -> (Vec3, Rgb) {
-        /// Levels below the cell that the curve is followed for, if not to single texels.
+        /// The number of levels below the cell to which the curve is followed, unless it reaches single texels first.
         const BELOW: i32 = 3;
         let map = Map { environment };
         let mut square = self.squares[cell];
@@ -361,7 +361,7 @@ impl Cells {
             let at = u * d;
             // Avoid branches, because they are mispredicted.
             let mut i = usize::from(at >= a) + usize::from(at >= b) + usize::from(at >= c);
-            // Rounding may lead past the last that has any mass.
+            // Rounding may lead past the last quarter with mass.
             while masses[i] <= 0.0 && i > 0 {
                 i -= 1;
             }
@@ -383,22 +383,22 @@ struct Map<'a> {
 }
 
 impl Map<'_> {
-    /// All of the map; none of a black one.
+    /// The whole map; `None` if it is black.
     fn root(&self) -> Option<Square> {
         let table = self.environment.table()?;
-        // A map of two to one is visited from its left to its right half.
+        // A 2:1 map is visited from its left to its right half.
         let state = HilbertState::SWAPPED;
         let (size, mass) = (table.depth() as i32, table.total() as f32);
         Some(Square { size, column: 0, row: 0, state, mass })
     }
 
-    /// Along the curve.
+    /// The quarters of a square, along the curve.
     fn quarters(&self, square: &Square) -> [Square; 4] {
         let masses = self.masses(square);
         std::array::from_fn(|i| square.quarter(i, masses[i]))
     }
 
-    /// Those of the quarters.
+    /// The masses of the quarters.
     fn masses(&self, &Square { size, column, row, state, mass }: &Square) -> [f32; 4] {
         let masses = match self.environment.table() {
             Some(table) if size > 0 => table.quarters(size as usize, column as usize, row as usize),
@@ -410,7 +410,7 @@ impl Map<'_> {
         })
     }
 
-    /// Its rectangle of the map, in texels: columns and rows, from and to.
+    /// The rectangle of a square on the map, in texels: columns and rows, start and end.
     fn rectangle(&self, square: &Square) -> [[f64; 2]; 2] {
         let side = functions::exp2(f64::from(square.size));
         let span =
@@ -419,7 +419,7 @@ impl Map<'_> {
         [span(square.column, map.width), span(square.row, map.height)]
     }
 
-    /// The mean direction of its light in the map's frame, times the square's mass.
+    /// The mean direction of a square's light in the map's frame, times its mass.
     fn moment(&self, square: &Square, depth: u32) -> Vec3 {
         if square.mass == 0.0 {
             return Vec3::ZERO;
@@ -431,7 +431,7 @@ impl Map<'_> {
         self.quarters(square).iter().map(|q| self.moment(q, depth - 1)).sum()
     }
 
-    /// Its solid angle, and 1 − |∫ ω dω| over it.
+    /// The solid angle a of a square, and 1 − |∫ ω dω|/a.
     fn area(&self, square: &Square) -> (f64, f64) {
         let [columns, rows] = self.rectangle(square);
         let width = (columns[1] - columns[0]) * TAU / self.environment.map().width as f64;
@@ -462,7 +462,7 @@ impl Map<'_> {
         let middle = self.environment.map_direction(0.5 * (x0 + x1), 0.5 * (y0 + y1));
         let center = moment.try_normalize().unwrap_or(middle);
         let bounding_angle = self.farthest(square, center);
-        // The light's variance along one axis, and the half side of a square that has it.
+        // The light's variance along one axis, and half the side of a square with this variance.
         let variance = 0.5 * (1.0 - functions::powi((moment.length() / square.mass).min(1.0), 2));
         let radius = (3.0 * variance).sqrt().max(0.5 * bounding_angle);
         let up = self.environment.orientation().up;
@@ -472,8 +472,8 @@ impl Map<'_> {
 
     /// The angle from `center` to the farthest point of a square.
     ///
-    /// Along a parallel it is at the column farthest from the center's. Along that meridian the cosine
-    /// is A sin θ + B cos θ, which is least at an end, or where it has its one minimum.
+    /// Along a parallel, it is at the column farthest from the center's. Along that meridian, the cosine is
+    /// A sin θ + B cos θ, which is smallest at an end or at its only minimum.
     fn farthest(&self, square: &Square, center: Vec3) -> f32 {
         let [columns, rows] = self.rectangle(square);
         let azimuth = |v: Vec3| functions::atan2(f64::from(v.x), f64::from(-v.z));
@@ -503,7 +503,7 @@ fn wrapped(angle: f64) -> f64 {
 /// The squares during splitting.
 struct Tree {
     nodes: Vec<Node>,
-    /// The children of each square that was split, one after the other, by row; those without light are left out.
+    /// The children of each split square, by row; children without light are left out.
     links: Vec<[Option<usize>; 4]>,
 }
 
@@ -539,7 +539,7 @@ impl Tree {
         tree
     }
 
-    /// How many of its splits were made with `most` leaves at most.
+    /// The number of splits made while there were at most `most` leaves.
     fn n_splits(&self, most: usize) -> usize {
         let mut n_cells = 1;
         let made = self.links.iter().take_while(|children| {
@@ -556,7 +556,7 @@ fn may_split(n_cells: usize, most: usize) -> bool {
     n_cells + 3 <= most
 }
 
-/// A square waiting to be split; the earlier node first among equals.
+/// A square waiting to be split; ties go to the earlier node.
 struct Next {
     priority: f64,
     node: usize,
@@ -611,13 +611,13 @@ mod tests {
         assert!(Cells::new(&Environment::constant(Rgb::BLACK).unwrap(), [MAX_ROWS]).is_none());
     }
 
-    /// The masses add up to the whole, and each is the light that a direction finds in it.
+    /// The masses add up to the whole, and each equals the light found in its cell.
     #[test]
     fn cells_partition_the_light() {
         let of_rows = |rows| environments().into_iter().map(move |(name, env)| (name, env, rows));
         for (name, environment, rows) in of_rows(32).chain(of_rows(MAX_ROWS)) {
             let [cells] = Cells::new(&environment, [rows]).unwrap();
-            // Cut together with finer ones they are the same.
+            // Cells built together with finer ones are the same.
             let [together, _] = Cells::new(&environment, [rows, MAX_ROWS]).unwrap();
             assert_eq!((&together.mass, &together.known), (&cells.mass, &cells.known), "{name}");
             assert!((100..=rows * LANES).contains(&cells.len()), "{name}: {}", cells.len());
@@ -644,7 +644,7 @@ mod tests {
                     let (cell, le) = cells.find(&environment, wi).unwrap();
                     assert_eq!(le, *texel, "{name}");
                     found[cell] += f64::from(le.luminance()) * solid_angle;
-                    // No direction lies further from the center than the bounding angle.
+                    // No direction is farther from the center than the bounding angle.
                     let center =
                         Vec3::from(cells.center.each_ref().map(|c| get(c, cells.slot(cell))));
                     let bounding_angle = get(&cells.bounding_angle, cells.slot(cell));
@@ -658,7 +658,7 @@ mod tests {
         }
     }
 
-    /// What is drawn lies in its cell, follows the light, and keeps the order of the numbers.
+    /// Samples are in their cell, follow the light, and keep the order of the random numbers.
     #[test]
     fn directions_are_drawn_by_luminance_along_the_curve() {
         let mut pcg = Pcg32::new(5, 6);
@@ -673,7 +673,7 @@ mod tests {
                     let jitter = [pcg.next_f32(), pcg.next_f32()];
                     let (wi, le) = cells.draw(&environment, cell, u, jitter);
                     assert!(le.luminance() > 0.0);
-                    // A direction that rounding took over an edge is in the cell a little further in.
+                    // A direction moved across an edge by rounding is in the cell slightly farther inside.
                     let map = Map { environment: &environment };
                     let [[x0, x1], [y0, y1]] = map.rectangle(&cells.squares[cell]);
                     let middle = environment.map_direction(0.5 * (x0 + x1), 0.5 * (y0 + y1));

@@ -88,8 +88,8 @@ impl ControlVariate {
         }
     }
 
-    /// Weights the glossy part as strata are weighted against BRDF samples: a cell whose light is as dense as `share`
-    /// times the pixel's mean counts half.
+    /// Weights the glossy part like strata against BRDF samples: a cell whose light is as dense as `share` times the
+    /// pixel's mean counts half.
     #[inline(always)]
     pub(super) fn balance<S: Simd>(&mut self, simd: S, cells: &Cells, share: f32) {
         if self.tint.is_none() || share == 0.0 {
@@ -184,7 +184,7 @@ mod tests {
     use crate::strategy::ShadingPoint;
     use testkit::ZTest;
 
-    /// The candidates of a pixel of some hits with all that is known of them.
+    /// The candidates of a pixel with several hits, and the data to check them.
     struct Draw<'a> {
         environment: &'a Environment,
         cells: &'a Cells,
@@ -195,7 +195,7 @@ mod tests {
     }
 
     impl Kernel for Draw<'_> {
-        /// Σ V̂ W, Σ V̂ h L/p, and what that is expected to be.
+        /// Σ V̂ W, Σ V̂ h L/p, and the expectation of the latter.
         type Output = [Rgb; 3];
 
         #[inline(always)]
@@ -235,8 +235,8 @@ mod tests {
         }
     }
 
-    /// The expectation of what is taken from the candidates is what is added: for materials of all kinds of lobes,
-    /// hits of several normals, any visibility; and of broad lobes it is most of their light.
+    /// The sum subtracted from the candidates has the added integral as its expectation, for all kinds of lobes, hits
+    /// with several normals, and any visibility. For broad lobes, it is most of their light.
     #[test]
     fn what_is_taken_is_added() {
         let environment = sky();

@@ -1,6 +1,6 @@
 //! The light sample pool: directions toward the light, redrawn for each pass and shared by its pixels.
 //!
-//! Sampling the map costs a walk through its pyramid and a direction, and a pixel needs a few hundred. So
+//! Sampling the map costs a walk through its pyramid and a direction, and a pixel needs a few hundred samples. So
 //! each cell has 32 or 16 precomputed directions, stratified along the curve within the cell, and a
 //! stratum in the cell uses the direction at its position. The estimate of a pixel is unbiased over the
 //! pools; all pixels of a pass share the error of its pool.
@@ -179,8 +179,8 @@ mod tests {
         dispatch(InstructionSet::best(), At { pool, slot, u })
     }
 
-    /// The mean over a cell's directions of any function over the density is its integral; of the
-    /// radiance's luminance exactly the mass.
+    /// The mean over a cell's directions of any function divided by the density is its integral; for the radiance's
+    /// luminance, it is exactly the mass.
     #[test]
     fn the_pool_stands_for_the_light() {
         let environment = sky();

@@ -102,7 +102,7 @@ impl Rays<'_> {
         chosen.resize(lights.len() * LANES + 1, CandidateIndex::default());
         let mut n_chosen = 0;
         for index in assignment.indices() {
-            // Overwritten by the next unless it is chosen.
+            // The next one overwrites this unless it is chosen.
             chosen[n_chosen] = index;
             let selection_probability =
                 lights[index.lane / LANES].selection_probabilities[index.lane % LANES];

@@ -15,17 +15,17 @@
 
 use crate::simd::{LANES, Simd, SimdF32x8, SimdFloat, SimdI32x8};
 
-/// π = 1: probabilities are whole numbers of 2⁻²⁴, so that their running sum is exact.
+/// π = 1: probabilities are multiples of 2⁻²⁴, so that their running sum is exact.
 const ONE: u32 = 1 << 24;
 
-/// π of a candidate whose size W_j g_j/τ is given: positive where the size is.
+/// π of a candidate with size W_j g_j/τ: positive if the size is.
 #[inline(always)]
 pub(super) fn probability(size: f32) -> u32 {
     let rounded = (size.min(1.0) * (ONE - 1) as f32) as u32;
     if size > 0.0 { rounded + 1 } else { 0 }
 }
 
-/// [`probability`] of candidates side by side.
+/// [`probability`] of several candidates.
 #[inline(always)]
 pub(super) fn probabilities<S: Simd>(simd: S, size: S::F32x8) -> [i32; LANES] {
     let rounded = (size.min(simd.splat(1.0)) * simd.splat((ONE - 1) as f32)).to_i32();
@@ -47,7 +47,7 @@ pub(super) struct SystematicSampler {
 }
 
 impl SystematicSampler {
-    /// From an offset in [0, 1).
+    /// Starts at an offset in [0, 1).
     pub(super) fn new(offset: f32) -> Self {
         Self { sum: (offset * ONE as f32) as u32 }
     }
@@ -67,7 +67,7 @@ mod tests {
     use crate::sampling::Pcg32;
     use testkit::ZTest;
 
-    /// The sum over the chosen of x/π is the sum over all of x, for any x.
+    /// The expected sum of x/π over the chosen candidates is the sum of x over all, for any x.
     #[test]
     fn systematic_sampling_is_unbiased() {
         let mut pcg = Pcg32::new(3, 4);
@@ -89,7 +89,7 @@ mod tests {
         }
     }
 
-    /// The number chosen of n candidates with π = p is n p, give or take one.
+    /// Of n candidates with π = p, n p are chosen, up to a difference of one.
     #[test]
     fn the_choice_is_systematic() {
         let mut sampler = SystematicSampler::new(0.3);

@@ -159,7 +159,7 @@ impl Table {
         }
     }
 
-    /// D(h) cos θ_i/(4 σ_o σ_i), of GGX or with tails (1 + t/3)⁻⁴ that are near to a Gaussian's, where
+    /// D(h) cos θ_i/(4 σ_o σ_i), for GGX or with tails (1 + t/3)⁻⁴ close to those of a Gaussian, where
     /// t = (h_x²/a_x² + h_y²/a_y²)/h_z² for h = ω_i + ω_o.
     #[inline(always)]
     fn add_slopes<S: Simd, const GAUSSIAN: bool, const CONTROL_VARIATE: bool>(
@@ -222,8 +222,8 @@ impl Table {
         }
     }
 
-    /// (1 + v/3σ²)⁻⁴/(2πσ²) of the versine v to the mirror direction, with σ² = 1/n: near to a
-    /// Gaussian of the power's variance.
+    /// (1 + v/3σ²)⁻⁴/(2πσ²) of the versine v to the mirror direction, with σ² = 1/n: close to a Gaussian with the
+    /// variance of the power.
     #[inline(always)]
     fn add_mirror<S: Simd, const CONTROL_VARIATE: bool>(
         &mut self,
@@ -446,7 +446,7 @@ mod tests {
         }
     }
 
-    /// Where a stratum falls.
+    /// Finds the cell of a stratum.
     struct Find<'a> {
         cells: &'a Cells,
         table: &'a Table,
@@ -475,8 +475,8 @@ mod tests {
         }
     }
 
-    /// A stratum at random falls into a cell with the probability of its width, and directions drawn
-    /// there have the density that candidates are weighed by.
+    /// A random stratum is in a cell with probability proportional to the cell's width, and directions sampled there
+    /// have the density by which candidates are weighted.
     #[test]
     fn strata_follow_the_table() {
         const M: usize = 7;
@@ -514,7 +514,7 @@ mod tests {
         }
     }
 
-    /// Wherever any hit of the pixel reflects light there is a chance to look.
+    /// Wherever any hit of the pixel reflects light, the density is positive.
     #[test]
     fn the_table_leaves_nothing_out() {
         let environment = sky();
@@ -527,7 +527,7 @@ mod tests {
                 let u = crate::math::vec2((0.618 * i as f32).fract(), i as f32 / 20_000.0);
                 let wi = crate::sampling::warp::uniform_sphere(u);
                 let Some((cell, le)) = cells.find(&environment, wi) else { continue };
-                // A glossy pixel has samples of its materials as well.
+                // A glossy pixel also has BRDF samples.
                 let left_to_table = |at: &ShadingPoint| {
                     let (f, pdf) = at.eval_pdf(wi);
                     !(f * le).is_black() && (name.starts_with("diffuse") || pdf == 0.0)

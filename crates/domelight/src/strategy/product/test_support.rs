@@ -1,4 +1,4 @@
-//! What the tests of several steps look at.
+//! Hits and environments for tests.
 
 use crate::bsdf::{Bsdf, MaterialSpec};
 use crate::environment::builtin::BuiltinProbe;
@@ -6,7 +6,7 @@ use crate::environment::{Environment, Orientation};
 use crate::math::{Frame, Vec3, vec3};
 use crate::strategy::ShadingPoint;
 
-/// A hit seen from 39° beside its normal, of a material in the notation of the command line.
+/// A hit seen 39° from its normal, with a material in the notation of the command line.
 pub(super) fn hit(bsdf: &str, normal: Vec3) -> ShadingPoint {
     let bsdf = Bsdf::from(bsdf.parse::<MaterialSpec>().unwrap());
     let frame = Frame::from_z_and_tangent(normal.normalize(), Vec3::X);

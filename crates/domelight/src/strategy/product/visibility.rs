@@ -60,7 +60,7 @@ impl Blocks {
         y / BLOCK * self.width + x / BLOCK
     }
 
-    /// The blocks that share an edge with a block, or the block itself where there is none.
+    /// The blocks that share an edge with a block; the block itself stands in for missing ones.
     fn neighbors(self, block: usize) -> [usize; 4] {
         let (x, y) = (block % self.width, block / self.width);
         [
@@ -169,7 +169,7 @@ fn sum<S: Simd>(simd: S, counts: &[CellArray], row: usize) -> S::F32x8 {
     sum
 }
 
-/// A row's counts in a block and, less, about it. Rows follow each other along the curve.
+/// A row's counts in a block and, with lower weight, around it. Rows follow each other along the curve.
 #[inline(always)]
 fn around<S: Simd>(
     simd: S,
@@ -188,7 +188,7 @@ fn around<S: Simd>(
         sum = sum + beside * simd.load(&counts[block][row + 1]);
     }
     for &neighbor in neighbors {
-        // A block without a neighbor on a side refers to itself there, and is not counted again.
+        // A block without a neighbor on a side refers to itself there; do not count it again.
         let share = simd.splat(if neighbor == block { 0.0 } else { NEIGHBOR });
         sum = sum + share * simd.load(&counts[neighbor][row]);
     }
@@ -233,7 +233,7 @@ mod tests {
         let mut pcg = Pcg32::new(1, 1);
         for _ in 0..200_000 {
             let (block, cell) = (pcg.next_u32() as usize % 8, pcg.next_u32() as usize % 100);
-            // Cell c is free c times of 100.
+            // Cell c is unoccluded with probability c/100.
             let is_free = pcg.next_f32() * 100.0 < cell as f32;
             visibility_stats.count(block, cell, if is_free { 1.0 } else { 0.0 });
         }
