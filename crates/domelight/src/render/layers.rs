@@ -92,8 +92,8 @@ layers! {
     color: RgbImage = "color" {
         file: Some(""), channels: ["R", "G", "B"], |sums, _scale| sums.mean(sums.color)
     }
-    /// Coverage: the fraction of camera samples that hit the scene, with the mean of `shadow`; 1 where the background is
-    /// shown.
+    /// Coverage: the fraction of camera samples that hit the scene, with the mean of `shadow`; 1 where the background
+    /// is shown.
     alpha: Vec<f32> = "alpha" { file: Some(""), channels: ["A"], |sums, _scale| sums.alpha() }
     /// Like `color`, but with every shadow ray unoccluded: the lecture's L_ns.
     unoccluded: RgbImage = "unoccluded" {

@@ -674,8 +674,8 @@ impl Batch {
 
 impl Batch {
     /// The background, darkened by the missing light. The estimate of the missing light is zero if every ray is
-/// unoccluded, so that no noise is added to the background.
-fn shadow_sample(
+    /// unoccluded, so that no noise is added to the background.
+    fn shadow_sample(
         &self,
         context: &RenderContext,
         catcher: Catcher,
