@@ -1,4 +1,4 @@
-//! NumPy arrays in and out: anything array-like comes in as C-contiguous `float32`, without a copy where it is that.
+//! NumPy arrays in and out: anything array-like becomes C-contiguous `float32`, without a copy if it already is.
 
 use domelight::math::{Vec3, vec3};
 use numpy::{
@@ -10,14 +10,14 @@ use pyo3::types::PyDict;
 
 use crate::error::bad_value;
 
-/// An array of `float32` that the caller lent.
+/// A borrowed array of `float32`.
 pub(crate) struct Floats<'py> {
     name: &'static str,
     array: PyReadonlyArrayDyn<'py, f32>,
 }
 
 impl<'py> Floats<'py> {
-    /// From anything that `numpy.asarray` makes real numbers of.
+    /// Converts anything that `numpy.asarray` turns into real numbers.
     pub(crate) fn new(name: &'static str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
         let array = as_array(name, value, "float32", "fiub", "real numbers")?;
         Ok(Self { name, array: array.cast_into::<PyArrayDyn<f32>>()?.try_readonly()? })
@@ -31,12 +31,12 @@ impl<'py> Floats<'py> {
         Ok(self.array.as_slice()?)
     }
 
-    /// The shape as Python writes it.
+    /// The shape in Python notation.
     pub(crate) fn shape_text(&self) -> String {
         shape_text(self.shape())
     }
 
-    /// An error that names the array, its shape and what it must be.
+    /// An error that names the array, its shape and the expected shape.
     pub(crate) fn bad_shape(&self, expected: &str) -> PyErr {
         bad_value(format!("{} has shape {}; it must be {expected}", self.name, self.shape_text()))
     }
@@ -92,7 +92,7 @@ impl<'py> Floats<'py> {
     }
 }
 
-/// `numpy.asarray` in C order, of numbers of some kinds.
+/// `numpy.asarray` in C order, for numbers of the given kinds.
 fn as_array<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
@@ -116,7 +116,7 @@ fn as_array<'py>(
         wrong
     })?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
-    // NumPy calls an empty list an array of doubles.
+    // NumPy converts an empty list to an array of doubles.
     let is_empty = array.getattr("size")?.extract::<usize>()? == 0;
     let is_known = kinds.contains(&kind) || (is_empty && kind == "f");
     if !is_known {
@@ -147,7 +147,7 @@ pub(crate) fn indices(
     Ok((array.as_slice()?.iter().map(|&i| i as u32).collect(), array.shape().to_vec()))
 }
 
-/// A shape as Python writes it.
+/// A shape in Python notation.
 pub(crate) fn shape_text(shape: &[usize]) -> String {
     match shape {
         [one] => format!("({one},)"),
@@ -155,11 +155,11 @@ pub(crate) fn shape_text(shape: &[usize]) -> String {
     }
 }
 
-/// Two arrays of finite rows side by side; one of them may be a single row for all.
+/// Pairs of finite rows from two arrays; one of them may be a single row for all.
 pub(crate) struct Pairs<'a, const A: usize, const B: usize> {
     a: &'a [[f32; A]],
     b: &'a [[f32; B]],
-    /// The shape of the result but for its last axis.
+    /// The shape of the result, except for its last axis.
     pub(crate) lead: Vec<usize>,
 }
 
@@ -209,7 +209,7 @@ pub(crate) fn rows<'py, const K: usize>(
     array(py, rows.into_flattened(), &shape)
 }
 
-/// A picture (height, width, 3) as the library's.
+/// Converts an array (height, width, 3) to the library's picture.
 pub(crate) fn image(floats: &Floats<'_>) -> PyResult<domelight::RgbImage> {
     let (rows, lead) = floats.rows::<3>().map_err(|_| floats.bad_shape("(height, width, 3)"))?;
     let &[height, width] = lead else { return Err(floats.bad_shape("(height, width, 3)")) };
@@ -217,7 +217,7 @@ pub(crate) fn image(floats: &Floats<'_>) -> PyResult<domelight::RgbImage> {
     Ok(domelight::RgbImage::new(width, height, pixels))
 }
 
-/// The library's picture as (height, width, 3).
+/// Converts the library's picture to an array (height, width, 3).
 pub(crate) fn from_image<'py>(
     py: Python<'py>,
     image: &domelight::RgbImage,

@@ -15,10 +15,10 @@ use crate::lobe::PythonLobe;
 /// A sum of reflectance lobes in the local frame, whose z axis is the shading normal.
 ///
 /// `wo` points toward the viewer, `wi` toward the light; both are unit vectors away from the surface. Values are
-/// f_r * cos(theta_i), the cosine inside, and densities are per solid angle [sr^-1]; both are 0 where a direction lies
-/// at or below the surface.
+/// f_r * cos(theta_i), including the cosine, and densities are per solid angle [sr^-1]; both are 0 for directions at or
+/// below the surface.
 ///
-/// `Bsdf.parse` and `Bsdf.custom` make one.
+/// Created by `Bsdf.parse` and `Bsdf.custom`.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Bsdf {
     pub(crate) inner: bsdf::Bsdf,
@@ -61,40 +61,40 @@ type FloatArray<'py> = Bound<'py, PyArrayDyn<f32>>;
 
 #[pymethods]
 impl Bsdf {
-    /// A BSDF from its text, such as 'diffuse:0.8', 'phong:50:1:0.5', 'ggx:0.2:gold' or 'gltf:1,0.8,0.6:0:0.5'.
+    /// Parse a BSDF from a text such as 'diffuse:0.8', 'phong:50:1:0.5', 'ggx:0.2:gold' or 'gltf:1,0.8,0.6:0:0.5'.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     If the text is none; the message says what may stand there.
+    ///     If the text is invalid; the message lists what is allowed.
     #[classmethod]
     fn parse(_cls: &Bound<'_, PyType>, text: &str) -> PyResult<Self> {
         Self::from_text(text)
     }
 
-    /// A BSDF of one's own, from functions of arrays.
+    /// Create a custom BSDF from functions of arrays.
     ///
     /// Parameters
     /// ----------
     /// eval : callable
     ///     `eval(wo, wi)` takes two arrays (N, 3) of local directions above the surface and returns f_r * cos(theta_i)
-    ///     [sr^-1], not negative, as (N, 3) or (N,).
+    ///     [sr^-1], nonnegative, as (N, 3) or (N,).
     /// pdf : callable, optional
     ///     `pdf(wo, wi)` returns the density of `sample` [sr^-1], (N,), positive wherever the value is.
     /// sample : callable, optional
-    ///     `sample(wo, u)` takes uniform numbers (N, 3) and returns directions (N, 3); one that points below the
-    ///     surface is a sample of value 0. Without `pdf` and `sample` directions are cosine-weighted.
+    ///     `sample(wo, u)` takes uniform numbers (N, 3) and returns directions (N, 3); directions below the surface are
+    ///     samples with value 0. Without `pdf` and `sample`, directions are cosine-weighted.
     /// albedo : float or array_like, shape (3,), default 0.5
-    ///     The reflected fraction of uniform light, roughly.
+    ///     The approximate reflected fraction of uniform light.
     /// max_eval : float, optional
-    ///     An upper bound of the values; the strategy 'rejection' needs it.
+    ///     An upper bound of the values, required by the strategy 'rejection'.
     /// roughness : float, optional
-    ///     The GGX alpha of a lobe about the mirror direction that is about as wide; it guides 'product'.
+    ///     The GGX alpha of a lobe of similar width about the mirror direction; it guides 'product'.
     ///
     /// Notes
     /// -----
-    /// Strategies written in Python evaluate such a BSDF for all points of a tile at once; the built-in ones call it
-    /// direction by direction, which is slow. The functions are kept until the program ends.
+    /// Strategies written in Python evaluate such a BSDF for all points of a tile at once; built-in strategies call it
+    /// for one direction at a time, which is slow. The functions are kept until the program ends.
     #[classmethod]
     #[pyo3(signature = (eval, pdf = None, sample = None, *, albedo = None, max_eval = None, roughness = None))]
     fn custom(
@@ -148,7 +148,7 @@ impl Bsdf {
         Ok(Self { inner, text: None, lobe: Some(lobe) })
     }
 
-    /// Values for pairs of directions.
+    /// Evaluate pairs of directions.
     ///
     /// Parameters
     /// ----------
@@ -199,15 +199,15 @@ impl Bsdf {
         Ok((rows(py, values, &pairs.lead)?, array(py, densities, &pairs.lead)?))
     }
 
-    /// Draw directions toward the light.
+    /// Sample directions toward the light.
     ///
     /// Parameters
     /// ----------
     /// wo : array_like, shape (..., 3)
     ///     Local unit vectors toward the viewer.
     /// u : array_like, shape (..., 3)
-    ///     Uniform numbers in [0, 1): two for the direction, the third for the choice of a lobe. BSDFs of a single lobe
-    ///     also take (..., 2).
+    ///     Uniform numbers in [0, 1): two for the direction, the third to choose a lobe. BSDFs with a single lobe also
+    ///     take (..., 2).
     ///
     /// Returns
     /// -------
@@ -216,7 +216,7 @@ impl Bsdf {
     /// weight : ndarray, shape (..., 3)
     ///     f_r * cos(theta_i) / pdf.
     /// pdf : ndarray, shape (...)
-    ///     Density [sr^-1]. All three are 0 where there is no sample: such a sample counts, with value 0.
+    ///     Density [sr^-1]. If there is no sample, all three are 0; it still counts as a sample with value 0.
     fn sample<'py>(
         &self,
         wo: &Bound<'py, PyAny>,
@@ -245,7 +245,7 @@ impl Bsdf {
         Ok((rows(py, wi, &lead)?, rows(py, weight, &lead)?, array(py, pdf, &lead)?))
     }
 
-    /// ndarray, shape (3,): the reflected fraction of uniform light, roughly.
+    /// ndarray, shape (3,): approximate reflected fraction of uniform light.
     #[getter]
     fn albedo<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
         array(py, self.inner.albedo().to_array().to_vec(), &[3])
@@ -269,7 +269,7 @@ impl Bsdf {
 }
 
 impl Bsdf {
-    /// Directions, weights and densities; zeros where nothing is drawn.
+    /// Directions, weights and densities; zeros where there is no sample.
     fn draw(&self, py: Python<'_>, wo: &[[f32; 3]], u: &[[f32; 3]]) -> PyResult<Vec<Drawn>> {
         let weighed = |wi: [f32; 3], value: Rgb, pdf: f32| {
             let is_sample = pdf > 0.0 && pdf.is_finite();
@@ -294,12 +294,12 @@ impl Bsdf {
     }
 }
 
-/// What a mesh is made of: the same BSDF everywhere.
+/// The material of a mesh: the same BSDF everywhere.
 ///
 /// Parameters
 /// ----------
 /// bsdf : Bsdf or str
-///     The reflectance, or its text as of `Bsdf.parse`.
+///     The reflectance, or a text as in `Bsdf.parse`.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Material {
     #[pyo3(get)]
@@ -341,7 +341,7 @@ impl Material {
         Ok(Self { bsdf })
     }
 
-    /// A material from the text of its BSDF; see `Bsdf.parse`.
+    /// Parse a material from the text of its BSDF; see `Bsdf.parse`.
     #[classmethod]
     fn parse(cls: &Bound<'_, PyType>, text: &str) -> PyResult<Self> {
         Self::new(cls.py(), MaterialLike::Text(text.to_owned()))

@@ -18,13 +18,13 @@ use crate::error::{bad_value, from_source, warn};
 use crate::render::{Choice, Job, Keywords, choose};
 use crate::scene::{CameraLike, Scene};
 
-/// Ends the work on a signal or when a function of Python's has raised, and keeps the warnings.
+/// Ends the work on a signal or after a Python function has raised, and keeps the warnings.
 struct PythonHost<'a> {
     job: &'a Job,
     choices: &'a [(String, Choice)],
     cancel: &'a AtomicBool,
     warnings: Mutex<Vec<String>>,
-    /// The share of the work that is done, in [0, 1], and what is at work.
+    /// The finished fraction, in [0, 1], and the current step.
     state: Mutex<(f64, String)>,
 }
 
@@ -34,7 +34,7 @@ impl PythonHost<'_> {
     }
 }
 
-/// Keeps how far the work is.
+/// Records the progress.
 struct Progress<'a>(&'a PythonHost<'a>);
 
 impl WorkProgress for Progress<'_> {
@@ -61,7 +61,7 @@ impl Host for PythonHost<'_> {
     }
 }
 
-/// A comparison as a dictionary; `domelight.compare` documents it and makes a `Comparison` of it.
+/// A comparison as a dictionary; `domelight.compare` documents it and converts it to a `Comparison`.
 #[pyfunction]
 pub(crate) fn compare<'py>(
     py: Python<'py>,
@@ -151,7 +151,7 @@ pub(crate) fn compare<'py>(
             let (sender, results) = mpsc::channel();
             scope.spawn(move || {
                 let compared = pool(job.n_threads()).and_then(|pool| caught(|| pool.install(run)));
-                // Whoever waits is there.
+                // The receiver is still waiting.
                 let _ = sender.send(compared);
             });
             wait(&results, cancel, &report_progress)

@@ -1,8 +1,8 @@
-//! How the engine is called: without holding the interpreter, in a pool of threads of its own, interruptible, and with
-//! panics as exceptions.
+//! Calls the engine: without holding the interpreter, in its own thread pool, interruptible, and with panics converted
+//! to exceptions.
 //!
-//! Every call has its own pool: a pool that outlives the call would be dead after `fork`, and the child would wait
-//! for it forever.
+//! Every call has its own pool, because a pool that outlives the call would be dead after `fork`, and the child would
+//! wait for it forever.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,10 +15,10 @@ use rayon::ThreadPool;
 
 use crate::error::{bad_value, from_panic};
 
-/// How often a waiting call looks for signals and reports progress.
+/// The interval at which a waiting call checks for signals and reports progress.
 const POLL: Duration = Duration::from_millis(10);
 
-/// Threads of a pool: as many as asked for, else the cores that the process may use.
+/// The number of threads of a pool: the requested number, otherwise the cores available to the process.
 pub(crate) fn n_threads(asked: Option<usize>) -> PyResult<usize> {
     match asked {
         Some(n) if (1..=1024).contains(&n) => Ok(n),
@@ -27,7 +27,7 @@ pub(crate) fn n_threads(asked: Option<usize>) -> PyResult<usize> {
     }
 }
 
-/// A pool of threads.
+/// A thread pool.
 pub(crate) fn pool(n_threads: usize) -> PyResult<ThreadPool> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build();
     pool.map_err(|error| PyRuntimeError::new_err(format!("cannot start the threads: {error}")))
@@ -43,7 +43,7 @@ pub(crate) fn parallel<T: Send>(py: Python<'_>, f: impl FnOnce() -> T + Send) ->
     parallel_on(py, None, f)
 }
 
-/// Computes without holding the interpreter, on as many threads as asked for, else on all cores.
+/// Computes without holding the interpreter, on the requested number of threads, otherwise on all cores.
 pub(crate) fn parallel_on<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,
@@ -56,14 +56,14 @@ pub(crate) fn parallel_on<T: Send>(
     })
 }
 
-/// The result, or the panic as an exception.
+/// Returns the result, or a panic as an exception.
 pub(crate) fn caught<T>(f: impl FnOnce() -> T) -> PyResult<T> {
     catch_unwind(AssertUnwindSafe(f)).map_err(|panic| from_panic(&*panic))
 }
 
-/// Waits for a result; to be called without holding the interpreter. A signal raises `cancel`, whereupon the result is
+/// Waits for a result; call it without holding the interpreter. A signal sets `cancel`, after which the result is
 /// expected soon; the second value is then the exception that the signal's handler raised. `progress` is called
-/// meanwhile.
+/// periodically.
 pub(crate) fn wait<T>(
     results: &Receiver<T>,
     cancel: &AtomicBool,

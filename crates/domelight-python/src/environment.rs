@@ -16,10 +16,10 @@ use crate::arrays::{Floats, array, from_image, image, rows};
 use crate::engine::{alone, parallel};
 use crate::error::{bad_value, from_source, to_python, warn};
 
-/// The texels of a map beyond which loading is refused: the library's limit for pictures.
+/// The maximum number of rows of a built-in map, from the library's limit for pictures.
 const MAX_ROWS: usize = 16_384;
 
-/// The axis that a text names.
+/// Parses the name of an axis.
 pub(crate) fn up_axis(text: &str) -> PyResult<UpAxis> {
     match text {
         "y" => Ok(UpAxis::Y),
@@ -28,7 +28,7 @@ pub(crate) fn up_axis(text: &str) -> PyResult<UpAxis> {
     }
 }
 
-/// The text that names an axis.
+/// The name of an axis.
 pub(crate) fn up_name(up: UpAxis) -> &'static str {
     match up {
         UpAxis::Y => "y",
@@ -36,22 +36,22 @@ pub(crate) fn up_name(up: UpAxis) -> &'static str {
     }
 }
 
-/// Radiance from every direction, and a way to draw directions in proportion to its luminance.
+/// The radiance from every direction, with sampling in proportion to luminance.
 ///
 /// Parameters
 /// ----------
 /// map : array_like, shape (H, W, 3)
-///     Radiance of a latitude-longitude map, linear Rec. 709 [W m^-2 sr^-1], finite and not negative.
-///     The first row faces the up axis; the center column looks toward -Z (toward +Y where z is up), and
-///     columns go to the right as seen from inside.
+///     Radiance of a latitude-longitude map, linear Rec. 709 [W m^-2 sr^-1], finite and nonnegative. The first row
+///     faces the up axis; the center column faces -Z (or +Y if z is up), and columns go to the right as seen from
+///     inside.
 /// rotation : float, default 0
 ///     Rotation about the up axis [degrees], counterclockwise seen from above.
 /// scale : float, default 1
-///     Factor on the radiance, not negative.
+///     Factor on the radiance, nonnegative.
 /// up : {'y', 'z'}, default 'y'
 ///     The world axis that the first row faces.
 /// name : str, optional
-///     What the environment is called in files and messages.
+///     The name of the environment in files and messages.
 ///
 /// Raises
 /// ------
@@ -75,13 +75,13 @@ impl Environment {
         Ok(Self { inner: Arc::new(inner.map_err(to_python)?), name })
     }
 
-    /// Radiance in watts, whatever the map's unit.
+    /// Converts radiance from the map's unit to watts.
     fn watts(&self, radiance: Rgb) -> [f32; 3] {
         watts(&self.inner, radiance)
     }
 }
 
-/// Radiance in watts, whatever the map's unit.
+/// Converts radiance from the map's unit to watts.
 fn watts(environment: &environment::Environment, radiance: Rgb) -> [f32; 3] {
     match environment.unit() {
         1.0 => radiance.to_array(),
@@ -89,14 +89,14 @@ fn watts(environment: &environment::Environment, radiance: Rgb) -> [f32; 3] {
     }
 }
 
-/// A light probe's map from a file, its light as warnings say.
+/// Loads a light probe's map from a file, and issues its warnings.
 pub(crate) fn load_map(py: Python<'_>, path: PathBuf, options: ProbeOptions) -> PyResult<RgbImage> {
     let probe = parallel(py, || load_probe(&path, &options))?.map_err(to_python)?;
     warn(py, &probe.warnings)?;
     Ok(probe.image)
 }
 
-/// A built-in probe's map.
+/// The map of a built-in probe.
 pub(crate) fn builtin_map(py: Python<'_>, name: &str, height: usize) -> PyResult<RgbImage> {
     let probe: BuiltinProbe = name.parse().map_err(|e| from_source(&e))?;
     if !(1..=MAX_ROWS).contains(&height) {
@@ -129,7 +129,7 @@ impl Environment {
     /// path : str or os.PathLike
     ///     A picture: .hdr, .exr, .pfm, .png or .jpg.
     /// rotation, scale, up
-    ///     As of the class.
+    ///     As in the class.
     /// mapping : str, optional
     ///     The layout, such as 'latlong', 'angular' or 'cube-cross'; guessed by default.
     /// layer : str, optional
@@ -146,12 +146,12 @@ impl Environment {
     /// OSError
     ///     If the file cannot be read.
     /// ValueError
-    ///     If it is damaged or no light probe.
+    ///     If it is damaged or not a light probe.
     ///
     /// Warns
     /// -----
     /// DomelightWarning
-    ///     If texels were repaired, or the format holds nothing brighter than white.
+    ///     If texels were repaired, or the format cannot store values above white.
     #[classmethod]
     #[pyo3(signature = (path, *, rotation = 0.0, scale = 1.0, up = "y", mapping = None, layer = None, strict = false))]
     fn load(
@@ -174,16 +174,16 @@ impl Environment {
         Self::build(py, map, orientation, scale, name)
     }
 
-    /// A probe made in code: 'sky', 'studio', 'cathedral' or 'constant'.
+    /// Create a built-in probe: 'sky', 'studio', 'cathedral' or 'constant'.
     ///
     /// Parameters
     /// ----------
     /// name : str
-    ///     Which one.
+    ///     The name of the probe.
     /// rows : int, default 1024
     ///     Rows of the map, which has twice as many columns.
     /// rotation, scale, up
-    ///     As of the class.
+    ///     As in the class.
     #[classmethod]
     #[pyo3(signature = (name, *, rows = 1024, rotation = 0.0, scale = 1.0, up = "y"))]
     fn builtin(
@@ -200,13 +200,12 @@ impl Environment {
         Self::build(py, map, orientation, scale, name.to_owned())
     }
 
-    /// The environment of a Mitsuba 3 emitter, or of a picture in its layout.
+    /// Convert a Mitsuba 3 emitter, or a picture in its layout.
     ///
     /// Parameters
     /// ----------
     /// source : mitsuba.Emitter or mitsuba.Bitmap
-    ///     An `envmap` or `constant` of an RGB variant, or a latitude-longitude picture whose first column looks
-    ///     toward -Z.
+    ///     An `envmap` or `constant` of an RGB variant, or a latitude-longitude picture whose first column faces -Z.
     ///
     /// Returns
     /// -------
@@ -217,7 +216,7 @@ impl Environment {
     /// ImportError
     ///     If Mitsuba is not installed.
     /// ValueError
-    ///     If it is another emitter, or turned otherwise than about +Y, or about +Z with the first row up.
+    ///     If it is another emitter, or rotated about an axis other than +Y, or +Z with the first row up.
     #[classmethod]
     fn from_mitsuba<'py>(
         cls: &Bound<'py, PyType>,
@@ -227,7 +226,7 @@ impl Environment {
         interop.call_method1("environment_from_mitsuba", (source,))
     }
 
-    /// A description of the environment for `mitsuba.load_dict`.
+    /// Describe the environment for `mitsuba.load_dict`.
     ///
     /// Returns
     /// -------
@@ -242,7 +241,7 @@ impl Environment {
         slf.py().import("domelight._interop")?.call_method1("environment_to_mitsuba", (slf,))
     }
 
-    /// ndarray, shape (H, W, 3): radiance of each texel [W m^-2 sr^-1], a copy.
+    /// ndarray, shape (H, W, 3): a copy of each texel's radiance [W m^-2 sr^-1].
     #[getter]
     fn map<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         if self.inner.unit() == 1.0 {
@@ -252,7 +251,7 @@ impl Environment {
         rows(py, pixels.iter().map(|&p| self.watts(p)).collect(), &[height, width])
     }
 
-    /// ndarray, shape (H,): solid angle of a texel of each row [sr], exact.
+    /// ndarray, shape (H,): exact solid angle of a texel in each row [sr].
     #[getter]
     fn solid_angles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let n = self.inner.map().height;
@@ -278,7 +277,7 @@ impl Environment {
         up_name(self.inner.orientation().up)
     }
 
-    /// str: what the environment is called.
+    /// str: the name of the environment.
     #[getter]
     fn name(&self) -> &str {
         &self.name
@@ -290,7 +289,7 @@ impl Environment {
         self.inner.power() * self.inner.unit()
     }
 
-    /// The same environment rotated further about its up axis.
+    /// Return the environment rotated further about its up axis.
     ///
     /// Parameters
     /// ----------
@@ -302,19 +301,19 @@ impl Environment {
         Ok(Self { inner: Arc::new(inner), name: self.name.clone() })
     }
 
-    /// The same environment with its radiance multiplied by a factor.
+    /// Return the environment with its radiance multiplied by a factor.
     ///
     /// Parameters
     /// ----------
     /// factor : float
-    ///     Finite and not negative.
+    ///     Finite and nonnegative.
     fn scaled(&self, py: Python<'_>, factor: f32) -> PyResult<Self> {
         let inner = self.inner.clone();
         let inner = parallel(py, || (*inner).clone().scaled(factor))?.map_err(to_python)?;
         Ok(Self { inner: Arc::new(inner), name: self.name.clone() })
     }
 
-    /// Draw directions in proportion to luminance.
+    /// Sample directions in proportion to luminance.
     ///
     /// Parameters
     /// ----------
@@ -326,16 +325,15 @@ impl Environment {
     /// wi : ndarray, shape (..., 3)
     ///     Unit vectors toward the light, in the world.
     /// radiance : ndarray, shape (..., 3)
-    ///     Radiance from there [W m^-2 sr^-1].
+    ///     Radiance from these directions [W m^-2 sr^-1].
     /// pdf : ndarray, shape (...)
-    ///     Density [sr^-1], equal to `pdf(wi)` to the bit. All three are 0 where nothing could be drawn, as of a
-    ///     black map.
+    ///     Density [sr^-1], bit-identical to `pdf(wi)`. All three are 0 if there is no sample, as for a black map.
     fn sample<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Samples<'py>> {
         let draw = |u: [f32; 2]| self.inner.sample(u.into());
         samples(&self.inner, u, draw)
     }
 
-    /// Radiance from directions, constant over each texel.
+    /// Look up the radiance from directions, constant over each texel.
     ///
     /// Parameters
     /// ----------
@@ -371,7 +369,7 @@ impl Environment {
         densities(wi, |w| self.inner.pdf(w.into()))
     }
 
-    /// The directions of points of the map.
+    /// Convert points on the map to directions.
     ///
     /// Parameters
     /// ----------
@@ -392,7 +390,7 @@ impl Environment {
         rows(py, values, lead)
     }
 
-    /// The points of the map that directions look at: the inverse of `directions`.
+    /// Convert directions to points on the map: the inverse of `directions`.
     ///
     /// Parameters
     /// ----------
@@ -448,14 +446,14 @@ impl Environment {
     }
 }
 
-/// What a pickled environment consists of: map, rotation, unit, axis and name.
+/// The parts of a pickled environment: map, rotation, unit, axis and name.
 type Pickled<'py> = (Bound<'py, PyArrayDyn<f32>>, f32, f64, &'static str, String);
 
 /// Directions, radiance and densities.
 type Samples<'py> =
     (Bound<'py, PyArrayDyn<f32>>, Bound<'py, PyArrayDyn<f32>>, Bound<'py, PyArrayDyn<f32>>);
 
-/// Draws a sample for each pair of uniform numbers.
+/// Draws one sample per pair of uniform numbers.
 fn samples<'py>(
     environment: &environment::Environment,
     u: &Bound<'py, PyAny>,
@@ -474,7 +472,7 @@ fn samples<'py>(
     Ok((rows(py, wi, lead)?, rows(py, le, lead)?, array(py, pdf, lead)?))
 }
 
-/// A density at each direction.
+/// The density of each direction.
 fn densities<'py>(
     wi: &Bound<'py, PyAny>,
     pdf: impl Fn([f32; 3]) -> f32 + Send + Sync,
@@ -486,18 +484,18 @@ fn densities<'py>(
     array(py, values, lead)
 }
 
-/// A density of one's own over the texels of an environment.
+/// A custom density over the texels of an environment.
 ///
 /// Parameters
 /// ----------
 /// environment : Environment
-///     Whose texels.
+///     The environment.
 /// weights : array_like, shape (H, W)
-///     Density of each texel up to a common factor, per solid angle; finite, not negative, not all zero.
+///     Density of each texel per solid angle, up to a common factor; finite, nonnegative, not all zero.
 ///
 /// Notes
 /// -----
-/// Where a weight is 0 and the radiance is not, this density alone is biased; combine it with another one.
+/// If a weight is 0 but the radiance is not, this density alone is biased; combine it with another density.
 ///
 /// Raises
 /// ------
@@ -526,7 +524,7 @@ impl Density {
         Ok(Self { density: density.map_err(|e| from_source(&e))?, environment })
     }
 
-    /// Draw directions from the density.
+    /// Sample directions from the density.
     ///
     /// Parameters
     /// ----------
@@ -536,7 +534,7 @@ impl Density {
     /// Returns
     /// -------
     /// wi, radiance, pdf
-    ///     As of `Environment.sample`.
+    ///     As in `Environment.sample`.
     fn sample<'py>(&self, u: &Bound<'py, PyAny>) -> PyResult<Samples<'py>> {
         let draw = |u: [f32; 2]| self.density.sample(&self.environment, u.into());
         samples(&self.environment, u, draw)

@@ -15,21 +15,21 @@ pyo3::create_exception!(
     domelight,
     DomelightWarning,
     PyUserWarning,
-    "What a picture or a map lacks, or what was repaired in it."
+    "A picture or map lacks something, or was repaired."
 );
 pyo3::create_exception!(
     domelight,
     RenderInterrupted,
     PyKeyboardInterrupt,
-    "A render was interrupted; the attribute `film` holds what was done."
+    "A render was interrupted; the attribute `film` holds the samples so far."
 );
 
-/// An error of the library: `OSError` where the system said no, else `ValueError`.
+/// Converts an error of the library to `OSError` for system errors, otherwise to `ValueError`.
 pub(crate) fn to_python(error: impl Into<domelight::Error>) -> PyErr {
     from_source(&error.into())
 }
 
-/// As [`to_python`], of any error.
+/// Like [`to_python`], for any error.
 pub(crate) fn from_source(error: &(dyn StdError + 'static)) -> PyErr {
     let text = error.to_string();
     let mut source = Some(error);
@@ -62,7 +62,7 @@ pub(crate) fn from_panic(panic: &(dyn std::any::Any + Send)) -> PyErr {
     PyRuntimeError::new_err(format!("internal error of domelight, please report it: {text}"))
 }
 
-/// Issues warnings, each of which may become an exception.
+/// Issues warnings, which may raise exceptions.
 pub(crate) fn warn(py: Python<'_>, warnings: &[String]) -> PyResult<()> {
     for text in warnings {
         let text = CString::new(text.replace('\0', "\u{fffd}"))?;

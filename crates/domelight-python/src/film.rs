@@ -36,50 +36,50 @@ fn layer<'py>(py: Python<'py>, layers: &Layers, layer: &LayerInfo) -> PyResult<B
     })
 }
 
-/// The exposure [stops] that makes the median of what a picture covers middle gray.
+/// The exposure [stops] that maps the median of the covered pixels to middle gray.
 pub(crate) fn automatic_exposure_of(layers: &Layers) -> f32 {
     let coverage: Vec<f32> = layers.n_hits.iter().map(|&n| n as f32).collect();
     Exposure::Auto.stops(&layers.color, Some(&coverage))
 }
 
-/// A rendered picture in layers. `render` and `progressive` make them.
+/// A rendered picture in layers, returned by `render` and `progressive`.
 ///
-/// `film[name]` is a new array of a layer:
+/// `film[name]` is a new array with a layer:
 ///
 /// ============  =========  =========================================================================
-/// name          shape      what
+/// name          shape      content
 /// ============  =========  =========================================================================
-/// 'color'       (H, W, 3)  direct light and the background where it is shown [W m^-2 sr^-1], premultiplied by alpha
-/// 'alpha'       (H, W)     the share of camera samples that hit the scene; 1 where the background is shown
-/// 'unoccluded'  (H, W, 3)  as color with every shadow ray free
-/// 'shadow'      (H, W, 3)  the share of the background that shadows take away on ground that catches them
-/// 'albedo'      (H, W, 3)  reflectance of what is seen
-/// 'normal'      (H, W, 3)  mean shading normal in the world, not normalized; 0 where nothing was hit
-/// 'depth'       (H, W)     mean distance from the camera's plane over the samples that hit
+/// 'color'       (H, W, 3)  direct light and any visible background [W m^-2 sr^-1], premultiplied by alpha
+/// 'alpha'       (H, W)     the fraction of camera samples that hit the scene; 1 where the background is shown
+/// 'unoccluded'  (H, W, 3)  like color, but with every shadow ray unoccluded
+/// 'shadow'      (H, W, 3)  the fraction of the background that shadows remove on a shadow catcher
+/// 'albedo'      (H, W, 3)  reflectance of the visible surfaces
+/// 'normal'      (H, W, 3)  mean world-space shading normal, not normalized; 0 without hits
+/// 'depth'       (H, W)     mean distance from the camera plane over the samples that hit
 /// 'variance'    (H, W, 3)  estimated variance of each pixel's mean
-/// 'samples'     (H, W)     camera samples (uint32)
-/// 'hits'        (H, W)     those that hit the scene (uint32)
+/// 'samples'     (H, W)     number of camera samples (uint32)
+/// 'hits'        (H, W)     number of camera samples that hit the scene (uint32)
 /// ============  =========  =========================================================================
 ///
-/// Arrays are float32 but for the counts; row 0 is the top. Films can be pickled and compared: they are equal if all sums
-/// behind them are, to the bit.
+/// Arrays are float32, except for the counts; row 0 is the top. Films can be pickled and compared: they are equal if
+/// their underlying sums are bit-identical.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Film {
     sums: render::Film,
     pub(crate) counts: Counts,
     pub(crate) complete: bool,
-    /// Camera samples that each pixel is to have.
+    /// The target number of camera samples per pixel.
     n_samples: u32,
-    /// The strategy's text, with what a pilot chose.
+    /// The strategy's text, with the pilot's choices.
     strategy: String,
     /// How the picture was made: names and values.
     provenance: Vec<(String, String)>,
-    /// The background was left out.
+    /// Whether the background is hidden.
     hidden: bool,
     layers: OnceLock<Layers>,
 }
 
-/// What a film is of.
+/// How a film was made.
 pub(crate) struct Making {
     pub(crate) n_samples: u32,
     pub(crate) strategy: String,
@@ -102,14 +102,14 @@ impl Film {
         self.hidden.then(|| &self.layers().alpha[..])
     }
 
-    /// The tone mapping at an exposure, by default the automatic one.
+    /// The tone mapping at an exposure, by default the automatic exposure.
     fn tone(&self, exposure: Option<f32>, curve: &str) -> PyResult<ToneMapping> {
         tone(&self.layers().color, None, exposure.or_else(|| Some(self.exposure())), curve)
     }
 
-    /// Color without noise, computed without holding the interpreter.
+    /// Denoised color, computed without holding the interpreter.
     fn denoised(&self, py: Python<'_>) -> PyResult<RgbImage> {
-        // The package's library, unless the user names another one.
+        // The package's library, unless the user names another.
         let file: Option<PathBuf> =
             match std::env::var_os(LIBRARY_VARIABLE).filter(|path| !path.is_empty()) {
                 Some(_) => None,
@@ -124,7 +124,7 @@ impl Film {
         })?
     }
 
-    /// Writes all layers, and a denoised one if there is one.
+    /// Writes all layers, including a denoised one if given.
     fn write_exr(&self, path: &Path, denoised: Option<&RgbImage>) -> Result<(), PictureError> {
         let mut attributes = self.provenance.clone();
         attributes.push(("domelight.complete".into(), self.complete.to_string()));
@@ -157,7 +157,7 @@ impl Film {
 #[pymethods]
 #[expect(clippy::unused_self, reason = "Python's methods have it")]
 impl Film {
-    /// ndarray, shape (H, W, 3): direct light, and the background where it is shown [W m^-2 sr^-1].
+    /// ndarray, shape (H, W, 3): direct light and any visible background [W m^-2 sr^-1].
     #[getter]
     fn color<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         from_image(py, &self.layers().color)
@@ -198,26 +198,26 @@ impl Film {
         (self.sums.height, self.sums.width)
     }
 
-    /// bool: all samples of all pixels are there.
+    /// bool: whether all samples of all pixels were taken.
     #[getter]
     fn complete(&self) -> bool {
         self.complete
     }
 
-    /// str: the strategy that rendered, as `render` takes it; 'python' for a function.
+    /// str: the strategy, as accepted by `render`; 'python' for a function.
     #[getter]
     fn strategy(&self) -> &str {
         &self.strategy
     }
 
-    /// float: the automatic exposure [stops], which makes the median of what the scene covers middle gray; 0 shows
-    /// radiance as it is. The program's renders of the same scene, light and view have the same one.
+    /// float: the automatic exposure [stops], which maps the median of the covered pixels to middle gray; 0 leaves
+    /// radiance unchanged. The program's renders of the same scene, light and view have the same exposure.
     #[getter]
     fn exposure(&self) -> f32 {
         kept_exposure(&self.provenance).unwrap_or_else(|| automatic_exposure_of(self.layers()))
     }
 
-    /// int: camera rays, with those of which it is known that they meet nothing.
+    /// int: camera rays, including those known to hit nothing.
     #[getter]
     fn camera_rays(&self) -> u64 {
         self.counts.camera_rays
@@ -241,26 +241,26 @@ impl Film {
         self.counts.non_finite
     }
 
-    /// Write the film; the end of the name says how.
+    /// Write the film in the format of the file name's extension.
     ///
     /// Parameters
     /// ----------
     /// path : str or os.PathLike
-    ///     .exr gets all layers, .hdr and .pfm color alone, .png what a screen shows, with alpha if the background was
-    ///     left out. The file is the old one or the whole new one.
+    ///     .exr gets all layers, .hdr and .pfm only color, .png the tone-mapped picture, with alpha if the background
+    ///     is hidden. Writing is atomic: no incomplete file is left.
     /// exposure : float or None, default None
-    ///     Of PNG [stops]; None is the film's `exposure`, 0 shows radiance as it is.
+    ///     Exposure of PNG [stops]; None is the film's `exposure`, 0 leaves radiance unchanged.
     /// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
     ///     The tone curve of PNG.
     /// bits : {8, 16}, default 8
-    ///     Of a channel of PNG.
+    ///     Bits per channel of PNG.
     /// denoise : bool, default False
-    ///     As `--denoise` of the program: .exr gets one more layer, others `denoise()` in place of color.
+    ///     As `--denoise` of the program: .exr gets one more layer, other formats `denoise()` instead of color.
     ///
     /// Raises
     /// ------
     /// OSError, ValueError
-    ///     If the file cannot be written, its name says no format, or a setting is wrong.
+    ///     If the file cannot be written, its extension is unknown, or a setting is invalid.
     /// ImportError
     ///     If there is no denoiser.
     #[pyo3(signature = (path, *, exposure = None, curve = "agx", bits = 8, denoise = false))]
@@ -284,39 +284,40 @@ impl Film {
         written.map_err(to_python)
     }
 
-    /// Color without noise, by Intel's Open Image Denoise with albedo and normals.
+    /// Denoise the color with Intel's Open Image Denoise, guided by albedo and normals.
     ///
-    /// A denoised picture is for viewing, not for measurement: the filter trades noise for bias. The library is that of the
-    /// file that the environment variable OIDN_LIBRARY names, else of the package pyoidn, else the system's.
+    /// A denoised picture is for viewing, not for measurement: the filter trades noise for bias. The library is the
+    /// file named by the environment variable OIDN_LIBRARY, otherwise that of the package pyoidn, otherwise the
+    /// system's.
     ///
     /// Returns
     /// -------
     /// ndarray, shape (H, W, 3)
-    ///     As `color`.
+    ///     Like `color`.
     ///
     /// Raises
     /// ------
     /// ImportError
-    ///     If there is no such library; `pip install pyoidn` gets it.
+    ///     If there is no such library; `pip install pyoidn` installs it.
     fn denoise<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         from_image(py, &self.denoised(py)?)
     }
 
-    /// The bytes of a PNG file as a screen shows it.
+    /// Encode the tone-mapped picture as PNG.
     ///
     /// Parameters
     /// ----------
     /// exposure : float or None, default None
-    ///     In stops; None is the film's `exposure`, 0 shows radiance as it is.
+    ///     In stops; None is the film's `exposure`, 0 leaves radiance unchanged.
     /// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
     ///     The tone curve.
     /// bits : {8, 16}, default 8
-    ///     Of a channel.
+    ///     Bits per channel.
     ///
     /// Returns
     /// -------
     /// bytes
-    ///     With alpha if the background was left out.
+    ///     The PNG file, with alpha if the background is hidden.
     #[pyo3(signature = (*, exposure = None, curve = "agx", bits = 8))]
     fn to_png<'py>(
         &self,
@@ -335,7 +336,7 @@ impl Film {
         self.to_png(py, None, "agx", 8)
     }
 
-    /// The film as an `xarray.Dataset` with the dimensions y, x and channel; needs the package xarray.
+    /// Convert the film to an `xarray.Dataset` with the dimensions y, x and channel; requires the package xarray.
     fn to_xarray<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("domelight._interop")?.call_method1("film_to_xarray", (slf,))
     }

@@ -13,14 +13,14 @@ use crate::error::{bad_value, from_source, to_python};
 use crate::render::{Choice, Job, Keywords, choose};
 use crate::scene::{CameraLike, Scene};
 
-/// What is found at a pixel.
+/// The result at a pixel.
 struct Found {
     summary: PixelSummary,
     hemisphere: Option<Hemisphere>,
     strategies: Vec<(Decomposition, Option<DirectionHistogram>)>,
 }
 
-/// The pixel X-ray; `domelight.inspect` documents it and makes an `Inspection` of the dictionary.
+/// The pixel X-ray; `domelight.inspect` documents it and converts the dictionary to an `Inspection`.
 #[pyfunction]
 pub(crate) fn inspect<'py>(
     py: Python<'py>,
@@ -132,7 +132,7 @@ impl Found {
             one.set_item("between_samples", decomposition.between_samples())?;
             let shares = PyDict::new(py);
             for share in &decomposition.shares {
-                // What is known without rays may differ for two reasons.
+                // Two causes can have the same name; add their shares.
                 let cause = share.cause.to_string();
                 let before =
                     shares.get_item(&cause)?.map_or(Ok(0.0), |before| before.extract::<f64>())?;

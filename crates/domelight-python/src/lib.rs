@@ -1,7 +1,7 @@
 //! The Python module `domelight._domelight`: a thin front end over the library's public functions.
 //!
-//! Arrays come in by [`arrays`], go out by it, and leave the interpreter free while the engine works ([`engine`]).
-//! What Python says better than Rust (strategies as functions, metrics by name, progress) is in `python/domelight`.
+//! [`arrays`] converts arrays in both directions; [`engine`] releases the interpreter while the engine works. Parts
+//! that are simpler in Python (strategies as functions, metrics by name, progress) are in `python/domelight`.
 
 mod arrays;
 mod bsdf;

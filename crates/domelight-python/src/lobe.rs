@@ -11,21 +11,21 @@ use pyo3::prelude::*;
 use crate::arrays::{Floats, rows, shape_text};
 use crate::error::bad_value;
 
-/// A lobe whose functions are Python's: each takes and returns arrays with a row for each pair of directions.
+/// A lobe with Python functions, which take and return arrays with one row per pair of directions.
 #[derive(Debug)]
 pub(crate) struct PythonLobe {
     eval: Py<PyAny>,
-    /// Its density and sampler; cosine-weighted without.
+    /// The density and the sampler; cosine-weighted if `None`.
     sampling: Option<(Py<PyAny>, Py<PyAny>)>,
     albedo: Rgb,
     max_eval: Option<f32>,
     roughness: Option<f32>,
-    /// What the first call raised that failed where nobody could be told.
+    /// The first exception raised where it could not be propagated.
     failure: Mutex<Option<PyErr>>,
 }
 
 impl PythonLobe {
-    /// Keeps a lobe until the program ends, as the library asks of lobes of the caller's own.
+    /// Keeps a lobe until the program ends, as the library requires of custom lobes.
     pub(crate) fn leak(
         eval: Py<PyAny>,
         sampling: Option<(Py<PyAny>, Py<PyAny>)>,
@@ -37,17 +37,17 @@ impl PythonLobe {
         Box::leak(Box::new(Self { eval, sampling, albedo, max_eval, roughness, failure }))
     }
 
-    /// Whether a library's lobe is this one.
+    /// Whether a lobe of the library is this one.
     pub(crate) fn is(&self, lobe: &CustomLobe) -> bool {
         std::ptr::addr_eq(lobe.bxdf(), self)
     }
 
-    /// Whether there is an upper bound to its values.
+    /// Whether its values have an upper bound.
     pub(crate) fn has_bound(&self) -> bool {
         self.max_eval.is_some()
     }
 
-    /// What a call raised since the last time.
+    /// The exception raised since the last call, if any.
     pub(crate) fn take_failure(&self) -> Option<PyErr> {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
@@ -57,7 +57,7 @@ impl PythonLobe {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 
-    /// Values f_r · cos θ_i and densities of pairs of local directions; black and 0 below the surface.
+    /// Values f_r · cos θ_i and densities of pairs of local directions; zero below the surface.
     pub(crate) fn eval_pdf_rows(
         &self,
         py: Python<'_>,
@@ -84,7 +84,7 @@ impl PythonLobe {
         Ok((values, densities))
     }
 
-    /// Local directions drawn for numbers (u, v, u_lobe); below the surface where nothing was drawn.
+    /// Local directions sampled from numbers (u, v, u_lobe); below the surface if there is no sample.
     pub(crate) fn sample_rows(
         &self,
         py: Python<'_>,
@@ -108,7 +108,7 @@ impl PythonLobe {
         Ok(directions.to_vec())
     }
 
-    /// The result of a call, or a default where it raised, which is kept for later.
+    /// The result of a call, or a default if it raised; keeps the exception for later.
     fn or_failed<T>(&self, default: T, call: impl FnOnce(Python<'_>) -> PyResult<T>) -> T {
         if self.has_failed() {
             return default;
@@ -120,7 +120,7 @@ impl PythonLobe {
     }
 }
 
-/// The cosine below which a direction counts as at the surface, as in the library.
+/// The cosine below which a direction is at the surface, as in the library.
 const HORIZON: f32 = 1e-7;
 
 /// A color for each of n rows, from (n, 3) or (n,).

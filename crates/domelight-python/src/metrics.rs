@@ -1,4 +1,4 @@
-//! Differences of pictures.
+//! Error metrics of pictures.
 
 use domelight::RgbImage;
 use domelight::picture::compare::{self, Comparison, SizeMismatch};
@@ -20,7 +20,7 @@ fn mismatch(error: SizeMismatch) -> PyErr {
     from_source(&error)
 }
 
-/// All differences of a picture from its reference, by name; `mask` says which pixels count.
+/// All errors of a picture against its reference, by name; `mask` selects the pixels.
 #[pyfunction]
 #[pyo3(signature = (test, reference, mask = None))]
 pub(crate) fn compare_pictures<'py>(
@@ -79,7 +79,7 @@ fn resolution(pixels_per_degree: Option<f32>) -> PyResult<f32> {
     }
 }
 
-/// LDR-FLIP of each pixel, of linear light on the screen in [0, 1].
+/// LDR-FLIP of each pixel, for linear display light in [0, 1].
 #[pyfunction]
 #[pyo3(signature = (test, reference, pixels_per_degree = None))]
 pub(crate) fn flip<'py>(
@@ -94,7 +94,7 @@ pub(crate) fn flip<'py>(
     array(py, map.map_err(mismatch)?, &[reference.height, reference.width])
 }
 
-/// HDR-FLIP of each pixel, of linear radiance.
+/// HDR-FLIP of each pixel, for linear radiance.
 #[pyfunction]
 #[pyo3(signature = (test, reference, pixels_per_degree = None))]
 pub(crate) fn hdr_flip<'py>(

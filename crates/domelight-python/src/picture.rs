@@ -1,4 +1,4 @@
-//! Pictures in files, and as a screen shows them.
+//! Picture files, and tone mapping.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use crate::arrays::{Floats, from_image, image};
 use crate::engine::parallel;
 use crate::error::{bad_value, from_source, to_python};
 
-/// The formats that can be written.
+/// The writable formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
     Exr,
@@ -30,7 +30,7 @@ pub(crate) enum Format {
 }
 
 impl Format {
-    /// What the end of a file's name means.
+    /// The format of a file name's extension.
     pub(crate) fn of(path: &Path) -> PyResult<Self> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         match extension.as_deref() {
@@ -46,7 +46,7 @@ impl Format {
     }
 }
 
-/// Exposure as Python gives it: a number of stops, or `None` for the automatic one.
+/// Converts Python's exposure: a number of stops, or `None` for the automatic exposure.
 pub(crate) fn tone(
     image: &RgbImage,
     alpha: Option<&[f32]>,
@@ -61,7 +61,7 @@ pub(crate) fn tone(
     Ok(ToneMapping { exposure: exposure.stops(image, alpha), curve })
 }
 
-/// Bits of a channel of PNG.
+/// Bits per channel of PNG.
 pub(crate) fn depth(bits: i64) -> PyResult<Depth> {
     match bits {
         8 => Ok(Depth::Eight),
@@ -70,7 +70,7 @@ pub(crate) fn depth(bits: i64) -> PyResult<Depth> {
     }
 }
 
-/// Writes color alone, PNG with alpha if there is one.
+/// Writes only color, for PNG also alpha if given.
 pub(crate) fn write_image(
     path: &Path,
     format: Format,
@@ -103,7 +103,7 @@ fn write_bands(
     })
 }
 
-/// What the system says stays what the system says.
+/// Keeps errors of the system unchanged.
 pub(crate) fn into_io(kind: PictureErrorKind) -> std::io::Error {
     match kind {
         PictureErrorKind::Io(error) => error,
@@ -141,25 +141,25 @@ pub(crate) fn read(
     from_image(py, &picture.image)
 }
 
-/// Write a picture; the end of the name says whether as OpenEXR, Radiance .hdr, PFM or PNG.
+/// Write a picture as OpenEXR, Radiance .hdr, PFM or PNG, according to the file name's extension.
 ///
 /// Parameters
 /// ----------
 /// path : str or os.PathLike
-///     The file: it is the old one or the whole new one.
+///     The file. Writing is atomic: no incomplete file is left.
 /// picture : array_like, shape (H, W, 3)
 ///     Linear Rec. 709, top row first.
 /// exposure : float or None, default None
-///     Of PNG [stops]; None makes the median middle gray, 0 shows radiance as it is.
+///     Exposure of PNG [stops]; None maps the median to middle gray, 0 leaves radiance unchanged.
 /// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
 ///     The tone curve of PNG.
 /// bits : {8, 16}, default 8
-///     Of a channel of PNG.
+///     Bits per channel of PNG.
 ///
 /// Raises
 /// ------
 /// OSError, ValueError
-///     If the file cannot be written, or the shape, the name or a setting is wrong.
+///     If the file cannot be written, or the shape, the name or a setting is invalid.
 #[pyfunction]
 #[pyo3(signature = (path, picture, *, exposure = None, curve = "agx", bits = 8))]
 pub(crate) fn write(
@@ -181,21 +181,21 @@ pub(crate) fn write(
     parallel(py, || write_image(&path, format, &image, None, &tone, depth))?.map_err(to_python)
 }
 
-/// What a screen shows of linear light.
+/// Tone-map linear light for display.
 ///
 /// Parameters
 /// ----------
 /// picture : array_like, shape (H, W, 3)
 ///     Linear Rec. 709.
 /// exposure : float or None, default None
-///     In stops; None makes the median middle gray.
+///     In stops; None maps the median to middle gray.
 /// curve : {'standard', 'reinhard', 'aces', 'agx', 'neutral'}, default 'agx'
 ///     The tone curve.
 ///
 /// Returns
 /// -------
 /// ndarray, shape (H, W, 3)
-///     sRGB-encoded, in [0, 1], as `matplotlib.pyplot.imshow` takes it.
+///     sRGB-encoded, in [0, 1], as expected by `matplotlib.pyplot.imshow`.
 #[pyfunction]
 #[pyo3(signature = (picture, *, exposure = None, curve = "agx"))]
 pub(crate) fn tone_map<'py>(

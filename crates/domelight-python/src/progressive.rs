@@ -1,4 +1,4 @@
-//! Renders that are watched: a film after each pass.
+//! Progressive renders: a film after each pass.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -16,12 +16,12 @@ use crate::film::Film;
 use crate::render::{Job, Keywords, Visitor, Watch, interrupted, warn_of};
 use crate::scene::{CameraLike, Scene};
 
-/// The film after a pass; none if there was nothing left to render.
+/// The film after a pass; `None` if nothing was left to render.
 type Step = PyResult<Option<Film>>;
 
-/// A render that goes on with each `next`, which gives a film of all samples so far.
+/// A progressive render: each `next` renders a pass and returns a film of all samples so far.
 ///
-/// It lives on a thread of its own and is idle between the calls. After an interruption the next call goes on.
+/// It runs on its own thread and is idle between calls. After an interruption, the next call continues.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Progressive {
     job: Arc<Job>,
@@ -29,16 +29,16 @@ pub(crate) struct Progressive {
     /// Camera samples so far.
     done: Arc<AtomicU64>,
     progress: Option<Py<PyAny>>,
-    /// Asks the render's thread for a step.
+    /// Requests a step from the render's thread.
     questions: Sender<()>,
-    /// What it answers.
+    /// The answers of the render's thread.
     answers: Mutex<Receiver<Step>>,
     last: Mutex<Option<Py<Film>>>,
     /// The process that the thread belongs to.
     process: u32,
 }
 
-/// Answers each question with the next pass.
+/// Answers each request with the next pass.
 struct Steps<'a> {
     job: &'a Job,
     cancel: &'a AtomicBool,
@@ -88,7 +88,7 @@ impl Progressive {
         let (result, stopped) = py.detach(|| {
             let answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
             self.cancel.store(false, Ordering::Relaxed);
-            // A thread that has ended is noticed by its missing answer.
+            // If the thread has ended, its answer will be missing.
             let _ = self.questions.send(());
             wait(&answers, &self.cancel, &|py| self.report(py, self.job.share(&self.done)))
         })?;
@@ -108,7 +108,7 @@ impl Progressive {
         Ok(Some(film))
     }
 
-    /// Film or None: the last one.
+    /// Film or None: the last film.
     #[getter]
     fn film(&self, py: Python<'_>) -> Option<Py<Film>> {
         let last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
@@ -116,27 +116,27 @@ impl Progressive {
     }
 }
 
-/// Render pass by pass: an iterator of films that grow.
+/// Render pass by pass: an iterator over films with more and more samples.
 ///
 /// Parameters
 /// ----------
 /// scene, env, strategy, spp, size, seed, threads, camera, filter, sampler, hide_env, adaptive, target_error, tile_size
-///     As of `render`.
+///     As in `render`.
 /// passes : {'doubling', 'efficient'}, default 'doubling'
-///     As of `render`: films of 1, 2, 4, 8, … samples, up to one for each 64 with 'product'; or as few films as the
-///     strategy works best with.
+///     As in `render`: films after 1, 2, 4, 8, … samples, with 'product' at least every 64 samples; or the passes that
+///     suit the strategy best.
 /// progress : bool or callable, default False
-///     As of `render`; the share is that of all samples.
+///     As in `render`; the fraction refers to all samples.
 ///
 /// Yields
 /// ------
 /// Film
-///     All samples so far; the last one is complete and has the bits of `render`'s with the same `passes`.
+///     All samples so far; the last film is complete and bit-identical to that of `render` with the same `passes`.
 ///
 /// Raises
 /// ------
 /// RenderInterrupted
-///     A `KeyboardInterrupt` whose attribute `film` holds what was done; a later `next` goes on from there.
+///     A `KeyboardInterrupt` whose attribute `film` holds the samples so far; a later `next` continues from there.
 #[pyfunction(name = "_progressive")]
 #[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = (640, 640), seed = 0, threads = None,
     camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,

@@ -1,4 +1,4 @@
-//! Rendering: settings from Python, a render that signals may end, and its film.
+//! Rendering: settings from Python, a render that signals can end, and its film.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock, mpsc};
@@ -27,34 +27,34 @@ use crate::lobe::PythonLobe;
 use crate::scene::{CameraLike, Scene, SceneData, size};
 use crate::strategy::PythonStrategy;
 
-/// Bytes of a pixel of a render: its sums, and the layers that they become.
+/// Memory per pixel of a render [bytes]: its sums and its layers.
 const PIXEL_BYTES: usize = 308;
 
-/// What renders: a strategy of the library's, or a function.
+/// The strategy: built-in or a Python function.
 pub(crate) enum Choice {
     Builtin(StrategySpec),
     Python(PythonStrategy),
 }
 
-/// All that a render needs.
+/// Everything that a render needs.
 pub(crate) struct Job {
     scene: Arc<SceneData>,
     environment: Arc<environment::Environment>,
     camera: scene::Camera,
-    /// In the scene's own units.
+    /// The camera, in the scene's own units.
     camera_settings: CameraSettings,
-    /// What the environment is called.
+    /// The name of the environment.
     probe: String,
     settings: RenderSettings,
     strategy: Choice,
     n_threads: usize,
-    /// The built-in strategy with what a pilot chose.
+    /// The built-in strategy with the pilot's choices.
     chosen: OnceLock<StrategySpec>,
-    /// Of all films [stops].
+    /// The exposure of all films [stops].
     exposure: OnceLock<f32>,
 }
 
-/// The keywords of `render` and `progressive`.
+/// The keyword arguments of `render` and `progressive`.
 pub(crate) struct Keywords<'py> {
     pub(crate) strategy: Bound<'py, PyAny>,
     pub(crate) spp: u32,
@@ -75,7 +75,7 @@ pub(crate) struct Keywords<'py> {
 const PYTHON_TILE_SIZE: usize = 64;
 
 impl Job {
-    /// Checks the settings before any work is done.
+    /// Checks the settings before any work.
     pub(crate) fn new(
         py: Python<'_>,
         scene: &Scene,
@@ -158,7 +158,7 @@ impl Job {
         })
     }
 
-    /// Hands a renderer over; on the calling thread's pool.
+    /// Passes a renderer to the visitor, on the calling thread's pool.
     pub(crate) fn with_renderer<V: Visitor>(&self, visitor: V) -> PyResult<V::Output> {
         let Self { scene, environment, camera, settings, .. } = self;
         // The pilot would call Python's BSDFs direction by direction.
@@ -209,19 +209,19 @@ impl Job {
         Film::new(sums, renderer.counts(), renderer.is_complete(), making)
     }
 
-    /// A pixel under the microscope.
+    /// An inspector for a pixel.
     pub(crate) fn inspector(&self, pixel: [usize; 2]) -> Result<Inspector<'_>, InspectError> {
         let Self { scene, environment, camera, settings, .. } = self;
         Inspector::new(&scene.scene, camera, environment, settings, pixel)
     }
 
-    /// A strategy with what a pilot chooses.
+    /// A strategy with the pilot's choices.
     pub(crate) fn for_picture(&self, spec: StrategySpec) -> StrategySpec {
         let Self { scene, environment, camera, settings, .. } = self;
         spec.for_picture(&scene.scene, camera, environment, settings)
     }
 
-    /// Settings of each picture.
+    /// The settings of each picture.
     pub(crate) fn settings(&self) -> &RenderSettings {
         &self.settings
     }
@@ -232,7 +232,7 @@ impl Job {
         PreparedSceneRef { scene: &scene.scene, camera, environment, report }
     }
 
-    /// The scene in words and numbers.
+    /// A report on the scene.
     pub(crate) fn scene_report(&self) -> SceneReport {
         let Self { scene, environment, settings, camera_settings, probe, .. } = self;
         let orientation = environment.orientation();
@@ -262,44 +262,44 @@ impl Job {
         &self.environment
     }
 
-    /// Threads to render with.
+    /// The number of threads.
     pub(crate) fn n_threads(&self) -> usize {
         self.n_threads
     }
 
-    /// Camera samples of all pixels.
+    /// The number of camera samples of all pixels.
     fn total_samples(&self) -> u64 {
         let RenderSettings { width, height, n_samples, .. } = self.settings;
         width as u64 * height as u64 * u64::from(n_samples)
     }
 
-    /// The share that is done, in [0, 1].
+    /// The finished fraction, in [0, 1].
     pub(crate) fn share(&self, done: &AtomicU64) -> f64 {
         (done.load(Ordering::Relaxed) as f64 / self.total_samples().max(1) as f64).min(1.0)
     }
 
-    /// What functions of Python's raised while they rendered.
+    /// The exception raised by Python functions during the render, if any.
     pub(crate) fn take_failure(&self) -> Option<PyErr> {
         let of_strategy = match &self.strategy {
             Choice::Builtin(_) => None,
             Choice::Python(strategy) => strategy.take_failure(),
         };
-        // All of them, lest a failure show up in a later render.
+        // Take all of them, so that no failure shows up in a later render.
         let of_lobes = self.scene.lobes.iter().filter_map(|lobe| lobe.take_failure());
         of_lobes.fold(of_strategy, |first, next| first.or(Some(next)))
     }
 
-    /// A function of Python's has raised.
+    /// Whether a Python function has raised.
     pub(crate) fn has_failed(&self) -> bool {
         let strategy = matches!(&self.strategy, Choice::Python(strategy) if strategy.has_failed());
         strategy || self.scene.lobes.iter().any(|lobe| lobe.has_failed())
     }
 }
 
-/// Rows of the built-in probe that a scene names, as of the program.
+/// The rows of a built-in probe named by a scene, as in the program.
 const BUILTIN_ROWS: usize = 1024;
 
-/// The strategy that Python names or gives.
+/// The strategy from Python, by name or as a function.
 pub(crate) fn choose(
     strategy: &Bound<'_, PyAny>,
     spp: u32,
@@ -328,7 +328,7 @@ pub(crate) fn choose(
     Ok(Choice::Builtin(spec))
 }
 
-/// Refuses a picture for which there is no memory, before the allocator ends the process.
+/// Rejects a picture that does not fit into memory, before the allocator ends the process.
 fn require_memory(width: usize, height: usize) -> PyResult<()> {
     let bytes = width.saturating_mul(height).saturating_mul(PIXEL_BYTES);
     Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| {
@@ -337,21 +337,21 @@ fn require_memory(width: usize, height: usize) -> PyResult<()> {
     })
 }
 
-/// Something to be done with a renderer of any strategy.
+/// An operation on a renderer with any strategy.
 pub(crate) trait Visitor {
-    /// What it gives.
+    /// The result.
     type Output;
 
-    /// Does it.
+    /// Performs the operation.
     fn visit<S: Strategy>(self, renderer: Renderer<S>) -> Self::Output;
 }
 
-/// Ends a render that was canceled, whose functions failed or whose time is over, and counts its samples.
+/// Ends a render that is canceled, fails or runs out of time, and counts its samples.
 pub(crate) struct Watch<'a> {
     pub(crate) job: &'a Job,
     pub(crate) cancel: &'a AtomicBool,
     pub(crate) done: &'a AtomicU64,
-    /// However short the time, a tile is finished.
+    /// The end of the time limit; started tiles are finished.
     pub(crate) end: Option<Instant>,
 }
 
@@ -368,7 +368,7 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// Renders until the end or until it is canceled, for that long.
+/// Renders until it is finished, canceled, or out of time.
 struct ToTheEnd<'a> {
     job: &'a Job,
     watch: Watch<'a>,
@@ -385,7 +385,7 @@ impl Visitor for ToTheEnd<'_> {
     }
 }
 
-/// What was done, as an exception: `RenderInterrupted` if a signal's handler raised `KeyboardInterrupt`.
+/// The samples so far as an exception: `RenderInterrupted` if a signal's handler raised `KeyboardInterrupt`.
 pub(crate) fn interrupted(py: Python<'_>, error: PyErr, film: Film) -> PyResult<PyErr> {
     if !error.is_instance_of::<pyo3::exceptions::PyKeyboardInterrupt>(py) {
         return Ok(error);
@@ -397,7 +397,7 @@ pub(crate) fn interrupted(py: Python<'_>, error: PyErr, film: Film) -> PyResult<
     Ok(interrupted)
 }
 
-/// Warns of what went wrong in a film.
+/// Warns of problems in a film.
 pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
     match film.counts.non_finite {
         0 => Ok(()),
@@ -405,63 +405,65 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
     }
 }
 
-/// Render a scene that is lit by an environment.
+/// Render a scene under an environment.
 ///
 /// Parameters
 /// ----------
 /// scene : Scene
-///     What is seen.
+///     The scene.
 /// env : Environment, optional
-///     The light; by default the scene's own, else the built-in sky.
+///     The light; by default the scene's own, otherwise the built-in sky.
 /// strategy : str or callable, default 'product'
-///     How directions are chosen: a text such as 'brdf:4', 'environment', 'mis:3:1', 'product:8', 'rejection:16',
-///     'sir:15/800', 'median-cut:64' or 'variance-minimization:64', or a function. A function gets the
-///     `ShadingPoints` of a tile and returns `(index, wi, weight)`: the points of shadow rays (M,), their directions
-///     (M, 3) and what each adds if it is free (M, 3) or (M,), 1 / n and 1 / pdf included. Its attribute `n_rays`, 1 by
-///     default, is the most rays of a point. It is called from several threads, one at a time.
+///     The sampling strategy: a text such as 'brdf:4', 'environment', 'mis:3:1', 'product:8', 'rejection:16',
+///     'sir:15/800', 'median-cut:64' or 'variance-minimization:64', or a function. A function receives the
+///     `ShadingPoints` of a tile and returns `(index, wi, weight)`: the points of the shadow rays (M,), their
+///     directions (M, 3) and their contributions if unoccluded (M, 3) or (M,), including 1 / n and 1 / pdf. Its
+///     attribute `n_rays`, 1 by default, is the maximum number of rays per point. It is called from several threads,
+///     one at a time.
 /// spp : int, default 32
-///     Camera samples of each pixel; with 'product' their mean.
+///     Camera samples per pixel; with 'product', on average.
 /// size : (int, int), default (640, 640)
 ///     Width and height.
 /// seed : int, default 0
-///     Names the random numbers; the same seed gives the same bits.
+///     Seed of the random numbers; the same seed gives the same bits.
 /// threads : int, optional
-///     By default the cores that the process may use. The picture does not depend on it.
+///     By default the cores available to the process. The picture does not depend on it.
 /// camera : Camera, str or int, optional
-///     A camera, or the name or number of one of the file's; by default the scene's own or a framing one.
+///     A camera, or the name or number of a camera in the file; by default the scene's own or one that frames the
+///     scene.
 /// filter : {'box', 'tent', 'gaussian', 'blackman-harris'}, default 'gaussian'
 ///     The pixel filter.
 /// sampler : {'sobol', 'independent'}, default 'sobol'
 ///     Owen-scrambled Sobol' points or independent random numbers.
 /// hide_env : bool, default False
-///     Leave the background out.
+///     Hide the background.
 /// adaptive : bool, default True
-///     With 'product', more samples for noisier pixels.
+///     Take more samples in noisier pixels, with 'product'.
 /// target_error : float, optional
-///     End each tile when two sets of its samples differ no more than this relMSE suggests, such as 1e-3, but not
-///     before 16 samples.
+///     Stop each tile when two sets of its samples indicate at most this relMSE, such as 1e-3, but not before 16
+///     samples.
 /// tile_size : int, optional
 ///     Pixels along a tile's edge; 16 by default, 64 for functions. Only 'product' depends on it.
 /// passes : {'efficient', 'doubling'}, default 'efficient'
-///     How samples are divided: as the strategy works best, or 1, 1, 2, 4, …, as `--passes doubling` of the program.
-///     Only 'product' depends on it.
+///     The division of samples into passes: as suits the strategy best, or 1, 1, 2, 4, …, like `--passes doubling` of
+///     the program. Only 'product' depends on it.
 /// time : float, optional
-///     End the render after so many seconds of rendering; `film.complete` says whether all samples are there.
+///     Stop after this many seconds of rendering; `film.complete` tells whether all samples were taken.
 /// progress : bool or callable, default False
-///     True shows a bar if tqdm is installed; a callable gets the share that is done, in [0, 1], every hundredth of a
-///     second.
+///     True shows a bar if tqdm is installed; a callable receives the finished fraction, in [0, 1], every hundredth of
+///     a second.
 ///
 /// Returns
 /// -------
 /// Film
-///     The same bits as the program's for the same settings.
+///     Bit-identical to the program's for the same settings.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     If a setting is wrong; the message says which.
+///     If a setting is invalid; the message names it.
 /// RenderInterrupted
-///     A `KeyboardInterrupt` whose attribute `film` holds what was done.
+///     A `KeyboardInterrupt` whose attribute `film` holds the samples so far.
 ///
 /// Warns
 /// -----
@@ -524,7 +526,7 @@ pub(crate) fn render<'py>(
                     let visitor = ToTheEnd { job, watch, time };
                     caught(|| pool.install(|| job.with_renderer(visitor)))?
                 });
-                // Whoever waits is there.
+                // The receiver is still waiting.
                 let _ = sender.send(rendered);
             });
             wait(&results, cancel, &report)
@@ -545,10 +547,10 @@ pub(crate) fn render<'py>(
     Ok(film)
 }
 
-/// Seconds as Python gives them.
+/// Converts Python's seconds.
 fn duration(seconds: f64) -> PyResult<Duration> {
     let time = Duration::try_from_secs_f64(seconds).ok();
-    // Beyond a year the clock may not reach.
+    // The clock may not reach beyond a year.
     time.filter(|time| !time.is_zero() && *time <= Duration::from_secs(1 << 25)).ok_or_else(|| {
         bad_value(format!(
             "time is {seconds}; it must be a positive number of seconds, up to a year"
@@ -556,7 +558,7 @@ fn duration(seconds: f64) -> PyResult<Duration> {
     })
 }
 
-/// The names of the built-in strategies, with a line for each.
+/// List the built-in strategies with a one-line description of each.
 #[pyfunction]
 pub(crate) fn strategy_names() -> Vec<(&'static str, &'static str)> {
     StrategyKind::ALL.into_iter().map(|kind| (kind.name(), kind.summary())).collect()

@@ -25,9 +25,9 @@ use crate::environment::{Environment, up_axis, up_name};
 use crate::error::{bad_value, from_source, to_python};
 use crate::picture::{Format as PictureFormat, write_image};
 
-/// Directional lights that stand for an environment, and what they leave of it. `lights` makes them.
+/// Directional lights that replace an environment, and its residual. Returned by `lights`.
 ///
-/// Lights come compact ones first, of each kind those of the largest luminance first.
+/// Compact sources come first; each kind is sorted by decreasing luminance.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Rig {
     inner: rig::Rig,
@@ -64,7 +64,7 @@ impl Rig {
         }
     }
 
-    /// Writes the picture of the residual that a format refers to; its name.
+    /// Writes the picture of the residual to which a format refers, and returns its name.
     fn write_dome(&self, path: &Path, format: Format) -> Result<Option<String>, domelight::Error> {
         let Some((residual, picture)) = self.residual.as_ref().zip(format.dome_picture()) else {
             return Ok(None);
@@ -102,19 +102,19 @@ impl Rig {
         self.vectors(py, |light| light.direction.to_array())
     }
 
-    /// ndarray, shape (N, 3): what a surface that faces the light receives [W m^-2].
+    /// ndarray, shape (N, 3): irradiance of a surface that faces the light [W m^-2].
     #[getter]
     fn irradiance<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
         self.vectors(py, |light| light.irradiance.to_array())
     }
 
-    /// ndarray, shape (N,): angular radius of the uniform disc of the same spread [rad].
+    /// ndarray, shape (N,): angular radius of a uniform disc with the same variance [rad].
     #[getter]
     fn angular_radius<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
         self.numbers(py, |light| light.angular_radius)
     }
 
-    /// ndarray, shape (N,): share of the map's luminance, in [0, 1].
+    /// ndarray, shape (N,): fraction of the map's luminance, in [0, 1].
     #[getter]
     fn share<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
         self.numbers(py, |light| light.share)
@@ -132,31 +132,31 @@ impl Rig {
         self.export(None).names()
     }
 
-    /// ndarray of uint32, shape (H, W): the light of each texel of the map; 4294967295 where none was taken.
+    /// ndarray of uint32, shape (H, W): index of the light of each texel; 4294967295 for texels without a light.
     #[getter]
     fn labels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<u32>>> {
         array(py, self.inner.labels.clone(), &[self.inner.height, self.inner.width])
     }
 
-    /// Environment or None: the environment without the light that was taken; None if all was.
+    /// Environment or None: the rest of the environment; None if the lights take all of it.
     #[getter]
     fn residual(&self) -> Option<Environment> {
         let residual = self.residual.clone()?;
         Some(Environment { inner: residual, name: format!("{} (residual)", self.name) })
     }
 
-    /// How well the rig, with what it leaves, shades.
+    /// Compute the shading error of the rig with its residual.
     ///
     /// Parameters
     /// ----------
     /// environment : Environment
-    ///     What the rig stands for.
+    ///     The environment that the rig replaces.
     ///
     /// Returns
     /// -------
     /// dict
-    ///     'diffuse' and 'glossy': root mean square error of a matte surface and of a lobe cos^20 over all normals,
-    ///     relative to the map's; 0.01 is one percent. Shadows are not part of it.
+    ///     'diffuse' and 'glossy': RMS error of a matte surface and of a lobe cos^20 over all normals, relative to the
+    ///     shading by the map; 0.01 is one percent. Shadows are ignored.
     fn shading_error<'py>(
         &self,
         environment: &Bound<'py, Environment>,
@@ -181,16 +181,15 @@ impl Rig {
     /// Parameters
     /// ----------
     /// path : str or os.PathLike
-    ///     The file; where its format refers to a picture of what the lights left, that is written beside it as
-    ///     `<name>_dome`.
+    ///     The file; if its format refers to a picture of the residual, that is written beside it as `<name>_dome`.
     /// format : str, optional
     ///     'json', 'csv', 'gltf', 'glb', 'usd', 'blender', 'mitsuba', 'pbrt', 'three', 'radiance' or 'sibl'; by default
-    ///     what the end of the name says (.json, .csv, .gltf, .glb, .usda, .py, .xml, .pbrt, .js, .rad, .ibl).
+    ///     by the extension (.json, .csv, .gltf, .glb, .usda, .py, .xml, .pbrt, .js, .rad, .ibl).
     ///
     /// Raises
     /// ------
     /// OSError, ValueError
-    ///     If a file cannot be written, or no format is known.
+    ///     If a file cannot be written, or the format is unknown.
     #[pyo3(signature = (path, *, format = None))]
     fn save(&self, py: Python<'_>, path: PathBuf, format: Option<&str>) -> PyResult<()> {
         let extension = path.extension().and_then(|e| e.to_str());
@@ -305,7 +304,7 @@ impl Rig {
     }
 }
 
-/// What a pickled rig consists of.
+/// The parts of a pickled rig.
 type Pickled<'py> = (
     FloatArray<'py>,
     FloatArray<'py>,
@@ -317,35 +316,35 @@ type Pickled<'py> = (
     String,
 );
 
-/// Turn an environment into directional lights.
+/// Convert an environment to directional lights.
 ///
 /// Parameters
 /// ----------
 /// env : Environment
 ///     The light.
 /// n : int or None, default 64
-///     How many lights take all of it, compact ones included; None leaves what `sun` and `lamps` do not take as the
-///     rig's residual.
+///     Total number of lights, including compact sources; with None, everything that `sun` and `lamps` do not take is
+///     the rig's residual.
 /// method : {'variance-minimization', 'median-cut'}, default 'variance-minimization'
-///     How the map is divided.
+///     The method that divides the map.
 /// sun : bool, default False
-///     Take the sun out as one light first.
+///     First extract the sun as one light.
 /// lamps : int, default 0
-///     Take so many other compact sources out.
+///     Number of other compact sources to extract.
 /// min_share : float, optional
-///     Share of the luminance below which a light stays on the residual, in [0, 1].
+///     Lights with a smaller fraction of the luminance, in [0, 1], stay in the residual.
 /// threads : int, optional
-///     By default the cores that the process may use. The lights do not depend on it.
+///     By default the cores available to the process. The lights do not depend on it.
 ///
 /// Returns
 /// -------
 /// Rig
-///     Its lights and residual add up to the environment, channel by channel.
+///     Lights and residual, which add up to the environment in every channel.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     If the map is black, has no sun or lamp where they were asked for alone, or fewer lit texels than lights.
+///     If the map is black, has no sun or lamp when only those are requested, or has fewer lit texels than lights.
 #[pyfunction]
 #[pyo3(signature = (env, n = Some(64), *, method = "variance-minimization", sun = false, lamps = 0, min_share = None,
     threads = None),

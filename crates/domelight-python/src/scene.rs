@@ -24,12 +24,12 @@ use crate::environment::{Environment, builtin_map, load_map, up_axis, up_name};
 use crate::error::{bad_value, from_source, to_python, warn};
 use crate::lobe::PythonLobe;
 
-/// Where a picture is taken from; what is left out is the scene's own camera's, or one's that frames the scene.
+/// A camera. Omitted parts come from the scene's own camera, or from one that frames the scene.
 ///
 /// Parameters
 /// ----------
 /// origin : array_like, shape (3,), optional
-///     Where the camera is, or any point of an orthographic one's axis.
+///     Position of the camera, or any point on the axis of an orthographic camera.
 /// target : array_like, shape (3,), optional
 ///     A point that it looks at.
 /// up : array_like, shape (3,), optional
@@ -37,7 +37,7 @@ use crate::lobe::PythonLobe;
 /// fov : float, optional
 ///     Vertical field of view of a perspective camera, in (0, 180) [degrees].
 /// ortho : float, optional
-///     Height of the picture of an orthographic camera in the world, positive.
+///     Height of an orthographic camera's picture in world units, positive.
 #[pyclass(frozen, from_py_object, module = "domelight")]
 #[derive(Clone)]
 pub(crate) struct Camera {
@@ -87,7 +87,7 @@ impl Camera {
         Ok(Self { origin, target, up, projection })
     }
 
-    /// ndarray, shape (3,), or None: where the camera is.
+    /// ndarray, shape (3,), or None: position of the camera.
     #[getter]
     fn origin<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArrayDyn<f32>>>> {
         from_vector(py, self.origin)
@@ -114,7 +114,7 @@ impl Camera {
         }
     }
 
-    /// float or None: height of an orthographic picture in the world.
+    /// float or None: height of an orthographic picture in world units.
     #[getter]
     fn ortho(&self) -> Option<f32> {
         match self.projection {
@@ -144,7 +144,7 @@ fn from_vector(py: Python<'_>, v: Option<Vec3>) -> PyResult<Option<Bound<'_, PyA
     v.map(|v| array(py, v.to_array().to_vec(), &[3])).transpose()
 }
 
-/// A camera, or the name or the number of one of the scene's.
+/// A camera, or the name or number of one of the scene's cameras.
 #[derive(FromPyObject)]
 pub(crate) enum CameraLike {
     Camera(Camera),
@@ -152,7 +152,7 @@ pub(crate) enum CameraLike {
     Name(String),
 }
 
-/// A built scene and what a description knows beyond it.
+/// A built scene, and the parts of its description that it lacks.
 pub(crate) struct SceneData {
     pub(crate) scene: scene::Scene,
     pub(crate) name: String,
@@ -206,22 +206,22 @@ impl SceneData {
     }
 }
 
-/// Meshes and what they are made of, ready for rays.
+/// Meshes and materials, prepared for ray tracing.
 ///
 /// Parameters
 /// ----------
 /// vertices : array_like, shape (V, 3)
 ///     Positions, finite.
 /// faces : array_like of int, shape (F, 3)
-///     Triangles as counterclockwise indices of vertices.
+///     Triangles as counterclockwise vertex indices.
 /// normals : array_like, shape (V, 3), optional
-///     Shading normals, of any length but 0; faces are flat without.
+///     Shading normals of any nonzero length; without them, shading is flat.
 /// colors : array_like, shape (V, 3), optional
 ///     Linear vertex colors in [0, 1], for meshes without a material.
 /// uvs : array_like, shape (V, 2), optional
-///     Texture coordinates: they orient anisotropic materials.
+///     Texture coordinates, which orient anisotropic materials.
 /// material : Material, Bsdf or str, default 'diffuse:0.5'
-///     What the mesh is made of.
+///     The material of the mesh.
 /// ground : bool, default False
 ///     Put a diffuse disk of reflectance 0.5 under the mesh.
 /// normalize : bool, default False
@@ -229,18 +229,18 @@ impl SceneData {
 /// up : {'y', 'z'}, default 'y'
 ///     The axis that points up.
 /// name : str, default 'mesh'
-///     What the scene is called in files and messages.
+///     The name of the scene in files and messages.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     If an array has a wrong shape or type, an index names no vertex, or a position is not finite.
+///     If an array has a wrong shape or type, an index is out of range, or a position is not finite.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Scene {
     pub(crate) inner: Arc<SceneData>,
 }
 
-/// The material of meshes that are given without.
+/// The reflectance of meshes without a material.
 const DEFAULT_REFLECTANCE: f32 = 0.5;
 
 impl Scene {
@@ -357,19 +357,19 @@ impl Scene {
     /// path : str or os.PathLike
     ///     The file.
     /// material : Material, Bsdf or str, optional
-    ///     Made of this instead of what the file says, but for floors and plinths.
+    ///     Replaces the file's materials, except for floors and plinths.
     /// ground, normalize
-    ///     As of the class.
+    ///     As in the class.
     /// scene : str, optional
     ///     The scene of a glTF file with several, by name or number from 0.
     /// animation : str, optional
     ///     An animation of a glTF file, by name or number from 0; at rest by default.
     /// at : float, default 0
-    ///     The moment of the animation [s].
+    ///     The time in the animation [s].
     /// strict : bool, default False
-    ///     Refuse what cannot be drawn instead of warning.
+    ///     Raise an error for unsupported parts instead of warning.
     /// up : {'y', 'z'}, optional
-    ///     The axis that points up, where the file does not say rightly.
+    ///     The axis that points up, if the file is wrong or does not specify it.
     ///
     /// Raises
     /// ------
@@ -381,7 +381,7 @@ impl Scene {
     /// Warns
     /// -----
     /// DomelightWarning
-    ///     For what the picture will lack.
+    ///     For parts that the picture will lack.
     #[classmethod]
     #[pyo3(signature = (path, *, material = None, ground = false, normalize = false, scene = None,
         animation = None, at = 0.0, strict = false, up = None))]
@@ -412,14 +412,14 @@ impl Scene {
         Self::build(py, path.display().to_string(), description, material, ground, normalize)
     }
 
-    /// A scene made in code: 'statue', 'spheres', 'material-ball', 'sphere' or 'sphere-orthographic'.
+    /// Create a built-in scene: 'statue', 'spheres', 'material-ball', 'sphere' or 'sphere-orthographic'.
     ///
     /// Parameters
     /// ----------
     /// name : str
-    ///     Which one.
+    ///     The name of the scene.
     /// material, ground, normalize
-    ///     As of `load`.
+    ///     As in `load`.
     #[classmethod]
     #[pyo3(signature = (name, *, material = None, ground = false, normalize = false))]
     fn builtin(
@@ -435,7 +435,7 @@ impl Scene {
         Self::build(py, name.to_owned(), description, material, ground, normalize)
     }
 
-    /// str: what the scene is called.
+    /// str: the name of the scene.
     #[getter]
     fn name(&self) -> &str {
         &self.inner.name
@@ -447,7 +447,7 @@ impl Scene {
         self.inner.scene.triangle_count()
     }
 
-    /// ndarray, shape (2, 3), or None: least and largest coordinates of what the camera frames.
+    /// ndarray, shape (2, 3), or None: minimum and maximum coordinates of the part that the camera frames.
     #[getter]
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArrayDyn<f32>>>> {
         let Aabb { min, max } = self.inner.subject;
@@ -469,12 +469,12 @@ impl Scene {
         self.inner.cameras.iter().map(|camera| camera.name.as_str()).collect()
     }
 
-    /// The scene's own camera, or one that frames the scene in a picture of a width / height.
+    /// Return the scene's own camera, or one that frames the scene in a picture of this aspect ratio.
     ///
     /// Parameters
     /// ----------
     /// aspect : float, default 1
-    ///     Width over height.
+    ///     Width / height.
     #[pyo3(signature = (aspect = 1.0))]
     fn camera(&self, aspect: f32) -> PyResult<Camera> {
         if !(aspect.is_finite() && aspect > 0.0) {
@@ -484,7 +484,7 @@ impl Scene {
         Ok(Camera::of(self.inner.camera_settings(None, aspect, up)?))
     }
 
-    /// The environment that the scene names, else the built-in sky.
+    /// Return the environment named by the scene, otherwise the built-in sky.
     ///
     /// Parameters
     /// ----------

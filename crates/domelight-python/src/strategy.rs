@@ -16,9 +16,9 @@ use crate::engine::alone;
 use crate::error::bad_value;
 use crate::lobe::{PythonLobe, colors};
 
-/// The shading points of a tile, which a strategy written in Python gets.
+/// The shading points of a tile, passed to strategies written in Python.
 ///
-/// Directions are unit vectors in the world; `wo` points toward the viewer, `wi` toward the light.
+/// Directions are unit vectors in world space; `wo` points toward the viewer, `wi` toward the light.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct ShadingPoints {
     points: Vec<ShadingPoint>,
@@ -43,7 +43,7 @@ impl ShadingPoints {
         rows(py, self.points.iter().map(|p| get(p).to_array()).collect(), &[self.points.len()])
     }
 
-    /// The points of rows: `index` of them, else the rows in order, equally many for each point.
+    /// The point of each row: from `index`, otherwise with equally many consecutive rows per point.
     fn points_of(&self, index: Option<&Bound<'_, PyAny>>, lead: &[usize]) -> PyResult<Vec<u32>> {
         let n: usize = lead.iter().product();
         let Some(index) = index else {
@@ -72,7 +72,7 @@ impl ShadingPoints {
         Ok(index)
     }
 
-    /// The lobe of Python's that a point consists of.
+    /// The Python lobe of a point, if any.
     fn python_lobe(&self, point: &ShadingPoint) -> Option<&'static PythonLobe> {
         if self.lobes.is_empty() {
             return None;
@@ -82,7 +82,7 @@ impl ShadingPoints {
         self.lobes.iter().copied().find(|known| known.is(custom))
     }
 
-    /// Values and densities, points of Python's BSDFs all at once.
+    /// Values and densities; points with Python BSDFs are evaluated all at once.
     fn evaluate(&self, py: Python<'_>, index: &[u32], wi: &[[f32; 3]]) -> PyResult<Evaluated> {
         let (mut values, mut densities): (Vec<[f32; 3]>, Vec<f32>) = alone(py, || {
             let one = |(&i, &wi): (&u32, &[f32; 3])| {
@@ -121,7 +121,7 @@ impl ShadingPoints {
         self.points.len()
     }
 
-    /// ndarray, shape (N, 3): positions in the world.
+    /// ndarray, shape (N, 3): world-space positions.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
         self.column(py, |p| p.position)
@@ -145,7 +145,7 @@ impl ShadingPoints {
         self.column(py, |p| p.frame.to_world(p.wo))
     }
 
-    /// ndarray, shape (N, 3): reflected fraction of uniform light, roughly.
+    /// ndarray, shape (N, 3): approximate reflected fraction of uniform light.
     #[getter]
     fn albedo<'py>(&self, py: Python<'py>) -> PyResult<FloatArray<'py>> {
         rows(
@@ -155,19 +155,19 @@ impl ShadingPoints {
         )
     }
 
-    /// Uniform numbers of each point: a pixel's form one well-distributed sequence.
+    /// Draw uniform numbers for each point; those of a pixel form one well-distributed sequence.
     ///
     /// Parameters
     /// ----------
     /// n : int, default 1
-    ///     Numbers for so many samples per point.
+    ///     The number of samples per point.
     /// purpose : {'environment', 'brdf', 'resampling'}, default 'environment'
     ///     Sequences of different purposes are independent.
     ///
     /// Returns
     /// -------
     /// ndarray, shape (N, n, 4)
-    ///     In [0, 1): two for a direction, one for the choice of a lobe or technique, one for whether to keep a sample.
+    ///     In [0, 1): two for a direction, one to choose a lobe or technique, one to decide whether to keep a sample.
     #[pyo3(signature = (n = 1, purpose = "environment"))]
     fn random<'py>(&self, py: Python<'py>, n: u32, purpose: &str) -> PyResult<FloatArray<'py>> {
         let dimension = match purpose {
@@ -193,18 +193,18 @@ impl ShadingPoints {
         rows(py, numbers, &[self.points.len(), n as usize])
     }
 
-    /// Reflectance toward the viewer.
+    /// Evaluate the reflectance toward the viewer.
     ///
     /// Parameters
     /// ----------
     /// wi : array_like, shape (N, ..., 3), or (M, 3) with `index`
     ///     Directions toward the light.
     /// index : array_like of int, optional
-    ///     The point of each direction, of the shape of `wi` but for its last axis.
+    ///     The point of each direction, in the shape of `wi` without the last axis.
     ///
     /// Returns
     /// -------
-    /// ndarray, of the shape of `wi`
+    /// ndarray, in the shape of `wi`
     ///     f_r * cos(theta_i) [sr^-1]; 0 below the geometric surface.
     #[pyo3(signature = (wi, index = None))]
     fn eval<'py>(
@@ -219,8 +219,8 @@ impl ShadingPoints {
     ///
     /// Returns
     /// -------
-    /// value : ndarray, of the shape of `wi`
-    /// pdf : ndarray, of the shape of `wi` but for its last axis
+    /// value : ndarray, in the shape of `wi`
+    /// pdf : ndarray, in the shape of `wi` without the last axis
     #[pyo3(signature = (wi, index = None))]
     fn eval_pdf<'py>(
         &self,
@@ -235,12 +235,12 @@ impl ShadingPoints {
         Ok((rows(py, values, lead)?, array(py, densities, lead)?))
     }
 
-    /// Draw directions from the BSDFs.
+    /// Sample directions from the BSDFs.
     ///
     /// Parameters
     /// ----------
     /// u : array_like, shape (N, ..., 3) or (N, ..., 4)
-    ///     Uniform numbers: two for the direction, the third for the choice of a lobe.
+    ///     Uniform numbers: two for the direction, the third to choose a lobe.
     /// index : array_like of int, optional
     ///     The point of each direction.
     ///
@@ -251,7 +251,7 @@ impl ShadingPoints {
     /// value : ndarray, shape (N, ..., 3)
     ///     f_r * cos(theta_i) [sr^-1].
     /// pdf : ndarray, shape (N, ...)
-    ///     Density [sr^-1]. All three are 0 where there is no sample: such a sample counts, with value 0.
+    ///     Density [sr^-1]. If there is no sample, all three are 0; it still counts as a sample with value 0.
     #[pyo3(signature = (u, index = None))]
     fn sample<'py>(
         &self,
@@ -278,7 +278,7 @@ impl ShadingPoints {
 }
 
 impl ShadingPoints {
-    /// Directions, values and densities; zeros where nothing is drawn.
+    /// Directions, values and densities; zeros where there is no sample.
     fn draw(&self, py: Python<'_>, index: &[u32], u: &[[f32; 3]]) -> PyResult<Drawn> {
         let mut drawn: Vec<([f32; 3], [f32; 3], f32)> = alone(py, || {
             let one = |(&i, &[x, y, u_lobe]): (&u32, &[f32; 3])| {
@@ -314,7 +314,7 @@ impl ShadingPoints {
     }
 }
 
-/// A function of [`ShadingPoints`] that gives (index, wi, weight).
+/// A function of [`ShadingPoints`] that returns (index, wi, weight).
 pub(crate) struct PythonStrategy {
     function: Py<PyAny>,
     n_rays: u32,
@@ -325,7 +325,7 @@ pub(crate) struct PythonStrategy {
 
 impl PythonStrategy {
     /// # Errors
-    /// If it cannot be called, or its attribute `n_rays` is no number of rays.
+    /// If it is not callable, or its attribute `n_rays` is not a valid number of rays.
     pub(crate) fn new(
         function: Bound<'_, PyAny>,
         lobes: Vec<&'static PythonLobe>,
@@ -346,17 +346,17 @@ impl PythonStrategy {
         Ok(Self { function: function.unbind(), n_rays, lobes, failure, failed })
     }
 
-    /// A call has raised.
+    /// Whether a call has raised.
     pub(crate) fn has_failed(&self) -> bool {
         self.failed.load(Ordering::Relaxed)
     }
 
-    /// What the first call raised that failed.
+    /// The exception of the first failed call, if any.
     pub(crate) fn take_failure(&self) -> Option<PyErr> {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Calls the function and takes what it gives.
+    /// Calls the function and converts its result.
     fn call(&self, py: Python<'_>, tile: &TileShading, out: &mut Contributions) -> PyResult<()> {
         let numbers = tile.pixels.iter().flat_map(|pixel| {
             let number = |i| (i, SampleIndex { sampler: pixel.sampler, sample: tile.samples[i] });
@@ -403,7 +403,7 @@ impl PythonStrategy {
                     wi.x, wi.y, wi.z
                 )));
             }
-            // Opaque: what lies below the surface needs no ray.
+            // The surface is opaque, so directions below it need no ray.
             if tile.points[point as usize].ng.dot(wi) > 0.0 {
                 out.push(point, wi, weight);
             }

@@ -1,4 +1,4 @@
-//! The statistical proofs of the engine's tests, for other people's samplers.
+//! The statistical tests of the engine, for users' samplers.
 
 use std::cell::RefCell;
 
@@ -55,7 +55,7 @@ pub(crate) fn chi2<'py>(
         ..Chi2::default()
     };
 
-    // Draw all samples at once, from the numbers that the harness will draw.
+    // Draw all samples at once, from the numbers that the test harness will draw.
     let mut rng = Pcg::new(seed);
     let numbers: Vec<[f32; 3]> = (0..samples)
         .map(|_| {
@@ -71,7 +71,7 @@ pub(crate) fn chi2<'py>(
     }
     let mut drawn = directions.iter().map(|&w| (w != [0.0; 3]).then_some(w));
 
-    // The first exception ends the questions.
+    // Stop at the first exception.
     let failure = RefCell::new(None);
     let density = |w: &[[f32; 3]]| -> Vec<f64> {
         let ask = || {

@@ -1,7 +1,7 @@
 """Direct illumination under measured light.
 
-A scene that is lit by an HDR environment is rendered by evaluating the integral of f_r cos(theta) L V over directions at
-every visible point, with every sampling strategy of the field, or one written in Python.
+Renders scenes under an HDR environment by integrating f_r cos(theta) L V over directions at every visible point, with
+any built-in sampling strategy or one written in Python.
 
 >>> import domelight as dl
 >>> scene = dl.Scene.builtin("sphere")
@@ -12,13 +12,13 @@ every visible point, with every sampling strategy of the field, or one written i
 
 Conventions
 -----------
-Arrays are float32 and C-contiguous; anything array-like is taken, without a copy where it is that. `wo` points toward the
-viewer and `wi` toward the light, both unit vectors away from the surface. Values of reflectance are f_r * cos(theta_i),
-the cosine inside; densities are per solid angle [sr^-1]; radiance is in W m^-2 sr^-1, linear Rec. 709. The world is
-right-handed, +Y up. Pictures have their top row first. Uniform numbers lie in [0, 1).
+Arrays are float32 and C-contiguous; functions accept anything array-like, and copy it only if it is not. `wo` points
+toward the viewer and `wi` toward the light, both unit vectors away from the surface. Reflectance values are
+f_r * cos(theta_i), including the cosine; densities are per solid angle [sr^-1]; radiance is in W m^-2 sr^-1, linear
+Rec. 709. The world is right-handed, +Y up. Pictures have their top row first. Uniform numbers are in [0, 1).
 
-Wrong input is a `ValueError` that names the argument, its shape or value, and what it must be. What a picture or a map
-lacks is a `DomelightWarning`.
+Invalid input raises a `ValueError` that names the argument, its shape or value, and the requirement. Missing or repaired
+parts of a picture or map give a `DomelightWarning`.
 """
 
 from . import metrics, strategies, testing

@@ -1,4 +1,4 @@
-"""Strategies on one scene at equal samples, rays or time."""
+"""Compares strategies on one scene at equal samples, rays or time."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What a comparison found; a notebook shows its page.
+    """The result of a comparison; a notebook displays its page.
 
     Attributes
     ----------
     report : dict
-        All numbers, as `domelight compare --json` gives them.
+        All numbers, as in `domelight compare --json`.
     page : str
-        One page of HTML with pictures, errors and plots that needs nothing else.
+        A self-contained HTML page with pictures, errors and plots.
     reference : ndarray, shape (H, W, 3)
-        What the pictures were measured against.
+        The reference picture.
     pictures : dict of str to ndarray, shape (H, W, 3)
         The first seed's picture of each strategy that was not left out.
     errors : dict of str to ndarray, shape (H, W)
-        Their relative errors.
+        The relative errors of the pictures.
     flip : dict of str to ndarray, shape (H, W)
-        Their FLIP, in [0, 1].
+        The FLIP maps of the pictures, in [0, 1].
     """
 
     report: dict[str, Any]
@@ -69,7 +69,7 @@ class Comparison:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        # A frame of its own, so that the page's styles stay its own.
+        # A frame isolates the page's styles.
         return (
             f'<iframe srcdoc="{html.escape(self.page)}" style="width:100%;height:900px;border:0">'
             f"</iframe>"
@@ -97,22 +97,22 @@ def compare(
     Parameters
     ----------
     scene : Scene
-        What is seen.
+        The scene.
     env : Environment, optional
         The light; by default the scene's own.
     strategies : sequence or mapping
-        Strategies as of `render`; a mapping names them. Functions count as unbiased.
+        Strategies as in `render`; a mapping names them. Functions are assumed to be unbiased.
     budget : str, default 'rays:32'
-        What each picture may cost: 'spp:16' camera samples per pixel, 'rays:64' shadow rays per pixel, or 'time:2s' of CPU.
+        The budget per picture: 'spp:16' camera samples per pixel, 'rays:64' shadow rays per pixel, or 'time:2s' of CPU.
     seeds : int, default 4
-        Pictures of each strategy.
+        The number of pictures per strategy.
     reference_spp : int, default 64
-        Camera samples of the rendered reference.
+        Camera samples per pixel of the rendered reference.
     size, seed, threads, camera, hide_env, tile_size
-        As of `render`; tiles are of 16 pixels unless said otherwise, for functions too.
+        As in `render`; the default tile size is 16, also for functions.
     progress : bool or callable, default False
-        True shows a bar if tqdm is installed; a callable gets the share of the work that is done, in [0, 1], and the name
-        of the picture that is rendered, every hundredth of a second.
+        True shows a bar if tqdm is installed; a callable receives the finished fraction, in [0, 1], and the name of the
+        current picture, every hundredth of a second.
 
     Returns
     -------
@@ -121,12 +121,12 @@ def compare(
     Raises
     ------
     ValueError
-        If a setting is wrong, or two strategies have one name.
+        If a setting is invalid, or two strategies have the same name.
 
     Warns
     -----
     DomelightWarning
-        If a strategy is left out or misses the budget, or the reference is too noisy to tell.
+        If a strategy is left out or misses the budget, or the reference is too noisy.
     """
     shown = bar(progress, "compare")
     report = callback(progress) if shown is None else shown.labeled

@@ -1,4 +1,4 @@
-"""The engine. Classes and functions document themselves; see `help(domelight.Environment)`, for instance."""
+"""The engine. For the documentation of classes and functions, see `help(domelight.Environment)`, for instance."""
 
 from collections.abc import Callable, Iterator
 from os import PathLike
@@ -20,10 +20,10 @@ _MaterialLike: TypeAlias = Material | Bsdf | str
 __version__: str
 
 class DomelightWarning(UserWarning):
-    """What a picture or a map lacks, or what was repaired in it."""
+    """A picture or map lacks something, or was repaired."""
 
 class RenderInterrupted(KeyboardInterrupt):
-    """A render was interrupted; `film` holds what was done."""
+    """A render was interrupted; `film` holds the samples so far."""
 
     film: Film
 

@@ -1,4 +1,4 @@
-"""The pixel X-ray: why a pixel is noisy, and what would help."""
+"""The pixel X-ray: why a pixel is noisy, and how to reduce the noise."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 
 SHOWN = 8
-"""Causes that a figure tells apart."""
+"""The number of causes that a figure distinguishes."""
 
 
 @dataclass(frozen=True)
 class Decomposition:
-    """The variance of a strategy at a pixel, by causes; in units of luminance.
+    """The variance of a strategy at a pixel, by cause, in units of luminance.
 
     Attributes
     ----------
@@ -32,19 +32,19 @@ class Decomposition:
     mean : float
         Luminance of the pixel.
     variance : float
-        Of the estimate from one camera sample.
+        Variance of the estimate from one camera sample.
     variance_per_ray : float
-        Of the estimate from one shadow ray.
+        Variance of the estimate from one shadow ray.
     rays_per_sample : float
-        Shadow rays of a camera sample.
+        Shadow rays per camera sample.
     between_samples : float
-        Share of the variance that no choice of directions changes.
+        Fraction of the variance that no choice of directions changes.
     shares : dict of str to float
-        Causes and their shares, the greatest first; they sum to 1, and one below 0 offsets others.
+        Causes and their shares, the largest first; they sum to 1, and negative shares offset others.
     diagnosis : str
-        Why the pixel is noisy, in a sentence.
+        Why the pixel is noisy, in one sentence.
     density : ndarray, shape (R, R), or None
-        Where the strategy sends its rays [sr^-1], counted, on the hemisphere's disk.
+        Counted density of the strategy's rays [sr^-1], on the hemisphere's disk.
     """
 
     name: str
@@ -60,27 +60,27 @@ class Decomposition:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What is found at a pixel; a notebook shows it as a figure if matplotlib is installed.
+    """The X-ray of a pixel; a notebook shows it as a figure if matplotlib is installed.
 
-    Maps are disks of the equal-area projection of the hemisphere: the shading normal in the middle, the horizon on the
-    circle, rows from +y of the local frame down.
+    Maps are disks in the equal-area projection of the hemisphere: the shading normal is at the center, the horizon on the
+    circle, and rows go down from +y of the local frame.
 
     Attributes
     ----------
     pixel : (int, int)
         Column and row, from the upper left.
     coverage : float
-        Share of the camera samples that hit the scene.
+        Fraction of the camera samples that hit the scene.
     position, normal, albedo : ndarray, shape (3,), or None
-        Of the hit nearest to the pixel's center.
+        The hit nearest to the pixel's center.
     frame : ndarray, shape (3, 3), or None
-        x, y and z of the local frame in the world, by rows.
+        x, y and z of the local frame in world space, by rows.
     maps : dict of str to ndarray
         'radiance', 'bsdf_cos', 'product' (R, R, 3) and 'visibility' (R, R); empty without a hit.
     strategies : list of Decomposition
-        In the order asked for.
+        The strategies, in the requested order.
     advice : str
-        What would help, in a sentence.
+        Advice, in one sentence.
     """
 
     pixel: tuple[int, int]
@@ -153,7 +153,7 @@ class Inspection:
 def named(
     strategies: Sequence[str | Strategy] | Mapping[str, str | Strategy],
 ) -> list[tuple[str, str | Strategy]]:
-    """Strategies with their names: their texts, or what functions are called."""
+    """Strategies with their names: their texts, or the names of functions."""
     if isinstance(strategies, Mapping):
         return list(strategies.items())
     return [
@@ -175,20 +175,20 @@ def inspect(
     hide_env: bool = False,
     resolution: int = 64,
 ) -> Inspection:
-    """Why is this pixel noisy, and what would help?
+    """Explain why a pixel is noisy, and how to reduce the noise.
 
     Parameters
     ----------
     scene : Scene
-        What is seen.
+        The scene.
     env : Environment, optional
         The light; by default the scene's own.
     pixel : (int, int)
-        Column and row of a picture of `size`, from the upper left.
+        Column and row in a picture of `size`, from the upper left.
     strategies : sequence or mapping
-        Strategies as of `render`; a mapping names them.
+        Strategies as in `render`; a mapping names them.
     size, seed, threads, camera, hide_env
-        As of `render`.
+        As in `render`.
     resolution : int, default 64
         Pixels along the edge of a map.
 
@@ -199,7 +199,7 @@ def inspect(
     Raises
     ------
     ValueError
-        If the pixel is not in the picture, or a setting is wrong.
+        If the pixel is not in the picture, or a setting is invalid.
     """
     found = _domelight.inspect(
         scene, env, named(strategies), pixel, size, seed, threads, camera, hide_env, resolution

@@ -1,4 +1,4 @@
-"""What other packages take and give, imported only where it is asked for."""
+"""Conversions for other packages, which are imported only on use."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def film_to_xarray(film: Film) -> Any:
 
 
 def oidn_library() -> str | None:
-    """The file of Open Image Denoise in the package pyoidn, if that is installed."""
+    """The Open Image Denoise library in the package pyoidn, if installed."""
     package = importlib.util.find_spec("pyoidn")
     for folder in (package and package.submodule_search_locations) or ():
         for file in sorted(pathlib.Path(folder).rglob("*OpenImageDenoise*")):
@@ -40,7 +40,7 @@ def oidn_library() -> str | None:
 
 
 OIDN_NAMES = ("libOpenImageDenoise.so.2", "libOpenImageDenoise.2.dylib", "OpenImageDenoise.dll")
-"""What the library is called on Linux, macOS and Windows."""
+"""The library's file names on Linux, macOS and Windows."""
 
 
 # Mitsuba's map has its first column toward -Z of its own space, where ours has its center column.
@@ -50,7 +50,7 @@ def environment_to_mitsuba(environment: Environment) -> dict[str, Any]:
     """A description of an environment for `mitsuba.load_dict`."""
     mitsuba: Any = importlib.import_module("mitsuba")
 
-    # Where the axes of Mitsuba's map point to in the world.
+    # The axes of Mitsuba's map in world space.
     back, left = environment.directions([[0.5, 0.5], [0.25, 0.5]]).astype(np.float64)
     up = np.cross(back, left)
     matrix = np.eye(4)
@@ -91,7 +91,7 @@ def environment_from_mitsuba(source: Any) -> Environment:
 
 
 def _without_margin(data: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """The map without the columns that Mitsuba repeats: one at its end, or one at each end in later versions."""
+    """The map without the columns that Mitsuba repeats: one at the end, or one at each end in later versions."""
     margin = data.shape[1] - 2 * data.shape[0]
     if margin not in (1, 2):
         wraps = np.array_equal(data[:, 0], data[:, -2]) and np.array_equal(data[:, 1], data[:, -1])

@@ -1,4 +1,4 @@
-"""Progress bars where the package tqdm is installed."""
+"""Progress bars, if the package tqdm is installed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 class Bar:
-    """A bar over the share of a work that is done, in [0, 1]; it ends when all is."""
+    """A bar for the finished fraction of a task, in [0, 1]; it closes at 1."""
 
     def __init__(self, tqdm: Any, label: str) -> None:
         self._label = label
@@ -19,7 +19,7 @@ class Bar:
             self.close()
 
     def labeled(self, share: float, label: str) -> None:
-        """Shows what is at work, too."""
+        """Also shows the current step."""
         if label and label != self._label:
             self._label = label
             self._bar.set_description_str(label, refresh=False)
@@ -30,7 +30,7 @@ class Bar:
 
 
 def bar(progress: bool | Callable[..., object], label: str) -> Bar | None:
-    """A bar if one is wanted and the package tqdm is installed."""
+    """A bar if requested and the package tqdm is installed."""
     if progress is not True:
         return None
     try:
@@ -41,5 +41,5 @@ def bar(progress: bool | Callable[..., object], label: str) -> Bar | None:
 
 
 def callback(progress: bool | Callable[..., object]) -> Callable[..., object] | None:
-    """What the caller wants to be called; None if that is nothing."""
+    """The caller's callback, or None."""
     return None if isinstance(progress, bool) else progress

@@ -1,4 +1,4 @@
-"""`render` and `progressive`, with a progress bar where one is wanted."""
+"""`render` and `progressive`, with an optional progress bar."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""How far a picture is from its reference.
+"""Errors of a picture against its reference.
 
-All take linear pictures of shape (H, W, 3), the one under test first, and compute in double precision. Errors of pictures
-with NaN or infinities are NaN or infinite.
+All functions take linear pictures of shape (H, W, 3), the tested picture first, and compute in double precision. Errors
+of pictures with NaN or infinities are NaN or infinite.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ __all__ = [
 
 
 class Comparison(TypedDict):
-    """All differences of a picture I from its reference R.
+    """All errors of a picture I against its reference R.
 
-    The errors are means over pixels and channels; `psnr` is in dB over the greatest channel of the reference.
+    The errors are means over pixels and channels; `psnr` is in dB relative to the largest channel of the reference.
     """
 
     n_pixels: int
@@ -49,14 +49,14 @@ class Comparison(TypedDict):
 def compare(
     test: npt.ArrayLike, reference: npt.ArrayLike, mask: npt.ArrayLike | None = None
 ) -> Comparison:
-    """All differences at once.
+    """Compute all errors at once.
 
     Parameters
     ----------
     test, reference : array_like, shape (H, W, 3)
         Linear pictures of the same size.
     mask : array_like, shape (H, W), optional
-        Pixels that count are not 0.
+        Nonzero for the pixels to compare.
 
     Returns
     -------
@@ -81,22 +81,22 @@ def rel_mse(
 def rel_mse_trimmed(
     test: npt.ArrayLike, reference: npt.ArrayLike, mask: npt.ArrayLike | None = None
 ) -> float:
-    """`rel_mse` without the worst 0.1 % of the pixels, so that a few fireflies do not decide."""
+    """`rel_mse` without the worst 0.1 % of the pixels, so that a few fireflies do not dominate."""
     return compare(test, reference, mask)["rel_mse_trimmed"]
 
 
 def psnr(test: npt.ArrayLike, reference: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
-    """10 log10(peak^2 / MSE) [dB]; the peak is the greatest channel of the reference. Infinite for equal pictures."""
+    """10 log10(peak^2 / MSE) [dB]; the peak is the largest channel of the reference. Infinite for equal pictures."""
     return compare(test, reference, mask)["psnr"]
 
 
 def relative_error_map(test: npt.ArrayLike, reference: npt.ArrayLike) -> npt.NDArray[np.float32]:
-    """Square root of the mean over channels of (I - R)^2 / (R^2 + 0.01), of shape (H, W)."""
+    """Square root of the mean over channels of (I - R)^2 / (R^2 + 0.01), shape (H, W)."""
     return error_map(test, reference, True)
 
 
 def absolute_error_map(test: npt.ArrayLike, reference: npt.ArrayLike) -> npt.NDArray[np.float32]:
-    """Square root of the mean over channels of (I - R)^2, of shape (H, W)."""
+    """Square root of the mean over channels of (I - R)^2, shape (H, W)."""
     return error_map(test, reference, False)
 
 
@@ -108,9 +108,9 @@ def flip_map(
     Parameters
     ----------
     test, reference : array_like, shape (H, W, 3)
-        Linear light on the screen, after the tone curve and before the sRGB encoding; clamped to [0, 1].
+        Linear display light, after the tone curve and before sRGB encoding; clamped to [0, 1].
     pixels_per_degree : float, optional
-        Resolution at the eye; by default that of a 0.7 m wide 4K screen seen from 0.7 m, 67.02.
+        Angular resolution; by default 67.02, for a 0.7 m wide 4K screen at a distance of 0.7 m.
     """
     return _flip(test, reference, pixels_per_degree)
 
@@ -125,7 +125,7 @@ def flip(
 def hdr_flip_map(
     test: npt.ArrayLike, reference: npt.ArrayLike, pixels_per_degree: float | None = None
 ) -> npt.NDArray[np.float32]:
-    """HDR-FLIP of each pixel, in [0, 1], of linear radiance; non-finite values count as 0."""
+    """HDR-FLIP of each pixel, in [0, 1], for linear radiance; non-finite values count as 0."""
     return _hdr_flip(test, reference, pixels_per_degree)
 
 

@@ -1,9 +1,9 @@
-"""Strategies written in Python, to be rendered with, read and changed.
+"""Strategies written in Python, to use, read and modify.
 
-A strategy is a function of the `ShadingPoints` of a tile. It returns `(index, wi, weight)`: the points of shadow rays,
-their directions, and what each adds if it is free. The estimate at a point is the sum of weight * V(wi) over its rays, so
-1 / n, 1 / pdf and weights of a combination are in the weight. The attribute `n_rays` says how many rays a point has at
-most.
+A strategy is a function of the `ShadingPoints` of a tile. It returns `(index, wi, weight)`: the points of the shadow
+rays, their directions, and their contributions if unoccluded. The estimate at a point is the sum of weight * V(wi) over
+its rays, so the weight includes 1 / n, 1 / pdf and combination weights. The attribute `n_rays` is the maximum number of
+rays per point.
 
 >>> import domelight as dl
 >>> env = dl.Environment.builtin("studio", rows=64)
@@ -28,11 +28,11 @@ Rays: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]
 """Indices of points (M,), directions (M, 3) and weights (M, 3) or (M,)."""
 
 Strategy: TypeAlias = "Callable[[ShadingPoints], Rays]"
-"""A function that chooses shadow rays for the points of a tile."""
+"""A function that generates shadow rays for the points of a tile."""
 
 
 class _Sampler(Protocol):
-    """What draws directions from the light: an environment or a density."""
+    """A sampler of directions toward the light: an environment or a density."""
 
     def sample(self, u: npt.ArrayLike) -> tuple[Any, Any, Any]: ...
 
@@ -40,23 +40,23 @@ class _Sampler(Protocol):
 
 
 def _flat(wi: npt.NDArray[np.float32], weight: npt.NDArray[np.float32]) -> Rays:
-    """The rays of arrays with n rows for each point, without those that add nothing."""
+    """The rays of arrays with n rows per point."""
     points, n = wi.shape[:2]
     index = np.repeat(np.arange(points, dtype=np.int64), n)
     return index, wi.reshape(-1, 3), weight.reshape(-1, 3)
 
 
 def _over(value: npt.NDArray[np.float32], pdf: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """value / pdf, and 0 where nothing was drawn."""
+    """value / pdf, and 0 where there is no sample."""
     out = np.zeros_like(value)
     np.divide(value, pdf[..., np.newaxis], out=out, where=pdf[..., np.newaxis] > 0)
     return out
 
 
 class Environment:
-    """Directions from the environment, or from a density over it.
+    """Samples directions from the environment, or from a density over it.
 
-    With the environment's own density it does what the built-in 'environment' does, to the bit.
+    With the environment's own density, the result is bit-identical to that of the built-in 'environment'.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Environment:
     n : int, default 1
         Rays of each point.
     density : Density, optional
-        Where directions are drawn from; by default luminance. It must be positive wherever light is.
+        The density of directions; by default proportional to luminance. It must be positive wherever there is light.
     """
 
     def __init__(self, env: Map, n: int = 1, density: Density | None = None) -> None:
@@ -81,7 +81,7 @@ class Environment:
 
 
 class Brdf:
-    """Directions from the BSDF.
+    """Samples directions from the BSDF.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class Brdf:
 
 
 class Cosine:
-    """Directions in proportion to the cosine about the shading normal: the first strategy that one writes.
+    """Samples directions in proportion to the cosine to the shading normal: the simplest strategy.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class Cosine:
 
 
 def _perpendicular(normal: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """A unit vector across each normal."""
+    """A unit vector perpendicular to each normal."""
     axis = np.where(np.abs(normal[..., :1]) < 0.5, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     across = np.cross(normal, axis)
     unit: npt.NDArray[np.float32] = across / np.linalg.norm(across, axis=-1, keepdims=True)
@@ -143,16 +143,16 @@ def _perpendicular(normal: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
 
 
 class Mis:
-    """Directions from the light and from the BSDF, weighted by the power heuristic.
+    """Samples directions from the light and from the BSDF, weighted by the power heuristic.
 
     Parameters
     ----------
     env : Environment
         The light.
     n_light, n_brdf : int, default 1
-        Rays of each point from the light and from the BSDF.
+        Rays per point from the light and from the BSDF.
     density : Density, optional
-        Where the light's directions are drawn from; by default luminance. It may be 0 where light is.
+        The density of the light's directions; by default proportional to luminance. It may be 0 where there is light.
     """
 
     def __init__(
@@ -186,7 +186,7 @@ class Mis:
 
     @staticmethod
     def _share(own: npt.NDArray[np.float32], other: npt.NDArray[np.float32]) -> Any:
-        """The power heuristic, computed from the quotient so that squares do not overflow."""
+        """The power heuristic, computed from the ratio so that squares do not overflow."""
         quotient = np.divide(other, own, out=np.zeros_like(own), where=own > 0)
         with np.errstate(over="ignore"):
             return (np.float32(1) / (np.float32(1) + quotient * quotient))[..., np.newaxis]

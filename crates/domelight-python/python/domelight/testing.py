@@ -1,7 +1,7 @@
-"""Statistical proofs for samplers and estimators: "this samples that density", "this estimates that integral".
+"""Statistical tests for samplers and estimators: "this samples that density", "this estimates that integral".
 
-A right sampler fails with a stated probability, `significance`, which several tests may share: with `tests=20` each of
-twenty gets its Sidak share. No tolerance on a random number is picked by hand.
+A correct sampler fails with probability `significance`, which several tests may share: with `tests=20`, each of twenty
+tests gets its Sidak share. No tolerance is chosen by hand.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ __all__ = ["Chi2Report", "chi2", "z_test"]
 
 
 class Chi2Report(TypedDict):
-    """A chi-squared test that passed.
+    """A passed chi-squared test.
 
-    `mass` is the integral of the density, `lost` the number of samples that were declined.
+    `mass` is the integral of the density, `lost` the number of rejected samples.
     """
 
     statistic: float
@@ -42,29 +42,29 @@ def chi2(
     significance: float = 0.01,
     name: str = "sampler",
 ) -> Chi2Report:
-    """Pearson's chi-squared test of a sampler of directions against its density.
+    """Test a sampler of directions against its density by Pearson's chi-squared test.
 
     Parameters
     ----------
     sample : callable
-        Takes uniform numbers (N, 3) in [0, 1) and returns unit vectors (N, 3); a row of zeros is a declined sample.
+        Takes uniform numbers (N, 3) in [0, 1) and returns unit vectors (N, 3); a row of zeros is a rejected sample.
     pdf : callable
         Takes unit vectors (N, 3) and returns their density (N,) [sr^-1]. It may integrate to less than 1: the rest is the
-        probability of a declined sample.
+        probability of a rejected sample.
     samples : int, default 100000
-        How many are drawn.
+        The number of samples.
     cells : (int, int), default (31, 61)
         Cells along the polar angle and around the axis.
     axis : array_like, shape (3,)
-        The polar axis of the cells: put it on a narrow lobe.
+        The polar axis of the cells; align it with narrow lobes.
     seed : int, default 1
-        Of the uniform numbers.
+        The seed of the uniform numbers.
     tests : int, default 1
-        Tests that share the significance.
+        The number of tests that share the significance.
     significance : float, default 0.01
-        Probability that a right sampler fails any of them.
+        The probability that a correct sampler fails any of the tests.
     name : str
-        For the message.
+        The name in messages.
 
     Returns
     -------
@@ -91,38 +91,38 @@ def z_test(
     rounding: float = 2e-6,
     name: str = "estimator",
 ) -> float:
-    """A test of an estimator's mean against the value that it estimates.
+    """Test an estimator's mean against a reference.
 
     Parameters
     ----------
     estimator : callable or array_like
         `estimator(rng, n)` returns n independent estimates, (n,) or (n, channels); or such an array.
     reference : float or array_like, shape (channels,)
-        What they estimate.
+        The expected value.
     standard_error : float or array_like, shape (channels,), default 0
-        Of the reference; 0 if it is exact.
+        The standard error of the reference; 0 if it is exact.
     samples : int, default 100000
-        Estimates that a callable is asked for.
+        The number of estimates requested from a callable.
     batches : int, default 100
-        Batches that are averaged first, at least 30.
+        The number of batches that are averaged first, at least 30.
     seed : int, default 1
-        Of the callable's random numbers.
+        The seed of the callable's random numbers.
     tests, significance
-        As of `chi2`.
+        As in `chi2`.
     rounding : float, default 2e-6
-        The relative difference that rounding explains.
+        The relative difference attributed to rounding.
     name : str
-        For the message.
+        The name in messages.
 
     Returns
     -------
     float
-        The least p-value of the channels.
+        The smallest p-value of the channels.
 
     Raises
     ------
     AssertionError
-        If a mean differs from the reference by more than chance allows, or is not finite.
+        If a mean differs significantly from the reference, or is not finite.
     """
     if callable(estimator):
         estimates = np.asarray(estimator(np.random.default_rng(seed), samples), np.float64)
