@@ -16,8 +16,8 @@ async function unpacked(script: string): Promise<[Worker, WebAssembly.Module]> {
   return [worker, module];
 }
 
-/** Half of the computer's memory as reported by the browser, or 4 GiB if it is not reported; `?memory=` in the address sets
- *  another limit [GiB]. */
+/** Half of the computer's memory as reported by the browser, or 4 GiB if it is not reported; `?memory=` in the address
+ *  sets another limit [GiB]. */
 function memoryLimit(): number {
   const given = Number(new URLSearchParams(location.search).get("memory"));
   const { deviceMemory = 8 } = navigator as Navigator & { deviceMemory?: number };

@@ -399,7 +399,7 @@ const resampling: Figure = (stage) => {
   });
 };
 
-/** The four ways: name, counts, the strategy at these counts, and a strategy with few samples per pass for equal time. */
+/** The four ways: name, counts, the strategy at these counts, and one with few samples at a time for equal time. */
 const WAYS = [
   { name: "environment", counts: "100", strategy: "environment:100", few: "environment:4" },
   { name: "reflectance", counts: "75", strategy: "brdf:75", few: "brdf:4" },

@@ -240,8 +240,8 @@ export class MapPanel {
     return { ...layers, values: layers.pixels.subarray(at * n, (at + 1) * n) };
   }
 
-  /** A density as the opacity of one color. The square root makes tails visible; full opacity is at the 99th percentile of
-   *  the map, because a sun at full opacity would hide everything else. */
+  /** A density as the opacity of one color. The square root makes tails visible; full opacity is at the 99th percentile
+   *  of the map, because otherwise a sun would make everything else invisible. */
   private heat(context: CanvasRenderingContext2D) {
     const layer = this.layer();
     if (!layer?.values.length) return;

@@ -99,7 +99,7 @@ export class XrayPanel {
     const context = canvas.getContext("2d")!;
     const small = h("canvas", { width: String(DENSITY), height: String(DENSITY) }), inner = small.getContext("2d")!;
     const image = inner.createImageData(DENSITY, DENSITY), sorted = density.filter((value) => value > 0).sort();
-    // Full opacity is at the 99th percentile, because a sun at full opacity would hide everything else.
+    // Full opacity is at the 99th percentile, because otherwise a sun would make everything else invisible.
     const most = sorted[Math.floor(0.99 * (sorted.length - 1))] ?? 1;
     density.forEach((value, i) => image.data.set([255, 96, 176, 255 * Math.sqrt(Math.min(value / most, 1))], 4 * i));
     inner.putImageData(image, 0, 0);

@@ -97,13 +97,14 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 19–20 and 28–29",
         caption: code!(
             Html,
-            "<p>Resampling draws M candidates and traces N of them. More candidates bring the distribution of the {RAYS} rays \
-             closer to the product. Then only visibility, which candidates ignore, adds variance: the error levels off, but the \
-             time keeps growing. The best balance minimizes error × time; it depends on the material and on the cost of a ray, so \
-             <code>sir</code> without a candidate count chooses it with a pilot.</p>\
-             <p>Multiple importance sampling splits {BOTH} rays into M environment samples and N BRDF samples, weighted by \
-             the power heuristic. One sample of the less useful technique costs little; dropping it entirely can ruin the \
-             estimate (the ends of the curves).</p>",
+            "<p>Resampling draws M candidates and traces N of them. More candidates bring the distribution of the \
+             {RAYS} rays closer to the product. Then only visibility, which candidates ignore, adds variance: the \
+             error levels off, but the time keeps growing. The best balance minimizes error × time; it depends on the \
+             material and on the cost of a ray, so <code>sir</code> without a candidate count chooses it with a \
+             pilot.</p>\
+             <p>Multiple importance sampling splits {BOTH} rays into M environment samples and N BRDF samples, \
+             weighted by the power heuristic. One sample of the less useful technique costs little; dropping it \
+             entirely can ruin the estimate (the ends of the curves).</p>",
             RAYS = RAYS,
             BOTH = BOTH,
         ),

@@ -150,8 +150,8 @@ fn caption(independent: &[Curve], sobol: &[Curve], n_seeds: u64) -> Code<Html> {
         "<p>The error of every method over its shadow rays or lights per point, for a statue of {MATERIAL}; bars show \
          the standard deviation over {n_seeds} seeds. Once samples have found all the light, the error of independent \
          samples falls as 1/√N, a slope of −½ (the variance falls as 1/N, not as 1/N²). Here the slopes are \
-         {range}.{outliers} Stratified points have slopes of {sobol}{verdict}. Fixed lights have bias instead of noise. \
-         The bias falls as lights are added (slopes of {fixed}), but averaging pictures does not remove it.</p>",
+         {range}.{outliers} Stratified points have slopes of {sobol}{verdict}. Fixed lights have bias instead of \
+         noise. The bias falls as lights are added (slopes of {fixed}), but averaging pictures does not remove it.</p>",
         MATERIAL = MATERIAL,
         n_seeds = n_seeds,
         range = range_of(sampled),
@@ -191,8 +191,8 @@ fn outliers(sampled: &[Curve]) -> Code<Html> {
     let flat = sentence(
         &flat,
         "Flatter",
-        "pictures with few rays rarely hit a small bright light and so underestimate the error, and where candidates or \
-         tries dominate the error, more rays help less",
+        "pictures with few rays rarely hit a small bright light and so underestimate the error, and where candidates \
+         or tries dominate the error, more rays help less",
     );
     let steep = sentence(
         &steep,

@@ -90,13 +90,14 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 24–25",
         caption: code!(
             Html,
-            "<p>Rejection sampling draws from one factor of the product and bounds the other. Factor times bound is the envelope, \
-             which must exceed the product everywhere; the area between them is rejected. Above: both envelopes along the great \
-             circle through the lobe’s axis (Phong, exponent {SHOWN}) and the brightest light, {OFF_AXIS:.0}° from it. The more the bounded \
-             factor varies, the looser the envelope: the light reaches its maximum in a few texels, the lobe only \
-             on its axis.</p><p>Below: the acceptance rate over the lobe’s exponent. A wide lobe is nearly constant, so its \
-             bound is tight; a narrow lobe rejects most environment samples. The better proposal changes with the \
-             point, so <code>rejection</code> takes the tighter bound at each.</p>",
+            "<p>Rejection sampling draws from one factor of the product and bounds the other. Factor times bound is \
+             the envelope, which must exceed the product everywhere; the area between them is rejected. Above: both \
+             envelopes along the great circle through the lobe’s axis (Phong, exponent {SHOWN}) and the brightest \
+             light, {OFF_AXIS:.0}° from it. The more the bounded factor varies, the looser the envelope: the light \
+             reaches its maximum in a few texels, the lobe only on its axis.</p>\
+             <p>Below: the acceptance rate over the lobe’s exponent. A wide lobe is nearly constant, so its bound is \
+             tight; a narrow lobe rejects most environment samples. The better proposal changes with the point, so \
+             <code>rejection</code> takes the tighter bound at each.</p>",
             SHOWN = SHOWN,
             OFF_AXIS = OFF_AXIS,
         ),

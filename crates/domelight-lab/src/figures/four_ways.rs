@@ -110,9 +110,9 @@ const CAPTION: &str = "<p>All pictures share the same camera rays, one per pixel
     estimate. The first row uses the lecture's counts: 100 environment samples (EM), 75 BRDF samples, 37 of each with \
     multiple importance sampling (power heuristic, compensated), and 15 shadow rays resampled from 800 candidates \
     (SIR). These took equal time in 2005, but a shadow ray is now cheaper than a candidate. So the row repeats MIS \
-    with the sample count that takes the time of SIR. It also shows the strategy <code>product</code>, which samples the \
-    product of light and BRDF from a table for each pixel, with as many rays as SIR; it is designed for pixels with \
-    several camera rays, which share a table. In the second row every strategy takes the time of 100 environment \
+    with the sample count that takes the time of SIR. It also shows the strategy <code>product</code>, which samples \
+    the product of light and BRDF from a table for each pixel, with as many rays as SIR; it is designed for pixels \
+    with several camera rays, which share a table. In the second row every strategy takes the time of 100 environment \
     samples, with counts calibrated by measurement: SIR with the lecture’s ratio of candidates to rays, and with the \
     best ratio for their costs here. Each picture is labeled with its error against the converged one (relMSE: mean of \
     (I − R)² / (R² + 0.01) over the pixels that show the scene), its shadow rays and its CPU seconds.</p>\

@@ -58,14 +58,15 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 8–9",
         caption: code!(
             Html,
-            "<p>A microfacet reflects the viewer’s direction ω<sub>o</sub> into ω<sub>i</sub> if its normal is their half vector \
-             ω<sub>h</sub>. So directions are sampled by sampling half vectors and reflecting about them. In the plane of \
-             incidence, rotating ω<sub>h</sub> rotates ω<sub>i</sub> twice as far; on the sphere, a small patch of half vectors \
-             maps to a patch of directions 4 (ω<sub>h</sub>·ω<sub>i</sub>) times as large, as the table measures. The density per \
-             solid angle of ω<sub>i</sub> is lower by the same factor.</p>\
-             <p>Below: the lobe {MATERIAL} seen {VIEWER}° from the normal, in the plane of incidence. {n} sampled directions \
-             follow the density with the Jacobian. Without the Jacobian the density integrates to {without} instead of {with}, the \
-             fraction of samples above the horizon; an estimate that divides by it is too dark by the ratio of the two.</p>",
+            "<p>A microfacet reflects the viewer’s direction ω<sub>o</sub> into ω<sub>i</sub> if its normal is their \
+             half vector ω<sub>h</sub>. So directions are sampled by sampling half vectors and reflecting about them. \
+             In the plane of incidence, rotating ω<sub>h</sub> rotates ω<sub>i</sub> twice as far; on the sphere, a \
+             small patch of half vectors maps to a patch of directions 4 (ω<sub>h</sub>·ω<sub>i</sub>) times as large, \
+             as the table measures. The density per solid angle of ω<sub>i</sub> is lower by the same factor.</p>\
+             <p>Below: the lobe {MATERIAL} seen {VIEWER}° from the normal, in the plane of incidence. {n} sampled \
+             directions follow the density with the Jacobian. Without the Jacobian the density integrates to {without} \
+             instead of {with}, the fraction of samples above the horizon; an estimate that divides by it is too dark \
+             by the ratio of the two.</p>",
             MATERIAL = MATERIAL,
             VIEWER = VIEWER,
             n = n,

@@ -81,12 +81,12 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         title: "Inverting a distribution function; sampling the environment",
         slides: "slides 10–11",
         caption: Code::literal(
-            "<p>Inverting equally spaced numbers through the distribution function yields values in proportion to \
-            the density: the function is steep where the density is high, flat where it is low. A map takes two such steps: \
-            first a row, by the energy of each scan line times sin θ, because rows near the poles cover little of the sphere; \
-            then a column in that row. The samples are shown as the course's marks of 5 × 5 pixels, as \
-            dots, and alone in the colors that remain when the density cancels the luminance: an estimate \
-            of a colored integral keeps that factor.</p>",
+            "<p>Inverting equally spaced numbers through the distribution function yields values in proportion to the \
+            density: the function is steep where the density is high, flat where it is low. A map takes two such \
+            steps: first a row, by the energy of each scan line times sin θ, because rows near the poles cover little \
+            of the sphere; then a column in that row. The samples are shown as the course's marks of 5 × 5 pixels, as \
+            dots, and alone in the colors that remain when the density cancels the luminance: an estimate of a colored \
+            integral keeps that factor.</p>",
         ),
         formulas: formulas::inversion(),
         rows: vec![

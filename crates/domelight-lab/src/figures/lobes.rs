@@ -51,13 +51,13 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 5–9",
         caption: code!(
             Html,
-            "<p>{n} directions per lobe, sampled by inverting its distribution function with the viewer \
-             along the normal: a thousand of them as dots (the center is the normal, the rim the horizon), \
-             and all of them as histograms over the density that the program divides by. If the histogram \
-             follows the curve, sampler and density agree; then χ² is near its degrees of freedom.</p>\
-             <p>Three pitfalls: the density of Ward's half vector needs cos³θ<sub>h</sub> in the denominator; a \
-             plain arctan for φ<sub>h</sub> reaches only half of the lobe, atan2 all of it; and \
-             p(ω<sub>i</sub>) = p(ω<sub>h</sub>) / 4(ω<sub>h</sub>·ω<sub>i</sub>), because ω<sub>i</sub> is traced.</p>",
+            "<p>{n} directions per lobe, sampled by inverting its distribution function with the viewer along the \
+             normal: a thousand of them as dots (the center is the normal, the rim the horizon), and all of them as \
+             histograms over the density that the program divides by. If the histogram follows the curve, sampler and \
+             density agree; then χ² is near its degrees of freedom.</p>\
+             <p>Three pitfalls: the density of Ward's half vector needs cos³θ<sub>h</sub> in the denominator; a plain \
+             arctan for φ<sub>h</sub> reaches only half of the lobe, atan2 all of it; and p(ω<sub>i</sub>) = \
+             p(ω<sub>h</sub>) / 4(ω<sub>h</sub>·ω<sub>i</sub>), because ω<sub>i</sub> is traced.</p>",
             n = n,
         ),
         formulas: formulas::lobes(),

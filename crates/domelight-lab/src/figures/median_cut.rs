@@ -85,12 +85,13 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         title: "Median cut",
         slides: "slides 31–41",
         caption: Code::literal(
-            "<p>The map starts as one region. Each round cuts every region across its longer side (with widths scaled by \
-            sin θ) into halves of equal energy; after n rounds each of the 2<sup>n</sup> regions \
-            becomes a light with the region's energy. The light sits at the centroid of that <em>energy</em> (blue). At the \
-            center of the rectangle instead, errors are several times as large, as the table shows (RMS error of \
-            unoccluded matte shading over all normals).</p><p>Fixed lights have bias instead of noise: shadows become \
-            sums of hard shadows, and narrow lobes would show separate lights. The bias falls as lights are added.</p>",
+            "<p>The map starts as one region. Each round cuts every region across its longer side (with widths scaled \
+            by sin θ) into halves of equal energy; after n rounds each of the 2<sup>n</sup> regions becomes a light \
+            with the region's energy. The light sits at the centroid of that <em>energy</em> (blue). At the center of \
+            the rectangle instead, errors are several times as large, as the table shows (RMS error of unoccluded \
+            matte shading over all normals).</p>\
+            <p>Fixed lights have bias instead of noise: shadows become sums of hard shadows, and narrow lobes would \
+            show separate lights. The bias falls as lights are added.</p>",
         ),
         formulas: vec![formulas::region_light()],
         rows: vec![

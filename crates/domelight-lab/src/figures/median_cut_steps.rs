@@ -62,11 +62,11 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         title: "Median cut, step by step",
         slides: "slides 32–37",
         caption: Code::literal(
-            "<p>A round cuts every region once, across its longer side, into halves of equal energy: new cuts \
-             are orange, earlier cuts white, and lights blue. Below each round, every cell shows the mean radiance of its \
-             region (exposed for the mean of the map); the light of a cell is that radiance times the solid angle. Bright \
-             areas are soon cut into small cells; dark areas stay large and waste no lights. Energy shares are not exactly equal, \
-             because a cut runs between texels.</p>",
+            "<p>A round cuts every region once, across its longer side, into halves of equal energy: new cuts are \
+             orange, earlier cuts white, and lights blue. Below each round, every cell shows the mean radiance of its \
+             region (exposed for the mean of the map); the light of a cell is that radiance times the solid angle. \
+             Bright areas are soon cut into small cells; dark areas stay large and waste no lights. Energy shares are \
+             not exactly equal, because a cut runs between texels.</p>",
         ),
         formulas: vec![formulas::region_light()],
         rows: vec![

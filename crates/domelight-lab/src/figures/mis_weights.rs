@@ -63,12 +63,12 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 19–20",
         caption: code!(
             Html,
-            "<p>The center of figure 3’s sphere, {SHOWN:.0}° around a Phong lobe of exponent 50 that leans {OFF_AXIS:.0}° past the \
-             brightest light, with one sample per technique. Each direction has one weight per technique, large where that \
-             technique’s density is high. The two weights of a direction add up to 1, so the parts add up to the product. The \
-             power heuristic separates them more sharply, which suppresses rare samples from the wrong technique. \
-             Outside the lobe’s hemisphere the BRDF has zero density: the environment gets all the weight, \
-             and the product is black.</p>",
+            "<p>The center of figure 3’s sphere, {SHOWN:.0}° around a Phong lobe of exponent 50 that leans \
+             {OFF_AXIS:.0}° past the brightest light, with one sample per technique. Each direction has one weight per \
+             technique, large where that technique’s density is high. The two weights of a direction add up to 1, so \
+             the parts add up to the product. The power heuristic separates them more sharply, which suppresses rare \
+             samples from the wrong technique. Outside the lobe’s hemisphere the BRDF has zero density: the \
+             environment gets all the weight, and the product is black.</p>",
             OFF_AXIS = OFF_AXIS,
             SHOWN = SHOWN,
         ),

@@ -55,11 +55,11 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 17–18",
         caption: code!(
             Html,
-            "<p>The sphere of directions as a light probe: the center is the lobe’s direction, the rim the opposite one. A Phong lobe of \
-             exponent 50 leans {OFF_AXIS:.0}° past the brightest light. Environment samples find lights \
-             that the surface does not reflect, and BRDF samples find directions with little light; \
-             product samples do neither. They are drawn by rejection, which follows the product exactly. \
-             (BRDF and product use a color scale over value<sup>0.4</sup> to show faint parts.)</p>",
+            "<p>The sphere of directions as a light probe: the center is the lobe’s direction, the rim the opposite \
+             one. A Phong lobe of exponent 50 leans {OFF_AXIS:.0}° past the brightest light. Environment samples find \
+             lights that the surface does not reflect, and BRDF samples find directions with little light; product \
+             samples do neither. They are drawn by rejection, which follows the product exactly. (BRDF and product use \
+             a color scale over value<sup>0.4</sup> to show faint parts.)</p>",
             OFF_AXIS = OFF_AXIS,
         ),
         formulas: formulas::product(),

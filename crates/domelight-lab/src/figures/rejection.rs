@@ -92,14 +92,15 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 24–25",
         caption: code!(
             Html,
-            "<p>A direction drawn from one factor of the product is accepted with probability proportional to the other. \
-             Accepted directions follow the product exactly; a tighter bound accepts more of them. Above: uniform \
-             tries under a bound on cos<sup>50</sup>θ, tight and three times too high. Below: a statue of {MATERIAL}, \
-             with {ACCEPT} directions to accept at each point in at most {MAX_TRIES} tries. A small bright light makes the bound \
-             on light loose everywhere; the bound on the BRDF is loose where lobes are narrow.</p>\
+            "<p>A direction drawn from one factor of the product is accepted with probability proportional to the \
+             other. Accepted directions follow the product exactly; a tighter bound accepts more of them. Above: \
+             uniform tries under a bound on cos<sup>50</sup>θ, tight and three times too high. Below: a statue of \
+             {MATERIAL}, with {ACCEPT} directions to accept at each point in at most {MAX_TRIES} tries. A small bright \
+             light makes the bound on light loose everywhere; the bound on the BRDF is loose where lobes are \
+             narrow.</p>\
              <p>Acceptance does not require the unshadowed integral, but the estimate does. N accepted of T tries is a \
-             biased estimate if the tries end with the N-th; (N − 1)/(T − 1) is unbiased (Haldane 1945). Where the tries run out, the \
-             estimate is accepted over tried, and the result stays unbiased.</p>",
+             biased estimate if the tries end with the N-th; (N − 1)/(T − 1) is unbiased (Haldane 1945). Where the \
+             tries run out, the estimate is accepted over tried, and the result stays unbiased.</p>",
             MATERIAL = MATERIAL,
             ACCEPT = ACCEPT,
             MAX_TRIES = MAX_TRIES,

@@ -63,13 +63,15 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 26–27",
         caption: code!(
             Html,
-            "<p>The center of figure 3’s sphere, {VIEW:.0}° around a lobe that leans {OFF_AXIS:.0}° past the brightest light. M candidates are drawn, half \
-             from the environment and half from the BRDF, and one is kept with probability proportional to product over \
-             density. A single candidate follows the mixture; a larger set more often contains one where the product is large. The \
-             histograms count {n} directions for each M. The distance to the product is half the sum of absolute differences over the \
-             cells, 100 % if nothing overlaps. It cannot fall below the noise of the counts, measured between two sets of exact \
-             directions (dashed; by rejection).</p><p>The estimate is unbiased for every M: unrepresentative candidates are \
-             compensated by the mean of their weights.</p>",
+            "<p>The center of figure 3’s sphere, {VIEW:.0}° around a lobe that leans {OFF_AXIS:.0}° past the brightest \
+             light. M candidates are drawn, half from the environment and half from the BRDF, and one is kept with \
+             probability proportional to product over density. A single candidate follows the mixture; a larger set \
+             more often contains one where the product is large. The histograms count {n} directions for each M. The \
+             distance to the product is half the sum of absolute differences over the cells, 100 % if nothing \
+             overlaps. It cannot fall below the noise of the counts, measured between two sets of exact directions \
+             (dashed; by rejection).</p>\
+             <p>The estimate is unbiased for every M: unrepresentative candidates are compensated by the mean of their \
+             weights.</p>",
             OFF_AXIS = OFF_AXIS,
             VIEW = VIEW,
             n = n,

@@ -70,13 +70,14 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         slides: "slides 42–45",
         caption: Code::literal(
             "<p>Equal energy is not optimal for shading: one light can represent concentrated energy, but not energy \
-            that is spread out. Here a cut minimizes the larger of the two halves’ variances, the \
-            energy times the squared distance to the centroid (not the variance of the pixel values). The first row uses the \
-            poster’s rule, with distances on the map. The second uses the program’s default: distances on the sphere, without \
-            poles or seams; the worst region is cut first, then regions are joined and refined into cells around their lights. \
-            The detail shows the surroundings of the brightest light: lights (blue) sit on the bright features.</p>\
-            <p>The table lists the RMS error of unoccluded shading over all normals, in percent of the RMS shading: matte, \
-            and for a lobe cos<sup>20</sup>.</p>",
+            that is spread out. Here a cut minimizes the larger of the two halves’ variances, the energy times the \
+            squared distance to the centroid (not the variance of the pixel values). The first row uses the poster’s \
+            rule, with distances on the map. The second uses the program’s default: distances on the sphere, without \
+            poles or seams; the worst region is cut first, then regions are joined and refined into cells around their \
+            lights. The detail shows the surroundings of the brightest light: lights (blue) sit on the bright \
+            features.</p>\
+            <p>The table lists the RMS error of unoccluded shading over all normals, in percent of the RMS shading: \
+            matte, and for a lobe cos<sup>20</sup>.</p>",
         ),
         formulas: vec![formulas::region_variance()],
         rows: vec![
