@@ -308,8 +308,14 @@ fn names_in_jobs_are_names() {
 fn memory_is_asked_for_before_it_is_taken() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
-    fs::write(at("many.toml"), "[[objects]]\nbuiltin = \"sphere\"\n".repeat(5000)).unwrap();
     let limit = ["--max-memory", "100MiB"];
+    // Spheres of one material share a mesh; others do not.
+    let sphere = "[[objects]]\nbuiltin = \"sphere\"\n";
+    fs::write(at("many.toml"), sphere.repeat(5000)).unwrap();
+    let output = domelight(&folder, &[&["render", "many.toml"], &SMALL[..], &limit].concat());
+    ended(&output, 0, &[]);
+    let each = (0..5000).map(|i| format!("{sphere}material = \"ggx:0.{}\"\n", 1000 + i));
+    fs::write(at("many.toml"), each.collect::<String>()).unwrap();
     let output = domelight(&folder, &[&["render", "many.toml"], &SMALL[..], &limit].concat());
     ended(&output, 2, &["many.toml", "sphere", "--max-memory"]);
     // Zeros as a color profile, which nobody needs.

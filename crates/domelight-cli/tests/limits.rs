@@ -267,10 +267,12 @@ fn files_that_would_take_more_memory_are_named() {
     ended(&domelight(&folder, &more), 0, &[]);
 }
 
-/// A glTF file of one mesh, with so many values, that many nodes show.
-fn instances(nodes: usize, accessors: &str) -> String {
+/// A glTF file of one mesh, with so many values, that many nodes show, stretched differently or alike.
+fn instances(nodes: usize, accessors: &str, stretched: bool) -> String {
     let list: Vec<String> = (0..nodes).map(|n| n.to_string()).collect();
-    let mesh = vec!["{\"mesh\":0}"; nodes].join(",");
+    let stretch = |n: usize| if stretched { n + 1 } else { 1 };
+    let mesh = (0..nodes).map(|n| format!("{{\"mesh\":0,\"scale\":[1,{},1]}}", stretch(n)));
+    let mesh = mesh.collect::<Vec<_>>().join(",");
     format!(
         "{{\"asset\":{{\"version\":\"2.0\"}},\"scene\":0,\"scenes\":[{{\"nodes\":[{}]}}],\"nodes\":[{mesh}],\
          \"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":0}}}}]}}],\
@@ -288,13 +290,16 @@ fn meshes_shown_very_often_are_counted_every_time() {
         \"sparse\":{\"count\":1,\"indices\":{\"bufferView\":0,\"componentType\":5125},\"values\":{\"bufferView\":0}}}";
     let limit = ["--max-memory", "100MiB"];
     // Values that nothing in the file backs: once they fit, a hundred times they do not.
-    write(&folder, "once.gltf", instances(1, sparse));
+    write(&folder, "once.gltf", instances(1, sparse, true));
     ended(&render(&folder, &[&["once.gltf"], &limit[..]].concat()), 0, &[]);
-    write(&folder, "often.gltf", instances(100, sparse));
+    write(&folder, "often.gltf", instances(100, sparse, true));
     let words = ["often.gltf, mesh 0", "MiB", "--max-memory SIZE"];
     ended(&render(&folder, &[&["often.gltf"], &limit[..]].concat()), 2, &words);
+    // Copies that are alike share their memory.
+    write(&folder, "alike.gltf", instances(100, sparse, false));
+    ended(&render(&folder, &[&["alike.gltf"], &limit[..]].concat()), 0, &[]);
     let huge = sparse.replace("300000", "4000000000");
-    write(&folder, "huge.gltf", instances(1, &huge));
+    write(&folder, "huge.gltf", instances(1, &huge, true));
     ended(
         &render(&folder, &[&["huge.gltf"], &limit[..]].concat()),
         2,
@@ -306,6 +311,10 @@ fn meshes_shown_very_often_are_counted_every_time() {
     let mut text = triangle("0").replace("face 1", "face 20000");
     text.push_str(&"3 0 1 2\n".repeat(19_999));
     write(&folder, "mesh.ply", text);
-    write(&folder, "scene.toml", "[[objects]]\nfile = \"mesh.ply\"\n".repeat(200));
+    let object = "[[objects]]\nfile = \"mesh.ply\"\n";
+    write(&folder, "scene.toml", object.repeat(200));
+    ended(&render(&folder, &[&["scene.toml"], &limit[..]].concat()), 0, &[]);
+    let stretched = (1..200).map(|i| format!("{object}scale = [1.0, {i}.0, 1.0]\n"));
+    write(&folder, "scene.toml", stretched.collect::<String>());
     ended(&render(&folder, &[&["scene.toml"], &limit[..]].concat()), 2, &["mesh.ply", "MiB"]);
 }

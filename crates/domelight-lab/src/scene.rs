@@ -307,7 +307,7 @@ impl LoadedScene {
         let camera_report = CameraReport::new(&camera, dof.map(focused));
         let (camera, camera_settings) = (Camera::new(&camera, width, height)?, camera);
         let camera = through(camera, lens);
-        let n_triangles: usize = description.parts.iter().map(|p| p.mesh.triangles.len()).sum();
+        let n_triangles = description.built_triangle_count();
         let tree = format!("{}: a BVH over {n_triangles} triangles", settings.scene);
         host.take_memory(&tree, TRIANGLE * n_triangles as u64)?;
         let scene = Scene::new(description).at(&settings.scene)?;

@@ -12,6 +12,7 @@ mod extraction;
 mod gltf;
 mod grid;
 mod inspect;
+mod instances;
 mod mapping;
 mod materials;
 mod picture_io;

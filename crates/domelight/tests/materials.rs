@@ -27,7 +27,7 @@ fn color(value: Rgb) -> ColorFactor {
 }
 
 /// Glazed clay, fabric and so on: a red dielectric under the given layers.
-fn layered(name: &str, layers: Layers) -> Material {
+fn layered(name: &str, layers: &Layers) -> Material {
     let model = MaterialModel::MetallicRoughness(MetallicRoughnessMaterial {
         base_color: Rgb::new(0.8, 0.2, 0.1),
         base_color_texture: None,
@@ -35,7 +35,7 @@ fn layered(name: &str, layers: Layers) -> Material {
         roughness: 0.7,
         metallic_roughness_texture: None,
     });
-    Material { model, layers, ..Material::diffuse(name, Rgb::WHITE) }
+    Material { model, layers: *layers, ..Material::diffuse(name, Rgb::WHITE) }
 }
 
 fn materials() -> Vec<Material> {
@@ -57,12 +57,12 @@ fn materials() -> Vec<Material> {
         Material::diffuse("diffuse", Rgb::splat(0.6)),
         of(fixed),
         of(phong),
-        layered("plain", Layers::default()),
-        layered("coat", Layers { clearcoat: coat, ..Layers::default() }),
-        layered("sheen", Layers { sheen, ..Layers::default() }),
-        layered("coat on sheen", Layers { clearcoat: coat, sheen, ..Layers::default() }),
-        layered("specular", Layers { specular, anisotropy, ..Layers::default() }),
-        layered("thin glass", Layers { transmission: Some(factor(0.6)), ..Layers::default() }),
+        layered("plain", &Layers::default()),
+        layered("coat", &Layers { clearcoat: coat, ..Layers::default() }),
+        layered("sheen", &Layers { sheen, ..Layers::default() }),
+        layered("coat on sheen", &Layers { clearcoat: coat, sheen, ..Layers::default() }),
+        layered("specular", &Layers { specular, anisotropy, ..Layers::default() }),
+        layered("thin glass", &Layers { transmission: Some(factor(0.6)), ..Layers::default() }),
     ]
 }
 

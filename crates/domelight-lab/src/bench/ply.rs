@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use domelight::geometry::Mesh;
 use domelight::math::Vec3;
-use domelight::scene::Scene;
+use domelight::scene::{Instance, Scene};
 
 /// Positions, shading normals and triangles of all parts.
 pub(super) fn encode(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
@@ -12,6 +12,11 @@ pub(super) fn encode(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     for part in scene.parts() {
         add(&part.mesh, &mut vertices, &mut triangles);
+    }
+    for Instance { part, transform } in scene.instances() {
+        let mut mesh = scene.parts()[part].mesh.clone();
+        mesh.transform(&transform);
+        add(&mesh, &mut vertices, &mut triangles);
     }
     write!(
         out,

@@ -107,7 +107,7 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Bvh, B
     };
     let (nodes, blocks) = lay_out(positions, triangles, &tree);
     let (bounds, instruction_set) = (bounds.aabb(), InstructionSet::best());
-    Ok(Bvh { nodes, blocks, bounds, triangle_count, instruction_set })
+    Ok(Bvh { nodes, blocks, bounds, triangle_count, instruction_set, instances: None })
 }
 
 /// Checks the input and boxes every triangle that has an area.

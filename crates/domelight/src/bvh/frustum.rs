@@ -63,18 +63,27 @@ impl Kernel for MayHit<'_> {
 }
 
 /// n·p ≥ d on the inner side.
-struct Plane {
+pub(super) struct Plane {
     normal: Vec3,
     d: f32,
 }
 
 /// The planes, moved outward by the maximum rounding error of rays and boxes.
-fn planes(frustum: &Frustum, bounds: &Aabb) -> [Plane; 4] {
+pub(super) fn planes(frustum: &Frustum, bounds: &Aabb) -> [Plane; 4] {
     const ROUNDING: f32 = 16.0 * f32::EPSILON;
     std::array::from_fn(|i| {
         let (normal, point) = (frustum.normals[i], frustum.points[i]);
         let scale = point.abs().max(bounds.min.abs()).max(bounds.max.abs()).element_sum();
         Plane { normal, d: normal.dot(point) - ROUNDING * scale }
+    })
+}
+
+/// Whether a box is not all outside of one plane.
+pub(super) fn sees(planes: &[Plane; 4], bounds: &Aabb) -> bool {
+    let corners = [bounds.min, bounds.max];
+    planes.iter().all(|Plane { normal, d }| {
+        let furthest = |axis: usize| normal[axis] * corners[usize::from(normal[axis] > 0.0)][axis];
+        furthest(0) + furthest(1) + furthest(2) >= *d
     })
 }
 

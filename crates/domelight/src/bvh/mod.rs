@@ -21,6 +21,8 @@
 //! multiply and subtract in one rounding on all of them, and nothing else is fused, so all of them **give the same
 //! bits** ([`InstructionSet`]).
 //!
+//! A few meshes in many places are traced as [`instances`].
+//!
 //! # Limits
 //! Coordinates from about 1e-12 to 1e12 in magnitude, and directions from about 1e-18 to 1e20 in
 //! length, keep all intermediate products finite and normal. Beyond that, rays may miss, but nothing
@@ -39,6 +41,7 @@
 
 mod build;
 mod frustum;
+mod instances;
 mod intersect;
 mod prepare;
 mod traverse;
@@ -50,6 +53,8 @@ use crate::simd;
 
 pub use crate::simd::InstructionSet;
 pub use frustum::Frustum;
+pub(crate) use instances::Instance;
+use instances::Instances;
 pub use validate::BvhDefect;
 
 /// The number of children of a node and of triangles in a block: the width of a vector.
@@ -67,6 +72,7 @@ pub struct Bvh {
     bounds: Aabb,
     triangle_count: usize,
     instruction_set: InstructionSet,
+    instances: Option<Box<Instances>>,
 }
 
 /// A node with the boxes and references of eight children.
@@ -167,22 +173,34 @@ impl Bvh {
     #[must_use]
     pub fn with_instruction_set(mut self, instruction_set: InstructionSet) -> Option<Self> {
         self.instruction_set = instruction_set;
+        if let Some(instances) = &mut self.instances {
+            instances.set_instruction_set(instruction_set);
+        }
         instruction_set.is_available().then_some(self)
     }
 
-    /// The bounding box of all triangles with an area.
+    /// The same BVH with copies of `objects`. Triangles are numbered as [`Instance::first_triangle`] says.
+    #[must_use]
+    pub(crate) fn with_instances(mut self, objects: Vec<Self>, instances: Vec<Instance>) -> Self {
+        self.instances = Instances::new(objects, instances).map(Box::new);
+        self
+    }
+
+    /// The bounding box of all triangles with an area; that of instances may be a little larger.
     pub fn bounds(&self) -> Aabb {
-        self.bounds
+        let of_instances = |instances: &Instances| instances.bounds();
+        self.bounds.union(self.instances.as_deref().map_or(Aabb::EMPTY, of_instances))
     }
 
     /// The number of triangles with an area, which are in the tree.
     pub fn triangle_count(&self) -> usize {
-        self.triangle_count
+        self.triangle_count + self.instances.as_deref().map_or(0, Instances::triangle_count)
     }
 
     /// The memory of nodes and triangles \[bytes\].
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..])
+        let own = size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..]);
+        own + self.instances.as_deref().map_or(0, Instances::bytes)
     }
 
     /// The first triangle that the ray hits in its open interval (0, `t_max`), from either side.
@@ -190,13 +208,22 @@ impl Bvh {
     /// Among hits at the same distance, the triangle with the smallest index is returned. A ray that is not finite or
     /// has a zero direction hits nothing.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        simd::dispatch(self.instruction_set, traverse::ClosestHit { bvh: self, ray })
+        let hit = simd::dispatch(self.instruction_set, traverse::ClosestHit { bvh: self, ray });
+        match &self.instances {
+            None => hit,
+            Some(instances) => instances.closest_hit(ray, hit, &|_| true),
+        }
     }
 
     /// [`Bvh::closest_hit`] among the hits for which `accept` returns true; other hits are ignored. `accept` may be
     /// called in any order, and must return the same answer each time.
     pub fn closest_hit_where(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
-        simd::dispatch(self.instruction_set, traverse::ClosestHitWhere { bvh: self, ray, accept })
+        let kernel = traverse::ClosestHitWhere { bvh: self, ray, accept: &accept };
+        let hit = simd::dispatch(self.instruction_set, kernel);
+        match &self.instances {
+            None => hit,
+            Some(instances) => instances.closest_hit(ray, hit, &accept),
+        }
     }
 
     /// [`Bvh::closest_hit`] for many rays. Fastest for neighboring rays, such as a tile's camera rays.
@@ -206,6 +233,11 @@ impl Bvh {
         hits.clear();
         hits.resize(rays.len(), None);
         simd::dispatch(self.instruction_set, traverse::ClosestHits { bvh: self, rays, hits });
+        if let Some(instances) = &self.instances {
+            for (ray, hit) in rays.iter().zip(hits) {
+                *hit = instances.closest_hit(ray, *hit, &|_| true);
+            }
+        }
     }
 
     /// [`Bvh::closest_hit_where`] for many rays. `accept` receives a few hits at a time, with the indices of their
@@ -220,8 +252,18 @@ impl Bvh {
     ) {
         hits.clear();
         hits.resize(rays.len(), None);
-        let kernel = traverse::ClosestHitsWhere { bvh: self, rays, accept, hits };
+        let kernel = traverse::ClosestHitsWhere { bvh: self, rays, accept: &accept, hits };
         simd::dispatch(self.instruction_set, kernel);
+        if let Some(instances) = &self.instances {
+            for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
+                let accept_one = |hit: &Hit| {
+                    let mut is_accepted = [false];
+                    accept(&[(i, *hit)], &mut is_accepted);
+                    is_accepted[0]
+                };
+                *hit = instances.closest_hit(ray, *hit, &accept_one);
+            }
+        }
     }
 
     /// Whether each ray of a batch hits any triangle up to infinity (V = 0).
@@ -239,6 +281,12 @@ impl Bvh {
             self.instruction_set,
             traverse::Occluded { bvh: self, rays, answers: occluded },
         );
+        if let Some(instances) = &self.instances {
+            for (i, occluded) in occluded.iter_mut().enumerate() {
+                let ray = || Ray::new(rays.origins[i], rays.directions[i]);
+                *occluded = *occluded || instances.any_hit(&ray());
+            }
+        }
     }
 
     /// The transmittance along each ray of a batch up to infinity: the product of `of_hit`, in \[0, 1\], over all
@@ -258,16 +306,23 @@ impl Bvh {
         assert!(rays.directions.len() >= rays.origins.len(), "a ray without a direction");
         transmittances.clear();
         transmittances.resize(rays.len(), 1.0);
-        let answers = transmittances;
+        let answers = &mut *transmittances;
         simd::dispatch(
             self.instruction_set,
             traverse::Transmittances { bvh: self, rays, of_hit, answers },
         );
+        if let Some(instances) = &self.instances {
+            for (i, transmittance) in transmittances.iter_mut().enumerate() {
+                let ray = Ray::new(rays.origins[i], rays.directions[i]);
+                *transmittance *= instances.transmittance(&ray, &|hit| of_hit(i, hit));
+            }
+        }
     }
 
     /// Whether the ray hits any triangle in its open interval (0, `t_max`).
     pub fn any_hit(&self, ray: &Ray) -> bool {
         simd::dispatch(self.instruction_set, traverse::AnyHit { bvh: self, ray })
+            || self.instances.as_ref().is_some_and(|instances| instances.any_hit(ray))
     }
 
     /// Whether a ray within the frustum may hit anything; false only if none does.
@@ -275,6 +330,7 @@ impl Bvh {
     /// It tests only boxes, so it is cheap, and true near geometry.
     pub fn may_hit(&self, frustum: &Frustum) -> bool {
         simd::dispatch(self.instruction_set, frustum::MayHit { bvh: self, frustum })
+            || self.instances.as_ref().is_some_and(|instances| instances.may_hit(frustum))
     }
 
     /// Checks that every triangle is in the tree once, each box contains its subtree, and every

@@ -51,6 +51,9 @@ pub enum BvhDefect {
 }
 
 pub(super) fn validate(bvh: &Bvh) -> Result<(), BvhDefect> {
+    if let Some(instances) = &bvh.instances {
+        instances.objects().iter().try_for_each(validate)?;
+    }
     let mut seen = Seen::default();
     let root = seen.visit(bvh, 0, 0)?;
     if root != bvh.bounds {

@@ -47,6 +47,15 @@ impl Aabb {
         self.max - self.min
     }
 
+    /// The eight corners.
+    pub(crate) fn corners(&self) -> [Vec3; 8] {
+        std::array::from_fn(|i| {
+            let side =
+                |axis: usize| if i >> axis & 1 == 0 { self.min[axis] } else { self.max[axis] };
+            Vec3::new(side(0), side(1), side(2))
+        })
+    }
+
     /// Half the surface area; 0 for an empty box.
     pub fn half_area(&self) -> f32 {
         if self.is_empty() {

@@ -3,6 +3,7 @@
 mod aabb;
 mod mesh;
 mod ray;
+mod similarity;
 
 pub use aabb::Aabb;
 #[cfg(feature = "io")]
@@ -10,3 +11,4 @@ pub(crate) use mesh::linear_part;
 pub(crate) use mesh::power_of_two;
 pub use mesh::{Mesh, MeshError};
 pub use ray::{Hit, Ray, RayBatch, offset_origin};
+pub(crate) use similarity::{Similarity, conjugated};

@@ -224,9 +224,7 @@ impl PixelSums {
                 *sum += f64::from(x) * unit;
             }
         }
-        if self.n_samples.is_power_of_two() {
-            self.prefixes = [Rgb::from(self.color.map(narrowed)), self.prefixes[0]];
-        }
+        self.keep_prefix();
         if let Some(surface) = sample.surface {
             self.albedo += surface.albedo;
             self.normal += surface.normal;
@@ -234,6 +232,22 @@ impl PixelSums {
             self.n_hits += 1;
         }
         finite
+    }
+
+    /// Adds a sample of a set that saw nothing, without background.
+    #[inline]
+    pub(super) fn add_miss(&mut self, set: SampleSet) {
+        self.n_samples += 1;
+        self.n_second += u32::from(set == SampleSet::Second);
+        self.keep_prefix();
+    }
+
+    /// Keeps `color` if the number of samples is a power of two.
+    #[inline]
+    fn keep_prefix(&mut self) {
+        if self.n_samples.is_power_of_two() {
+            self.prefixes = [Rgb::from(self.color.map(narrowed)), self.prefixes[0]];
+        }
     }
 
     /// Adds `n` samples of a set that saw nothing, without background, to a pixel that never saw anything.

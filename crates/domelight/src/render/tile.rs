@@ -439,25 +439,37 @@ impl Tile {
         let mut non_finite = 0;
         let mut point = 0;
         let adaptive = batch.adaptive;
+        let shown = context.settings.background == Background::Shown;
+        // Whether nothing is where no ray hits: neither background nor what transmitting surfaces take from it.
+        let is_empty = !shown && batch.sights.throughputs.is_empty();
         for i in 0..batch.camera_rays.len() {
             let CameraRays { samples, first } = batch.camera_rays[i].clone();
             if samples.is_empty() {
                 continue;
             }
             let (x, y) = self.position(i);
-            let shown = context.settings.background == Background::Shown;
             if first.is_none() && !shown {
                 self.pixels[i].add_misses(samples.len() as u32, set);
                 batch.allocation.learn(i, &PassSums::default(), false);
                 continue;
             }
+            let PixelPoints { ref points, one_material, .. } = batch.pixels[i];
+            let is_uniform = one_material && !points.is_empty();
+            let albedo = is_uniform.then(|| batch.points[points.start].bsdf.albedo());
             let mut sums = PassSums::default();
             for (s, sample) in samples.clone().enumerate() {
                 let ray = first.map(|first| first + s);
-                let sample = match ray.map(|ray| (&batch.rays[ray], batch.sights.hits[ray])) {
+                let mut sample = match ray.map(|ray| (&batch.rays[ray], batch.sights.hits[ray])) {
                     Some((ray, Some(hit))) => {
                         point += 1;
-                        batch.surface_sample(context, point - 1, ray, &hit, unit)
+                        batch.surface_sample(context, point - 1, ray, &hit, albedo, unit)
+                    }
+                    Some(_) if is_empty => {
+                        self.pixels[i].add_miss(set);
+                        if adaptive {
+                            sums.add(0.0, false);
+                        }
+                        continue;
                     }
                     Some((ray, None)) => background_sample(ray.direction),
                     None => {
@@ -466,8 +478,9 @@ impl Tile {
                         background_sample(ray.direction)
                     }
                 };
-                let throughput = ray.and_then(|ray| batch.sights.throughputs.get(ray));
-                let sample = throughput.map_or(sample, |&through| sample.through(through));
+                if let Some(&through) = ray.and_then(|ray| batch.sights.throughputs.get(ray)) {
+                    sample = sample.through(through);
+                }
                 if adaptive {
                     let luminance = sample.color.luminance() + sample.unseen;
                     sums.add(luminance, sample.surface.is_some());
@@ -574,12 +587,11 @@ impl Batch {
             let (mut material, mut one_material) = (None, true);
             for (ray, sample) in of_pixel.range().zip(of_pixel.samples.clone()) {
                 let Some(hit) = &self.sights.hits[ray] else { continue };
-                let constant = context.scene.constant_material(hit);
+                let point = &mut self.points[self.samples.len()];
+                let constant = context.scene.shade(&self.rays[ray], hit, point);
                 let known = self.samples.len() == start || constant == material;
                 one_material &= known && constant.is_some();
                 material = constant;
-                let point = &mut self.points[self.samples.len()];
-                context.scene.shade(&self.rays[ray], hit, point);
                 self.origins.push(offset_origin(point.position, point.ng, context.extent));
                 self.samples.push(sample);
             }
@@ -638,6 +650,7 @@ impl Batch {
         strategy_context.strategy.learn(&tile, rays, visibility, scratch);
     }
 
+    /// What a camera ray sees of a surface with a known albedo, if it is known.
     #[inline]
     fn surface_sample(
         &self,
@@ -645,6 +658,7 @@ impl Batch {
         point: usize,
         ray: &Ray,
         hit: &Hit,
+        albedo: Option<Rgb>,
         unit: f64,
     ) -> CameraSample {
         if context.scene.catches_shadows(hit)
@@ -664,7 +678,7 @@ impl Batch {
             shadow: Rgb::BLACK,
             unseen: 0.0,
             surface: Some(SurfaceSample {
-                albedo: context.scene.albedo(hit, p),
+                albedo: albedo.unwrap_or_else(|| p.bsdf.albedo()),
                 normal: p.frame.z,
                 depth: context.camera.depth(ray.at(hit.t)) * context.scene.unit(),
             }),

@@ -435,7 +435,11 @@ impl Scene {
         if self.materials[part.material].double_sided {
             return true;
         }
-        part.mesh.area_normal(triangle).dot(ray.direction) <= 0.0
+        let direction = match self.placement(hit.triangle) {
+            None => ray.direction,
+            Some(placement) => placement.inverse_direction(ray.direction),
+        };
+        part.mesh.area_normal(triangle).dot(direction) <= 0.0
     }
 }
 

@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
+use rayon::prelude::*;
+
 use super::camera::CameraSettings;
 use super::framing::ViewDirection;
 use super::material::Material;
 use super::texture::Texture;
 use crate::environment::{EnvironmentError, UpAxis};
-use crate::geometry::{Aabb, Mesh};
+use crate::geometry::{Aabb, Mesh, conjugated};
 use crate::math::{Mat4, functions};
 
 /// The description of a scene, from a loader or a built-in scene. [`Scene::new`](super::Scene::new) checks it.
@@ -15,6 +17,8 @@ use crate::math::{Mat4, functions};
 pub struct SceneDescription {
     /// The meshes.
     pub parts: Vec<Part>,
+    /// Copies of parts in other places.
+    pub instances: Vec<Instance>,
     /// The materials of the parts.
     pub materials: Vec<Material>,
     /// The images that the materials refer to.
@@ -45,6 +49,16 @@ pub struct Part {
     pub mesh: Mesh,
     /// Index into [`SceneDescription::materials`].
     pub material: usize,
+}
+
+/// A copy of a part in another place. It shares the part's memory if the part is opaque and the transform preserves
+/// angles and orientation; otherwise [`Scene::new`](super::Scene::new) makes it a part of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instance {
+    /// Index into [`SceneDescription::parts`].
+    pub part: usize,
+    /// An affine transform in world space, from the part's place to that of the copy.
+    pub transform: Mat4,
 }
 
 /// One of a file's cameras.
@@ -99,19 +113,71 @@ pub enum EnvironmentSource {
 impl SceneDescription {
     /// The bounding box of all vertices.
     pub fn bounds(&self) -> Aabb {
-        self.parts.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()))
+        self.bounds_of(|_| true)
+    }
+
+    /// The bounding box of the vertices of some parts and their copies.
+    pub(super) fn bounds_of(&self, is_counted: impl Fn(usize) -> bool + Sync) -> Aabb {
+        let parts = self.parts.iter().enumerate().filter(|&(i, _)| is_counted(i));
+        let of_parts = parts.fold(Aabb::EMPTY, |b, (_, part)| b.union(part.mesh.bounds()));
+        let of_instance = |&Instance { part, ref transform }: &Instance| {
+            let vertices = self.parts[part].mesh.positions.iter();
+            Aabb::around(vertices.map(|&p| transform.transform_point3(p)))
+        };
+        let counted = self.instances.par_iter().filter(|instance| is_counted(instance.part));
+        of_parts.union(counted.map(of_instance).reduce(|| Aabb::EMPTY, Aabb::union))
+    }
+
+    /// The total number of triangles, including copies.
+    pub fn triangle_count(&self) -> usize {
+        let of_part = |part: usize| self.parts[part].mesh.triangles.len();
+        let copies = self.instances.iter().map(|instance| instance.part);
+        (0..self.parts.len()).chain(copies).map(of_part).sum()
+    }
+
+    /// The number of triangles to be built into BVHs: those of parts, and once more those of parts with instances.
+    pub fn built_triangle_count(&self) -> usize {
+        let mut instanced = vec![false; self.parts.len()];
+        self.instances.iter().for_each(|instance| instanced[instance.part] = true);
+        let parts = self.parts.iter().zip(instanced);
+        parts.map(|(part, copied)| part.mesh.triangles.len() * (1 + usize::from(copied))).sum()
     }
 
     /// Bytes that its meshes take.
     #[cfg(feature = "io")]
     pub(crate) fn memory(&self) -> u64 {
-        self.parts.iter().map(|part| part.mesh.memory()).sum()
+        let meshes: u64 = self.parts.iter().map(|part| part.mesh.memory()).sum();
+        meshes + size_of_val(&self.instances[..]) as u64
+    }
+
+    /// Turns all instances into parts.
+    pub fn expand_instances(&mut self) {
+        self.expand(|_, _| true);
+    }
+
+    /// Turns some instances into parts.
+    pub(super) fn expand(&mut self, is_expanded: impl Fn(&Self, &Instance) -> bool) {
+        for instance in std::mem::take(&mut self.instances) {
+            if !is_expanded(self, &instance) {
+                self.instances.push(instance);
+                continue;
+            }
+            if self.scenery.contains(&instance.part) {
+                self.scenery.push(self.parts.len());
+            }
+            let mut copy = self.parts[instance.part].clone();
+            copy.mesh.transform(&instance.transform);
+            self.parts.push(copy);
+        }
     }
 
     /// Transforms the parts and the camera by an affine matrix.
     pub fn transform(&mut self, m: &Mat4) {
         for part in &mut self.parts {
             part.mesh.transform(m);
+        }
+        for instance in &mut self.instances {
+            instance.transform = conjugated(m, &instance.transform, m);
         }
         let all = self.cameras.iter_mut().map(|c| &mut c.settings);
         for camera in self.camera.iter_mut().chain(all) {
@@ -129,6 +195,8 @@ impl SceneDescription {
         for material in &mut other.materials {
             material.shift_textures(textures);
         }
+        let shifted = |i: Instance| Instance { part: i.part + self.parts.len(), ..i };
+        self.instances.extend(other.instances.into_iter().map(shifted));
         self.parts.append(&mut other.parts);
         self.materials.append(&mut other.materials);
         self.textures.append(&mut other.textures);

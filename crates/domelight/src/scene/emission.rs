@@ -7,10 +7,13 @@ use crate::geometry::Hit;
 
 impl Scene {
     /// The radiance ≥ 0 that the surface at a hit sends to the camera, independent of the light on it.
+    #[inline]
     pub fn emitted(&self, hit: &Hit) -> Rgb {
-        if !self.emits {
-            return Rgb::BLACK;
-        }
+        if self.emits { self.emitted_there(hit) } else { Rgb::BLACK }
+    }
+
+    /// [`Scene::emitted`] where some surface emits.
+    fn emitted_there(&self, hit: &Hit) -> Rgb {
         let (part, triangle) = self.locate(hit.triangle);
         let material = &self.materials[part.material];
         let corners = || Corners::new(&part.mesh, triangle, hit);

@@ -20,6 +20,10 @@ impl Scene {
             f.numbers(mesh.tangents.iter().flat_map(Vec4::to_array));
             f.numbers(mesh.colors.iter().flat_map(|c| c.to_array()));
         }
+        for copy in &self.placed {
+            f.words([copy.part as u32]);
+            f.numbers(copy.placement.numbers());
+        }
         for material in &self.materials {
             let Material {
                 name: _,

@@ -37,26 +37,6 @@ pub struct Material {
     pub layers: Layers,
 }
 
-/// The BSDF of a material that has the same everywhere on meshes without vertex colors, up to the choice of lobes.
-#[derive(Clone, Debug)]
-pub(super) struct ConstantBsdf {
-    pub(super) bsdf: Bsdf,
-    pub(super) albedo: Rgb,
-}
-
-impl ConstantBsdf {
-    /// `None` if the material has textures, or a coat or sheen, which dim the layers below depending on the view.
-    pub(super) fn of(material: &Material) -> Option<Self> {
-        let is_layered = material.layers.sheen.is_some() || material.layers.clearcoat.is_some();
-        if is_layered || material.shading_textures().next().is_some() {
-            return None;
-        }
-        let mut bsdf = Bsdf::BLACK;
-        material.set_bsdf(&[], &Uvs::default(), Rgb::WHITE, [Vec3::Z, Vec3::Z], &mut bsdf);
-        Some(Self { bsdf, albedo: bsdf.albedo() })
-    }
-}
-
 /// The reflectance model of a material, with its parameters.
 #[derive(Clone, Debug)]
 pub enum MaterialModel {
@@ -213,6 +193,18 @@ impl Material {
         };
         let of_model = of_model.into_iter().flatten();
         of_model.chain(self.normal_map.as_ref().map(|n| &n.texture)).chain(self.layers.textures())
+    }
+
+    /// The BSDF that the material has everywhere on meshes without vertex colors, up to the choice of lobes. `None` if it
+    /// has textures, or a coat or sheen, which dim the layers below depending on the view.
+    pub(super) fn constant_bsdf(&self) -> Option<Bsdf> {
+        let is_layered = self.layers.sheen.is_some() || self.layers.clearcoat.is_some();
+        if is_layered || self.shading_textures().next().is_some() {
+            return None;
+        }
+        let mut bsdf = Bsdf::BLACK;
+        self.set_bsdf(&[], &Uvs::default(), Rgb::WHITE, [Vec3::Z, Vec3::Z], &mut bsdf);
+        Some(bsdf)
     }
 
     /// Whether the direction of the tangent matters.

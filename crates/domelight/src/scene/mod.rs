@@ -23,7 +23,7 @@ pub use crate::environment::UpAxis;
 pub use camera::{Camera, CameraError, CameraSettings, Lens, Projection};
 pub use coverage::{Sight, SightKey, Sights};
 pub use description::{
-    EnvironmentSettings, EnvironmentSource, NamedCamera, Part, SceneDescription,
+    EnvironmentSettings, EnvironmentSource, Instance, NamedCamera, Part, SceneDescription,
 };
 pub use framing::{Framing, UnknownView, ViewDirection};
 pub use layers::{
@@ -41,10 +41,9 @@ pub use material::{
 pub use texture::{Encoding, Texture, TextureError, TextureFilter, TextureRef, UvTransform, Wrap};
 
 use crate::bsdf::Bsdf;
-use crate::bvh::{Bvh, BvhError, InstructionSet};
-use crate::geometry::{Aabb, Mesh, MeshError};
+use crate::bvh::{self, Bvh, BvhError, InstructionSet};
+use crate::geometry::{Aabb, Mesh, MeshError, Similarity};
 use coverage::Partial;
-use material::ConstantBsdf;
 
 /// A scene ready for ray tracing.
 #[derive(Debug)]
@@ -54,9 +53,13 @@ pub struct Scene {
     materials: Vec<Material>,
     textures: Vec<Texture>,
     /// The BSDFs of the materials that do not vary.
-    constant_bsdfs: Vec<Option<ConstantBsdf>>,
+    constant_bsdfs: Vec<Option<Bsdf>>,
     /// The first triangle of each part in the BVH.
     first_triangle: Vec<u32>,
+    /// Copies of opaque parts, in the order of their triangles, which follow those of all parts.
+    placed: Vec<PlacedPart>,
+    /// The first triangle of the copies; `u32::MAX` if there are none.
+    first_placed: u32,
     /// The BVH over the opaque parts, which come first.
     bvh: Bvh,
     /// The parts that are not opaque, if there are any.
@@ -86,6 +89,15 @@ pub struct Scene {
     up: UpAxis,
 }
 
+/// A copy of a part.
+#[derive(Clone, Copy, Debug)]
+struct PlacedPart {
+    /// The index of the part.
+    part: usize,
+    first_triangle: u32,
+    placement: Similarity,
+}
+
 /// An invalid scene description.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
@@ -106,6 +118,14 @@ pub enum SceneError {
         material: usize,
         /// The number available.
         materials: usize,
+    },
+    /// A copy of a part that does not exist.
+    #[error("an instance is of part {part}, but there are only {parts}")]
+    NoPart {
+        /// The index of the part.
+        part: usize,
+        /// The number available.
+        parts: usize,
     },
     /// A material with a texture that does not exist.
     #[error("material {material} refers to texture {texture}, but there are only {textures}")]
@@ -148,26 +168,45 @@ impl Scene {
     ///
     /// # Errors
     /// The first [`SceneError`] found. A scene without triangles is valid: nothing is hit.
-    pub fn new(description: SceneDescription) -> Result<Self, SceneError> {
+    pub fn new(mut description: SceneDescription) -> Result<Self, SceneError> {
         check(&description)?;
+        // Where coverage or angles change, copies have meshes of their own.
+        description.expand(|description, instance| {
+            let Instance { part, transform } = instance;
+            let is_opaque = description.parts[*part].is_opaque(&description.materials);
+            !is_opaque || Similarity::from_matrix(transform).is_none()
+        });
         let subject_bounds = description.subject_bounds();
         let is_subject = description.is_subject();
         let bounds = description.bounds();
         let scale = description.usual_scale();
         check_size(&bounds, &subject_bounds, scale)?;
-        let SceneDescription { mut parts, materials, textures, camera, up, view, .. } = description;
+        let SceneDescription {
+            mut parts, instances, materials, textures, camera, up, view, ..
+        } = description;
         let up = up.unwrap_or_default();
         if scale != 1.0 {
             for part in &mut parts {
                 part.mesh.scale(scale);
             }
         }
-        let mut parts: Vec<_> = parts.into_iter().zip(is_subject).collect();
-        parts.sort_by_key(|(part, _)| !part.is_opaque(&materials));
-        let (parts, is_subject): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+        let mut order: Vec<_> = (0..parts.len()).collect();
+        order.sort_by_key(|&i| !parts[i].is_opaque(&materials));
+        let mut new_index = vec![0; parts.len()];
+        order.iter().enumerate().for_each(|(new, &old)| new_index[old] = new);
+        let is_subject = order.iter().map(|&i| is_subject[i]).collect();
+        let mut unsorted: Vec<_> = parts.into_iter().map(Some).collect();
+        let parts: Vec<_> = order.iter().filter_map(|&i| unsorted[i].take()).collect();
         let n_opaque = parts.partition_point(|part| part.is_opaque(&materials));
         let (opaque, others) = parts.split_at(n_opaque);
-        let bvh = build(opaque)?;
+        let n_own: usize = parts.iter().map(|part| part.mesh.triangles.len()).sum();
+        let placed = instances.iter().filter_map(|instance| {
+            let placement = Similarity::from_matrix(&instance.transform)?.scaled(scale);
+            Some((new_index[instance.part], placement))
+        });
+        let placed = placed_parts(&parts, n_own, placed)?;
+        let first_placed = if placed.is_empty() { u32::MAX } else { n_own as u32 };
+        let bvh = with_instances(build(opaque)?, &parts, &placed)?;
         let n_triangles = opaque.iter().map(|p| p.mesh.triangles.len()).sum::<usize>() as u32;
         let partial =
             if others.is_empty() { None } else { Some(Partial::new(build(others)?, n_triangles)) };
@@ -179,13 +218,15 @@ impl Scene {
         let catches_shadows = used().any(|material| material.catches_shadows);
         let dims = |part: &Part| !materials[part.material].catches_shadows;
         let dims_light = parts[n_opaque..].iter().any(dims);
-        let constant_bsdfs = materials.iter().map(ConstantBsdf::of).collect();
+        let constant_bsdfs = materials.iter().map(Material::constant_bsdf).collect();
         Ok(Self {
             parts,
             materials,
             textures,
             constant_bsdfs,
             first_triangle,
+            placed,
+            first_placed,
             bvh,
             partial,
             has_single_sided,
@@ -242,7 +283,12 @@ impl Scene {
         let subject = parts.filter(|(_, is_subject)| **is_subject);
         let framing = Framing { view: framing.view.or(self.view), ..*framing };
         let vertices = subject.flat_map(|(part, _)| part.mesh.positions.iter().copied());
-        let mut camera = framing.fit(vertices);
+        let copies = self.placed.iter().filter(|copy| self.is_subject[copy.part]);
+        let corners = copies.flat_map(|copy| {
+            let corners = self.parts[copy.part].mesh.bounds().corners();
+            corners.map(|corner| copy.placement.point(corner))
+        });
+        let mut camera = framing.fit(vertices.chain(corners));
         if self.unit != 1.0 {
             camera.scale(self.unit);
         }
@@ -299,14 +345,46 @@ impl Scene {
         &self.materials
     }
 
-    /// The total number of triangles.
+    /// The copies of [`Scene::parts`] that share their memory, in the same units.
+    pub fn instances(&self) -> impl Iterator<Item = Instance> {
+        let instance = |copy: &PlacedPart| {
+            let &PlacedPart { part, ref placement, .. } = copy;
+            Instance { part, transform: placement.matrix() }
+        };
+        self.placed.iter().map(instance)
+    }
+
+    /// The total number of triangles, including copies.
     pub fn triangle_count(&self) -> usize {
-        self.parts.iter().map(|p| p.mesh.triangles.len()).sum()
+        let copies = self.placed.iter().map(|copy| copy.part);
+        let parts = (0..self.parts.len()).chain(copies);
+        parts.map(|part| self.parts[part].mesh.triangles.len()).sum()
+    }
+
+    /// The copy that a triangle belongs to; `None` for a part's own triangles.
+    #[inline]
+    fn copy_of(&self, triangle: u32) -> Option<&PlacedPart> {
+        (triangle >= self.first_placed).then(|| self.find_copy(triangle))
+    }
+
+    #[cold]
+    fn find_copy(&self, triangle: u32) -> &PlacedPart {
+        let copy = self.placed.partition_point(|copy| copy.first_triangle <= triangle);
+        &self.placed[copy - 1]
+    }
+
+    /// From the place of its part's mesh to that of a triangle; `None` if they are the same.
+    #[inline]
+    pub(crate) fn placement(&self, triangle: u32) -> Option<&Similarity> {
+        self.copy_of(triangle).map(|copy| &copy.placement)
     }
 
     /// The part of a triangle of the BVH, and the triangle's index in its mesh.
     #[inline]
     pub(crate) fn locate(&self, triangle: u32) -> (&Part, usize) {
+        if let Some(copy) = self.copy_of(triangle) {
+            return (&self.parts[copy.part], (triangle - copy.first_triangle) as usize);
+        }
         let part = self.first_triangle.partition_point(|&first| first <= triangle) - 1;
         (&self.parts[part], (triangle - self.first_triangle[part]) as usize)
     }
@@ -325,7 +403,10 @@ fn check_size(bounds: &Aabb, subject: &Aabb, scale: f32) -> Result<(), SceneErro
 }
 
 fn check(description: &SceneDescription) -> Result<(), SceneError> {
-    let SceneDescription { parts, materials, textures, .. } = description;
+    let SceneDescription { parts, instances, materials, textures, .. } = description;
+    if let Some(&Instance { part, .. }) = instances.iter().find(|i| i.part >= parts.len()) {
+        return Err(SceneError::NoPart { part, parts: parts.len() });
+    }
     for Part { name, mesh, material } in parts {
         mesh.validate().map_err(|source| SceneError::Mesh { part: name.clone(), source })?;
         if *material >= materials.len() {
@@ -356,6 +437,44 @@ fn build(parts: &[Part]) -> Result<Bvh, SceneError> {
         triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
     }
     Ok(Bvh::build(&positions, &triangles)?)
+}
+
+/// Numbers the triangles of copies, from `first` on. Empty copies are left out.
+fn placed_parts(
+    parts: &[Part],
+    first: usize,
+    copies: impl Iterator<Item = (usize, Similarity)>,
+) -> Result<Vec<PlacedPart>, SceneError> {
+    let mut count = first;
+    let mut placed = Vec::new();
+    for (part, placement) in copies {
+        let n_triangles = parts[part].mesh.triangles.len();
+        if n_triangles > 0 {
+            placed.push(PlacedPart { part, first_triangle: count as u32, placement });
+        }
+        count += n_triangles;
+    }
+    let max = u32::MAX as usize;
+    if count > max { Err(BvhError::TooManyTriangles { count, max }.into()) } else { Ok(placed) }
+}
+
+/// Adds copies to a BVH: a tree for each part that has any.
+fn with_instances(bvh: Bvh, parts: &[Part], placed: &[PlacedPart]) -> Result<Bvh, SceneError> {
+    if placed.is_empty() {
+        return Ok(bvh);
+    }
+    let (mut objects, mut object_of) = (Vec::new(), vec![None; parts.len()]);
+    let mut instances = Vec::with_capacity(placed.len());
+    for &PlacedPart { part, first_triangle, placement } in placed {
+        let object = if let Some(object) = object_of[part] {
+            object
+        } else {
+            objects.push(build(std::slice::from_ref(&parts[part]))?);
+            *object_of[part].insert(objects.len() - 1)
+        };
+        instances.push(bvh::Instance { object, placement, first_triangle });
+    }
+    Ok(bvh.with_instances(objects, instances))
 }
 
 /// The first triangle of each part.

@@ -40,9 +40,23 @@ impl Scene {
         point
     }
 
-    /// Sets `point` to [`Scene::shading_point`] in place, because a point is large.
+    /// Sets `point` to [`Scene::shading_point`] in place, because a point is large. Returns the material if its BSDF is
+    /// the same everywhere.
     #[inline]
-    pub(crate) fn shade(&self, ray: &Ray, hit: &Hit, point: &mut ShadingPoint) {
+    pub(crate) fn shade(&self, ray: &Ray, hit: &Hit, point: &mut ShadingPoint) -> Option<usize> {
+        let Some(placement) = self.placement(hit.triangle) else {
+            return self.shade_part(ray, hit, point);
+        };
+        let constant = self.shade_part(&placement.inverse_ray(ray), hit, point);
+        point.position = placement.point(point.position);
+        point.ng = placement.direction(point.ng);
+        point.frame = placement.frame(point.frame);
+        constant
+    }
+
+    /// [`Scene::shade`] where the mesh of the hit's part is.
+    #[inline]
+    fn shade_part(&self, ray: &Ray, hit: &Hit, point: &mut ShadingPoint) -> Option<usize> {
         let (part, triangle) = self.locate(hit.triangle);
         let material = &self.materials[part.material];
         let corner = Corners::new(&part.mesh, triangle, hit);
@@ -75,13 +89,17 @@ impl Scene {
             _ => Vec3::Z,
         };
         let tint = corner.mix(&part.mesh.colors);
-        match (&self.constant_bsdfs[part.material], tint) {
-            (Some(constant), None) => point.bsdf.set(&constant.bsdf, wo),
+        let constant = match (&self.constant_bsdfs[part.material], tint) {
+            (Some(bsdf), None) => {
+                point.bsdf.set(bsdf, wo);
+                Some(part.material)
+            }
             (_, tint) => {
                 let tint = tint.unwrap_or(Rgb::WHITE);
                 material.set_bsdf(&self.textures, &uvs, tint, [wo, coat_normal], &mut point.bsdf);
+                None
             }
-        }
+        };
         let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
         let side = if smooth.dot(ng) < 0.0 { -1.0 } else { 1.0 };
         (point.position, point.ng) = match corner.rise(&part.mesh, position, ng, side) {
@@ -89,24 +107,7 @@ impl Scene {
             None => (position, ng),
         };
         (point.frame, point.wo) = (frame, wo);
-    }
-
-    /// The material of a hit, if its BSDF is the same everywhere.
-    #[inline]
-    pub(crate) fn constant_material(&self, hit: &Hit) -> Option<usize> {
-        let (part, _) = self.locate(hit.triangle);
-        let is_plain = part.mesh.colors.is_empty() && self.constant_bsdfs[part.material].is_some();
-        is_plain.then_some(part.material)
-    }
-
-    /// The albedo of a shading point of this scene, seen from above.
-    #[inline]
-    pub(crate) fn albedo(&self, hit: &Hit, point: &ShadingPoint) -> Rgb {
-        let (part, _) = self.locate(hit.triangle);
-        match &self.constant_bsdfs[part.material] {
-            Some(constant) if part.mesh.colors.is_empty() => constant.albedo,
-            _ => point.bsdf.albedo(),
-        }
+        constant
     }
 
     /// The normals and the tangent at a hit, given the interpolated `normal`.
@@ -177,6 +178,15 @@ fn bend(normal: Vec3, viewer: Vec3, ng: Vec3) -> Vec3 {
         .map_or(viewer, |n| (horizon * n + MIN_COS_THETA_O * viewer).normalize())
 }
 
+/// A normal of unit length; 0 if it has none.
+#[inline]
+fn unit_or_zero(normal: Vec3) -> Vec3 {
+    /// The squared length of a unit vector that was rounded is within this of 1.
+    const ROUNDING: f32 = 1e-6;
+    let is_unit = (normal.length_squared() - 1.0).abs() <= ROUNDING;
+    if is_unit { normal } else { normal.normalize_or_zero() }
+}
+
 /// The corners of the triangle that was hit, and their barycentric weights.
 pub(super) struct Corners {
     indices: [usize; 3],
@@ -220,7 +230,7 @@ impl Corners {
         if mesh.normals.is_empty() {
             return None;
         }
-        let normals = self.of(&mesh.normals).map(|n| side * n.normalize_or_zero());
+        let normals = self.of(&mesh.normals).map(|n| side * unit_or_zero(n));
         let cosines = normals.map(|n| n.dot(ng));
         if cosines.iter().all(|&cos| cos > COS_FLAT) || cosines.iter().any(|&cos| cos < COS_ROUGH) {
             return None;

@@ -20,9 +20,8 @@ const CATCHER_RADII: [f32; 2] = [12.0, 32.0];
 impl SceneDescription {
     /// The bounding box of the parts that are not scenery, or of all parts if there are no others.
     pub fn subject_bounds(&self) -> Aabb {
-        let subject =
-            self.parts.iter().zip(self.is_subject()).filter(|(_, is_subject)| *is_subject);
-        subject.fold(Aabb::EMPTY, |b, (p, _)| b.union(p.mesh.bounds()))
+        let is_subject = self.is_subject();
+        self.bounds_of(|part| is_subject[part])
     }
 
     /// Whether each part belongs to the subject: it is not scenery, or there is nothing else.
@@ -38,7 +37,13 @@ impl SceneDescription {
         let is_subject = self.is_subject();
         let subject = self.parts.iter().zip(&is_subject).filter(|(_, is_subject)| **is_subject);
         let framing = Framing { view: framing.view.or(self.view), ..*framing };
-        framing.fit(subject.flat_map(|(part, _)| part.mesh.positions.iter().copied()))
+        let vertices = subject.flat_map(|(part, _)| part.mesh.positions.iter().copied());
+        let copies = self.instances.iter().filter(|instance| is_subject[instance.part]);
+        let corners = copies.flat_map(|instance| {
+            let corners = self.parts[instance.part].mesh.bounds().corners();
+            corners.map(|corner| instance.transform.transform_point3(corner))
+        });
+        framing.fit(vertices.chain(corners))
     }
 
     /// Scales a very small or very large scene to a moderate size, together with `view` and the scene's own camera.
@@ -52,6 +57,8 @@ impl SceneDescription {
         let factor = self.usual_scale();
         if factor != 1.0 {
             self.parts.iter_mut().for_each(|part| part.mesh.scale(factor));
+            let translations = self.instances.iter_mut().map(|i| &mut i.transform.w_axis);
+            translations.for_each(|t| *t = (factor * t.truncate()).extend(t.w));
             self.camera.iter_mut().chain([view]).for_each(|camera| camera.scale(factor));
         }
         factor
@@ -101,6 +108,10 @@ impl SceneDescription {
         if scenery.len() < self.parts.len() {
             let mut index = 0..;
             self.parts.retain(|_| index.next().is_some_and(|i| !scenery.contains(&i)));
+            self.instances.retain(|instance| !scenery.contains(&instance.part));
+            for instance in &mut self.instances {
+                instance.part -= scenery.iter().filter(|&&i| i < instance.part).count();
+            }
         }
     }
 

@@ -81,6 +81,9 @@ impl Loaded {
 /// The albedo of meshes that come without a material.
 const DEFAULT_ALBEDO: Rgb = Rgb::splat(0.6);
 
+/// Copies of a mesh that have more triangles than this together share its memory, though rays through them are slower.
+const SHARED_TRIANGLES: u64 = 1 << 20;
+
 /// The folders that a scene's files may be in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reach {

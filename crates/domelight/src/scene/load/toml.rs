@@ -50,21 +50,22 @@
 //! Paths are relative to the scene file. Unknown keys and missing files are errors.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::textures::{Content, Textures};
-use super::{Budget, LoadError, LoadOptions, Loaded, load_mesh, relative};
+use super::{Budget, LoadError, LoadOptions, Loaded, SHARED_TRIANGLES, load_mesh, relative};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, ParseMaterialError};
-use crate::geometry::linear_part;
+use crate::geometry::{Similarity, conjugated, linear_part};
 use crate::math::{Mat4, Vec2, Vec3, Vec4, rotation_x, rotation_y, rotation_z};
 use crate::scene::builtin::{BuiltinScene, UnknownScene};
 use crate::scene::camera::{CameraError, CameraSettings, Projection};
 use crate::scene::{
-    Coverage, Emission, EnvironmentSettings, EnvironmentSource, Material, MaterialModel,
+    Coverage, Emission, EnvironmentSettings, EnvironmentSource, Instance, Material, MaterialModel,
     MetallicRoughnessMaterial, NormalMap, SceneDescription, TextureRef, UpAxis, UvTransform, Wrap,
 };
 
@@ -211,6 +212,12 @@ struct ObjectTable {
     matrix: Option<[[f32; 4]; 4]>,
 }
 
+impl ObjectTable {
+    fn key(&self) -> ObjectKey {
+        [self.file.clone(), self.builtin.clone(), self.material.clone()]
+    }
+}
+
 #[derive(Clone, Copy, Deserialize)]
 #[serde(untagged, expecting = "a scale is a number or [x, y, z]")]
 enum Scale {
@@ -247,6 +254,8 @@ pub(super) fn load(
     let mut reader = Reader {
         path,
         lines,
+        n_objects: BTreeMap::new(),
+        shared: BTreeMap::new(),
         named: BTreeMap::new(),
         builtin: BTreeMap::new(),
         textures: Textures::new(budget),
@@ -273,9 +282,22 @@ impl Lines {
     }
 }
 
+/// What makes objects copies of each other: file, built-in scene, material.
+type ObjectKey = [Option<String>; 3];
+
+/// An object whose copies share its memory.
+struct SharedObject {
+    parts: Range<usize>,
+    instances: Range<usize>,
+    matrix: Mat4,
+}
+
 struct Reader<'a> {
     path: &'a Path,
     lines: Lines,
+    /// The number of objects of each kind.
+    n_objects: BTreeMap<ObjectKey, u64>,
+    shared: BTreeMap<ObjectKey, SharedObject>,
     /// Indices of materials by their name or notation.
     named: BTreeMap<String, usize>,
     /// Built-in scenes that were made.
@@ -312,6 +334,9 @@ impl Reader<'_> {
             let at = environment.span().start;
             let settings = self.environment(environment.into_inner(), at)?;
             self.loaded.description.environment = Some(settings);
+        }
+        for object in &file.objects {
+            *self.n_objects.entry(object.get_ref().key()).or_default() += 1;
         }
         for object in file.objects {
             let at = object.span().start;
@@ -440,6 +465,9 @@ impl Reader<'_> {
 
     fn object(&mut self, table: &ObjectTable, at: usize) -> Result<(), LoadError> {
         let matrix = matrix(table).map_err(|kind| self.error(at, kind))?;
+        if self.add_copy(&table.key(), &matrix)? {
+            return Ok(());
+        }
         let mut loaded = match (&table.file, &table.builtin) {
             (Some(file), None) => {
                 let line = self.lines.of(at);
@@ -468,7 +496,7 @@ impl Reader<'_> {
         }
         let material =
             table.material.as_ref().map(|text| self.material_index(text, at)).transpose()?;
-        let first = self.loaded.description.parts.len();
+        let (first, first_instance) = self.count();
         self.loaded.description.append(description);
         // A material is the subject's; floors and plinths keep theirs.
         let SceneDescription { parts, scenery, .. } = &mut self.loaded.description;
@@ -477,7 +505,47 @@ impl Reader<'_> {
                 part.material = material;
             }
         }
+        self.share(table.key(), first, first_instance, matrix);
         Ok(())
+    }
+
+    /// The numbers of parts and of instances so far.
+    fn count(&self) -> (usize, usize) {
+        let SceneDescription { parts, instances, .. } = &self.loaded.description;
+        (parts.len(), instances.len())
+    }
+
+    /// Lets later objects of the same kind share the memory of the last one, which begins at a part and an instance, if
+    /// its copies would take much and are opaque.
+    fn share(&mut self, key: ObjectKey, first: usize, first_instance: usize, matrix: Mat4) {
+        let SceneDescription { parts, instances, materials, .. } = &self.loaded.description;
+        let n_copies = self.n_objects.get(&key).map_or(0, |n| n - 1);
+        let own = parts[first..].iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
+        let is_large = n_copies.saturating_mul(own as u64) > SHARED_TRIANGLES;
+        if is_large && parts[first..].iter().all(|part| part.is_opaque(materials)) {
+            let (parts, instances) = (first..parts.len(), first_instance..instances.len());
+            self.shared.entry(key).or_insert(SharedObject { parts, instances, matrix });
+        }
+    }
+
+    /// Adds an object as a copy of an earlier one. Returns whether it is one.
+    fn add_copy(&mut self, key: &ObjectKey, matrix: &Mat4) -> Result<bool, LoadError> {
+        let Some(SharedObject { parts, instances, matrix: first }) = self.shared.get(key) else {
+            return Ok(false);
+        };
+        let transform = conjugated(matrix, &Mat4::IDENTITY, first);
+        if Similarity::from_matrix(&transform).is_none() {
+            return Ok(false);
+        }
+        let bytes = (parts.len() + instances.len()) * size_of::<Instance>();
+        self.budget.take(&self.path.display().to_string(), bytes as u64)?;
+        let all = &mut self.loaded.description.instances;
+        all.extend(parts.clone().map(|part| Instance { part, transform }));
+        for i in instances.clone() {
+            let Instance { part, transform: inner } = all[i];
+            all.push(Instance { part, transform: conjugated(&transform, &inner, &Mat4::IDENTITY) });
+        }
+        Ok(true)
     }
 
     /// The index of the material of that name, or of that notation.

@@ -134,7 +134,13 @@ mod tests {
             targets: BTreeMap::from([(1, target)]),
             ..Vertices::default()
         };
-        let slot = Slot { material: 0, uv_sets: [None; 2], tangent_set: None, alpha: false };
+        let slot = Slot {
+            material: 0,
+            uv_sets: [None; 2],
+            tangent_set: None,
+            alpha: false,
+            transmits: false,
+        };
         Geometry { vertices, triangles: vec![[0, 1, 2]], slot }
     }
 

@@ -224,6 +224,17 @@ fn checked<T>(
     }
 }
 
+/// The number of triangles of a primitive at most, by the counts of its accessors.
+pub(super) fn n_triangles(
+    source: &Source<'_>,
+    primitive: &json::Primitive,
+) -> Result<u64, GltfErrorKind> {
+    let accessor = primitive.indices.as_ref().or_else(|| primitive.attributes.get("POSITION"));
+    let Some(&accessor) = accessor else { return Ok(0) };
+    let count = source.document.get::<json::Accessor>(accessor)?.count as u64;
+    Ok(if primitive.mode == TRIANGLES { count / 3 } else { count.saturating_sub(2) })
+}
+
 /// The memory of a primitive, read and placed `placements` times, from the counts of its accessors \[bytes\].
 pub(super) fn memory(
     source: &Source<'_>,

@@ -25,6 +25,8 @@ pub(super) struct Slot {
     pub(super) tangent_set: Option<usize>,
     /// Whether vertex opacity is used.
     pub(super) alpha: bool,
+    /// Whether light passes through.
+    pub(super) transmits: bool,
 }
 
 /// The materials in use.
@@ -69,6 +71,7 @@ impl<'a> Materials<'a> {
             uv_sets,
             tangent_set: follows,
             alpha: material.coverage.mode != AlphaMode::Opaque,
+            transmits: material.transmits(),
         };
         self.loaded.push(material);
         self.slots.insert(index, slot);

@@ -48,10 +48,12 @@ use self::deform::Pose;
 use self::error::Failure;
 use self::geometry::{Deformations, TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES};
 use self::graph::{Graph, Placement};
-use self::material::Materials;
+use self::material::{Materials, Slot};
 use self::source::Source;
-use super::{Budget, LoadError, LoadOptions, Loaded};
-use crate::scene::{Part, SceneDescription, UpAxis};
+use super::{Budget, LoadError, LoadOptions, Loaded, SHARED_TRIANGLES};
+use crate::geometry::{Similarity, conjugated};
+use crate::math::Mat4;
+use crate::scene::{Instance, Part, SceneDescription, UpAxis};
 
 pub(super) fn load(
     path: &Path,
@@ -80,14 +82,16 @@ fn read(
     };
     let graph = Graph::new(&source, options.scene.as_deref(), poses)?;
     let mut materials = Materials::new(&source);
-    let mut parts = Vec::new();
+    let (mut parts, mut instances) = (Vec::new(), Vec::new());
     for (&mesh, placements) in &graph.placements {
-        read_mesh(&source, &graph, &mut materials, mesh, placements, &mut parts)?;
+        let mut shown = Shown { parts: &mut parts, instances: &mut instances };
+        read_mesh(&source, &graph, &mut materials, mesh, placements, &mut shown)?;
     }
     let (materials, textures) = materials.finish(|text| source.warn(text));
     let cameras = graph.cameras;
     let description = SceneDescription {
         parts,
+        instances,
         materials,
         textures,
         camera: cameras.first().map(|camera| camera.settings),
@@ -98,6 +102,34 @@ fn read(
     Ok(Loaded { description, warnings: source.into_warnings(), ..Loaded::default() })
 }
 
+/// What nodes show.
+struct Shown<'a> {
+    parts: &'a mut Vec<Part>,
+    instances: &'a mut Vec<Instance>,
+}
+
+/// The transforms from the first place to each other one, if a primitive's copies are to share its memory: it is
+/// opaque and rigid, and the copies would take much.
+fn shared_places(
+    source: &Source<'_>,
+    primitive: &json::Primitive,
+    slot: Slot,
+    placements: &[Placement],
+) -> Result<Option<Vec<Mat4>>, GltfErrorKind> {
+    let [first, copies @ ..] = placements else { return Ok(None) };
+    let is_rigid = |p: &Placement| p.skin.is_none() && p.weights == first.weights;
+    let n_triangles = geometry::n_triangles(source, primitive)?;
+    let is_large = n_triangles.saturating_mul(copies.len() as u64) > SHARED_TRIANGLES;
+    if slot.alpha || slot.transmits || !is_large || !placements.iter().all(is_rigid) {
+        return Ok(None);
+    }
+    let transform = |copy: &Placement| {
+        let transform = conjugated(&copy.world, &Mat4::IDENTITY, &first.world);
+        Similarity::from_matrix(&transform).map(|_| transform)
+    };
+    Ok(copies.iter().map(transform).collect())
+}
+
 /// Reads a mesh once, and adds a part for each primitive and placement.
 fn read_mesh(
     source: &Source<'_>,
@@ -105,7 +137,7 @@ fn read_mesh(
     materials: &mut Materials<'_>,
     index: usize,
     placements: &[Placement],
-    parts: &mut Vec<Part>,
+    shown: &mut Shown<'_>,
 ) -> Result<(), Failure> {
     let mesh: json::Mesh = source.document.get(index)?;
     let own_weights = mesh.weights.unwrap_or_default();
@@ -140,21 +172,28 @@ fn read_mesh(
             source.warn(&format!("{} has no positions and is left out", place()));
             continue;
         }
-        let bytes = geometry::memory(source, primitive, &deformations, placements.len() as u64)
-            .map_err(|e| e.within(place()))?;
-        source.budget.take(&memory_place, bytes)?;
         let slot = materials.slot(source, primitive.material)?;
+        let shared =
+            shared_places(source, primitive, slot, placements).map_err(|e| e.within(place()))?;
+        let n_meshes = if shared.is_some() { 1 } else { placements.len() };
+        let copies = shared.as_ref().map_or(0, |places| size_of_val(&places[..]) as u64);
+        let bytes = geometry::memory(source, primitive, &deformations, n_meshes as u64)
+            .map_err(|e| e.within(place()))?;
+        source.budget.take(&memory_place, bytes.saturating_add(copies))?;
         let geometry = geometry::read(source, primitive, slot, &deformations, &memory_place)
             .map_err(|e| e.within(place))?;
         // A primitive without joints follows its node.
         let has_joints = !geometry.vertices.joints.is_empty();
         let material = geometry.slot.material;
-        let copies = std::iter::repeat_n(geometry, poses.len());
+        let part = shown.parts.len();
+        let instance = |transform| Instance { part, transform };
+        shown.instances.extend(shared.into_iter().flatten().map(instance));
+        let copies = std::iter::repeat_n(geometry, n_meshes);
         for ((pose, world, weights), geometry) in poses.iter().zip(copies) {
             let rigid = Pose::Rigid(*world);
             let pose = if has_joints { pose } else { &rigid };
             let mesh = deform::place(geometry, pose, weights);
-            parts.push(Part { name: name.clone(), mesh, material });
+            shown.parts.push(Part { name: name.clone(), mesh, material });
         }
     }
     Ok(())

@@ -138,8 +138,13 @@ mod tests {
         let normals = vec![[0., 0., 1.]; 4];
         let vertices =
             Vertices { positions, normals, uvs: [uvs, Vec::new()], ..Vertices::default() };
-        let slot =
-            Slot { material: 0, uv_sets: [Some(0), None], tangent_set: Some(0), alpha: false };
+        let slot = Slot {
+            material: 0,
+            uv_sets: [Some(0), None],
+            tangent_set: Some(0),
+            alpha: false,
+            transmits: false,
+        };
         Geometry { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]], slot }
     }
 
