@@ -21,7 +21,7 @@
 //! multiply and subtract in one rounding on all of them, and nothing else is fused, so all of them **give the same
 //! bits** ([`InstructionSet`]).
 //!
-//! A few meshes in many places are traced as [`instances`].
+//! A few meshes in many places are traced through a second tree, over their copies (`instances.rs`).
 //!
 //! # Limits
 //! Coordinates from about 1e-12 to 1e12 in magnitude, and directions from about 1e-18 to 1e20 in
