@@ -10,11 +10,12 @@ use domelight::Rgb;
 use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::bvh::InstructionSet;
 use domelight::environment::{Environment, Orientation, builtin::BuiltinProbe};
+use domelight::math::{Mat4, Vec3, vec3};
 use domelight::render::{
     Background, Filter, LAYERS, LayerValues, Layers, Passes, RenderSettings, render,
 };
 use domelight::scene::builtin::BuiltinScene;
-use domelight::scene::{Camera, EnvironmentSource, Material, Scene};
+use domelight::scene::{Camera, EnvironmentSource, Instance, Material, Scene};
 use domelight::strategy::{PreparedStrategy, StrategySpec};
 
 /// One for each kind of strategy, and for what differs most within a kind.
@@ -56,10 +57,17 @@ const SCENES: [BuiltinScene; 4] = [
     BuiltinScene::SphereOrthographic,
 ];
 
+/// The axes of a rotation about x, then about y.
+const TURN: [Vec3; 3] = [
+    Vec3::new(0.8, 0.0, -0.6),
+    Vec3::new(0.6 * 0.28, 0.96, 0.8 * 0.28),
+    Vec3::new(0.6 * 0.96, -0.28, 0.8 * 0.96),
+];
+
 /// Pixels along an edge: not a multiple of a tile.
 const SIZE: usize = 37;
 
-/// A line for each strategy, material, surface and for short passes: its name, a space and sixteen hexadecimal digits.
+/// A line for each strategy, material, surface, for instances and for short passes: its name, a space and sixteen hexadecimal digits.
 ///
 /// # Panics
 /// If a name above is none, a scene cannot be rendered, or the processor lacks the instructions.
@@ -91,6 +99,12 @@ pub fn report(instruction_set: InstructionSet) -> String {
         }
         writeln!(report, "{surface} {:016x}", checksum.0).expect("text has room");
     }
+    stage.copy();
+    let mut checksum = Checksum::new();
+    for strategy in ["mis:2:2", "product:4", "sir:2/16:from=brdf"] {
+        checksum.layers(&stage.render(strategy));
+    }
+    writeln!(report, "instances {:016x}", checksum.0).expect("text has room");
     for strategy in ["mis:2:2", "product:4"] {
         let mut checksum = Checksum::new();
         for stage in &stages {
@@ -116,7 +130,8 @@ impl Stage {
         let EnvironmentSource::Builtin(probe) = &light.source else { panic!("a built-in probe") };
         let map = probe.parse::<BuiltinProbe>().expect("a probe").image(64);
         let orientation = Orientation { up: light.up, rotation: light.rotate_degrees };
-        let environment = Environment::new(map, orientation, light.factor().expect("a factor")).expect("a map");
+        let environment =
+            Environment::new(map, orientation, light.factor().expect("a factor")).expect("a map");
         let scene =
             Scene::builtin(builtin).with_instruction_set(instruction_set).expect("instructions");
         Self { builtin, scene, environment, instruction_set }
@@ -133,6 +148,23 @@ impl Stage {
 
     fn make_of(&mut self, material: Material) {
         let scene = Scene::new(surfaces::made_of(self.builtin, material)).expect("a scene");
+        self.scene = scene.with_instruction_set(self.instruction_set).expect("instructions");
+    }
+
+    /// Shows every part in six more places, turned and scaled.
+    fn copy(&mut self) {
+        let mut description = self.builtin.description();
+        for part in 0..description.parts.len() {
+            description.instances.extend((1..7).map(|i| {
+                let scale = 0.4 + 0.1 * i as f32;
+                let [x, y, z] = TURN.map(|axis| axis * scale);
+                let place = vec3((i % 3) as f32 - 1.0, 0.5 * i as f32, 1.3 * (i % 2) as f32);
+                let [x, y, z] = [x, y, z].map(|axis| axis.extend(0.0));
+                Instance { part, transform: Mat4::from_cols(x, y, z, place.extend(1.0)) }
+            }));
+        }
+        let scene = Scene::new(description).expect("a scene");
+        assert!(scene.instances().count() > 0, "copies share their memory");
         self.scene = scene.with_instruction_set(self.instruction_set).expect("instructions");
     }
 
