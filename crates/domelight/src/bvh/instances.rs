@@ -105,8 +105,7 @@ impl Instances {
                 return Next::Go;
             }
             let object = &self.objects[instance.object];
-            let in_scene =
-                |hit: &Hit| Hit { triangle: hit.triangle + instance.first_triangle, ..*hit };
+            let in_scene = |hit: &Hit| hit.numbered_from(instance.first_triangle);
             let local = instance.placement.inverse_ray(&rest);
             if let Some(hit) = object.closest_hit_where(&local, |hit| accept(&in_scene(hit))) {
                 closest = Some(in_scene(&hit));
@@ -133,9 +132,7 @@ impl Instances {
         self.visit(ray, |instance, _| {
             let local = instance.placement.inverse_ray(ray);
             let one = RayBatch { origins: vec![local.origin], directions: vec![local.direction] };
-            let of_hit = |_, hit: &Hit| {
-                of_hit(&Hit { triangle: hit.triangle + instance.first_triangle, ..*hit })
-            };
+            let of_hit = |_, hit: &Hit| of_hit(&hit.numbered_from(instance.first_triangle));
             self.objects[instance.object].transmittances(&one, &of_hit, &mut answers);
             product *= answers[0];
             if product > 0.0 { Next::Go } else { Next::Stop }

@@ -38,6 +38,14 @@ pub struct Hit {
     pub triangle: u32,
 }
 
+impl Hit {
+    /// The same hit where the triangles are numbered from `first` on.
+    #[inline]
+    pub(crate) fn numbered_from(self, first: u32) -> Self {
+        Self { triangle: self.triangle + first, ..self }
+    }
+}
+
 /// Shadow rays to infinity in structure-of-arrays form.
 #[derive(Clone, Debug, Default)]
 pub struct RayBatch {

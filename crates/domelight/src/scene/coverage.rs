@@ -40,7 +40,7 @@ impl Partial {
 
     /// The hit with the triangle's index in the scene.
     fn in_scene(&self, hit: &Hit) -> Hit {
-        Hit { triangle: hit.triangle + self.first_triangle, ..*hit }
+        hit.numbered_from(self.first_triangle)
     }
 }
 

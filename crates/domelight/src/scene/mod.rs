@@ -44,6 +44,7 @@ use crate::bsdf::Bsdf;
 use crate::bvh::{self, Bvh, BvhError, InstructionSet};
 use crate::geometry::{Aabb, Mesh, MeshError, Similarity};
 use coverage::Partial;
+use subject::{framed_points, usual_scale};
 
 /// A scene ready for ray tracing.
 #[derive(Debug)]
@@ -179,7 +180,7 @@ impl Scene {
         let subject_bounds = description.subject_bounds();
         let is_subject = description.is_subject();
         let bounds = description.bounds();
-        let scale = description.usual_scale();
+        let scale = usual_scale(&bounds);
         check_size(&bounds, &subject_bounds, scale)?;
         let SceneDescription {
             mut parts, instances, materials, textures, camera, up, view, ..
@@ -279,16 +280,12 @@ impl Scene {
 
     /// A camera that frames the subject, regardless of the file's camera, in units of the description.
     pub fn framed(&self, framing: &Framing) -> CameraSettings {
-        let parts = self.parts.iter().zip(&self.is_subject);
-        let subject = parts.filter(|(_, is_subject)| **is_subject);
         let framing = Framing { view: framing.view.or(self.view), ..*framing };
-        let vertices = subject.flat_map(|(part, _)| part.mesh.positions.iter().copied());
-        let copies = self.placed.iter().filter(|copy| self.is_subject[copy.part]);
-        let corners = copies.flat_map(|copy| {
-            let corners = self.parts[copy.part].mesh.bounds().corners();
-            corners.map(|corner| copy.placement.point(corner))
+        let copies = self.placed.iter().map(|PlacedPart { part, placement, .. }| {
+            let place = |corner| placement.point(corner);
+            (*part, place)
         });
-        let mut camera = framing.fit(vertices.chain(corners));
+        let mut camera = framing.fit(framed_points(&self.parts, &self.is_subject, copies));
         if self.unit != 1.0 {
             camera.scale(self.unit);
         }

@@ -178,15 +178,6 @@ fn bend(normal: Vec3, viewer: Vec3, ng: Vec3) -> Vec3 {
         .map_or(viewer, |n| (horizon * n + MIN_COS_THETA_O * viewer).normalize())
 }
 
-/// A normal of unit length; 0 if it has none.
-#[inline]
-fn unit_or_zero(normal: Vec3) -> Vec3 {
-    /// The squared length of a unit vector that was rounded is within this of 1.
-    const ROUNDING: f32 = 1e-6;
-    let is_unit = (normal.length_squared() - 1.0).abs() <= ROUNDING;
-    if is_unit { normal } else { normal.normalize_or_zero() }
-}
-
 /// The corners of the triangle that was hit, and their barycentric weights.
 pub(super) struct Corners {
     indices: [usize; 3],
@@ -230,7 +221,7 @@ impl Corners {
         if mesh.normals.is_empty() {
             return None;
         }
-        let normals = self.of(&mesh.normals).map(|n| side * unit_or_zero(n));
+        let normals = self.of(&mesh.normals).map(|n| side * n.normalize_or_zero());
         let cosines = normals.map(|n| n.dot(ng));
         if cosines.iter().all(|&cos| cos > COS_FLAT) || cosines.iter().any(|&cos| cos < COS_ROUGH) {
             return None;

@@ -2,7 +2,9 @@
 
 use super::builtin::shapes;
 use super::material::CATCHER_REFLECTANCE;
-use super::{AlphaMode, CameraSettings, Coverage, Framing, Material, Part, SceneDescription};
+use super::{
+    AlphaMode, CameraSettings, Coverage, Framing, Instance, Material, Part, SceneDescription,
+};
 use crate::Rgb;
 use crate::bsdf::Bsdf;
 use crate::geometry::{Aabb, Mesh, power_of_two};
@@ -35,15 +37,12 @@ impl SceneDescription {
     /// A camera that frames the subject, regardless of the scene's camera.
     pub fn framed(&self, framing: &Framing) -> CameraSettings {
         let is_subject = self.is_subject();
-        let subject = self.parts.iter().zip(&is_subject).filter(|(_, is_subject)| **is_subject);
         let framing = Framing { view: framing.view.or(self.view), ..*framing };
-        let vertices = subject.flat_map(|(part, _)| part.mesh.positions.iter().copied());
-        let copies = self.instances.iter().filter(|instance| is_subject[instance.part]);
-        let corners = copies.flat_map(|instance| {
-            let corners = self.parts[instance.part].mesh.bounds().corners();
-            corners.map(|corner| instance.transform.transform_point3(corner))
+        let copies = self.instances.iter().map(|Instance { part, transform }| {
+            let place = |corner| transform.transform_point3(corner);
+            (*part, place)
         });
-        framing.fit(vertices.chain(corners))
+        framing.fit(framed_points(&self.parts, &is_subject, copies))
     }
 
     /// Scales a very small or very large scene to a moderate size, together with `view` and the scene's own camera.
@@ -54,7 +53,7 @@ impl SceneDescription {
     /// [`Scene::new`](super::Scene::new) scales the meshes of other scenes automatically, and takes a camera in the
     /// units of the description.
     pub fn rescale(&mut self, view: &mut CameraSettings) -> f32 {
-        let factor = self.usual_scale();
+        let factor = usual_scale(&self.bounds());
         if factor != 1.0 {
             self.parts.iter_mut().for_each(|part| part.mesh.scale(factor));
             let translations = self.instances.iter_mut().map(|i| &mut i.transform.w_axis);
@@ -62,24 +61,6 @@ impl SceneDescription {
             self.camera.iter_mut().chain([view]).for_each(|camera| camera.scale(factor));
         }
         factor
-    }
-
-    /// The factor, a power of two, that scales a scene to a moderate size; 1 if it has one.
-    pub(super) fn usual_scale(&self) -> f32 {
-        let bounds = self.bounds();
-        let size = bounds.size().max_element();
-        let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
-        if bounds.is_empty() || !farthest.is_finite() || size == 0.0 {
-            return 1.0;
-        }
-        let unit = if farthest > USUAL[1] { power_of_two(farthest) } else { 1.0 };
-        let (size, farthest) = (size / unit, farthest / unit);
-        if size >= USUAL[0] {
-            return 1.0 / unit;
-        }
-        // A scene far from the origin cannot be enlarged.
-        let least = 2.0 * power_of_two(farthest) / USUAL[1];
-        1.0 / (unit * (0.5 * power_of_two(size)).max(least).min(1.0))
     }
 
     /// Moves the center of the subject's bounds to the origin and scales its longest half-extent
@@ -167,6 +148,41 @@ impl SceneDescription {
     }
 }
 
+/// The factor, a power of two, that scales a scene with these bounds to a moderate size; 1 if it has one.
+pub(super) fn usual_scale(bounds: &Aabb) -> f32 {
+    let size = bounds.size().max_element();
+    let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    if bounds.is_empty() || !farthest.is_finite() || size == 0.0 {
+        return 1.0;
+    }
+    let unit = if farthest > USUAL[1] { power_of_two(farthest) } else { 1.0 };
+    let (size, farthest) = (size / unit, farthest / unit);
+    if size >= USUAL[0] {
+        return 1.0 / unit;
+    }
+    // A scene far from the origin cannot be enlarged.
+    let least = 2.0 * power_of_two(farthest) / USUAL[1];
+    1.0 / (unit * (0.5 * power_of_two(size)).max(least).min(1.0))
+}
+
+/// The points that a camera keeps in the picture: the vertices of the subject's parts, and the corners of the boxes of
+/// their copies, each given as a part and the map from its place to the copy's.
+pub(super) fn framed_points<'a, F: Fn(Vec3) -> Vec3>(
+    parts: &'a [Part],
+    is_subject: &'a [bool],
+    copies: impl Iterator<Item = (usize, F)>,
+) -> impl Iterator<Item = Vec3> + Clone {
+    let vertices = parts.iter().zip(is_subject).filter(|(_, is_subject)| **is_subject);
+    let vertices = vertices.flat_map(|(part, _)| part.mesh.positions.iter().copied());
+    let mut boxes = vec![None; parts.len()];
+    let mut corners = Vec::new();
+    for (part, place) in copies.filter(|(part, _)| is_subject[*part]) {
+        let of_part = boxes[part].get_or_insert_with(|| parts[part].mesh.bounds().corners());
+        corners.extend(of_part.map(place));
+    }
+    vertices.chain(corners)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -201,7 +217,7 @@ mod tests {
             let mut view = CameraSettings::framing(&scene.bounds(), 1.0, Vec3::Y);
             let (old, old_view) = (scene.clone(), view);
             let undo = scene.rescale(&mut view);
-            assert_eq!(scene.usual_scale(), 1.0);
+            assert_eq!(usual_scale(&scene.bounds()), 1.0);
             let size = scene.bounds().size().max_element();
             assert!((USUAL[0]..=USUAL[1]).contains(&size), "{factor:e}: {size}");
             let old_size = old.bounds().size().max_element();
@@ -222,7 +238,7 @@ mod tests {
             scene.parts[0].mesh.transform(&m);
             let mut view = CameraSettings::framing(&scene.bounds(), 1.0, Vec3::Y);
             scene.rescale(&mut view);
-            assert_eq!(scene.usual_scale(), 1.0, "{size:e} at {distance}");
+            assert_eq!(usual_scale(&scene.bounds()), 1.0, "{size:e} at {distance}");
             assert!(scene.bounds().max.max_element() <= USUAL[1], "{size:e} at {distance}");
         }
     }
