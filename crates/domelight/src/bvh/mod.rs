@@ -179,6 +179,11 @@ impl Bvh {
         instruction_set.is_available().then_some(self)
     }
 
+    /// The instruction set that it is traced with.
+    pub(crate) fn instruction_set(&self) -> InstructionSet {
+        self.instruction_set
+    }
+
     /// The same BVH with copies of `objects`. Triangles are numbered as [`Instance::first_triangle`] says.
     #[must_use]
     pub(crate) fn with_instances(mut self, objects: Vec<Self>, instances: Vec<Instance>) -> Self {

@@ -130,7 +130,11 @@ struct Batch {
     sights: Sights,
     /// The camera rays of each pixel.
     camera_rays: Vec<CameraRays>,
+    /// The rays that hit something; for each the shading point, its material if the BSDF of this is the same everywhere,
+    /// and the camera sample.
+    seeing: Vec<u32>,
     points: Vec<ShadingPoint>,
+    constants: Vec<Option<usize>>,
     samples: Vec<u32>,
     pixels: Vec<PixelPoints>,
     /// The origin of each point's shadow rays, off the surface on the viewer's side.
@@ -579,26 +583,33 @@ impl Batch {
 
     /// Turns hits into shading points, grouped by pixel.
     fn gather_points(&mut self, context: &RenderContext) {
-        self.origins.clear();
+        // Find the rays that hit something.
         self.samples.clear();
-        self.points.resize(self.sights.hits.iter().flatten().count(), ShadingPoint::UNSET);
+        self.seeing.clear();
         for (pixel, of_pixel) in self.pixels.iter_mut().zip(&self.camera_rays) {
             let start = self.samples.len();
-            let (mut material, mut one_material) = (None, true);
             for (ray, sample) in of_pixel.range().zip(of_pixel.samples.clone()) {
-                let Some(hit) = &self.sights.hits[ray] else { continue };
-                let point = &mut self.points[self.samples.len()];
-                let constant = context.scene.shade(&self.rays[ray], hit, point);
-                let known = self.samples.len() == start || constant == material;
-                one_material &= known && constant.is_some();
-                material = constant;
-                self.origins.push(offset_origin(point.position, point.ng, context.extent));
-                self.samples.push(sample);
+                if self.sights.hits[ray].is_some() {
+                    self.seeing.push(ray as u32);
+                    self.samples.push(sample);
+                }
             }
             pixel.points = start..self.samples.len();
-            pixel.one_material = one_material;
         }
-        debug_assert_eq!(self.samples.len(), self.points.len(), "a point for each hit");
+        // Shade them.
+        let n_points = self.samples.len();
+        self.points.resize(n_points, ShadingPoint::UNSET);
+        self.constants.resize(n_points, None);
+        let Self { rays, sights, seeing, points, constants, .. } = self;
+        context.scene.shade_all(rays, &sights.hits, seeing, points, constants);
+        for pixel in &mut self.pixels {
+            let mut constants = self.constants[pixel.points.clone()].iter();
+            let first = constants.next().copied().flatten();
+            pixel.one_material = first.is_some() && constants.all(|&constant| constant == first);
+        }
+        self.origins.clear();
+        let origin = |p: &ShadingPoint| offset_origin(p.position, p.ng, context.extent);
+        self.origins.extend(self.points.iter().map(origin));
     }
 
     /// Runs a round of the strategy; returns the number of shadow rays.

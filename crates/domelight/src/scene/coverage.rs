@@ -16,7 +16,7 @@
 
 use std::cell::RefCell;
 
-use super::shading::Corners;
+use super::corners::Corners;
 use super::texture::Uvs;
 use super::{AlphaMode, Coverage, Material, Part, Scene};
 use crate::Rgb;

@@ -1,7 +1,7 @@
 //! Emission and unlit colors, which the camera sees but which light nothing else.
 
 use super::Scene;
-use super::shading::Corners;
+use super::corners::Corners;
 use crate::Rgb;
 use crate::geometry::Hit;
 

@@ -5,9 +5,11 @@
 
 pub mod builtin;
 mod camera;
+mod corners;
 mod coverage;
 mod description;
 mod emission;
+mod facet;
 #[cfg(feature = "io")]
 mod fingerprint;
 mod framing;
@@ -55,6 +57,8 @@ pub struct Scene {
     textures: Vec<Texture>,
     /// The BSDFs of the materials that do not vary.
     constant_bsdfs: Vec<Option<Bsdf>>,
+    /// Whether each material has such a BSDF and takes its frame from the normal alone.
+    plain_materials: Vec<bool>,
     /// The first triangle of each part in the BVH.
     first_triangle: Vec<u32>,
     /// Copies of opaque parts, in the order of their triangles, which follow those of all parts.
@@ -219,12 +223,17 @@ impl Scene {
         let catches_shadows = used().any(|material| material.catches_shadows);
         let dims = |part: &Part| !materials[part.material].catches_shadows;
         let dims_light = parts[n_opaque..].iter().any(dims);
-        let constant_bsdfs = materials.iter().map(Material::constant_bsdf).collect();
+        let constant_bsdfs: Vec<_> = materials.iter().map(Material::constant_bsdf).collect();
+        let is_plain = |(material, bsdf): (&Material, &Option<Bsdf>)| {
+            bsdf.is_some() && !material.needs_tangent()
+        };
+        let plain_materials = materials.iter().zip(&constant_bsdfs).map(is_plain).collect();
         Ok(Self {
             parts,
             materials,
             textures,
             constant_bsdfs,
+            plain_materials,
             first_triangle,
             placed,
             first_placed,

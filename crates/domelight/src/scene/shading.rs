@@ -4,30 +4,18 @@
 //! the barycentric coordinates, with the error of the vertices, rather than from origin + t · direction, whose error
 //! grows with the distance.
 //!
-//! An interpolated or mapped normal may face away from the viewer although the surface does not.
-//! Such a normal is **bent toward the viewer** until `wo` lies just above the shading horizon:
-//! n' = √(1 − ε²) t + ε wo with t ∝ n − (n·wo) wo, the nearest normal with n'·wo = ε. Otherwise there
-//! would be black pixels along silhouettes.
-//!
-//! A smooth surface with coarse triangles is shaded as smooth: shadow rays start where the smooth surface would be,
-//! above the triangle, and may point as far down as it allows. Otherwise triangles shadow one another near the
-//! terminator, in stair-steps. (Hanika 2021, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4.)
+//! [`facet`](super::facet) does what needs no material, for several hits side by side.
 
+use super::corners::Corners;
+use super::facet::{Facet, TriangleLanes};
+use super::texture::Uvs;
 use super::{Layers, Material, NormalMap, Part, Scene};
 use crate::Rgb;
-use crate::geometry::{Hit, Mesh, Ray};
-use crate::math::{Frame, Vec2, Vec3, Vec4};
-use crate::scene::texture::Uvs;
+use crate::bsdf::Bsdf;
+use crate::geometry::{Hit, Ray};
+use crate::math::{Frame, Vec3};
+use crate::simd::{Kernel, LANES, Simd, dispatch};
 use crate::strategy::ShadingPoint;
-
-/// The minimum cosine between the shading normal and the direction to the viewer.
-const MIN_COS_THETA_O: f32 = 1e-3;
-
-/// Vertex normals within this cosine of the geometric one belong to a flat triangle: 0.1°, far more than rounding.
-const COS_FLAT: f32 = 0.999_998;
-
-/// Vertex normals beyond this cosine do not describe a smooth surface over the triangle: 60°.
-const COS_ROUGH: f32 = 0.5;
 
 impl Scene {
     /// The shading point of a hit that [`Scene::bvh`] reported for `ray`.
@@ -36,78 +24,94 @@ impl Scene {
     /// If `hit.triangle` is not one of this scene's.
     pub fn shading_point(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
         let mut point = ShadingPoint::UNSET;
-        self.shade(ray, hit, &mut point);
+        let surface = self.surface(ray, hit);
+        let Surface { part, corners, direction } = &surface;
+        self.shade(&surface, hit, &Facet::new(&part.mesh, corners, *direction), &mut point);
         point
     }
 
-    /// Sets `point` to [`Scene::shading_point`] in place, because a point is large. Returns the material if its BSDF is
-    /// the same everywhere.
-    #[inline]
-    pub(crate) fn shade(&self, ray: &Ray, hit: &Hit, point: &mut ShadingPoint) -> Option<usize> {
-        let Some(placement) = self.placement(hit.triangle) else {
-            return self.shade_part(ray, hit, point);
-        };
-        let constant = self.shade_part(&placement.inverse_ray(ray), hit, point);
-        point.position = placement.point(point.position);
-        point.ng = placement.direction(point.ng);
-        point.frame = placement.frame(point.frame);
-        constant
+    /// Sets each of `points` to [`Scene::shading_point`] of one of the `seeing` rays, and each of `constants` to its
+    /// material if the BSDF of this is the same everywhere. `hits` has an entry for each ray.
+    ///
+    /// # Panics
+    /// If one of the `seeing` rays hits nothing.
+    pub(crate) fn shade_all(
+        &self,
+        rays: &[Ray],
+        hits: &[Option<Hit>],
+        seeing: &[u32],
+        points: &mut [ShadingPoint],
+        constants: &mut [Option<usize>],
+    ) {
+        dispatch(
+            self.bvh.instruction_set(),
+            ShadeAll { scene: self, rays, hits, seeing, points, constants },
+        );
     }
 
-    /// [`Scene::shade`] where the mesh of the hit's part is.
+    /// The triangle of a hit.
     #[inline]
-    fn shade_part(&self, ray: &Ray, hit: &Hit, point: &mut ShadingPoint) -> Option<usize> {
+    fn surface(&self, ray: &Ray, hit: &Hit) -> Surface<'_> {
         let (part, triangle) = self.locate(hit.triangle);
-        let material = &self.materials[part.material];
-        let corner = Corners::new(&part.mesh, triangle, hit);
-        let viewer = -ray.direction.normalize();
+        let placement = self.placement(hit.triangle);
+        let direction = placement.map_or(ray.direction, |p| p.inverse_direction(ray.direction));
+        Surface { part, corners: Corners::new(&part.mesh, triangle, hit), direction }
+    }
 
-        let [p0, p1, p2] = corner.of(&part.mesh.positions);
-        let ng = (p1 - p0).cross(p2 - p0).try_normalize().unwrap_or(viewer);
-        let uvs = corner.uvs(&part.mesh);
-        let smooth = corner.mix(&part.mesh.normals).and_then(Vec3::try_normalize).unwrap_or(ng);
+    /// Sets `point` to the shading point of a facet. Returns the material if its BSDF is the same everywhere.
+    fn shade(
+        &self,
+        surface: &Surface,
+        hit: &Hit,
+        facet: &Facet<f32>,
+        point: &mut ShadingPoint,
+    ) -> Option<usize> {
+        let Surface { part, corners, .. } = surface;
+        let material = &self.materials[part.material];
+        let uvs = corners.uvs(&part.mesh);
+        let smooth = facet.smooth();
         let relief = if material.needs_tangent() {
-            self.relief(part, material, &corner, smooth, &uvs)
+            self.relief(part, material, corners, smooth, &uvs)
         } else {
             Relief { normal: smooth, coat_normal: smooth, tangent: None }
         };
-
-        let ng = if ng.dot(viewer) < 0.0 { -ng } else { ng };
-        let to_viewer = |normal: Vec3| {
-            let normal = if smooth.dot(ng) < 0.0 { -normal } else { normal };
-            bend(normal, viewer, ng)
-        };
-        let normal = to_viewer(relief.normal);
+        let toward_viewer = |normal: Vec3| Vec3::from(facet.toward_viewer(normal.into()));
+        let normal = toward_viewer(relief.normal);
         let frame = relief
             .tangent
             .map_or_else(|| Frame::from_z(normal), |t| Frame::from_z_and_tangent(normal, t));
-        let wo = frame.to_local(viewer).normalize();
+        facet.set(point, frame);
         let coat_normal = match material.layers.clearcoat {
             Some(_) if relief.coat_normal != relief.normal => {
-                frame.to_local(to_viewer(relief.coat_normal))
+                frame.to_local(toward_viewer(relief.coat_normal))
             }
             _ => Vec3::Z,
         };
-        let tint = corner.mix(&part.mesh.colors);
-        let constant = match (&self.constant_bsdfs[part.material], tint) {
+        let constant = match (&self.constant_bsdfs[part.material], corners.mix(&part.mesh.colors)) {
             (Some(bsdf), None) => {
-                point.bsdf.set(bsdf, wo);
+                point.bsdf.set(bsdf, point.wo);
                 Some(part.material)
             }
             (_, tint) => {
                 let tint = tint.unwrap_or(Rgb::WHITE);
-                material.set_bsdf(&self.textures, &uvs, tint, [wo, coat_normal], &mut point.bsdf);
+                let directions = [point.wo, coat_normal];
+                material.set_bsdf(&self.textures, &uvs, tint, directions, &mut point.bsdf);
                 None
             }
         };
-        let position = corner.mix(&part.mesh.positions).unwrap_or(p0);
-        let side = if smooth.dot(ng) < 0.0 { -1.0 } else { 1.0 };
-        (point.position, point.ng) = match corner.rise(&part.mesh, position, ng, side) {
-            Some(rise) => (position + rise, to_viewer(smooth)),
-            None => (position, ng),
-        };
-        (point.frame, point.wo) = (frame, wo);
+        if let Some(placement) = self.placement(hit.triangle) {
+            point.position = placement.point(point.position);
+            point.ng = placement.direction(point.ng);
+            point.frame = placement.frame(point.frame);
+        }
         constant
+    }
+
+    /// The material of a part and its BSDF, if nothing but the mesh's normals varies.
+    #[inline]
+    fn plain_bsdf(&self, part: &Part) -> Option<&Bsdf> {
+        let is_plain = self.plain_materials[part.material] && part.mesh.colors.is_empty();
+        self.constant_bsdfs[part.material].as_ref().filter(|_| is_plain)
     }
 
     /// The normals and the tangent at a hit, given the interpolated `normal`.
@@ -163,111 +167,74 @@ struct Relief {
     tangent: Option<Vec3>,
 }
 
-/// `normal` bent toward `viewer` until their cosine is [`MIN_COS_THETA_O`]; see the
-/// [module](self).
-#[inline]
-fn bend(normal: Vec3, viewer: Vec3, ng: Vec3) -> Vec3 {
-    let cos_theta_o = normal.dot(viewer);
-    if cos_theta_o >= MIN_COS_THETA_O {
-        return normal;
-    }
-    let grazing = |n: Vec3| (n - n.dot(viewer) * viewer).try_normalize();
-    let horizon = (1.0 - MIN_COS_THETA_O * MIN_COS_THETA_O).sqrt();
-    grazing(normal)
-        .or_else(|| grazing(ng))
-        .map_or(viewer, |n| (horizon * n + MIN_COS_THETA_O * viewer).normalize())
+/// The triangle of a hit and the direction in which it is seen, where the mesh of its part is.
+struct Surface<'a> {
+    part: &'a Part,
+    corners: Corners,
+    direction: Vec3,
 }
 
-/// The corners of the triangle that was hit, and their barycentric weights.
-pub(super) struct Corners {
-    indices: [usize; 3],
-    weights: [f32; 3],
+/// Shades hits side by side.
+struct ShadeAll<'a> {
+    scene: &'a Scene,
+    rays: &'a [Ray],
+    hits: &'a [Option<Hit>],
+    seeing: &'a [u32],
+    points: &'a mut [ShadingPoint],
+    constants: &'a mut [Option<usize>],
 }
 
-impl Corners {
-    #[inline]
-    pub(super) fn new(mesh: &Mesh, triangle: usize, hit: &Hit) -> Self {
-        Self {
-            indices: mesh.triangles[triangle].map(|i| i as usize),
-            weights: [1.0 - hit.u - hit.v, hit.u, hit.v],
+impl Kernel for ShadeAll<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self { scene, rays, hits, seeing, points, constants } = self;
+        let mut lanes = TriangleLanes::default();
+        let out = points.chunks_mut(LANES).zip(constants.chunks_mut(LANES));
+        for (seeing, (points, constants)) in seeing.chunks(LANES).zip(out) {
+            for (lane, &ray) in seeing.iter().enumerate() {
+                let surface = scene.surface(&rays[ray as usize], expect_hit(hits, ray));
+                lanes.set(lane, &surface.part.mesh, &surface.corners, surface.direction);
+            }
+            let facets = lanes.facets(simd);
+            for (lane, &ray) in seeing.iter().enumerate() {
+                let (hit, point) = (expect_hit(hits, ray), &mut points[lane]);
+                let (part, _) = scene.locate(hit.triangle);
+                constants[lane] = match scene.plain_bsdf(part) {
+                    Some(bsdf) if scene.placement(hit.triangle).is_none() => {
+                        facets.set(lane, point);
+                        point.bsdf.set(bsdf, point.wo);
+                        Some(part.material)
+                    }
+                    _ => {
+                        let surface = scene.surface(&rays[ray as usize], hit);
+                        scene.shade(&surface, hit, &facets.get(lane), point)
+                    }
+                };
+            }
         }
     }
+}
 
-    /// An attribute at the corners.
-    #[inline]
-    fn of<T: Copy>(&self, attribute: &[T]) -> [T; 3] {
-        self.indices.map(|i| attribute[i])
-    }
-
-    /// An interpolated attribute; `None` if the mesh lacks it.
-    #[inline]
-    pub(super) fn mix<T>(&self, attribute: &[T]) -> Option<T>
-    where
-        T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>,
-    {
-        if attribute.is_empty() {
-            return None;
-        }
-        let [a, b, c] = self.of(attribute);
-        let [wa, wb, wc] = self.weights;
-        Some(a * wa + b * wb + c * wc)
-    }
-
-    /// The offset from `position` on the triangle up to the smooth surface that the vertex normals, times `side`,
-    /// describe, if that surface bulges to the side of the geometric normal `ng`: Σ bᵢ max(0, (pᵢ − p) · nᵢ) nᵢ,
-    /// where each term leads to the tangent plane of a vertex. `None` for flat triangles and hollows.
-    #[inline]
-    fn rise(&self, mesh: &Mesh, position: Vec3, ng: Vec3, side: f32) -> Option<Vec3> {
-        if mesh.normals.is_empty() {
-            return None;
-        }
-        let normals = self.of(&mesh.normals).map(|n| side * n.normalize_or_zero());
-        let cosines = normals.map(|n| n.dot(ng));
-        if cosines.iter().all(|&cos| cos > COS_FLAT) || cosines.iter().any(|&cos| cos < COS_ROUGH) {
-            return None;
-        }
-        let corners = self.of(&mesh.positions);
-        let terms = (0..3).map(|i| {
-            let height = (corners[i] - position).dot(normals[i]).max(0.0);
-            self.weights[i] * height * normals[i]
-        });
-        let rise = terms.fold(Vec3::ZERO, |sum, term| sum + term);
-        (rise != Vec3::ZERO).then_some(rise)
-    }
-
-    /// The texture coordinates; 0 for a set that the mesh lacks.
-    #[inline]
-    pub(super) fn uvs(&self, mesh: &Mesh) -> Uvs {
-        [&mesh.uvs, &mesh.uvs2].map(|set| self.mix(set).unwrap_or_default())
-    }
-
-    /// The tangent ∂p/∂u with the bitangent's sign as glTF defines it: the bitangent points toward
-    /// falling v, which is up in the image.
-    #[inline]
-    fn uv_tangent(&self, positions: &[Vec3], uvs: &[Vec2], normal: Vec3) -> Option<Vec4> {
-        if uvs.is_empty() {
-            return None;
-        }
-        let [p0, p1, p2] = self.of(positions);
-        let [t0, t1, t2] = self.of(uvs);
-        let (e1, e2, d1, d2) = (p1 - p0, p2 - p0, t1 - t0, t2 - t0);
-        let sign = 1f32.copysign(d1.perp_dot(d2));
-        let along_u = (sign * (d2.y * e1 - d1.y * e2)).try_normalize()?;
-        let along_v = sign * (d1.x * e2 - d2.x * e1);
-        let handedness = -1f32.copysign(normal.cross(along_u).dot(along_v));
-        Some(along_u.extend(handedness))
-    }
+#[inline(always)]
+fn expect_hit(hits: &[Option<Hit>], ray: u32) -> &Hit {
+    hits[ray as usize].as_ref().expect("the ray hits something")
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::facet::MIN_COS_THETA_O;
     use super::*;
-    use crate::geometry::offset_origin;
-    use crate::math::{vec2, vec3};
+    use crate::geometry::{Mesh, offset_origin};
+    use crate::math::{Mat4, Quat, Vec4, vec2, vec3};
     use crate::sampling::Pcg32;
     use crate::sampling::warp::uniform_sphere;
     use crate::scene::builtin::shapes;
-    use crate::scene::{Encoding, MaterialModel, NormalMap, SceneDescription, Texture, TextureRef};
+    use crate::scene::{
+        Encoding, Instance, MaterialModel, NormalMap, SceneDescription, Texture, TextureRef,
+    };
+    use crate::simd::InstructionSet;
 
     /// The triangle (0,0,0), (1,0,0), (0,1,0) with its image's v axis pointing down.
     fn triangle() -> Mesh {
@@ -291,6 +258,20 @@ mod tests {
             parts: vec![part],
             materials: vec![material],
             textures,
+            ..SceneDescription::default()
+        };
+        Scene::new(description).unwrap()
+    }
+
+    /// A copy of a mesh, turned and enlarged.
+    fn scene_of_copy(mesh: Mesh) -> Scene {
+        let part = Part { name: "original".into(), mesh, material: 0 };
+        let turn = Quat::from_rotation_x(0.7);
+        let transform = Mat4::from_scale_rotation_translation(Vec3::splat(2.0), turn, Vec3::X);
+        let description = SceneDescription {
+            parts: vec![part],
+            instances: vec![Instance { part: 0, transform }],
+            materials: vec![Material::diffuse("gray", Rgb::splat(0.5))],
             ..SceneDescription::default()
         };
         Scene::new(description).unwrap()
@@ -329,6 +310,55 @@ mod tests {
     }
 
     /// Triangles of a coarse ball do not shade one another: rays start on the ball, and leave it wherever its normal says.
+    /// Hits that are shaded side by side have the bits of those shaded one by one: with and without normals, seen from
+    /// either side, at grazing angles, with a normal map, with vertex colors, and in a copy.
+    #[test]
+    fn hits_side_by_side_have_the_same_bits() {
+        let ball = shapes::uv_sphere(7, 5);
+        let mut flat = ball.clone();
+        flat.normals.clear();
+        let mut colored = ball.clone();
+        colored.colors = vec![Rgb::new(0.2, 0.4, 0.8); ball.positions.len()];
+        let mut pcg = Pcg32::new(5, 9);
+        let mut hits_of_all = 0;
+        let scenes = [scene(ball.clone(), None), scene(flat, None), scene(colored, None)]
+            .into_iter()
+            .chain([scene(ball.clone(), Some([200, 90, 180])), scene_of_copy(ball)]);
+        for scene in scenes {
+            let rays: Vec<Ray> = (0..200)
+                .map(|i| {
+                    let at = uniform_sphere(vec2(pcg.next_f32(), pcg.next_f32()));
+                    let toward = 1.1 * uniform_sphere(vec2(pcg.next_f32(), pcg.next_f32()));
+                    let from = if i % 4 == 0 { 0.1 * at } else { 4.0 * at };
+                    Ray::new(from, (toward - from) * (0.5 + pcg.next_f32()))
+                })
+                .collect();
+            let hits: Vec<_> = rays.iter().map(|ray| scene.bvh().closest_hit(ray)).collect();
+            let seeing: Vec<u32> = (0..200).filter(|&ray| hits[ray as usize].is_some()).collect();
+            hits_of_all += seeing.len();
+            for set in InstructionSet::ALL {
+                let mut points = vec![ShadingPoint::UNSET; seeing.len()];
+                let mut constants = vec![None; seeing.len()];
+                let (out, constants) = (&mut points[..], &mut constants[..]);
+                let kernel = ShadeAll {
+                    scene: &scene,
+                    rays: &rays,
+                    hits: &hits,
+                    seeing: &seeing,
+                    points: out,
+                    constants,
+                };
+                dispatch(set, kernel);
+                for (&ray, point) in seeing.iter().zip(&points) {
+                    let ray = ray as usize;
+                    let one = scene.shading_point(&rays[ray], &hits[ray].unwrap());
+                    assert_eq!(format!("{point:?}"), format!("{one:?}"), "{set:?}");
+                }
+            }
+        }
+        assert!(hits_of_all > 500, "{hits_of_all}");
+    }
+
     #[test]
     fn a_coarse_ball_is_shaded_as_a_ball() {
         let scene = scene(shapes::icosphere(1), None);
@@ -424,7 +454,7 @@ mod tests {
     fn triangles_find_their_part_past_empty_ones() {
         let part = |name: &str, mesh| Part { name: name.into(), mesh, material: 0 };
         let mut moved = triangle();
-        moved.transform(&crate::math::Mat4::from_translation(vec3(5.0, 0.0, 0.0)));
+        moved.transform(&Mat4::from_translation(vec3(5.0, 0.0, 0.0)));
         let description = SceneDescription {
             parts: vec![
                 part("empty", Mesh::default()),

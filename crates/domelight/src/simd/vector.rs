@@ -46,6 +46,23 @@ impl<F: SimdFloat> Vectors<F> {
         Self { x: self.x - b.x, y: self.y - b.y, z: self.z - b.z }
     }
 
+    #[inline(always)]
+    pub(crate) fn cross(self, b: Self) -> Self {
+        Self {
+            x: self.y * b.z - b.y * self.z,
+            y: self.z * b.x - b.z * self.x,
+            z: self.x * b.y - b.x * self.y,
+        }
+    }
+
+    /// The unit vectors, or `other` where the length is not positive and finite.
+    #[inline(always)]
+    pub(crate) fn normalized_or(self, other: Self) -> Self {
+        let (zero, infinity) = (self.x.splat(0.0), self.x.splat(f32::INFINITY));
+        let scale = self.x.splat(1.0) / self.length_squared().sqrt();
+        Self::select(zero.lt(scale) & scale.lt(infinity), self.times(scale), other)
+    }
+
     /// mask ? a : b.
     #[inline(always)]
     pub(crate) fn select(mask: F::Mask, a: Self, b: Self) -> Self {
