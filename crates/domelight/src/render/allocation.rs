@@ -10,7 +10,8 @@
 //! The number of samples of a pixel depends on the samples of pixels of lower levels, never on its own, so the mean of
 //! its samples stays unbiased. (A number that depends on the pixel's own samples would introduce bias: Kirk & Arvo
 //! 1991, "Unbiased Sampling Techniques for Image Synthesis".) Pixels of lower levels reveal silhouettes by the
-//! background in their samples, and by differences of their means if their coverage differs.
+//! background in their samples, and by differences of their means if their coverage differs. Pixels at silhouettes get at
+//! least the default number, because a dark edge matters as soon as the picture is composited over something bright.
 //!
 //! One scale serves the whole picture, so that samples move from quiet tiles to noisy ones. Scouts determine it
 //! ([`super::scouts`]).
@@ -123,29 +124,44 @@ impl Allocation {
 
     /// The relative variance predicted by pixels of lower levels.
     fn predicted(&self, pixel: usize) -> Option<f32> {
-        let around = || coarser(pixel, self.width, self.seen.len()).filter_map(|i| self.seen[i]);
-        let variances = || around().filter_map(|seen| seen.relative_variance);
+        let variances = || self.around(pixel).filter_map(|seen| seen.relative_variance);
         let n_variances = variances().count();
         if n_variances == 0 {
             return None;
         }
         let within = variances().sum::<f32>() / n_variances as f32;
-        // There is a silhouette between a covered and an uncovered pixel.
-        let coverage =
-            |(low, high): (f32, f32), seen: Seen| (low.min(seen.coverage), high.max(seen.coverage));
-        let (low, high) = around().fold((1.0, 0.0), coverage);
+        let (low, high) = self.coverage(pixel);
         // At the rim of a tile, empty neighbors on one side say nothing about the other side.
-        if high == 0.0 && around().count() < 4 {
+        if high == 0.0 && self.around(pixel).count() < 4 {
             return None;
         }
-        if high - low <= SILHOUETTE {
+        if !shows_silhouette((low, high)) {
             return Some(within);
         }
-        let n = around().count() as f32;
-        let mean = around().map(|seen| seen.mean).sum::<f32>() / n;
-        let variance = around().map(|seen| functions::powi(seen.mean - mean, 2)).sum::<f32>() / n;
-        let between = variance / (mean * mean + 0.01);
+        let n = self.around(pixel).count() as f32;
+        let mean = self.around(pixel).map(|seen| seen.mean).sum::<f32>() / n;
+        let squares = self.around(pixel).map(|seen| functions::powi(seen.mean - mean, 2));
+        let between = squares.sum::<f32>() / n / (mean * mean + 0.01);
         Some(if between.is_finite() { within.max(between) } else { within })
+    }
+
+    /// The known pixels of lower levels around a pixel.
+    fn around(&self, pixel: usize) -> impl Iterator<Item = Seen> {
+        coarser(pixel, self.width, self.seen.len()).filter_map(|i| self.seen[i])
+    }
+
+    /// The least and the greatest coverage around a pixel.
+    fn coverage(&self, pixel: usize) -> (f32, f32) {
+        let widen =
+            |(low, high): (f32, f32), seen: Seen| (low.min(seen.coverage), high.max(seen.coverage));
+        self.around(pixel).fold((1.0, 0.0), widen)
+    }
+
+    /// The minimum octaves of a pixel: the default number if at least two more levels build on it, and at silhouettes,
+    /// because coverage counts however dark it is.
+    pub(super) fn fewest(&self, pixel: usize) -> i32 {
+        let is_built_on = self.level(pixel) + 2 < N_LEVELS;
+        if is_built_on || shows_silhouette(self.coverage(pixel)) { 0 } else { OCTAVES[0] }
     }
 
     /// Assigns the samples of the pixels of a round.
@@ -155,7 +171,7 @@ impl Allocation {
             if self.level(i) == round
                 && let Some(log) = self.log(i)
             {
-                self.counts[i] = count(self.n_samples, log - mean_log, fewest(round));
+                self.counts[i] = count(self.n_samples, log - mean_log, self.fewest(i));
             }
         }
     }
@@ -178,10 +194,9 @@ pub(super) fn count(n: u32, octaves: f32, fewest: i32) -> u32 {
     count.max(1)
 }
 
-/// The minimum octaves of the pixels of a level. Pixels on which at least two more levels build get at least the
-/// default number.
-pub(super) fn fewest(level: u32) -> i32 {
-    if level + 2 < N_LEVELS { 0 } else { OCTAVES[0] }
+/// Whether there is a silhouette between pixels of these coverages.
+fn shows_silhouette((low, high): (f32, f32)) -> bool {
+    high - low > SILHOUETTE
 }
 
 /// Dithers by up to an eighth of an octave, so that pixels of equal variance do not all jump to another power of two.
@@ -262,6 +277,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Pixels between a black surface and a black background get at least the default number, for the sake of alpha.
+    #[test]
+    fn dark_silhouettes_have_the_usual_samples() {
+        let counts = pass(16, |_| true, |i, n| sums(n, if i % WIDTH < 9 { n } else { 0 }, 1e-3));
+        let is_edge = |i: usize| (8..=9).contains(&(i % WIDTH)) && (1..15).contains(&(i / WIDTH));
+        for (i, &n) in counts.iter().enumerate() {
+            assert!(!is_edge(i) || n >= 16, "{} {}: {n}", i % WIDTH, i / WIDTH);
+        }
+        assert!(counts.iter().filter(|&&n| n < 16).count() > WIDTH * WIDTH / 4);
     }
 
     /// An object that covers only part of the last row is not mistaken for an empty tile.

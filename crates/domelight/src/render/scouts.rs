@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::allocation::{Allocation, OCTAVES, count, fewest};
+use super::allocation::{OCTAVES, count};
 use super::tile::{Pass, SECOND_SETS, Scratch, Tile};
 use super::tiling::Window;
 use super::{RenderContext, RenderSettings};
@@ -27,24 +27,33 @@ struct Scout {
     level: u32,
     /// The logarithm that determines its number of samples; `None` for the default number.
     log: Option<f32>,
+    /// The minimum octaves of that number.
+    fewest: i32,
+    /// The expected number of its sets of samples.
+    n_sets: f64,
 }
 
 impl Scout {
     /// The pixels of a rendered tile.
-    fn of_tile(allocation: &Allocation) -> impl Iterator<Item = Self> {
-        let scout =
-            |pixel: usize| Self { level: allocation.level(pixel), log: allocation.log(pixel) };
+    fn of_tile<S: Strategy>(scratch: &Scratch<S>, second_sets: f64) -> impl Iterator<Item = Self> {
+        let allocation = scratch.allocation();
+        let scout = move |pixel: usize| Self {
+            level: allocation.level(pixel),
+            log: allocation.log(pixel),
+            fewest: allocation.fewest(pixel),
+            n_sets: if scratch.seen()[pixel] { 1.0 + second_sets } else { 1.0 },
+        };
         (0..allocation.n_pixels()).map(scout)
     }
 
     /// Its number of samples, if a pixel at `mean_log` has `n`.
     fn count(self, n: u32, mean_log: f32) -> f64 {
         let octaves = self.log.map(|log| log - mean_log);
-        f64::from(octaves.map_or(n, |octaves| count(n, octaves, fewest(self.level))))
+        self.n_sets * f64::from(octaves.map_or(n, |octaves| count(n, octaves, self.fewest)))
     }
 }
 
-/// The mean number of samples of a pixel of the picture, over n, if a pixel at `mean_log` has `n`.
+/// The mean number of samples of a pixel of the picture over n, second sets included, if a pixel at `mean_log` has `n`.
 fn spent(scouts: &[Scout], n: u32, mean_log: f32) -> f64 {
     let (mut sum, mut shares) = (0.0, 0.0);
     for level in 0..N_LEVELS {
@@ -58,9 +67,9 @@ fn spent(scouts: &[Scout], n: u32, mean_log: f32) -> f64 {
     sum / shares / f64::from(n)
 }
 
-/// The logarithm at which a pixel has `n` samples, if pixels like these have `budget` times `n` on average; `None` if
-/// no pixel sees the scene.
-fn mean_log(scouts: &[Scout], n: u32, budget: f64) -> Option<f32> {
+/// The logarithm at which a pixel has `n` samples, if pixels like these have `n` on average; `None` if no pixel sees the
+/// scene.
+fn mean_log(scouts: &[Scout], n: u32) -> Option<f32> {
     /// The number of bisection steps.
     const STEPS: usize = 20;
     let [fewest, most] = OCTAVES.map(|octaves| octaves as f32);
@@ -70,7 +79,7 @@ fn mean_log(scouts: &[Scout], n: u32, budget: f64) -> Option<f32> {
     // `low` spends too much; `high` does not.
     for _ in 0..STEPS {
         let middle = 0.5 * (low + high);
-        if spent(scouts, n, middle) > budget {
+        if spent(scouts, n, middle) > 1.0 {
             low = middle;
         } else {
             high = middle;
@@ -108,22 +117,22 @@ pub(super) fn scale<S: Strategy>(
     let n_samples = (pass.n_samples / SAMPLES_DIVISOR).max(FEWEST_SAMPLES).min(pass.n_samples);
     let shared = strategy.begin_pass(sampler, n_samples);
     let mut pass = Pass { n_samples, mean_log: None, shared, ..*pass };
+    // Second sets of samples count toward the budget, except with a target error, where they are passes of their own.
+    let second_sets = if settings.target_error.is_none() { SECOND_SETS } else { 0.0 };
     let scouts = |n: usize, pass: &Pass<S>| -> Vec<Scout> {
         spread(width, height, SCOUT_WINDOW, n)
             .into_par_iter()
             .map_init(Scratch::<S>::default, |scratch, window| {
                 Tile::new(window).render(context, strategy, pass, scratch, &());
-                Scout::of_tile(scratch.allocation()).collect::<Vec<_>>()
+                Scout::of_tile(scratch, second_sets).collect::<Vec<_>>()
             })
             .flatten_iter()
             .collect()
     };
-    // Second sets of samples count toward the same budget.
-    let budget = if settings.target_error.is_none() { 1.0 / (1.0 + SECOND_SETS) } else { 1.0 };
-    pass.mean_log = Some(mean_log(&scouts(FIRST, &pass), pass.n_samples, budget)?);
+    pass.mean_log = Some(mean_log(&scouts(FIRST, &pass), pass.n_samples)?);
     let [fewest, most] = N_WINDOWS;
     let n_windows = (width * height / PIXELS_PER_WINDOW).clamp(fewest, most);
-    mean_log(&scouts(n_windows, &pass), pass.n_samples, budget)
+    mean_log(&scouts(n_windows, &pass), pass.n_samples)
 }
 
 /// About `n` windows of `size` × `size` pixels, or as large as the picture allows, one at a random position in each
@@ -162,15 +171,20 @@ mod tests {
                     .map(|i| {
                         let level = level(i % 32, i / 32);
                         let log = -3.0 + range * (pcg.next_f32() - 0.5);
-                        Scout { level, log: (level > 0).then_some(log) }
+                        Scout {
+                            level,
+                            log: (level > 0).then_some(log),
+                            fewest: OCTAVES[0],
+                            n_sets: 1.0,
+                        }
                     })
                     .collect();
-                let mean_log = mean_log(&scouts, n, 1.0).unwrap();
+                let mean_log = mean_log(&scouts, n).unwrap();
                 let mean = spent(&scouts, n, mean_log);
                 assert!((mean - 1.0).abs() < 0.06, "{n} {range}: {mean}");
             }
         }
-        assert_eq!(mean_log(&[Scout { level: 0, log: None }], 8, 1.0), None);
+        assert_eq!(mean_log(&[Scout { level: 0, log: None, fewest: 0, n_sets: 1.0 }], 8), None);
     }
 
     #[test]

@@ -92,6 +92,11 @@ impl<S: Strategy> Scratch<S> {
     pub(super) fn allocation(&self) -> &Allocation {
         &self.batch.allocation
     }
+
+    /// Whether each pixel of the last tile may see anything.
+    pub(super) fn seen(&self) -> &[bool] {
+        &self.batch.seen
+    }
 }
 
 impl<S: Strategy> Default for Scratch<S> {
