@@ -56,6 +56,7 @@ impl Kernel for TileEstimator<'_, '_> {
     }
 }
 
+// In WebAssembly, the whole module has the vector instructions, and browsers compile short functions better.
 impl TileEstimator<'_, '_> {
     /// Chooses the rays of a pixel, and sets the part of its points that needs no rays.
     #[inline(always)]
@@ -89,7 +90,8 @@ impl TileEstimator<'_, '_> {
     ///
     /// For diffuse pixels, where the control variate is exact, the density is proportional to the uncertainty of
     /// visibility.
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn tabulate_product<S: Simd>(&mut self, simd: S, block: usize, counts: Counts) {
         let cells = self.cells;
         let ProductScratch { groups, table, control_variate, visibility, .. } = &mut *self.scratch;
@@ -114,7 +116,8 @@ impl TileEstimator<'_, '_> {
     }
 
     /// Draws strata along the curve, each with a direction from the pool, and BRDF samples.
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn draw_candidates<S: Simd>(
         &mut self,
         simd: S,
@@ -130,7 +133,8 @@ impl TileEstimator<'_, '_> {
     }
 
     /// Adds Σ_c V̂_c ∫_c h L to each point. Returns the mean luminance over the points.
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn integrate_control_variate<S: Simd>(
         &mut self,
         simd: S,
@@ -167,7 +171,8 @@ impl TileEstimator<'_, '_> {
     }
 
     /// Adds Σ_j V̂_j (W_j − h_j L_j/p_j) − Σ_chosen (W_j/π_j) V̂_j to each point, and traces the chosen candidates.
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn choose_rays<S: Simd>(
         &mut self,
         simd: S,
