@@ -12,10 +12,11 @@ use super::variance::VarianceSums;
 use super::{Background, Catcher, Observer, RenderContext, RenderSettings, Stage, visibility};
 use crate::Rgb;
 use crate::geometry::{Hit, Ray, RayBatch, offset_origin};
-use crate::math::{Vec3, vec2};
+use crate::math::{Vec3, vec2, vec3};
 use crate::sampling::rng::hash2;
 use crate::sampling::{Dimension, SampleSequence, Sampler};
 use crate::scene::{SightKey, Sights};
+use crate::simd::{Kernel, LANES, Simd, dispatch};
 use crate::strategy::levels::{N_LEVELS, level};
 use crate::strategy::{Contributions, PixelPoints, ShadingPoint, Strategy, TileShading};
 
@@ -373,8 +374,10 @@ impl Tile {
             let first = seen.then_some(rays.len());
             if first.is_some() {
                 let numbers = CameraNumbers::of(context, &sampler);
-                let ray = |sample| camera_ray(context, x, y, &numbers, sample);
-                rays.extend(samples.clone().map(ray));
+                let numbers = &numbers;
+                let (pixel, of_pixel) = ((x, y), samples.clone());
+                let kernel = PixelRays { context, pixel, numbers, samples: of_pixel, rays };
+                dispatch(context.scene.bvh().instruction_set(), kernel);
                 if has_see_through {
                     let key = self.key(context, i, set);
                     keys.extend(samples.clone().map(|sample| SightKey { key, sample }));
@@ -560,6 +563,41 @@ fn camera_ray(
         Some(lens) => {
             let [[u], [v]] = lens.u(sample);
             context.camera.lens_ray(px, py, [u, v])
+        }
+    }
+}
+
+/// The camera rays of a pixel.
+struct PixelRays<'a> {
+    context: &'a RenderContext<'a>,
+    pixel: (usize, usize),
+    numbers: &'a CameraNumbers,
+    samples: Range<u32>,
+    rays: &'a mut Vec<Ray>,
+}
+
+impl Kernel for PixelRays<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self { context, pixel: (x, y), numbers, samples, rays } = self;
+        for first in samples.clone().step_by(LANES) {
+            let count = LANES.min((samples.end - first) as usize);
+            let [mut px, mut py] = numbers.film.u::<LANES>(first);
+            for (px, py) in px.iter_mut().zip(&mut py) {
+                let at = context.filter.sample(vec2(*px, *py));
+                (*px, *py) = (x as f32 + at.x, y as f32 + at.y);
+            }
+            if let Some(origin) = context.camera.pinhole() {
+                let directions = context.camera.directions(simd.load(&px), simd.load(&py));
+                let [dx, dy, dz] = directions.store();
+                let ray = |i: usize| Ray::new(origin, vec3(dx[i], dy[i], dz[i]));
+                rays.extend((0..count).map(ray));
+            } else {
+                let ray = |sample| camera_ray(context, x, y, numbers, sample);
+                rays.extend((first..first + count as u32).map(ray));
+            }
         }
     }
 }

@@ -13,6 +13,7 @@ use crate::bvh::Frustum;
 use crate::geometry::{Ray, power_of_two};
 use crate::math::{Mat4, TAU, Vec2, Vec3, functions, vec2};
 use crate::sampling::warp::concentric_disk;
+use crate::simd::{SimdFloat, Vectors};
 
 /// The settings of a camera, independent of the size of its picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -335,12 +336,26 @@ impl Camera {
     /// right and `py` in [0, height) down; its direction is a unit vector.
     #[inline]
     pub fn ray(&self, px: f32, py: f32) -> Ray {
-        let step = px * self.step_x + py * self.step_y;
         if self.orthographic {
+            let step = px * self.step_x + py * self.step_y;
             Ray::new(self.origin + step, self.direction)
         } else {
-            Ray::new(self.origin, (self.direction + step).normalize())
+            Ray::new(self.origin, self.directions(px, py).into())
         }
+    }
+
+    /// The origin of all rays of a pinhole camera.
+    pub(crate) fn pinhole(&self) -> Option<Vec3> {
+        (!self.orthographic && self.lens.is_none()).then_some(self.origin)
+    }
+
+    /// The directions of the rays of a perspective camera through points of the picture, see [`Camera::ray`].
+    #[inline(always)]
+    pub(crate) fn directions<F: SimdFloat>(&self, px: F, py: F) -> Vectors<F> {
+        let step_x = Vectors::splat(px, self.step_x).times(px);
+        let step_y = Vectors::splat(py, self.step_y).times(py);
+        let toward = Vectors::splat(px, self.direction).plus(step_x.plus(step_y));
+        toward.times(px.splat(1.0) / toward.length_squared().sqrt())
     }
 
     /// Like [`Camera::ray`], for a ray through the point of the lens that `u` in \[0, 1)² samples. `u` is ignored if
