@@ -339,9 +339,9 @@ fn within(
     shares
 }
 
-/// Adds what a strategy must have missed of a source that it found less than half of: if k of n estimates have found it,
-/// no more than about (k + 3) / n of all do (the rule of three, at 95 %), so that a mean ℓ has a variance of ℓ² n / (k + 3)
-/// at least.
+/// Adds the variance that the estimates cannot show, for a source of which they found less than half. If k of n estimates
+/// found it, at most about (k + 3) / n of all estimates do (the rule of three, at 95 %), so a mean ℓ has a variance of at
+/// least ℓ² n / (k + 3).
 fn add_missed(
     shares: &mut [Share],
     replicates: &Replicates,

@@ -59,21 +59,21 @@ impl Sight {
     }
 }
 
-/// Which random numbers decide what a camera ray sees. Numbers of many samples of one key, which may be a pixel, are
-/// stratified.
+/// Selects the random numbers that decide what a camera ray sees. The numbers of the samples of one key, such as a pixel,
+/// are stratified.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SightKey {
     /// For example, the pixel.
     pub key: u64,
-    /// The sample's number in it.
+    /// The index of the sample.
     pub sample: u32,
 }
 
 impl SightKey {
-    /// Whether the ray meets a triangle that it meets with a probability.
+    /// Whether the ray hits a triangle, given the probability that it does.
     #[inline]
     fn meets(self, triangle: u32, probability: f32) -> bool {
-        // Cut-outs are there or are not: no number is needed.
+        // Cut-outs need no random number.
         if probability <= 0.0 || probability >= 1.0 {
             return probability >= 1.0;
         }
@@ -84,13 +84,13 @@ impl SightKey {
 /// What a batch of camera rays sees; see [`Scene::sights`]. Its memory serves the next batch.
 #[derive(Debug, Default)]
 pub struct Sights {
-    /// The surface that each ray meets; `None`: what is behind the scene.
+    /// The surface that each ray hits; `None` for the background.
     pub hits: Vec<Option<Hit>>,
-    /// The factor ≥ 0 on the radiance that comes from there, of each ray; empty where nothing transmits.
+    /// The factor ≥ 0 on the radiance from there, for each ray; empty if nothing transmits.
     pub throughputs: Vec<Rgb>,
-    /// The rays as far as what is opaque.
+    /// The rays, ending at the closest opaque surface.
     rays: Vec<Ray>,
-    /// What each meets there.
+    /// The hits of these rays on surfaces that are not opaque.
     met: Vec<Option<Hit>>,
     crossings: Vec<Crossing>,
 }
@@ -114,7 +114,7 @@ struct Layer {
 }
 
 impl Layer {
-    /// On the radiance of a ray that meets it, or does not.
+    /// The factors on the radiance of a ray that hits it, and of one that does not.
     fn factor(&self, is_met: bool) -> Rgb {
         if is_met { self.if_met } else { self.if_not }
     }
@@ -126,20 +126,20 @@ impl Default for Layer {
     }
 }
 
-/// A surface that transmits, on the way of a camera ray.
+/// A transmissive surface along a camera ray.
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
-    /// The ray's number in its batch.
+    /// The index of the ray in its batch.
     ray: usize,
     t: f32,
     triangle: u32,
     is_met: bool,
-    /// The factor on the radiance of a ray that meets it, if it is met, else of one that does not.
+    /// The factor on the radiance of the ray, whether it hits the surface or passes.
     factor: Rgb,
 }
 
-/// The product over a ray's crossings up to the surface that is seen. The hierarchy asks about hits in any order, and about
-/// some twice; so they are sorted and may be repeated.
+/// The product over a ray's crossings up to the surface that is seen. The BVH reports hits in any order, some of them
+/// twice, so they are sorted and duplicates are ignored.
 fn throughput(crossings: &[Crossing], seen: Option<Hit>) -> Rgb {
     let seen = seen.map(|seen| (seen.t, seen.triangle));
     let counts = |crossing: &&Crossing| {
@@ -150,7 +150,7 @@ fn throughput(crossings: &[Crossing], seen: Option<Hit>) -> Rgb {
     each_once.filter(counts).fold(Rgb::WHITE, |product, crossing| product * crossing.factor)
 }
 
-/// By ray, and along it.
+/// The order by ray, and by distance along each ray.
 fn sort(crossings: &mut [Crossing]) {
     crossings.sort_unstable_by(|a, b| {
         a.ray.cmp(&b.ray).then(a.t.total_cmp(&b.t)).then(a.triangle.cmp(&b.triangle))
@@ -202,8 +202,8 @@ impl Scene {
         self.has_single_sided || self.partial.is_some()
     }
 
-    /// [`Scene::sight`] of many rays; quickest for neighbors, such as a tile's. There is a key for each ray; none are needed
-    /// where nothing can be seen through. `sights` is overwritten.
+    /// [`Scene::sight`] of many rays; fastest for neighboring rays, such as a tile's. Needs a key for each ray, or none if
+    /// all surfaces are opaque. Overwrites `sights`.
     pub fn sights(&self, rays: &[Ray], keys: &[SightKey], sights: &mut Sights) {
         let Sights { hits, throughputs, rays: nearer, met, crossings } = sights;
         self.bvh.closest_hits(rays, hits);
@@ -212,7 +212,7 @@ impl Scene {
             rays.iter().zip(&mut *hits).for_each(|(ray, hit)| *hit = self.facing(ray, *hit));
         }
         let Some(partial) = &self.partial else { return };
-        // Trace each ray on to what it meets before.
+        // Find what each ray hits before that.
         nearer.clear();
         nearer.extend(rays.iter().zip(&*hits).map(|(ray, hit)| up_to(ray, hit.as_ref())));
         crossings.clear();
@@ -235,7 +235,7 @@ impl Scene {
         if !self.transmits {
             return;
         }
-        // Multiply what each has come through.
+        // Multiply the transmittances along each ray.
         sort(crossings);
         let mut rest = &crossings[..];
         throughputs.extend(hits.iter().enumerate().map(|(i, hit)| {
@@ -245,7 +245,7 @@ impl Scene {
         }));
     }
 
-    /// The texture coordinates of up to [`TOGETHER`] hits of the second hierarchy.
+    /// The texture coordinates of up to [`TOGETHER`] hits of the second BVH.
     fn fetch_uvs(&self, partial: &Partial, hits: &[(usize, Hit)]) -> [Uvs; TOGETHER] {
         let mut corners = [const { None }; TOGETHER];
         for (corners, (_, hit)) in corners.iter_mut().zip(hits) {
@@ -256,7 +256,7 @@ impl Scene {
         corners.map(|of| of.map_or_else(Uvs::default, |(mesh, corners)| corners.uvs(mesh)))
     }
 
-    /// [`Scene::sight`], given the closest `hit` of what is opaque.
+    /// [`Scene::sight`], given the closest opaque `hit`.
     fn seen(&self, ray: &Ray, hit: Option<Hit>, key: SightKey) -> Sight {
         let hit = self.facing(ray, hit);
         let Some(partial) = &self.partial else { return Sight::clear(hit) };
@@ -275,8 +275,8 @@ impl Scene {
         Sight { hit, throughput: throughput(&crossings, hit) }
     }
 
-    /// Whether ray `i` of a batch meets a surface that is not opaque, at a hit with texture coordinates `uvs`; hands over
-    /// what transmits to `crossed`.
+    /// Whether ray `i` of a batch hits a surface that is not opaque, at a hit with texture coordinates `uvs`. Passes
+    /// transmissive surfaces to `crossed`.
     #[inline]
     fn meets(
         &self,
