@@ -21,7 +21,7 @@
 
 use super::prepare::PreparedRays;
 use super::{Block, Lanes, Node, WIDTH};
-use crate::simd::{LaneMask, Simd, SimdF32x8, SimdFloat};
+use crate::simd::{LaneMask, Simd, SimdF32x8, SimdFloat, Vectors};
 
 /// A node's planes in the order in which rays of one octant cross them.
 #[derive(Clone, Copy)]
@@ -103,62 +103,28 @@ fn ordered(planes: &[Lanes; 2], is_negative: u32) -> [&Lanes; 2] {
     [&planes[near], &planes[near ^ 1]]
 }
 
-/// Eight points.
-#[derive(Clone, Copy)]
-struct Points<F> {
-    x: F,
-    y: F,
-    z: F,
+/// The numbers of ray `i` in every lane.
+#[inline(always)]
+fn of_ray<S: Simd, const N: usize>(
+    simd: S,
+    numbers: &[[f32; N]; 3],
+    i: usize,
+) -> Vectors<S::F32x8> {
+    let [x, y, z] = numbers;
+    Vectors { x: simd.splat(x[i]), y: simd.splat(y[i]), z: simd.splat(z[i]) }
 }
 
-impl<F: SimdF32x8> Points<F> {
-    #[inline(always)]
-    fn load<S: Simd<F32x8 = F>>(simd: S, lanes: &[Lanes; 3]) -> Self {
-        Self { x: simd.load(&lanes[0]), y: simd.load(&lanes[1]), z: simd.load(&lanes[2]) }
-    }
-
-    /// Splats the numbers of ray `i`.
-    #[inline(always)]
-    fn of_ray<S: Simd<F32x8 = F>, const N: usize>(
-        simd: S,
-        numbers: &[[f32; N]; 3],
-        i: usize,
-    ) -> Self {
-        let [x, y, z] = numbers;
-        Self { x: simd.splat(x[i]), y: simd.splat(y[i]), z: simd.splat(z[i]) }
-    }
-
-    /// Loads the rows of the axes x, y and z.
-    #[inline(always)]
-    fn along<S: Simd<F32x8 = F>>(simd: S, lanes: &[Lanes; 3], [x, y, z]: [usize; 3]) -> Self {
-        Self { x: simd.load(&lanes[x]), y: simd.load(&lanes[y]), z: simd.load(&lanes[z]) }
-    }
-
-    #[inline(always)]
-    fn sub(self, q: Self) -> Self {
-        Self { x: self.x - q.x, y: self.y - q.y, z: self.z - q.z }
-    }
-
-    #[inline(always)]
-    fn dot(self, q: Self) -> F {
-        self.x * q.x + self.y * q.y + self.z * q.z
-    }
-
-    #[inline(always)]
-    fn cross(self, q: Self) -> Self {
-        Self {
-            x: self.y * q.z - self.z * q.y,
-            y: self.z * q.x - self.x * q.z,
-            z: self.x * q.y - self.y * q.x,
-        }
-    }
+/// Loads the rows of the axes x, y and z.
+#[inline(always)]
+fn along<S: Simd>(simd: S, lanes: &[Lanes; 3], [x, y, z]: [usize; 3]) -> Vectors<S::F32x8> {
+    Vectors { x: simd.load(&lanes[x]), y: simd.load(&lanes[y]), z: simd.load(&lanes[z]) }
 }
 
 /// A ray and the triangles of a block, in the plane across the ray's longest axis.
 pub(super) struct Sheared<S: Simd> {
     frame: ShearedFrame<S::F32x8>,
     /// From the origin to the first corner, not sheared.
-    to_corner: Points<S::F32x8>,
+    to_corner: Vectors<S::F32x8>,
     /// The depths of the corners along z.
     depths: [S::F32x8; 3],
     /// Barycentric weights, scaled alike.
@@ -249,7 +215,7 @@ impl<S: Simd> Sheared<S> {
 /// The frame in which the ray is the z axis.
 struct ShearedFrame<F> {
     axes: [usize; 3],
-    origin: Points<F>,
+    origin: Vectors<F>,
     /// Direction x/z, y/z.
     shear: [F; 2],
     /// 1/z.
@@ -259,10 +225,10 @@ struct ShearedFrame<F> {
 impl<F: SimdF32x8> ShearedFrame<F> {
     #[inline(always)]
     fn new<S: Simd<F32x8 = F>, const N: usize>(simd: S, rays: &PreparedRays<N>, i: usize) -> Self {
-        let shears = Points::of_ray(simd, &rays.shears, i);
+        let shears = of_ray(simd, &rays.shears, i);
         Self {
             axes: rays.axes(i),
-            origin: Points::of_ray(simd, &rays.sheared_origins, i),
+            origin: of_ray(simd, &rays.sheared_origins, i),
             shear: [shears.x, shears.y],
             scale: shears.z,
         }
@@ -270,19 +236,19 @@ impl<F: SimdF32x8> ShearedFrame<F> {
 
     /// From the origin to a vertex, not sheared.
     #[inline(always)]
-    fn to<S: Simd<F32x8 = F>>(&self, simd: S, vertex: &[Lanes; 3]) -> Points<F> {
-        Points::along(simd, vertex, self.axes).sub(self.origin)
+    fn to<S: Simd<F32x8 = F>>(&self, simd: S, vertex: &[Lanes; 3]) -> Vectors<F> {
+        along(simd, vertex, self.axes).minus(self.origin)
     }
 
     #[inline(always)]
-    fn sheared(&self, Points { x, y, z }: Points<F>) -> Points<F> {
-        Points { x: x - self.shear[0] * z, y: y - self.shear[1] * z, z }
+    fn sheared(&self, Vectors { x, y, z }: Vectors<F>) -> Vectors<F> {
+        Vectors { x: x - self.shear[0] * z, y: y - self.shear[1] * z, z }
     }
 }
 
 /// Twice the signed area of 0, p, q in the sheared plane; exactly opposite for q, p.
 #[inline(always)]
-fn edge<F: SimdF32x8>(p: Points<F>, q: Points<F>) -> F {
+fn edge<F: SimdF32x8>(p: Vectors<F>, q: Vectors<F>) -> F {
     p.x * q.y - p.y * q.x
 }
 
@@ -299,10 +265,10 @@ pub(super) struct Planes {
 impl Planes {
     #[inline(always)]
     pub(super) fn of<S: Simd>(simd: S, block: &Block) -> Self {
-        let a = Points::load(simd, &block.vertices[0]);
-        let b = Points::load(simd, &block.vertices[1]);
-        let c = Points::load(simd, &block.vertices[2]);
-        let Points { x, y, z } = b.sub(a).cross(c.sub(a));
+        let a = Vectors::load(simd, &block.vertices[0]);
+        let b = Vectors::load(simd, &block.vertices[1]);
+        let c = Vectors::load(simd, &block.vertices[2]);
+        let Vectors { x, y, z } = b.minus(a).cross(c.minus(a));
         Self { normals: [x.store(), y.store(), z.store()] }
     }
 
@@ -314,11 +280,11 @@ impl Planes {
         &self,
         simd: S,
         frame: &ShearedFrame<S::F32x8>,
-        to_corner: Points<S::F32x8>,
+        to_corner: Vectors<S::F32x8>,
     ) -> S::F32x8 {
-        let n = Points::along(simd, &self.normals, frame.axes);
-        let along = n.z + n.x * frame.shear[0] + n.y * frame.shear[1];
-        n.dot(to_corner) / along
+        let n = along(simd, &self.normals, frame.axes);
+        let slope = n.z + n.x * frame.shear[0] + n.y * frame.shear[1];
+        n.dot_each(to_corner) / slope
     }
 }
 

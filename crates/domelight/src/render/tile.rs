@@ -374,10 +374,16 @@ impl Tile {
             let first = seen.then_some(rays.len());
             if first.is_some() {
                 let numbers = CameraNumbers::of(context, &sampler);
-                let numbers = &numbers;
-                let (pixel, of_pixel) = ((x, y), samples.clone());
-                let kernel = PixelRays { context, pixel, numbers, samples: of_pixel, rays };
-                dispatch(context.scene.bvh().instruction_set(), kernel);
+                let of_pixel = samples.clone();
+                if let Some(origin) = context.camera.pinhole() {
+                    let film = &numbers.film;
+                    let kernel =
+                        PinholeRays { context, origin, x, y, film, samples: of_pixel, rays };
+                    dispatch(context.scene.bvh().instruction_set(), kernel);
+                } else {
+                    let ray = |sample| camera_ray(context, x, y, &numbers, sample);
+                    rays.extend(of_pixel.map(ray));
+                }
                 if has_see_through {
                     let key = self.key(context, i, set);
                     keys.extend(samples.clone().map(|sample| SightKey { key, sample }));
@@ -567,37 +573,33 @@ fn camera_ray(
     }
 }
 
-/// The camera rays of a pixel.
-struct PixelRays<'a> {
+/// [`camera_ray`] of many samples of the pixel at (`x`, `y`), for a pinhole camera.
+struct PinholeRays<'a> {
     context: &'a RenderContext<'a>,
-    pixel: (usize, usize),
-    numbers: &'a CameraNumbers,
+    origin: Vec3,
+    x: usize,
+    y: usize,
+    film: &'a SampleSequence,
     samples: Range<u32>,
     rays: &'a mut Vec<Ray>,
 }
 
-impl Kernel for PixelRays<'_> {
+impl Kernel for PinholeRays<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { context, pixel: (x, y), numbers, samples, rays } = self;
+        let Self { context, origin, x, y, film, samples, rays } = self;
         for first in samples.clone().step_by(LANES) {
-            let count = LANES.min((samples.end - first) as usize);
-            let [mut px, mut py] = numbers.film.u::<LANES>(first);
+            let [mut px, mut py] = film.u::<LANES>(first);
             for (px, py) in px.iter_mut().zip(&mut py) {
                 let at = context.filter.sample(vec2(*px, *py));
                 (*px, *py) = (x as f32 + at.x, y as f32 + at.y);
             }
-            if let Some(origin) = context.camera.pinhole() {
-                let directions = context.camera.directions(simd.load(&px), simd.load(&py));
-                let [dx, dy, dz] = directions.store();
-                let ray = |i: usize| Ray::new(origin, vec3(dx[i], dy[i], dz[i]));
-                rays.extend((0..count).map(ray));
-            } else {
-                let ray = |sample| camera_ray(context, x, y, numbers, sample);
-                rays.extend((first..first + count as u32).map(ray));
-            }
+            let directions = context.camera.directions(simd.load(&px), simd.load(&py));
+            let [dx, dy, dz] = directions.store();
+            let count = LANES.min((samples.end - first) as usize);
+            rays.extend((0..count).map(|i| Ray::new(origin, vec3(dx[i], dy[i], dz[i]))));
         }
     }
 }

@@ -12,7 +12,7 @@ use super::texture::Uvs;
 use super::{Layers, Material, NormalMap, Part, Scene};
 use crate::Rgb;
 use crate::bsdf::Bsdf;
-use crate::geometry::{Hit, Ray};
+use crate::geometry::{Hit, Ray, Similarity};
 use crate::math::{Frame, Vec3};
 use crate::simd::{Kernel, LANES, Simd, dispatch};
 use crate::strategy::ShadingPoint;
@@ -25,8 +25,8 @@ impl Scene {
     pub fn shading_point(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
         let mut point = ShadingPoint::UNSET;
         let surface = self.surface(ray, hit);
-        let Surface { part, corners, direction } = &surface;
-        self.shade(&surface, hit, &Facet::new(&part.mesh, corners, *direction), &mut point);
+        let facet = Facet::new(&surface.part.mesh, &surface.corners, surface.direction);
+        self.shade(&surface, &facet, &mut point);
         point
     }
 
@@ -55,18 +55,18 @@ impl Scene {
         let (part, triangle) = self.locate(hit.triangle);
         let placement = self.placement(hit.triangle);
         let direction = placement.map_or(ray.direction, |p| p.inverse_direction(ray.direction));
-        Surface { part, corners: Corners::new(&part.mesh, triangle, hit), direction }
+        let corners = Corners::new(&part.mesh, triangle, hit);
+        Surface { part, placement, corners, direction }
     }
 
     /// Sets `point` to the shading point of a facet. Returns the material if its BSDF is the same everywhere.
     fn shade(
         &self,
         surface: &Surface,
-        hit: &Hit,
         facet: &Facet<f32>,
         point: &mut ShadingPoint,
     ) -> Option<usize> {
-        let Surface { part, corners, .. } = surface;
+        let Surface { part, placement, corners, .. } = surface;
         let material = &self.materials[part.material];
         let uvs = corners.uvs(&part.mesh);
         let smooth = facet.smooth();
@@ -99,7 +99,7 @@ impl Scene {
                 None
             }
         };
-        if let Some(placement) = self.placement(hit.triangle) {
+        if let Some(placement) = placement {
             point.position = placement.point(point.position);
             point.ng = placement.direction(point.ng);
             point.frame = placement.frame(point.frame);
@@ -107,11 +107,12 @@ impl Scene {
         constant
     }
 
-    /// The material of a part and its BSDF, if nothing but the mesh's normals varies.
+    /// The BSDF of a surface on which nothing but the mesh's normals varies.
     #[inline]
-    fn plain_bsdf(&self, part: &Part) -> Option<&Bsdf> {
+    fn plain_bsdf(&self, Surface { part, placement, .. }: &Surface) -> Option<&Bsdf> {
         let is_plain = self.plain_materials[part.material] && part.mesh.colors.is_empty();
-        self.constant_bsdfs[part.material].as_ref().filter(|_| is_plain)
+        let bsdf = self.constant_bsdfs[part.material].as_ref();
+        bsdf.filter(|_| is_plain && placement.is_none())
     }
 
     /// The normals and the tangent at a hit, given the interpolated `normal`.
@@ -170,6 +171,8 @@ struct Relief {
 /// The triangle of a hit and the direction in which it is seen, where the mesh of its part is.
 struct Surface<'a> {
     part: &'a Part,
+    /// From there to the hit; `None` if it is the same place.
+    placement: Option<&'a Similarity>,
     corners: Corners,
     direction: Vec3,
 }
@@ -191,35 +194,30 @@ impl Kernel for ShadeAll<'_> {
     fn run<S: Simd>(self, simd: S) {
         let Self { scene, rays, hits, seeing, points, constants } = self;
         let mut lanes = TriangleLanes::default();
+        let mut surfaces = [const { None }; LANES];
         let out = points.chunks_mut(LANES).zip(constants.chunks_mut(LANES));
         for (seeing, (points, constants)) in seeing.chunks(LANES).zip(out) {
             for (lane, &ray) in seeing.iter().enumerate() {
-                let surface = scene.surface(&rays[ray as usize], expect_hit(hits, ray));
+                let (ray, hit) = (&rays[ray as usize], hits[ray as usize].as_ref());
+                let surface = scene.surface(ray, hit.expect("the ray hits something"));
                 lanes.set(lane, &surface.part.mesh, &surface.corners, surface.direction);
+                surfaces[lane] = Some(surface);
             }
             let facets = lanes.facets(simd);
-            for (lane, &ray) in seeing.iter().enumerate() {
-                let (hit, point) = (expect_hit(hits, ray), &mut points[lane]);
-                let (part, _) = scene.locate(hit.triangle);
-                constants[lane] = match scene.plain_bsdf(part) {
-                    Some(bsdf) if scene.placement(hit.triangle).is_none() => {
-                        facets.set(lane, point);
-                        point.bsdf.set(bsdf, point.wo);
-                        Some(part.material)
-                    }
-                    _ => {
-                        let surface = scene.surface(&rays[ray as usize], hit);
-                        scene.shade(&surface, hit, &facets.get(lane), point)
-                    }
+            let out = points.iter_mut().zip(constants);
+            for (lane, (surface, (point, constant))) in
+                surfaces.iter().flatten().zip(out).enumerate()
+            {
+                *constant = if let Some(bsdf) = scene.plain_bsdf(surface) {
+                    facets.set(lane, point);
+                    point.bsdf.set(bsdf, point.wo);
+                    Some(surface.part.material)
+                } else {
+                    scene.shade(surface, &facets.get(lane), point)
                 };
             }
         }
     }
-}
-
-#[inline(always)]
-fn expect_hit(hits: &[Option<Hit>], ray: u32) -> &Hit {
-    hits[ray as usize].as_ref().expect("the ray hits something")
 }
 
 #[cfg(test)]
