@@ -117,9 +117,9 @@ impl Allocation {
         self.counts.len()
     }
 
-    /// log₂ of the relative number of samples of a pixel; `None` if nothing predicts it.
+    /// log₂ of the relative number of samples of a pixel, before dithering; `None` if nothing predicts it.
     pub(super) fn log(&self, pixel: usize) -> Option<f32> {
-        self.predicted(pixel).map(|variance| log(variance) + dither(pixel))
+        self.predicted(pixel).map(log)
     }
 
     /// The relative variance predicted by pixels of lower levels.
@@ -132,13 +132,13 @@ impl Allocation {
         let within = variances().sum::<f32>() / n_variances as f32;
         let (low, high) = self.coverage(pixel);
         // At the rim of a tile, empty neighbors on one side say nothing about the other side.
-        if high == 0.0 && self.around(pixel).count() < 4 {
+        if high == 0.0 && self.n_known(pixel) < 4 {
             return None;
         }
         if !shows_silhouette((low, high)) {
             return Some(within);
         }
-        let n = self.around(pixel).count() as f32;
+        let n = self.n_known(pixel) as f32;
         let mean = self.around(pixel).map(|seen| seen.mean).sum::<f32>() / n;
         let squares = self.around(pixel).map(|seen| functions::powi(seen.mean - mean, 2));
         let between = squares.sum::<f32>() / n / (mean * mean + 0.01);
@@ -148,6 +148,11 @@ impl Allocation {
     /// The known pixels of lower levels around a pixel.
     fn around(&self, pixel: usize) -> impl Iterator<Item = Seen> {
         coarser(pixel, self.width, self.seen.len()).filter_map(|i| self.seen[i])
+    }
+
+    /// The number of known pixels of lower levels around a pixel.
+    pub(super) fn n_known(&self, pixel: usize) -> usize {
+        self.around(pixel).count()
     }
 
     /// The least and the greatest coverage around a pixel.
@@ -171,7 +176,8 @@ impl Allocation {
             if self.level(i) == round
                 && let Some(log) = self.log(i)
             {
-                self.counts[i] = count(self.n_samples, log - mean_log, self.fewest(i));
+                let octaves = log - mean_log + DITHER * (fraction(i) - 0.5);
+                self.counts[i] = count(self.n_samples, octaves, self.fewest(i));
             }
         }
     }
@@ -188,10 +194,18 @@ fn log(relative_variance: f32) -> f32 {
 }
 
 /// The default number n times a power of two, as digital nets require, within `fewest` and the maximum octaves.
-pub(super) fn count(n: u32, octaves: f32, fewest: i32) -> u32 {
+fn count(n: u32, octaves: f32, fewest: i32) -> u32 {
     let octaves = (octaves.round() as i32).clamp(fewest, OCTAVES[1]);
     let count = if octaves < 0 { n >> -octaves } else { n.saturating_mul(1 << octaves) };
     count.max(1)
+}
+
+/// The mean of [`count`] over the dither, which crosses at most one power of two.
+pub(super) fn mean_count(n: u32, octaves: f32, fewest: i32) -> f64 {
+    let (low, high) = (octaves - 0.5 * DITHER, octaves + 0.5 * DITHER);
+    let above = ((high - (high.round() - 0.5)) / DITHER).min(1.0);
+    let [low, high] = [low, high].map(|octaves| f64::from(count(n, octaves, fewest)));
+    low + f64::from(above) * (high - low)
 }
 
 /// Whether there is a silhouette between pixels of these coverages.
@@ -199,11 +213,14 @@ fn shows_silhouette((low, high): (f32, f32)) -> bool {
     high - low > SILHOUETTE
 }
 
-/// Dithers by up to an eighth of an octave, so that pixels of equal variance do not all jump to another power of two.
-fn dither(pixel: usize) -> f32 {
+/// The range of the dither, in octaves. It keeps pixels of equal variance from jumping to another power of two together.
+const DITHER: f32 = 0.25;
+
+/// A number between 0 and 1 that is spread evenly over the pixels of a tile: multiples of the golden ratio.
+fn fraction(pixel: usize) -> f32 {
     /// The fractional part of the golden ratio, times 2³².
     const GOLDEN: u32 = 0x9e37_79b9;
-    0.25 * ((pixel as u32).wrapping_mul(GOLDEN) as f32 / 4_294_967_296.0 - 0.5)
+    (pixel as u32).wrapping_mul(GOLDEN) as f32 / 4_294_967_296.0
 }
 
 #[cfg(test)]
@@ -276,6 +293,19 @@ mod tests {
                     assert!(level(x, y) == 0 || counts[i] >= 16, "{x} {y}: {}", counts[i]);
                 }
             }
+        }
+    }
+
+    /// The mean over the dither is that over the pixels of a tile.
+    #[test]
+    fn the_mean_over_the_dither_is_continuous() {
+        let n_pixels = 4096;
+        for octaves in [-3.0, -1.55, -1.5, -0.4, 0.0, 0.45, 0.6, 1.4, 2.7, 9.0f32] {
+            let counts = (0..n_pixels)
+                .map(|i| count(64, octaves + DITHER * (fraction(i) - 0.5), OCTAVES[0]));
+            let mean = counts.map(f64::from).sum::<f64>() / n_pixels as f64;
+            let expected = mean_count(64, octaves, OCTAVES[0]);
+            assert!((mean / expected - 1.0).abs() < 2e-3, "{octaves}: {mean} {expected}");
         }
     }
 
