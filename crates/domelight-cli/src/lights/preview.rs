@@ -14,9 +14,7 @@ use super::ExtractedRig;
 use super::report::error_text;
 use crate::map_picture::{MAP, circle, map_picture, place, png_bytes};
 use domelight_lab::svg::plot::{Axis, Datum, Join, Legend, Marker, Plot, Scale, Series};
-use domelight_lab::svg::{
-    Anchor, Color, Document, PALETTE, Pixels, Rect, Style, TextStyle, rasterize,
-};
+use domelight_lab::svg::{Anchor, Color, Document, PALETTE, Pixels, Rect, Style, TextStyle};
 
 const WIDTH: f64 = 1320.0;
 const MARGIN: f64 = 20.0;
@@ -54,7 +52,7 @@ impl Preview<'_> {
             let left = MARGIN + 3.0 * (edge + GAP);
             self.draw_errors(&mut sheet, Rect::new(left, below, WIDTH - left - MARGIN, 340.0));
         }
-        Ok(rasterize(&sheet.to_svg(), 1.0)?)
+        Ok(sheet.to_png(1.0)?)
     }
 
     fn rig(&self) -> &Rig {

@@ -8,7 +8,7 @@ use domelight::picture::tone::ToneMapping;
 use domelight_lab::probe::{RAYS_A_PIXEL, StrategyNoise};
 use domelight_lab::svg::plot::{Axis, Datum, Join, Legend, Plot, Scale, Series};
 use domelight_lab::svg::{
-    Anchor, Color, Document, PALETTE, Pixels, Rect, Style, TextStyle, rasterize, text_width,
+    Anchor, Color, Document, PALETTE, Pixels, Rect, Style, TextStyle, text_width,
 };
 
 use super::MeasuredProbe;
@@ -42,7 +42,7 @@ impl Sheet<'_> {
         light_by_stops(image).draw(&mut sheet, Rect::new(MARGIN, below, half, PANEL));
         let right = Rect::new(2.0 * MARGIN + half, below, half, PANEL);
         draw_noise(&mut sheet, right, &self.measured.noise);
-        Ok(rasterize(&sheet.to_svg(), 1.0)?)
+        Ok(sheet.to_png(1.0)?)
     }
 
     fn draw_title(&self, sheet: &mut Document) {

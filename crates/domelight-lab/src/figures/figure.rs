@@ -12,7 +12,7 @@ use domelight::quote::{Code, Html};
 use serde_json::{Map, Value};
 
 use crate::svg::plot::Plot;
-use crate::svg::{Anchor, Color, Document, Pixels, Rect, Style, TextStyle, rasterize, superscript};
+use crate::svg::{Anchor, Color, Document, Pixels, Rect, Style, TextStyle, superscript};
 
 /// One of the lecture's figures.
 pub(crate) struct Figure {
@@ -117,7 +117,7 @@ impl Figure {
     pub(crate) fn write(&self, folder: &Path, scale: f32, host: &dyn Host) -> Result<(), Error> {
         let n = self.number;
         let sheet = self.sheet();
-        host.write(&folder.join(format!("figure-{n}.png")), &rasterize(&sheet.to_svg(), scale)?)?;
+        host.write(&folder.join(format!("figure-{n}.png")), &sheet.to_png(f64::from(scale))?)?;
         if let (true, Some(table)) = (self.has_data, self.tables.first()) {
             host.write(&folder.join(format!("figure-{n}.csv")), table.csv().as_bytes())?;
             host.write(&folder.join(format!("figure-{n}.json")), table.json()?.as_bytes())?;

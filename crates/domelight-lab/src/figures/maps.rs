@@ -1,7 +1,5 @@
 //! The environment map and overlays on it.
 
-use std::fmt::Write as _;
-
 use crate::Error;
 use domelight::math::Vec3;
 use domelight::picture::tone::srgb_from_linear;
@@ -10,7 +8,7 @@ use domelight::{Rgb, RgbImage};
 
 use super::context::FigureContext;
 use super::figure::{Picture, picture_panel, png_bytes};
-use crate::svg::{Color, Document, Pixels, Rect, Style};
+use crate::svg::{Color, Document, Pixels, Point, Rect, Style};
 
 /// Width of a map on the sheet.
 pub(crate) const MAP_WIDTH: f64 = 480.0;
@@ -103,17 +101,15 @@ pub(crate) fn borders_in(
     let (y0, y1) =
         ((part.y * h as f64) as usize, ((part.y + part.height) * h as f64).ceil() as usize);
     let (x1, y1) = (x1.min(w), y1.min(h));
-    let mut path = String::new();
-    let mut line = |a: (f64, f64), b: (f64, f64)| {
-        let _ = write!(path, "M{:.1} {:.1}L{:.1} {:.1}", a.0, a.1, b.0, b.1);
-    };
+    let mut lines = Vec::new();
+    let mut line = |a: Point, b: Point| lines.push([a, b]);
     for y in (y0..y1).step_by(step).skip(1) {
         runs(x0, x1, step, |x| label(x, y) != label(x, y - step), |a, b| line(at(a, y), at(b, y)));
     }
     for x in (x0..x1).step_by(step).skip(1) {
         runs(y0, y1, step, |y| label(x, y) != label(x - step, y), |a, b| line(at(x, a), at(x, b)));
     }
-    sheet.path(&path, Style::stroke(color, width));
+    sheet.lines(lines, Style::stroke(color, width));
 }
 
 /// Calls `found(a, b)` for each longest run a..b in which `is` holds.

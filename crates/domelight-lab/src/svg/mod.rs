@@ -1,19 +1,17 @@
-//! Drawings as SVG text: shapes, text and pictures on a white sheet, and [`plot`]s.
+//! Drawings: shapes, text and pictures on a white sheet, and [`plot`]s.
 //!
-//! Lengths are in pixels of the sheet, x to the right, y down. [`rasterize`] converts a sheet to PNG; with
-//! [`font_face_css`], a web page shows the sheet in the same font.
+//! Lengths are in pixels of the sheet, x to the right, y down. A sheet can be written as SVG text or as PNG; with
+//! [`font_face_css`], a web page shows the SVG text in the font of the PNG.
 
+mod font;
 pub mod plot;
 mod raster;
 mod ticks;
+mod write;
 
-pub use raster::{font_face_css, rasterize};
+pub use font::text_width;
 pub use ticks::superscript;
-
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
-use domelight::quote::xml;
-use std::fmt::{self, Display, Write as _};
+pub use write::{data_uri, font_face_css};
 
 /// A point on the sheet.
 pub type Point = (f64, f64);
@@ -51,12 +49,6 @@ impl Color {
     pub const GRAY: Self = Self(0x6b, 0x72, 0x7c);
     /// The color of grid lines.
     pub const FAINT: Self = Self(0xe0, 0xe3, 0xe8);
-}
-
-impl Display for Color {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "#{:02x}{:02x}{:02x}", self.0, self.1, self.2)
-    }
 }
 
 /// Colors that color-blind readers can distinguish on white: Okabe & Ito 2008, "Color Universal Design", without yellow
@@ -108,26 +100,6 @@ impl Style {
     #[must_use]
     pub fn opacity(self, opacity: f64) -> Self {
         Self { opacity: Some(opacity), ..self }
-    }
-}
-
-impl Display for Style {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.fill {
-            Some(color) => write!(f, " fill=\"{color}\"")?,
-            None => write!(f, " fill=\"none\"")?,
-        }
-        if let Some((color, width)) = self.stroke {
-            write!(f, " stroke=\"{color}\" stroke-width=\"{}\"", Number(width))?;
-            write!(f, " stroke-linejoin=\"round\" stroke-linecap=\"round\"")?;
-        }
-        if let Some(length) = self.dash {
-            write!(f, " stroke-dasharray=\"{}\"", Number(length))?;
-        }
-        if let Some(opacity) = self.opacity {
-            write!(f, " opacity=\"{}\"", Number(opacity))?;
-        }
-        Ok(())
     }
 }
 
@@ -190,11 +162,15 @@ impl TextStyle {
     pub fn halo(self) -> Self {
         Self { halo: true, ..self }
     }
-}
 
-/// The approximate width of a line of text.
-pub fn text_width(text: &str, size: f64) -> f64 {
-    0.56 * size * text.chars().count() as f64
+    /// The color and width of the line under the glyphs. The only font has a single weight; a thin line makes it bolder.
+    fn rim(&self) -> Option<(Color, f64)> {
+        if self.halo {
+            Some((Color::WHITE, 0.2 * self.size))
+        } else {
+            self.bold.then_some((self.color, 0.04 * self.size))
+        }
+    }
 }
 
 /// The interpolation of an enlarged picture.
@@ -206,18 +182,54 @@ pub enum Pixels {
     Smooth,
 }
 
+/// A part of a drawing.
+#[derive(Clone, Debug)]
+enum Element {
+    Shape(Shape, Style),
+    Text {
+        at: Point,
+        text: String,
+        style: TextStyle,
+    },
+    /// A PNG, stretched over the rectangle.
+    Image {
+        place: Rect,
+        png: Vec<u8>,
+        pixels: Pixels,
+    },
+    /// Elements that are moved by `offset` and clipped to `place`, which is not moved.
+    Group {
+        place: Rect,
+        offset: Point,
+        elements: Vec<Self>,
+    },
+}
+
+/// The outline of a shape.
+#[derive(Clone, Debug)]
+enum Shape {
+    Rect(Rect),
+    Circle {
+        center: Point,
+        radius: f64,
+    },
+    Polyline(Vec<Point>),
+    /// Separate straight lines.
+    Lines(Vec<[Point; 2]>),
+}
+
 /// A sheet with its drawing.
 #[derive(Clone, Debug)]
 pub struct Document {
     width: f64,
     height: f64,
-    body: String,
+    elements: Vec<Element>,
 }
 
 impl Document {
     /// A white sheet.
     pub fn new(width: f64, height: f64) -> Self {
-        let mut sheet = Self { width, height, body: String::new() };
+        let mut sheet = Self { width, height, elements: Vec::new() };
         sheet.rect(Rect::new(0.0, 0.0, width, height), Style::fill(Color::WHITE));
         sheet
     }
@@ -234,158 +246,53 @@ impl Document {
 
     /// Draws a rectangle.
     pub fn rect(&mut self, r: Rect, style: Style) {
-        self.push(format_args!("<rect{}{style}/>", Place(r)));
+        self.elements.push(Element::Shape(Shape::Rect(r), style));
     }
 
     /// Draws a straight line.
     pub fn line(&mut self, a: Point, b: Point, style: Style) {
-        let [x1, y1, x2, y2] = [a.0, a.1, b.0, b.1].map(Number);
-        self.push(format_args!("<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"{style}/>"));
+        self.lines([[a, b]], style);
+    }
+
+    /// Draws separate straight lines.
+    pub fn lines(&mut self, lines: impl IntoIterator<Item = [Point; 2]>, style: Style) {
+        let lines = lines.into_iter().collect();
+        self.elements.push(Element::Shape(Shape::Lines(lines), style));
     }
 
     /// Draws a circle.
     pub fn circle(&mut self, center: Point, radius: f64, style: Style) {
-        let [x, y, r] = [center.0, center.1, radius].map(Number);
-        self.push(format_args!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\"{style}/>"));
+        self.elements.push(Element::Shape(Shape::Circle { center, radius }, style));
     }
 
     /// Draws a line through the points, or its area if the style fills.
     pub fn polyline(&mut self, points: impl IntoIterator<Item = Point>, style: Style) {
-        let mut list = String::new();
-        for (x, y) in points {
-            let _ = write!(list, "{},{} ", Number(x), Number(y));
-        }
-        self.push(format_args!("<polyline points=\"{}\"{style}/>", list.trim_end()));
-    }
-
-    /// Draws SVG path data.
-    pub fn path(&mut self, data: &str, style: Style) {
-        self.push(format_args!("<path d=\"{}\"{style}/>", xml::text(data)));
+        let points = points.into_iter().collect();
+        self.elements.push(Element::Shape(Shape::Polyline(points), style));
     }
 
     /// Draws a line of text.
     pub fn text(&mut self, at: Point, text: &str, style: TextStyle) {
-        let (x, y, color) = (Number(at.0), Number(at.1), style.color);
-        let anchor = match style.anchor {
-            Anchor::Start => "",
-            Anchor::Middle => " text-anchor=\"middle\"",
-            Anchor::End => " text-anchor=\"end\"",
-        };
-        let mut more = anchor.to_owned();
-        if style.rotation != 0.0 {
-            let _ = write!(more, " transform=\"rotate({} {x} {y})\"", Number(style.rotation));
-        }
-        // The only font has a single weight; a thin outline makes it bolder.
-        if style.halo {
-            let rim = Number(0.2 * style.size);
-            let _ = write!(
-                more,
-                " stroke=\"#fff\" stroke-width=\"{rim}\" paint-order=\"stroke\" stroke-linejoin=\"round\""
-            );
-        } else if style.bold {
-            let _ =
-                write!(more, " stroke=\"{color}\" stroke-width=\"{}\"", Number(0.04 * style.size));
-        }
-        self.push(format_args!(
-            "<text x=\"{x}\" y=\"{y}\" font-family=\"{FONT}, sans-serif\" font-size=\"{}\" fill=\"{color}\"{more}>{}</text>",
-            Number(style.size),
-            xml::text(text)
-        ));
+        self.elements.push(Element::Text { at, text: text.to_owned(), style });
     }
 
     /// Draws a PNG, stretched over the rectangle.
     pub fn image(&mut self, r: Rect, png: &[u8], pixels: Pixels) {
-        let rendering = match pixels {
-            // The attribute is for rasterize, the property for browsers.
-            Pixels::Sharp => {
-                " image-rendering=\"optimizeSpeed\" style=\"image-rendering:pixelated\""
-            }
-            Pixels::Smooth => "",
-        };
-        self.push(format_args!(
-            "<image{}{rendering} preserveAspectRatio=\"none\" href=\"{}\"/>",
-            Place(r),
-            data_uri("image/png", png)
-        ));
+        self.elements.push(Element::Image { place: r, png: png.to_vec(), pixels });
     }
 
     /// Draws with `draw`, clipped to the rectangle.
     pub fn clipped(&mut self, r: Rect, draw: impl FnOnce(&mut Self)) {
-        let [x, y, w, h] = [r.x, r.y, r.width, r.height].map(Number);
-        self.push(format_args!("<svg{} viewBox=\"{x} {y} {w} {h}\">", Place(r)));
-        draw(self);
-        self.push(format_args!("</svg>"));
+        let mut inside = Self { width: self.width, height: self.height, elements: Vec::new() };
+        draw(&mut inside);
+        let elements = inside.elements;
+        self.elements.push(Element::Group { place: r, offset: (0.0, 0.0), elements });
     }
 
     /// Adds another sheet with its corner at `at`.
     pub fn append(&mut self, at: Point, other: &Self) {
-        let place = Place(Rect::new(at.0, at.1, other.width, other.height));
-        self.push(format_args!("<svg{place}>{}</svg>", other.body));
-    }
-
-    /// The SVG text, for a file or a web page.
-    pub fn to_svg(&self) -> String {
-        let [w, h] = [self.width, self.height].map(Number);
-        format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\">{}</svg>",
-            self.body
-        )
-    }
-
-    fn push(&mut self, element: fmt::Arguments) {
-        let _ = self.body.write_fmt(element);
-    }
-}
-
-/// The family of the only font.
-const FONT: &str = "Inter";
-
-/// Embeds bytes in a page or a drawing.
-pub fn data_uri(media_type: &str, bytes: &[u8]) -> String {
-    format!("data:{media_type};base64,{}", STANDARD.encode(bytes))
-}
-
-/// The attributes of a rectangle.
-struct Place(Rect);
-
-impl Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [x, y, w, h] = [self.0.x, self.0.y, self.0.width, self.0.height].map(Number);
-        write!(f, " x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\"")
-    }
-}
-
-/// A length rounded to a hundredth of a pixel, without trailing zeros; 0 if it is not finite.
-struct Number(f64);
-
-impl Display for Number {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let value = if self.0.is_finite() { (self.0 * 100.0).round() / 100.0 } else { 0.0 };
-        // Not −0.
-        write!(f, "{}", value + 0.0)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn text_is_escaped() {
-        let mut sheet = Document::new(10.0, 10.0);
-        sheet.text((0.0, 0.0), "a<b & \"c\" 'd'\u{1}", TextStyle::new(12.0));
-        assert!(sheet.to_svg().contains(">a&lt;b &amp; &quot;c&quot; &#39;d&#39;\u{fffd}</text>"));
-    }
-
-    #[test]
-    fn numbers_are_short_and_finite() {
-        let text =
-            [1.0, 0.125, -0.001, 1e6, f64::NAN, f64::INFINITY].map(|x| Number(x).to_string());
-        assert_eq!(text, ["1", "0.13", "0", "1000000", "0", "0"]);
-    }
-
-    #[test]
-    fn colors_are_written_in_hexadecimal() {
-        assert_eq!(Color(0, 18, 255).to_string(), "#0012ff");
+        let place = Rect::new(at.0, at.1, other.width, other.height);
+        let elements = other.elements.clone();
+        self.elements.push(Element::Group { place, offset: at, elements });
     }
 }
