@@ -28,6 +28,18 @@ impl std::fmt::Display for InterruptedAndSaved {
 
 impl Error for InterruptedAndSaved {}
 
+/// The work was interrupted before there was anything to keep; exit code 130.
+#[derive(Debug)]
+pub(crate) struct InterruptedTooEarly(pub(crate) String);
+
+impl std::fmt::Display for InterruptedTooEarly {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl Error for InterruptedTooEarly {}
+
 /// Prints a line to standard error, with terminal control characters escaped. If standard error is closed or full, the line
 /// is lost and the work continues.
 pub(crate) fn status(line: &str) {

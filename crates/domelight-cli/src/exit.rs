@@ -1,8 +1,10 @@
 //! Error messages for the user, and exit codes.
 
 use crate::args::FIRST_STEPS;
-use crate::error::{InterruptedAndSaved, Label, UsageError, print_labeled, status_lines};
-use crate::interrupt::RUN_AGAIN;
+use crate::error::{
+    InterruptedAndSaved, InterruptedTooEarly, Label, UsageError, print_labeled, status_lines,
+};
+use crate::interrupt::{ENDED, RUN_AGAIN};
 use crate::memory;
 use crate::merge::MergeError;
 use crate::output::NobodyReads;
@@ -19,6 +21,7 @@ use domelight::quote::terminal;
 use domelight::render::CheckpointError;
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{CameraError, LoadError, SceneError};
+use domelight::strategy::PrepareError;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::io;
@@ -58,9 +61,8 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
 /// 2 if retrying cannot help, because the arguments, the scene or the probe are invalid. 75 if a retry continues the work.
 fn code(error: &anyhow::Error) -> u8 {
     let is_wrong_use = |cause: &(dyn Error + 'static)| {
-        // An error with a location is boxed.
-        let boxed = cause.downcast_ref::<Box<domelight_lab::Error>>().map(|error| &**error);
-        matches!(boxed.or(cause.downcast_ref()), Some(domelight_lab::Error::Usage(_)))
+        matches!(of_lab(cause), Some(domelight_lab::Error::Usage(_)))
+            || cause.is::<PrepareError>()
             || cause.is::<UsageError>()
             || cause.is::<LoadError>()
             || cause.is::<ProbeError>()
@@ -84,9 +86,23 @@ fn code(error: &anyhow::Error) -> u8 {
     }
     match () {
         () if error.is::<InterruptedAndSaved>() => RUN_AGAIN as u8,
+        () if error.is::<InterruptedTooEarly>() || error.chain().any(is_interruption) => {
+            ENDED as u8
+        }
         () if is_permanent && !passing => 2,
         () => 1,
     }
+}
+
+/// An error of the lab; with a location, it is boxed.
+fn of_lab<'a>(cause: &'a (dyn Error + 'static)) -> Option<&'a domelight_lab::Error> {
+    let boxed = cause.downcast_ref::<Box<domelight_lab::Error>>().map(|error| &**error);
+    boxed.or(cause.downcast_ref())
+}
+
+/// The lab keeps nothing of interrupted work.
+fn is_interruption(cause: &(dyn Error + 'static)) -> bool {
+    matches!(of_lab(cause), Some(domelight_lab::Error::Interrupted(_)))
 }
 
 /// The error and its causes, except for causes that the message above already contains.

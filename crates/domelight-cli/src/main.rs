@@ -40,12 +40,11 @@ mod tone;
 mod turntable;
 
 use args::{Arguments, Command};
-use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     clock::start();
-    let Arguments { command, quiet, memory } = match Arguments::try_parse() {
+    let Arguments { command, quiet, memory } = match args::parse() {
         Ok(arguments) => arguments,
         Err(error) => return exit::report_usage(error),
     };

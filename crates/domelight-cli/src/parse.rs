@@ -204,6 +204,7 @@ impl FromStr for Frames {
 pub(crate) fn not_negative(s: &str) -> Result<f32, BadValue> {
     match s.parse::<f32>() {
         Ok(x) if x.is_finite() && x >= 0.0 => Ok(x),
+        Ok(x) if x == f32::INFINITY => Err(bad(s, "a number up to 3.4e38")),
         _ => Err(bad(s, "a number that is not negative")),
     }
 }

@@ -3,7 +3,7 @@
 use std::str::FromStr as _;
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 use domelight::picture::tone::ToneMapping;
 use domelight::render::{Layers, RenderSettings, Rendering, automatic_exposure, pilot_points};
 use domelight::scene::Camera;
@@ -11,7 +11,7 @@ use domelight::strategy::PreparedStrategy;
 
 use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
 use crate::clock;
-use crate::error::{UsageError, status};
+use crate::error::{InterruptedTooEarly, UsageError, status};
 use crate::interrupt;
 use crate::memory;
 use crate::output::{self, PicturePath, print_progress, require_one_on_standard_output};
@@ -127,7 +127,8 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     };
     let saved = render_run.saved();
     if rendering.counts.camera_rays == 0 && saved.is_none() {
-        bail!("ended before the first sample; nothing was written");
+        let text = "ended before the first sample; nothing was written".to_owned();
+        return Err(InterruptedTooEarly(text).into());
     }
     let render = watch.lap();
 
@@ -141,6 +142,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let rejection = acceptance(spec, points, environment, settings.seed)?;
     let rotate = described.scene.environment.rotate();
     let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
+    report.leave_out_of_speed(&render_run.earlier_counts());
     report.profile = progress.profile();
     report.denoised = denoised;
     if outputs.iter().any(PicturePath::is_png) {

@@ -399,6 +399,11 @@ impl RenderRun {
         }
     }
 
+    /// The work of earlier runs, which this run continues.
+    pub(crate) fn earlier_counts(&self) -> Counts {
+        self.from.as_ref().map_or_else(Counts::default, |(_, checkpoint)| checkpoint.counts)
+    }
+
     /// The file of the state, if it was saved.
     pub(crate) fn saved(&self) -> Option<&Path> {
         self.save.as_deref()

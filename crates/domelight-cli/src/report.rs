@@ -1,7 +1,7 @@
 //! The report of a render, as JSON or as two lines of text.
 
 use anyhow::{Result, bail};
-use domelight::render::{Provenance, RenderSettings, Rendering};
+use domelight::render::{Counts, Provenance, RenderSettings, Rendering};
 use domelight_lab::report::SceneReport;
 use domelight_lab::{Acceptance, Host as _, Seconds, peak_memory};
 use serde::Serialize;
@@ -130,6 +130,13 @@ impl RenderReport {
             denoised: None,
             profile: None,
         }
+    }
+
+    /// Leaves rays of earlier runs out of the speed.
+    pub(crate) fn leave_out_of_speed(&mut self, earlier: &Counts) {
+        let rays = self.camera_rays + self.shadow_rays;
+        let rays = rays.saturating_sub(earlier.camera_rays + earlier.shadow_rays);
+        self.rays_per_second = rays as f64 / self.seconds.render.wall.max(1e-9);
     }
 
     pub(crate) fn print_json(&self) -> Result<()> {

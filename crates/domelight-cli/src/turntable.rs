@@ -8,7 +8,7 @@ use domelight::scene::Camera;
 use domelight_lab::scene::PreparedScene;
 
 use crate::args::turntable::TurntableArguments;
-use crate::error::UsageError;
+use crate::error::{InterruptedTooEarly, UsageError};
 use crate::output::PicturePath;
 
 /// The frames to render.
@@ -81,7 +81,11 @@ impl Turntable {
             let degrees = 360.0 * index as f32 / self.n_frames as f32;
             let mut rendering = render(&view.camera_around(degrees)?)?;
             if !rendering.complete {
-                bail!("interrupted; {}", self.left(index));
+                let text = format!("interrupted; {}", self.left(index));
+                if index == self.range.start {
+                    return Err(InterruptedTooEarly(text).into());
+                }
+                bail!(text);
             }
             write(&rendering, &self.frame(index))?;
             rendering.counts += last.map_or_else(Default::default, |last| last.counts);

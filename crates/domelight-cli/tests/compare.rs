@@ -402,6 +402,6 @@ fn an_interrupt_leaves_no_report() {
         "--json=x.json",
     ];
     let output = common::interrupted(&folder, &arguments);
-    refused(&output, 1, &["interrupted", "no report"]);
+    refused(&output, 130, &["interrupted", "no report"]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }

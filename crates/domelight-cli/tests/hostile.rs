@@ -431,3 +431,93 @@ fn messages_say_what_is_so() {
     ended(&output, 1, &["shading error of"]);
     assert!(!stderr(&output).contains(" 0.00 %"), "{}", stderr(&output));
 }
+
+#[test]
+fn what_would_lose_light_without_a_word_is_refused_or_said() {
+    let folder = folder();
+    let rig =
+        ["lights", "in.hdr", "-n", "4", "--min-energy", "1", "-o", "r.usda", "--keep-residual"];
+    let output = domelight(&folder, &[&rig[..], &["r.png"]].concat());
+    ended(&output, 2, &["--keep-residual", "r.png", ".exr, .hdr or .pfm"]);
+    let turned = ["lights", "in.hdr", "-n", "4", "-o", "r.ibl"];
+    ended(&domelight(&folder, &turned), 0, &[]);
+    assert!(!stderr(&domelight(&folder, &turned)).contains("warning"));
+    let output = domelight(&folder, &[&turned[..], &["--env-rotate", "90"]].concat());
+    ended(&output, 0, &["r.ibl", "orientation"]);
+    for (file, mapping, is_guessed) in [
+        ("ball.exr", "mirror-ball", false),
+        ("ball.hdr", "angular", true),
+        ("map.hdr", "lat-long-exr", false),
+        ("map.exr", "lat-long-exr", true),
+        ("map.pfm", "octahedral", true),
+    ] {
+        let output = domelight(&folder, &["probe", "in.hdr", "--to", mapping, "-o", file]);
+        ended(&output, 0, &[]);
+        let hint = format!("{file}: read it with --mapping {mapping}");
+        assert_eq!(stderr(&output).contains(&hint), !is_guessed, "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn values_that_options_cannot_have_are_named_with_their_option() {
+    let folder = folder();
+    for (option, value) in [
+        ("--spp", "-1"),
+        ("--seed", "-1"),
+        ("--target-error", "-1"),
+        ("--env-scale", "1e308"),
+        ("--ortho", "1e300"),
+    ] {
+        let output = domelight(&folder, &["render", "sphere", option, value]);
+        ended(&output, 2, &[&format!("'{value}'"), option]);
+    }
+    let output = domelight(&folder, &["lights", "in.hdr", "--lamps", "1", "--min-energy", "99"]);
+    ended(&output, 1, &["at least 99.00 %"]);
+    fs::write(
+        folder.path().join("black.pfm"),
+        b"PF\n2 1\n-1.0\n\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0",
+    )
+    .unwrap();
+    let black = ["render", "sphere", "--env", "black.pfm", "--strategy", "median-cut:4"];
+    ended(&domelight(&folder, &black), 2, &["black.pfm"]);
+    let output = domelight(&folder, &["farm", "slurm", "--shards", "2", "--env", "-"]);
+    ended(&output, 2, &["--env -"]);
+}
+
+#[test]
+fn flags_take_precedence_over_the_text_of_a_strategy() {
+    let folder = folder();
+    for (strategy, flag, value, used) in
+        [("mis:3:1", "--rays", "4", "mis 2:2,"), ("mis", "--split", "3:1", "mis 3:1,")]
+    {
+        let small =
+            ["--size", "8x8", "--spp", "1", "--env-rows", "16", "-o", "x.pfm", "-q", "--json"];
+        let given = ["render", "sphere", "--strategy", strategy, flag, value];
+        let report = json(&domelight(&folder, &[&given[..], &small].concat()));
+        assert!(report["settings"]["strategy"].as_str().unwrap().starts_with(used), "{report}");
+    }
+}
+
+#[test]
+fn a_resumed_render_is_as_fast_as_its_own_rays() {
+    let folder = folder();
+    let render = |more: &[&str]| {
+        let fixed = [
+            "render",
+            "sphere",
+            "--size",
+            "32x32",
+            "--env-rows",
+            "16",
+            "-o",
+            "x.pfm",
+            "-q",
+            "--json",
+        ];
+        json(&domelight(&folder, &[&fixed[..], more].concat()))
+    };
+    let first = render(&["--spp", "64", "--checkpoint", "c.exr"]);
+    let again = render(&["--spp", "64", "--resume", "c.exr"]);
+    assert_eq!(again["camera_rays"], first["camera_rays"]);
+    assert_eq!(again["rays_per_second"], 0.0);
+}

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use clap::parser::ValueSource;
 use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 
-use super::MemoryArguments;
 use super::sampling::{PixelArguments, SampleArguments, StrategyArguments};
 use super::scene::SceneArguments;
+use super::{MemoryArguments, Tone};
 use crate::output::PicturePath;
 
 pub(super) const EXAMPLES: &str = "\
@@ -29,7 +29,7 @@ Examples:
 pub(crate) struct FarmArguments {
     // First, because the others remove their values from the matches.
     #[command(flatten)]
-    pub(crate) render: RenderWords,
+    pub(crate) words: JobWords,
     /// Engine that runs the jobs
     #[arg(value_enum)]
     pub(crate) engine: Engine,
@@ -51,6 +51,9 @@ pub(crate) struct FarmArguments {
     /// Merged picture [default: picture.exr in the folder]
     #[arg(long, value_name = "FILE", help_heading = "Farm")]
     pub(crate) picture: Option<PicturePath>,
+    /// How a merged picture for viewing is developed.
+    #[command(flatten, next_help_heading = "Farm")]
+    pub(crate) tone: Tone,
     /// Cores per task
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Farm",
           value_parser = clap::value_parser!(u32).range(1..=1024))]
@@ -75,15 +78,16 @@ pub(crate) enum Engine {
     Parallel,
 }
 
-/// The given arguments of `render`, as words that `render` parses to the same values; the scene comes last.
+/// The given arguments of `render` and `merge`, as words that these parse to the same values; the scene comes last.
 #[derive(Clone, Debug)]
-pub(crate) struct RenderWords {
-    pub(crate) words: Vec<OsString>,
+pub(crate) struct JobWords {
+    pub(crate) render: Vec<OsString>,
+    pub(crate) merge: Vec<OsString>,
 }
 
-impl RenderWords {
-    /// The arguments that are passed to jobs unchanged.
-    fn command() -> Command {
+impl JobWords {
+    /// The arguments of `render` that are passed to jobs unchanged.
+    fn render_command() -> Command {
         let command = SceneArguments::augment_args(Command::new("render"));
         let command = StrategyArguments::augment_args(command);
         let command = SampleArguments::augment_args(command);
@@ -91,7 +95,7 @@ impl RenderWords {
     }
 }
 
-impl Args for RenderWords {
+impl Args for JobWords {
     fn augment_args(command: Command) -> Command {
         command
     }
@@ -101,11 +105,27 @@ impl Args for RenderWords {
     }
 }
 
-impl FromArgMatches for RenderWords {
+impl FromArgMatches for JobWords {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let tone = Tone::augment_args(Command::new("merge"));
+        Ok(Self {
+            render: Self::words(&Self::render_command(), matches),
+            merge: Self::words(&tone, matches),
+        })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl JobWords {
+    /// The given arguments of `command`.
+    fn words(command: &Command, matches: &ArgMatches) -> Vec<OsString> {
         let mut words = Vec::new();
         let mut scene = Vec::new();
-        for argument in Self::command().get_arguments() {
+        for argument in command.get_arguments() {
             let id = argument.get_id().as_str();
             // Each engine sets the number of threads.
             if id == "threads" || matches.value_source(id) != Some(ValueSource::CommandLine) {
@@ -127,12 +147,7 @@ impl FromArgMatches for RenderWords {
             }
         }
         words.append(&mut scene);
-        Ok(Self { words })
-    }
-
-    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        *self = Self::from_arg_matches(matches)?;
-        Ok(())
+        words
     }
 }
 
@@ -148,14 +163,14 @@ mod tests {
         };
         // Render parses them to the same values.
         let render =
-            ["domelight", "render"].map(Into::into).into_iter().chain(farm.render.words.clone());
+            ["domelight", "render"].map(Into::into).into_iter().chain(farm.words.render.clone());
         let Subcommand::Render(render) = Arguments::try_parse_from(render).unwrap().command else {
             panic!("no render")
         };
         assert_eq!(format!("{:?}", render.scene), format!("{:?}", farm.scene));
         assert_eq!(format!("{:?}", render.strategy), format!("{:?}", farm.strategy));
         assert_eq!(format!("{:?}", render.samples), format!("{:?}", farm.samples));
-        let words: Vec<_> = farm.render.words.iter().map(|w| w.to_string_lossy()).collect();
+        let words: Vec<_> = farm.words.render.iter().map(|w| w.to_string_lossy()).collect();
         words.join(" ")
     }
 
@@ -191,5 +206,16 @@ mod tests {
         ] {
             assert_eq!(words(given), told);
         }
+    }
+
+    #[test]
+    fn the_merge_is_told_how_to_develop_the_picture() {
+        let given =
+            ["domelight", "farm", "slurm", "--shards=2", "--exposure", "-1.5", "--tone=standard"];
+        let Subcommand::Farm(farm) = Arguments::try_parse_from(given).unwrap().command else {
+            panic!("no farm")
+        };
+        assert_eq!(farm.words.merge, ["--exposure=-1.5", "--tone=standard"]);
+        assert!(farm.words.render.is_empty());
     }
 }

@@ -65,7 +65,7 @@ pub(crate) struct LightsArguments {
           requires = "output")]
     pub(crate) format: Option<Format>,
     /// Write the probe without the light of the rig (.exr, .hdr, .pfm)
-    #[arg(long, value_name = "FILE.exr", help_heading = "Output")]
+    #[arg(long, value_name = "FILE.exr", help_heading = "Output", value_parser = radiance_path)]
     pub(crate) keep_residual: Option<PicturePath>,
     /// Write a picture of the rig: regions, lights, and a sphere under probe and rig; or none [default: on a terminal
     /// RIG_preview.png next to the first rig, otherwise none]
@@ -85,6 +85,15 @@ pub(super) fn positional(env: clap::Arg) -> clap::Arg {
                 reads standard input)";
     let env = env.long(None::<&'static str>).index(1).required(true);
     env.help(help).help_heading(None::<&'static str>)
+}
+
+/// A picture whose format keeps radiance.
+fn radiance_path(text: &str) -> Result<PicturePath, String> {
+    let path: PicturePath = text.parse()?;
+    if path.is_png() {
+        return Err("a PNG cannot hold the light of a map; its name must end in .exr, .hdr or .pfm, or be -".into());
+    }
+    Ok(path)
 }
 
 fn format() -> impl TypedValueParser<Value = Format> {

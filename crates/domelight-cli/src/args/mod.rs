@@ -15,7 +15,7 @@ pub(crate) mod turntable;
 use crate::memory::MaxMemory;
 use crate::output::PicturePath;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Arg, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
 use domelight::environment::mapping::Mapping;
 use domelight::picture::exposure::Exposure;
 use domelight::picture::tone::{ToneCurve, ToneMapping};
@@ -37,6 +37,23 @@ Five things to try:
       how noisy each strategy is on one scene, as an HTML page; takes half a minute
 
 domelight --help lists the commands; domelight COMMAND --help lists every option of a command.";
+
+/// Parses the command line. Options take negative numbers, so that their errors name option and value.
+///
+/// # Errors
+/// If the arguments are invalid, or help was requested.
+pub(crate) fn parse() -> Result<Arguments, clap::Error> {
+    let matches = with_negative_numbers(Arguments::command()).try_get_matches()?;
+    Arguments::from_arg_matches(&matches)
+}
+
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let allow = |argument: Arg| {
+        let has_value = argument.get_action().takes_values() && argument.get_long().is_some();
+        if has_value { argument.allow_negative_numbers(true) } else { argument }
+    };
+    command.mut_args(allow).mut_subcommands(with_negative_numbers)
+}
 
 /// Direct illumination under measured light.
 #[derive(Debug, Parser)]

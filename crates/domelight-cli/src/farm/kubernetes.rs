@@ -67,9 +67,10 @@ spec:
     let picture = farm.volume_picture.clone().unwrap_or_else(|| format!("{name}.exr"));
     let merge = code!(
         Shell,
-        "exec domelight merge {parts} -o {picture}",
+        "exec domelight merge {parts} -o {picture}{options}",
         parts = parts,
         picture = shell::word(&picture),
+        options = farm.merge_options,
     );
     let merge_spec = Code::literal("  backoffLimit: 3");
     let files = vec![

@@ -6,6 +6,7 @@ mod openjd;
 mod parallel;
 mod slurm;
 
+use std::ffi::OsString;
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
@@ -30,6 +31,8 @@ struct Farm {
     folder: String,
     /// The arguments of `domelight render`; they stand last.
     render: Code<Shell>,
+    /// The options of `domelight merge`, such as an exposure, each after a space.
+    merge_options: Code<Shell>,
     n_shards: u32,
     /// Threads of each shard.
     threads: u32,
@@ -74,6 +77,9 @@ struct Submission {
 /// Runs the subcommand.
 pub(crate) fn run(arguments: &FarmArguments, quiet: bool) -> Result<()> {
     refuse_repeating_points(arguments.strategy.spec()?, arguments.samples.spp)?;
+    if arguments.scene.environment.env.as_deref() == Some("-") {
+        return Err(UsageError("--env -: a job has no standard input; name a file".into()).into());
+    }
     let farm = Farm::new(arguments)?;
     let Submission { files, command } = match arguments.engine {
         Engine::Slurm => slurm::submission(&farm),
@@ -122,12 +128,17 @@ impl Farm {
             Some(picture) => cwd.join(&picture.path),
             None => folder.join("picture.exr"),
         };
-        let words = &arguments.render.words;
-        let words = words.iter().map(|word| utf8(Path::new(word))).collect::<Result<Vec<_>>>()?;
+        let words = |words: &[OsString]| -> Result<Vec<String>> {
+            words.iter().map(|word| utf8(Path::new(word))).collect()
+        };
+        let merge_options = words(&arguments.words.merge)?
+            .iter()
+            .fold(Code::default(), |code, word| code + Code::literal(" ") + shell::word(word));
         Ok(Self {
             program: utf8(&program)?,
             cwd: utf8(&cwd)?,
-            render: shell::words(words),
+            render: shell::words(words(&arguments.words.render)?),
+            merge_options,
             n_shards: arguments.shards,
             threads: arguments.pixel.threads.unwrap_or(arguments.cpus),
             picture: utf8(&picture)?,
@@ -165,7 +176,13 @@ impl Farm {
     /// The command that merges, but for the program.
     fn merge(&self) -> Code<Shell> {
         let picture = shell::word(&self.picture);
-        code!(Shell, "merge {parts} -o {picture}", parts = self.file("parts"), picture = picture)
+        code!(
+            Shell,
+            "merge {parts} -o {picture}{options}",
+            parts = self.file("parts"),
+            picture = picture,
+            options = self.merge_options,
+        )
     }
 }
 

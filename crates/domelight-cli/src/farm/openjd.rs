@@ -25,7 +25,11 @@ pub(super) fn submission(farm: &Farm) -> Submission {
         threads = farm.threads,
         render = farm.render,
     );
-    let merge = code!(Shell, "set -eu\nexec \"$1\" merge -o \"$3\" -- \"$2\"\n");
+    let merge = code!(
+        Shell,
+        "set -eu\nexec \"$1\" merge -o \"$3\"{options} -- \"$2\"\n",
+        options = farm.merge_options,
+    );
     let template = code!(
         Yaml,
         r#"specificationVersion: jobtemplate-2023-09

@@ -21,7 +21,7 @@ use domelight::rig::{
 use domelight::scene::SceneDescription;
 
 use crate::args::lights::{LightsArguments, PreviewPath, RigPath};
-use crate::error::{UsageError, status};
+use crate::error::{UsageError, status, warn};
 use crate::files;
 use crate::memory;
 use crate::output::{PictureFormat, PicturePath, print, print_json};
@@ -43,6 +43,13 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
     let mut watch = Stopwatch::start();
 
     let (environment, probe) = arguments.load(quiet)?;
+    let is_turned = environment.orientation() != Orientation::default();
+    for output in outputs.iter().filter(|o| is_turned && o.format == Format::Sibl) {
+        let path = output.path.display();
+        let text = "an .ibl file cannot state the orientation of its panorama: turn the lights and the panorama in the \
+                    program that opens it";
+        warn(quiet, &format!("{path}: {text}"));
+    }
     let load = watch.lap();
     let measured = preview.is_some() || arguments.json;
     let found = arguments.find(&environment, measured).with_context(|| probe.clone())?;

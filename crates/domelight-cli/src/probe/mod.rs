@@ -4,7 +4,7 @@ mod sheet;
 
 use crate::args::PreviewPng;
 use crate::args::ProbeArguments;
-use crate::error::warn;
+use crate::error::{status, warn};
 use crate::files;
 use crate::memory;
 use crate::output::{
@@ -12,7 +12,9 @@ use crate::output::{
 };
 use domelight::environment::Environment;
 use domelight::environment::builtin::BuiltinProbe;
-use domelight::environment::io::{LoadedProbe, ProbeOptions, SanitizeReport, load_probe};
+use domelight::environment::io::{
+    LoadedProbe, ProbeOptions, SanitizeReport, guess_mapping, load_probe,
+};
 use domelight::environment::mapping::{Mapping, from_lat_long, to_lat_long};
 use domelight::environment::statistics::{ProbeStatistics, Sun};
 use domelight::picture::exposure::Exposure;
@@ -49,7 +51,7 @@ pub(crate) fn run(arguments: &ProbeArguments, quiet: bool) -> anyhow::Result<()>
     let probe = load(arguments)?;
     probe.warnings.iter().for_each(|warning| warn(quiet, warning));
     if let Some(output) = output {
-        convert(arguments, &probe.image, output)?;
+        convert(arguments, &probe.image, output, quiet)?;
     }
     let on_standard_output =
         [preview_path, output].into_iter().flatten().any(PicturePath::is_standard_output);
@@ -126,7 +128,12 @@ fn load(arguments: &ProbeArguments) -> anyhow::Result<LoadedProbe> {
 }
 
 /// Writes the probe in another mapping, size or format.
-fn convert(arguments: &ProbeArguments, map: &RgbImage, output: &PicturePath) -> anyhow::Result<()> {
+fn convert(
+    arguments: &ProbeArguments,
+    map: &RgbImage,
+    output: &PicturePath,
+    quiet: bool,
+) -> anyhow::Result<()> {
     let rows = arguments.size.map_or(map.height, |size| size as usize);
     memory::keep(12 * map.pixels.len() as u64);
     let what = format!("{} with {rows} rows", arguments.probe.display());
@@ -140,7 +147,16 @@ fn convert(arguments: &ProbeArguments, map: &RgbImage, output: &PicturePath) -> 
         _ => mapping.size_for(map.height),
     };
     let converted = from_lat_long(map, mapping, size);
-    output.write(&converted, tone, PictureFormat::Exr, Some(mapping))
+    output.write(&converted, tone, PictureFormat::Exr, Some(mapping))?;
+    // Only OpenEXR states the mapping, and only of some.
+    let envmap = if output.is_exr() { mapping.envmap() } else { None };
+    let guess = guess_mapping(&converted, envmap);
+    if guess != mapping && !output.is_png() && !quiet {
+        status(&format!(
+            "{output}: read it with --mapping {mapping} (of render: --env-mapping); otherwise it is taken for {guess}"
+        ));
+    }
+    Ok(())
 }
 
 fn table(measured: &MeasuredProbe) -> String {

@@ -4,7 +4,7 @@
 //! stitching leaves NaN in some. They are repaired and counted in a warning, because a NaN may be where the sun was.
 //! With [`ProbeOptions::strict`], they are an error that names the first bad texel.
 
-use super::mapping::{Mapping, ShapeError, to_lat_long};
+use super::mapping::{EnvmapKind, Mapping, ShapeError, to_lat_long};
 use crate::math::{Vec2, vec2};
 use crate::memory;
 use crate::picture::{self, DataWindow, Format, PictureError, ReadOptions};
@@ -141,12 +141,7 @@ pub fn probe_from_picture(
             if picture.format == Format::Png { "PNG" } else { "JPEG" }
         ));
     }
-    let mapping = options.mapping.unwrap_or_else(|| {
-        match Mapping::guess(image.width, image.height, picture.envmap) {
-            Mapping::Angular => guess_of_square(&image),
-            mapping => mapping,
-        }
-    });
+    let mapping = options.mapping.unwrap_or_else(|| guess_mapping(&image, picture.envmap));
     mapping
         .check_shape(image.width, image.height)
         .map_err(|shape| ProbeError::Shape { file: file.to_owned(), shape })?;
@@ -200,6 +195,15 @@ fn in_display_window(
         }
     }
     Ok(Some(framed))
+}
+
+/// The mapping in which a picture is read if none is stated: that of [`Mapping::guess`], but a square that is not black
+/// outside its disc is octahedral. Mirror balls are taken for angular maps.
+pub fn guess_mapping(image: &RgbImage, envmap: Option<EnvmapKind>) -> Mapping {
+    match Mapping::guess(image.width, image.height, envmap) {
+        Mapping::Angular => guess_of_square(image),
+        mapping => mapping,
+    }
 }
 
 /// An angular map is black outside its disc; any other square is interpreted as octahedral.

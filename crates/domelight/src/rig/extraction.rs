@@ -121,10 +121,10 @@ impl<'a> CompactExtraction<'a> {
         let sources =
             compact_sources(environment.map(), SourceCriteria { sun, n_lamps, min_share });
         if sun && !sources.first().is_some_and(|s| s.is_sun) {
-            return Err(RigError::NoSun);
+            return Err(RigError::NoSun { min_share });
         }
         if sources.is_empty() && n_lights.is_none() {
-            return Err(RigError::NoLamp);
+            return Err(RigError::NoLamp { min_share });
         }
         let texels = Texels::new(environment);
         let mut lights: Vec<RigLight> = sources.iter().map(|s| compact_light(&texels, s)).collect();

@@ -63,16 +63,24 @@ pub enum RigError {
     },
     /// No sun.
     #[error(
-        "there is no sun: no compact source with at least 0.1 % of the map's light stands out \
-         from its surroundings by a factor of 4"
+        "there is no sun: no compact source with at least {} % of the map's light stands out \
+         from its surroundings by a factor of 4",
+        digits((100.0 * min_share) as f32)
     )]
-    NoSun,
+    NoSun {
+        /// The minimum share of the map's light, in \[0, 1\].
+        min_share: f64,
+    },
     /// No lamp.
     #[error(
-        "there is no lamp: no compact source with at least 0.1 % of the map's light stands out \
-         from its surroundings by a factor of 4"
+        "there is no lamp: no compact source with at least {} % of the map's light stands out \
+         from its surroundings by a factor of 4",
+        digits((100.0 * min_share) as f32)
     )]
-    NoLamp,
+    NoLamp {
+        /// The minimum share of the map's light, in \[0, 1\].
+        min_share: f64,
+    },
     /// All lights are too dim to keep.
     #[error("no light has the requested minimum share of the map's light")]
     TooDim,

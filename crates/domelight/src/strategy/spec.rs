@@ -369,12 +369,12 @@ impl StrategyOptions {
         Ok(())
     }
 
-    /// Fills missing options from `other`.
+    /// Fills missing options from `other`. Rays and split replace each other, because one follows from the other.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self {
-            rays: self.rays.or(other.rays),
-            split: self.split.or(other.split),
+            rays: self.rays.or(other.rays.filter(|_| self.split.is_none())),
+            split: self.split.or(other.split.filter(|_| self.rays.is_none())),
             lights: self.lights.or(other.lights),
             candidates: self.candidates.or(other.candidates),
             from: self.from.or(other.from),
