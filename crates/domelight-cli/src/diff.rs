@@ -52,6 +52,10 @@ pub(crate) fn run(arguments: &DiffArguments, quiet: bool) -> anyhow::Result<()> 
             anyhow::bail!("{file}: has no alpha, which --covered needs")
         }
     };
+    if mask.as_ref().is_some_and(|mask| !mask.contains(&true)) {
+        let file = arguments.reference.display();
+        anyhow::bail!("{file}: its alpha is 0 everywhere, so --covered leaves nothing to compare")
+    }
     let difference = Difference::new(arguments, &test.image, &reference.image, mask.as_deref())?;
     let white = difference.write_picture(arguments, &test.image, &reference.image)?;
     if arguments.json {

@@ -15,7 +15,7 @@ use domelight_lab::denoise::{Denoiser, Features};
 use serde::Serialize;
 
 use crate::args::{Bits, Tone, ToneArguments};
-use crate::error::{UsageError, status};
+use crate::error::{UsageError, status, warn};
 use crate::files;
 use crate::memory;
 use crate::output::{PictureFormat, print_json, require_one_on_standard_output};
@@ -63,6 +63,11 @@ pub(crate) fn run(arguments: &ToneArguments, quiet: bool) -> Result<()> {
     let name = path.display().to_string();
     let picture = layer_of(&bytes, &name, layer.as_deref())?;
     memory::allow(&name, TEXEL * picture.image.pixels.len() as u64)?;
+    let non_finite = picture.image.pixels.iter().filter(|pixel| !pixel.is_finite()).count();
+    if non_finite > 0 {
+        let are = if non_finite == 1 { "pixel is" } else { "pixels are" };
+        warn(quiet, &format!("{name}: {non_finite} {are} NaN or infinite"));
+    }
     let (exposure_from, tone) = develop(arguments, &picture);
     let depth = match arguments.bits {
         Bits::Eight => Depth::Eight,

@@ -315,6 +315,9 @@ impl LoadedScene {
         let probe = probe_name(&light.source);
         let scale = light.factor().at(&probe)?;
         let environment = Environment::new(map, orientation, scale).at(&probe)?;
+        if environment.power() == 0.0 {
+            host.warn(&format!("{probe}: gives no light: the map is black, or --env-scale is 0"));
+        }
         let report = SceneReport {
             scene: file_name(&settings.scene),
             triangles: scene.triangle_count(),
