@@ -37,8 +37,10 @@ pub(crate) fn report_usage(mut error: clap::Error) -> ExitCode {
     suggest::add_to(&mut error);
     let text = error.to_string();
     if terminal::lines(&text) == text {
-        // In color.
-        let _ = error.print();
+        // In color. Help that cannot be written is lost, unless nobody reads it.
+        if error.print().is_err_and(|error| error.kind() != io::ErrorKind::BrokenPipe) {
+            return ExitCode::FAILURE;
+        }
     } else {
         status_lines(text.trim_end());
     }

@@ -569,3 +569,11 @@ fn pictures_without_light_and_with_bad_pixels_get_a_warning() {
     let output = domelight(&folder, &["diff", "e.exr", "e.exr", "--covered"]);
     ended(&output, 1, &["e.exr: its alpha is 0 everywhere"]);
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn help_that_cannot_be_written_is_a_failure() {
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let status = Command::new(env!("CARGO_BIN_EXE_domelight")).arg("--help").stdout(full).status();
+    assert_eq!(status.unwrap().code(), Some(1));
+}
