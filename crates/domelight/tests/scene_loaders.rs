@@ -603,6 +603,23 @@ fn stl_in_both_encodings() {
 }
 
 #[test]
+fn bytes_after_the_facets_of_a_binary_stl_are_no_facets() {
+    let spaces = format!("{:80}", "solid but binary");
+    for header in [&b"by a scanner"[..], b"solid but binary", spaces.as_bytes()] {
+        let mut bytes = binary_stl(header);
+        bytes.extend([0xff; 120]);
+        for name in ["two.stl", "two.part"] {
+            let d = one(name, &bytes).description;
+            assert_eq!((d.parts.len(), d.parts[0].mesh.triangles.len()), (1, 2), "{name}");
+        }
+        fails("two.stl", &bytes[..150], &["2 facets", "184 bytes", "150"]);
+    }
+    // Text stays text.
+    let padded = STL.replacen("one of two", &format!("one{}", "\0".repeat(90)), 1);
+    assert_eq!(one("two.stl", padded).description.parts.len(), 2);
+}
+
+#[test]
 fn broken_stl_files_name_the_place() {
     fails("a.stl", STL.replace("1.0e0", "one"), &["line 5", "vertex one 0 0"]);
     fails_if_strict("a.stl", STL.replace("1.0e0", "inf"), &["line 5"]);

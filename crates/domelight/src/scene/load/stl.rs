@@ -4,8 +4,9 @@
 //! because files often have wrong normals or none. The colors in the two bytes after a binary facet mean different
 //! things to different programs and are ignored.
 //!
-//! 3D Systems 1989, "StereoLithography Interface Specification". A binary file may begin with `solid`, too: a file is
-//! binary if it is as long as its count of facets says.
+//! 3D Systems 1989, "StereoLithography Interface Specification". A binary file may begin with `solid`, too, and some
+//! programs append bytes of their own: a file is binary if it is as long as its count of facets says, or longer and its
+//! header is not text.
 //!
 //! We do not use the crate stl_io, because it reads one solid and allocates memory for as many facets as a header
 //! claims.
@@ -84,7 +85,8 @@ pub(super) fn load(
     let name = path.display().to_string();
     let parts = if let Some(facets) = facets(bytes) {
         budget.take(&name, facets as u64 * (3 * 12 + 12))?;
-        vec![(stem(path), binary(&bytes[HEADER..], strict).map_err(error)?)]
+        let facets = &bytes[HEADER..HEADER + facets * FACET];
+        vec![(stem(path), binary(facets, strict).map_err(error)?)]
     } else if is_text(bytes) {
         budget.take(&name, MEMORY_PER_BYTE * bytes.len() as u64)?;
         ascii(path, bytes, strict).map_err(error)?
@@ -103,16 +105,28 @@ pub(super) fn load(
     Ok(Loaded { description, ..Loaded::default() })
 }
 
+/// Whether it begins as text does. Zeros are in binary headers, or where a name was padded in text that has facets.
 fn is_text(bytes: &[u8]) -> bool {
+    let is_facet = |word: &[u8]| word.eq_ignore_ascii_case(b"facet");
+    begins_with_solid(bytes) && (!has_zeros(bytes) || bytes.windows(5).any(is_facet))
+}
+
+fn begins_with_solid(bytes: &[u8]) -> bool {
     let start = bytes.trim_ascii_start();
     start.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+}
+
+/// Whether there are zeros where a binary file has its header. The bytes of a count below 2²⁴ include one.
+fn has_zeros(bytes: &[u8]) -> bool {
+    bytes.iter().take(HEADER).any(|&b| b == 0)
 }
 
 /// How many facets a binary file has; none if it is no binary file. Some programs append bytes of their own.
 fn facets(bytes: &[u8]) -> Option<usize> {
     let count = u32::from_le_bytes(*bytes.get(80..)?.first_chunk()?) as usize;
     let needed = count.checked_mul(FACET)?.checked_add(HEADER)?;
-    let fits = bytes.len() == needed || (bytes.len() > needed && count > 0 && !is_text(bytes));
+    let may_be_longer = count > 0 && (!begins_with_solid(bytes) || has_zeros(bytes));
+    let fits = bytes.len() == needed || (bytes.len() > needed && may_be_longer);
     fits.then_some(count)
 }
 
