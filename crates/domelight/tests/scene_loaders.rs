@@ -620,6 +620,24 @@ fn bytes_after_the_facets_of_a_binary_stl_are_no_facets() {
 }
 
 #[test]
+fn text_without_the_end_of_its_last_solid_may_be_truncated() {
+    let cut = &STL[..STL.find("ENDSOLID").unwrap()];
+    let [first, second] = [&cut[..cut.find("endsolid").unwrap()], cut];
+    for (text, n_parts, line) in [(first, 1, "line 8"), (second, 2, "line 17")] {
+        let loaded = one("a.stl", text);
+        assert_eq!(loaded.description.parts.len(), n_parts);
+        let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings) };
+        for word in ["a.stl", line, "endsolid", "truncated"] {
+            assert!(warning.contains(word), "'{word}' is not in: {warning}");
+        }
+        fails_if_strict("a.stl", text, &[line, "endsolid", "truncated", "--strict"]);
+    }
+    assert_eq!(one("a.stl", STL).warnings, [""; 0]);
+    // The end of one solid is the beginning of the next.
+    assert_eq!(one("a.stl", STL.replace("endsolid one of two\n", "")).warnings, [""; 0]);
+}
+
+#[test]
 fn broken_stl_files_name_the_place() {
     fails("a.stl", STL.replace("1.0e0", "one"), &["line 5", "vertex one 0 0"]);
     fails_if_strict("a.stl", STL.replace("1.0e0", "inf"), &["line 5"]);

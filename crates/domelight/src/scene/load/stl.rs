@@ -50,6 +50,15 @@ pub enum StlErrorKind {
         /// How many it has.
         corners: usize,
     },
+    /// Text that ends within a solid.
+    #[error(
+        "line {line}: the text ends here without 'endsolid', so the file may be truncated; without --strict the facets \
+         before are drawn"
+    )]
+    Unended {
+        /// The last line that is not empty, from 1.
+        line: usize,
+    },
     /// A vertex of a binary file at no place.
     #[error(
         "facet {facet}: the position is not finite: {position}; without --strict the facet is left out"
@@ -83,13 +92,20 @@ pub(super) fn load(
 ) -> Result<Loaded, LoadError> {
     let error = |kind| LoadError::Stl { path: path.into(), kind };
     let name = path.display().to_string();
+    let mut warnings = Vec::new();
     let parts = if let Some(facets) = facets(bytes) {
         budget.take(&name, facets as u64 * (3 * 12 + 12))?;
         let facets = &bytes[HEADER..HEADER + facets * FACET];
         vec![(stem(path), binary(facets, strict).map_err(error)?)]
     } else if is_text(bytes) {
         budget.take(&name, MEMORY_PER_BYTE * bytes.len() as u64)?;
-        ascii(path, bytes, strict).map_err(error)?
+        let Solids { parts, unended } = ascii(path, bytes, strict).map_err(error)?;
+        warnings.extend(unended.map(|line| {
+            format!(
+                "{name}, line {line}: the text ends here without 'endsolid'; the file may be truncated"
+            )
+        }));
+        parts
     } else {
         let count = bytes.get(80..HEADER).and_then(|b| b.try_into().ok());
         let facets = count.map_or(0, u32::from_le_bytes);
@@ -102,7 +118,7 @@ pub(super) fn load(
         materials: vec![Material::diffuse("default", DEFAULT_ALBEDO)],
         ..SceneDescription::default()
     };
-    Ok(Loaded { description, ..Loaded::default() })
+    Ok(Loaded { description, warnings, ..Loaded::default() })
 }
 
 /// Whether it begins as text does. Zeros are in binary headers, or where a name was padded in text that has facets.
@@ -146,20 +162,34 @@ fn binary(bytes: &[u8], strict: bool) -> Result<Mesh, StlErrorKind> {
     Ok(mesh)
 }
 
-fn ascii(path: &Path, bytes: &[u8], strict: bool) -> Result<Vec<(String, Mesh)>, StlErrorKind> {
+/// The solids of a text.
+struct Solids {
+    parts: Vec<(String, Mesh)>,
+    /// The last line, if the last solid does not end.
+    unended: Option<usize>,
+}
+
+fn ascii(path: &Path, bytes: &[u8], strict: bool) -> Result<Solids, StlErrorKind> {
     let mut solids: Vec<(String, Mesh)> = Vec::new();
     let mut corners = 0;
+    let mut unended = None;
     for (index, line) in bytes.split(|&b| b == b'\n' || b == b'\r').enumerate() {
         let text = text_of(line);
         let text = text.trim();
         let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
         let line = index + 1;
+        if !text.is_empty() {
+            unended = unended.map(|_| line);
+        }
         if keyword.eq_ignore_ascii_case("solid") {
             if corners > 0 {
                 return Err(StlErrorKind::Facet { line, corners });
             }
             let name = if rest.trim().is_empty() { stem(path) } else { rest.trim().to_owned() };
             solids.push((name, Mesh::default()));
+            unended = Some(line);
+        } else if keyword.eq_ignore_ascii_case("endsolid") {
+            unended = None;
         } else if keyword.eq_ignore_ascii_case("vertex") {
             let Some((_, mesh)) = solids.last_mut() else { continue };
             mesh.positions.push(vertex(rest, strict).ok_or_else(|| StlErrorKind::Vertex {
@@ -181,7 +211,10 @@ fn ascii(path: &Path, bytes: &[u8], strict: bool) -> Result<Vec<(String, Mesh)>,
         let line = bytes.split(|&b| b == b'\n' || b == b'\r').count();
         return Err(StlErrorKind::Facet { line, corners });
     }
-    Ok(solids)
+    match unended {
+        Some(line) if strict => Err(StlErrorKind::Unended { line }),
+        unended => Ok(Solids { parts: solids, unended }),
+    }
 }
 
 fn vertex(text: &str, strict: bool) -> Option<Vec3> {
