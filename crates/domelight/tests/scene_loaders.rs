@@ -472,6 +472,37 @@ fn mtl_maps_of_roughness_and_metalness() {
 }
 
 #[test]
+fn mtl_keywords_of_any_case() {
+    let library = "NEWMTL a\nkd 1 0 0\nMAP_KD c.png\nBump n.png\nD 0.25\nPR 0.5\n";
+    let text = "mtllib a.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";
+    let folder = Folder::new()
+        .with("a.obj", text)
+        .with("a.mtl", library)
+        .with_image("c.png", [255, 0, 0])
+        .with_image("n.png", [127, 130, 250]);
+    let loaded = folder.load("a.obj");
+    assert_eq!(loaded.warnings, [""; 0]);
+    let material = &loaded.description.materials[0];
+    let MaterialModel::MetallicRoughness(m) = &material.model else { panic!() };
+    assert_eq!((m.base_color, m.roughness), (Rgb::new(1.0, 0.0, 0.0), 0.5));
+    assert!(m.base_color_texture.is_some() && material.normal_map.is_some());
+    assert_eq!(material.coverage.opacity, 0.25);
+}
+
+#[test]
+fn maps_that_mtl_ignores_are_named() {
+    let library = "refl -type sphere sky.png\nmap_Ka a.png\nmap_aat on\nDisp h.png\nmap_Ps s.png\n";
+    let warnings = mtl(library, &[]).1.warnings;
+    for (warning, word) in warnings.iter().zip(["reflection map (refl)", "(Disp)", "(map_Ps)"]) {
+        assert!(
+            warning.contains(word) && warning.contains("ignored, of material 'a'"),
+            "{warning}"
+        );
+    }
+    assert_eq!(warnings.len(), 3, "{warnings:?}");
+}
+
+#[test]
 fn strict_loads_refuse_textures_and_libraries_that_are_missing() {
     let strict = LoadOptions { strict: true, ..LoadOptions::default() };
     let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";

@@ -5,7 +5,8 @@
 //! `map_Ke` are emission. `d`, or else `Tr`, is opacity, multiplied by `map_d`: its alpha channel if it has one, else
 //! its luminance. `norm` is a normal map, and so is `map_Bump` or `bump` if its picture looks like one, as most
 //! exporters write it. The texture options `-s`, `-o`, `-bm` and `-clamp` are supported. Heights, spectra, other maps
-//! and textures that cannot be read are ignored, each kind with one warning.
+//! and textures that cannot be read are ignored, each kind with one warning; only `map_Ka` is ignored without one,
+//! because rays determine what is ambient. Keywords may be written in any case.
 
 use std::path::Path;
 
@@ -52,7 +53,8 @@ pub(super) fn is_library(bytes: &[u8]) -> bool {
     });
     let first = words.map(|word| word.strip_prefix(b"\xef\xbb\xbf").unwrap_or(word)).next();
     first.is_none_or(|word| {
-        word.starts_with(b"map_") || KEYWORDS.iter().any(|keyword| keyword.as_bytes() == word)
+        let is_map = word.get(..4).is_some_and(|begin| begin.eq_ignore_ascii_case(b"map_"));
+        is_map || KEYWORDS.iter().any(|keyword| word.eq_ignore_ascii_case(keyword.as_bytes()))
     })
 }
 
@@ -92,12 +94,13 @@ pub(super) fn parse(
         let text = text.trim();
         let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
         let line = Line { number, keyword, rest: rest.trim() };
-        match (keyword, entries.last_mut()) {
-            ("newmtl", _) => entries.push(Entry { name: line.rest.into(), ..Entry::default() }),
-            (_, Some(entry)) => reader.statement(entry, line)?,
-            ("", None) => {}
-            (_, None) if keyword.starts_with('#') => {}
-            (_, None) => {
+        match entries.last_mut() {
+            _ if keyword.eq_ignore_ascii_case("newmtl") => {
+                entries.push(Entry { name: line.rest.into(), ..Entry::default() });
+            }
+            Some(entry) => reader.statement(entry, line)?,
+            None if keyword.is_empty() || keyword.starts_with('#') => {}
+            None => {
                 let kind = ObjErrorKind::NoMaterial { keyword: keyword.into() };
                 return Err(reader.error(line, kind));
             }
@@ -146,37 +149,40 @@ impl Reader<'_, '_> {
     }
 
     fn statement(&mut self, entry: &mut Entry, line: Line<'_>) -> Result<(), LoadError> {
+        let keyword = line.keyword.to_ascii_lowercase();
         let is_spectrum = matches!(line.rest.split_whitespace().next(), Some("spectral" | "xyz"));
-        if is_spectrum && matches!(line.keyword, "Ka" | "Kd" | "Ks" | "Ke" | "Tf") {
+        if is_spectrum && matches!(&*keyword, "ka" | "kd" | "ks" | "ke" | "tf") {
             self.ignored(entry, line, "a color that is not RGB");
             return Ok(());
         }
-        match line.keyword {
-            "Kd" => entry.diffuse = Some(self.color(line)?),
-            "Ks" => entry.specular = Some(self.color(line)?),
-            "Ke" => entry.emission = Some(self.color(line)?),
-            "Ns" => entry.exponent = Some(self.scalar(line)?),
-            "Pr" => entry.roughness = Some(self.scalar(line)?),
-            "Pm" => entry.metallic = Some(self.scalar(line)?),
+        match &*keyword {
+            "kd" => entry.diffuse = Some(self.color(line)?),
+            "ks" => entry.specular = Some(self.color(line)?),
+            "ke" => entry.emission = Some(self.color(line)?),
+            "ns" => entry.exponent = Some(self.scalar(line)?),
+            "pr" => entry.roughness = Some(self.scalar(line)?),
+            "pm" => entry.metallic = Some(self.scalar(line)?),
             "d" => {
                 // The factor of a halo is of the view, which is not drawn.
                 let rest = line.rest.strip_prefix("-halo").unwrap_or(line.rest).trim_start();
                 entry.opacity = Some(self.scalar(Line { rest, ..line })?);
             }
-            "Tr" => entry.transparency = Some(self.scalar(line)?),
-            "map_Kd" => entry.diffuse_texture = self.map(line, Content::Color)?,
-            "map_Ke" => entry.emission_texture = self.map(line, Content::Color)?,
-            "map_Pr" => entry.roughness_texture = self.map(line, Content::Numbers)?,
-            "map_Pm" => entry.metallic_texture = self.map(line, Content::Numbers)?,
+            "tr" => entry.transparency = Some(self.scalar(line)?),
+            "map_kd" => entry.diffuse_texture = self.map(line, Content::Color)?,
+            "map_ke" => entry.emission_texture = self.map(line, Content::Color)?,
+            "map_pr" => entry.roughness_texture = self.map(line, Content::Numbers)?,
+            "map_pm" => entry.metallic_texture = self.map(line, Content::Numbers)?,
             "map_d" => entry.opacity_texture = self.map(line, Content::Opacity)?,
             "norm" => {
                 entry.normal_map = self.relief(line, Content::Numbers)?.map(normal_map);
             }
-            "bump" | "map_bump" | "map_Bump" if entry.normal_map.is_none() => {
-                self.bump(entry, line)?;
-            }
-            "map_Tr" => self.ignored(entry, line, "a transparency map"),
-            "map_Ks" | "map_Ns" => self.ignored(entry, line, "a map"),
+            "bump" | "map_bump" if entry.normal_map.is_none() => self.bump(entry, line)?,
+            "map_tr" => self.ignored(entry, line, "a transparency map"),
+            "refl" => self.ignored(entry, line, "a reflection map"),
+            // A relief beside a normal map, a map of ambient light, which rays determine, and a switch.
+            "map_bump" | "map_ka" | "map_aat" => {}
+            "disp" | "decal" => self.ignored(entry, line, "a map"),
+            other if other.starts_with("map_") => self.ignored(entry, line, "a map"),
             _ => {}
         }
         Ok(())
