@@ -503,7 +503,27 @@ fn animations_move_nodes_at_a_moment() {
     assert_eq!(first(&at("go", 99.0)), vec3(2.0, 1.0, 0.0));
     has(&error_with(&json, &at("stop", 0.0)), &["no animation 'stop'", "0 'go'"]);
     let broken = json.replace(r#""sampler":0,"target""#, r#""sampler":4,"target""#);
-    has(&error_with(&broken, &at("go", 0.0)), &["animation 0, channel 0", "sampler 4"]);
+    has(&error_with(&broken, &at("go", 0.0)), &["animation 'go', channel 0", "sampler 4"]);
+}
+
+#[test]
+fn channels_without_usable_keys_leave_their_nodes_at_rest() {
+    // A value less than there are keys, and times that are those of colors.
+    let more = r#""scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"translation":[7,0,0]},{}],"animations":[{"name":"go","samplers":
+[{"input":3,"output":0,"interpolation":"CUBICSPLINE"},{"input":3,"output":0}],"channels":[
+{"sampler":0,"target":{"node":0,"path":"translation"}},{"sampler":1,"target":{"node":0,"path":"scale"}},
+{"sampler":0,"target":{"node":1,"path":"scale"}}]}],"#;
+    let json = document(more, "}");
+    let animation = Some(AnimationTime { name: "go".into(), seconds: 1.0 });
+    let options = LoadOptions { animation, ..LoadOptions::default() };
+    let loaded = loaded_with(&json, &options);
+    let mesh = &loaded.description.parts[0].mesh;
+    assert_eq!(mesh.positions[1], vec3(8.0, 0.0, 0.0), "scaled, but not moved");
+    let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings) };
+    let place = "animation 'go', channel 0 (translation of node 0)";
+    has(warning, &["a.gltf", place, "3 values for 3 keys", "three", "it and one more channel"]);
+    let message = error_with(&json, &LoadOptions { strict: true, ..options });
+    has(&message, &["a.gltf", place, "3 values for 3 keys", "without --strict"]);
 }
 
 #[test]

@@ -8,6 +8,40 @@ use super::source::Source;
 use crate::math::{Quat, Vec4, functions};
 use crate::scene::load::AnimationTime;
 
+/// Keys of an animation that have no value at any time.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum KeyError {
+    /// No keys.
+    #[error("there are no keys")]
+    Empty,
+    /// A time that is NaN or infinite, or before that of the last key.
+    #[error("key {key} is at {time} s, but times must be finite and must not decrease")]
+    Time {
+        /// The key, from 0.
+        key: usize,
+        /// Its time \[s\].
+        time: f32,
+    },
+    /// A number of values that does not fit the number of keys.
+    #[error("there are {values} values for {keys} keys, each of which needs {needed}")]
+    Count {
+        /// The number of values.
+        values: usize,
+        /// The number of keys.
+        keys: usize,
+        /// The number of values for each key, in words.
+        needed: &'static str,
+    },
+    /// A value that is NaN or infinite.
+    #[error("value {index} is not finite: {value}")]
+    Value {
+        /// The value, from 0.
+        index: usize,
+        /// Its first number that is not finite.
+        value: f32,
+    },
+}
+
 /// The animated properties of a node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct NodePose {
@@ -31,7 +65,8 @@ pub(super) fn choose(
     })
 }
 
-/// The poses of nodes in an animation at a time.
+/// The poses of nodes in an animation at a time. Channels with unusable keys are left out with one warning, unless the
+/// load is strict.
 pub(super) fn at(
     source: &Source<'_>,
     time: &AnimationTime,
@@ -41,12 +76,30 @@ pub(super) fn at(
     let names = all.map(|a| a.map(|a| a.name).unwrap_or_default()).collect();
     let index = choose("animation", &time.name, names)?;
     let animation: json::Animation = source.document.get(index)?;
+    let name = match &*animation.name {
+        "" => format!("animation {index}"),
+        name => format!("animation '{name}'"),
+    };
     let mut poses: HashMap<usize, NodePose> = HashMap::new();
+    let mut unusable = Vec::new();
     for (i, channel) in animation.channels.iter().enumerate() {
         let Some(node) = channel.target.node else { continue };
+        let place = || format!("{name}, channel {i} ({} of node {node})", channel.target.path);
         let pose = poses.entry(node).or_default();
-        channel_at(source, &animation, channel, time.seconds, pose)
-            .map_err(|e| e.within(|| format!("animation {index}, channel {i}")))?;
+        match channel_at(source, &animation, channel, time.seconds, pose) {
+            Err(Failure::Problem(GltfErrorKind::Keys { source: problem })) if !source.strict => {
+                unusable.push(format!("{}: {problem}", place()));
+            }
+            result => result.map_err(|e| e.within(place))?,
+        }
+    }
+    if let [first, others @ ..] = &unusable[..] {
+        let all = match others.len() {
+            0 => "it is".into(),
+            1 => "it and one more channel like it are".into(),
+            n => format!("it and {n} more channels like it are"),
+        };
+        source.warn(&format!("{first}; {all} left out"));
     }
     Ok(poses)
 }
@@ -81,7 +134,9 @@ fn channel_at(
     };
     let flat: Vec<f32> = values.iter().flat_map(|v| v[..n].iter().copied()).collect();
     let curve = Curve { times: &times, values: &flat, interpolation: sampler.interpolation };
-    let Some(mut value) = curve.at(seconds, &channel.target.path) else { return Ok(()) };
+    let size = (shape != "SCALAR").then_some(n);
+    curve.check(size).map_err(|source| GltfErrorKind::Keys { source })?;
+    let mut value = curve.at(seconds, &channel.target.path);
     match &*channel.target.path {
         "translation" => pose.translation = value.try_into().ok(),
         "scale" => pose.scale = value.try_into().ok(),
@@ -100,7 +155,7 @@ fn channel_at(
 /// An upper bound on the morph targets of any real mesh.
 const MAX_WEIGHTS: usize = 1 << 16;
 
-/// Values at times; the number of components per value is the ratio of the counts.
+/// Values at times, checked; the number of components per value is the ratio of the counts.
 struct Curve<'c> {
     times: &'c [f32],
     values: &'c [f32],
@@ -108,15 +163,50 @@ struct Curve<'c> {
 }
 
 impl Curve<'_> {
-    /// The value at a time, clamped to the first and last keys. `None` without keys or with too few values.
-    fn at(&self, seconds: f32, path: &str) -> Option<Vec<f32>> {
-        let cubic = self.interpolation == Interpolation::CubicSpline;
-        let per_key = if cubic { 3 } else { 1 };
-        let n = self.values.len() / (self.times.len() * per_key).max(1);
-        if self.times.is_empty() || n == 0 {
-            return None;
+    /// The number of values for each key: a spline's key holds in-tangent, value and out-tangent.
+    fn per_key(&self) -> usize {
+        if self.interpolation == Interpolation::CubicSpline { 3 } else { 1 }
+    }
+
+    /// Checks that there is a value at any time. Values have `size` components each, or as many as there are morph
+    /// targets.
+    fn check(&self, size: Option<usize>) -> Result<(), KeyError> {
+        let (keys, numbers, per_key) = (self.times.len(), self.values.len(), self.per_key());
+        if keys == 0 {
+            return Err(KeyError::Empty);
         }
-        // A spline's key holds in-tangent, value and out-tangent; other keys hold the value.
+        let before = std::iter::once(&f32::NEG_INFINITY).chain(self.times);
+        let is_bad = |(&time, &before): (&f32, &f32)| !(time.is_finite() && time >= before);
+        if let Some(key) = self.times.iter().zip(before).position(is_bad) {
+            return Err(KeyError::Time { key, time: self.times[key] });
+        }
+        let fits = match size {
+            Some(size) => numbers == keys * per_key * size,
+            None => numbers > 0 && numbers.is_multiple_of(keys * per_key),
+        };
+        if !fits {
+            let needed = match (size, per_key) {
+                (Some(_), 1) => "one",
+                (Some(_), _) => "three",
+                (None, 1) => "one for each morph target",
+                (None, _) => "three for each morph target",
+            };
+            let values = numbers / size.unwrap_or(1);
+            return Err(KeyError::Count { values, keys, needed });
+        }
+        match self.values.iter().position(|value| !value.is_finite()) {
+            Some(i) => {
+                let index = i / size.unwrap_or(1);
+                Err(KeyError::Value { index, value: self.values[i] })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The value at a time, clamped to the first and last keys.
+    fn at(&self, seconds: f32, path: &str) -> Vec<f32> {
+        let (cubic, per_key) = (self.interpolation == Interpolation::CubicSpline, self.per_key());
+        let n = self.values.len() / (self.times.len() * per_key);
         let of_key = |key: usize, part: usize| {
             let begin = (key * per_key + part) * n;
             &self.values[begin..begin + n]
@@ -124,7 +214,7 @@ impl Curve<'_> {
         let value = |key| of_key(key, usize::from(cubic));
         let next = self.times.partition_point(|&t| t <= seconds);
         if next == 0 || next == self.times.len() {
-            return Some(value(next.saturating_sub(1)).to_vec());
+            return value(next.saturating_sub(1)).to_vec();
         }
         let key = next - 1;
         let interval = self.times[next] - self.times[key];
@@ -146,9 +236,9 @@ impl Curve<'_> {
         };
         if path == "rotation" && self.interpolation == Interpolation::Linear && n == 4 {
             let q = |key| Quat::from_slice(value(key)).normalize();
-            return Some(slerp(q(key), q(next), t).to_array().to_vec());
+            return slerp(q(key), q(next), t).to_array().to_vec();
         }
-        Some((0..n).map(mix).collect())
+        (0..n).map(mix).collect()
     }
 }
 
@@ -174,15 +264,43 @@ mod tests {
         let curve = |interpolation, values| Curve { times: &[1.0, 3.0], values, interpolation };
         let linear = curve(Interpolation::Linear, &[10.0, 0.0, 20.0, 2.0]);
         for (t, expected) in [(0.0, [10.0, 0.0]), (2.0, [15.0, 1.0]), (9.0, [20.0, 2.0])] {
-            assert_eq!(linear.at(t, "translation").unwrap(), expected);
+            assert_eq!(linear.at(t, "translation"), expected);
         }
         let step = curve(Interpolation::Step, &[10.0, 20.0]);
-        assert_eq!(step.at(2.9, "weights").unwrap(), [10.0]);
+        assert_eq!(step.at(2.9, "weights"), [10.0]);
         // At the middle of a 2 s interval: the mean, plus 2 s / 8 times the tangents' difference.
         let spline = curve(Interpolation::CubicSpline, &[9.0, 10.0, 4.0, 0.0, 20.0, 9.0]);
-        assert_eq!(spline.at(2.0, "translation").unwrap(), [16.0]);
-        assert_eq!(spline.at(3.0, "translation").unwrap(), [20.0]);
-        assert_eq!(curve(Interpolation::Linear, &[]).at(2.0, "scale"), None);
+        assert_eq!(spline.at(2.0, "translation"), [16.0]);
+        assert_eq!(spline.at(3.0, "translation"), [20.0]);
+    }
+
+    #[test]
+    fn curves_have_keys_in_order_with_a_value_each() {
+        let check = |times: &[f32], values: &[f32], interpolation, size| {
+            Curve { times, values, interpolation }.check(size).map_err(|e| e.to_string())
+        };
+        let (linear, cubic) = (Interpolation::Linear, Interpolation::CubicSpline);
+        assert_eq!(check(&[1.0, 2.0, 2.0], &[0.0; 9], linear, Some(3)), Ok(()));
+        assert_eq!(check(&[1.0], &[0.0; 6], cubic, None), Ok(()));
+        let bad = |times: &[f32], values: &[f32], interpolation, size, words: &str| {
+            let error = check(times, values, interpolation, size).unwrap_err();
+            assert!(error.contains(words), "{error}");
+        };
+        bad(&[], &[], linear, Some(3), "no keys");
+        bad(
+            &[1.0, 2.0],
+            &[0.0; 3],
+            linear,
+            Some(3),
+            "1 values for 2 keys, each of which needs one",
+        );
+        bad(&[1.0], &[0.0; 6], linear, Some(3), "2 values for 1 keys");
+        bad(&[1.0], &[0.0; 3], cubic, Some(3), "needs three");
+        bad(&[1.0, 2.0], &[0.0; 3], linear, None, "needs one for each morph target");
+        bad(&[1.0], &[], linear, None, "0 values");
+        bad(&[f32::NAN], &[0.0; 3], linear, Some(3), "key 0 is at NaN s");
+        bad(&[2.0, 1.0], &[0.0; 6], linear, Some(3), "key 1 is at 1 s");
+        bad(&[1.0], &[0.0, f32::INFINITY, 0.0], linear, Some(3), "value 0 is not finite: inf");
     }
 
     #[test]
@@ -191,7 +309,7 @@ mod tests {
         let values = [a.to_array(), (-b).to_array()].concat();
         let curve =
             Curve { times: &[0.0, 1.0], values: &values, interpolation: Interpolation::Linear };
-        let quarter = Quat::from_slice(&curve.at(0.25, "rotation").unwrap());
+        let quarter = Quat::from_slice(&curve.at(0.25, "rotation"));
         assert!(quarter.dot(Quat::from_rotation_z(0.5)).abs() > 0.999_999);
     }
 

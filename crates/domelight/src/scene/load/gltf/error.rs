@@ -1,5 +1,6 @@
 //! Errors in glTF files.
 
+use super::animation::KeyError;
 use super::ktx2::Ktx2Error;
 use super::meshopt::MeshoptError;
 use crate::scene::TextureError;
@@ -187,6 +188,12 @@ pub enum GltfErrorKind {
     RequiredExtension {
         /// The extension.
         name: String,
+    },
+    /// An animation with unusable keys in strict mode.
+    #[error("{source}; without --strict, the channel is left out")]
+    Keys {
+        /// What is wrong with the keys.
+        source: KeyError,
     },
     /// Attributes of instances with different lengths.
     #[error("an attribute of its instances has {count} values, another {instances}")]

@@ -40,6 +40,7 @@ mod tangents;
 use std::collections::HashMap;
 use std::path::Path;
 
+pub use animation::KeyError;
 pub use error::GltfErrorKind;
 pub use ktx2::Ktx2Error;
 pub use meshopt::MeshoptError;
