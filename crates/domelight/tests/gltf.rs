@@ -611,6 +611,55 @@ fn damaged_unknown_and_remote_images_are_left_out_once_a_kind() {
     has(&error_with(&json, &strict()), &["a.gltf", "image 1", "Gif"]);
 }
 
+/// One warning per kind and mesh, however many primitives there are.
+#[test]
+fn vertices_without_what_their_material_needs_are_named() {
+    let more = format!(
+        r#""materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0,"texCoord":0}}}},
+"normalTexture":{{"index":0,"texCoord":7}}}}],"textures":[{{"source":0}}],"images":[{{"uri":"{}"}}],"#,
+        png([255; 4])
+    );
+    let twice = r#"},"material":0},{"attributes":{"POSITION":0,"TEXCOORD_0":1},"material":0"#;
+    let sound = document(&more, twice).replace(r#""texCoord":7"#, r#""texCoord":1"#);
+    let lacking = sound.replace(r#","TEXCOORD_1":1"#, "");
+    // Infinite numbers in place of the second coordinate and of the last color's blue.
+    let mut data = data();
+    for at in [40, 60 + 4 * 10] {
+        data[at..][..4].copy_from_slice(&f32::INFINITY.to_le_bytes());
+    }
+    let bad = |json: &str| json.replace(&STANDARD.encode(self::data()), &STANDARD.encode(&data));
+    let cases = [
+        (lacking.clone(), vec!["TEXCOORD_1, which it lacks"]),
+        (
+            bad(&lacking),
+            vec![
+                "TEXCOORD_1",
+                "TEXCOORD_0 of vertex 0 is not finite: [0, inf]",
+                "COLOR_0 of vertex 2",
+            ],
+        ),
+        // Nothing looks at the coordinates.
+        (bad(&document("", "}")), vec!["COLOR_0 of vertex 2 is not finite: [1, 0.5, inf, 0]"]),
+        (
+            document(&more, r#"},"material":0"#).replace(r#""texCoord":7"#, r#""texCoord":1"#),
+            vec![],
+        ),
+    ];
+    for (json, expected) in cases {
+        let warnings = loaded(&json).warnings;
+        assert_eq!(warnings.len(), expected.len(), "{warnings:#?}");
+        for (warning, words) in warnings.iter().zip(&expected) {
+            has(warning, &["a.gltf", "mesh 0, primitive 0 ('tri')", words]);
+        }
+        if let Some(first) = expected.first() {
+            has(
+                &error_with(&json, &strict()),
+                &["a.gltf", "mesh 0, primitive 0", first, "--strict"],
+            );
+        }
+    }
+}
+
 #[test]
 fn vertices_that_are_not_finite_are_left_out_unless_that_is_refused() {
     let numbers = |numbers: &[f32]| {

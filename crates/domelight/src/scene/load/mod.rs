@@ -36,7 +36,7 @@ use std::collections::HashSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use self::gltf::{GltfErrorKind, KeyError, Ktx2Error, MeshoptError};
+pub use self::gltf::{GltfErrorKind, KeyError, Ktx2Error, MeshoptError, VertexError};
 pub use files::Resolver;
 pub use format::SceneFormat;
 pub use off::OffErrorKind;

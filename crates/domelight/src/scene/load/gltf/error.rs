@@ -1,6 +1,7 @@
 //! Errors in glTF files.
 
 use super::animation::KeyError;
+use super::geometry::VertexError;
 use super::ktx2::Ktx2Error;
 use super::meshopt::MeshoptError;
 use crate::scene::TextureError;
@@ -188,6 +189,12 @@ pub enum GltfErrorKind {
     RequiredExtension {
         /// The extension.
         name: String,
+    },
+    /// Vertices that lack something in strict mode.
+    #[error("{source}; without --strict, the mesh is drawn in wrong colors there")]
+    Vertices {
+        /// What they lack.
+        source: VertexError,
     },
     /// An animation with unusable keys in strict mode.
     #[error("{source}; without --strict, the channel is left out")]

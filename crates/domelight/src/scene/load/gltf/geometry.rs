@@ -8,6 +8,7 @@ use super::error::{Failure, GltfErrorKind};
 use super::json;
 use super::material::Slot;
 use super::source::Source;
+use crate::math::{Vec2, Vec4};
 
 /// The vertices of a primitive; each attribute is empty or has one value per vertex.
 #[derive(Clone, Debug, Default)]
@@ -45,6 +46,57 @@ pub(super) struct Geometry {
 pub(super) struct Deformations {
     pub(super) targets: BTreeSet<usize>,
     pub(super) skin: bool,
+}
+
+/// Vertices that do not have what their material needs.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum VertexError {
+    /// A set of texture coordinates that a texture needs.
+    #[error("a texture of its material needs TEXCOORD_{set}, which it lacks")]
+    NoUvs {
+        /// The number of the set.
+        set: u32,
+    },
+    /// Texture coordinates that are NaN or infinite.
+    #[error("TEXCOORD_{set} of vertex {vertex} is not finite: {value}")]
+    Uv {
+        /// The number of the set.
+        set: u32,
+        /// The first such vertex.
+        vertex: usize,
+        /// Its coordinates.
+        value: Vec2,
+    },
+    /// A color that is NaN or infinite.
+    #[error("COLOR_0 of vertex {vertex} is not finite: {value}")]
+    Color {
+        /// The first such vertex.
+        vertex: usize,
+        /// Its color.
+        value: Vec4,
+    },
+}
+
+impl Geometry {
+    /// What the vertices lack for their material, the first of each kind.
+    pub(super) fn problems(&self) -> impl Iterator<Item = VertexError> {
+        let Vertices { uvs, colors, .. } = &self.vertices;
+        let sets = || {
+            let used = self.slot.uv_sets.iter().zip(uvs);
+            used.filter_map(|(set, uvs)| Some(((*set)?, uvs)))
+        };
+        let missing = sets().find(|(_, uvs)| uvs.is_empty());
+        let missing = missing.map(|(set, _)| VertexError::NoUvs { set });
+        let uv = sets().find_map(|(set, uvs)| {
+            let vertex = uvs.iter().position(|&uv| !Vec2::from(uv).is_finite())?;
+            Some(VertexError::Uv { set, vertex, value: uvs[vertex].into() })
+        });
+        let n_channels = if self.slot.alpha { 4 } else { 3 };
+        let is_bad = |color: &[f32; 4]| color[..n_channels].iter().any(|c| !c.is_finite());
+        let color = colors.iter().position(is_bad);
+        let color = color.map(|i| VertexError::Color { vertex: i, value: colors[i].into() });
+        [missing, uv, color].into_iter().flatten()
+    }
 }
 
 /// Reads a primitive. `place` names it in messages about memory.

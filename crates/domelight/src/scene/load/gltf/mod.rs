@@ -37,11 +37,13 @@ mod meshopt;
 mod source;
 mod tangents;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::mem::discriminant;
 use std::path::Path;
 
 pub use animation::KeyError;
 pub use error::GltfErrorKind;
+pub use geometry::VertexError;
 pub use ktx2::Ktx2Error;
 pub use meshopt::MeshoptError;
 
@@ -162,6 +164,7 @@ fn read_mesh(
         poses.push((pose, placement.world, weights));
     }
     let name = if mesh.name.is_empty() { format!("mesh {index}") } else { mesh.name };
+    let mut told = HashSet::new();
     let memory_place = format!("{}, mesh {index}", source.path.display());
     for (i, primitive) in mesh.primitives.iter().enumerate() {
         let place = || format!("mesh {index}, primitive {i}");
@@ -183,6 +186,19 @@ fn read_mesh(
         source.budget.take(&memory_place, bytes.saturating_add(copies))?;
         let geometry = geometry::read(source, primitive, slot, &deformations, &memory_place)
             .map_err(|e| e.within(place))?;
+        for problem in geometry.problems() {
+            if source.strict {
+                let problem = GltfErrorKind::Vertices { source: problem };
+                return Err(problem.within(place()).into());
+            }
+            // Once for each kind and mesh.
+            if told.insert(discriminant(&problem)) {
+                source.warn(&format!(
+                    "{} ('{name}'): {problem}; its colors are wrong there",
+                    place()
+                ));
+            }
+        }
         // A primitive without joints follows its node.
         let has_joints = !geometry.vertices.joints.is_empty();
         let material = geometry.slot.material;
