@@ -486,6 +486,28 @@ fn cameras_scenes_and_hidden_nodes() {
 }
 
 #[test]
+fn unusable_cameras_are_left_out_unless_that_is_refused() {
+    let cases = [
+        (r#""perspective":{"yfov":0}"#, "0°"),
+        (r#""orthographic":{"ymag":0}"#, "height 0"),
+        (r#""type":"perspective""#, "neither perspective nor orthographic"),
+    ];
+    for (camera, words) in cases {
+        let more = format!(
+            r#""scenes":[{{"nodes":[0,1,2]}}],"nodes":[{{"mesh":0}},{{"camera":0,"name":"left"}},{{"camera":1}}],
+"cameras":[{{{camera}}},{{"name":"sound","perspective":{{"yfov":0.5}}}}],"#
+        );
+        let json = document(&more, "}");
+        let loaded = loaded(&json);
+        assert_eq!(loaded.description.cameras.len(), 1);
+        assert_eq!(loaded.description.cameras[0].name, "sound");
+        let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings) };
+        has(warning, &["a.gltf", "camera 0 ('left')", words, "left out"]);
+        has(&error_with(&json, &strict()), &["a.gltf", "camera 0 ('left')", words, "--strict"]);
+    }
+}
+
+#[test]
 fn animations_move_nodes_at_a_moment() {
     // The positions' accessor as a path.
     let more = r#""scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"scale":[2,2,2],"rotation":[0,0,0,2]}],"animations":[{"name":"go","samplers":

@@ -202,6 +202,12 @@ pub enum GltfErrorKind {
         /// What is wrong with the keys.
         source: KeyError,
     },
+    /// An unusable camera in strict mode.
+    #[error("{problem}; without --strict, the camera is left out")]
+    Camera {
+        /// Why it is unusable.
+        problem: String,
+    },
     /// Attributes of instances with different lengths.
     #[error("an attribute of its instances has {count} values, another {instances}")]
     Instances {

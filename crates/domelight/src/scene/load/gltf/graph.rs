@@ -105,14 +105,28 @@ impl<'g, 's> Graph<'g, 's> {
             self.placements.entry(mesh).or_default().extend(placements);
         }
         if let Some(camera) = node.camera {
-            let camera: json::Camera = self.source.document.get(camera)?;
-            let name = if camera.name.is_empty() { node.name } else { camera.name.clone() };
-            if let Some(settings) = camera_settings(&camera, &world) {
-                self.cameras.push(NamedCamera { name, settings });
-            }
+            self.camera(camera, &node.name, &world)?;
         }
         for child in node.children {
             self.node(child, world, depth + 1)?;
+        }
+        Ok(())
+    }
+
+    /// Adds a camera, which may have the name of its node. An unusable camera is left out with a warning, unless the load
+    /// is strict.
+    fn camera(&mut self, index: usize, node: &str, world: &Mat4) -> Result<(), Failure> {
+        let camera: json::Camera = self.source.document.get(index)?;
+        let name = if camera.name.is_empty() { node } else { &*camera.name }.to_owned();
+        match camera_settings(&camera, world) {
+            Ok(settings) => self.cameras.push(NamedCamera { name, settings }),
+            Err(problem) if self.source.strict => {
+                let problem = GltfErrorKind::Camera { problem };
+                return Err(problem.within(format!("camera {index} ('{name}')")).into());
+            }
+            Err(problem) => {
+                self.source.warn(&format!("camera {index} ('{name}'): {problem}; it is left out"));
+            }
         }
         Ok(())
     }
@@ -167,16 +181,16 @@ fn local(node: &json::Node, pose: Option<&NodePose>) -> Mat4 {
     )
 }
 
-/// Camera settings: a glTF camera looks along its node's −Z, with +Y up. `None` for an unusable camera.
-fn camera_settings(camera: &json::Camera, world: &Mat4) -> Option<CameraSettings> {
+/// Camera settings: a glTF camera looks along its node's −Z, with +Y up. The error is why the camera is unusable.
+fn camera_settings(camera: &json::Camera, world: &Mat4) -> Result<CameraSettings, String> {
     let projection = match (&camera.perspective, &camera.orthographic) {
         (Some(p), _) => Projection::Perspective { fov_y_degrees: p.yfov.to_degrees() },
         (None, Some(o)) => Projection::Orthographic { height: 2.0 * o.ymag.abs() },
-        (None, None) => return None,
+        (None, None) => return Err("it is neither perspective nor orthographic".into()),
     };
     let origin = world.transform_point3(Vec3::ZERO);
     let forward = world.transform_vector3(Vec3::NEG_Z);
     let up = world.transform_vector3(Vec3::Y);
     let settings = CameraSettings { projection, origin, target: origin + forward, up };
-    settings.check().is_ok().then_some(settings)
+    settings.check().map(|()| settings).map_err(|problem| problem.to_string())
 }
