@@ -1141,7 +1141,16 @@ fn broken_scene_files_name_the_line_and_the_reason() {
     bad("roughness = 0.25", "roughness = 25", &["line 18", "roughness", "25"]);
     bad("roughness = 0.25", "opacity = 1.5", &["line 18", "opacity", "1.5"]);
     bad("roughness = 0.25", "emission = [0, -1, 0]", &["line 18", "emission", "-1"]);
-    bad("roughness = 0.25", "rougness = 0.25", &["line 18", "roughness"]);
+    bad("roughness = 0.25", "rougness = 0.25", &["line 23", "`rougness`", "materials.brass"]);
+    let short = &["line 19", "invalid length 2", "in materials.brass.base_color = [1, 1]"];
+    bad("[0.9, 0.7, 0.3]", "[1, 1]", short);
+    let word = &["line 19", "string \"red\", expected f32", "in materials.brass.base_color"];
+    bad("0.9, 0.7", "\"red\", 0.7", word);
+    let wrap = &["line 23", "`foo`", "`mirror`", "in materials.brass.wrap"];
+    bad("roughness = 0.25", "wrap = \"foo\"", wrap);
+    bad("\"diffuse:0.5\"", "0.5", &["line 16", "0.5", "ggx:0.2", "in materials.clay"]);
+    bad("rotate = [0, 0, 90]", "rotate = 90", &["line 30", "90", "in objects.rotate"]);
+    bad("scale = 2\n", "scale = [2, 2]\n", &["line 29", "[x, y, z]", "objects.scale = [2, 2]"]);
     bad("brass.png", "gone.png", &["gone.png", "brass", "line 18"]);
     bad("quad.ply", "gone.ply", &["gone.ply", "line 26"]);
     bad("quad.ply", "scene.toml", &["scene.toml"]);

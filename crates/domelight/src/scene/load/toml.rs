@@ -50,10 +50,13 @@
 //! Paths are relative to the scene file. Unknown keys and missing files are errors.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::ops::Range;
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
 use super::textures::{Content, Textures};
@@ -164,14 +167,35 @@ struct EnvironmentTable {
     up: UpAxis,
 }
 
-#[derive(Deserialize)]
-#[serde(
-    untagged,
-    expecting = "a material is notation such as \"ggx:0.2\" or a table of base_color, base_color_texture, metallic, roughness, metallic_roughness_texture, normal_map, normal_scale, emission, emission_texture, opacity, opacity_texture, wrap and uv_scale"
-)]
 enum MaterialEntry {
     Notation(String),
     Table(Box<MaterialTable>),
+}
+
+/// By hand, because the errors of derived code for an untagged enum say neither where nor what is wrong.
+impl<'de> Deserialize<'de> for MaterialEntry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(MaterialVisitor)
+    }
+}
+
+struct MaterialVisitor;
+
+impl<'de> Visitor<'de> for MaterialVisitor {
+    type Value = MaterialEntry;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a material: notation such as \"ggx:0.2\", or a table")
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<MaterialEntry, E> {
+        Ok(MaterialEntry::Notation(text.into()))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<MaterialEntry, A::Error> {
+        let table = MaterialTable::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(MaterialEntry::Table(Box::new(table)))
+    }
 }
 
 #[derive(Deserialize)]
@@ -249,7 +273,7 @@ pub(super) fn load(
     let lines = Lines::new(text);
     let file: SceneFile = toml::from_str(text).map_err(|e| {
         let line = e.span().map(|span| lines.of(span.start));
-        failed(line, TomlErrorKind::Syntax(e.message().into()))
+        failed(line, TomlErrorKind::Syntax(syntax(e, text)))
     })?;
     let mut reader = Reader {
         path,
@@ -265,6 +289,25 @@ pub(super) fn load(
     };
     reader.scene(file)?;
     Ok(reader.finish())
+}
+
+/// What the parser says, with the keys that lead there and the value if it does not say them itself.
+fn syntax(mut error: toml::de::Error, text: &str) -> String {
+    const MOST: usize = 60;
+    let message = error.message().to_owned();
+    let value = error.span().and_then(|span| text.get(span)).unwrap_or_default();
+    let value: String = value.lines().next().unwrap_or_default().chars().take(MOST).collect();
+    // Without the text, the last line of the error is the keys.
+    error.set_input(None);
+    let whole = error.to_string();
+    let keys = whole.lines().last().and_then(|line| line.strip_prefix("in `")?.strip_suffix('`'));
+    match keys {
+        None => message,
+        Some(keys) if message.contains(value.trim_matches(['"', '\''])) => {
+            format!("{message}, in {keys}")
+        }
+        Some(keys) => format!("{message}, in {keys} = {value}"),
+    }
 }
 
 /// Where the lines of a text begin.
