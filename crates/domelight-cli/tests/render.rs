@@ -338,6 +338,12 @@ fn missing_and_bad_files_are_named() {
     let scene = "[[objects]]\nfile = \"gone.ply\"\n";
     fs::write(at("scene.toml"), scene).unwrap();
     refused(&render(&folder, &["scene.toml"]), 2, &["gone.ply", "scene.toml"]);
+    // No file's content makes the program wait for standard input.
+    let scene = "[environment]\nfile = \"-\"\n[[objects]]\nbuiltin = \"sphere\"\n";
+    fs::write(at("scene.toml"), scene).unwrap();
+    refused(&render(&folder, &["scene.toml"]), 2, &["./-", "No such file"]);
+    write_exr(&at("-"), &RgbImage::filled(8, 4, Rgb::WHITE), None);
+    succeeded(&render(&folder, &["scene.toml", "-o", "x.pfm"]));
     assert!(!at("domelight.exr").exists());
 }
 

@@ -9,8 +9,8 @@ use domelight::math::vec3;
 use domelight::picture::{hdr, pfm};
 use domelight::render::{Layers, RenderSettings, Renderer};
 use domelight::scene::{
-    Camera, LoadError, LoadOptions, Reach, Scene, SceneDescription, SceneError, SceneFormat, load,
-    load_bytes,
+    Camera, EnvironmentSource, LoadError, LoadOptions, Reach, Scene, SceneDescription, SceneError,
+    SceneFormat, load, load_bytes,
 };
 use domelight::{Error, Rgb, RgbImage};
 
@@ -187,6 +187,20 @@ fn missing_files_are_named() {
     assert!(matches!(error, Error::Load(LoadError::Ply { .. })), "{error}");
     let error = load_bytes("a.blend", b"BLENDER", &nothing, &options).unwrap_err();
     assert!(matches!(error, LoadError::UnknownFormat { .. }));
+}
+
+/// What reads a file named `-` reads standard input, which no scene file may ask for.
+#[test]
+fn a_probe_of_a_scene_file_is_never_standard_input() {
+    let nothing = |_: &Path| Err(io::ErrorKind::NotFound.into());
+    for (name, file, expected) in
+        [("a.toml", "-", "./-"), ("a.toml", "-/.", "./-"), ("b/a.toml", "-", "b/-")]
+    {
+        let text = format!("[environment]\nfile = \"{file}\"\n[[objects]]\nbuiltin = \"sphere\"\n");
+        let loaded = load_bytes(name, text.as_bytes(), &nothing, &LoadOptions::default()).unwrap();
+        let environment = loaded.description.environment.unwrap();
+        assert_eq!(environment.source, EnvironmentSource::File(expected.into()), "{file}");
+    }
 }
 
 #[test]

@@ -414,7 +414,9 @@ fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// A path that a file gives, relative to that file; backslashes count as slashes.
+/// A path that a file gives, relative to that file; backslashes count as slashes. `-` is a file of that name: what reads
+/// standard input is up to the user.
 fn relative(file: &Path, path: &str) -> PathBuf {
-    file.parent().unwrap_or(Path::new("")).join(path.replace('\\', "/"))
+    let path = file.parent().unwrap_or(Path::new("")).join(path.replace('\\', "/"));
+    if path == Path::new("-") { Path::new(".").join(path) } else { path }
 }
