@@ -341,10 +341,33 @@ fn missing_and_bad_files_are_named() {
     // No file's content makes the program wait for standard input.
     let scene = "[environment]\nfile = \"-\"\n[[objects]]\nbuiltin = \"sphere\"\n";
     fs::write(at("scene.toml"), scene).unwrap();
-    refused(&render(&folder, &["scene.toml"]), 2, &["./-", "No such file"]);
+    refused(&render(&folder, &["scene.toml"]), 2, &["./-", "No such file", "scene.toml, line 1"]);
     write_exr(&at("-"), &RgbImage::filled(8, 4, Rgb::WHITE), None);
     succeeded(&render(&folder, &["scene.toml", "-o", "x.pfm"]));
     assert!(!at("domelight.exr").exists());
+}
+
+/// As meshes and textures are. A probe of the command line stays the user's own choice.
+#[test]
+fn a_scene_files_probe_is_named_with_its_line() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("sub")).unwrap();
+    let scene = |environment: &str| {
+        let text = format!("[[objects]]\nbuiltin = \"sphere\"\n[environment]\n{environment}\n");
+        fs::write(at("sub/scene.toml"), text).unwrap();
+        render(&folder, &["sub/scene.toml"])
+    };
+    let line = "sub/scene.toml, line 3, [environment]";
+    let missing = scene("file = \"nope.exr\"");
+    refused(&missing, 2, &["cannot read sub/nope.exr", line, "refers to", "No such file"]);
+    assert!(!stderr(&missing).contains("hint"), "{}", stderr(&missing));
+    fs::write(at("sub/bad.hdr"), "#?RADIANCE\n\n-Y 4000 +X 9000\n").unwrap();
+    refused(&scene("file = \"bad.hdr\""), 2, &["sub/bad.hdr", line]);
+    refused(&scene("builtin = \"skye\""), 2, &["skye", line]);
+    let own = render(&folder, &["sub/scene.toml", "--env", "grace.hdr"]);
+    refused(&own, 2, &["grace.hdr: No such file", "hint: a probe is a file or one of sky"]);
+    assert!(!stderr(&own).contains("scene.toml"), "{}", stderr(&own));
 }
 
 #[test]

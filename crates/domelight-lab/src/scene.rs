@@ -6,14 +6,16 @@ use std::str::FromStr as _;
 use domelight::RgbImage;
 use domelight::bsdf::{Bsdf, MaterialSpec, ParseMaterialError};
 use domelight::environment::builtin::BuiltinProbe;
-use domelight::environment::io::ProbeOptions;
+use domelight::environment::io::{ProbeError, ProbeOptions};
 use domelight::environment::mapping::Mapping;
 use domelight::environment::{Environment, Orientation, UpAxis, key_light_rotation};
 use domelight::math::Vec3;
+use domelight::picture::{PictureError, PictureErrorKind};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{
     AnimationTime, Camera, CameraSettings, EnvironmentSettings, EnvironmentSource, Framing, Lens,
-    LoadOptions, NamedCamera, Projection, Scene, SceneDescription, ViewDirection, load_with,
+    LoadError, LoadOptions, NamedCamera, Projection, Scene, SceneDescription, ViewDirection,
+    load_with,
 };
 
 pub use crate::depth_of_field::{BadDepthOfField, DepthOfField};
@@ -419,6 +421,7 @@ impl LightSettings {
         };
         let plain = |source| EnvironmentSettings {
             source,
+            referrer: None,
             rotate_degrees: 0.0,
             scale: 1.0,
             exposure: 0.0,
@@ -445,7 +448,10 @@ impl LightSettings {
         let path = match &light.source {
             EnvironmentSource::Builtin(name) => {
                 let probe = BuiltinProbe::from_str(name);
-                let probe = probe.map_err(|error| Error::Usage(error.to_string()))?;
+                let probe = probe.map_err(|error| match &light.referrer {
+                    Some(referrer) => Error::Usage(format!("{referrer}: {error}")),
+                    None => Error::Usage(error.to_string()),
+                })?;
                 let rows = u64::from(self.rows);
                 let bytes = Environment::MEMORY_PER_TEXEL * 2 * rows * rows;
                 host.take_memory(&format!("{name} with {rows} rows"), bytes)?;
@@ -460,11 +466,28 @@ impl LightSettings {
             max_memory: host.memory_left(),
         };
         host.reads(path)?;
-        let loaded = host.load_probe(path, &options)?;
+        let loaded = host.load_probe(path, &options);
+        let loaded = loaded.map_err(|error| of_scene_file(error, path, light))?;
         let texels = loaded.image.pixels.len() as u64;
         host.take_memory(&path.display().to_string(), Environment::MEMORY_PER_TEXEL * texels)?;
         loaded.warnings.iter().for_each(|warning| host.warn(warning));
         Ok(loaded.image)
+    }
+}
+
+/// An error in loading a probe, with the line of the scene file that names it, if there is one.
+fn of_scene_file(error: Error, path: &Path, light: &EnvironmentSettings) -> Error {
+    let Some(referrer) = &light.referrer else { return error };
+    match error {
+        Error::Probe(ProbeError::Picture(PictureError {
+            kind: PictureErrorKind::Io(source),
+            ..
+        })) => {
+            let (path, referrer) = (path.to_owned(), format!("{referrer},"));
+            LoadError::ReadReferenced { path, referrer, source }.into()
+        }
+        Error::Probe(error) => Error::At { place: referrer.clone(), error: Box::new(error.into()) },
+        other => other,
     }
 }
 

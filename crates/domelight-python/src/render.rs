@@ -238,6 +238,7 @@ impl Job {
         let orientation = environment.orientation();
         let light = EnvironmentSettings {
             source: EnvironmentSource::Builtin(probe.clone()),
+            referrer: None,
             rotate_degrees: orientation.rotation,
             scale: 1.0,
             exposure: 0.0,

@@ -494,6 +494,7 @@ impl Scene {
     pub(crate) fn environment(&self, py: Python<'_>, rows: usize) -> PyResult<Environment> {
         let sky = || EnvironmentSettings {
             source: EnvironmentSource::Builtin("sky".to_owned()),
+            referrer: None,
             rotate_degrees: 0.0,
             scale: 1.0,
             exposure: 0.0,

@@ -253,6 +253,7 @@ impl Engine {
         let orientation = Orientation { up, rotation: light.rotate };
         let settings = EnvironmentSettings {
             source: EnvironmentSource::Builtin(light.probe),
+            referrer: None,
             rotate_degrees: light.rotate,
             scale: light.scale,
             exposure: light.exposure,

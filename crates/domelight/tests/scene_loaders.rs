@@ -1066,6 +1066,8 @@ fn a_scene_file_combines_everything() {
     let environment = d.environment.as_ref().unwrap();
     assert_eq!(environment.source, EnvironmentSource::File(folder.path("probes/sky.exr")));
     assert_eq!((environment.rotate_degrees, environment.scale), (90.0, 2.0));
+    let referrer = environment.referrer.as_ref().unwrap();
+    assert!(referrer.ends_with("scene.toml, line 9, [environment]"), "{referrer}");
 
     assert_eq!(d.parts.len(), 3);
     assert!(close(d.parts[0].mesh.positions[1], vec3(10.0, 2.0, 0.0)));

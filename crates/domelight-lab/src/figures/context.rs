@@ -73,6 +73,7 @@ impl<'a> FigureContext<'a> {
         if is_builtin || description.environment.is_none() {
             description.environment = Some(EnvironmentSettings {
                 source: EnvironmentSource::Builtin(BuiltinProbe::Cathedral.name().to_owned()),
+                referrer: None,
                 rotate_degrees: 0.0,
                 scale: 1.0,
                 exposure: 0.0,

@@ -75,6 +75,8 @@ pub struct NamedCamera {
 pub struct EnvironmentSettings {
     /// The source of the map.
     pub source: EnvironmentSource,
+    /// The scene file and the line in it that name the source, for messages; `None` if no scene file names it.
+    pub referrer: Option<String>,
     /// Rotation about the up axis \[degrees\].
     pub rotate_degrees: f32,
     /// A factor on the radiance, ≥ 0.
@@ -217,7 +219,15 @@ mod tests {
         let factor = |scale, exposure| {
             let source = EnvironmentSource::Builtin("sky".to_owned());
             let up = UpAxis::Y;
-            EnvironmentSettings { source, rotate_degrees: 0.0, scale, exposure, up }.factor()
+            let settings = EnvironmentSettings {
+                source,
+                referrer: None,
+                rotate_degrees: 0.0,
+                scale,
+                exposure,
+                up,
+            };
+            settings.factor()
         };
         assert_eq!(factor(0.5, -3.0), Ok(0.0625));
         assert_eq!(factor(0.0, 3.0), Ok(0.0));

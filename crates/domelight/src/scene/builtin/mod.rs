@@ -109,6 +109,7 @@ impl BuiltinScene {
     pub fn environment(self) -> EnvironmentSettings {
         EnvironmentSettings {
             source: EnvironmentSource::Builtin(self.probe().to_owned()),
+            referrer: None,
             rotate_degrees: self.probe_rotation(),
             scale: 1.0,
             exposure: 0.0,

@@ -102,8 +102,9 @@ pub struct LoadOptions {
     /// The folders that the scene's files may be in.
     pub reach: Reach,
     /// Whether to reject files that require an unknown extension (glTF), refer to an image or a material library that
-    /// cannot be read (glTF, OBJ), or have a vertex with a NaN or infinite position. Otherwise the rest is drawn,
-    /// with a warning.
+    /// cannot be read (glTF, OBJ), end within a solid (STL), have a vertex with a NaN or infinite position, or have
+    /// unusable texture coordinates, colors, cameras or keys of the requested animation (glTF). Otherwise the rest is
+    /// drawn, with a warning.
     pub strict: bool,
     /// The scene in a file with several scenes (glTF), by name or by number from 0.
     pub scene: Option<String>,

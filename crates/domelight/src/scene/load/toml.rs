@@ -477,10 +477,12 @@ impl Reader<'_> {
         table: EnvironmentTable,
         at: usize,
     ) -> Result<EnvironmentSettings, LoadError> {
+        let line = self.lines.of(at);
+        let referrer = format!("{}, line {line}, [environment]", self.path.display());
         let source = match (table.file, table.builtin) {
             (Some(file), None) => {
                 let file = relative(self.path, &file);
-                self.budget.refer(&file, &format!("{}, [environment],", self.path.display()))?;
+                self.budget.refer(&file, &format!("{referrer},"))?;
                 EnvironmentSource::File(file)
             }
             (None, Some(name)) => EnvironmentSource::Builtin(name),
@@ -499,6 +501,7 @@ impl Reader<'_> {
         }
         Ok(EnvironmentSettings {
             source,
+            referrer: Some(referrer),
             rotate_degrees: table.rotate,
             scale: table.scale,
             exposure: table.exposure,
