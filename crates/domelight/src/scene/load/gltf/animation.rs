@@ -2,45 +2,11 @@
 
 use std::collections::HashMap;
 
-use super::error::{Failure, GltfErrorKind};
+use super::error::{Failure, GltfErrorKind, KeyError};
 use super::json::{self, Interpolation};
 use super::source::Source;
 use crate::math::{Quat, Vec4, functions};
 use crate::scene::load::AnimationTime;
-
-/// Keys of an animation that have no value at any time.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum KeyError {
-    /// No keys.
-    #[error("there are no keys")]
-    Empty,
-    /// A time that is NaN or infinite, or before that of the last key.
-    #[error("key {key} is at {time} s, but times must be finite and must not decrease")]
-    Time {
-        /// The key, from 0.
-        key: usize,
-        /// Its time \[s\].
-        time: f32,
-    },
-    /// A number of values that does not fit the number of keys.
-    #[error("there are {values} values for {keys} keys, each of which needs {needed}")]
-    Count {
-        /// The number of values.
-        values: usize,
-        /// The number of keys.
-        keys: usize,
-        /// The number of values for each key, in words.
-        needed: &'static str,
-    },
-    /// A value that is NaN or infinite.
-    #[error("value {index} is not finite: {value}")]
-    Value {
-        /// The value, from 0.
-        index: usize,
-        /// Its first number that is not finite.
-        value: f32,
-    },
-}
 
 /// The animated properties of a node.
 #[derive(Clone, Debug, Default, PartialEq)]

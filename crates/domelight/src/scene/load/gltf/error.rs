@@ -1,9 +1,8 @@
 //! Errors in glTF files.
 
-use super::animation::KeyError;
-use super::geometry::VertexError;
 use super::ktx2::Ktx2Error;
 use super::meshopt::MeshoptError;
+use crate::math::{Vec2, Vec4};
 use crate::scene::TextureError;
 use crate::scene::load::LoadError;
 
@@ -225,6 +224,69 @@ pub enum GltfErrorKind {
         asked: String,
         /// The available names.
         known: Vec<String>,
+    },
+}
+
+/// Vertices that do not have what their material needs.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum VertexError {
+    /// A set of texture coordinates that a texture needs.
+    #[error("a texture of its material needs TEXCOORD_{set}, which it lacks")]
+    NoUvs {
+        /// The number of the set.
+        set: u32,
+    },
+    /// Texture coordinates that are NaN or infinite.
+    #[error("TEXCOORD_{set} of vertex {vertex} is not finite: {value}")]
+    Uv {
+        /// The number of the set.
+        set: u32,
+        /// The first such vertex.
+        vertex: usize,
+        /// Its coordinates.
+        value: Vec2,
+    },
+    /// A color that is NaN or infinite.
+    #[error("COLOR_0 of vertex {vertex} is not finite: {value}")]
+    Color {
+        /// The first such vertex.
+        vertex: usize,
+        /// Its color.
+        value: Vec4,
+    },
+}
+
+/// Keys of an animation that have no value at any time.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum KeyError {
+    /// No keys.
+    #[error("there are no keys")]
+    Empty,
+    /// A time that is NaN or infinite, or before that of the last key.
+    #[error("key {key} is at {time} s, but times must be finite and must not decrease")]
+    Time {
+        /// The key, from 0.
+        key: usize,
+        /// Its time \[s\].
+        time: f32,
+    },
+    /// A number of values that does not fit the number of keys.
+    #[error("there are {values} values for {keys} keys, each of which needs {needed}")]
+    Count {
+        /// The number of values.
+        values: usize,
+        /// The number of keys.
+        keys: usize,
+        /// The number of values for each key, in words.
+        needed: &'static str,
+    },
+    /// A value that is NaN or infinite.
+    #[error("value {index} is not finite: {value}")]
+    Value {
+        /// The value, from 0.
+        index: usize,
+        /// Its first number that is not finite.
+        value: f32,
     },
 }
 

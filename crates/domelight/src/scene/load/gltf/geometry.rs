@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::accessor::component_range;
 use super::draco::DracoMesh;
-use super::error::{Failure, GltfErrorKind};
+use super::error::{Failure, GltfErrorKind, VertexError};
 use super::json;
 use super::material::Slot;
 use super::source::Source;
-use crate::math::{Vec2, Vec4};
+use crate::math::Vec2;
 
 /// The vertices of a primitive; each attribute is empty or has one value per vertex.
 #[derive(Clone, Debug, Default)]
@@ -46,35 +46,6 @@ pub(super) struct Geometry {
 pub(super) struct Deformations {
     pub(super) targets: BTreeSet<usize>,
     pub(super) skin: bool,
-}
-
-/// Vertices that do not have what their material needs.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum VertexError {
-    /// A set of texture coordinates that a texture needs.
-    #[error("a texture of its material needs TEXCOORD_{set}, which it lacks")]
-    NoUvs {
-        /// The number of the set.
-        set: u32,
-    },
-    /// Texture coordinates that are NaN or infinite.
-    #[error("TEXCOORD_{set} of vertex {vertex} is not finite: {value}")]
-    Uv {
-        /// The number of the set.
-        set: u32,
-        /// The first such vertex.
-        vertex: usize,
-        /// Its coordinates.
-        value: Vec2,
-    },
-    /// A color that is NaN or infinite.
-    #[error("COLOR_0 of vertex {vertex} is not finite: {value}")]
-    Color {
-        /// The first such vertex.
-        vertex: usize,
-        /// Its color.
-        value: Vec4,
-    },
 }
 
 impl Geometry {

@@ -41,9 +41,7 @@ use std::collections::{HashMap, HashSet};
 use std::mem::discriminant;
 use std::path::Path;
 
-pub use animation::KeyError;
-pub use error::GltfErrorKind;
-pub use geometry::VertexError;
+pub use error::{GltfErrorKind, KeyError, VertexError};
 pub use ktx2::Ktx2Error;
 pub use meshopt::MeshoptError;
 
