@@ -243,8 +243,8 @@ fn noise_hides_no_sun_and_makes_none() {
     let (with_sun, without) = (noise(discs_on(sky, &[disc])), noise(discs_on(sky, &[])));
     let light = extract(&with_sun, SUN).unwrap().rig.lights[0];
     assert!(light.direction.angle_between(disc.center) < TEXEL);
-    assert_eq!(extract(&without, SUN).unwrap_err(), RigError::NoSun);
-    assert_eq!(extract(&without, lamps(9)).unwrap_err(), RigError::NoLamp);
+    assert_eq!(extract(&without, SUN).unwrap_err(), RigError::NoSun { min_share: 0.001 });
+    assert_eq!(extract(&without, lamps(9)).unwrap_err(), RigError::NoLamp { min_share: 0.001 });
 }
 
 #[test]
@@ -252,8 +252,8 @@ fn nothing_to_extract_is_an_error() {
     let constant = environment(RgbImage::filled(64, 32, Rgb::splat(0.7)));
     let black = environment(RgbImage::filled(64, 32, Rgb::BLACK));
     let lights = |n| ExtractionSettings { n_lights: Some(n), ..lamps(0) };
-    assert_eq!(extract(&constant, SUN).unwrap_err(), RigError::NoSun);
-    assert_eq!(extract(&constant, lamps(2)).unwrap_err(), RigError::NoLamp);
+    assert_eq!(extract(&constant, SUN).unwrap_err(), RigError::NoSun { min_share: 0.001 });
+    assert_eq!(extract(&constant, lamps(2)).unwrap_err(), RigError::NoLamp { min_share: 0.001 });
     assert_eq!(extract(&black, SUN).unwrap_err(), RigError::Black);
     assert_eq!(extract(&black, lights(3)).unwrap_err(), RigError::Black);
     assert_eq!(extract(&constant, lamps(0)).unwrap_err(), RigError::NoLights);

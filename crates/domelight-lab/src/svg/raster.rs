@@ -29,7 +29,7 @@ impl Document {
         let white = Rgb([u8::MAX; 3]);
         let mut canvas = Canvas(RgbImage::from_pixel(width as u32, height as u32, white));
         let clip = Rect::new(0.0, 0.0, width, height);
-        let view = View { scale, offset: (0.0, 0.0), clip };
+        let view = Viewport { scale, offset: (0.0, 0.0), clip };
         canvas.draw(&self.elements, &view).map_err(|error| Error::Failed(error.to_string()))?;
         let mut bytes = Vec::new();
         let encoder =
@@ -42,7 +42,7 @@ impl Document {
 
 /// The place of a drawing on a picture.
 #[derive(Clone, Copy)]
-struct View {
+struct Viewport {
     /// Pixels per unit of the sheet.
     scale: f64,
     /// The corner of the drawing, in units of the sheet.
@@ -51,7 +51,7 @@ struct View {
     clip: Rect,
 }
 
-impl View {
+impl Viewport {
     fn place(&self, (x, y): Point) -> Vector {
         let [low, high] = RANGE;
         let [x, y] = [x + self.offset.0, y + self.offset.1]
@@ -83,7 +83,7 @@ fn intersection(a: Rect, b: Rect) -> Rect {
 struct Canvas(RgbImage);
 
 impl Canvas {
-    fn draw(&mut self, elements: &[Element], view: &View) -> image::ImageResult<()> {
+    fn draw(&mut self, elements: &[Element], view: &Viewport) -> image::ImageResult<()> {
         for element in elements {
             match element {
                 Element::Shape(shape, style) => self.draw_shape(&outline(shape, view), style, view),
@@ -101,7 +101,7 @@ impl Canvas {
         Ok(())
     }
 
-    fn draw_shape(&mut self, path: &[Command], style: &Style, view: &View) {
+    fn draw_shape(&mut self, path: &[Command], style: &Style, view: &Viewport) {
         let opacity = style.opacity.unwrap_or(1.0);
         if let Some(color) = style.fill {
             self.paint(path, Fill::NonZero.into(), color, opacity, view);
@@ -114,7 +114,7 @@ impl Canvas {
         }
     }
 
-    fn draw_text(&mut self, at: Point, text: &str, style: &TextStyle, view: &View) {
+    fn draw_text(&mut self, at: Point, text: &str, style: &TextStyle, view: &Viewport) {
         let start = match style.anchor {
             Anchor::Start => 0.0,
             Anchor::Middle => -0.5 * font::text_width(text, 1.0),
@@ -138,7 +138,7 @@ impl Canvas {
         style: ZenoStyle,
         color: Color,
         opacity: f64,
-        view: &View,
+        view: &Viewport,
     ) {
         let bounds = zeno::bounds(path, style, None);
         if bounds.is_empty() {
@@ -172,7 +172,7 @@ impl Canvas {
     }
 
     /// Draws a picture over a rectangle of whole pixels.
-    fn draw_picture(&mut self, picture: &RgbaImage, place: Rect, pixels: Pixels, view: &View) {
+    fn draw_picture(&mut self, picture: &RgbaImage, place: Rect, pixels: Pixels, view: &Viewport) {
         let [x, y] = [place.x, place.y].map(f64::round);
         let [width, height] =
             [place.x + place.width - x, place.y + place.height - y].map(f64::round);
@@ -230,7 +230,7 @@ fn round(width: f64) -> Stroke<'static> {
 }
 
 /// The outline of a shape in pixels.
-fn outline(shape: &Shape, view: &View) -> Vec<Command> {
+fn outline(shape: &Shape, view: &Viewport) -> Vec<Command> {
     let mut path = Vec::new();
     match shape {
         Shape::Rect(r) => {
@@ -248,7 +248,7 @@ fn outline(shape: &Shape, view: &View) -> Vec<Command> {
     path
 }
 
-fn add_polyline(path: &mut Vec<Command>, points: impl IntoIterator<Item = Point>, view: &View) {
+fn add_polyline(path: &mut Vec<Command>, points: impl IntoIterator<Item = Point>, view: &Viewport) {
     for (i, point) in points.into_iter().enumerate() {
         let at = view.place(point);
         path.push(if i == 0 { Command::MoveTo(at) } else { Command::LineTo(at) });
