@@ -54,7 +54,7 @@ const one = (key: string, label: string, name: string, value: number, max: numbe
 export const STRATEGIES: Kind[] = [
   one("product", "product", "Max. rays", 8, 64),
   {
-    key: "mis", label: "multiple importance (MIS)",
+    key: "mis", label: "MIS",
     fields: [
       whole("Environment", 1, 128, 0), whole("BRDF", 1, 128, 0),
       choice("Weights", [["power", "power heuristic"], ["balance", "balance heuristic"]]),

@@ -96,7 +96,9 @@ export function plot(series: Series[], axes: Axes): string {
     out.push(`<text x="${X(t)}" y="${height - bottom + 17}" text-anchor="${anchor}">${escape(label)}</text>`);
   }
   const base = Y(axes.y.log ? ys[0] : Math.max(ys[0], Math.min(0, ys[1])));
-  for (const s of series) {
+  // Lines stay visible above areas.
+  const isArea = (s: Series) => s.as === "area" || s.as === "band";
+  for (const s of [...series.filter(isArea), ...series.filter((s) => !isArea(s))]) {
     const points = s.points.filter(([x, y]) => isFinite(x) && isFinite(y) && (!axes.y.log || y > 0) && (!axes.x.log || x > 0));
     if (!points.length) continue;
     if (s.as === "dots") out.push(...points.map((p) => `<circle class="${s.kind} fill" cx="${X(p[0]).toFixed(1)}" cy="${Y(p[1]).toFixed(1)}" r="${points.length > 200 ? 1.5 : 3}"/>`));

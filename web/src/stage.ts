@@ -71,6 +71,7 @@ export class Stage {
   }
 
   say(text: string) {
-    this.result.textContent = text;
+    // A number stays with its percent sign.
+    this.result.textContent = text.replaceAll(" %", "\u00a0%");
   }
 }
