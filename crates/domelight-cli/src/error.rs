@@ -1,44 +1,22 @@
 //! Errors of the program, and lines on standard error.
 
 use domelight::quote::terminal;
-use std::error::Error;
 use std::io::{self, IsTerminal, Write as _};
 
 /// Arguments that are valid but incompatible; exit code 2.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
 pub(crate) struct UsageError(pub(crate) String);
 
-impl std::fmt::Display for UsageError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl Error for UsageError {}
-
 /// The work was interrupted and its state saved, so that it can be run again; exit code 75, EX_TEMPFAIL of sysexits.h.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
 pub(crate) struct InterruptedAndSaved(pub(crate) String);
 
-impl std::fmt::Display for InterruptedAndSaved {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl Error for InterruptedAndSaved {}
-
 /// The work was interrupted before there was anything to keep; exit code 130.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
 pub(crate) struct InterruptedTooEarly(pub(crate) String);
-
-impl std::fmt::Display for InterruptedTooEarly {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl Error for InterruptedTooEarly {}
 
 /// Prints a line to standard error, with terminal control characters escaped. If standard error is closed or full, the line
 /// is lost and the work continues.

@@ -525,21 +525,13 @@ fn a_resumed_render_is_as_fast_as_its_own_rays() {
 #[test]
 fn pictures_without_light_and_with_bad_pixels_get_a_warning() {
     let folder = folder();
-    let dark = [
-        "render",
-        "sphere",
-        "--size",
-        "8x8",
-        "--spp",
-        "1",
-        "--env-rows",
-        "16",
-        "--env-scale",
-        "0",
-        "-o",
-        "x.pfm",
-    ];
-    ended(&domelight(&folder, &dark), 0, &["gives no light"]);
+    let render = |more: &[&'static str]| {
+        let output = domelight(&folder, &[&["render", "sphere"], &SMALL[..8], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        output
+    };
+    let dark = render(&["--env-scale", "0", "-o", "x.pfm"]);
+    ended(&dark, 0, &["gives no light"]);
     let nan = [&b"PF\n1 1\n-1.0\n"[..], &f32::NAN.to_le_bytes().repeat(3)].concat();
     fs::write(folder.path().join("nan.pfm"), nan).unwrap();
     ended(
@@ -547,25 +539,7 @@ fn pictures_without_light_and_with_bad_pixels_get_a_warning() {
         0,
         &["1 pixel is NaN or infinite"],
     );
-    let empty = [
-        "render",
-        "sphere",
-        "--size",
-        "8x8",
-        "--spp",
-        "1",
-        "--env-rows",
-        "16",
-        "--hide-env",
-        "--target",
-        "9,0,0",
-        "--origin",
-        "5,0,0",
-        "-o",
-        "e.exr",
-        "-q",
-    ];
-    ended(&domelight(&folder, &empty), 0, &[]);
+    render(&["--hide-env", "--target", "9,0,0", "--origin", "5,0,0", "-o", "e.exr"]);
     let output = domelight(&folder, &["diff", "e.exr", "e.exr", "--covered"]);
     ended(&output, 1, &["e.exr: its alpha is 0 everywhere"]);
 }
