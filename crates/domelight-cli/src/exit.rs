@@ -37,7 +37,7 @@ pub(crate) fn report_usage(mut error: clap::Error) -> ExitCode {
     suggest::add_to(&mut error);
     let text = error.to_string();
     if terminal::lines(&text) == text {
-        // In color. Help that cannot be written is lost, unless nobody reads it.
+        // In color. Help that cannot be written is a failure, unless its reader is gone.
         if error.print().is_err_and(|error| error.kind() != io::ErrorKind::BrokenPipe) {
             return ExitCode::FAILURE;
         }

@@ -39,11 +39,6 @@ pub(crate) enum PictureFormat {
 }
 
 impl PicturePath {
-    /// An OpenEXR file.
-    pub(crate) fn is_exr(&self) -> bool {
-        self.format == Some(PictureFormat::Exr)
-    }
-
     /// A PNG file.
     pub(crate) fn is_png(&self) -> bool {
         self.format == Some(PictureFormat::Png)

@@ -141,8 +141,9 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let points = || pilot_points(scene, camera, settings);
     let rejection = acceptance(spec, points, environment, settings.seed)?;
     let rotate = described.scene.environment.rotate();
-    let mut report = RenderReport::new(described, &rendering, stages, rejection, &outputs, stopped);
-    report.leave_out_of_speed(&render_run.earlier_counts());
+    let earlier = render_run.earlier_counts();
+    let mut report =
+        RenderReport::new(described, &rendering, &earlier, stages, rejection, &outputs, stopped);
     report.profile = progress.profile();
     report.denoised = denoised;
     if outputs.iter().any(PicturePath::is_png) {

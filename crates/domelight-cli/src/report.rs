@@ -102,16 +102,19 @@ fn listed(names: &[String]) -> String {
 }
 
 impl RenderReport {
+    /// The report of a run that continues the work of `earlier` ones, whose rays do not count as its speed.
     pub(crate) fn new(
         settings: Settings,
         rendering: &Rendering,
+        earlier: &Counts,
         seconds: Timings,
         rejection: Option<Acceptance>,
         outputs: &[PicturePath],
         stopped: Option<StopReason>,
     ) -> Self {
         let counts = rendering.counts;
-        let rays = (counts.camera_rays + counts.shadow_rays) as f64;
+        let n_rays = |counts: &Counts| counts.camera_rays + counts.shadow_rays;
+        let rays = n_rays(&counts).saturating_sub(n_rays(earlier)) as f64;
         Self {
             version: env!("CARGO_PKG_VERSION"),
             settings,
@@ -130,13 +133,6 @@ impl RenderReport {
             denoised: None,
             profile: None,
         }
-    }
-
-    /// Leaves rays of earlier runs out of the speed.
-    pub(crate) fn leave_out_of_speed(&mut self, earlier: &Counts) {
-        let rays = self.camera_rays + self.shadow_rays;
-        let rays = rays.saturating_sub(earlier.camera_rays + earlier.shadow_rays);
-        self.rays_per_second = rays as f64 / self.seconds.render.wall.max(1e-9);
     }
 
     pub(crate) fn print_json(&self) -> Result<()> {

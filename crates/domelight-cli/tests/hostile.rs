@@ -449,11 +449,13 @@ fn what_would_lose_light_without_a_word_is_refused_or_said() {
         ("ball.hdr", "angular", true),
         ("map.hdr", "lat-long-exr", false),
         ("map.exr", "lat-long-exr", true),
+        ("-", "lat-long-exr", true),
         ("map.pfm", "octahedral", true),
     ] {
         let output = domelight(&folder, &["probe", "in.hdr", "--to", mapping, "-o", file]);
         ended(&output, 0, &[]);
-        let hint = format!("{file}: read it with --mapping {mapping}");
+        let name = if file == "-" { "standard output" } else { file };
+        let hint = format!("{name}: read it with --mapping {mapping}");
         assert_eq!(stderr(&output).contains(&hint), !is_guessed, "{}", stderr(&output));
     }
 }

@@ -419,14 +419,7 @@ impl LightSettings {
             Ok(probe) => EnvironmentSource::Builtin(probe.name().to_owned()),
             Err(_) => EnvironmentSource::File(name.into()),
         };
-        let plain = |source| EnvironmentSettings {
-            source,
-            referrer: None,
-            rotate_degrees: 0.0,
-            scale: 1.0,
-            exposure: 0.0,
-            up: scene.up.unwrap_or_default(),
-        };
+        let plain = |source| EnvironmentSettings::new(source, scene.up.unwrap_or_default());
         let mut settings = match (&self.probe, &scene.environment) {
             // Another probe does not inherit the first one's adjustments.
             (Some(name), _) => plain(source(name)),

@@ -237,12 +237,8 @@ impl Job {
         let Self { scene, environment, settings, camera_settings, probe, .. } = self;
         let orientation = environment.orientation();
         let light = EnvironmentSettings {
-            source: EnvironmentSource::Builtin(probe.clone()),
-            referrer: None,
             rotate_degrees: orientation.rotation,
-            scale: 1.0,
-            exposure: 0.0,
-            up: orientation.up,
+            ..EnvironmentSettings::new(EnvironmentSource::Builtin(probe.clone()), orientation.up)
         };
         SceneReport {
             scene: scene.name.clone(),

@@ -492,13 +492,9 @@ impl Scene {
     ///     Rows of a built-in probe.
     #[pyo3(signature = (rows = 1024))]
     pub(crate) fn environment(&self, py: Python<'_>, rows: usize) -> PyResult<Environment> {
-        let sky = || EnvironmentSettings {
-            source: EnvironmentSource::Builtin("sky".to_owned()),
-            referrer: None,
-            rotate_degrees: 0.0,
-            scale: 1.0,
-            exposure: 0.0,
-            up: self.inner.up,
+        let sky = || {
+            let source = EnvironmentSource::Builtin("sky".to_owned());
+            EnvironmentSettings::new(source, self.inner.up)
         };
         let settings = self.inner.environment.clone().unwrap_or_else(sky);
         let (map, name) = match &settings.source {

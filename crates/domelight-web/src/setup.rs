@@ -252,12 +252,10 @@ impl Engine {
         let up = self.scene.as_ref().map_or(UpAxis::Y, |(_, loaded)| loaded.up);
         let orientation = Orientation { up, rotation: light.rotate };
         let settings = EnvironmentSettings {
-            source: EnvironmentSource::Builtin(light.probe),
-            referrer: None,
             rotate_degrees: light.rotate,
             scale: light.scale,
             exposure: light.exposure,
-            up,
+            ..EnvironmentSettings::new(EnvironmentSource::Builtin(light.probe), up)
         };
         let scale = settings.factor().map_err(error)?;
         let environment = Environment::new(image, orientation, scale).map_err(error)?;

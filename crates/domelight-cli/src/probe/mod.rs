@@ -149,9 +149,13 @@ fn convert(
     let converted = from_lat_long(map, mapping, size);
     output.write(&converted, tone, PictureFormat::Exr, Some(mapping))?;
     // Only OpenEXR states the mapping, and only of some.
-    let envmap = if output.is_exr() { mapping.envmap() } else { None };
+    let envmap = match output.format().unwrap_or(PictureFormat::Exr) {
+        PictureFormat::Exr => mapping.envmap(),
+        PictureFormat::Hdr | PictureFormat::Pfm => None,
+        PictureFormat::Png => return Ok(()),
+    };
     let guess = guess_mapping(&converted, envmap);
-    if guess != mapping && !output.is_png() && !quiet {
+    if guess != mapping && !quiet {
         status(&format!(
             "{output}: read it with --mapping {mapping} (of render: --env-mapping); otherwise it is taken for {guess}"
         ));

@@ -71,14 +71,9 @@ impl<'a> FigureContext<'a> {
             load_scene(&settings.scene, &FileSettings::default(), false, host)?;
         let is_builtin = BuiltinScene::from_str(&settings.scene).is_ok();
         if is_builtin || description.environment.is_none() {
-            description.environment = Some(EnvironmentSettings {
-                source: EnvironmentSource::Builtin(BuiltinProbe::Cathedral.name().to_owned()),
-                referrer: None,
-                rotate_degrees: 0.0,
-                scale: 1.0,
-                exposure: 0.0,
-                up: description.up.unwrap_or_default(),
-            });
+            let source = EnvironmentSource::Builtin(BuiltinProbe::Cathedral.name().to_owned());
+            let up = description.up.unwrap_or_default();
+            description.environment = Some(EnvironmentSettings::new(source, up));
         }
         let light = settings.environment.over(&description);
         let map = settings.environment.load(&light, host)?;

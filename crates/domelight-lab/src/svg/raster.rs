@@ -65,6 +65,15 @@ impl Viewport {
         Rect::new(x, y, f64::from(b.x) - x, f64::from(b.y) - y)
     }
 
+    /// The pixels that the visible part of a rectangle touches; `None` if there are none.
+    fn window(&self, r: Rect) -> Option<Window> {
+        let r = intersection(self.clip, r);
+        let [x, y] = [r.x, r.y].map(|start| start.floor() as u32);
+        let [right, bottom] = [r.x + r.width, r.y + r.height].map(|end| end.ceil() as u32);
+        let is_empty = r.width <= 0.0 || r.height <= 0.0;
+        (!is_empty).then(|| Window { x, y, width: right - x, height: bottom - y })
+    }
+
     /// The view of a group of elements.
     fn inside(&self, place: Rect, offset: Point) -> Self {
         let offset = (self.offset.0 + offset.0, self.offset.1 + offset.1);
@@ -146,10 +155,7 @@ impl Canvas {
         }
         let (min, max) = (bounds.min, bounds.max);
         let [x, y, width, height] = [min.x, min.y, max.x - min.x, max.y - min.y].map(f64::from);
-        let Some(window) = Window::around(intersection(view.clip, Rect::new(x, y, width, height)))
-        else {
-            return;
-        };
+        let Some(window) = view.window(Rect::new(x, y, width, height)) else { return };
         let (coverage, _) = Mask::new(path)
             .style(style)
             .size(window.width, window.height)
@@ -176,10 +182,7 @@ impl Canvas {
         let [x, y] = [place.x, place.y].map(f64::round);
         let [width, height] =
             [place.x + place.width - x, place.y + place.height - y].map(f64::round);
-        let Some(window) = Window::around(intersection(view.clip, Rect::new(x, y, width, height)))
-        else {
-            return;
-        };
+        let Some(window) = view.window(Rect::new(x, y, width, height)) else { return };
         let filter = match pixels {
             Pixels::Sharp => FilterType::Nearest,
             Pixels::Smooth => FilterType::CatmullRom,
@@ -203,16 +206,6 @@ struct Window {
     y: u32,
     width: u32,
     height: u32,
-}
-
-impl Window {
-    /// The pixels that a rectangle touches; `None` if there are none.
-    fn around(r: Rect) -> Option<Self> {
-        let [x, y] = [r.x, r.y].map(|start| start.floor() as u32);
-        let [right, bottom] = [r.x + r.width, r.y + r.height].map(|end| end.ceil() as u32);
-        let is_empty = r.width <= 0.0 || r.height <= 0.0;
-        (!is_empty).then(|| Self { x, y, width: right - x, height: bottom - y })
-    }
 }
 
 fn blend(pixel: &mut Rgb<u8>, color: [u8; 3], alpha: f32) {

@@ -88,6 +88,11 @@ pub struct EnvironmentSettings {
 }
 
 impl EnvironmentSettings {
+    /// The map as it is, not rotated, named by no scene file.
+    pub fn new(source: EnvironmentSource, up: UpAxis) -> Self {
+        Self { source, referrer: None, rotate_degrees: 0.0, scale: 1.0, exposure: 0.0, up }
+    }
+
     /// The factor on the radiance: scale · 2^exposure.
     ///
     /// # Errors
@@ -219,15 +224,7 @@ mod tests {
         let factor = |scale, exposure| {
             let source = EnvironmentSource::Builtin("sky".to_owned());
             let up = UpAxis::Y;
-            let settings = EnvironmentSettings {
-                source,
-                referrer: None,
-                rotate_degrees: 0.0,
-                scale,
-                exposure,
-                up,
-            };
-            settings.factor()
+            EnvironmentSettings { scale, exposure, ..EnvironmentSettings::new(source, up) }.factor()
         };
         assert_eq!(factor(0.5, -3.0), Ok(0.0625));
         assert_eq!(factor(0.0, 3.0), Ok(0.0));

@@ -107,14 +107,9 @@ impl BuiltinScene {
 
     /// The suitable probe, rotated for the scene.
     pub fn environment(self) -> EnvironmentSettings {
-        EnvironmentSettings {
-            source: EnvironmentSource::Builtin(self.probe().to_owned()),
-            referrer: None,
-            rotate_degrees: self.probe_rotation(),
-            scale: 1.0,
-            exposure: 0.0,
-            up: UpAxis::Y,
-        }
+        let source = EnvironmentSource::Builtin(self.probe().to_owned());
+        let rotate_degrees = self.probe_rotation();
+        EnvironmentSettings { rotate_degrees, ..EnvironmentSettings::new(source, UpAxis::Y) }
     }
 
     /// The description of the scene, with its camera or the view that frames it, and the suitable probe.
