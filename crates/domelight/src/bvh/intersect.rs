@@ -45,9 +45,10 @@ impl<S: Simd> Slabs<S> {
     }
 
     /// The distances where ray `i` enters the boxes (0 if it starts inside) and leaves them. If it misses a box, it
-    /// leaves before it enters.
+    /// leaves before it enters. `EXACT` products are for rays that
+    /// [`need_exact_products`](PreparedRays::need_exact_products).
     #[inline(always)]
-    pub(super) fn cross<const N: usize>(
+    pub(super) fn cross<const N: usize, const EXACT: bool>(
         &self,
         simd: S,
         rays: &PreparedRays<N>,
@@ -59,7 +60,7 @@ impl<S: Simd> Slabs<S> {
         let inverse = [one(inverse, 0), one(inverse, 1), one(inverse, 2)];
         let near = [one(near, 0), one(near, 1), one(near, 2)];
         let far = [one(far, 0), one(far, 1), one(far, 2)];
-        let [enter, leave] = if S::F32x8::FUSES || !rays.is_moderate {
+        let [enter, leave] = if S::F32x8::FUSES || EXACT {
             [distances_fused(self.near, inverse, near), distances_fused(self.far, inverse, far)]
         } else {
             [distances(self.near, inverse, near), distances(self.far, inverse, far)]
@@ -70,15 +71,30 @@ impl<S: Simd> Slabs<S> {
 
     /// The boxes that ray `i` crosses within [0, `limit`], and the distances where it enters them.
     #[inline(always)]
-    pub(super) fn cross_within<const N: usize>(
+    pub(super) fn cross_within<const N: usize, const EXACT: bool>(
         &self,
         simd: S,
         rays: &PreparedRays<N>,
         i: usize,
         limit: f32,
     ) -> (<S::F32x8 as SimdFloat>::Mask, S::F32x8) {
-        let [enter, leave] = self.cross(simd, rays, i);
+        let [enter, leave] = self.cross::<N, EXACT>(simd, rays, i);
         (enter.le(leave.min(simd.splat(limit))), enter)
+    }
+
+    /// The same for a single ray.
+    #[inline(always)]
+    pub(super) fn cross_within_one<const N: usize>(
+        &self,
+        simd: S,
+        ray: &PreparedRays<N>,
+        limit: f32,
+    ) -> (<S::F32x8 as SimdFloat>::Mask, S::F32x8) {
+        if ray.need_exact_products::<S>() {
+            self.cross_within::<N, true>(simd, ray, 0, limit)
+        } else {
+            self.cross_within::<N, false>(simd, ray, 0, limit)
+        }
     }
 }
 

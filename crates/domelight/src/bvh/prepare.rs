@@ -10,7 +10,7 @@ pub(super) struct PreparedRays<const N: usize> {
     /// One bit per axis: set if the rays enter through the upper plane.
     pub(super) octant: u32,
     /// Whether products of planes and inverse directions neither overflow nor lose digits to underflow.
-    pub(super) is_moderate: bool,
+    is_moderate: bool,
     /// The origins, by axis. Origins and directions are given; the rest is computed from them.
     origins: [[f32; N]; 3],
     directions: [[f32; N]; 3],
@@ -147,6 +147,12 @@ impl<const N: usize> PreparedRays<N> {
             store(shear, &mut self.shears[k], first);
         }
         [is_finite.bits(), is_moderate.bits()]
+    }
+
+    /// Whether the instruction set rounds products that must be exact for these rays.
+    #[inline(always)]
+    pub(super) fn need_exact_products<S: Simd>(&self) -> bool {
+        !S::F32x8::FUSES && !self.is_moderate
     }
 
     /// The axes x, y and z of the sheared space of ray `i`.

@@ -316,7 +316,7 @@ fn closest_hit<S: Simd>(
         } else {
             let node = &bvh.nodes[child.index()];
             let slabs = Slabs::load(simd, node, ray.octant);
-            let (crossed, enter) = slabs.cross_within(simd, ray, 0, limit);
+            let (crossed, enter) = slabs.cross_within_one(simd, ray, limit);
             let crossed = crossed.bits();
             if crossed.is_power_of_two() {
                 child = node.children[crossed.trailing_zeros() as usize % WIDTH];
@@ -351,7 +351,7 @@ fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRays<WIDTH>, limit: f32) -
         } else {
             let node = &bvh.nodes[child.index()];
             let slabs = Slabs::load(simd, node, ray.octant);
-            let (crossed, _) = slabs.cross_within(simd, ray, 0, limit);
+            let (crossed, _) = slabs.cross_within_one(simd, ray, limit);
             // Push the last and largest on top.
             for lane in set_bits(crossed.bits()) {
                 stack[len] = node.children[lane];
@@ -514,6 +514,67 @@ impl<S: Simd> Entering<S> {
     }
 }
 
+// Rays that need exact products are rare. Their loops are functions of their own, because their conversions would fill
+// the registers of the others.
+impl<S: Simd> Entering<S> {
+    /// The rays of `members` whose lines cross each child of a node. The node's planes stay in registers while one ray
+    /// after the other is tested against the eight boxes.
+    #[inline(always)]
+    fn of_node<const EXACT: bool>(
+        simd: S,
+        node: &Node,
+        rays: &PreparedRays<STREAM>,
+        members: u64,
+    ) -> Self {
+        let slabs = Slabs::load(simd, node, rays.octant);
+        let mut entering = Self::none(simd);
+        for i in set_bits(members) {
+            let [enter, leave] = slabs.cross::<STREAM, EXACT>(simd, rays, i);
+            entering.insert(i, enter.le(leave));
+        }
+        entering
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn of_node_exact(simd: S, node: &Node, rays: &PreparedRays<STREAM>, members: u64) -> Self {
+        Self::of_node::<true>(simd, node, rays, members)
+    }
+
+    /// The rays of `members` that cross each child of a node within their limits, and the distances where the last one
+    /// enters them.
+    #[inline(always)]
+    fn of_node_within<const EXACT: bool>(
+        simd: S,
+        node: &Node,
+        rays: &PreparedRays<STREAM>,
+        limits: &[f32; STREAM],
+        members: u64,
+    ) -> (Self, S::F32x8) {
+        let slabs = Slabs::load(simd, node, rays.octant);
+        let mut entering = Self::none(simd);
+        let mut enter = simd.splat(0.0);
+        for i in set_bits(members) {
+            let (crossed, entered) = slabs.cross_within::<STREAM, EXACT>(simd, rays, i, limits[i]);
+            entering.insert(i, crossed);
+            enter = entered;
+        }
+        (entering, enter)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn of_node_within_exact(
+        simd: S,
+        node: &Node,
+        rays: &PreparedRays<STREAM>,
+        limits: &[f32; STREAM],
+        members: u64,
+    ) -> (Self, S::F32x8) {
+        Self::of_node_within::<true>(simd, node, rays, limits, members)
+    }
+}
+
 /// The children to visit, each with the rays of the stream that enter it.
 struct StreamStack {
     children: [u32; STACK],
@@ -533,8 +594,7 @@ impl StreamStack {
         self.len += 1;
     }
 
-    /// Pushes the children of a node whose boxes any of `members`, rays of the stream as bits, crosses. The node's
-    /// planes stay in registers while one ray after the other is tested against the eight boxes.
+    /// Pushes the children of a node whose boxes any of `members`, rays of the stream as bits, crosses.
     #[inline(always)]
     fn push_crossed<S: Simd>(
         &mut self,
@@ -543,12 +603,11 @@ impl StreamStack {
         rays: &PreparedRays<STREAM>,
         members: u64,
     ) {
-        let slabs = Slabs::load(simd, node, rays.octant);
-        let mut entering = Entering::none(simd);
-        for i in set_bits(members) {
-            let [enter, leave] = slabs.cross(simd, rays, i);
-            entering.insert(i, enter.le(leave));
-        }
+        let entering = if rays.need_exact_products::<S>() {
+            Entering::of_node_exact(simd, node, rays, members)
+        } else {
+            Entering::of_node::<false>(simd, node, rays, members)
+        };
         self.push_entered(&node.children, entering);
     }
 
@@ -575,14 +634,11 @@ impl StreamStack {
         limits: &[f32; STREAM],
         members: u64,
     ) {
-        let slabs = Slabs::load(simd, node, rays.octant);
-        let mut entering = Entering::none(simd);
-        let mut enter = simd.splat(0.0);
-        for i in set_bits(members) {
-            let (crossed, entered) = slabs.cross_within(simd, rays, i, limits[i]);
-            entering.insert(i, crossed);
-            enter = entered;
-        }
+        let (entering, enter) = if rays.need_exact_products::<S>() {
+            Entering::of_node_within_exact(simd, node, rays, limits, members)
+        } else {
+            Entering::of_node_within::<false>(simd, node, rays, limits, members)
+        };
         let not_empty = entering.0.map(SimdBitSets::not_empty);
         let (halves, enter) = (entering.0.map(SimdBitSets::store), enter.store());
         let base = self.len;

@@ -1,12 +1,14 @@
 //! WebAssembly SIMD: a vector is two registers of four. The instructions are a property of the module, so there is no
 //! run-time check, and the intrinsics are safe.
+#![allow(unsafe_code)]
 
 use std::arch::wasm32::{
-    f32x4, f32x4_add, f32x4_convert_i32x4, f32x4_demote_f64x2_zero, f32x4_div, f32x4_eq,
+    f32x4_add, f32x4_convert_i32x4, f32x4_demote_f64x2_zero, f32x4_div, f32x4_eq,
     f32x4_extract_lane, f32x4_le, f32x4_lt, f32x4_mul, f32x4_pmax, f32x4_pmin, f32x4_splat,
     f32x4_sqrt, f32x4_sub, f64x2_mul, f64x2_promote_low_f32x4, f64x2_sub, i32x4, i32x4_add,
     i32x4_bitmask, i32x4_eq, i32x4_extract_lane, i32x4_lt, i32x4_min, i32x4_shl, i32x4_shuffle,
-    i32x4_splat, i32x4_trunc_sat_f32x4, u32x4_splat, v128, v128_and, v128_bitselect, v128_not,
+    i32x4_splat, i32x4_trunc_sat_f32x4, i64x2_shuffle, u8x16, u8x16_add, u8x16_splat, u8x16_sub,
+    u8x16_swizzle, u32x4, u32x4_splat, v128, v128_and, v128_bitselect, v128_load, v128_not,
     v128_or,
 };
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
@@ -45,6 +47,75 @@ fn lanes(a: v128, b: v128) -> [i32; LANES] {
     ]
 }
 
+/// Transposes four rows of four numbers.
+#[inline(always)]
+fn transpose([a, b, c, d]: [v128; 4]) -> [v128; 4] {
+    let [ab_low, cd_low] = [(a, b), (c, d)].map(|(x, y)| i32x4_shuffle::<0, 4, 1, 5>(x, y));
+    let [ab_high, cd_high] = [(a, b), (c, d)].map(|(x, y)| i32x4_shuffle::<2, 6, 3, 7>(x, y));
+    [
+        i64x2_shuffle::<0, 2>(ab_low, cd_low),
+        i64x2_shuffle::<1, 3>(ab_low, cd_low),
+        i64x2_shuffle::<0, 2>(ab_high, cd_high),
+        i64x2_shuffle::<1, 3>(ab_high, cd_high),
+    ]
+}
+
+/// Moves lanes to the front.
+#[derive(Clone, Copy)]
+struct Compression {
+    /// For each register, the bytes of the kept lanes, in order; zeros follow.
+    low: v128,
+    high: v128,
+    /// The same, moved up by the number of lanes kept of the lower register, and what is moved out of that register.
+    up: v128,
+    down: v128,
+    count: usize,
+}
+
+impl Compression {
+    /// `keep` is a set of lanes.
+    #[inline(always)]
+    fn of(keep: u32) -> Self {
+        /// The bytes of the lanes in each set of four; 255 selects a zero.
+        const FRONT: [[u8; 16]; 16] = {
+            let mut table = [[255; 16]; 16];
+            let mut set = 0;
+            while set < 16 {
+                let (mut byte, mut len) = (0, 0);
+                while byte < 16 {
+                    if set >> (byte / 4) & 1 == 1 {
+                        table[set][len] = byte as u8;
+                        len += 1;
+                    }
+                    byte += 1;
+                }
+                set += 1;
+            }
+            table
+        };
+        let [low, high] = [keep & 15, keep >> 4 & 15].map(|set| bytes(&FRONT[set as usize]));
+        let shift = 4 * (keep & 15).count_ones() as u8;
+        let iota = u8x16(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+        // Indices below 0 wrap around, so they also select zeros.
+        let up = u8x16_sub(iota, u8x16_splat(shift));
+        let down = u8x16_add(iota, u8x16_splat(16 - shift));
+        Self { low, high, up, down, count: keep.count_ones() as usize }
+    }
+
+    #[inline(always)]
+    fn apply(self, [a, b]: [v128; 2]) -> [v128; 2] {
+        let (a, b) = (u8x16_swizzle(a, self.low), u8x16_swizzle(b, self.high));
+        [v128_or(a, u8x16_swizzle(b, self.up)), u8x16_swizzle(b, self.down)]
+    }
+}
+
+/// Loads sixteen bytes.
+#[inline(always)]
+fn bytes(x: &[u8; 16]) -> v128 {
+    // SAFETY: sixteen bytes are a register, and `v128_load` needs no alignment.
+    unsafe { v128_load(x.as_ptr().cast()) }
+}
+
 impl Simd for Simd128 {
     type F32x8 = F32x8;
     type I32x8 = I32x8;
@@ -57,7 +128,9 @@ impl Simd for Simd128 {
     }
     #[inline(always)]
     fn load(self, x: &Lanes) -> F32x8 {
-        F32x8(f32x4(x[0], x[1], x[2], x[3]), f32x4(x[4], x[5], x[6], x[7]))
+        let halves: *const v128 = x.as_ptr().cast();
+        // SAFETY: eight numbers are two registers of four, and `v128_load` needs no alignment.
+        unsafe { F32x8(v128_load(halves), v128_load(halves.add(1))) }
     }
     #[inline(always)]
     fn prefetch<T>(self, _: &T) {}
@@ -79,7 +152,15 @@ impl Simd for Simd128 {
     }
     #[inline(always)]
     fn transpose(self, rows: [&Lanes; LANES]) -> [F32x8; LANES] {
-        std::array::from_fn(|column| self.load(&rows.map(|row| row[column])))
+        let [a, b, c, d, e, f, g, h] = rows.map(|row| self.load(row));
+        let [upper_left, lower_left] =
+            [[a, b, c, d], [e, f, g, h]].map(|rows| transpose(rows.map(|row| row.0)));
+        let [upper_right, lower_right] =
+            [[a, b, c, d], [e, f, g, h]].map(|rows| transpose(rows.map(|row| row.1)));
+        std::array::from_fn(|i| match i {
+            0..4 => F32x8(upper_left[i], lower_left[i]),
+            _ => F32x8(upper_right[i - 4], lower_right[i - 4]),
+        })
     }
 }
 
@@ -231,7 +312,8 @@ impl SimdI32x8 for I32x8 {
     }
     #[inline(always)]
     fn compress(self, keep: Mask8) -> [i32; 8] {
-        super::compress(self.store(), keep.bits())
+        let [low, high] = Compression::of(keep.bits()).apply([self.0, self.1]);
+        lanes(low, high)
     }
     #[inline(always)]
     fn store(self) -> [i32; 8] {
@@ -260,8 +342,16 @@ impl SimdBitSets for BitSets8 {
         Mask8(is_set(self.0), is_set(self.1)).bits()
     }
     #[inline(always)]
-    fn pack(pair: [Self; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
-        super::pack(pair.map(Self::store), numbers)
+    fn pack([a, b]: [Self; 2], numbers: [u32; 8]) -> ([[u32; 8]; 2], [u32; 8], usize) {
+        let not_empty = Self(v128_or(a.0, b.0), v128_or(a.1, b.1)).not_empty();
+        let compression = Compression::of(not_empty);
+        let compressed = |x: Self| {
+            let [low, high] = compression.apply([x.0, x.1]);
+            Self(low, high).store()
+        };
+        let [n0, n1, n2, n3, n4, n5, n6, n7] = numbers;
+        let numbers = Self(u32x4(n0, n1, n2, n3), u32x4(n4, n5, n6, n7));
+        ([compressed(a), compressed(b)], compressed(numbers), compression.count)
     }
     #[inline(always)]
     fn store(self) -> [u32; 8] {
