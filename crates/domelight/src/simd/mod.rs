@@ -315,6 +315,12 @@ pub(crate) trait SimdBitSets: Copy {
     fn store(self) -> [u32; 8];
 }
 
+/// Lane `lane` of each row. The rows are not copied.
+#[inline(always)]
+pub(crate) fn lane_of<const N: usize>(rows: &[Lanes; N], lane: usize) -> [f32; N] {
+    rows.each_ref().map(|row| row[lane])
+}
+
 /// The set bits, from the lowest.
 #[inline(always)]
 pub(crate) fn set_bits(bits: impl Into<u64>) -> impl Iterator<Item = usize> {

@@ -11,7 +11,8 @@ use crate::environment::Environment;
 use crate::math::Vec3;
 use crate::sampling::Dimension;
 use crate::simd::{
-    Colors, LANES, LaneMask as _, Lanes, Simd, SimdF32x8 as _, SimdFloat as _, Vectors, set_bits,
+    Colors, LANES, LaneMask as _, Lanes, Simd, SimdF32x8 as _, SimdFloat as _, Vectors, lane_of,
+    set_bits,
 };
 
 /// The shading frames and random numbers of BRDF samples, one per lane.
@@ -62,7 +63,7 @@ impl BrdfSamples {
         }
         let mut wi = [[0.0; LANES]; 3];
         for lane in 0..self.n {
-            let (wo, u) = (Vec3::from(self.wo.map(|c| c[lane])), self.u.map(|u| u[lane]));
+            let (wo, u) = (Vec3::from(lane_of(&self.wo, lane)), lane_of(&self.u, lane));
             let bsdf = hits.bsdf(self.hits[lane]);
             let of_lane = Vec3::from(bsdf.sample_lanes(wo.into(), self.u_lobe[lane], u));
             (0..3).for_each(|c| wi[c][lane] = of_lane[c]);
@@ -83,7 +84,7 @@ impl BrdfSamples {
         }
         let (mut f, mut pdf, wi) = ([[0.0; LANES]; 3], [0.0; LANES], wi.store());
         for lane in 0..self.n {
-            let [wo, wi] = [self.wo, wi].map(|v| Vec3::from(v.map(|c| c[lane])));
+            let [wo, wi] = [&self.wo, &wi].map(|v| Vec3::from(lane_of(v, lane)));
             let (value, density) = hits.bsdf(self.hits[lane]).eval_pdf(wo, wi);
             (f[0][lane], f[1][lane], f[2][lane]) = (value.r, value.g, value.b);
             pdf[lane] = density;
@@ -185,9 +186,9 @@ impl BrdfSampleBatch {
     ) {
         let BesideStrata { environment, cells, table, strata, n_brdf } = *beside;
         let mut found = LightLookup::default();
-        let at = |lane: usize| Vec3::from(self.wi.map(|c| c[lane]));
+        let at = |lane: usize| Vec3::from(lane_of(&self.wi, lane));
         for lane in set_bits(self.possible) {
-            let texel = self.texels.map(|i| i[lane] as usize);
+            let texel = self.texels.each_ref().map(|i| i[lane] as usize);
             let Some(cell) = cells.at_texel(environment, texel, at(lane)) else {
                 continue;
             };
@@ -204,7 +205,7 @@ impl BrdfSampleBatch {
         for lane in set_bits(found.lanes) {
             candidates.push(Candidate {
                 wi: at(lane),
-                value: Rgb::from(value.map(|c| c[lane])),
+                value: Rgb::from(lane_of(&value, lane)),
                 luminance: luminance[lane],
                 slot: found.slots[lane] as u32,
                 hit: self.hits[lane] as u32,

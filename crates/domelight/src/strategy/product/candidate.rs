@@ -2,7 +2,7 @@
 
 use crate::Rgb;
 use crate::math::Vec3;
-use crate::simd::{LANES, Lanes};
+use crate::simd::{LANES, Lanes, lane_of};
 
 /// A direction that may become a shadow ray.
 #[derive(Clone, Copy, Debug)]
@@ -40,8 +40,8 @@ impl CandidateBlock {
     #[inline(always)]
     pub(super) fn get(&self, lane: usize, hit: u32) -> Candidate {
         Candidate {
-            wi: Vec3::from(self.wi.map(|c| c[lane])),
-            value: Rgb::from(self.value.map(|c| c[lane])),
+            wi: Vec3::from(lane_of(&self.wi, lane)),
+            value: Rgb::from(lane_of(&self.value, lane)),
             luminance: self.luminance[lane],
             slot: self.slots[lane] as u32,
             hit,

@@ -113,38 +113,46 @@ impl ControlVariate {
         pool: &LightSamplePool,
         visible: &CellArray,
     ) -> Integral {
+        // One channel after the other, whose sums stay in registers.
+        let [r, g, b] = pool.moments.each_ref();
+        let [(dr, r), (dg, g), (db, b)] = [
+            self.integral_of_channel(simd, cells, r, visible),
+            self.integral_of_channel(simd, cells, g, visible),
+            self.integral_of_channel(simd, cells, b, visible),
+        ];
+        let gloss = Rgb::new(r, g, b) * self.tint.unwrap_or(Rgb::BLACK);
+        Integral { diffuse: [dr, dg, db], gloss }
+    }
+
+    #[inline(always)]
+    fn integral_of_channel<S: Simd>(
+        &self,
+        simd: S,
+        cells: &Cells,
+        [m, mx, my, mz]: &[CellArray; 4],
+        visible: &CellArray,
+    ) -> (Vec3, f32) {
         let zero = simd.splat_f32x16(0.0);
-        let (mut diffuse, mut gloss) = ([[zero; 3]; 3], [zero; 3]);
+        let [mut dx, mut dy, mut dz] = [zero; 3];
         for pair in cells.pairs() {
-            let seen = visible.pair(simd, pair);
-            let above = seen * self.above.pair(simd, pair);
-            for (sums, [_, vector @ ..]) in diffuse.iter_mut().zip(pool.moments.iter()) {
-                for (sum, moment) in sums.iter_mut().zip(vector) {
-                    *sum = *sum + above * moment.pair(simd, pair);
-                }
-            }
-            if self.tint.is_some() {
-                let a = self.gloss[0].pair(simd, pair) * seen;
-                let x = self.gloss[1].pair(simd, pair) * seen;
-                let y = self.gloss[2].pair(simd, pair) * seen;
-                let z = self.gloss[3].pair(simd, pair) * seen;
-                for (sum, [m, mx, my, mz]) in gloss.iter_mut().zip(pool.moments.iter()) {
-                    let constant = a * m.pair(simd, pair);
-                    let linear =
-                        x * mx.pair(simd, pair) + y * my.pair(simd, pair) + z * mz.pair(simd, pair);
-                    *sum = *sum + (constant + linear);
-                }
+            let above = visible.pair(simd, pair) * self.above.pair(simd, pair);
+            dx = dx + above * mx.pair(simd, pair);
+            dy = dy + above * my.pair(simd, pair);
+            dz = dz + above * mz.pair(simd, pair);
+        }
+        let mut gloss = zero;
+        if self.tint.is_some() {
+            let [a, x, y, z] = &self.gloss;
+            for pair in cells.pairs() {
+                let seen = visible.pair(simd, pair);
+                let constant = a.pair(simd, pair) * seen * m.pair(simd, pair);
+                let linear = x.pair(simd, pair) * seen * mx.pair(simd, pair)
+                    + y.pair(simd, pair) * seen * my.pair(simd, pair)
+                    + z.pair(simd, pair) * seen * mz.pair(simd, pair);
+                gloss = gloss + (constant + linear);
             }
         }
-        let [[rx, ry, rz], [gx, gy, gz], [bx, by, bz]] = diffuse;
-        let diffuse = [
-            Vec3::new(rx.sum(), ry.sum(), rz.sum()),
-            Vec3::new(gx.sum(), gy.sum(), gz.sum()),
-            Vec3::new(bx.sum(), by.sum(), bz.sum()),
-        ];
-        let [r, g, b] = gloss;
-        let gloss = Rgb::new(r.sum(), g.sum(), b.sum()) * self.tint.unwrap_or(Rgb::BLACK);
-        Integral { diffuse, gloss }
+        (Vec3::new(dx.sum(), dy.sum(), dz.sum()), gloss.sum())
     }
 
     /// h toward `wi` in the cells in `slots`, at a hit with diffuse albedo `diffuse` and these cosines.
