@@ -1,6 +1,6 @@
 // Shared by all panels: the engines, the state, and the loaded scene and light.
 
-import { $, latest } from "./dom";
+import { $, h, latest } from "./dom";
 import type { Camera, Engines, Host } from "./engines";
 import { DEFAULT, SCENES, fileName, fromHash, isBuiltinProbe, toHash, type State } from "./state";
 
@@ -59,6 +59,7 @@ export class App {
     addEventListener("hashchange", () => {
       if (location.hash.replace(/^#/, "") === toHash(this.state)) return;
       this.state = fromHash(location.hash);
+      this.forgetError();
       this.emit("all");
       this.load();
     });
@@ -75,7 +76,11 @@ export class App {
   /** Changes the state, and reloads scene and light if necessary. */
   set(change: Partial<State>, what: Change = "render") {
     Object.assign(this.state, change);
-    this.keepInAddress();
+    this.forgetError();
+    // The browser's Back leads to the last panel or step.
+    const hash = `#${toHash(this.state)}`;
+    if (("panel" in change || "step" in change) && hash !== location.hash) history.pushState(null, "", hash);
+    else this.keepInAddress();
     if (["scene", "material", "ground", "env", "rows", "rotate", "ev", "scale"].some((key) => key in change)) this.load();
     else this.emit(what);
   }
@@ -119,10 +124,16 @@ export class App {
     } catch (error) {
       await this.goBack();
       this.tell((error as Error).message, true);
+      // A link with a bad material shows the scene's own.
+      if (!this.good && this.state.material) {
+        this.state.material = "";
+        this.load();
+      }
       return;
     }
     this.good = { state: { ...this.state }, files: this.files, drops: this.drops, loaded: { ...this.loaded } };
     this.tellMissing();
+    this.tellWarnings();
     this.emit(what);
   });
 
@@ -156,7 +167,6 @@ export class App {
       this.scene = (await all("loadScene", scene)) as SceneReport;
       this.loaded.scene = scene;
       what = "scene";
-      if (this.scene.warnings.length) this.tell(this.scene.warnings.join("; "));
       this.adopt(this.scene);
     }
     const { env } = this.keys();
@@ -164,7 +174,6 @@ export class App {
       this.probe = (await all("loadEnvironment", withTurn(env, rotate))) as ProbeReport;
       this.loaded = { ...this.loaded, env, rotate };
       if (what === "render") what = "light";
-      if (this.probe.warnings.length) this.tell(this.probe.warnings.join("; "));
     }
     return what;
   }
@@ -180,6 +189,13 @@ export class App {
     this.adopts = false;
   }
 
+  /** Shows what was repaired or left out of the scene and the light. */
+  private tellWarnings() {
+    const warnings = [...this.scene?.warnings ?? [], ...this.probe?.warnings ?? []];
+    $("warnings").hidden = !warnings.length;
+    $("warnings").replaceChildren(...warnings.map((warning) => h("li", {}, warning)));
+  }
+
   /** Shows which files a link needs. */
   private tellMissing() {
     const names = Object.values(this.missing).filter(Boolean).map(fileName);
@@ -192,7 +208,13 @@ export class App {
   private async goBack() {
     const { good, state } = this;
     this.adopts = false;
-    if (!good || (good.drops === this.drops && good.state.scene === state.scene && good.state.env === state.env)) return;
+    if (!good) return;
+    if (good.drops === this.drops && good.state.scene === state.scene && good.state.env === state.env) {
+      // Only the material fails. Its text stays in the field, to be corrected.
+      Object.assign(state, { material: good.state.material });
+      this.keepInAddress();
+      return;
+    }
     const { scene, material, camera, pixel, env, rotate, ev, scale, exposure } = good.state;
     Object.assign(state, { scene, material, camera, pixel, env, rotate, ev, scale, exposure });
     this.files = good.files;
@@ -208,6 +230,16 @@ export class App {
     const status = $("status");
     status.textContent = text;
     status.classList.toggle("error", isError);
+  }
+
+  /** Tells the progress of a render, which does not replace an error. */
+  progress(text: string) {
+    if (!$("status").classList.contains("error")) this.tell(text);
+  }
+
+  /** The next progress replaces an error. */
+  private forgetError() {
+    $("status").classList.remove("error");
   }
 
   /** An engine for a reference, with the loaded scene and light. */

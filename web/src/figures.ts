@@ -86,18 +86,19 @@ const estimator: Figure = (stage) => {
   });
 };
 
-/** A polar plot of densities [1/sr] over the angle from the normal, −90° to 90°. */
-function polar(series: Series[], directions: [number, string][]): string {
+/** A polar plot of densities [1/sr] over the angle from the normal, −90° to 90°, with a direction on the left and one on
+ *  the right. */
+function polar(series: Series[], directions: [[number, string], [number, string]]): string {
   const width = figureWidth(), x0 = width / 2, radius = Math.min(240, x0 - 40), y0 = radius + 44, height = y0 + 28;
   const most = Math.max(...series.flatMap((s) => s.points.map((p) => p[1])), 1e-9);
   const at = (theta: number, r: number) => `${(x0 + radius * r * Math.sin(theta)).toFixed(1)},${(y0 - radius * r * Math.cos(theta)).toFixed(1)}`;
-  const label = (theta: number, r: number, text: string, kind = "name") => {
+  const label = (theta: number, r: number, text: string, side: number) => {
     const [x, y] = at(theta, r).split(",");
-    return `<text${kind && ` class="${kind}"`} x="${x}" y="${Number(y) + 4}" text-anchor="${theta < -0.3 ? "end" : theta > 0.3 ? "start" : "middle"}">${text}</text>`;
+    return `<text class="name" x="${Number(x) + 4 * side}" y="${Number(y) + 4}" text-anchor="${side < 0 ? "end" : "start"}">${text}</text>`;
   };
   const rings = [0.5, 1].map((r) => `<path class="grid" fill="none" d="M${at(-Math.PI / 2, r)}A${radius * r} ${radius * r} 0 0 1 ${at(Math.PI / 2, r)}"/><text x="${x0 + radius * r}" y="${y0 + 16}" text-anchor="middle">${short(r * most)}${r === 1 ? " per sr" : ""}</text>`);
   const curves = series.map((s) => `<path class="${s.kind} line" d="M${s.points.map(([t, r]) => at(t, r / most)).join("L")}"/>`);
-  const arrows = directions.map(([theta, name]) => `<path class="axis" d="M${x0} ${y0}L${at(theta, 1)}"/>${label(theta, 1.04, name)}`);
+  const arrows = directions.map(([theta, name], i) => `<path class="axis" d="M${x0} ${y0}L${at(theta, 1)}"/>${label(theta, 1.04, name, 2 * i - 1)}`);
   const legend = series.map((s, i) => `<path class="${s.kind} line" d="M8 ${14 + 18 * i}h16"/><text class="name" x="30" y="${18 + 18 * i}">${s.name}</text>`);
   return `<svg viewBox="0 0 ${width} ${height}" aria-hidden="true">${rings.join("")}<path class="axis" d="M20 ${y0}H${width - 20}"/>${arrows.join("")}${curves.join("")}${legend.join("")}</svg>`;
 }
@@ -176,7 +177,7 @@ const ward: Figure = (stage) => {
     }
     const mark = (name: string, side: number) => {
       const [x, y] = fromAbove([side * Math.sin(theta), 0, Math.cos(theta)], view);
-      return `<circle class="axis" cx="${x}" cy="${y}" r="5"/><text class="name halo" x="${x}" y="${y + 20}" text-anchor="middle">${name}</text>`;
+      return `<circle class="axis" cx="${x}" cy="${y}" r="5"/><text class="name halo" x="${x + 9 * side}" y="${y + 4}" text-anchor="${side < 0 ? "end" : "start"}">${name}</text>`;
     };
     stage.svg(`<svg viewBox="0 0 ${2 * view[0]} ${view[1] + 158}" aria-hidden="true">${rings(view)}<path class="first dots" d="${dots.join("")}"/>${mark("viewer", -1)}${mark("mirror", 1)}</svg>`,
       "Directions sampled from Ward’s lobe, seen from above");
@@ -257,8 +258,12 @@ const rowsAndColumns: Figure = (stage) => {
     const width = 128, height = width / 2, y = chosen();
     const { rows, columns } = JSON.parse(await stage.app.engines.call("rowProbabilities", width, y, weighted() === "solid-angle")) as { rows: number[]; columns: number[] };
     const points = (values: number[]) => values.map((p, i): Point => [i, p]);
-    stage.svg(plot([{ name: "p(y)", kind: "first", points: points(rows), as: "bars" }, { name: "", kind: "second", points: [[y, rows[y]]], as: "dots" }],
-      { x: { name: "row y, from the top", range: [-1, height] }, y: { name: "probability of a row", range: [0, Math.max(...rows)] }, height: 170 })
+    // A row with a sun would flatten all others, so its bar is cut.
+    const most = Math.max(...rows), others = [...rows].sort((a, b) => a - b)[Math.floor(0.95 * height)];
+    const top = most > 4 * others ? 2 * others : most;
+    const cut = top < most ? `, cut at row ${rows.indexOf(most)}: ${short(most)}` : "";
+    stage.svg(plot([{ name: `p(y)${cut}`, kind: "first", points: points(rows), as: "bars" }, { name: "", kind: "second", points: [[y, rows[y]]], as: "dots" }],
+      { x: { name: "row y, from the top", range: [-1, height] }, y: { name: "probability of a row", range: [0, top] }, height: 170 })
       + plot([{ name: `p(x | y = ${y})`, kind: "second", points: points(columns), as: "bars" }],
         { x: { name: "column x", range: [-1, width] }, y: { name: "probability of a column", range: [0, Math.max(...columns)] }, height: 170 }), "Probabilities of the rows, and of the columns in the chosen row");
     const poles = [...rows.slice(0, 4), ...rows.slice(-4)].reduce((a, b) => a + b, 0);
@@ -337,11 +342,11 @@ const product: Figure = (stage) => {
   stage.draw(() => {
     const lobe = (x: number) => gauss(x, center(), width());
     const f = (x: number) => light(x) * lobe(x), total = integral(f, 4000), p = (x: number) => f(x) / total;
-    const visible = integral((x) => (x < hidden() ? p(x) : 0), 4000), hiddenShare = 1 - visible, exact = visible * total;
+    const visible = Math.min(integral((x) => (x < hidden() ? p(x) : 0), 4000), 1), exact = visible * total;
     const q = normalized(light), r = normalized(lobe);
     const relative = (d: (x: number) => number) => {
       const second = integral((x) => (x < hidden() && d(x) > 0 ? f(x) ** 2 / d(x) : 0), 4000);
-      return exact > 0 ? short(Math.sqrt(Math.max(second / exact ** 2 - 1, 0))) : "–";
+      return short(Math.sqrt(Math.max(second - exact ** 2, 0)) / total);
     };
     const top = (g: (x: number) => number) => Math.max(...line(400, g).map((s) => s[1]));
     stage.svg(plot([
@@ -349,7 +354,7 @@ const product: Figure = (stage) => {
       { name: "product", kind: "third", points: line(400, (x) => p(x) / top(p)), as: "area" },
       { name: "occluded", kind: "shade", points: [[hidden(), 0], [1, 0]], as: "band" },
     ], { x: { name: "direction", range: [0, 1] }, y: { name: "relative to the maximum", range: [0, 1.05] } }), "Light, lobe and their product");
-    stage.say(`${short(100 * visible)} % of the product is unoccluded. Relative standard deviation of one sample: light ${relative(q)}, lobe ${relative(r)}, product ${visible > 0 ? short(hiddenShare > 1e-9 ? Math.sqrt(hiddenShare / visible) : 0) : "–"}.`);
+    stage.say(`${short(100 * visible)} % of the product is unoccluded. Standard deviation of one sample, relative to the unoccluded radiance: light ${relative(q)}, lobe ${relative(r)}, product ${short(Math.sqrt(visible * (visible < 1 - 1e-9 ? 1 - visible : 0)))}.`);
   });
 };
 
@@ -404,7 +409,7 @@ const WAYS = [
   { name: "environment", counts: "100", strategy: "environment:100", few: "environment:4" },
   { name: "reflectance", counts: "75", strategy: "brdf:75", few: "brdf:4" },
   { name: "both", counts: "50 : 38", strategy: "mis:50:38", few: "mis:2:2" },
-  { name: "resampling", counts: "15/800", strategy: "sir:15/800", few: "sir:15/800" },
+  { name: "resampling", counts: "15/800", strategy: "sir:15/800", few: "sir:1/53" },
 ];
 /** The settings of the reference picture. */
 const TRUTH = { strategy: "product:16", spp: 32 };
@@ -444,7 +449,8 @@ const fourWays: Figure = (stage) => {
       if (message.kind === "failed") reject(new Error(message.error));
       if (message.kind !== "update") return;
       film.put(message.windows, message.pixels);
-      if (message.complete || performance.now() >= end) resolve({ film, statistics: message.statistics });
+      // Every pixel has at least one sample.
+      if (message.complete || (performance.now() >= end && message.statistics.samples >= 1)) resolve({ film, statistics: message.statistics });
     };
     host.send({ kind: "render", token: mine, settings: JSON.stringify({ width: size, height: size, spp, strategy, seed: mine, hideEnvironment: true, camera: null, shard: [0, 1] }) });
   });
@@ -470,12 +476,16 @@ const fourWays: Figure = (stage) => {
   });
 };
 
+/** The lower end of the error axis. */
+const LEAST_ERROR = 1e-5;
+
 const biasAndVariance: Figure = (stage) => {
   const edge = stage.slider("Shadow edge", 0.1, 0.9, 0.005, 0.4);
   stage.draw(() => {
     const f = (x: number) => (x < edge() ? 1 : 0), random = generator(9);
     const counts = Array.from({ length: 40 }, (_, k) => Math.round(2 ** (1 + k / 4.5))).filter((c, k, all) => c !== all[k - 1]);
-    const fixed = counts.map((n): Point => [n, Math.abs(Array.from({ length: n }, (_, i) => f((i + 0.5) / n)).reduce((a: number, b) => a + b, 0) / n - edge())]);
+    // An error of 0, by luck, is drawn at the lower end of the axis.
+    const fixed = counts.map((n): Point => [n, Math.max(Math.abs(Array.from({ length: n }, (_, i) => f((i + 0.5) / n)).reduce((a: number, b) => a + b, 0) / n - edge()), LEAST_ERROR)]);
     const runs = 200;
     const noisy = counts.map((n): Point => {
       let squares = 0;
@@ -487,18 +497,27 @@ const biasAndVariance: Figure = (stage) => {
       return [n, Math.sqrt(squares / runs)];
     });
     stage.svg(plot([{ name: "random samples", kind: "first", points: noisy }, { name: "fixed lights", kind: "second", points: fixed }],
-      { x: { name: "number of samples or lights N", log: true, range: [2, 1000], ticks: [2, 10, 100, 1000] }, y: { name: "absolute error", log: true, range: [1e-5, 1] } }), "Error of random samples and fixed lights");
+      { x: { name: "number of samples or lights N", log: true, range: [2, 1000], ticks: [2, 10, 100, 1000] }, y: { name: "absolute error", log: true, range: [LEAST_ERROR, 1] } }), "Error of random samples and fixed lights");
     stage.say(`At N = ${counts.at(-1)} the noise is ${short(noisy.at(-1)![1])} and the bias ${short(fixed.at(-1)![1])}; at N = ${counts[8]} they are ${short(noisy[8][1])} and ${short(fixed[8][1])}.`);
   });
 };
+
+/** The lights within 2° of the brightest light, and their share of the energy. */
+function aroundBrightest(lights: { uv: Point; share: number }[]): { count: number; share: number } {
+  const direction = ([u, v]: Point): Vector => [Math.sin(Math.PI * v) * Math.cos(2 * Math.PI * u), Math.cos(Math.PI * v), Math.sin(Math.PI * v) * Math.sin(2 * Math.PI * u)];
+  const brightest = direction(lights.reduce((a, b) => (b.share > a.share ? b : a)).uv);
+  const near = lights.filter(({ uv }) => direction(uv).reduce((sum, c, k) => sum + c * brightest[k], 0) > Math.cos(Math.PI / 90));
+  return { count: near.length, share: near.reduce((sum, { share }) => sum + share, 0) };
+}
 
 const cuts = (method: string, other: string): Figure => (stage) => {
   const rounds = stage.slider("Lights", 0, 9, 1, 4, (k) => String(2 ** k));
   stage.draw(async () => {
     const { engines } = stage.app, n = 2 ** rounds(), width = 640;
-    const ask = async (name: string) => JSON.parse(await engines.call("lights", JSON.stringify({ method: name, refine: true, n, sun: false, lamps: 0 })));
+    const settings = (name: string) => JSON.stringify({ method: name, refine: true, n, sun: false, lamps: 0 });
+    const ask = async (name: string) => JSON.parse(await engines.call("lights", settings(name)));
     const beside = await ask(other), rig = await ask(method);
-    const regions = (await engines.call("regions", width)) as Uint32Array;
+    const regions = (await engines.call("regions", settings(method), width)) as Uint32Array;
     const rgb = (await engines.call("map", width / 2)) as Float32Array;
     const context = canvas(stage, width, width / 2, `The map in ${n} regions`);
     paintMap(context, rgb, width / 2);
@@ -515,8 +534,8 @@ const cuts = (method: string, other: string): Figure => (stage) => {
       context.strokeStyle = "#000";
       context.stroke();
     }
-    const percent = (x: number) => `${short(100 * x)} %`;
-    stage.say(`${n} light${n > 1 ? "s" : ""} of ${stage.app.envName}: the shading error is ${percent(rig.diffuse)} matte and ${percent(rig.glossy)} glossy; with ${other.replace("-", " ")}, ${percent(beside.diffuse)} and ${percent(beside.glossy)}.`);
+    const percent = (x: number) => `${short(100 * x)} %`, near = aroundBrightest(rig.lights);
+    stage.say(`${n} light${n > 1 ? "s" : ""} of ${stage.app.envName}, ${near.count} of them within 2° of the brightest, with ${percent(near.share)} of the light: the shading error is ${percent(rig.diffuse)} matte and ${percent(rig.glossy)} glossy; with ${other.replace("-", " ")}, ${percent(beside.diffuse)} and ${percent(beside.glossy)}.`);
   });
 };
 

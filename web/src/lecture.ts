@@ -3,11 +3,13 @@
 import type { App, Change } from "./app";
 import { $, h } from "./dom";
 import { FIGURES } from "./figures";
+import { onFigureWidth } from "./plot";
 import { Stage } from "./stage";
 import { STEPS } from "./steps";
 
 export class Lecture {
   private shown = -1;
+  private stage: Stage | null = null;
 
   constructor(private app: App) {
     $("steps").replaceChildren(...STEPS.map(({ title }, i) => {
@@ -17,9 +19,14 @@ export class Lecture {
     }));
     app.on((what) => this.changed(what));
     this.changed("all");
-    // Open all answers for printing.
+    onFigureWidth(() => this.stage?.redraw());
+    // Open all answers for printing, and close those that were closed before.
     const paper = matchMedia("print");
-    paper.addEventListener("change", () => document.querySelectorAll<HTMLDetailsElement>("#step details").forEach((details) => { details.open = paper.matches; }));
+    let opened: HTMLDetailsElement[] = [];
+    paper.addEventListener("change", () => {
+      if (paper.matches) opened = [...document.querySelectorAll<HTMLDetailsElement>("#step details:not([open])")];
+      for (const details of opened) details.open = paper.matches;
+    });
   }
 
   private changed(what: Change) {
@@ -47,15 +54,21 @@ export class Lecture {
     const move = (name: string, k: number) => {
       const button = h("button", { type: "button" }, name);
       button.disabled = k < 0 || k >= STEPS.length;
-      button.addEventListener("click", () => this.go(k));
+      button.addEventListener("click", () => {
+        this.go(k);
+        // The focus stays on the button of this name, as long as there are more steps.
+        const again = [...$("step").querySelectorAll<HTMLButtonElement>(".steps button")].find((other) => other.textContent === name);
+        (again?.disabled ? $("step").querySelector<HTMLElement>("h2") : again)?.focus({ preventScroll: true });
+      });
       return button;
     };
     $("step").replaceChildren(
-      h("h2", {}, title), ...text.map((paragraph) => h("p", {}, paragraph)), formulaBox, place,
+      h("h2", { tabindex: "-1" }, title), ...text.map((paragraph) => h("p", {}, paragraph)), formulaBox, place,
       h("div", { class: "question" }, h("p", {}, question), h("details", {}, h("summary", {}, "Answer"), h("p", {}, answer))),
       h("div", { class: "steps" }, move("← Previous", i - 1), move("Next →", i + 1)));
     // Figures need a map.
-    if (this.app.probe) FIGURES[i](new Stage(place, this.app, this.app.state.figure.split(";")));
+    this.stage = this.app.probe ? new Stage(place, this.app, this.app.state.figure.split(";")) : null;
+    if (this.stage) FIGURES[i](this.stage);
     document.documentElement.dataset.step = String(i + 1);
   }
 }

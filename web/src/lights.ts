@@ -1,9 +1,9 @@
 // The Lights panel: a probe as a rig, with its regions, its shading and its files.
 
 import type { App, Change } from "./app";
-import { $, h, latest, percentage, save, short, words } from "./dom";
+import { $, degrees, h, latest, percentage, save, short, words } from "./dom";
 import { Film, FilmView } from "./film";
-import { isBuiltinProbe, quoted } from "./state";
+import { fileWord, isBuiltinProbe, quoted } from "./state";
 
 const WIDTH = 768, SPHERE = 160;
 
@@ -143,15 +143,15 @@ export class LightsPanel {
     const { leave } = state;
     for (const id of ["n-lights", "fewer-lights", "more-lights", "play-lights"]) $<HTMLInputElement>(id).disabled = leave;
     if (leave) this.play(false);
-    const settings = { method: state.method, refine: state.refine, n: leave ? null : state.lights, sun: state.sun, lamps: state.lamps };
+    const settings = JSON.stringify({ method: state.method, refine: state.refine, n: leave ? null : state.lights, sun: state.sun, lamps: state.lamps });
     let rig: Rig, regions: Uint32Array, view, spheres: Float32Array;
     try {
-      rig = JSON.parse(await app.engines.call("lights", JSON.stringify(settings)));
-      regions = (await app.engines.call("regions", WIDTH)) as Uint32Array;
       view = await app.engines.call("mapView", "lat-long", 0, WIDTH);
-      spheres = (await app.engines.call("spheres", SPHERE, state.gloss)) as Float32Array;
+      rig = JSON.parse(await app.engines.call("lights", settings));
+      regions = (await app.engines.call("regions", settings, WIDTH)) as Uint32Array;
+      spheres = (await app.engines.call("spheres", settings, SPHERE, state.gloss)) as Float32Array;
     } catch (error) {
-      app.tell((error as Error).message, true);
+      this.clear((error as Error).message);
       return;
     }
     this.rig = rig;
@@ -159,7 +159,7 @@ export class LightsPanel {
     film.pixels = view.pixels;
     this.map.set({ exposure: film.exposure() });
     this.map.show(0, film);
-    const of = JSON.stringify({ ...settings, n: 0, env: state.env, rows: state.rows, rotate: state.rotate });
+    const of = JSON.stringify([state.method, state.refine, leave, state.sun, state.lamps, state.env, state.rows, state.rotate]);
     const divided = leave || isRefined(state.method, state.refine) || this.before?.of !== of || this.before.lights >= rig.lights.length ? new Set<number>() : splits(this.before.regions, regions);
     this.mark(regions, leave, divided);
     this.tellStep(divided, rig.lights.length);
@@ -173,12 +173,25 @@ export class LightsPanel {
       sphere.show(0, picture);
     }
     const lights = rig.lights.length;
-    $("rig-caption").textContent = `${lights} light${lights === 1 ? "" : "s"} of ${app.envName}${rig.residual ? `; the rest of the light stays on the map` : ""}. Shading error: matte ${percent(rig.diffuse)}, glossy ${percent(rig.glossy)}.`;
+    $("rig-caption").textContent = `${lights} light${lights === 1 ? "" : "s"} of ${app.envName}${rig.residual ? `; the rest of the light stays on the map` : ""}${state.rotate ? `. The map is drawn unrotated; lights are exported rotated by ${degrees(state.rotate)}` : ""}. Shading error: matte ${percent(rig.diffuse)}, glossy ${percent(rig.glossy)}.`;
     $("rig-table").querySelector("tbody")!.replaceChildren(...rig.lights.slice(0, 6).map((light) =>
       h("tr", {}, h("th", { scope: "row" }, light.name.replace("_", " ")), h("td", {}, percentage(light.share)), h("td", {}, `${light.radius.toFixed(1)}°`))));
-    this.offer(leave);
+    this.offer(settings);
     document.documentElement.dataset.rig = `${state.method}:${lights}`;
   });
+
+  /** Shows why there is no rig. */
+  private clear(reason: string) {
+    this.rig = this.before = null;
+    this.drawn = this.app.state.lights;
+    $<HTMLCanvasElement>("rig-marks").getContext("2d")!.clearRect(0, 0, WIDTH, WIDTH / 2);
+    for (const canvas of ["sphere-truth", "sphere-rig"]) $<HTMLCanvasElement>(canvas).getContext("2d")?.clearRect(0, 0, SPHERE, SPHERE);
+    for (const id of ["rig-step", "formats", "dome-files", "rig-command"]) $(id).replaceChildren();
+    $("rig-table").querySelector("tbody")!.replaceChildren();
+    $("rig-command").hidden = true;
+    $("rig-caption").textContent = `There are no lights: ${reason.replace(/\.$/, "")}.`;
+    document.documentElement.dataset.rig = "none";
+  }
 
   /** Describes the last step. */
   private tellStep(divided: Set<number>, lights: number) {
@@ -222,9 +235,9 @@ export class LightsPanel {
     }
   }
 
-  /** Shows buttons for all files, and the command that writes them. */
-  private offer(leave: boolean) {
-    const { app } = this, { state } = app, rig = this.rig!;
+  /** Shows buttons for all files of the rig of these settings, and the command that writes them. */
+  private offer(settings: string) {
+    const { app } = this, { state } = app, { leave } = state, rig = this.rig!;
     const button = (name: string, bytes: () => Promise<Uint8Array>, reader = "") => {
       const element = h("button", { type: "button" }, name, ...(reader ? [h("small", {}, reader)] : []));
       element.addEventListener("click", async () => {
@@ -238,11 +251,12 @@ export class LightsPanel {
       return element;
     };
     $("formats").replaceChildren(...rig.formats.map((format) =>
-      button(`rig.${format.extension}`, () => app.engines.call("rigFile", format.name, app.envName) as Promise<Uint8Array>, READERS[format.name])));
+      button(`rig.${format.extension}`, () => app.engines.call("rigFile", settings, format.name, app.envName) as Promise<Uint8Array>,
+        format.name === "sibl" && state.rotate ? `${READERS.sibl}, which has no rotation: turn it by ${degrees(state.rotate)}` : READERS[format.name])));
     const domes = [...new Set(rig.formats.flatMap((format) => format.dome ?? []))];
-    $("dome-files").replaceChildren(...domes.map((name) => button(name, () => app.engines.call("domeFile", name) as Promise<Uint8Array>)));
-    const command = ["domelight", "lights", state.env, ...(isBuiltinProbe(state.env) ? [`--env-rows=${state.rows}`] : []),
-      ...(state.rotate ? [`--env-rotate=${state.rotate}`] : []), ...(state.scale === 1 ? [] : [`--env-scale=${state.scale}`]), ...(state.ev ? [`--env-exposure=${state.ev}`] : []), ...(state.sun ? ["--sun"] : []),
+    $("dome-files").replaceChildren(...domes.map((name) => button(name, () => app.engines.call("domeFile", settings, name) as Promise<Uint8Array>)));
+    const command = ["domelight", "lights", fileWord(state.env), ...(isBuiltinProbe(state.env) ? [`--env-rows=${state.rows}`] : []),
+      ...(state.rotate ? [`--env-rotate=${state.rotate}`] : []), ...(state.scale === 1 ? [] : [`--env-scale=${state.scale}`]), ...(state.ev ? [`--env-exposure=${state.ev}`] : []), ...(state.sun ? ["--sun"] : []), ...(state.lamps ? [`--lamps=${state.lamps}`] : []),
       ...(leave ? ["--keep-residual", "dome.exr"] : ["-n", String(state.lights)]), "--method", state.method, "-o", "rig.json"];
     // The program refines.
     $("rig-command").hidden = state.method === "variance-minimization" && !state.refine;

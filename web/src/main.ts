@@ -134,6 +134,7 @@ function wireDrop(app: App) {
     try {
       const found = await dropped(event.dataTransfer);
       if (found.length) await app.open(found);
+      else if (event.dataTransfer.types.includes("Files")) app.tell("the dropped folder has no files", true);
     } catch (error) {
       app.tell(`the dropped files cannot be read: ${(error as Error).message}`, true);
     }

@@ -4,11 +4,8 @@ import type { App, Change } from "./app";
 import { $, degrees, fill, h, latest, short, stops } from "./dom";
 import { Film, FilmView } from "./film";
 import type { MapPicture } from "./protocol";
+import { MAPPINGS } from "./state";
 
-const MAPPINGS: [string, string][] = [
-  ["lat-long", "latitude and longitude"], ["angular", "angular, light probe"], ["mirror-ball", "mirror ball"],
-  ["octahedral", "octahedral"], ["cross-horizontal", "cube, horizontal cross"], ["cross-vertical", "cube, vertical cross"], ["strip-horizontal", "cube, strip"],
-];
 const WIDTH = 768, LAYER = 192;
 /** Layers of the engine's `importance`, in their order. */
 const IMPORTANCE = ["light", "reflectance", "visibility", "environment", "brdf", "mis", "target"];
@@ -97,6 +94,14 @@ export class MapPanel {
   }
 
   readonly draw = latest(async () => {
+    try {
+      await this.show();
+    } catch (error) {
+      this.app.tell((error as Error).message, true);
+    }
+  });
+
+  private async show() {
     const { app } = this, { state } = app;
     const { width, height, pixels } = await app.engines.call("mapView", state.mapping, state.rotate, WIDTH);
     const film = new Film(width, height);
@@ -116,8 +121,8 @@ export class MapPanel {
     if (this.sunOf !== key) {
       this.sunOf = key;
       try {
-        await app.engines.call("lights", JSON.stringify({ method: "median-cut", refine: true, n: null, sun: true, lamps: 0 }));
-        this.sun = circle((await app.engines.call("regions", WIDTH)) as Uint32Array);
+        const sun = JSON.stringify({ method: "median-cut", refine: true, n: null, sun: true, lamps: 0 });
+        this.sun = circle((await app.engines.call("regions", sun, WIDTH)) as Uint32Array);
       } catch {
         this.sun = null;
       }
@@ -127,7 +132,7 @@ export class MapPanel {
     $("map-caption").textContent = `${app.envName}, ${size[0]} × ${size[1]} texels, rotated by ${degrees(state.rotate)}; ${this.sun ? "the sun is outlined" : "no sun found"}.`;
     this.mark();
     document.documentElement.dataset.map = key;
-  });
+  }
 
   /** Requests the pixel's layers, samples and radiance. */
   private readonly ask = latest(async () => {

@@ -5,9 +5,9 @@ import { $, color, count, degrees, fill, save, short, signed, stops, words } fro
 import { materialEditor, strategyEditor } from "./editors";
 import type { Camera, Job, RenderSettings } from "./engines";
 import { Film, FilmView } from "./film";
-import { plot, slope, type Series } from "./plot";
+import { onFigureWidth, plot, slope, type Series } from "./plot";
 import { Reference } from "./reference";
-import { PROBES, SCENES, command, commandWords, toHash } from "./state";
+import { PROBES, SCENES, command, commandWords, fileName, toHash } from "./state";
 import { CURVES, CURVE_NAMES, type Curve } from "./tone";
 
 type Vec = [number, number, number];
@@ -22,6 +22,8 @@ const turned = (v: number[], axis: number[], angle: number): Vec =>
 
 /** The edge length of the preview while the camera moves [pixels]. */
 const PREVIEW = 128;
+/** The distances that zooming reaches [radii of the scene]. */
+const NEAREST = 1e-3, FARTHEST = 1e3;
 
 export class PicturePanel {
   private view: FilmView;
@@ -53,6 +55,7 @@ export class PicturePanel {
     this.wireCamera();
     this.wireDivider();
     this.fillControls();
+    onFigureWidth(() => { if (this.jobs.length) this.report(true); });
   }
 
   private changed(what: Change) {
@@ -115,7 +118,7 @@ export class PicturePanel {
     this.films = this.jobs.map(() => new Film(size, size));
     this.histories = [[], []];
     this.refer();
-    if (!preview) this.app.tell("Rendering …");
+    if (!preview) this.app.progress("Rendering …");
     $("viewer").toggleAttribute("data-busy", true);
   }
 
@@ -148,7 +151,7 @@ export class PicturePanel {
     this.report(job.complete);
     if (this.jobs.every((j) => j.complete)) {
       this.times.done = performance.now();
-      this.app.tell(`Done in ${((this.times.done - this.times.start) / 1000).toFixed(1)} s${this.app.engines.shortage}`);
+      this.app.progress(`Done in ${((this.times.done - this.times.start) / 1000).toFixed(1)} s${this.app.engines.shortage}`);
       $("viewer").toggleAttribute("data-busy", false);
       document.documentElement.dataset.complete = String(job.token);
     }
@@ -355,8 +358,10 @@ export class PicturePanel {
     const tilt = (point: number[]) => add(center, turned(sub(point, center), right, -limited));
     origin = tilt(origin);
     target = tilt(target);
-    origin = add(target, sub(origin, target), zoom);
-    const ortho = camera.ortho === null ? null : Math.fround(camera.ortho * zoom);
+    const zoomed = (size: number) => Math.min(Math.max(size * zoom, NEAREST * scene.radius), FARTHEST * scene.radius);
+    const distance = Math.hypot(...sub(origin, target));
+    origin = add(target, sub(origin, target), zoomed(distance) / distance);
+    const ortho = camera.ortho === null ? null : Math.fround(zoomed(camera.ortho));
     const rounded = (v: Vec) => v.map(Math.fround);
     this.app.state.camera = { origin: rounded(origin), target: rounded(target), up: rounded(turned(camera.up, up, yaw)), fov: camera.fov, ortho };
     this.app.set({ pixel: null }, "camera");
@@ -541,7 +546,7 @@ export class PicturePanel {
     const automatic = (await engines.call("automaticExposure", settings)) as number;
     await engines.gather(this.jobs[0]);
     if (kind === "png") return engines.call("png", state.exposure ?? automatic, state.curve) as Promise<Uint8Array>;
-    return engines.call("exr", JSON.stringify({ scene, environment: env, samples: spp, seed, exposure: automatic })) as Promise<Uint8Array>;
+    return engines.call("exr", JSON.stringify({ scene: fileName(scene), environment: fileName(env), samples: spp, seed, exposure: automatic })) as Promise<Uint8Array>;
   }
 
   private async save(kind: "exr" | "png") {

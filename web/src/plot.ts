@@ -70,6 +70,19 @@ function swatch({ kind, as }: Series, x: number, y: number): string {
 /** The width of a figure; text keeps its size on a phone. */
 export const figureWidth = () => Math.min(640, Math.max(320, document.documentElement.clientWidth - 32));
 
+/** Calls `redraw` when the window's size has changed the width of figures. */
+export function onFigureWidth(redraw: () => void) {
+  let drawn = figureWidth(), timer = 0;
+  addEventListener("resize", () => {
+    clearTimeout(timer);
+    timer = setTimeout(() => {
+      if (figureWidth() === drawn) return;
+      drawn = figureWidth();
+      redraw();
+    }, 100) as unknown as number;
+  });
+}
+
 /** An SVG plot of series. */
 export function plot(series: Series[], axes: Axes): string {
   const width = axes.width ?? figureWidth(), height = axes.height ?? 240;

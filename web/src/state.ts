@@ -1,6 +1,7 @@
 // The page's state, in the URL's hash and as the program's command line.
 
 import type { Camera } from "./engines";
+import { CURVES } from "./tone";
 
 export interface State {
   panel: string;
@@ -58,6 +59,19 @@ export const DEFAULT: State = {
   pixel: null, compared: "brdf:1 environment:1 mis:1:1 product:8", step: 1, figure: "",
 };
 
+/** The mappings of the map, and their names. */
+export const MAPPINGS: [string, string][] = [
+  ["lat-long", "latitude and longitude"], ["angular", "angular, light probe"], ["mirror-ball", "mirror ball"],
+  ["octahedral", "octahedral"], ["cross-horizontal", "cube, horizontal cross"], ["cross-vertical", "cube, vertical cross"], ["strip-horizontal", "cube, strip"],
+];
+
+/** The texts that the state may have where only a few are possible. */
+const CHOICES: Partial<Record<keyof State, readonly string[]>> = {
+  equal: ["rays", "time"], curve: CURVES, view: ["picture", "error"], mapping: MAPPINGS.map(([name]) => name),
+  layer: ["", "reflectance", "visibility", "target", "environment", "brdf", "mis", "product", "sir", "rejection", "own"],
+  method: ["median-cut", "variance-minimization"],
+};
+
 /** The differences to the defaults, as text after `#`. */
 export function toHash(state: State): string {
   const parts = new URLSearchParams();
@@ -76,7 +90,7 @@ export function fromHash(hash: string): State {
     if (!(key in DEFAULT)) continue;
     const fallback = DEFAULT[key as keyof State];
     if (typeof fallback === "string") {
-      state[key] = text;
+      if (CHOICES[key as keyof State]?.includes(text) ?? true) state[key] = text;
       continue;
     }
     try {
@@ -84,14 +98,16 @@ export function fromHash(hash: string): State {
       if (isOfKind(key, value, fallback)) state[key] = value;
     } catch { /* Not JSON: the default. */ }
   }
-  const clamp = (key: "size" | "spp" | "rows" | "lights" | "samples" | "gloss", most: number, least = 1) => {
+  const clamp = (key: "size" | "spp" | "seed" | "rows" | "lights" | "samples" | "lamps" | "gloss", most: number, least = 1) => {
     state[key] = Math.min(Math.max(least, Math.round(state[key] as number)), most);
   };
   clamp("size", 2048);
   clamp("spp", 1 << 16);
+  clamp("seed", Number.MAX_SAFE_INTEGER, 0);
   clamp("rows", 4096);
   clamp("lights", 4096);
   clamp("samples", 8, 0);
+  clamp("lamps", 4096, 0);
   clamp("gloss", 100, 0);
   if (!((state.scale as number) >= 0)) state.scale = 1;
   return state as unknown as State;
@@ -103,16 +119,20 @@ function isOfKind(key: string, value: unknown, fallback: unknown): boolean {
   if (key === "exposure") return Number.isFinite(value);
   if (key === "camera") {
     const camera = value as Camera | null;
-    return !!camera && numbers(camera.origin, 3) && numbers(camera.target, 3) && numbers(camera.up, 3);
+    return !!camera && numbers(camera.origin, 3) && numbers(camera.target, 3) && numbers(camera.up, 3)
+      && [camera.fov, camera.ortho].some(Number.isFinite);
   }
   return typeof value === typeof fallback && (typeof value !== "number" || Number.isFinite(value));
 }
 
 export const quoted = (word: string) => (/^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
 
+/** A file's name as a word of a command, where it must not look like an option. */
+export const fileWord = (name: string) => (name.startsWith("-") ? `./${name}` : name);
+
 /** The command that renders the same picture, word by word. */
 export function commandWords(state: State): string[] {
-  const words = ["domelight", "render", state.scene, "--env", state.env];
+  const words = ["domelight", "render", fileWord(state.scene), "--env", fileWord(state.env)];
   const option = (name: string, value: string) => words.push(`--${name}=${value}`);
   if (isBuiltinProbe(state.env)) option("env-rows", String(state.rows));
   if (state.rotate || state.scene === "statue") option("env-rotate", String(state.rotate));

@@ -49,7 +49,7 @@ export const STEPS: Step[] = [
       "The diffuse lobe is the power 1 about the normal. Phong’s lobe is the power n about the mirror direction, so sampled directions are rotated to that axis; directions below the surface count as zero.",
     ],
     formulas: [row(i("p"), par(i("θ"), o(","), i("φ")), eq, frac(row(i("n"), o("+"), n(1)), row(n(2), i("π"))), sup(i("cos"), i("n")), of, i("θ")), row(i("θ"), eq, i("arccos"), of, sup(par(n(1), o("−"), sub(i("u"), n(1))), frac(n(1), row(i("n"), o("+"), n(1))))), row(i("φ"), eq, n(2), i("π"), sub(i("u"), n(2)))],
-    question: "Why does the tallest curve lose the fewest samples?",
+    question: "Lower the exponent, then raise it. Why does the taller lobe lose fewer samples?",
     answer: "A density integrates to one, so a narrow lobe is tall. It also stays clear of the horizon, below which samples are lost, unless the viewer is at a grazing angle.",
   },
   {
@@ -90,7 +90,7 @@ export const STEPS: Step[] = [
     ],
     formulas: [row(i("p"), par(i("x"), o(","), i("y")), eq, i("p"), par(i("y")), i("p"), par(i("x"), o("|"), i("y"))), row(i("p"), par(i("y")), o("∝"), i("sin"), of, sub(i("θ"), i("y")), sum(i("x"), ""), sub(i("L"), row(i("x"), i("y"))))],
     question: "Leave sin θ out: which rows gain?",
-    answer: "The rows at the top and bottom. Under a constant sky all rows would be equally likely, although the top row is a point.",
+    answer: "The rows at the top and bottom. Under a constant sky all rows would be equally likely, although the upper edge of the top row is a single point.",
   },
   {
     title: "Sample the environment",
@@ -130,7 +130,7 @@ export const STEPS: Step[] = [
     ],
     formulas: [row(i("P"), par(i("keep")), eq, frac(row(i("p"), par(wi)), row(i("c"), o("·"), i("q"), par(wi))), o("≤"), n(1)), row(i("E"), par(i("tries")), eq, i("c"))],
     question: "How do the accepted samples change when the bound is twice too high, and when it is too low?",
-    answer: "Twice too high: the same distribution, half as many samples. Too low: the peak is cut off where the target exceeds the envelope, and the result is biased.",
+    answer: "Twice too high: the same distribution, half as many samples. Too low: the target is cut off where it exceeds the envelope, here beside the peak, where the lobe is strongest relative to the light; the result is biased.",
   },
   {
     title: "Resampling",
@@ -163,25 +163,25 @@ export const STEPS: Step[] = [
     ],
     formulas: [row(i("E"), par(sup(par(i("error")), n(2))), eq, sup(i("bias"), n(2)), o("+"), i("variance"))],
     question: "Move the edge: which curve changes, and how?",
-    answer: "The error of the fixed lights jumps up and down, sometimes near zero by luck. The curve of the random samples stays a line, because it shows only the mean square.",
+    answer: "The error of the fixed lights jumps up and down, sometimes near zero by luck. The curve of the random samples stays a line, because it shows the root of the mean square.",
   },
   {
     title: "Median cut",
     text: [
-      "To convert a probe to lights, cut it into two halves of equal energy; cut each half again across its longer side, and so on. After k rounds there are 2ᵏ regions of equal energy.",
+      "To convert a probe to lights, cut it into two halves of equal energy; cut each half again across its longer side, and so on. After k rounds there are 2ᵏ regions of about equal energy; only a single texel, such as a small sun, cannot be cut further.",
       "A light is placed at the centroid of each region, with the region’s sum as its color. Bright areas get many small regions, dark areas a few large ones.",
     ],
     formulas: [row(int(sub(i("R"), n(1))), i("L"), d, i("ω"), eq, int(sub(i("R"), n(2))), i("L"), d, i("ω"), eq, frac(n(1), n(2)), int(i("R")), i("L"), d, i("ω"))],
     question: "Under a sky with a sun, how many lights end up in the sun, and does that help?",
-    answer: "The sun gets lights in proportion to its energy. All of them shine from almost the same direction, so most are wasted.",
+    answer: "As many as its energy is worth, until its regions are single texels; the figure counts them. They all shine from almost the same direction, so one light with their sum would do as well, and the rest of the sky lacks the others.",
   },
   {
     title: "Variance minimization",
     text: [
-      "The goal is not equal energy but a small error. The error of a light at a centroid grows with the variance of its region’s light around it. So cut where the larger of the two variances is smallest.",
+      "The goal is not equal energy but a small error. The error of a light at a centroid grows with the variance of its region’s light around it. So cut where the sum of the two variances is smallest (the original of 2009 minimizes the larger one). Finally, join regions that belong together and move each light to the centroid of what is nearest to it, until nothing moves; this bends the borders.",
       "Then the sun stays in one region, and the lights go where the energy is spread out: to the sky around it and to the ground.",
     ],
-    formulas: [row(`<munder>${row(i("min"))}${i("cut")}</munder>`, o("max"), par(i("v"), par(sub(i("R"), n(1))), o(","), i("v"), par(sub(i("R"), n(2))))), row(i("v"), par(i("R")), eq, int(i("R")), i("L"), sup(row(o("‖"), i("ω"), o("−"), sub(i("c"), i("R")), o("‖")), n(2)), d, i("ω"))],
+    formulas: [row(`<munder>${row(i("min"))}${i("cut")}</munder>`, par(i("v"), par(sub(i("R"), n(1))), o("+"), i("v"), par(sub(i("R"), n(2))))), row(i("v"), par(i("R")), eq, int(i("R")), i("L"), sup(row(o("‖"), i("ω"), o("−"), sub(i("c"), i("R")), o("‖")), n(2)), d, i("ω"))],
     question: "With 64 lights, which method has the smaller shading error, and by how much?",
     answer: "Variance minimization, as the numbers under the picture show; on a map without small bright lights the difference is smaller.",
   },

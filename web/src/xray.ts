@@ -71,7 +71,7 @@ export class XrayPanel {
       const { pixel: [x, y], coverage } = report.summary;
       $("xray-summary").textContent = `Pixel ${x}, ${y} of ${app.state.size} × ${app.state.size}: ${percent(coverage)} of its camera samples show the scene.`;
       $("xray-advice").textContent = sentence(report.advice);
-      $("hemispheres").hidden = !maps.length;
+      $("hemispheres").hidden = $("directions").hidden = !maps.length;
       if (maps.length) this.paint(maps);
       const densities: Float32Array[] = [];
       for (const { name } of report.strategies) densities.push((await app.engines.call("directions", settings([name]), DENSITY)) as Float32Array);
@@ -124,13 +124,20 @@ export class XrayPanel {
       h("tr", {}, h("th", { scope: "row" }, s.name), h("td", {}, short(s.variance)), h("td", {}, short(s.raysPerSample)), h("td", {}, short(s.variancePerRay)))));
     $("causes").replaceChildren(...report.strategies.flatMap((s) => [
       h("h3", {}, s.name), h("p", { class: "sentence" }, sentence(s.diagnosis)),
-      ...s.causes.slice(0, 4).map(([name, share]) => {
+      ...shown(s.causes).map(([name, share]) => {
         const bar = h("div", { class: "bar" });
         bar.style.width = `${Math.max(0, Math.min(100, 100 * share))}%`;
         return h("div", { class: "cause" }, h("span", {}, name), h("div", {}, bar), h("span", {}, percentage(share)));
       }),
     ]));
   }
+}
+
+/** The largest causes, and the remaining ones together. */
+function shown(causes: [string, number][]): [string, number][] {
+  const [largest, others] = [causes.slice(0, 4), causes.slice(4)];
+  const rest = others.reduce((sum, [, share]) => sum + share, 0);
+  return Math.abs(rest) < 5e-4 ? largest : [...largest, ["others", rest]];
 }
 
 /** Adds a period, and a capital unless the text begins with a strategy's name. */

@@ -153,6 +153,20 @@ test("PNG and JPEG are light probes, unless they come with a scene", async () =>
   await done();
 });
 
+test("what was repaired stays on the page, until there is other light", async () => {
+  const rows = Buffer.alloc(4 * 3 * 8);
+  for (let i = 0; i < 24; i++) rows.writeFloatLE(i === 5 ? NaN : 1, 4 * i);
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  await renderedAnew(page, () => drop(page, [put("nan.pfm", Buffer.concat([Buffer.from("PF\n4 2\n-1\n"), rows]))]));
+  assert.match(await text(page, "#warnings"), /nan\.pfm: repaired 0 negative and 1 NaN/);
+  assert.doesNotMatch(await text(page, "#warnings"), /--/, "no options of the program");
+  assert.ok(await page.isVisible("#warnings"));
+  await renderedAnew(page, () => page.selectOption("#env", "studio"));
+  assert.equal(await page.isVisible("#warnings"), false);
+  await done();
+});
+
 test("a scene file brings its camera and its light", async () => {
   const { page, done } = await open(SMALL);
   await rendered(page);

@@ -261,6 +261,38 @@ for (const method of ["median-cut", "variance-minimization"]) {
   });
 }
 
+test("a rig is exported as it is shown, whatever other panels ask of the engine meanwhile", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lights`);
+  await page.waitForSelector("html[data-rig='variance-minimization:64']");
+  for (const step of [15, 0]) {
+    // The map extracts its sun, or a step of the lecture its own lights, while the panel draws its rig again.
+    await page.evaluate(() => delete document.documentElement.dataset.rig);
+    if (step) {
+      await show(page, "lecture");
+      await page.click(`#steps li:nth-child(${step}) a`);
+    } else await show(page, "map");
+    await show(page, "lights");
+    await page.waitForSelector("html[data-rig='variance-minimization:64']");
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click("#formats button:has-text('rig.csv')")]);
+    const rows = readFileSync(await download.path(), "utf8").trim().split("\n").filter((row) => /^light_/.test(row.split(",")[0].replaceAll('"', "")));
+    assert.equal(rows.length, 64, rows[0]);
+  }
+  await done();
+});
+
+test("where there are no lights, the panel says why and offers nothing", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lights`);
+  await page.waitForSelector("html[data-rig='variance-minimization:64']");
+  await page.evaluate(() => window.domelight.app.set({ env: "constant", sun: true, leave: true }));
+  await page.waitForSelector("html[data-rig='none']");
+  assert.match(await text(page, "#rig-caption"), /^There are no lights: /);
+  assert.equal(await page.locator("#formats button").count(), 0);
+  await page.evaluate(() => window.domelight.app.set({ env: "sky", sun: false, leave: false }));
+  await page.waitForSelector("html[data-rig='variance-minimization:64']");
+  assert.ok(await page.locator("#formats button").count() > 5);
+  await done();
+});
+
 test("the X-ray of a pixel names causes whose shares are drawn", async () => {
   const { page, done } = await open(`${SMALL}&pixel=[27,27]&panel=xray&strategy=mis:1:1`);
   await page.waitForSelector("html[data-xray]");
@@ -368,6 +400,27 @@ test("a link shows the lecture's figure as it was left", async () => {
   await page.goto(`${address}#${SMALL}&panel=lecture&step=6&figure=alike;3`);
   await drawn(page, 1);
   assert.deepEqual(await values(), ["alike", "3"]);
+  await done();
+});
+
+test("the lecture is read by keys, and its figures follow the window", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lecture&step=13`);
+  await page.waitForSelector("#figure svg");
+  const [next, previous] = ["Next →", "← Previous"].map((name) => page.locator(`#step .steps button:has-text("${name}")`));
+  await next.focus();
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("html[data-step='14']");
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("html[data-step='15']");
+  assert.equal(await page.evaluate(() => document.activeElement.tagName), "H2", "there is no next step");
+  for (const step of [14, 13]) {
+    await previous.focus();
+    await page.keyboard.press("Enter");
+    await page.waitForSelector(`html[data-step='${step}']`);
+  }
+  await page.waitForSelector("#figure svg[viewBox^='0 0 640']");
+  await page.setViewportSize({ width: 400, height: 800 });
+  await page.waitForSelector("#figure svg[viewBox^='0 0 368']");
   await done();
 });
 
@@ -515,6 +568,70 @@ test("a hash of nonsense is the default picture", async () => {
   const { page, done } = await open("size=-5&spp=99999999&camera={}&pixel=[1]&panel=__proto__&step=99&rows=x&size=64&spp=1");
   await rendered(page);
   assert.equal(await page.inputValue("#scene"), "statue");
+  await done();
+});
+
+test("words that a link cannot have are the defaults", async () => {
+  const words = "mapping=nope&layer=nope&method=nope&curve=nope&view=nope&equal=nope&seed=-1&lamps=-1&pixel=[27,27]"
+    + `&camera=${encodeURIComponent('{"origin":[0,0,9],"target":[0,0,0],"up":[0,1,0],"fov":null,"ortho":null}')}`;
+  for (const panel of ["picture", "map", "lights"]) {
+    const { page, done } = await open(`${SMALL}&${words}&panel=${panel}`);
+    await rendered(page);
+    assert.equal(await page.inputValue("#curve"), "agx");
+    assert.equal(await page.inputValue("#seed"), "0");
+    if (panel === "map") assert.equal(await page.inputValue("#mapping"), "lat-long");
+    if (panel === "lights") await page.waitForSelector("html[data-rig='variance-minimization:64']");
+    await done();
+  }
+});
+
+test("a material that is none is told and changes nothing", async () => {
+  const linked = await open(`${SMALL}&material=ggx:bad`);
+  await rendered(linked.page);
+  assert.match(await text(linked.page, "#status"), /ggx:bad/, "also when the picture is done");
+  await linked.done();
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  await page.fill("#material", "ggx:bad");
+  await page.press("#material", "Enter");
+  await page.waitForSelector("#status.error");
+  await renderedAnew(page, () => page.evaluate(() => window.domelight.app.set({ spp: 2 })));
+  assert.equal(await page.inputValue("#material"), "ggx:bad", "to be corrected");
+  assert.doesNotMatch(await text(page, "#command"), /bad/);
+  assert.doesNotMatch(await page.evaluate(() => location.hash), /bad/);
+  await done();
+});
+
+test("the browser's Back leads to the last panel", async () => {
+  const { page, done } = await open(SMALL);
+  await show(page, "lights");
+  await show(page, "lecture");
+  await page.click("#steps li:nth-child(3) a");
+  for (const [panel, step] of [["lecture", "1"], ["lights", "1"], ["picture", "1"]]) {
+    await page.goBack();
+    await page.waitForFunction((panel) => window.domelight.app.state.panel === panel, panel);
+    assert.equal(await page.isVisible(`#${panel}`), true);
+    if (panel === "lecture") await page.waitForSelector(`html[data-step='${step}']`);
+  }
+  await done();
+});
+
+test("zooming ends far outside and close to the scene", async () => {
+  const { page, done } = await open(SMALL);
+  await rendered(page);
+  const box = await page.locator("#viewer").boundingBox();
+  await page.mouse.move(box.x + 50, box.y + 50);
+  for (const [by, last] of [[100, 1e3], [-100, 1e-3]]) {
+    await page.evaluate((by) => {
+      for (let i = 0; i < 800; i++) document.getElementById("viewer").dispatchEvent(new WheelEvent("wheel", { deltaY: by, cancelable: true }));
+    }, by);
+    await rendered(page);
+    const distance = await page.evaluate(() => {
+      const { state: { camera: { origin, target } }, scene } = window.domelight.app;
+      return Math.hypot(...origin.map((c, i) => c - target[i])) / scene.radius;
+    });
+    assert.ok(Math.abs(distance / last - 1) < 0.05, `${distance} radii`);
+  }
   await done();
 });
 

@@ -41,7 +41,8 @@ pub struct Engine {
     setup: Setup,
     /// Parts of a picture that the Workers have rendered.
     parts: Vec<Checkpoint>,
-    extraction: Option<Extraction>,
+    /// The last rig, and its settings.
+    extraction: Option<(String, Extraction)>,
 }
 
 #[wasm_bindgen]

@@ -7,8 +7,8 @@ use domelight::picture::exr::ExrLayers;
 use domelight::picture::hdr;
 use domelight::rig::export::{Dome, DomePicture, Format, RigExport};
 use domelight::rig::{
-    ExtractionSettings, MedianCut, Method, Region, Rig, ShadingReference, SphericalHarmonics,
-    VarianceMinimization, extract, quadrature,
+    Extraction, ExtractionSettings, MedianCut, Method, Region, Rig, ShadingReference,
+    SphericalHarmonics, VarianceMinimization, extract, quadrature,
 };
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
@@ -19,7 +19,7 @@ use crate::{Engine, error};
 /// Lights that stand for the probe when it lights a sphere.
 const QUADRATURE: usize = 1 << 12;
 
-/// The settings of [`Engine::lights`].
+/// The settings of a rig.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LightsState {
@@ -67,7 +67,7 @@ struct LightReport {
 struct FormatReport {
     name: &'static str,
     extension: &'static str,
-    dome: Option<String>,
+    dome: Option<&'static str>,
 }
 
 fn method(name: &MethodName, refine: bool) -> Method {
@@ -82,37 +82,44 @@ fn method(name: &MethodName, refine: bool) -> Method {
 }
 
 /// The file of the dome that rigs of a format name.
-fn dome_file(format: Format) -> Option<&'static str> {
-    format.dome_picture().map(|picture| match picture {
+fn dome_file(format: Format) -> &'static str {
+    match format.dome_picture().unwrap_or(DomePicture::LatLong) {
         DomePicture::LatLong => "dome.exr",
         DomePicture::LatLongHdr => "dome.hdr",
         DomePicture::Octahedral => "dome_octahedral.exr",
-    })
+    }
 }
 
 impl Engine {
-    fn rig(&self) -> Result<&domelight::rig::Extraction, JsError> {
-        self.extraction.as_ref().ok_or_else(|| JsError::new("there are no lights yet"))
+    /// The rig of the settings in `json`, extracted unless it is the last one.
+    fn rig(&mut self, json: &str) -> Result<&Extraction, JsError> {
+        let extracted = match self.extraction.take() {
+            Some((of, extraction)) if of == json => extraction,
+            _ => {
+                let state: LightsState = parse(json)?;
+                let settings = ExtractionSettings {
+                    sun: state.sun,
+                    n_lamps: state.lamps,
+                    n_lights: state.n,
+                    method: method(&state.method, state.refine),
+                    min_share: None,
+                };
+                extract(self.environment()?, settings).map_err(error)?
+            }
+        };
+        Ok(&self.extraction.insert((json.to_owned(), extracted)).1)
     }
 }
 
 #[wasm_bindgen]
 impl Engine {
-    /// Divides the map into lights: `{"method", "refine", "n", "sun", "lamps"}`.
+    /// Divides the map into lights. Here and below, `json` is `{"method", "refine", "n", "sun", "lamps"}`.
     ///
     /// # Errors
     /// If there is no environment or no rig of it.
     pub fn lights(&mut self, json: &str) -> Result<String, JsError> {
-        let state: LightsState = parse(json)?;
         let environment = self.environment()?.clone();
-        let settings = ExtractionSettings {
-            sun: state.sun,
-            n_lamps: state.lamps,
-            n_lights: state.n,
-            method: method(&state.method, state.refine),
-            min_share: None,
-        };
-        let extraction = extract(&environment, settings).map_err(error)?;
+        let extraction = self.rig(json)?;
         let reference = ShadingReference::new(&environment);
         let rig = &extraction.rig;
         let measured = match &extraction.residual {
@@ -137,7 +144,7 @@ impl Engine {
         let formats = Format::ALL.map(|format| FormatReport {
             name: format.name(),
             extension: format.extensions()[0],
-            dome: extraction.residual.as_ref().and(dome_file(format)).map(str::to_owned),
+            dome: extraction.residual.as_ref().map(|_| dome_file(format)),
         });
         let report = RigReport {
             lights: lights.collect(),
@@ -146,7 +153,6 @@ impl Engine {
             residual: extraction.residual.is_some(),
             formats: formats.into(),
         };
-        self.extraction = Some(extraction);
         Ok(to_json(&report))
     }
 
@@ -154,9 +160,9 @@ impl Engine {
     /// there is none.
     ///
     /// # Errors
-    /// If there are no lights.
-    pub fn regions(&self, width: usize) -> Result<Vec<u32>, JsError> {
-        let rig: &Rig = &self.rig()?.rig;
+    /// As for [`Self::lights`].
+    pub fn regions(&mut self, json: &str, width: usize) -> Result<Vec<u32>, JsError> {
+        let rig: &Rig = &self.rig(json)?.rig;
         let height = width / 2;
         let at = |i: usize, n: usize, of: usize| (2 * i + 1) * of / (2 * n);
         let row = |y: usize| at(y, height, rig.height) * rig.width;
@@ -168,20 +174,20 @@ impl Engine {
     /// The lights as a file of a format.
     ///
     /// # Errors
-    /// If there are no lights or no such format.
+    /// As for [`Self::lights`], or if there is no such format.
     #[wasm_bindgen(js_name = rigFile)]
-    pub fn rig_file(&self, format: &str, probe: &str) -> Result<Vec<u8>, JsError> {
+    pub fn rig_file(&mut self, json: &str, format: &str, probe: &str) -> Result<Vec<u8>, JsError> {
         let format: Format = format
             .parse()
             .map_err(|e: domelight::rig::export::UnknownFormat| JsError::new(&e.to_string()))?;
-        let extraction = self.rig()?;
+        let orientation = self.environment()?.orientation();
+        let extraction = self.rig(json)?;
         let residual = extraction.residual.as_ref();
         let dome = residual.map(|environment| Dome {
             environment,
             harmonics: SphericalHarmonics::project(environment),
-            file: dome_file(format),
+            file: Some(dome_file(format)),
         });
-        let orientation = self.environment()?.orientation();
         let rig = RigExport { probe, orientation, lights: &extraction.rig.lights, dome };
         format.encode(&rig).map_err(|e| JsError::new(&e.to_string()))
     }
@@ -189,11 +195,11 @@ impl Engine {
     /// The picture of what the lights leave of the map, as files of a format name it.
     ///
     /// # Errors
-    /// If nothing is left, or there is no such file.
+    /// As for [`Self::lights`], or if nothing is left, or there is no such file.
     #[wasm_bindgen(js_name = domeFile)]
-    pub fn dome_file(&self, name: &str) -> Result<Vec<u8>, JsError> {
+    pub fn dome_file(&mut self, json: &str, name: &str) -> Result<Vec<u8>, JsError> {
         let missing = || JsError::new("the lights take all of the map");
-        let map = self.rig()?.residual.as_ref().ok_or_else(missing)?.map();
+        let map = self.rig(json)?.residual.as_ref().ok_or_else(missing)?.map();
         let failed = |e: String| JsError::new(&e);
         match name {
             "dome.hdr" => {
@@ -217,10 +223,10 @@ impl Engine {
     /// shadows: R, G and B of both pictures, radiance. `exponent` 0 is matte, else a lobe cos^exponent.
     ///
     /// # Errors
-    /// If there are no lights.
-    pub fn spheres(&self, size: usize, exponent: i32) -> Result<Vec<f32>, JsError> {
-        let extraction = self.rig()?;
+    /// As for [`Self::lights`].
+    pub fn spheres(&mut self, json: &str, size: usize, exponent: i32) -> Result<Vec<f32>, JsError> {
         let truth = quadrature(self.environment()?, QUADRATURE);
+        let extraction = self.rig(json)?;
         let mut approximate = extraction.rig.clone().lights;
         if let Some(dome) = &extraction.residual
             && dome.power() > 0.0

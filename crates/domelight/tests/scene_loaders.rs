@@ -198,7 +198,9 @@ fn broken_ply_files_name_the_place() {
     fails("a.ply", PLY_QUAD.replace("ascii", "ebcdic"), &["line 2", "ebcdic"]);
     fails("a.ply", PLY_QUAD.replace("format ascii 1.0\n", ""), &["format"]);
     fails("a.ply", "ply\nformat ascii 1.0\n", &["end_header"]);
-    fails("a.ply", "", &["end_header"]);
+    for name in ["a.ply", "a.obj", "a.stl", "a.off", "a.glb", "a.gltf", "a.toml"] {
+        fails(name, "", &[name, "the file is empty"]);
+    }
 }
 
 // OBJ and MTL

@@ -152,7 +152,7 @@ pub fn probe_from_picture(
     if sanitized != SanitizeReport::default() {
         let SanitizeReport { negative, non_finite } = sanitized;
         warnings.push(format!(
-            "{file}: repaired {negative} negative and {non_finite} NaN or infinite values; --strict refuses them"
+            "{file}: repaired {negative} negative and {non_finite} NaN or infinite values"
         ));
     }
     let file_size = (image.width, image.height);

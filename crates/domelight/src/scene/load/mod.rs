@@ -204,6 +204,12 @@ pub enum LoadError {
         /// The file.
         path: PathBuf,
     },
+    /// A file without a byte.
+    #[error("{}: the file is empty", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
     /// An invalid PLY file.
     #[error("{}, {place}: {kind}", path.display())]
     Ply {
@@ -366,6 +372,9 @@ fn load_file(
 ) -> Result<Loaded, LoadError> {
     let unknown = || LoadError::UnknownFormat { path: path.into() };
     let format = SceneFormat::of(path, bytes).ok_or_else(unknown)?;
+    if bytes.is_empty() {
+        return Err(LoadError::Empty { path: path.into() });
+    }
     let is_gltf = matches!(format, SceneFormat::Gltf | SceneFormat::Glb);
     let chosen = [("scenes", options.scene.is_some()), ("animations", options.animation.is_some())];
     if let (false, Some((what, _))) = (is_gltf, chosen.into_iter().find(|(_, chosen)| *chosen)) {
