@@ -261,7 +261,7 @@ const rowsAndColumns: Figure = (stage) => {
     // A row with a sun would flatten all others, so its bar is cut.
     const most = Math.max(...rows), others = [...rows].sort((a, b) => a - b)[Math.floor(0.95 * height)];
     const top = most > 4 * others ? 2 * others : most;
-    const cut = top < most ? `, cut at row ${rows.indexOf(most)}: ${short(most)}` : "";
+    const cut = top < most ? `; row ${rows.indexOf(most)} reaches ${short(most)}` : "";
     stage.svg(plot([{ name: `p(y)${cut}`, kind: "first", points: points(rows), as: "bars" }, { name: "", kind: "second", points: [[y, rows[y]]], as: "dots" }],
       { x: { name: "row y, from the top", range: [-1, height] }, y: { name: "probability of a row", range: [0, top] }, height: 170 })
       + plot([{ name: `p(x | y = ${y})`, kind: "second", points: points(columns), as: "bars" }],
@@ -535,7 +535,8 @@ const cuts = (method: string, other: string): Figure => (stage) => {
       context.stroke();
     }
     const percent = (x: number) => `${short(100 * x)} %`, near = aroundBrightest(rig.lights);
-    stage.say(`${n} light${n > 1 ? "s" : ""} of ${stage.app.envName}, ${near.count} of them within 2° of the brightest, with ${percent(near.share)} of the light: the shading error is ${percent(rig.diffuse)} matte and ${percent(rig.glossy)} glossy; with ${other.replace("-", " ")}, ${percent(beside.diffuse)} and ${percent(beside.glossy)}.`);
+    const sun = near.count > 1 ? `the ${near.count} lights within 2° of the brightest hold` : "the brightest holds";
+    stage.say(`${n} light${n > 1 ? "s" : ""} of ${stage.app.envName}; ${sun} ${percent(near.share)} of its energy. The shading error is ${percent(rig.diffuse)} matte and ${percent(rig.glossy)} glossy; with ${other.replace("-", " ")}, ${percent(beside.diffuse)} and ${percent(beside.glossy)}.`);
   });
 };
 

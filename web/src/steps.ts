@@ -25,7 +25,7 @@ const int = (a: string) => `<msub>${o("∫")}${row(a)}</msub>`;
 const tall = (...x: string[]) => row(o("("), ...x, o(")"));
 const par = (...x: string[]) => row('<mo stretchy="false">(</mo>', ...x, '<mo stretchy="false">)</mo>');
 const sqrt = (...x: string[]) => `<msqrt>${x.join("")}</msqrt>`;
-const eq = o("="), d = `<mi mathvariant="normal">d</mi>`;
+const eq = o("="), d = `<mspace width="0.17em"/><mi mathvariant="normal">d</mi>`;
 const wi = sub(i("ω"), i("i")), wo = sub(i("ω"), i("o")), wh = sub(i("ω"), i("h"));
 const fr = sub(i("f"), i("r")), cos = (x: string) => row(i("cos"), of, sub(i("θ"), x));
 const phat = `<mover>${i("p")}${o("^")}</mover>`;
