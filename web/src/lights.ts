@@ -173,7 +173,7 @@ export class LightsPanel {
       sphere.show(0, picture);
     }
     const lights = rig.lights.length;
-    $("rig-caption").textContent = `${lights} light${lights === 1 ? "" : "s"} of ${app.envName}${rig.residual ? `; the rest of the light stays on the map` : ""}${state.rotate ? `. The map is drawn unrotated; lights are exported rotated by ${degrees(state.rotate)}` : ""}. Shading error: matte ${percent(rig.diffuse)}, glossy ${percent(rig.glossy)}.`;
+    $("rig-caption").textContent = `${lights} light${lights === 1 ? "" : "s"} of ${app.envName}${rig.residual ? `; the rest of the light stays on the map` : ""}${state.rotate ? `. The map is drawn unrotated; files have the rotation of ${degrees(state.rotate)}, except for sIBL, which cannot state it` : ""}. Shading error: matte ${percent(rig.diffuse)}, glossy ${percent(rig.glossy)}.`;
     $("rig-table").querySelector("tbody")!.replaceChildren(...rig.lights.slice(0, 6).map((light) =>
       h("tr", {}, h("th", { scope: "row" }, light.name.replace("_", " ")), h("td", {}, percentage(light.share)), h("td", {}, `${light.radius.toFixed(1)}°`))));
     this.offer(settings);
@@ -251,8 +251,7 @@ export class LightsPanel {
       return element;
     };
     $("formats").replaceChildren(...rig.formats.map((format) =>
-      button(`rig.${format.extension}`, () => app.engines.call("rigFile", settings, format.name, app.envName) as Promise<Uint8Array>,
-        format.name === "sibl" && state.rotate ? `${READERS.sibl}, which has no rotation: turn it by ${degrees(state.rotate)}` : READERS[format.name])));
+      button(`rig.${format.extension}`, () => app.engines.call("rigFile", settings, format.name, app.envName) as Promise<Uint8Array>, READERS[format.name])));
     const domes = [...new Set(rig.formats.flatMap((format) => format.dome ?? []))];
     $("dome-files").replaceChildren(...domes.map((name) => button(name, () => app.engines.call("domeFile", settings, name) as Promise<Uint8Array>)));
     const command = ["domelight", "lights", fileWord(state.env), ...(isBuiltinProbe(state.env) ? [`--env-rows=${state.rows}`] : []),

@@ -125,11 +125,11 @@ impl fmt::Display for Advice {
                 let digits = usize::from(*times_fewer < 10.0);
                 write!(
                     f,
-                    "{name} would help: it needs {times_fewer:.digits$} times fewer rays than {than} to the same error"
+                    "{name} is best here: it needs {times_fewer:.digits$} times fewer rays than {than} to the same error"
                 )
             }
             Self::Strategy { name, .. } => {
-                write!(f, "{name} would help: it has no error at this pixel")
+                write!(f, "{name} is best here: it has no error at this pixel")
             }
             Self::Rays => f.write_str("more rays would help; the strategies are about equal here"),
         }

@@ -1,5 +1,6 @@
 //! WebAssembly SIMD: a vector is two registers of four. The instructions are a property of the module, so there is no
-//! run-time check, and the intrinsics are safe.
+//! run-time check, and the intrinsics are safe, except for loads. Vectors are loaded whole: compilers otherwise load the
+//! lanes one by one where only some are used together.
 #![allow(unsafe_code)]
 
 use std::arch::wasm32::{
