@@ -16,6 +16,7 @@
 use super::ONE_MINUS_EPSILON;
 use super::table::{TableError, TableSample};
 use crate::math::{Vec2, vec2};
+use crate::simd::SimdFloat;
 
 /// Four cells: upper left, upper right, lower left, lower right.
 type Quad = [f32; 4];
@@ -130,7 +131,7 @@ fn split(u: &mut f32, first: f32, second: f32) -> bool {
     let at = *u * (first + second);
     let beyond = at >= first && second > 0.0;
     let stretched = if beyond { (at - first) / second } else { at / first };
-    *u = stretched.min(ONE_MINUS_EPSILON);
+    *u = SimdFloat::min(stretched, ONE_MINUS_EPSILON);
     beyond
 }
 
