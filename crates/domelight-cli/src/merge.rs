@@ -22,7 +22,7 @@ use crate::args::MergeArguments;
 use crate::error::status;
 use crate::memory;
 use crate::output::{PicturePath, print_json, require_one_on_standard_output};
-use crate::render_run::read;
+use crate::render_run::{or_none, read};
 use crate::terminal::Terminal;
 use crate::tone::Shown;
 use domelight_lab::Host as _;
@@ -167,7 +167,9 @@ impl Merged {
         let foreign = |what: &str, here: &str, there: &str| {
             let first = &self.name;
             let text = format!(
-                "{name} belongs to another render: its {what} is {here}, that of {first} {there}"
+                "{name} belongs to another render: its {what} is {}, that of {first} {}",
+                or_none(here),
+                or_none(there)
             );
             Err(MergeError::Foreign(text))
         };
@@ -280,7 +282,6 @@ impl Merged {
             shadow_rays: u64,
             non_finite_samples: u64,
             outputs: Vec<String>,
-            #[serde(skip_serializing_if = "Option::is_none")]
             png: Option<Shown>,
         }
         Terminal { quiet }.warn_of_non_finite("", self.counts.non_finite);

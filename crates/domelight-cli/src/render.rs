@@ -11,7 +11,7 @@ use domelight::strategy::PreparedStrategy;
 
 use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
 use crate::clock;
-use crate::error::{InterruptedTooEarly, UsageError, status};
+use crate::error::{InterruptedTooEarly, UsageError, status, warn};
 use crate::interrupt;
 use crate::memory;
 use crate::output::{self, PicturePath, print_progress, require_one_on_standard_output};
@@ -72,12 +72,19 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     };
     let spec = spec.for_picture(scene, camera, environment, settings);
     memory::allow(&format!("the tables of {spec}"), PreparedStrategy::memory(spec, environment))?;
+    if settings.target_error.is_some() && spec.draws_from_the_bsdf_alone() {
+        let text = "samples drawn from the BSDF alone may all miss a small light: tiles that do stop too early and too dark. \
+                    Use product, mis or environment with --target-error";
+        warn(quiet, text);
+    }
     let strategy = &PreparedStrategy::new(spec, environment).with_context(|| probe.clone())?;
     let automatic = automatic_exposure(scene, camera, environment, settings);
     let described = Settings {
         scene: report.clone(),
         strategy: spec.description(),
         spp: settings.n_samples,
+        adaptive: settings.adaptive,
+        target_error: settings.target_error,
         passes: settings.passes.name(),
         sampler: settings.sampler.name(),
         filter: settings.filter.name(),

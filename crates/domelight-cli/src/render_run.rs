@@ -187,9 +187,13 @@ pub(crate) fn read(path: &Path) -> Result<Checkpoint> {
     Checkpoint::decode(&bytes).with_context(name)
 }
 
+/// A value of a render's identity, for messages.
+pub(crate) fn or_none(value: &str) -> &str {
+    if value.is_empty() { "none" } else { value }
+}
+
 fn require_same(path: &Path, checkpoint: &Checkpoint, identity: &[(String, String)]) -> Result<()> {
     let Some(difference) = checkpoint.difference(identity) else { return Ok(()) };
-    let or_none = |value: &str| if value.is_empty() { "none".to_owned() } else { value.to_owned() };
     let text = format!(
         "{} belongs to another render: its {} is {}, that of this render {}",
         path.display(),

@@ -19,7 +19,10 @@ pub(crate) struct Settings {
     #[serde(flatten)]
     pub(crate) scene: SceneReport,
     pub(crate) strategy: String,
+    /// The number of camera samples per pixel: on average if `adaptive`, at most with a `target_error`.
     pub(crate) spp: u32,
+    pub(crate) adaptive: bool,
+    pub(crate) target_error: Option<f32>,
     pub(crate) passes: &'static str,
     pub(crate) sampler: &'static str,
     pub(crate) filter: &'static str,
@@ -83,13 +86,10 @@ pub(crate) struct RenderReport {
     stopped: Option<StopReason>,
     outputs: Vec<String>,
     /// How PNG output is developed, if there is any.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) png: Option<Shown>,
     /// How output was denoised, if it was.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) denoised: Option<String>,
     /// CPU seconds by stage of the render, if requested.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) profile: Option<Vec<StageSeconds>>,
 }
 
@@ -141,13 +141,14 @@ impl RenderReport {
 
     /// Two lines on standard error.
     pub(crate) fn print_summary(&self) {
-        let Settings { scene, strategy, spp, .. } = &self.settings;
+        let Settings { scene, strategy, spp, target_error, .. } = &self.settings;
         let SceneReport { scene, environment, size: [w, h], .. } = scene;
         let environment = environment.probe();
         let Timings { load, build, render, write, total } = &self.seconds;
+        let up_to = if target_error.is_some() { "up to " } else { "" };
         let cpu = render.cpu.map_or(String::new(), |cpu| format!(" ({cpu:.2} CPU-s)"));
         status(&format!(
-            "{scene} under {environment}: {w}x{h}, {spp} samples per pixel, {strategy}"
+            "{scene} under {environment}: {w}x{h}, {up_to}{spp} samples per pixel, {strategy}"
         ));
         let png = self.png.map_or(String::new(), |shown| format!(" (PNG at {shown})"));
         status(&format!(

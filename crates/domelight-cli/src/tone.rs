@@ -154,7 +154,6 @@ struct Report<'a> {
     shown: Shown,
     /// The source of the automatic exposure.
     exposure_from: ExposureSource,
-    #[serde(skip_serializing_if = "Option::is_none")]
     denoised: Option<&'a str>,
     bits: u8,
     output: String,

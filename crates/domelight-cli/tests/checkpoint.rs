@@ -343,6 +343,26 @@ fn budgets_end_the_render_with_what_is_there() {
     assert_eq!(report["complete"], true);
     let per_pixel = report["camera_rays"].as_u64().unwrap() / (70 * 50);
     assert!((16..1024).contains(&per_pixel), "{per_pixel}");
+    let settings = &report["settings"];
+    assert!((settings["target_error"].as_f64().unwrap() - 0.02).abs() < 1e-6, "{settings}");
+    assert_eq!(settings["adaptive"], true);
+    // Names and values of OpenEXR attributes are plain bytes.
+    let file = fs::read(folder.path().join("y.exr")).unwrap();
+    let has = |text: &str| file.windows(text.len()).any(|bytes| bytes == text.as_bytes());
+    assert!(has("domelight.target_error") && has("domelight.adaptive"));
+}
+
+/// Samples of the BSDF alone may all miss the light, which a tile takes for precision.
+#[test]
+fn a_target_error_needs_samples_of_the_light() {
+    let folder = folder();
+    for (strategy, warns) in [("brdf:1", true), ("mis:0:1", true), ("mis:1:1", false)] {
+        let small = ["render", "sphere", "--env-rows", "16", "--size", "16x16", "-o", "y.pfm"];
+        let precise = ["--spp", "32", "--target-error", "1", "--strategy", strategy];
+        let output = common::domelight(&folder, &[&small[..], &precise].concat());
+        ended(&output, 0, &["up to 32 samples per pixel"]);
+        assert_eq!(common::stderr(&output).contains("all miss a small light"), warns, "{strategy}");
+    }
 }
 
 #[test]

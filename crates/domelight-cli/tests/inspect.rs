@@ -56,6 +56,16 @@ fn a_page_that_needs_nothing_else() {
     }
 }
 
+/// A shadow catcher's picture is not reflected light.
+#[test]
+fn a_shadow_catcher_is_not_explained() {
+    let folder = TempDir::new().unwrap();
+    let at =
+        |pixel| [&QUICK[..], &["--ground", "shadow", "--pixel", pixel, "-o", "x.html"]].concat();
+    ended(&domelight(&folder, &at("3,23")), 2, &["pixel (3, 23) shows a shadow catcher"]);
+    ended(&domelight(&folder, &at("16,16")), 0, &[]);
+}
+
 #[test]
 fn what_is_wrong_is_named() {
     let folder = TempDir::new().unwrap();

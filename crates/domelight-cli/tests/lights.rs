@@ -70,6 +70,38 @@ fn the_sun_and_the_probe_without_it() {
     assert!((irradiance / lost - 1.0).abs() < 1e-3, "{irradiance} {lost}");
 }
 
+/// With fewer lights than the sun and lamps, the rest of the light stays in the map, which rigs refer to.
+#[test]
+fn few_lights_leave_a_dome() {
+    let folder = probes();
+    for (lamps, n, kinds) in [("0", "1", &["sun"][..]), ("3", "2", &["sun", "lamp"])] {
+        let arguments = ["lights", "sun.exr", "--sun", "--lamps", lamps, "-n", n, "-q"];
+        let more = ["-o", "rig.json", "-o", "rig.xml", "--keep-residual", "dome.exr"];
+        done(&domelight(&folder, &[&arguments[..], &more].concat()));
+        let json = rig(&folder, "rig.json");
+        let found: Vec<&Value> = json["lights"].as_array().expect("lights").iter().collect();
+        assert_eq!(found.iter().map(|l| &l["kind"]).collect::<Vec<_>>(), kinds);
+        assert_eq!(json["dome"]["file"], "dome.exr");
+        let dome = load(&folder, "dome.exr");
+        assert!((dome.get(0, 0).g - 0.5).abs() < 1e-3 && dome.get(40, 10).g < 1.0);
+        done(&domelight(&folder, &[&arguments[..], &["-o", "alone.xml"]].concat()));
+        for (file, dome) in [("rig.xml", "dome.exr"), ("alone.xml", "alone_dome.exr")] {
+            let xml = std::fs::read_to_string(folder.path().join(file)).expect(file);
+            assert!(xml.contains("envmap") && xml.contains(dome), "{xml}");
+            std::fs::remove_file(folder.path().join(dome)).expect(dome);
+        }
+    }
+    // Where nothing is left, nothing is written.
+    let before = files(&folder);
+    for more in [&["--sun", "-n", "16"][..], &["-n", "4", "--min-energy", "0.001"]] {
+        let arguments = [&["lights", "sun.exr", "-o", "x.json", "--keep-residual", "d.exr"], more];
+        let output = domelight(&folder, &arguments.concat());
+        assert_eq!(output.status.code(), Some(2), "{more:?}");
+        assert!(stderr(&output).contains("nothing is left for --keep-residual"));
+        assert_eq!(files(&folder), before);
+    }
+}
+
 #[test]
 fn every_format_to_files_and_standard_output() {
     let folder = probes();

@@ -677,7 +677,6 @@ fn broken_stl_files_name_the_place() {
     fails("a.stl", STL.replace("VERTEX 0 0 1\n", ""), &["line 16", "2 vertices"]);
     fails("a.stl", &STL[..100], &["vertices"]);
     fails("a.stl", "solid nothing\nendsolid\n", &["no triangles"]);
-    fails("a.stl", "", &["truncated"]);
     let whole = binary_stl(b"");
     fails("a.stl", &whole[..150], &["2 facets", "184 bytes", "150"]);
     let mut huge = whole.clone();
@@ -774,7 +773,7 @@ fn broken_off_files_name_the_line() {
     fails("a.off", OFF.replace("3 1 2 4", "3 1 2 5"), &["line 12", "index 5"]);
     fails("a.off", OFF.replace("3 1 2 4", "3 1 2 -1"), &["line 12", "index -1"]);
     fails("a.off", OFF.replace("3 1 2 4", "99999999999999999999 1 2 4"), &["line 12"]);
-    fails("a.off", "", &["counts"].map(|_| "numbers"));
+    fails("a.off", "\n", &["numbers"]);
     fails("a.off", "OFF 3 0 0\n0 0 0\n1 0 0\n0 1 0\n", &["no triangles"]);
 }
 
@@ -1166,7 +1165,7 @@ fn broken_scene_files_name_the_line_and_the_reason() {
     bad("name = \"second\"", "name = \"second\"\nscale = 2", &["matrix"]);
     bad("[camera]", "[camera", &["line 4"]);
     fails("a.toml", [0x61, 0xff], &["UTF-8", "byte 1"]);
-    fails("a.toml", "", &["no triangles"]);
+    fails("a.toml", "# nothing\n", &["no triangles"]);
 }
 
 // Any format

@@ -64,7 +64,8 @@ pub(crate) struct LightsArguments {
     #[arg(long, value_name = "FORMAT", help_heading = "Output", value_parser = format(),
           requires = "output")]
     pub(crate) format: Option<Format>,
-    /// Write the probe without the light of the rig (.exr, .hdr, .pfm)
+    /// Write the probe without the light of the rig (.exr, .hdr, .pfm). It keeps the probe's own orientation: use it with
+    /// the same --env-rotate and --env-up, but without --env-scale and --env-exposure, which it contains
     #[arg(long, value_name = "FILE.exr", help_heading = "Output", value_parser = radiance_path)]
     pub(crate) keep_residual: Option<PicturePath>,
     /// Write a picture of the rig: regions, lights, and a sphere under probe and rig; or none [default: on a terminal

@@ -57,6 +57,13 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
 
     let domes = match (&dome_path, &found.extraction.residual) {
         (Some(path), Some(dome)) => arguments.write_dome(path, dome.map(), &outputs)?,
+        _ if arguments.keep_residual.is_some() => {
+            let why = match arguments.min_energy {
+                Some(percent) => format!("every light has at least {percent} % of the energy"),
+                None => WHOLE_PROBE.to_owned(),
+            };
+            return Err(UsageError(nothing_left(&why)).into());
+        }
         _ => DomeFiles { written: Vec::new(), of_outputs: vec![None; outputs.len()] },
     };
     let harmonics = found.extraction.residual.as_ref().map(SphericalHarmonics::project);
@@ -101,6 +108,16 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
     Ok(())
 }
 
+const WHOLE_PROBE: &str = "the lights use the whole probe";
+
+/// The message if there is nothing to write for --keep-residual.
+fn nothing_left(why: &str) -> String {
+    format!(
+        "nothing is left for --keep-residual: {why}. Omit -n and --error to keep the light that --sun and --lamps do not \
+         use, or leave dim lights in the map with --min-energy"
+    )
+}
+
 /// The pictures of a dome.
 struct DomeFiles {
     /// All of them.
@@ -137,6 +154,12 @@ impl LightsArguments {
         self.n_lights.is_some() || self.error.is_some() || !(self.sun || self.lamps > 0)
     }
 
+    /// Whether lights may leave something of the map: what is not compact, lights that are too dim, or all regions, if
+    /// -n allows only for the sun and lamps.
+    fn may_leave_light(&self) -> bool {
+        !self.has_regions() || self.min_energy.is_some() || self.sun || self.lamps > 0
+    }
+
     fn settings(&self) -> ExtractionSettings {
         ExtractionSettings {
             sun: self.sun,
@@ -153,11 +176,8 @@ impl LightsArguments {
             let message = "only one result can go to standard output; give a file name";
             return Err(UsageError(message.into()).into());
         }
-        if self.keep_residual.is_some() && self.has_regions() && self.min_energy.is_none() {
-            let message = "nothing is left for --keep-residual: the lights use the whole probe. \
-             Omit -n and --error to keep the light that --sun and --lamps do not use, or leave \
-             dim lights in the map with --min-energy";
-            return Err(UsageError(message.into()).into());
+        if self.keep_residual.is_some() && !self.may_leave_light() {
+            return Err(UsageError(nothing_left(WHOLE_PROBE)).into());
         }
         let outputs: Vec<_> = self.output.iter().map(|o| self.output(o)).collect::<Result<_>>()?;
         let unnamed = self.keep_residual.as_ref().is_some_and(PicturePath::is_standard_output);
@@ -251,7 +271,7 @@ impl LightsArguments {
 
     /// The file of the dome's map, if there may be a residual: as requested, or next to the first rig that refers to it.
     fn dome_path(&self, outputs: &[Output]) -> Result<Option<PicturePath>> {
-        if self.has_regions() && self.min_energy.is_none() {
+        if !self.may_leave_light() {
             return Ok(None);
         }
         if let Some(path) = &self.keep_residual {

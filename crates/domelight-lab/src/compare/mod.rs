@@ -275,8 +275,10 @@ fn compare_with(of_mis: Option<usize>, strategies: &mut [StrategyReport]) {
         return;
     };
     for result in strategies.iter_mut().filter_map(|s| s.result.as_mut()) {
-        result.error_ratio_to_mis = Some(error / result.rel_mse.mean);
-        result.efficiency_ratio_to_mis = Some(result.efficiency / efficiency);
+        // Strategies without error have no ratio.
+        let ratio = |x: f64| Some(x).filter(|x| x.is_finite());
+        result.error_ratio_to_mis = ratio(error / result.rel_mse.mean);
+        result.efficiency_ratio_to_mis = ratio(result.efficiency / efficiency);
     }
 }
 

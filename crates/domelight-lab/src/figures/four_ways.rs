@@ -86,7 +86,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         plots.push(plot(name, &lecture, &equal));
         let heading = format!("{name}: the lecture's counts, and MIS in the time of SIR");
         add(&mut figure, &figure_scene, name, "lecture", &heading, lecture)?;
-        let heading = format!("{name}: equal time, {} CPU s each", number(seconds));
+        let heading = format!("{name}: equal time, about {} CPU s each", number(seconds));
         add(&mut figure, &figure_scene, name, "equal time", &heading, equal)?;
     }
     figure.rows.push(Row::new("Error over time, at the lecture's counts and at equal time", plots));
@@ -97,7 +97,7 @@ pub(crate) fn make(context: &FigureContext) -> Result<Figure, Error> {
         let seconds = em.measured.render.seconds;
         let resampled = equal_time(&figure_scene, seconds, SIR.0, tuned_sir(&figure_scene))?;
         let heading =
-            format!("{name}: environment against product, {} CPU s each", number(seconds));
+            format!("{name}: environment against product, about {} CPU s each", number(seconds));
         let resampled = ShownStrategy::new("Bidirectional: SIR", &figure_scene, resampled)?;
         let table = product_in(&figure_scene, seconds)?;
         let table = ShownStrategy::new("Product", &figure_scene, table)?;
@@ -112,7 +112,7 @@ const CAPTION: &str = "<p>All pictures share the same camera rays, one per pixel
     (SIR). These took equal time in 2005, but a shadow ray is now cheaper than a candidate. So the row repeats MIS \
     with the sample count that takes the time of SIR. It also shows the strategy <code>product</code>, which samples \
     the product of light and BRDF from a table for each pixel, with as many rays as SIR; it is designed for pixels \
-    with several camera rays, which share a table. In the second row every strategy takes the time of 100 environment \
+    with several camera rays, which share a table. In the second row every strategy takes about the time of 100 environment \
     samples, with counts calibrated by measurement: SIR with the lecture’s ratio of candidates to rays, and with the \
     best ratio for their costs here. Each picture is labeled with its error against the converged one (relMSE: mean of \
     (I − R)² / (R² + 0.01) over the pixels that show the scene), its shadow rays and its CPU seconds.</p>\

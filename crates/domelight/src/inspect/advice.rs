@@ -30,7 +30,7 @@ impl fmt::Display for Diagnosis<'_> {
         match cause {
             Cause::Coverage => write!(
                 f,
-                "the pixel lies on an edge, and {} of its camera samples show the scene",
+                "{} of the camera samples show the scene: an edge, or a surface that is partly transparent",
                 percent(decomposition.coverage)
             ),
             Cause::Background => f.write_str("the background differs between camera samples"),

@@ -70,6 +70,17 @@ pub enum InspectError {
         /// Rows of the picture.
         height: usize,
     },
+    /// It shows a shadow catcher, whose picture is the background times the share of the light that arrives, and not the
+    /// reflected light that would be explained.
+    #[error(
+        "pixel ({x}, {y}) shows a shadow catcher, which reflects no light; choose a pixel of the subject"
+    )]
+    ShadowCatcher {
+        /// Its column.
+        x: usize,
+        /// Its row.
+        y: usize,
+    },
 }
 
 /// Inspects one pixel.
@@ -122,7 +133,7 @@ impl<'a> Inspector<'a> {
     /// the picture's size, filter, background and seed.
     ///
     /// # Errors
-    /// If the pixel is outside the picture.
+    /// If the pixel is outside the picture, or any of its camera samples shows a shadow catcher.
     pub fn new(
         scene: &'a Scene,
         camera: &Camera,
@@ -140,6 +151,9 @@ impl<'a> Inspector<'a> {
         let filter = FilterSampler::new(settings.filter);
         let see = |ray: &Ray, sample: u32| {
             let Sight { hit, throughput } = scene.sight(ray, settings.seed, sample);
+            if hit.is_some_and(|hit| scene.catches_shadows(&hit)) {
+                return Err(InspectError::ShadowCatcher { x, y });
+            }
             let known = match (&hit, settings.background) {
                 (Some(hit), _) => luminance(scene.emitted(hit) * throughput),
                 (None, Background::Hidden) => 0.0,
@@ -149,7 +163,7 @@ impl<'a> Inspector<'a> {
                 }
             };
             let point = hit.map(|hit| scene.shading_point(ray, &hit));
-            CameraSample { point, known, throughput }
+            Ok(CameraSample { point, known, throughput })
         };
         let samples: Vec<CameraSample> = (0..N_SAMPLES as u32)
             .map(|i| {
@@ -158,7 +172,7 @@ impl<'a> Inspector<'a> {
                 let [[u], [v]] = lens.u(i);
                 see(&camera.lens_ray(x as f32 + at.x, y as f32 + at.y, [u, v]), i)
             })
-            .collect();
+            .collect::<Result<_, _>>()?;
         let center = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
         let representative = scene.camera_hit(&center, settings.seed, 0);
         let representative = representative.map(|hit| scene.shading_point(&center, &hit));

@@ -26,19 +26,23 @@ impl Provenance<'_> {
     /// The names and values of the attributes, in file order.
     pub fn attributes(&self) -> Vec<(String, String)> {
         let Self { scene, environment, strategy, settings, exposure } = *self;
-        let attributes = [
+        let mut attributes = vec![
             ("domelight.version", env!("CARGO_PKG_VERSION").to_owned()),
             ("domelight.scene", scene.to_owned()),
             ("domelight.environment", environment.to_owned()),
             ("domelight.strategy", strategy.to_owned()),
             ("domelight.samples", settings.n_samples.to_string()),
+            ("domelight.adaptive", settings.adaptive.to_string()),
             ("domelight.passes", settings.passes.name().to_owned()),
             ("domelight.sampler", settings.sampler.name().to_owned()),
             ("domelight.filter", settings.filter.name().to_owned()),
             ("domelight.seed", settings.seed.to_string()),
-            (EXPOSURE, exposure.to_string()),
         ];
-        attributes.map(|(name, value)| (name.to_owned(), value)).to_vec()
+        let target =
+            settings.target_error.map(|error| ("domelight.target_error", error.to_string()));
+        attributes.extend(target);
+        attributes.push((EXPOSURE, exposure.to_string()));
+        attributes.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
     }
 }
 
@@ -68,6 +72,8 @@ mod tests {
         let mut attributes = provenance.attributes();
         let of = |name: &str| attributes.iter().find(|(n, _)| n == name).map(|(_, v)| &v[..]);
         assert_eq!(of("domelight.samples"), Some("3"));
+        assert_eq!(of("domelight.adaptive"), Some("true"));
+        assert_eq!(of("domelight.target_error"), None);
         assert_eq!(of("domelight.passes"), Some("efficient"));
         assert_eq!(of("domelight.sampler"), Some("sobol"));
         assert_eq!(kept_exposure(&attributes), Some(-1.25));

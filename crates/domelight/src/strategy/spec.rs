@@ -449,6 +449,17 @@ fn named<T: Copy>(option: &'static str, names: Names<T>, text: &str) -> Result<T
 }
 
 impl StrategySpec {
+    /// Whether all directions are drawn from the BSDF. Light that it finds rarely is then missing from the samples as well as
+    /// from their variance.
+    pub fn draws_from_the_bsdf_alone(&self) -> bool {
+        match self {
+            Self::Brdf { .. } | Self::Mis { n_environment: 0, .. } => true,
+            Self::Rejection { proposal, .. } => *proposal == Proposal::Brdf,
+            Self::Sir { candidates, .. } => *candidates == Candidates::Brdf,
+            _ => false,
+        }
+    }
+
     /// Creates the strategy with these options. The defaults are 1 ray, 1:1 for `mis`, 8 rays for `product`, 16 tries
     /// and 64 lights.
     ///
