@@ -53,6 +53,11 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
     };
     let result = calibrated.run(&reference)?;
     drop(calibrated);
+    if result.report.strategies.iter().all(|strategy| strategy.result.is_none()) {
+        let why = result.report.strategies.iter().find_map(|strategy| strategy.left_out.as_ref());
+        let why = why.map_or(String::new(), |why| format!(": {why}"));
+        return Err(UsageError(format!("nothing was compared{why}")).into());
+    }
     write(arguments, &result)?;
     result.report.summary().iter().for_each(|line| host.status(line));
     host.status(&format!("-> {}", arguments.output.display()));

@@ -125,7 +125,7 @@ fn an_edge() {
     // A coin of the values 0 and 1/2.
     assert!((found[0].variance - 0.0625).abs() < 0.003, "{}", found[0].variance);
     let text = found[0].diagnosis().to_string();
-    assert!(text.contains("on an edge"), "{text}");
+    assert!(text.contains("show the scene: an edge"), "{text}");
     assert!(matches!(advice(&found), Advice::CameraSamples { .. }));
 }
 
