@@ -256,7 +256,7 @@ export class LightsPanel {
     $("dome-files").replaceChildren(...domes.map((name) => button(name, () => app.engines.call("domeFile", settings, name) as Promise<Uint8Array>)));
     const command = ["domelight", "lights", fileWord(state.env), ...(isBuiltinProbe(state.env) ? [`--env-rows=${state.rows}`] : []),
       ...(state.rotate ? [`--env-rotate=${state.rotate}`] : []), ...(state.scale === 1 ? [] : [`--env-scale=${state.scale}`]), ...(state.ev ? [`--env-exposure=${state.ev}`] : []), ...(state.sun ? ["--sun"] : []), ...(state.lamps ? [`--lamps=${state.lamps}`] : []),
-      ...(leave ? ["--keep-residual", "dome.exr"] : ["-n", String(state.lights)]), "--method", state.method, "-o", "rig.json"];
+      ...(leave ? [] : ["-n", String(state.lights)]), ...(rig.residual ? ["--keep-residual", "dome.exr"] : []), "--method", state.method, "-o", "rig.json"];
     // The program refines.
     $("rig-command").hidden = state.method === "variance-minimization" && !state.refine;
     $("rig-command").replaceChildren(...words(command.map(quoted)));
