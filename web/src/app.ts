@@ -193,7 +193,7 @@ export class App {
   private tellWarnings() {
     const warnings = [...this.scene?.warnings ?? [], ...this.probe?.warnings ?? []];
     $("warnings").hidden = !warnings.length;
-    $("warnings").replaceChildren(...warnings.map((warning) => h("li", {}, warning)));
+    $("warnings").querySelector("ul")!.replaceChildren(...warnings.map((warning) => h("li", {}, warning)));
   }
 
   /** Shows which files a link needs. */
