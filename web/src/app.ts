@@ -211,7 +211,7 @@ export class App {
     if (!good) return;
     if (good.drops === this.drops && good.state.scene === state.scene && good.state.env === state.env) {
       // Only the material fails. Its text stays in the field, to be corrected.
-      Object.assign(state, { material: good.state.material });
+      state.material = good.state.material;
       this.keepInAddress();
       return;
     }

@@ -1,5 +1,6 @@
 // The page's state, in the URL's hash and as the program's command line.
 
+import { $ } from "./dom";
 import type { Camera } from "./engines";
 import { CURVES } from "./tone";
 
@@ -65,11 +66,12 @@ export const MAPPINGS: [string, string][] = [
   ["octahedral", "octahedral"], ["cross-horizontal", "cube, horizontal cross"], ["cross-vertical", "cube, vertical cross"], ["strip-horizontal", "cube, strip"],
 ];
 
+const optionsOf = (id: string) => [...$<HTMLSelectElement>(id).options].map(({ value }) => value);
+
 /** The texts that the state may have where only a few are possible. */
 const CHOICES: Partial<Record<keyof State, readonly string[]>> = {
-  equal: ["rays", "time"], curve: CURVES, view: ["picture", "error"], mapping: MAPPINGS.map(([name]) => name),
-  layer: ["", "reflectance", "visibility", "target", "environment", "brdf", "mis", "product", "sir", "rejection", "own"],
-  method: ["median-cut", "variance-minimization"],
+  curve: CURVES, mapping: MAPPINGS.map(([name]) => name),
+  equal: optionsOf("equal"), view: optionsOf("view"), layer: optionsOf("layer"), method: optionsOf("method"),
 };
 
 /** The differences to the defaults, as text after `#`. */

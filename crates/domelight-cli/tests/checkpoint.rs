@@ -359,7 +359,7 @@ fn a_target_error_needs_samples_of_the_light() {
     for (strategy, warns) in [("brdf:1", true), ("mis:0:1", true), ("mis:1:1", false)] {
         let small = ["render", "sphere", "--env-rows", "16", "--size", "16x16", "-o", "y.pfm"];
         let precise = ["--spp", "32", "--target-error", "1", "--strategy", strategy];
-        let output = common::domelight(&folder, &[&small[..], &precise].concat());
+        let output = domelight(&folder, &[&small[..], &precise].concat());
         ended(&output, 0, &["up to 32 samples per pixel"]);
         assert_eq!(common::stderr(&output).contains("all miss a small light"), warns, "{strategy}");
     }

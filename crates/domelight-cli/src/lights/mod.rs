@@ -58,11 +58,7 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
     let domes = match (&dome_path, &found.extraction.residual) {
         (Some(path), Some(dome)) => arguments.write_dome(path, dome.map(), &outputs)?,
         _ if arguments.keep_residual.is_some() => {
-            let why = match arguments.min_energy {
-                Some(percent) => format!("every light has at least {percent} % of the energy"),
-                None => WHOLE_PROBE.to_owned(),
-            };
-            return Err(UsageError(nothing_left(&why)).into());
+            return Err(UsageError(NOTHING_LEFT.into()).into());
         }
         _ => DomeFiles { written: Vec::new(), of_outputs: vec![None; outputs.len()] },
     };
@@ -108,15 +104,10 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
     Ok(())
 }
 
-const WHOLE_PROBE: &str = "the lights use the whole probe";
-
 /// The message if there is nothing to write for --keep-residual.
-fn nothing_left(why: &str) -> String {
-    format!(
-        "nothing is left for --keep-residual: {why}. Omit -n and --error to keep the light that --sun and --lamps do not \
-         use, or leave dim lights in the map with --min-energy"
-    )
-}
+const NOTHING_LEFT: &str = "nothing is left for --keep-residual: the lights use the whole probe. Omit -n and --error to \
+                            keep the light that --sun and --lamps do not use, or leave dim lights in the map with \
+                            --min-energy";
 
 /// The pictures of a dome.
 struct DomeFiles {
@@ -177,7 +168,7 @@ impl LightsArguments {
             return Err(UsageError(message.into()).into());
         }
         if self.keep_residual.is_some() && !self.may_leave_light() {
-            return Err(UsageError(nothing_left(WHOLE_PROBE)).into());
+            return Err(UsageError(NOTHING_LEFT.into()).into());
         }
         let outputs: Vec<_> = self.output.iter().map(|o| self.output(o)).collect::<Result<_>>()?;
         let unnamed = self.keep_residual.as_ref().is_some_and(PicturePath::is_standard_output);

@@ -52,6 +52,7 @@ impl Sheen {
     fn d(&self, sin2: f32) -> f32 {
         let n = self.exponent();
         if sin2 > 0.0 {
+            // A comparison, because `f32::min` is a call in WebAssembly.
             (2.0 + n) / TAU
                 * functions::exp(0.5 * n * functions::ln_1p(SimdFloat::min(sin2, 1.0) - 1.0))
         } else {

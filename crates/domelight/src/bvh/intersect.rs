@@ -69,32 +69,20 @@ impl<S: Simd> Slabs<S> {
         [enter[0].max(enter[1]).max(enter[2].max(zero)), leave[0].min(leave[1]).min(leave[2])]
     }
 
-    /// The boxes that ray `i` crosses within [0, `limit`], and the distances where it enters them.
+    /// The boxes that a single ray crosses within [0, `limit`], and the distances where it enters them.
     #[inline(always)]
-    pub(super) fn cross_within<const N: usize, const EXACT: bool>(
-        &self,
-        simd: S,
-        rays: &PreparedRays<N>,
-        i: usize,
-        limit: f32,
-    ) -> (<S::F32x8 as SimdFloat>::Mask, S::F32x8) {
-        let [enter, leave] = self.cross::<N, EXACT>(simd, rays, i);
-        (enter.le(leave.min(simd.splat(limit))), enter)
-    }
-
-    /// The same for a single ray.
-    #[inline(always)]
-    pub(super) fn cross_within_one<const N: usize>(
+    pub(super) fn cross_within<const N: usize>(
         &self,
         simd: S,
         ray: &PreparedRays<N>,
         limit: f32,
     ) -> (<S::F32x8 as SimdFloat>::Mask, S::F32x8) {
-        if ray.need_exact_products::<S>() {
-            self.cross_within::<N, true>(simd, ray, 0, limit)
+        let [enter, leave] = if ray.need_exact_products::<S>() {
+            self.cross::<N, true>(simd, ray, 0)
         } else {
-            self.cross_within::<N, false>(simd, ray, 0, limit)
-        }
+            self.cross::<N, false>(simd, ray, 0)
+        };
+        (enter.le(leave.min(simd.splat(limit))), enter)
     }
 }
 

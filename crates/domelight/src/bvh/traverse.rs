@@ -316,7 +316,7 @@ fn closest_hit<S: Simd>(
         } else {
             let node = &bvh.nodes[child.index()];
             let slabs = Slabs::load(simd, node, ray.octant);
-            let (crossed, enter) = slabs.cross_within_one(simd, ray, limit);
+            let (crossed, enter) = slabs.cross_within(simd, ray, limit);
             let crossed = crossed.bits();
             if crossed.is_power_of_two() {
                 child = node.children[crossed.trailing_zeros() as usize % WIDTH];
@@ -351,7 +351,7 @@ fn any_hit<S: Simd>(simd: S, bvh: &Bvh, ray: &PreparedRays<WIDTH>, limit: f32) -
         } else {
             let node = &bvh.nodes[child.index()];
             let slabs = Slabs::load(simd, node, ray.octant);
-            let (crossed, _) = slabs.cross_within_one(simd, ray, limit);
+            let (crossed, _) = slabs.cross_within(simd, ray, limit);
             // Push the last and largest on top.
             for lane in set_bits(crossed.bits()) {
                 stack[len] = node.children[lane];
@@ -514,64 +514,57 @@ impl<S: Simd> Entering<S> {
     }
 }
 
-// Rays that need exact products are rare. Their loops are functions of their own, because their conversions would fill
-// the registers of the others.
 impl<S: Simd> Entering<S> {
-    /// The rays of `members` whose lines cross each child of a node. The node's planes stay in registers while one ray
-    /// after the other is tested against the eight boxes.
+    /// The rays of `members` that cross each child of a node, within their limits if they have any, and the distances
+    /// where the last one enters them.
     #[inline(always)]
-    fn of_node<const EXACT: bool>(
+    fn of_node(
         simd: S,
         node: &Node,
         rays: &PreparedRays<STREAM>,
+        limits: Option<&[f32; STREAM]>,
         members: u64,
-    ) -> Self {
+    ) -> (Self, S::F32x8) {
+        if rays.need_exact_products::<S>() {
+            Self::exact(simd, node, rays, limits, members)
+        } else {
+            Self::test::<false>(simd, node, rays, limits, members)
+        }
+    }
+
+    /// Tests one ray after the other against the eight boxes, while the node's planes stay in registers.
+    #[inline(always)]
+    fn test<const EXACT: bool>(
+        simd: S,
+        node: &Node,
+        rays: &PreparedRays<STREAM>,
+        limits: Option<&[f32; STREAM]>,
+        members: u64,
+    ) -> (Self, S::F32x8) {
         let slabs = Slabs::load(simd, node, rays.octant);
         let mut entering = Self::none(simd);
+        let mut last = simd.splat(0.0);
         for i in set_bits(members) {
             let [enter, leave] = slabs.cross::<STREAM, EXACT>(simd, rays, i);
+            let leave = limits.map_or(leave, |limits| leave.min(simd.splat(limits[i])));
             entering.insert(i, enter.le(leave));
+            last = enter;
         }
-        entering
+        (entering, last)
     }
 
+    /// [`Self::test`] with exact products: rare, and kept apart, because their conversions would fill the registers of
+    /// the other loop.
     #[cold]
     #[inline(never)]
-    fn of_node_exact(simd: S, node: &Node, rays: &PreparedRays<STREAM>, members: u64) -> Self {
-        Self::of_node::<true>(simd, node, rays, members)
-    }
-
-    /// The rays of `members` that cross each child of a node within their limits, and the distances where the last one
-    /// enters them.
-    #[inline(always)]
-    fn of_node_within<const EXACT: bool>(
+    fn exact(
         simd: S,
         node: &Node,
         rays: &PreparedRays<STREAM>,
-        limits: &[f32; STREAM],
+        limits: Option<&[f32; STREAM]>,
         members: u64,
     ) -> (Self, S::F32x8) {
-        let slabs = Slabs::load(simd, node, rays.octant);
-        let mut entering = Self::none(simd);
-        let mut enter = simd.splat(0.0);
-        for i in set_bits(members) {
-            let (crossed, entered) = slabs.cross_within::<STREAM, EXACT>(simd, rays, i, limits[i]);
-            entering.insert(i, crossed);
-            enter = entered;
-        }
-        (entering, enter)
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn of_node_within_exact(
-        simd: S,
-        node: &Node,
-        rays: &PreparedRays<STREAM>,
-        limits: &[f32; STREAM],
-        members: u64,
-    ) -> (Self, S::F32x8) {
-        Self::of_node_within::<true>(simd, node, rays, limits, members)
+        Self::test::<true>(simd, node, rays, limits, members)
     }
 }
 
@@ -603,11 +596,7 @@ impl StreamStack {
         rays: &PreparedRays<STREAM>,
         members: u64,
     ) {
-        let entering = if rays.need_exact_products::<S>() {
-            Entering::of_node_exact(simd, node, rays, members)
-        } else {
-            Entering::of_node::<false>(simd, node, rays, members)
-        };
+        let (entering, _) = Entering::of_node(simd, node, rays, None, members);
         self.push_entered(&node.children, entering);
     }
 
@@ -634,11 +623,7 @@ impl StreamStack {
         limits: &[f32; STREAM],
         members: u64,
     ) {
-        let (entering, enter) = if rays.need_exact_products::<S>() {
-            Entering::of_node_within_exact(simd, node, rays, limits, members)
-        } else {
-            Entering::of_node_within::<false>(simd, node, rays, limits, members)
-        };
+        let (entering, enter) = Entering::of_node(simd, node, rays, Some(limits), members);
         let not_empty = entering.0.map(SimdBitSets::not_empty);
         let (halves, enter) = (entering.0.map(SimdBitSets::store), enter.store());
         let base = self.len;

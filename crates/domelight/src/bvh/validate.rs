@@ -4,6 +4,7 @@ use super::build::MAX_DEPTH;
 use super::{Block, Bvh, Child, Node, WIDTH};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
+use crate::simd::lane_of;
 
 /// A defect in a BVH, which would be a bug in the builder.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -127,10 +128,9 @@ fn child_bounds(node: &Node, lane: usize) -> Aabb {
 
 fn block_bounds(block: &Block) -> Aabb {
     let present = (0..WIDTH).filter(|&lane| block.ids[lane] != Block::NONE);
-    Aabb::around(present.flat_map(|lane| {
-        block
-            .vertices
-            .each_ref()
-            .map(|vertex| Vec3::from_array(vertex.each_ref().map(|axis| axis[lane])))
-    }))
+    Aabb::around(
+        present.flat_map(|lane| {
+            block.vertices.each_ref().map(|vertex| Vec3::from(lane_of(vertex, lane)))
+        }),
+    )
 }

@@ -131,6 +131,7 @@ fn split(u: &mut f32, first: f32, second: f32) -> bool {
     let at = *u * (first + second);
     let beyond = at >= first && second > 0.0;
     let stretched = if beyond { (at - first) / second } else { at / first };
+    // A comparison, because `f32::min` is a call in WebAssembly.
     *u = SimdFloat::min(stretched, ONE_MINUS_EPSILON);
     beyond
 }

@@ -11,8 +11,8 @@
 
 use super::corners::Corners;
 use crate::geometry::Mesh;
-use crate::math::{Frame, Vec3, tangents, vec3};
-use crate::simd::{LaneMask, Lanes, Simd, SimdF32x8, SimdFloat, Vectors};
+use crate::math::{Frame, Vec3, tangents};
+use crate::simd::{LaneMask, Lanes, Simd, SimdF32x8, SimdFloat, Vectors, lane_of};
 use crate::strategy::ShadingPoint;
 
 /// The minimum cosine between the shading normal and the direction to the viewer.
@@ -231,11 +231,11 @@ impl FacetLanes {
     /// The surface of one lane.
     pub(super) fn get(&self, lane: usize) -> Facet<f32> {
         Facet {
-            viewer: lane_of(&self.viewer, lane).into(),
-            ng: lane_of(&self.ng, lane).into(),
-            smooth: lane_of(&self.smooth, lane).into(),
+            viewer: vec3_of(&self.viewer, lane).into(),
+            ng: vec3_of(&self.ng, lane).into(),
+            smooth: vec3_of(&self.smooth, lane).into(),
             side: self.side[lane],
-            position: lane_of(&self.position, lane).into(),
+            position: vec3_of(&self.position, lane).into(),
             is_risen: self.is_risen(lane),
         }
     }
@@ -244,11 +244,11 @@ impl FacetLanes {
     #[inline(always)]
     pub(super) fn set(&self, lane: usize, point: &mut ShadingPoint) {
         let [x, y, z] = &self.frame;
-        let frame = Frame { x: lane_of(x, lane), y: lane_of(y, lane), z: lane_of(z, lane) };
-        point.position = lane_of(&self.position, lane);
-        point.ng = if self.is_risen(lane) { frame.z } else { lane_of(&self.ng, lane) };
+        let frame = Frame { x: vec3_of(x, lane), y: vec3_of(y, lane), z: vec3_of(z, lane) };
+        point.position = vec3_of(&self.position, lane);
+        point.ng = if self.is_risen(lane) { frame.z } else { vec3_of(&self.ng, lane) };
         point.frame = frame;
-        point.wo = lane_of(&self.wo, lane);
+        point.wo = vec3_of(&self.wo, lane);
     }
 
     #[inline(always)]
@@ -263,6 +263,6 @@ fn set_lane(of: &mut Lanes3, lane: usize, v: Vec3) {
 }
 
 #[inline(always)]
-fn lane_of(v: &Lanes3, lane: usize) -> Vec3 {
-    vec3(v[0][lane], v[1][lane], v[2][lane])
+fn vec3_of(v: &Lanes3, lane: usize) -> Vec3 {
+    lane_of(v, lane).into()
 }

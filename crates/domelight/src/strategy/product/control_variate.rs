@@ -124,6 +124,8 @@ impl ControlVariate {
         Integral { diffuse: [dr, dg, db], gloss }
     }
 
+    /// The integrals of the diffuse part, a vector to be multiplied by the normal, and of the glossy part, both with the
+    /// `moments` of one channel of the light.
     #[inline(always)]
     fn integral_of_channel<S: Simd>(
         &self,
@@ -188,7 +190,7 @@ mod tests {
     use crate::environment::Environment;
     use crate::math::vec3;
     use crate::sampling::{Sampler, SamplerKind};
-    use crate::simd::{InstructionSet, Kernel, LANES, dispatch};
+    use crate::simd::{InstructionSet, Kernel, LANES, dispatch, lane_of};
     use crate::strategy::ShadingPoint;
     use testkit::ZTest;
 
@@ -231,7 +233,7 @@ mod tests {
             for block in &candidates.lights {
                 for lane in 0..LANES {
                     let v = super::super::cells::get(self.visible, block.slots[lane] as usize);
-                    let of = |c: &[crate::simd::Lanes; 3]| Rgb::from(c.map(|c| c[lane])) * v;
+                    let of = |c: &[crate::simd::Lanes; 3]| Rgb::from(lane_of(c, lane)) * v;
                     value += of(&block.value);
                     known += of(&block.value) - of(&block.residual);
                 }
