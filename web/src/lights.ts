@@ -144,9 +144,12 @@ export class LightsPanel {
     for (const id of ["n-lights", "fewer-lights", "more-lights", "play-lights"]) $<HTMLInputElement>(id).disabled = leave;
     if (leave) this.play(false);
     const settings = JSON.stringify({ method: state.method, refine: state.refine, n: leave ? null : state.lights, sun: state.sun, lamps: state.lamps });
-    let rig: Rig, regions: Uint32Array, view, spheres: Float32Array;
+    let rig: Rig, regions: Uint32Array, spheres: Float32Array;
     try {
-      view = await app.engines.call("mapView", "lat-long", 0, WIDTH);
+      const view = await app.engines.call("mapView", "lat-long", 0, WIDTH), film = new Film(view.width, view.height);
+      film.pixels = view.pixels;
+      this.map.set({ exposure: film.exposure() });
+      this.map.show(0, film);
       rig = JSON.parse(await app.engines.call("lights", settings));
       regions = (await app.engines.call("regions", settings, WIDTH)) as Uint32Array;
       spheres = (await app.engines.call("spheres", settings, SPHERE, state.gloss)) as Float32Array;
@@ -155,10 +158,6 @@ export class LightsPanel {
       return;
     }
     this.rig = rig;
-    const film = new Film(view.width, view.height);
-    film.pixels = view.pixels;
-    this.map.set({ exposure: film.exposure() });
-    this.map.show(0, film);
     const of = JSON.stringify([state.method, state.refine, leave, state.sun, state.lamps, state.env, state.rows, state.rotate]);
     const divided = leave || isRefined(state.method, state.refine) || this.before?.of !== of || this.before.lights >= rig.lights.length ? new Set<number>() : splits(this.before.regions, regions);
     this.mark(regions, leave, divided);
@@ -176,6 +175,7 @@ export class LightsPanel {
     $("rig-caption").textContent = `${lights} light${lights === 1 ? "" : "s"} of ${app.envName}${rig.residual ? `; the rest of the light stays on the map` : ""}${state.rotate ? `. The map is drawn unrotated; files have the rotation of ${degrees(state.rotate)}, except for sIBL, which cannot state it` : ""}. Shading error: matte ${percent(rig.diffuse)}, glossy ${percent(rig.glossy)}.`;
     $("rig-table").querySelector("tbody")!.replaceChildren(...rig.lights.slice(0, 6).map((light) =>
       h("tr", {}, h("th", { scope: "row" }, light.name.replace("_", " ")), h("td", {}, percentage(light.share)), h("td", {}, `${light.radius.toFixed(1)}°`))));
+    $("rig-shading").hidden = false;
     this.offer(settings);
     document.documentElement.dataset.rig = `${state.method}:${lights}`;
   });
@@ -185,10 +185,8 @@ export class LightsPanel {
     this.rig = this.before = null;
     this.drawn = this.app.state.lights;
     $<HTMLCanvasElement>("rig-marks").getContext("2d")!.clearRect(0, 0, WIDTH, WIDTH / 2);
-    for (const canvas of ["sphere-truth", "sphere-rig"]) $<HTMLCanvasElement>(canvas).getContext("2d")?.clearRect(0, 0, SPHERE, SPHERE);
-    for (const id of ["rig-step", "formats", "dome-files", "rig-command"]) $(id).replaceChildren();
-    $("rig-table").querySelector("tbody")!.replaceChildren();
-    $("rig-command").hidden = true;
+    for (const id of ["rig-step", "formats", "dome-files"]) $(id).replaceChildren();
+    $("rig-shading").hidden = $("rig-command").hidden = true;
     $("rig-caption").textContent = `There are no lights: ${reason.replace(/\.$/, "")}.`;
     document.documentElement.dataset.rig = "none";
   }
