@@ -236,6 +236,24 @@ fn bad_texels_are_refused_or_repaired_and_counted() {
     assert_eq!(report["sanitized"], serde_json::json!({"negative": 1, "non_finite": 1}));
 }
 
+/// A layer is a channel group of OpenEXR; asking for one elsewhere is answered by a warning.
+#[test]
+fn a_layer_of_a_map_that_has_none_is_warned_of() {
+    let folder = pictures();
+    done(&domelight(&folder, &["probe", "studio", "--size", "16", "-o", "map.hdr"]));
+    let render = ["render", "sphere", "--size", "8x8", "--spp", "1", "-o", "a.pfm", "--env"];
+    let asked = |command: &[&str]| domelight(&folder, &[command, &["--env-layer", "sky"]].concat());
+    let of_file = asked(&[&render[..], &["map.hdr"]].concat());
+    assert_eq!(of_file.status.code(), Some(0));
+    assert!(
+        stderr(&of_file).contains("map.hdr: only OpenEXR files have layers; 'sky' is not used")
+    );
+    let of_builtin = "studio is built in: its layer and mapping cannot be chosen";
+    assert!(stderr(&asked(&[&render[..], &["studio"]].concat())).contains(of_builtin));
+    let probe = domelight(&folder, &["probe", "studio", "--layer", "sky"]);
+    assert!(stderr(&probe).contains(of_builtin), "{}", stderr(&probe));
+}
+
 #[test]
 fn probes_pass_through_pipes() {
     let folder = pictures();

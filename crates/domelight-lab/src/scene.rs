@@ -445,6 +445,11 @@ impl LightSettings {
                     Some(referrer) => Error::Usage(format!("{referrer}: {error}")),
                     None => Error::Usage(error.to_string()),
                 })?;
+                if self.layer.is_some() || self.mapping.is_some() {
+                    host.warn(&format!(
+                        "{name} is built in: its layer and mapping cannot be chosen"
+                    ));
+                }
                 let rows = u64::from(self.rows);
                 let bytes = Environment::MEMORY_PER_TEXEL * 2 * rows * rows;
                 host.take_memory(&format!("{name} with {rows} rows"), bytes)?;

@@ -114,7 +114,10 @@ fn load(arguments: &ProbeArguments) -> anyhow::Result<LoadedProbe> {
         let image = builtin.image(rows as usize);
         let (mapping, file_size) = (Mapping::LatLong, (image.width, image.height));
         let sanitized = SanitizeReport::default();
-        let warnings = Vec::new();
+        let chosen = arguments.layer.is_some() || arguments.mapping.is_some();
+        let warning =
+            || format!("{} is built in: its layer and mapping cannot be chosen", builtin.name());
+        let warnings = chosen.then(warning).into_iter().collect();
         return Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings });
     }
     files::reads(&arguments.probe)?;

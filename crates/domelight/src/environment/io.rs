@@ -141,6 +141,11 @@ pub fn probe_from_picture(
             if picture.format == Format::Png { "PNG" } else { "JPEG" }
         ));
     }
+    if let Some(layer) = &options.layer
+        && picture.format != Format::Exr
+    {
+        warnings.push(format!("{file}: only OpenEXR files have layers; '{layer}' is not used"));
+    }
     let mapping = options.mapping.unwrap_or_else(|| guess_mapping(&image, picture.envmap));
     mapping
         .check_shape(image.width, image.height)
