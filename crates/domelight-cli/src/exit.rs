@@ -34,6 +34,12 @@ pub(crate) fn report_usage(mut error: clap::Error) -> ExitCode {
         status_lines(FIRST_STEPS);
         return ExitCode::from(error.exit_code() as u8);
     }
+    if error.kind() == ErrorKind::InvalidUtf8
+        && let Some(word) = std::env::args_os().find(|word| word.to_str().is_none())
+    {
+        print_labeled(Label::Error, &format!("{word:?} is not UTF-8, which this command needs"));
+        return ExitCode::from(error.exit_code() as u8);
+    }
     suggest::add_to(&mut error);
     let text = error.to_string();
     if terminal::lines(&text) == text {
