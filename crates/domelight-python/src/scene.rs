@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr as _;
 use std::sync::Arc;
 
+use domelight::environment::io::ProbeOptions;
 use domelight::environment::{Orientation, UpAxis};
 use domelight::geometry::{Aabb, Mesh};
 use domelight::math::{Vec2, Vec3};
@@ -498,12 +499,20 @@ impl Scene {
         };
         let settings = self.inner.environment.clone().unwrap_or_else(sky);
         let (map, name) = match &settings.source {
-            EnvironmentSource::Builtin(name) => (builtin_map(py, name, rows)?, name.clone()),
-            EnvironmentSource::File(path) => (
-                load_map(py, path.clone(), domelight::environment::io::ProbeOptions::default())?,
-                path.display().to_string(),
-            ),
+            EnvironmentSource::Builtin(name) => (builtin_map(py, name, rows), name.clone()),
+            EnvironmentSource::File(path) => {
+                (load_map(py, path.clone(), ProbeOptions::default()), path.display().to_string())
+            }
         };
+        // Name the line of the scene file that asks for the map.
+        let located = |error: PyErr| match &settings.referrer {
+            Some(referrer) => {
+                let text = format!("{referrer}: {}", error.value(py));
+                PyErr::from_type(error.get_type(py), text)
+            }
+            None => error,
+        };
+        let map = map.map_err(located)?;
         let orientation = Orientation { up: settings.up, rotation: settings.rotate_degrees };
         let scale = settings.factor().map_err(to_python)?;
         Environment::build(py, map, orientation, scale, name)

@@ -153,3 +153,11 @@ def test_wrong_meshes_are_named(arguments, words):
 def test_wrong_attributes_are_named(attributes, words):
     with pytest.raises(ValueError, match=words):
         dl.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], **attributes)
+
+
+def test_the_line_of_a_scene_file_that_names_a_missing_map_is_named(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text('[environment]\nfile = "none.hdr"\n\n[[objects]]\nbuiltin = "sphere"\n')
+    scene = dl.Scene.load(path)
+    with pytest.raises(FileNotFoundError, match=r"scene\.toml.*line 2.*none\.hdr"):
+        scene.environment()
