@@ -1,12 +1,13 @@
 //! `domelight diff`: a picture against its reference.
 
 use crate::args::{DiffArguments, Metric};
-use crate::error::UsageError;
+use crate::error::{UsageError, warn};
 use crate::files;
 use crate::memory;
 use crate::output::{
     PictureFormat, PicturePath, print, print_json, require_one_on_standard_output,
 };
+use anyhow::Context as _;
 use domelight::RgbImage;
 use domelight::picture::compare::{
     ColorScale, Comparison, absolute_error_map, compare, relative_error_map,
@@ -14,7 +15,7 @@ use domelight::picture::compare::{
 use domelight::picture::exposure::Exposure;
 use domelight::picture::flip::{HdrFlip, PIXELS_PER_DEGREE, hdr_flip, ldr_flip};
 use domelight::picture::tone::ToneMapping;
-use domelight::picture::{ReadOptions, read};
+use domelight::picture::{Picture, ReadOptions, read};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -37,11 +38,13 @@ pub(crate) fn run(arguments: &DiffArguments, quiet: bool) -> anyhow::Result<()> 
     }
     files::reads(&arguments.test)?;
     files::reads(&arguments.reference)?;
-    let options = || ReadOptions { layer: arguments.layer.clone(), max_memory: memory::left() };
-    let test = read(&arguments.test, &options())?;
-    memory::keep(PICTURE_TEXEL * test.image.pixels.len() as u64);
-    let reference = read(&arguments.reference, &options())?;
-    memory::keep(PICTURE_TEXEL * reference.image.pixels.len() as u64);
+    let of_reference = arguments.reference_layer.as_ref().or(arguments.layer.as_ref());
+    let mut test = load(&arguments.test, arguments.layer.as_ref(), quiet)?;
+    let mut reference = load(&arguments.reference, of_reference, quiet)?;
+    if test.window != reference.window {
+        test = in_frame(&arguments.test, test, quiet)?;
+        reference = in_frame(&arguments.reference, reference, quiet)?;
+    }
     let texels = test.image.pixels.len().max(reference.image.pixels.len()) as u64;
     memory::allow("comparing the pictures", COMPARISON_TEXEL * texels)?;
     let mask = match (&reference.alpha, arguments.covered) {
@@ -64,6 +67,26 @@ pub(crate) fn run(arguments: &DiffArguments, quiet: bool) -> anyhow::Result<()> 
         print(&difference.table(white.map(|w| (w, arguments.metric))))?;
     }
     Ok(())
+}
+
+/// Reads a picture and accounts for its memory.
+fn load(path: &Path, layer: Option<&String>, quiet: bool) -> anyhow::Result<Picture> {
+    let picture = read(path, &ReadOptions { layer: layer.cloned(), max_memory: memory::left() })?;
+    memory::keep(PICTURE_TEXEL * picture.image.pixels.len() as u64);
+    if let Some(guessed) = &picture.guessed_layer {
+        warn(quiet, &format!("{}: {guessed}; --layer chooses", path.display()));
+    }
+    Ok(picture)
+}
+
+/// The picture in its display window, because only there two windows of pictures correspond.
+fn in_frame(path: &Path, picture: Picture, quiet: bool) -> anyhow::Result<Picture> {
+    let Some(window) = picture.window else { return Ok(picture) };
+    let (width, height) = window.display;
+    let name = path.display();
+    memory::allow(&name.to_string(), PICTURE_TEXEL * width as u64 * height as u64)?;
+    warn(quiet, &format!("{name}: compared in its display window, black outside its data window"));
+    picture.in_display_window().with_context(|| name.to_string())
 }
 
 struct Difference {

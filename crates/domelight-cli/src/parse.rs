@@ -195,6 +195,9 @@ impl FromStr for Frames {
         let (first, last) = s.split_once('-').unwrap_or((s, s));
         match (first.parse(), last.parse()) {
             (Ok(first), Ok(last)) if first <= last => Ok(Self { first, last }),
+            (Ok(first), Ok(last)) if first > last => {
+                Err(bad(s, "frames in rising order, such as 0-11"))
+            }
             _ => Err(bad(s, "frames such as 0-11, first and last, counted from 0")),
         }
     }

@@ -63,6 +63,9 @@ pub(crate) fn run(arguments: &ToneArguments, quiet: bool) -> Result<()> {
     let name = path.display().to_string();
     let picture = layer_of(&bytes, &name, layer.as_deref())?;
     memory::allow(&name, TEXEL * picture.image.pixels.len() as u64)?;
+    if let Some(guessed) = &picture.guessed_layer {
+        warn(quiet, &format!("{name}: {guessed}; --layer chooses"));
+    }
     let non_finite = picture.image.pixels.iter().filter(|pixel| !pixel.is_finite()).count();
     if non_finite > 0 {
         let are = if non_finite == 1 { "pixel is" } else { "pixels are" };

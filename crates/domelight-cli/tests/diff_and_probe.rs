@@ -3,6 +3,7 @@
 use crate::common;
 
 use common::{domelight, done, json, load, stderr, stdout, write_exr};
+use domelight::picture::exr::ExrLayers;
 use domelight::{Rgb, RgbImage};
 use serde_json::Value;
 use std::process::{Command, Output, Stdio};
@@ -60,6 +61,42 @@ fn a_known_difference_is_reported_as_json_and_as_a_table() {
         assert!(done(&table).contains(name), "{name}");
     }
     assert_eq!(done(&domelight(&folder, &["diff", "brighter.exr", "gray.exr", "-q"])), "");
+}
+
+/// Two crops of one picture are compared where they are in it, and a layer by another name.
+#[test]
+fn crops_are_compared_in_their_frame_and_layers_by_name() {
+    let folder = pictures();
+    let whole = RgbImage::from_fn(16, 8, |x, y| Rgb::splat((x * y) as f32));
+    let crop = |name: &str, origin: (usize, usize)| {
+        let part = RgbImage::from_fn(9, 5, |x, y| whole.get(x + origin.0, y + origin.1));
+        let layers =
+            ExrLayers { origin, whole: Some((16, 8)), ..ExrLayers::from_image(&part, None) };
+        std::fs::write(folder.path().join(name), layers.encode().unwrap()).unwrap();
+    };
+    crop("a.exr", (2, 1));
+    crop("b.exr", (3, 1));
+    let output = domelight(&folder, &["diff", "a.exr", "b.exr", "--json"]);
+    let warning = "a.exr: compared in its display window, black outside its data window";
+    assert!(stderr(&output).contains(warning), "{}", stderr(&output));
+    // Only the columns that one of them lacks differ.
+    let missing = |x: usize| (1..6).map(move |y| ((x * y) as f64).powi(2)).sum::<f64>();
+    let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(report["pixels"], 128);
+    assert_eq!(report["mse"], (missing(2) + missing(11)) / 128.0);
+    let same = json(&domelight(&folder, &["diff", "a.exr", "a.exr", "--json"]));
+    assert_eq!((&same["pixels"], &same["mse"]), (&45.into(), &0.0.into()));
+    let named = |name: &str, layer: &str| {
+        let mut layers = ExrLayers::new(20, 10);
+        layers.push_rgb(layer, &load(&folder, "gray.exr"), None);
+        std::fs::write(folder.path().join(name), layers.encode().unwrap()).unwrap();
+    };
+    named("named.exr", "View.Combined");
+    named("other.exr", "fill");
+    let mean = |arguments: &[&str]| json(&domelight(&folder, arguments))["mse"].clone();
+    assert_eq!(mean(&["diff", "named.exr", "gray.exr", "--json"]), 0.0);
+    let layers = ["--layer", "combined", "--reference-layer", "fill"];
+    assert_eq!(mean(&[&["diff", "named.exr", "other.exr", "--json"], &layers[..]].concat()), 0.0);
 }
 
 #[test]
@@ -233,7 +270,10 @@ fn bad_texels_are_refused_or_repaired_and_counted() {
     let repaired = domelight(&folder, &["probe", "bad.exr", "--json"]);
     assert!(stderr(&repaired).contains("1 negative and 1 NaN"), "{}", stderr(&repaired));
     let report: Value = serde_json::from_slice(&repaired.stdout).expect("JSON");
-    assert_eq!(report["sanitized"], serde_json::json!({"negative": 1, "non_finite": 1}));
+    assert_eq!(
+        report["sanitized"],
+        serde_json::json!({"negative": 1, "non_finite": 1, "infinite": 0})
+    );
 }
 
 /// A layer is a channel group of OpenEXR; asking for one elsewhere is answered by a warning.

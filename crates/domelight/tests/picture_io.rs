@@ -538,7 +538,27 @@ fn exr_layers_are_written_and_found_again() {
         layer(Some("shadow")).unwrap_err().to_string(),
         "test: there is no layer \"shadow\" with color channels; the file has albedo, depth, normal"
     );
-    // Without unnamed channels the first with R, G and B is the picture.
+    // Without unnamed channels, a layer named after the whole picture is the picture.
+    let named = |names: [&str; 3]| {
+        let mut layers = ExrLayers::new(33, 17);
+        let levels = [1.0, 2.0, 3.0].map(|level| RgbImage::filled(33, 17, Rgb::splat(level)));
+        names.iter().zip(&levels).for_each(|(name, image)| layers.push_rgb(name, image, None));
+        layers.encode().unwrap()
+    };
+    let read = |bytes: &[u8], name: Option<&str>| {
+        let options = ReadOptions { layer: name.map(Into::into), ..Default::default() };
+        read_bytes(bytes, "test", &options).map(|p| (p.image.pixels[0].r, p.guessed_layer))
+    };
+    let blender = named(["ViewLayer.AO", "ViewLayer.Combined", "ViewLayer.DiffCol"]);
+    assert_eq!(read(&blender, None).unwrap(), (2.0, None));
+    // Its last word names a layer, if there is only one.
+    assert_eq!(read(&blender, Some("diffcol")).unwrap(), (3.0, None));
+    assert!(read(&named(["a.x", "b.x", "c"]), Some("x")).is_err());
+    // The first of others is a guess.
+    let (level, guessed) = read(&named(["fill", "key", "rim"]), None).unwrap();
+    let words = guessed.expect("a guess").to_string();
+    assert_eq!((level, &*words), (1.0, "the layer 'fill' is read; the file also has key, rim"));
+    // Something that is no color is no picture.
     let mut only = ExrLayers::new(33, 17);
     only.push_channel("a", "Z", vec![1.0; 561]);
     let none = kind(&only.encode().unwrap()).to_string();
@@ -771,10 +791,12 @@ fn texels_that_are_no_radiance_are_named_or_repaired() {
     let repaired = load_probe(&path, &ProbeOptions::default()).unwrap();
     let [warning] = &repaired.warnings[..] else { panic!("{:?}", repaired.warnings) };
     assert!(warning.contains("1 negative and 2 NaN or infinite"), "{warning}");
-    assert_eq!(repaired.sanitized, SanitizeReport { negative: 1, non_finite: 2 });
+    assert_eq!(repaired.sanitized, SanitizeReport { negative: 1, non_finite: 2, infinite: 1 });
+    assert!(warning.contains("1 infinite ones became 65504"), "{warning}");
     // The mean of 2, 3, 4 in the rows around and 2, 4 beside it.
     assert_eq!(repaired.image.get(3, 1), Rgb::new(1.0, 3.0, 0.0));
-    assert_eq!(repaired.image.get(5, 2).r, 5.0);
+    // What overflowed is as bright as can be.
+    assert_eq!(repaired.image.get(5, 2).r, 65504.0);
 }
 
 /// A map whose black borders were cropped, one with texels beyond its frame, and one with any frame.
@@ -810,6 +832,9 @@ fn data_windows_stand_in_display_windows_that_are_maps() {
     assert_eq!(beyond.image.get(0, 0), smooth(18, 10).get(1, 1));
     let as_is = probe(&smooth(16, 8), (0, 0), (19, 11));
     assert_eq!((as_is.image, as_is.warnings.len()), (smooth(16, 8), 0));
+    let either = probe(&smooth(20, 10), (1, -3), (16, 8));
+    assert_eq!((either.image, either.file_size), (smooth(20, 10), (20, 10)));
+    assert!(either.warnings[0].ends_with("the data window is read as the whole map"));
 }
 
 #[test]
@@ -830,6 +855,30 @@ fn pictures_of_a_screen_are_maps_with_a_warning() {
     }
 }
 
+/// A PNG that states a gamma is decoded by it, unless it is about that of sRGB or comes with the chunk sRGB.
+#[test]
+fn a_png_may_state_its_gamma() {
+    let with = |gamma: Option<u32>, srgb: bool| {
+        let mut bytes = Vec::new();
+        let mut encoder = ::png::Encoder::new(&mut bytes, 1, 1);
+        encoder.set_color(::png::ColorType::Rgb);
+        if srgb {
+            encoder.set_source_srgb(::png::SrgbRenderingIntent::Perceptual);
+        }
+        if let Some(gamma) = gamma {
+            encoder.set_source_gamma(::png::ScaledFloat::from_scaled(gamma));
+        }
+        encoder.write_header().unwrap().write_image_data(&[128; 3]).unwrap();
+        read_bytes(&bytes, "a.png", &ReadOptions::default()).unwrap().image.pixels[0].g
+    };
+    let near = |a: f32, b: f32| (a - b).abs() < 1e-3;
+    assert!(near(with(None, false), 0.2159));
+    assert!(near(with(Some(45455), false), 0.2159));
+    assert!(near(with(Some(100_000), false), 0.502));
+    assert!(near(with(Some(50_000), false), 0.252));
+    assert!(near(with(Some(100_000), true), 0.2159));
+}
+
 #[test]
 fn large_holes_are_filled_from_their_borders() {
     let mut image = RgbImage::filled(40, 30, Rgb::new(2.0, f32::NAN, 2.0));
@@ -839,7 +888,7 @@ fn large_holes_are_filled_from_their_borders() {
         }
     }
     let report = sanitize(&mut image);
-    assert_eq!(report, SanitizeReport { negative: 0, non_finite: 1200 + 2 * 600 });
+    assert_eq!(report, SanitizeReport { negative: 0, non_finite: 1200 + 2 * 600, infinite: 0 });
     assert!(image.pixels.iter().all(|&pixel| pixel == Rgb::new(2.0, 0.0, 2.0)));
 }
 

@@ -113,6 +113,9 @@ fn ascii_ply_with_extras_and_polygons() {
     assert_eq!(mesh.normals, [Vec3::Z; 4]);
     assert_eq!(mesh.colors[0], Rgb::new(1.0, 0.0, 0.0));
     assert!((mesh.colors[3].g - 0.502).abs() < 2e-3, "sRGB 188 is about half");
+    assert_eq!(loaded.warnings, [""; 0]);
+    let longer = one("quad.ply", format!("{PLY_QUAD}3 0 1 2\n"));
+    assert!(longer.warnings[0].contains("text follows the rows that the header counts"));
 }
 
 #[test]
@@ -647,6 +650,11 @@ fn bytes_after_the_facets_of_a_binary_stl_are_no_facets() {
         }
         fails("two.stl", &bytes[..150], &["2 facets", "184 bytes", "150"]);
     }
+    // Whole facets beyond the header's count are missed.
+    let mut bytes = binary_stl(b"by a scanner");
+    bytes.extend([0; 50]);
+    let loaded = one("two.stl", &bytes);
+    assert!(loaded.warnings[0].contains("counts 2 facets; bytes of 1 more follow"));
     // Text stays text.
     let padded = STL.replacen("one of two", &format!("one{}", "\0".repeat(90)), 1);
     assert_eq!(one("two.stl", padded).description.parts.len(), 2);
@@ -1159,8 +1167,8 @@ fn broken_scene_files_name_the_line_and_the_reason() {
     bad("quad.ply", "scene.toml", &["scene.toml"]);
     bad("file = \"quad.ply\"", "builtin = \"unicorn\"", &["unicorn", "line 26"]);
     bad("material = \"brass\"", "material = \"brss\"", &["brss", "line 26"]);
-    bad("scale = 2\n", "scale = 0\n", &["line 26", "singular"]);
-    bad("scale = 2\n", "scale = nan\n", &["line 26", "singular"]);
+    bad("scale = 2\n", "scale = 0\n", &["line 26", "inverted"]);
+    bad("scale = 2\n", "scale = nan\n", &["line 26", "inverted"]);
     bad("[0, 0, 0, 1]]", "[0, 0, 1, 1]]", &["line 33", "last row"]);
     bad("name = \"second\"", "name = \"second\"\nscale = 2", &["matrix"]);
     bad("[camera]", "[camera", &["line 4"]);

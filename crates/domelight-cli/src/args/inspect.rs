@@ -24,7 +24,13 @@ pub(crate) struct InspectArguments {
     pub(crate) scene: SceneArguments,
 
     /// Column and row of the pixel, counted from 0 at the upper left [default: the center]
-    #[arg(long, value_name = "X,Y", help_heading = "Inspection", value_parser = pixel)]
+    #[arg(
+        long,
+        value_name = "X,Y",
+        help_heading = "Inspection",
+        value_parser = pixel,
+        allow_hyphen_values = true
+    )]
     pub(crate) pixel: Option<[usize; 2]>,
     /// Strategies, in the notation of compare
     #[arg(

@@ -245,6 +245,9 @@ pub(crate) struct DiffArguments {
     /// The OpenEXR layer to compare.
     #[arg(long, value_name = "NAME")]
     pub(crate) layer: Option<String>,
+    /// The OpenEXR layer of the reference [default: that of --layer].
+    #[arg(long, value_name = "NAME")]
+    pub(crate) reference_layer: Option<String>,
     /// Exposure and tone curve applied for ꟻLIP.
     #[command(flatten)]
     pub(crate) tone: Tone,

@@ -30,6 +30,6 @@ pub(crate) struct RenderRunArguments {
     /// Stop this long after the program started, including loading and writing, and write the picture so far. A part is
     /// saved unfinished with exit code 75; the same command continues it. A picture gets at least one sample per pixel;
     /// --denoise takes additional time
-    #[arg(long, value_name = "TIME", value_parser = duration)]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub(crate) time: Option<Duration>,
 }

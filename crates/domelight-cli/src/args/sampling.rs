@@ -81,7 +81,7 @@ pub(crate) struct SampleArguments {
     #[arg(long, value_name = "N", default_value_t = 32,
           value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub(crate) spp: u32,
-    /// With product, take the same number of camera samples in every pixel
+    /// With product, take the same number of camera samples in every pixel, but for the second sets of the variance layer
     #[arg(long)]
     pub(crate) no_adaptive: bool,
     /// How the camera samples are divided into passes over the picture

@@ -197,7 +197,7 @@ fn table(measured: &MeasuredProbe) -> String {
             format!("{} in {n} texels, {share:.1} % of the energy: {what}", plateau.value),
         );
     }
-    let SanitizeReport { negative, non_finite } = probe.sanitized;
+    let SanitizeReport { negative, non_finite, .. } = probe.sanitized;
     if negative + non_finite > 0 {
         row("repaired values", format!("{negative} negative, {non_finite} NaN or infinite"));
     }
@@ -281,6 +281,7 @@ fn json(arguments: &ProbeArguments, measured: &MeasuredProbe) -> serde_json::Val
         "sanitized": {
             "negative": probe.sanitized.negative,
             "non_finite": probe.sanitized.non_finite,
+            "infinite": probe.sanitized.infinite,
         },
     })
 }

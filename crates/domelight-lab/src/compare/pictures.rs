@@ -73,7 +73,11 @@ fn read_picture(path: &Path, times: &Times, host: &dyn Host) -> Result<OtherPict
     host.reads(path)?;
     let bytes = fs::read(path)?;
     let options = ReadOptions { max_memory: host.memory_left(), ..Default::default() };
-    let image = read_bytes(&bytes, &path.to_string_lossy(), &options)?.image;
+    let picture = read_bytes(&bytes, &path.to_string_lossy(), &options)?;
+    if let Some(guessed) = &picture.guessed_layer {
+        host.warn(&format!("{}: {guessed}", path.display()));
+    }
+    let image = picture.image;
     host.keeps_memory(12 * image.pixels.len() as u64);
     let stem = stem(path);
     let (name, of_name) = name_and_seconds(&stem);

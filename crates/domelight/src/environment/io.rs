@@ -44,9 +44,14 @@ pub struct LoadedProbe {
 pub struct SanitizeReport {
     /// Negative values, replaced by 0.
     pub negative: usize,
-    /// NaN and infinities, replaced by the mean of their neighbors.
+    /// NaN and −∞, replaced by the mean of their neighbors, and ∞.
     pub non_finite: usize,
+    /// ∞ among these, replaced by [`OVERFLOWED`].
+    pub infinite: usize,
 }
+
+/// The radiance that replaces an infinite one: the largest half-precision number, in which suns overflow.
+pub const OVERFLOWED: f32 = 65504.0;
 
 /// An error in loading a probe.
 #[derive(Debug, thiserror::Error)]
@@ -121,19 +126,28 @@ pub fn probe_from_picture(
     options: &ProbeOptions,
 ) -> Result<LoadedProbe, ProbeError> {
     let mut warnings = Vec::new();
-    let mut image = picture.image;
-    if let Some(window) = picture.window
-        && let Some(framed) =
-            in_display_window(&image, window, options).map_err(|problem| problem.in_file(file))?
-    {
-        warnings.push(format!(
-            "{file}: the data window of {}x{} texels differs from the display window of {}x{}; \
-             texels outside the data window are black, texels outside the display window are \
-             cropped",
-            image.width, image.height, framed.width, framed.height
-        ));
-        image = framed;
+    if let Some(guessed) = &picture.guessed_layer {
+        warnings.push(format!("{file}: {guessed}"));
     }
+    let mut picture = picture;
+    if let Some(window) = picture.window
+        && is_map(window.display, options)
+    {
+        let [data, display] = [(picture.image.width, picture.image.height), window.display]
+            .map(|(width, height)| format!("{width}x{height}"));
+        let treatment = if is_map((picture.image.width, picture.image.height), options) {
+            "the data window is read as the whole map"
+        } else {
+            picture = in_display_window(&picture, window, options)
+                .map_err(|problem| problem.in_file(file))?;
+            "texels outside the data window are black, texels outside the display window are cropped"
+        };
+        warnings.push(format!(
+            "{file}: the data window of {data} texels differs from the display window of \
+             {display}; {treatment}"
+        ));
+    }
+    let mut image = picture.image;
     if matches!(picture.format, Format::Png | Format::Jpeg) {
         warnings.push(format!(
             "{file}: {} holds nothing brighter than white, so suns and lamps are clipped; use \
@@ -155,9 +169,15 @@ pub fn probe_from_picture(
     }
     let sanitized = sanitize(&mut image);
     if sanitized != SanitizeReport::default() {
-        let SanitizeReport { negative, non_finite } = sanitized;
+        let SanitizeReport { negative, non_finite, infinite } = sanitized;
+        let overflowed = match infinite {
+            0 => String::new(),
+            _ => format!(
+                "; {infinite} infinite ones became {OVERFLOWED}: a sun or lamp may be too dim"
+            ),
+        };
         warnings.push(format!(
-            "{file}: repaired {negative} negative and {non_finite} NaN or infinite values"
+            "{file}: repaired {negative} negative and {non_finite} NaN or infinite values{overflowed}"
         ));
     }
     let file_size = (image.width, image.height);
@@ -167,39 +187,27 @@ pub fn probe_from_picture(
     Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings })
 }
 
-/// The picture in the display window, if it has the shape of a map and the data window does not.
+/// Whether a window has the shape of a map.
 ///
-/// Cropped maps and those with borders beyond the frame keep their directions so. But the display windows of many
-/// files are whatever their makers had open, so a data window that looks like a map is one.
-fn in_display_window(
-    image: &RgbImage,
-    window: DataWindow,
-    options: &ProbeOptions,
-) -> Result<Option<RgbImage>, picture::PictureErrorKind> {
-    let looks_like_map = |width: usize, height: usize| match options.mapping {
+/// Cropped maps and those with borders beyond the frame keep their directions in a display window of such a shape. But
+/// the display windows of many files are whatever their makers had open, so a data window that looks like a map is one.
+fn is_map((width, height): (usize, usize), options: &ProbeOptions) -> bool {
+    match options.mapping {
         Some(Mapping::LatLong | Mapping::LatLongExr) => width == 2 * height,
         Some(mapping) => mapping.check_shape(width, height).is_ok(),
         None => width == 2 * height || Mapping::guess(width, height, None) != Mapping::LatLong,
-    };
-    let (width, height) = window.display;
-    if looks_like_map(image.width, image.height) || !looks_like_map(width, height) {
-        return Ok(None);
     }
-    let texels = picture::checked_area(width, height)?;
+}
+
+/// The picture in its display window, if there is memory for it.
+fn in_display_window(
+    picture: &picture::Picture,
+    window: DataWindow,
+    options: &ProbeOptions,
+) -> Result<picture::Picture, picture::PictureErrorKind> {
+    let texels = picture::checked_area(window.display.0, window.display.1)?;
     memory::require(12 * texels as u64, options.max_memory)?;
-    let mut framed = RgbImage::new(width, height, picture::allocate(Rgb::BLACK, width, height)?);
-    for (y, row) in image.pixels.chunks_exact(image.width).enumerate() {
-        let at = |i: usize, origin: i64, size: usize| {
-            usize::try_from(i as i64 + origin).ok().filter(|&i| i < size)
-        };
-        let Some(to) = at(y, window.position.1, height) else { continue };
-        for (x, &pixel) in row.iter().enumerate() {
-            if let Some(x) = at(x, window.position.0, width) {
-                framed.pixels[to * width + x] = pixel;
-            }
-        }
-    }
-    Ok(Some(framed))
+    picture.in_display_window()
 }
 
 /// The mapping in which a picture is read if none is stated: that of [`Mapping::guess`], but a square that is not black
@@ -245,8 +253,8 @@ fn require_radiance(image: &RgbImage, file: &str) -> Result<(), ProbeError> {
     })
 }
 
-/// Makes every value finite and ≥ 0. Negative values become 0; NaN and infinities become the mean of their finite
-/// 8-neighbors, from the border of a bad region inward. A channel without any finite value becomes 0.
+/// Makes every value finite and ≥ 0. Negative values become 0, ∞ becomes [`OVERFLOWED`], and NaN and −∞ become the mean of
+/// their finite 8-neighbors, from the border of a bad region inward. A channel without any finite value becomes 0.
 pub fn sanitize(image: &mut RgbImage) -> SanitizeReport {
     let mut report = SanitizeReport::default();
     for pixel in &mut image.pixels {
@@ -254,10 +262,15 @@ pub fn sanitize(image: &mut RgbImage) -> SanitizeReport {
             let negative = c < 0.0 && c.is_finite();
             report.negative += usize::from(negative);
             report.non_finite += usize::from(!c.is_finite());
-            if negative { 0.0 } else { c }
+            report.infinite += usize::from(c == f32::INFINITY);
+            match c {
+                _ if negative => 0.0,
+                f32::INFINITY => OVERFLOWED,
+                _ => c,
+            }
         });
     }
-    if report.non_finite > 0 {
+    if report.non_finite > report.infinite {
         fill_channel(image, |pixel| &mut pixel.r);
         fill_channel(image, |pixel| &mut pixel.g);
         fill_channel(image, |pixel| &mut pixel.b);

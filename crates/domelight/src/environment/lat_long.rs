@@ -100,6 +100,41 @@ pub(crate) fn narrow_band(row: usize, height: usize) -> f64 {
     2.0 * functions::sin(step * (row as f64 + 0.5)) * functions::sin(0.5 * step)
 }
 
+/// Integrals over one texel of a row; those over φ are [`column_integrals`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RowIntegrals {
+    /// ∫∫ sin θ dθ dφ \[sr\].
+    pub(crate) solid_angle: f64,
+    /// ∫∫ cos θ sin θ dθ dφ: the vertical part of ∫ ω dω.
+    pub(crate) vertical: f64,
+    /// ∫ sin² θ dθ: times the column's integrals, the horizontal part of ∫ ω dω.
+    pub(crate) horizontal: f64,
+}
+
+impl RowIntegrals {
+    pub(crate) fn new(y: usize, width: usize, height: usize) -> Self {
+        let (top, bottom) = (PI * y as f64 / height as f64, PI * (y + 1) as f64 / height as f64);
+        let step = TAU / width as f64;
+        let half = 0.5 * (bottom - top);
+        let middle = top + half;
+        // Differences of cos θ, sin² θ / 2 and (2θ − sin 2θ) / 4 as products.
+        let band = 2.0 * functions::sin(middle) * functions::sin(half);
+        Self {
+            solid_angle: step * band,
+            vertical: step * 0.5 * functions::sin(2.0 * middle) * functions::sin(2.0 * half),
+            horizontal: half - 0.5 * functions::cos(2.0 * middle) * functions::sin(2.0 * half),
+        }
+    }
+}
+
+/// ∫ sin φ dφ and −∫ cos φ dφ over column `x` of `width`; φ is 0 in the middle of the map.
+pub(crate) fn column_integrals(x: usize, width: usize) -> [f64; 2] {
+    // ∫ sin φ = 2 sin φ_c sin(Δ/2) without the cancellation of cos φ0 − cos φ1.
+    let (sin, cos) = functions::sin_cos(TAU * ((x as f64 + 0.5) / width as f64 - 0.5));
+    let chord = 2.0 * functions::sin(PI / width as f64);
+    [sin * chord, -cos * chord]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

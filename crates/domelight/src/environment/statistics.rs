@@ -7,6 +7,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::LatLongGrid;
 use super::compact::{SourceCriteria, compact_sources};
+use super::lat_long::{RowIntegrals, column_integrals};
 use super::mapping::Mapping;
 use crate::color::Rgb;
 use crate::image::RgbImage;
@@ -173,13 +174,15 @@ fn sun(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Sun> {
     let [mut energy, mut solid_angle] = [0.0; 2];
     for (&i, rest) in source.texels.iter().zip(&source.residual) {
         let (x, y) = (i as usize % map.width, i as usize / map.width);
-        let omega = weights.solid_angle(y);
+        let row = RowIntegrals::new(y, map.width, map.height);
+        let [sin, cos] = column_integrals(x, map.width);
+        let omega = row.solid_angle;
         let taken = map.pixels[i as usize] - *rest;
-        let weight = taken.luminance() as f64 * omega;
-        let d = texel_direction(map, x, y).to_array();
-        moment.iter_mut().zip(d).for_each(|(m, d)| *m += weight * d as f64);
+        let luminance = f64::from(taken.luminance());
+        let d = [row.horizontal * sin, row.vertical, row.horizontal * cos];
+        moment.iter_mut().zip(d).for_each(|(m, d)| *m += luminance * d);
         irradiance.iter_mut().zip(taken.to_array()).for_each(|(e, l)| *e += l as f64 * omega);
-        energy += weight;
+        energy += luminance * omega;
         solid_angle += omega;
     }
     let direction = Vec3::from_array(moment.map(|m| (m / energy) as f32)).try_normalize()?;
@@ -277,6 +280,19 @@ mod tests {
             assert!((sun.elevation() - 36.0).abs() < 0.5 * step, "{} at {height}", sun.elevation());
             assert!((sun.azimuth() + 122.0).abs() < 0.5 * step, "{} at {height}", sun.azimuth());
         }
+    }
+
+    /// The sun of a coarse map is as wide as its texels, and of one texel.
+    #[test]
+    fn a_texel_of_sun_is_as_wide_as_a_texel() {
+        let mut map = RgbImage::filled(64, 32, Rgb::splat(0.1));
+        map.pixels[12 * 64 + 20] = Rgb::splat(500.0);
+        let sun = ProbeStatistics::new(&map).sun.expect("a sun");
+        let omega = Weights::new(&map).solid_angle(12);
+        assert!((sun.solid_angle / omega - 1.0).abs() < 1e-6, "{}", sun.solid_angle);
+        // A disc with the texel's variance is a little wider than one with its area.
+        let disc = functions::acos(1.0 - omega / (2.0 * PI));
+        assert!((1.0..1.1).contains(&(sun.angular_radius / disc)), "{}", sun.angular_radius / disc);
     }
 
     #[test]

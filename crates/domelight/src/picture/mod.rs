@@ -23,9 +23,10 @@ pub mod tone;
 pub use crate::files::{WriteSeek, require_writable, write_atomically, write_atomically_seeking};
 pub use error::{PictureError, PictureErrorKind};
 
-use crate::RgbImage;
 use crate::environment::mapping::EnvmapKind;
 use crate::memory;
+use crate::{Rgb, RgbImage};
+use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -68,22 +69,83 @@ pub struct Picture {
     pub envmap: Option<EnvmapKind>,
     /// The position of the picture in OpenEXR's display window, if the two differ.
     pub window: Option<DataWindow>,
+    /// Set if OpenEXR's layers do not show which of them is the picture, and none was requested.
+    pub guessed_layer: Option<GuessedLayer>,
     /// The format of the file.
     pub format: Format,
     /// OpenEXR's text attributes, by name.
     pub attributes: Vec<(String, String)>,
 }
 
+/// An OpenEXR layer that was read because it is the first of several.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GuessedLayer {
+    /// Its name.
+    pub name: String,
+    /// The names of the other layers with colors.
+    pub others: Vec<String>,
+}
+
+/// States what was read.
+impl fmt::Display for GuessedLayer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, others } = self;
+        write!(f, "the layer '{name}' is read; the file also has {}", others.join(", "))
+    }
+}
+
 impl Picture {
     fn opaque(image: RgbImage, format: Format) -> Self {
-        Self { image, alpha: None, envmap: None, window: None, format, attributes: Vec::new() }
+        let attributes = Vec::new();
+        let (alpha, envmap, window, guessed_layer) = (None, None, None, None);
+        Self { image, alpha, envmap, window, guessed_layer, format, attributes }
+    }
+
+    /// The picture in OpenEXR's display window: black and transparent outside its data window, and cropped to it.
+    ///
+    /// # Errors
+    /// If the display window is too large.
+    pub fn in_display_window(&self) -> Result<Self, PictureErrorKind> {
+        let Some(window) = self.window else { return Ok(self.clone()) };
+        let (width, height) = window.display;
+        checked_area(width, height)?;
+        let size = self.image.width;
+        let mut image = RgbImage::new(width, height, allocate(Rgb::BLACK, width, height)?);
+        place(&self.image.pixels, size, &mut image.pixels, window);
+        let alpha = match &self.alpha {
+            Some(alpha) => {
+                let mut framed = allocate(0.0, width, height)?;
+                place(alpha, size, &mut framed, window);
+                Some(framed)
+            }
+            None => None,
+        };
+        let (guessed_layer, attributes) = (self.guessed_layer.clone(), self.attributes.clone());
+        Ok(Self { image, alpha, window: None, guessed_layer, attributes, ..*self })
+    }
+}
+
+/// Copies the texels of a data window of `width` columns that lie in the display window.
+fn place<T: Copy>(texels: &[T], width: usize, framed: &mut [T], window: DataWindow) {
+    let (columns, rows) = window.display;
+    let at = |i: usize, origin: i64, size: usize| {
+        usize::try_from(i as i64 + origin).ok().filter(|&i| i < size)
+    };
+    for (y, row) in texels.chunks_exact(width).enumerate() {
+        let Some(to) = at(y, window.position.1, rows) else { continue };
+        for (x, &texel) in row.iter().enumerate() {
+            if let Some(x) = at(x, window.position.0, columns) {
+                framed[to * columns + x] = texel;
+            }
+        }
     }
 }
 
 /// Options for reading a picture file.
 #[derive(Clone, Debug, Default)]
 pub struct ReadOptions {
-    /// The OpenEXR layer; by default the unnamed R, G, B channels, or else the first layer that has them.
+    /// The OpenEXR layer; by default the unnamed R, G, B channels, or else the layer named after the whole picture, or
+    /// else the first that has them.
     pub layer: Option<String>,
     /// The maximum memory \[bytes\] for the file and the picture; unlimited by default.
     pub max_memory: Option<u64>,

@@ -7,6 +7,7 @@
 use super::display::DisplayEncoder;
 use super::tone::{ToneMapping, linear_from_srgb};
 use super::{Format, Picture, PictureErrorKind, checked_area};
+use crate::math::functions;
 use crate::{Rgb, RgbImage, parallel};
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::{self, Cursor, Write};
@@ -111,7 +112,8 @@ pub(crate) fn texels(bytes: &[u8], format: Format) -> Result<usize, PictureError
     Err(PictureErrorKind::Header { line: 1, found, expected })
 }
 
-/// Decodes a PNG as sRGB (ignoring its color metadata) into linear, premultiplied color.
+/// Decodes a PNG into linear, premultiplied color: by its own gamma if it states one other than sRGB's, and otherwise as
+/// sRGB. A color profile is ignored.
 ///
 /// # Errors
 /// If the file is damaged or incomplete.
@@ -123,6 +125,28 @@ pub fn decode(bytes: &[u8]) -> Result<Picture, PictureErrorKind> {
 fn is_whole_jpeg(bytes: &[u8]) -> bool {
     let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xff, marker]);
     last(0xd9) > last(0xda)
+}
+
+/// The exponent with which a PNG encodes light, from its chunk gAMA, if it is not about that of sRGB and the picture has
+/// neither a color profile nor the chunk sRGB, which take precedence (PNG specification, 3rd edition, 4.3).
+fn stated_gamma(bytes: &[u8]) -> Option<f32> {
+    /// 1/2.2 and .45 are written for sRGB.
+    const SRGB: std::ops::Range<f32> = 0.44..0.47;
+    let mut rest = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n")?;
+    let mut gamma = None;
+    while let Some((header, data)) = rest.split_first_chunk::<8>() {
+        let [a, b, c, d, name @ ..] = *header;
+        let data = data.get(..u32::from_be_bytes([a, b, c, d]) as usize)?;
+        match &name {
+            b"sRGB" | b"iCCP" | b"cICP" => return None,
+            b"gAMA" => gamma = Some(u32::from_be_bytes(data.try_into().ok()?) as f32 / 1e5),
+            b"IDAT" => break,
+            _ => {}
+        }
+        // The checksum follows the data.
+        rest = rest.get(8 + data.len() + 4..)?;
+    }
+    gamma.filter(|gamma| (0.01..100.0).contains(gamma) && !SRGB.contains(gamma))
 }
 
 fn of_crate(format: Format) -> ImageFormat {
@@ -169,11 +193,16 @@ pub(super) fn decode_within(
     let has_alpha = decoder.color_type().has_alpha();
     let decoded = image::DynamicImage::from_decoder(decoder).map_err(PictureErrorKind::Image)?;
     let texels = decoded.into_rgba32f();
+    let gamma = stated_gamma(bytes);
+    let linear = |c: f32| match gamma {
+        Some(gamma) => functions::powf(c, 1.0 / gamma),
+        None => linear_from_srgb(c),
+    };
     let mut alpha = Vec::with_capacity(if has_alpha { texels.len() / 4 } else { 0 });
     let pixels = texels.pixels().map(|texel| {
         let [r, g, b, a] = texel.0;
         alpha.extend(has_alpha.then_some(a));
-        Rgb::new(r, g, b).map(linear_from_srgb) * if has_alpha { a } else { 1.0 }
+        Rgb::new(r, g, b).map(linear) * if has_alpha { a } else { 1.0 }
     });
     let image = RgbImage::new(width as usize, height as usize, pixels.collect());
     let alpha = has_alpha.then_some(alpha);

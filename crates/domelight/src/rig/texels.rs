@@ -5,25 +5,15 @@ use std::ops::Range;
 
 use crate::Rgb;
 use crate::environment::Environment;
+use crate::environment::lat_long::{RowIntegrals, column_integrals};
 use crate::math::{Vec2, Vec3, functions, vec2, vec3};
-
-/// Integrals over one texel of a row; those over φ are in [`Texels::columns`].
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Row {
-    /// ∫∫ sin θ dθ dφ \[sr\].
-    pub(super) solid_angle: f64,
-    /// ∫∫ cos θ sin θ dθ dφ: the vertical part of ∫ ω dω.
-    pub(super) vertical: f64,
-    /// ∫ sin² θ dθ: times the column's integrals, the horizontal part of ∫ ω dω.
-    pub(super) horizontal: f64,
-}
 
 /// A map in its own frame: +Y up, the center column toward −Z, whatever its orientation.
 pub(super) struct Texels<'a> {
     environment: &'a Environment,
     /// ∫ sin φ dφ and −∫ cos φ dφ over each column.
     pub(super) columns: Vec<[f64; 2]>,
-    pub(super) rows: Vec<Row>,
+    pub(super) rows: Vec<RowIntegrals>,
     /// sin φ and −cos φ at the edges and middles of columns, by half columns from the left.
     half_columns: Vec<[f32; 2]>,
     /// sin θ and cos θ at the edges and middles of rows, by half rows from the top.
@@ -35,15 +25,8 @@ pub(super) struct Texels<'a> {
 impl<'a> Texels<'a> {
     pub(super) fn new(environment: &'a Environment) -> Self {
         let (width, height) = (environment.map().width, environment.map().height);
-        let phi = |x: f64| TAU * (x / width as f64 - 0.5);
-        let column = |x: usize| {
-            // ∫ sin φ = 2 sin φ_c sin(Δ/2) without the cancellation of cos φ0 − cos φ1.
-            let (sin, cos) = functions::sin_cos(phi(x as f64 + 0.5));
-            let chord = 2.0 * functions::sin(PI / width as f64);
-            [sin * chord, -cos * chord]
-        };
         let half_column = |i: usize| {
-            let (sin, cos) = functions::sin_cos(phi(0.5 * i as f64));
+            let (sin, cos) = functions::sin_cos(TAU * (0.5 * i as f64 / width as f64 - 0.5));
             [sin as f32, -cos as f32]
         };
         let half_row = |i: usize| {
@@ -52,8 +35,8 @@ impl<'a> Texels<'a> {
         };
         Self {
             environment,
-            columns: (0..width).map(column).collect(),
-            rows: (0..height).map(|y| Row::new(y, width, height)).collect(),
+            columns: (0..width).map(|x| column_integrals(x, width)).collect(),
+            rows: (0..height).map(|y| RowIntegrals::new(y, width, height)).collect(),
             half_columns: (0..=2 * width).map(half_column).collect(),
             half_rows: (0..=2 * height).map(half_row).collect(),
             axes: [vec2(0.75, 0.5), vec2(0.5, 0.0), vec2(0.5, 0.5)]
@@ -118,22 +101,6 @@ impl<'a> Texels<'a> {
     pub(super) fn to_world(&self, m: [f64; 3]) -> Vec3 {
         let v = unit(m).unwrap_or(Vec3::Y);
         (self.axes[0] * v.x + self.axes[1] * v.y - self.axes[2] * v.z).normalize()
-    }
-}
-
-impl Row {
-    fn new(y: usize, width: usize, height: usize) -> Self {
-        let (top, bottom) = (PI * y as f64 / height as f64, PI * (y + 1) as f64 / height as f64);
-        let step = TAU / width as f64;
-        let half = 0.5 * (bottom - top);
-        let middle = top + half;
-        // Differences of cos θ, sin² θ / 2 and (2θ − sin 2θ) / 4 as products.
-        let band = 2.0 * functions::sin(middle) * functions::sin(half);
-        Self {
-            solid_angle: step * band,
-            vertical: step * 0.5 * functions::sin(2.0 * middle) * functions::sin(2.0 * half),
-            horizontal: half - 0.5 * functions::cos(2.0 * middle) * functions::sin(2.0 * half),
-        }
     }
 }
 

@@ -143,7 +143,8 @@ impl CompactSource {
     fn take(&mut self, map: &RgbImage, x: usize, y: usize, background: Rgb) {
         let le = map.row(y)[x];
         let rest = Rgb::new(le.r.min(background.r), le.g.min(background.g), le.b.min(background.b));
-        if rest != le {
+        // The rounding of the background is no light.
+        if (le - rest).max_component() > 1e-5 * le.max_component() {
             self.texels.push((y * map.width + x) as u32);
             self.residual.push(rest);
         }

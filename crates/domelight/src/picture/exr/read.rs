@@ -14,7 +14,9 @@ use super::luminance_chroma::LuminanceChroma;
 use super::write::string_attributes;
 use crate::environment::mapping::EnvmapKind;
 use crate::picture::primaries::transform;
-use crate::picture::{Format, MAX_TEXELS, Picture, PictureErrorKind, allocate, checked_area};
+use crate::picture::{
+    Format, GuessedLayer, MAX_TEXELS, Picture, PictureErrorKind, allocate, checked_area,
+};
 use crate::{Rgb, RgbImage};
 use ::exr::block::UncompressedBlock;
 use ::exr::block::chunk::{Chunk, CompressedBlock};
@@ -31,10 +33,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Decodes one layer of a complete file.
 ///
-/// By default, this is the unnamed R, G, B channels, or else the first layer with R, G, B, or else one with only Y,
-/// or else the only channel, whatever its name except depth and coverage. `layer` names another: a part, the part of
-/// the channel names before the last dot, or both joined by a dot, case-insensitive. X, Y, Z or a single channel of
-/// any name then also count as color.
+/// By default, this is the unnamed R, G, B channels, or else the layer that programs name after the whole picture
+/// (Blender's `ViewLayer.Combined`, `rgba`, `beauty`), or else the first layer with R, G, B, or else one with only Y, or
+/// else the only channel, whatever its name except depth and coverage. `layer` names another: a part, the part of the
+/// channel names before the last dot, both joined by a dot, or the last word of these if only one layer has it,
+/// case-insensitive. X, Y, Z or a single channel of any name then also count as color.
 ///
 /// # Errors
 /// If the file is damaged, incomplete or deep, or has no such layer.
@@ -90,6 +93,7 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Pictur
         alpha: image.1,
         envmap,
         window,
+        guessed_layer: selected.guessed,
         attributes,
         ..Picture::opaque(image.0, Format::Exr)
     })
@@ -234,6 +238,8 @@ struct Selected {
     channels: [Option<usize>; 4],
     /// Red, green and blue, not a gray or something else by its own name.
     is_color: bool,
+    /// Set if nothing says which of several layers is the picture.
+    guessed: Option<GuessedLayer>,
 }
 
 /// The channels of one part that share what stands before the last dot of their names.
@@ -279,6 +285,23 @@ impl Candidate {
             .any(|name| !name.is_empty() && name.eq_ignore_ascii_case(asked))
     }
 
+    /// The last word of its name.
+    fn last_word(&self) -> String {
+        self.full_name().rsplit('.').next().unwrap_or_default().to_ascii_lowercase()
+    }
+
+    /// How well it suits as the picture of a file, among those with R, G, B: less is better.
+    fn rank(&self) -> usize {
+        /// Names of the whole picture: of Blender, Mitsuba and Nuke, V-Ray and Arnold.
+        const WHOLE: [&str; 6] = ["combined", "rgba", "beauty", "rgb", "color", "main"];
+        match () {
+            () if self.full_name().is_empty() => 0,
+            () if WHOLE.contains(&self.last_word().as_str()) => 1,
+            () if self.prefix.is_empty() => 2,
+            () => 3,
+        }
+    }
+
     fn channel(&self, name: &str) -> Option<usize> {
         self.channels.iter().find(|(n, _)| n == name).map(|&(_, index)| index)
     }
@@ -313,7 +336,8 @@ impl Candidate {
 
     fn selected(&self, [r, g, b]: [usize; 3], is_color: bool) -> Selected {
         let alpha = self.channel("A").or_else(|| self.channel("a"));
-        Selected { header: self.header, channels: [Some(r), Some(g), Some(b), alpha], is_color }
+        let channels = [Some(r), Some(g), Some(b), alpha];
+        Selected { header: self.header, channels, is_color, guessed: None }
     }
 }
 
@@ -323,17 +347,21 @@ fn select(headers: &[Header], layer: Option<&str>) -> Result<Selected, PictureEr
     }
     let all = candidates(headers);
     let selected = if let Some(asked) = layer {
+        let picture = |c: &Candidate| c.rgb().or_else(|| c.anything()).or_else(|| c.luminance());
         let mut called = all.iter().filter(|candidate| candidate.is_called(asked));
-        let found = called.find_map(|c| c.rgb().or_else(|| c.anything()).or_else(|| c.luminance()));
+        let by_last_word = || {
+            let word = asked.to_ascii_lowercase();
+            let mut with_it = all.iter().filter(|candidate| candidate.last_word() == word);
+            with_it.next().filter(|_| with_it.next().is_none()).and_then(picture)
+        };
+        let found = called.find_map(picture).or_else(by_last_word);
         found.ok_or_else(|| PictureErrorKind::NoSuchLayer {
             asked: asked.to_owned(),
             present: all.iter().map(Candidate::full_name).filter(|name| !name.is_empty()).collect(),
         })?
     } else {
         let unnamed = || all.iter().filter(|candidate| candidate.prefix.is_empty());
-        let found = unnamed()
-            .find_map(Candidate::rgb)
-            .or_else(|| all.iter().find_map(Candidate::rgb))
+        let found = the_picture(&all)
             .or_else(|| unnamed().find_map(Candidate::luminance))
             .or_else(|| all.iter().find_map(Candidate::luminance))
             .or_else(|| unnamed().find_map(Candidate::only));
@@ -345,6 +373,17 @@ fn select(headers: &[Header], layer: Option<&str>) -> Result<Selected, PictureEr
         return Err(PictureErrorKind::ExrUnsupported("subsampled channels"));
     }
     Ok(selected)
+}
+
+/// The layer with R, G, B that is most likely the picture.
+fn the_picture(all: &[Candidate]) -> Option<Selected> {
+    let colored = || all.iter().filter(|candidate| candidate.rgb().is_some());
+    let best = colored().min_by_key(|candidate| candidate.rank())?;
+    let others = colored().map(Candidate::full_name).filter(|name| *name != best.full_name());
+    let others: Vec<_> = others.collect();
+    let is_guess = best.rank() > 1 && !others.is_empty();
+    let guessed = is_guess.then(|| GuessedLayer { name: best.full_name(), others });
+    Some(Selected { guessed, ..best.rgb()? })
 }
 
 fn no_color(headers: &[Header], all: &[Candidate]) -> PictureErrorKind {

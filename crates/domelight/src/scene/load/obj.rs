@@ -146,6 +146,10 @@ impl<'a> Reader<'a> {
                 return Err(at(ObjErrorKind::Name { keyword: keyword.into() }));
             }
             "mtllib" => self.library(number, rest)?,
+            "curv" | "surf" => {
+                let before = format!("{}: free-form geometry is left out: ", self.path.display());
+                self.notes.add(&before, keyword, "");
+            }
             _ => {}
         }
         Ok(())

@@ -126,24 +126,41 @@ pub(super) fn load(
     let header = Header::parse(bytes).map_err(error)?;
     header.check_size(bytes.len() - header.length).map_err(error)?;
     budget.take(&path.display().to_string(), header.memory(bytes.len() - header.length))?;
-    let mesh = parse(&header, bytes, strict).map_err(error)?;
-    Ok(Loaded::of_mesh(path, mesh))
+    let Parsed { mesh, rest } = parse(&header, bytes, strict).map_err(error)?;
+    let mut loaded = Loaded::of_mesh(path, mesh);
+    if header.format == Format::Ascii && !rest.trim_ascii().is_empty() {
+        loaded.warnings.push(format!(
+            "{}: text follows the rows that the header counts, and is left out",
+            path.display()
+        ));
+    }
+    Ok(loaded)
 }
 
-fn parse(header: &Header, bytes: &[u8], strict: bool) -> Located<Mesh> {
+struct Parsed<'a> {
+    mesh: Mesh,
+    /// What follows the rows that the header counts.
+    rest: &'a [u8],
+}
+
+fn parse<'a>(header: &Header, bytes: &'a [u8], strict: bool) -> Located<Parsed<'a>> {
     let body = &bytes[header.length..];
-    let at = header.length;
-    match header.format {
+    let start = header.length;
+    let (mesh, position) = match header.format {
         Format::Ascii => {
-            read_body(header, &mut Ascii { data: body, position: 0, start: at }, strict)
+            let mut numbers = Ascii { data: body, position: 0, start };
+            (read_body(header, &mut numbers, strict)?, numbers.position)
         }
         Format::Little => {
-            read_body(header, &mut Binary::<false> { data: body, start: at, position: 0 }, strict)
+            let mut numbers = Binary::<false> { data: body, position: 0, start };
+            (read_body(header, &mut numbers, strict)?, numbers.position)
         }
         Format::Big => {
-            read_body(header, &mut Binary::<true> { data: body, start: at, position: 0 }, strict)
+            let mut numbers = Binary::<true> { data: body, position: 0, start };
+            (read_body(header, &mut numbers, strict)?, numbers.position)
         }
-    }
+    };
+    Ok(Parsed { mesh, rest: &body[position..] })
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

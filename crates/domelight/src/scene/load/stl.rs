@@ -95,8 +95,14 @@ pub(super) fn load(
     let mut warnings = Vec::new();
     let parts = if let Some(facets) = facets(bytes) {
         budget.take(&name, facets as u64 * (3 * 12 + 12))?;
-        let facets = &bytes[HEADER..HEADER + facets * FACET];
-        vec![(stem(path), binary(facets, strict).map_err(error)?)]
+        let (counted, rest) = bytes[HEADER..].split_at(facets * FACET);
+        if !rest.is_empty() && rest.len().is_multiple_of(FACET) {
+            warnings.push(format!(
+                "{name}: the header counts {facets} facets; bytes of {} more follow and are left out",
+                rest.len() / FACET
+            ));
+        }
+        vec![(stem(path), binary(counted, strict).map_err(error)?)]
     } else if is_text(bytes) {
         budget.take(&name, MEMORY_PER_BYTE * bytes.len() as u64)?;
         let Solids { parts, unended } = ascii(path, bytes, strict).map_err(error)?;

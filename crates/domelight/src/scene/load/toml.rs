@@ -98,7 +98,7 @@ pub enum TomlErrorKind {
     #[error(transparent)]
     Builtin(#[from] UnknownScene),
     /// A material that is neither defined nor valid notation.
-    #[error("material '{text}' is neither defined in [materials] nor valid notation: {source}")]
+    #[error("material '{text}' is neither a name in [materials] nor valid notation: {source}")]
     Material {
         /// The text.
         text: String,
@@ -116,7 +116,9 @@ pub enum TomlErrorKind {
         range: &'static str,
     },
     /// A singular or non-finite transform.
-    #[error("the transform of this object is singular or not finite; no scale may be 0")]
+    #[error(
+        "the transform of this object cannot be inverted: no scale may be 0 or vanish beside 1, and every number must be finite"
+    )]
     Singular,
     /// A matrix together with other transforms.
     #[error("'matrix' replaces 'scale', 'rotate' and 'translate'; give one or the other")]
