@@ -131,7 +131,7 @@ impl Environment {
     /// rotation, scale, up
     ///     As in the class.
     /// mapping : str, optional
-    ///     The layout, such as 'latlong', 'angular' or 'cube-cross'; guessed by default.
+    ///     The layout, such as 'lat-long', 'angular' or 'cross-vertical'; guessed by default.
     /// layer : str, optional
     ///     The OpenEXR layer.
     /// strict : bool, default False

@@ -50,8 +50,8 @@ pub(crate) struct EnvironmentArguments {
     /// - reads standard input) [default: the scene's, otherwise sky]
     #[arg(long, value_name = "PROBE")]
     pub(crate) env: Option<String>,
-    /// Rotate the environment about the up axis, counterclockwise as seen from above [degrees]; auto puts its sun or
-    /// brightest side to the left of the camera
+    /// Rotate the environment about the up axis, counterclockwise as seen from above [degrees]; with a
+    /// camera, auto puts its sun or brightest side to the left of it
     #[arg(long, value_name = "DEG|auto", allow_negative_numbers = true)]
     pub(crate) env_rotate: Option<Rotation>,
     /// Multiply the environment's radiance

@@ -293,7 +293,16 @@ impl CompareReport {
             if let Some((what, off)) = self.miss(result) {
                 host.warn(&format!("{name} misses the budget by {off:+.0} %: {what}"));
             }
-            host.warn_of_non_finite(&format!("{name}: "), result.non_finite_samples);
+            let n = result.non_finite_samples;
+            match unbiased {
+                Some(_) => host.warn_of_non_finite(&format!("{name}: "), n),
+                None if n > 0 => {
+                    host.warn(&format!(
+                        "{name}: {n} values are NaN or infinite and count as black"
+                    ));
+                }
+                None => {}
+            }
             // Noise makes the estimate uncertain, never that much.
             let is_off = result.bias.is_some_and(|bias| bias > 0.5 * result.rel_mse.mean);
             if *unbiased == Some(true) && is_off && self.reference.source == Source::File {

@@ -133,10 +133,13 @@ impl Times {
                 return Err(usage(format!("'{time}' is not a number of seconds above 0")));
             };
             let stem = name.strip_suffix(".exr").unwrap_or(&name).to_owned();
-            if !pictures.contains(&stem) {
+            // A name may be without the time at its end.
+            let shown = |picture: &&String| name_and_seconds(picture).0 == stem;
+            let exact = pictures.iter().find(|picture| **picture == stem);
+            let Some(picture) = exact.or_else(|| pictures.iter().find(shown)) else {
                 return Err(usage(format!("there is no picture {stem}.exr in the folder")));
-            }
-            times.insert(stem, seconds);
+            };
+            times.insert(picture.clone(), seconds);
         }
         Ok(Self(times))
     }
@@ -210,7 +213,8 @@ mod tests {
 
     #[test]
     fn tables_of_times_name_their_pictures() {
-        let pictures = ["a", "b,c"].map(str::to_owned);
+        let pictures = ["a", "b,c", "e.12.5s"].map(str::to_owned);
+        assert_eq!(Times::parse("e,99\n", &pictures).unwrap().0["e.12.5s"], 99.0);
         let times = Times::parse("picture,seconds\na.exr,2\n\n\"b,c\",1:30\n", &pictures).unwrap();
         assert_eq!((times.0["a"], times.0["b,c"]), (2.0, 90.0));
         for (text, why) in [

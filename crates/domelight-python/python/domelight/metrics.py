@@ -1,7 +1,8 @@
 """Errors of a picture against its reference.
 
-All functions take linear pictures of shape (H, W, 3), the tested picture first, and compute in double precision. Errors
-of pictures with NaN or infinities are NaN or infinite.
+All functions take linear pictures of shape (H, W, 3), the tested picture first, and compute in double precision. Mean
+errors of pictures with NaN or infinities are NaN or infinite; the trimmed mean drops the worst pixels, and FLIP takes
+NaN for black.
 """
 
 from __future__ import annotations

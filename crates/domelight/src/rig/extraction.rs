@@ -86,7 +86,7 @@ pub fn extract(
 ) -> Result<Extraction, RigError> {
     let compact = CompactExtraction::new(environment, settings)?;
     if compact.n_regions(settings.n_lights) == 0 {
-        return Ok(Extraction { rig: compact.compact_rig(), residual: compact.residual });
+        return Ok(Extraction { rig: compact.compact_rig(), residual: lit(compact.residual) });
     }
     compact.with_lights(settings.n_lights)
 }
@@ -158,7 +158,10 @@ impl<'a> CompactExtraction<'a> {
     pub fn with_lights(&self, n_lights: Option<usize>) -> Result<Extraction, RigError> {
         let n_regions = self.n_regions(n_lights);
         if n_regions == 0 {
-            return Ok(Extraction { rig: self.compact_rig(), residual: self.residual.clone() });
+            return Ok(Extraction {
+                rig: self.compact_rig(),
+                residual: lit(self.residual.clone()),
+            });
         }
         let regions = self.settings.method.rig(self.rest(), n_regions)?;
         self.combine(regions)
@@ -222,8 +225,13 @@ impl<'a> CompactExtraction<'a> {
         if regions.lights.is_empty() {
             return Err(RigError::TooDim);
         }
-        Ok(Extraction { rig: regions, residual })
+        Ok(Extraction { rig: regions, residual: lit(residual) })
     }
+}
+
+/// A residual with any light.
+fn lit(residual: Option<Environment>) -> Option<Environment> {
+    residual.filter(|residual| residual.power() > 0.0)
 }
 
 /// The environment without compact sources.
