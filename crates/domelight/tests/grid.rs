@@ -137,7 +137,7 @@ const LONG: usize = 9;
 
 /// Strategies, camera samples, and the lobes and lights of which so few samples are enough for a t-test: of others rare
 /// samples decide.
-const STRATEGIES: [(&str, usize, Option<Width>, Option<Light>); 8] = [
+const STRATEGIES: [(&str, usize, Option<Width>, Option<Light>); 9] = [
     ("environment:2", SHORT, Some(Width::Wide), Some(Light::Even)),
     ("brdf:2", SHORT, None, Some(Light::Even)),
     ("mis:1:1", SHORT, None, None),
@@ -146,6 +146,7 @@ const STRATEGIES: [(&str, usize, Option<Width>, Option<Light>); 8] = [
     ("sir:2/7", SHORT, None, None),
     ("product:8", SHORT, None, None),
     ("product:1", LONG, None, None),
+    ("product:1", 1, None, None),
 ];
 
 /// Fixed lights, which err by what they leave out: they are only finite.
@@ -269,7 +270,7 @@ fn what_is_black_at_normal_incidence_reflects_at_others() {
     };
     let reference = of("mis:4:4", 8);
     assert!(reference.iter().all(|mean| mean[0] > 1e-5));
-    for (text, n) in [("product:8", SHORT), ("product:1", LONG)] {
+    for (text, n) in [("product:8", SHORT), ("product:1", LONG), ("product:1", 1)] {
         let test = ZTest { suite: Suite::of(2), ..ZTest::default() };
         test.two_sample(text, &of(text, n), &reference).unwrap_or_else(|f| panic!("{f}"));
     }

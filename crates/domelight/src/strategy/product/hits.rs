@@ -154,7 +154,7 @@ impl Groups {
             diffuse.chain(g.lobe_summary.lobes().map(|(c, _)| c)).map(|c| c.luminance() * g.share)
         });
         let albedo: f32 = lobes.sum();
-        if counts.brdf == 0 || counts.light == 0 || albedo <= 0.0 {
+        if counts.brdf == 0 || albedo <= 0.0 {
             return 0.0;
         }
         counts.brdf as f32 / counts.light as f32 * total / albedo

@@ -136,11 +136,14 @@ impl<'a> ProductSampling<'a> {
     fn counts(&self, groups: &Groups, n_hits: usize, pilot: bool) -> Counts {
         let times = if pilot && PassLength::new(n_hits) == PassLength::Short { PILOT } else { 1 };
         let all = self.n_rays as usize * n_hits * times;
-        let brdf = match groups.narrowest() {
-            Some(width) if width < NARROW => all.div_ceil(BRDF_SHARE[1]),
-            Some(width) if !groups.is_well_tabulated(width) => all.div_ceil(BRDF_SHARE[0]),
-            _ => 0,
+        let share = match groups.narrowest() {
+            Some(width) if width < NARROW => BRDF_SHARE[1],
+            Some(width) if !groups.is_well_tabulated(width) => BRDF_SHARE[0],
+            _ => return Counts { light: all, brdf: 0 },
         };
+        // Strata correct the control variate, so there must be one beside a BRDF sample.
+        let all = all.max(2);
+        let brdf = all.div_ceil(share);
         Counts { light: all - brdf, brdf }
     }
 
