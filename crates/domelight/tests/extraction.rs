@@ -232,6 +232,27 @@ fn a_lamp_and_its_dish_are_one() {
     assert!(found.residual.unwrap().max_luminance() < 0.2);
 }
 
+/// A tube overhead and a band along the horizon have small solid angles, but no direction: they stay on the map, and a
+/// bulb beside them is found.
+#[test]
+fn long_sources_are_no_lamps() {
+    let bulb = Disc::new(vec3(0.3, 0.4, 1.0), 0.04, 200.0);
+    let tube = |w: Vec3| w.y > 0.3 && (w.x / w.y).abs() < 0.03;
+    let band = |w: Vec3| w.y.abs() < 0.03 && w.z > -0.7;
+    for is_long in [tube as fn(Vec3) -> bool, band] {
+        let map = map_of(WIDTH, HEIGHT, |w| match () {
+            () if bulb.covers(w) => bulb.le,
+            () if is_long(w) => Rgb::splat(30.0),
+            () => Rgb::splat(0.2),
+        });
+        let env = environment(map);
+        let found = extract(&env, lamps(4)).unwrap();
+        assert_conserved(&env, &found);
+        let [lamp] = &found.rig.lights[..] else { panic!("{:?}", found.rig.lights) };
+        assert!(lamp.direction.dot(bulb.center) > 0.999, "{:?}", lamp.direction);
+    }
+}
+
 #[test]
 fn noise_hides_no_sun_and_makes_none() {
     let mut pcg = Pcg32::new(5, 1);

@@ -11,16 +11,25 @@ mod fill;
 mod grid;
 mod level_sets;
 
+use crate::math::functions;
 use crate::{Rgb, RgbImage};
 use fill::continue_rim;
 use grid::Grid;
 use level_sets::{Peak, find_peaks};
 
-/// Solid angle of the widest sun \[sr\], a cap of 7°. The real one has 6.8e-5 sr, but thin cloud and
-/// a camera's glare widen it.
-const WIDEST_SUN: f64 = 0.047;
-/// Solid angle of the widest lamp or window \[sr\], a cap of 28°.
-const WIDEST_LAMP: f64 = 0.75;
+/// The widest sun, a cap of 7°. The real one has 6.8e-5 sr, but thin cloud and a camera's glare widen it.
+const WIDEST_SUN: Extent = Extent { solid_angle: 0.047, radius: 7.0 };
+/// The widest lamp or window, a cap of 28°.
+const WIDEST_LAMP: Extent = Extent { solid_angle: 0.75, radius: 28.0 };
+
+/// How wide a source is. A tube is long, but has a small solid angle.
+#[derive(Clone, Copy, Debug)]
+struct Extent {
+    /// \[sr\]
+    solid_angle: f64,
+    /// The radius of the even disc of as much angular variance \[°\].
+    radius: f64,
+}
 
 /// How many times the solid angle of a source what belongs to it around it has at the most: four
 /// times the radius.
@@ -66,29 +75,56 @@ pub(crate) fn compact_sources(map: &RgbImage, criteria: SourceCriteria) -> Vec<C
     let grid = Grid::new(map);
     let mut peaks: Vec<Option<Peak>> = Vec::new();
     peaks.extend(find_peaks(&grid, criteria.min_share * grid.total()).into_iter().map(Some));
+    let radii = radii(&grid, &peaks);
     let mut chosen = Vec::new();
     if criteria.sun {
-        let suns = whole_sources(&peaks, WIDEST_SUN);
+        let suns = whole_sources(&peaks, &radii, WIDEST_SUN);
         if let Some(sun) = brightest(&suns, 1).pop() {
             remove(&mut peaks, sun);
             chosen.extend(suns[sun]);
         }
     }
     let has_sun = !chosen.is_empty();
-    let lamps = whole_sources(&peaks, WIDEST_LAMP);
+    let lamps = whole_sources(&peaks, &radii, WIDEST_LAMP);
     chosen.extend(brightest(&lamps, criteria.n_lamps).into_iter().filter_map(|i| lamps[i]));
     let mut sources = take_out(map, &grid, &chosen);
     sources.iter_mut().take(1).for_each(|first| first.is_sun = has_sun);
     sources
 }
 
-/// The peaks that are no wider than `widest` \[sr\], whole: what surrounds a single one and is no
-/// wider than [`SHELL`] times its solid angle belongs to it, as the dish does to the bulb.
-fn whole_sources(peaks: &[Option<Peak>], widest: f64) -> Vec<Option<Peak>> {
+/// The radius of the even disc of as much angular variance as each peak has \[°\]; 0 for peaks that no limit admits.
+fn radii(grid: &Grid, peaks: &[Option<Peak>]) -> Vec<f64> {
+    let mut entered = vec![NO_OWNER; grid.luminance.len()];
+    let of_peak = |(i, peak): (usize, &Option<Peak>)| {
+        let admitted = |p: &Peak| p.solid_angle <= WIDEST_LAMP.solid_angle;
+        let Some(peak) = peak.filter(admitted) else { return 0.0 };
+        let above = |cell: usize| f64::from(grid.luminance[cell] - peak.level);
+        let cells = flood(grid, peak.seed, |c| {
+            above(c) > 0.0 && std::mem::replace(&mut entered[c], i as u32) != i as u32
+        });
+        let (mut moment, mut energy) = ([0.0; 3], 0.0);
+        for cell in cells.into_iter().map(|cell| cell as usize) {
+            let weight = above(cell) * grid.solid_angle(cell);
+            let direction = grid.direction(cell).to_array();
+            moment.iter_mut().zip(direction).for_each(|(m, d)| *m += weight * f64::from(d));
+            energy += weight;
+        }
+        // An even disc of angular radius r has a mean direction of length (1 + cos r) / 2.
+        let length = moment.map(|m| m * m).iter().sum::<f64>().sqrt();
+        let concentration = if energy > 0.0 { (length / energy).min(1.0) } else { 1.0 };
+        functions::acos(2.0 * concentration - 1.0).to_degrees()
+    };
+    peaks.iter().enumerate().map(of_peak).collect()
+}
+
+/// The peaks that are no wider than `widest`, whole: what surrounds a single one and is no wider than [`SHELL`] times its
+/// solid angle belongs to it, as the dish does to the bulb.
+fn whole_sources(peaks: &[Option<Peak>], radii: &[f64], widest: Extent) -> Vec<Option<Peak>> {
     let mut whole = vec![None; peaks.len()];
     // What lies within another comes before it.
-    for (i, peak) in peaks.iter().enumerate() {
-        let Some(mut peak) = peak.filter(|p| p.solid_angle <= widest) else { continue };
+    for (i, (peak, &radius)) in peaks.iter().zip(radii).enumerate() {
+        let fits = |p: &Peak| p.solid_angle <= widest.solid_angle && radius <= widest.radius;
+        let Some(mut peak) = peak.filter(fits) else { continue };
         if let Some(core) = peak.core.map(|c| c as usize)
             && whole[core].is_some_and(|c: Peak| peak.solid_angle <= SHELL * c.solid_angle)
         {
