@@ -37,7 +37,10 @@ pub(crate) fn report_usage(mut error: clap::Error) -> ExitCode {
     if error.kind() == ErrorKind::InvalidUtf8
         && let Some(word) = std::env::args_os().find(|word| word.to_str().is_none())
     {
-        print_labeled(Label::Error, &format!("{} is not UTF-8, which this command needs", word.display()));
+        print_labeled(
+            Label::Error,
+            &format!("{} is not UTF-8, which this command needs", word.display()),
+        );
         return ExitCode::from(error.exit_code() as u8);
     }
     suggest::add_to(&mut error);
