@@ -265,7 +265,7 @@ fn names_need_not_be_utf_8() {
         ["compare", "sphere", "--size", "24x20", "--env-rows", "16", "--reference", "NAME"];
     let more = ["--strategies", "mis", "--budget", "spp:1", "--seeds", "1"];
     ended(&run(&[&compare[..], &more].concat()), 0, &[]);
-    ended(&run(&["render", "NAME"]), 2, &[r#""\xFF.exr" is not UTF-8"#]);
+    ended(&run(&["render", "NAME"]), 2, &["\u{fffd}.exr is not UTF-8"]);
 }
 
 /// Every engine's files, from a folder and for a scene whose names are commands; those of shells are run.
