@@ -113,8 +113,8 @@ const CAPTION: &str = "<p>All pictures share the same camera rays, one per pixel
     with the sample count that takes the time of SIR. It also shows the strategy <code>product</code>, which samples \
     the product of light and BRDF from a table for each pixel, with as many rays as SIR; it is designed for pixels \
     with several camera rays, which share a table. In the second row every strategy takes about the time of 100 environment \
-    samples, or its least time if that is more, with counts calibrated by measurement: SIR with the lecture’s ratio of candidates to rays, and with the \
-    best ratio for their costs here. Each picture is labeled with its error against the converged one (relMSE: mean of \
+    samples, or its least time if that is more, with counts calibrated by measurement: SIR with the lecture’s ratio of \
+    candidates to rays, and with the best ratio for their costs here. Each picture is labeled with its error against the converged one (relMSE: mean of \
     (I − R)² / (R² + 0.01) over the pixels that show the scene), its shadow rays and its CPU seconds.</p>\
     <p>The MIS weights of a direction add up to 1, and each technique’s samples are divided by that technique’s count. \
     Dividing by M + N instead, as is sometimes written, gives half the result.</p>";

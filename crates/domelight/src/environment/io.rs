@@ -121,7 +121,7 @@ pub fn probe_from_bytes(
 /// # Errors
 /// Those of [`load_probe`], except for reading.
 pub fn probe_from_picture(
-    picture: picture::Picture,
+    mut picture: picture::Picture,
     file: &str,
     options: &ProbeOptions,
 ) -> Result<LoadedProbe, ProbeError> {
@@ -129,7 +129,6 @@ pub fn probe_from_picture(
     if let Some(guessed) = &picture.guessed_layer {
         warnings.push(format!("{file}: {guessed}"));
     }
-    let mut picture = picture;
     if let Some(window) = picture.window
         && is_map(window.display, options)
     {
