@@ -159,5 +159,5 @@ def test_the_line_of_a_scene_file_that_names_a_missing_map_is_named(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text('[environment]\nfile = "none.hdr"\n\n[[objects]]\nbuiltin = "sphere"\n')
     scene = dl.Scene.load(path)
-    with pytest.raises(FileNotFoundError, match=r"scene\.toml.*line 2.*none\.hdr"):
+    with pytest.raises(FileNotFoundError, match=r"scene\.toml.*line 1, \[environment\].*none\.hdr"):
         scene.environment()
