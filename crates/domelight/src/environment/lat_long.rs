@@ -135,6 +135,15 @@ pub(crate) fn column_integrals(x: usize, width: usize) -> [f64; 2] {
     [sin * chord, -cos * chord]
 }
 
+/// The angular radius of the even disc of as much angular variance as light has \[rad\]; `moment` is ∫ L ω dω, and `energy`
+/// is ∫ L dω. 0 without light.
+pub(crate) fn even_disc_radius(moment: [f64; 3], energy: f64) -> f64 {
+    // An even disc of angular radius r has a mean direction of length (1 + cos r) / 2.
+    let length = moment.map(|m| m * m).iter().sum::<f64>().sqrt();
+    let concentration = (length / energy).min(1.0);
+    functions::acos(2.0 * concentration - 1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

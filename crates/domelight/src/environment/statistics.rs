@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::LatLongGrid;
 use super::compact::{SourceCriteria, compact_sources};
-use super::lat_long::{RowIntegrals, column_integrals};
+use super::lat_long::{RowIntegrals, column_integrals, even_disc_radius};
 use super::mapping::Mapping;
 use crate::color::Rgb;
 use crate::image::RgbImage;
@@ -186,9 +186,7 @@ fn sun(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Sun> {
         solid_angle += omega;
     }
     let direction = Vec3::from_array(moment.map(|m| (m / energy) as f32)).try_normalize()?;
-    // An even disc of angular radius r has a mean direction of length (1 + cos r) / 2.
-    let concentration = (moment.map(|m| m * m).iter().sum::<f64>().sqrt() / energy).min(1.0);
-    let angular_radius = functions::acos(2.0 * concentration - 1.0);
+    let angular_radius = even_disc_radius(moment, energy);
     let power = |(i, &l): (usize, &f32)| l as f64 * weights.solid_angle(i / map.width);
     let all: f64 = luminance.iter().enumerate().map(power).sum();
     let irradiance = Rgb::from(irradiance.map(|e| e as f32));

@@ -40,7 +40,8 @@ pub use split::Order;
 pub use variance_minimization::{Rule, VarianceMinimization, variance_minimization};
 
 use crate::Rgb;
-use crate::math::{Vec3, functions};
+use crate::environment::lat_long::even_disc_radius;
+use crate::math::Vec3;
 use crate::parallel::{bands, in_order};
 use texels::Texels;
 
@@ -327,12 +328,10 @@ impl RegionSums {
     fn light(&self, texels: &Texels, total: f64, region: Region) -> RigLight {
         let unit = texels.environment().unit();
         let [r, g, b] = self.irradiance.map(|c| (c * unit) as f32);
-        let length = self.moment.map(|m| m * m).iter().sum::<f64>().sqrt();
-        let concentration = (length / self.energy).min(1.0);
         RigLight {
             direction: texels.to_world(self.moment),
             irradiance: Rgb::new(r, g, b),
-            angular_radius: functions::acos(2.0 * concentration - 1.0) as f32,
+            angular_radius: even_disc_radius(self.moment, self.energy) as f32,
             share: (self.energy / total) as f32,
             solid_angle: self.solid_angle as f32,
             region,

@@ -11,7 +11,7 @@ mod fill;
 mod grid;
 mod level_sets;
 
-use crate::math::functions;
+use crate::environment::lat_long::even_disc_radius;
 use crate::{Rgb, RgbImage};
 use fill::continue_rim;
 use grid::Grid;
@@ -109,10 +109,7 @@ fn radii(grid: &Grid, peaks: &[Option<Peak>]) -> Vec<f64> {
             moment.iter_mut().zip(direction).for_each(|(m, d)| *m += weight * f64::from(d));
             energy += weight;
         }
-        // An even disc of angular radius r has a mean direction of length (1 + cos r) / 2.
-        let length = moment.map(|m| m * m).iter().sum::<f64>().sqrt();
-        let concentration = if energy > 0.0 { (length / energy).min(1.0) } else { 1.0 };
-        functions::acos(2.0 * concentration - 1.0).to_degrees()
+        even_disc_radius(moment, energy).to_degrees()
     };
     peaks.iter().enumerate().map(of_peak).collect()
 }
