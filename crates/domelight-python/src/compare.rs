@@ -71,7 +71,7 @@ pub(crate) fn compare<'py>(
     budget: &str,
     seeds: u32,
     reference_spp: u32,
-    size: (i64, i64),
+    size: [i64; 2],
     seed: u64,
     threads: Option<usize>,
     camera: Option<CameraLike>,

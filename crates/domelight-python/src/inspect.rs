@@ -27,8 +27,8 @@ pub(crate) fn inspect<'py>(
     scene: &Bound<'py, Scene>,
     env: Option<&Bound<'py, Environment>>,
     strategies: Vec<(String, Bound<'py, PyAny>)>,
-    pixel: (i64, i64),
-    size: (i64, i64),
+    pixel: [i64; 2],
+    size: [i64; 2],
     seed: u64,
     threads: Option<usize>,
     camera: Option<CameraLike>,
@@ -57,9 +57,11 @@ pub(crate) fn inspect<'py>(
         passes: "efficient",
     };
     let job = &Job::new(py, scene.get(), env, keywords)?;
-    let inside = |(x, y): (i64, i64)| Some([usize::try_from(x).ok()?, usize::try_from(y).ok()?]);
-    let pixel = inside(pixel)
-        .ok_or_else(|| bad_value(format!("pixel is {pixel:?}; column and row are not negative")))?;
+    let inside = |[x, y]: [i64; 2]| Some([usize::try_from(x).ok()?, usize::try_from(y).ok()?]);
+    let pixel = inside(pixel).ok_or_else(|| {
+        let [x, y] = pixel;
+        bad_value(format!("pixel is ({x}, {y}); column and row are not negative"))
+    })?;
     let lobes = &scene.get().inner.lobes;
     let choices = strategies
         .into_iter()

@@ -138,7 +138,7 @@ impl Progressive {
 /// RenderInterrupted
 ///     A `KeyboardInterrupt` whose attribute `film` holds the samples so far; a later `next` continues from there.
 #[pyfunction(name = "_progressive")]
-#[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = (640, 640), seed = 0, threads = None,
+#[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = [640, 640], seed = 0, threads = None,
     camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,
     tile_size = None, passes = "doubling", progress = None),
     text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, passes='doubling', progress=None)")]
@@ -148,7 +148,7 @@ pub(crate) fn progressive<'py>(
     env: Option<&Bound<'py, Environment>>,
     strategy: Option<Bound<'py, PyAny>>,
     spp: u32,
-    size: (i64, i64),
+    size: [i64; 2],
     seed: u64,
     threads: Option<usize>,
     camera: Option<CameraLike>,

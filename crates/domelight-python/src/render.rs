@@ -58,7 +58,7 @@ pub(crate) struct Job {
 pub(crate) struct Keywords<'py> {
     pub(crate) strategy: Bound<'py, PyAny>,
     pub(crate) spp: u32,
-    pub(crate) size: (i64, i64),
+    pub(crate) size: [i64; 2],
     pub(crate) seed: u64,
     pub(crate) threads: Option<usize>,
     pub(crate) camera: Option<CameraLike>,
@@ -467,7 +467,7 @@ pub(crate) fn warn_of(py: Python<'_>, film: &Film) -> PyResult<()> {
 /// DomelightWarning
 ///     If samples were NaN or infinite.
 #[pyfunction(name = "_render")]
-#[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = (640, 640), seed = 0, threads = None,
+#[pyo3(signature = (scene, env = None, strategy = None, *, spp = 32, size = [640, 640], seed = 0, threads = None,
     camera = None, filter = "gaussian", sampler = "sobol", hide_env = false, adaptive = true, target_error = None,
     tile_size = None, passes = "efficient", time = None, progress = None),
     text_signature = "(scene, env=None, strategy=None, *, spp=32, size=(640, 640), seed=0, threads=None, camera=None, filter='gaussian', sampler='sobol', hide_env=False, adaptive=True, target_error=None, tile_size=None, passes='efficient', time=None, progress=None)")]
@@ -477,7 +477,7 @@ pub(crate) fn render<'py>(
     env: Option<&Bound<'py, Environment>>,
     strategy: Option<Bound<'py, PyAny>>,
     spp: u32,
-    size: (i64, i64),
+    size: [i64; 2],
     seed: u64,
     threads: Option<usize>,
     camera: Option<CameraLike>,

@@ -538,7 +538,7 @@ fn attribute<const K: usize>(
 }
 
 /// A picture's width and height.
-pub(crate) fn size((width, height): (i64, i64)) -> PyResult<(usize, usize)> {
+pub(crate) fn size([width, height]: [i64; 2]) -> PyResult<(usize, usize)> {
     let positive = |n: i64| usize::try_from(n).ok().filter(|&n| n > 0);
     let area = |(w, h): &(usize, usize)| w.checked_mul(*h).is_some_and(|area| area <= MAX_TEXELS);
     positive(width).zip(positive(height)).filter(area).ok_or_else(|| {

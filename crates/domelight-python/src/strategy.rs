@@ -390,11 +390,21 @@ impl PythonStrategy {
         if !index.is_sorted() {
             order.sort_by_key(|&row| index[row as usize]);
         }
+        let mut n_of_point = vec![0; tile.points.len()];
         for row in order {
             let row = row as usize;
             let (point, wi, weight) = (index[row], Vec3::from(directions[row]), weights[row]);
             if weight.is_black() {
                 continue;
+            }
+            let n = &mut n_of_point[point as usize];
+            *n += 1;
+            if *n > self.n_rays {
+                return Err(bad_value(format!(
+                    "the strategy returned rays for point {point} beyond its n_rays, {}; set its attribute n_rays to \
+                     the maximum number of rays per point",
+                    self.n_rays
+                )));
             }
             let is_unit = (wi.length_squared() - 1.0).abs() < 1e-3;
             if !is_unit {

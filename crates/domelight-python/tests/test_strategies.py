@@ -144,6 +144,17 @@ def test_what_is_raised_comes_back(sphere, env):
         dl.render(sphere, env, broken, **SIZE)
 
 
+def test_more_rays_than_announced_are_refused(sphere, env):
+    def two(points):
+        index = np.repeat(np.arange(len(points)), 2)
+        return index, points.normal[index], np.full(len(index), 0.5)
+
+    with pytest.raises(ValueError, match="beyond its n_rays, 1"):
+        dl.render(sphere, env, two, **SIZE)
+    two.n_rays = 2
+    assert dl.render(sphere, env, two, **SIZE).color.any()
+
+
 def test_not_a_number_is_counted(sphere, env):
     def wrong(points):
         return np.arange(len(points)), points.normal, np.full(len(points), np.nan)

@@ -119,8 +119,29 @@ fn ascii_ply_with_extras_and_polygons() {
 }
 
 #[test]
-fn windows_line_ends_in_ply() {
-    let loaded = one("quad.ply", PLY_QUAD.replace('\n', "\r\n"));
+fn line_ends_of_other_systems() {
+    // The last is what text mode makes of Windows' line ends.
+    for end in ["\r\n", "\r", "\r\r\n"] {
+        let ply = one("quad.ply", PLY_QUAD.replace('\n', end));
+        assert_eq!(ply.description.parts[0].mesh.triangles.len(), 2, "{end:?}");
+        assert_eq!(ply.warnings, [""; 0]);
+        for (name, text) in [("a.obj", OBJ), ("a.off", OFF)] {
+            let triangles = |text: String| {
+                let parts = one(name, text).description.parts;
+                parts.iter().map(|part| part.mesh.triangles.len()).collect::<Vec<_>>()
+            };
+            assert_eq!(
+                triangles(text.replace('\n', end)),
+                triangles(text.into()),
+                "{name} {end:?}"
+            );
+        }
+    }
+    // Bytes after a binary file's header are no line ends.
+    let binary = binary_ply(false);
+    let header = binary.windows(10).position(|w| w == b"end_header").unwrap() + 11;
+    let text = String::from_utf8_lossy(&binary[..header]).replace('\n', "\r");
+    let loaded = one("mesh.ply", [text.as_bytes(), &binary[header..]].concat());
     assert_eq!(loaded.description.parts[0].mesh.triangles.len(), 2);
 }
 

@@ -410,6 +410,14 @@ fn read_referenced(path: &Path, referrer: &str, budget: &Budget) -> Result<Vec<u
     })
 }
 
+/// The byte that ends the lines of a text: a line feed, or a carriage return if none follows the first line.
+fn line_end(text: &[u8]) -> u8 {
+    let is_end = |&b: &u8| b == b'\n' || b == b'\r';
+    let first = text.iter().position(is_end).unwrap_or(text.len());
+    let after = text[first..].iter().find(|&&b| b != b'\r');
+    if after == Some(&b'\n') || first == text.len() { b'\n' } else { b'\r' }
+}
+
 /// Text that may be of before UTF-8.
 fn text_of(bytes: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(bytes) {

@@ -13,7 +13,7 @@
 use std::path::Path;
 
 use super::faces::{Polygons, color_triangles};
-use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, non_finite};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, line_end, non_finite};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
@@ -148,7 +148,8 @@ struct Words<'a> {
 impl<'a> Words<'a> {
     fn new(bytes: &'a [u8], strict: bool) -> Self {
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        let is_end: fn(&u8) -> bool = |&b| b == b'\n';
+        let is_end: fn(&u8) -> bool =
+            if line_end(bytes) == b'\r' { |&b| b == b'\r' } else { |&b| b == b'\n' };
         let rest = "".split_whitespace();
         Self { lines: bytes.split(is_end).enumerate(), line: 0, rest, by_line: true, strict }
     }
@@ -192,7 +193,8 @@ fn number(word: &str) -> Result<f32, OffErrorKind> {
 
 fn read(bytes: &[u8], strict: bool) -> Located<Mesh> {
     let mut words = Words::new(bytes, strict);
-    let lines = bytes.split(|&b| b == b'\n').count();
+    let end = line_end(bytes);
+    let lines = bytes.split(|&b| b == end).count();
     let (kind, vertices, faces) = header(&mut words, lines)?;
     let mut mesh = Mesh::default();
     let mut colors = Colors::default();

@@ -13,7 +13,7 @@ use std::fmt;
 use std::path::Path;
 
 use super::faces::{Polygons, color_triangles};
-use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, non_finite};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, line_end, non_finite};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
@@ -243,7 +243,8 @@ struct Header {
 impl Header {
     fn parse(bytes: &[u8]) -> Located<Self> {
         let (mut format, mut elements, mut length) = (None, Vec::<Element>::new(), 0);
-        for (index, line) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
+        let end = line_end(bytes);
+        for (index, line) in bytes.split_inclusive(|&b| b == end).enumerate() {
             length += line.len();
             let text = String::from_utf8_lossy(line);
             let words: Vec<&str> = text.split_whitespace().collect();

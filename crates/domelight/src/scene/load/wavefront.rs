@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::text_of;
+use super::{line_end, text_of};
 
 /// An error in a line of an OBJ or MTL file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -62,7 +62,8 @@ pub enum ObjErrorKind {
 /// The lines of an OBJ or MTL file with their numbers from 1; one that ends in a backslash goes on in the next.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let mut rest = bytes.split(|&b| b == b'\n').enumerate();
+    let end = line_end(bytes);
+    let mut rest = bytes.split(move |&b| b == end).enumerate();
     std::iter::from_fn(move || {
         let (index, first) = rest.next()?;
         let Some(begin) = continued(first) else { return Some((index + 1, text_of(first))) };
