@@ -124,6 +124,8 @@ export class Job {
   /** The engine's name for the strategy, with the pilot's choices. */
   strategy = "";
   private statisticsOf = new Map<Host, Statistics>();
+  /** The last with a variance. */
+  private measuredOf = new Map<Host, Statistics>();
   private progressOf = new Map<Host, number>();
   paused = false;
   ended = false;
@@ -131,8 +133,8 @@ export class Job {
   constructor(readonly token: number, readonly hosts: Host[], readonly settings: RenderSettings) {}
 
   note(host: Host, update: Update) {
-    const relativeVariance = update.statistics.relativeVariance ?? this.statisticsOf.get(host)?.relativeVariance ?? null;
-    this.statisticsOf.set(host, { ...update.statistics, relativeVariance });
+    this.statisticsOf.set(host, update.statistics);
+    if (update.statistics.relativeVariance !== null) this.measuredOf.set(host, update.statistics);
     this.progressOf.set(host, update.progress);
   }
 
@@ -151,7 +153,18 @@ export class Job {
     return {
       cameraRays: sum("cameraRays"), shadowRays: sum("shadowRays"), shadingPoints: sum("shadingPoints"),
       nonFinite: sum("nonFinite"), pixels, samples: sum("cameraRays") / Math.max(pixels, 1),
-      relativeVariance: all.some((s) => s.relativeVariance === null) ? null : sum("relativeVariance") / Math.max(pixels, 1), complete: this.complete,
+      relativeVariance: this.measured?.error ?? null, complete: this.complete,
+    };
+  }
+
+  /** The last estimate of the relative variance, and the rays and samples that it is of, which are fewer than those by now. */
+  get measured() {
+    const all = [...this.measuredOf.values()];
+    if (all.length < this.hosts.length) return null;
+    const sum = (of: (s: Statistics) => number) => all.reduce((sum, s) => sum + of(s), 0);
+    return {
+      error: sum((s) => s.relativeVariance!) / Math.max(sum((s) => s.pixels), 1), rays: sum((s) => s.shadowRays),
+      samples: Math.min(...all.map((s) => s.samples)),
     };
   }
 }

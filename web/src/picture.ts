@@ -141,13 +141,10 @@ export class PicturePanel {
       document.documentElement.dataset.preview = String(Math.round(performance.now() - this.times.start));
       return;
     }
-    const statistics = job.statistics;
+    const { measured } = job;
     const history = this.histories[side];
-    const last = history.at(-1);
-    const error = statistics.relativeVariance;
-    if (error !== null && statistics.samples >= 2 && (!last || statistics.shadowRays > 1.15 * last.rays || job.complete)) {
-      history.push({ rays: statistics.shadowRays, error, samples: statistics.samples });
-    }
+    const last = history.at(-1)?.rays ?? 0;
+    if (measured && measured.samples >= 2 && measured.rays > (job.complete ? last : 1.15 * last)) history.push(measured);
     this.report(job.complete);
     if (this.jobs.every((j) => j.complete)) {
       this.times.done = performance.now();

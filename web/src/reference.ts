@@ -51,7 +51,9 @@ export class Reference {
     if (message.kind === "failed") this.app.tell(message.error, true);
     if (message.kind !== "update") return;
     const { windows, pixels, statistics } = message;
-    const relativeVariance = statistics.relativeVariance ?? this.statistics?.relativeVariance ?? null;
+    const before = this.statistics;
+    // An estimate of before is of fewer samples.
+    const relativeVariance = statistics.relativeVariance ?? (before && before.relativeVariance !== null ? before.relativeVariance * before.samples / statistics.samples : null);
     this.statistics = { ...statistics, relativeVariance };
     const isFirst = this.film !== film;
     this.film = film;

@@ -102,6 +102,23 @@ test("two strategies at equal rays, with a divider", async () => {
   await done();
 });
 
+test("the plot of the error pairs each estimate with the rays that it is of", async () => {
+  const { page, done } = await open("size=128&spp=64&rows=64&strategy=mis:1:1");
+  await rendered(page);
+  const [points, rays] = await page.evaluate(() => {
+    const { histories, jobs } = window.domelight.picture;
+    return [histories[0], jobs[0].statistics.shadowRays];
+  });
+  assert.ok(points.length >= 2, JSON.stringify(points));
+  assert.equal(points.at(-1).rays, rays);
+  points.forEach(({ error, samples }, i) => {
+    assert.ok(error > 0 && samples >= 2, JSON.stringify(points));
+    // No estimate stands at the rays of later ones.
+    if (i) assert.notEqual(error, points[i - 1].error);
+  });
+  await done();
+});
+
 test("the error view measures the picture against a reference", async () => {
   const { page, done } = await open("size=64&spp=32&rows=64&env=studio&strategy=mis:1:1&beside=product:8&view=error");
   await page.waitForFunction(() => /Relative squared error: mis:1:1/.test(document.getElementById("error-legend").textContent));

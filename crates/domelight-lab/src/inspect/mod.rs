@@ -81,7 +81,7 @@ pub struct StrategyReport<'a> {
 pub struct Maps {
     /// Pixels along an edge.
     pub resolution: usize,
-    /// x, y and z of the local frame in the world.
+    /// The axes of the maps in world space: to the right, to the top, and the shading normal.
     pub frame: [[f32; 3]; 3],
     /// L \[W·m⁻²·sr⁻¹\].
     pub radiance: Vec<f32>,

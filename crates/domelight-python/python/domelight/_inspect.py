@@ -63,7 +63,8 @@ class Inspection:
     """The X-ray of a pixel; a notebook shows it as a figure if matplotlib is installed.
 
     Maps are disks in the equal-area projection of the hemisphere: the shading normal is at the center, the horizon on the
-    circle, and rows go down from +y of the local frame.
+    circle, and the upper side of the surface at the top; of a surface that is nearly horizontal, the side away from the
+    viewer.
 
     Attributes
     ----------
@@ -74,7 +75,7 @@ class Inspection:
     position, normal, albedo : ndarray, shape (3,), or None
         The hit nearest to the pixel's center.
     frame : ndarray, shape (3, 3), or None
-        x, y and z of the local frame in world space, by rows.
+        The axes of the maps in world space, by rows: to the right, to the top, and the shading normal.
     maps : dict of str to ndarray
         'radiance', 'bsdf_cos', 'product' (R, R, 3) and 'visibility' (R, R); empty without a hit.
     strategies : list of Decomposition

@@ -1,7 +1,8 @@
 //! The hemisphere above a point as maps.
 //!
 //! A map is the disk of Lambert's azimuthal equal-area projection in a square. The normal is in the center, the
-//! horizon is the circle, and every pixel has the same solid angle. Rows run from +y of the local frame down.
+//! horizon is the circle, and every pixel has the same solid angle. The top of a map is the upper side of the surface;
+//! of a surface that is nearly horizontal, the side away from the viewer.
 
 use crate::Rgb;
 use crate::environment::Environment;
@@ -16,7 +17,7 @@ const SUBPIXELS: usize = 4;
 pub struct Hemisphere {
     /// The number of pixels along an edge.
     pub resolution: usize,
-    /// The x, y and z axes of the local frame in world space; z is the shading normal.
+    /// The x, y and z axes of the maps in world space: to the right, to the top, and the shading normal.
     pub frame: [[f32; 3]; 3],
     /// L \[W·m⁻²·sr⁻¹\].
     pub radiance: Vec<Rgb>,
@@ -36,7 +37,7 @@ impl Hemisphere {
         trace: impl Fn(&ShadingPoint, &[Vec3]) -> Vec<f32>,
     ) -> Self {
         let n = resolution * resolution;
-        let frame = point.frame;
+        let frame = upright(point);
         let mut maps = Self {
             resolution,
             frame: [frame.x, frame.y, frame.z].map(|v| v.to_array()),
@@ -114,9 +115,9 @@ impl DirectionHistogram {
         let mut density = vec![0.0; n];
         // The disk has area π and 2π sr, the square area 4.
         let pixel = 8.0 / n as f32;
-        let mut samples = Vec::new();
+        let (frame, mut samples) = (upright(point), Vec::new());
         for (&(wi, weight), &visibility) in rays.iter().zip(visibility) {
-            let Some(place) = place(&point.frame, wi) else { continue };
+            let Some(place) = place(&frame, wi) else { continue };
             let cell = |c: f32| {
                 (((0.5 + 0.5 * c) * resolution as f32) as usize).min(resolution.saturating_sub(1))
             };
@@ -128,6 +129,15 @@ impl DirectionHistogram {
         }
         Self { resolution, density, n_rays: rays.len(), samples }
     }
+}
+
+/// The frame of a point's maps.
+fn upright(point: &ShadingPoint) -> Frame {
+    /// The cosine of 8°.
+    const HORIZONTAL: f32 = 0.99;
+    let normal = point.frame.z;
+    let top = if normal.y.abs() < HORIZONTAL { Vec3::Y } else { -point.frame.to_world(point.wo) };
+    Frame::from_z_and_tangent(normal, top.cross(normal))
 }
 
 /// The local direction at a place of the disk; none outside.
@@ -154,6 +164,24 @@ fn place(frame: &Frame, wi: Vec3) -> Option<[f32; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn maps_are_upright() {
+        for normal in [vec3(0.6, 0.0, 0.8), vec3(-0.3, 0.5, -0.2).normalize()] {
+            let frame = Frame::from_z(normal);
+            let maps = upright(&ShadingPoint { frame, ..ShadingPoint::UNSET });
+            assert!(maps.x.y.abs() < 1e-6 && maps.y.y > 0.0, "{maps:?}");
+            assert!(maps.x.cross(maps.y).abs_diff_eq(normal, 1e-6));
+        }
+    }
+
+    #[test]
+    fn the_top_of_a_floor_is_away_from_the_viewer() {
+        let frame = Frame::from_z(Vec3::Y);
+        let wo = frame.to_local(vec3(0.0, 0.6, 0.8));
+        let maps = upright(&ShadingPoint { frame, wo, ..ShadingPoint::UNSET });
+        assert!(maps.y.abs_diff_eq(-Vec3::Z, 1e-6) && maps.x.abs_diff_eq(Vec3::X, 1e-6));
+    }
 
     #[test]
     fn places_are_directions() {
