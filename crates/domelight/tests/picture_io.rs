@@ -156,6 +156,11 @@ fn hdr_exposure_correction_and_line_ends() {
     let header = "#?RADIANCE\r\nEXPOSURE=2\r\nEXPOSURE= 0.25\r\nCOLORCORR= 1 2 4\r\nVIEW= -vtv\r\n\r\n-Y 1 +X 1\r\n";
     let bytes = [header.as_bytes(), &[128, 128, 128, 129]].concat();
     assert_eq!(decode(&bytes).unwrap().image.pixels, [Rgb::new(2.0, 1.0, 0.5)]);
+    // Indented lines are of the pictures that this one was made from.
+    let header =
+        "#?RADIANCE\npcomb a.hdr\na.hdr:\n\tEXPOSURE=2.0\n\tFORMAT=of a friend\n\n-Y 1 +X 1\n";
+    let bytes = [header.as_bytes(), &[128, 128, 128, 129]].concat();
+    assert_eq!(decode(&bytes).unwrap().image.pixels, [Rgb::WHITE]);
     for bad in ["EXPOSURE=0", "EXPOSURE=nan", "COLORCORR=1 1", "FORMAT=png"] {
         let bytes = format!("#?RADIANCE\n{bad}\n\n-Y 1 +X 1\nabcd");
         let message = decode(bytes.as_bytes()).unwrap_err().to_string();
@@ -179,9 +184,12 @@ fn hdr_xyze_becomes_rec709() {
     );
     assert!(image.get(1, 0).r == 0.0 && image.get(1, 0).g > 0.5);
     // Primaries of Rec. 709 itself change nothing; others do, but keep white.
-    for (primaries, same) in
-        [(".64 .33 .3 .6 .15 .06 .3127 .329", true), (".7 .3 .17 .8 .13 .05 .33 .34", false)]
-    {
+    for (primaries, same) in [
+        (".64 .33 .3 .6 .15 .06 .3127 .329", true),
+        (".7 .3 .17 .8 .13 .05 .33 .34", false),
+        // ACES AP0, whose green and blue are no colors.
+        (".7347 .2653 0 1 .0001 -.077 .32168 .33767", false),
+    ] {
         let header = format!("#?RADIANCE\nPRIMARIES= {primaries}\n\n-Y 1 +X 2\n");
         let bytes = [header.as_bytes(), &[128, 128, 128, 129, 255, 128, 128, 129]].concat();
         let image = decode(&bytes).unwrap().image;
@@ -427,6 +435,80 @@ fn exr_data_window_attribute_and_chromaticities() {
         -0.02400 * from.r - 0.12897 * from.g + 1.15297 * from.b,
     );
     assert!((to - expected).map(f32::abs).max_component() < 2e-3, "{to:?} {expected:?}");
+}
+
+/// A sun beyond half precision, and what renderers make of a division by zero, in ACEScg.
+#[test]
+fn values_that_are_no_light_are_found_in_files_of_other_primaries() {
+    let mut image = RgbImage::filled(4, 2, Rgb::splat(0.5));
+    image.pixels[1] = Rgb::splat(f32::INFINITY);
+    image.pixels[2].g = f32::NAN;
+    image.pixels[5].r = f32::NEG_INFINITY;
+    let channels = rgb_channels(&image, "", SampleType::F32);
+    let layer = Layer::new(
+        (4, 2),
+        LayerAttributes::default(),
+        Encoding::SMALL_LOSSLESS,
+        AnyChannels::sort(channels.into_iter().collect()),
+    );
+    let mut file = Image::from_layer(layer);
+    file.attributes.chromaticities = Some(Chromaticities {
+        red: Vec2(0.713, 0.293),
+        green: Vec2(0.165, 0.83),
+        blue: Vec2(0.128, 0.044),
+        white: Vec2(0.32168, 0.33767),
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("aces.exr");
+    file.write().to_file(&path).unwrap();
+    let probe = load_probe(&path, &ProbeOptions::default()).unwrap();
+    assert_eq!(probe.image.pixels[1], Rgb::splat(65504.0));
+    let expected = SanitizeReport { negative: 0, non_finite: 5, infinite: 3 };
+    assert_eq!(probe.sanitized, expected);
+    assert!((probe.image.pixels[2].g - 0.5).abs() < 1e-3);
+    let strict = ProbeOptions { strict: true, ..ProbeOptions::default() };
+    assert!(load_probe(&path, &strict).is_err());
+}
+
+#[test]
+fn exr_of_x_y_z_is_cie_xyz_and_coordinates_are_no_picture() {
+    let layers = |names: [&str; 3]| {
+        let mut layers = ExrLayers::new(2, 1);
+        for (name, value) in names.iter().zip([0.9505f32, 1.0, 1.089]) {
+            let (layer, channel) = name.rsplit_once('.').unwrap_or(("", name));
+            layers.push_channel(layer, channel, vec![value; 2]);
+        }
+        layers.encode().unwrap()
+    };
+    let white = decode(&layers(["X", "Y", "Z"])).unwrap().image.pixels[0];
+    assert!((white - Rgb::WHITE).map(f32::abs).max_component() < 1e-3, "{white:?}");
+    assert!(matches!(kind(&layers(["N.X", "N.Y", "N.Z"])), PictureErrorKind::NoColor { .. }));
+    assert!(matches!(kind(&layers(["uv.X", "uv.Y", "d.Z"])), PictureErrorKind::NoColor { .. }));
+    let guess = decode(&layers(["a.Y", "b.Y", "c.Z"])).unwrap().guessed_layer;
+    assert_eq!(guess.unwrap().others, ["b"]);
+}
+
+/// The table of a file of scanlines names one block twice.
+#[test]
+fn exr_of_blocks_that_are_missing_is_corrupt() {
+    let image = smooth(8, 6);
+    let encoding = Encoding { compression: Compression::Uncompressed, ..Encoding::SMALL_LOSSLESS };
+    let channels = rgb_channels(&image, "", SampleType::F32);
+    let bytes = exr_bytes((8, 6), channels, encoding, LayerAttributes::default());
+    let table = bytes.len() - 6 * (8 + 8 + 8 * 12);
+    let mut twice = bytes.clone();
+    twice.copy_within(table + 8..table + 16, table + 16);
+    assert!(matches!(kind(&twice), PictureErrorKind::MissingBlocks), "{}", kind(&twice));
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data");
+    let mut bytes = std::fs::read(format!("{folder}/luminance_chroma_zips.exr")).unwrap();
+    let begins = |at: &usize| {
+        let offset = bytes.get(*at..*at + 8).map(|b| u64::from_le_bytes(b.try_into().unwrap()));
+        // A block for each of the 36 lines, right after the table.
+        offset == Some((*at + 36 * 8) as u64)
+    };
+    let table = (0..bytes.len()).find(begins).unwrap();
+    bytes.copy_within(table + 8..table + 16, table + 16);
+    assert!(matches!(kind(&bytes), PictureErrorKind::MissingBlocks));
 }
 
 /// Files of 16 × 36 texels that OpenEXR's own library wrote (3.5.3, by its Python module), chroma at every second
@@ -835,6 +917,10 @@ fn data_windows_stand_in_display_windows_that_are_maps() {
     let either = probe(&smooth(20, 10), (1, -3), (16, 8));
     assert_eq!((either.image, either.file_size), (smooth(20, 10), (20, 10)));
     assert!(either.warnings[0].ends_with("the data window is read as the whole map"));
+    let neither = probe(&smooth(21, 9), (5, 3), (30, 17));
+    assert_eq!(neither.image, smooth(21, 9));
+    assert!(neither.warnings[0].ends_with("the data window is read as the whole map"));
+    assert!(neither.warnings[1].contains("21x9 texels are stretched"), "{:?}", neither.warnings);
 }
 
 #[test]
@@ -877,6 +963,45 @@ fn a_png_may_state_its_gamma() {
     assert!(near(with(Some(100_000), false), 0.502));
     assert!(near(with(Some(50_000), false), 0.252));
     assert!(near(with(Some(100_000), true), 0.2159));
+}
+
+/// A PNG's chunk of code points for the signal takes precedence.
+#[test]
+fn a_png_may_state_its_transfer_function() {
+    let with = |transfer: u8| {
+        let mut bytes = Vec::new();
+        let mut encoder = ::png::Encoder::new(&mut bytes, 1, 1);
+        encoder.set_color(::png::ColorType::Rgb);
+        encoder.set_source_gamma(::png::ScaledFloat::from_scaled(50_000));
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_chunk(::png::chunk::cICP, &[1, transfer, 0, 1]).unwrap();
+        writer.write_image_data(&[128; 3]).unwrap();
+        drop(writer);
+        let picture = read_bytes(&bytes, "a.png", &ReadOptions::default());
+        picture.map(|picture| picture.image.pixels[0].g)
+    };
+    for (transfer, expected) in [(8, 0.502), (13, 0.2159), (5, 0.1452)] {
+        let found = with(transfer).unwrap();
+        assert!((found - expected).abs() < 1e-3, "{transfer}: {found}");
+    }
+    for (transfer, name) in [(16, "PQ"), (18, "HLG")] {
+        assert!(with(transfer).unwrap_err().to_string().contains(name));
+    }
+}
+
+/// Cameras append films and gain maps to their pictures.
+#[test]
+fn what_follows_a_jpeg_is_of_no_concern() {
+    let mut bytes = Vec::new();
+    let image = image::RgbImage::from_fn(40, 20, |x, y| image::Rgb([x as u8 * 6, y as u8 * 9, 0]));
+    image.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Jpeg).unwrap();
+    let read = |bytes: &[u8]| read_bytes(bytes, "a.jpg", &ReadOptions::default());
+    assert!(read(&bytes).is_ok());
+    let longer = [&bytes[..], &[0xff, 0xda, 0, 8, 1, 2, 3]].concat();
+    assert!(read(&longer).is_ok());
+    for length in [bytes.len() - 1, bytes.len() - 2, bytes.len() / 2] {
+        assert!(read(&bytes[..length]).is_err(), "{length}");
+    }
 }
 
 #[test]

@@ -114,6 +114,13 @@ fn ascii_ply_with_extras_and_polygons() {
     assert_eq!(mesh.colors[0], Rgb::new(1.0, 0.0, 0.0));
     assert!((mesh.colors[3].g - 0.502).abs() < 2e-3, "sRGB 188 is about half");
     assert_eq!(loaded.warnings, [""; 0]);
+    for (kind, max) in [("int", "255"), ("uint", "255"), ("short", "255"), ("ushort", "65535")] {
+        let text = PLY_QUAD.replace("property uchar red", &format!("property {kind} red"));
+        let text = text.replace("1 1 0 1 9 1 1 255 0 0", &format!("1 1 0 1 9 1 1 {max} 0 0"));
+        let colors = &one("quad.ply", text).description.parts[0].mesh.colors;
+        assert_eq!(colors[2].r, 1.0, "{kind}");
+        assert!(kind == "ushort" || (colors[0].r - 1.0).abs() < 1e-6, "{kind}: {:?}", colors[0]);
+    }
     let longer = one("quad.ply", format!("{PLY_QUAD}3 0 1 2\n"));
     assert!(longer.warnings[0].contains("text follows the rows that the header counts"));
 }

@@ -129,12 +129,13 @@ pub fn probe_from_picture(
     if let Some(guessed) = &picture.guessed_layer {
         warnings.push(format!("{file}: {guessed}"));
     }
-    if let Some(window) = picture.window
-        && is_map(window.display, options)
-    {
-        let [data, display] = [(picture.image.width, picture.image.height), window.display]
-            .map(|(width, height)| format!("{width}x{height}"));
-        let treatment = if is_map((picture.image.width, picture.image.height), options) {
+    let shape = (picture.image.width, picture.image.height);
+    let is_certain =
+        |window: DataWindow| is_map(shape, options) && !is_map(window.display, options);
+    if let Some(window) = picture.window.filter(|&window| !is_certain(window)) {
+        let [data, display] =
+            [shape, window.display].map(|(width, height)| format!("{width}x{height}"));
+        let treatment = if is_map(shape, options) || !is_map(window.display, options) {
             "the data window is read as the whole map"
         } else {
             picture = in_display_window(&picture, window, options)
@@ -160,6 +161,12 @@ pub fn probe_from_picture(
         warnings.push(format!("{file}: only OpenEXR files have layers; '{layer}' is not used"));
     }
     let mapping = options.mapping.unwrap_or_else(|| guess_mapping(&image, picture.envmap));
+    if options.mapping.is_none() && mapping == Mapping::LatLong && is_stretched(&image) {
+        warnings.push(format!(
+            "{file}: its {}x{} texels are stretched over the sphere; lat-long maps have twice as many columns as rows",
+            image.width, image.height
+        ));
+    }
     mapping
         .check_shape(image.width, image.height)
         .map_err(|shape| ProbeError::Shape { file: file.to_owned(), shape })?;
@@ -196,6 +203,12 @@ fn is_map((width, height): (usize, usize), options: &ProbeOptions) -> bool {
         Some(mapping) => mapping.check_shape(width, height).is_ok(),
         None => width == 2 * height || Mapping::guess(width, height, None) != Mapping::LatLong,
     }
+}
+
+/// Whether a lat-long map is not 2:1, beyond what rounding explains. Maps of one row or column are gradients.
+fn is_stretched(image: &RgbImage) -> bool {
+    let (width, height) = (image.width, image.height);
+    width > 1 && height > 1 && width.abs_diff(2 * height) > 1.max(width / 50)
 }
 
 /// The picture in its display window, if there is memory for it.

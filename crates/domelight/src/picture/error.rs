@@ -99,6 +99,12 @@ pub enum PictureErrorKind {
         /// Its own words.
         message: String,
     },
+    /// The table of an OpenEXR file names one block twice, so that another is missing.
+    #[error("OpenEXR: blocks of the picture are missing: the file is corrupt")]
+    MissingBlocks,
+    /// The values of a PNG are encoded for HDR displays.
+    #[error("PNG: values encoded by {0} are not supported; convert the picture to OpenEXR")]
+    PngTransfer(&'static str),
     /// An OpenEXR feature that is not supported.
     #[error("OpenEXR: {0} are not supported")]
     ExrUnsupported(&'static str),

@@ -13,7 +13,7 @@
 //! header promises before memory is allocated. The second decodes scanlines independently, in parallel. The `image`
 //! crate's decoder supports only one orientation and drops EXPOSURE.
 
-use super::primaries::{Primaries, transform, xyz_to_rec709};
+use super::primaries::{Primaries, to_light, xyz_to_rec709};
 use super::{PictureErrorKind, allocate, checked_area};
 use crate::math::functions;
 use crate::{Rgb, RgbImage};
@@ -113,13 +113,15 @@ impl Header {
 
     fn read_variable(&mut self, line: &[u8], number: usize) -> Result<(), PictureErrorKind> {
         let line = String::from_utf8_lossy(line);
-        let Some((name, value)) = line.split_once('=').filter(|_| !line.starts_with('#')) else {
+        // Indented lines are of the pictures that this one was made from.
+        let is_own = !line.starts_with(['#', ' ', '\t']);
+        let Some((name, value)) = line.split_once('=').filter(|_| is_own) else {
             return Ok(());
         };
         let bad =
             |expected| PictureErrorKind::Header { line: number, found: line.to_string(), expected };
         let value = value.trim();
-        match name.trim() {
+        match name.trim_end() {
             "FORMAT" => {
                 self.is_xyz = match value {
                     "32-bit_rle_rgbe" => false,
@@ -137,7 +139,7 @@ impl Header {
             }
             // A set of primaries that cannot be read is as good as none: everybody else ignores them.
             "PRIMARIES" => {
-                self.primaries = positive_numbers::<8>(value).map(|p| {
+                self.primaries = numbers::<8>(value).map(|p| {
                     Primaries([0, 1, 2, 3].map(|i| [p[2 * i] as f32, p[2 * i + 1] as f32]))
                 });
             }
@@ -185,10 +187,14 @@ fn parse_resolution(line: &[u8]) -> Option<(Axis, Axis)> {
 }
 
 fn positive_numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    numbers(text).filter(|numbers| numbers.iter().all(|&n| n > 0.0))
+}
+
+/// So many finite numbers.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     let numbers: Vec<f64> =
         text.split_ascii_whitespace().map(str::parse).collect::<Result<_, _>>().ok()?;
-    let usable = numbers.iter().all(|&n| n > 0.0 && n.is_finite());
-    numbers.try_into().ok().filter(|_| usable)
+    numbers.try_into().ok().filter(|numbers: &[f64; N]| numbers.iter().all(|n| n.is_finite()))
 }
 
 /// The lines of a header, each without its line end (LF or CRLF).
@@ -391,7 +397,7 @@ impl ColorTable {
             Rgb::new(f32::from(r) * scale[0], f32::from(g) * scale[1], f32::from(b) * scale[2]);
         match &self.matrix {
             None => color,
-            Some(matrix) => transform(matrix, color).map(|c| c.max(0.0)),
+            Some(matrix) => to_light(matrix, color),
         }
     }
 }

@@ -113,7 +113,7 @@ pub(crate) fn texels(bytes: &[u8], format: Format) -> Result<usize, PictureError
 }
 
 /// Decodes a PNG into linear, premultiplied color: by its own gamma if it states one other than sRGB's, and otherwise as
-/// sRGB. A color profile is ignored.
+/// sRGB. A color profile and primaries are ignored.
 ///
 /// # Errors
 /// If the file is damaged or incomplete.
@@ -121,32 +121,69 @@ pub fn decode(bytes: &[u8]) -> Result<Picture, PictureErrorKind> {
     decode_within(bytes, Format::Png, None)
 }
 
-/// Whether the marker of an end comes after that of the last scan: the decoder makes up what is cut off.
+/// Whether the marker of the end comes after the scans; whatever follows it is of no concern. The decoder makes up what is
+/// cut off.
 fn is_whole_jpeg(bytes: &[u8]) -> bool {
-    let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xff, marker]);
-    last(0xd9) > last(0xda)
+    const END: u8 = 0xd9;
+    const SCAN: u8 = 0xda;
+    let is_scan_data = |marker: u8| matches!(marker, 0x00 | 0xd0..=0xd7);
+    let mut rest = bytes.get(2..).unwrap_or_default();
+    loop {
+        match rest {
+            [0xff, END, ..] => return true,
+            // Fill bytes before a marker.
+            [0xff, 0xff, ..] => rest = &rest[1..],
+            [0xff, marker, a, b, ..] => {
+                let length = 2 + usize::from(u16::from_be_bytes([*a, *b]));
+                let Some(after) = rest.get(length..) else { return false };
+                rest = after;
+                if *marker == SCAN {
+                    let is_marker = |pair: &[u8]| pair[0] == 0xff && !is_scan_data(pair[1]);
+                    let Some(next) = rest.windows(2).position(is_marker) else { return false };
+                    rest = &rest[next..];
+                }
+            }
+            _ => return false,
+        }
+    }
 }
 
-/// The exponent with which a PNG encodes light, from its chunk gAMA, if it is not about that of sRGB and the picture has
-/// neither a color profile nor the chunk sRGB, which take precedence (PNG specification, 3rd edition, 4.3).
-fn stated_gamma(bytes: &[u8]) -> Option<f32> {
-    /// 1/2.2 and .45 are written for sRGB.
-    const SRGB: std::ops::Range<f32> = 0.44..0.47;
-    let mut rest = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n")?;
+/// The exponent with which a PNG encodes light, if it is not about that of sRGB: from its chunk cICP or gAMA. Color profiles
+/// and the chunk sRGB take precedence over gAMA, and cICP over all (PNG specification, 3rd edition, 4.3).
+fn stated_gamma(bytes: &[u8]) -> Result<Option<f32>, PictureErrorKind> {
     let mut gamma = None;
-    while let Some((header, data)) = rest.split_first_chunk::<8>() {
-        let [a, b, c, d, name @ ..] = *header;
-        let data = data.get(..u32::from_be_bytes([a, b, c, d]) as usize)?;
-        match &name {
-            b"sRGB" | b"iCCP" | b"cICP" => return None,
-            b"gAMA" => gamma = Some(u32::from_be_bytes(data.try_into().ok()?) as f32 / 1e5),
-            b"IDAT" => break,
+    for (name, data) in chunks(bytes) {
+        match (&name, data) {
+            // Transfer functions of Rec. ITU-T H.273.
+            (b"cICP", [_, 5, ..]) => return Ok(Some(1.0 / 2.8)),
+            (b"cICP", [_, 8, ..]) => return Ok(Some(1.0)),
+            (b"cICP", [_, 16, ..]) => return Err(PictureErrorKind::PngTransfer("PQ")),
+            (b"cICP", [_, 18, ..]) => return Err(PictureErrorKind::PngTransfer("HLG")),
+            (b"cICP", _) => return Ok(None),
+            (b"sRGB" | b"iCCP", _) => gamma = Some(None),
+            (b"gAMA", &[a, b, c, d]) => {
+                let stated = u32::from_be_bytes([a, b, c, d]) as f32 / 1e5;
+                gamma.get_or_insert(Some(stated));
+            }
             _ => {}
         }
-        // The checksum follows the data.
-        rest = rest.get(8 + data.len() + 4..)?;
     }
-    gamma.filter(|gamma| (0.01..100.0).contains(gamma) && !SRGB.contains(gamma))
+    /// 1/2.2 and .45 are written for sRGB.
+    const SRGB: std::ops::Range<f32> = 0.44..0.47;
+    let stated = gamma.flatten();
+    Ok(stated.filter(|gamma| (0.01..100.0).contains(gamma) && !SRGB.contains(gamma)))
+}
+
+/// The chunks before the picture's data.
+fn chunks(bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], &[u8])> {
+    let mut rest = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n").unwrap_or_default();
+    std::iter::from_fn(move || {
+        let (&[a, b, c, d, e, f, g, h], after) = rest.split_first_chunk::<8>()?;
+        let (data, after) = after.split_at_checked(u32::from_be_bytes([a, b, c, d]) as usize)?;
+        // A checksum follows the data.
+        rest = after.get(4..)?;
+        Some(([e, f, g, h], data)).filter(|(name, _)| name != b"IDAT")
+    })
 }
 
 fn of_crate(format: Format) -> ImageFormat {
@@ -193,7 +230,7 @@ pub(super) fn decode_within(
     let has_alpha = decoder.color_type().has_alpha();
     let decoded = image::DynamicImage::from_decoder(decoder).map_err(PictureErrorKind::Image)?;
     let texels = decoded.into_rgba32f();
-    let gamma = stated_gamma(bytes);
+    let gamma = stated_gamma(bytes)?;
     let linear = |c: f32| match gamma {
         Some(gamma) => functions::powf(c, 1.0 / gamma),
         None => linear_from_srgb(c),

@@ -54,8 +54,17 @@ pub(super) fn xyz_to_rec709() -> Mat3 {
     Primaries::REC709.to_xyz().expect("Rec. 709 spans a color space").inverse()
 }
 
+/// Converts a color of a file by `matrix`, and clips what lies outside Rec. 709. A color with a value that is negative or not
+/// finite is no light: it is left as it is in the file, so that whoever checks colors finds it.
+pub(super) fn to_light(matrix: &Mat3, c: Rgb) -> Rgb {
+    if c.to_array().iter().any(|&c| !(0.0..f32::INFINITY).contains(&c)) {
+        return c;
+    }
+    transform(matrix, c).map(|c| c.max(0.0))
+}
+
 /// `matrix` on a color.
-pub(super) fn transform(matrix: &Mat3, c: Rgb) -> Rgb {
+fn transform(matrix: &Mat3, c: Rgb) -> Rgb {
     Rgb::from((*matrix * vec3(c.r, c.g, c.b)).to_array())
 }
 
@@ -89,6 +98,18 @@ mod tests {
                 assert!((a - b).abs() < 1e-3, "{a} {b}");
             }
         }
+    }
+
+    #[test]
+    fn what_is_no_light_stays_to_be_found() {
+        let acescg =
+            Primaries([[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]]);
+        let matrix = acescg.to_rec709().unwrap();
+        for c in [[f32::INFINITY; 3], [f32::INFINITY, 1.0, 1.0], [-1.0, 2.0, 1e30]] {
+            assert_eq!(to_light(&matrix, Rgb::from(c)), Rgb::from(c));
+        }
+        assert!(to_light(&matrix, Rgb::new(1.0, f32::NAN, 1.0)).g.is_nan());
+        assert!(to_light(&matrix, Rgb::new(0.0, 1.0, 0.0)).r == 0.0, "Rec. 709 has no such green");
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! Header attributes for the position and the colors of the picture.
 
+use crate::environment::mapping::EnvmapKind;
 use crate::math::Mat3;
 use crate::picture::DataWindow;
 use crate::picture::primaries::Primaries;
-use ::exr::meta::attribute::Chromaticities;
+use ::exr::meta::attribute::{Chromaticities, EnvironmentMap};
 use ::exr::meta::header::Header;
 
 /// Where the data window lies in the display window, if they differ.
@@ -15,6 +16,14 @@ pub(super) fn window(header: &Header) -> Option<DataWindow> {
     let display = (display.size.0, display.size.1);
     let same = position == (0, 0) && display == (data.size.0, data.size.1);
     (!same).then_some(DataWindow { position, display })
+}
+
+/// The value of the attribute `envmap`.
+pub(super) fn envmap(header: &Header) -> Option<EnvmapKind> {
+    header.own_attributes.environment_map.map(|kind| match kind {
+        EnvironmentMap::LatitudeLongitude => EnvmapKind::LatLong,
+        EnvironmentMap::Cube => EnvmapKind::Cube,
+    })
 }
 
 pub(super) fn to_rec709(c: &Chromaticities) -> Option<Mat3> {

@@ -6,8 +6,9 @@
 //! The `exr` crate decompresses subsampled channels but rejects their headers, so this module reads the table of
 //! blocks itself.
 
-use super::attributes::{primaries, to_rec709, window};
-use crate::picture::primaries::{Primaries, transform};
+use super::attributes::{envmap, primaries, to_rec709, window};
+use super::write::string_attributes;
+use crate::picture::primaries::{Primaries, to_light};
 use crate::picture::{Format, Picture, PictureErrorKind, allocate, checked_area};
 use crate::{Rgb, RgbImage};
 use ::exr::math::Vec2;
@@ -16,6 +17,7 @@ use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::Compression;
 use half::f16;
+use std::collections::HashSet;
 use std::io::Cursor;
 
 /// One part with Y, RY and BY, and where its table of blocks begins.
@@ -86,16 +88,20 @@ impl LuminanceChroma {
             let luminance = luminance.at(x, y);
             let (r, b) = ((ry.at(x, y) + 1.0) * luminance, (by.at(x, y) + 1.0) * luminance);
             let g = (luminance - weights[0] * r - weights[2] * b) / weights[1];
-            let color = Rgb::new(r, g, b);
-            match &matrix {
-                None => color,
-                Some(matrix) => transform(matrix, color),
-            }
+            let color = match luminance {
+                // The chroma of a negative value, or of one that is not finite, is no color.
+                y if !(0.0..f32::INFINITY).contains(&y) => return Rgb::splat(y),
+                // The chroma is rounded, so what should be 0 may be less.
+                _ => Rgb::new(r, g, b).map(|c| if c < 0.0 { 0.0 } else { c }),
+            };
+            matrix.as_ref().map_or(color, |matrix| to_light(matrix, color))
         });
         let alpha =
             of("A").map(|a| (0..width * height).map(|i| a.at(i % width, i / width)).collect());
-        let window = window(&self.header);
-        Ok(Picture { alpha, window, ..Picture::opaque(image, Format::Exr) })
+        let (envmap, window) = (envmap(&self.header), window(&self.header));
+        let attributes = string_attributes(&self.header);
+        let opaque = Picture::opaque(image, Format::Exr);
+        Ok(Picture { alpha, envmap, window, attributes, ..opaque })
     }
 
     /// The first line of each block, from 0, and its compressed bytes.
@@ -117,7 +123,10 @@ impl LuminanceChroma {
             first.is_multiple_of(lines).then_some((first, data))
         };
         let entries = table.as_chunks::<8>().0.iter();
-        entries.map(|entry| block(entry).ok_or_else(|| truncated(bytes.len()))).collect()
+        let blocks = entries.map(|entry| block(entry).ok_or_else(|| truncated(bytes.len())));
+        let blocks: Vec<_> = blocks.collect::<Result<_, _>>()?;
+        let distinct: HashSet<_> = blocks.iter().map(|(first, _)| first).collect();
+        if distinct.len() == count { Ok(blocks) } else { Err(PictureErrorKind::MissingBlocks) }
     }
 
     /// Zeros, where the sampling divides the picture.

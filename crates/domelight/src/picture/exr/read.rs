@@ -9,11 +9,10 @@
 //! pool for each file, in which a panic over a corrupt block would abort the process. Assertions of the crate that
 //! replace errors are caught here and become [`PictureErrorKind::ExrPanic`].
 
-use super::attributes::{to_rec709, window};
+use super::attributes::{envmap, to_rec709, window};
 use super::luminance_chroma::LuminanceChroma;
 use super::write::string_attributes;
-use crate::environment::mapping::EnvmapKind;
-use crate::picture::primaries::transform;
+use crate::picture::primaries::{to_light, xyz_to_rec709};
 use crate::picture::{
     Format, GuessedLayer, MAX_TEXELS, Picture, PictureErrorKind, allocate, checked_area,
 };
@@ -22,20 +21,20 @@ use ::exr::block::UncompressedBlock;
 use ::exr::block::chunk::{Chunk, CompressedBlock};
 use ::exr::block::lines::LineRef;
 use ::exr::block::reader::{ChunksReader, Reader};
-use ::exr::meta::attribute::EnvironmentMap;
 use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{Compression, SampleType, Text, f16};
 use half::slice::HalfFloatSliceExt;
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Decodes one layer of a complete file.
 ///
 /// By default, this is the unnamed R, G, B channels, or else the layer that programs name after the whole picture
-/// (Blender's `ViewLayer.Combined`, `rgba`, `beauty`), or else the first layer with R, G, B, or else one with only Y, or
-/// else the only channel, whatever its name except depth and coverage. `layer` names another: a part, the part of the
+/// (Blender's `ViewLayer.Combined`, `rgba`, `beauty`), or else the first layer with R, G, B, or else unnamed X, Y, Z, which
+/// are CIE XYZ, or else a layer with Y, or else the only channel, whatever its name except depth and coverage. `layer` names another: a part, the part of the
 /// channel names before the last dot, both joined by a dot, or the last word of these if only one layer has it,
 /// case-insensitive. X, Y, Z or a single channel of any name then also count as color.
 ///
@@ -68,15 +67,16 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Pictur
     let reader = open(bytes)?;
     let selected = select(reader.headers(), layer)?;
     let header = &reader.headers()[selected.header];
-    let envmap = header.own_attributes.environment_map.map(|kind| match kind {
-        EnvironmentMap::LatitudeLongitude => EnvmapKind::LatLong,
-        EnvironmentMap::Cube => EnvmapKind::Cube,
-    });
-    let matrix = header.shared_attributes.chromaticities.as_ref().and_then(to_rec709);
+    let envmap = envmap(header);
+    let matrix = match selected.space {
+        Space::Rgb => header.shared_attributes.chromaticities.as_ref().and_then(to_rec709),
+        Space::Xyz => Some(xyz_to_rec709()),
+        Space::Data => None,
+    };
 
     // Memory for the picture is taken when its first blocks have turned out to be whole.
     let mut planes = None;
-    let (channels, is_color) = (selected.channels, selected.is_color);
+    let channels = selected.channels;
     let header = header.clone();
     for_each_block(reader, selected.header, |block| {
         let planes = match &mut planes {
@@ -86,7 +86,7 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Pictur
         planes.insert(&header, block)
     })?;
     let planes = planes.map_or_else(|| Planes::new(&header, channels), Ok)?;
-    let image = planes.into_image(matrix.filter(|_| is_color));
+    let image = planes.into_image(matrix);
     let window = window(&header);
     let attributes = string_attributes(&header);
     Ok(Picture {
@@ -135,16 +135,21 @@ pub(super) fn for_each_block(
         })
         .map_err(PictureErrorKind::Exr)?;
     let meta = chunks.meta_data().clone();
+    let (mut found, mut texels) = (HashSet::new(), 0);
     loop {
         let batch: Vec<Chunk> =
             chunks.by_ref().take(BATCH).collect::<Result<_, _>>().map_err(PictureErrorKind::Exr)?;
         if batch.is_empty() {
-            return Ok(());
+            break;
         }
         for block in &decompress(batch, &meta)? {
             each(block)?;
+            let (place, size) = (block.index.pixel_position, block.index.pixel_size);
+            texels += if found.insert((place.0, place.1)) { size.area() } else { 0 };
         }
     }
+    let whole = meta.headers[part].layer_size.area();
+    if texels == whole { Ok(()) } else { Err(PictureErrorKind::MissingBlocks) }
 }
 
 fn decompress(
@@ -231,13 +236,23 @@ fn check_promises(header: &Header, held: u64) -> Result<(), PictureErrorKind> {
     Ok(())
 }
 
+/// What three channels are.
+#[derive(Clone, Copy, PartialEq)]
+enum Space {
+    /// Colors in the file's primaries.
+    Rgb,
+    /// Colors in CIE XYZ.
+    Xyz,
+    /// A gray, or something else by its own name.
+    Data,
+}
+
 /// Which channels of which part make the picture.
 struct Selected {
     header: usize,
     /// Indices into the part's channels of red, green, blue and, if there is one, alpha.
     channels: [Option<usize>; 4],
-    /// Red, green and blue, not a gray or something else by its own name.
-    is_color: bool,
+    space: Space,
     /// Set if nothing says which of several layers is the picture.
     guessed: Option<GuessedLayer>,
 }
@@ -312,32 +327,38 @@ impl Candidate {
 
     fn rgb(&self) -> Option<Selected> {
         let rgb = self.three(["R", "G", "B"]).or_else(|| self.three(["r", "g", "b"]))?;
-        Some(self.selected(rgb, true))
+        Some(self.selected(rgb, Space::Rgb))
     }
 
-    /// Luminance without the subsampled chroma that sometimes goes with it.
+    /// CIE XYZ, as Mitsuba writes it.
+    fn xyz(&self) -> Option<Selected> {
+        self.three(["X", "Y", "Z"]).map(|xyz| self.selected(xyz, Space::Xyz))
+    }
+
+    /// Luminance without the subsampled chroma that sometimes goes with it; not a coordinate.
     fn luminance(&self) -> Option<Selected> {
-        let y = self.channel("Y").filter(|_| self.channel("RY").is_none())?;
-        Some(self.selected([y; 3], false))
+        let is_other = ["RY", "X"].iter().any(|name| self.channel(name).is_some());
+        let y = self.channel("Y").filter(|_| !is_other)?;
+        Some(self.selected([y; 3], Space::Data))
     }
 
     fn anything(&self) -> Option<Selected> {
         let vector = self.three(["X", "Y", "Z"]);
         let single = (self.channels.len() == 1).then(|| [self.channels[0].1; 3]);
-        vector.or(single).map(|channels| self.selected(channels, false))
+        vector.or(single).map(|channels| self.selected(channels, Space::Data))
     }
 
     /// A single channel that may be light.
     fn only(&self) -> Option<Selected> {
         let [(name, index)] = &self.channels[..] else { return None };
         let is_light = !matches!(name.as_str(), "A" | "a" | "Z" | "z" | "ZBack");
-        is_light.then(|| self.selected([*index; 3], false))
+        is_light.then(|| self.selected([*index; 3], Space::Data))
     }
 
-    fn selected(&self, [r, g, b]: [usize; 3], is_color: bool) -> Selected {
+    fn selected(&self, [r, g, b]: [usize; 3], space: Space) -> Selected {
         let alpha = self.channel("A").or_else(|| self.channel("a"));
         let channels = [Some(r), Some(g), Some(b), alpha];
-        Selected { header: self.header, channels, is_color, guessed: None }
+        Selected { header: self.header, channels, space, guessed: None }
     }
 }
 
@@ -361,9 +382,9 @@ fn select(headers: &[Header], layer: Option<&str>) -> Result<Selected, PictureEr
         })?
     } else {
         let unnamed = || all.iter().filter(|candidate| candidate.prefix.is_empty());
-        let found = the_picture(&all)
-            .or_else(|| unnamed().find_map(Candidate::luminance))
-            .or_else(|| all.iter().find_map(Candidate::luminance))
+        let found = the_picture(&all, Candidate::rgb)
+            .or_else(|| unnamed().find_map(Candidate::xyz))
+            .or_else(|| the_picture(&all, Candidate::luminance))
             .or_else(|| unnamed().find_map(Candidate::only));
         found.ok_or_else(|| no_color(headers, &all))?
     };
@@ -375,15 +396,18 @@ fn select(headers: &[Header], layer: Option<&str>) -> Result<Selected, PictureEr
     Ok(selected)
 }
 
-/// The layer with R, G, B that is most likely the picture.
-fn the_picture(all: &[Candidate]) -> Option<Selected> {
-    let colored = || all.iter().filter(|candidate| candidate.rgb().is_some());
-    let best = colored().min_by_key(|candidate| candidate.rank())?;
-    let others = colored().map(Candidate::full_name).filter(|name| *name != best.full_name());
+/// Of the layers that are pictures by `read`, the one that is most likely that of the file.
+fn the_picture(
+    all: &[Candidate],
+    read: impl Fn(&Candidate) -> Option<Selected>,
+) -> Option<Selected> {
+    let pictures = || all.iter().filter(|candidate| read(candidate).is_some());
+    let best = pictures().min_by_key(|candidate| candidate.rank())?;
+    let others = pictures().map(Candidate::full_name).filter(|name| *name != best.full_name());
     let others: Vec<_> = others.collect();
     let is_guess = best.rank() > 1 && !others.is_empty();
     let guessed = is_guess.then(|| GuessedLayer { name: best.full_name(), others });
-    Some(Selected { guessed, ..best.rgb()? })
+    Some(Selected { guessed, ..read(best)? })
 }
 
 fn no_color(headers: &[Header], all: &[Candidate]) -> PictureErrorKind {
@@ -456,14 +480,7 @@ impl Planes {
     fn into_image(self, matrix: Option<crate::math::Mat3>) -> (RgbImage, Option<Vec<f32>>) {
         let mut pixels = self.pixels;
         if let Some(matrix) = matrix {
-            for pixel in &mut pixels {
-                // A color outside Rec. 709 is clipped; a negative value of the file is kept to be seen.
-                let valid = pixel.min_component() >= 0.0;
-                *pixel = transform(&matrix, *pixel);
-                if valid {
-                    *pixel = pixel.map(|c| c.max(0.0));
-                }
-            }
+            pixels.iter_mut().for_each(|pixel| *pixel = to_light(&matrix, *pixel));
         }
         (RgbImage::new(self.width, self.height, pixels), self.alpha)
     }

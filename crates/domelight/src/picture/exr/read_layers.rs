@@ -1,14 +1,12 @@
 //! Reads everything that [`ExrLayers::encode`] writes.
 
+use super::attributes::envmap;
 use super::read::{for_each_block, guarded, open};
 use super::write::string_attributes;
 use super::{Compression, ExrLayers, Layer, Plane};
 use crate::picture::{PictureErrorKind, allocate};
 use ::exr::block::lines::LineRef;
-use ::exr::meta::attribute::EnvironmentMap;
 use ::exr::prelude::SampleType;
-
-use crate::environment::mapping::EnvmapKind;
 
 impl ExrLayers {
     /// Decodes all channels and strings of the first part, to the bit: the inverse of [`ExrLayers::encode`].
@@ -55,10 +53,7 @@ fn decode_unguarded(bytes: &[u8]) -> Result<ExrLayers, PictureErrorKind> {
         whole: ((whole.0, whole.1) != (width, height)).then_some((whole.0, whole.1)),
         layers: Vec::new(),
         attributes: string_attributes(&header),
-        envmap: header.own_attributes.environment_map.map(|kind| match kind {
-            EnvironmentMap::LatitudeLongitude => EnvmapKind::LatLong,
-            EnvironmentMap::Cube => EnvmapKind::Cube,
-        }),
+        envmap: envmap(&header),
         compression: Compression::default(),
     };
     for (channel, plane) in list.iter().zip(planes) {

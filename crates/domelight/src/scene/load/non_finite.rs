@@ -12,7 +12,12 @@ use crate::scene::Part;
 /// The number that a word means: NaN of `nan`, `-nan(ind)` and `1.#QNAN`, infinite of `inf` and of what is too large.
 pub(super) fn parse(word: &str) -> Option<f32> {
     let digits = word.trim_start_matches(['+', '-']).to_ascii_lowercase();
-    let is_nan = digits.starts_with("nan") || digits.contains('#');
+    let of_windows = digits.split_once(".#").is_some_and(|(whole, kind)| {
+        let is =
+            |text: &str, all: fn(&u8) -> bool| !text.is_empty() && text.bytes().all(|b| all(&b));
+        is(whole, u8::is_ascii_digit) && is(kind, u8::is_ascii_alphanumeric)
+    });
+    let is_nan = digits.starts_with("nan") || of_windows;
     if is_nan { Some(f32::NAN) } else { word.parse().ok() }
 }
 
@@ -69,6 +74,9 @@ mod tests {
 
     #[test]
     fn words_of_exporters_are_numbers() {
+        for word in ["#hello", "a#b", "1#2", ".#nan", "1.#"] {
+            assert_eq!(parse(word), None, "{word}");
+        }
         for word in ["nan", "-nan(ind)", "1.#QNAN", "-1.#IND00"] {
             assert!(parse(word).is_some_and(f32::is_nan), "{word}");
         }

@@ -206,12 +206,13 @@ impl Scalar {
         }
     }
 
-    /// The largest value of an integer type.
+    /// What an integer color is 1 at. Wider types than two bytes hold bytes.
     fn max(self) -> Option<f32> {
         match self {
-            Self::U8 => Some(255.0),
+            Self::I8 => Some(127.0),
+            Self::U8 | Self::I16 | Self::I32 | Self::U32 => Some(255.0),
             Self::U16 => Some(65535.0),
-            _ => None,
+            Self::F32 | Self::F64 => None,
         }
     }
 }

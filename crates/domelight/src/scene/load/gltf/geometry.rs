@@ -122,6 +122,14 @@ struct Reader<'r, 's> {
     draco: Option<DracoMesh<'r>>,
 }
 
+/// The values of an attribute; none if it is broken and the material does not use it.
+fn unless_unused<T>(values: Result<Vec<T>, Failure>, is_used: bool) -> Result<Vec<T>, Failure> {
+    match values {
+        Err(Failure::Problem(_)) if !is_used => Ok(Vec::new()),
+        values => values,
+    }
+}
+
 impl Reader<'_, '_> {
     fn vertices(&self, slot: Slot, deformations: &Deformations) -> Result<Vertices, Failure> {
         let positions = self.floats("POSITION", "VEC3", None)?;
@@ -134,10 +142,12 @@ impl Reader<'_, '_> {
             Some(set) => self.floats(&format!("TEXCOORD_{set}"), "VEC2", n),
             None => Ok(Vec::new()),
         };
+        let first = slot.uv_sets[0];
+        let tangents = self.floats("TANGENT", "VEC4", n);
         let mut vertices = Vertices {
             normals: self.floats("NORMAL", "VEC3", n)?,
-            tangents: self.floats("TANGENT", "VEC4", n)?,
-            uvs: [uvs(slot.uv_sets[0].or(Some(0)))?, uvs(slot.uv_sets[1])?],
+            tangents: unless_unused(tangents, slot.tangent_set.is_some())?,
+            uvs: [unless_unused(uvs(first.or(Some(0))), first.is_some())?, uvs(slot.uv_sets[1])?],
             colors: self.colors(n)?,
             positions,
             ..Vertices::default()
