@@ -4,7 +4,7 @@
 use domelight::RgbImage;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::{Environment, Orientation};
-use domelight::render::{Layers, RenderSettings, Renderer};
+use domelight::render::{Background, Layers, RenderSettings, Renderer};
 use domelight::scene::builtin::BuiltinScene;
 use domelight::scene::{Camera, Scene};
 use rayon::prelude::*;
@@ -171,6 +171,33 @@ fn a_target_error_is_reached_within_a_factor_of_two() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Pixels at a silhouette against a hidden background are darker than their neighbors: the error relative to those would
+/// be too small, the more so the brighter the light is.
+#[test]
+fn a_target_error_is_reached_at_silhouettes_without_background() {
+    let scene = Scene::builtin(BuiltinScene::Sphere);
+    let environment = environment(BuiltinProbe::Constant).scaled(16.0).unwrap();
+    let settings = RenderSettings {
+        width: SIZE,
+        height: SIZE,
+        background: Background::Hidden,
+        ..RenderSettings::default()
+    };
+    let converged = RenderSettings { n_samples: 1024, seed: 99, ..settings };
+    let reference = picture(&scene, &environment, "mis:1:1", converged).color;
+    let target = 3e-3;
+    let of_seed = |seed| {
+        let (n_samples, target_error) = (1 << 14, Some(target));
+        let settings = RenderSettings { n_samples, target_error, seed, ..settings };
+        picture(&scene, &environment, "mis:1:1", settings)
+    };
+    let pictures: Vec<Layers> = (0..8).into_par_iter().map(of_seed).collect();
+    let late = (0..(SIZE / TILE).pow(2)).filter(|&tile| stops_late(&pictures, tile));
+    let errors: Vec<f64> = late.map(|tile| error_over_seeds(&pictures, &reference, tile)).collect();
+    let ratio = errors.iter().sum::<f64>() / errors.len() as f64 / f64::from(target);
+    assert!(errors.len() >= 4 && (0.5..2.0).contains(&ratio), "{ratio:.2} over {}", errors.len());
 }
 
 /// Columns and rows of a picture and of its tiles.

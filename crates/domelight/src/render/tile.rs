@@ -219,8 +219,11 @@ impl Tile {
     /// Whether the tile has all its samples or has reached the target error, independent of other tiles.
     pub(super) fn is_finished(&self, settings: &RenderSettings) -> bool {
         let n_samples = self.n_samples();
-        let precise =
-            |error| n_samples >= FEWEST_SAMPLES && self.has_even_sets() && self.error() <= error;
+        let precise = |error| {
+            n_samples >= FEWEST_SAMPLES
+                && self.has_even_sets()
+                && self.error(settings.background) <= error
+        };
         n_samples >= settings.n_samples || settings.target_error.is_some_and(precise)
     }
 
@@ -232,12 +235,18 @@ impl Tile {
 
     /// The relMSE from the differences of the two sets, plus one standard error. Without the latter, a tile whose error
     /// is in a few pixels would stop on the first lucky estimate.
-    fn error(&self) -> f32 {
+    fn error(&self, background: Background) -> f32 {
         let luminance: Vec<f32> = self.pixels.iter().map(PixelSums::luminance).collect();
         let (mut sum, mut sum_of_squares) = (0.0, 0.0);
         for (i, pixel) in self.pixels.iter().enumerate() {
-            // A firefly inflates the pixel's own brightness, so average over its neighbors.
-            let mean = self.mean_around(i, &luminance);
+            // A firefly inflates the pixel's own brightness, so average over its neighbors, unless they are brighter or
+            // darker because the scene covers another part of them.
+            let is_covered_in_part = (1..pixel.n_samples()).contains(&pixel.n_hits);
+            let mean = if background == Background::Hidden && is_covered_in_part {
+                luminance[i]
+            } else {
+                self.mean_around(i, &luminance)
+            };
             let error = pixel.variance_by_sets() / (mean * mean + 0.01);
             sum += error;
             sum_of_squares += error * error;
