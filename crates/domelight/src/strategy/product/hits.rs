@@ -30,6 +30,8 @@ pub(super) struct Group {
     pub(super) wo: Vec3,
     /// The maximum angle between the normals and their mean \[rad\].
     pub(super) normal_spread: f32,
+    /// The maximum angle between the tangents of elongated lobes and that of the first hit \[rad\].
+    tangent_spread: f32,
     /// The BSDF of the first hit.
     pub(super) lobe_summary: LobeSummary,
     /// The fraction of the pixel's hits.
@@ -47,11 +49,15 @@ impl Group {
 
 /// The normals of a group are within 18° of the first hit's normal.
 const LIKE_NORMALS: f32 = 0.95;
+/// The tangents of a group's elongated lobes are within 26° of the first hit's tangent.
+const LIKE_TANGENTS: f32 = 0.9;
 /// The roughnesses of a group are within this factor of the first hit's roughness.
 const LIKE_ROUGHNESS: f32 = 1.5;
 
 /// The spread of normals that hardly rotates a lobe, as a fraction of its roughness.
 const SMALL_NORMAL_SPREAD: f32 = 0.25;
+/// The spread of tangents that moves the ends of an elongated lobe by a fraction of its width.
+const SMALL_TANGENT_SPREAD: f32 = 0.25;
 /// The cosine of the view above which lobes are not elongated.
 const STEEP_COSINE: f32 = 0.5;
 
@@ -87,9 +93,12 @@ impl Groups {
             if i == 0 || !one_material {
                 lobe_summary = p.bsdf.lobe_summary(p.wo);
             }
+            let is_elongated = elongation(&lobe_summary) > 1.0;
             let like = |g: &HitCluster| {
-                points[g.first].frame.z.dot(p.frame.z) > LIKE_NORMALS
+                let first = &points[g.first].frame;
+                first.z.dot(p.frame.z) > LIKE_NORMALS
                     && (one_material || alike(&g.lobe_summary, &lobe_summary))
+                    && (!is_elongated || first.x.dot(p.frame.x).abs() > LIKE_TANGENTS)
             };
             let group = self.clusters.iter().position(like).unwrap_or_else(|| {
                 let (normals, viewers) = (Vec3::ZERO, Vec3::ZERO);
@@ -113,6 +122,7 @@ impl Groups {
                 frame,
                 wo: Vec3::new(wo.x, wo.y, wo.z.max(1e-3)),
                 normal_spread: 0.0,
+                tangent_spread: 0.0,
                 lobe_summary: g.lobe_summary,
                 share: g.n as f32 / points.len() as f32,
             });
@@ -122,6 +132,12 @@ impl Groups {
             // The chord differs from the angle by less than a twentieth here.
             let angle = 1.05 * p.frame.z.distance(group.frame.z);
             group.normal_spread = group.normal_spread.max(angle);
+            if elongation(&group.lobe_summary) > 1.0 {
+                let first = &points[self.clusters[member].first].frame;
+                // A lobe is the same along its tangent's two directions.
+                let [same, opposite] = [1.0, -1.0].map(|sign| p.frame.x.distance(sign * first.x));
+                group.tangent_spread = group.tangent_spread.max(1.05 * same.min(opposite));
+            }
         }
     }
 }
@@ -141,9 +157,11 @@ impl Groups {
     /// Whether a table approximates lobes of this roughness well: the lobe hardly rotates within a group, and is not
     /// elongated along the horizon.
     pub(super) fn is_well_tabulated(&self, roughness: f32) -> bool {
-        self.all
-            .iter()
-            .all(|g| g.normal_spread <= SMALL_NORMAL_SPREAD * roughness && g.wo.z >= STEEP_COSINE)
+        self.all.iter().all(|g| {
+            g.normal_spread <= SMALL_NORMAL_SPREAD * roughness
+                && g.tangent_spread * elongation(&g.lobe_summary) <= SMALL_TANGENT_SPREAD
+                && g.wo.z >= STEEP_COSINE
+        })
     }
 
     /// The density of BRDF samples relative to strata of a table with this total, where the light of a cell has
@@ -159,6 +177,16 @@ impl Groups {
         }
         counts.brdf as f32 / counts.light as f32 * total / albedo
     }
+}
+
+/// The ratio of the length and the width of the most elongated lobe; 1 of isotropic lobes.
+#[inline(always)]
+fn elongation(summary: &LobeSummary) -> f32 {
+    let ratio = |lobe: GlossyLobe| match lobe {
+        GlossyLobe::Slopes { alpha: [a, b], .. } => a.max(b) / a.min(b).max(f32::MIN_POSITIVE),
+        GlossyLobe::Mirror { .. } => 1.0,
+    };
+    summary.lobes().map(|(_, lobe)| ratio(lobe)).fold(1.0, f32::max)
 }
 
 /// Compares BSDFs in similar local frames.
@@ -194,4 +222,43 @@ fn alike(a: &LobeSummary, b: &LobeSummary) -> bool {
             (None, None) => true,
             _ => false,
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bsdf::MaterialSpec;
+
+    /// Hits on a plane with the tangent at these angles \[degrees\].
+    fn grouped(material: &str, tangents: &[f32]) -> Groups {
+        let bsdf = Bsdf::from(material.parse::<MaterialSpec>().unwrap());
+        let hit = |&degrees: &f32| {
+            let (y, x) = degrees.to_radians().sin_cos();
+            let frame = Frame::from_z_and_tangent(Vec3::Z, Vec3::new(x, y, 0.0));
+            ShadingPoint { frame, bsdf, ..ShadingPoint::UNSET }
+        };
+        let points: Vec<_> = tangents.iter().map(hit).collect();
+        let mut groups = Groups::default();
+        groups.cluster(Hits { points: &points, one_material: true });
+        groups
+    }
+
+    #[test]
+    fn elongated_lobes_of_crossed_tangents_have_tables_of_their_own() {
+        let threads = [0.0, 90.0, 180.0, 270.0];
+        let brushed = grouped("ggx:0.4,0.1", &threads);
+        let shares: Vec<f32> = brushed.all.iter().map(|group| group.share).collect();
+        assert_eq!(shares, [0.5, 0.5]);
+        assert!(brushed.is_well_tabulated(0.1));
+        assert_eq!(grouped("ggx:0.4", &threads).all.len(), 1);
+    }
+
+    #[test]
+    fn a_table_is_poor_where_elongated_lobes_turn() {
+        let bend = [0.0, 10.0, 20.0];
+        assert_eq!(grouped("ggx:0.4,0.1", &bend).all.len(), 1);
+        assert!(!grouped("ggx:0.4,0.1", &bend).is_well_tabulated(0.1));
+        assert!(grouped("ggx:0.4,0.1", &[0.0, 1.0, 2.0]).is_well_tabulated(0.1));
+        assert!(grouped("ggx:0.4", &bend).is_well_tabulated(0.4));
+    }
 }
