@@ -25,7 +25,7 @@ pub(crate) fn run(arguments: &CompareArguments, quiet: bool) -> Result<()> {
         files::writes(path)?;
     }
     let Size { width, height } = arguments.scene.camera.size;
-    memory::allow_picture(width, height, memory::COMPARED_PIXEL)?;
+    memory::allow_picture(width, height, memory::compared_pixel(arguments.strategies.len()))?;
     start_threads(arguments.pixel.threads)?;
     interrupt::flag();
     let host = &Terminal { quiet };

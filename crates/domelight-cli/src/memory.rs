@@ -43,8 +43,11 @@ pub(crate) const PIXEL: u64 = 332;
 /// The same with a checkpoint, or of a part: the sums again, their bits and the file.
 pub(crate) const SAVED_PIXEL: u64 = 776;
 
-/// For each pixel of a comparison: a render, the reference, what its page shows, and eight pictures to compare in pairs.
-pub(crate) const COMPARED_PIXEL: u64 = 980;
+/// For each pixel of a comparison of so many pictures: a render, the reference, what its page shows, and the pictures, each
+/// with its error and what the page shows of it.
+pub(crate) fn compared_pixel(n_pictures: usize) -> u64 {
+    684 + 37 * n_pictures.max(8) as u64
+}
 
 static LIMIT: OnceLock<Option<u64>> = OnceLock::new();
 static TAKEN: AtomicU64 = AtomicU64::new(0);

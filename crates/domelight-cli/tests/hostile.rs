@@ -78,6 +78,8 @@ fn no_result_takes_the_place_of_what_is_read_or_of_another() {
         (vec!["figures", "--quick", "--env", "figures/figure-4/p.exr"], over),
         (vec!["bench", "--suite", "rigs", "--probes", "in.hdr", "-o", "in.hdr"], over),
         (vec!["farm", "slurm", "--shards", "2", "--env", "in.hdr", "--picture", "in.hdr"], over),
+        (vec!["farm", "parallel", "scene.toml", "--shards", "2", "--picture", "in.hdr"], over),
+        (vec!["farm", "parallel", "scene.toml", "--shards", "2", "--picture", "t.png"], over),
     ];
     for (arguments, why) in cases {
         let output = domelight(&folder, &arguments);
@@ -147,6 +149,26 @@ fn half_a_picture_is_a_failure() {
         .output()
         .unwrap();
     ended(&closed, 2, &["standard output is closed"]);
+}
+
+/// Shells name pipes and files that they opened so: `-o >(command)`, `3>file`.
+#[test]
+#[cfg(target_os = "linux")]
+fn an_output_may_be_an_open_file() {
+    let folder = folder();
+    let shell = |script: &str| {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", script, env!("CARGO_BIN_EXE_domelight")]).current_dir(&folder).output()
+    };
+    let light = "\"$0\" lights sky -n 2 -q --format json -o";
+    let piped = shell(&format!("{light} /dev/fd/3 3>&1 | cat")).unwrap();
+    assert!(serde_json::from_slice::<serde_json::Value>(&piped.stdout).is_ok(), "{piped:?}");
+    let linked = shell(&format!("ln -s /dev/stdout o.json && {light} o.json | cat")).unwrap();
+    assert_eq!(linked.stdout, piped.stdout);
+    let removed = format!("exec 4>gone; rm gone; {light} /dev/fd/4; cat /dev/fd/4; ls");
+    let removed = shell(&removed).unwrap();
+    assert!(removed.stdout.starts_with(&piped.stdout), "{removed:?}");
+    assert!(!stdout(&removed).contains("gone"), "{removed:?}");
 }
 
 #[test]
@@ -259,7 +281,8 @@ fn names_need_not_be_utf_8() {
             .output()
             .unwrap()
     };
-    assert_eq!(json(&run(&["probe", "NAME", "--json"]))["probe"], "\u{fffd}.exr");
+    let probe = run(&["probe", "NAME", "--json", "--mapping", "lat-long"]);
+    assert_eq!(json(&probe)["probe"], "\u{fffd}.exr");
     assert_eq!(json(&run(&["diff", "NAME", "ref.exr", "--json"]))["a"], "\u{fffd}.exr");
     let compare =
         ["compare", "sphere", "--size", "24x20", "--env-rows", "16", "--reference", "NAME"];

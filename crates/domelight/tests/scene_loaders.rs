@@ -310,6 +310,19 @@ fn obj_with_materials_polygons_and_relative_indices() {
     assert!(loaded.warnings.iter().any(|w| w.contains("nowhere")), "{:?}", loaded.warnings);
 }
 
+/// A file of one long name and many parts would take their product of memory.
+#[test]
+fn names_of_parts_are_shortened() {
+    let long = "ö".repeat(1000);
+    let obj = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\no {long}\nf 1 2 3\nusemtl {long}\nf 1 2 3\n");
+    let parts = one("a.obj", &obj).description.parts;
+    assert_eq!(parts.len(), 2);
+    assert!(parts.iter().all(|part| part.name == format!("{}…", "ö".repeat(200))));
+    let toml = format!("[[objects]]\nbuiltin = \"spheres\"\nname = \"{long}\"\n");
+    let parts = one("a.toml", toml).description.parts;
+    assert!(parts.len() > 1 && parts.iter().all(|part| part.name.chars().count() == 201));
+}
+
 #[test]
 fn an_obj_without_its_library_is_gray_with_a_warning() {
     let loaded = one("a.obj", OBJ);

@@ -89,6 +89,10 @@ pub(crate) fn run(arguments: &FarmArguments, quiet: bool) -> Result<()> {
     };
     // Jobs read these, and write the picture.
     arguments.scene.declare()?;
+    if Path::new(&farm.picture).exists() {
+        // It may be one of the scene's own files.
+        arguments.scene.load(true)?;
+    }
     for path in files.iter().map(|file| farm.path(file.name)).chain([farm.picture.clone()]) {
         files::declare(Path::new(&path))?;
     }

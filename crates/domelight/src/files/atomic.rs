@@ -7,8 +7,8 @@ use std::io::{self, BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// Runs `write` on a new file next to `path` and renames it to `path` once it is completely on disk, so that a crash
-/// never leaves an incomplete file; `-` is standard output. A device or a pipe is written to directly, and a symbolic
-/// link keeps its target. A replaced file keeps its permissions and, if allowed, its owner.
+/// never leaves an incomplete file; `-` is standard output. A device, a pipe or an open file without a name is written to
+/// directly, and a symbolic link keeps its target. A replaced file keeps its permissions and, if allowed, its owner.
 ///
 /// # Errors
 /// If the file cannot be created, written or renamed, or the existing file is read-only. The old file is then
@@ -41,7 +41,7 @@ pub fn write_atomically_seeking(
     path: &Path,
     write: impl FnOnce(&mut dyn WriteSeek) -> io::Result<()>,
 ) -> Result<(), PictureError> {
-    if path != Path::new("-") && !fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+    if path != Path::new("-") && !is_nameless(path) {
         let replaced = target(path).and_then(|path| replace_plain(&path, |out| write(out)));
         return replaced
             .map_err(|error| PictureErrorKind::Io(error).in_file(&path.display().to_string()));
@@ -70,7 +70,7 @@ fn try_place(path: &Path) -> io::Result<()> {
     let path = target(path)?;
     match fs::metadata(&path) {
         Ok(there) if there.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
-        Ok(there) if !there.is_file() => Ok(()),
+        Ok(_) if is_nameless(&path) => Ok(()),
         there => {
             there.map_or(Ok(()), |there| require_replaceable(&path, &there))?;
             remove_abandoned(folder_of(&path));
@@ -119,14 +119,23 @@ fn take_after(old: &Metadata, new: &File) -> io::Result<()> {
 
 fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let path = target(path)?;
-    if fs::metadata(&path).is_ok_and(|there| !there.is_file()) {
+    if is_nameless(&path) {
         return finish(File::options().write(true).open(&path)?, |out| write(out));
     }
     replace_plain(&path, |out| write(out))
 }
 
+/// Whether a path leads to what no other file can replace: a device, a pipe, or an open file that was removed
+/// (`/dev/fd/3`).
+fn is_nameless(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|there| !there.is_file() || fs::canonicalize(path).is_err())
+}
+
 /// The file itself, at the end of symbolic links, also where it is not there yet.
 pub(super) fn target(path: &Path) -> io::Result<PathBuf> {
+    if is_nameless(path) {
+        return Ok(path.to_path_buf());
+    }
     match fs::canonicalize(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => match fs::read_link(path) {
             // A circle of links is another error.

@@ -427,6 +427,15 @@ fn text_of(bytes: &[u8]) -> Cow<'_, str> {
     }
 }
 
+/// The name of a part, which serves messages alone: the beginning of a long one, because every part has its own copy.
+fn part_name(name: &str) -> String {
+    const MOST: usize = 200;
+    match name.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}…", &name[..end]),
+        None => name.to_owned(),
+    }
+}
+
 /// The name of a file without folder and extension.
 fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()

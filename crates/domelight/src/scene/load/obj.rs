@@ -12,12 +12,13 @@
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use super::notes::Notes;
 use super::polygon::Triangulator;
 use super::textures::Textures;
 use super::wavefront::{ObjErrorKind, enough, lines, number, numbers, words};
-use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, mtl, non_finite, stem};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, mtl, non_finite, part_name, stem};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
@@ -51,16 +52,16 @@ struct Corner {
 
 /// The faces of one object and one material.
 struct Group {
-    name: String,
-    material: Option<String>,
+    name: Rc<str>,
+    material: Option<Rc<str>>,
     triangles: Vec<[Corner; 3]>,
 }
 
 /// What faces belong to until the next line that says so.
 #[derive(Clone, Default, PartialEq, Eq, Hash)]
 struct Label {
-    name: String,
-    material: Option<String>,
+    name: Rc<str>,
+    material: Option<Rc<str>>,
 }
 
 struct Reader<'a> {
@@ -101,7 +102,7 @@ impl<'a> Reader<'a> {
             normals: Vec::new(),
             groups: Vec::new(),
             group_of: HashMap::new(),
-            label: Label { name: stem(path), material: None },
+            label: Label { name: stem(path).into(), material: None },
             group: None,
             materials: Vec::new(),
             libraries: HashSet::new(),
@@ -135,11 +136,12 @@ impl<'a> Reader<'a> {
             // `fo` was the keyword of old.
             "f" | "fo" => self.face(rest).map_err(at)?,
             "o" | "g" => {
-                self.label.name = if rest.is_empty() { stem(self.path) } else { rest.into() };
+                self.label.name =
+                    if rest.is_empty() { stem(self.path).into() } else { part_name(rest).into() };
                 self.group = None;
             }
             "usemtl" => {
-                self.label.material = (!rest.is_empty()).then(|| rest.to_owned());
+                self.label.material = (!rest.is_empty()).then(|| rest.into());
                 self.group = None;
             }
             "mtllib" if rest.is_empty() => {
@@ -254,7 +256,7 @@ impl<'a> Reader<'a> {
             if !group.triangles.is_empty() {
                 let material = self.material_index(group.material.as_deref());
                 let mesh = self.mesh(&group.triangles, &smooth);
-                parts.push(Part { name: group.name, mesh, material });
+                parts.push(Part { name: group.name.to_string(), mesh, material });
             }
         }
         let description = SceneDescription {

@@ -60,7 +60,9 @@ use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
 use super::textures::{Content, Textures};
-use super::{Budget, LoadError, LoadOptions, Loaded, SHARED_TRIANGLES, load_mesh, relative};
+use super::{
+    Budget, LoadError, LoadOptions, Loaded, SHARED_TRIANGLES, load_mesh, part_name, relative,
+};
 use crate::Rgb;
 use crate::bsdf::{Bsdf, ParseMaterialError};
 use crate::geometry::{Similarity, conjugated, linear_part};
@@ -537,9 +539,9 @@ impl Reader<'_> {
         description.transform(&matrix);
         // The scene file decides which axis points up.
         description.up = None;
-        if let Some(name) = &table.name {
+        if let Some(name) = table.name.as_deref().map(part_name) {
             for part in &mut description.parts {
-                part.name.clone_from(name);
+                part.name.clone_from(&name);
             }
         }
         let material =

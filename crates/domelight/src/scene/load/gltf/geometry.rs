@@ -279,6 +279,8 @@ pub(super) fn memory(
     const VALUE: u64 = 16 + 16;
     // An index, and one triangle per index in a strip.
     const INDEX: u64 = 4 + 12;
+    /// A part without vertices, with its name.
+    const PART: u64 = 512;
     let count = |&accessor: &usize| -> Result<u64, GltfErrorKind> {
         Ok(source.document.get::<json::Accessor>(accessor)?.count as u64)
     };
@@ -290,7 +292,8 @@ pub(super) fn memory(
     }
     let vertices = primitive.attributes.get("POSITION").map_or(Ok(0), count)?;
     let indices = primitive.indices.as_ref().map_or(Ok(vertices), count)?;
-    Ok(bytes.saturating_add(indices.saturating_mul(INDEX)).saturating_mul(placements))
+    let bytes = bytes.saturating_add(indices.saturating_mul(INDEX)).saturating_add(PART);
+    Ok(bytes.saturating_mul(placements))
 }
 
 #[cfg(test)]

@@ -51,7 +51,7 @@ use self::geometry::{Deformations, TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES};
 use self::graph::{Graph, Placement};
 use self::material::{Materials, Slot};
 use self::source::Source;
-use super::{Budget, LoadError, LoadOptions, Loaded, SHARED_TRIANGLES};
+use super::{Budget, LoadError, LoadOptions, Loaded, SHARED_TRIANGLES, part_name};
 use crate::geometry::{Similarity, conjugated};
 use crate::math::Mat4;
 use crate::scene::{Instance, Part, SceneDescription, UpAxis};
@@ -161,7 +161,7 @@ fn read_mesh(
         };
         poses.push((pose, placement.world, weights));
     }
-    let name = if mesh.name.is_empty() { format!("mesh {index}") } else { mesh.name };
+    let name = if mesh.name.is_empty() { format!("mesh {index}") } else { part_name(&mesh.name) };
     let mut told = HashSet::new();
     let memory_place = format!("{}, mesh {index}", source.path.display());
     for (i, primitive) in mesh.primitives.iter().enumerate() {
