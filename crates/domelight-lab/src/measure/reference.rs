@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use domelight::picture::compare::{SizeMismatch, compare};
+use domelight::picture::compare::{REGULARIZER, SizeMismatch};
 use domelight::picture::exr::{ExrLayers, text_attributes};
 use domelight::picture::{ReadOptions, read, read_bytes};
 use domelight::render::{Layers, RenderSettings};
@@ -296,14 +296,11 @@ impl Goal {
         let mut take = |each: u32| -> Result<(ReferencePicture, Noise), Error> {
             let [a, b] = [render(each, 0)?, render(each, 1)?];
             let mean = a.mean(&b);
-            // (a − m)² = ((a − b) / 2)², whose expected value is the variance of m.
-            let noise = |mask: Option<&[bool]>| -> Result<f64, Error> {
-                Ok(compare(&a.image, &mean.image, mask)?.rel_mse)
-            };
+            let noise = |mask: Option<&[bool]>| relative_noise(&a.image, &b.image, mask);
             let touched = mean.touched().filter(|_| matches!(self, Self::Noise { .. }));
             let covered = mean.covered().filter(|covered| covered.contains(&true));
-            let covered = covered.map(|covered| noise(Some(&covered))).transpose()?;
-            let noise = Noise { all: noise(touched.as_deref())?, covered };
+            let covered = covered.map(|covered| noise(Some(&covered)));
+            let noise = Noise { all: noise(touched.as_deref()), covered };
             Ok((mean, noise))
         };
         match self {
@@ -327,8 +324,41 @@ impl Goal {
     }
 }
 
+/// The relMSE of the mean of two halves, over some pixels: ((a − b) / 2)² is the mean's variance in expectation. It is
+/// relative to the darker half, because a firefly brightens the mean.
+fn relative_noise(a: &RgbImage, b: &RgbImage, mask: Option<&[bool]>) -> f64 {
+    let is_counted = |i: &usize| mask.is_none_or(|mask| mask[*i]);
+    let (mut n, mut sum) = (0, 0.0);
+    for i in (0..a.pixels.len()).filter(is_counted) {
+        let channels = a.pixels[i].to_array().into_iter().zip(b.pixels[i].to_array());
+        for (a, b) in channels.map(|(a, b)| (f64::from(a), f64::from(b))) {
+            let (half, least) = (0.5 * (a - b), a.abs().min(b.abs()));
+            sum += half * half / (least * least + REGULARIZER);
+            n += 1;
+        }
+    }
+    sum / f64::from(n.max(1))
+}
+
 /// Enough samples to divide the noise by `ratio`; the noise falls with the number of samples or faster. At least twice as
 /// many, but not many more at once than before.
 fn next_samples(each: u32, ratio: f64) -> u32 {
     (f64::from(each) * ratio.clamp(2.0, 16.0)).ceil() as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_firefly_does_not_hide_in_its_own_brightness() {
+        let dim = RgbImage::filled(2, 1, Rgb::WHITE);
+        let mut bright = dim.clone();
+        bright.pixels[0] = Rgb::splat(101.0);
+        let expected = 0.5 * 50.0 * 50.0 / 1.01;
+        for halves in [[&dim, &bright], [&bright, &dim]] {
+            assert!((relative_noise(halves[0], halves[1], None) - expected).abs() < 1e-6);
+        }
+        assert_eq!(relative_noise(&dim, &bright, Some(&[false, true])), 0.0);
+    }
 }
