@@ -70,6 +70,26 @@ fn the_sun_and_the_probe_without_it() {
     assert!((irradiance / lost - 1.0).abs() < 1e-3, "{irradiance} {lost}");
 }
 
+/// The brightest texel of an extreme map is scaled inside; what is written is in watts.
+#[test]
+fn an_extreme_map_leaves_a_dome_in_watts() {
+    let folder = probes();
+    let dome = |scale: &str| {
+        let arguments = ["lights", "sun.exr", "--env-scale", scale, "--sun", "-q"];
+        let files = ["--keep-residual", "dome.pfm", "-o", "rig.json"];
+        done(&domelight(&folder, &[&arguments[..], &files].concat()));
+        let harmonics = rig(&folder, "rig.json")["dome"]["spherical_harmonics"][0][1].as_f64();
+        [f64::from(load(&folder, "dome.pfm").get(0, 0).g), harmonics.expect("a number")]
+    };
+    let [radiance, harmonic] = dome("1");
+    for scale in ["1e18", "1e-30"] {
+        let [scaled_radiance, scaled_harmonic] = dome(scale);
+        let scale: f64 = scale.parse().expect("a number");
+        assert!((scaled_radiance / scale / radiance - 1.0).abs() < 1e-5, "{scale}");
+        assert!((scaled_harmonic / scale / harmonic - 1.0).abs() < 1e-5, "{scale}");
+    }
+}
+
 /// With fewer lights than the sun and lamps, the rest of the light stays in the map, which rigs refer to.
 #[test]
 fn few_lights_leave_a_dome() {

@@ -244,11 +244,7 @@ impl Environment {
     /// ndarray, shape (H, W, 3): a copy of each texel's radiance [W m^-2 sr^-1].
     #[getter]
     fn map<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
-        if self.inner.unit() == 1.0 {
-            return from_image(py, self.inner.map());
-        }
-        let RgbImage { width, height, ref pixels } = *self.inner.map();
-        rows(py, pixels.iter().map(|&p| self.watts(p)).collect(), &[height, width])
+        from_image(py, &self.inner.radiance_map())
     }
 
     /// ndarray, shape (H,): exact solid angle of a texel in each row [sr].

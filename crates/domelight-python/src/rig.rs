@@ -79,12 +79,12 @@ impl Rig {
             DomePicture::LatLongHdr => PictureFormat::Hdr,
             DomePicture::LatLong | DomePicture::Octahedral => PictureFormat::Exr,
         };
-        let map = residual.map();
+        let map = residual.radiance_map();
         let mapping = picture.mapping();
         let converted: Option<RgbImage> = (mapping != Mapping::LatLong)
-            .then(|| from_lat_long(map, mapping, mapping.size_for(map.height)));
+            .then(|| from_lat_long(&map, mapping, mapping.size_for(map.height)));
         let tone = ToneMapping::default();
-        let map = converted.as_ref().unwrap_or(map);
+        let map = converted.as_ref().unwrap_or(&map);
         write_image(&path.with_file_name(&name), format, map, None, &tone, Depth::default())?;
         Ok(Some(name))
     }
@@ -218,7 +218,7 @@ impl Rig {
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|other| {
             let other = other.get();
-            let map = |rig: &Self| rig.residual.as_ref().map(|e| e.map().clone());
+            let map = |rig: &Self| rig.residual.as_ref().map(|e| e.radiance_map().into_owned());
             self.inner == other.inner
                 && self.orientation == other.orientation
                 && map(self) == map(other)

@@ -199,21 +199,21 @@ impl Engine {
     #[wasm_bindgen(js_name = domeFile)]
     pub fn dome_file(&mut self, json: &str, name: &str) -> Result<Vec<u8>, JsError> {
         let missing = || JsError::new("the lights take all of the map");
-        let map = self.rig(json)?.residual.as_ref().ok_or_else(missing)?.map();
+        let map = self.rig(json)?.residual.as_ref().ok_or_else(missing)?.radiance_map();
         let failed = |e: String| JsError::new(&e);
         match name {
             "dome.hdr" => {
                 let mut bytes = Vec::new();
-                hdr::encode(map, &mut bytes).map_err(|e| failed(e.to_string()))?;
+                hdr::encode(&map, &mut bytes).map_err(|e| failed(e.to_string()))?;
                 Ok(bytes)
             }
             "dome_octahedral.exr" => {
                 let size = Mapping::Octahedral.size_for(map.height);
-                let converted = from_lat_long(map, Mapping::Octahedral, size);
+                let converted = from_lat_long(&map, Mapping::Octahedral, size);
                 ExrLayers::from_image(&converted, None).encode().map_err(|e| failed(e.to_string()))
             }
             "dome.exr" => {
-                ExrLayers::from_image(map, None).encode().map_err(|e| failed(e.to_string()))
+                ExrLayers::from_image(&map, None).encode().map_err(|e| failed(e.to_string()))
             }
             _ => Err(failed(format!("there is no picture {name} of a dome"))),
         }

@@ -6,7 +6,8 @@ use domelight::environment::{Environment, Orientation, UpAxis};
 use domelight::math::{Mat3, Vec3, vec2, vec3};
 use domelight::rig::{
     CompactExtraction, Extraction, ExtractionSettings, MedianCut, Method, Region, Rig, RigError,
-    RigLight, ShadingReference, VarianceMinimization, extract, quadrature, smallest_rig,
+    RigLight, ShadingReference, SphericalHarmonics, VarianceMinimization, extract, quadrature,
+    smallest_rig,
 };
 use domelight::sampling::Pcg32;
 use domelight::{Rgb, RgbImage};
@@ -420,6 +421,31 @@ fn a_sun_beside_a_dome_has_little_error() {
     let dome = ShadingReference::new(found.residual.as_ref().unwrap());
     assert!(reference.error_beside(&found.rig, &dome).worst() < 0.01);
     assert!(reference.error(&found.rig).worst() > 0.05);
+}
+
+/// Maps whose unit is not 1: lights, residual, harmonics and errors are those of an ordinary map times the scale.
+#[test]
+fn rigs_of_extreme_maps_are_scaled_rigs() {
+    let map = discs_on(sky, &[Disc::new(vec3(0.3, 0.5, -0.8), 0.03, 2000.0)]);
+    let rig = |scale: f32| {
+        let env = Environment::new(map.clone(), Orientation::default(), scale).unwrap();
+        let found = extract(&env, SUN).unwrap();
+        let (reference, dome) = (ShadingReference::new(&env), found.residual.as_ref().unwrap());
+        let harmonics = SphericalHarmonics::project(dome).coefficients[0].g;
+        let numbers =
+            [dome.radiance_map().get(0, 0).g, harmonics, found.rig.lights[0].irradiance.g];
+        let error = reference.error_beside(&found.rig, &ShadingReference::new(dome));
+        let smallest = smallest_rig(&env, SUN, 0.2).unwrap().extraction.rig.lights.len();
+        (env.unit(), numbers.map(|x| f64::from(x) / f64::from(scale)), error, smallest)
+    };
+    let (unit, numbers, error, smallest) = rig(1.0);
+    assert_eq!(unit, 1.0);
+    // At 2⁶⁰, only the sun is extreme.
+    for exponent in [60, 80, -80] {
+        let scaled = rig(2f32.powi(exponent));
+        assert_ne!(scaled.0, 1.0);
+        assert_eq!((scaled.1, scaled.2, scaled.3), (numbers, error, smallest), "2^{exponent}");
+    }
 }
 
 #[test]

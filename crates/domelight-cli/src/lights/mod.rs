@@ -56,7 +56,7 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
     let extract = watch.lap();
 
     let domes = match (&dome_path, &found.extraction.residual) {
-        (Some(path), Some(dome)) => arguments.write_dome(path, dome.map(), &outputs)?,
+        (Some(path), Some(dome)) => arguments.write_dome(path, &dome.radiance_map(), &outputs)?,
         _ if arguments.keep_residual.is_some() => {
             return Err(UsageError(NOTHING_LEFT.into()).into());
         }
@@ -78,8 +78,10 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
         files::write(output.path, |out| out.write_all(&bytes))?;
     }
     if let Some(path) = &preview {
-        let tone = arguments.tone.of_picture(|| Exposure::Auto.stops(environment.map(), None));
-        let preview = Preview { environment: &environment, found: &found, probe: &probe, tone };
+        let map = environment.radiance_map();
+        let tone = arguments.tone.of_picture(|| Exposure::Auto.stops(&map, None));
+        let preview =
+            Preview { environment: &environment, map: &map, found: &found, probe: &probe, tone };
         let bytes = preview.png()?;
         files::write(path, |out| out.write_all(&bytes))?;
     }

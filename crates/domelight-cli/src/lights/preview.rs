@@ -32,6 +32,8 @@ const MAX_NUMBERS: usize = 128;
 
 pub(super) struct Preview<'a> {
     pub(super) environment: &'a Environment,
+    /// The environment's radiance.
+    pub(super) map: &'a RgbImage,
     pub(super) found: &'a ExtractedRig,
     pub(super) probe: &'a str,
     pub(super) tone: ToneMapping,
@@ -81,7 +83,7 @@ impl Preview<'_> {
             let (column, row) = (x * rig.width / width, y * rig.height / height);
             rig.labels[row * rig.width + column]
         };
-        map_picture(self.environment.map(), |x, y, radiance| {
+        map_picture(self.map, |x, y, radiance| {
             let here = label(x, y);
             let border =
                 label((x + 1) % width, y) != here || label(x, (y + 1).min(height - 1)) != here;

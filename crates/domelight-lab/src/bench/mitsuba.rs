@@ -122,7 +122,7 @@ impl Mitsuba {
         let mut file = std::io::BufWriter::new(fs::File::create(path(MESH))?);
         ply::encode(&built.view.scene, &mut file)?;
         file.flush()?;
-        let map = ExrLayers::from_image(built.view.environment.map(), None);
+        let map = ExrLayers::from_image(&built.view.environment.radiance_map(), None);
         fs::write(path(MAP), map.encode()?)?;
         let times = self.ask(&json!({ "scene": scene }))?;
         self.setup = seconds(&times);

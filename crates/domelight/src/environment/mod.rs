@@ -415,9 +415,27 @@ impl Environment {
         self.unit
     }
 
-    /// The map, including the scale.
+    /// The map, including the scale, in multiples of [`Environment::unit`].
     pub fn map(&self) -> &RgbImage {
         &self.map
+    }
+
+    /// The map, including the scale \[W·m⁻²·sr⁻¹\], whatever the unit.
+    pub fn radiance_map(&self) -> Cow<'_, RgbImage> {
+        if self.unit == 1.0 {
+            return Cow::Borrowed(&self.map);
+        }
+        let in_watts = |c: f32| (f64::from(c) * self.unit) as f32;
+        let pixels = self.map.pixels.iter().map(|p| p.map(in_watts)).collect();
+        Cow::Owned(RgbImage { pixels, ..self.map })
+    }
+
+    /// Other radiance in the same unit and orientation.
+    ///
+    /// # Errors
+    /// Those of [`Environment::new`].
+    pub(crate) fn with_pixels(&self, pixels: Vec<Rgb>) -> Result<Self, EnvironmentError> {
+        Self::in_units(RgbImage { pixels, ..self.map }, self.orientation, self.unit, 1.0)
     }
 
     /// The orientation of the map in the world.

@@ -64,7 +64,11 @@ impl ShadingReference {
     pub fn new(environment: &Environment) -> Self {
         let texels = Texels::new(environment);
         let blocks = Blocks::at_most(MAX_BLOCKS, texels.width(), texels.height());
-        let lights = if blocks.step > 1 { of_blocks(&texels, &blocks) } else { of_cells(&texels) };
+        let mut lights =
+            if blocks.step > 1 { of_blocks(&texels, &blocks) } else { of_cells(&texels) };
+        for (_, energy) in &mut lights {
+            *energy *= environment.unit();
+        }
         Self { exact: in_order(N_NORMALS, |i| shade(normal(i), &lights)) }
     }
 

@@ -39,7 +39,7 @@ impl SphericalHarmonics {
         let mut coefficients = [Rgb::BLACK; 9];
         let channels = moments.channels.map(|c| c.harmonics());
         for (i, coefficient) in coefficients.iter_mut().enumerate() {
-            *coefficient = Rgb::from(channels.map(|c| c[i] as f32));
+            *coefficient = Rgb::from(channels.map(|c| (c[i] * environment.unit()) as f32));
         }
         Self { coefficients }
     }
