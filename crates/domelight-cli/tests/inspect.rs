@@ -56,6 +56,22 @@ fn a_page_that_needs_nothing_else() {
     }
 }
 
+/// Fixed lights have the least noise, and are not advised.
+#[test]
+fn fixed_lights_are_marked_as_biased() {
+    let folder = TempDir::new().unwrap();
+    let strategies = "--strategies=median-cut:4,mis,brdf";
+    let arguments = [&QUICK[..6], &[strategies, "-o", "x.html", "--json", "-q"]].concat();
+    let report = json(&domelight(&folder, &arguments));
+    let unbiased: Vec<_> = (0..3).map(|i| report["strategies"][i]["unbiased"].clone()).collect();
+    assert_eq!(unbiased, [false, true, true]);
+    let diagnosis = report["strategies"][0]["diagnosis"].as_str().unwrap();
+    assert!(diagnosis.contains("biased: its mean is"), "{diagnosis}");
+    assert!(!report["advice_text"].as_str().unwrap().contains("median-cut"), "{report}");
+    let page = fs::read_to_string(folder.path().join("x.html")).unwrap();
+    assert!(page.contains("median-cut:4, biased</th>") && !page.contains("mis, biased"));
+}
+
 /// A shadow catcher's picture is not reflected light.
 #[test]
 fn a_shadow_catcher_is_not_explained() {

@@ -123,10 +123,12 @@ impl Found {
         let frame = hemisphere.map(|h| rows(py, h.frame.to_vec(), &[3])).transpose()?;
         found.set_item("frame", frame)?;
         let list = PyList::empty(py);
-        let mut decompositions = Vec::new();
+        let decompositions: Vec<Decomposition> =
+            strategies.iter().map(|(decomposition, _)| decomposition.clone()).collect();
         for (decomposition, directions) in strategies {
             let one = PyDict::new(py);
             one.set_item("name", &decomposition.name)?;
+            one.set_item("unbiased", decomposition.unbiased)?;
             one.set_item("mean", decomposition.mean)?;
             one.set_item("variance", decomposition.variance)?;
             one.set_item("variance_per_ray", decomposition.variance_per_ray())?;
@@ -141,11 +143,10 @@ impl Found {
                 shares.set_item(cause, before + share.share)?;
             }
             one.set_item("shares", shares)?;
-            one.set_item("diagnosis", decomposition.diagnosis().to_string())?;
+            one.set_item("diagnosis", decomposition.diagnosis(&decompositions).to_string())?;
             let density = directions.map(|d| array(py, d.density, &square)).transpose()?;
             one.set_item("density", density)?;
             list.append(one)?;
-            decompositions.push(decomposition);
         }
         found.set_item("strategies", list)?;
         found.set_item("advice", advice(&decompositions).to_string())?;

@@ -30,6 +30,12 @@ def test_a_pixel_is_explained(sphere, env):
     assert built_in.strategies[0].variance == pytest.approx(found.strategies[2].variance, rel=1e-6)
 
 
+def test_fixed_lights_are_biased(sphere, env):
+    found = dl.inspect(sphere, env, pixel=(20, 20), size=(40, 40), strategies=["median-cut:4", "mis"], resolution=16)
+    assert [s.unbiased for s in found.strategies] == [False, True]
+    assert "that of mis" in found.strategies[0].diagnosis and "median-cut" not in found.advice
+
+
 def test_a_notebook_shows_the_figure(sphere, env):
     found = dl.inspect(sphere, env, pixel=(20, 20), size=(40, 40), strategies=["mis"], resolution=16)
     pytest.importorskip("matplotlib")

@@ -95,7 +95,7 @@ impl Engine {
                 variance: d.variance,
                 rays_per_sample: d.rays_per_sample,
                 variance_per_ray: d.variance_per_ray(),
-                diagnosis: d.diagnosis().to_string(),
+                diagnosis: d.diagnosis(&found).to_string(),
                 causes: d.shares.iter().map(|s| (s.cause.to_string(), s.share)).collect(),
                 samples,
             });

@@ -124,7 +124,7 @@ fn an_edge() {
     assert!((found[0].coverage - 0.5).abs() < 0.1);
     // A coin of the values 0 and 1/2.
     assert!((found[0].variance - 0.0625).abs() < 0.003, "{}", found[0].variance);
-    let text = found[0].diagnosis().to_string();
+    let text = found[0].diagnosis(&found).to_string();
     assert!(text.contains("show the scene: an edge"), "{text}");
     assert!(matches!(advice(&found), Advice::CameraSamples { .. }));
 }
@@ -138,7 +138,7 @@ fn a_penumbra() {
     assert!(matches!(main_cause(&found[0], 0.8), Cause::Penumbra(_)));
     let of_lamp = &found[0].sources[0];
     assert!((of_lamp.free.unwrap() - 0.5).abs() < 0.1, "{of_lamp:?}");
-    assert!(found[0].diagnosis().to_string().contains("partly hidden"));
+    assert!(found[0].diagnosis(&found).to_string().contains("partly hidden"));
 }
 
 #[test]
@@ -151,7 +151,7 @@ fn the_edge_of_a_shadow() {
     pixel.origin = vec3(0.0, 0.009, 0.0);
     let found = pixel.inspect(0, &["environment"]);
     assert!(matches!(main_cause(&found[0], 0.8), Cause::ShadowEdge(_)));
-    let text = found[0].diagnosis().to_string();
+    let text = found[0].diagnosis(&found).to_string();
     assert!(text.contains("of the camera samples"), "{text}");
     assert!(matches!(advice(&found), Advice::CameraSamples { .. }));
 }
@@ -178,7 +178,7 @@ fn a_small_sun() {
     assert_eq!(main_cause(&found[0], 0.9), Cause::Directions(SourceKind::Sun));
     let of_sun = &found[0].sources[0];
     assert!(of_sun.rays < 0.01 && of_sun.light > 0.9, "{of_sun:?}");
-    let text = found[0].diagnosis().to_string();
+    let text = found[0].diagnosis(&found).to_string();
     assert!(text.contains("of the rays go to the sun"), "{text}");
     assert!(matches!(advice(&found), Advice::Strategy { name, .. } if name != "brdf"));
 }
@@ -194,7 +194,7 @@ fn a_sun_that_no_ray_finds() {
     let found = pixel.inspect(0, &["brdf", "environment"]);
     assert!(found[0].mean < 0.5 * found[1].mean, "{found:?}");
     assert!(found[0].variance > 100.0 * found[1].variance, "{found:?}");
-    let text = found[0].diagnosis().to_string();
+    let text = found[0].diagnosis(&found).to_string();
     assert!(text.contains("hardly any of the rays go to"), "{text}");
     assert!(matches!(advice(&found), Advice::Strategy { name, .. } if name == "environment"));
 }
@@ -206,6 +206,33 @@ fn constant_light() {
     assert_eq!(found[0].variance, 0.0, "{:?}", found[0]);
     assert!(found[0].shares.is_empty() && (found[0].mean - 0.5).abs() < 1e-4);
     assert_eq!(advice(&found), Advice::Nothing);
+}
+
+/// Few fixed lights have no noise here, and another mean.
+#[test]
+fn fixed_lights_are_biased_and_never_the_best() {
+    let sky = map(|x, y| if y < 16 { 1.0 + ((x / 8) % 2 * y) as f32 } else { 0.0 });
+    // A blocker hides half of the sky; where it ends, few lights are all or nothing.
+    let cards = vec![card([-9.0, 9.0], 0.0, 9.0), card([0.3, 9e3], 900.0, 9e3)];
+    let pixel = Pixel::new(cards, "diffuse:0.5", 0.01, sky);
+    let found = pixel.inspect(0, &["median-cut:4", "mis:1:1", "brdf", "variance-minimization:4"]);
+    assert_eq!(found.iter().map(|d| d.unbiased).collect::<Vec<_>>(), [false, true, true, false]);
+    let best = if found[1].variance_per_ray() < found[2].variance_per_ray() { 1 } else { 2 };
+    let best = &found[best].name;
+    for fixed in [&found[0], &found[3]] {
+        // Nothing is charged for light that fixed lights leave out.
+        assert_eq!((fixed.variance, fixed.shares.len()), (0.0, 0), "{fixed:?}");
+        let text = fixed.diagnosis(&found).to_string();
+        assert!(text.starts_with("no noise, but biased: its mean is "), "{text}");
+        assert!(text.ends_with(&format!("that of {best}")), "{text}");
+    }
+    let names_fixed = |name: &String| found[0].name == *name || found[3].name == *name;
+    assert!(!matches!(advice(&found), Advice::Strategy { name, .. } if names_fixed(&name)));
+    assert_eq!(advice(&found), advice(&found[1..3]));
+    // Alone, they allow no advice.
+    assert_eq!(advice(&found[..1]), Advice::AllBiased);
+    let text = found[0].diagnosis(&found[..1]).to_string();
+    assert!(text.contains("such as mis"), "{text}");
 }
 
 #[test]

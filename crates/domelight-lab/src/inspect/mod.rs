@@ -136,23 +136,24 @@ impl<'a> Inspection<'a> {
         self.strategies.push(InspectedStrategy { settings, decomposition, directions });
     }
 
+    fn decompositions(&self) -> Vec<Decomposition> {
+        self.strategies.iter().map(|s| s.decomposition.clone()).collect()
+    }
+
     /// What would help.
     pub fn advice(&self) -> Advice {
-        let all: Vec<Decomposition> =
-            self.strategies.iter().map(|s| s.decomposition.clone()).collect();
-        advice(&all)
+        advice(&self.decompositions())
     }
 
     /// A sentence for each strategy, and what would help.
     pub fn summary(&self) -> Vec<String> {
-        let named = self.strategies.iter().map(|s| &s.decomposition);
-        let width = named.clone().map(|d| d.name.chars().count()).max().unwrap_or(0);
-        let mut lines: Vec<String> = named
-            .map(|d| {
-                let variance = d.variance_per_ray();
-                format!("{:width$}  variance per ray {variance:.2e}  {}", d.name, d.diagnosis())
-            })
-            .collect();
+        let all = self.decompositions();
+        let width = all.iter().map(|d| d.name.chars().count()).max().unwrap_or(0);
+        let line = |d: &Decomposition| {
+            let (variance, diagnosis) = (d.variance_per_ray(), d.diagnosis(&all));
+            format!("{:width$}  variance per ray {variance:.2e}  {diagnosis}", d.name)
+        };
+        let mut lines: Vec<String> = all.iter().map(line).collect();
         lines.push(self.advice().to_string());
         lines
     }
@@ -168,7 +169,7 @@ impl<'a> Inspection<'a> {
             visibility: h.visibility.clone(),
             product: luminance(&h.product),
         };
-        let advice = self.advice();
+        let (advice, all) = (self.advice(), self.decompositions());
         InspectionReport {
             version: env!("CARGO_PKG_VERSION"),
             command: &self.command,
@@ -181,7 +182,7 @@ impl<'a> Inspection<'a> {
                 .map(|s| StrategyReport {
                     settings: &s.settings,
                     variance_per_ray: s.decomposition.variance_per_ray(),
-                    diagnosis: s.decomposition.diagnosis().to_string(),
+                    diagnosis: s.decomposition.diagnosis(&all).to_string(),
                     decomposition: &s.decomposition,
                     density: s.directions.as_ref().map(|d| &d.density[..]),
                 })

@@ -108,20 +108,21 @@ fn causes(report: &InspectionReport) -> Code<Html> {
 }
 
 fn table(report: &InspectionReport) -> Code<Html> {
-    let per_ray = report.strategies.iter().map(|s| s.variance_per_ray);
-    let least = per_ray.fold(f64::INFINITY, f64::min);
+    let unbiased = report.strategies.iter().filter(|s| s.decomposition.unbiased);
+    let least = unbiased.map(|s| s.variance_per_ray).fold(f64::INFINITY, f64::min);
     let mut rows = Code::default();
     for StrategyReport { decomposition: d, variance_per_ray, .. } in &report.strategies {
-        let ratio = if least > 0.0 { variance_per_ray / least } else { f64::NAN };
+        let ratio = if least > 0.0 && d.unbiased { variance_per_ray / least } else { f64::NAN };
         rows += code!(
             Html,
-            "<tr><th scope=\"row\">{name}</th><td>{mean}</td><td>{variance}</td><td>{rays}</td>\
+            "<tr><th scope=\"row\">{name}{biased}</th><td>{mean}</td><td>{variance}</td><td>{rays}</td>\
              <td{best}>{per_ray}</td><td>{ratio}</td></tr>",
             name = html::text(&d.name),
+            biased = if d.unbiased { "" } else { ", biased" },
             mean = number(format!("{:.4}", d.mean)),
             variance = number(format!("{:.2e}", d.variance)),
             rays = number(format!("{:.2}", d.rays_per_sample)),
-            best = if *variance_per_ray <= least { " class=\"best\"" } else { "" },
+            best = if d.unbiased && *variance_per_ray <= least { " class=\"best\"" } else { "" },
             per_ray = number(format!("{variance_per_ray:.2e}")),
             ratio = number(match ratio {
                 _ if !ratio.is_finite() => "–".to_owned(),

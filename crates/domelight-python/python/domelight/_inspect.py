@@ -29,6 +29,8 @@ class Decomposition:
     ----------
     name : str
         The strategy.
+    unbiased : bool
+        Whether the strategy is unbiased; otherwise its variance is not its error. True for functions.
     mean : float
         Luminance of the pixel.
     variance : float
@@ -48,6 +50,7 @@ class Decomposition:
     """
 
     name: str
+    unbiased: bool
     mean: float
     variance: float
     variance_per_ray: float

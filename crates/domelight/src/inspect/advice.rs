@@ -5,26 +5,74 @@ use std::fmt;
 use super::decomposition::{Cause, Decomposition, Share};
 
 impl Decomposition {
-    /// Explains why the pixel is noisy, in a sentence with numbers.
-    pub fn diagnosis(&self) -> Diagnosis<'_> {
-        Diagnosis(self)
+    /// Explains why the pixel is noisy, in a sentence with numbers. The mean of a biased strategy is compared with that
+    /// of the best unbiased one among all `strategies` at the pixel.
+    pub fn diagnosis<'a>(&'a self, strategies: &'a [Self]) -> Diagnosis<'a> {
+        Diagnosis { decomposition: self, unbiased: best_first(strategies).first().copied() }
     }
+}
+
+/// The unbiased strategies; the first needs the fewest rays.
+fn best_first(strategies: &[Decomposition]) -> Vec<&Decomposition> {
+    let mut order: Vec<&Decomposition> = strategies.iter().filter(|d| d.unbiased).collect();
+    order.sort_by(|a, b| a.variance_per_ray().total_cmp(&b.variance_per_ray()));
+    order
 }
 
 /// Why the pixel is noisy with one strategy. It displays as a sentence.
 #[derive(Clone, Copy, Debug)]
-pub struct Diagnosis<'a>(&'a Decomposition);
+pub struct Diagnosis<'a> {
+    decomposition: &'a Decomposition,
+    /// The best unbiased strategy.
+    unbiased: Option<&'a Decomposition>,
+}
 
 impl fmt::Display for Diagnosis<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(decomposition) = self;
-        let Some(&Share { cause, share }) = decomposition.shares.first() else {
-            return f.write_str("no error: all estimates of this pixel are equal");
+        match (self.decomposition.shares.first(), self.decomposition.unbiased) {
+            (None, true) => f.write_str("no error: all estimates of this pixel are equal"),
+            (None, false) => {
+                f.write_str("no noise, but biased: ")?;
+                self.write_bias(f)
+            }
+            (Some(&first), true) => self.write_cause(f, first, "error"),
+            (Some(&first), false) => {
+                f.write_str("biased: ")?;
+                self.write_bias(f)?;
+                f.write_str("; ")?;
+                self.write_cause(f, first, "noise")
+            }
+        }
+    }
+}
+
+impl Diagnosis<'_> {
+    /// The mean beside that of an unbiased strategy.
+    fn write_bias(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        /// A difference that is not worth a number.
+        const EQUAL: f64 = 5e-4;
+        let mean = self.decomposition.mean;
+        let Some(Decomposition { name, mean: exact, .. }) = self.unbiased else {
+            return f.write_str("compare its mean with that of an unbiased strategy, such as mis");
         };
+        let off = mean / exact - 1.0;
+        match off {
+            _ if mean == *exact || off.abs() < EQUAL => write!(f, "its mean is that of {name}"),
+            f64::INFINITY => write!(f, "its mean is {mean:.2e}, and that of {name} is 0"),
+            _ => {
+                let side = if off < 0.0 { "below" } else { "above" };
+                write!(f, "its mean is {} {side} that of {name}", percent(off.abs()))
+            }
+        }
+    }
+
+    /// The largest cause of `what`.
+    fn write_cause(&self, f: &mut fmt::Formatter<'_>, first: Share, what: &str) -> fmt::Result {
+        let (Share { cause, share }, decomposition) = (first, self.decomposition);
         if share >= 0.995 {
-            f.write_str("nearly all of the error: ")?;
+            write!(f, "nearly all of the {what}: ")?;
         } else {
-            write!(f, "{} of the error: ", percent(share))?;
+            write!(f, "{} of the {what}: ", percent(share))?;
         }
         let of = |kind| decomposition.source(kind).copied();
         match cause {
@@ -68,6 +116,8 @@ impl fmt::Display for Diagnosis<'_> {
 pub enum Advice {
     /// There is no error.
     Nothing,
+    /// All strategies are biased, so that their noise is not their error.
+    AllBiased,
     /// The error of most strategies is between camera samples.
     CameraSamples {
         /// The strategy that needs the fewest rays.
@@ -88,13 +138,14 @@ pub enum Advice {
     Rays,
 }
 
-/// Advice for a pixel, given the variance of some strategies there.
+/// Advice for a pixel, given the variance of some strategies there. Biased strategies have no part in it.
 pub fn advice(strategies: &[Decomposition]) -> Advice {
     /// A factor that is worth changing the strategy for.
     const WORTH: f64 = 1.5;
-    let mut order: Vec<&Decomposition> = strategies.iter().collect();
-    order.sort_by(|a, b| a.variance_per_ray().total_cmp(&b.variance_per_ray()));
-    let (Some(best), Some(worst)) = (order.first(), order.last()) else { return Advice::Nothing };
+    let order = best_first(strategies);
+    let (Some(best), Some(worst)) = (order.first(), order.last()) else {
+        return if strategies.is_empty() { Advice::Nothing } else { Advice::AllBiased };
+    };
     if worst.variance == 0.0 {
         return Advice::Nothing;
     }
@@ -115,6 +166,10 @@ impl fmt::Display for Advice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Nothing => f.write_str("nothing needs to be done"),
+            Self::AllBiased => f.write_str(
+                "an unbiased strategy, such as mis, would show the bias: all strategies here are biased, and their noise \
+                 is not their error",
+            ),
             Self::CameraSamples { name, between } => write!(
                 f,
                 "more camera samples would help: {} of the error of {name}, the best here, is between them, and no \

@@ -90,6 +90,8 @@ pub struct SourceStatistics {
 pub struct Decomposition {
     /// The name of the strategy.
     pub name: String,
+    /// Whether the strategy is unbiased. Otherwise its variance is not its error.
+    pub unbiased: bool,
     /// The luminance of the pixel.
     pub mean: f64,
     /// The variance of the estimate from one camera sample. Directions are as well distributed as in a pass of 16
@@ -111,6 +113,7 @@ const ROUNDING: f64 = 1e-10;
 impl Decomposition {
     pub(super) fn new(
         name: &str,
+        unbiased: bool,
         samples: &[CameraSample],
         replicates: &Replicates,
         regions: &Regions,
@@ -125,7 +128,10 @@ impl Decomposition {
                 None => shares.push(Share { cause, share }),
             }
         }
-        add_missed(&mut shares, replicates, regions.sources(), light, samples.len());
+        // A biased strategy has no light to find by chance.
+        if unbiased {
+            add_missed(&mut shares, replicates, regions.sources(), light, samples.len());
+        }
         let variance: f64 = shares.iter().map(|share| share.share).sum();
         if variance <= ROUNDING * means.mean * means.mean {
             shares.clear();
@@ -137,6 +143,7 @@ impl Decomposition {
         shares.sort_by(|a, b| b.share.total_cmp(&a.share));
         Self {
             name: name.to_owned(),
+            unbiased,
             mean: means.mean,
             variance: if shares.is_empty() { 0.0 } else { variance },
             rays_per_sample: replicates.rays_per_sample(),

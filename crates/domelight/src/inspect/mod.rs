@@ -21,7 +21,7 @@
 //!     found.push(inspector.decompose(text, &strategy));
 //! }
 //! for decomposition in &found {
-//!     println!("{}: {}", decomposition.name, decomposition.diagnosis());
+//!     println!("{}: {}", decomposition.name, decomposition.diagnosis(&found));
 //! }
 //! println!("{}", advice(&found));
 //! # Ok::<(), domelight::Error>(())
@@ -246,10 +246,12 @@ impl<'a> Inspector<'a> {
 
     /// Decomposes the variance of a strategy at this pixel by cause.
     ///
-    /// Contributions from rays too rare to be found are included with their lower bound at a confidence of 95 %.
+    /// Contributions from rays too rare to be found are included with their lower bound at a confidence of 95 %, unless
+    /// the strategy is biased.
     pub fn decompose<S: Strategy>(&self, name: &str, strategy: &S) -> Decomposition {
         let replicates = self.replicates(strategy);
-        Decomposition::new(name, &self.samples, &replicates, &self.regions, &self.light)
+        let unbiased = strategy.is_unbiased();
+        Decomposition::new(name, unbiased, &self.samples, &replicates, &self.regions, &self.light)
     }
 
     fn replicates<S: Strategy>(&self, strategy: &S) -> Replicates {

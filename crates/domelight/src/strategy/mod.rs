@@ -268,6 +268,11 @@ pub trait Strategy: Sync {
     /// The maximum number of shadow rays per point, for sizing batches.
     fn n_rays(&self) -> u32;
 
+    /// Whether the expected value of the estimate is the integral; a strategy that is not needs to say so.
+    fn is_unbiased(&self) -> bool {
+        true
+    }
+
     /// The unit of weights and base; see [`PointStrategy::unit`].
     fn unit(&self) -> f64 {
         1.0
@@ -310,6 +315,10 @@ impl<S: PointStrategy> Strategy for S {
 
     fn n_rays(&self) -> u32 {
         PointStrategy::n_rays(self)
+    }
+
+    fn is_unbiased(&self) -> bool {
+        S::UNBIASED
     }
 
     fn unit(&self) -> f64 {

@@ -211,6 +211,10 @@ impl Strategy for PreparedStrategy<'_> {
         each!(self, s => s.n_rounds())
     }
 
+    fn is_unbiased(&self) -> bool {
+        each!(self, s => s.is_unbiased())
+    }
+
     fn unit(&self) -> f64 {
         each!(self, s => Strategy::unit(s))
     }
