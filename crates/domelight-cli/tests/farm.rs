@@ -3,7 +3,7 @@
 
 use crate::common;
 
-use common::{domelight, stderr, stdout};
+use common::{domelight, json, stderr, stdout};
 use std::fs;
 use std::process::{Command, Output};
 use tempfile::TempDir;
@@ -50,6 +50,25 @@ fn the_tasks_of_an_array_and_their_merge_make_the_single_run() {
     run("merge.sbatch", "");
     let merged = fs::read(files.join("picture.exr")).unwrap();
     assert!(merged == fs::read(folder.path().join("whole.exr")).unwrap());
+}
+
+#[test]
+fn quiet_prints_only_what_is_asked_for() {
+    let folder = TempDir::new().unwrap();
+    let output = farm(&folder, "slurm", &["--shards", "3", "-q"]);
+    succeeded(&output);
+    assert_eq!((stdout(&output), stderr(&output)), ("", ""));
+    let report = json(&farm(&folder, "slurm", &["--shards", "3", "-q", "--json"]));
+    assert!(report["submit"].as_str().unwrap().contains("submit.sh"), "{report}");
+}
+
+/// `openjd run` refuses a template without the parameter that has no default.
+#[test]
+fn the_example_of_openjd_names_the_working_folder() {
+    let folder = TempDir::new().unwrap();
+    let output = domelight(&folder, &["farm", "--help"]);
+    let help = stdout(&output);
+    assert!(help.contains("openjd run farm/job.yaml -p WorkDir=\"$PWD\""), "{help}");
 }
 
 #[test]

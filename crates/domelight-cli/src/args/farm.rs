@@ -15,7 +15,7 @@ pub(super) const EXAMPLES: &str = "\
 Examples:
   domelight farm slurm scene.toml --spp 1024 --shards 64 -o farm && sh farm/submit.sh
       an array of 64 tasks, and a merge that waits for it
-  domelight farm openjd scene.toml --spp 1024 --shards 64 -o farm && openjd run farm/job.yaml
+  domelight farm openjd scene.toml --shards 64 && openjd run farm/job.yaml -p WorkDir=\"$PWD\"
       a template for Deadline Cloud and other Open Job Description engines
   domelight farm parallel scene.toml --shards 8 --cpus 2 && sh farm/render.sh
       eight parts on this machine, as many at a time as it has cores";

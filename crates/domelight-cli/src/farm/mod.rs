@@ -115,8 +115,7 @@ pub(crate) fn run(arguments: &FarmArguments, quiet: bool) -> Result<()> {
             "submit": command.as_str(),
         }));
     }
-    print_code(&command)?;
-    Ok(())
+    if quiet { Ok(()) } else { print_code(&command) }
 }
 
 impl Farm {
