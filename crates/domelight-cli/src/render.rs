@@ -83,7 +83,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         scene: report.clone(),
         strategy: spec.description(),
         spp: settings.n_samples,
-        adaptive: settings.adaptive,
+        adaptive: settings.adapts(strategy),
         target_error: settings.target_error,
         passes: settings.passes.name(),
         sampler: settings.sampler.name(),

@@ -126,6 +126,13 @@ pub struct RenderSettings {
     pub tile_size: usize,
 }
 
+impl RenderSettings {
+    /// Whether noisier pixels get more samples with this strategy: if it renders a tile in rounds.
+    pub fn adapts(&self, strategy: &impl Strategy) -> bool {
+        self.adaptive && strategy.n_rounds() > 1
+    }
+}
+
 impl Default for RenderSettings {
     fn default() -> Self {
         Self {

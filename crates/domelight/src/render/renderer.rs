@@ -286,7 +286,7 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         let sampler = Sampler::for_pass(settings.sampler, settings.seed, start);
         let n_samples = samples.len() as u32;
         let shared = strategy.begin_pass(sampler, n_samples);
-        let adaptive = settings.adaptive && strategy.n_rounds() > 1;
+        let adaptive = settings.adapts(strategy);
         let mut pass = Pass { n_samples, set, adaptive, mean_log: None, shared };
         if adaptive {
             pass.mean_log = scale(context, strategy, &pass);
