@@ -122,6 +122,21 @@ fn few_lights_leave_a_dome() {
     }
 }
 
+/// Blender and OpenUSD read no PFM, Mitsuba does.
+#[test]
+fn a_dome_in_pfm_is_written_as_exr_for_programs_without_it() {
+    let folder = probes();
+    let rigs = ["-o", "rig.py", "-o", "rig.usda", "-o", "rig.xml"];
+    let arguments = ["lights", "sun.exr", "--sun", "--keep-residual", "dome.pfm", "-q"];
+    done(&domelight(&folder, &[&arguments[..], &rigs].concat()));
+    assert_eq!(load(&folder, "dome.pfm").pixels, load(&folder, "dome.exr").pixels);
+    for (rig, dome) in [("rig.py", "dome.exr"), ("rig.usda", "dome.exr"), ("rig.xml", "dome.pfm")] {
+        let text = std::fs::read_to_string(folder.path().join(rig)).expect(rig);
+        let other = if dome == "dome.exr" { "dome.pfm" } else { "dome.exr" };
+        assert!(text.contains(dome) && !text.contains(other), "{text}");
+    }
+}
+
 #[test]
 fn every_format_to_files_and_standard_output() {
     let folder = probes();

@@ -71,13 +71,15 @@ impl Rig {
         };
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let name = match picture {
-            DomePicture::LatLong => format!("{stem}_dome.exr"),
+            DomePicture::LatLong | DomePicture::LatLongExrOrHdr => format!("{stem}_dome.exr"),
             DomePicture::LatLongHdr => format!("{stem}_dome.hdr"),
             DomePicture::Octahedral => format!("{stem}_dome_octahedral.exr"),
         };
         let format = match picture {
             DomePicture::LatLongHdr => PictureFormat::Hdr,
-            DomePicture::LatLong | DomePicture::Octahedral => PictureFormat::Exr,
+            DomePicture::LatLong | DomePicture::LatLongExrOrHdr | DomePicture::Octahedral => {
+                PictureFormat::Exr
+            }
         };
         let map = residual.radiance_map();
         let mapping = picture.mapping();

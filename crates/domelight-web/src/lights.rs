@@ -84,7 +84,7 @@ fn method(name: &MethodName, refine: bool) -> Method {
 /// The file of the dome that rigs of a format name.
 fn dome_file(format: Format) -> &'static str {
     match format.dome_picture().unwrap_or(DomePicture::LatLong) {
-        DomePicture::LatLong => "dome.exr",
+        DomePicture::LatLong | DomePicture::LatLongExrOrHdr => "dome.exr",
         DomePicture::LatLongHdr => "dome.hdr",
         DomePicture::Octahedral => "dome_octahedral.exr",
     }

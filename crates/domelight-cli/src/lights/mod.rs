@@ -312,7 +312,8 @@ impl LightsArguments {
 /// The name of a picture of the dome beside its map: `dome.exr`, `dome.hdr`, `dome_octahedral.exr`.
 fn picture_path(map: &PicturePath, picture: DomePicture) -> Result<PicturePath> {
     let path = match picture {
-        DomePicture::LatLong => map.path.clone(),
+        DomePicture::LatLongExrOrHdr if is_pfm(&map.path) => map.path.with_extension("exr"),
+        DomePicture::LatLong | DomePicture::LatLongExrOrHdr => map.path.clone(),
         DomePicture::LatLongHdr => map.path.with_extension("hdr"),
         DomePicture::Octahedral => {
             let [stem, extension] = [map.path.file_stem(), map.path.extension()]
@@ -321,6 +322,10 @@ fn picture_path(map: &PicturePath, picture: DomePicture) -> Result<PicturePath> 
         }
     };
     Ok(path.to_string_lossy().parse::<PicturePath>().map_err(UsageError)?)
+}
+
+fn is_pfm(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pfm"))
 }
 
 fn measure(environment: &Environment, found: &Extraction) -> ShadingError {

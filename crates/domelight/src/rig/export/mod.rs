@@ -104,6 +104,8 @@ pub enum Format {
 pub enum DomePicture {
     /// The map itself in any HDR format.
     LatLong,
+    /// The map itself as OpenEXR or Radiance `.hdr`, for programs that read no PFM.
+    LatLongExrOrHdr,
     /// The map itself as Radiance `.hdr`.
     LatLongHdr,
     /// The map in [`Mapping::Octahedral`], in any HDR format.
@@ -114,7 +116,7 @@ impl DomePicture {
     /// The mapping of the picture, in the map's own frame.
     pub fn mapping(self) -> Mapping {
         match self {
-            Self::LatLong | Self::LatLongHdr => Mapping::LatLong,
+            Self::LatLong | Self::LatLongExrOrHdr | Self::LatLongHdr => Mapping::LatLong,
             Self::Octahedral => Mapping::Octahedral,
         }
     }
@@ -213,7 +215,8 @@ impl Format {
     pub fn dome_picture(self) -> Option<DomePicture> {
         match self {
             Self::Json | Self::Csv | Self::Gltf | Self::Glb | Self::Three => None,
-            Self::Usd | Self::Blender | Self::Mitsuba | Self::Sibl => Some(DomePicture::LatLong),
+            Self::Mitsuba | Self::Sibl => Some(DomePicture::LatLong),
+            Self::Usd | Self::Blender => Some(DomePicture::LatLongExrOrHdr),
             Self::Pbrt => Some(DomePicture::Octahedral),
             Self::Radiance => Some(DomePicture::LatLongHdr),
         }

@@ -2,7 +2,7 @@
 
 use super::Format;
 use crate::code;
-use crate::quote::{Code, Xml, javascript, pbrt, shell, xml};
+use crate::quote::{Code, Shell, Xml, javascript, pbrt, shell, xml};
 
 impl Format {
     /// The names of the programs that read files of this format.
@@ -24,8 +24,10 @@ impl Format {
     /// How to open the file: a command for a POSIX shell, or the text to add to a scene or module of the program, or
     /// otherwise a menu entry.
     pub fn how_to_open(self, file: &str) -> String {
-        let word = shell::word(file);
-        let beside = format!("./{}", file.rsplit('/').next().unwrap_or(file));
+        let word = argument(file);
+        let name = file.rsplit('/').next().unwrap_or(file);
+        let beside = format!("./{name}");
+        let is_here = file == name || file == beside;
         match self {
             Self::Json => format!("python3 -m json.tool {word}"),
             Self::Csv => format!("column -s, -t {word}"),
@@ -38,18 +40,29 @@ impl Format {
                 include.into_string()
             }
             Self::Pbrt => {
-                let name = pbrt::string(file);
-                let name = name.map_or_else(|| format!("\"{file}\""), Code::into_string);
-                format!("after WorldBegin Include {name}")
+                // pbrt looks for the dome's picture from the folder of the scene.
+                let folder = if is_here { "" } else { "in a scene in the rig's folder " };
+                let quoted = pbrt::string(name);
+                let name = quoted.map_or_else(|| format!("\"{name}\""), Code::into_string);
+                format!("{folder}after WorldBegin Include {name}")
             }
             Self::Three => {
                 let module = javascript::string(&beside).into_string();
                 format!("import {{ addRig }} from {module}; await addRig(scene)")
             }
-            Self::Radiance => format!("oconv scene.rad {word} > scene.oct"),
+            Self::Radiance => {
+                // Radiance looks for the dome's picture from the working folder.
+                let folder = if is_here { "" } else { "in the rig's folder, as for the render, " };
+                format!("{folder}oconv scene.rad {} > scene.oct", argument(name))
+            }
             Self::Sibl => "as a set of the program's sIBL loader".to_owned(),
         }
     }
+}
+
+/// A file as a word of a command: neither an option nor, for `oconv`, a command.
+fn argument(file: &str) -> Code<Shell> {
+    if file.starts_with(['-', '!']) { shell::word(&format!("./{file}")) } else { shell::word(file) }
 }
 
 #[cfg(test)]
@@ -64,8 +77,33 @@ mod tests {
             Format::Three.how_to_open("rigs/rig.js"),
             r#"import { addRig } from "./rig.js"; await addRig(scene)"#
         );
+        for (format, command) in [
+            (Format::Json, "python3 -m json.tool ./-rig"),
+            (Format::Csv, "column -s, -t ./-rig"),
+            (Format::Usd, "usdview ./-rig"),
+            (Format::Blender, "blender --python ./-rig"),
+            (Format::Radiance, "oconv scene.rad ./-rig > scene.oct"),
+        ] {
+            assert_eq!(format.how_to_open("-rig"), command);
+        }
         for format in Format::ALL {
             assert!(!format.program().is_empty() && !format.how_to_open("rig").is_empty());
         }
+    }
+
+    /// The picture of the dome is beside the rig, where these programs do not look by themselves.
+    #[test]
+    fn a_rig_in_another_folder_is_opened_there() {
+        for here in ["rig.pbrt", "./rig.pbrt"] {
+            assert_eq!(Format::Pbrt.how_to_open(here), r#"after WorldBegin Include "rig.pbrt""#);
+        }
+        assert_eq!(
+            Format::Pbrt.how_to_open("out/rig.pbrt"),
+            r#"in a scene in the rig's folder after WorldBegin Include "rig.pbrt""#
+        );
+        assert_eq!(
+            Format::Radiance.how_to_open("out/rig.rad"),
+            "in the rig's folder, as for the render, oconv scene.rad rig.rad > scene.oct"
+        );
     }
 }
