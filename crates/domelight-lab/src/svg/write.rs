@@ -2,7 +2,7 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use domelight::quote::xml;
+use domelight::quote::html;
 use std::fmt::{self, Display, Write as _};
 
 use super::font::FONT_FILE;
@@ -95,7 +95,8 @@ fn write_text(svg: &mut String, at: Point, text: &str, style: &TextStyle) -> fmt
         write!(svg, " stroke=\"{color}\" stroke-width=\"{}\"", Number(width))?;
         write!(svg, " stroke-linejoin=\"round\" paint-order=\"stroke\"")?;
     }
-    write!(svg, ">{}</text>", xml::text(text))
+    // As in the pages that contain the drawing.
+    write!(svg, ">{}</text>", html::text(text))
 }
 
 /// The family of the only font.

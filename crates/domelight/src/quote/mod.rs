@@ -209,10 +209,14 @@ fn comment_text(text: &str) -> String {
 
 /// Controls, separators of lines and paragraphs, marks of writing direction, and what is no character.
 fn is_invisible(c: char) -> bool {
-    let directs = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     c.is_control()
-        || directs
+        || directs_writing(c)
         || matches!(c, '\u{2028}' | '\u{2029}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}')
+}
+
+/// Marks of writing direction, which let text look like other text.
+fn directs_writing(c: char) -> bool {
+    matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// A literal in double quotes that JavaScript, Python, YAML and JSON read alike.
