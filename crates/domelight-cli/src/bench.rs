@@ -1,13 +1,13 @@
 //! `domelight bench`: the CPU time that strategies need to reach a given error.
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use domelight_lab::Host as _;
 use domelight_lab::bench::{self, BenchSettings, Results, Table};
 
 use crate::args::bench::{BenchArguments, Peer, Suite};
 use crate::command_line;
 use crate::compare::cache;
-use crate::error::UsageError;
+use crate::error::{Interrupted, UsageError};
 use crate::files;
 use crate::interrupt;
 use crate::output::print;
@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &BenchArguments, quiet: bool) -> Result<()> {
     let (results, done) = bench::run(&settings, host);
     show(arguments, &results, quiet)?;
     if host.canceled() {
-        bail!("interrupted; the results are partial");
+        return Err(Interrupted("interrupted; the results are partial".into()).into());
     }
     Ok(done?)
 }

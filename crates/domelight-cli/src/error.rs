@@ -13,10 +13,10 @@ pub(crate) struct UsageError(pub(crate) String);
 #[error("{0}")]
 pub(crate) struct InterruptedAndSaved(pub(crate) String);
 
-/// The work was interrupted before there was anything to keep; exit code 130.
+/// The work was interrupted and has no saved state, perhaps a picture; exit code 130.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
-pub(crate) struct InterruptedTooEarly(pub(crate) String);
+pub(crate) struct Interrupted(pub(crate) String);
 
 /// Prints a line to standard error, with terminal control characters escaped. If standard error is closed or full, the line
 /// is lost and the work continues.

@@ -2,7 +2,7 @@
 
 use crate::args::FIRST_STEPS;
 use crate::error::{
-    InterruptedAndSaved, InterruptedTooEarly, Label, UsageError, print_labeled, status_lines,
+    Interrupted, InterruptedAndSaved, Label, UsageError, print_labeled, status_lines,
 };
 use crate::interrupt::{ENDED, RUN_AGAIN};
 use crate::memory;
@@ -97,9 +97,7 @@ fn code(error: &anyhow::Error) -> u8 {
     }
     match () {
         () if error.is::<InterruptedAndSaved>() => RUN_AGAIN as u8,
-        () if error.is::<InterruptedTooEarly>() || error.chain().any(is_interruption) => {
-            ENDED as u8
-        }
+        () if error.is::<Interrupted>() || error.chain().any(is_interruption) => ENDED as u8,
         () if is_permanent && !passing => 2,
         () => 1,
     }

@@ -11,7 +11,7 @@ use domelight::strategy::PreparedStrategy;
 
 use crate::args::render::{OutputArguments, ProgressKind, RenderArguments};
 use crate::clock;
-use crate::error::{InterruptedTooEarly, UsageError, status, warn};
+use crate::error::{Interrupted, UsageError, status, warn};
 use crate::interrupt;
 use crate::memory;
 use crate::output::{self, PicturePath, print_progress, require_one_on_standard_output};
@@ -135,7 +135,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     let saved = render_run.saved();
     if rendering.counts.camera_rays == 0 && saved.is_none() {
         let text = "ended before the first sample; nothing was written".to_owned();
-        return Err(InterruptedTooEarly(text).into());
+        return Err(Interrupted(text).into());
     }
     let render = watch.lap();
 

@@ -1,13 +1,13 @@
 //! The report of a render, as JSON or as two lines of text.
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use domelight::render::{Counts, Provenance, RenderSettings, Rendering};
 use domelight_lab::report::SceneReport;
 use domelight_lab::{Acceptance, Host as _, Seconds, peak_memory};
 use serde::Serialize;
 use std::path::Path;
 
-use crate::error::{InterruptedAndSaved, status, status_lines};
+use crate::error::{Interrupted, InterruptedAndSaved, status, status_lines};
 use crate::output::{self, PicturePath};
 use crate::profile::{self, StageSeconds};
 use crate::terminal::Terminal;
@@ -181,9 +181,11 @@ impl RenderReport {
     pub(crate) fn check(&self, saved: Option<&Path>, is_part: bool, quiet: bool) -> Result<()> {
         Terminal { quiet }.warn_of_non_finite("", self.non_finite_samples);
         match (self.stopped, saved) {
-            (Some(StopReason::Interrupted), None) => {
-                bail!("interrupted; the picture so far is in {}", self.outputs.join(", "))
-            }
+            (Some(StopReason::Interrupted), None) => Err(Interrupted(format!(
+                "interrupted; the picture so far is in {}",
+                self.outputs.join(", ")
+            ))
+            .into()),
             (Some(StopReason::Interrupted), Some(saved)) => Err(InterruptedAndSaved(format!(
                 "interrupted; {} holds the state to resume from",
                 saved.display()

@@ -8,7 +8,7 @@ use domelight::scene::Camera;
 use domelight_lab::scene::PreparedScene;
 
 use crate::args::turntable::TurntableArguments;
-use crate::error::{InterruptedTooEarly, UsageError};
+use crate::error::{Interrupted, UsageError};
 use crate::output::PicturePath;
 
 /// The frames to render.
@@ -82,10 +82,7 @@ impl Turntable {
             let mut rendering = render(&view.camera_around(degrees)?)?;
             if !rendering.complete {
                 let text = format!("interrupted; {}", self.left(index));
-                if index == self.range.start {
-                    return Err(InterruptedTooEarly(text).into());
-                }
-                bail!(text);
+                return Err(Interrupted(text).into());
             }
             write(&rendering, &self.frame(index))?;
             rendering.counts += last.map_or_else(Default::default, |last| last.counts);

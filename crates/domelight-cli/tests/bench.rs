@@ -161,7 +161,7 @@ fn an_interrupt_keeps_what_is_done() {
         "x.json",
     ];
     let output = common::interrupted(&folder, &arguments);
-    refused(&output, 1, &["interrupted", "partial"]);
+    refused(&output, 130, &["interrupted", "partial"]);
     let results = fs::read_to_string(folder.path().join("x.json")).unwrap();
     let results: Value = serde_json::from_str(&results).unwrap();
     assert_eq!(results["complete"], false);

@@ -417,6 +417,27 @@ fn a_full_standard_error_does_no_harm() {
     assert_eq!(load(&folder, "domelight.png").width, 8);
 }
 
+/// Ctrl-C keeps the frames that are finished and names those that are not.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_finished_frames() {
+    use std::time::{Duration, Instant};
+    let folder = folder();
+    let scene = ["render", "sphere", "--env", "constant", "--env-rows", "32", "--size", "32x32"];
+    let turn = ["--strategy", "mis", "--spp", "64", "--turntable", "3600", "-o", "x.exr"];
+    let first = folder.path().join("x.0000.exr");
+    let first_frame = || {
+        let until = Instant::now() + Duration::from_secs(60);
+        while !first.exists() && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    };
+    let arguments = [&scene[..], &turn].concat();
+    let output = common::interrupted_after(&folder, &arguments, first_frame);
+    refused(&output, 130, &["interrupted", "finished", "-3599 renders the rest"]);
+    assert!(first.exists());
+}
+
 /// Ctrl-C ends a long render with what is there.
 #[cfg(unix)]
 #[test]
@@ -437,7 +458,7 @@ fn an_interrupt_keeps_what_is_done() {
         "x.exr",
     ];
     let output = common::interrupted(&folder, &arguments);
-    refused(&output, 1, &["interrupted", "x.exr"]);
+    refused(&output, 130, &["interrupted", "x.exr"]);
     assert_eq!(stdout(&output), "");
     assert!(load(&folder, "x.exr").pixels.iter().all(|p| p.is_finite()));
     let bytes = fs::read(folder.path().join("x.exr")).unwrap();

@@ -57,6 +57,13 @@ pub fn load_layer(folder: &TempDir, name: &str, layer: &str) -> RgbImage {
 /// What the program says and leaves when it is interrupted while it works.
 #[cfg(unix)]
 pub fn interrupted(folder: &TempDir, arguments: &[&str]) -> Output {
+    let wait = || std::thread::sleep(std::time::Duration::from_millis(1500));
+    interrupted_after(folder, arguments, wait)
+}
+
+/// The same when `wait` returns.
+#[cfg(unix)]
+pub fn interrupted_after(folder: &TempDir, arguments: &[&str], wait: impl FnOnce()) -> Output {
     use nix::sys::signal::{Signal, kill};
     use nix::unistd::Pid;
     let child = Command::new(env!("CARGO_BIN_EXE_domelight"))
@@ -67,7 +74,7 @@ pub fn interrupted(folder: &TempDir, arguments: &[&str]) -> Output {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
-    std::thread::sleep(std::time::Duration::from_millis(1500));
+    wait();
     kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).expect("the process is there");
     child.wait_with_output().expect("a child")
 }
