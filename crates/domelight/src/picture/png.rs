@@ -151,6 +151,8 @@ fn is_whole_jpeg(bytes: &[u8]) -> bool {
 /// The exponent with which a PNG encodes light, if it is not about that of sRGB: from its chunk cICP or gAMA. Color profiles
 /// and the chunk sRGB take precedence over gAMA, and cICP over all (PNG specification, 3rd edition, 4.3).
 fn stated_gamma(bytes: &[u8]) -> Result<Option<f32>, PictureErrorKind> {
+    /// 1/2.2 and .45 are written for sRGB.
+    const SRGB: std::ops::Range<f32> = 0.44..0.47;
     let mut gamma = None;
     for (name, data) in chunks(bytes) {
         match (&name, data) {
@@ -168,8 +170,6 @@ fn stated_gamma(bytes: &[u8]) -> Result<Option<f32>, PictureErrorKind> {
             _ => {}
         }
     }
-    /// 1/2.2 and .45 are written for sRGB.
-    const SRGB: std::ops::Range<f32> = 0.44..0.47;
     let stated = gamma.flatten();
     Ok(stated.filter(|gamma| (0.01..100.0).contains(gamma) && !SRGB.contains(gamma)))
 }

@@ -480,7 +480,9 @@ impl Planes {
     fn into_image(self, matrix: Option<crate::math::Mat3>) -> (RgbImage, Option<Vec<f32>>) {
         let mut pixels = self.pixels;
         if let Some(matrix) = matrix {
-            pixels.iter_mut().for_each(|pixel| *pixel = to_light(&matrix, *pixel));
+            for pixel in &mut pixels {
+                *pixel = to_light(&matrix, *pixel);
+            }
         }
         (RgbImage::new(self.width, self.height, pixels), self.alpha)
     }
