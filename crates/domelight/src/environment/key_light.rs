@@ -22,8 +22,8 @@ const BESIDE_CAMERA: f32 = -45.0;
 /// lat-long map comes from the left of a camera: 45° around the up axis from the direction `toward_camera`, which may
 /// have any length.
 ///
-/// The key light is the sun of the map or, without a sun that gives a tenth of the light, the direction in the plane of the horizon from which most
-/// light comes. Maps without such a direction are not rotated.
+/// The key light is the sun of the map or, without a sun that gives a tenth of the light, the direction in the plane of
+/// the horizon from which most light comes. Maps without such a direction are not rotated.
 ///
 /// # Panics
 /// If the map has no texels.
