@@ -5,6 +5,7 @@ use numpy::{
     Element, IntoPyArray as _, PyArrayDyn, PyArrayMethods as _, PyReadonlyArrayDyn,
     PyUntypedArrayMethods as _,
 };
+use pyo3::basic::CompareOp;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -21,6 +22,23 @@ impl<'py> Floats<'py> {
     pub(crate) fn new(name: &'static str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
         let array = as_array(name, value, "float32", "fiub", "real numbers")?;
         Ok(Self { name, array: array.cast_into::<PyArrayDyn<f32>>()?.try_readonly()? })
+    }
+
+    /// Like [`Self::new`], for uniform numbers: those below 1 that single precision would round to 1 become the largest
+    /// number below 1.
+    pub(crate) fn uniform_numbers(name: &'static str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let floats = Self::new(name, value)?;
+        if !floats.values()?.contains(&1.0) {
+            return Ok(floats);
+        }
+        let is_below = given_array(name, value, "real numbers")?.rich_compare(1, CompareOp::Lt)?;
+        let is_below = Self::new(name, &is_below)?;
+        let below = |(&x, &is_below): (&f32, &f32)| {
+            if is_below == 1.0 { x.min(1f32.next_down()) } else { x }
+        };
+        let values = floats.values()?.iter().zip(is_below.values()?).map(below).collect();
+        let array = array(value.py(), values, floats.shape())?.try_readonly()?;
+        Ok(Self { name, array })
     }
 
     pub(crate) fn shape(&self) -> &[usize] {
@@ -92,12 +110,10 @@ impl<'py> Floats<'py> {
     }
 }
 
-/// `numpy.asarray` in C order, for numbers of the given kinds.
-fn as_array<'py>(
+/// `numpy.asarray`, also for objects that only export DLPack.
+fn given_array<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
-    dtype: &str,
-    kinds: &str,
     what: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = value.py();
@@ -110,11 +126,23 @@ fn as_array<'py>(
     } else {
         numpy.call_method1("asarray", (value,))
     };
-    let array = array.map_err(|error| {
+    array.map_err(|error| {
         let wrong = bad_value(format!("{name} is no array of {what}: {error}"));
         wrong.set_cause(py, Some(error));
         wrong
-    })?;
+    })
+}
+
+/// `numpy.asarray` in C order, for numbers of the given kinds.
+fn as_array<'py>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+    dtype: &str,
+    kinds: &str,
+    what: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = value.py();
+    let array = given_array(name, value, what)?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     // NumPy converts an empty list to an array of doubles.
     let is_empty = array.getattr("size")?.extract::<usize>()? == 0;
@@ -126,7 +154,7 @@ fn as_array<'py>(
     let arguments = PyDict::new(py);
     arguments.set_item("dtype", dtype)?;
     arguments.set_item("order", "C")?;
-    numpy.call_method("asarray", (array,), Some(&arguments))
+    py.import("numpy")?.call_method("asarray", (array,), Some(&arguments))
 }
 
 /// Indices, each below `end`, and their shape.
@@ -188,6 +216,11 @@ impl<'a, const A: usize, const B: usize> Pairs<'a, A, B> {
         let at = |len: usize, i: usize| if len == 1 { 0 } else { i };
         (0..n).map(move |i| (self.a[at(self.a.len(), i)], self.b[at(self.b.len(), i)]))
     }
+}
+
+/// The bits of a number, the same for both zeros, which are equal.
+pub(crate) fn hashable(x: f32) -> u32 {
+    (x + 0.0).to_bits()
 }
 
 /// An array of any shape.

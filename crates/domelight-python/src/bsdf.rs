@@ -80,7 +80,7 @@ impl Bsdf {
     ///     `eval(wo, wi)` takes two arrays (N, 3) of local directions above the surface and returns f_r * cos(theta_i)
     ///     [sr^-1], nonnegative, as (N, 3) or (N,).
     /// pdf : callable, optional
-    ///     `pdf(wo, wi)` returns the density of `sample` [sr^-1], (N,), positive wherever the value is.
+    ///     `pdf(wo, wi)` returns the density of `sample` [sr^-1], (N,), finite, and positive wherever the value is.
     /// sample : callable, optional
     ///     `sample(wo, u)` takes uniform numbers (N, 3) and returns directions (N, 3); directions below the surface are
     ///     samples with value 0. Without `pdf` and `sample`, directions are cosine-weighted.
@@ -94,7 +94,8 @@ impl Bsdf {
     /// Notes
     /// -----
     /// Strategies written in Python evaluate such a BSDF for all points of a tile at once; built-in strategies call it
-    /// for one direction at a time, which is slow. The functions are kept until the program ends.
+    /// for one direction at a time, which is slow. For that reason, 'sir' without a number of candidates draws 16 for
+    /// each ray instead of measuring which number is best. The functions are kept until the program ends.
     #[classmethod]
     #[pyo3(signature = (eval, pdf = None, sample = None, *, albedo = None, max_eval = None, roughness = None))]
     fn custom(
@@ -223,7 +224,7 @@ impl Bsdf {
         u: &Bound<'py, PyAny>,
     ) -> PyResult<(FloatArray<'py>, FloatArray<'py>, FloatArray<'py>)> {
         let py = wo.py();
-        let (wo, u) = (Floats::new("wo", wo)?, Floats::new("u", u)?);
+        let (wo, u) = (Floats::new("wo", wo)?, Floats::uniform_numbers("u", u)?);
         let (directions, numbers, lead) = if u.shape().last() == Some(&2) {
             if self.inner.lobes().count() > 1 {
                 return Err(u.bad_shape("(…, 3): the third number chooses among the lobes"));

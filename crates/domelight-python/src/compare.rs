@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{array, from_image};
-use crate::engine::{caught, pool, wait};
+use crate::engine::{caught, wait};
 use crate::environment::Environment;
 use crate::error::{bad_value, from_source, warn};
 use crate::render::{Choice, Job, Keywords, choose};
@@ -21,7 +21,6 @@ use crate::scene::{CameraLike, Scene};
 /// Ends the work on a signal or after a Python function has raised, and keeps the warnings.
 struct PythonHost<'a> {
     job: &'a Job,
-    choices: &'a [(String, Choice)],
     cancel: &'a AtomicBool,
     warnings: Mutex<Vec<String>>,
     /// The finished fraction, in [0, 1], and the current step.
@@ -53,11 +52,7 @@ impl Host for PythonHost<'_> {
     }
 
     fn canceled(&self) -> bool {
-        let failed =
-            |(_, choice): &(String, Choice)| matches!(choice, Choice::Python(s) if s.has_failed());
-        self.cancel.load(Ordering::Relaxed)
-            || self.job.has_failed()
-            || self.choices.iter().any(failed)
+        self.cancel.load(Ordering::Relaxed) || self.job.failure().has_failed()
     }
 }
 
@@ -113,7 +108,6 @@ pub(crate) fn compare<'py>(
     let cancel = &AtomicBool::new(false);
     let host = &PythonHost {
         job,
-        choices,
         cancel,
         warnings: Mutex::new(Vec::new()),
         state: Mutex::new((0.0, String::new())),
@@ -150,18 +144,14 @@ pub(crate) fn compare<'py>(
         std::thread::scope(|scope| {
             let (sender, results) = mpsc::channel();
             scope.spawn(move || {
-                let compared = pool(job.n_threads()).and_then(|pool| caught(|| pool.install(run)));
+                let compared = job.pool().and_then(|pool| caught(|| pool.install(run)));
                 // The receiver is still waiting.
                 let _ = sender.send(compared);
             });
             wait(&results, cancel, &report_progress)
         })
     })?;
-    let of_choices = choices.iter().find_map(|(_, choice)| match choice {
-        Choice::Python(strategy) => strategy.take_failure(),
-        Choice::Builtin(_) => None,
-    });
-    if let Some(error) = job.take_failure().or(of_choices).or(stopped) {
+    if let Some(error) = job.failure().take().or(stopped) {
         return Err(error);
     }
     let result = result?.map_err(|e| from_source(&e))?;

@@ -5,6 +5,7 @@
 //! wait for it forever.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
@@ -14,6 +15,7 @@ use pyo3::prelude::*;
 use rayon::ThreadPool;
 
 use crate::error::{bad_value, from_panic};
+use crate::failure::Failure;
 
 /// The interval at which a waiting call checks for signals and reports progress.
 const POLL: Duration = Duration::from_millis(10);
@@ -27,9 +29,11 @@ pub(crate) fn n_threads(asked: Option<usize>) -> PyResult<usize> {
     }
 }
 
-/// A thread pool.
-pub(crate) fn pool(n_threads: usize) -> PyResult<ThreadPool> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build();
+/// A thread pool whose threads report exceptions of Python functions to `failure`.
+pub(crate) fn pool(n_threads: usize, failure: &Arc<Failure>) -> PyResult<ThreadPool> {
+    let failure = failure.clone();
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(n_threads);
+    let pool = builder.start_handler(move |_| failure.watch_thread()).build();
     pool.map_err(|error| PyRuntimeError::new_err(format!("cannot start the threads: {error}")))
 }
 
@@ -51,8 +55,10 @@ pub(crate) fn parallel_on<T: Send>(
 ) -> PyResult<T> {
     let n = n_threads(threads)?;
     py.detach(|| {
-        let pool = pool(n)?;
-        caught(|| pool.install(f))
+        let failure = Arc::new(Failure::default());
+        let pool = pool(n, &failure)?;
+        let result = caught(|| pool.install(f));
+        failure.take().map_or(result, Err)
     })
 }
 

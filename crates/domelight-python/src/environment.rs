@@ -438,7 +438,9 @@ impl Environment {
     ) -> PyResult<Self> {
         let orientation = Orientation { up: up_axis(up)?, rotation };
         let map = image(&Floats::new("map", map)?)?;
-        Self::build(cls.py(), map, orientation, unit as f32, name)
+        let inner =
+            parallel(cls.py(), || environment::Environment::from_units(map, orientation, unit))?;
+        Ok(Self { inner: Arc::new(inner.map_err(to_python)?), name })
     }
 }
 
@@ -456,7 +458,7 @@ fn samples<'py>(
     draw: impl Fn([f32; 2]) -> Option<EnvironmentSample> + Send + Sync,
 ) -> PyResult<Samples<'py>> {
     let py = u.py();
-    let u = Floats::new("u", u)?;
+    let u = Floats::uniform_numbers("u", u)?;
     let (points, lead) = u.uniform::<2>()?;
     let (wi, (le, pdf)): (Vec<_>, (Vec<_>, Vec<_>)) = alone(py, || {
         let drawn = points.iter().map(|&u| match draw(u) {

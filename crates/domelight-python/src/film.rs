@@ -1,5 +1,6 @@
 //! Films: rendered pictures in layers.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -17,7 +18,7 @@ use pyo3::exceptions::{PyImportError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
 
-use crate::arrays::{array, from_image, rows};
+use crate::arrays::{array, from_image, hashable, rows};
 use crate::engine::parallel;
 use crate::error::{bad_value, from_source, to_python};
 use crate::picture::{Format, depth, into_io, to_png, tone, write_image};
@@ -351,8 +352,12 @@ impl Film {
         })
     }
 
-    fn __hash__(slf: &Bound<'_, Self>) -> usize {
-        slf.as_ptr() as usize >> 4
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        (self.shape(), self.n_samples).hash(&mut hasher);
+        let color = &self.layers().color.pixels;
+        color.iter().for_each(|c| c.to_array().map(hashable).hash(&mut hasher));
+        hasher.finish()
     }
 
     fn __repr__(&self) -> String {

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{array, rows};
-use crate::engine::parallel_on;
+use crate::engine::caught;
 use crate::environment::Environment;
 use crate::error::{bad_value, from_source, to_python};
 use crate::render::{Choice, Job, Keywords, choose};
@@ -67,7 +67,7 @@ pub(crate) fn inspect<'py>(
         .into_iter()
         .map(|(name, strategy)| Ok((name, choose(&strategy, 1, lobes)?)))
         .collect::<PyResult<Vec<_>>>()?;
-    let found = parallel_on(py, threads, || -> PyResult<Found> {
+    let inspect = || -> PyResult<Found> {
         let inspector = job.inspector(pixel).map_err(|e| from_source(&e))?;
         let one = |(name, choice): &(String, Choice)| match choice {
             Choice::Builtin(spec) => {
@@ -78,8 +78,7 @@ pub(crate) fn inspect<'py>(
             }
             Choice::Python(strategy) => {
                 let directions = inspector.directions(strategy, resolution);
-                let decomposition = inspector.decompose(name, strategy);
-                strategy.take_failure().map_or(Ok((decomposition, directions)), Err)
+                Ok((inspector.decompose(name, strategy), directions))
             }
         };
         Ok(Found {
@@ -87,8 +86,12 @@ pub(crate) fn inspect<'py>(
             hemisphere: inspector.hemisphere(resolution),
             strategies: choices.iter().map(one).collect::<PyResult<_>>()?,
         })
-    })?;
-    if let Some(error) = job.take_failure() {
+    };
+    let found = py.detach(|| {
+        let pool = job.pool()?;
+        caught(|| pool.install(inspect))?
+    });
+    if let Some(error) = job.failure().take() {
         return Err(error);
     }
     found?.into_dict(py, resolution)

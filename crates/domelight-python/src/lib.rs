@@ -9,6 +9,7 @@ mod compare;
 mod engine;
 mod environment;
 mod error;
+mod failure;
 mod film;
 mod inspect;
 mod lobe;

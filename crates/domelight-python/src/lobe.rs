@@ -1,7 +1,5 @@
 //! Reflectance written in Python.
 
-use std::sync::{Mutex, PoisonError};
-
 use domelight::Rgb;
 use domelight::bsdf::{Bxdf, CustomLobe};
 use domelight::math::{FRAC_1_PI, Vec2, Vec3};
@@ -10,6 +8,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Floats, rows, shape_text};
 use crate::error::bad_value;
+use crate::failure::or_report;
 
 /// A lobe with Python functions, which take and return arrays with one row per pair of directions.
 #[derive(Debug)]
@@ -20,8 +19,6 @@ pub(crate) struct PythonLobe {
     albedo: Rgb,
     max_eval: Option<f32>,
     roughness: Option<f32>,
-    /// The first exception raised where it could not be propagated.
-    failure: Mutex<Option<PyErr>>,
 }
 
 impl PythonLobe {
@@ -33,8 +30,7 @@ impl PythonLobe {
         max_eval: Option<f32>,
         roughness: Option<f32>,
     ) -> &'static Self {
-        let failure = Mutex::new(None);
-        Box::leak(Box::new(Self { eval, sampling, albedo, max_eval, roughness, failure }))
+        Box::leak(Box::new(Self { eval, sampling, albedo, max_eval, roughness }))
     }
 
     /// Whether a lobe of the library is this one.
@@ -45,16 +41,6 @@ impl PythonLobe {
     /// Whether its values have an upper bound.
     pub(crate) fn has_bound(&self) -> bool {
         self.max_eval.is_some()
-    }
-
-    /// The exception raised since the last call, if any.
-    pub(crate) fn take_failure(&self) -> Option<PyErr> {
-        self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
-    }
-
-    /// Whether a call has failed.
-    pub(crate) fn has_failed(&self) -> bool {
-        self.failure.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 
     /// Values f_r · cos θ_i and densities of pairs of local directions; zero below the surface.
@@ -107,17 +93,6 @@ impl PythonLobe {
         }
         Ok(directions.to_vec())
     }
-
-    /// The result of a call, or a default if it raised; keeps the exception for later.
-    fn or_failed<T>(&self, default: T, call: impl FnOnce(Python<'_>) -> PyResult<T>) -> T {
-        if self.has_failed() {
-            return default;
-        }
-        Python::attach(call).unwrap_or_else(|error| {
-            *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-            default
-        })
-    }
 }
 
 /// The cosine below which a direction is at the surface, as in the library.
@@ -142,27 +117,30 @@ fn numbers(name: &'static str, value: &Bound<'_, PyAny>, n: usize) -> PyResult<V
     if floats.shape() != [n] {
         return Err(floats.bad_shape(&shape_text(&[n])));
     }
-    if let Some(bad) = floats.values()?.iter().find(|x| x.is_nan() || **x < 0.0) {
-        return Err(bad_value(format!("{name} holds {bad}; densities are not negative")));
+    if let Some(bad) = floats.values()?.iter().find(|x| !(x.is_finite() && **x >= 0.0)) {
+        return Err(bad_value(format!(
+            "{name} holds {bad}; densities are finite and not negative"
+        )));
     }
     Ok(floats.values()?.to_vec())
 }
 
 impl Bxdf for PythonLobe {
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        self.or_failed((Rgb::BLACK, 0.0), |py| {
+        let result = or_report(|py| {
             let (values, densities) = self.eval_pdf_rows(py, &[wo.to_array()], &[wi.to_array()])?;
             Ok((values[0], densities[0]))
-        })
+        });
+        result.unwrap_or((Rgb::BLACK, 0.0))
     }
 
     fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<Vec3> {
         if self.sampling.is_none() {
             return Some(cosine_hemisphere(u));
         }
-        self.or_failed(None, |py| {
+        or_report(|py| {
             let drawn = self.sample_rows(py, &[wo.to_array()], &[[u.x, u.y, u_lobe]])?;
-            Ok(Some(drawn[0].into()))
+            Ok(drawn[0].into())
         })
     }
 

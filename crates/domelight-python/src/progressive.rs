@@ -5,12 +5,12 @@ use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use domelight::render::Renderer;
+use domelight::render::{Observer as _, Renderer};
 use domelight::strategy::Strategy;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-use crate::engine::{caught, pool, wait};
+use crate::engine::{caught, wait};
 use crate::environment::Environment;
 use crate::film::Film;
 use crate::render::{Job, Keywords, Visitor, Watch, interrupted, warn_of};
@@ -21,7 +21,8 @@ type Step = PyResult<Option<Film>>;
 
 /// A progressive render: each `next` renders a pass and returns a film of all samples so far.
 ///
-/// It runs on its own thread and is idle between calls. After an interruption, the next call continues.
+/// It runs on its own thread and is idle between calls. After an interruption, the next call continues; after an
+/// exception of a strategy or BSDF, there are no more films.
 #[pyclass(frozen, module = "domelight")]
 pub(crate) struct Progressive {
     job: Arc<Job>,
@@ -60,6 +61,12 @@ impl Visitor for Steps<'_> {
             }
             let step = caught(|| {
                 renderer.step_with(&watch);
+                let is_due = |renderer: &Renderer<S>| {
+                    renderer.least_samples().is_power_of_two() || renderer.is_complete()
+                };
+                while job.joins_passes() && !is_due(&renderer) && !watch.canceled() {
+                    renderer.step_with(&watch);
+                }
                 Some(job.film(&renderer))
             });
             let _ = answers.send(step);
@@ -85,6 +92,9 @@ impl Progressive {
                 "this render was begun before the process was forked",
             ));
         }
+        if self.job.failure().has_failed() {
+            return Ok(None);
+        }
         let (result, stopped) = py.detach(|| {
             let answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
             self.cancel.store(false, Ordering::Relaxed);
@@ -92,10 +102,13 @@ impl Progressive {
             let _ = self.questions.send(());
             wait(&answers, &self.cancel, &|py| self.report(py, self.job.share(&self.done)))
         })?;
-        if let Some(error) = self.job.take_failure() {
+        // Any error ends the render.
+        let failure = self.job.failure();
+        let film = result.map_err(|error| failure.report(error)).ok().flatten();
+        if let Some(error) = failure.take() {
             return Err(error);
         }
-        let Some(film) = result? else { return Ok(None) };
+        let Some(film) = film.filter(|_| !failure.has_failed()) else { return Ok(None) };
         if let Some(error) = stopped {
             return Err(interrupted(py, error, film)?);
         }
@@ -123,8 +136,8 @@ impl Progressive {
 /// scene, env, strategy, spp, size, seed, threads, camera, filter, sampler, hide_env, adaptive, target_error, tile_size
 ///     As in `render`.
 /// passes : {'doubling', 'efficient'}, default 'doubling'
-///     As in `render`: films after 1, 2, 4, 8, … samples, with 'product' at least every 64 samples; or the passes that
-///     suit the strategy best.
+///     As in `render`: films after 1, 2, 4, 8, … samples, with 'product' at least every 64 samples; or after the passes
+///     that suit the strategy best, as always with `target_error`.
 /// progress : bool or callable, default False
 ///     As in `render`; the fraction refers to all samples.
 ///
@@ -185,8 +198,8 @@ pub(crate) fn progressive<'py>(
     let body = move || {
         let (job, cancel, done) = (&*on_thread.0, &*on_thread.1, &*on_thread.2);
         let steps = Steps { job, cancel, done, questions, answers: answers.clone() };
-        let served = pool(job.n_threads())
-            .and_then(|pool| caught(|| pool.install(|| job.with_renderer(steps)))?);
+        let served =
+            job.pool().and_then(|pool| caught(|| pool.install(|| job.with_renderer(steps)))?);
         if let Err(error) = served {
             let _ = answers.send(Err(error));
         }

@@ -18,10 +18,12 @@ use domelight_lab::report::{CameraReport, EnvironmentReport, SceneReport};
 use domelight_lab::scene::PreparedSceneRef;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
+use rayon::ThreadPool;
 
 use crate::engine::{caught, n_threads, pool, wait};
 use crate::environment::Environment;
 use crate::error::{RenderInterrupted, bad_value, from_source, to_python, warn};
+use crate::failure::Failure;
 use crate::film::{Film, Making, automatic_exposure_of};
 use crate::lobe::PythonLobe;
 use crate::scene::{CameraLike, Scene, SceneData, size};
@@ -52,6 +54,8 @@ pub(crate) struct Job {
     chosen: OnceLock<StrategySpec>,
     /// The exposure of all films [stops].
     exposure: OnceLock<f32>,
+    /// The exception of a Python function, if any.
+    failure: Arc<Failure>,
 }
 
 /// The keyword arguments of `render` and `progressive`.
@@ -155,6 +159,7 @@ impl Job {
             n_threads,
             chosen: OnceLock::new(),
             exposure: OnceLock::new(),
+            failure: Arc::default(),
         })
     }
 
@@ -259,9 +264,9 @@ impl Job {
         &self.environment
     }
 
-    /// The number of threads.
-    pub(crate) fn n_threads(&self) -> usize {
-        self.n_threads
+    /// The threads that render.
+    pub(crate) fn pool(&self) -> PyResult<ThreadPool> {
+        pool(self.n_threads, &self.failure)
     }
 
     /// The number of camera samples of all pixels.
@@ -275,21 +280,21 @@ impl Job {
         (done.load(Ordering::Relaxed) as f64 / self.total_samples().max(1) as f64).min(1.0)
     }
 
-    /// The exception raised by Python functions during the render, if any.
-    pub(crate) fn take_failure(&self) -> Option<PyErr> {
-        let of_strategy = match &self.strategy {
-            Choice::Builtin(_) => None,
-            Choice::Python(strategy) => strategy.take_failure(),
+    /// Whether a progressive render joins passes until its samples have doubled. Passes of strategies with many rays are
+    /// short. Those of product sampling are worth a film each, and a target error has passes of its own.
+    pub(crate) fn joins_passes(&self) -> bool {
+        let kind = match &self.strategy {
+            Choice::Builtin(spec) => Some(spec.kind()),
+            Choice::Python(_) => None,
         };
-        // Take all of them, so that no failure shows up in a later render.
-        let of_lobes = self.scene.lobes.iter().filter_map(|lobe| lobe.take_failure());
-        of_lobes.fold(of_strategy, |first, next| first.or(Some(next)))
+        self.settings.passes == Passes::Doubling
+            && self.settings.target_error.is_none()
+            && kind != Some(StrategyKind::Product)
     }
 
-    /// Whether a Python function has raised.
-    pub(crate) fn has_failed(&self) -> bool {
-        let strategy = matches!(&self.strategy, Choice::Python(strategy) if strategy.has_failed());
-        strategy || self.scene.lobes.iter().any(|lobe| lobe.has_failed())
+    /// What has failed, if anything.
+    pub(crate) fn failure(&self) -> &Failure {
+        &self.failure
     }
 }
 
@@ -313,6 +318,7 @@ pub(crate) fn choose(
     };
     let spec: StrategySpec =
         text.parse().map_err(|e: domelight::strategy::StrategyError| to_python(e))?;
+    let spec = if lobes.is_empty() { spec } else { without_pilot(spec) };
     let n_points = spec.points_per_sample();
     if u64::from(spp) * u64::from(n_points) > 1 << 32 {
         return Err(bad_value(format!(
@@ -323,6 +329,19 @@ pub(crate) fn choose(
         return Err(bad_value("rejection needs the max_eval of a BSDF of one's own"));
     }
     Ok(Choice::Builtin(spec))
+}
+
+/// Sets the number of SIR candidates if it was left open. A pilot would call Python's BSDFs direction by direction, for a
+/// minute, before the render can be interrupted.
+fn without_pilot(spec: StrategySpec) -> StrategySpec {
+    const CANDIDATES_PER_RAY: u32 = 16;
+    match spec {
+        StrategySpec::Sir { n_candidates: None, n_samples, candidates, resampling } => {
+            let n_candidates = Some(n_samples * CANDIDATES_PER_RAY);
+            StrategySpec::Sir { n_candidates, n_samples, candidates, resampling }
+        }
+        other => other,
+    }
 }
 
 /// Rejects a picture that does not fit into memory, before the allocator ends the process.
@@ -360,7 +379,7 @@ impl Observer for Watch<'_> {
     fn canceled(&self) -> bool {
         let is_late = || self.end.is_some_and(|end| Instant::now() >= end);
         self.cancel.load(Ordering::Relaxed)
-            || self.job.has_failed()
+            || self.job.failure().has_failed()
             || (self.done.load(Ordering::Relaxed) > 0 && is_late())
     }
 }
@@ -518,7 +537,7 @@ pub(crate) fn render<'py>(
         std::thread::scope(|scope| {
             let (sender, results) = mpsc::channel();
             scope.spawn(move || {
-                let rendered = pool(job.n_threads()).and_then(|pool| {
+                let rendered = job.pool().and_then(|pool| {
                     let watch = Watch { job, cancel, done, end: None };
                     let visitor = ToTheEnd { job, watch, time };
                     caught(|| pool.install(|| job.with_renderer(visitor)))?
@@ -529,7 +548,7 @@ pub(crate) fn render<'py>(
             wait(&results, cancel, &report)
         })
     })?;
-    if let Some(error) = job.take_failure() {
+    if let Some(error) = job.failure().take() {
         return Err(error);
     }
     let film = result?;

@@ -1,5 +1,6 @@
 //! Light rigs.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -19,7 +20,7 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
-use crate::arrays::{Floats, array, indices, rows};
+use crate::arrays::{Floats, array, hashable, indices, rows};
 use crate::engine::{parallel, parallel_on};
 use crate::environment::{Environment, up_axis, up_name};
 use crate::error::{bad_value, from_source, to_python};
@@ -227,8 +228,12 @@ impl Rig {
         })
     }
 
-    fn __hash__(slf: &Bound<'_, Self>) -> usize {
-        slf.as_ptr() as usize >> 4
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.inner.labels.hash(&mut hasher);
+        let irradiance = self.inner.lights.iter().map(|light| light.irradiance);
+        irradiance.for_each(|e| e.to_array().map(hashable).hash(&mut hasher));
+        hasher.finish()
     }
 
     fn __repr__(&self) -> String {

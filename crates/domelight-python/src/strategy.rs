@@ -1,8 +1,5 @@
 //! Strategies written in Python.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
-
 use domelight::Rgb;
 use domelight::bsdf::Lobe;
 use domelight::math::{Vec2, Vec3};
@@ -14,6 +11,7 @@ use pyo3::prelude::*;
 use crate::arrays::{Floats, array, indices, rows, shape_text};
 use crate::engine::alone;
 use crate::error::bad_value;
+use crate::failure::or_report;
 use crate::lobe::{PythonLobe, colors};
 
 /// The shading points of a tile, passed to strategies written in Python.
@@ -259,7 +257,7 @@ impl ShadingPoints {
         index: Option<Bound<'py, PyAny>>,
     ) -> PyResult<(FloatArray<'py>, FloatArray<'py>, FloatArray<'py>)> {
         let py = u.py();
-        let u = Floats::new("u", u)?;
+        let u = Floats::uniform_numbers("u", u)?;
         let (numbers, lead) = if u.shape().last() == Some(&4) {
             let (numbers, lead) = u.uniform::<4>()?;
             (numbers.iter().map(|&[x, y, z, _]| [x, y, z]).collect::<Vec<_>>(), lead)
@@ -319,8 +317,6 @@ pub(crate) struct PythonStrategy {
     function: Py<PyAny>,
     n_rays: u32,
     lobes: Vec<&'static PythonLobe>,
-    failure: Mutex<Option<PyErr>>,
-    failed: AtomicBool,
 }
 
 impl PythonStrategy {
@@ -342,18 +338,7 @@ impl PythonStrategy {
                 })?
             }
         };
-        let (failure, failed) = (Mutex::new(None), AtomicBool::new(false));
-        Ok(Self { function: function.unbind(), n_rays, lobes, failure, failed })
-    }
-
-    /// Whether a call has raised.
-    pub(crate) fn has_failed(&self) -> bool {
-        self.failed.load(Ordering::Relaxed)
-    }
-
-    /// The exception of the first failed call, if any.
-    pub(crate) fn take_failure(&self) -> Option<PyErr> {
-        self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
+        Ok(Self { function: function.unbind(), n_rays, lobes })
     }
 
     /// Calls the function and converts its result.
@@ -447,13 +432,11 @@ impl Strategy for PythonStrategy {
     fn begin_pass(&self, _: Sampler, _: u32) {}
 
     fn push(&self, (): &(), tile: &TileShading, _round: u32, (): &mut (), out: &mut Contributions) {
-        if tile.points.is_empty() || self.has_failed() {
+        if tile.points.is_empty() {
             return;
         }
-        if let Err(error) = Python::attach(|py| self.call(py, tile, out)) {
+        if or_report(|py| self.call(py, tile, out)).is_none() {
             out.reset(tile.points.len());
-            self.failed.store(true, Ordering::Relaxed);
-            self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
         }
     }
 }

@@ -1,6 +1,8 @@
 """BSDFs, the library's and one's own."""
 
+import itertools
 import pickle
+import threading
 
 import numpy as np
 import pytest
@@ -103,6 +105,60 @@ def test_a_function_that_raises_ends_the_render(env):
         dl.render(shapes, env, "brdf", spp=1, size=(8, 8))
 
 
+@pytest.mark.parametrize("strategy", ["environment", "python"])
+def test_a_failure_ends_its_render_and_no_other(env, strategy):
+    """Two threads render the same scene; one call fails."""
+    chosen = dl.strategies.Environment(env) if strategy == "python" else strategy
+    settings = dict(strategy=chosen, size=(32, 32), threads=1, tile_size=16)
+    calls, results = itertools.count(), {}
+
+    def once(wo, wi):
+        if next(calls) == (4 if strategy == "python" else 1000):
+            raise KeyError("my own")
+        return np.maximum(wi[:, 2], 0) * 0.6 / np.pi
+
+    scene = dl.Scene.builtin("sphere", material=dl.Bsdf.custom(once))
+
+    def work(seed):
+        try:
+            results[seed] = dl.render(scene, env, seed=seed, spp=2, **settings)
+        except KeyError as error:
+            results[seed] = error
+
+    threads = [threading.Thread(target=work, args=(seed,)) for seed in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [type(result) for result in results.values()].count(KeyError) == 1
+    for seed, result in results.items():
+        # The function does not raise again.
+        if isinstance(result, dl.Film):
+            assert result == dl.render(scene, env, seed=seed, spp=2, **settings)
+
+
+def test_progressive_ends_with_a_failure(env):
+    for strategy in ("brdf", dl.strategies.Environment(env)):
+        calls = itertools.count()
+
+        def once(wo, wi):
+            if next(calls) == 2:
+                raise KeyError("my own")
+            return wi[:, 2] * 0.6 / np.pi
+
+        scene = dl.Scene.builtin("sphere", material=dl.Bsdf.custom(once))
+        steps = dl.progressive(scene, env, strategy, spp=64, size=(16, 16), threads=1)
+        with pytest.raises(KeyError, match="my own"):
+            list(steps)
+        assert list(steps) == []
+
+
+def test_candidates_are_not_measured(env):
+    """The pilot would take a minute."""
+    film = dl.render(dl.Scene.builtin("sphere", material=diffuse()), env, "sir:2", spp=1, size=(4, 4))
+    assert film.strategy == "sir:2/32"
+
+
 def test_wrong_functions_are_refused(env):
     with pytest.raises(ValueError, match="eval is 3"):
         dl.Bsdf.custom(3)
@@ -111,6 +167,11 @@ def test_wrong_functions_are_refused(env):
     with pytest.raises(ValueError, match="albedo"):
         dl.Bsdf.custom(len, albedo=2)
     unbounded = dl.Scene.builtin("sphere", material=dl.Bsdf.custom(lambda wo, wi: wi[:, 2]))
+    for value in (np.inf, np.nan, -1):
+        pdf = lambda wo, wi: np.full(len(wi), value)
+        endless = dl.Scene.builtin("sphere", material=dl.Bsdf.custom(lambda wo, wi: wi[:, 2], pdf, lambda wo, u: wo))
+        with pytest.raises(ValueError, match="finite and not negative"):
+            dl.render(endless, env, "brdf", spp=1, size=(8, 8))
     with pytest.raises(ValueError, match="max_eval"):
         dl.render(unbounded, env, "rejection", spp=1, size=(8, 8))
 

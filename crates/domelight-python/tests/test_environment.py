@@ -57,6 +57,10 @@ def test_extreme_maps_keep_their_radiance(factor, rng):
     wi, radiance, pdf = env.sample(rng.random((100, 2)))
     assert np.array_equal(radiance, env.radiance(wi)) and np.all(pdf > 0)
     assert np.array_equal(pickle.loads(pickle.dumps(env)).map, env.map)
+    # The unit is beyond single precision.
+    for scaled in (env.scaled(factor), env.scaled(factor).scaled(factor)):
+        other = pickle.loads(pickle.dumps(scaled))
+        assert other.power == scaled.power > 0 and np.array_equal(other.map, scaled.map)
 
 
 def test_environments_are_pickled_and_copied(env):
@@ -96,6 +100,12 @@ def test_uniform_numbers_are_checked(env):
             env.sample([[0.5, 0.5], [value, 0.5]])
     with pytest.raises(ValueError, match=r"u has shape \(3,\)"):
         env.sample([0.1, 0.2, 0.3])
+    # In single precision these would be 1.
+    almost_one, largest = 1 - 2.0**-30, np.float32(1) - np.float32(2) ** -24
+    for drawn, expected in zip(env.sample([[almost_one, 0.5]]), env.sample([[largest, 0.5]])):
+        assert np.array_equal(drawn, expected)
+    with pytest.raises(ValueError, match=r"u\[1, 0\]"):
+        env.sample([[almost_one, 0.5], [1.0, 0.5]])
 
 
 def test_repairs_are_warnings(tmp_path):

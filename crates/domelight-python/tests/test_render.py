@@ -107,6 +107,7 @@ def test_threads_and_tiles_change_no_bit(sphere, env):
     assert films[0] != dl.render(sphere, env, "mis", seed=1, **SMALL)
     product = [dl.render(sphere, env, threads=t, **SMALL) for t in (1, 2)]
     assert product[0] == product[1]
+    assert len({*films, *product}) == 2
 
 
 @pytest.mark.parametrize("strategy", ["product:4", "environment:2", "sir"])
@@ -125,6 +126,12 @@ def test_progressive_films_of_product_double(sphere, env):
     films = list(dl.progressive(sphere, env, "product:4", spp=16, size=(24, 24), adaptive=False))
     # Some pixels have a second set, which shows the variance.
     assert [film["samples"].mean() for film in films] == pytest.approx([1, 2, 4, 8, 16], rel=0.03)
+
+
+@pytest.mark.parametrize("n", [1, 2, 16])
+def test_progressive_films_of_functions_double(sphere, env, n):
+    films = dl.progressive(sphere, env, dl.strategies.Environment(env, n), spp=40, size=(24, 24))
+    assert [film["samples"].max() for film in films] == [1, 2, 4, 8, 16, 32, 40]
 
 
 def test_progressive_can_be_left_and_ends_once(sphere, env):

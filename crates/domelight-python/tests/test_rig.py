@@ -83,6 +83,7 @@ def test_rigs_are_pickled(env):
     for rig in (dl.lights(env, 8), dl.lights(env, 8, method="median-cut")):
         other = pickle.loads(pickle.dumps(rig))
         assert other == rig and other.names == rig.names and other != dl.lights(env, 7)
+        assert hash(other) == hash(rig)
 
 
 @pytest.mark.parametrize(

@@ -137,8 +137,10 @@ def test_what_is_raised_comes_back(sphere, env):
 
     with pytest.raises(LookupError, match="my own"):
         dl.render(sphere, env, broken, **SIZE)
+    steps = dl.progressive(sphere, env, broken, **SIZE)
     with pytest.raises(LookupError, match="my own"):
-        next(dl.progressive(sphere, env, broken, **SIZE))
+        next(steps)
+    assert list(steps) == []
     broken.n_rays = 0
     with pytest.raises(ValueError, match="n_rays is 0"):
         dl.render(sphere, env, broken, **SIZE)

@@ -284,6 +284,22 @@ impl Environment {
         Self::in_units(map, orientation, 1.0, scale)
     }
 
+    /// Like [`Environment::new`], but from radiance in multiples of `unit`, which single precision may not hold: from
+    /// [`Environment::map`] and [`Environment::unit`] of another environment.
+    ///
+    /// # Errors
+    /// If the map has no pixels, or a pixel, the rotation or the unit is invalid.
+    pub fn from_units(
+        map: RgbImage,
+        orientation: Orientation,
+        unit: f64,
+    ) -> Result<Self, EnvironmentError> {
+        if !unit.is_finite() || unit < 0.0 {
+            return Err(EnvironmentError::BadScale(unit as f32));
+        }
+        Self::in_units(map, orientation, unit, 1.0)
+    }
+
     /// [`Environment::new`] from multiples of `unit`.
     fn in_units(
         mut map: RgbImage,
