@@ -7,6 +7,7 @@ use domelight::environment::io::ProbeError;
 use domelight::files::FileConflict;
 use domelight::memory::OverLimit;
 use domelight::picture::compare::SizeMismatch;
+use domelight::picture::flip::FlipError;
 use domelight::picture::{PictureError, PictureErrorKind};
 use domelight::rig::RigError;
 use domelight::sampling::TableError;
@@ -80,6 +81,9 @@ pub enum Error {
     /// Pictures of different sizes.
     #[error("{0}")]
     Size(#[source] SizeMismatch),
+    /// Pictures without a ꟻLIP.
+    #[error("{0}")]
+    Flip(#[source] FlipError),
     /// More memory than is allowed.
     #[error("{0}")]
     Memory(#[source] OverLimit),
@@ -110,7 +114,7 @@ macro_rules! from {
 from! {
     Load(LoadError), Probe(ProbeError), Scene(SceneError), Camera(CameraError), Environment(EnvironmentError),
     Strategy(StrategyError), Prepare(PrepareError), Material(ParseMaterialError), Rig(RigError), Picture(PictureError),
-    PictureBytes(PictureErrorKind), Size(SizeMismatch), Memory(OverLimit), Conflict(FileConflict), Io(std::io::Error),
+    PictureBytes(PictureErrorKind), Size(SizeMismatch), Flip(FlipError), Memory(OverLimit), Conflict(FileConflict), Io(std::io::Error),
     Json(serde_json::Error), Rejection(RejectionError), Table(TableError), Bvh(BvhError),
 }
 

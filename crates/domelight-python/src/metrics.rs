@@ -74,8 +74,11 @@ pub(crate) fn error_map<'py>(
 
 fn resolution(pixels_per_degree: Option<f32>) -> PyResult<f32> {
     match pixels_per_degree.unwrap_or(flip_metric::PIXELS_PER_DEGREE) {
-        p if p > 0.0 && p <= 1e4 => Ok(p),
-        p => Err(bad_value(format!("pixels_per_degree is {p}; it must be in (0, 10000]"))),
+        p if flip_metric::RESOLUTIONS.contains(&p) => Ok(p),
+        p => {
+            let [least, most] = [flip_metric::RESOLUTIONS.start(), flip_metric::RESOLUTIONS.end()];
+            Err(bad_value(format!("pixels_per_degree is {p}; it must be from {least} to {most}")))
+        }
     }
 }
 
@@ -91,7 +94,7 @@ pub(crate) fn flip<'py>(
     let (test, reference) = pair(test, reference)?;
     let resolution = resolution(pixels_per_degree)?;
     let map = parallel(py, || flip_metric::ldr_flip(&reference, &test, resolution))?;
-    array(py, map.map_err(mismatch)?, &[reference.height, reference.width])
+    array(py, map.map_err(|e| from_source(&e))?, &[reference.height, reference.width])
 }
 
 /// HDR-FLIP of each pixel, for linear radiance.
@@ -106,5 +109,5 @@ pub(crate) fn hdr_flip<'py>(
     let (test, reference) = pair(test, reference)?;
     let resolution = resolution(pixels_per_degree)?;
     let found = parallel(py, || flip_metric::hdr_flip(&reference, &test, resolution))?;
-    array(py, found.map_err(mismatch)?.map, &[reference.height, reference.width])
+    array(py, found.map_err(|e| from_source(&e))?.map, &[reference.height, reference.width])
 }

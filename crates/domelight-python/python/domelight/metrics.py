@@ -2,7 +2,7 @@
 
 All functions take linear pictures of shape (H, W, 3), the tested picture first, and compute in double precision. Mean
 errors of pictures with NaN or infinities are NaN or infinite; the trimmed mean drops the worst pixels, and FLIP takes
-NaN for black.
+NaN for black and infinity for white.
 """
 
 from __future__ import annotations
@@ -109,9 +109,9 @@ def flip_map(
     Parameters
     ----------
     test, reference : array_like, shape (H, W, 3)
-        Linear display light, after the tone curve and before sRGB encoding; clamped to [0, 1].
+        Linear display light, after the tone curve and before sRGB encoding; clamped to [0, 1], NaN to 0.
     pixels_per_degree : float, optional
-        Angular resolution; by default 67.02, for a 0.7 m wide 4K screen at a distance of 0.7 m.
+        Angular resolution, from 2 to 10000; by default 67.02, for a 0.7 m wide 4K screen at a distance of 0.7 m.
     """
     return _flip(test, reference, pixels_per_degree)
 
@@ -126,7 +126,7 @@ def flip(
 def hdr_flip_map(
     test: npt.ArrayLike, reference: npt.ArrayLike, pixels_per_degree: float | None = None
 ) -> npt.NDArray[np.float32]:
-    """HDR-FLIP of each pixel, in [0, 1], for linear radiance; non-finite values count as 0."""
+    """HDR-FLIP of each pixel, in [0, 1], for linear radiance; NaN counts as 0, and infinity as white at every exposure."""
     return _hdr_flip(test, reference, pixels_per_degree)
 
 

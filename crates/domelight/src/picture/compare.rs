@@ -80,12 +80,14 @@ pub fn compare(
     let peak = compared.iter().map(|(_, r)| r.max_component()).fold(0.0, f32::max) as f64;
     let mean = channel_means(compared.iter().map(|p| p.0));
     let mean_reference = channel_means(compared.iter().map(|p| p.1));
+    // A black reference has no peak.
+    let psnr = if mse == 0.0 { f64::INFINITY } else { 10.0 * functions::log10(peak * peak / mse) };
     Ok(Comparison {
         n_pixels: compared.len(),
         mse,
         rel_mse,
         rel_mse_trimmed: relative.iter().sum::<f64>() / relative.len() as f64,
-        psnr: 10.0 * functions::log10(peak * peak / mse),
+        psnr,
         mean,
         mean_reference,
         mean_ratio: [0, 1, 2].map(|c| mean[c] / mean_reference[c]),
@@ -220,6 +222,8 @@ mod tests {
         let picture = RgbImage::from_fn(5, 4, |x, y| Rgb::new(x as f32, y as f32, 1.0));
         let c = compare(&picture, &picture, None).unwrap();
         assert_eq!((c.mse, c.rel_mse, c.rel_mse_trimmed, c.psnr), (0.0, 0.0, 0.0, f64::INFINITY));
+        let black = RgbImage::filled(2, 2, Rgb::BLACK);
+        assert_eq!(compare(&black, &black, None).unwrap().psnr, f64::INFINITY);
         assert_eq!((c.mean_ratio, c.n_non_finite), ([1.0; 3], 0));
     }
 

@@ -17,9 +17,13 @@ use crate::color::Rgb;
 use crate::image::RgbImage;
 use crate::math::functions;
 use rayon::prelude::*;
+use std::ops::RangeInclusive;
 
 /// Pixels per degree of a 0.7 m wide 4K screen seen from 0.7 m: 3840 π / 180.
 pub const PIXELS_PER_DEGREE: f32 = 67.020_64;
+
+/// The pixels per degree at which the filters are defined. With fewer, those of features lie between the pixels.
+pub const RESOLUTIONS: RangeInclusive<f32> = 2.0..=1e4;
 
 /// Exponent of the color difference.
 const Q_COLOR: f32 = 0.7;
@@ -35,6 +39,21 @@ const FEATURE_WIDTH: f32 = 0.082;
 /// The white of the reference illuminant D65, X Y Z of linear RGB (1, 1, 1).
 const WHITE: [f32; 3] = [0.950_428_55, 1.0, 1.088_900_4];
 
+/// Two pictures have no ꟻLIP.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FlipError {
+    /// The pictures differ in size.
+    #[error(transparent)]
+    Size(#[from] SizeMismatch),
+    /// The number of pixels per degree is not in [`RESOLUTIONS`].
+    #[error(
+        "ꟻLIP is not defined at {0} pixels per degree; there must be from {least} to {most}",
+        least = RESOLUTIONS.start(), most = RESOLUTIONS.end()
+    )]
+    Resolution(f32),
+}
+
 /// The HDR difference and the exposures behind it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HdrFlip {
@@ -49,18 +68,18 @@ pub struct HdrFlip {
 }
 
 /// LDR-ꟻLIP of each pixel, in \[0, 1\], of two pictures of linear light on the screen in \[0, 1\] (that is,
-/// after the tone curve, before the sRGB encoding). Values outside are clamped.
+/// after the tone curve, before the sRGB encoding). Values outside are clamped; NaN counts as 0.
 ///
-/// `pixels_per_degree` > 0 is the resolution at the eye, see [`PIXELS_PER_DEGREE`].
+/// `pixels_per_degree` is the resolution at the eye, see [`PIXELS_PER_DEGREE`].
 ///
 /// # Errors
-/// If the pictures differ in size.
+/// If the pictures differ in size, or the resolution is not in [`RESOLUTIONS`].
 pub fn ldr_flip(
     reference: &RgbImage,
     test: &RgbImage,
     pixels_per_degree: f32,
-) -> Result<Vec<f32>, SizeMismatch> {
-    check_sizes(test, reference)?;
+) -> Result<Vec<f32>, FlipError> {
+    check(reference, test, pixels_per_degree)?;
     if reference.pixels.is_empty() {
         return Ok(Vec::new());
     }
@@ -79,20 +98,29 @@ pub fn ldr_flip(
     Ok((0..reference.lab.len()).into_par_iter().map(difference).collect())
 }
 
-/// HDR-ꟻLIP of two pictures of linear radiance, as the authors' program flip-evaluator 1.7 computes it; non-finite
-/// values count as 0.
+/// Whether the pictures have a ꟻLIP.
+fn check(reference: &RgbImage, test: &RgbImage, pixels_per_degree: f32) -> Result<(), FlipError> {
+    check_sizes(test, reference)?;
+    if !RESOLUTIONS.contains(&pixels_per_degree) {
+        return Err(FlipError::Resolution(pixels_per_degree));
+    }
+    Ok(())
+}
+
+/// HDR-ꟻLIP of two pictures of linear radiance, as the authors' program flip-evaluator 1.7 computes it; NaN counts as 0,
+/// and infinity as white at every exposure.
 ///
 /// Negative values pass through the tone curve unchanged, which shows values below −0.02 as *bright*. Repair them first
 /// if that is not wanted.
 ///
 /// # Errors
-/// If the pictures differ in size.
+/// If the pictures differ in size, or the resolution is not in [`RESOLUTIONS`].
 pub fn hdr_flip(
     reference: &RgbImage,
     test: &RgbImage,
     pixels_per_degree: f32,
-) -> Result<HdrFlip, SizeMismatch> {
-    check_sizes(test, reference)?;
+) -> Result<HdrFlip, FlipError> {
+    check(reference, test, pixels_per_degree)?;
     let (start, stop) = exposure_range(reference);
     let n = (stop - start).ceil().max(2.0) as u32;
     let mut map = vec![0.0f32; reference.pixels.len()];
@@ -290,7 +318,7 @@ fn relative_xyz([r, g, b]: [f32; 3]) -> [f32; 3] {
 
 /// The linear opponent space YCxCz.
 fn opponent_of_rgb(color: Rgb) -> [f32; 3] {
-    let on_screen = color.map(|c| if c.is_finite() { c.clamp(0.0, 1.0) } else { 0.0 });
+    let on_screen = color.map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, 1.0) });
     let [x, y, z] = relative_xyz(on_screen.to_array());
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
@@ -458,6 +486,40 @@ mod tests {
             let gray = RgbImage::filled(width, height, Rgb::splat(0.5));
             let map = ldr_flip(&gray, &black, PIXELS_PER_DEGREE).unwrap();
             assert!(map.iter().all(|e| (0.5..=1.0).contains(e)));
+        }
+    }
+
+    #[test]
+    fn filters_are_defined_at_all_resolutions() {
+        let (a, b) = (pattern(24, 16), RgbImage::filled(24, 16, Rgb::splat(0.3)));
+        for resolution in [*RESOLUTIONS.start(), 2.5, 5.0, 300.0] {
+            let ldr = ldr_flip(&a, &b, resolution).unwrap();
+            let hdr = hdr_flip(&a, &b, resolution).unwrap().map;
+            for map in [ldr, hdr] {
+                assert!(map.iter().all(|e| (0.0..=1.0).contains(e)), "{resolution}");
+                assert!(mean(&map) > 0.1, "{resolution}");
+            }
+        }
+        for resolution in [1.0, 0.0, -3.0, 2e4, f32::NAN] {
+            let error = ldr_flip(&a, &b, resolution).unwrap_err();
+            assert!(error.to_string().contains("pixels per degree"), "{error}");
+            assert!(hdr_flip(&a, &b, resolution).is_err());
+        }
+    }
+
+    #[test]
+    fn nan_is_black_and_infinity_is_white() {
+        let uniform = |value: f32| RgbImage::filled(8, 8, Rgb::splat(value));
+        let gray = uniform(0.3);
+        for (odd, usual) in [(f32::NAN, 0.0), (f32::INFINITY, 1.0), (f32::NEG_INFINITY, 0.0)] {
+            let [odd, usual] = [odd, usual]
+                .map(|value| ldr_flip(&gray, &uniform(value), PIXELS_PER_DEGREE).unwrap());
+            assert_eq!(odd, usual);
+        }
+        for (odd, usual) in [(f32::NAN, 0.0), (f32::INFINITY, 1e30)] {
+            let [odd, usual] = [odd, usual]
+                .map(|value| hdr_flip(&gray, &uniform(value), PIXELS_PER_DEGREE).unwrap());
+            assert_eq!(odd, usual);
         }
     }
 
