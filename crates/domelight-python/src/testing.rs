@@ -9,6 +9,7 @@ use pyo3::types::PyDict;
 use testkit::{Chi2, Pcg, Suite, ZTest};
 
 use crate::arrays::{Floats, rows, shape_text, vector};
+use crate::engine::caught;
 use crate::error::bad_value;
 
 /// The significance and the number of tests that share it.
@@ -69,6 +70,15 @@ pub(crate) fn chi2<'py>(
     if lead != [samples] {
         return Err(drawn.bad_shape(&shape_text(&[samples, 3])));
     }
+    for (row, &[x, y, z]) in directions.iter().enumerate() {
+        let squared = x * x + y * y + z * z;
+        if squared != 0.0 && !((squared - 1.0).abs() < 1e-3) {
+            return Err(bad_value(format!(
+                "the result of sample has the row {row} ({x}, {y}, {z}); it must be a unit vector, or zeros for a \
+                 rejected sample"
+            )));
+        }
+    }
     let mut drawn = directions.iter().map(|&w| (w != [0.0; 3]).then_some(w));
 
     // Stop at the first exception.
@@ -90,7 +100,7 @@ pub(crate) fn chi2<'py>(
             vec![0.0; w.len()]
         })
     };
-    let report = test.sphere_batched(name, |_, _| drawn.next().flatten(), density);
+    let report = caught(|| test.sphere_batched(name, |_, _| drawn.next().flatten(), density))?;
     if let Some(error) = failure.into_inner() {
         return Err(error);
     }
@@ -127,6 +137,14 @@ pub(crate) fn z_test(
             reference.len()
         )));
     }
+    let errors = standard_error.iter().map(|&error| ("standard_error", error));
+    for (name, value) in errors.chain([("rounding", rounding)]) {
+        if !(value.is_finite() && value >= 0.0) {
+            return Err(bad_value(format!(
+                "{name} is {value}; it must be finite and not negative"
+            )));
+        }
+    }
     let test = ZTest { suite: suite(tests, significance)?.times(channels), rounding };
     let mut least = 1.0f64;
     for (channel, column) in batches.columns().into_iter().enumerate() {
@@ -135,7 +153,7 @@ pub(crate) fn z_test(
             value: [reference[channel]],
             standard_error: [standard_error[channel]],
         };
-        let p = test.against(&format!("{name}[{channel}]"), &column, reference);
+        let p = caught(|| test.against(&format!("{name}[{channel}]"), &column, reference))?;
         least = least.min(p.map_err(|failed| PyAssertionError::new_err(failed.to_string()))?);
     }
     Ok(least)

@@ -20,6 +20,8 @@ def test_formulas(pictures):
     assert dl.metrics.rel_mse_trimmed(*pictures) < dl.metrics.rel_mse(*pictures)
     psnr = 10 * np.log10(reference.max() ** 2 / squares.mean())
     assert dl.metrics.psnr(*pictures) == pytest.approx(psnr)
+    black = np.zeros((2, 2, 3))
+    assert dl.metrics.psnr(black, black) == np.inf
     absolute = dl.metrics.absolute_error_map(*pictures)
     assert np.allclose(absolute, np.sqrt(squares.mean(axis=-1)), rtol=1e-4)
     relative = np.sqrt((squares / (reference**2 + 0.01)).mean(axis=-1))
@@ -46,8 +48,15 @@ def test_flip_of_equal_and_other_pictures(pictures):
         values = flip(test, reference)
         assert values.shape == (40, 50) and 0 < values.mean() < 1
     assert dl.metrics.flip(test, reference, 20) != dl.metrics.flip(test, reference)
-    with pytest.raises(ValueError, match="pixels_per_degree"):
-        dl.metrics.flip(test, reference, 0)
+    for resolution in (0, 1, np.nan, 20_000):
+        for flip in (dl.metrics.flip, dl.metrics.hdr_flip):
+            with pytest.raises(ValueError, match="pixels_per_degree"):
+                flip(test, reference, resolution)
+    assert dl.metrics.flip(test, reference, 2) > 0
+    for odd, usual in [(np.nan, 0), (np.inf, 1e30)]:
+        odd, usual = (np.full_like(reference, value) for value in (odd, usual))
+        for flip in (dl.metrics.flip, dl.metrics.hdr_flip):
+            assert flip(odd, reference) == flip(usual, reference)
 
 
 def test_other_sizes_are_named(pictures):
@@ -94,6 +103,11 @@ def test_chi2_tells_right_from_wrong():
         dl.testing.chi2(uniform, lambda w: {}["nothing"])
     with pytest.raises(ValueError, match="the result of sample has shape"):
         dl.testing.chi2(lambda u: u[1:], right)
+    for wrong in (lambda u: 2 * uniform(u), lambda u: np.full((len(u), 3), np.nan)):
+        with pytest.raises(ValueError, match="the row 0 .* unit vector"):
+            dl.testing.chi2(wrong, right)
+    with pytest.raises(AssertionError, match="refine the cells"):
+        dl.testing.chi2(uniform, lambda w: 0.9 * right(w))
     for wrong, words in [
         (dict(samples=1), "samples is 1"),
         (dict(cells=(1, 2)), "cells"),
@@ -103,6 +117,15 @@ def test_chi2_tells_right_from_wrong():
     ]:
         with pytest.raises(ValueError, match=words):
             dl.testing.chi2(uniform, right, **wrong)
+
+
+@pytest.mark.parametrize("probe, rows", [("sky", 33), ("sky", 128), ("cathedral", 16), ("cathedral", 64)])
+def test_chi2_passes_the_samplers_of_maps(probe, rows):
+    """Their densities are constant over each texel, which the default cells cut anywhere."""
+    env = dl.Environment.builtin(probe, rows=rows)
+    for axis in [(0, 0, 1), (0, 1, 0)]:
+        report = dl.testing.chi2(lambda u: env.sample(u[:, :2])[0], env.pdf, axis=axis, tests=8)
+        assert report["mass"] == pytest.approx(1, abs=1e-4)
 
 
 def test_z_test_tells_right_from_wrong():
@@ -118,8 +141,14 @@ def test_z_test_tells_right_from_wrong():
         (dict(batches=3), "at least 30"),
         (dict(samples=40), "as many as batches"),
         (dict(reference=[1, 2]), "reference has shape"),
+        (dict(standard_error=np.nan), "standard_error is NaN"),
+        (dict(standard_error=-0.1), "standard_error is -0.1"),
+        (dict(rounding=np.nan), "rounding is NaN"),
     ]:
         with pytest.raises(ValueError, match=words):
             dl.testing.z_test(squares, **{"reference": 1 / 3, **wrong})
+    # The last estimates count, too.
+    with pytest.raises(AssertionError):
+        dl.testing.z_test(np.append(np.zeros(300), np.full(99, 1e3)), 0, batches=100)
     with pytest.raises(ValueError, match="estimates have shape"):
         dl.testing.z_test(np.zeros((50, 2, 2)), 0)

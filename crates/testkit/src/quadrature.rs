@@ -120,7 +120,7 @@ pub fn direction(theta: f64, phi: f64) -> [f64; 3] {
 }
 
 /// The adaptive rule: a rectangle is quartered until its 4 × 4 rule and the sum over its quarters
-/// differ by less than a tolerance.
+/// differ by less than a tolerance, and nothing hides between the nodes and the border of a quarter.
 #[derive(Clone, Copy, Debug)]
 pub struct Adaptive {
     /// Absolute difference at which a rectangle is good enough.
@@ -146,14 +146,83 @@ const RULE: [(f64, f64); 4] = [
     (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
 ];
 
+/// Where the corners of a panel are probed, on [−1, 1]: inside, because a jump along the border is of the neighbor.
+const CORNER: f64 = 0.999;
+
+/// The polynomial through the values at the nodes of [`RULE`], at −[`CORNER`].
+const EXTRAPOLATION: [f64; 4] = [
+    1.522_518_694_190_352,
+    -0.806_736_710_730_242_3,
+    0.397_059_232_282_952_7,
+    -0.112_841_215_743_062_3,
+];
+
+/// The part of a panel between its outermost nodes and one side.
+const MARGIN: f64 = 0.069_431_844_202_973_7;
+
+/// A rectangle's 4 × 4 rule.
+#[derive(Clone, Copy)]
+struct Panel<const N: usize> {
+    integral: [f64; N],
+    /// What the margins may contain that the nodes do not show: a jump there.
+    hidden: [f64; N],
+}
+
+impl<const N: usize> Panel<N> {
+    /// The nodes row by row, then the corners (−, −), (+, −), (−, +), (+, +).
+    fn points(r: Rect) -> impl Iterator<Item = [f64; 2]> {
+        let [cx, cy] = r.center();
+        let (hx, hy) = (0.5 * (r.x[1] - r.x[0]), 0.5 * (r.y[1] - r.y[0]));
+        let nodes = RULE.into_iter().flat_map(|(y, _)| RULE.map(|(x, _)| [x, y]));
+        let corners = [-CORNER, CORNER].into_iter().flat_map(|y| [[-CORNER, y], [CORNER, y]]);
+        nodes.chain(corners).map(move |[x, y]| [cx + hx * x, cy + hy * y])
+    }
+
+    /// From the values at [`Panel::points`].
+    fn new(r: Rect, values: &[[f64; N]; 20]) -> Self {
+        let area = (r.x[1] - r.x[0]) * (r.y[1] - r.y[0]);
+        let weight = |node: usize| 0.25 * area * RULE[node / 4].1 * RULE[node % 4].1;
+        let integral =
+            std::array::from_fn(|k| (0..16).map(|node| weight(node) * values[node][k]).sum());
+        // The nodes from each corner along the diagonal.
+        let diagonals = [[0, 5, 10, 15], [3, 6, 9, 12], [12, 9, 6, 3], [15, 10, 5, 0]];
+        let surprise = |corner: usize, k: usize| {
+            let nodes = diagonals[corner].into_iter().zip(EXTRAPOLATION);
+            let expected: f64 = nodes.map(|(node, c)| c * values[node][k]).sum();
+            let difference = (values[16 + corner][k] - expected).abs();
+            // At a pole, single precision may have left the domain. Only values at nodes count.
+            if difference.is_finite() { difference } else { 0.0 }
+        };
+        let hidden = std::array::from_fn(|k| {
+            MARGIN * area * (0..4).map(|corner| surprise(corner, k)).fold(0.0, f64::max)
+        });
+        Self { integral, hidden }
+    }
+
+    fn of(r: Rect, f: &mut impl FnMut(f64, f64) -> [f64; N]) -> Self {
+        let mut values = [[0.0; N]; 20];
+        values.iter_mut().zip(Self::points(r)).for_each(|(value, [x, y])| *value = f(x, y));
+        Self::new(r, &values)
+    }
+}
+
 impl Adaptive {
+    /// Whether the quarters of a rectangle are good enough.
+    fn is_settled<const N: usize>(&self, whole: &Panel<N>, quarters: &[Panel<N>; 4]) -> bool {
+        (0..N).all(|k| {
+            let sum: f64 = quarters.iter().map(|q| q.integral[k]).sum();
+            let hidden: f64 = quarters.iter().map(|q| q.hidden[k]).sum();
+            (sum - whole.integral[k]).abs() <= self.tolerance && hidden <= self.tolerance
+        })
+    }
+
     /// ∫ f over a rectangle.
     pub fn rect<const N: usize>(
         &self,
         rect: Rect,
         f: &mut impl FnMut(f64, f64) -> [f64; N],
     ) -> [f64; N] {
-        let whole = tensor(rect, f);
+        let whole = Panel::of(rect, f);
         self.refine(rect, whole, 0, f)
     }
 
@@ -176,21 +245,20 @@ impl Adaptive {
         mut f: impl FnMut(&[[f64; 2]]) -> Vec<f64>,
     ) -> Vec<f64> {
         let mut totals = vec![0.0; rects.len()];
-        let wholes = tensors(rects, &mut f);
-        let mut level: Vec<(usize, Rect, f64)> =
+        let wholes = panels(rects, &mut f);
+        let mut level: Vec<(usize, Rect, Panel<1>)> =
             rects.iter().zip(wholes).enumerate().map(|(i, (&r, whole))| (i, r, whole)).collect();
         for depth in 0.. {
             let mut next = Vec::new();
             for some in level.chunks(BATCH) {
                 let quarters: Vec<Rect> = some.iter().flat_map(|(_, r, _)| r.quarters()).collect();
-                let parts = tensors(&quarters, &mut f);
+                let parts = panels(&quarters, &mut f);
                 let each =
                     some.iter().zip(quarters.as_chunks::<4>().0).zip(parts.as_chunks::<4>().0);
                 for ((&(i, _, whole), quarters), parts) in each {
-                    let sum: f64 = parts.iter().sum();
-                    let settled = (sum - whole).abs() <= self.tolerance;
+                    let settled = self.is_settled(&whole, parts);
                     if (settled && depth >= self.min_depth) || depth >= self.max_depth {
-                        totals[i] += sum;
+                        totals[i] += parts.iter().map(|part| part.integral[0]).sum::<f64>();
                     } else {
                         next.extend(quarters.iter().zip(parts).map(|(&q, &part)| (i, q, part)));
                     }
@@ -207,16 +275,15 @@ impl Adaptive {
     fn refine<const N: usize>(
         &self,
         r: Rect,
-        whole: [f64; N],
+        whole: Panel<N>,
         depth: u32,
         f: &mut impl FnMut(f64, f64) -> [f64; N],
     ) -> [f64; N] {
         let quarters = r.quarters();
-        let parts = quarters.map(|q| tensor(q, f));
-        let sum = parts.into_iter().fold([0.0; N], add);
-        let settled = (0..N).all(|k| (sum[k] - whole[k]).abs() <= self.tolerance);
+        let parts = quarters.map(|q| Panel::of(q, f));
+        let settled = self.is_settled(&whole, &parts);
         if (settled && depth >= self.min_depth) || depth >= self.max_depth {
-            return sum;
+            return parts.iter().fold([0.0; N], |sum, part| add(sum, part.integral));
         }
         (0..4).fold([0.0; N], |sum, i| add(sum, self.refine(quarters[i], parts[i], depth + 1, f)))
     }
@@ -226,34 +293,15 @@ fn add<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
     std::array::from_fn(|k| a[k] + b[k])
 }
 
-fn tensor<const N: usize>(r: Rect, f: &mut impl FnMut(f64, f64) -> [f64; N]) -> [f64; N] {
-    let [cx, cy] = r.center();
-    let (hx, hy) = (0.5 * (r.x[1] - r.x[0]), 0.5 * (r.y[1] - r.y[0]));
-    let mut sum = [0.0; N];
-    for (y, wy) in RULE {
-        for (x, wx) in RULE {
-            let value = f(cx + hx * x, cy + hy * y);
-            (0..N).for_each(|k| sum[k] += wx * wy * hx * hy * value[k]);
-        }
-    }
-    sum
-}
-
 /// Rectangles whose quarters are asked for at once.
 const BATCH: usize = 1 << 14;
 
-/// [`tensor`] of several rectangles by one call of f.
-fn tensors(rects: &[Rect], f: &mut impl FnMut(&[[f64; 2]]) -> Vec<f64>) -> Vec<f64> {
-    let mut points = Vec::with_capacity(16 * rects.len());
-    for &r in rects {
-        tensor(r, &mut |x, y| {
-            points.push([x, y]);
-            [0.0]
-        });
-    }
+/// The panels of several rectangles by one call of f.
+fn panels(rects: &[Rect], f: &mut impl FnMut(&[[f64; 2]]) -> Vec<f64>) -> Vec<Panel<1>> {
+    let points: Vec<[f64; 2]> = rects.iter().flat_map(|&r| Panel::<1>::points(r)).collect();
     let mut values = f(&points).into_iter();
-    let sum = |&r: &Rect| tensor(r, &mut |_, _| [values.next().unwrap_or(f64::NAN)])[0];
-    rects.iter().map(sum).collect()
+    let mut next = |_, _| [values.next().unwrap_or(f64::NAN)];
+    rects.iter().map(|&r| Panel::of(r, &mut next)).collect()
 }
 
 #[cfg(test)]

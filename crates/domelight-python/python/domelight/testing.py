@@ -54,7 +54,8 @@ def chi2(
     samples : int, default 100000
         The number of samples.
     cells : (int, int), default (31, 61)
-        Cells along the polar angle and around the axis.
+        Cells along the polar angle and around the axis. Take cells finer than the texels of a density that is constant
+        over each: a sampler within a texel is then tested, too, and none is missed by the integration.
     axis : array_like, shape (3,)
         The polar axis of the cells; align it with narrow lobes.
     seed : int, default 1
@@ -73,7 +74,10 @@ def chi2(
     Raises
     ------
     AssertionError
-        If the samples do not follow the density, or it is negative, not finite, or integrates to more than 1.
+        If the samples do not follow the density, or it is negative, not finite, or integrates to more than 1, or to less
+        than rejected samples explain.
+    ValueError
+        If a setting is invalid, or a sample is not a unit vector.
     """
     return _domelight.chi2(name, sample, pdf, samples, cells, axis, seed, tests, significance)
 
@@ -123,6 +127,8 @@ def z_test(
     ------
     AssertionError
         If a mean differs significantly from the reference, or is not finite.
+    ValueError
+        If a setting is invalid.
     """
     if callable(estimator):
         estimates = np.asarray(estimator(np.random.default_rng(seed), samples), np.float64)
@@ -137,8 +143,8 @@ def z_test(
         raise ValueError(f"batches is {batches}; it must be at least 30")
     if n < batches:
         raise ValueError(f"there are {n} estimates; they must be at least as many as batches, {batches}")
-    size = n // batches
-    means = estimates[: batches * size].reshape(batches, size, channels).mean(axis=1)
+    # Batches whose sizes differ by at most one.
+    means = np.stack([batch.mean(axis=0) for batch in np.array_split(estimates, batches)])
     values = _of_channels("reference", reference, channels)
     errors = _of_channels("standard_error", standard_error, channels)
     return _domelight.z_test(
