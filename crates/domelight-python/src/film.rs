@@ -355,8 +355,9 @@ impl Film {
     fn __hash__(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         (self.shape(), self.n_samples).hash(&mut hasher);
-        let color = &self.layers().color.pixels;
-        color.iter().for_each(|c| c.to_array().map(hashable).hash(&mut hasher));
+        for color in &self.layers().color.pixels {
+            color.to_array().map(hashable).hash(&mut hasher);
+        }
         hasher.finish()
     }
 

@@ -231,8 +231,9 @@ impl Rig {
     fn __hash__(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         self.inner.labels.hash(&mut hasher);
-        let irradiance = self.inner.lights.iter().map(|light| light.irradiance);
-        irradiance.for_each(|e| e.to_array().map(hashable).hash(&mut hasher));
+        for light in &self.inner.lights {
+            light.irradiance.to_array().map(hashable).hash(&mut hasher);
+        }
         hasher.finish()
     }
 

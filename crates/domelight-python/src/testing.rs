@@ -72,7 +72,8 @@ pub(crate) fn chi2<'py>(
     }
     for (row, &[x, y, z]) in directions.iter().enumerate() {
         let squared = x * x + y * y + z * z;
-        if squared != 0.0 && !((squared - 1.0).abs() < 1e-3) {
+        let is_unit = (squared - 1.0).abs() < 1e-3;
+        if squared != 0.0 && !is_unit {
             return Err(bad_value(format!(
                 "the result of sample has the row {row} ({x}, {y}, {z}); it must be a unit vector, or zeros for a \
                  rejected sample"
