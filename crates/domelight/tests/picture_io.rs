@@ -293,6 +293,13 @@ fn rgb_channels(
     ]
 }
 
+const ACESCG: Chromaticities = Chromaticities {
+    red: Vec2(0.713, 0.293),
+    green: Vec2(0.165, 0.83),
+    blue: Vec2(0.128, 0.044),
+    white: Vec2(0.32168, 0.33767),
+};
+
 fn exr_bytes(
     size: (usize, usize),
     channels: Vec<AnyChannel<FlatSamples>>,
@@ -417,13 +424,7 @@ fn exr_data_window_attribute_and_chromaticities() {
         AnyChannels::sort(channels.into_iter().collect()),
     );
     let mut file = Image::from_layer(layer);
-    let acescg = Chromaticities {
-        red: Vec2(0.713, 0.293),
-        green: Vec2(0.165, 0.83),
-        blue: Vec2(0.128, 0.044),
-        white: Vec2(0.32168, 0.33767),
-    };
-    file.attributes.chromaticities = Some(acescg);
+    file.attributes.chromaticities = Some(ACESCG);
     let mut bytes = Cursor::new(Vec::new());
     file.write().to_buffered(&mut bytes).unwrap();
     // ACEScg (0.5, 0.3, 0.9) and Rec. 709 by the matrix that everybody prints, to its digits.
@@ -452,12 +453,7 @@ fn values_that_are_no_light_are_found_in_files_of_other_primaries() {
         AnyChannels::sort(channels.into_iter().collect()),
     );
     let mut file = Image::from_layer(layer);
-    file.attributes.chromaticities = Some(Chromaticities {
-        red: Vec2(0.713, 0.293),
-        green: Vec2(0.165, 0.83),
-        blue: Vec2(0.128, 0.044),
-        white: Vec2(0.32168, 0.33767),
-    });
+    file.attributes.chromaticities = Some(ACESCG);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("aces.exr");
     file.write().to_file(&path).unwrap();

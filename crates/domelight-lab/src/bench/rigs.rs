@@ -94,7 +94,7 @@ impl Row {
 
 /// Summed in double precision, texel by texel, so that it is the rig's error and not the sum's.
 fn flux_error(environment: &Environment, rig: &Rig) -> f64 {
-    let map = environment.map();
+    let map = environment.radiance_map();
     let mut flux = [0.0; 3];
     for (row, pixels) in map.pixels.chunks(map.width).enumerate() {
         let solid_angle = environment.texel_solid_angle(row);

@@ -130,18 +130,21 @@ pub fn probe_from_picture(
         warnings.push(format!("{file}: {guessed}"));
     }
     let shape = (picture.image.width, picture.image.height);
-    let is_certain =
-        |window: DataWindow| is_map(shape, options) && !is_map(window.display, options);
-    if let Some(window) = picture.window.filter(|&window| !is_certain(window)) {
-        let [data, display] =
-            [shape, window.display].map(|(width, height)| format!("{width}x{height}"));
-        let treatment = if is_map(shape, options) || !is_map(window.display, options) {
-            "the data window is read as the whole map"
-        } else {
+    let windows = picture.window.map(|window| (window, [shape, window.display]));
+    let read_as = match windows.map(|(window, shapes)| (window, shapes.map(|s| is_map(s, options))))
+    {
+        None | Some((_, [true, false])) => None,
+        Some((window, [false, true])) => {
             picture = in_display_window(&picture, window, options)
                 .map_err(|problem| problem.in_file(file))?;
-            "texels outside the data window are black, texels outside the display window are cropped"
-        };
+            Some(
+                "texels outside the data window are black, texels outside the display window are cropped",
+            )
+        }
+        Some(_) => Some("the data window is read as the whole map"),
+    };
+    if let (Some((_, shapes)), Some(treatment)) = (windows, read_as) {
+        let [data, display] = shapes.map(|(width, height)| format!("{width}x{height}"));
         warnings.push(format!(
             "{file}: the data window of {data} texels differs from the display window of \
              {display}; {treatment}"

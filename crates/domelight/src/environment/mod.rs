@@ -446,14 +446,6 @@ impl Environment {
         Cow::Owned(RgbImage { pixels, ..self.map })
     }
 
-    /// Other radiance in the same unit and orientation.
-    ///
-    /// # Errors
-    /// Those of [`Environment::new`].
-    pub(crate) fn with_pixels(&self, pixels: Vec<Rgb>) -> Result<Self, EnvironmentError> {
-        Self::in_units(RgbImage { pixels, ..self.map }, self.orientation, self.unit, 1.0)
-    }
-
     /// The orientation of the map in the world.
     pub fn orientation(&self) -> Orientation {
         self.orientation

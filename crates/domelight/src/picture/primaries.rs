@@ -57,10 +57,15 @@ pub(super) fn xyz_to_rec709() -> Mat3 {
 /// Converts a color of a file by `matrix`, and clips what lies outside Rec. 709. A color with a value that is negative or not
 /// finite is no light: it is left as it is in the file, so that whoever checks colors finds it.
 pub(super) fn to_light(matrix: &Mat3, c: Rgb) -> Rgb {
-    if c.to_array().iter().any(|&c| !(0.0..f32::INFINITY).contains(&c)) {
+    if !c.to_array().into_iter().all(is_light) {
         return c;
     }
     transform(matrix, c).map(|c| c.max(0.0))
+}
+
+/// Whether a value can be light: finite and not negative.
+pub(super) fn is_light(value: f32) -> bool {
+    (0.0..f32::INFINITY).contains(&value)
 }
 
 /// `matrix` on a color.
@@ -87,6 +92,9 @@ fn adaptation(white: Vec3) -> Mat3 {
 mod tests {
     use super::*;
 
+    const ACESCG: Primaries =
+        Primaries([[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]]);
+
     #[test]
     fn xyz_matrix_is_that_of_srgb() {
         // IEC 61966-2-1, to its four digits.
@@ -102,9 +110,7 @@ mod tests {
 
     #[test]
     fn what_is_no_light_stays_to_be_found() {
-        let acescg =
-            Primaries([[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]]);
-        let matrix = acescg.to_rec709().unwrap();
+        let matrix = ACESCG.to_rec709().unwrap();
         for c in [[f32::INFINITY; 3], [f32::INFINITY, 1.0, 1.0], [-1.0, 2.0, 1e30]] {
             assert_eq!(to_light(&matrix, Rgb::from(c)), Rgb::from(c));
         }
@@ -115,9 +121,7 @@ mod tests {
     #[test]
     fn white_stays_white() {
         assert_eq!(Primaries::REC709.to_rec709(), None);
-        let acescg =
-            Primaries([[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]]);
-        let white = acescg.to_rec709().unwrap() * Vec3::ONE;
+        let white = ACESCG.to_rec709().unwrap() * Vec3::ONE;
         assert!((white - Vec3::ONE).length() < 1e-4, "{white}");
         assert_eq!(Primaries([[0.3, 0.0]; 4]).to_rec709(), None);
     }

@@ -1,34 +1,22 @@
 //! HTML.
 
-use std::fmt::Write as _;
-
-use super::{Code, Html, directs_writing, xml};
+use super::{Code, Html, directs_writing, replaced, xml};
 
 /// Text within an element, or an attribute's value in double quotes. What HTML cannot hold becomes U+FFFD, and marks of
 /// writing direction stand there as `\u{202e}`.
 pub fn text(text: &str) -> Code<Html> {
     // What XML can hold HTML holds as well, written alike.
-    Code::generated(xml::text(&with_visible_marks(text, "\\")).into_string())
+    let visible = replaced(text, |c| directs_writing(c).then(|| c.escape_unicode().to_string()));
+    Code::generated(xml::text(&visible).into_string())
 }
 
 /// JSON within a `script` element: it can neither end the element nor begin a comment. In its strings, marks of writing
 /// direction stand as in [`text`].
 pub fn script_data(json: &serde_json::Value) -> Code<Html> {
     // Within JSON these stand in strings alone.
-    let json = with_visible_marks(&json.to_string(), r"\\").replace('<', "\\u003c");
+    let visible = |c| directs_writing(c).then(|| format!(r"\{}", c.escape_unicode()));
+    let json = replaced(&json.to_string(), visible).replace('<', "\\u003c");
     Code::generated(json.replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029"))
-}
-
-/// Writes marks of writing direction by their numbers, after a `backslash`.
-fn with_visible_marks(text: &str, backslash: &str) -> String {
-    text.chars().fold(String::with_capacity(text.len()), |mut visible, c| {
-        if directs_writing(c) {
-            let _ = write!(visible, "{backslash}u{{{:x}}}", u32::from(c));
-        } else {
-            visible.push(c);
-        }
-        visible
-    })
 }
 
 #[cfg(test)]

@@ -228,20 +228,23 @@ fn double_quoted(text: &str) -> String {
 /// A literal in double quotes with backslash escapes for quotes, backslashes, line breaks and tabs; `escape` gives those
 /// of further characters.
 fn escaped(text: &str, escape: impl Fn(char) -> Option<String>) -> String {
-    let mut quoted = String::with_capacity(text.len() + 2);
-    quoted.push('"');
-    for c in text.chars() {
-        match c {
-            '"' | '\\' => quoted.extend(['\\', c]),
-            '\n' => quoted += "\\n",
-            '\r' => quoted += "\\r",
-            '\t' => quoted += "\\t",
-            c => match escape(c) {
-                Some(escape) => quoted += &escape,
-                None => quoted.push(c),
-            },
+    let content = replaced(text, |c| match c {
+        '"' | '\\' => Some(format!("\\{c}")),
+        '\n' => Some("\\n".to_owned()),
+        '\r' => Some("\\r".to_owned()),
+        '\t' => Some("\\t".to_owned()),
+        c => escape(c),
+    });
+    format!("\"{content}\"")
+}
+
+/// The text with some characters replaced; `None` keeps one.
+fn replaced(text: &str, replace: impl Fn(char) -> Option<String>) -> String {
+    text.chars().fold(String::with_capacity(text.len()), |mut whole, c| {
+        match replace(c) {
+            Some(other) => whole.push_str(&other),
+            None => whole.push(c),
         }
-    }
-    quoted.push('"');
-    quoted
+        whole
+    })
 }

@@ -1,8 +1,6 @@
 //! A terminal, which obeys what it is sent.
 
-use std::fmt::Write as _;
-
-use super::is_invisible;
+use super::{is_invisible, replaced};
 
 /// A line in which nothing commands the terminal: what is invisible stands there as `\u{1b}`, a line break as `\n`.
 pub fn line(text: &str) -> String {
@@ -17,27 +15,12 @@ pub fn lines(text: &str) -> String {
 /// The same of JSON, which stays what it is.
 pub fn json(text: &str) -> String {
     // Line breaks and tabs are between its values, all else in strings.
-    let kept = |c| matches!(c, '\n' | '\r' | '\t') || !is_invisible(c);
-    text.chars().fold(String::with_capacity(text.len()), |mut json, c| {
-        if kept(c) {
-            json.push(c);
-        } else {
-            let _ = write!(json, "\\u{:04x}", u32::from(c));
-        }
-        json
-    })
+    let is_escaped = |c| is_invisible(c) && !matches!(c, '\n' | '\r' | '\t');
+    replaced(text, |c| is_escaped(c).then(|| format!("\\u{:04x}", u32::from(c))))
 }
 
 fn visible(text: &str, kept: impl Fn(char) -> bool) -> String {
-    let mut visible = String::with_capacity(text.len());
-    for c in text.chars() {
-        if is_invisible(c) && !kept(c) {
-            visible.extend(c.escape_default());
-        } else {
-            visible.push(c);
-        }
-    }
-    visible
+    replaced(text, |c| (is_invisible(c) && !kept(c)).then(|| c.escape_default().to_string()))
 }
 
 #[cfg(test)]

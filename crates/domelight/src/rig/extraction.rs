@@ -10,9 +10,9 @@ use super::median_cut::{MedianCut, median_cut};
 use super::texels::Texels;
 use super::variance_minimization::{VarianceMinimization, variance_minimization};
 use super::{Region, RegionSums, Rig, RigError, RigLight};
-use crate::Rgb;
 use crate::environment::Environment;
 use crate::environment::compact::{CompactSource, SourceCriteria, compact_sources};
+use crate::{Rgb, RgbImage};
 
 /// The algorithm that divides a map into regions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -247,7 +247,9 @@ fn without(environment: &Environment, sources: &[CompactSource]) -> Environment 
 
 /// Other radiance of the same orientation, nowhere above the first.
 fn environment_of(environment: &Environment, pixels: Vec<Rgb>) -> Environment {
-    environment.with_pixels(pixels).expect("parts of a valid map are valid")
+    let map = RgbImage { pixels, ..*environment.map() };
+    Environment::from_units(map, environment.orientation(), environment.unit())
+        .expect("parts of a valid map are valid")
 }
 
 /// The light of what a source took.

@@ -8,7 +8,7 @@
 
 use super::attributes::{envmap, primaries, to_rec709, window};
 use super::write::string_attributes;
-use crate::picture::primaries::{Primaries, to_light};
+use crate::picture::primaries::{Primaries, is_light, to_light};
 use crate::picture::{Format, Picture, PictureErrorKind, allocate, checked_area};
 use crate::{Rgb, RgbImage};
 use ::exr::math::Vec2;
@@ -88,12 +88,12 @@ impl LuminanceChroma {
             let luminance = luminance.at(x, y);
             let (r, b) = ((ry.at(x, y) + 1.0) * luminance, (by.at(x, y) + 1.0) * luminance);
             let g = (luminance - weights[0] * r - weights[2] * b) / weights[1];
-            let color = match luminance {
-                // The chroma of a negative value, or of one that is not finite, is no color.
-                y if !(0.0..f32::INFINITY).contains(&y) => return Rgb::splat(y),
-                // The chroma is rounded, so what should be 0 may be less.
-                _ => Rgb::new(r, g, b).map(|c| if c < 0.0 { 0.0 } else { c }),
-            };
+            // The chroma of a negative value, or of one that is not finite, is no color.
+            if !is_light(luminance) {
+                return Rgb::splat(luminance);
+            }
+            // The chroma is rounded, so what should be 0 may be less.
+            let color = Rgb::new(r, g, b).map(|c| if c < 0.0 { 0.0 } else { c });
             matrix.as_ref().map_or(color, |matrix| to_light(matrix, color))
         });
         let alpha =

@@ -32,6 +32,8 @@ pub(super) struct Group {
     pub(super) normal_spread: f32,
     /// The maximum angle between the tangents of elongated lobes and that of the first hit \[rad\].
     tangent_spread: f32,
+    /// The ratio of the length and the width of the most elongated lobe.
+    elongation: f32,
     /// The BSDF of the first hit.
     pub(super) lobe_summary: LobeSummary,
     /// The fraction of the pixel's hits.
@@ -88,12 +90,12 @@ impl Groups {
         self.clusters.clear();
         self.member.clear();
         self.diffuse.clear();
-        let mut lobe_summary = LobeSummary::default();
+        let (mut lobe_summary, mut is_elongated) = (LobeSummary::default(), false);
         for (i, p) in points.iter().enumerate() {
             if i == 0 || !one_material {
                 lobe_summary = p.bsdf.lobe_summary(p.wo);
+                is_elongated = elongation(&lobe_summary) > 1.0;
             }
-            let is_elongated = elongation(&lobe_summary) > 1.0;
             let like = |g: &HitCluster| {
                 let first = &points[g.first].frame;
                 first.z.dot(p.frame.z) > LIKE_NORMALS
@@ -123,6 +125,7 @@ impl Groups {
                 wo: Vec3::new(wo.x, wo.y, wo.z.max(1e-3)),
                 normal_spread: 0.0,
                 tangent_spread: 0.0,
+                elongation: elongation(&g.lobe_summary),
                 lobe_summary: g.lobe_summary,
                 share: g.n as f32 / points.len() as f32,
             });
@@ -132,7 +135,7 @@ impl Groups {
             // The chord differs from the angle by less than a twentieth here.
             let angle = 1.05 * p.frame.z.distance(group.frame.z);
             group.normal_spread = group.normal_spread.max(angle);
-            if elongation(&group.lobe_summary) > 1.0 {
+            if group.elongation > 1.0 {
                 let first = &points[self.clusters[member].first].frame;
                 // A lobe is the same along its tangent's two directions.
                 let [same, opposite] = [1.0, -1.0].map(|sign| p.frame.x.distance(sign * first.x));
@@ -159,7 +162,7 @@ impl Groups {
     pub(super) fn is_well_tabulated(&self, roughness: f32) -> bool {
         self.all.iter().all(|g| {
             g.normal_spread <= SMALL_NORMAL_SPREAD * roughness
-                && g.tangent_spread * elongation(&g.lobe_summary) <= SMALL_TANGENT_SPREAD
+                && g.tangent_spread * g.elongation <= SMALL_TANGENT_SPREAD
                 && g.wo.z >= STEEP_COSINE
         })
     }
