@@ -241,9 +241,7 @@ impl Bsdf {
 
     /// Whether samples choose among lobes or parts of them; if not, `u_lobe` is unused.
     pub(crate) fn has_choice(&self) -> bool {
-        let mut terms = self.terms().iter();
-        self.n_terms > 1
-            || terms.any(|t| matches!(t.lobe, Lobe::MetallicRoughness(_) | Lobe::Custom(_)))
+        self.n_terms > 1 || self.terms().iter().any(|t| t.lobe.has_choice())
     }
 
     /// The lobes with their weights.
@@ -254,6 +252,22 @@ impl Bsdf {
     #[inline]
     fn terms(&self) -> &[Term] {
         &self.terms[..self.n_terms as usize]
+    }
+}
+
+impl Lobe {
+    /// Whether its samples use `u_lobe`.
+    fn has_choice(&self) -> bool {
+        match self {
+            Self::MetallicRoughness(_) | Self::Custom(_) => true,
+            Self::Lambert(_)
+            | Self::Phong(_)
+            | Self::Ward(_)
+            | Self::Ggx(_)
+            | Self::Beckmann(_)
+            | Self::Sheen(_)
+            | Self::Coat(_) => false,
+        }
     }
 }
 
