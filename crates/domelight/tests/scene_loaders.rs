@@ -332,11 +332,36 @@ fn an_obj_without_its_library_is_gray_with_a_warning() {
 
 #[test]
 fn smooth_normals_cross_seams_of_an_obj() {
-    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nusemtl b\nf 1/2 3/2 4/2\n";
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 1\ns 1\nf 1/1 2/1 3/1\nusemtl b\nf 1/2 3/2 4/2\n";
     let loaded = one("a.obj", text);
     let [a, b] = &loaded.description.parts[..] else { panic!() };
     let expected = vec3(1.0, 0.0, 1.0).normalize();
     assert!(close(a.mesh.normals[0], expected) && close(b.mesh.normals[0], expected));
+}
+
+#[test]
+fn faces_of_an_obj_are_flat_unless_a_smoothing_group_joins_them() {
+    let normals = |first: &str, second: &str| {
+        let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+        let loaded = one("a.obj", format!("{vertices}{first}\nf 1 2 3\n{second}\nf 1 3 4\n"));
+        loaded.description.parts[0].mesh.normals.clone()
+    };
+    for (first, second) in [("", ""), ("s off", ""), ("s 0", "s null"), ("s", "s OFF # none")] {
+        assert_eq!(normals(first, second), [], "{first}, {second}");
+    }
+    // Faces of different groups share no normal, those of one group do.
+    let apart = normals("s 1", "s 2");
+    assert!(apart.len() == 6 && apart[..3].iter().all(|&n| n == Vec3::Z));
+    assert!(apart[3..].iter().all(|&n| n == Vec3::X));
+    for smooth in ["s 1", "s 3 # of 32", "s on"] {
+        let joined = normals(smooth, "");
+        assert_eq!(joined.len(), 4);
+        assert!(close(joined[0], vec3(1.0, 0.0, 1.0).normalize()), "{smooth}: {joined:?}");
+        assert!(joined[1] == Vec3::Z && joined[3] == Vec3::X);
+    }
+    // A flat face beside a smooth one has no normals.
+    let mixed = normals("s 1", "s off");
+    assert_eq!(mixed.iter().filter(|&&n| n == Vec3::ZERO).count(), 3);
 }
 
 #[test]

@@ -26,6 +26,7 @@ mod obj;
 mod off;
 mod ply;
 mod polygon;
+mod smoothing;
 mod stl;
 mod textures;
 mod toml;

@@ -1,11 +1,11 @@
 //! Wavefront OBJ.
 //!
 //! The reader supports `v` (with colors), `vt` (v upward), `vn`, `f` (polygons of any shape, relative
-//! indices), `o`, `g`, `usemtl` and `mtllib` ([`super::mtl`]). Lines, points, curves and smoothing
-//! groups are ignored. A backslash continues a line; text that is not UTF-8 is read as Latin-1.
+//! indices), `s`, `o`, `g`, `usemtl` and `mtllib` ([`super::mtl`]). Lines, points and curves are ignored. A
+//! backslash continues a line; text that is not UTF-8 is read as Latin-1.
 //! Every object or group and material becomes a separate part, wherever in the file its faces are.
-//! A corner without a normal gets the smooth normal of its position, computed over the whole file, so
-//! that seams of texture coordinates and materials do not show.
+//! A corner without a normal is flat, or has the normal of its smoothing group ([`super::smoothing`]), computed over
+//! the whole file, so that seams of texture coordinates and materials do not show.
 //!
 //! We do not use the crate tobj, because it reports no line numbers and its arithmetic overflows on
 //! out-of-range relative indices.
@@ -16,6 +16,7 @@ use std::rc::Rc;
 
 use super::notes::Notes;
 use super::polygon::Triangulator;
+use super::smoothing::Smoothing;
 use super::textures::Textures;
 use super::wavefront::{ObjErrorKind, enough, lines, number, numbers, words};
 use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, mtl, non_finite, part_name, stem};
@@ -47,7 +48,18 @@ pub(super) fn load(
 struct Corner {
     position: u32,
     uv: Option<u32>,
-    normal: Option<u32>,
+    normal: Normal,
+}
+
+/// Where the normal of a corner comes from.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Normal {
+    /// The file.
+    Given(u32),
+    /// A smoothing group.
+    Smooth(u32),
+    /// The triangle.
+    Flat,
 }
 
 /// The faces of one object and one material.
@@ -77,6 +89,8 @@ struct Reader<'a> {
     groups: Vec<Group>,
     group_of: HashMap<Label, usize>,
     label: Label,
+    /// The normal of corners that bring none.
+    shading: Normal,
     /// The group of `label`, once it has faces.
     group: Option<usize>,
     materials: Vec<Material>,
@@ -103,6 +117,7 @@ impl<'a> Reader<'a> {
             groups: Vec::new(),
             group_of: HashMap::new(),
             label: Label { name: stem(path).into(), material: None },
+            shading: Normal::Flat,
             group: None,
             materials: Vec::new(),
             libraries: HashSet::new(),
@@ -135,6 +150,7 @@ impl<'a> Reader<'a> {
             }
             // `fo` was the keyword of old.
             "f" | "fo" => self.face(rest).map_err(at)?,
+            "s" => self.shading = smoothing_group(rest),
             "o" | "g" => {
                 self.label.name =
                     if rest.is_empty() { stem(self.path).into() } else { part_name(rest).into() };
@@ -178,6 +194,7 @@ impl<'a> Reader<'a> {
         let position = index("vertex (v)", self.positions.len())?;
         let uv = index("texture coordinate (vt)", self.uvs.len())?;
         let normal = index("normal (vn)", self.normals.len())?;
+        let normal = normal.map_or(self.shading, Normal::Given);
         let position = position.ok_or_else(|| ObjErrorKind::Corner { text: text.into() })?;
         Ok(Corner { position, uv, normal })
     }
@@ -250,12 +267,12 @@ impl<'a> Reader<'a> {
     fn finish(mut self) -> Loaded {
         self.colors
             .resize(if self.colors.is_empty() { 0 } else { self.positions.len() }, Rgb::WHITE);
-        let smooth = self.smooth_normals();
+        let smoothing = self.smoothing();
         let mut parts = Vec::new();
         for group in std::mem::take(&mut self.groups) {
             if !group.triangles.is_empty() {
                 let material = self.material_index(group.material.as_deref());
-                let mesh = self.mesh(&group.triangles, &smooth);
+                let mesh = self.mesh(&group.triangles, &smoothing);
                 parts.push(Part { name: group.name.to_string(), mesh, material });
             }
         }
@@ -290,37 +307,42 @@ impl<'a> Reader<'a> {
         gray
     }
 
-    /// Smooth normals of all positions; empty if every corner brings its own.
-    fn smooth_normals(&self) -> Vec<Vec3> {
-        let all = || self.groups.iter().flat_map(|g| &g.triangles);
-        if all().flatten().all(|c| c.normal.is_some()) {
-            return Vec::new();
+    /// The normals of all smoothing groups.
+    fn smoothing(&self) -> Smoothing {
+        let mut smoothing = Smoothing::default();
+        for triangle in self.groups.iter().flat_map(|group| &group.triangles) {
+            // A face has one group.
+            let group = triangle.iter().find_map(|corner| match corner.normal {
+                Normal::Smooth(group) => Some(group),
+                Normal::Given(_) | Normal::Flat => None,
+            });
+            if let Some(group) = group {
+                smoothing.add(group, triangle.map(|corner| corner.position), &self.positions);
+            }
         }
-        let mut mesh = Mesh {
-            positions: self.positions.clone(),
-            triangles: all().map(|t| t.map(|c| c.position)).collect(),
-            ..Mesh::default()
-        };
-        mesh.compute_normals();
-        mesh.normals
+        smoothing
     }
 
     /// One vertex for each different corner.
-    fn mesh(&self, triangles: &[[Corner; 3]], smooth: &[Vec3]) -> Mesh {
+    fn mesh(&self, triangles: &[[Corner; 3]], smoothing: &Smoothing) -> Mesh {
         let mut mesh = Mesh::default();
         let mut known = HashMap::new();
         let has_uvs = triangles.iter().flatten().any(|c| c.uv.is_some());
+        let has_normals = triangles.iter().flatten().any(|c| c.normal != Normal::Flat);
         mesh.triangles.reserve(triangles.len());
         for triangle in triangles {
             let indices = triangle.map(|corner| {
                 *known.entry(corner).or_insert_with(|| {
                     let position = corner.position as usize;
                     mesh.positions.push(self.positions[position]);
-                    mesh.normals.push(
-                        corner
-                            .normal
-                            .map_or_else(|| smooth[position], |n| self.normals[n as usize]),
-                    );
+                    if has_normals {
+                        mesh.normals.push(match corner.normal {
+                            Normal::Given(normal) => self.normals[normal as usize],
+                            Normal::Smooth(group) => smoothing.normal(group, corner.position),
+                            // Zero stands for the triangle's own.
+                            Normal::Flat => Vec3::ZERO,
+                        });
+                    }
                     if has_uvs {
                         mesh.uvs.push(corner.uv.map_or(Vec2::ZERO, |t| self.uvs[t as usize]));
                     }
@@ -333,6 +355,21 @@ impl<'a> Reader<'a> {
             mesh.triangles.push(indices);
         }
         mesh
+    }
+}
+
+/// The group that `s` names: none for `off`, `null` and 0. Words that are no numbers, such as `on`, name one group.
+fn smoothing_group(rest: &str) -> Normal {
+    match words(rest).next() {
+        None => Normal::Flat,
+        Some(word) if ["off", "null"].iter().any(|no| word.eq_ignore_ascii_case(no)) => {
+            Normal::Flat
+        }
+        Some(word) => match word.parse() {
+            Ok(0) => Normal::Flat,
+            Ok(group) => Normal::Smooth(group),
+            Err(_) => Normal::Smooth(u32::MAX),
+        },
     }
 }
 
