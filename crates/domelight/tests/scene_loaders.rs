@@ -369,6 +369,16 @@ fn vertex_colors_of_an_obj() {
     let loaded = one("a.obj", "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 0 0 1\nv 2 2 2\nf 1 2 3\n");
     let colors = &loaded.description.parts[0].mesh.colors;
     assert_eq!(colors[..], [Rgb::new(1.0, 0.0, 0.0), Rgb::WHITE, Rgb::new(0.0, 0.0, 1.0)]);
+    // Display values from 0 to 1 or to 255.
+    for half in ["0.5 0.5 0.5", "127.5 127.5 127.5"] {
+        let last = if half.len() > 12 { "255 0 0" } else { "nan 0 0" };
+        let text = format!("v 0 0 0 {half}\nv 1 0 0 {half}\nv 0 1 0 {last}\nf 1 2 3\n");
+        let loaded = one("a.obj", text);
+        let colors = &loaded.description.parts[0].mesh.colors;
+        assert!(close_f(colors[0].g, 0.214_041) && colors[2].r == 1.0, "{colors:?}");
+        let warns = loaded.warnings.iter().any(|warning| warning.contains("1 color is NaN"));
+        assert_eq!(warns, last.contains("nan"));
+    }
 }
 
 #[test]
@@ -810,7 +820,7 @@ fn off_and_its_variants() {
         };
         vertices.iter().fold(OFF.replace("OFF #", &format!("{word} #")), line)
     };
-    for rgb in ["255 188 0", "255 188 0 128", "1.0 0.5 0.0 1.0"] {
+    for rgb in ["255 188 0", "255 188 0 128", "1.0 0.735 0.0 1.0"] {
         let mesh = check(&with("COFF", rgb));
         assert_eq!(mesh.colors.len(), 5);
         assert!((mesh.colors[2] - Rgb::new(1.0, 0.5, 0.0)).map(f32::abs).max_component() < 4e-3);
@@ -865,6 +875,16 @@ fn ply_strips_and_colored_faces() {
         format!("{head}end_header\n{}", body.replace("1 4 2 2", "1 5 2 2")),
         &["tristrips 0", "5"],
     );
+
+    let float = PLY_QUAD.replace("property uchar", "property float");
+    let float = float
+        .replace("255 188 0", "1 0.5 nan")
+        .replace("255", "1")
+        .replace("float flag", "uchar flag");
+    let loaded = one("a.ply", float);
+    let colors = &loaded.description.parts[0].mesh.colors;
+    assert_eq!(colors[..2], [Rgb::new(1.0, 0.0, 0.0); 2]);
+    assert!(colors[3] == Rgb::WHITE && loaded.warnings[0].contains("1 color is NaN"));
 
     let colored = PLY_QUAD
         .replace(

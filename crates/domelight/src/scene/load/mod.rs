@@ -15,6 +15,7 @@
 //! that names the file and the place, never a panic.
 
 mod budget;
+mod colors;
 mod faces;
 mod files;
 mod format;

@@ -14,12 +14,13 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use super::colors::ColorScale;
 use super::notes::Notes;
 use super::polygon::Triangulator;
 use super::smoothing::Smoothing;
 use super::textures::Textures;
 use super::wavefront::{ObjErrorKind, enough, lines, number, numbers, words};
-use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, mtl, non_finite, part_name, stem};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, colors, mtl, non_finite, part_name, stem};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
@@ -81,8 +82,8 @@ struct Reader<'a> {
     /// Whether positions that are not finite and files that cannot be read are errors.
     strict: bool,
     positions: Vec<Vec3>,
-    /// One a position, white where the file gives none; empty if it never does.
-    colors: Vec<Rgb>,
+    /// One a position as the file has it, none where it gives none; empty if it never does.
+    colors: Vec<Option<Rgb>>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
     /// In the order of their first faces.
@@ -176,8 +177,8 @@ impl<'a> Reader<'a> {
     /// A position, perhaps with a weight (which rendering ignores) or a color after it.
     fn vertex(&mut self, n: &[f32]) {
         if n.len() >= 6 {
-            self.colors.resize(self.positions.len(), Rgb::WHITE);
-            self.colors.push(Rgb::new(n[n.len() - 3], n[n.len() - 2], n[n.len() - 1]));
+            self.colors.resize(self.positions.len(), None);
+            self.colors.push(Some(Rgb::new(n[n.len() - 3], n[n.len() - 2], n[n.len() - 1])));
         }
         self.positions.push(Vec3::new(n[0], n[1], n[2]));
     }
@@ -265,14 +266,13 @@ impl<'a> Reader<'a> {
     }
 
     fn finish(mut self) -> Loaded {
-        self.colors
-            .resize(if self.colors.is_empty() { 0 } else { self.positions.len() }, Rgb::WHITE);
+        let colors = self.linear_colors();
         let smoothing = self.smoothing();
         let mut parts = Vec::new();
         for group in std::mem::take(&mut self.groups) {
             if !group.triangles.is_empty() {
                 let material = self.material_index(group.material.as_deref());
-                let mesh = self.mesh(&group.triangles, &smoothing);
+                let mesh = self.mesh(&group.triangles, &smoothing, &colors);
                 parts.push(Part { name: group.name.to_string(), mesh, material });
             }
         }
@@ -307,6 +307,18 @@ impl<'a> Reader<'a> {
         gray
     }
 
+    /// The color of each position, white where the file gives none; empty if it never does.
+    fn linear_colors(&mut self) -> Vec<Rgb> {
+        if self.colors.is_empty() {
+            return Vec::new();
+        }
+        self.colors.resize(self.positions.len(), None);
+        let scale = ColorScale::of(self.colors.iter().copied().flatten());
+        self.warnings.extend(colors::warning(self.path, scale.non_finite));
+        let linear = |color: &Option<Rgb>| color.map_or(Rgb::WHITE, |color| scale.linear(color));
+        self.colors.iter().map(linear).collect()
+    }
+
     /// The normals of all smoothing groups.
     fn smoothing(&self) -> Smoothing {
         let mut smoothing = Smoothing::default();
@@ -324,7 +336,7 @@ impl<'a> Reader<'a> {
     }
 
     /// One vertex for each different corner.
-    fn mesh(&self, triangles: &[[Corner; 3]], smoothing: &Smoothing) -> Mesh {
+    fn mesh(&self, triangles: &[[Corner; 3]], smoothing: &Smoothing, colors: &[Rgb]) -> Mesh {
         let mut mesh = Mesh::default();
         let mut known = HashMap::new();
         let has_uvs = triangles.iter().flatten().any(|c| c.uv.is_some());
@@ -346,9 +358,7 @@ impl<'a> Reader<'a> {
                     if has_uvs {
                         mesh.uvs.push(corner.uv.map_or(Vec2::ZERO, |t| self.uvs[t as usize]));
                     }
-                    if !self.colors.is_empty() {
-                        mesh.colors.push(self.colors[position]);
-                    }
+                    mesh.colors.extend(colors.get(position));
                     (mesh.positions.len() - 1) as u32
                 })
             });

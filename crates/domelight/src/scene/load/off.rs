@@ -3,21 +3,20 @@
 //! The reader supports the header words `OFF`, `COFF` (colors of vertices), `NOFF` (normals), `STOFF` (texture
 //! coordinates), `4OFF` (homogeneous coordinates) and their compounds, or none; the counts on the same line or even
 //! in the same word; comments after `#`; polygons of any shape; and face colors after the indices, with one number
-//! for gray, three or four. Colors are sRGB from 0 to 255 if all colors of a file are whole numbers and some exceed
-//! 1, otherwise linear from 0 to 1. Opacity and indices into color maps are ignored. Vertices without normals get
-//! smooth ones.
+//! for gray, three or four ([`super::colors`]). Opacity and indices into color maps are ignored. Vertices without
+//! normals get smooth ones.
 //!
 //! <http://www.geomview.org/docs/html/OFF.html>. Binary files and files with other dimensions are rejected with a
 //! message.
 
 use std::path::Path;
 
+use super::colors::ColorScale;
 use super::faces::{Polygons, color_triangles};
-use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, line_end, non_finite};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, colors, line_end, non_finite};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
-use crate::scene::texture::{Encoding, decode};
 
 /// An error in an OFF file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -83,8 +82,10 @@ pub(super) fn load(
 ) -> Result<Loaded, LoadError> {
     budget.take(&path.display().to_string(), MEMORY_PER_BYTE * bytes.len() as u64)?;
     let error = |(line, kind)| LoadError::Off { path: path.into(), line, kind };
-    let mesh = read(bytes, strict).map_err(error)?;
-    Ok(Loaded::of_mesh(path, mesh))
+    let Read { mesh, non_finite_colors } = read(bytes, strict).map_err(error)?;
+    let mut loaded = Loaded::of_mesh(path, mesh);
+    loaded.warnings.extend(colors::warning(path, non_finite_colors));
+    Ok(loaded)
 }
 
 /// What the header word says of vertices.
@@ -191,16 +192,23 @@ fn number(word: &str) -> Result<f32, OffErrorKind> {
     value.ok_or_else(|| OffErrorKind::NotANumber { text: word.chars().take(40).collect() })
 }
 
-fn read(bytes: &[u8], strict: bool) -> Located<Mesh> {
+/// What a file holds.
+struct Read {
+    mesh: Mesh,
+    /// How many colors are NaN or infinite.
+    non_finite_colors: usize,
+}
+
+fn read(bytes: &[u8], strict: bool) -> Located<Read> {
     let mut words = Words::new(bytes, strict);
     let end = line_end(bytes);
     let lines = bytes.split(|&b| b == end).count();
     let (kind, vertices, faces) = header(&mut words, lines)?;
     let mut mesh = Mesh::default();
-    let mut colors = Colors::default();
+    let mut vertex_colors = Colors::default();
     for found in 0..vertices {
         let ended = || OffErrorKind::EndOfFile { what: "vertices", found, promised: vertices };
-        read_vertex(&mut words, kind, &mut mesh, &mut colors, &ended)?;
+        read_vertex(&mut words, kind, &mut mesh, &mut vertex_colors, &ended)?;
     }
     let mut polygons = Polygons::default();
     let mut face_colors = Colors::default();
@@ -210,20 +218,24 @@ fn read(bytes: &[u8], strict: bool) -> Located<Mesh> {
         let color = words.rest_of_line();
         face_colors.add(&color).map_err(|kind| (words.line, kind))?;
     }
+    let mut non_finite_colors = 0;
     if kind.colors {
-        mesh.colors = colors.linear().into_iter().map(|c| c.unwrap_or(Rgb::WHITE)).collect();
+        let (colors, non_finite) = vertex_colors.linear();
+        mesh.colors = colors.into_iter().map(|c| c.unwrap_or(Rgb::WHITE)).collect();
+        non_finite_colors = non_finite;
     }
     let triangles = polygons.triangles(&mesh.positions);
     mesh.triangles = triangles.iter().map(|(triangle, _)| *triangle).collect();
     if mesh.normals.is_empty() {
         mesh.compute_normals();
     }
-    let face_colors = face_colors.linear();
+    let (face_colors, non_finite) = face_colors.linear();
     if mesh.colors.is_empty() && face_colors.iter().any(Option::is_some) {
         let of = |&(_, face): &([u32; 3], usize)| face_colors[face].unwrap_or(DEFAULT_ALBEDO);
         mesh = color_triangles(&mesh, triangles.iter().map(of));
+        non_finite_colors = non_finite;
     }
-    Ok(mesh)
+    Ok(Read { mesh, non_finite_colors })
 }
 
 /// The kind, and how many vertices and faces are promised, in a file of so many lines.
@@ -319,33 +331,25 @@ fn read_face(
     Ok(())
 }
 
-/// Colors as they are written.
+/// Colors as they are written, none where a file has an index into a color map that nobody has.
 #[derive(Default)]
-struct Colors {
-    values: Vec<Option<Rgb>>,
-    has_fractions: bool,
-    greatest: f32,
-}
+struct Colors(Vec<Option<Rgb>>);
 
 impl Colors {
-    /// One number is an index into a color map that nobody has, three or four are a color.
+    /// Three numbers or four are a color.
     fn add(&mut self, words: &[&str]) -> Result<(), OffErrorKind> {
-        if words.len() < 3 {
-            self.values.push(None);
-            return Ok(());
-        }
-        let [r, g, b] = [number(words[0])?, number(words[1])?, number(words[2])?];
-        self.has_fractions |= words[..3].iter().any(|word| word.parse::<i64>().is_err());
-        self.greatest = self.greatest.max(r).max(g).max(b);
-        self.values.push(Some(Rgb::new(r, g, b)));
+        let value = |word| non_finite::parse(word).map_or_else(|| number(word), Ok);
+        self.0.push(match words {
+            [r, g, b, ..] => Some(Rgb::new(value(r)?, value(g)?, value(b)?)),
+            _ => None,
+        });
         Ok(())
     }
 
-    fn linear(self) -> Vec<Option<Rgb>> {
-        let bytes = !self.has_fractions && self.greatest > 1.0;
-        let linear = |c: f32| {
-            if bytes { decode((c / 255.0).clamp(0.0, 1.0), Encoding::Srgb) } else { c.max(0.0) }
-        };
-        self.values.into_iter().map(|color| color.map(|color| color.map(linear))).collect()
+    /// Linear colors, and how many are not finite.
+    fn linear(self) -> (Vec<Option<Rgb>>, usize) {
+        let scale = ColorScale::of(self.0.iter().copied().flatten());
+        let linear = self.0.into_iter().map(|color| color.map(|color| scale.linear(color)));
+        (linear.collect(), scale.non_finite)
     }
 }

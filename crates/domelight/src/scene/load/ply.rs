@@ -1,8 +1,7 @@
 //! Stanford PLY: ASCII and both binary byte orders.
 //!
 //! The reader supports, for the element `vertex`, the properties `x y z`, `nx ny nz`, texture coordinates
-//! (`s t`, `u v` or `texture_u texture_v`, v upward) and `red green blue` (integers: sRGB, floats:
-//! linear); for the element `face`, the list `vertex_indices` or `vertex_index` with polygons of any shape, and
+//! (`s t`, `u v` or `texture_u texture_v`, v upward) and `red green blue` (sRGB; floats by [`super::colors`]); for the element `face`, the list `vertex_indices` or `vertex_index` with polygons of any shape, and
 //! colors as for vertices, which are used if vertices have none; for `tristrips`, the same list, where −1 ends a
 //! strip. Elements and properties may come in any order. Everything else is ignored. A file without normals gets
 //! smooth ones.
@@ -13,7 +12,7 @@ use std::fmt;
 use std::path::Path;
 
 use super::faces::{Polygons, color_triangles};
-use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, line_end, non_finite};
+use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, colors, line_end, non_finite};
 use crate::Rgb;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
@@ -126,8 +125,10 @@ pub(super) fn load(
     let header = Header::parse(bytes).map_err(error)?;
     header.check_size(bytes.len() - header.length).map_err(error)?;
     budget.take(&path.display().to_string(), header.memory(bytes.len() - header.length))?;
-    let Parsed { mesh, rest } = parse(&header, bytes, strict).map_err(error)?;
+    let Parsed { body: Body { mesh, non_finite_colors }, rest } =
+        parse(&header, bytes, strict).map_err(error)?;
     let mut loaded = Loaded::of_mesh(path, mesh);
+    loaded.warnings.extend(colors::warning(path, non_finite_colors));
     if header.format == Format::Ascii && !rest.trim_ascii().is_empty() {
         loaded.warnings.push(format!(
             "{}: text follows the rows that the header counts, and is left out",
@@ -137,30 +138,37 @@ pub(super) fn load(
     Ok(loaded)
 }
 
-struct Parsed<'a> {
+/// What the rows hold.
+struct Body {
     mesh: Mesh,
+    /// How many colors are NaN or infinite.
+    non_finite_colors: usize,
+}
+
+struct Parsed<'a> {
+    body: Body,
     /// What follows the rows that the header counts.
     rest: &'a [u8],
 }
 
 fn parse<'a>(header: &Header, bytes: &'a [u8], strict: bool) -> Located<Parsed<'a>> {
-    let body = &bytes[header.length..];
+    let data = &bytes[header.length..];
     let start = header.length;
-    let (mesh, position) = match header.format {
+    let (body, position) = match header.format {
         Format::Ascii => {
-            let mut numbers = Ascii { data: body, position: 0, start };
+            let mut numbers = Ascii { data, position: 0, start };
             (read_body(header, &mut numbers, strict)?, numbers.position)
         }
         Format::Little => {
-            let mut numbers = Binary::<false> { data: body, position: 0, start };
+            let mut numbers = Binary::<false> { data, position: 0, start };
             (read_body(header, &mut numbers, strict)?, numbers.position)
         }
         Format::Big => {
-            let mut numbers = Binary::<true> { data: body, position: 0, start };
+            let mut numbers = Binary::<true> { data, position: 0, start };
             (read_body(header, &mut numbers, strict)?, numbers.position)
         }
     };
-    Ok(Parsed { mesh, rest: &body[position..] })
+    Ok(Parsed { body, rest: &data[position..] })
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -423,8 +431,9 @@ impl<const BIG: bool> Numbers for Binary<'_, BIG> {
     }
 }
 
-fn read_body(header: &Header, numbers: &mut impl Numbers, strict: bool) -> Located<Mesh> {
+fn read_body(header: &Header, numbers: &mut impl Numbers, strict: bool) -> Located<Body> {
     let mut mesh = Mesh::default();
+    let mut non_finite_colors = 0;
     let mut faces = Faces::default();
     let (mut has_vertices, mut has_faces) = (false, false);
     let vertices = header.vertices();
@@ -432,11 +441,11 @@ fn read_body(header: &Header, numbers: &mut impl Numbers, strict: bool) -> Locat
         match element.name.as_str() {
             "vertex" => {
                 has_vertices = true;
-                read_vertices(element, numbers, &mut mesh, strict)?;
+                non_finite_colors += read_vertices(element, numbers, &mut mesh, strict)?;
             }
             "face" => {
                 has_faces = true;
-                read_faces(element, numbers, vertices, &mut faces)?;
+                non_finite_colors += read_faces(element, numbers, vertices, &mut faces)?;
             }
             "tristrips" => {
                 has_faces = true;
@@ -455,7 +464,7 @@ fn read_body(header: &Header, numbers: &mut impl Numbers, strict: bool) -> Locat
             PlyErrorKind::Missing { what: "element face; points alone cannot be rendered" },
         ));
     }
-    Ok(faces.finish(mesh))
+    Ok(Body { mesh: faces.finish(mesh), non_finite_colors })
 }
 
 /// What is read of a vertex, each with its names; the number is the slot in a row of values.
@@ -495,18 +504,23 @@ impl Colors {
         Some(Self { max: red.scalar.max() })
     }
 
-    fn linear(self, rgb: [f32; 3]) -> Rgb {
-        let linear = |c: f32| self.max.map_or(c, |max| decode(c / max, Encoding::Srgb));
-        Rgb::from(rgb).map(linear)
+    /// Makes colors linear, and returns how many are not finite.
+    fn linearize(self, colors: &mut [Rgb]) -> usize {
+        let Some(max) = self.max else { return colors::linearize(colors) };
+        for color in colors {
+            *color = color.map(|c| decode(c / max, Encoding::Srgb));
+        }
+        0
     }
 }
 
+/// Reads positions and what comes with them, and returns how many colors are not finite.
 fn read_vertices(
     element: &Element,
     numbers: &mut impl Numbers,
     mesh: &mut Mesh,
     strict: bool,
-) -> Located<()> {
+) -> Located<usize> {
     let slots: Vec<Option<usize>> = element.properties.iter().map(slot_of).collect();
     let has = |wanted: std::ops::Range<usize>| wanted.into_iter().all(|s| slots.contains(&Some(s)));
     let place = PlyPlace::Line(element.line);
@@ -537,9 +551,9 @@ fn read_vertices(
         if uvs {
             mesh.uvs.push(Vec2::new(u, 1.0 - v));
         }
-        mesh.colors.extend(colors.map(|colors| colors.linear([r, g, b])));
+        mesh.colors.extend(colors.map(|_| Rgb::new(r, g, b)));
     }
-    Ok(())
+    Ok(colors.map_or(0, |colors| colors.linearize(&mut mesh.colors)))
 }
 
 /// What the triangles are made of.
@@ -591,12 +605,13 @@ fn index(value: f64, vertices: u64, element: &Element, row: usize) -> Located<u3
     Err((place, PlyErrorKind::Index { value, vertices: vertices as usize }))
 }
 
+/// Reads polygons and their colors, and returns how many colors are not finite.
 fn read_faces(
     element: &Element,
     numbers: &mut impl Numbers,
     vertices: u64,
     out: &mut Faces,
-) -> Located<()> {
+) -> Located<usize> {
     require_indices(element)?;
     let colors = Colors::of(element);
     for row in 0..element.count as usize {
@@ -615,9 +630,9 @@ fn read_faces(
             }
         }
         out.polygons.end();
-        out.colors.extend(colors.map(|colors| colors.linear(rgb)));
+        out.colors.extend(colors.map(|_| Rgb::from(rgb)));
     }
-    Ok(())
+    Ok(colors.map_or(0, |colors| colors.linearize(&mut out.colors)))
 }
 
 /// Every corner after the second of a strip makes a triangle with the two before it, every other one turned.
