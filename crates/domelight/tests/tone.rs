@@ -34,7 +34,7 @@ const PATCHES: [[u8; 3]; 24] = [
 ];
 
 /// What Blender 5.0.1's view AgX, look None, shows of the patches at an exposure \[stops\]: sRGB of 16 bits, as
-/// `interop/agx.py` prints it.
+/// `checks/interop/agx.py` prints it.
 const BLENDER: [(f32, [[u16; 3]; 24]); 3] = [
     (
         -4.0,

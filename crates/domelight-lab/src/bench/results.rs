@@ -119,32 +119,3 @@ impl Results {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The tables of the documentation are made of these files.
-    #[test]
-    fn published_results_become_tables() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../bench/results");
-        let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-        let files: Vec<_> = files.filter(|f| f.extension().is_some_and(|e| e == "json")).collect();
-        assert!(files.len() >= 9, "{files:?}");
-        for file in files {
-            let results = Results::read(&file).unwrap_or_else(|error| panic!("{error}"));
-            let tables = results.tables();
-            let counts_silhouettes = tables.iter().any(|t| t.markdown().contains("inside, to"));
-            for table in tables {
-                let markdown = table.markdown();
-                assert!(!table.rows.is_empty(), "{}: {markdown}", file.display());
-                let width = table.head.len();
-                assert!(table.rows.iter().all(|row| row.len() == width), "{}", file.display());
-                // Files of before say whose error theirs is.
-                if matches!(results.rows, Rows::Probes(_)) && !counts_silhouettes {
-                    assert!(markdown.contains("without silhouettes"), "{markdown}");
-                }
-            }
-        }
-    }
-}

@@ -2,7 +2,7 @@
 //
 //   npm ci && npm test
 //
-// DOMELIGHT names the program (by default the one in ../target), CHROMIUM the browser.
+// DOMELIGHT names the program (by default the one in target), CHROMIUM the browser.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -14,7 +14,7 @@ import { after, before, test } from "node:test";
 import { chromium } from "playwright-core";
 
 const first = (places) => places.filter(Boolean).find((place) => existsSync(place));
-const target = resolve(import.meta.dirname, "../target");
+const target = resolve(import.meta.dirname, "../../target");
 const program = first([process.env.DOMELIGHT, `${target}/release/domelight`, `${target}/debug/domelight`]);
 const browserPath = first([process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"]);
 assert.ok(program, "no domelight in target/: build it first, or set DOMELIGHT");

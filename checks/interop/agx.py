@@ -1,6 +1,6 @@
 """Prints what Blender's view transform AgX makes of 24 patches at three exposures: the table of tests/tone.rs.
 
-Runs in interop's Python with `bpy` (`interop/run` installs it), or in Blender: blender -b --python agx.py
+Runs in interop's Python with `bpy` (`checks/interop/run` installs it), or in Blender: blender -b --python agx.py
 """
 
 import pathlib
