@@ -1,0 +1,27 @@
+//! `bindgen MODULE FOLDER`: writes `engine.js`, `engine.d.ts` and `engine_bg.wasm`, what the command wasm-bindgen does
+//! for pages, without the web servers and drivers that it is built with.
+use std::process::ExitCode;
+
+use wasm_bindgen_cli_support::Bindgen;
+
+fn main() -> ExitCode {
+    let arguments: Vec<_> = std::env::args_os().skip(1).collect();
+    let [module, folder] = &arguments[..] else {
+        eprintln!("usage: bindgen MODULE FOLDER");
+        return ExitCode::from(2);
+    };
+    let mut bindgen = Bindgen::new();
+    let written = bindgen
+        .input_path(module)
+        .out_name("engine")
+        .typescript(true)
+        .web(true)
+        .and_then(|b| b.generate(folder));
+    match written {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("bindgen: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
