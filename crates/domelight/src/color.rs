@@ -15,6 +15,9 @@ pub struct Rgb {
     pub b: f32,
 }
 
+/// Added to R² in the denominator of relMSE, as most papers on sampling do, so that dark pixels do not dominate.
+pub const REGULARIZER: f64 = 0.01;
+
 impl Rgb {
     /// (0, 0, 0).
     pub const BLACK: Self = Self::splat(0.0);

@@ -3,6 +3,7 @@
 use super::tiling::SampleSet;
 use super::variance::Contrast;
 use crate::Rgb;
+use crate::color::REGULARIZER;
 use crate::math::{Vec3, functions};
 
 /// The contribution of one camera sample to its pixel.
@@ -268,31 +269,36 @@ impl PixelSums {
         }
     }
 
-    /// The luminance of the mean.
-    pub(super) fn luminance(&self) -> f32 {
-        self.mean(self.color).luminance()
+    /// The relMSE of the mean from the difference of the two sets; 0 if either is empty.
+    pub(super) fn error_by_sets(&self) -> f64 {
+        let [first, second] = self.means_of_sets();
+        let of_channel = |c: usize| {
+            let variance = self.balance() * functions::powi(first[c] - second[c], 2);
+            // A firefly brightens one of the sets. The other shows how bright the pixel is.
+            let brightness = first[c].min(second[c]).max(0.0);
+            variance / (brightness * brightness + REGULARIZER)
+        };
+        (0..3).map(of_channel).sum::<f64>() / 3.0
     }
 
-    /// The squared error of the mean's luminance, from the difference of the two sets; 0 without a second set.
-    pub(super) fn variance_by_sets(&self) -> f32 {
-        let difference = Rgb::from(self.difference().map(|d| d as f32)).luminance();
-        self.balance() as f32 * difference * difference
-    }
-
-    /// The difference of the means of the two sets; 0 if either is empty.
-    fn difference(&self) -> [f64; 3] {
-        let [first, second] =
-            [SampleSet::First, SampleSet::Second].map(|set| f64::from(self.n_of(set)));
-        if first == 0.0 || second == 0.0 {
-            return [0.0; 3];
+    /// The means of the two sets; black if either is empty.
+    fn means_of_sets(&self) -> [[f64; 3]; 2] {
+        let [n_first, n_second] = self.sizes_of_sets();
+        if n_first == 0.0 || n_second == 0.0 {
+            return [[0.0; 3]; 2];
         }
-        std::array::from_fn(|c| (self.color[c] - self.second[c]) / first - self.second[c] / second)
+        let first = std::array::from_fn(|c| (self.color[c] - self.second[c]) / n_first);
+        [first, self.second.map(|sum| sum / n_second)]
+    }
+
+    /// The numbers of samples of the two sets.
+    fn sizes_of_sets(&self) -> [f64; 2] {
+        [SampleSet::First, SampleSet::Second].map(|set| f64::from(self.n_of(set)))
     }
 
     /// The variance of the mean divided by that of the difference of the sets, for equally noisy sets: a b / (a + b)².
     fn balance(&self) -> f64 {
-        let [first, second] =
-            [SampleSet::First, SampleSet::Second].map(|set| f64::from(self.n_of(set)));
+        let [first, second] = self.sizes_of_sets();
         first * second / functions::powi(first + second, 2).max(1.0)
     }
 
@@ -304,10 +310,9 @@ impl PixelSums {
         let independent: f64 = self.independent_variance().into_iter().sum();
         let squares = |x: [f64; 3]| x.into_iter().map(|x| x * x).sum::<f64>();
         if self.n_second > 0 {
-            return Some(Contrast::Sets([
-                independent,
-                self.balance() * squares(self.difference()),
-            ]));
+            let [first, second] = self.means_of_sets();
+            let difference = std::array::from_fn(|c| first[c] - second[c]);
+            return Some(Contrast::Sets([independent, self.balance() * squares(difference)]));
         }
         let [whole, half] = self.prefixes.map(|sum| sum.to_array().map(f64::from));
         let prefix = f64::from(1u32 << self.n_samples.ilog2());

@@ -219,11 +219,8 @@ impl Tile {
     /// Whether the tile has all its samples or has reached the target error, independent of other tiles.
     pub(super) fn is_finished(&self, settings: &RenderSettings) -> bool {
         let n_samples = self.n_samples();
-        let precise = |error| {
-            n_samples >= FEWEST_SAMPLES
-                && self.has_even_sets()
-                && self.error(settings.background) <= error
-        };
+        let precise =
+            |error| n_samples >= FEWEST_SAMPLES && self.has_even_sets() && self.error() <= error;
         n_samples >= settings.n_samples || settings.target_error.is_some_and(precise)
     }
 
@@ -235,35 +232,15 @@ impl Tile {
 
     /// The relMSE from the differences of the two sets, plus one standard error. Without the latter, a tile whose error
     /// is in a few pixels would stop on the first lucky estimate.
-    fn error(&self, background: Background) -> f32 {
-        let luminance: Vec<f32> = self.pixels.iter().map(PixelSums::luminance).collect();
+    fn error(&self) -> f32 {
         let (mut sum, mut sum_of_squares) = (0.0, 0.0);
-        for (i, pixel) in self.pixels.iter().enumerate() {
-            // A firefly inflates the pixel's own brightness, so average over its neighbors, unless they are brighter or
-            // darker because the scene covers another part of them.
-            let is_covered_in_part = (1..pixel.n_samples()).contains(&pixel.n_hits);
-            let mean = if background == Background::Hidden && is_covered_in_part {
-                luminance[i]
-            } else {
-                self.mean_around(i, &luminance)
-            };
-            let error = pixel.variance_by_sets() / (mean * mean + 0.01);
+        for error in self.pixels.iter().map(PixelSums::error_by_sets) {
             sum += error;
             sum_of_squares += error * error;
         }
         // The square of a normal number with variance v has the variance 2 v² and the mean square 3 v².
         let standard_error = (sum_of_squares * 2.0 / 3.0).sqrt();
-        (sum + standard_error) / self.window.area() as f32
-    }
-
-    /// The mean over pixel `i` and its neighbors in the tile.
-    fn mean_around(&self, i: usize, values: &[f32]) -> f32 {
-        let Window { width, height, .. } = self.window;
-        let near = |center: usize, n: usize| center.saturating_sub(1)..(center + 2).min(n);
-        let (columns, rows) = (near(i % width, width), near(i / width, height));
-        let n = columns.len() * rows.len();
-        let row = |y: usize| values[y * width..][columns.clone()].iter().sum::<f32>();
-        rows.map(row).sum::<f32>() / n as f32
+        ((sum + standard_error) / self.window.area() as f64) as f32
     }
 
     /// Adds the samples of a pass to each pixel.
