@@ -90,14 +90,14 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         filter: settings.filter.name(),
         seed: settings.seed,
         threads: rayon::current_num_threads(),
-        automatic_exposure: automatic,
+        automatic_exposure: automatic.stops,
     };
     let render_run = &arguments.render_run;
     let render_run = render_run.render_run(view, settings, &described, spec, &outputs, quiet)?;
     let build = watch.lap();
     drop(loading);
 
-    let shown_as = arguments.output.tone.of_picture(|| automatic);
+    let shown_as = arguments.output.tone.of_picture(|| automatic.stops);
     if arguments.output.preview {
         preview::write(view, settings, strategy, &outputs, &shown_as, interrupted)?;
     }
@@ -154,7 +154,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     report.profile = progress.profile();
     report.denoised = denoised;
     if outputs.iter().any(PicturePath::is_png) {
-        report.png = Some(Shown::new(&arguments.output.tone, &shown_as));
+        report.png = Some(Shown::new(&arguments.output.tone, &shown_as).metered(automatic.basis));
     }
     if arguments.output.json {
         report.print_json()?;

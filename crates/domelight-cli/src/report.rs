@@ -28,7 +28,7 @@ pub(crate) struct Settings {
     pub(crate) filter: &'static str,
     pub(crate) seed: u64,
     pub(crate) threads: usize,
-    /// The exposure that maps the median of the picture to middle gray \[stops\].
+    /// The exposure by the light \[stops\].
     pub(crate) automatic_exposure: f32,
 }
 

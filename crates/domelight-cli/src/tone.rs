@@ -10,7 +10,7 @@ use domelight::picture::tone::ToneMapping;
 use domelight::picture::{
     Format, Picture, PictureError, PictureErrorKind, ReadOptions, png, read_bytes, read_file,
 };
-use domelight::render::kept_exposure;
+use domelight::render::{ExposureBasis, kept_exposure};
 use domelight_lab::denoise::{Denoiser, Features};
 use serde::Serialize;
 
@@ -30,20 +30,32 @@ pub(crate) struct Shown {
     exposure: f32,
     /// Whether the exposure was automatic.
     automatic: bool,
+    /// What the automatic exposure of a render meters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    basis: Option<ExposureBasis>,
     tone: &'static str,
 }
 
 impl Shown {
     pub(crate) fn new(arguments: &Tone, mapping: &ToneMapping) -> Self {
         let automatic = arguments.is_automatic();
-        Self { exposure: mapping.exposure, automatic, tone: mapping.curve.name() }
+        Self { exposure: mapping.exposure, automatic, basis: None, tone: mapping.curve.name() }
+    }
+
+    /// The same, with what an automatic exposure meters.
+    pub(crate) fn metered(self, basis: ExposureBasis) -> Self {
+        Self { basis: self.automatic.then_some(basis), ..self }
     }
 }
 
 impl fmt::Display for Shown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { exposure, automatic, tone } = self;
-        let automatic = if *automatic { " (automatic)" } else { "" };
+        let Self { exposure, automatic, basis, tone } = self;
+        let automatic = match (automatic, basis) {
+            (false, _) => String::new(),
+            (true, None) => " (automatic)".to_owned(),
+            (true, Some(basis)) => format!(" (automatic, {basis})"),
+        };
         write!(f, "{exposure:+.2} EV{automatic}, {tone}")
     }
 }

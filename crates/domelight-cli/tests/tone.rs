@@ -37,12 +37,14 @@ fn a_render_is_exposed_automatically_and_says_so() {
     let report = json(&output);
     let exposure = report["settings"]["automatic_exposure"].as_f64().unwrap();
     assert!((-8.0..-3.0).contains(&exposure), "{exposure}");
-    let png = serde_json::json!({ "exposure": exposure, "automatic": true, "tone": "agx" });
+    let png = serde_json::json!({
+        "exposure": exposure, "automatic": true, "basis": "light", "tone": "agx"
+    });
     assert_eq!(report["png"], png);
     // Brighter by five stops, and yet the same on the screen.
     let output = render(&folder, &["-o", "b.png"]);
     let line = stderr(&output).lines().last().unwrap().to_owned();
-    let dimmer = format!("{:+.2} EV (automatic), agx", exposure + 5.0);
+    let dimmer = format!("{:+.2} EV (automatic, for the light), agx", exposure + 5.0);
     assert!(line.contains(&dimmer), "{line}, not {dimmer}");
     let (bright, dim) = (median(&load(&folder, "a.png")), median(&load(&folder, "b.png")));
     assert!((bright - dim).abs() < 0.01, "{bright} {dim}");

@@ -168,7 +168,7 @@ impl Job {
         let Self { scene, environment, camera, settings, .. } = self;
         // The pilot would call Python's BSDFs direction by direction.
         if scene.lobes.is_empty() {
-            let found = || automatic_exposure(&scene.scene, camera, environment, settings);
+            let found = || automatic_exposure(&scene.scene, camera, environment, settings).stops;
             self.exposure.get_or_init(found);
         }
         let scene = &scene.scene;

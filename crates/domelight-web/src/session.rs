@@ -162,7 +162,7 @@ impl Engine {
     pub fn automatic_exposure(&self, json: &str) -> Result<f32, JsError> {
         let state: RenderState = parse(json)?;
         let Borrowed { scene, environment, camera } = self.borrowed(&state)?;
-        Ok(automatic_exposure(&scene, &camera, &environment, &Session::settings(&state)))
+        Ok(automatic_exposure(&scene, &camera, &environment, &Session::settings(&state)).stops)
     }
 
     /// Begins a picture, or a shard of it: `{"width", "height", "spp", "strategy", "seed", "hideEnvironment", "camera",

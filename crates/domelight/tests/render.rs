@@ -5,10 +5,9 @@ use domelight::bsdf::{Bsdf, MaterialSpec};
 use domelight::environment::{CompensatedTable, Environment, Orientation};
 use domelight::geometry::Mesh;
 use domelight::math::{Mat4, Vec3, vec3};
-use domelight::picture::exposure::Exposure;
 use domelight::render::{
-    Background, Filter, Layers, Observer, Passes, RenderSettings, Renderer, Rendering,
-    automatic_exposure, render,
+    Background, ExposureBasis, Filter, Layers, Observer, Passes, RenderSettings, Renderer,
+    Rendering, automatic_exposure, render,
 };
 use domelight::rig::{VarianceMinimization, variance_minimization};
 use domelight::sampling::{Heuristic, Pcg32, SamplerKind};
@@ -541,7 +540,7 @@ fn an_empty_scene_and_a_black_probe_render() {
     }
 }
 
-/// The exposure is that of the finished picture, whatever is left to the render: samples, seed, background, size.
+/// The exposure does not depend on what is left to the render: samples, seed, background, size.
 #[test]
 fn the_automatic_exposure_is_known_before_the_picture() {
     let (scene, environment) = (scene("ggx:0.3"), environment());
@@ -556,11 +555,55 @@ fn the_automatic_exposure_is_known_before_the_picture() {
         let of_other = automatic_exposure(&scene, &camera(&other), &environment, &other);
         assert_eq!(of_other, exposure, "{other:?}");
     }
-    let settings = RenderSettings { n_samples: 64, ..settings };
-    let camera = camera(&settings);
-    let Rendering { layers, .. } =
-        render(&scene, &camera, &environment, &mis(&environment), &settings, &());
-    let coverage: Vec<f32> = layers.n_hits.iter().map(|&n| n as f32).collect();
-    let of_picture = Exposure::Auto.stops(&layers.color, Some(&coverage));
-    assert!((of_picture - exposure).abs() < 0.1, "{of_picture} {exposure}");
+}
+
+/// In the open, all subjects are exposed for the light: black stays black, and white stays white.
+#[test]
+fn the_automatic_exposure_is_the_same_for_all_albedos() {
+    let environment = environment();
+    let settings = RenderSettings { width: 60, height: 40, ..Default::default() };
+    let exposures = ["diffuse:0.02", "diffuse:0.2", "diffuse:0.8", "ggx:0.1"].map(|material| {
+        automatic_exposure(&scene(material), &camera(&settings), &environment, &settings)
+    });
+    assert!(exposures.iter().all(|&e| e == exposures[0]), "{exposures:?}");
+    assert_eq!(exposures[0].basis, ExposureBasis::Light);
+}
+
+/// A gray ball under uniform light is middle gray.
+#[test]
+fn a_gray_ball_is_middle_gray() {
+    let environment = Environment::constant(Rgb::splat(8.0)).unwrap();
+    let settings = RenderSettings { width: 60, height: 40, ..Default::default() };
+    let exposure =
+        automatic_exposure(&scene("diffuse:0.18"), &camera(&settings), &environment, &settings);
+    assert!((exposure.stops - -3.0).abs() < 0.011, "{exposure:?}");
+}
+
+/// In a box with a small opening, the exposure is for the light that comes in. Light that the camera alone could see does
+/// not count.
+#[test]
+fn the_automatic_exposure_in_a_room_is_for_the_light_that_arrives() {
+    let mut mesh = Mesh::default();
+    let mut wall = |origin: Vec3, x: Vec3, y: Vec3| {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([origin, origin + x, origin + x + y, origin + y]);
+        mesh.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| first + i)));
+    };
+    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| 4.0 * axis);
+    let o = Vec3::splat(-2.0);
+    for (origin, [a, b]) in
+        [(o, [x, z]), (o, [y, z]), (o + x, [y, z]), (o, [x, y]), (o + z, [x, y])]
+    {
+        wall(origin, a, b);
+    }
+    // The ceiling leaves a gap.
+    wall(o + y, 0.9 * x, z);
+    let room = Scene::from_mesh(mesh, "diffuse:0.7".parse().unwrap()).unwrap();
+    let settings = RenderSettings { width: 40, height: 40, ..Default::default() };
+    let (origin, target) = (vec3(0.0, -1.0, 1.5), vec3(0.0, -1.5, -2.0));
+    let view = CameraSettings { origin, target, ..view() };
+    let camera = Camera::new(&view, 40, 40).unwrap();
+    let exposure = automatic_exposure(&room, &camera, &environment(), &settings);
+    let ExposureBasis::Shade(share) = exposure.basis else { panic!("{exposure:?}") };
+    assert!((1e-3..0.1).contains(&share), "{share}");
 }

@@ -205,7 +205,7 @@ impl<'a> Comparison<'a> {
             Exposure::Stops(stops) => stops,
             Exposure::Auto => {
                 let PreparedSceneRef { scene, camera, environment, .. } = self.view;
-                automatic_exposure(scene, camera, environment, &self.settings.render)
+                automatic_exposure(scene, camera, environment, &self.settings.render).stops
             }
         }
     }

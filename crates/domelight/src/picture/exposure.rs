@@ -33,7 +33,6 @@ impl Exposure {
     /// # Panics
     /// If `coverage` has fewer values than the picture has pixels.
     pub fn stops(self, image: &RgbImage, coverage: Option<&[f32]>) -> f32 {
-        const RANGE: f32 = 30.0;
         if let Self::Stops(stops) = self {
             return stops;
         }
@@ -47,10 +46,15 @@ impl Exposure {
         }
         let middle = luminances.len() / 2;
         let (_, median, _) = luminances.select_nth_unstable_by(middle, f32::total_cmp);
-        let stops = functions::log2(MIDDLE_GRAY / *median).clamp(-RANGE, RANGE);
-        // No minus before a zero.
-        (stops * 100.0).round() / 100.0 + 0.0
+        rounded(functions::log2(MIDDLE_GRAY / *median))
     }
+}
+
+/// An exposure \[stops\] in hundredths, so that it can be typed, and within ±30.
+pub(crate) fn rounded(stops: f32) -> f32 {
+    const RANGE: f32 = 30.0;
+    // No minus before a zero.
+    (stops.clamp(-RANGE, RANGE) * 100.0).round() / 100.0 + 0.0
 }
 
 impl FromStr for Exposure {

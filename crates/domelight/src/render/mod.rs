@@ -29,7 +29,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 #[cfg(feature = "io")]
 pub use checkpoint::{Checkpoint, CheckpointError, Difference};
 #[cfg(feature = "io")]
-pub use exposure::automatic_exposure;
+pub use exposure::{AutomaticExposure, ExposureBasis, automatic_exposure};
 pub use film::{Film, FilmMismatch};
 pub use filter::{Filter, FilterSampler, UnknownFilter};
 pub use layers::{LAYERS, LayerInfo, LayerValues, Layers};
