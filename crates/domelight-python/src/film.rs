@@ -211,7 +211,7 @@ impl Film {
         &self.strategy
     }
 
-    /// float: the automatic exposure [stops], which maps the median of the covered pixels to middle gray; 0 leaves
+    /// float: the automatic exposure [stops], by the light on the scene; 0 leaves
     /// radiance unchanged. The program's renders of the same scene, light and view have the same exposure.
     #[getter]
     fn exposure(&self) -> f32 {
