@@ -190,7 +190,7 @@ impl Job {
 
     /// The film of a renderer so far.
     pub(crate) fn film<S: Strategy>(&self, renderer: &Renderer<S>) -> Film {
-        let sums = renderer.film();
+        let sums = renderer.whole_film();
         let exposure = *self.exposure.get_or_init(|| automatic_exposure_of(&sums.layers()));
         let (strategy, description) = match (&self.strategy, self.chosen.get()) {
             (Choice::Builtin(spec), None) | (_, Some(spec)) => {

@@ -3,6 +3,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use domelight::RgbImage;
 use domelight::environment::builtin::BuiltinProbe;
 use domelight::environment::{Environment, Orientation};
 use domelight::picture::exr::ExrLayers;
@@ -115,6 +116,35 @@ fn a_strategy_that_learns_can_be_interrupted() {
     let test_scene = test_scene();
     let settings = RenderSettings { n_samples: 80, tile_size: 16, ..settings() };
     interrupt_and_resume(&test_scene, &ProductSampling::new(&test_scene.environment, 2), &settings);
+}
+
+/// The picture of a render that was interrupted in its first pass is coarse where nothing was rendered. The film that a
+/// checkpoint keeps knows nothing of that.
+#[test]
+fn an_interrupted_picture_has_no_holes() {
+    let test_scene = test_scene();
+    let settings = RenderSettings { n_samples: 80, ..settings() };
+    let strategy = ProductSampling::new(&test_scene.environment, 2);
+    let mut renderer = renderer(&test_scene, &strategy, &settings);
+    assert!(!renderer.run(&After::tiles(3)));
+    let rendering = renderer.rendering();
+    let coarse = rendering.layers.n_samples.iter().filter(|&&n| n == 1).count();
+    assert!(coarse > 53 * 38 / 2, "{coarse}");
+    assert!(!rendering.complete && rendering.layers.n_samples.iter().all(|&n| n > 0));
+    assert!(renderer.whole_film().layers().color.pixels == rendering.layers.color.pixels);
+    // Where it is coarse, it is the same picture.
+    let expected = uninterrupted(&test_scene, &strategy, &settings).layers.color;
+    let blurred = |image: &RgbImage, x: usize, y: usize| -> f32 {
+        let block = (8 * y..8 * y + 8).flat_map(|y| &image.row(y)[8 * x..8 * x + 8]);
+        block.map(|p| p.luminance()).sum()
+    };
+    for (x, y) in (0..4).flat_map(|y| (0..6).map(move |x| (x, y))) {
+        let [kept, whole] = [&rendering.layers.color, &expected].map(|image| blurred(image, x, y));
+        assert!((0.5..2.0).contains(&(kept / whole)), "{x} {y}: {kept} {whole}");
+    }
+    assert!(renderer.film().layers().n_samples.contains(&0));
+    renderer.run(&());
+    assert_eq!(renderer.rendering().layers.color.pixels, expected.pixels);
 }
 
 /// Before no background tiles that see nothing keep no sums.

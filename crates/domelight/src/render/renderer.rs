@@ -143,10 +143,14 @@ impl<'a, S: Strategy> Renderer<'a, S> {
     ) -> Self {
         let filter = FilterSampler::new(settings.filter);
         let (camera, extent) = (scene.camera_inside(camera), scene.extent());
-        let tiling = Tiling::new(&settings, strategy.n_rays());
         let catcher = Catcher::of(scene, environment);
         let context =
             RenderContext { scene, camera, environment, settings, filter, extent, catcher };
+        Self::of_context(context, strategy)
+    }
+
+    fn of_context(context: RenderContext<'a>, strategy: Held<'a, S>) -> Self {
+        let tiling = Tiling::new(&context.settings, strategy.n_rays());
         let empty = Self {
             context,
             strategy,
@@ -355,6 +359,47 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         film
     }
 
+    /// The film so far, with a coarse picture of one camera sample for 2 × 2 pixels where nothing was rendered. It shows
+    /// the whole picture of an interrupted render, which cannot continue from it. A part of a picture stays as it is.
+    pub fn whole_film(&self) -> Film {
+        let mut film = self.film();
+        self.coarse_tiles().iter().for_each(|tile| film.put(tile.window, &tile.sums()));
+        film
+    }
+
+    /// The tiles without samples, with those of a coarse picture.
+    fn coarse_tiles(&self) -> Vec<Tile> {
+        let empty = |tile: &&Tile| tile.n_samples() == 0;
+        let is_part = self.tiles.len() < self.tiling.n_tiles();
+        if is_part || !self.tiles.iter().any(|tile| empty(&tile)) {
+            return Vec::new();
+        }
+        let RenderSettings { width, height, .. } = self.context.settings;
+        let [columns, rows] = [width, height].map(|n| n.div_ceil(2));
+        let settings = RenderSettings {
+            width: columns,
+            height: rows,
+            n_samples: 1,
+            adaptive: false,
+            target_error: None,
+            ..self.context.settings
+        };
+        let camera = self.context.camera.resized((width, height), (columns, rows));
+        let filter = FilterSampler::new(settings.filter);
+        let context = RenderContext { camera, settings, filter, ..self.context };
+        let coarse = Renderer::of_context(context, Held::Lent(&*self.strategy)).finish();
+        let sums = coarse.get(coarse.window);
+        let at = |x: usize, y: usize| sums[y * rows / height * columns + x * columns / width];
+        let filled = |tile: &Tile| {
+            let Window { x, y, width, height } = tile.window;
+            let row = |y: usize| (x..x + width).map(move |x| at(x, y));
+            let mut filled = Tile::new(tile.window);
+            filled.restore((y..y + height).flat_map(row).collect());
+            filled
+        };
+        self.tiles.iter().filter(empty).map(filled).collect()
+    }
+
     /// The film of one tile, for instance one that has changed.
     ///
     /// # Panics
@@ -390,13 +435,13 @@ impl<'a, S: Strategy> Renderer<'a, S> {
         Ok(())
     }
 
-    /// The picture of all tiles so far.
+    /// The picture of all tiles so far, coarse where nothing was rendered; see [`Renderer::whole_film`].
     pub fn rendering(&self) -> Rendering {
         let window = self.tiling.window(&self.range);
         let mut layers = Layers::new(window.width, window.height);
         let mut variance = VarianceSums::default();
         self.tiles.iter().for_each(|tile| variance.add(&tile.variance_sums()));
-        for tile in &self.tiles {
+        for tile in self.tiles.iter().chain(&self.coarse_tiles()) {
             tile.put_into(&mut layers, window, &variance);
         }
         Rendering { layers, counts: self.counts(), complete: self.is_complete() }
