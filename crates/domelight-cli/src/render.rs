@@ -138,6 +138,9 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
         return Err(Interrupted(text).into());
     }
     let render = watch.lap();
+    if let Some(reason) = domelight_lab::black::reason(&rendering.layers) {
+        warn(quiet, reason);
+    }
 
     // A part is its own checkpoint, and written.
     if turntable.is_none() && !arguments.render_run.is_part() {

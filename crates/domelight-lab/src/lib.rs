@@ -27,6 +27,7 @@
 
 mod acceptance;
 pub mod bench;
+pub mod black;
 pub mod compare;
 pub mod denoise;
 mod depth_of_field;

@@ -20,6 +20,7 @@ mod faces;
 mod files;
 mod format;
 mod gltf;
+mod inside_out;
 mod mtl;
 mod non_finite;
 mod notes;
@@ -399,6 +400,7 @@ fn load_file(
     }
     if !strict {
         loaded.warnings.extend(non_finite::leave_out(path, &mut loaded.description.parts));
+        loaded.warnings.extend(inside_out::show(path, &mut loaded.description));
     }
     Ok(loaded)
 }
