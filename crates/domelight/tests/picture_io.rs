@@ -161,7 +161,15 @@ fn hdr_exposure_correction_and_line_ends() {
         "#?RADIANCE\npcomb a.hdr\na.hdr:\n\tEXPOSURE=2.0\n\tFORMAT=of a friend\n\n-Y 1 +X 1\n";
     let bytes = [header.as_bytes(), &[128, 128, 128, 129]].concat();
     assert_eq!(decode(&bytes).unwrap().image.pixels, [Rgb::WHITE]);
-    for bad in ["EXPOSURE=0", "EXPOSURE=nan", "COLORCORR=1 1", "FORMAT=png"] {
+    // What cannot be meant is ignored.
+    for odd in ["EXPOSURE=0", "EXPOSURE=nan", "COLORCORR=1 1", "PRIMARIES=0 0 0 0 0 0 0 0"] {
+        let bytes = [format!("#?RADIANCE\n{odd}\n\n-Y 1 +X 1\n").as_bytes(), &[128, 128, 128, 129]]
+            .concat();
+        let picture = decode(&bytes).unwrap();
+        assert_eq!(picture.image.get(0, 0), Rgb::WHITE, "{odd}");
+        assert!(picture.warnings[0].contains(odd), "{:?}", picture.warnings);
+    }
+    for bad in ["FORMAT=png"] {
         let bytes = format!("#?RADIANCE\n{bad}\n\n-Y 1 +X 1\nabcd");
         let message = decode(bytes.as_bytes()).unwrap_err().to_string();
         assert!(
@@ -183,6 +191,11 @@ fn hdr_xyze_becomes_rec709() {
         "{white:?}"
     );
     assert!(image.get(1, 0).r == 0.0 && image.get(1, 0).g > 0.5);
+    // Radiance's own converter: white is (1/3, 1/3), 179 lumens are a watt.
+    let header = "#?RADIANCE\nra_xyze a.hdr b.hdr\nEXPOSURE=5.5866e-03\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n";
+    let picture = decode(&[header.as_bytes(), &[128, 128, 128, 129]].concat()).unwrap();
+    assert!((picture.image.get(0, 0) - Rgb::WHITE).map(f32::abs).max_component() < 1e-3);
+    assert_eq!(picture.notes.len(), 2, "{:?}", picture.notes);
     // Primaries of Rec. 709 itself change nothing; others do, but keep white.
     for (primaries, same) in [
         (".64 .33 .3 .6 .15 .06 .3127 .329", true),
@@ -436,6 +449,39 @@ fn exr_data_window_attribute_and_chromaticities() {
         -0.02400 * from.r - 0.12897 * from.g + 1.15297 * from.b,
     );
     assert!((to - expected).map(f32::abs).max_component() < 2e-3, "{to:?} {expected:?}");
+}
+
+/// OpenEXR's own test picture of XYZ states these chromaticities: X and Z have no luminance, so y is 0.
+#[test]
+fn exr_xyz_chromaticities_are_xyz() {
+    let xyz = Chromaticities {
+        red: Vec2(1.0, 0.0),
+        green: Vec2(0.0, 1.0),
+        blue: Vec2(0.0, 0.0),
+        white: Vec2(1.0 / 3.0, 1.0 / 3.0),
+    };
+    let impossible = Chromaticities { green: Vec2(1.0, 0.0), ..xyz };
+    // D65 white of luminance 1.
+    let image = RgbImage::filled(2, 1, Rgb::new(0.95047, 1.0, 1.08883));
+    let read = |chromaticities: Chromaticities| {
+        let layer = Layer::new(
+            (2, 1),
+            LayerAttributes::default(),
+            Encoding::SMALL_LOSSLESS,
+            AnyChannels::sort(rgb_channels(&image, "", SampleType::F32).into_iter().collect()),
+        );
+        let mut file = Image::from_layer(layer);
+        file.attributes.chromaticities = Some(chromaticities);
+        let mut bytes = Cursor::new(Vec::new());
+        file.write().to_buffered(&mut bytes).unwrap();
+        decode(&bytes.into_inner()).unwrap()
+    };
+    let back = read(xyz);
+    assert!((back.image.pixels[0] - Rgb::WHITE).map(f32::abs).max_component() < 2e-3, "{back:?}");
+    assert!(back.notes[0].contains("chromaticities") && back.warnings.is_empty());
+    let back = read(impossible);
+    assert_eq!(back.image, image);
+    assert!(back.warnings[0].contains("no color space") && back.notes.is_empty());
 }
 
 /// A sun beyond half precision, and what renderers make of a division by zero, in ACEScg.

@@ -118,7 +118,14 @@ fn load(arguments: &ProbeArguments) -> anyhow::Result<LoadedProbe> {
         let warning =
             || format!("{} is built in: its layer and mapping cannot be chosen", builtin.name());
         let warnings = chosen.then(warning).into_iter().collect();
-        return Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings });
+        return Ok(LoadedProbe {
+            image,
+            mapping,
+            file_size,
+            sanitized,
+            warnings,
+            notes: Vec::new(),
+        });
     }
     files::reads(&arguments.probe)?;
     let options = ProbeOptions {
@@ -176,6 +183,9 @@ fn table(measured: &MeasuredProbe) -> String {
     row("size", format!("{width}x{height}, {}", probe.mapping));
     if probe.mapping != Mapping::LatLong {
         row("working map", format!("{}x{}, lat-long", probe.image.width, probe.image.height));
+    }
+    if !probe.notes.is_empty() {
+        row("header", probe.notes.join("; "));
     }
     let range = s.dynamic_range();
     row("luminance", format!("{:.4e} to {:.4e}", s.min_luminance, s.max_luminance));
@@ -251,6 +261,7 @@ fn json(arguments: &ProbeArguments, measured: &MeasuredProbe) -> serde_json::Val
         "file_width": probe.file_size.0,
         "file_height": probe.file_size.1,
         "mapping": probe.mapping.name(),
+        "header": probe.notes,
         "width": probe.image.width,
         "height": probe.image.height,
         "min_luminance": s.min_luminance,

@@ -37,6 +37,8 @@ pub struct LoadedProbe {
     pub sanitized: SanitizeReport,
     /// Differences between the map and the original light, one sentence each.
     pub warnings: Vec<String>,
+    /// What the file asked for and was applied, one phrase each.
+    pub notes: Vec<String>,
 }
 
 /// The numbers of repaired values (channels of texels).
@@ -125,7 +127,8 @@ pub fn probe_from_picture(
     file: &str,
     options: &ProbeOptions,
 ) -> Result<LoadedProbe, ProbeError> {
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<String> =
+        picture.warnings.iter().map(|warning| format!("{file}: {warning}")).collect();
     if let Some(guessed) = &picture.guessed_layer {
         warnings.push(format!("{file}: {guessed}"));
     }
@@ -150,6 +153,7 @@ pub fn probe_from_picture(
              {display}; {treatment}"
         ));
     }
+    let notes = picture.notes;
     let mut image = picture.image;
     if matches!(picture.format, Format::Png | Format::Jpeg) {
         warnings.push(format!(
@@ -193,7 +197,7 @@ pub fn probe_from_picture(
     let height = mapping.lat_long_height(image.width, image.height);
     let image =
         if mapping == Mapping::LatLong { image } else { to_lat_long(&image, mapping, height) };
-    Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings })
+    Ok(LoadedProbe { image, mapping, file_size, sanitized, warnings, notes })
 }
 
 /// Whether a window has the shape of a map.

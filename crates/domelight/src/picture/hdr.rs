@@ -6,15 +6,16 @@
 //! file leaves it unchanged.
 //!
 //! EXPOSURE and COLORCORR are divided out (all of them, as they accumulate), and PRIMARIES other than Rec. 709's are
-//! converted. XYZE is converted to Rec. 709 with the D65 matrix. Colors outside the gamut are clipped at zero, because
-//! a mantissa step in XYZ is enough to leave it.
+//! converted. What cannot be meant, such as the EXPOSURE=0 of old versions of FreeImage, is ignored with a warning.
+//! XYZE is converted to Rec. 709 with the D65 matrix. In files of Radiance's `ra_xyze`, white is (1/3, 1/3), and EXPOSURE
+//! makes lumens of watts. Colors outside the gamut are clipped at zero, because a mantissa step in XYZ is enough to leave it.
 //!
 //! Reading takes two passes. The first scans the runs of all scanlines, which proves that the file holds what the
 //! header promises before memory is allocated. The second decodes scanlines independently, in parallel. The `image`
 //! crate's decoder supports only one orientation and drops EXPOSURE.
 
-use super::primaries::{Primaries, to_light, xyz_to_rec709};
-use super::{PictureErrorKind, allocate, checked_area};
+use super::primaries::{Primaries, to_light, xyz_of_white_to_rec709, xyz_to_rec709};
+use super::{Format, Picture, PictureErrorKind, allocate, checked_area};
 use crate::math::functions;
 use crate::{Rgb, RgbImage};
 use rayon::prelude::*;
@@ -24,7 +25,7 @@ use std::io::{self, Write};
 ///
 /// # Errors
 /// If the header or the data is damaged or incomplete.
-pub fn decode(bytes: &[u8]) -> Result<RgbImage, PictureErrorKind> {
+pub fn decode(bytes: &[u8]) -> Result<Picture, PictureErrorKind> {
     let header = Header::parse(bytes)?;
     let (lines, length) = (header.lines, header.length);
     let area = checked_area(length, lines)?;
@@ -47,7 +48,8 @@ pub fn decode(bytes: &[u8]) -> Result<RgbImage, PictureErrorKind> {
             }
         },
     );
-    Ok(header.upright(pixels))
+    let picture = Picture::opaque(header.upright(pixels), Format::Hdr);
+    Ok(Picture { notes: header.notes(), warnings: header.warnings, ..picture })
 }
 
 /// How many texels the header promises.
@@ -64,8 +66,19 @@ struct Axis {
     size: usize,
 }
 
+/// Lumens per watt of white light, by Radiance's definition.
+const EFFICACY: f64 = 179.0;
+
+/// The chromaticity of white in `ra_xyze`.
+const EQUAL_ENERGY: [f32; 2] = [1.0 / 3.0; 2];
+
 struct Header {
     is_xyz: bool,
+    /// Whether Radiance's `ra_xyze` made the file.
+    is_of_ra_xyze: bool,
+    has_exposure: bool,
+    /// What was ignored.
+    warnings: Vec<String>,
     /// What the pixels were multiplied by, per channel.
     exposure: [f64; 3],
     primaries: Option<Primaries>,
@@ -83,6 +96,9 @@ impl Header {
         let mut lines = Lines { bytes, at: 0, number: 0 };
         let mut header = Self {
             is_xyz: false,
+            is_of_ra_xyze: false,
+            has_exposure: false,
+            warnings: Vec::new(),
             exposure: [1.0; 3],
             primaries: None,
             lines: 0,
@@ -113,6 +129,7 @@ impl Header {
 
     fn read_variable(&mut self, line: &[u8], number: usize) -> Result<(), PictureErrorKind> {
         let line = String::from_utf8_lossy(line);
+        self.is_of_ra_xyze |= line.split_ascii_whitespace().next() == Some("ra_xyze");
         // Indented lines are of the pictures that this one was made from.
         let is_own = !line.starts_with(['#', ' ', '\t']);
         let Some((name, value)) = line.split_once('=').filter(|_| is_own) else {
@@ -121,6 +138,7 @@ impl Header {
         let bad =
             |expected| PictureErrorKind::Header { line: number, found: line.to_string(), expected };
         let value = value.trim();
+        let ignored = || format!("header line {number}: {line:?} is not possible, and is ignored");
         match name.trim_end() {
             "FORMAT" => {
                 self.is_xyz = match value {
@@ -130,22 +148,65 @@ impl Header {
                 }
             }
             "EXPOSURE" => {
-                let by = positive_numbers::<1>(value).ok_or_else(|| bad("a positive exposure"))?;
-                self.exposure.iter_mut().for_each(|e| *e *= by[0]);
+                let Some([by]) = positive_numbers::<1>(value) else {
+                    self.warnings.push(ignored());
+                    return Ok(());
+                };
+                self.has_exposure = true;
+                self.exposure.iter_mut().for_each(|e| *e *= by);
             }
             "COLORCORR" => {
-                let by = positive_numbers::<3>(value).ok_or_else(|| bad("three positive gains"))?;
+                let Some(by) = positive_numbers::<3>(value) else {
+                    self.warnings.push(ignored());
+                    return Ok(());
+                };
                 self.exposure.iter_mut().zip(by).for_each(|(e, by)| *e *= by);
             }
-            // A set of primaries that cannot be read is as good as none: everybody else ignores them.
+            // Primaries that cannot be read are ignored, as everybody does.
             "PRIMARIES" => {
-                self.primaries = numbers::<8>(value).map(|p| {
-                    Primaries([0, 1, 2, 3].map(|i| [p[2 * i] as f32, p[2 * i + 1] as f32]))
-                });
+                self.primaries = numbers::<8>(value)
+                    .map(|p| {
+                        Primaries([0, 1, 2, 3].map(|i| [p[2 * i] as f32, p[2 * i + 1] as f32]))
+                    })
+                    .filter(Primaries::span_a_space);
+                if self.primaries.is_none() {
+                    self.warnings.push(ignored());
+                }
             }
             _ => {}
         }
         Ok(())
+    }
+
+    /// What radiance is divided by to get the file's numbers, per channel.
+    fn scale(&self) -> [f64; 3] {
+        let of_lumens =
+            if self.is_xyz && self.is_of_ra_xyze && self.has_exposure { EFFICACY } else { 1.0 };
+        self.exposure.map(|exposure| exposure * of_lumens)
+    }
+
+    /// The matrix to linear Rec. 709.
+    fn matrix(&self) -> Option<crate::math::Mat3> {
+        match self.primaries {
+            _ if self.is_xyz && self.is_of_ra_xyze => Some(xyz_of_white_to_rec709(EQUAL_ENERGY)),
+            _ if self.is_xyz => Some(xyz_to_rec709()),
+            primaries => primaries.and_then(Primaries::to_rec709),
+        }
+    }
+
+    /// What was applied.
+    fn notes(&self) -> Vec<String> {
+        let scale = self.scale();
+        let scaled = (scale != [1.0; 3]).then(|| {
+            let [r, g, b] = scale.map(|s| s as f32);
+            let by = if r == g && g == b { format!("{r}") } else { format!("{r}, {g}, {b}") };
+            format!("divided by {by} (EXPOSURE, COLORCORR)")
+        });
+        let converted = self.matrix().map(|_| {
+            let from = if self.is_xyz { "XYZ" } else { "PRIMARIES" };
+            format!("converted from {from} to Rec. 709")
+        });
+        scaled.into_iter().chain(converted).collect()
     }
 
     fn size(&self) -> (usize, usize) {
@@ -381,13 +442,9 @@ impl ColorTable {
     fn new(header: &Header) -> Self {
         let scale = (0..256).map(|e| match e {
             0 => [0.0; 3],
-            e => header.exposure.map(|exposure| (functions::powi(2.0, e - 136) / exposure) as f32),
+            e => header.scale().map(|scale| (functions::powi(2.0, e - 136) / scale) as f32),
         });
-        let matrix = match header.primaries {
-            _ if header.is_xyz => Some(xyz_to_rec709()),
-            primaries => primaries.and_then(Primaries::to_rec709),
-        };
-        Self { scale: scale.collect(), matrix }
+        Self { scale: scale.collect(), matrix: header.matrix() }
     }
 
     #[inline]

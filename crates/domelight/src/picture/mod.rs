@@ -75,6 +75,10 @@ pub struct Picture {
     pub format: Format,
     /// OpenEXR's text attributes, by name.
     pub attributes: Vec<(String, String)>,
+    /// What the header asked for and was applied, one phrase each.
+    pub notes: Vec<String>,
+    /// What the header asked for and was ignored, one sentence each.
+    pub warnings: Vec<String>,
 }
 
 /// An OpenEXR layer that was read because it is the first of several.
@@ -96,9 +100,9 @@ impl fmt::Display for GuessedLayer {
 
 impl Picture {
     fn opaque(image: RgbImage, format: Format) -> Self {
-        let attributes = Vec::new();
+        let (attributes, notes, warnings) = Default::default();
         let (alpha, envmap, window, guessed_layer) = (None, None, None, None);
-        Self { image, alpha, envmap, window, guessed_layer, format, attributes }
+        Self { image, alpha, envmap, window, guessed_layer, format, attributes, notes, warnings }
     }
 
     /// The picture in OpenEXR's display window: black and transparent outside its data window, and cropped to it.
@@ -120,8 +124,17 @@ impl Picture {
             }
             None => None,
         };
-        let (guessed_layer, attributes) = (self.guessed_layer.clone(), self.attributes.clone());
-        Ok(Self { image, alpha, window: None, guessed_layer, attributes, ..*self })
+        let Self { guessed_layer, attributes, notes, warnings, .. } = self;
+        Ok(Self {
+            image,
+            alpha,
+            window: None,
+            guessed_layer: guessed_layer.clone(),
+            attributes: attributes.clone(),
+            notes: notes.clone(),
+            warnings: warnings.clone(),
+            ..*self
+        })
     }
 }
 
@@ -183,7 +196,7 @@ pub fn read_bytes(
     };
     allowed().map_err(|kind: PictureErrorKind| kind.in_file(name))?;
     let decoded = match format_of(bytes) {
-        Some(Format::Hdr) => hdr::decode(bytes).map(|image| Picture::opaque(image, Format::Hdr)),
+        Some(Format::Hdr) => hdr::decode(bytes),
         Some(Format::Exr) => exr::decode(bytes, options.layer.as_deref()),
         Some(Format::Pfm) => pfm::decode(bytes).map(|image| Picture::opaque(image, Format::Pfm)),
         Some(format @ (Format::Png | Format::Jpeg)) => {

@@ -23,15 +23,29 @@ impl Primaries {
         if self.0.iter().zip(&Self::REC709.0).all(|(a, b)| same(a, b)) {
             return None;
         }
+        // The colors are XYZ, whatever white the file states.
+        if self.0[..3] == Self::XYZ {
+            return Some(xyz_to_rec709());
+        }
         let matrix = xyz_to_rec709() * adaptation(self.white()) * self.to_xyz()?;
         matrix.is_finite().then_some(matrix)
     }
 
+    /// The chromaticities of X, Y and Z.
+    const XYZ: [[f32; 2]; 3] = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]];
+
+    /// Whether every color is a mixture of red, green and blue.
+    pub(super) fn span_a_space(&self) -> bool {
+        self.to_xyz().is_some()
+    }
+
     /// RGB = (1, 1, 1) has the white's chromaticity and Y = 1.
     fn to_xyz(self) -> Option<Mat3> {
-        let [r, g, b] = [0, 1, 2].map(|i| xyz_of(self.0[i]));
+        // A primary on the line y = 0 has no luminance, and so no length yet.
+        let [r, g, b] =
+            [0, 1, 2].map(|i| vec3(self.0[i][0], self.0[i][1], 1.0 - self.0[i][0] - self.0[i][1]));
         let columns = Mat3::from_cols(r, g, b);
-        if !columns.is_finite() || columns.determinant().abs() < 1e-6 {
+        if !columns.is_finite() || columns.determinant().abs() < 1e-6 || !self.white().is_finite() {
             return None;
         }
         let scale = columns.inverse() * self.white();
@@ -52,6 +66,11 @@ impl Primaries {
 /// XYZ (relative to Y = 1 of D65 white, no adaptation) to linear Rec. 709.
 pub(super) fn xyz_to_rec709() -> Mat3 {
     Primaries::REC709.to_xyz().expect("Rec. 709 spans a color space").inverse()
+}
+
+/// XYZ with a white of chromaticity `white` to linear Rec. 709, white to white.
+pub(super) fn xyz_of_white_to_rec709(white: [f32; 2]) -> Mat3 {
+    xyz_to_rec709() * adaptation(xyz_of(white))
 }
 
 /// Converts a color of a file by `matrix`, and clips what lies outside Rec. 709. A color with a value that is negative or not

@@ -9,7 +9,7 @@
 //! pool for each file, in which a panic over a corrupt block would abort the process. Assertions of the crate that
 //! replace errors are caught here and become [`PictureErrorKind::ExrPanic`].
 
-use super::attributes::{envmap, to_rec709, window};
+use super::attributes::{envmap, primaries, to_rec709, window};
 use super::luminance_chroma::LuminanceChroma;
 use super::write::string_attributes;
 use crate::picture::primaries::{to_light, xyz_to_rec709};
@@ -68,11 +68,19 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Pictur
     let selected = select(reader.headers(), layer)?;
     let header = &reader.headers()[selected.header];
     let envmap = envmap(header);
+    let chromaticities = header.shared_attributes.chromaticities.as_ref();
     let matrix = match selected.space {
-        Space::Rgb => header.shared_attributes.chromaticities.as_ref().and_then(to_rec709),
+        Space::Rgb => chromaticities.and_then(to_rec709),
         Space::Xyz => Some(xyz_to_rec709()),
         Space::Data => None,
     };
+    let is_impossible = chromaticities.is_some_and(|c| !primaries(c).span_a_space());
+    let warnings = (selected.space == Space::Rgb && is_impossible)
+        .then(|| "the attribute chromaticities spans no color space, and is ignored".to_owned());
+    let notes = matrix.map(|_| {
+        let from = if selected.space == Space::Xyz { "X, Y, Z" } else { "its chromaticities" };
+        format!("converted from {from} to Rec. 709")
+    });
 
     // Memory for the picture is taken when its first blocks have turned out to be whole.
     let mut planes = None;
@@ -95,6 +103,8 @@ fn decode_unguarded(bytes: &[u8], layer: Option<&str>) -> Result<Picture, Pictur
         window,
         guessed_layer: selected.guessed,
         attributes,
+        notes: notes.into_iter().collect(),
+        warnings: warnings.into_iter().collect(),
         ..Picture::opaque(image.0, Format::Exr)
     })
 }
