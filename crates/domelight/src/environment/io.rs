@@ -4,7 +4,10 @@
 //! stitching leaves NaN in some. They are repaired and counted in a warning, because a NaN may be where the sun was.
 //! With [`ProbeOptions::strict`], they are an error that names the first bad texel.
 
+pub use super::repair::{OVERFLOWED, SanitizeReport, sanitize};
+
 use super::mapping::{EnvmapKind, Mapping, ShapeError, to_lat_long};
+use super::repair::finite_light;
 use crate::math::{Vec2, vec2};
 use crate::memory;
 use crate::picture::{self, DataWindow, Format, PictureError, ReadOptions};
@@ -40,20 +43,6 @@ pub struct LoadedProbe {
     /// What the file asked for and was applied, one phrase each.
     pub notes: Vec<String>,
 }
-
-/// The numbers of repaired values (channels of texels).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SanitizeReport {
-    /// Negative values, replaced by 0.
-    pub negative: usize,
-    /// NaN and −∞, replaced by the mean of their neighbors, and ∞.
-    pub non_finite: usize,
-    /// ∞ among these, replaced by [`OVERFLOWED`].
-    pub infinite: usize,
-}
-
-/// The radiance that replaces an infinite one: the largest half-precision number, in which suns overflow.
-pub const OVERFLOWED: f32 = 65504.0;
 
 /// An error in loading a probe.
 #[derive(Debug, thiserror::Error)]
@@ -180,17 +169,22 @@ pub fn probe_from_picture(
     if options.strict {
         require_radiance(&image, file)?;
     }
-    let sanitized = sanitize(&mut image);
+    let before = finite_light(&image, mapping);
+    let sanitized = sanitize(&mut image, mapping);
     if sanitized != SanitizeReport::default() {
         let SanitizeReport { negative, non_finite, infinite } = sanitized;
         let overflowed = match infinite {
             0 => String::new(),
             _ => format!(
-                "; {infinite} infinite ones became {OVERFLOWED}: a sun or lamp may be too dim"
+                "; {infinite} infinite ones became as bright as their neighbors, at least {OVERFLOWED}: a sun or lamp may be \
+                 too dim"
             ),
         };
+        let change = 100.0 * (finite_light(&image, mapping) / before - 1.0);
+        let changed =
+            if change.is_finite() { format!(", {change:+.2} % light") } else { String::new() };
         warnings.push(format!(
-            "{file}: repaired {negative} negative and {non_finite} NaN or infinite values{overflowed}"
+            "{file}: repaired {negative} negative and {non_finite} NaN or infinite values{changed}{overflowed}"
         ));
     }
     let file_size = (image.width, image.height);
@@ -270,75 +264,4 @@ fn require_radiance(image: &RgbImage, file: &str) -> Result<(), ProbeError> {
         value: values[channel],
         count,
     })
-}
-
-/// Makes every value finite and ≥ 0. Negative values become 0, ∞ becomes [`OVERFLOWED`], and NaN and −∞ become the mean of
-/// their finite 8-neighbors, from the border of a bad region inward. A channel without any finite value becomes 0.
-pub fn sanitize(image: &mut RgbImage) -> SanitizeReport {
-    let mut report = SanitizeReport::default();
-    for pixel in &mut image.pixels {
-        *pixel = pixel.map(|c| {
-            let negative = c < 0.0 && c.is_finite();
-            report.negative += usize::from(negative);
-            report.non_finite += usize::from(!c.is_finite());
-            report.infinite += usize::from(c == f32::INFINITY);
-            match c {
-                _ if negative => 0.0,
-                f32::INFINITY => OVERFLOWED,
-                _ => c,
-            }
-        });
-    }
-    if report.non_finite > report.infinite {
-        fill_channel(image, |pixel| &mut pixel.r);
-        fill_channel(image, |pixel| &mut pixel.g);
-        fill_channel(image, |pixel| &mut pixel.b);
-    }
-    report
-}
-
-/// Replaces the non-finite values of one channel ring by ring, each from the values around it that are known then.
-fn fill_channel(image: &mut RgbImage, channel: fn(&mut Rgb) -> &mut f32) {
-    let (width, height) = (image.width, image.height);
-    let mut values: Vec<f32> = image.pixels.iter_mut().map(|pixel| *channel(pixel)).collect();
-    let mut queued: Vec<bool> = values.iter().map(|value| value.is_finite()).collect();
-    let borders_known = |&i: &usize| neighbors(i, width, height).any(|j| values[j].is_finite());
-    let mut ring: Vec<usize> =
-        (0..values.len()).filter(|&i| !queued[i]).filter(borders_known).collect();
-    while !ring.is_empty() {
-        for &i in &ring {
-            queued[i] = true;
-        }
-        let means: Vec<f32> =
-            ring.iter().map(|&i| mean_around(&values, i, width, height)).collect();
-        ring.iter().zip(means).for_each(|(&i, mean)| values[i] = mean);
-        let mut next = Vec::new();
-        for j in ring.iter().flat_map(|&i| neighbors(i, width, height)) {
-            if !std::mem::replace(&mut queued[j], true) {
-                next.push(j);
-            }
-        }
-        ring = next;
-    }
-    for (pixel, value) in image.pixels.iter_mut().zip(values) {
-        *channel(pixel) = if value.is_finite() { value } else { 0.0 };
-    }
-}
-
-fn mean_around(values: &[f32], i: usize, width: usize, height: usize) -> f32 {
-    let (mut sum, mut count) = (0.0, 0);
-    for value in neighbors(i, width, height).map(|j| values[j]).filter(|value| value.is_finite()) {
-        sum += f64::from(value);
-        count += 1;
-    }
-    (sum / f64::from(count)) as f32
-}
-
-fn neighbors(i: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
-    let (x, y) = (i % width, i / width);
-    let rows = y.saturating_sub(1)..(y + 2).min(height);
-    rows.flat_map(move |row| {
-        (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| row * width + x)
-    })
-    .filter(move |&j| j != i)
 }

@@ -14,6 +14,8 @@ pub mod io;
 mod key_light;
 pub(crate) mod lat_long;
 pub mod mapping;
+#[cfg(feature = "io")]
+mod repair;
 pub mod statistics;
 
 pub use compensation::CompensatedTable;
