@@ -111,6 +111,16 @@ fn few_lights_leave_a_dome() {
             std::fs::remove_file(folder.path().join(dome)).expect(dome);
         }
     }
+    // The dome of a sun on black is black.
+    let mut map = RgbImage::filled(64, 32, Rgb::BLACK);
+    map.pixels[9 * 64 + 30] = Rgb::splat(100.0);
+    write_exr(&folder.path().join("alone.exr"), &map, None);
+    let arguments = ["lights", "alone.exr", "--sun", "-o", "x.json", "--keep-residual", "d.exr"];
+    done(&domelight(&folder, &arguments));
+    assert!(load(&folder, "d.exr").pixels.iter().all(|p| p.is_black()));
+    for file in ["x.json", "d.exr"] {
+        std::fs::remove_file(folder.path().join(file)).expect(file);
+    }
     // Where nothing is left, nothing is written.
     let before = files(&folder);
     for more in [&["--sun", "-n", "16"][..], &["-n", "4", "--min-energy", "0.001"]] {

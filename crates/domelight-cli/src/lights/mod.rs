@@ -9,7 +9,6 @@ use std::io::{self, IsTerminal as _};
 use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context as _, Result};
-use domelight::RgbImage;
 use domelight::environment::mapping::{Mapping, from_lat_long};
 use domelight::environment::{Environment, Orientation};
 use domelight::picture::exposure::Exposure;
@@ -19,6 +18,7 @@ use domelight::rig::{
     smallest_rig,
 };
 use domelight::scene::SceneDescription;
+use domelight::{Rgb, RgbImage};
 
 use crate::args::lights::{LightsArguments, PreviewPath, RigPath};
 use crate::error::{UsageError, status, warn};
@@ -57,6 +57,11 @@ pub(crate) fn run(arguments: &LightsArguments, quiet: bool) -> Result<()> {
 
     let domes = match (&dome_path, &found.extraction.residual) {
         (Some(path), Some(dome)) => arguments.write_dome(path, &dome.radiance_map(), &outputs)?,
+        // The sun and the lamps are all of the light.
+        (Some(path), None) if !arguments.has_regions() => {
+            let RgbImage { width, height, .. } = *environment.map();
+            arguments.write_dome(path, &RgbImage::filled(width, height, Rgb::BLACK), &outputs)?
+        }
         _ if arguments.keep_residual.is_some() => {
             return Err(UsageError(NOTHING_LEFT.into()).into());
         }

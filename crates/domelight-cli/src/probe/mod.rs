@@ -95,7 +95,7 @@ fn measure(arguments: &ProbeArguments, probe: LoadedProbe) -> anyhow::Result<Mea
 fn clipping_warning(measured: &MeasuredProbe) -> Option<String> {
     let plateau = measured.statistics.plateau.filter(|_| !measured.is_builtin)?;
     Some(format!(
-        "{}: {} adjacent texels have the maximum value, {}: a sun or lamp is clipped, unless it \
+        "{}: {} texels have the maximum value, {}: a sun or lamp is clipped, unless it \
          is evenly bright; a clipped light is too dim, and its shadows are too faint",
         measured.name, plateau.n_texels, plateau.value
     ))

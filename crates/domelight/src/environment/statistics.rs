@@ -195,8 +195,10 @@ fn sun(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Sun> {
 
 /// The texels of the largest value, if they are several, small, bright, and end sharply.
 fn plateau(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Plateau> {
-    /// What is at least so bright belongs to a peak that has no sharp edge.
-    const NEAR: f32 = 0.98;
+    /// What is at least so bright has the greatest value, up to the error of lossy compression.
+    const GREATEST: f32 = 0.98;
+    /// What is at least so bright beside it belongs to a peak that has no sharp edge.
+    const NEAR: f32 = 0.9;
     const LEAST_TEXELS: usize = 4;
     /// A cap of 7° \[sr\]: what is wider is a lamp or a window, which may well be even.
     const WIDEST: f64 = 0.047;
@@ -210,7 +212,7 @@ fn plateau(map: &RgbImage, luminance: &[f32], weights: &Weights) -> Option<Plate
             let power = f64::from(l) * omega;
             all += power;
             let brightest = texel.max_component();
-            if brightest == value {
+            if brightest >= GREATEST * value {
                 n_texels += 1;
                 solid_angle += omega;
                 energy += power;

@@ -109,4 +109,21 @@ impl<'a> Grid<'a> {
         let [d, e, f] = if y == last { [opposite; 3] } else { row(y + 1) };
         [a, b, c, y * columns + left, y * columns + right, d, e, f]
     }
+
+    /// The cells with which a cell is connected if both are bright: its neighbors, and those behind a gap of one cell. A wire
+    /// or a bar before a source does not divide it.
+    pub(super) fn connected(&self, cell: usize) -> [usize; 12] {
+        let near = self.neighbors(cell);
+        let [_, up, _, left, right, _, down, _] = near;
+        let beyond = [
+            self.neighbors(up)[1],
+            self.neighbors(left)[3],
+            self.neighbors(right)[4],
+            self.neighbors(down)[6],
+        ];
+        let mut connected = [0; 12];
+        connected[..8].copy_from_slice(&near);
+        connected[8..].copy_from_slice(&beyond);
+        connected
+    }
 }

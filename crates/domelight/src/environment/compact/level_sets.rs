@@ -141,9 +141,9 @@ impl Search<'_> {
     }
 
     /// The components that touch a cell: so many of the list.
-    fn touching(&mut self, cell: usize) -> ([u32; 8], usize) {
-        let (mut roots, mut n_roots) = ([NONE; 8], 0);
-        for n in self.grid.neighbors(cell) {
+    fn touching(&mut self, cell: usize) -> ([u32; 12], usize) {
+        let (mut roots, mut n_roots) = ([NONE; 12], 0);
+        for n in self.grid.connected(cell) {
             if self.component[n] != NONE {
                 let root = self.root(self.component[n]);
                 if !roots[..n_roots].contains(&root) {

@@ -99,9 +99,11 @@ fn radii(grid: &Grid, peaks: &[Option<Peak>]) -> Vec<f64> {
         let admitted = |p: &Peak| p.solid_angle <= WIDEST_LAMP.solid_angle;
         let Some(peak) = peak.filter(admitted) else { return 0.0 };
         let above = |cell: usize| f64::from(grid.luminance[cell] - peak.level);
-        let cells = flood(grid, peak.seed, |c| {
-            above(c) > 0.0 && std::mem::replace(&mut entered[c], i as u32) != i as u32
-        });
+        let cells = flood(
+            peak.seed,
+            |cell| grid.connected(cell),
+            |c| above(c) > 0.0 && std::mem::replace(&mut entered[c], i as u32) != i as u32,
+        );
         let (mut moment, mut energy) = ([0.0; 3], 0.0);
         for cell in cells.into_iter().map(|cell| cell as usize) {
             let weight = above(cell) * grid.solid_angle(cell);
@@ -198,9 +200,11 @@ fn owners(grid: &Grid, peaks: &[Peak]) -> Vec<u32> {
     for i in order {
         let id = i as u32;
         let bright = |cell: usize| grid.luminance[cell] > peaks[i].level;
-        inside.extend(flood(grid, peaks[i].seed, |c| {
-            bright(c) && std::mem::replace(&mut owner[c], id) != id
-        }));
+        inside.extend(flood(
+            peaks[i].seed,
+            |cell| grid.connected(cell),
+            |c| bright(c) && std::mem::replace(&mut owner[c], id) != id,
+        ));
     }
     for cell in inside {
         for n in grid.neighbors(cell as usize) {
@@ -212,8 +216,12 @@ fn owners(grid: &Grid, peaks: &[Peak]) -> Vec<u32> {
     owner
 }
 
-/// The cells connected to `seed` for which `enter`, which is asked once for each, holds.
-fn flood(grid: &Grid, seed: u32, mut enter: impl FnMut(usize) -> bool) -> Vec<u32> {
+/// The cells that are connected to `seed` by steps to cells `around` for which `enter` holds.
+fn flood<const N: usize>(
+    seed: u32,
+    around: impl Fn(usize) -> [usize; N],
+    mut enter: impl FnMut(usize) -> bool,
+) -> Vec<u32> {
     let mut cells = Vec::new();
     if enter(seed as usize) {
         cells.push(seed);
@@ -221,7 +229,7 @@ fn flood(grid: &Grid, seed: u32, mut enter: impl FnMut(usize) -> bool) -> Vec<u3
     let mut next = 0;
     while let Some(&cell) = cells.get(next) {
         next += 1;
-        let entered = grid.neighbors(cell as usize).into_iter().filter(|&n| enter(n));
+        let entered = around(cell as usize).into_iter().filter(|&n| enter(n));
         cells.extend(entered.map(|n| n as u32));
     }
     cells
@@ -244,13 +252,17 @@ impl<'a> BackgroundEstimate<'a> {
                 continue;
             }
             let mut rim = Vec::new();
-            let group = flood(grid, seed as u32, |cell| {
-                if owner[cell] == NO_OWNER {
-                    rim.push(cell as u32);
-                    return false;
-                }
-                std::mem::replace(&mut index[cell], 0) == NO_OWNER
-            });
+            let group = flood(
+                seed as u32,
+                |cell| grid.neighbors(cell),
+                |cell| {
+                    if owner[cell] == NO_OWNER {
+                        rim.push(cell as u32);
+                        return false;
+                    }
+                    std::mem::replace(&mut index[cell], 0) == NO_OWNER
+                },
+            );
             rim.sort_unstable();
             rim.dedup();
             for (i, &cell) in group.iter().enumerate() {
@@ -284,5 +296,29 @@ impl<'a> BackgroundEstimate<'a> {
         let (right, top) = ((left + 1) % columns, v as usize);
         let row = |row| self.cell(left, row).lerp(self.cell(right, row), fx);
         row(top).lerp(row((top + 1).min(rows - 1)), fy)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wire of one texel before the sun, upright, level or aslant, divides neither its light nor its background.
+    #[test]
+    fn a_sun_behind_a_wire_is_whole() {
+        let wires =
+            [|x: usize, _: usize| x == 60, |_, y| y == 40, |x: usize, y: usize| x == y + 20];
+        for wire in wires {
+            let map = RgbImage::from_fn(256, 128, |x, y| {
+                let (dx, dy) = (x as f32 - 60.0, y as f32 - 40.0);
+                let is_sun = dx * dx + dy * dy < 9.0;
+                Rgb::splat(if is_sun && !wire(x, y) { 5000.0 } else { 0.5 })
+            });
+            let sources = compact_sources(&map, SourceCriteria::SUN);
+            let [sun] = &sources[..] else { panic!("{} sources", sources.len()) };
+            let n_bright = map.pixels.iter().filter(|p| p.r > 100.0).count();
+            assert_eq!(sun.texels.len(), n_bright);
+            assert!(sun.residual.iter().all(|p| p.r <= 0.51), "{:?}", sun.residual);
+        }
     }
 }
