@@ -161,8 +161,12 @@ fn hdr_exposure_correction_and_line_ends() {
         "#?RADIANCE\npcomb a.hdr\na.hdr:\n\tEXPOSURE=2.0\n\tFORMAT=of a friend\n\n-Y 1 +X 1\n";
     let bytes = [header.as_bytes(), &[128, 128, 128, 129]].concat();
     assert_eq!(decode(&bytes).unwrap().image.pixels, [Rgb::WHITE]);
+    // Half of the sphere, as Radiance's angular fisheye sees it.
+    let fisheye = "#?RADIANCE\nVIEW= -vta -vd 0 0 1 -vh 180 -vv 180\n\n-Y 1 +X 1\n";
+    let picture = decode(&[fisheye.as_bytes(), &[128, 128, 128, 129]].concat()).unwrap();
+    assert!(picture.warnings[0].contains("180"), "{:?}", picture.warnings);
     // What cannot be meant is ignored.
-    for odd in ["EXPOSURE=0", "EXPOSURE=nan", "COLORCORR=1 1", "PRIMARIES=0 0 0 0 0 0 0 0"] {
+    for odd in ["EXPOSURE=0", "EXPOSURE=nan", "COLORCORR=1 1", "PRIMARIES=1 0 1 0 1 0 1 0"] {
         let bytes = [format!("#?RADIANCE\n{odd}\n\n-Y 1 +X 1\n").as_bytes(), &[128, 128, 128, 129]]
             .concat();
         let picture = decode(&bytes).unwrap();
@@ -865,12 +869,15 @@ fn probes_of_any_shape_load() {
             assert_eq!((&probe.image, probe.mapping), (&image, Mapping::LatLong));
         }
     }
-    let cross = saved(&folder, "cross", &smooth(48, 64));
+    let layout = Mapping::Cube(CubeLayout::CrossVertical);
+    let smooth = smooth(48, 64);
+    let cross = RgbImage::from_fn(48, 64, |x, y| {
+        let uv = domelight::math::vec2((x as f32 + 0.5) / 48.0, (y as f32 + 0.5) / 64.0);
+        if layout.direction(uv).is_some() { smooth.get(x, y) } else { Rgb::BLACK }
+    });
+    let cross = saved(&folder, "cross", &cross);
     let probe = load_probe(&cross, &ProbeOptions::default()).unwrap();
-    assert_eq!(
-        (probe.mapping, probe.file_size),
-        (Mapping::Cube(CubeLayout::CrossVertical), (48, 64))
-    );
+    assert_eq!((probe.mapping, probe.file_size), (layout, (48, 64)));
     assert_eq!((probe.image.width, probe.image.height), (52, 26));
     let ball = ProbeOptions { mapping: Some(Mapping::MirrorBall), ..Default::default() };
     assert_eq!(
@@ -1041,7 +1048,13 @@ fn what_follows_a_jpeg_is_of_no_concern() {
     let image = image::RgbImage::from_fn(40, 20, |x, y| image::Rgb([x as u8 * 6, y as u8 * 9, 0]));
     image.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Jpeg).unwrap();
     let read = |bytes: &[u8]| read_bytes(bytes, "a.jpg", &ReadOptions::default());
-    assert!(read(&bytes).is_ok());
+    assert!(read(&bytes).is_ok_and(|picture| !picture.has_gain_map));
+    // An application segment with XMP, after the start of the image.
+    let xmp =
+        b"http://ns.adobe.com/xap/1.0/\0<x xmlns:hdrgm=\"http://ns.adobe.com/hdr-gain-map/1.0/\"/>";
+    let length = (xmp.len() as u16 + 2).to_be_bytes();
+    let ultra = [&bytes[..2], &[0xff, 0xe1], &length, &xmp[..], &bytes[2..]].concat();
+    assert!(read(&ultra).is_ok_and(|picture| picture.has_gain_map));
     let longer = [&bytes[..], &[0xff, 0xda, 0, 8, 1, 2, 3]].concat();
     assert!(read(&longer).is_ok());
     for length in [bytes.len() - 1, bytes.len() - 2, bytes.len() / 2] {

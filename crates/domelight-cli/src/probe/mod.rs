@@ -12,9 +12,7 @@ use crate::output::{
 };
 use domelight::environment::Environment;
 use domelight::environment::builtin::BuiltinProbe;
-use domelight::environment::io::{
-    LoadedProbe, ProbeOptions, SanitizeReport, guess_mapping, load_probe,
-};
+use domelight::environment::io::{Guess, LoadedProbe, ProbeOptions, SanitizeReport, load_probe};
 use domelight::environment::mapping::{Mapping, from_lat_long, to_lat_long};
 use domelight::environment::statistics::{ProbeStatistics, Sun};
 use domelight::picture::exposure::Exposure;
@@ -164,7 +162,7 @@ fn convert(
         PictureFormat::Hdr | PictureFormat::Pfm => None,
         PictureFormat::Png => return Ok(()),
     };
-    let guess = guess_mapping(&converted, envmap);
+    let guess = Guess::of(&converted, envmap).mapping;
     if guess != mapping && !quiet {
         status(&format!(
             "{output}: read it with --mapping {mapping} (of render: --env-mapping); otherwise it is taken for {guess}"

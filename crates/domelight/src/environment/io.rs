@@ -4,11 +4,11 @@
 //! stitching leaves NaN in some. They are repaired and counted in a warning, because a NaN may be where the sun was.
 //! With [`ProbeOptions::strict`], they are an error that names the first bad texel.
 
+pub use super::guess::Guess;
 pub use super::repair::{OVERFLOWED, SanitizeReport, sanitize};
 
-use super::mapping::{EnvmapKind, Mapping, ShapeError, to_lat_long};
+use super::mapping::{Mapping, ShapeError, to_lat_long};
 use super::repair::finite_light;
-use crate::math::{Vec2, vec2};
 use crate::memory;
 use crate::picture::{self, DataWindow, Format, PictureError, ReadOptions};
 use crate::{Rgb, RgbImage};
@@ -17,7 +17,7 @@ use std::path::Path;
 /// Options for loading a probe.
 #[derive(Clone, Debug, Default)]
 pub struct ProbeOptions {
-    /// The mapping; by default inferred from the attribute, the shape and, for a square, the corners.
+    /// The mapping; by default guessed, see [`Guess`].
     pub mapping: Option<Mapping>,
     /// The OpenEXR layer; see [`ReadOptions::layer`].
     pub layer: Option<String>,
@@ -145,18 +145,29 @@ pub fn probe_from_picture(
     let notes = picture.notes;
     let mut image = picture.image;
     if matches!(picture.format, Format::Png | Format::Jpeg) {
-        warnings.push(format!(
-            "{file}: {} holds nothing brighter than white, so suns and lamps are clipped; use \
-             .exr or .hdr",
-            if picture.format == Format::Png { "PNG" } else { "JPEG" }
-        ));
+        warnings.push(if picture.has_gain_map {
+            format!(
+                "{file}: its gain map, which holds what is brighter than white, is not read, so suns and lamps are \
+                 clipped; use .exr or .hdr"
+            )
+        } else {
+            format!(
+                "{file}: {} holds nothing brighter than white, so suns and lamps are clipped; use .exr or .hdr",
+                if picture.format == Format::Png { "PNG" } else { "JPEG" }
+            )
+        });
     }
     if let Some(layer) = &options.layer
         && picture.format != Format::Exr
     {
         warnings.push(format!("{file}: only OpenEXR files have layers; '{layer}' is not used"));
     }
-    let mapping = options.mapping.unwrap_or_else(|| guess_mapping(&image, picture.envmap));
+    let guess = match options.mapping {
+        Some(mapping) => Guess { mapping, doubt: None },
+        None => Guess::of(&image, picture.envmap),
+    };
+    let mapping = guess.mapping;
+    warnings.extend(guess.doubt.map(|doubt| format!("{file}: {doubt}")));
     if options.mapping.is_none() && mapping == Mapping::LatLong && is_stretched(&image) {
         warnings.push(format!(
             "{file}: its {}x{} texels are stretched over the sphere; lat-long maps have twice as many columns as rows",
@@ -221,29 +232,6 @@ fn in_display_window(
     let texels = picture::checked_area(window.display.0, window.display.1)?;
     memory::require(12 * texels as u64, options.max_memory)?;
     picture.in_display_window()
-}
-
-/// The mapping in which a picture is read if none is stated: that of [`Mapping::guess`], but a square that is not black
-/// outside its disc is octahedral. Mirror balls are taken for angular maps.
-pub fn guess_mapping(image: &RgbImage, envmap: Option<EnvmapKind>) -> Mapping {
-    match Mapping::guess(image.width, image.height, envmap) {
-        Mapping::Angular => guess_of_square(image),
-        mapping => mapping,
-    }
-}
-
-/// An angular map is black outside its disc; any other square is interpreted as octahedral.
-fn guess_of_square(image: &RgbImage) -> Mapping {
-    let n = image.width as f32;
-    let is_outside = |x: usize, y: usize| {
-        let from_center = vec2(x as f32 + 0.5, y as f32 + 0.5) / n * 2.0 - Vec2::ONE;
-        // A texel's half diagonal beyond the circle.
-        from_center.length() > 1.0 + 1.5 / n
-    };
-    let lit = |(i, pixel): (usize, &Rgb)| {
-        is_outside(i % image.width, i / image.width) && pixel.max_component() > 0.0
-    };
-    if image.pixels.iter().enumerate().any(lit) { Mapping::Octahedral } else { Mapping::Angular }
 }
 
 fn is_radiance(value: f32) -> bool {

@@ -10,6 +10,8 @@ pub(crate) mod compact;
 mod compensation;
 mod density;
 #[cfg(feature = "io")]
+mod guess;
+#[cfg(feature = "io")]
 pub mod io;
 mod key_light;
 pub(crate) mod lat_long;

@@ -169,10 +169,13 @@ impl Header {
                         Primaries([0, 1, 2, 3].map(|i| [p[2 * i] as f32, p[2 * i + 1] as f32]))
                     })
                     .filter(Primaries::span_a_space);
-                if self.primaries.is_none() {
+                // Zeros, which cameras' software writes, mean that nothing is known.
+                let is_unknown = numbers::<8>(value).is_some_and(|p| p == [0.0; 8]);
+                if self.primaries.is_none() && !is_unknown {
                     self.warnings.push(ignored());
                 }
             }
+            "VIEW" => self.warnings.extend(doubt_of_view(value)),
             _ => {}
         }
         Ok(())
@@ -226,6 +229,17 @@ impl Header {
             pixels[along(self.slow, slow) * self.length + along(self.fast, fast)]
         })
     }
+}
+
+/// A fisheye of less than the whole sphere, if that is the view of Radiance's `rpict`: no mapping is one.
+fn doubt_of_view(view: &str) -> Option<String> {
+    let words: Vec<&str> = view.split_ascii_whitespace().collect();
+    let is_fisheye = words.iter().any(|word| ["-vta", "-vth", "-vts"].contains(word));
+    let at = words.iter().position(|&word| word == "-vh")?;
+    let angle: f64 = words.get(at + 1)?.parse().ok()?;
+    (is_fisheye && angle < 360.0).then(|| {
+        format!("its VIEW is a fisheye of {angle} degrees, which is not read: convert it to lat-long first")
+    })
 }
 
 /// "-Y 512 +X 1024": the first axis goes from scanline to scanline; y grows upward, so that −Y runs downward.

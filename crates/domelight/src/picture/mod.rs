@@ -75,6 +75,8 @@ pub struct Picture {
     pub format: Format,
     /// OpenEXR's text attributes, by name.
     pub attributes: Vec<(String, String)>,
+    /// Whether a JPEG has a gain map (Ultra HDR, ISO 21496-1), which is not read.
+    pub has_gain_map: bool,
     /// What the header asked for and was applied, one phrase each.
     pub notes: Vec<String>,
     /// What the header asked for and was ignored, one sentence each.
@@ -102,7 +104,19 @@ impl Picture {
     fn opaque(image: RgbImage, format: Format) -> Self {
         let (attributes, notes, warnings) = Default::default();
         let (alpha, envmap, window, guessed_layer) = (None, None, None, None);
-        Self { image, alpha, envmap, window, guessed_layer, format, attributes, notes, warnings }
+        let has_gain_map = false;
+        Self {
+            image,
+            alpha,
+            envmap,
+            window,
+            guessed_layer,
+            format,
+            attributes,
+            has_gain_map,
+            notes,
+            warnings,
+        }
     }
 
     /// The picture in OpenEXR's display window: black and transparent outside its data window, and cropped to it.

@@ -243,5 +243,15 @@ pub(super) fn decode_within(
     });
     let image = RgbImage::new(width as usize, height as usize, pixels.collect());
     let alpha = has_alpha.then_some(alpha);
-    Ok(Picture { alpha, ..Picture::opaque(image, format) })
+    let has_gain_map = format == Format::Jpeg && has_gain_map(bytes);
+    Ok(Picture { alpha, has_gain_map, ..Picture::opaque(image, format) })
+}
+
+/// Whether a JPEG names a gain map: by Adobe's XMP properties, as Ultra HDR does, or by ISO 21496-1.
+fn has_gain_map(bytes: &[u8]) -> bool {
+    let names: [&[u8]; 2] =
+        [b"http://ns.adobe.com/hdr-gain-map/1.0/", b"urn:iso:std:iso:ts:21496:-1"];
+    // Both stand in a segment before the data.
+    let header = &bytes[..bytes.len().min(1 << 16)];
+    names.iter().any(|name| header.windows(name.len()).any(|window| window == *name))
 }
