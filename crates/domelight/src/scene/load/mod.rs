@@ -374,6 +374,7 @@ fn load_file(
     options: &LoadOptions,
 ) -> Result<Loaded, LoadError> {
     let unknown = || LoadError::UnknownFormat { path: path.into() };
+    let bytes = &*utf8_of(bytes);
     let format = SceneFormat::of(path, bytes).ok_or_else(unknown)?;
     if bytes.is_empty() {
         return Err(LoadError::Empty { path: path.into() });
@@ -420,6 +421,20 @@ fn line_end(text: &[u8]) -> u8 {
     let first = text.iter().position(is_end).unwrap_or(text.len());
     let after = text[first..].iter().find(|&&b| b != b'\r');
     if after == Some(&b'\n') || first == text.len() { b'\n' } else { b'\r' }
+}
+
+/// The bytes of a text after its byte order mark, in UTF-8 if the mark is of UTF-16; other bytes as they are.
+fn utf8_of(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let of_units = |unit: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|b| unit([b[0], b[1]])).collect();
+        Cow::Owned(String::from_utf16_lossy(&units).into_bytes())
+    };
+    match bytes {
+        [0xff, 0xfe, ..] => of_units(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => of_units(u16::from_be_bytes),
+        [0xef, 0xbb, 0xbf, text @ ..] => Cow::Borrowed(text),
+        _ => Cow::Borrowed(bytes),
+    }
 }
 
 /// Text that may be of before UTF-8.

@@ -13,7 +13,7 @@ use std::path::Path;
 use super::LoadError;
 use super::notes::Notes;
 use super::textures::{Content, Textures};
-use super::wavefront::{ObjErrorKind, lines, number, numbers};
+use super::wavefront::{ObjErrorKind, lines, number, numbers, unquoted};
 use crate::Rgb;
 use crate::math::{Vec2, vec2};
 use crate::scene::{
@@ -214,7 +214,17 @@ impl Reader<'_, '_> {
         let (file, texture, bump) = parsed.map_err(|kind| self.error(line, kind))?;
         let referrer = format!("{}, line {}", self.path.display(), line.number);
         let path = super::relative(self.path, file);
-        match self.textures.file_of(&path, content, &referrer) {
+        let found = self.textures.file_of(&path, content, &referrer).or_else(|error| {
+            // A path of the computer where the file was made: its last part, beside the library.
+            let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
+            match (&error, super::relative(self.path, name)) {
+                (LoadError::ReadReferenced { .. }, beside) if beside != path => {
+                    self.textures.file_of(&beside, content, &referrer).map_err(|_| error)
+                }
+                _ => Err(error),
+            }
+        });
+        match found {
             Ok(index) => Ok(Some((TextureRef { texture: index, ..texture }, bump))),
             Err(error) if !self.strict && error.is_about_one_image() => {
                 self.warnings.push(format!("{error}; it is left out"));
@@ -226,7 +236,15 @@ impl Reader<'_, '_> {
 
     fn material(&mut self, entry: Entry) -> Result<Material, LoadError> {
         let default = if entry.diffuse_texture.is_some() { 1.0 } else { 0.8 };
-        let diffuse = entry.diffuse.unwrap_or(Rgb::splat(default));
+        let mut diffuse = entry.diffuse.unwrap_or(Rgb::splat(default));
+        if diffuse.is_black() && entry.diffuse_texture.is_some() {
+            let before = format!(
+                "{}: Kd is black, but map_Kd is taken for the color, of material ",
+                self.path.display()
+            );
+            self.notes.add(&before, &entry.name, "");
+            diffuse = Rgb::WHITE;
+        }
         let maps = [entry.roughness_texture, entry.metallic_texture];
         let is_physical =
             entry.roughness.or(entry.metallic).is_some() || maps.iter().any(Option::is_some);
@@ -376,7 +394,7 @@ fn options<'a>(
         return Err(no_name());
     }
     let transform = UvTransform::new(vec2(offset.x, 1.0 - scale.y - offset.y), 0.0, scale);
-    Ok((rest, TextureRef { wrap: [wrap; 2], transform, ..TextureRef::new(0) }, bump))
+    Ok((unquoted(rest), TextureRef { wrap: [wrap; 2], transform, ..TextureRef::new(0) }, bump))
 }
 
 fn skip_words(mut text: &str, n: usize) -> &str {

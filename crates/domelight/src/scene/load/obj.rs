@@ -19,7 +19,7 @@ use super::notes::Notes;
 use super::polygon::Triangulator;
 use super::smoothing::Smoothing;
 use super::textures::Textures;
-use super::wavefront::{ObjErrorKind, enough, lines, number, numbers, words};
+use super::wavefront::{ObjErrorKind, enough, lines, number, numbers, unquoted, words};
 use super::{Budget, DEFAULT_ALBEDO, LoadError, Loaded, colors, mtl, non_finite, part_name, stem};
 use crate::Rgb;
 use crate::geometry::Mesh;
@@ -97,6 +97,8 @@ struct Reader<'a> {
     materials: Vec<Material>,
     /// Material libraries that were read.
     libraries: HashSet<PathBuf>,
+    /// What faces refer to and does not exist.
+    missing: HashSet<&'static str>,
     material_of: HashMap<String, usize>,
     textures: Textures<'a>,
     triangulator: Triangulator,
@@ -122,6 +124,7 @@ impl<'a> Reader<'a> {
             group: None,
             materials: Vec::new(),
             libraries: HashSet::new(),
+            missing: HashSet::new(),
             material_of: HashMap::new(),
             textures: Textures::new(budget),
             triangulator: Triangulator::default(),
@@ -183,7 +186,8 @@ impl<'a> Reader<'a> {
         self.positions.push(Vec3::new(n[0], n[1], n[2]));
     }
 
-    fn corner(&self, text: &str) -> Result<Corner, ObjErrorKind> {
+    /// A corner of a face. Without `strict`, texture coordinates and normals that do not exist are left out.
+    fn corner(&mut self, text: &str) -> Result<Corner, ObjErrorKind> {
         let mut words = text.split('/');
         let mut index = |what, count| match words.next() {
             None | Some("") => Ok(None),
@@ -193,11 +197,29 @@ impl<'a> Reader<'a> {
             }
         };
         let position = index("vertex (v)", self.positions.len())?;
-        let uv = index("texture coordinate (vt)", self.uvs.len())?;
-        let normal = index("normal (vn)", self.normals.len())?;
+        let uv = index("texture coordinate (vt)", self.uvs.len());
+        let normal = index("normal (vn)", self.normals.len());
+        let [uv, normal] = [self.existing(uv)?, self.existing(normal)?];
         let normal = normal.map_or(self.shading, Normal::Given);
         let position = position.ok_or_else(|| ObjErrorKind::Corner { text: text.into() })?;
         Ok(Corner { position, uv, normal })
+    }
+
+    fn existing(
+        &mut self,
+        index: Result<Option<u32>, ObjErrorKind>,
+    ) -> Result<Option<u32>, ObjErrorKind> {
+        match index {
+            Err(ObjErrorKind::Index { what, .. }) if !self.strict => {
+                if self.missing.insert(what) {
+                    let path = self.path.display();
+                    let before = format!("{path}: left out of faces, because it does not exist: ");
+                    self.notes.add(&before, what, "");
+                }
+                Ok(None)
+            }
+            index => index,
+        }
     }
 
     fn face(&mut self, text: &str) -> Result<(), ObjErrorKind> {
@@ -227,6 +249,7 @@ impl<'a> Reader<'a> {
 
     /// Reads a material library, or several; one that is missing is a warning.
     fn library(&mut self, line: usize, names: &str) -> Result<(), LoadError> {
+        let names = unquoted(names);
         // A name may hold spaces.
         let path = super::relative(self.path, names);
         if names.contains(char::is_whitespace) && !self.textures.budget.exists(&path) {
@@ -243,11 +266,12 @@ impl<'a> Reader<'a> {
         let place = format!("{}, line {line}", self.path.display());
         let why = match super::read_referenced(&path, &place, self.textures.budget) {
             // What is no library is nobody's business.
-            Ok(bytes) if !mtl::is_library(&bytes) => {
+            Ok(bytes) if !mtl::is_library(&super::utf8_of(&bytes)) => {
                 "it is not a material library (MTL)".to_owned()
             }
             Ok(bytes) => {
                 let (textures, warnings) = (&mut self.textures, &mut self.warnings);
+                let bytes = super::utf8_of(&bytes);
                 for material in mtl::parse(&path, &bytes, textures, self.strict, warnings)? {
                     // Of two of a name, the first.
                     let next = self.materials.len();

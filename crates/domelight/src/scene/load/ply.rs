@@ -293,6 +293,8 @@ impl Header {
                         format.ok_or((PlyPlace::Line(index + 1), PlyErrorKind::NoFormat))?;
                     return Ok(Self { format, elements, length });
                 }
+                // What is neither is a comment without its keyword, as Blender 2.47 wrote.
+                ([word, ..], _) if !["ply", "format", "element", "property"].contains(word) => {}
                 _ => return Err(wrong()),
             }
         }

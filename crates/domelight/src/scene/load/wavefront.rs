@@ -90,6 +90,12 @@ pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split_whitespace().take_while(|word| !word.starts_with('#'))
 }
 
+/// A file name without the quotation marks that some exporters put around it.
+pub(super) fn unquoted(name: &str) -> &str {
+    let inner = name.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+    inner.map_or(name, str::trim)
+}
+
 /// All numbers after a keyword, at least `needed`.
 pub(super) fn numbers(keyword: &str, rest: &str, needed: usize) -> Result<Vec<f32>, ObjErrorKind> {
     enough(keyword, words(rest).map(number).collect::<Result<_, _>>()?, needed)
@@ -109,5 +115,7 @@ pub(super) fn enough(
 
 pub(super) fn number(word: &str) -> Result<f32, ObjErrorKind> {
     let not_a_number = || ObjErrorKind::NotANumber { text: word.chars().take(40).collect() };
-    word.parse().ok().filter(|v: &f32| v.is_finite()).ok_or_else(not_a_number)
+    // Some exporters write the sign before the e.
+    let swapped = || word.replace("+e", "e+").replace("-e", "e-").parse().ok();
+    word.parse().ok().or_else(swapped).filter(|v: &f32| v.is_finite()).ok_or_else(not_a_number)
 }
