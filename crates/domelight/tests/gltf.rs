@@ -709,3 +709,27 @@ fn vertices_that_are_not_finite_are_left_out_unless_that_is_refused() {
     }
     assert_eq!(loaded(&soup(1.0)).warnings, [""; 0]);
 }
+
+/// Without normals, the format says, tangents are ignored: those along the texture coordinates take their place.
+#[test]
+fn tangents_without_normals_are_ignored() {
+    let png = {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let image = image::RgbImage::from_pixel(2, 2, image::Rgb([200, 128, 220]));
+        image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        STANDARD.encode(bytes.into_inner())
+    };
+    let more = format!(
+        r#""materials":[{{"name":null,"normalTexture":{{"index":0}}}}],"textures":[{{"source":0}}],
+        "images":[{{"uri":"data:image/png;base64,{png}"}}],"#
+    );
+    let document = document(&more, r#","TANGENT":2"#);
+    let document = document.replace("}}]}],\n", "},\"material\":0}]}],\n");
+    let without = document.replace(r#","TANGENT":2"#, "");
+    let tangents = |json: &str| {
+        let loaded = load_with(&file(json).path, &LoadOptions::default()).unwrap();
+        loaded.description.parts[0].mesh.tangents.clone()
+    };
+    assert!(!tangents(&document).is_empty());
+    assert_eq!(tangents(&document), tangents(&without));
+}

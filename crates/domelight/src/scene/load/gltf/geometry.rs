@@ -143,10 +143,13 @@ impl Reader<'_, '_> {
             None => Ok(Vec::new()),
         };
         let first = slot.uv_sets[0];
-        let tangents = self.floats("TANGENT", "VEC4", n);
+        let normals = self.floats("NORMAL", "VEC3", n)?;
+        // glTF 2.0, 3.7.2.1: without normals, tangents are ignored.
+        let uses_tangents = slot.tangent_set.is_some() && !normals.is_empty();
+        let tangents = unless_unused(self.floats("TANGENT", "VEC4", n), uses_tangents)?;
         let mut vertices = Vertices {
-            normals: self.floats("NORMAL", "VEC3", n)?,
-            tangents: unless_unused(tangents, slot.tangent_set.is_some())?,
+            normals,
+            tangents: if uses_tangents { tangents } else { Vec::new() },
             uvs: [unless_unused(uvs(first.or(Some(0))), first.is_some())?, uvs(slot.uv_sets[1])?],
             colors: self.colors(n)?,
             positions,

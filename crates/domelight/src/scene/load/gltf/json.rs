@@ -15,6 +15,11 @@ use serde_json::value::RawValue;
 use super::error::GltfErrorKind;
 use super::meshopt::Compression;
 
+/// A name; none where an exporter wrote `null`.
+fn name<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    Option::deserialize(deserializer).map(Option::unwrap_or_default)
+}
+
 /// The top level of the document.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
@@ -222,7 +227,7 @@ impl BufferViewExtensions {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Scene {
-    #[serde(default)]
+    #[serde(default, deserialize_with = "name")]
     pub(super) name: String,
     #[serde(default)]
     pub(super) nodes: Vec<usize>,
@@ -231,6 +236,7 @@ pub(super) struct Scene {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Node {
+    #[serde(deserialize_with = "name")]
     pub(super) name: String,
     pub(super) children: Vec<usize>,
     pub(super) matrix: Option<[f32; 16]>,
@@ -267,7 +273,7 @@ pub(super) struct Visibility {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Mesh {
-    #[serde(default)]
+    #[serde(default, deserialize_with = "name")]
     pub(super) name: String,
     #[serde(default)]
     pub(super) primitives: Vec<Primitive>,
@@ -312,7 +318,7 @@ pub(super) struct Skin {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Animation {
-    #[serde(default)]
+    #[serde(default, deserialize_with = "name")]
     pub(super) name: String,
     #[serde(default)]
     pub(super) channels: Vec<Channel>,
@@ -351,7 +357,7 @@ pub(super) enum Interpolation {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Camera {
-    #[serde(default)]
+    #[serde(default, deserialize_with = "name")]
     pub(super) name: String,
     pub(super) perspective: Option<Perspective>,
     pub(super) orthographic: Option<Orthographic>,
@@ -441,6 +447,7 @@ pub(super) struct TextureTransform {
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Material {
+    #[serde(deserialize_with = "name")]
     pub(super) name: String,
     pub(super) pbr_metallic_roughness: MetallicRoughness,
     pub(super) normal_texture: Option<TextureInfo>,
