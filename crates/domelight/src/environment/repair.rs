@@ -106,7 +106,9 @@ impl Channel<'_> {
         let holes = (0..self.values.len()).filter(|&i| !queued[i]);
         let mut ring: Vec<usize> = holes.filter(borders_known).collect();
         while !ring.is_empty() {
-            ring.iter().for_each(|&i| queued[i] = true);
+            for &i in &ring {
+                queued[i] = true;
+            }
             let means: Vec<f32> = ring.iter().map(|&i| self.mean_around(i)).collect();
             ring.iter().zip(means).for_each(|(&i, mean)| self.values[i] = mean);
             let mut next = Vec::new();
