@@ -164,7 +164,7 @@ export function commandWords(state: State): string[] {
 export const command = (state: State) => commandWords(state).join(" ");
 
 export const PROBES = ["sky", "studio", "cathedral", "constant"];
-export const SCENES = ["statue", "spheres", "material-ball", "sphere", "sphere-orthographic"];
+export const SCENES = ["statue", "spheres", "material-ball", "room", "sphere", "sphere-orthographic"];
 export const isBuiltinProbe = (name: string) => PROBES.includes(name);
 
 /** The last part of a path. */

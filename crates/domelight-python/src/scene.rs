@@ -413,7 +413,7 @@ impl Scene {
         Self::build(py, path.display().to_string(), description, material, ground, normalize)
     }
 
-    /// Create a built-in scene: 'statue', 'spheres', 'material-ball', 'sphere' or 'sphere-orthographic'.
+    /// Create a built-in scene: 'statue', 'spheres', 'material-ball', 'room', 'sphere' or 'sphere-orthographic'.
     ///
     /// Parameters
     /// ----------

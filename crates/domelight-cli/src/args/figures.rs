@@ -21,7 +21,7 @@ pub(crate) struct FiguresArguments {
     /// Output folder, created if it does not exist
     #[arg(short, long = "output", value_name = "DIR", default_value = "figures")]
     pub(crate) output: PathBuf,
-    /// A built-in scene (statue, spheres, material-ball, sphere, …), a mesh or a scene file
+    /// A built-in scene (statue, spheres, material-ball, room, …), a mesh or a scene file
     #[arg(long, value_name = "SCENE", default_value = "statue")]
     pub(crate) scene: String,
     /// The figures to make [default: all, 1 to 14]

@@ -12,7 +12,7 @@ use domelight_lab::scene::{BUILTIN_ROWS, DepthOfField, NamedMaterial};
 /// A scene, its light and a camera, for every command that renders.
 #[derive(Args, Debug)]
 pub(crate) struct SceneArguments {
-    /// A built-in scene (statue, spheres, material-ball, sphere, …), a mesh (.ply, .obj, .stl, .off,
+    /// A built-in scene (statue, spheres, material-ball, room, …), a mesh (.ply, .obj, .stl, .off,
     /// .gltf, .glb) or a scene file (.toml)
     #[arg(default_value = "statue")]
     pub(crate) scene: String,

@@ -4,6 +4,7 @@
 //! normal. [`BuiltinScene::environment`] is a suitable light.
 
 pub(crate) mod material_ball;
+pub(crate) mod room;
 pub mod shapes;
 pub(crate) mod statue;
 mod surface_nets;
@@ -33,7 +34,7 @@ const LEAST_ROUGHNESS: f32 = 0.1;
 const FLOOR_RADIUS: f32 = 100.0;
 
 /// The parts that only set off the subject.
-const SCENERY: [&str; 3] = ["floor", "plinth", "cradle"];
+const SCENERY: [&str; 4] = ["floor", "plinth", "cradle", "walls"];
 
 /// A procedural scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -44,6 +45,8 @@ pub enum BuiltinScene {
     Spheres,
     /// A grooved ball in a cradle: curvature, edges and contact shadows.
     MaterialBall,
+    /// A room with a table, lit through a window.
+    Room,
     /// The unit sphere at the origin in perspective.
     Sphere,
     /// The unit sphere at the origin, filling an orthographic picture.
@@ -53,8 +56,8 @@ pub enum BuiltinScene {
 /// A name that is no built-in scene.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "there is no built-in scene {name:?}; the scenes are statue, spheres, material-ball, sphere and \
-     sphere-orthographic"
+    "there is no built-in scene {name:?}; the scenes are statue, spheres, material-ball, room, sphere \
+     and sphere-orthographic"
 )]
 pub struct UnknownScene {
     /// The name that was given.
@@ -63,8 +66,14 @@ pub struct UnknownScene {
 
 impl BuiltinScene {
     /// All built-in scenes, in the order of their documentation.
-    pub const ALL: [Self; 5] =
-        [Self::Statue, Self::Spheres, Self::MaterialBall, Self::Sphere, Self::SphereOrthographic];
+    pub const ALL: [Self; 6] = [
+        Self::Statue,
+        Self::Spheres,
+        Self::MaterialBall,
+        Self::Room,
+        Self::Sphere,
+        Self::SphereOrthographic,
+    ];
 
     /// The name that [`FromStr`] reads.
     pub const fn name(self) -> &'static str {
@@ -72,6 +81,7 @@ impl BuiltinScene {
             Self::Statue => "statue",
             Self::Spheres => "spheres",
             Self::MaterialBall => "material-ball",
+            Self::Room => "room",
             Self::Sphere => "sphere",
             Self::SphereOrthographic => "sphere-orthographic",
         }
@@ -83,6 +93,7 @@ impl BuiltinScene {
             Self::Statue => "pierced, fluted marble on a plinth, with strong self-shadowing",
             Self::Spheres => "seven metal spheres with increasing roughness on a floor",
             Self::MaterialBall => "grooved ball in a cradle: curvature, edges, contact shadows",
+            Self::Room => "a table and a vase in a room, lit through a window",
             Self::Sphere => "a single diffuse sphere in perspective",
             Self::SphereOrthographic => "a single diffuse sphere that fills the picture",
         }
@@ -91,16 +102,18 @@ impl BuiltinScene {
     /// The name of the built-in probe that suits the scene best.
     pub const fn probe(self) -> &'static str {
         match self {
-            Self::Statue => "sky",
+            Self::Statue | Self::Room => "sky",
             Self::Spheres | Self::MaterialBall => "studio",
             Self::Sphere | Self::SphereOrthographic => "cathedral",
         }
     }
 
-    /// How far that probe is turned \[degrees\]: its key light comes over the camera's shoulder.
+    /// How far that probe is turned \[degrees\]: its key light comes over the camera's shoulder, or
+    /// through the window.
     const fn probe_rotation(self) -> f32 {
         match self {
             Self::Statue => 125.0,
+            Self::Room => 90.0,
             _ => 0.0,
         }
     }
@@ -122,6 +135,7 @@ impl BuiltinScene {
             Self::Statue => statue_scene(),
             Self::Spheres => spheres_scene(),
             Self::MaterialBall => material_ball_scene(),
+            Self::Room => room_scene(),
             Self::Sphere => sphere_scene(camera(30.0, vec3(0.0, 0.0, 4.4), Vec3::ZERO)),
             Self::SphereOrthographic => sphere_scene(CameraSettings {
                 projection: Projection::Orthographic { height: 2.0 },
@@ -187,6 +201,22 @@ fn material_ball_scene() -> SceneDescription {
             ("core", material_ball::core(), steel),
             ("cradle", material_ball::cradle(), stone),
             floor(),
+        ],
+    )
+}
+
+fn room_scene() -> SceneDescription {
+    let plaster = Material::diffuse("plaster", Rgb::new(0.76, 0.74, 0.70));
+    let planks = glossy("planks", Rgb::new(0.36, 0.22, 0.12), 0.0, 0.4);
+    let oak = glossy("oak", Rgb::new(0.48, 0.33, 0.19), 0.0, 0.5);
+    let glaze = glossy("glaze", Rgb::new(0.10, 0.22, 0.40), 0.0, 0.25);
+    scene(
+        camera(60.0, vec3(-1.2, 1.5, 2.3), vec3(0.2, 1.0, -2.0)),
+        [
+            ("table", room::table(), oak),
+            ("vase", room::vase(), glaze),
+            ("walls", room::walls(), plaster),
+            ("floor", room::floor(), planks),
         ],
     )
 }

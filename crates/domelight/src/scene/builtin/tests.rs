@@ -71,6 +71,10 @@ fn solids() -> Vec<(&'static str, Mesh)> {
         ("ball", material_ball::ball()),
         ("core", material_ball::core()),
         ("cradle", material_ball::cradle()),
+        ("walls", room::walls()),
+        ("floor", room::floor()),
+        ("table", room::table()),
+        ("vase", room::vase()),
     ]
 }
 
