@@ -6,8 +6,9 @@ export interface Series {
   name: string;
   points: [number, number][];
   kind: "first" | "second" | "third" | "shade";
-  /** Draws bars, dots or an area instead of a line; a band covers the range between two values of x. */
-  as?: "line" | "dots" | "bars" | "area" | "band";
+  /** Draws bars, dots or an area instead of a line; a band covers the range between two values of x; a ribbon is bounded by
+   *  its points, which run along its upper edge and back along its lower edge. */
+  as?: "line" | "dots" | "bars" | "area" | "band" | "ribbon";
 }
 
 export interface Axes {
@@ -63,7 +64,7 @@ const widthOf = (() => {
 /** The legend key of a series, 14 wide, ending at `x`. */
 function swatch({ kind, as }: Series, x: number, y: number): string {
   if (as === "dots") return `<circle class="${kind} fill" cx="${x - 7}" cy="${y}" r="3"/>`;
-  if (as === "bars" || as === "area" || as === "band") return `<rect class="${kind} fill faint" x="${x - 14}" y="${y - 5}" width="14" height="10"/>`;
+  if (as === "bars" || as === "area" || as === "band" || as === "ribbon") return `<rect class="${kind} fill faint" x="${x - 14}" y="${y - 5}" width="14" height="10"/>`;
   return `<path class="${kind} line" d="M${x - 14} ${y}h14"/>`;
 }
 
@@ -110,7 +111,7 @@ export function plot(series: Series[], axes: Axes): string {
   }
   const base = Y(axes.y.log ? ys[0] : Math.max(ys[0], Math.min(0, ys[1])));
   // Lines stay visible above areas.
-  const isArea = (s: Series) => s.as === "area" || s.as === "band";
+  const isArea = (s: Series) => s.as === "area" || s.as === "band" || s.as === "ribbon";
   for (const s of [...series.filter(isArea), ...series.filter((s) => !isArea(s))]) {
     const points = s.points.filter(([x, y]) => isFinite(x) && isFinite(y) && (!axes.y.log || y > 0) && (!axes.x.log || x > 0));
     if (!points.length) continue;
@@ -122,6 +123,7 @@ export function plot(series: Series[], axes: Axes): string {
       const [from, to] = [X(points[0][0]), X(points[points.length - 1][0])];
       out.push(`<rect class="${s.kind} fill faint" x="${from}" y="${top}" width="${to - from}" height="${height - bottom - top}"/>`);
     } else if (s.as === "area") out.push(`<path class="${s.kind} fill faint" d="M${X(points[0][0])},${base}L${points.map(at).join("L")}L${X(points[points.length - 1][0])},${base}Z"/>`);
+    else if (s.as === "ribbon") out.push(`<path class="${s.kind} fill faint" d="M${points.map(at).join("L")}Z"/>`);
     else out.push(`<path class="${s.kind} line" d="M${points.map(at).join("L")}"/>`);
   }
   out.push(`<path class="axis" d="M${left} ${height - bottom}H${width - right}"/>`);
@@ -134,7 +136,8 @@ export function plot(series: Series[], axes: Axes): string {
     out.push(swatch(s, legend, legendAt - 4));
     legend -= 30;
   }
-  return `<svg viewBox="0 0 ${width} ${height}" aria-hidden="true">${out.join("")}</svg>`;
+  const frame = axes.x.log || axes.y.log ? "" : ` data-frame='${JSON.stringify({ left, right: width - right, top, bottom: height - bottom, xs, ys })}'`;
+  return `<svg viewBox="0 0 ${width} ${height}"${frame} aria-hidden="true">${out.join("")}</svg>`;
 }
 
 /** The slope of log y over log x by least squares; NaN for fewer than two points. */

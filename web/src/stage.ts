@@ -2,6 +2,8 @@
 
 import type { App } from "./app";
 import { h, latest, short } from "./dom";
+import { player } from "./player";
+import { onPointer, type Pointed } from "./pointer";
 
 /** Controls and a drawing area, filled by a figure. */
 export class Stage {
@@ -17,12 +19,41 @@ export class Stage {
 
   /** Adds a slider; `shown` formats its value. */
   slider(name: string, min: number, max: number, step: number, value: number, shown: (x: number) => string = short): () => number {
+    const input = this.range(name, min, max, step, value, shown);
+    return () => Number(input.value);
+  }
+
+  /** Adds a slider that plays from `min` to `max` in steps of one. */
+  player(name: string, min: number, max: number, value: number, shown: (x: number) => string): () => number {
+    const input = this.range(name, min, max, 1, value, shown);
+    this.controls.append(player(input));
+    return () => Number(input.value);
+  }
+
+  /** Adds a slider that dragging in the first plot moves as well: to `value` of the place, which is null to leave it. The
+   *  result is the place under the pointer. */
+  dragged(name: string, min: number, max: number, step: number, value: number, shown: (x: number) => string, valueAt: (at: Pointed) => number | null): [() => number, () => Pointed | null] {
+    const input = this.range(name, min, max, step, value, shown);
+    let pointed: Pointed | null = null;
+    this.drawing.classList.add("touchable");
+    onPointer(this.drawing, (at) => {
+      if (!at && !pointed) return;
+      pointed = at;
+      const moved = at?.dragged ? valueAt(at) : null;
+      if (moved === null) return this.redraw();
+      input.value = String(moved);
+      input.dispatchEvent(new Event("input", { bubbles: true }));
+    });
+    return [() => Number(input.value), () => pointed];
+  }
+
+  private range(name: string, min: number, max: number, step: number, value: number, shown: (x: number) => string): HTMLInputElement {
     const input = h("input", { type: "range", min: String(min), max: String(max), step: String(step) });
     input.value = this.begin(input, String(value));
     const output = h("output", {}, shown(Number(input.value)));
     input.addEventListener("input", () => { output.textContent = shown(Number(input.value)); this.changed(); });
     this.controls.append(h("label", {}, name, input, output));
-    return () => Number(input.value);
+    return input;
   }
 
   choice(name: string, values: [string, string][]): () => string {

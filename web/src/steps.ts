@@ -13,6 +13,8 @@ const i = (x: string) => `<mi>${x}</mi>`;
 const n = (x: number | string) => `<mn>${x}</mn>`;
 const o = (x: string) => `<mo>${x}</mo>`;
 const row = (...x: string[]) => `<mrow>${x.join("")}</mrow>`;
+/** A term in the color of its curve in the figure. */
+const ofKind = (kind: "first" | "second", ...x: string[]) => `<mrow class="${kind}">${x.join("")}</mrow>`;
 const frac = (a: string, b: string) => `<mfrac>${row(a)}${row(b)}</mfrac>`;
 const sub = (a: string, b: string) => `<msub>${row(a)}${row(b)}</msub>`;
 const sup = (a: string, b: string) => `<msup>${row(a)}${row(b)}</msup>`;
@@ -38,8 +40,8 @@ export const STEPS: Step[] = [
       "A pixel’s direct illumination is an integral over all directions: reflectance times cosine, times incident light, times visibility. It has no closed form for a photographed sky.",
       "But it has a Monte Carlo estimate. Sample directions from any density that is positive wherever the integrand is, divide each value by the density of its direction, and average. The estimate is unbiased for every N; only its standard deviation depends on the density, and it falls with the square root of N.",
     ],
-    formulas: [row(i("I"), eq, o("∫"), i("f"), par(i("x")), d, i("x"), o("≈"), overN, sumN, frac(row(i("f"), par(sub(i("x"), i("j")))), row(i("p"), par(sub(i("x"), i("j")))))), row(i("σ"), o("∝"), frac(n(1), sqrt(i("N"))))],
-    question: "How many more samples halve the error? Also try a density that resembles the integrand.",
+    formulas: [row(i("I"), eq, o("∫"), ofKind("first", i("f"), par(i("x"))), d, i("x"), o("≈"), overN, sumN, frac(ofKind("first", i("f"), par(sub(i("x"), i("j")))), ofKind("second", i("p"), par(sub(i("x"), i("j")))))), row(i("σ"), o("∝"), frac(n(1), sqrt(i("N"))))],
+    question: "How many more samples halve the error? Press Play, then drag p until it resembles f.",
     answer: "Four times as many: on log axes the error falls with slope −½. A density shaped like the integrand lowers the whole line, and a density exactly proportional to it has no error at all.",
   },
   {

@@ -400,6 +400,50 @@ test("every step of the lecture has a figure that each of its controls changes",
   await done();
 });
 
+test("the first step of the lecture plays, pauses, steps, is dragged and read", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lecture&step=1&figure=0;0`);
+  await drawn(page, 1);
+  const result = () => text(page, "#figure .result");
+  const samples = () => page.locator("#figure label", { hasText: "Samples" }).locator("output").textContent().then(Number);
+  const button = (name) => page.locator(`#figure .player button:text-is("${name}")`);
+  assert.equal(await samples(), 1);
+  await button("Play").click();
+  await page.waitForFunction(() => /^Sample [4-9],/.test(document.querySelector("#figure .result").textContent));
+  await button("Pause").click();
+  const paused = await samples();
+  await page.waitForTimeout(400);
+  assert.equal(await samples(), paused, "a paused figure stands still");
+  await button("Step forward").click();
+  assert.equal(await samples(), paused + 1);
+  await button("Step back").click();
+  await button("Step back").click();
+  assert.equal(await samples(), paused - 1);
+  const circles = (kind) => page.$$eval("#figure svg:nth-of-type(1)", ([svg], kind) => svg.querySelectorAll(`circle.${kind}[r]`).length, kind);
+  assert.equal(await circles("third"), paused - 1 + 1, "each sample is a dot, and the legend has one");
+  // Over x = 0.9, f is 2.43; the pointer drags p through it.
+  const svg = page.locator("#figure svg").first();
+  await svg.scrollIntoViewIfNeeded();
+  const place = await svg.evaluate((svg) => {
+    const { left, right, top, bottom, xs, ys } = JSON.parse(svg.dataset.frame), box = svg.getBoundingClientRect();
+    const scale = box.width / svg.viewBox.baseVal.width;
+    const at = (x, y) => [box.left + scale * (left + (right - left) * (x - xs[0]) / (xs[1] - xs[0])), box.top + scale * (bottom - (bottom - top) * (y - ys[0]) / (ys[1] - ys[0]))];
+    return { low: at(0.9, 1), high: at(0.9, 2.9) };
+  });
+  await page.mouse.move(...place.low);
+  await page.waitForFunction(() => /^Under the pointer, x = 0.90: f = 2.4\d, p = 1.00, f\/p = 2.4\d. ∫ p = 1.00/.test(document.querySelector("#figure .result").textContent));
+  await page.mouse.down();
+  await page.mouse.move(...place.high, { steps: 4 });
+  await page.mouse.up();
+  await page.waitForFunction(() => /every sample equals the integral/.test(document.querySelector("#figure .result").textContent));
+  assert.match(await text(page, "#figure"), /100 % similar/);
+  await page.waitForFunction(() => /figure=1%3B/.test(location.hash));
+  // Without the pointer, the numbers are of the last sample.
+  await page.mouse.move(2, 2);
+  await page.waitForFunction(() => /^Sample /.test(document.querySelector("#figure .result").textContent));
+  assert.doesNotMatch(await result(), /NaN|Infinity/);
+  await done();
+});
+
 test("a link shows the lecture's figure as it was left", async () => {
   const { page, done } = await open(`${SMALL}&panel=lecture&step=8&figure=-0.5;3;2`);
   await drawn(page, 1);
