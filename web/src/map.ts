@@ -129,7 +129,7 @@ export class MapPanel {
     }
     this.outline = this.sun && ((await app.engines.call("placesOf", state.mapping, state.rotate, this.sun)) as Float32Array);
     const size = app.probe!.size;
-    $("map-caption").textContent = `${app.envName}, ${size[0]} × ${size[1]} texels, rotated by ${degrees(state.rotate)}; ${this.sun ? "the sun is outlined" : "no sun found"}.`;
+    $("map-caption").textContent = `${app.envName}, ${size[0]} × ${size[1]} texels, rotated by ${degrees(state.rotate)}; ${this.sun ? `${state.env === "sky" ? "the sun" : "the brightest compact light"} is outlined` : "no compact light found"}.`;
     this.mark();
     document.documentElement.dataset.map = key;
   }

@@ -262,17 +262,17 @@ export class PicturePanel {
     const errors = this.tellError();
     const series: Series[] = this.jobs.map((job, i) => ({
       name: job.strategy || job.settings.strategy, kind: i ? "second" : "first",
-      points: this.histories[i].map((p): [number, number] => [p.rays, p.error]),
+      points: this.histories[i].map((p): [number, number] => [p.rays, Math.sqrt(p.error)]),
     }));
     const measured = errors.flatMap((error, i): Series[] => (error > 0 ? [{
-      name: "", kind: i ? "second" : "first", as: "dots", points: [[this.jobs[i].statistics.shadowRays, error]],
+      name: "", kind: i ? "second" : "first", as: "dots", points: [[this.jobs[i].statistics.shadowRays, Math.sqrt(error)]],
     }] : []));
     if ([...series, ...measured].every((s) => !s.points.length)) $("error-plot").replaceChildren();
-    else $("error-plot").innerHTML = plot([...series, ...measured], { x: { name: "shadow rays", log: true, tick: count }, y: { name: "relative variance of the mean", log: true }, height: 200 });
+    else $("error-plot").innerHTML = plot([...series, ...guideLine(series), ...measured], { x: { name: "shadow rays", log: true, tick: count }, y: { name: "relative RMSE", log: true }, height: 200 });
     const slopes = series.map((s) => `${s.name}: ${short(s.points.at(-1)?.[1] ?? NaN)}, slope ${signed(slope(s.points))}`);
-    $("error-plot").setAttribute("aria-label", `Estimated relative variance. ${slopes.join("; ")}`);
+    $("error-plot").setAttribute("aria-label", `Relative RMSE estimated from the variance. ${slopes.join("; ")}`);
     $("error-plot").parentElement!.querySelector("figcaption")!.textContent =
-      `Estimated error over shadow rays — ${series.map((s) => { const k = slope(s.points); return !isFinite(k) ? `${s.name}: a slope needs two passes` : k < 0 ? `${s.name} falls with slope ${signed(k)}` : `${s.name}: too few samples for a slope`; }).join("; ")}${measured.length ? ". Dots: measured against the reference" : ""}`;
+      `Relative RMSE over shadow rays, estimated from the variance of the samples, which shows neither bias nor rare bright samples — ${series.map((s) => { const k = slope(s.points); return !isFinite(k) ? `${s.name}: a slope needs two passes` : k < 0 ? `${s.name} falls with slope ${signed(k)}` : `${s.name}: too few samples for a slope`; }).join("; ")}${measured.length ? ". Dots: measured against the reference" : ". “Show its error” measures it"}`;
     $("command").replaceChildren(...words(commandWords(this.app.state)));
   }
 
@@ -560,3 +560,11 @@ export class PicturePanel {
 /** Redraws canvases when the theme changes. */
 export const themed = (draw: () => void) => matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 export { color };
+
+/** The slope of independent samples, −½, from the first point of the first line that has two. */
+function guideLine(series: Series[]): Series[] {
+  const points = series.map((s) => s.points.filter(([x, y]) => x > 0 && y > 0)).find((all) => all.length > 1);
+  if (!points) return [];
+  const [[x, y], [end]] = [points[0], points.at(-1)!];
+  return [{ name: "slope −½", kind: "shade", points: [[x, y], [end, y * Math.sqrt(x / end)]] }];
+}

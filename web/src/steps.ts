@@ -117,7 +117,7 @@ export const STEPS: Step[] = [
   {
     title: "The product is the target",
     text: [
-      "The best density available without tracing rays is proportional to reflectance times cosine times light. Its normalization is the picture without shadows, the unoccluded radiance.",
+      "The best density available without tracing rays is proportional to reflectance times cosine times light. Its normalization is the picture without shadows, the unoccluded radiance. It is best only where nothing is occluded: where most of the product is in shadow, a density that sends more rays to the visible rest, even one of the two factors, may have less variance.",
       "Samples of this density all have the same value except for visibility. Only the binary visibility has variance: zero without occlusion and in full shadow, largest where half of the light is occluded. Reflectance and light no longer contribute.",
     ],
     formulas: [row(i("p"), par(wi), eq, frac(row(fr, cos(i("i")), sub(i("L"), i("i"))), sub(i("L"), i("ns")))), row(i("Var"), eq, frac(both(i("L"), i("ns"), n(2)), i("N")), i("Var"), of, par(i("V")))],
