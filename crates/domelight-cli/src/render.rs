@@ -48,7 +48,7 @@ fn render(arguments: &RenderArguments, quiet: bool) -> Result<()> {
     arguments.render_run.check(&outputs)?;
     outputs.iter().try_for_each(PicturePath::declare)?;
     if !arguments.render_run.is_part() {
-        // Before anything is loaded; again, with what the render is known to save, when all is.
+        // Check the memory before loading. `render_run` checks again, with what it saves.
         let Size { width, height } = arguments.scene.camera.size;
         memory::allow_picture(width, height, memory::PIXEL)?;
     }

@@ -13,7 +13,7 @@ use crate::names::display_name;
 pub struct SceneReport {
     /// A built-in scene, or a file's name without its folder.
     pub scene: String,
-    /// How many the scene has.
+    /// The number of triangles.
     pub triangles: usize,
     /// What the picture lacks of the file, one sentence each.
     pub warnings: Vec<String>,

@@ -75,7 +75,7 @@ pub struct BenchSettings {
     pub rotate: f32,
     /// Width and height of the pictures \[pixels\].
     pub size: Option<[usize; 2]>,
-    /// Who is measured.
+    /// The strategies to measure.
     pub strategies: Vec<NamedStrategy>,
     /// Pictures at each budget.
     pub n_seeds: u32,

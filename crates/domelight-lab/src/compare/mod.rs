@@ -322,9 +322,9 @@ impl CompareReport {
         }
     }
 
-    /// By how many percent a result is beside the budget, if that is much.
+    /// The difference of a result's cost from the budget \[%\], if it is large.
     fn miss(&self, result: &ResultReport) -> Option<(String, f64)> {
-        // Of another renderer's picture nobody knows the samples.
+        // The samples of another renderer's picture are unknown.
         let spp = result.spp?;
         let (spent, budget, unit) = match self.budget {
             Budget::Samples(_) => return None,

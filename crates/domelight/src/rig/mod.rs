@@ -4,7 +4,7 @@
 //! - [`median_cut`] halves the energy of rectangles: Debevec 2005, "A Median Cut Algorithm for
 //!   Light Probe Sampling".
 //! - [`variance_minimization`] minimizes their variance instead: Viriyothai & Debevec 2009, "Variance
-//!   Minimization Light Probe Sampling", and a variant on the sphere that is always better.
+//!   Minimization Light Probe Sampling", and a variant on the sphere, better in all tests but for few lights on glossy surfaces.
 //!
 //! # What is exact
 //! Every texel of the map belongs to one region. A light's irradiance is the sum over its region's

@@ -386,7 +386,7 @@ fn load_file(
     }
     let strict = options.strict;
     let mut loaded = match format {
-        // Another file's content is nobody's business.
+        // Report nothing of the content of a file that is no mesh.
         SceneFormat::Ply if mesh_only && !bytes.starts_with(b"ply") => return Err(unknown()),
         SceneFormat::Toml if mesh_only => return Err(unknown()),
         SceneFormat::Ply => ply::load(path, bytes, budget, strict)?,

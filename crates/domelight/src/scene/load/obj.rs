@@ -265,7 +265,7 @@ impl<'a> Reader<'a> {
         }
         let place = format!("{}, line {line}", self.path.display());
         let why = match super::read_referenced(&path, &place, self.textures.budget) {
-            // What is no library is nobody's business.
+            // Report nothing of the content of another file.
             Ok(bytes) if !mtl::is_library(&super::utf8_of(&bytes)) => {
                 "it is not a material library (MTL)".to_owned()
             }
