@@ -18,6 +18,9 @@ export class Lecture {
       return h("li", {}, link);
     }));
     app.on((what) => this.changed(what));
+    $("present").addEventListener("click", () => this.present(true));
+    addEventListener("keydown", (event) => this.key(event));
+    document.addEventListener("fullscreenchange", () => { if (!document.fullscreenElement) this.present(false); });
     this.changed("all");
     onFigureWidth(() => this.stage?.redraw());
     // Open all answers for printing, and close those that were closed before.
@@ -33,6 +36,28 @@ export class Lecture {
     if (this.app.state.panel !== "lecture" || what === "view" || what === "pixel") return;
     const step = Math.min(Math.max(Math.round(this.app.state.step) - 1, 0), STEPS.length - 1);
     if (step !== this.shown || ["all", "scene", "light"].includes(what)) this.show(step);
+  }
+
+  /** Shows the lecture for a room full of people, in full screen where the browser permits it. */
+  private present(on: boolean) {
+    document.documentElement.toggleAttribute("data-presenting", on);
+    if (on) document.documentElement.requestFullscreen?.().catch(() => {});
+    else if (document.fullscreenElement) void document.exitFullscreen();
+    $("step").scrollIntoView({ block: "start" });
+  }
+
+  private key(event: KeyboardEvent) {
+    if (this.app.state.panel !== "lecture" || event.ctrlKey || event.altKey || event.metaKey) return;
+    if ((event.target as Element).closest?.("input, select, textarea")) return;
+    const presents = document.documentElement.hasAttribute("data-presenting");
+    const by = { ArrowRight: 1, PageDown: 1, ArrowLeft: -1, PageUp: -1 }[event.key];
+    if (event.key === "f" || event.key === "F") this.present(!presents);
+    else if (presents && event.key === "Escape") this.present(false);
+    else if (presents && by) {
+      const step = this.shown + by;
+      if (step >= 0 && step < STEPS.length) this.go(step);
+    } else return;
+    event.preventDefault();
   }
 
   private go(step: number) {

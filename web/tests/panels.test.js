@@ -444,6 +444,25 @@ test("the first step of the lecture plays, pauses, steps, is dragged and read", 
   await done();
 });
 
+test("a teacher presents: F, PageDown, arrow keys, Escape, and labels of 24 px", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lecture&step=1`, { viewport: { width: 1920, height: 1080 } });
+  await drawn(page, 1);
+  await page.keyboard.press("f");
+  await page.waitForSelector("html[data-presenting]");
+  assert.ok(await page.isHidden("#tabs"));
+  assert.ok(await page.isHidden("#steps"));
+  const label = () => page.$eval("#figure svg text", (text) => parseFloat(getComputedStyle(text).fontSize) * text.getScreenCTM().a);
+  assert.ok(await label() >= 24, `${await label()} px`);
+  for (const [key, step] of [["PageDown", 2], ["ArrowRight", 3], ["ArrowLeft", 2], ["PageUp", 1], ["ArrowLeft", 1]]) {
+    await page.keyboard.press(key);
+    await page.waitForSelector(`html[data-step='${step}']`);
+  }
+  await page.keyboard.press("f");
+  await page.waitForSelector("html:not([data-presenting])");
+  assert.ok(await page.isVisible("#tabs"));
+  await done();
+});
+
 test("a link shows the lecture's figure as it was left", async () => {
   const { page, done } = await open(`${SMALL}&panel=lecture&step=8&figure=-0.5;3;2`);
   await drawn(page, 1);
