@@ -444,7 +444,7 @@ test("the first step of the lecture plays, pauses, steps, is dragged and read", 
   await done();
 });
 
-test("a teacher presents: F, PageDown, arrow keys, Escape, and labels of 24 px", async () => {
+test("a teacher presents: F, PageDown, arrow keys, and labels of 24 px", async () => {
   const { page, done } = await open(`${SMALL}&panel=lecture&step=1`, { viewport: { width: 1920, height: 1080 } });
   await drawn(page, 1);
   await page.keyboard.press("f");
@@ -456,6 +456,8 @@ test("a teacher presents: F, PageDown, arrow keys, Escape, and labels of 24 px",
   for (const [key, step] of [["PageDown", 2], ["ArrowRight", 3], ["ArrowLeft", 2], ["PageUp", 1], ["ArrowLeft", 1]]) {
     await page.keyboard.press(key);
     await page.waitForSelector(`html[data-step='${step}']`);
+    await page.waitForSelector("#figure svg text");
+    assert.ok(await label() >= 24, `step ${step}: ${await label()} px`);
   }
   await page.keyboard.press("f");
   await page.waitForSelector("html:not([data-presenting])");
