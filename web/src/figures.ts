@@ -271,7 +271,7 @@ const halfVectors: Figure = (stage) => {
 };
 
 const inversion: Figure = (stage) => {
-  const n = stage.slider("Samples", 1, 64, 1, 16);
+  const n = stage.player("Samples", 1, 64, 16);
   const peak = stage.slider("Peak", 0.01, 0.2, 0.01, 0.04, (x) => `width ${x}`);
   stage.draw(() => {
     const p = normalized((x) => 0.25 + gauss(x, 0.7, peak()) * 0.2 / peak() + 0.6 * gauss(x, 0.25, 0.1));
@@ -324,7 +324,7 @@ function paintMap(context: CanvasRenderingContext2D, rgb: Float32Array, width: n
 }
 
 const environmentSamples: Figure = (stage) => {
-  const n = stage.slider("Samples", 0, 11, 1, 7, (x) => String(2 ** x));
+  const n = stage.player("Samples", 0, 11, 7, (x) => String(2 ** x));
   stage.draw(async () => {
     const { engines, envName } = stage.app, width = 320, count = 2 ** n();
     const rgb = (await engines.call("map", width)) as Float32Array;
@@ -415,7 +415,7 @@ const rejection: Figure = (stage) => {
 };
 
 const resampling: Figure = (stage) => {
-  const m = stage.slider("Candidates M", 0, 10, 1, 2, (x) => String(2 ** x));
+  const m = stage.player("Candidates M", 0, 10, 2, (x) => String(2 ** x));
   stage.draw(() => {
     const table = new Table(light), q = normalized(light), random = generator(7);
     const bins = 50, picks = Math.min(20000, Math.floor(2e6 / 2 ** m())), histogram = new Array<number>(bins).fill(0);

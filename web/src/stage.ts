@@ -24,7 +24,7 @@ export class Stage {
   }
 
   /** Adds a slider that plays from `min` to `max` in steps of one. */
-  player(name: string, min: number, max: number, value: number, shown: (x: number) => string): () => number {
+  player(name: string, min: number, max: number, value: number, shown: (x: number) => string = short): () => number {
     const input = this.range(name, min, max, 1, value, shown);
     this.controls.append(player(input));
     return () => Number(input.value);

@@ -444,6 +444,20 @@ test("the first step of the lecture plays, pauses, steps, is dragged and read", 
   await done();
 });
 
+test("samples and candidates play", async () => {
+  const { page, done } = await open(`${SMALL}&panel=lecture`);
+  for (const step of [5, 7, 11]) {
+    await page.click(`#steps li:nth-child(${step}) a`);
+    await page.waitForSelector(`html[data-step='${step}']`);
+    await drawn(page, 1);
+    const before = await figureOf(page);
+    await page.click('#figure .player button:text-is("Play")');
+    await drawn(page, 3);
+    assert.notEqual(await figureOf(page), before, `step ${step}`);
+  }
+  await done();
+});
+
 test("a teacher presents: F, PageDown, arrow keys, and labels of 24 px", async () => {
   const { page, done } = await open(`${SMALL}&panel=lecture&step=1`, { viewport: { width: 1920, height: 1080 } });
   await drawn(page, 1);
