@@ -64,7 +64,7 @@ mod tests {
         assert_eq!(scene(Path::new("statu")), Some("statue"));
         assert_eq!(scene(Path::new("matrial-ball")), Some("material-ball"));
         assert_eq!(probe(Path::new("Cathedrel")), Some("cathedral"));
-        for file in ["statu.ply", "models/statu", "robot", ""] {
+        for file in ["statu.ply", "models/statu", "vehicle", ""] {
             assert_eq!(scene(Path::new(file)), None, "{file}");
         }
         assert_eq!(nearest("enviroment", ["brdf", "environment"]), Some("environment"));
