@@ -16,7 +16,8 @@ pub struct Rgb {
 }
 
 /// Added to R² in the denominator of relMSE, as most papers on sampling do, so that dark pixels do not dominate.
-pub const REGULARIZER: f64 = 0.01;
+#[cfg(feature = "render")]
+pub(crate) const REGULARIZER: f64 = 0.01;
 
 impl Rgb {
     /// (0, 0, 0).

@@ -5,11 +5,12 @@
 //! 0.1 % of the pixels, so that a few fireflies do not dominate either.
 
 use super::tone::linear_from_srgb;
-pub use crate::color::REGULARIZER;
 use crate::color::Rgb;
 use crate::image::RgbImage;
 use crate::math::functions;
 
+/// Added to R² in the denominator of the relative error.
+pub const REGULARIZER: f64 = crate::color::REGULARIZER;
 /// Part of the pixels that the trimmed error keeps.
 const KEPT: f64 = 0.999;
 
